@@ -1,0 +1,24 @@
+#include "cli/model_files.hpp"
+
+#include <utility>
+
+#include <CLI/CLI.hpp>
+
+namespace arbiter::cli {
+
+void add_model_options(CLI::App& verb, rules::ModelFiles& files) {
+  verb.add_option("MODEL", files.models, "Files of behaviours and rules; together one model")
+      ->required();
+  verb.add_option("--application", files.application,
+                  "File that says which connections exist; without it, those of the model");
+}
+
+std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics) {
+  rules::RuleSet rules = rules::load(files, diagnostics);
+  if (diagnostics.has_errors()) return std::nullopt;
+  rules::CompiledModel compiled = rules::compile(rules, diagnostics);
+  if (diagnostics.has_errors()) return std::nullopt;
+  return Model{std::move(rules), std::move(compiled)};
+}
+
+}  // namespace arbiter::cli

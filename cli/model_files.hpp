@@ -1,0 +1,27 @@
+// What all verbs that look at a model have in common.
+#pragma once
+
+#include <optional>
+
+#include "rules/compile.hpp"
+#include "rules/diagnostic.hpp"
+#include "rules/load.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace arbiter::cli {
+
+// MODEL... and --application.
+void add_model_options(CLI::App& verb, rules::ModelFiles& files);
+
+struct Model {
+  rules::RuleSet rules;
+  rules::CompiledModel compiled;
+};
+
+// Reads, compiles and proves a model; nothing if that finds an error.
+std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics);
+
+}  // namespace arbiter::cli

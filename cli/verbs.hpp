@@ -1,0 +1,16 @@
+// The verbs of the command line. Each adds itself to the program, and sets the exit code when it is
+// the one that runs: 0 fine, 1 an error in what it looked at. Wrong use, and files that cannot be
+// opened, are exceptions that main() turns into 2.
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+namespace arbiter::cli {
+
+void add_check(CLI::App& app, int& exit_code);
+void add_rules(CLI::App& app, int& exit_code);
+void add_simulate(CLI::App& app, int& exit_code);
+
+}  // namespace arbiter::cli

@@ -1,0 +1,83 @@
+// What the templates call: the compiled library behind them. Not for use by programs.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <typeinfo>
+
+#include <arbiter/options.hpp>
+#include <arbiter/result.hpp>
+
+namespace arbiter::detail {
+
+class InputCore;
+class NodeCore;
+class OutputCore;
+
+struct PortType {
+  const char* name = nullptr;  // null: untyped
+  std::size_t size = 0;
+  std::size_t alignment = 1;
+};
+
+struct LoanedSlot {
+  std::byte* data = nullptr;  // null: none to be had
+  std::uint32_t slot = 0;
+};
+
+// A sample that a component holds; `data` null: none.
+struct HeldSample {
+  const std::byte* data = nullptr;
+  std::size_t size = 0;
+  std::uint64_t sequence = 0;
+  std::int64_t stamp_ns = 0;
+  std::uint32_t source = 0;
+  std::uint32_t hold = 0;  // index of the hold
+};
+
+enum class Waited : std::uint8_t { kSample, kIdle, kTimeout };
+
+std::shared_ptr<NodeCore> make_node(std::string_view name, const NodeOptions& options);
+void service(NodeCore& node);
+int service_fd(const NodeCore& node) noexcept;
+
+std::shared_ptr<OutputCore> open_output(NodeCore& node, std::string_view name, const PortType& type,
+                                        const OutputPortOptions& options);
+void close_output(std::shared_ptr<OutputCore> core) noexcept;
+LoanedSlot loan(OutputCore& core, std::size_t size) noexcept;
+void end_loan(OutputCore& core, std::uint32_t slot) noexcept;
+Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size) noexcept;
+Outcome publish_copy(OutputCore& core, const void* data, std::size_t size) noexcept;
+Outcome signal(OutputCore& core) noexcept;
+void deactivate(OutputCore& core) noexcept;
+std::size_t max_size(const OutputCore& core) noexcept;
+const std::string& name(const OutputCore& core) noexcept;
+
+std::shared_ptr<InputCore> open_input(NodeCore& node, std::string_view name, const PortType& type,
+                                      const InputPortOptions& options);
+void close_input(std::shared_ptr<InputCore> core) noexcept;
+HeldSample take(InputCore& core);
+Waited wait(InputCore& core, std::int64_t timeout_ns, HeldSample& sample);
+void give_back(InputCore& core, std::uint32_t hold) noexcept;
+int wait_descriptor(InputCore& core);
+std::optional<std::string> winner(InputCore& core);
+bool is_idle(InputCore& core) noexcept;
+std::string source_name(const InputCore& core, std::uint32_t source);
+const std::string& name(const InputCore& core) noexcept;
+
+template <class T>
+PortType port_type() noexcept {
+  static_assert(
+      std::is_trivially_copyable_v<T>,
+      "a sample is read in place by other processes: its type must be trivially copyable");
+  static_assert(!std::is_pointer_v<T>, "a pointer means nothing in another process");
+  static_assert(alignof(T) <= 4096, "samples are aligned to at most a page");
+  return {typeid(T).name(), sizeof(T), alignof(T)};
+}
+
+}  // namespace arbiter::detail

@@ -1,0 +1,187 @@
+// Input ports: where data reaches a component, past the port's arbiter (paper, section III).
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <arbiter/bytes.hpp>
+#include <arbiter/detail/cores.hpp>
+#include <arbiter/result.hpp>
+
+namespace arbiter {
+
+// A sample, read in place. It is given back when it goes out of scope; until then its memory is not
+// used again. Use it on the port's thread. The port stays open for as long as one of its samples is
+// held.
+class SampleBase {
+ public:
+  SampleBase(SampleBase&& other) noexcept = default;
+  SampleBase& operator=(SampleBase&& other) noexcept {
+    if (this != &other) {
+      give_back();
+      core_ = std::move(other.core_);
+      held_ = other.held_;
+    }
+    return *this;
+  }
+  ~SampleBase() { give_back(); }
+
+  // The output port it came from.
+  [[nodiscard]] std::string source() const { return detail::source_name(*core_, held_.source); }
+  // The source's own count of its samples, from 1.
+  [[nodiscard]] std::uint64_t sequence() const noexcept { return held_.sequence; }
+  // When it arrived: CLOCK_MONOTONIC, in nanoseconds.
+  [[nodiscard]] std::int64_t stamp_ns() const noexcept { return held_.stamp_ns; }
+
+ protected:
+  SampleBase(std::shared_ptr<detail::InputCore> core, const detail::HeldSample& held) noexcept
+      : core_(std::move(core)), held_(held) {}
+  [[nodiscard]] const detail::HeldSample& held() const noexcept { return held_; }
+
+ private:
+  void give_back() noexcept {
+    if (core_ != nullptr) detail::give_back(*core_, held_.hold);
+    core_ = nullptr;
+  }
+
+  std::shared_ptr<detail::InputCore> core_;
+  detail::HeldSample held_;
+};
+
+template <class T>
+class Sample : public SampleBase {
+ public:
+  const T& operator*() const noexcept { return *get(); }
+  const T* operator->() const noexcept { return get(); }
+  [[nodiscard]] const T* get() const noexcept {
+    return std::launder(reinterpret_cast<const T*>(held().data));
+  }
+
+ private:
+  template <class>
+  friend class InputPort;
+  using SampleBase::SampleBase;
+};
+
+template <>
+class Sample<void> : public SampleBase {
+ public:
+  const Bytes& operator*() const noexcept { return bytes_; }
+  const Bytes* operator->() const noexcept { return &bytes_; }
+  [[nodiscard]] const std::byte* data() const noexcept { return bytes_.data(); }
+  [[nodiscard]] std::size_t size() const noexcept { return bytes_.size(); }
+
+ private:
+  template <class>
+  friend class InputPort;
+  Sample(std::shared_ptr<detail::InputCore> core, const detail::HeldSample& held) noexcept
+      : SampleBase(std::move(core), held), bytes_(held.data, held.size) {}
+
+  Bytes bytes_;
+};
+
+enum class WaitStatus : std::uint8_t {
+  sample,   // here it is
+  idle,     // the port has become idle: no connection is selected any more; told once for each time
+  timeout,  // nothing of the kind happened in time
+};
+
+// What wait_for() returns: converts to bool and dereferences as take()'s result.
+template <class T>
+class WaitResult {
+ public:
+  explicit operator bool() const noexcept { return sample_.has_value(); }
+  [[nodiscard]] bool has_value() const noexcept { return sample_.has_value(); }
+  Sample<T>& operator*() noexcept { return *sample_; }
+  const Sample<T>& operator*() const noexcept { return *sample_; }
+  Sample<T>* operator->() noexcept { return &*sample_; }
+  const Sample<T>* operator->() const noexcept { return &*sample_; }
+
+  [[nodiscard]] WaitStatus status() const noexcept { return status_; }
+  [[nodiscard]] bool idle() const noexcept { return status_ == WaitStatus::idle; }
+  [[nodiscard]] bool timed_out() const noexcept { return status_ == WaitStatus::timeout; }
+
+ private:
+  template <class>
+  friend class InputPort;
+  explicit WaitResult(WaitStatus status) noexcept : status_(status) {}
+  explicit WaitResult(Sample<T> sample) noexcept
+      : status_(WaitStatus::sample), sample_(std::move(sample)) {}
+
+  WaitStatus status_;
+  std::optional<Sample<T>> sample_;
+};
+
+// T = void: untyped; accepts anything and gives bytes. Movable.
+template <class T = void>
+class InputPort {
+ public:
+  InputPort(InputPort&&) noexcept = default;
+  InputPort& operator=(InputPort&& other) noexcept {
+    if (this != &other) {
+      detail::close_input(std::move(core_));
+      core_ = std::move(other.core_);
+    }
+    return *this;
+  }
+  ~InputPort() { detail::close_input(std::move(core_)); }
+
+  // The oldest waiting sample whose connection is the winner now (with `keep`: the oldest one that
+  // was accepted), or empty. Waiting samples that have been overridden since are dropped and
+  // counted. Wait-free. Throws arbiter::Error if max_held samples are held already.
+  [[nodiscard]] std::optional<Sample<T>> take() {
+    const detail::HeldSample held = detail::take(*core_);
+    if (held.data == nullptr) return std::nullopt;
+    return Sample<T>(core_, held);
+  }
+
+  // As take(), but blocks, without spinning, until there is a sample, the port becomes idle, or the
+  // time has passed. Losing publishers do not wake it.
+  template <class Rep, class Period>
+  [[nodiscard]] WaitResult<T> wait_for(std::chrono::duration<Rep, Period> timeout) {
+    detail::HeldSample held;
+    switch (detail::wait(*core_, nanoseconds(timeout), held)) {
+      case detail::Waited::kSample:
+        return WaitResult<T>(Sample<T>(core_, held));
+      case detail::Waited::kIdle:
+        return WaitResult<T>(WaitStatus::idle);
+      case detail::Waited::kTimeout:
+        break;
+    }
+    return WaitResult<T>(WaitStatus::timeout);
+  }
+
+  // For poll() and epoll: readable when there may be a sample, or the port may have become idle.
+  // Then call take() until it returns nothing; that arms the descriptor again. The port owns it.
+  // Throws arbiter::Error if the system has no descriptor left.
+  [[nodiscard]] int fd() { return detail::wait_descriptor(*core_); }
+
+  // The source of the connection that is selected now, if one is. At a port that is not arbitrated
+  // nothing is selected.
+  [[nodiscard]] std::optional<std::string> winner() { return detail::winner(*core_); }
+  // True if no connection is selected now; at a port that is not arbitrated, if none is active.
+  [[nodiscard]] bool idle() noexcept { return detail::is_idle(*core_); }
+  [[nodiscard]] const std::string& name() const noexcept { return detail::name(*core_); }
+
+ private:
+  friend class Node;
+  explicit InputPort(std::shared_ptr<detail::InputCore> core) noexcept : core_(std::move(core)) {}
+
+  // Saturating, so that wait_for(hours::max()) waits for ever rather than not at all.
+  template <class Rep, class Period>
+  static std::int64_t nanoseconds(std::chrono::duration<Rep, Period> timeout) noexcept {
+    using Seconds = std::chrono::duration<double>;
+    if (Seconds(timeout) > Seconds(std::chrono::hours(24 * 365))) return INT64_MAX;
+    if (timeout <= timeout.zero()) return 0;
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(timeout).count();
+  }
+
+  std::shared_ptr<detail::InputCore> core_;
+};
+
+}  // namespace arbiter

@@ -1,0 +1,58 @@
+// A component's connection to the daemon, and the maker of its ports.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string_view>
+
+#include <arbiter/detail/cores.hpp>
+#include <arbiter/input_port.hpp>
+#include <arbiter/options.hpp>
+#include <arbiter/output_port.hpp>
+
+namespace arbiter {
+
+class Node {
+ public:
+  // Blocks until a daemon of the instance answers, at most options.connect_timeout; then throws
+  // arbiter::Error. `name` is for people to read; several nodes may share one.
+  explicit Node(std::string_view name, const NodeOptions& options = {})
+      : core_(detail::make_node(name, options)) {}
+
+  // Opens an output port. Its name is the source of its connections. Blocks while the daemon
+  // connects it with the input ports that are open, which takes below a millisecond, or up to 0.2 s
+  // where a component at the other end does not run. Throws arbiter::Error: the name is taken or
+  // malformed, an option is out of bounds, there is no memory, the daemon is gone.
+  template <class T>
+  [[nodiscard]] OutputPort<T> output_port(std::string_view name,
+                                          const OutputPortOptions& options = {}) {
+    return OutputPort<T>(detail::open_output(*core_, name, detail::port_type<T>(), options));
+  }
+  // An untyped one, for samples of up to options.max_size bytes.
+  [[nodiscard]] OutputPort<void> output_port(std::string_view name,
+                                             const OutputPortOptions& options = {}) {
+    return OutputPort<void>(detail::open_output(
+        *core_, name, {nullptr, options.max_size, alignof(std::max_align_t)}, options));
+  }
+
+  // Opens an input port; as for output_port().
+  template <class T>
+  [[nodiscard]] InputPort<T> input_port(std::string_view name,
+                                        const InputPortOptions& options = {}) {
+    return InputPort<T>(detail::open_input(*core_, name, detail::port_type<T>(), options));
+  }
+  [[nodiscard]] InputPort<void> input_port(std::string_view name,
+                                           const InputPortOptions& options = {}) {
+    return InputPort<void>(detail::open_input(*core_, name, {}, options));
+  }
+
+  // Without a service thread: takes up what the daemon has announced. Does not block. service_fd()
+  // is readable when there is something to do.
+  void service() { detail::service(*core_); }
+  [[nodiscard]] int service_fd() const noexcept { return detail::service_fd(*core_); }
+
+ private:
+  std::shared_ptr<detail::NodeCore> core_;
+};
+
+}  // namespace arbiter

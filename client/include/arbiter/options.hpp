@@ -1,0 +1,50 @@
+// What can be chosen when nodes and ports are made. C++20: {.depth = 4}; C++17: member by member.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+namespace arbiter {
+
+struct NodeOptions {
+  // Which daemon; empty: $ARBITER_INSTANCE, else "default".
+  std::string instance;
+  // How long Node() waits for a daemon before it throws.
+  std::chrono::milliseconds connect_timeout{5000};
+  // Whether a thread of low priority takes up what the daemon announces (ports that come and go,
+  // new models). Without it call Node::service() often: until you do, this node's ports do not see
+  // changes.
+  bool service_thread = true;
+};
+
+struct OutputPortOptions {
+  // Untyped ports: the largest sample, in bytes.
+  std::size_t max_size = 4096;
+  // How many samples may be on loan at once, 1 to 64.
+  std::uint32_t max_loans = 2;
+  // The most memory, in bytes, that this port's samples may take up. It is taken as input ports
+  // connect: each needs its depth and what it may hold. One that does not fit gets a smaller depth.
+  std::size_t max_memory = std::size_t{1} << 30;
+};
+
+// What gives way when `depth` samples of one connection wait already.
+enum class WhenFull : std::uint8_t {
+  drop_oldest,  // the oldest of them
+  refuse_new,   // the new one; the publisher is told
+};
+inline constexpr WhenFull drop_oldest = WhenFull::drop_oldest;
+inline constexpr WhenFull refuse_new = WhenFull::refuse_new;
+
+struct InputPortOptions {
+  // How many samples of each connection may wait, 1 to 1024.
+  std::uint32_t depth = 8;
+  WhenFull when_full = WhenFull::drop_oldest;
+  // Receive all that was accepted, even if an override has come since. For loggers, not for motors.
+  bool keep = false;
+  // How many samples the component may hold at once, 1 to 64.
+  std::uint32_t max_held = 1;
+};
+
+}  // namespace arbiter

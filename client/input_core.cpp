@@ -1,0 +1,168 @@
+// The service thread's side of an input port, and the taking up of what it offers.
+#include "client/input_core.hpp"
+
+#include <algorithm>
+#include <system_error>
+
+#include "client/count.hpp"
+
+namespace arbiter::detail {
+
+InputCore::InputCore(std::string name, const shm::TypeInfo& type, const InputPortOptions& options,
+                     std::shared_ptr<SharedMemory> memory)
+    : name_(std::move(name)),
+      type_(type),
+      max_held_(options.max_held),
+      keep_(options.keep),
+      memory_(std::move(memory)),
+      descriptor_(shm::make_segment("arbiter-input", sizeof(shm::InputSegment))),
+      mapping_(descriptor_, sizeof(shm::InputSegment), shm::Access::kReadWrite),
+      segment_(mapping_.as<shm::InputSegment>()) {
+  if (const auto error = shm::allocate(descriptor_, 0, sizeof(shm::InputSegment))) {
+    throw std::system_error(error, "allocating an input port");
+  }
+  shm::InputHeader& header = segment_->header;
+  header.magic = shm::InputHeader::kMagic;
+  header.version = shm::InputHeader::kVersion;
+  header.depth = options.depth;
+  header.max_held = options.max_held;
+  header.keep = options.keep ? 1 : 0;
+  header.refuse_new = options.when_full == WhenFull::refuse_new ? 1 : 0;
+  header.type = type_;
+  shm::seal(descriptor_, shm::Seals::kOneWriter);
+}
+
+void InputCore::bind(shm::PortInstance instance, shm::PortId port) {
+  instance_ = instance;
+  port_ = port;
+}
+
+void InputCore::add_peer(std::shared_ptr<const OutputPeer> peer) {
+  const auto instance = peer->instance;
+  links_[instance] = {std::move(peer), false};
+  offer_view();
+}
+
+void InputCore::lose_peer(shm::PortInstance peer) {
+  const auto found = links_.find(peer);
+  if (found == links_.end()) return;
+  found->second.gone = true;
+  offer_view();
+}
+
+void InputCore::disconnect_peer(shm::PortInstance peer) {
+  if (links_.erase(peer) != 0) offer_view();
+}
+
+void InputCore::tidy() {
+  handover_.collect();
+  const bool drained = std::any_of(links_.begin(), links_.end(), [](const auto& link) {
+    return link.second.peer->drained.load(std::memory_order_relaxed);
+  });
+  if (drained) offer_view();
+}
+
+// A receiver that waits must look again: a publisher may have delivered to it already.
+void InputCore::offer_view() {
+  auto view = std::make_unique<InputView>();
+  for (auto link = links_.begin(); link != links_.end();) {
+    if (link->second.peer->drained.load(std::memory_order_relaxed)) {
+      link = links_.erase(link);
+      continue;
+    }
+    view->links.push_back(link->second);
+    ++link;
+  }
+  handover_.offer(std::move(view));
+  shm::ring_bell(bell_.write_end().get());
+}
+
+// Port's thread.
+
+void InputCore::accept_view() {
+  std::unique_ptr<InputView> view = handover_.accept();
+  if (view == nullptr) return;
+  const auto link_of = [&](const Queue& queue) {
+    return std::find_if(view->links.begin(), view->links.end(),
+                        [&](const OutputLink& link) { return link.peer == queue.peer; });
+  };
+  for (Queue& queue : queues_) {
+    const auto link = link_of(queue);
+    if (link != view->links.end()) {
+      queue.gone = link->gone;
+    } else {
+      retire_queue(queue);
+    }
+  }
+  std::erase_if(queues_, [](const Queue& queue) { return queue.lane == nullptr; });
+  for (const OutputLink& link : view->links) {
+    const bool known = std::any_of(queues_.begin(), queues_.end(),
+                                   [&](const Queue& queue) { return queue.peer == link.peer; });
+    if (known || link.peer->drained.load(std::memory_order_relaxed)) continue;
+    Queue queue;
+    queue.peer = link.peer;
+    queue.gone = link.gone;
+    queue.reader = shm::ChannelReader(link.peer->segment, link.peer->instance, instance_);
+    queue.lane = free_lane();
+    if (queue.lane == nullptr) continue;
+    queue.lane->source.store(link.peer->source, std::memory_order_relaxed);
+    queue.lane->consumed.store(0, std::memory_order_relaxed);
+    queue.lane->taken.store(0, std::memory_order_relaxed);
+    queue.lane->dropped.store(0, std::memory_order_relaxed);
+    queue.lane->overtaken.store(0, std::memory_order_relaxed);
+    queue.lane->publisher.store(link.peer->instance, std::memory_order_release);
+    queues_.push_back(std::move(queue));
+  }
+  handover_.retire(std::exchange(view_, std::move(view)));
+  memory_->service_bell().ring();  // to dispose of the old one
+  bound_generation_ = UINT64_MAX;
+}
+
+shm::Lane* InputCore::free_lane() noexcept {
+  for (shm::Lane& lane : segment_->lanes) {
+    if (lane.publisher.load(std::memory_order_relaxed) == 0) return &lane;
+  }
+  return nullptr;
+}
+
+// What the queue still has is lost: its connection is gone, or a later publisher of the same source
+// has closed since.
+void InputCore::retire_queue(Queue& queue) noexcept {
+  count(segment_->header.counters.dropped, queue.reader.backlog(queue.reader.backlog_end()));
+  queue.peer->drained.store(true, std::memory_order_relaxed);
+  queue.lane->publisher.store(0, std::memory_order_release);
+  queue.lane = nullptr;
+}
+
+void InputCore::bind_rules(const shm::TableSnapshot& snapshot) {
+  snapshot_ = snapshot;
+  bound_generation_ = snapshot.generation;
+  const shm::TableView& table = snapshot.table;
+  rules_.clear();
+  sources_.clear();
+  for (Queue& queue : queues_) queue.rule = {};
+  const auto range = table.connections_to(port_);
+  for (auto index = range.first; index != range.first + range.count; ++index) {
+    rules_.push_back(table.rule(index));
+    sources_.push_back(rules_.back().source);
+    for (Queue& queue : queues_) {
+      if (queue.peer->source == rules_.back().source) queue.rule = rules_.back();
+    }
+  }
+  const shm::WordList read = table.sources_read(port_);
+  for (shm::Word i = 0; i < read.count && i < shm::kMaxSourcesPerPort; ++i) {
+    sources_.push_back(read[i]);
+  }
+  std::sort(sources_.begin(), sources_.end());
+  sources_.erase(std::unique(sources_.begin(), sources_.end()), sources_.end());
+  picture_.resize(sources_.size());
+}
+
+void InputCore::refresh() {
+  if (handover_.has_offer()) accept_view();
+  if (memory_->tables().generation() != bound_generation_) {
+    bind_rules(memory_->tables().snapshot());
+  }
+}
+
+}  // namespace arbiter::detail

@@ -1,0 +1,146 @@
+// An input port: take(), wait_for(), and what they need.
+//
+// Two threads meet here. The port's thread takes and waits; the service thread learns of output
+// ports, maps them, and offers the result as a view.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <arbiter/detail/cores.hpp>
+
+#include "client/handover.hpp"
+#include "client/memory.hpp"
+#include "client/peers.hpp"
+#include "shm/bell.hpp"
+#include "shm/channel.hpp"
+#include "shm/clock.hpp"
+#include "shm/input_segment.hpp"
+
+namespace arbiter::detail {
+
+class InputCore {
+ public:
+  // Makes and seals the segment, and the bell. Throws std::system_error.
+  InputCore(std::string name, const shm::TypeInfo& type, const InputPortOptions& options,
+            std::shared_ptr<SharedMemory> memory);
+
+  // Service thread.
+
+  void bind(shm::PortInstance instance, shm::PortId port);
+  void add_peer(std::shared_ptr<const OutputPeer> peer);
+  // The peer has closed or died; what it has delivered can still be taken.
+  void lose_peer(shm::PortInstance peer);
+  // The model has disconnected it.
+  void disconnect_peer(shm::PortInstance peer);
+  // Unmaps what the port's thread has let go of.
+  void tidy();
+
+  // Port's thread.
+
+  HeldSample take();
+  Waited wait(shm::Nanoseconds timeout, HeldSample& sample);
+  void give_back(std::uint32_t hold) noexcept;
+  int wait_descriptor();
+  [[nodiscard]] std::optional<std::string> winner();
+  [[nodiscard]] bool is_idle() noexcept;
+  [[nodiscard]] std::uint32_t held() const noexcept { return held_; }
+
+  // Either.
+
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] shm::PortInstance instance() const noexcept { return instance_; }
+  [[nodiscard]] const shm::TypeInfo& type() const noexcept { return type_; }
+  [[nodiscard]] const shm::FileDescriptor& segment_descriptor() const noexcept {
+    return descriptor_;
+  }
+  [[nodiscard]] const shm::Bell& bell() const noexcept { return bell_; }
+  [[nodiscard]] const SharedMemory& memory() const noexcept { return *memory_; }
+
+  std::shared_ptr<NodeCore>
+      node;  // kept for as long as the port is, so that they may go in any order
+  bool close_when_given_back = false;  // port's thread: the port is gone, samples of it are not
+
+ private:
+  // A link as the port's thread works with it: one publisher's queue.
+  struct Queue {
+    std::shared_ptr<const OutputPeer> peer;
+    bool gone = false;
+    shm::ChannelReader reader;
+    shm::Lane* lane = nullptr;
+    shm::Rule rule;  // of the connection, under snapshot_
+    // Of the take under way.
+    shm::Entry head = 0;
+    shm::Nanoseconds head_stamp = 0;
+    std::uint64_t end = 0;  // sequence of the newest entry when the take looked
+    shm::Verdict verdict = shm::Verdict::kLoses;
+  };
+
+  void offer_view();
+  void accept_view();
+  shm::Lane* free_lane() noexcept;
+  void retire_queue(Queue& queue) noexcept;
+  void bind_rules(const shm::TableSnapshot& snapshot);
+  void refresh();
+
+  // take() in parts: look at the queues, decide, hold.
+  Queue* look() noexcept;
+  bool look_at(Queue& queue) noexcept;
+  void yield_to_successor(Queue& queue) noexcept;
+  enum class Choice : std::uint8_t { kTake, kNothing, kAgain };
+  Choice choose(Queue*& oldest) noexcept;
+  Choice choose_among_all(Queue*& chosen) noexcept;
+  bool decide_all() noexcept;
+  void drop_losers(const Queue* winner) noexcept;
+  bool hold(Queue& queue, HeldSample& sample) noexcept;
+  [[nodiscard]] std::uint32_t free_hold() const;
+  void consume(Queue& queue) noexcept;
+
+  // wait() in parts.
+  [[nodiscard]] bool is_selected() noexcept;
+  [[nodiscard]] shm::SourceId selected_source() noexcept;
+  [[nodiscard]] bool is_selected_at(shm::Nanoseconds time) noexcept;
+  [[nodiscard]] shm::Nanoseconds next_idle() noexcept;
+  Waited wait_once(shm::Nanoseconds timeout, HeldSample& sample);
+  bool arm(HeldSample& sample, bool& selected);
+  void disarm() noexcept;
+  void arm_descriptor(HeldSample& sample);
+  HeldSample take_once();
+
+  // Constant once bound.
+  const std::string name_;
+  const shm::TypeInfo type_;
+  const std::uint32_t max_held_;
+  const bool keep_;
+  const std::shared_ptr<SharedMemory> memory_;
+  shm::FileDescriptor descriptor_;
+  shm::Mapping mapping_;
+  shm::InputSegment* segment_ = nullptr;
+  shm::Bell bell_;
+  shm::PortInstance instance_ = 0;
+  shm::PortId port_ = shm::kNone;
+
+  // Service thread.
+  std::map<shm::PortInstance, OutputLink> links_;
+
+  Handover<InputView> handover_;
+
+  // Port's thread.
+  std::unique_ptr<InputView> view_;
+  std::vector<Queue> queues_;
+  shm::TableSnapshot snapshot_;
+  std::uint64_t bound_generation_ = UINT64_MAX;
+  std::vector<shm::Rule> rules_;            // of all connections to the port, in document order
+  std::vector<shm::SourceId> sources_;      // those that the rules and connections name
+  std::vector<shm::ActivityWord> picture_;  // scratch, parallel to sources_
+  shm::Nanoseconds last_reading_ = 0;       // of the clock, by this port
+  std::uint32_t held_ = 0;
+  bool commanded_ = false;  // seen selected since idle was last told
+  shm::FileDescriptor epoll_;
+  shm::FileDescriptor timer_;
+};
+
+}  // namespace arbiter::detail

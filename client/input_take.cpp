@@ -1,0 +1,246 @@
+// take(): which sample, if any, the component gets.
+//
+// The oldest waiting sample whose connection is the winner now. Three steps:
+//   look    at the head of each queue, and at where each ends
+//   decide  for the oldest head; if it loses and other queues have samples too, for all of them in
+//   one
+//           picture, so that the whole take has one instant
+//   hold    the sample, and see that it is still there
+// A decision drops only what was there before it: a sample accepted later was accepted by a later
+// one.
+#include <algorithm>
+
+#include "client/count.hpp"
+#include "client/input_core.hpp"
+
+namespace arbiter::detail {
+namespace {
+
+// How often a take starts again because publishers overtook it, or changed the picture, meanwhile.
+constexpr int kMaxTakes = 64;
+
+}  // namespace
+
+HeldSample InputCore::take() {
+  HeldSample sample = take_once();
+  if (sample.data == nullptr && epoll_) arm_descriptor(sample);
+  return sample;
+}
+
+HeldSample InputCore::take_once() {
+  HeldSample sample;
+  for (int tries = 0; tries < kMaxTakes; ++tries) {
+    refresh();
+    Queue* oldest = look();
+    if (oldest == nullptr) return sample;
+    if (held_ == max_held_) {
+      throw Error(name_ + ": " + std::to_string(max_held_) +
+                  " samples are held already; give one back first, or raise max_held");
+    }
+    const Choice choice = keep_ ? Choice::kTake : choose(oldest);
+    if (choice == Choice::kNothing) return sample;
+    if (choice == Choice::kTake && hold(*oldest, sample)) {
+      commanded_ = true;
+      return sample;
+    }
+  }
+  count(segment_->header.counters.unsettled);
+  return sample;
+}
+
+// The queue with the oldest head, or null if nothing waits.
+InputCore::Queue* InputCore::look() noexcept {
+  Queue* oldest = nullptr;
+  for (Queue& queue : queues_) {
+    if (!look_at(queue)) continue;
+    if (oldest == nullptr) {
+      oldest = &queue;
+      continue;
+    }
+    // Only now does the order matter. A head that was overtaken while we looked sorts as it stood.
+    if (oldest->head_stamp == 0) {
+      static_cast<void>(oldest->reader.peek_stamp(oldest->head, oldest->head_stamp));
+    }
+    static_cast<void>(queue.reader.peek_stamp(queue.head, queue.head_stamp));
+    if (queue.head_stamp < oldest->head_stamp) oldest = &queue;
+  }
+  return oldest;
+}
+
+bool InputCore::look_at(Queue& queue) noexcept {
+  using State = shm::ChannelReader::State;
+  queue.head = 0;
+  queue.head_stamp = 0;
+  if (queue.reader.state() == State::kUnjoined) {
+    if (!queue.reader.join()) return false;
+    queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_release);
+  }
+  if (queue.gone) yield_to_successor(queue);
+  std::uint64_t lost = 0;
+  queue.head = queue.reader.peek(lost);
+  if (lost != 0) {
+    count(queue.lane->overtaken, lost);
+    count(segment_->header.counters.overtaken, lost);
+    queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_release);
+  }
+  if (queue.reader.state() == State::kMisbehaved &&
+      queue.lane->source.load(std::memory_order_relaxed) != shm::kNone) {
+    count(segment_->header.counters.misbehaved);
+    queue.lane->source.store(shm::kNone, std::memory_order_relaxed);
+  }
+  if (queue.head == 0 && queue.gone && !queue.peer->drained.load(std::memory_order_relaxed)) {
+    queue.peer->drained.store(true, std::memory_order_relaxed);
+    memory_->service_bell().ring();
+  }
+  return queue.head != 0;
+}
+
+// A connection's queue is one, though its publisher was replaced: the old one's samples and the new
+// one's together are at most `depth`; the oldest give way.
+void InputCore::yield_to_successor(Queue& queue) noexcept {
+  std::uint64_t behind = 0;
+  for (Queue& other : queues_) {
+    if (&other == &queue || other.peer->source != queue.peer->source) continue;
+    if (other.peer->instance < queue.peer->instance) continue;
+    behind += other.reader.backlog(other.reader.backlog_end());
+  }
+  const std::uint64_t depth = segment_->header.depth;
+  for (std::uint64_t own = queue.reader.backlog(queue.reader.backlog_end());
+       own != 0 && own + behind > depth; --own) {
+    consume(queue);
+    count(queue.lane->overtaken);
+    count(segment_->header.counters.overtaken);
+  }
+}
+
+InputCore::Choice InputCore::choose(Queue*& oldest) noexcept {
+  bool others = false;
+  for (Queue& queue : queues_) {
+    queue.end = queue.head == 0 ? 0 : queue.reader.backlog_end();
+    others = others || (queue.head != 0 && &queue != oldest);
+  }
+  shm::DecisionClock clock(last_reading_, false);
+  shm::Decider decider(snapshot_.table, memory_->pages(), clock);
+  const shm::Verdict verdict = decider.decide(oldest->rule);
+  last_reading_ = clock.reading();
+  if (!memory_->tables().is_whole(snapshot_)) return Choice::kAgain;
+  switch (verdict) {
+    case shm::Verdict::kWins:
+      return Choice::kTake;
+    case shm::Verdict::kBlind:
+      count(segment_->header.counters.blind);
+      return Choice::kNothing;
+    case shm::Verdict::kUnsettled:
+      count(segment_->header.counters.unsettled);
+      return Choice::kNothing;
+    case shm::Verdict::kLoses:
+      break;
+  }
+  if (others) return choose_among_all(oldest);
+  oldest->verdict = verdict;
+  drop_losers(nullptr);
+  return Choice::kNothing;
+}
+
+// The oldest head loses: what of the others? Decides for every queue, and accepts the decisions
+// only if no source has changed from before the first to after the last, and time has not been read
+// again.
+InputCore::Choice InputCore::choose_among_all(Queue*& chosen) noexcept {
+  if (!decide_all()) return Choice::kAgain;
+  chosen = nullptr;
+  for (Queue& queue : queues_) {
+    if (queue.head == 0) continue;
+    if (queue.verdict == shm::Verdict::kBlind) {
+      count(segment_->header.counters.blind);
+      return Choice::kNothing;
+    }
+    if (queue.verdict != shm::Verdict::kWins) continue;
+    if (chosen == nullptr || queue.head_stamp < chosen->head_stamp) chosen = &queue;
+  }
+  drop_losers(chosen);
+  return chosen == nullptr ? Choice::kNothing : Choice::kTake;
+}
+
+bool InputCore::decide_all() noexcept {
+  const auto word_of = [&](shm::SourceId source) {
+    const auto* word = memory_->pages().find(source);
+    return word == nullptr ? shm::kNeverActive : word->load(std::memory_order_acquire);
+  };
+  std::transform(sources_.begin(), sources_.end(), picture_.begin(), word_of);
+  const shm::Nanoseconds now = shm::monotonic_now();
+  shm::DecisionClock clock(now, true);
+  shm::Decider decider(snapshot_.table, memory_->pages(), clock);
+  for (Queue& queue : queues_) {
+    if (queue.head == 0) continue;
+    queue.verdict = decider.decide(queue.rule);
+    if (queue.verdict == shm::Verdict::kUnsettled) return false;
+  }
+  last_reading_ = clock.reading();
+  const bool unchanged = std::equal(
+      sources_.begin(), sources_.end(), picture_.begin(),
+      [&](shm::SourceId source, shm::ActivityWord seen) { return word_of(source) == seen; });
+  return unchanged && clock.reading() == now && memory_->tables().is_whole(snapshot_);
+}
+
+// Drops what waited in losing queues before the decision and is older than the sample that is
+// taken.
+void InputCore::drop_losers(const Queue* winner) noexcept {
+  for (Queue& queue : queues_) {
+    if (queue.head == 0 || queue.verdict != shm::Verdict::kLoses) continue;
+    std::uint64_t waiting = queue.reader.backlog(queue.end);
+    while (waiting-- != 0) {
+      std::uint64_t lost = 0;
+      const shm::Entry entry = queue.reader.peek(lost);
+      if (entry == 0 || lost != 0) break;  // overtaken: the next take counts it
+      shm::Nanoseconds stamp = 0;
+      if (winner != nullptr &&
+          (!queue.reader.peek_stamp(entry, stamp) || stamp > winner->head_stamp)) {
+        break;
+      }
+      consume(queue);
+      count(queue.lane->dropped);
+      count(segment_->header.counters.dropped);
+    }
+  }
+}
+
+void InputCore::consume(Queue& queue) noexcept {
+  queue.reader.consume();
+  queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_release);
+}
+
+std::uint32_t InputCore::free_hold() const {
+  for (std::uint32_t i = 0; i < max_held_; ++i) {
+    if (segment_->header.holds[i].load(std::memory_order_relaxed) == 0) return i;
+  }
+  return shm::kNone;  // held_ < max_held_ says that this is never reached
+}
+
+bool InputCore::hold(Queue& queue, HeldSample& sample) noexcept {
+  const std::uint32_t index = free_hold();
+  if (index == shm::kNone) return false;
+  shm::Atomic<shm::Hold>& word = segment_->header.holds[index];
+  if (!queue.reader.hold(queue.head, word)) return false;
+  const std::uint32_t slot = shm::slot_of(queue.head);
+  const shm::OutputSegment& from = queue.reader.segment();
+  const shm::SlotHeader& header = from.slot_header(slot);
+  sample.data = from.payload(slot);
+  sample.size =
+      std::min<std::uint64_t>(header.size.load(std::memory_order_relaxed), from.layout().stride);
+  sample.sequence = header.sequence.load(std::memory_order_relaxed);
+  sample.stamp_ns = header.stamp.load(std::memory_order_relaxed);
+  sample.source = queue.peer->source;
+  sample.hold = index;
+  consume(queue);
+  count(queue.lane->taken);
+  count(segment_->header.counters.taken);
+  ++held_;
+  return true;
+}
+
+void InputCore::give_back(std::uint32_t hold) noexcept {
+  shm::ChannelReader::release(segment_->header.holds[hold]);
+  --held_;
+}
+
+}  // namespace arbiter::detail

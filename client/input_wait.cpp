@@ -1,0 +1,172 @@
+// wait_for(), fd(), idle() and winner(): who commands now, and sleeping until that matters.
+//
+// A port is idle when no connection to it is selected. The component learns it once for each time
+// that it had been commanded before. Nothing runs while it sleeps: a sample rings the bell; so does
+// a source whose activity begins or ends and thereby makes what the port believes of itself untrue;
+// and where activity is going to run out by itself, the sleep ends at that time.
+#include <sys/epoll.h>
+#include <sys/timerfd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "client/count.hpp"
+#include "client/input_core.hpp"
+
+namespace arbiter::detail {
+namespace {
+
+// How many ends of activity a port looks ahead for the one that makes it idle; then it looks again.
+constexpr int kMaxLookAhead = 32;
+
+shm::Nanoseconds after(shm::Nanoseconds now, shm::Nanoseconds timeout) {
+  return timeout > shm::kMaxTime - now ? shm::kForever : now + timeout;
+}
+
+}  // namespace
+
+Waited InputCore::wait(shm::Nanoseconds timeout, HeldSample& sample) {
+  const Waited result = wait_once(timeout, sample);
+  // A descriptor in use was disarmed by this; let its owner's loop arm it again.
+  if (epoll_) shm::ring_bell(bell_.write_end().get());
+  return result;
+}
+
+Waited InputCore::wait_once(shm::Nanoseconds timeout, HeldSample& sample) {
+  shm::Nanoseconds deadline =
+      -1;  // read when it is first needed: a sample that waits costs no clock
+  for (;;) {
+    sample = take_once();
+    if (sample.data != nullptr) return Waited::kSample;
+    bool selected = is_selected();
+    if (commanded_ && !selected) {
+      commanded_ = false;
+      count(segment_->header.counters.idles);
+      return Waited::kIdle;
+    }
+    commanded_ = selected;
+    const shm::Nanoseconds now = shm::monotonic_now();
+    if (deadline < 0) deadline = after(now, timeout);
+    if (now >= deadline) return Waited::kTimeout;
+    if (arm(sample, selected)) {
+      bell_.wait(std::min(deadline, selected ? next_idle() : shm::kForever));
+      count(segment_->header.counters.wakes);
+    }
+    disarm();
+    if (sample.data != nullptr) return Waited::kSample;
+  }
+}
+
+// Says that we wait and what we believe, then looks once more; true if it is still so.
+// SYNC POINT: waiting. Fence (d), between our wait word and our last look. Pairs with fences (a)
+// and (b) of publishers: either we see what they did, or they see us wait.
+bool InputCore::arm(HeldSample& sample, bool& selected) {
+  shm::InputHeader& header = segment_->header;
+  header.believed.store(selected ? shm::Selection::kSelected : shm::Selection::kIdle,
+                        std::memory_order_relaxed);
+  // Release, with the acquire of publishers: who sees us wait sees what we believe.
+  header.wait.store(header.wait.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+  shm::full_fence();
+  sample = take_once();
+  if (sample.data != nullptr) return false;
+  return is_selected() == selected;
+}
+
+// The next wait has another number. What rang for this one is forgotten before the next begins.
+void InputCore::disarm() noexcept {
+  shm::InputHeader& header = segment_->header;
+  const std::uint64_t wait = header.wait.load(std::memory_order_relaxed);
+  if ((wait & 1) != 0) header.wait.store(wait + 1, std::memory_order_relaxed);
+  bell_.silence();
+}
+
+shm::SourceId InputCore::selected_source() noexcept {
+  shm::DecisionClock clock(shm::monotonic_now(), true);
+  shm::Decider decider(snapshot_.table, memory_->pages(), clock);
+  shm::SourceId selected = shm::kNone;
+  for (const shm::Rule& rule : rules_) {
+    if (decider.decide_with_own(rule) != shm::Verdict::kWins) continue;
+    selected = rule.source;
+    break;
+  }
+  last_reading_ = clock.reading();
+  return selected;
+}
+
+bool InputCore::is_selected() noexcept {
+  refresh();
+  return selected_source() != shm::kNone;
+}
+
+bool InputCore::is_selected_at(shm::Nanoseconds time) noexcept {
+  shm::FixedClock clock(time);
+  shm::Decider decider(snapshot_.table, memory_->pages(), clock);
+  return std::any_of(rules_.begin(), rules_.end(), [&](const shm::Rule& rule) {
+    return decider.decide_with_own(rule) == shm::Verdict::kWins;
+  });
+}
+
+// When the port will be idle if nothing arrives until then; kForever: never.
+shm::Nanoseconds InputCore::next_idle() noexcept {
+  std::size_t ends = 0;
+  for (const shm::SourceId source : sources_) {
+    const auto* word = memory_->pages().find(source);
+    if (word == nullptr) continue;
+    const shm::ActivityWord value = word->load(std::memory_order_acquire);
+    if (shm::is_finite(value) && value > last_reading_) picture_[ends++] = value;
+  }
+  std::sort(picture_.begin(), picture_.begin() + static_cast<std::ptrdiff_t>(ends));
+  for (std::size_t i = 0; i < ends; ++i) {
+    if (i == kMaxLookAhead || !is_selected_at(picture_[i])) return picture_[i];
+  }
+  return shm::kForever;
+}
+
+std::optional<std::string> InputCore::winner() {
+  refresh();
+  if (!snapshot_.table.is_arbitrated(port_)) return std::nullopt;
+  const shm::SourceId selected = selected_source();
+  if (selected == shm::kNone) return std::nullopt;
+  return memory_->source_name(selected);
+}
+
+bool InputCore::is_idle() noexcept { return !is_selected(); }
+
+// A descriptor for the user's own loop: the bell, and a timer for the time at which activity runs
+// out.
+int InputCore::wait_descriptor() {
+  if (epoll_) return epoll_.get();
+  shm::FileDescriptor epoll(epoll_create1(EPOLL_CLOEXEC));
+  shm::FileDescriptor timer(timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
+  epoll_event event{};
+  event.events = EPOLLIN;
+  if (!epoll || !timer || epoll_ctl(epoll.get(), EPOLL_CTL_ADD, bell_.read_end(), &event) != 0 ||
+      epoll_ctl(epoll.get(), EPOLL_CTL_ADD, timer.get(), &event) != 0) {
+    throw Error(name_ + ": no descriptor to wait on: " + std::strerror(errno));
+  }
+  epoll_ = std::move(epoll);
+  timer_ = std::move(timer);
+  shm::ring_bell(bell_.write_end().get());  // what waits already is there to be taken
+  return epoll_.get();
+}
+
+// After a take that found nothing: from now on the descriptor becomes readable when there is cause.
+void InputCore::arm_descriptor(HeldSample& sample) {
+  for (;;) {
+    disarm();
+    bool selected = is_selected();
+    const bool armed = arm(sample, selected);
+    if (sample.data != nullptr) return;
+    if (!armed) continue;
+    const shm::Nanoseconds idle_at = selected ? next_idle() : shm::kForever;
+    itimerspec at{};  // zero: no alarm
+    if (idle_at != shm::kForever) {
+      at.it_value = {idle_at / 1'000'000'000, idle_at % 1'000'000'000};
+    }
+    timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &at, nullptr);
+    return;
+  }
+}
+
+}  // namespace arbiter::detail

@@ -1,0 +1,39 @@
+#include "client/memory.hpp"
+
+#include <stdexcept>
+#include <utility>
+
+namespace arbiter::detail {
+
+SharedMemory::SharedMemory(const shm::FileDescriptor& board) {
+  const std::size_t size = shm::checked_size(board, shm::Seals::kFixedSize);
+  if (size != sizeof(shm::Board)) throw std::runtime_error("the daemon's board has another size");
+  board_ = shm::Mapping(board, size, shm::Access::kReadOnly);
+  const auto* mapped = board_.as<const shm::Board>();
+  if (mapped->magic != shm::Board::kMagic || mapped->version != shm::Board::kVersion) {
+    throw std::runtime_error("the daemon is of another version");
+  }
+  tables_ = shm::TableReader(*mapped);
+}
+
+void SharedMemory::add_page(shm::SourceId id, std::string name, const shm::FileDescriptor& page) {
+  if (id >= shm::kMaxSources)
+    throw std::runtime_error("the daemon names a source beyond its limit");
+  if (shm::checked_size(page, shm::Seals::kFixedSize) != sizeof(shm::ActivityPage)) {
+    throw std::runtime_error("an activity page has another size");
+  }
+  {
+    const std::lock_guard lock(names_mutex_);
+    names_[id] = std::move(name);
+  }
+  mappings_.emplace_back(page, sizeof(shm::ActivityPage), shm::Access::kReadOnly);
+  pages_->attach(id, &mappings_.back().as<const shm::ActivityPage>()->word);
+}
+
+std::string SharedMemory::source_name(shm::SourceId id) const {
+  const std::lock_guard lock(names_mutex_);
+  const auto found = names_.find(id);
+  return found == names_.end() ? "source " + std::to_string(id) : found->second;
+}
+
+}  // namespace arbiter::detail

@@ -1,0 +1,127 @@
+// An output port: publish(), and what it needs.
+//
+// Two threads meet here. The port's thread publishes; the service thread (or whoever services the
+// node) learns of input ports, maps them, allocates memory, and offers the result as a view.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <arbiter/detail/cores.hpp>
+
+#include "client/handover.hpp"
+#include "client/memory.hpp"
+#include "client/peers.hpp"
+#include "shm/channel.hpp"
+#include "shm/clock.hpp"
+#include "shm/output_segment.hpp"
+#include "shm/slot_pool.hpp"
+
+namespace arbiter::detail {
+
+class OutputCore {
+ public:
+  // Makes and seals the segment. Throws std::system_error.
+  OutputCore(std::string name, const shm::TypeInfo& type, const OutputPortOptions& options,
+             std::shared_ptr<SharedMemory> memory);
+
+  // Service thread.
+
+  // The port is open: the daemon has given it its place.
+  void bind(shm::PortInstance instance, shm::SourceId source, const shm::FileDescriptor& page);
+  void add_peer(std::shared_ptr<const InputPeer> peer, bool connected);
+  void remove_peer(shm::PortInstance peer);
+  void disconnect_peer(shm::PortInstance peer);
+  // Unmaps what the port's thread has let go of.
+  void tidy();
+
+  // Port's thread.
+
+  [[nodiscard]] LoanedSlot loan(std::size_t size) noexcept;
+  void end_loan(std::uint32_t slot) noexcept;
+  // Arrivals at `now`, a reading of the clock.
+  Outcome publish_loan(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
+  Outcome publish_copy(const void* data, std::size_t size, shm::Nanoseconds now) noexcept;
+  Outcome signal(shm::Nanoseconds now) noexcept;
+  void deactivate(shm::Nanoseconds now) noexcept;
+
+  // Either.
+
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] shm::PortInstance instance() const noexcept { return instance_; }
+  [[nodiscard]] shm::SourceId source() const noexcept { return source_; }
+  [[nodiscard]] const shm::TypeInfo& type() const noexcept { return type_; }
+  [[nodiscard]] const shm::FileDescriptor& segment_descriptor() const noexcept {
+    return descriptor_;
+  }
+  [[nodiscard]] const SharedMemory& memory() const noexcept { return *memory_; }
+
+  std::shared_ptr<NodeCore>
+      node;  // kept for as long as the port is, so that they may go in any order
+
+ private:
+  // A link as the port's thread works with it.
+  struct Destination {
+    const InputPeer* peer = nullptr;  // kept alive by view_
+    bool joined = false;  // it has a queue of ours; else it senses, or holds old samples
+    std::uint32_t channel = shm::kNone;
+    shm::ChannelWriter writer;
+    shm::Rule rule;  // of the connection, under bound_generation_
+    shm::Verdict verdict = shm::Verdict::kLoses;
+    std::uint64_t rung = 0;           // the wait that we rang for last
+    const shm::Lane* lane = nullptr;  // ours in the peer's segment, once found
+  };
+
+  void assign_channel(InputLink& link);
+  void allocate_slots();
+  void offer_view();
+  void accept_view() noexcept;
+  void leave_all_but(const OutputView& view) noexcept;
+  void bind_rules(const shm::TableSnapshot& snapshot) noexcept;
+
+  // With the sample in `slot`, or without one (kNoSlot).
+  Outcome arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
+  void stamp(shm::ActivityWord word) noexcept;
+  void decide_all(shm::Nanoseconds now) noexcept;
+  Outcome hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
+  [[nodiscard]] bool is_full(Destination& destination) const noexcept;
+  static void ring_if_waiting(Destination& destination) noexcept;
+  void ring_where_selection_changed(shm::Nanoseconds now) noexcept;
+  [[nodiscard]] bool selection_differs(const Destination& destination,
+                                       shm::Nanoseconds now) noexcept;
+  std::uint32_t acquire_slot() noexcept;
+
+  // Constant once bound.
+  const std::string name_;
+  const shm::TypeInfo type_;
+  const std::uint32_t max_loans_;
+  const std::shared_ptr<SharedMemory> memory_;
+  shm::FileDescriptor descriptor_;
+  shm::Mapping mapping_;
+  shm::OutputSegment segment_;
+  shm::PortInstance instance_ = 0;
+  shm::SourceId source_ = shm::kNone;
+  shm::Mapping page_;
+  shm::Atomic<shm::ActivityWord>* activity_ = nullptr;
+
+  // Service thread.
+  std::map<shm::PortInstance, InputLink> links_;
+  std::uint32_t allocated_slots_ = 0;
+
+  Handover<OutputView> handover_;
+
+  // Port's thread.
+  std::unique_ptr<OutputView> view_;
+  std::vector<Destination> destinations_;
+  shm::SlotPool pool_;
+  std::uint32_t loans_ = 0;
+  std::uint64_t sequence_ = 0;
+  shm::ActivityWord own_word_ = shm::kNeverActive;
+  std::uint64_t bound_generation_ = UINT64_MAX;
+  shm::TableSnapshot snapshot_;
+  shm::Nanoseconds timeout_ = shm::kDefaultTimeout;
+};
+
+}  // namespace arbiter::detail

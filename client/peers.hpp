@@ -1,0 +1,71 @@
+// The ports at the other ends of a port's connections, as the service thread has mapped them.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "shm/atomic.hpp"
+#include "shm/bell.hpp"
+#include "shm/ids.hpp"
+#include "shm/input_segment.hpp"
+#include "shm/output_segment.hpp"
+#include "shm/segment.hpp"
+#include "shm/wire.hpp"
+
+namespace arbiter::detail {
+
+// An input port, as an output port sees it. What the foreign segment says of itself is read once,
+// here.
+struct InputPeer {
+  shm::PortInstance instance = 0;
+  shm::PortId port = shm::kNone;
+  shm::Mapping mapping;
+  const shm::InputSegment* segment = nullptr;
+  shm::Ringer ringer;
+  std::uint32_t depth = 1;
+  std::uint32_t max_held = 1;
+  bool refuse_new = false;
+};
+
+struct InputLink {
+  std::shared_ptr<const InputPeer> peer;
+  // Else the port only senses the source, or was disconnected and may still hold samples.
+  bool connected = false;
+  std::uint32_t channel = shm::kNone;  // none: waits until another link's is free
+  std::uint32_t depth = 1;             // of the queue: the peer's, or less where memory is short
+};
+
+struct OutputView {
+  std::vector<InputLink> links;
+  std::uint32_t slots = 0;  // allocated for the pool by now
+  OutputView* next_retired = nullptr;
+};
+
+// An output port, as an input port sees it.
+struct OutputPeer {
+  shm::PortInstance instance = 0;
+  shm::SourceId source = shm::kNone;
+  shm::Mapping mapping;
+  shm::OutputSegment segment;
+  // Set by the port's thread once a publisher that is gone has nothing left to be taken.
+  mutable shm::Atomic<bool> drained{false};
+};
+
+struct OutputLink {
+  std::shared_ptr<const OutputPeer> peer;
+  bool gone = false;  // closed or dead: drain it
+};
+
+struct InputView {
+  std::vector<OutputLink> links;
+  InputView* next_retired = nullptr;
+};
+
+// Map what the daemon has announced, and check it: the segment must be whole, and carry a type that
+// `own` can take or give. Throw std::runtime_error saying what is wrong.
+std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
+                                                const shm::TypeInfo& own);
+std::shared_ptr<const OutputPeer> map_output_peer(const shm::Received& announced,
+                                                  const shm::TypeInfo& own);
+
+}  // namespace arbiter::detail

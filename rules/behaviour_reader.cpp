@@ -1,0 +1,163 @@
+#include "rules/behaviour_reader.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "rules/condition_parser.hpp"
+#include "rules/names.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+class BehaviourReader {
+ public:
+  BehaviourReader(ElementReader& reader, Model& model, Diagnostics& diagnostics)
+      : reader_(reader), model_(model), diagnostics_(diagnostics) {}
+
+  void read(const XmlNode& element) {
+    behaviour_.is_meta = is_meta_behaviour(element.text);
+    reader_.check_attributes(element, {"name"});
+    reader_.check_no_text(element.first_child);
+    read_name(element);
+    for (const XmlNode& child : Elements(element.first_child)) {
+      if (!read_property(child)) behaviour_.is_incomplete = true;
+    }
+    // What has no name was still checked, but cannot be told from others.
+    if (!behaviour_.name.empty()) model_.behaviours.push_back(std::move(behaviour_));
+  }
+
+ private:
+  void read_name(const XmlNode& element) {
+    const auto written = reader_.attribute(element, "name");
+    const auto name = written ? reader_.name(*written, "the name of this behaviour") : std::nullopt;
+    if (!name) {
+      model_.has_unknown_gaps = true;
+      return;
+    }
+    behaviour_.name = name->name;
+    behaviour_.where = name->where;
+    if (auto problem = find_problem_in_behaviour(name->name)) {
+      reader_.error(std::move(problem->code), name->where, problem->message);
+    }
+  }
+
+  // False where something was refused, as in all that follows.
+  bool read_property(const XmlNode& element) {
+    const bool is_meta = behaviour_.is_meta;
+    if (element.text == "condition") return read_own_condition(element);
+    if (element.text == "inhibition") return read_inhibition(element);
+    if (element.text == "config" && !is_meta) return read_config(element);
+    if (is_meta && (is_behaviour(element.text) || is_meta_behaviour(element.text))) {
+      return read_child(element);
+    }
+    if (element.text == "config") {
+      reader_.error("unknown-element", reader_.where(element),
+                    "a meta-behaviour has no <config>, only its behaviours have; move it into "
+                    "one of them");
+    } else if (is_meta) {
+      reader_.report_unknown_element(element, {"behavior", "condition", "inhibition"});
+    } else {
+      reader_.report_unknown_element(element, {"config", "condition", "inhibition"});
+    }
+    return false;
+  }
+
+  bool read_config(const XmlNode& element) {
+    reader_.check_attributes(element, {"at"});
+    const auto port = reader_.port_attribute(element, "at");
+    const auto text = reader_.text(element);
+    const auto source = text ? reader_.port_name(*text, "the output port") : std::nullopt;
+    if (!port || !source) return false;
+    behaviour_.configs.push_back(
+        {source->name, port->name, reader_.where(element), model_.next_order++});
+    return true;
+  }
+
+  bool read_child(const XmlNode& element) {
+    if (ElementReader::has_attribute(element, "name")) {
+      const std::string tag(element.text);
+      reader_.error("unknown-attribute", reader_.where(element),
+                    "a meta-behaviour names its behaviours, it does not define them; write <" +
+                        tag + ">name</" + tag + "> here, and the definition outside");
+      refuse(element, model_);
+      return false;
+    }
+    const bool fine = reader_.check_attributes(element, {});
+    const auto text = reader_.text(element);
+    auto name = text ? reader_.name(*text, "the name of this behaviour") : std::nullopt;
+    if (!name) return false;
+    behaviour_.children.push_back(std::move(*name));
+    return fine;
+  }
+
+  bool read_own_condition(const XmlNode& element) {
+    const bool fine = reader_.check_attributes(element, {});
+    const auto condition = read_condition(element, reader_, diagnostics_);
+    if (!condition) return false;
+    if (*condition != nullptr) behaviour_.conditions.push_back(*condition);
+    return fine;
+  }
+
+  bool read_inhibition(const XmlNode& element) {
+    bool fine = reader_.check_attributes(element, {});
+    const auto text = reader_.text(element);
+    if (!text) return false;
+    if (text->is_blank()) return fine;
+    const std::string& bytes = text->bytes();
+    for (std::size_t first = 0; first <= bytes.size();) {
+      const std::size_t comma = std::min(bytes.find(',', first), bytes.size());
+      std::string name = collapse_blanks(std::string_view(bytes).substr(first, comma - first));
+      if (name.empty()) {
+        const std::size_t at = comma < bytes.size() ? comma : first - 1;
+        reader_.error("empty-name", text->where(at),
+                      "a name is missing beside this comma; write it, or remove the comma" +
+                          text->origin(at));
+        fine = false;
+      } else {
+        const std::size_t start = bytes.find_first_not_of(" \t\r\n", first);
+        behaviour_.inhibitions.push_back({std::move(name), text->where(start)});
+      }
+      first = comma + 1;
+    }
+    return fine;
+  }
+
+  ElementReader& reader_;
+  Model& model_;
+  Diagnostics& diagnostics_;
+  Behaviour behaviour_;
+};
+
+}  // namespace
+
+bool is_behaviour(std::string_view tag) { return tag == "behavior" || tag == "behaviour"; }
+
+bool is_meta_behaviour(std::string_view tag) {
+  return tag == "meta_behavior" || tag == "meta_behaviour";
+}
+
+void read_behaviour(const XmlNode& element, ElementReader& reader, Model& model,
+                    Diagnostics& diagnostics) {
+  BehaviourReader(reader, model, diagnostics).read(element);
+}
+
+std::optional<ExpressionPtr> read_condition(const XmlNode& element, ElementReader& reader,
+                                            Diagnostics& diagnostics) {
+  const auto text = reader.text(element);
+  if (!text) return {};
+  if (text->is_blank()) return ExpressionPtr();
+  return parse_condition(*text, diagnostics);
+}
+
+void refuse(const XmlNode& element, Model& model) {
+  for (const XmlAttribute& attribute : element.attributes) {
+    if (attribute.name == "name") {
+      model.refused_names.insert(collapse_blanks(attribute.value));
+      return;
+    }
+  }
+  model.has_unknown_gaps = true;
+}
+
+}  // namespace arbiter::rules

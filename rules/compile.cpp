@@ -1,0 +1,177 @@
+#include "rules/compile.hpp"
+
+#include <algorithm>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "rules/compile_port.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+// Rules that outgrow the node table cost a second each; after so many there is no more to learn.
+constexpr int kMaxOutgrownPorts = 8;
+
+class ModelCompiler {
+ public:
+  ModelCompiler(const RuleSet& rules, Diagnostics& diagnostics)
+      : rules_(rules), context_{{}, {}, diagnostics} {}
+
+  CompiledModel compile();
+
+ private:
+  [[nodiscard]] std::vector<std::string> all_sources() const;
+  void gather_parts();
+  void compile_arbitrated_ports();
+  void add_unarbitrated_ports();
+  void report_never_running();
+  void check_limits();
+  void limit_exceeded(const Location& where, std::string_view what, std::string_view limit,
+                      std::size_t value);
+
+  const RuleSet& rules_;
+  CompileContext context_;
+  CompiledModel model_;
+  std::map<std::string, std::vector<BehaviourPart>> parts_;             // by port
+  std::map<std::string, std::vector<std::string>> unselected_sources_;  // by port
+  std::vector<bool> may_run_;                                           // by behaviour
+};
+
+CompiledModel ModelCompiler::compile() {
+  model_.timeout = rules_.timeout;
+  model_.timeouts = rules_.timeouts;
+  model_.sources = all_sources();
+  gather_parts();
+  compile_arbitrated_ports();
+  add_unarbitrated_ports();
+  report_never_running();
+  check_limits();
+  return std::move(model_);
+}
+
+std::vector<std::string> ModelCompiler::all_sources() const {
+  std::set<std::string> sources(rules_.sources.begin(), rules_.sources.end());
+  for (const auto& connection : rules_.other_connections) sources.insert(connection.source);
+  return {sources.begin(), sources.end()};
+}
+
+void ModelCompiler::gather_parts() {
+  for (const auto& connection : rules_.other_connections) {
+    unselected_sources_[connection.port].push_back(connection.source);
+  }
+  may_run_.resize(rules_.behaviours.size());
+  for (std::size_t i = 0; i < rules_.behaviours.size(); ++i) {
+    for (const auto& [port, rule] : rules_.behaviours[i].rules) {
+      parts_[port].push_back({i, &rule});
+    }
+  }
+}
+
+void ModelCompiler::compile_arbitrated_ports() {
+  int outgrown = 0;
+  for (const auto& port : rules_.ports) {
+    if (outgrown == kMaxOutgrownPorts) {
+      context_.diagnostics.note("not-checked", port.where,
+                                "the rules at " + port.port +
+                                    ", and at the ports after it, were not looked at, since those "
+                                    "of too many ports exceed a limit");
+      may_run_.assign(may_run_.size(), true);
+      return;
+    }
+    const auto& parts = parts_[port.port];
+    auto unselected = unselected_sources_[port.port];
+    auto result = compile_port(context_, {port, unselected, parts});
+    if (!result) {
+      ++outgrown;
+      for (const auto& part : parts) may_run_[part.behaviour] = true;  // as nobody knows
+      continue;
+    }
+    for (const std::size_t behaviour : result->running) may_run_[behaviour] = true;
+    for (auto& source : unselected) {
+      CompiledRule rule;
+      rule.source = std::move(source);
+      rule.kind = shm::table::kNever;
+      result->port.rules.push_back(std::move(rule));
+    }
+    model_.ports.push_back(std::move(result->port));
+  }
+}
+
+void ModelCompiler::add_unarbitrated_ports() {
+  std::set<std::string_view> arbitrated;
+  for (const auto& port : rules_.ports) arbitrated.insert(port.port);
+  for (auto& [name, sources] : unselected_sources_) {
+    if (arbitrated.contains(name)) continue;
+    CompiledPort port{name, false, {}, {}};
+    for (auto& source : sources) {
+      CompiledRule rule;
+      rule.source = std::move(source);
+      rule.kind = shm::table::kAlways;
+      port.rules.push_back(std::move(rule));
+    }
+    model_.ports.push_back(std::move(port));
+  }
+  std::sort(model_.ports.begin(), model_.ports.end(),
+            [](const auto& left, const auto& right) { return left.port < right.port; });
+}
+
+void ModelCompiler::report_never_running() {
+  for (std::size_t i = 0; i < rules_.behaviours.size(); ++i) {
+    const auto& behaviour = rules_.behaviours[i];
+    if (may_run_[i] || behaviour.rules.empty()) continue;
+    context_.diagnostics.warning(
+        "never-runs", behaviour.where,
+        "no activity of the sources lets the behaviour \"" + behaviour.name +
+            "\" run: none of its connections can ever be selected for it; look for a condition or "
+            "an inhibition, its own or inherited, that contradicts another one");
+  }
+}
+
+void ModelCompiler::limit_exceeded(const Location& where, std::string_view what,
+                                   std::string_view limit, std::size_t value) {
+  context_.diagnostics.error("limit-exceeded", where,
+                             std::string(what) + " than " + std::string(limit) + " (" +
+                                 std::to_string(value) + ") allows; split the model");
+}
+
+// What is true of every table that is made of the model, whatever ids its sources and ports get.
+void ModelCompiler::check_limits() {
+  const Location start{rules_.ports.empty() ? std::string() : rules_.ports[0].where.file, 1, 1};
+  if (model_.sources.size() > shm::kMaxSources) {
+    limit_exceeded(start, "more sources", "kMaxSources", shm::kMaxSources);
+  }
+  if (model_.ports.size() > shm::kMaxInputPorts) {
+    limit_exceeded(start, "more input ports", "kMaxInputPorts", shm::kMaxInputPorts);
+  }
+  std::size_t connections = 0;
+  std::map<std::string_view, std::size_t> destinations;
+  for (const auto& port : model_.ports) {
+    connections += port.rules.size();
+    if (port.rules.size() > shm::kMaxSourcesPerPort) {
+      limit_exceeded(start, "more connections to " + port.port, "kMaxSourcesPerPort",
+                     shm::kMaxSourcesPerPort);
+    }
+    for (const auto& rule : port.rules) {
+      if (++destinations[rule.source] == shm::kMaxDestinations + 1) {
+        limit_exceeded(start, "more connections from " + rule.source, "kMaxDestinations",
+                       shm::kMaxDestinations);
+      }
+    }
+  }
+  if (connections > shm::kMaxConnections) {
+    limit_exceeded(start, "more connections", "kMaxConnections", shm::kMaxConnections);
+  }
+  if (largest_table(model_) > shm::kMaxTableWords) {
+    limit_exceeded(start, "more words in the decision table", "kMaxTableWords",
+                   shm::kMaxTableWords);
+  }
+}
+
+}  // namespace
+
+CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics) {
+  return ModelCompiler(rules, diagnostics).compile();
+}
+
+}  // namespace arbiter::rules

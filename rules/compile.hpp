@@ -1,0 +1,60 @@
+// From rules to decision diagrams, with the proof that at most one connection of a port can win.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "rules/diagnostic.hpp"
+#include "rules/rule_set.hpp"
+#include "shm/decision_table.hpp"
+
+namespace arbiter::rules {
+
+// One connection's reduced, ordered decision diagram, with the connection's own source taken as
+// active.
+struct CompiledRule {
+  std::string source;
+  shm::Word kind = 0;              // table::RuleKind
+  std::vector<std::string> reads;  // the sources that decide, in the order of the diagram
+  std::vector<bool> expected;      // kConjunction: the activity that each read must have
+  struct Node {
+    shm::Word position, low, high;  // as in the flat table
+  };
+  std::vector<Node> nodes;  // kDiagram
+};
+
+struct CompiledPort {
+  std::string port;
+  bool arbitrated = true;
+  std::vector<std::string> reads;   // each source written in its rules, in byte order
+  std::vector<CompiledRule> rules;  // in document order; those that no rule selects come last
+};
+
+struct CompiledModel {
+  shm::Nanoseconds timeout = shm::kDefaultTimeout;
+  std::map<std::string, shm::Nanoseconds> timeouts;
+  std::vector<std::string> sources;
+  std::vector<CompiledPort> ports;  // in byte order
+};
+
+// Proves every port and reports what fails: two connections that can both win, with a shortest
+// witness; rules that nothing satisfies; limits exceeded. To be used only if there is no error.
+CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics);
+
+// The ids under which a table names sources and ports; each must be below the limits of the table.
+struct TableIds {
+  std::function<shm::SourceId(const std::string& source)> source;
+  std::function<shm::PortId(const std::string& port)> port;
+};
+
+// How many words a table of the model can have at most, whatever the ids. compile() makes sure that
+// it is within kMaxTableWords, so that what a check has accepted can be loaded.
+std::size_t largest_table(const CompiledModel& model);
+
+// The words of shm/decision_table.hpp. Throws std::length_error where kMaxTableWords is exceeded.
+std::vector<shm::Word> flatten(const CompiledModel& model, const TableIds& ids);
+
+}  // namespace arbiter::rules

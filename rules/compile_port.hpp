@@ -1,0 +1,75 @@
+// Compiles and proves the rules of one port.
+#pragma once
+
+#include <optional>
+#include <set>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "rules/compile.hpp"
+#include "rules/diagram.hpp"
+#include "rules/proof.hpp"
+#include "rules/witness.hpp"
+
+namespace arbiter::rules {
+
+// What the ports of one model share.
+struct CompileContext {
+  DiagramBuilder builder;
+  Proof proof;
+  Diagnostics& diagnostics;
+};
+
+// A behaviour's part in the rule of one connection of the port.
+struct BehaviourPart {
+  std::size_t behaviour;  // index into RuleSet::behaviours
+  const ConnectionRule* rule;
+};
+
+struct PortTask {
+  const PortRules& port;
+  std::vector<std::string> unselected;  // sources of its connections that no rule selects
+  std::vector<BehaviourPart> parts;
+};
+
+struct PortResult {
+  CompiledPort port;
+  std::vector<std::size_t> running;  // behaviours of which some activation satisfies the part
+};
+
+// Nothing if a limit was met, which is reported.
+std::optional<PortResult> compile_port(CompileContext& context, const PortTask& task);
+
+// Turns expressions into diagrams.
+class RuleBuilder {
+ public:
+  explicit RuleBuilder(DiagramBuilder& builder) : builder_(builder) {}
+
+  // Numbers a source, so that the order of the variables is that of their first mention.
+  void mention(const std::string& source);
+  void mention_all(const Expression& expression, std::set<std::string>& written);
+
+  [[nodiscard]] int variable(const std::string& source) const { return variables_.at(source); }
+  [[nodiscard]] const std::vector<std::string>& names() const { return names_; }  // by variable
+
+  // The own source active, and the condition.
+  Diagram rule(const ConnectionRule& rule);
+  void forget_parts() { built_.clear(); }
+
+ private:
+  Diagram build(const ExpressionPtr& expression);
+  Diagram build_new(const Expression& expression);
+  Diagram join(Operator op, const std::vector<const ExpressionPtr*>& operands);
+
+  DiagramBuilder& builder_;
+  std::vector<std::string> names_;
+  std::unordered_map<std::string, int> variables_;
+  std::unordered_map<const Expression*, Diagram> built_;  // shared ones are built once
+};
+
+// The kind, reads and nodes of a rule whose function is given, its own source taken as active.
+CompiledRule to_compiled_rule(std::string source, const DiagramNodes& function,
+                              const std::vector<std::string>& names);
+
+}  // namespace arbiter::rules

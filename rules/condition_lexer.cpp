@@ -1,0 +1,156 @@
+#include "rules/condition_lexer.hpp"
+
+#include <array>
+#include <cctype>
+#include <utility>
+#include <vector>
+
+#include "rules/names.hpp"
+#include "rules/utf8.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+using Spelling = std::pair<std::string_view, TokenKind>;
+
+// Those that others begin with come later.
+constexpr std::array<Spelling, 15> kOperators{{
+    {"<->", TokenKind::kIff},
+    {"↔", TokenKind::kIff},
+    {"->", TokenKind::kImplies},
+    {"→", TokenKind::kImplies},
+    {"||", TokenKind::kOr},
+    {"|", TokenKind::kOr},
+    {"∨", TokenKind::kOr},
+    {"&&", TokenKind::kAnd},
+    {"&", TokenKind::kAnd},
+    {"∧", TokenKind::kAnd},
+    {"!", TokenKind::kNot},
+    {"~", TokenKind::kNot},
+    {"¬", TokenKind::kNot},
+    {"(", TokenKind::kOpen},
+    {")", TokenKind::kClose},
+}};
+
+constexpr std::array<Spelling, 11> kWords{{
+    {"iff", TokenKind::kIff},
+    {"implies", TokenKind::kImplies},
+    {"or", TokenKind::kOr},
+    {"xor", TokenKind::kXor},
+    {"and", TokenKind::kAnd},
+    {"not", TokenKind::kNot},
+    {"true", TokenKind::kTrue},
+    {"false", TokenKind::kFalse},
+    {"any", TokenKind::kAny},
+    {"all", TokenKind::kAll},
+    {"none", TokenKind::kNone},
+}};
+
+bool is_letter_or_digit(char byte) {
+  return (byte >= 'a' && byte <= 'z') || (byte >= 'A' && byte <= 'Z') ||
+         (byte >= '0' && byte <= '9');
+}
+
+[[noreturn]] void fail_at_word(std::size_t at, std::string_view word) {
+  std::string lower;
+  for (const char byte : word.substr(0, word.find('/'))) {
+    lower += static_cast<char>(std::tolower(static_cast<unsigned char>(byte)));
+  }
+  std::vector<std::string_view> known;
+  for (const auto& [spelling, kind] : kWords) {
+    if (spelling == lower) {
+      throw ConditionError{at,
+                           "keywords are in lower case; write " + lower + " for " + quote(word)};
+    }
+    known.push_back(spelling);
+  }
+  throw ConditionError{at, quote(word) + " is neither a keyword nor a port's name" +
+                               advise(word, known, "names begin with '/'")};
+}
+
+}  // namespace
+
+Token ConditionLexer::take() {
+  const Token token = token_;
+  advance();
+  return token;
+}
+
+Token ConditionLexer::take_glob() {
+  skip_blanks();
+  Token glob{TokenKind::kPort, next_, {}, {}};
+  if (rest().starts_with('"')) {
+    glob = read_quoted();
+  } else {
+    glob.spelling = glob.name = bare_name("*");
+    if (glob.name.empty()) {
+      throw ConditionError{next_, "a pattern is expected here, such as /Face/* or \"/Face/*\""};
+    }
+  }
+  next_ += glob.spelling.size();
+  advance();
+  return glob;
+}
+
+void ConditionLexer::advance() {
+  skip_blanks();
+  token_ = Token{TokenKind::kEnd, next_, {}, {}};
+  if (rest().empty()) return;
+  token_ = read_operator();
+  if (token_.spelling.empty()) token_ = rest().starts_with('"') ? read_quoted() : read_word();
+  next_ += token_.spelling.size();
+}
+
+void ConditionLexer::skip_blanks() {
+  while (next_ < condition_.size() && is_blank(condition_[next_])) ++next_;
+}
+
+Token ConditionLexer::read_operator() const {
+  for (const auto& [spelling, kind] : kOperators) {
+    if (rest().starts_with(spelling)) return {kind, next_, spelling, {}};
+  }
+  return {};
+}
+
+Token ConditionLexer::read_quoted() const {
+  const std::size_t close = rest().find('"', 1);
+  if (close == std::string_view::npos) {
+    throw ConditionError{next_, "this quoted name does not end; close it with '\"'"};
+  }
+  const std::string_view name = rest().substr(1, close - 1);
+  if (name.empty()) throw ConditionError{next_, "this name is empty; write one between the quotes"};
+  return {TokenKind::kPort, next_, rest().substr(0, close + 1), name};
+}
+
+Token ConditionLexer::read_word() const {
+  const std::string_view word = bare_name("");
+  if (word.empty()) {
+    const std::size_t length = decode_utf8(rest()).length;
+    throw ConditionError{next_, quote(rest().substr(0, length)) +
+                                    " has no meaning in a condition; remove it, or put the name " +
+                                    "that it belongs to in double quotes"};
+  }
+  if (word.starts_with('/')) return {TokenKind::kPort, next_, word, word};
+  // Nothing but letters makes a keyword, so that not/a is understood.
+  const std::string_view letters = word.substr(0, word.find('/'));
+  for (const auto& [spelling, kind] : kWords) {
+    if (spelling == letters) return {kind, next_, spelling, {}};
+  }
+  fail_at_word(next_, word);
+}
+
+std::string_view ConditionLexer::bare_name(std::string_view more_characters) const {
+  static constexpr std::string_view kPunctuation = "_.:/-";
+  std::size_t length = 0;
+  for (; length < rest().size(); ++length) {
+    const char byte = rest()[length];
+    if (rest().substr(length).starts_with("->")) break;  // an operator wherever it stands
+    if (!is_letter_or_digit(byte) && kPunctuation.find(byte) == std::string_view::npos &&
+        more_characters.find(byte) == std::string_view::npos) {
+      break;
+    }
+  }
+  return rest().substr(0, length);
+}
+
+}  // namespace arbiter::rules

@@ -1,0 +1,30 @@
+// Conditions: first-order logic over the finite set of sources (paper, section IV.A).
+//
+//   loosest   iff       <->  ↔      left-associative
+//             implies   ->   →      right-associative
+//             or        | || ∨
+//             xor                   left-associative
+//             and       & && ∧
+//   tightest  not       !  ~ ¬
+//
+// Operands: a port's name, true, false, ( … ), any(GLOB), all(GLOB), none(GLOB). A bare name begins
+// with '/' and takes letters, digits and _ . : / -, except that "->" is always the operator; other
+// names stand in double quotes. A name says that this source is active.
+#pragma once
+
+#include <optional>
+
+#include "rules/diagnostic.hpp"
+#include "rules/expression.hpp"
+#include "rules/text.hpp"
+
+namespace arbiter::rules {
+
+// Of parentheses, and of operators inside each other; whoever walks an expression may recurse.
+inline constexpr int kMaxConditionDepth = 500;
+
+// The text must not be blank: what an absent condition means is the caller's to know. Empty where
+// it is malformed, which was then reported.
+std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diagnostics);
+
+}  // namespace arbiter::rules

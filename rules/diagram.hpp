@@ -1,0 +1,112 @@
+// Reduced, ordered binary decision diagrams (Bryant 1986; paper, section III.A), made by BuDDy.
+//
+// BuDDy keeps one instance in global variables, ends the program on an error unless told otherwise,
+// and reports an error by calling back in the middle of its work. diagram.cpp is the only file that
+// includes it: there its errors become exceptions, and its node table gets a bound.
+//
+// Thread safety: a builder holds the one instance for as long as it lives; another thread that
+// makes one waits. A builder and its diagrams are for one thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <stdexcept>
+#include <vector>
+
+#include "shm/decision_table.hpp"
+#include "shm/limits.hpp"
+
+namespace arbiter::rules {
+
+// Four times what one connection may have in the end, since what lies between is often larger than
+// the result. 262144 nodes and their caches take about 16 MiB.
+inline constexpr int kMaxWorkingNodes = 4 * static_cast<int>(shm::kMaxNodesPerConnection);
+
+// A function outgrew the node table. The builder is as new afterwards: all its diagrams are lost.
+class DiagramLimit : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// A Boolean function of the builder's variables. Two are the same function iff they are equal.
+class Diagram {
+ public:
+  Diagram() = default;  // false
+  Diagram(const Diagram& other);
+  Diagram(Diagram&& other) noexcept;
+  Diagram& operator=(Diagram other) noexcept;
+  ~Diagram();
+
+  [[nodiscard]] bool is_false() const { return node_ == 0; }
+  [[nodiscard]] bool is_true() const { return node_ == 1; }
+  [[nodiscard]] int id() const { return node_; }  // the same for the same function
+
+  friend bool operator==(const Diagram& a, const Diagram& b) { return a.node_ == b.node_; }
+
+ private:
+  friend class DiagramBuilder;
+  Diagram(int node, std::uint32_t instance);
+
+  int node_ = 0;
+  std::uint32_t instance_ = 0;  // of BuDDy; a diagram that outlives its instance is inert
+};
+
+// A diagram taken out of BuDDy. Nodes are sorted by level: node 0 is the root, successors lie
+// behind their node, or are shm::table::kFalse / kTrue.
+struct DiagramNodes {
+  struct Node {
+    int level;  // place of the variable in the order
+    int variable;
+    shm::Word low, high;
+  };
+  shm::Word root = shm::table::kFalse;  // 0, kFalse or kTrue
+  std::vector<Node> nodes;
+};
+
+enum class Connective { kAnd, kOr, kXor, kImplies, kIff, kAndNot };
+
+class DiagramBuilder {
+ public:
+  static constexpr int kVariables = static_cast<int>(shm::kMaxSourcesPerPort);
+
+  DiagramBuilder();
+  ~DiagramBuilder();
+  DiagramBuilder(const DiagramBuilder&) = delete;
+  DiagramBuilder& operator=(const DiagramBuilder&) = delete;
+
+  // All of these throw DiagramLimit.
+  [[nodiscard]] Diagram combine(Connective connective, const Diagram& a, const Diagram& b);
+  [[nodiscard]] Diagram negate(const Diagram& a);
+  [[nodiscard]] Diagram when(const Diagram& a, int variable);  // `variable` taken as true
+  // Looks for an order of the variables that makes all living diagrams together smaller.
+  void sift();
+
+  [[nodiscard]] Diagram constant(bool value);
+  [[nodiscard]] Diagram variable(int variable);
+  // Of a diagram that is not constant.
+  [[nodiscard]] int top_variable(const Diagram& a) const;
+  [[nodiscard]] Diagram low(const Diagram& a);
+  [[nodiscard]] Diagram high(const Diagram& a);
+
+  [[nodiscard]] int level_of(int variable) const;
+  [[nodiscard]] std::size_t node_count(const Diagram& a) const;
+  [[nodiscard]] DiagramNodes nodes(const Diagram& a);
+
+  // Back to the order 0, 1, 2, … if it was changed. All diagrams are lost then.
+  void restore_order();
+
+ private:
+  template <class Operation>
+  int run(Operation operation);
+  void start();
+  void stop();
+  static int node_of(const Diagram& a);
+  static Diagram keep(int node);
+
+  std::unique_lock<std::mutex> only_one_;
+  bool order_changed_ = false;
+  std::vector<shm::Word> index_of_node_;  // scratch of nodes(), by BuDDy's node
+};
+
+}  // namespace arbiter::rules

@@ -1,0 +1,94 @@
+#include "rules/load.hpp"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+#include <tuple>
+#include <vector>
+
+#include "rules/application_reader.hpp"
+#include "rules/defines.hpp"
+#include "rules/extraction.hpp"
+#include "rules/hierarchy.hpp"
+#include "rules/model.hpp"
+#include "rules/model_checks.hpp"
+#include "rules/model_reader.hpp"
+#include "rules/text_file.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+Model read_models(const std::vector<std::string>& paths, Diagnostics& diagnostics) {
+  Model model;
+  Defines defines;
+  std::set<std::string> read;
+  for (const std::string& path : paths) {
+    if (!read.insert(path).second) {
+      diagnostics.error("duplicate-file", {path, 1, 1}, "this file is given twice; give it once");
+      continue;
+    }
+    read_model(TextFile(path, read_bytes(path)), defines, model, diagnostics);
+  }
+  return model;
+}
+
+std::optional<Application> read_application_if_any(const ModelFiles& files,
+                                                   Diagnostics& diagnostics) {
+  if (!files.application) return {};
+  return read_application(TextFile(*files.application, read_bytes(*files.application)),
+                          diagnostics);
+}
+
+// Checks go through a model in various orders; the reader of their findings goes through files.
+void hand_over_sorted(const ModelFiles& files, const Diagnostics& found, Diagnostics& diagnostics) {
+  std::map<std::string, std::size_t> places;
+  for (const std::string& path : files.models) places.emplace(path, places.size());
+  if (files.application) places.emplace(*files.application, places.size());
+  std::vector<const Diagnostic*> sorted;
+  for (const Diagnostic& item : found.items()) sorted.push_back(&item);
+  std::stable_sort(sorted.begin(), sorted.end(), [&](const Diagnostic* a, const Diagnostic* b) {
+    return std::tuple(places[a->where.file], a->where.line, a->where.column) <
+           std::tuple(places[b->where.file], b->where.line, b->where.column);
+  });
+  const bool is_cut = found.dropped() > 0;
+  if (is_cut) sorted.pop_back();  // makes room for the last word
+  for (const Diagnostic* item : sorted) {
+    switch (item->severity) {
+      case Severity::kError:
+        diagnostics.error(item->code, item->where, item->message, item->witness);
+        break;
+      case Severity::kWarning:
+        diagnostics.warning(item->code, item->where, item->message);
+        break;
+      case Severity::kNote:
+        diagnostics.note(item->code, item->where, item->message);
+        break;
+    }
+  }
+  if (is_cut) {
+    diagnostics.error("too-many-problems", sorted.back()->where,
+                      std::to_string(found.dropped() + 1) +
+                          " more problems are not shown; correct the ones above first");
+  }
+}
+
+}  // namespace
+
+RuleSet load(const ModelFiles& files, Diagnostics& diagnostics) {
+  Diagnostics found;
+  const Model model = read_models(files.models, found);
+  const std::optional<Application> application = read_application_if_any(files, found);
+  check_sources(model, found);
+  const Hierarchy hierarchy(model, found);
+  RuleSet rules = extract_rules(model, hierarchy, found);
+  if (application) check_application(*application, rules, found);
+  Location whole;
+  if (files.application) whole.file = *files.application;
+  if (!files.models.empty()) whole.file = files.models.front();
+  check_limits(rules, application ? &*application : nullptr, whole, found);
+  hand_over_sorted(files, found, diagnostics);
+  return rules;
+}
+
+}  // namespace arbiter::rules

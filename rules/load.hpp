@@ -1,0 +1,29 @@
+// From files to rules: reads the model and application files, checks them, extracts the rules.
+#pragma once
+
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "rules/diagnostic.hpp"
+#include "rules/rule_set.hpp"
+
+namespace arbiter::rules {
+
+struct ModelFiles {
+  std::vector<std::string> models;  // together they form one model
+  std::optional<std::string> application;
+};
+
+// A file that cannot be opened or read; the message names it and says why.
+class FileError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// Reports all problems of all files in one go; the result is to be used only if there is no error.
+// Throws FileError.
+RuleSet load(const ModelFiles& files, Diagnostics& diagnostics);
+
+}  // namespace arbiter::rules

@@ -1,0 +1,22 @@
+// What is checked of a model as a whole, beside what finding its way through it takes.
+#pragma once
+
+#include "rules/diagnostic.hpp"
+#include "rules/model.hpp"
+#include "rules/rule_set.hpp"
+
+namespace arbiter::rules {
+
+// Sources that are declared twice.
+void check_sources(const Model& model, Diagnostics& diagnostics);
+
+// Each connection that a rule selects must be in the application; those that no rule selects are
+// added to the rules.
+void check_application(const Application& application, RuleSet& rules, Diagnostics& diagnostics);
+
+// The limits of shm/limits.hpp that a model can exceed. `whole` is the place for what cannot be
+// pinned to a line. `application` may be null.
+void check_limits(const RuleSet& rules, const Application* application, const Location& whole,
+                  Diagnostics& diagnostics);
+
+}  // namespace arbiter::rules

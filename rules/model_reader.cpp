@@ -1,0 +1,233 @@
+#include "rules/model_reader.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "rules/behaviour_reader.hpp"
+#include "rules/duration.hpp"
+#include "rules/element_reader.hpp"
+#include "rules/names.hpp"
+#include "rules/xml.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+bool is_blank_text(const XmlNode* first) {
+  for (const XmlNode* node = first; node != nullptr; node = node->next) {
+    if (!trim(node->text).empty()) return false;
+  }
+  return true;
+}
+
+bool is_root(std::string_view tag) { return tag == "behaviors" || tag == "behaviours"; }
+
+class ModelReader {
+ public:
+  ModelReader(const TextFile& file, Defines& defines, Model& model, Diagnostics& diagnostics)
+      : file_(file),
+        defines_(defines),
+        model_(model),
+        diagnostics_(diagnostics),
+        reader_(file, defines, diagnostics) {}
+
+  void read() {
+    const auto document =
+        check_characters(file_, diagnostics_) ? parse_xml(file_, diagnostics_) : std::nullopt;
+    if (!document) return give_up();
+    const Elements top(document->first());
+    if (top.begin() == top.end() && is_blank_text(document->first())) {
+      diagnostics_.error("empty-file", file_.locate(0),
+                         "the file is empty; a model without rules is <behaviors/>");
+      return give_up();
+    }
+    if (top.begin() != top.end() && is_root((*top.begin()).text)) {
+      read_document(*document);
+    } else {
+      read_list(document->first());
+    }
+  }
+
+ private:
+  void give_up() {
+    model_.has_unknown_gaps = true;
+    defines_.expect_gaps();
+  }
+
+  void read_document(const XmlDocument& document) {
+    reader_.check_no_text(document.first());
+    Elements::Iterator at = Elements(document.first()).begin();
+    const XmlNode& root = *at;
+    reader_.check_attributes(root, {"timeout"});
+    if (const auto text = reader_.optional_attribute(root, "timeout")) read_root_timeout(*text);
+    is_in_root_ = true;
+    read_list(root.first_child);
+    for (const Elements::Iterator end(nullptr); ++at != end;) {
+      reader_.error("unknown-element", reader_.where(*at),
+                    "<" + std::string((*at).text) + "> stands behind the root; move it into <" +
+                        std::string(root.text) + ">");
+      refuse(*at, model_);
+    }
+  }
+
+  void read_root_timeout(const Text& text) {
+    const auto value = read_duration(text);
+    if (!value) return;
+    if (!model_.timeout) {
+      model_.timeout = {*value, text.where()};
+    } else if (model_.timeout->value != *value) {
+      reader_.error("conflicting-timeout", text.where(),
+                    "the model's timeout is another one at " + describe(model_.timeout->where) +
+                        "; keep one of them");
+    }
+  }
+
+  void read_list(const XmlNode* first) {
+    reader_.check_no_text(first);
+    announce_defines(first);
+    for (const XmlNode& element : Elements(first)) {
+      if (element.text == "define") {
+        read_define(element);
+      } else if (element.text == "source") {
+        read_source(element);
+      } else if (is_behaviour(element.text) || is_meta_behaviour(element.text)) {
+        read_behaviour(element, reader_, model_, diagnostics_);
+      } else if (element.text == "arbiter") {
+        read_arbiter(element);
+      } else {
+        report_unknown(element);
+      }
+    }
+  }
+
+  void report_unknown(const XmlNode& element) {
+    refuse(element, model_);
+    if (element.text == "application") {
+      reader_.error("unknown-element", reader_.where(element),
+                    "this is an application file, not a model; give it as the application");
+    } else if (is_root(element.text)) {
+      reader_.error("unknown-element", reader_.where(element),
+                    "<" + std::string(element.text) +
+                        "> is a root; put it around everything, or leave it away");
+    } else if (is_in_root_) {
+      reader_.report_unknown_element(element,
+                                     {"define", "source", "behavior", "meta_behavior", "arbiter"});
+    } else {
+      reader_.report_unknown_element(
+          element, {"behaviors", "define", "source", "behavior", "meta_behavior", "arbiter"});
+    }
+  }
+
+  void announce_defines(const XmlNode* first) {
+    for (const XmlNode& element : Elements(first)) {
+      if (element.text != "define") continue;
+      for (const XmlAttribute& attribute : element.attributes) {
+        if (attribute.name == "name") {
+          defines_.announce(collapse_blanks(attribute.value), reader_.where(element));
+        }
+      }
+    }
+  }
+
+  void read_define(const XmlNode& element) {
+    reader_.check_attributes(element, {"name"});
+    const auto written = reader_.attribute(element, "name");
+    const auto name = written ? reader_.name(*written, "the name of a define") : std::nullopt;
+    const auto text = reader_.text(element);
+    if (!name) return defines_.expect_gaps();
+    if (name->name.find_first_of("{}$") != std::string::npos) {
+      reader_.error("invalid-name", name->where,
+                    "the name of a define has none of the characters $ { }; rename it");
+    }
+    // Trimmed, so that ${a}${b} can make one name.
+    std::optional<std::string> value;
+    if (text) value = std::string(trim(text->bytes()));
+    if (!defines_.add(name->name, std::move(value), name->where)) {
+      reader_.error("duplicate-define", name->where,
+                    "the define " + quote(name->name) + " exists already, at " +
+                        describe(*defines_.find(name->name)) + "; rename or remove one");
+    }
+  }
+
+  void read_source(const XmlNode& element) {
+    reader_.check_attributes(element, {"port", "timeout"});
+    reader_.check_no_text(element.first_child);
+    for (const XmlNode& child : Elements(element.first_child)) {
+      reader_.report_unknown_element(child, {});
+    }
+    const auto port = reader_.port_attribute(element, "port");
+    const auto text = reader_.optional_attribute(element, "timeout");
+    const auto timeout = text ? read_duration(*text) : std::nullopt;
+    if (port) model_.sources.push_back({port->name, reader_.where(element), timeout});
+  }
+
+  std::optional<shm::Nanoseconds> read_duration(const Text& text) {
+    ParsedDuration parsed = parse_duration(trim(text.bytes()));
+    if (parsed.problem.empty()) return parsed.value;
+    reader_.error("invalid-timeout", text.where(), parsed.problem + text.origin(0));
+    return {};
+  }
+
+  void read_arbiter(const XmlNode& element) {
+    reader_.check_attributes(element, {"at", "conflict"});
+    reader_.check_no_text(element.first_child);
+    const auto port = reader_.port_attribute(element, "at");
+    Arbiter arbiter;
+    arbiter.where = reader_.where(element);
+    if (ElementReader::has_attribute(element, "conflict")) {
+      read_conflict(element, arbiter);
+    }
+    for (const XmlNode& child : Elements(element.first_child)) {
+      if (child.text == "select") {
+        if (!read_select(child, port)) arbiter.is_incomplete = true;
+      } else {
+        arbiter.is_incomplete = true;
+        reader_.report_unknown_element(child, {"select"});
+      }
+    }
+    if (!port) return;
+    arbiter.port = port->name;
+    model_.arbiters.push_back(std::move(arbiter));
+  }
+
+  void read_conflict(const XmlNode& element, Arbiter& arbiter) {
+    const auto text = reader_.optional_attribute(element, "conflict");
+    if (!text) return;
+    const std::string_view value = trim(text->bytes());
+    if (value == "first") {
+      arbiter.first_wins = true;
+    } else {
+      reader_.error("invalid-conflict", text->where(),
+                    "conflict=" + quote(value) +
+                        " is not known; write conflict=\"first\", or "
+                        "leave it away so that conflicts are errors");
+    }
+  }
+
+  bool read_select(const XmlNode& element, const std::optional<Mention>& port) {
+    reader_.check_attributes(element, {"from"});
+    const auto source = reader_.port_attribute(element, "from");
+    const auto condition = read_condition(element, reader_, diagnostics_);
+    if (!port || !source || !condition) return false;
+    model_.selects.push_back({source->name, port->name,
+                              *condition ? *condition : make_constant(true), reader_.where(element),
+                              model_.next_order++});
+    return true;
+  }
+
+  const TextFile& file_;
+  Defines& defines_;
+  Model& model_;
+  Diagnostics& diagnostics_;
+  ElementReader reader_;
+  bool is_in_root_ = false;
+};
+
+}  // namespace
+
+void read_model(const TextFile& file, Defines& defines, Model& model, Diagnostics& diagnostics) {
+  ModelReader(file, defines, model, diagnostics).read();
+}
+
+}  // namespace arbiter::rules

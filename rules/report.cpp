@@ -1,0 +1,100 @@
+#include "rules/report.hpp"
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+namespace arbiter::rules {
+namespace {
+
+const char* name_of(Severity severity) {
+  switch (severity) {
+    case Severity::kError:
+      return "error";
+    case Severity::kWarning:
+      return "warning";
+    case Severity::kNote:
+      return "note";
+  }
+  return "error";
+}
+
+// From the top of each file down, the files in the order in which something was found in them; the
+// steps of reading and compiling are of no interest to the reader.
+std::vector<const Diagnostic*> in_reading_order(const Diagnostics& diagnostics) {
+  std::map<std::string, std::size_t> files;
+  std::vector<const Diagnostic*> items;
+  for (const auto& item : diagnostics.items()) {
+    files.emplace(item.where.file, files.size());
+    items.push_back(&item);
+  }
+  const auto place = [&](const Diagnostic* item) {
+    return std::tuple(files.at(item->where.file), item->where.line, item->where.column);
+  };
+  std::stable_sort(items.begin(), items.end(),
+                   [&](const auto* left, const auto* right) { return place(left) < place(right); });
+  return items;
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  if (names.empty()) return "none";
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+void write_counts(std::ostream& out, const Diagnostics& diagnostics) {
+  const char* separator = "";
+  for (const Severity severity : {Severity::kError, Severity::kWarning, Severity::kNote}) {
+    const auto& items = diagnostics.items();
+    const auto count = std::count_if(items.begin(), items.end(), [&](const Diagnostic& item) {
+      return item.severity == severity;
+    });
+    if (count == 0) continue;
+    out << separator << count << ' ' << name_of(severity) << (count == 1 ? "" : "s");
+    separator = ", ";
+  }
+  out << '\n';
+}
+
+}  // namespace
+
+void write_text(std::ostream& out, const Diagnostics& diagnostics) {
+  if (diagnostics.items().empty()) return;
+  for (const Diagnostic* item : in_reading_order(diagnostics)) {
+    out << item->where.file << ':' << item->where.line << ':' << item->where.column << ": "
+        << name_of(item->severity) << ": " << item->message << " [" << item->code << "]\n";
+    if (item->witness) {
+      out << "  active: " << joined(item->witness->active)
+          << "; inactive: " << joined(item->witness->inactive) << '\n';
+    }
+  }
+  write_counts(out, diagnostics);
+}
+
+void write_json(std::ostream& out, const Diagnostics& diagnostics) {
+  using Json = nlohmann::ordered_json;
+  Json array = Json::array();
+  for (const Diagnostic* item : in_reading_order(diagnostics)) {
+    Json object = {{"severity", name_of(item->severity)},
+                   {"code", item->code},
+                   {"file", item->where.file},
+                   {"line", item->where.line},
+                   {"column", item->where.column},
+                   {"message", item->message},
+                   {"witness", nullptr}};
+    if (item->witness) {
+      object["witness"] = {{"active", item->witness->active},
+                           {"inactive", item->witness->inactive}};
+    }
+    array.push_back(std::move(object));
+  }
+  // A file's name may be any bytes.
+  out << array.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+}
+
+}  // namespace arbiter::rules

@@ -1,0 +1,18 @@
+// Writes what was found: for people as compilers do, for programs as JSON.
+#pragma once
+
+#include <ostream>
+
+#include "rules/diagnostic.hpp"
+
+namespace arbiter::rules {
+
+// file:line:column: error: message [code], with a line for the witness where there is one, and a
+// count of all at the end. Nothing if nothing was found.
+void write_text(std::ostream& out, const Diagnostics& diagnostics);
+
+// One array of {severity, code, file, line, column, message, witness}; the witness is
+// {"active": […], "inactive": […]} or null.
+void write_json(std::ostream& out, const Diagnostics& diagnostics);
+
+}  // namespace arbiter::rules

@@ -1,0 +1,55 @@
+// What extraction makes of a model (paper, section V): the rules of each input port's arbiter.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "rules/diagnostic.hpp"
+#include "rules/expression.hpp"
+#include "shm/activity.hpp"
+
+namespace arbiter::rules {
+
+// The rule that selects the connection {source, port}: `source` active, and `condition`.
+struct ConnectionRule {
+  std::string source;
+  // Without quantifiers, and without the connection's own activity, which is implied.
+  ExpressionPtr condition;
+  Location where;         // of the first <config> or <select> that makes the connection
+  std::string behaviour;  // the first one that configures it; empty if written by hand
+};
+
+struct PortRules {
+  std::string port;
+  bool first_wins = false;            // conflict="first"
+  Location where;                     // of the <arbiter> element, else of the first rule
+  std::vector<ConnectionRule> rules;  // in document order
+};
+
+struct Connection {
+  std::string source;
+  std::string port;
+};
+
+// What one behaviour asks for, before the rules of several are joined.
+struct BehaviourRules {
+  std::string name;
+  Location where;
+  std::vector<std::pair<std::string, ConnectionRule>> rules;  // by port
+};
+
+struct RuleSet {
+  shm::Nanoseconds timeout = shm::kDefaultTimeout;   // T of all others
+  std::map<std::string, shm::Nanoseconds> timeouts;  // T of sources that have their own
+  std::vector<std::string> sources;                  // each one that the model names, in byte order
+  std::vector<PortRules> ports;                      // the arbitrated ports, in byte order
+  // From the application file: connections that no rule selects, to arbitrated ports (they never
+  // deliver) and to others (they always do).
+  std::vector<Connection> other_connections;
+  std::vector<BehaviourRules> behaviours;  // in document order; a check asks whether each can run
+};
+
+}  // namespace arbiter::rules

@@ -1,0 +1,115 @@
+#include "rules/text_file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "rules/load.hpp"
+#include "rules/utf8.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+[[noreturn]] void fail(const std::string& path, const char* what, int error) {
+  throw FileError("cannot " + std::string(what) + " " + path + ": " + std::strerror(error));
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(const std::string& path) : fd_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
+    if (fd_ < 0) fail(path, "open", errno);
+  }
+  ~Descriptor() { ::close(fd_); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  [[nodiscard]] int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+bool check_size(const TextFile& file, Diagnostics& diagnostics) {
+  if (file.content().size() <= kMaxFileBytes) return true;
+  diagnostics.error("limit-exceeded", file.locate(0),
+                    "the file is larger than the limit of " + std::to_string(kMaxFileBytes >> 20) +
+                        " MiB; split it into several files");
+  return false;
+}
+
+std::string in_hex(unsigned value) {
+  static constexpr char kDigits[] = "0123456789abcdef";
+  return {'0', 'x', kDigits[value >> 4 & 15], kDigits[value & 15]};
+}
+
+}  // namespace
+
+TextFile::TextFile(std::string path, std::string content)
+    : path_(std::move(path)), content_(std::move(content)) {
+  if (content_.starts_with("\xef\xbb\xbf")) content_.erase(0, 3);
+  line_starts_.push_back(0);
+  for (std::size_t i = 0; i < content_.size(); ++i) {
+    if (content_[i] == '\n') line_starts_.push_back(i + 1);
+  }
+}
+
+Location TextFile::locate(std::size_t offset) const {
+  offset = std::min(offset, content_.size());
+  const auto next = std::upper_bound(line_starts_.begin(), line_starts_.end(), offset);
+  const auto line = static_cast<std::uint32_t>(next - line_starts_.begin());
+  return {path_, line, static_cast<std::uint32_t>(offset - *(next - 1) + 1)};
+}
+
+std::string read_bytes(const std::string& path) {
+  const Descriptor file(path);
+  std::string content;
+  std::array<char, 65536> buffer;
+  while (content.size() <= kMaxFileBytes) {
+    const ssize_t count = ::read(file.get(), buffer.data(), buffer.size());
+    if (count == 0) break;
+    if (count > 0) {
+      content.append(buffer.data(), static_cast<std::size_t>(count));
+    } else if (errno != EINTR) {
+      fail(path, "read", errno);
+    }
+  }
+  return content;
+}
+
+bool check_characters(const TextFile& file, Diagnostics& diagnostics) {
+  if (!check_size(file, diagnostics)) return false;
+  const std::string_view content = file.content();
+  for (std::size_t i = 0; i < content.size();) {
+    const Utf8Character character = decode_utf8(content.substr(i));
+    if (character.length == 0) {
+      diagnostics.error("invalid-character", file.locate(i),
+                        "the byte " + in_hex(static_cast<unsigned char>(content[i])) +
+                            " is not UTF-8 here; save the file in UTF-8");
+      return false;
+    }
+    if (is_control(character.code) && !is_blank(content[i])) {
+      diagnostics.error("invalid-character", file.locate(i),
+                        "the control character " + in_hex(character.code) +
+                            " must not occur in a model; remove it");
+      return false;
+    }
+    i += character.length;
+  }
+  return true;
+}
+
+bool check_readable(const TextFile& file, Diagnostics& diagnostics) {
+  if (!check_size(file, diagnostics)) return false;
+  const std::size_t nul = file.content().find('\0');
+  if (nul == std::string_view::npos) return true;
+  diagnostics.error("invalid-character", file.locate(nul),
+                    "a NUL byte must not occur in a file of XML; save the file in UTF-8");
+  return false;
+}
+
+}  // namespace arbiter::rules

@@ -1,0 +1,51 @@
+// A file in memory, and the way back from a byte of it to its line and column.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "rules/diagnostic.hpp"
+
+namespace arbiter::rules {
+
+inline constexpr std::size_t kMaxFileBytes = 16u << 20;
+
+// What is read out of a file refers to its bytes by std::string_view, hence it stays where it is.
+class TextFile {
+ public:
+  // Takes a byte order mark off: it has no place on the first line, for an editor hides it.
+  TextFile(std::string path, std::string content);
+  TextFile(const TextFile&) = delete;
+  TextFile& operator=(const TextFile&) = delete;
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] std::string_view content() const { return content_; }
+
+  // Offsets beyond the end are taken for the end.
+  [[nodiscard]] Location locate(std::size_t offset) const;
+  // Of a byte of content(), or the one behind the last.
+  [[nodiscard]] std::size_t offset_of(const char* byte) const {
+    return static_cast<std::size_t>(byte - content_.data());
+  }
+
+ private:
+  std::string path_;
+  std::string content_;
+  std::vector<std::size_t> line_starts_;
+};
+
+// The whole of a file, but not much more than kMaxFileBytes of it: a device may have no end.
+// Throws FileError.
+std::string read_bytes(const std::string& path);
+
+// Whether a model may consist of these bytes: UTF-8 within the limit, without control characters
+// (some of which end a file early in a careless reader). Reports the first place where it may not.
+bool check_characters(const TextFile& file, Diagnostics& diagnostics);
+
+// What an application file must hold to: the limit, and no NUL. Its other bytes are not ours to
+// judge; real ones have names of authors in Latin-1.
+bool check_readable(const TextFile& file, Diagnostics& diagnostics);
+
+}  // namespace arbiter::rules

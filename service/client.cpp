@@ -1,0 +1,89 @@
+#include "service/client.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
+#include "service/log.hpp"
+
+#ifndef SO_PEERPIDFD
+#define SO_PEERPIDFD 77  // Linux 6.5; older headers lack it
+#endif
+
+namespace arbiter::service {
+namespace {
+
+// The process at the other end. The kernel may know it by descriptor; where it is too old for that,
+// its number is opened, which is sure for as long as the socket is not closed at that end.
+shm::FileDescriptor open_process(int socket, pid_t pid) {
+  int fd = -1;
+  socklen_t size = sizeof fd;
+  if (getsockopt(socket, SOL_SOCKET, SO_PEERPIDFD, &fd, &size) == 0) return shm::FileDescriptor(fd);
+  return shm::FileDescriptor(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
+}
+
+}  // namespace
+
+Client::Client(ClientId id, shm::FileDescriptor socket) : id_(id), socket_(std::move(socket)) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  if (getsockopt(socket_.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
+    throw std::system_error(errno, std::generic_category(), "asking who connects");
+  }
+  pid_ = peer.pid;
+  user_ = peer.uid;
+  process_ = open_process(socket_.get(), pid_);
+  if (!process_)
+    throw std::system_error(errno, std::generic_category(), "opening a client's process");
+}
+
+void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescriptors> descriptors) {
+  if (lost_) return;
+  if (queue_.empty()) {
+    const shm::SendResult result = shm::send_message(socket_.get(), message, descriptors);
+    if (result == shm::SendResult::kSent) return;
+    if (result == shm::SendResult::kClosed) {
+      lost_ = true;
+      return;
+    }
+  }
+  if (queue_.size() == kMaxQueue) {
+    log::warn("{} does not read its messages: {} wait; giving it up", description(), queue_.size());
+    lost_ = true;
+    return;
+  }
+  auto queued = std::make_unique<Queued>();
+  queued->message = message;
+  for (std::size_t i = 0; i < descriptors.size() && descriptors[i] >= 0; ++i) {
+    queued->descriptors[i].reset(fcntl(descriptors[i], F_DUPFD_CLOEXEC, 0));
+  }
+  queue_.push_back(std::move(queued));
+}
+
+void Client::flush() {
+  while (!queue_.empty() && !lost_) {
+    const Queued& next = *queue_.front();
+    std::array<int, shm::kMaxDescriptors> descriptors{};
+    for (std::size_t i = 0; i < descriptors.size(); ++i) descriptors[i] = next.descriptors[i].get();
+    const shm::SendResult result = shm::send_message(socket_.get(), next.message, descriptors);
+    if (result == shm::SendResult::kFull) return;
+    if (result == shm::SendResult::kClosed) lost_ = true;
+    queue_.pop_front();
+  }
+}
+
+bool Client::has_died() const {
+  pollfd process{process_.get(), POLLIN, 0};
+  return process_ && ::poll(&process, 1, 0) == 1;
+}
+
+std::string Client::description() const {
+  return "node \"" + name + "\" (pid " + std::to_string(pid_) + ")";
+}
+
+}  // namespace arbiter::service

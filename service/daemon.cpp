@@ -1,0 +1,381 @@
+#include "service/daemon.hpp"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/epoll.h>
+#include <sys/mman.h>
+#include <sys/signalfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <stdexcept>
+
+#include "service/log.hpp"
+#include "service/status.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::service {
+namespace {
+
+// How long a component that does not run may hold up the opening of a port, or a new model.
+constexpr shm::Nanoseconds kMaxWaitForClients = 200'000'000;
+
+shm::Message reply_to(std::uint64_t request, shm::MessageKind kind) {
+  shm::Message message;
+  message.kind = kind;
+  message.request = request;
+  return message;
+}
+
+std::uint64_t event_key(std::uint32_t tag, ClientId client) {
+  return std::uint64_t{tag} << 56 | client;
+}
+
+}  // namespace
+
+Daemon::Daemon(const DaemonOptions& options)
+    : instance_(options.instance), models_(options.files, directory_) {
+  if (models_.has_files()) {
+    models_.prepare();
+    models_.put_in_force();
+  }
+  listener_ = shm::listen_at(options.directory, instance_);
+  epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
+  if (!epoll_) throw std::system_error(errno, std::generic_category(), "epoll_create1");
+  watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
+}
+
+Daemon::~Daemon() { unlink(listener_.path.c_str()); }
+
+void Daemon::watch(int fd, Tag tag, ClientId client, std::uint32_t events) {
+  epoll_event event{};
+  event.events = events;
+  event.data.u64 = event_key(static_cast<std::uint32_t>(tag), client);
+  if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) != 0 &&
+      (errno != EEXIST || epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, fd, &event) != 0)) {
+    throw std::system_error(errno, std::generic_category(), "epoll_ctl");
+  }
+}
+
+int Daemon::timeout_ms() const {
+  const shm::Nanoseconds deadline = barriers_.next_deadline();
+  if (deadline == shm::kForever) return -1;
+  const shm::Nanoseconds left = std::max<shm::Nanoseconds>(deadline - shm::monotonic_now(), 0);
+  return static_cast<int>(left / 1'000'000 + 1);
+}
+
+void Daemon::run(int signal_descriptor) {
+  watch(signal_descriptor, Tag::kSignals, 0, EPOLLIN);
+  for (;;) {
+    epoll_event events[64];
+    const int count = epoll_wait(epoll_.get(), events, 64, timeout_ms());
+    if (count < 0 && errno != EINTR) {
+      throw std::system_error(errno, std::generic_category(), "epoll_wait");
+    }
+    for (int i = 0; i < count; ++i) {
+      const auto tag = static_cast<Tag>(events[i].data.u64 >> 56);
+      const ClientId id = events[i].data.u64 & ((std::uint64_t{1} << 56) - 1);
+      if (tag == Tag::kListener) accept_client();
+      if (tag == Tag::kSignals && handle_signal(signal_descriptor)) return;
+      const auto client = clients_.find(id);
+      if (client == clients_.end()) continue;
+      if (tag == Tag::kClient && (events[i].events & EPOLLOUT) != 0) client->second->flush();
+      if (tag == Tag::kClient && (events[i].events & ~EPOLLOUT) != 0) serve(*client->second);
+      // What it sent before it died is served first.
+      if (tag == Tag::kProcess) {
+        serve(*client->second);
+        drop(id);
+      }
+    }
+    barriers_.expire(shm::monotonic_now());
+    settle();
+  }
+}
+
+bool Daemon::handle_signal(int signal_descriptor) {
+  signalfd_siginfo info{};
+  while (::read(signal_descriptor, &info, sizeof info) == static_cast<ssize_t>(sizeof info)) {
+    if (info.ssi_signo == SIGHUP) {
+      reload();
+      continue;
+    }
+    log::info("stopping: signal {}", info.ssi_signo);
+    return true;
+  }
+  return false;
+}
+
+void Daemon::accept_client() {
+  for (;;) {
+    shm::FileDescriptor socket(
+        accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    if (!socket) {
+      if (errno != EAGAIN && errno != ECONNABORTED) log::warn("accept: {}", std::strerror(errno));
+      return;
+    }
+    try {
+      const ClientId id = ++last_client_;
+      auto client = std::make_unique<Client>(id, std::move(socket));
+      watch(client->socket(), Tag::kClient, id, EPOLLIN | EPOLLRDHUP);
+      if (client->process() >= 0) watch(client->process(), Tag::kProcess, id, EPOLLIN);
+      clients_.emplace(id, std::move(client));
+    } catch (const std::exception& error) {
+      log::warn("a client was turned away: {}", error.what());
+    }
+    return;
+  }
+}
+
+void Daemon::serve(Client& client) {
+  const ClientId id = client.id();
+  shm::Received received;
+  for (;;) {
+    switch (shm::receive_message(client.socket(), received, false)) {
+      case shm::ReceiveResult::kNothing:
+        return;
+      case shm::ReceiveResult::kReceived:
+        break;
+      case shm::ReceiveResult::kMalformed:
+        log::warn("{} sent what is no message; dropped", client.description());
+        drop(id);
+        return;
+      case shm::ReceiveResult::kClosed:
+        drop(id);
+        return;
+    }
+    try {
+      handle(client, received);
+    } catch (const std::exception& error) {
+      log::warn("{}: {}", client.description(), error.what());
+      refuse(client, received.message.request, error.what());
+    }
+    if (clients_.count(id) == 0) return;
+  }
+}
+
+void Daemon::drop(ClientId id) {
+  const auto found = clients_.find(id);
+  if (found == clients_.end()) return;
+  const std::unique_ptr<Client> client = std::move(found->second);
+  clients_.erase(found);
+  if (!client->name.empty()) {
+    log::info("{} left, {} ports with it", client->description(), client->ports.size());
+  }
+  while (!client->ports.empty()) switchboard_.remove(*client->ports.begin());
+  barriers_.forget(id);
+}
+
+// After each round: sends what is queued, and drops who is lost.
+void Daemon::settle() {
+  std::vector<ClientId> lost;
+  for (const auto& [id, client] : clients_) {
+    if (client->is_lost()) {
+      lost.push_back(id);
+    } else {
+      const std::uint32_t out = client->has_queue() ? static_cast<std::uint32_t>(EPOLLOUT) : 0u;
+      if (out != 0 || client->watches_queue) {
+        watch(client->socket(), Tag::kClient, id, EPOLLIN | EPOLLRDHUP | out);
+        client->watches_queue = out != 0;
+      }
+    }
+  }
+  for (const ClientId id : lost) drop(id);
+  if (reload_wanted_ && !swapping_) {
+    reload_wanted_ = false;
+    reload();
+  }
+}
+
+void Daemon::handle(Client& client, shm::Received& received) {
+  const shm::Message& message = received.message;
+  if (client.name.empty() && message.kind != shm::MessageKind::kHello) {
+    throw std::runtime_error("a client must say hello first");
+  }
+  switch (message.kind) {
+    case shm::MessageKind::kHello:
+      hello(client, message);
+      break;
+    case shm::MessageKind::kOpenOutput:
+      open_output(client, received);
+      break;
+    case shm::MessageKind::kOpenInput:
+      open_input(client, received);
+      break;
+    case shm::MessageKind::kClosePort:
+      close_port(client, message.port);
+      break;
+    case shm::MessageKind::kSynced:
+      barriers_.synced(client.id(), message.request);
+      break;
+    case shm::MessageKind::kStatus:
+      send_status(client, message.request);
+      break;
+    case shm::MessageKind::kDeactivate:
+      deactivate(client, message);
+      break;
+    case shm::MessageKind::kObserve:
+      client.observes = true;
+      switchboard_.show_everything(client);
+      client.send(reply_to(message.request, shm::MessageKind::kDone));
+      break;
+    case shm::MessageKind::kPeerRefused:
+      if (client.ports.count(message.port) != 0) {
+        switchboard_.refuse(message.port, message.peer, std::string(message.text_view()));
+      }
+      break;
+    default:
+      throw std::runtime_error("an unknown kind of message");
+  }
+}
+
+void Daemon::hello(Client& client, const shm::Message& message) {
+  if (!client.name.empty()) throw std::runtime_error("a client says hello once");
+  if (message.value != shm::kWireVersion) {
+    throw std::runtime_error("the client speaks version " + std::to_string(message.value) +
+                             ", this daemon version " + std::to_string(shm::kWireVersion));
+  }
+  if (message.name_view().empty()) throw std::runtime_error("a client must have a name");
+  client.name = message.name_view();
+  client.has_service_thread = (message.flags & shm::kHasServiceThread) != 0;
+  client.send(reply_to(message.request, shm::MessageKind::kWelcome), {models_.board().get(), -1});
+  log::debug("{} is here", client.description());
+}
+
+void Daemon::require_free(shm::PortInstance holder, const std::string& what) {
+  if (holder == 0) return;
+  Client* client = nullptr;
+  if (const auto* output = switchboard_.output(holder)) client = output->client;
+  if (const auto* input = switchboard_.input(holder)) client = input->client;
+  if (client == nullptr) return;
+  if (client->has_died()) {
+    drop(client->id());
+    return;
+  }
+  throw std::runtime_error(what + " is held by " + client->description());
+}
+
+void Daemon::open_output(Client& client, shm::Received& received) {
+  const std::string name(received.message.name_view());
+  if (name.empty() || name[0] != '/') throw std::runtime_error("a port's name begins with '/'");
+  auto port = adopt_output(received);
+  Source& source = directory_.source(name);
+  require_free(source.open, "the output port " + name);
+  const OutputPort& opened = switchboard_.add(std::move(port), client, source);
+  auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
+  reply.port = opened.instance;
+  reply.id = source.id;
+  client.send(reply, {source.writable.get(), -1});
+  log::info("{} opened output port {}", client.description(), name);
+  connect(client, received.message.request, opened.instance);
+}
+
+void Daemon::open_input(Client& client, shm::Received& received) {
+  const std::string name(received.message.name_view());
+  if (name.empty() || name[0] != '/') throw std::runtime_error("a port's name begins with '/'");
+  auto port = adopt_input(received);
+  InputName& input = directory_.input(name);
+  require_free(input.open, "the input port " + name);
+  const InputPort& opened = switchboard_.add(std::move(port), client, input);
+  auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
+  reply.port = opened.instance;
+  reply.id = input.id;
+  client.send(reply);
+  log::info("{} opened input port {}", client.description(), name);
+  connect(client, received.message.request, opened.instance);
+}
+
+// Introduces a new port to its peers, and tells its component once they know it.
+void Daemon::connect(Client& client, std::uint64_t request, shm::PortInstance port) {
+  auto told = switchboard_.link_one(models_.in_force().table, port);
+  told.erase(&client);  // hears of it in order, before the kConnected
+  for (const auto& [id, other] : clients_) {
+    if (other->observes) switchboard_.show_everything(*other);
+  }
+  barriers_.raise(told, shm::monotonic_now() + kMaxWaitForClients,
+                  [this, id = client.id(), request] {
+                    const auto found = clients_.find(id);
+                    if (found == clients_.end()) return;
+                    found->second->send(reply_to(request, shm::MessageKind::kConnected));
+                  });
+}
+
+void Daemon::close_port(Client& client, shm::PortInstance port) {
+  if (client.ports.count(port) == 0) return;
+  switchboard_.remove(port);
+}
+
+void Daemon::send_status(Client& client, std::uint64_t request) {
+  const std::string document = status_document(
+      {instance_, models_, directory_, switchboard_, clients_.size(), reloads_refused_},
+      shm::monotonic_now());
+  const auto file = shm::make_segment("arbiter-status", document.size());
+  if (pwrite(file.get(), document.data(), document.size(), 0) !=
+      static_cast<ssize_t>(document.size())) {
+    throw std::runtime_error("the status document could not be written");
+  }
+  client.send(reply_to(request, shm::MessageKind::kStatusReply),
+              {shm::reopen(file, O_RDONLY).get(), -1});
+}
+
+void Daemon::deactivate(Client& client, const shm::Message& message) {
+  const std::string name(message.name_view());
+  Source* source = directory_.find_source(name);
+  if (source == nullptr) {
+    throw std::runtime_error("no model and no component has named the source " + name);
+  }
+  require_free(source->open, "the output port " + name);
+  const shm::Nanoseconds now = shm::monotonic_now();
+  const bool was_active = shm::is_active(source->activity().load(std::memory_order_relaxed), now);
+  source->activity().store(shm::deactivation(now), std::memory_order_relaxed);
+  shm::full_fence();  // (a): as a publisher's own deactivate()
+  switchboard_.ring_concerned(models_.in_force().table, source->id);
+  auto reply = reply_to(message.request, shm::MessageKind::kDone);
+  reply.value = was_active ? 1 : 0;
+  client.send(reply);
+  log::info("{} deactivated {}", client.description(), name);
+}
+
+void Daemon::refuse(Client& client, std::uint64_t request, const std::string& why) {
+  auto reply = reply_to(request, shm::MessageKind::kRefused);
+  reply.set_text(why);
+  client.send(reply);
+}
+
+// The new table is written and its clients are told before it counts; they switch all at once.
+void Daemon::reload() {
+  if (swapping_) {
+    reload_wanted_ = true;
+    return;
+  }
+  if (!models_.has_files()) {
+    log::warn("there is no model file to read again; start with --model");
+    return;
+  }
+  try {
+    models_.prepare();
+  } catch (const std::exception& error) {
+    ++reloads_refused_;
+    log::error("the model in force stays: {}", error.what());
+    return;
+  }
+  swapping_ = true;
+  const auto told = switchboard_.link_all(models_.prepared());
+  barriers_.raise(told, shm::monotonic_now() + kMaxWaitForClients, [this] { put_in_force(); });
+}
+
+void Daemon::put_in_force() {
+  models_.put_in_force();
+  swapping_ = false;
+  const auto snapshot = models_.in_force();
+  switchboard_.link_all(snapshot.table);  // ports that were opened meanwhile
+  switchboard_.unlink(snapshot.table);
+  switchboard_.ring_all();
+  for (const auto& [id, client] : clients_) {
+    if (client->observes) switchboard_.show_everything(*client);
+  }
+  log::info("model {} is in force", snapshot.generation);
+}
+
+}  // namespace arbiter::service

@@ -1,0 +1,92 @@
+// arbiterd: the daemon of one instance, in the foreground.
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/signalfd.h>
+#include <systemd/sd-daemon.h>
+
+#include <CLI/CLI.hpp>
+
+#include "service/daemon.hpp"
+#include "service/log.hpp"
+
+namespace {
+
+using arbiter::service::Daemon;
+namespace log = arbiter::service::log;
+
+constexpr const char* kExample = R"(
+Example:
+  arbiterd --model search_and_track.xml
+
+It runs in the foreground, needs no configuration and no privileges, and logs to standard error.
+SIGHUP reads the files again; a bad model changes nothing. SIGTERM and SIGINT stop it.
+It listens in $RUNTIME_DIRECTORY, else $XDG_RUNTIME_DIR/arbiter, else /run/arbiter if it may write
+there, else arbiter-UID in the temporary directory.)";
+
+// Components and sources take a few descriptors each.
+void raise_descriptor_limit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+arbiter::shm::FileDescriptor catch_signals() {
+  sigset_t caught;
+  sigemptyset(&caught);
+  for (const int number : {SIGHUP, SIGTERM, SIGINT}) sigaddset(&caught, number);
+  sigprocmask(SIG_BLOCK, &caught, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+  return arbiter::shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
+}
+
+int serve(const arbiter::service::DaemonOptions& options, const std::string& instance) {
+  raise_descriptor_limit();
+  const auto signals = catch_signals();
+  Daemon daemon(options);
+  log::info("instance \"{}\" is ready at {}", instance, daemon.path());
+  sd_notifyf(0, "READY=1\nSTATUS=instance %s", instance.c_str());
+  daemon.run(signals.get());
+  sd_notify(0, "STOPPING=1");
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("arbiterd: decides at each input port whose data gets through", "arbiterd");
+  app.footer(kExample);
+  app.set_version_flag("--version", std::string("arbiterd ") + ARBITER_VERSION);
+  arbiter::service::DaemonOptions options;
+  std::string application;
+  std::string instance;
+  std::string level = "info";
+  app.add_option("--model", options.files.models, "Model file; several form one model")
+      ->type_name("FILE");
+  app.add_option("--application", application, "Application file: which connections exist")
+      ->type_name("FILE");
+  app.add_option("--instance", instance,
+                 "Name of this daemon; without it $ARBITER_INSTANCE, else \"default\"")
+      ->type_name("NAME");
+  app.add_option("--log-level", level, "trace, debug, info, warn or error")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error"}));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  log::set_default_logger(log::stderr_logger_mt("arbiterd"));
+  log::set_level(log::level::from_str(level));
+  if (!application.empty()) options.files.application = application;
+  try {
+    options.instance = arbiter::shm::instance_name(instance);
+    options.directory = arbiter::shm::daemon_directory();
+    return serve(options, options.instance);
+  } catch (const std::invalid_argument& error) {
+    log::error("{}", error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    log::error("{}", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,82 @@
+#include "service/models.hpp"
+
+#include <fcntl.h>
+
+#include "rules/compile.hpp"
+#include "service/log.hpp"
+
+namespace arbiter::service {
+namespace {
+
+shm::FileDescriptor make_board() {
+  auto board = shm::make_segment("arbiter-board", sizeof(shm::Board));
+  if (const auto error = shm::allocate(board, 0, offsetof(shm::Board, tables))) {
+    throw std::system_error(error, "allocating the board");
+  }
+  shm::seal(board, shm::Seals::kFixedSize);
+  return board;
+}
+
+void log_findings(const rules::Diagnostics& diagnostics) {
+  for (const rules::Diagnostic& finding : diagnostics.items()) {
+    const auto level = finding.severity == rules::Severity::kError     ? log::level::err
+                       : finding.severity == rules::Severity::kWarning ? log::level::warn
+                                                                       : log::level::info;
+    log::log(level, "{}:{}:{}: {} [{}]", finding.where.file, finding.where.line,
+             finding.where.column, finding.message, finding.code);
+  }
+}
+
+}  // namespace
+
+Models::Models(rules::ModelFiles files, Directory& directory)
+    : files_(std::move(files)),
+      directory_(directory),
+      writable_(make_board()),
+      readable_(shm::reopen(writable_, O_RDONLY)),
+      mapping_(writable_, sizeof(shm::Board), shm::Access::kReadWrite),
+      writer_(*mapping_.as<shm::Board>()),
+      reader_(*mapping_.as<shm::Board>()) {
+  shm::TableWriter::initialize(*mapping_.as<shm::Board>());
+}
+
+void Models::prepare() {
+  rules::Diagnostics diagnostics;
+  rules::CompiledModel model;
+  try {
+    const rules::RuleSet rules = rules::load(files_, diagnostics);
+    if (!diagnostics.has_errors()) model = rules::compile(rules, diagnostics);
+  } catch (const rules::FileError& error) {
+    throw BadModel(error.what());
+  }
+  log_findings(diagnostics);
+  if (diagnostics.has_errors()) throw BadModel("the model has errors");
+  const std::uint64_t generation = writer_.next_generation();
+  std::vector<shm::Word> words;
+  try {
+    words = rules::flatten(model, {[&](const std::string& name) {
+                                     Source& source = directory_.source(name);
+                                     source.used_by_generation = generation;
+                                     return source.id;
+                                   },
+                                   [&](const std::string& name) {
+                                     InputName& input = directory_.input(name);
+                                     input.used_by_generation = generation;
+                                     return input.id;
+                                   }});
+  } catch (const std::length_error& error) {
+    throw BadModel(error.what());
+  }
+  if (const auto error =
+          shm::allocate(writable_, writer_.next_offset(), words.size() * sizeof(shm::Word))) {
+    throw std::system_error(error, "allocating a decision table");
+  }
+  writer_.write(words);
+}
+
+void Models::put_in_force() {
+  writer_.put_in_force();
+  directory_.set_generation(reader_.generation());
+}
+
+}  // namespace arbiter::service

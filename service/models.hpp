@@ -1,0 +1,48 @@
+// The model in force: read, proved, compiled and written into the board that all clients map.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "rules/load.hpp"
+#include "service/directory.hpp"
+#include "shm/segment.hpp"
+#include "shm/table_ring.hpp"
+
+namespace arbiter::service {
+
+// A model that was refused; the findings have been logged.
+class BadModel : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class Models {
+ public:
+  // Throws std::system_error.
+  Models(rules::ModelFiles files, Directory& directory);
+
+  // Reads the files and writes their table behind the ones in use; put_in_force() makes it count.
+  // Logs every finding. Throws BadModel, std::system_error; then nothing has changed.
+  void prepare();
+  void put_in_force();
+
+  [[nodiscard]] shm::TableSnapshot in_force() const { return reader_.snapshot(); }
+  [[nodiscard]] shm::TableView prepared() const { return writer_.next_table(); }
+  // Read-only, for clients.
+  [[nodiscard]] const shm::FileDescriptor& board() const { return readable_; }
+  [[nodiscard]] const rules::ModelFiles& files() const { return files_; }
+  [[nodiscard]] bool has_files() const { return !files_.models.empty() || files_.application; }
+
+ private:
+  rules::ModelFiles files_;
+  Directory& directory_;
+  shm::FileDescriptor writable_;
+  shm::FileDescriptor readable_;
+  shm::Mapping mapping_;
+  shm::TableWriter writer_;
+  shm::TableReader reader_;
+};
+
+}  // namespace arbiter::service

@@ -1,0 +1,62 @@
+// The live ports, as the daemon knows them: whose, where their segments are, who they are linked
+// with.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+
+#include "service/client.hpp"
+#include "service/directory.hpp"
+#include "shm/input_segment.hpp"
+#include "shm/output_segment.hpp"
+#include "shm/segment.hpp"
+
+namespace arbiter::service {
+
+struct OutputPort {
+  shm::PortInstance instance = 0;
+  Client* client = nullptr;
+  Source* source = nullptr;
+  shm::TypeInfo type;
+  shm::FileDescriptor segment;  // read-only
+  shm::Mapping mapping;
+  shm::OutputLayout layout;
+
+  [[nodiscard]] const shm::OutputHeader& header() const {
+    return *mapping.as<const shm::OutputHeader>();
+  }
+};
+
+struct InputPort {
+  shm::PortInstance instance = 0;
+  Client* client = nullptr;
+  InputName* name = nullptr;
+  shm::TypeInfo type;
+  shm::FileDescriptor segment;  // read-only
+  shm::FileDescriptor bell;     // its write end
+  shm::Mapping mapping;
+
+  [[nodiscard]] const shm::InputSegment& shared() const {
+    return *mapping.as<const shm::InputSegment>();
+  }
+};
+
+// Check what a client has handed over for a port: its segment and, for an input port, its bell.
+// Throw std::runtime_error saying what is wrong with it.
+std::unique_ptr<OutputPort> adopt_output(const shm::Received& open);
+std::unique_ptr<InputPort> adopt_input(const shm::Received& open);
+
+// How an output port and an input port stand to each other.
+enum class LinkKind {
+  kSensing,    // the input port's rules read the source, or its selection depends on it
+  kConnected,  // there is a connection
+  kLapsed,     // neither any more; the publisher still heeds what the input port holds
+};
+
+struct Link {
+  LinkKind kind = LinkKind::kSensing;
+  std::string mismatch;  // why they are not connected although there is a connection; else empty
+};
+
+}  // namespace arbiter::service

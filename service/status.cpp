@@ -1,0 +1,208 @@
+#include "service/status.hpp"
+
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+
+#include "shm/clock.hpp"
+#include "shm/decision.hpp"
+
+namespace arbiter::service {
+namespace {
+
+using nlohmann::json;
+
+std::uint64_t read(const shm::Atomic<std::uint64_t>& counter) {
+  return counter.load(std::memory_order_relaxed);
+}
+
+json type_json(const shm::TypeInfo& type) {
+  if (!type.is_typed()) return nullptr;
+  return {{"name", type.type_name()}, {"size", type.size}, {"alignment", type.alignment}};
+}
+
+json client_json(const Client& client) {
+  return {{"node", client.name}, {"pid", client.pid()}, {"user", client.user()}};
+}
+
+// What the publisher's and the receiver's segment say of one connection.
+json connection_counters(const OutputPort* output, const InputPort* input) {
+  json counters{{"accepted", 0}, {"discarded", 0}, {"refused", 0}, {"taken", 0},
+                {"dropped", 0},  {"overtaken", 0}, {"waiting", 0}};
+  if (output == nullptr || input == nullptr) return counters;
+  const shm::OutputSegment segment(output->mapping.data(), output->layout);
+  for (std::uint32_t i = 0; i < shm::kMaxDestinations; ++i) {
+    const shm::Channel& channel = segment.channel(i);
+    if (channel.receiver.load(std::memory_order_acquire) != input->instance) continue;
+    const std::uint64_t before = read(channel.first) - 1;
+    const std::uint64_t accepted = read(channel.accepted);
+    counters["accepted"] = accepted - before;
+    counters["discarded"] = read(channel.discarded);
+    counters["refused"] = read(channel.refused);
+    counters["depth"] = channel.depth.load(std::memory_order_relaxed);
+    for (const shm::Lane& lane : input->shared().lanes) {
+      if (lane.publisher.load(std::memory_order_acquire) != output->instance) continue;
+      const std::uint64_t consumed = std::max(read(lane.consumed), before);
+      counters["taken"] = read(lane.taken);
+      counters["dropped"] = read(lane.dropped);
+      counters["overtaken"] = read(lane.overtaken);
+      counters["waiting"] = accepted - std::min(consumed, accepted);
+    }
+  }
+  return counters;
+}
+
+class Document {
+ public:
+  Document(const StatusOf& of, shm::Nanoseconds now)
+      : of_(of), snapshot_(of.models.in_force()), now_(now) {}
+
+  json build() {
+    json document;
+    document["instance"] = of_.instance;
+    document["pid"] = getpid();
+    document["model"] = {
+        {"generation", snapshot_.generation},
+        {"files", of_.models.files().models},
+        {"application",
+         of_.models.files().application ? json(*of_.models.files().application) : json(nullptr)},
+        {"reloads_refused", of_.reloads_refused}};
+    document["clients"] = of_.clients;
+    document["sources"] = json::array();
+    for (const auto& source : of_.directory.sources()) {
+      if (is_worth_showing(*source)) document["sources"].push_back(source_json(*source));
+    }
+    document["inputs"] = json::array();
+    for (const auto& input : of_.directory.inputs()) {
+      if (input->open != 0 || snapshot_.table.knows_port(input->id)) {
+        document["inputs"].push_back(input_json(*input));
+      }
+    }
+    return document;
+  }
+
+ private:
+  [[nodiscard]] bool is_worth_showing(const Source& source) const {
+    return source.open != 0 || snapshot_.table.knows_source(source.id);
+  }
+
+  [[nodiscard]] bool is_active(const Source& source) const {
+    return shm::is_active(source.activity().load(std::memory_order_acquire), now_);
+  }
+
+  json source_json(const Source& source) const {
+    const shm::Nanoseconds timeout = snapshot_.table.timeout(source.id);
+    json result{{"name", source.name},
+                {"active", is_active(source)},
+                {"timeout_ns", timeout == shm::kForever ? json("forever") : json(timeout)}};
+    const OutputPort* output = of_.switchboard.output(source.open);
+    result["open"] = output != nullptr;
+    if (output == nullptr) return result;
+    const auto& counters = output->header().counters;
+    result["component"] = client_json(*output->client);
+    result["type"] = type_json(output->type);
+    result["published"] = read(counters.published);
+    result["signals"] = read(counters.signals);
+    result["delivered"] = read(counters.delivered);
+    result["discarded"] = read(counters.discarded);
+    result["refused"] = read(counters.refused);
+    result["blind"] = read(counters.blind);
+    result["unsettled"] = read(counters.unsettled);
+    result["no_slot"] = read(counters.no_slot);
+    return result;
+  }
+
+  json input_json(const InputName& name) {
+    const auto winner = winner_of(name.id);
+    const bool arbitrated = snapshot_.table.is_arbitrated(name.id);
+    json result{
+        {"name", name.name},
+        {"arbitrated", arbitrated},
+        {"idle", winner == shm::kNone},
+        {"winner", arbitrated && winner != shm::kNone ? json(of_.directory.sources()[winner]->name)
+                                                      : json(nullptr)},
+        {"connections", json::array()},
+        {"senses", json::array()}};
+    const InputPort* input = of_.switchboard.input(name.open);
+    result["open"] = input != nullptr;
+    if (input != nullptr) add_open(*input, result);
+    add_connections(name, input, winner, result);
+    return result;
+  }
+
+  static void add_open(const InputPort& input, json& result) {
+    const shm::InputHeader& header = input.shared().header;
+    result["component"] = client_json(*input.client);
+    result["type"] = type_json(input.type);
+    result["depth"] = header.depth;
+    result["keep"] = header.keep != 0;
+    result["when_full"] = header.refuse_new != 0 ? "refuse_new" : "drop_oldest";
+    result["taken"] = read(header.counters.taken);
+    result["dropped"] = read(header.counters.dropped);
+    result["overtaken"] = read(header.counters.overtaken);
+    result["blind"] = read(header.counters.blind);
+    result["unsettled"] = read(header.counters.unsettled);
+    result["misbehaved"] = read(header.counters.misbehaved);
+    result["idles"] = read(header.counters.idles);
+  }
+
+  void add_connections(const InputName& name, const InputPort* input, shm::SourceId winner,
+                       json& result) {
+    std::set<shm::SourceId> connected;
+    const auto range = snapshot_.table.connections_to(name.id);
+    for (auto index = range.first; index != range.first + range.count; ++index) {
+      const shm::SourceId id = snapshot_.table.rule(index).source;
+      const auto* source =
+          id < of_.directory.sources().size() ? of_.directory.sources()[id].get() : nullptr;
+      if (source == nullptr) continue;
+      connected.insert(id);
+      const OutputPort* output = of_.switchboard.output(source->open);
+      json connection = connection_counters(output, input);
+      connection["source"] = source->name;
+      connection["active"] = is_active(*source);
+      connection["winner"] = id == winner && snapshot_.table.is_arbitrated(name.id);
+      connection["state"] = output == nullptr && input == nullptr ? "both ends closed"
+                            : output == nullptr                   ? "output port closed"
+                            : input == nullptr                    ? "input port closed"
+                                                                  : "connected";
+      connection["mismatch"] = nullptr;
+      if (output != nullptr && input != nullptr) {
+        const auto link = of_.switchboard.links().find({output->instance, input->instance});
+        if (link != of_.switchboard.links().end() && !link->second.mismatch.empty()) {
+          connection["state"] = "mismatch";
+          connection["mismatch"] = link->second.mismatch;
+        }
+      }
+      result["connections"].push_back(std::move(connection));
+    }
+    const auto senses = snapshot_.table.sources_read(name.id);
+    for (shm::Word i = 0; i < senses.count; ++i) {
+      if (connected.count(senses[i]) != 0 || senses[i] >= of_.directory.sources().size()) continue;
+      const Source& source = *of_.directory.sources()[senses[i]];
+      result["senses"].push_back({{"source", source.name}, {"active", is_active(source)}});
+    }
+  }
+
+  [[nodiscard]] shm::SourceId winner_of(shm::PortId port) const {
+    shm::DecisionClock clock(now_, true);
+    shm::Decider decider(snapshot_.table, of_.directory.pages(), clock);
+    const auto range = snapshot_.table.connections_to(port);
+    for (auto index = range.first; index != range.first + range.count; ++index) {
+      const shm::Rule rule = snapshot_.table.rule(index);
+      if (decider.decide_with_own(rule) == shm::Verdict::kWins) return rule.source;
+    }
+    return shm::kNone;
+  }
+
+  const StatusOf& of_;
+  const shm::TableSnapshot snapshot_;
+  const shm::Nanoseconds now_;
+};
+
+}  // namespace
+
+std::string status_document(const StatusOf& of, shm::Nanoseconds now) {
+  return Document(of, now).build().dump(2) + "\n";
+}
+
+}  // namespace arbiter::service

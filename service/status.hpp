@@ -1,0 +1,24 @@
+// The status document: ports, connections, who is active, who wins, and the counters, as JSON.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "service/models.hpp"
+#include "service/switchboard.hpp"
+
+namespace arbiter::service {
+
+struct StatusOf {
+  const std::string& instance;
+  const Models& models;
+  const Directory& directory;
+  const Switchboard& switchboard;
+  std::size_t clients = 0;
+  std::uint64_t reloads_refused = 0;
+};
+
+// Reads segments that others are writing; every value is right for some moment of the call.
+std::string status_document(const StatusOf& of, shm::Nanoseconds now);
+
+}  // namespace arbiter::service

@@ -1,0 +1,253 @@
+#include "service/switchboard.hpp"
+
+#include "service/log.hpp"
+#include "shm/bell.hpp"
+
+namespace arbiter::service {
+namespace {
+
+shm::Message message_to(shm::MessageKind kind, shm::PortInstance port, shm::PortInstance peer,
+                        std::uint32_t id = 0) {
+  shm::Message message;
+  message.kind = kind;
+  message.port = port;
+  message.peer = peer;
+  message.id = id;
+  return message;
+}
+
+}  // namespace
+
+OutputPort& Switchboard::add(std::unique_ptr<OutputPort> port, Client& client, Source& source) {
+  port->instance = ++last_instance_;
+  port->client = &client;
+  port->source = &source;
+  source.open = port->instance;
+  client.ports.insert(port->instance);
+  return *(outputs_[port->instance] = std::move(port));
+}
+
+InputPort& Switchboard::add(std::unique_ptr<InputPort> port, Client& client, InputName& name) {
+  port->instance = ++last_instance_;
+  port->client = &client;
+  port->name = &name;
+  name.open = port->instance;
+  client.ports.insert(port->instance);
+  return *(inputs_[port->instance] = std::move(port));
+}
+
+void Switchboard::remove(shm::PortInstance port) {
+  for (auto link = links_.begin(); link != links_.end();) {
+    const auto [output, input] = link->first;
+    if (output != port && input != port) {
+      ++link;
+      continue;
+    }
+    const shm::PortInstance peer = output == port ? input : output;
+    Client& client = output == port ? *inputs_.at(peer)->client : *outputs_.at(peer)->client;
+    client.send(message_to(shm::MessageKind::kPeerGone, peer, port));
+    // A publisher may have died between delivering and ringing.
+    if (output == port) shm::ring_bell(inputs_.at(peer)->bell.get());
+    link = links_.erase(link);
+  }
+  if (const auto found = outputs_.find(port); found != outputs_.end()) {
+    found->second->source->open = 0;
+    found->second->client->ports.erase(port);
+    outputs_.erase(found);
+  }
+  if (const auto found = inputs_.find(port); found != inputs_.end()) {
+    found->second->name->open = 0;
+    found->second->client->ports.erase(port);
+    inputs_.erase(found);
+  }
+}
+
+void Switchboard::want_links(const OutputPort& output, const shm::TableView& table,
+                             Wanted& wanted) const {
+  const auto want = [&](shm::PortId id, LinkKind kind) {
+    const InputName* name = directory_.input_by_id(id);
+    if (name != nullptr && name->open != 0) wanted[{output.instance, name->open}] = kind;
+  };
+  const auto concerned = table.ports_concerned(output.source->id);
+  for (shm::Word i = 0; i < concerned.count; ++i) want(concerned[i], LinkKind::kSensing);
+  const auto connections = table.connections_of_source(output.source->id);
+  for (shm::Word i = 0; i < connections.count; ++i) {
+    want(table.rule(connections[i]).port, LinkKind::kConnected);
+  }
+}
+
+void Switchboard::want_links(const InputPort& input, const shm::TableView& table,
+                             Wanted& wanted) const {
+  const auto want = [&](shm::SourceId id, LinkKind kind) {
+    const Source* source = directory_.source_by_id(id);
+    if (source != nullptr && source->open != 0) wanted[{source->open, input.instance}] = kind;
+  };
+  const auto read = table.sources_read(input.name->id);
+  for (shm::Word i = 0; i < read.count; ++i) want(read[i], LinkKind::kSensing);
+  const auto range = table.connections_to(input.name->id);
+  for (auto index = range.first; index != range.first + range.count; ++index) {
+    want(table.rule(index).source, LinkKind::kConnected);
+  }
+}
+
+Switchboard::Told Switchboard::link_all(const shm::TableView& table) {
+  Told told;
+  Wanted wanted;
+  for (const auto& [instance, input] : inputs_) {
+    send_pages(*input->client, input->name->id, table, told);
+  }
+  for (const auto& [instance, output] : outputs_) {
+    send_pages(*output, table, told);
+    want_links(*output, table, wanted);
+  }
+  make_links(wanted, told);
+  return told;
+}
+
+Switchboard::Told Switchboard::link_one(const shm::TableView& table, shm::PortInstance port) {
+  Told told;
+  Wanted wanted;
+  if (const auto input = inputs_.find(port); input != inputs_.end()) {
+    send_pages(*input->second->client, input->second->name->id, table, told);
+    want_links(*input->second, table, wanted);
+  }
+  if (const auto output = outputs_.find(port); output != outputs_.end()) {
+    send_pages(*output->second, table, told);
+    want_links(*output->second, table, wanted);
+  }
+  make_links(wanted, told);
+  return told;
+}
+
+void Switchboard::make_links(const Wanted& wanted, Told& told) {
+  for (const auto& [key, kind] : wanted) {
+    const auto known = links_.find(key);
+    const bool stands = known != links_.end() && known->second.kind != LinkKind::kLapsed &&
+                        (known->second.kind == kind || kind == LinkKind::kSensing);
+    if (!stands) make_link(*outputs_.at(key.first), *inputs_.at(key.second), kind, told);
+  }
+}
+
+// A publisher decides for every port that its source concerns, so it needs all that their rules
+// read.
+void Switchboard::send_pages(const OutputPort& output, const shm::TableView& table, Told& told) {
+  const auto concerned = table.ports_concerned(output.source->id);
+  for (shm::Word i = 0; i < concerned.count; ++i) {
+    send_pages(*output.client, concerned[i], table, told);
+  }
+  const auto connections = table.connections_of_source(output.source->id);
+  for (shm::Word i = 0; i < connections.count; ++i) {
+    send_pages(*output.client, table.rule(connections[i]).port, table, told);
+  }
+}
+
+// A mismatch leaves the two linked as if the input port only sensed the source.
+void Switchboard::make_link(const OutputPort& output, const InputPort& input, LinkKind kind,
+                            Told& told) {
+  Link& link = links_[{output.instance, input.instance}];
+  link.kind = kind;
+  link.mismatch = kind == LinkKind::kConnected ? shm::type_mismatch(output.type, input.type) : "";
+  const bool connects = kind == LinkKind::kConnected && link.mismatch.empty();
+  if (!link.mismatch.empty()) {
+    log::warn("{} is not connected to {}: {}", output.source->name, input.name->name,
+              link.mismatch);
+  } else if (connects) {
+    log::debug("{} is connected to {}", output.source->name, input.name->name);
+  }
+  auto to_output =
+      message_to(shm::MessageKind::kInputPeer, output.instance, input.instance, input.name->id);
+  to_output.flags = connects ? shm::kIsConnected : 0u;
+  output.client->send(to_output, {input.segment.get(), input.bell.get()});
+  told.insert(output.client);
+  if (!connects) return;
+  input.client->send(
+      message_to(shm::MessageKind::kOutputPeer, input.instance, output.instance, output.source->id),
+      {output.segment.get(), -1});
+  told.insert(input.client);
+}
+
+Switchboard::Told Switchboard::unlink(const shm::TableView& table) {
+  Told told;
+  Wanted wanted;
+  for (const auto& [instance, output] : outputs_) want_links(*output, table, wanted);
+  for (auto& [key, link] : links_) {
+    const auto still = wanted.find(key);
+    const LinkKind kind = still == wanted.end() ? LinkKind::kLapsed : still->second;
+    if (kind == link.kind) continue;
+    const OutputPort& output = *outputs_.at(key.first);
+    const InputPort& input = *inputs_.at(key.second);
+    output.client->send(message_to(shm::MessageKind::kDisconnected, key.first, key.second));
+    input.client->send(message_to(shm::MessageKind::kDisconnected, key.second, key.first));
+    told.insert(output.client);
+    told.insert(input.client);
+    link = {kind, ""};
+  }
+  return told;
+}
+
+void Switchboard::send_pages(Client& client, shm::PortId port, const shm::TableView& table,
+                             Told& told) {
+  const auto send = [&](shm::SourceId id) {
+    const Source* source = directory_.source_by_id(id);
+    if (source == nullptr || !client.pages.insert(id).second) return;
+    send_page(client, *source);
+    told.insert(&client);
+  };
+  const auto read = table.sources_read(port);
+  for (shm::Word i = 0; i < read.count; ++i) send(read[i]);
+  const auto range = table.connections_to(port);
+  for (auto index = range.first; index != range.first + range.count; ++index) {
+    send(table.rule(index).source);
+  }
+}
+
+void Switchboard::send_page(Client& client, const Source& source) {
+  auto message = message_to(shm::MessageKind::kSourcePage, 0, 0, source.id);
+  message.set_name(source.name);
+  client.send(message, {source.readable.get(), -1});
+}
+
+void Switchboard::show_everything(Client& client) {
+  for (const auto& source : directory_.sources()) {
+    if (client.pages.insert(source->id).second) send_page(client, *source);
+  }
+  for (const auto& input : directory_.inputs()) {
+    auto message = message_to(shm::MessageKind::kPortName, 0, 0, input->id);
+    message.set_name(input->name);
+    client.send(message);
+  }
+}
+
+void Switchboard::refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
+  for (const LinkKey& key : {LinkKey{port, peer}, LinkKey{peer, port}}) {
+    const auto found = links_.find(key);
+    if (found == links_.end()) continue;
+    found->second.mismatch = why;
+    log::warn("{} is not connected to {}: {}", outputs_.at(key.first)->source->name,
+              inputs_.at(key.second)->name->name, why);
+  }
+}
+
+void Switchboard::ring_all() const {
+  for (const auto& [instance, input] : inputs_) shm::ring_bell(input->bell.get());
+}
+
+void Switchboard::ring_concerned(const shm::TableView& table, shm::SourceId source) const {
+  const auto concerned = table.ports_concerned(source);
+  for (shm::Word i = 0; i < concerned.count; ++i) {
+    const InputName* name = directory_.input_by_id(concerned[i]);
+    if (name != nullptr && name->open != 0) shm::ring_bell(inputs_.at(name->open)->bell.get());
+  }
+}
+
+const OutputPort* Switchboard::output(shm::PortInstance instance) const {
+  const auto found = outputs_.find(instance);
+  return found == outputs_.end() ? nullptr : found->second.get();
+}
+
+const InputPort* Switchboard::input(shm::PortInstance instance) const {
+  const auto found = inputs_.find(instance);
+  return found == inputs_.end() ? nullptr : found->second.get();
+}
+
+}  // namespace arbiter::service

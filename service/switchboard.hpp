@@ -1,0 +1,73 @@
+// Which live ports are linked, under the model in force, and telling their components so.
+//
+// Owns the live ports. Every change (a port opens or closes, a model comes into force) ends in
+// link(): it works out how things should stand and tells clients the difference, no more.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "service/ports.hpp"
+#include "shm/decision_table.hpp"
+
+namespace arbiter::service {
+
+class Switchboard {
+ public:
+  explicit Switchboard(Directory& directory) : directory_(directory) {}
+
+  using LinkKey = std::pair<shm::PortInstance, shm::PortInstance>;  // output, input
+  using Told = std::set<Client*>;  // clients that have news to take up
+
+  // A new port takes its place. The name must be free. Returns its instance.
+  OutputPort& add(std::unique_ptr<OutputPort> port, Client& client, Source& source);
+  InputPort& add(std::unique_ptr<InputPort> port, Client& client, InputName& name);
+  // A port closes or dies: its peers are told, its name is free.
+  void remove(shm::PortInstance port);
+
+  // Sends the pages, and makes the links, that a table asks for: all of them, or those of one
+  // port. Links that it does not ask for any more stay until unlink().
+  Told link_all(const shm::TableView& table);
+  Told link_one(const shm::TableView& table, shm::PortInstance port);
+  Told unlink(const shm::TableView& table);
+  // Sends a client every page and port name, for those who observe.
+  void show_everything(Client& client);
+  // A client could not take up a peer.
+  void refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
+  // Wakes every component that waits, to look anew.
+  void ring_all() const;
+  // Wakes those that a source concerns.
+  void ring_concerned(const shm::TableView& table, shm::SourceId source) const;
+
+  [[nodiscard]] const OutputPort* output(shm::PortInstance instance) const;
+  [[nodiscard]] const InputPort* input(shm::PortInstance instance) const;
+  [[nodiscard]] const std::map<shm::PortInstance, std::unique_ptr<OutputPort>>& outputs() const {
+    return outputs_;
+  }
+  [[nodiscard]] const std::map<shm::PortInstance, std::unique_ptr<InputPort>>& inputs() const {
+    return inputs_;
+  }
+  [[nodiscard]] const std::map<LinkKey, Link>& links() const { return links_; }
+
+ private:
+  using Wanted = std::map<LinkKey, LinkKind>;
+  void want_links(const OutputPort& output, const shm::TableView& table, Wanted& wanted) const;
+  void want_links(const InputPort& input, const shm::TableView& table, Wanted& wanted) const;
+  void make_links(const Wanted& wanted, Told& told);
+  void send_pages(const OutputPort& output, const shm::TableView& table, Told& told);
+  void make_link(const OutputPort& output, const InputPort& input, LinkKind kind, Told& told);
+  void send_pages(Client& client, shm::PortId port, const shm::TableView& table, Told& told);
+  void send_page(Client& client, const Source& source);
+
+  Directory& directory_;
+  shm::PortInstance last_instance_ = 0;
+  std::map<shm::PortInstance, std::unique_ptr<OutputPort>> outputs_;
+  std::map<shm::PortInstance, std::unique_ptr<InputPort>> inputs_;
+  std::map<LinkKey, Link> links_;
+};
+
+}  // namespace arbiter::service

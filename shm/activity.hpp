@@ -1,0 +1,56 @@
+// Activity of a source (paper, section III): "recently delivered data".
+//
+// One 64-bit word tells it, so that one load and one signed compare test it. Times are readings of
+// CLOCK_MONOTONIC in nanoseconds, below 2^62 (146 years).
+//
+//   word                    meaning                                  active at `now`
+//   0 .. 2^62-1             activity ends at this time (arrival + T)  word > now
+//   2^62 | arrival          active until deactivated (T = forever)    always
+//   negative, 2^63 | time   deactivated at this time                  never
+//
+// Invariants
+//  1. One writer: the component that has the source's output port open, or its successor.
+//  2. A value stands for one write: each kind carries its own time, so a reader that sees the same
+//     value twice knows that nothing happened in between (decision.hpp rests on this).
+#pragma once
+
+#include <cstdint>
+
+#include "shm/atomic.hpp"
+#include "shm/limits.hpp"
+
+namespace arbiter::shm {
+
+using Nanoseconds = std::int64_t;  // a point on, or a span of, CLOCK_MONOTONIC
+using ActivityWord = std::int64_t;
+
+inline constexpr Nanoseconds kForever = INT64_MAX;  // as a timeout T
+inline constexpr Nanoseconds kMaxTime =
+    (std::int64_t{1} << 61) - 1;                             // of a clock, and of a finite T
+inline constexpr Nanoseconds kDefaultTimeout = 500'000'000;  // T where no model says otherwise
+inline constexpr ActivityWord kForeverFlag = std::int64_t{1} << 62;
+inline constexpr ActivityWord kDeactivatedFlag = INT64_MIN;
+inline constexpr ActivityWord kNeverActive = 0;
+
+constexpr ActivityWord arrival(Nanoseconds at, Nanoseconds timeout) noexcept {
+  return timeout == kForever ? (kForeverFlag | at) : at + timeout;
+}
+constexpr ActivityWord deactivation(Nanoseconds at) noexcept { return kDeactivatedFlag | at; }
+
+constexpr bool is_active(ActivityWord word, Nanoseconds now) noexcept { return word > now; }
+
+// True where the passing of time alone can change what the word says.
+constexpr bool is_finite(ActivityWord word) noexcept { return word >= 0 && word < kForeverFlag; }
+
+// True where the word was surely written after the clock read `now`, given the source's T.
+constexpr bool is_newer_than(ActivityWord word, Nanoseconds timeout, Nanoseconds now) noexcept {
+  return is_finite(word) && timeout != kForever && word - timeout > now;
+}
+
+// The page that the daemon makes for each source; a page, because that is what the kernel protects.
+struct alignas(kPageSize) ActivityPage {
+  Atomic<ActivityWord> word{kNeverActive};
+};
+static_assert(sizeof(ActivityPage) == kPageSize);
+
+}  // namespace arbiter::shm

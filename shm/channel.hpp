@@ -1,0 +1,229 @@
+// The queue of one connection: an output port's channel, written by the publisher and read by one
+// input port, in two segments of which each side writes its own.
+//
+// Thread safety: ChannelWriter belongs to the publisher's thread, ChannelReader to the receiver's;
+// they may be in different processes, and either may stop or die anywhere. Both sides are
+// wait-free.
+//
+// Invariants
+//  1. Entry n lies at index (n - first) % depth of the ring; storing it takes entry n - depth out.
+//  2. A slot is written only while no ring has an entry of it and no receiver holds it.
+//  3. A receiver reads a slot only while it holds it, and it holds it only if the entry was still
+//  in the
+//     ring after the hold could be seen.
+//  4. A receiver reads only entries from `first` on, which the publisher stored when it had mapped
+//  the
+//     receiver's holds already.
+//
+// Why 2 and 3 fit together: the receiver stores its hold, passes fence (c), and reads the entry
+// again; the publisher overwrites the entry, passes fence (b), and reads the holds. Of the two
+// fences one comes first: either the receiver sees the entry gone and lets go, or the publisher
+// sees the hold and waits.
+#pragma once
+
+#include <cstdint>
+
+#include "shm/atomic.hpp"
+#include "shm/ids.hpp"
+#include "shm/input_segment.hpp"
+#include "shm/limits.hpp"
+#include "shm/output_segment.hpp"
+
+namespace arbiter::shm {
+
+inline constexpr std::uint32_t kNoSlot = 0xffffffff;
+
+class ChannelWriter {
+ public:
+  ChannelWriter() = default;
+  ChannelWriter(const OutputSegment& segment, std::uint32_t index) noexcept
+      : channel_(&segment.channel(index)), ring_(segment.ring(index)) {}
+
+  // Begins a queue for `receiver`, whose holds are mapped by now.
+  // SYNC POINT: channel-joined. The release pairs with the acquire in ChannelReader::join(): who
+  // finds itself named finds `first` and `depth`.
+  void join(PortInstance receiver, PortId port, std::uint32_t depth) noexcept {
+    depth_ = depth;
+    next_ = 0;
+    live_ = 0;
+    channel_->first.store(accepted_ + 1, std::memory_order_relaxed);
+    channel_->depth.store(depth, std::memory_order_relaxed);
+    channel_->port.store(port, std::memory_order_relaxed);
+    channel_->discarded.store(0, std::memory_order_relaxed);
+    channel_->refused.store(0, std::memory_order_relaxed);
+    channel_->receiver.store(receiver, std::memory_order_release);
+  }
+
+  // Ends it. Calls `evicted(slot)` for each entry that was in the queue. The receiver takes no new
+  // hold from fence (b) of the next publish on; it sees itself gone when it reads `receiver` again.
+  template <class Evicted>
+  void leave(Evicted evicted) noexcept {
+    channel_->receiver.store(0, std::memory_order_release);
+    for (; live_ != 0; --live_) {
+      next_ = (next_ == 0 ? depth_ : next_) - 1;
+      evicted(slot_of(ring_[next_].load(std::memory_order_relaxed)));
+    }
+  }
+
+  // Appends a sample; returns the slot of the one that gave way to it, or kNoSlot.
+  // SYNC POINT: entry-stored. The release pairs with the acquire in ChannelReader::peek(): who sees
+  // the entry sees the sample. Fence (b) must follow before the holds are read.
+  [[nodiscard]] std::uint32_t push(std::uint32_t slot) noexcept {
+    Atomic<Entry>& entry = ring_[next_];
+    std::uint32_t evicted = kNoSlot;
+    if (live_ == depth_) {
+      evicted = slot_of(entry.load(std::memory_order_relaxed));  // our own store
+    } else {
+      ++live_;
+    }
+    entry.store(make_entry(++accepted_ & kSequenceMask, slot), std::memory_order_release);
+    // SYNC POINT: backlog-counted. The release pairs with the acquire in
+    // ChannelReader::backlog_end().
+    channel_->accepted.store(accepted_, std::memory_order_release);
+    if (++next_ == depth_) next_ = 0;
+    return evicted;
+  }
+
+  // Whether `depth` samples wait, given the receiver's own word for how far it is. A receiver that
+  // lies harms nobody else: it is refused samples, or overtaken.
+  [[nodiscard]] bool is_full(std::uint64_t consumed) const noexcept {
+    return accepted_ - consumed >= depth_ && consumed <= accepted_;
+  }
+  [[nodiscard]] std::uint64_t accepted() const noexcept { return accepted_; }
+  [[nodiscard]] Channel& channel() const noexcept { return *channel_; }
+
+ private:
+  Channel* channel_ = nullptr;
+  Atomic<Entry>* ring_ = nullptr;
+  std::uint64_t accepted_ = 0;
+  std::uint32_t depth_ = 1;
+  std::uint32_t next_ = 0;  // index of the next entry
+  std::uint32_t live_ = 0;  // entries stored since join(), at most depth
+};
+
+class ChannelReader {
+ public:
+  enum class State : std::uint8_t { kUnjoined, kJoined, kLeft, kMisbehaved };
+
+  ChannelReader() = default;
+  ChannelReader(const OutputSegment& segment, PortInstance publisher, PortInstance self) noexcept
+      : segment_(segment), publisher_(publisher), self_(self) {}
+
+  // Looks whether the publisher has begun our queue. Cheap enough for every take.
+  // SYNC POINT: channel-joined (see ChannelWriter::join()).
+  bool join() noexcept {
+    for (std::uint32_t index = 0; index < kMaxDestinations; ++index) {
+      const Channel& channel = segment_.channel(index);
+      if (channel.receiver.load(std::memory_order_acquire) != self_) continue;
+      depth_ = channel.depth.load(std::memory_order_relaxed);
+      if (depth_ == 0 || depth_ > kMaxDepth) {
+        state_ = State::kMisbehaved;
+        return false;
+      }
+      next_ = channel.first.load(std::memory_order_relaxed) & kSequenceMask;
+      channel_ = &channel;
+      ring_ = segment_.ring(index);
+      position_ = 0;
+      state_ = State::kJoined;
+      return true;
+    }
+    return false;
+  }
+
+  // The oldest entry of the queue, or 0 if it is empty. `lost` grows by the entries that were
+  // overtaken. Bounded: a publisher that overtakes again and again is given up for this call.
+  [[nodiscard]] Entry peek(std::uint64_t& lost) noexcept {
+    if (state_ != State::kJoined) return 0;
+    for (int tries = 0; tries < kMaxTries; ++tries) {
+      // SYNC POINT: entry-stored (see ChannelWriter::push()).
+      const Entry entry = ring_[position_].load(std::memory_order_acquire);
+      const std::uint64_t ahead = (sequence_of(entry) - next_) & kSequenceMask;
+      if (ahead == 0) {
+        if (slot_of(entry) < segment_.layout().slot_count) return entry;
+        state_ = State::kMisbehaved;
+        return 0;
+      }
+      if (ahead > kSequenceMask / 2) return 0;  // an older one: nothing new yet
+      if (ahead % depth_ != 0) {
+        state_ = State::kMisbehaved;
+        return 0;
+      }
+      // Overtaken: the entry here is the newest, the oldest lies behind it.
+      const std::uint64_t gone = ahead - depth_ + 1;
+      lost += gone;
+      next_ = (next_ + gone) & kSequenceMask;
+      advance(1);
+    }
+    return 0;
+  }
+
+  // Announces a hold on the entry that peek() gave. False: it was overtaken, or the queue has
+  // ended. SYNC POINT: slot-held. Fence (c) pairs with fence (b) of publish().
+  [[nodiscard]] bool hold(Entry entry, Atomic<Hold>& word) noexcept {
+    word.store(make_hold(publisher_, slot_of(entry)), std::memory_order_relaxed);
+    full_fence();  // (c)
+    const bool named = channel_->receiver.load(std::memory_order_acquire) == self_;
+    if (named && ring_[position_].load(std::memory_order_acquire) == entry) return true;
+    release(word);
+    if (!named) state_ = State::kLeft;
+    return false;
+  }
+
+  // SYNC POINT: slot-released. The release pairs with the acquire in SlotPool::reclaim(): our reads
+  // of the slot come before the publisher writes it again.
+  static void release(Atomic<Hold>& word) noexcept { word.store(0, std::memory_order_release); }
+
+  // Done with the entry that peek() gave, taken or not.
+  void consume() noexcept {
+    next_ = (next_ + 1) & kSequenceMask;
+    advance(1);
+  }
+  [[nodiscard]] std::uint64_t consumed() const noexcept { return next_ - 1; }
+  [[nodiscard]] std::uint64_t next() const noexcept { return next_; }
+
+  // The sequence of the newest entry; all that came before a decision may be dropped by it, nothing
+  // that came after. SYNC POINT: backlog-counted (see ChannelWriter::push()).
+  [[nodiscard]] std::uint64_t backlog_end() const noexcept {
+    return state_ == State::kJoined
+               ? channel_->accepted.load(std::memory_order_acquire) & kSequenceMask
+               : next_ - 1;
+  }
+  // How many entries wait, given that end; at most the depth, whatever the publisher says.
+  [[nodiscard]] std::uint64_t backlog(std::uint64_t end) const noexcept {
+    const std::uint64_t count = (end + 1 - next_) & kSequenceMask;
+    return count > kSequenceMask / 2 ? 0 : (count < depth_ ? count : depth_);
+  }
+
+  // The arrival time of an entry that is not held, for ordering; sure only if the entry is still
+  // there. SYNC POINT: stamp-peeked. The acquire fence keeps the second look at the entry behind
+  // the load.
+  [[nodiscard]] bool peek_stamp(Entry entry, Nanoseconds& stamp) const noexcept {
+    stamp = segment_.slot_header(slot_of(entry)).stamp.load(std::memory_order_relaxed);
+    acquire_fence();
+    return ring_[position_].load(std::memory_order_relaxed) == entry;
+  }
+
+  [[nodiscard]] State state() const noexcept { return state_; }
+  [[nodiscard]] const OutputSegment& segment() const noexcept { return segment_; }
+  [[nodiscard]] PortInstance publisher() const noexcept { return publisher_; }
+
+ private:
+  static constexpr int kMaxTries = 64;
+
+  void advance(std::uint32_t by) noexcept {
+    position_ += by;
+    if (position_ >= depth_) position_ -= depth_;
+  }
+
+  const Channel* channel_ = nullptr;
+  const Atomic<Entry>* ring_ = nullptr;
+  std::uint64_t next_ = 1;      // sequence of the oldest entry that is not consumed
+  std::uint32_t position_ = 0;  // its index
+  std::uint32_t depth_ = 1;
+  State state_ = State::kUnjoined;
+  OutputSegment segment_;
+  PortInstance publisher_ = 0;
+  PortInstance self_ = 0;
+};
+
+}  // namespace arbiter::shm

@@ -1,0 +1,27 @@
+// Every bound of the shared memory, in one place. What runs into one is told its name.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace arbiter::shm {
+
+// g++ warns that std::hardware_destructive_interference_size may change with flags; a layout that
+// several programs share must not.
+inline constexpr std::size_t kCacheLine = 64;
+inline constexpr std::size_t kPageSize = 4096;
+
+inline constexpr std::uint32_t kMaxSourcesPerPort = 256;  // connected and sensed together
+inline constexpr std::uint32_t kMaxConnections = 4096;    // of one model
+inline constexpr std::uint32_t kMaxDestinations = 64;     // of one output port
+inline constexpr std::uint32_t kMaxSources = 8192;        // names of output ports, one instance
+inline constexpr std::uint32_t kMaxInputPorts = 4096;     // names of input ports, one instance
+inline constexpr std::uint32_t kMaxNodesPerConnection = 65536;  // of one decision diagram
+inline constexpr std::uint32_t kMaxTableWords = 4u << 20;       // one flat decision table, 16 MiB
+inline constexpr std::uint32_t kMaxNameLength = 255;            // bytes of a port's or node's name
+inline constexpr std::uint32_t kMaxDepth = 1024;                // samples queued on one connection
+inline constexpr std::uint32_t kMaxHeld = 64;                   // samples a component holds at once
+inline constexpr std::uint32_t kMaxLoans = 64;                  // samples being written at once
+inline constexpr std::uint32_t kMaxSlots = 65535;               // payload slots of one output port
+
+}  // namespace arbiter::shm

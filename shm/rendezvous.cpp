@@ -1,0 +1,179 @@
+#include "shm/rendezvous.hpp"
+
+#include <fcntl.h>
+#include <pwd.h>
+#include <sys/file.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+#include <system_error>
+
+namespace arbiter::shm {
+namespace {
+
+constexpr const char* kSystemDirectory = "/run/arbiter";
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? std::string() : std::string(value);
+}
+
+std::string temporary_directory(uid_t user) {
+  const std::string base = environment("TMPDIR");
+  return (base.empty() ? "/tmp" : base) + "/arbiter-" + std::to_string(user);
+}
+
+[[noreturn]] void fail(const std::string& what) {
+  throw std::runtime_error(what + ": " + std::generic_category().message(errno));
+}
+
+// Whoever may write in the directory could put a socket of his own there.
+void require_safe(const std::string& directory) {
+  struct stat status {};
+  if (lstat(directory.c_str(), &status) != 0) fail("cannot look at " + directory);
+  if (!S_ISDIR(status.st_mode)) throw std::runtime_error(directory + " is not a directory");
+  if (status.st_uid != geteuid()) {
+    throw std::runtime_error(directory + " belongs to user " + std::to_string(status.st_uid) +
+                             "; set RUNTIME_DIRECTORY to a directory of your own");
+  }
+  if ((status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
+    throw std::runtime_error("others may write in " + directory + "; run: chmod go-w " + directory);
+  }
+}
+
+std::string make_safe(const std::string& directory) {
+  if (mkdir(directory.c_str(), 0755) != 0 && errno != EEXIST) fail("cannot make " + directory);
+  require_safe(directory);
+  return directory;
+}
+
+bool may_use_system_directory() {
+  if (mkdir(kSystemDirectory, 0755) == 0) return true;
+  struct stat status {};
+  return errno == EEXIST && lstat(kSystemDirectory, &status) == 0 && S_ISDIR(status.st_mode) &&
+         status.st_uid == geteuid();
+}
+
+std::optional<uid_t> arbiter_user() {
+  passwd entry{};
+  passwd* found = nullptr;
+  std::vector<char> buffer(4096);
+  if (getpwnam_r("arbiter", &entry, buffer.data(), buffer.size(), &found) != 0) return {};
+  if (found == nullptr) return {};
+  return entry.pw_uid;
+}
+
+// An address for a path of any length: a long one goes by way of its directory's descriptor.
+struct Address {
+  sockaddr_un address{};
+  FileDescriptor directory;
+};
+
+Address address_of(const std::string& directory, const std::string& file) {
+  Address result;
+  result.address.sun_family = AF_UNIX;
+  std::string path = directory + "/" + file;
+  if (path.size() >= sizeof result.address.sun_path) {
+    result.directory.reset(open(directory.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+    path = "/proc/self/fd/" + std::to_string(result.directory.get()) + "/" + file;
+  }
+  std::memcpy(result.address.sun_path, path.c_str(), path.size() + 1);
+  return result;
+}
+
+FileDescriptor make_socket() {
+  FileDescriptor made(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+  if (!made) fail("cannot make a socket");
+  return made;
+}
+
+}  // namespace
+
+std::string instance_name(const std::string& given) {
+  std::string name = given.empty() ? environment("ARBITER_INSTANCE") : given;
+  if (name.empty()) name = kDefaultInstance;
+  const bool fine = name.size() <= 64 && name[0] != '.' &&
+                    std::all_of(name.begin(), name.end(), [](unsigned char c) {
+                      return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
+                    });
+  if (!fine) {
+    throw std::invalid_argument("\"" + name +
+                                "\" is not a name for an instance: use 1 to 64 letters, digits, "
+                                "'_', '-' or '.', not beginning with '.'");
+  }
+  return name;
+}
+
+std::string daemon_directory() {
+  const std::string given = environment("RUNTIME_DIRECTORY");
+  if (!given.empty()) return make_safe(given.substr(0, given.find(':')));
+  const std::string session = environment("XDG_RUNTIME_DIR");
+  if (!session.empty()) return make_safe(session + "/arbiter");
+  if (may_use_system_directory()) return make_safe(kSystemDirectory);
+  return make_safe(temporary_directory(geteuid()));
+}
+
+std::vector<std::string> client_directories() {
+  std::vector<std::string> directories;
+  const auto add = [&](std::string directory) {
+    if (std::find(directories.begin(), directories.end(), directory) == directories.end()) {
+      directories.push_back(std::move(directory));
+    }
+  };
+  const std::string given = environment("RUNTIME_DIRECTORY");
+  if (!given.empty()) add(given.substr(0, given.find(':')));
+  const std::string session = environment("XDG_RUNTIME_DIR");
+  if (!session.empty()) add(session + "/arbiter");
+  add(kSystemDirectory);
+  add(temporary_directory(geteuid()));
+  add(temporary_directory(0));
+  if (const auto user = arbiter_user()) add(temporary_directory(*user));
+  return directories;
+}
+
+Listener listen_at(const std::string& directory, const std::string& instance) {
+  Listener listener;
+  listener.path = directory + "/" + instance + ".sock";
+  const std::string lock_path = directory + "/" + instance + ".lock";
+  listener.lock.reset(open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
+  if (!listener.lock) fail("cannot open " + lock_path);
+  if (flock(listener.lock.get(), LOCK_EX | LOCK_NB) != 0) {
+    throw std::runtime_error("a daemon of instance \"" + instance + "\" is running already (" +
+                             listener.path + "); choose another name with --instance");
+  }
+  unlink(listener.path.c_str());  // left by a daemon that was killed: the lock says nobody has it
+  listener.socket = make_socket();
+  const Address at = address_of(directory, instance + ".sock");
+  const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
+  if (bind(listener.socket.get(), address, sizeof at.address) != 0) {
+    fail("cannot listen at " + listener.path);
+  }
+  if (chmod(listener.path.c_str(), 0666) != 0) fail("cannot open up " + listener.path);
+  if (listen(listener.socket.get(), SOMAXCONN) != 0) fail("cannot listen at " + listener.path);
+  return listener;
+}
+
+std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not) {
+  for (const std::string& directory : client_directories()) {
+    FileDescriptor socket = make_socket();
+    const Address at = address_of(directory, instance + ".sock");
+    const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
+    if (connect(socket.get(), address, sizeof at.address) != 0) continue;
+    ucred peer{};
+    socklen_t size = sizeof peer;
+    if (getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) continue;
+    if (peer.uid == 0 || peer.uid == geteuid() || peer.uid == arbiter_user()) return socket;
+    why_not = "the daemon in " + directory + " runs as user " + std::to_string(peer.uid) +
+              ", who is neither root, nor \"arbiter\", nor you";
+  }
+  return {};
+}
+
+}  // namespace arbiter::shm

@@ -1,0 +1,39 @@
+// Where a daemon and its clients meet: a socket in a runtime directory, one for each instance.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "shm/file_descriptor.hpp"
+
+namespace arbiter::shm {
+
+inline constexpr const char* kDefaultInstance = "default";
+
+// `given`, else $ARBITER_INSTANCE, else "default". Throws std::invalid_argument unless it is 1 to
+// 64 letters, digits, '_', '-' or '.', not beginning with '.'.
+std::string instance_name(const std::string& given);
+
+// The daemon's directory, made if need be: $RUNTIME_DIRECTORY (the first of several), else
+// $XDG_RUNTIME_DIR/arbiter, else /run/arbiter if we may write there, else arbiter-UID in $TMPDIR or
+// /tmp. Throws std::runtime_error where it is not ours, or others may write in it.
+std::string daemon_directory();
+
+// The directories in which a client looks, in this order.
+std::vector<std::string> client_directories();
+
+// A listening socket at DIRECTORY/INSTANCE.sock that every user may connect to. Holds a lock beside
+// it for as long as the result lives; throws std::runtime_error if another daemon has it.
+struct Listener {
+  FileDescriptor lock;
+  FileDescriptor socket;
+  std::string path;
+};
+Listener listen_at(const std::string& directory, const std::string& instance);
+
+// Connects to the instance's daemon, if one listens in any of the directories. One that runs as
+// neither root, nor the user `arbiter`, nor this user is not trusted; `why_not` then says so.
+std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not);
+
+}  // namespace arbiter::shm

@@ -1,0 +1,90 @@
+#include "shm/segment.hpp"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <stdexcept>
+#include <string>
+
+#include <boost/interprocess/exceptions.hpp>
+
+namespace arbiter::shm {
+namespace {
+
+[[noreturn]] void fail(const char* what) {
+  throw std::system_error(errno, std::generic_category(), what);
+}
+
+// What Boost.Interprocess maps: anything that tells a mapping handle.
+class MemoryMappable {
+ public:
+  explicit MemoryMappable(int fd) noexcept : handle_{fd, false} {}
+  [[nodiscard]] boost::interprocess::mapping_handle_t get_mapping_handle() const { return handle_; }
+
+ private:
+  boost::interprocess::mapping_handle_t handle_;
+};
+
+constexpr int seal_bits(Seals seals) {
+  const int fixed = F_SEAL_SHRINK | F_SEAL_GROW;
+  return seals == Seals::kOneWriter ? fixed | F_SEAL_FUTURE_WRITE : fixed;
+}
+
+}  // namespace
+
+FileDescriptor make_segment(const char* name, std::size_t size) {
+  FileDescriptor segment(memfd_create(name, MFD_CLOEXEC | MFD_ALLOW_SEALING));
+  if (!segment) fail("memfd_create");
+  if (fchmod(segment.get(), 0644) != 0) fail("fchmod of a segment");
+  if (ftruncate(segment.get(), static_cast<off_t>(size)) != 0) fail("ftruncate of a segment");
+  return segment;
+}
+
+void seal(const FileDescriptor& segment, Seals seals) {
+  if (fcntl(segment.get(), F_ADD_SEALS, seal_bits(seals) | F_SEAL_SEAL) != 0) {
+    fail("sealing a segment");
+  }
+}
+
+std::error_code allocate(const FileDescriptor& segment, std::size_t offset,
+                         std::size_t bytes) noexcept {
+  while (fallocate(segment.get(), 0, static_cast<off_t>(offset), static_cast<off_t>(bytes)) != 0) {
+    if (errno != EINTR) return {errno, std::generic_category()};
+  }
+  return {};
+}
+
+FileDescriptor reopen(const FileDescriptor& segment, int flags) {
+  const std::string path = "/proc/self/fd/" + std::to_string(segment.get());
+  FileDescriptor opened(::open(path.c_str(), flags | O_CLOEXEC));
+  if (!opened) fail("reopening a descriptor");
+  return opened;
+}
+
+std::size_t checked_size(const FileDescriptor& segment, Seals wanted) {
+  const int seals = fcntl(segment.get(), F_GET_SEALS);
+  if (seals < 0) throw std::runtime_error("the descriptor is not a memfd");
+  if ((seals & seal_bits(wanted)) != seal_bits(wanted)) {
+    throw std::runtime_error("the segment is not sealed as it must be");
+  }
+  struct stat status {};
+  if (fstat(segment.get(), &status) != 0) fail("fstat of a segment");
+  return static_cast<std::size_t>(status.st_size);
+}
+
+Mapping::Mapping(const FileDescriptor& segment, std::size_t size, Access access) {
+  namespace bip = boost::interprocess;
+  try {
+    bip::mapped_region region(MemoryMappable(segment.get()),
+                              access == Access::kReadOnly ? bip::read_only : bip::read_write, 0,
+                              size);
+    region_.swap(region);
+  } catch (const bip::interprocess_exception& error) {
+    throw std::system_error(error.get_native_error(), std::generic_category(), "mapping a segment");
+  }
+  if (access == Access::kReadWrite) madvise(data(), this->size(), MADV_DONTFORK);
+}
+
+}  // namespace arbiter::shm

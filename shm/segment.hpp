@@ -1,0 +1,68 @@
+// Memory shared between processes: made by its one writer, sealed, and handed on to be read.
+//
+// A segment is a memfd: it has no name to leak or to guess, and lives as long as somebody maps it
+// or holds its descriptor. Two kinds of owners:
+//   - a component's own segment is sealed once its owner has mapped it: nobody, not even the owner,
+//     can shrink or grow it, nor make another writable mapping (F_SEAL_FUTURE_WRITE);
+//   - what must pass to a successor (the daemon's board, the activity pages) stays unsealed against
+//     writing, belongs to the daemon, and is handed out read-only except to its one writer.
+#pragma once
+
+#include <cstddef>
+#include <system_error>
+
+#include <boost/interprocess/mapped_region.hpp>
+
+#include "shm/file_descriptor.hpp"
+
+namespace arbiter::shm {
+
+enum class Seals {
+  kFixedSize,  // cannot shrink or grow
+  kOneWriter,  // and cannot be mapped writable again
+};
+
+// Makes a zeroed memfd, `size` bytes long, mode 0644. Its memory is allocated as it is touched;
+// call allocate() for what must never fault. Throws std::system_error.
+FileDescriptor make_segment(const char* name, std::size_t size);
+
+// Throws std::system_error.
+void seal(const FileDescriptor& segment, Seals seals);
+
+// Allocates the memory of a byte range now, so that using it later cannot fail for want of memory.
+[[nodiscard]] std::error_code allocate(const FileDescriptor& segment, std::size_t offset,
+                                       std::size_t bytes) noexcept;
+
+// Opens the same segment anew, read-only or read-write, as far as its mode lets this user.
+// Throws std::system_error.
+FileDescriptor reopen(const FileDescriptor& segment, int flags);
+
+// The size of a segment that somebody else made, once it is sure that it is a memfd that can
+// neither shrink nor grow under us, nor be written by anyone but its owner. Throws
+// std::runtime_error with what is wrong with it.
+std::size_t checked_size(const FileDescriptor& segment, Seals wanted);
+
+enum class Access { kReadOnly, kReadWrite };
+
+// A mapping of a whole segment. Writable ones are not inherited by a fork: a child that ran on with
+// them would be a second writer.
+class Mapping {
+ public:
+  Mapping() = default;
+  // Throws std::system_error.
+  Mapping(const FileDescriptor& segment, std::size_t size, Access access);
+
+  [[nodiscard]] std::byte* data() const noexcept {
+    return static_cast<std::byte*>(region_.get_address());
+  }
+  [[nodiscard]] std::size_t size() const noexcept { return region_.get_size(); }
+  template <class T>
+  [[nodiscard]] T* as(std::size_t offset = 0) const noexcept {
+    return reinterpret_cast<T*>(data() + offset);
+  }
+
+ private:
+  boost::interprocess::mapped_region region_;
+};
+
+}  // namespace arbiter::shm

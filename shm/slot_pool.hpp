@@ -1,0 +1,92 @@
+// Which payload slots of an output port are free. Private to the publisher; nothing of it is
+// shared.
+//
+// A slot goes round: free -> loaned -> in queues -> retired -> free. It is retired when the last
+// ring entry of it is overwritten, and becomes free once no receiver holds it.
+//
+// Invariant: with at least (sum of the queues' depths) + (sum of the receivers' max_held) + (loans)
+// slots, acquire() always finds one: at worst every queue is full of samples of its own, every
+// receiver holds as many others, and the other loans are out.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "shm/atomic.hpp"
+#include "shm/channel.hpp"
+#include "shm/input_segment.hpp"
+
+namespace arbiter::shm {
+
+class SlotPool {
+ public:
+  // Slots up to `count` may be used from now on.
+  void grow(std::uint32_t count) {
+    const auto before = static_cast<std::uint32_t>(references_.size());
+    if (count <= before) return;
+    references_.resize(count);
+    free_.reserve(count);
+    retired_.reserve(count);
+    held_.reserve(kMaxHeld * kMaxDestinations);
+    for (std::uint32_t slot = count; slot-- > before;) free_.push_back(slot);
+  }
+
+  // A free slot, or kNoSlot. `for_each_holds(f)` calls f(const Atomic<Hold>* holds, count) for
+  // every receiver that may hold slots of `publisher`. A fence (b) stands between the last evict()
+  // and this.
+  template <class ForEachHolds>
+  [[nodiscard]] std::uint32_t acquire(PortInstance publisher, ForEachHolds for_each_holds) {
+    if (free_.empty()) reclaim(publisher, for_each_holds);
+    if (free_.empty()) return kNoSlot;
+    const std::uint32_t slot = free_.back();
+    free_.pop_back();
+    return slot;
+  }
+
+  void add_reference(std::uint32_t slot) noexcept { ++references_[slot]; }
+  // One queue has let go of the slot.
+  void evict(std::uint32_t slot) {
+    if (--references_[slot] == 0) retired_.push_back(slot);
+  }
+  // A loan ended: back to the free slots if no queue took it.
+  void end_loan(std::uint32_t slot) {
+    if (references_[slot] == 0) free_.push_back(slot);
+  }
+
+  [[nodiscard]] std::uint32_t size() const noexcept {
+    return static_cast<std::uint32_t>(references_.size());
+  }
+  [[nodiscard]] std::size_t free_count() const noexcept { return free_.size(); }
+  [[nodiscard]] std::size_t retired_count() const noexcept { return retired_.size(); }
+
+ private:
+  template <class ForEachHolds>
+  void reclaim(PortInstance publisher, ForEachHolds for_each_holds) {
+    held_.clear();
+    for_each_holds([&](const Atomic<Hold>* holds, std::uint32_t count) {
+      for (std::uint32_t i = 0; i < count; ++i) {
+        // SYNC POINT: slot-released (see ChannelReader::release()).
+        const Hold hold = holds[i].load(std::memory_order_acquire);
+        if (publisher_of(hold) == publisher) held_.push_back(slot_of(hold));
+      }
+    });
+    std::size_t kept = 0;
+    for (const std::uint32_t slot : retired_) {
+      bool held = false;
+      for (const std::uint32_t other : held_) held = held || other == slot;
+      if (held) {
+        retired_[kept++] = slot;
+      } else {
+        free_.push_back(slot);
+      }
+    }
+    retired_.resize(kept);
+  }
+
+  std::vector<std::uint32_t> references_;  // by slot: ring entries that name it
+  std::vector<std::uint32_t> free_;
+  std::vector<std::uint32_t> retired_;
+  std::vector<std::uint32_t> held_;  // scratch
+};
+
+}  // namespace arbiter::shm

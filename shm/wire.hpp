@@ -1,0 +1,113 @@
+// What the daemon and its clients say to each other, over a Unix socket that keeps messages apart.
+//
+// Nothing of it is on the data path: messages carry names and descriptors when ports open and close
+// and when models change. A message is plain data of one layout; fields that a kind does not name
+// are zero.
+//
+// A client opens a port:   kOpenOutput / kOpenInput  ->
+//                          <- kOpened (or kRefused), kSourcePage…, kInputPeer… / kOutputPeer…,
+//                          kConnected
+// kConnected says that the peers have mapped the new port too, or were given up waiting for.
+//
+// The daemon changes what a client sees: kSourcePage…, kInputPeer…, then kSync; the client answers
+// kSynced when it has taken up all that came before.
+#pragma once
+
+#include <sys/types.h>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "shm/activity.hpp"
+#include "shm/file_descriptor.hpp"
+#include "shm/ids.hpp"
+#include "shm/limits.hpp"
+#include "shm/type_info.hpp"
+
+namespace arbiter::shm {
+
+inline constexpr std::uint32_t kWireVersion = 1;
+
+enum class MessageKind : std::uint32_t {
+  // From a client.
+  kHello = 1,    // name, flags (kHasServiceThread); value = kWireVersion
+  kOpenOutput,   // name, type; descriptor: its segment
+  kOpenInput,    // name, type; descriptors: its segment, its bell
+  kClosePort,    // port
+  kSynced,       // request: that of the kSync
+  kStatus,       // ask for a status document
+  kDeactivate,   // name: a source whose process is gone
+  kObserve,      // send every page and every port name, now and as they come
+  kPeerRefused,  // port, peer, text: the client could not take up a peer, for status
+
+  // From the daemon.
+  kWelcome = 100,  // descriptor: the board, read-only
+  kOpened,         // port: its instance; id: its source or port id; descriptor: an output's page
+  kConnected,
+  kRefused,     // text: why
+  kSourcePage,  // id, name: a source; descriptor: its activity page, read-only
+  kPortName,    // id, name: an input port
+  kOutputPeer,  // to input `port`: peer, id = source; descriptor: its segment
+  kInputPeer,   // to output `port`: peer, id = port id, flags (kIsConnected); descriptors: segment,
+                // bell
+  kPeerGone,    // `port` has lost `peer`: closed or dead
+  kDisconnected,  // `port` is no longer connected to `peer`, which lives: the model has changed
+  kSync,
+  kStatusReply,  // descriptor: a memfd with JSON
+  kDone,
+};
+
+enum MessageFlag : std::uint32_t {
+  kHasServiceThread = 1,
+  kIsConnected = 2,  // else the input port only senses the output port
+};
+
+struct Message {
+  MessageKind kind = MessageKind::kHello;
+  std::uint32_t flags = 0;
+  std::uint64_t request = 0;  // a reply bears that of its question
+  PortInstance port = 0;      // of the receiver of the message
+  PortInstance peer = 0;
+  std::uint32_t id = 0;
+  std::uint32_t value = 0;
+  TypeInfo type;
+  char name[kMaxNameLength + 1] = {};
+  char text[1024] = {};
+
+  [[nodiscard]] std::string_view name_view() const noexcept {
+    return {name, strnlen(name, kMaxNameLength)};
+  }
+  [[nodiscard]] std::string_view text_view() const noexcept {
+    return {text, strnlen(text, sizeof text - 1)};
+  }
+  void set_name(std::string_view value_text) noexcept { copy(value_text, name, sizeof name); }
+  void set_text(std::string_view value_text) noexcept { copy(value_text, text, sizeof text); }
+
+ private:
+  static void copy(std::string_view from, char* to, std::size_t capacity) noexcept {
+    const std::size_t length = from.size() < capacity - 1 ? from.size() : capacity - 1;
+    std::memcpy(to, from.data(), length);
+    to[length] = '\0';
+  }
+};
+
+inline constexpr std::size_t kMaxDescriptors = 2;
+
+struct Received {
+  Message message;
+  std::array<FileDescriptor, kMaxDescriptors> descriptors;
+  std::size_t descriptor_count = 0;
+};
+
+enum class SendResult { kSent, kFull, kClosed };
+enum class ReceiveResult { kReceived, kNothing, kClosed, kMalformed };
+
+// Non-blocking unless the socket blocks. Never raises SIGPIPE.
+[[nodiscard]] SendResult send_message(int socket, const Message& message,
+                                      std::array<int, kMaxDescriptors> descriptors = {-1,
+                                                                                      -1}) noexcept;
+[[nodiscard]] ReceiveResult receive_message(int socket, Received& received, bool wait) noexcept;
+
+}  // namespace arbiter::shm

@@ -1,0 +1,304 @@
+#include "rules/compile.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/rules/rules_by_hand.hpp"
+#include "tests/support/live_table.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using rules::Diagnostics;
+using rules::Severity;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+std::string source_name(std::size_t i) { return "/s" + std::to_string(1000 + i); }
+
+// s0 is inhibited by s1 and all after it, and so on: the priorities of the paper.
+std::vector<std::pair<std::string, ExpressionPtr>> priority_chain(std::size_t count) {
+  std::vector<std::pair<std::string, ExpressionPtr>> rules;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::vector<ExpressionPtr> literals;
+    for (std::size_t j = i + 1; j < count; ++j) literals.push_back(inactive(source_name(j)));
+    rules.emplace_back(source_name(i), all_of(std::move(literals)));
+  }
+  return rules;
+}
+
+std::vector<std::string> codes(const Diagnostics& diagnostics) {
+  std::vector<std::string> result;
+  for (const auto& item : diagnostics.items()) result.push_back(item.code);
+  return result;
+}
+
+TEST(Compile, ASourceWithoutConditionAlwaysWins) {
+  Diagnostics diagnostics;
+  const auto model = compile(RulesByHand().port("/p", {{"/a", always()}}), diagnostics);
+  EXPECT_TRUE(diagnostics.items().empty());
+  EXPECT_EQ(model.ports.at(0).rules.at(0).kind, shm::table::kAlways);
+}
+
+TEST(Compile, AConjunctionListsTheActivityThatEachSourceMustHave) {
+  Diagnostics diagnostics;
+  const auto model = compile(
+      RulesByHand().port("/p", {{"/a", all_of({inactive("/b"), active("/c")})}}), diagnostics);
+  const auto& rule = model.ports.at(0).rules.at(0);
+  EXPECT_EQ(rule.kind, shm::table::kConjunction);
+  EXPECT_THAT(rule.reads, ElementsAre("/b", "/c"));
+  EXPECT_THAT(rule.expected, ElementsAre(false, true));
+}
+
+TEST(Compile, APortReadsWhatIsWrittenInItsRulesEvenWhereItCannotMatter) {
+  Diagnostics diagnostics;
+  const auto redundant = any_of({active("/c"), inactive("/c")});
+  const auto model =
+      compile(RulesByHand().port("/p", {{"/b", all_of({redundant, inactive("/a")})}}), diagnostics);
+  EXPECT_THAT(model.ports.at(0).reads, ElementsAre("/a", "/c"));
+  EXPECT_THAT(model.ports.at(0).rules.at(0).reads, ElementsAre("/a"));
+}
+
+TEST(Compile, APortDoesNotReadASourceThatIsOnlyConnected) {
+  Diagnostics diagnostics;
+  const auto model =
+      compile(RulesByHand().port("/p", {{"/a", inactive("/b")}, {"/b", always()}}), diagnostics);
+  EXPECT_THAT(model.ports.at(0).reads, ElementsAre("/b"));
+}
+
+TEST(Compile, WithConflictFirstALaterRuleReadsTheEarlierSources) {
+  Diagnostics diagnostics;
+  const auto model =
+      compile(RulesByHand().port("/p", {{"/a", always()}, {"/b", always()}}, true), diagnostics);
+  EXPECT_TRUE(diagnostics.items().empty());
+  EXPECT_THAT(model.ports.at(0).reads, ElementsAre("/a"));
+  EXPECT_THAT(model.ports.at(0).rules.at(1).reads, ElementsAre("/a"));
+  EXPECT_THAT(model.ports.at(0).rules.at(1).expected, ElementsAre(false));
+}
+
+TEST(Compile, AConnectionWithoutARuleNeverDeliversAtAnArbitratedPort) {
+  Diagnostics diagnostics;
+  const auto model =
+      compile(RulesByHand().port("/p", {{"/a", always()}}).other("/x", "/p"), diagnostics);
+  ASSERT_EQ(model.ports.size(), 1u);
+  EXPECT_EQ(model.ports[0].rules.at(1).source, "/x");
+  EXPECT_EQ(model.ports[0].rules.at(1).kind, shm::table::kNever);
+  EXPECT_THAT(model.sources, ElementsAre("/a", "/x"));
+}
+
+TEST(Compile, APortThatNoRuleMentionsDeliversEverything) {
+  Diagnostics diagnostics;
+  const auto model =
+      compile(RulesByHand().port("/q", {{"/a", always()}}).other("/x", "/p").other("/a", "/p"),
+              diagnostics);
+  ASSERT_EQ(model.ports.size(), 2u);
+  EXPECT_EQ(model.ports[0].port, "/p");
+  EXPECT_FALSE(model.ports[0].arbitrated);
+  EXPECT_EQ(model.ports[0].rules.at(0).kind, shm::table::kAlways);
+  EXPECT_EQ(model.ports[0].rules.at(1).kind, shm::table::kAlways);
+  EXPECT_TRUE(model.ports[1].arbitrated);
+}
+
+TEST(Compile, AnEmptyModelIsAModelWithoutPorts) {
+  Diagnostics diagnostics;
+  const auto model = compile(rules::RuleSet{}, diagnostics);
+  EXPECT_TRUE(diagnostics.items().empty());
+  EXPECT_TRUE(model.ports.empty());
+  EXPECT_EQ(model.timeout, shm::kDefaultTimeout);
+}
+
+TEST(Compile, WarnsOfARuleThatNothingSatisfies) {
+  Diagnostics diagnostics;
+  compile(RulesByHand().port("/p", {{"/a", all_of({active("/b"), inactive("/b")})}}), diagnostics);
+  ASSERT_THAT(codes(diagnostics), ElementsAre("never-selected"));
+  EXPECT_EQ(diagnostics.items()[0].severity, Severity::kWarning);
+  EXPECT_EQ(diagnostics.items()[0].where.line, 2u);
+  EXPECT_FALSE(diagnostics.has_errors());
+}
+
+TEST(Compile, WarnsOfARuleThatWantsItsOwnSourceInactive) {
+  Diagnostics diagnostics;
+  compile(RulesByHand().port("/p", {{"/a", inactive("/a")}}), diagnostics);
+  EXPECT_THAT(codes(diagnostics), ElementsAre("never-selected"));
+}
+
+TEST(Compile, WarnsOfARuleThatAnEarlierOneAlwaysBeats) {
+  Diagnostics diagnostics;
+  compile(RulesByHand().port("/p", {{"/a", always()}, {"/b", active("/a")}}, true), diagnostics);
+  ASSERT_THAT(codes(diagnostics), ElementsAre("never-selected"));
+  EXPECT_THAT(diagnostics.items()[0].message, HasSubstr("conflict=\"first\""));
+}
+
+TEST(Compile, WarnsOfABehaviourThatNoActivityLetsRun) {
+  Diagnostics diagnostics;
+  const auto impossible = all_of({active("/b"), inactive("/b")});
+  compile(RulesByHand()
+              .port("/p", {{"/a", any_of({impossible, inactive("/c")})}})
+              .behaviour("Dead", "/p", "/a", impossible)
+              .behaviour("Alive", "/p", "/a", inactive("/c")),
+          diagnostics);
+  ASSERT_THAT(codes(diagnostics), ElementsAre("never-runs"));
+  EXPECT_THAT(diagnostics.items()[0].message, HasSubstr("\"Dead\""));
+}
+
+TEST(Compile, ABehaviourThatRunsAtOnePortRuns) {
+  Diagnostics diagnostics;
+  const auto impossible = inactive("/a");
+  rules::RuleSet set = RulesByHand()
+                           .port("/p", {{"/a", impossible}})
+                           .port("/q", {{"/a", always()}})
+                           .behaviour("Half", "/p", "/a", impossible);
+  set.behaviours[0].rules.push_back({"/q", {"/a", always(), {}, "Half"}});
+  compile(set, diagnostics);
+  EXPECT_THAT(codes(diagnostics), ElementsAre("never-selected"));
+}
+
+TEST(Compile, AWholePortOfPrioritiesIsProvedAndCompiled) {
+  Diagnostics diagnostics;
+  const auto model = compile(RulesByHand().port("/p", priority_chain(256)), diagnostics);
+  EXPECT_TRUE(diagnostics.items().empty());
+  LiveTable table(model);
+  table.activate_only({source_name(3), source_name(200), source_name(77)});
+  EXPECT_THAT(table.winners("/p"), ElementsAre(source_name(200)));
+}
+
+TEST(Compile, SixteenPortsOfTwoHundredAndFiftySixConnectionsAreWithinTheLimits) {
+  RulesByHand by_hand;
+  for (int i = 0; i < 16; ++i) by_hand.port("/p" + std::to_string(i), priority_chain(256));
+  Diagnostics diagnostics;
+  const auto model = compile(by_hand, diagnostics);
+  EXPECT_TRUE(diagnostics.items().empty());
+  EXPECT_EQ(model.ports.size(), 16u);
+}
+
+TEST(Compile, ParityOfAllTheSourcesThatAPortMayHaveIsASmallDiagram) {
+  ExpressionPtr parity = active(source_name(0));
+  for (std::size_t i = 1; i < 255; ++i) {
+    parity = binary(Operator::kXor, parity, active(source_name(i)));
+  }
+  Diagnostics diagnostics;
+  const auto model = compile(RulesByHand().port("/p", {{"/own", parity}}), diagnostics);
+  EXPECT_TRUE(diagnostics.items().empty());
+  EXPECT_EQ(model.ports.at(0).rules.at(0).nodes.size(), 2 * 255u - 1);
+  LiveTable table(model);
+  table.activate_only({"/own", source_name(7), source_name(8), source_name(200)});
+  EXPECT_TRUE(table.winner("/p").has_value());
+  table.activate_only({"/own", source_name(7), source_name(8)});
+  EXPECT_FALSE(table.winner("/p").has_value());
+}
+
+// x0 = y0 and x1 = y1 and … with all x before all y: 2^n nodes in the order of the document, 3 n in
+// a good one.
+TEST(Compile, ABadOrderOfTheDocumentIsMendedBySifting) {
+  constexpr std::size_t kPairs = 14;
+  std::vector<ExpressionPtr> mention, equal;
+  for (std::size_t i = 0; i < kPairs; ++i) mention.push_back(active("/x" + source_name(i)));
+  for (std::size_t i = 0; i < kPairs; ++i) {
+    equal.push_back(
+        binary(Operator::kIff, active("/x" + source_name(i)), active("/y" + source_name(i))));
+  }
+  Diagnostics diagnostics;
+  const auto model = compile(
+      RulesByHand().port("/p", {{"/own", all_of({any_of(mention), all_of(equal)})}}), diagnostics);
+  EXPECT_TRUE(diagnostics.items().empty());
+  const auto& rule = model.ports.at(0).rules.at(0);
+  EXPECT_LT(rule.nodes.size(), 200u);
+  LiveTable table(model);
+  table.activate_only({"/own", "/x" + source_name(2), "/y" + source_name(2)});
+  EXPECT_TRUE(table.winner("/p").has_value());
+  table.activate_only({"/own", "/x" + source_name(2), "/y" + source_name(3)});
+  EXPECT_FALSE(table.winner("/p").has_value());
+}
+
+// The middle bit of a sum of products has no small diagram in any order.
+TEST(Compile, ARuleThatExplodesIsAnErrorThatNamesTheLimit) {
+  constexpr std::size_t kBits = 16;
+  std::vector<ExpressionPtr> column(2 * kBits, rules::make_constant(false));
+  for (std::size_t i = 0; i < kBits; ++i) {
+    std::vector<ExpressionPtr> carry_free;
+    ExpressionPtr carry = rules::make_constant(false);
+    for (std::size_t j = 0; j < kBits; ++j) {
+      const auto product = all_of({active("/x" + source_name(i)), active("/y" + source_name(j))});
+      const auto old = column[i + j];
+      column[i + j] = binary(Operator::kXor, binary(Operator::kXor, old, product), carry);
+      carry = any_of({all_of({old, product}), all_of({old, carry}), all_of({product, carry})});
+    }
+    column[i + kBits] = carry;
+  }
+  Diagnostics diagnostics;
+  compile(RulesByHand().port("/p", {{"/own", column[kBits]}}).port("/q", {{"/a", inactive("/a")}}),
+          diagnostics);
+  ASSERT_THAT(codes(diagnostics), ElementsAre("limit-exceeded", "never-selected"));
+  EXPECT_THAT(diagnostics.items()[0].message, HasSubstr("kMaxNodesPerConnection"));
+  EXPECT_EQ(diagnostics.items()[0].where.line, 2u);
+}
+
+TEST(Compile, MoreSourcesAtAPortThanTheLimitAreAnError) {
+  std::vector<ExpressionPtr> literals;
+  for (std::size_t i = 0; i < 256; ++i) literals.push_back(inactive(source_name(i)));
+  Diagnostics diagnostics;
+  compile(RulesByHand().port("/p", {{"/own", all_of(literals)}}), diagnostics);
+  ASSERT_THAT(codes(diagnostics), ElementsAre("limit-exceeded"));
+  EXPECT_THAT(diagnostics.items()[0].message, HasSubstr("kMaxSourcesPerPort (256)"));
+}
+
+TEST(Compile, ConnectionsWithoutARuleCountAgainstTheLimit) {
+  RulesByHand by_hand;
+  by_hand.port("/p", {{"/own", always()}});
+  for (std::size_t i = 0; i < 256; ++i) by_hand.other(source_name(i), "/p");
+  Diagnostics diagnostics;
+  compile(by_hand, diagnostics);
+  EXPECT_THAT(codes(diagnostics), ElementsAre("limit-exceeded"));
+}
+
+TEST(Compile, MoreDestinationsOfOneSourceThanTheLimitAreAnError) {
+  RulesByHand by_hand;
+  for (std::size_t i = 0; i < 65; ++i) by_hand.port("/p" + std::to_string(i), {{"/a", always()}});
+  Diagnostics diagnostics;
+  compile(by_hand, diagnostics);
+  ASSERT_THAT(codes(diagnostics), ElementsAre("limit-exceeded"));
+  EXPECT_THAT(diagnostics.items()[0].message, HasSubstr("kMaxDestinations (64)"));
+}
+
+TEST(Compile, ATableThatCouldBeTooLargeIsRefusedBeforeItIsMade) {
+  rules::CompiledModel model;
+  rules::CompiledPort port{"/p", true, {}, {}};
+  rules::CompiledRule rule;
+  rule.nodes.resize(shm::kMaxNodesPerConnection);
+  for (int i = 0; i < 22; ++i) port.rules.push_back(rule);
+  model.ports.push_back(port);
+  EXPECT_GT(largest_table(model), shm::kMaxTableWords);
+  model.ports[0].rules.resize(20);
+  EXPECT_LE(largest_table(model), shm::kMaxTableWords);
+}
+
+TEST(Compile, GivesTheSameTableEachTime) {
+  const auto once = [] {
+    Diagnostics diagnostics;
+    const auto xors =
+        binary(Operator::kXor, active("/c"), binary(Operator::kXor, active("/d"), inactive("/e")));
+    const auto model = compile(RulesByHand()
+                                   .port("/p", {{"/a", xors}, {"/b", negation(xors)}})
+                                   .port("/q", priority_chain(20)),
+                               diagnostics);
+    return LiveTable(model);
+  };
+  const auto first = once(), second = once();
+  const auto all = [](const LiveTable& table) {
+    std::vector<std::string> lines;
+    for (shm::ConnectionIndex c = 0; c < table.view().connection_count(); ++c) {
+      const auto rule = table.view().rule(c);
+      std::string line = std::to_string(rule.kind);
+      for (shm::Word i = 0; i < rule.reads.count; ++i) line += " " + std::to_string(rule.reads[i]);
+      for (shm::Word i = 0; i < rule.nodes.count; ++i) line += " " + std::to_string(rule.nodes[i]);
+      lines.push_back(line);
+    }
+    return lines;
+  };
+  EXPECT_EQ(all(first), all(second));
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,65 @@
+#include "rules/duration.hpp"
+
+#include <gmock/gmock.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace arbiter::rules {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Duration, IsAWholeNumberWithAUnit) {
+  const std::vector<std::pair<std::string, shm::Nanoseconds>> cases{
+      {"1ns", 1},
+      {"250ns", 250},
+      {"10us", 10'000},
+      {"500ms", 500'000'000},
+      {"0500ms", 500'000'000},
+      {"2s", 2'000'000'000},
+      {"forever", shm::kForever},
+      {"2305843009213693951ns", shm::kMaxTime},
+      {"2305843009s", 2'305'843'009'000'000'000},
+  };
+  for (const auto& [text, value] : cases) {
+    const ParsedDuration parsed = parse_duration(text);
+    EXPECT_EQ(parsed.problem, "") << text;
+    EXPECT_EQ(parsed.value, value) << text;
+  }
+}
+
+TEST(Duration, IsRefusedWithAReason) {
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"", "not a whole number"},
+      {"ms", "not a whole number"},
+      {"-5ms", "not a whole number"},
+      {"+5ms", "not a whole number"},
+      {"Forever", "not a whole number"},
+      {"0x10ms", "unknown unit"},
+      {"500", "no unit"},
+      {"500 ms", "unknown unit"},
+      {"500MS", "unknown unit"},
+      {"500min", "unknown unit"},
+      {"1e3ms", "unknown unit"},
+      {"1s500ms", "unknown unit"},
+      {"0.5s", "fraction"},
+      {"1,5s", "fraction"},
+      {"0s", "zero"},
+      {"000ns", "zero"},
+      {"2305843009213693952ns", "longer than the limit of 2305843009213693951ns"},
+      {"2305843010s", "longer than the limit"},
+      {"9223372036854775807ns", "longer than the limit"},
+      {"9223372036854775808ns", "longer than the limit"},
+      {"18446744073709551617ns", "longer than the limit"},
+      {std::string(1000, '9') + "s", "longer than the limit"},
+  };
+  for (const auto& [text, reason] : cases) {
+    EXPECT_THAT(parse_duration(text).problem, HasSubstr(reason)) << text;
+    EXPECT_THAT(parse_duration(text).problem, HasSubstr("; ")) << "does not say what to do";
+  }
+}
+
+}  // namespace
+}  // namespace arbiter::rules

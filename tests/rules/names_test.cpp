@@ -1,0 +1,84 @@
+#include "rules/names.hpp"
+
+#include <gmock/gmock.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace arbiter::rules {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Names, AreTrimmedAndInnerWhiteSpaceIsOneBlank) {
+  EXPECT_EQ(collapse_blanks(" \n Look \t\r\n Around "), "Look Around");
+  EXPECT_EQ(collapse_blanks(" \n "), "");
+  EXPECT_EQ(collapse_blanks(""), "");
+}
+
+TEST(Names, OfPortsTakeAnyPrintableCharacter) {
+  for (const std::string name : {"/a", "/", "/Face/pos:o", "/a-b_c.d/0", "/größe+1@x,y*", "/日本",
+                                 "//", "/&<>'"}) {
+    EXPECT_FALSE(find_problem_in_port(name)) << name;
+  }
+  EXPECT_FALSE(find_problem_in_port("/" + std::string(254, 'x')));
+}
+
+TEST(Names, OfPortsAreRefusedAtTheVeryByteThatIsWrong) {
+  struct Case {
+    std::string name;
+    std::size_t at;
+    std::string message;
+  };
+  const std::vector<Case> cases{
+      {"Face/pos:o", 0, "begins with '/'; write \"/Face/pos:o\""},
+      {"/a b", 2, "white space"},
+      {"/a\n/b", 2, "white space"},
+      {"/a\"b", 2, "a double quote"},
+      {"/ä\xc2\xa0", 3, "an invisible character"},
+      {"/a\xe2\x80\x8b", 2, "an invisible character"},
+      {"/a\x7f", 2, "an invisible character"},
+      {"/a\xc2\x85", 2, "an invisible character"},
+      {"/a\xff", 2, "not UTF-8"},
+  };
+  for (const Case& c : cases) {
+    const auto problem = find_problem_in_port(c.name);
+    ASSERT_TRUE(problem) << c.name;
+    EXPECT_EQ(problem->code, "invalid-port-name");
+    EXPECT_EQ(problem->at, c.at) << c.name;
+    EXPECT_THAT(problem->message, HasSubstr(c.message));
+  }
+}
+
+TEST(Names, LongerThanTheLimitAreRefused) {
+  const auto problem = find_problem_in_port("/" + std::string(255, 'x'));
+  ASSERT_TRUE(problem);
+  EXPECT_EQ(problem->code, "name-too-long");
+  EXPECT_THAT(problem->message, HasSubstr("has 256 bytes, more than the limit of 255"));
+  EXPECT_TRUE(find_problem_in_behaviour(std::string(256, 'x')));
+  EXPECT_FALSE(find_problem_in_behaviour(std::string(255, 'x')));
+}
+
+TEST(Names, ThatAreLongAreCutInMessagesBetweenCharacters) {
+  EXPECT_EQ(quote("short"), "\"short\"");
+  EXPECT_EQ(quote(std::string(200, 'x')), '"' + std::string(80, 'x') + "…\"");
+  EXPECT_EQ(quote(std::string(79, 'x') + "ä" + std::string(9, 'x')),
+            '"' + std::string(79, 'x') + "…\"");
+}
+
+TEST(Names, AMisspeltOneIsRecognised) {
+  const std::vector<std::string_view> known{"Look Around", "Follow Face", "Rest Arm"};
+  EXPECT_EQ(find_similar("Look Arond", known), "Look Around");
+  EXPECT_EQ(find_similar("look around", known), "Look Around");
+  EXPECT_EQ(find_similar("RestArm", known), "Rest Arm");
+  EXPECT_EQ(find_similar("Track Object", known), std::nullopt);
+  EXPECT_EQ(find_similar("", known), std::nullopt);
+  EXPECT_EQ(find_similar("B", {"A"}), std::nullopt) << "one letter is like any other";
+  EXPECT_EQ(find_similar("abcd", {"abxy", "abcx"}), "abcx") << "the nearest one";
+  EXPECT_EQ(advise("RestArm", known, "define it"), "; did you mean \"Rest Arm\"?");
+  EXPECT_EQ(advise("Fly", known, "define it"), "; define it");
+}
+
+}  // namespace
+}  // namespace arbiter::rules

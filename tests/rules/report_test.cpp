@@ -1,0 +1,83 @@
+#include "rules/report.hpp"
+
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+
+namespace arbiter::test {
+namespace {
+
+using rules::Diagnostics;
+
+std::string text_of(const Diagnostics& diagnostics) {
+  std::ostringstream out;
+  write_text(out, diagnostics);
+  return out.str();
+}
+
+nlohmann::json json_of(const Diagnostics& diagnostics) {
+  std::ostringstream out;
+  write_json(out, diagnostics);
+  return nlohmann::json::parse(out.str());
+}
+
+TEST(Report, SaysNothingIfNothingWasFound) {
+  EXPECT_EQ(text_of({}), "");
+  EXPECT_EQ(json_of({}), nlohmann::json::array());
+}
+
+TEST(Report, WritesAsCompilersDoAndCounts) {
+  Diagnostics diagnostics;
+  diagnostics.note("some-note", {"m.xml", 3, 4}, "by the way");
+  diagnostics.error("both-can-win", {"m.xml", 9, 1}, "both win",
+                    rules::Witness{{"/a", "/b"}, {"/c"}});
+  diagnostics.error("both-can-win", {"m.xml", 10, 1}, "both win", rules::Witness{{"/a"}, {}});
+  EXPECT_EQ(text_of(diagnostics),
+            "m.xml:3:4: note: by the way [some-note]\n"
+            "m.xml:9:1: error: both win [both-can-win]\n"
+            "  active: /a, /b; inactive: /c\n"
+            "m.xml:10:1: error: both win [both-can-win]\n"
+            "  active: /a; inactive: none\n"
+            "2 errors, 1 note\n");
+}
+
+TEST(Report, CountsOneAsOne) {
+  Diagnostics diagnostics;
+  diagnostics.error("e", {"m.xml", 1, 1}, "one");
+  diagnostics.warning("w", {"m.xml", 2, 1}, "two");
+  diagnostics.warning("w", {"m.xml", 3, 1}, "three");
+  EXPECT_TRUE(text_of(diagnostics).ends_with("\n1 error, 2 warnings\n"));
+}
+
+TEST(Report, GoesThroughEachFileFromTheTop) {
+  Diagnostics diagnostics;
+  diagnostics.error("e", {"b.xml", 7, 1}, "third");
+  diagnostics.error("e", {"a.xml", 1, 1}, "fourth");
+  diagnostics.error("e", {"b.xml", 2, 9}, "second");
+  diagnostics.error("e", {"b.xml", 2, 8}, "first");
+  std::vector<std::string> messages;
+  for (const auto& item : json_of(diagnostics)) messages.push_back(item["message"]);
+  EXPECT_EQ(messages, (std::vector<std::string>{"first", "second", "third", "fourth"}));
+}
+
+TEST(Report, WritesJsonForPrograms) {
+  Diagnostics diagnostics;
+  diagnostics.warning("never-selected", {"m.xml", 3, 4}, "a \"quoted\" message");
+  diagnostics.error("both-can-win", {"m.xml", 5, 6}, "both", rules::Witness{{"/a"}, {}});
+  EXPECT_EQ(json_of(diagnostics), nlohmann::json::parse(R"([
+    {"severity": "warning", "code": "never-selected", "file": "m.xml", "line": 3, "column": 4,
+     "message": "a \"quoted\" message", "witness": null},
+    {"severity": "error", "code": "both-can-win", "file": "m.xml", "line": 5, "column": 6,
+     "message": "both", "witness": {"active": ["/a"], "inactive": []}}])"));
+}
+
+TEST(Report, WritesJsonEvenIfAFilesNameIsNotUtf8) {
+  Diagnostics diagnostics;
+  diagnostics.error("e", {"m\xff.xml", 1, 1}, "odd");
+  EXPECT_EQ(json_of(diagnostics)[0]["file"], "m\xef\xbf\xbd.xml");
+}
+
+}  // namespace
+}  // namespace arbiter::test

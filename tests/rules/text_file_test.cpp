@@ -1,0 +1,77 @@
+#include "rules/text_file.hpp"
+
+#include <gmock/gmock.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "rules/load.hpp"
+#include "rules/utf8.hpp"
+#include "tests/rules/model_text.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+TEST(TextFile, KnowsLineAndColumnOfEachByte) {
+  const TextFile file("f", "ab\n\ncd\r\ne");
+  const std::vector<std::pair<std::uint32_t, std::uint32_t>> places{
+      {1, 1}, {1, 2}, {1, 3}, {2, 1}, {3, 1}, {3, 2}, {3, 3}, {3, 4}, {4, 1}, {4, 2}};
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    EXPECT_EQ(file.locate(i), (Location{"f", places[i].first, places[i].second})) << i;
+  }
+  EXPECT_EQ(file.locate(1000), (Location{"f", 4, 2}));
+}
+
+TEST(TextFile, CountsColumnsInBytes) {
+  EXPECT_EQ(TextFile("f", "äx").locate(2), (Location{"f", 1, 3}));
+}
+
+TEST(TextFile, TakesAByteOrderMarkOff) {
+  const TextFile file("f", "\xef\xbb\xbf<a/>");
+  EXPECT_EQ(file.content(), "<a/>");
+  EXPECT_EQ(file.locate(0), (Location{"f", 1, 1}));
+}
+
+std::string why_unreadable(const std::string& path) {
+  try {
+    read_bytes(path);
+  } catch (const FileError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(TextFile, ThatCannotBeReadIsNamedWithTheReason) {
+  const Folder folder;
+  EXPECT_THAT(why_unreadable(folder.file("none.xml")),
+              AllOf(HasSubstr("none.xml"), HasSubstr("No such file or directory")));
+  EXPECT_THAT(why_unreadable(folder.file("")), HasSubstr("Is a directory"));
+  EXPECT_EQ(why_unreadable("/dev/null"), "");
+}
+
+TEST(TextFile, WithoutAnEndIsReadUpToTheLimit) {
+  EXPECT_GT(read_bytes("/dev/zero").size(), kMaxFileBytes);
+  EXPECT_LT(read_bytes("/dev/zero").size(), 2 * kMaxFileBytes);
+}
+
+TEST(Utf8, IsDecodedStrictly) {
+  const std::vector<std::pair<std::string, std::uint32_t>> good{
+      {"a", 'a'}, {"ä", 0xe4}, {"→", 0x2192}, {"😀", 0x1f600}, {"\xf4\x8f\xbf\xbf", 0x10ffff}};
+  for (const auto& [bytes, code] : good) {
+    EXPECT_EQ(decode_utf8(bytes + "x").code, code);
+    EXPECT_EQ(decode_utf8(bytes).length, bytes.size());
+    EXPECT_EQ(encode_utf8(code), bytes);
+  }
+  for (const std::string bad :
+       {"\x80", "\xc3", "\xc3x", "\xc0\x80", "\xc1\xbf", "\xe0\x80\x80", "\xed\xa0\x80", "\xe2\x86",
+        "\xf4\x90\x80\x80", "\xf8\x88\x80\x80\x80", "\xff", ""}) {
+    EXPECT_EQ(decode_utf8(bad).length, 0u);
+  }
+}
+
+}  // namespace
+}  // namespace arbiter::rules
