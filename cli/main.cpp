@@ -22,6 +22,11 @@ int run(int argc, char** argv) {
   arbiter::cli::add_check(app, exit_code);
   arbiter::cli::add_rules(app, exit_code);
   arbiter::cli::add_simulate(app, exit_code);
+  arbiter::cli::add_play(app, exit_code);
+  arbiter::cli::add_echo(app, exit_code);
+  arbiter::cli::add_pub(app, exit_code);
+  arbiter::cli::add_status(app, exit_code);
+  arbiter::cli::add_deactivate(app, exit_code);
   try {
     app.parse(argc, argv);  // runs the verb
   } catch (const CLI::ParseError& error) {

@@ -12,5 +12,10 @@ namespace arbiter::cli {
 void add_check(CLI::App& app, int& exit_code);
 void add_rules(CLI::App& app, int& exit_code);
 void add_simulate(CLI::App& app, int& exit_code);
+void add_play(CLI::App& app, int& exit_code);
+void add_echo(CLI::App& app, int& exit_code);
+void add_pub(CLI::App& app, int& exit_code);
+void add_status(CLI::App& app, int& exit_code);
+void add_deactivate(CLI::App& app, int& exit_code);
 
 }  // namespace arbiter::cli

@@ -135,7 +135,8 @@ class InputCore {
   std::uint64_t bound_generation_ = UINT64_MAX;
   std::vector<shm::Rule> rules_;            // of all connections to the port, in document order
   std::vector<shm::SourceId> sources_;      // those that the rules and connections name
-  std::vector<shm::ActivityWord> picture_;  // scratch, parallel to sources_
+  std::vector<shm::SeenActivity> picture_;  // scratch, parallel to sources_
+  std::vector<shm::Nanoseconds> ends_;      // scratch
   shm::Nanoseconds last_reading_ = 0;       // of the clock, by this port
   std::uint32_t held_ = 0;
   bool commanded_ = false;  // seen selected since idle was last told

@@ -162,11 +162,11 @@ InputCore::Choice InputCore::choose_among_all(Queue*& chosen) noexcept {
 }
 
 bool InputCore::decide_all() noexcept {
-  const auto word_of = [&](shm::SourceId source) {
-    const auto* word = memory_->pages().find(source);
-    return word == nullptr ? shm::kNeverActive : word->load(std::memory_order_acquire);
+  const auto look_at_source = [&](shm::SourceId source) {
+    const auto* activity = memory_->pages().find(source);
+    return activity == nullptr ? shm::SeenActivity{} : shm::SeenActivity::of(*activity);
   };
-  std::transform(sources_.begin(), sources_.end(), picture_.begin(), word_of);
+  std::transform(sources_.begin(), sources_.end(), picture_.begin(), look_at_source);
   const shm::Nanoseconds now = shm::monotonic_now();
   shm::DecisionClock clock(now, true);
   shm::Decider decider(snapshot_.table, memory_->pages(), clock);
@@ -176,10 +176,12 @@ bool InputCore::decide_all() noexcept {
     if (queue.verdict == shm::Verdict::kUnsettled) return false;
   }
   last_reading_ = clock.reading();
-  const bool unchanged = std::equal(
-      sources_.begin(), sources_.end(), picture_.begin(),
-      [&](shm::SourceId source, shm::ActivityWord seen) { return word_of(source) == seen; });
-  return unchanged && clock.reading() == now && memory_->tables().is_whole(snapshot_);
+  const bool stands =
+      std::equal(sources_.begin(), sources_.end(), picture_.begin(),
+                 [&](shm::SourceId source, const shm::SeenActivity& seen) {
+                   return seen.stands(look_at_source(source), snapshot_.table.timeout(source), now);
+                 });
+  return stands && clock.reading() == now && memory_->tables().is_whole(snapshot_);
 }
 
 // Drops what waited in losing queues before the decision and is older than the sample that is

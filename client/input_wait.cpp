@@ -109,16 +109,16 @@ bool InputCore::is_selected_at(shm::Nanoseconds time) noexcept {
 
 // When the port will be idle if nothing arrives until then; kForever: never.
 shm::Nanoseconds InputCore::next_idle() noexcept {
-  std::size_t ends = 0;
+  ends_.clear();
   for (const shm::SourceId source : sources_) {
-    const auto* word = memory_->pages().find(source);
-    if (word == nullptr) continue;
-    const shm::ActivityWord value = word->load(std::memory_order_acquire);
-    if (shm::is_finite(value) && value > last_reading_) picture_[ends++] = value;
+    const auto* activity = memory_->pages().find(source);
+    if (activity == nullptr) continue;
+    const shm::ActivityWord word = activity->word.load(std::memory_order_acquire);
+    if (shm::is_finite(word) && word > last_reading_) ends_.push_back(word);
   }
-  std::sort(picture_.begin(), picture_.begin() + static_cast<std::ptrdiff_t>(ends));
-  for (std::size_t i = 0; i < ends; ++i) {
-    if (i == kMaxLookAhead || !is_selected_at(picture_[i])) return picture_[i];
+  std::sort(ends_.begin(), ends_.end());
+  for (std::size_t i = 0; i < ends_.size(); ++i) {
+    if (i == kMaxLookAhead || !is_selected_at(ends_[i])) return ends_[i];
   }
   return shm::kForever;
 }

@@ -27,7 +27,7 @@ void SharedMemory::add_page(shm::SourceId id, std::string name, const shm::FileD
     names_[id] = std::move(name);
   }
   mappings_.emplace_back(page, sizeof(shm::ActivityPage), shm::Access::kReadOnly);
-  pages_->attach(id, &mappings_.back().as<const shm::ActivityPage>()->word);
+  pages_->attach(id, &mappings_.back().as<const shm::ActivityPage>()->activity);
 }
 
 std::string SharedMemory::source_name(shm::SourceId id) const {

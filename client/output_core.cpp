@@ -58,8 +58,8 @@ void OutputCore::bind(shm::PortInstance instance, shm::SourceId source,
     throw std::runtime_error("the activity page has another size");
   }
   page_ = shm::Mapping(page, sizeof(shm::ActivityPage), shm::Access::kReadWrite);
-  activity_ = &page_.as<shm::ActivityPage>()->word;
-  own_word_ = activity_->load(std::memory_order_relaxed);  // a predecessor's: it carries on
+  activity_ = &page_.as<shm::ActivityPage>()->activity;
+  own_word_ = activity_->word.load(std::memory_order_relaxed);  // a predecessor's: it carries on
   instance_ = instance;
   source_ = source;
 }
@@ -236,8 +236,12 @@ void OutputCore::end_loan(std::uint32_t slot) noexcept {
 // other, at least one sees the other), with fence (d) of a receiver about to wait, and gives the
 // guarantee that no take() which begins after publish() has returned misses the stamp.
 void OutputCore::stamp(shm::ActivityWord word) noexcept {
+  if (shm::is_deactivation(word)) {
+    activity_->word.store(word, std::memory_order_relaxed);
+  } else {
+    activity_->arrive(own_word_, word);
+  }
   own_word_ = word;
-  activity_->store(word, std::memory_order_relaxed);
   shm::full_fence();
 }
 

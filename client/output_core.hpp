@@ -104,7 +104,7 @@ class OutputCore {
   shm::PortInstance instance_ = 0;
   shm::SourceId source_ = shm::kNone;
   shm::Mapping page_;
-  shm::Atomic<shm::ActivityWord>* activity_ = nullptr;
+  shm::Activity* activity_ = nullptr;
 
   // Service thread.
   std::map<shm::PortInstance, InputLink> links_;

@@ -123,9 +123,9 @@ class Extraction {
   }
 
   bool take_account_of(std::size_t terms, std::size_t behaviour) {
-    if (term_count_ > kMaxRuleTerms) return false;
     term_count_ += terms;
     if (term_count_ <= kMaxRuleTerms) return true;
+    if (std::exchange(is_exhausted_, true)) return false;
     diagnostics_.error("limit-exceeded", model_.behaviours[behaviour].where,
                        "from here on, the rules of the model have more terms than the limit of " +
                            std::to_string(kMaxRuleTerms) + " in all; use fewer inhibitions");
@@ -167,11 +167,12 @@ class Extraction {
     if (voice) return *voice;
     voice.emplace();
     std::vector<std::size_t> pending{behaviour};
-    while (!pending.empty()) {
+    while (!pending.empty() && term_count_ <= kMaxRuleTerms) {
       const std::size_t at = pending.back();
       pending.pop_back();
       const auto& children = hierarchy_.children(at);
       pending.insert(pending.end(), children.rbegin(), children.rend());
+      term_count_ += 1 + model_.behaviours[at].configs.size();
       for (const Config& config : model_.behaviours[at].configs) {
         const SourceIndex source = source_indices_.at(config.source);
         voice->at[index_port(config.port)].push_back(source);
@@ -282,6 +283,7 @@ class Extraction {
   std::size_t rule_count_ = 0;
   std::vector<std::size_t> last_rule_with_;  // by source: the last rule that has it as a term
   std::size_t term_count_ = 0;
+  bool is_exhausted_ = false;
   std::set<std::pair<const Mention*, PortIndex>> noted_;
 };
 

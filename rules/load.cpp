@@ -1,14 +1,13 @@
 #include "rules/load.hpp"
 
 #include <algorithm>
-#include <map>
 #include <optional>
 #include <set>
-#include <tuple>
 #include <vector>
 
 #include "rules/application_reader.hpp"
 #include "rules/defines.hpp"
+#include "rules/document_order.hpp"
 #include "rules/extraction.hpp"
 #include "rules/hierarchy.hpp"
 #include "rules/model.hpp"
@@ -41,15 +40,12 @@ std::optional<Application> read_application_if_any(const ModelFiles& files,
 }
 
 // Checks go through a model in various orders; the reader of their findings goes through files.
-void hand_over_sorted(const ModelFiles& files, const Diagnostics& found, Diagnostics& diagnostics) {
-  std::map<std::string, std::size_t> places;
-  for (const std::string& path : files.models) places.emplace(path, places.size());
-  if (files.application) places.emplace(*files.application, places.size());
+void hand_over_sorted(const Diagnostics& found, const DocumentOrder& order,
+                      Diagnostics& diagnostics) {
   std::vector<const Diagnostic*> sorted;
   for (const Diagnostic& item : found.items()) sorted.push_back(&item);
   std::stable_sort(sorted.begin(), sorted.end(), [&](const Diagnostic* a, const Diagnostic* b) {
-    return std::tuple(places[a->where.file], a->where.line, a->where.column) <
-           std::tuple(places[b->where.file], b->where.line, b->where.column);
+    return order(a->where, b->where);
   });
   const bool is_cut = found.dropped() > 0;
   if (is_cut) sorted.pop_back();  // makes room for the last word
@@ -76,6 +72,10 @@ void hand_over_sorted(const ModelFiles& files, const Diagnostics& found, Diagnos
 }  // namespace
 
 RuleSet load(const ModelFiles& files, Diagnostics& diagnostics) {
+  std::vector<std::string> paths = files.models;
+  if (files.application) paths.push_back(*files.application);
+  const DocumentOrder order(paths);
+
   Diagnostics found;
   const Model model = read_models(files.models, found);
   const std::optional<Application> application = read_application_if_any(files, found);
@@ -83,11 +83,9 @@ RuleSet load(const ModelFiles& files, Diagnostics& diagnostics) {
   const Hierarchy hierarchy(model, found);
   RuleSet rules = extract_rules(model, hierarchy, found);
   if (application) check_application(*application, rules, found);
-  Location whole;
-  if (files.application) whole.file = *files.application;
-  if (!files.models.empty()) whole.file = files.models.front();
-  check_limits(rules, application ? &*application : nullptr, whole, found);
-  hand_over_sorted(files, found, diagnostics);
+  const Location whole{paths.empty() ? "" : paths.front(), 1, 1};
+  check_limits(rules, application ? &*application : nullptr, whole, order, found);
+  hand_over_sorted(found, order, diagnostics);
   return rules;
 }
 

@@ -1,11 +1,13 @@
 #include "rules/model_checks.hpp"
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <string>
 #include <string_view>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include "rules/names.hpp"
@@ -26,62 +28,79 @@ void collect_reads(const ExpressionPtr& expression, std::unordered_set<const Exp
 
 class LimitCheck {
  public:
-  LimitCheck(const RuleSet& rules, const Application* application, Diagnostics& diagnostics)
+  LimitCheck(const RuleSet& rules, const Application* application, const DocumentOrder& order,
+             Diagnostics& diagnostics)
       : rules_(rules), diagnostics_(diagnostics) {
     for (const PortRules& port : rules.ports) {
-      for (const ConnectionRule& rule : port.rules) add(rule.source, port.port, rule.where);
+      for (const ConnectionRule& rule : port.rules) {
+        connections_.push_back({&rule.source, &port.port, &rule.where});
+      }
     }
-    if (application == nullptr) return;
-    std::unordered_map<std::string_view, const Location*> places;
-    std::set<std::pair<std::string_view, std::string_view>> others;
-    for (const Connection& connection : rules.other_connections) {
-      others.emplace(connection.source, connection.port);
-    }
-    for (const Application::Link& link : application->connections) {
-      if (others.count({link.source, link.port}) != 0) add(link.source, link.port, link.where);
+    add_others(application);
+    std::sort(connections_.begin(), connections_.end(),
+              [&](const Place& a, const Place& b) { return order(*a.where, *b.where); });
+    for (const Place& connection : connections_) {
+      at_port_[*connection.port].push_back(connection);
+      of_source_[*connection.source].push_back(connection);
     }
   }
 
   void check(const Location& whole) {
-    check_ports();
+    for (const auto& [source, connections] : of_source_) {
+      check_count(connections, shm::kMaxDestinations, "destinations of " + std::string(source),
+                  "connect it to fewer input ports");
+    }
+    for (const auto& [port, connections] : at_port_) check_port(port, connections);
+    check_count(connections_, shm::kMaxConnections, "connections", "remove some");
     std::unordered_set<std::string_view> sources(rules_.sources.begin(), rules_.sources.end());
-    for (const auto& [source, count] : destinations_) sources.insert(source);
-    report(connections_, shm::kMaxConnections, "connections", first_beyond_, "remove some");
+    for (const auto& [source, connections] : of_source_) sources.insert(source);
     report(sources.size(), shm::kMaxSources, "sources", whole, "use fewer output ports");
-    report(sources_at_.size(), shm::kMaxInputPorts, "input ports", whole, "use fewer of them");
+    report(at_port_.size(), shm::kMaxInputPorts, "input ports", whole, "use fewer of them");
   }
 
  private:
-  void add(const std::string& source, const std::string& port, const Location& where) {
-    if (++connections_ == shm::kMaxConnections + 1) first_beyond_ = where;
-    sources_at_[port].push_back({&source, &where});
-    auto& destinations = destinations_[source];
-    if (++destinations.count == shm::kMaxDestinations + 1) destinations.first_beyond = where;
+  struct Place {
+    const std::string* source;
+    const std::string* port;
+    const Location* where;
+  };
+
+  void add_others(const Application* application) {
+    if (application == nullptr) return;
+    std::set<std::pair<std::string_view, std::string_view>> others;
+    for (const Connection& connection : rules_.other_connections) {
+      others.emplace(connection.source, connection.port);
+    }
+    for (const Application::Link& link : application->connections) {
+      if (others.count({link.source, link.port}) == 0) continue;
+      connections_.push_back({&link.source, &link.port, &link.where});
+    }
   }
 
-  void check_ports() {
-    for (const auto& [source, destinations] : destinations_) {
-      report(destinations.count, shm::kMaxDestinations, "destinations of " + std::string(source),
-             destinations.first_beyond, "connect it to fewer input ports");
-    }
-    std::unordered_map<std::string_view, const PortRules*> arbitrated;
-    for (const PortRules& port : rules_.ports) arbitrated.emplace(port.port, &port);
-    for (const auto& [port, connected] : sources_at_) {
-      std::unordered_set<std::string_view> sources;
-      for (const auto& [source, where] : connected) sources.insert(*source);
-      const auto found = arbitrated.find(port);
-      if (found != arbitrated.end()) {
-        std::unordered_set<const Expression*> seen;
-        for (const ConnectionRule& rule : found->second->rules) {
-          collect_reads(rule.condition, seen, sources);
-        }
+  void check_port(std::string_view name, const std::vector<Place>& connections) {
+    std::unordered_set<std::string_view> sources;
+    for (const Place& connection : connections) sources.insert(*connection.source);
+    const Location* where = connections.front().where;
+    const auto rules = std::lower_bound(
+        rules_.ports.begin(), rules_.ports.end(), name,
+        [](const PortRules& port, std::string_view wanted) { return port.port < wanted; });
+    if (rules != rules_.ports.end() && rules->port == name) {
+      where = &rules->where;
+      std::unordered_set<const Expression*> seen;
+      for (const ConnectionRule& rule : rules->rules) {
+        collect_reads(rule.condition, seen, sources);
       }
-      const Location& where =
-          found != arbitrated.end() ? found->second->where : *connected.front().second;
-      report(sources.size(), shm::kMaxSourcesPerPort,
-             "sources at " + std::string(port) + ", connected or read by its rules", where,
-             "connect and mention fewer there");
     }
+    report(sources.size(), shm::kMaxSourcesPerPort,
+           "sources at " + std::string(name) + ", connected or read by its rules", *where,
+           "connect and mention fewer there");
+  }
+
+  // At the first connection that is one too many.
+  void check_count(const std::vector<Place>& connections, std::size_t limit,
+                   const std::string& what, const std::string& advice) {
+    if (connections.size() <= limit) return;
+    report(connections.size(), limit, what, *connections[limit].where, advice);
   }
 
   void report(std::size_t count, std::size_t limit, const std::string& what, const Location& where,
@@ -92,18 +111,11 @@ class LimitCheck {
                            ", more than the limit of " + std::to_string(limit) + "; " + advice);
   }
 
-  struct Destinations {
-    std::size_t count = 0;
-    Location first_beyond;
-  };
-
   const RuleSet& rules_;
   Diagnostics& diagnostics_;
-  std::size_t connections_ = 0;
-  Location first_beyond_;
-  std::map<std::string_view, std::vector<std::pair<const std::string*, const Location*>>>
-      sources_at_;                                         // by port
-  std::map<std::string_view, Destinations> destinations_;  // by source
+  std::vector<Place> connections_;  // in document order, as in the lists of these
+  std::map<std::string_view, std::vector<Place>> at_port_;
+  std::map<std::string_view, std::vector<Place>> of_source_;
 };
 
 }  // namespace
@@ -142,8 +154,8 @@ void check_application(const Application& application, RuleSet& rules, Diagnosti
 }
 
 void check_limits(const RuleSet& rules, const Application* application, const Location& whole,
-                  Diagnostics& diagnostics) {
-  LimitCheck(rules, application, diagnostics).check(whole);
+                  const DocumentOrder& order, Diagnostics& diagnostics) {
+  LimitCheck(rules, application, order, diagnostics).check(whole);
 }
 
 }  // namespace arbiter::rules

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "rules/diagnostic.hpp"
+#include "rules/document_order.hpp"
 #include "rules/model.hpp"
 #include "rules/rule_set.hpp"
 
@@ -17,6 +18,6 @@ void check_application(const Application& application, RuleSet& rules, Diagnosti
 // The limits of shm/limits.hpp that a model can exceed. `whole` is the place for what cannot be
 // pinned to a line. `application` may be null.
 void check_limits(const RuleSet& rules, const Application* application, const Location& whole,
-                  Diagnostics& diagnostics);
+                  const DocumentOrder& order, Diagnostics& diagnostics);
 
 }  // namespace arbiter::rules

@@ -37,7 +37,6 @@ Simulation::Simulation(const CompiledModel& model)
       pages_(std::make_unique<shm::ActivityPages>()) {
   for (const auto& port : model.ports) ports_.push_back(port.port);
   for (std::size_t id = 0; id < activity_.size(); ++id) {
-    activity_[id] = shm::kNeverActive;
     pages_->attach(static_cast<shm::SourceId>(id), &activity_[id]);
   }
 }
@@ -69,9 +68,9 @@ void Simulation::apply(const TraceEvent& event) {
   clock_.now = event.at;
   if (event.kind == TraceKind::kTick || !knows(event.source)) return;
   const shm::SourceId source = ids_.at(event.source);
-  activity_[source] = event.kind == TraceKind::kArrival
-                          ? shm::arrival(event.at, table_.timeout(source))
-                          : shm::deactivation(event.at);
+  activity_[source].word = event.kind == TraceKind::kArrival
+                               ? shm::arrival(event.at, table_.timeout(source))
+                               : shm::deactivation(event.at);
 }
 
 PortOutcome Simulation::outcome_at(shm::PortId port, const TraceEvent& event) {

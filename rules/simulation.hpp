@@ -61,7 +61,7 @@ class Simulation {
   std::unordered_map<std::string, shm::SourceId> ids_;
   std::vector<shm::Atomic<shm::Word>> words_;
   shm::TableView table_;
-  std::vector<shm::Atomic<shm::ActivityWord>> activity_;  // by source id
+  std::vector<shm::Activity> activity_;  // by source id
   std::unique_ptr<shm::ActivityPages> pages_;
   Clock clock_;
 };

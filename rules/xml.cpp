@@ -78,7 +78,8 @@ struct Explanation {
 };
 
 // Either a closing tag that does not fit, or the end of the file where one is missing.
-Explanation explain_mismatch(const TextFile& file, const Scan& scanned) {
+Explanation explain_mismatch(const TextFile& file, const Scan& scanned,
+                             pugi::xml_parse_status status) {
   const std::string_view content = file.content();
   std::string opened;
   if (!scanned.open.empty()) {
@@ -92,6 +93,9 @@ Explanation explain_mismatch(const TextFile& file, const Scan& scanned) {
   }
   if (find_tag_end(content, scanned.construct) == std::string_view::npos) {
     return {scanned.construct, "this closing tag does not end; close it with '>'"};
+  }
+  if (status == pugi::status_bad_end_element) {
+    return {scanned.construct, "this closing tag has more in it than a name; remove that"};
   }
   if (opened.empty()) {
     return {scanned.construct, "this closing tag closes nothing; remove it"};
@@ -123,7 +127,7 @@ Explanation explain(const TextFile& file, const pugi::xml_parse_result& result) 
       return here("'<' must begin a tag here; where the character is meant, write &lt;");
     case pugi::status_bad_end_element:
     case pugi::status_end_element_mismatch:
-      return explain_mismatch(file, scanned);
+      return explain_mismatch(file, scanned, result.status);
     default:
       return {offset, std::string("the XML cannot be read: ") + result.description()};
   }
@@ -194,9 +198,9 @@ std::string resolve_reference(std::string_view name) {
 }  // namespace
 
 std::optional<XmlDocument> parse_xml(const TextFile& file, Diagnostics& diagnostics) {
-  // The line end is there for pugixml's sake, which overlooks a '<' as the very last byte.
+  // The line ends are there for pugixml's sake, which overlooks a '<' as the very last byte.
   std::string buffer(file.content());
-  buffer += '\n';
+  buffer += "\n\n";
   pugi::xml_document parsed;
   const auto result =
       parsed.load_buffer_inplace(buffer.data(), buffer.size(), kParseFlags, pugi::encoding_utf8);
@@ -205,9 +209,12 @@ std::optional<XmlDocument> parse_xml(const TextFile& file, Diagnostics& diagnost
     report(file, explanation.offset, explanation.message, diagnostics);
     return {};
   }
-  // Walks without recursion: the depth is the file's to choose.
   XmlDocument document;
   const Views views(file, parsed.first_child());
+  const pugi::xml_node last = parsed.last_child();
+  const bool is_padding = last.type() == pugi::node_pcdata && copy(last, views).text.empty();
+  if (is_padding) parsed.remove_child(last);
+  // Walks without recursion: the depth is the file's to choose.
   std::vector<XmlNode*> parents;
   XmlNode* previous = nullptr;
   for (pugi::xml_node at = parsed.first_child(); at;) {

@@ -327,8 +327,9 @@ void Daemon::deactivate(Client& client, const shm::Message& message) {
   }
   require_free(source->open, "the output port " + name);
   const shm::Nanoseconds now = shm::monotonic_now();
-  const bool was_active = shm::is_active(source->activity().load(std::memory_order_relaxed), now);
-  source->activity().store(shm::deactivation(now), std::memory_order_relaxed);
+  const bool was_active =
+      shm::is_active(source->activity().word.load(std::memory_order_relaxed), now);
+  source->activity().word.store(shm::deactivation(now), std::memory_order_relaxed);
   shm::full_fence();  // (a): as a publisher's own deactivate()
   switchboard_.ring_concerned(models_.in_force().table, source->id);
   auto reply = reply_to(message.request, shm::MessageKind::kDone);

@@ -26,8 +26,8 @@ struct Source {
   std::uint64_t used_by_generation = 0;  // the last model that named it
   shm::PortInstance open = 0;            // the live output port, if any
 
-  [[nodiscard]] shm::Atomic<shm::ActivityWord>& activity() const {
-    return page.as<shm::ActivityPage>()->word;
+  [[nodiscard]] shm::Activity& activity() const {
+    return page.as<shm::ActivityPage>()->activity;
   }
 };
 

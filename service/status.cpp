@@ -87,7 +87,7 @@ class Document {
   }
 
   [[nodiscard]] bool is_active(const Source& source) const {
-    return shm::is_active(source.activity().load(std::memory_order_acquire), now_);
+    return shm::is_active(source.activity().word.load(std::memory_order_acquire), now_);
   }
 
   json source_json(const Source& source) const {

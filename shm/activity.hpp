@@ -9,9 +9,13 @@
 //   negative, 2^63 | time   deactivated at this time                  never
 //
 // Invariants
-//  1. One writer: the component that has the source's output port open, or its successor.
+//  1. One writer: the component that has the source's output port open, or its successor; the
+//  daemon
+//     while nobody has.
 //  2. A value stands for one write: each kind carries its own time, so a reader that sees the same
 //     value twice knows that nothing happened in between (decision.hpp rests on this).
+//  3. Between two values that are not deactivations there was none, if `breaks` is the same for
+//  both.
 #pragma once
 
 #include <cstdint>
@@ -44,12 +48,39 @@ constexpr bool is_finite(ActivityWord word) noexcept { return word >= 0 && word 
 
 // True where the word was surely written after the clock read `now`, given the source's T.
 constexpr bool is_newer_than(ActivityWord word, Nanoseconds timeout, Nanoseconds now) noexcept {
-  return is_finite(word) && timeout != kForever && word - timeout > now;
+  if (word < 0) return (word & ~kDeactivatedFlag) > now;
+  if (word >= kForeverFlag) return (word & ~kForeverFlag) > now;
+  return timeout != kForever && word - timeout > now;
 }
+
+constexpr bool is_deactivation(ActivityWord word) noexcept { return word < 0; }
+
+// The arrival that wrote a word that is not a deactivation, given the source's T.
+constexpr Nanoseconds arrival_of(ActivityWord word, Nanoseconds timeout) noexcept {
+  if (word >= kForeverFlag) return word & ~kForeverFlag;
+  return timeout == kForever ? word : word - timeout;
+}
+
+struct Activity {
+  Atomic<ActivityWord> word{kNeverActive};
+  Atomic<std::uint64_t> breaks{0};  // how often an arrival has followed a deactivation
+
+  // By the one writer. Relaxed is enough for the word: what it must come before, a fence orders.
+  // SYNC POINT: break-counted. The release, and the order of the two stores, pair with the acquires
+  // in Decider::collect() and continues(): who sees the arrival sees the break before it.
+  void arrive(ActivityWord before, ActivityWord next) noexcept {
+    if (!is_deactivation(before)) {
+      word.store(next, std::memory_order_relaxed);
+      return;
+    }
+    breaks.store(breaks.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    word.store(next, std::memory_order_release);
+  }
+};
 
 // The page that the daemon makes for each source; a page, because that is what the kernel protects.
 struct alignas(kPageSize) ActivityPage {
-  Atomic<ActivityWord> word{kNeverActive};
+  Activity activity;
 };
 static_assert(sizeof(ActivityPage) == kPageSize);
 

@@ -37,7 +37,10 @@ class ChannelWriter {
  public:
   ChannelWriter() = default;
   ChannelWriter(const OutputSegment& segment, std::uint32_t index) noexcept
-      : channel_(&segment.channel(index)), ring_(segment.ring(index)) {}
+      : channel_(&segment.channel(index)),
+        ring_(segment.ring(index)),
+        joins_(&segment.header().joins),
+        accepted_(channel_->accepted.load(std::memory_order_relaxed)) {}
 
   // Begins a queue for `receiver`, whose holds are mapped by now.
   // SYNC POINT: channel-joined. The release pairs with the acquire in ChannelReader::join(): who
@@ -52,6 +55,7 @@ class ChannelWriter {
     channel_->discarded.store(0, std::memory_order_relaxed);
     channel_->refused.store(0, std::memory_order_relaxed);
     channel_->receiver.store(receiver, std::memory_order_release);
+    joins_->store(joins_->load(std::memory_order_relaxed) + 1, std::memory_order_release);
   }
 
   // Ends it. Calls `evicted(slot)` for each entry that was in the queue. The receiver takes no new
@@ -95,6 +99,7 @@ class ChannelWriter {
  private:
   Channel* channel_ = nullptr;
   Atomic<Entry>* ring_ = nullptr;
+  Atomic<std::uint64_t>* joins_ = nullptr;
   std::uint64_t accepted_ = 0;
   std::uint32_t depth_ = 1;
   std::uint32_t next_ = 0;  // index of the next entry
@@ -112,6 +117,9 @@ class ChannelReader {
   // Looks whether the publisher has begun our queue. Cheap enough for every take.
   // SYNC POINT: channel-joined (see ChannelWriter::join()).
   bool join() noexcept {
+    const std::uint64_t joins = segment_.header().joins.load(std::memory_order_acquire);
+    if (joins == seen_joins_) return false;
+    seen_joins_ = joins;
     for (std::uint32_t index = 0; index < kMaxDestinations; ++index) {
       const Channel& channel = segment_.channel(index);
       if (channel.receiver.load(std::memory_order_acquire) != self_) continue;
@@ -221,6 +229,7 @@ class ChannelReader {
   std::uint32_t position_ = 0;  // its index
   std::uint32_t depth_ = 1;
   State state_ = State::kUnjoined;
+  std::uint64_t seen_joins_ = 0;
   OutputSegment segment_;
   PortInstance publisher_ = 0;
   PortInstance self_ = 0;

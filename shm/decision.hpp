@@ -6,9 +6,11 @@
 // some instant. Reading one after the other is not enough: with the rule A and not B and not C, let
 // C arrive and then B be deactivated between our reading of C and our reading of B; each was seen
 // inactive, yet never were both. So the words are collected, then read again, and count only if
-// none has changed: values never repeat (activity.hpp), hence at the end of the first pass all of
-// them stood as collected. A reading that denies a conjunction needs no second look: at the instant
-// of that one load the conjunction was false.
+// each still says the same: its value is unchanged, and values never repeat (activity.hpp), or an
+// active source was renewed in time, without a break. Hence at the end of the first pass all of
+// them stood as collected, and a source that publishes flat out unsettles nobody. A reading that
+// denies a conjunction needs no second look: at the instant of that one load the conjunction was
+// false.
 //
 // Time. `now` is a reading of the clock that the caller took before. Where a word was written after
 // that reading, an activity that ended in between would be combined with one that began later; so
@@ -40,15 +42,38 @@ enum class Verdict : std::uint8_t {
 // attach() pairs with the acquire in find(): who finds a page finds it mapped.
 class ActivityPages {
  public:
-  void attach(SourceId id, const Atomic<ActivityWord>* word) noexcept {
-    words_[id].store(word, std::memory_order_release);
+  void attach(SourceId id, const Activity* activity) noexcept {
+    activities_[id].store(activity, std::memory_order_release);
   }
-  [[nodiscard]] const Atomic<ActivityWord>* find(SourceId id) const noexcept {
-    return id < kMaxSources ? words_[id].load(std::memory_order_acquire) : nullptr;
+  [[nodiscard]] const Activity* find(SourceId id) const noexcept {
+    return id < kMaxSources ? activities_[id].load(std::memory_order_acquire) : nullptr;
   }
 
  private:
-  std::array<Atomic<const Atomic<ActivityWord>*>, kMaxSources> words_{};
+  std::array<Atomic<const Activity*>, kMaxSources> activities_{};
+};
+
+// One look at a source.
+struct SeenActivity {
+  ActivityWord word;
+  std::uint64_t breaks;
+
+  // SYNC POINT: activity-picture. Acquire, so that a second look comes after the first; breaks
+  // before the word, so that a break that comes later is seen to (activity.hpp).
+  static SeenActivity of(const Activity& activity) noexcept {
+    const std::uint64_t breaks = activity.breaks.load(std::memory_order_acquire);
+    return {activity.word.load(std::memory_order_acquire), breaks};
+  }
+
+  // Whether the source has stood as it was seen, at `now`, until a later look: nothing was written,
+  // or it was active and has been renewed since without a gap.
+  [[nodiscard]] bool stands(const SeenActivity& later, Nanoseconds timeout,
+                            Nanoseconds now) const noexcept {
+    if (later.word == word) return true;
+    if (!is_active(word, now) || is_deactivation(later.word) || later.breaks != breaks)
+      return false;
+    return !is_finite(word) || arrival_of(later.word, timeout) < word;
+  }
 };
 
 // How often a picture is taken anew before the decision is given up as unsettled. A second round
@@ -71,18 +96,27 @@ class Decider {
 
   // The same with the connection's own activity read too: is it the winner?
   [[nodiscard]] Verdict decide_with_own(const Rule& rule) noexcept {
-    const Atomic<ActivityWord>* own = pages_.find(rule.source);
-    if (own == nullptr) return rule.source == kNone ? Verdict::kLoses : Verdict::kBlind;
-    ActivityWord own_seen = kNeverActive;
-    return repeat([&] { return with_own(rule, *own, own_seen); });
+    if (rule.kind == table::kNever) return Verdict::kLoses;
+    return repeat([&] {
+      const Pass own = collect(rule.source, kOwn);
+      if (own == Pass::kAgain) return read_clock({}, 0);
+      if (own != Pass::kYes) return own;
+      const Pass rest = once(rule);
+      if (rest != Pass::kYes || rule.reads.count == 0) return rest;
+      return stands(rule.source, kOwn) ? rest : Pass::kAgain;
+    });
   }
 
  private:
   enum class Pass : std::uint8_t { kNo, kYes, kAgain, kBlind };
 
+  static constexpr Word kOwn = kMaxSourcesPerPort;
+
   template <class Attempt>
   Verdict repeat(Attempt attempt) noexcept {
-    known_ = 0;
+    collected_ = 0;
+    settled_ = 0;
+    own_settled_ = false;
     for (int i = 0; i < kMaxPictures; ++i) {
       switch (attempt()) {
         case Pass::kNo:
@@ -92,36 +126,12 @@ class Decider {
         case Pass::kBlind:
           return Verdict::kBlind;
         case Pass::kAgain:
+          settled_ = collected_;
+          own_settled_ = true;
           break;
       }
     }
     return Verdict::kUnsettled;
-  }
-
-  // Whether `word` can be judged only by a reading of the clock that is taken after it was seen.
-  // `seen_before_reading` says that it was; then no T, not even one that a reload has changed
-  // since, makes it look newer than the reading.
-  [[nodiscard]] bool needs_clock(SourceId source, ActivityWord word,
-                                 bool seen_before_reading) const noexcept {
-    if (!is_active(word, clock_.reading()) || !is_finite(word)) return false;
-    if (!clock_.is_fresh()) return true;
-    return !seen_before_reading && is_newer_than(word, table_.timeout(source), clock_.reading());
-  }
-
-  Pass with_own(const Rule& rule, const Atomic<ActivityWord>& own,
-                ActivityWord& own_seen) noexcept {
-    const ActivityWord word = own.load(std::memory_order_acquire);  // SYNC POINT: activity-picture
-    const bool seen = word == own_seen;
-    own_seen = word;
-    if (needs_clock(rule.source, word, seen)) {
-      clock_.read();
-      known_ = 0;
-      return Pass::kAgain;
-    }
-    if (!is_active(word, clock_.reading())) return Pass::kNo;
-    const Pass rest = once(rule);
-    if (rest != Pass::kYes || rule.reads.count == 0) return rest;
-    return own.load(std::memory_order_relaxed) == word ? rest : Pass::kAgain;
   }
 
   Pass once(const Rule& rule) noexcept {
@@ -137,48 +147,80 @@ class Decider {
     }
   }
 
-  // The first pass over one word.
-  Pass collect(const Rule& rule, Word i) noexcept {
-    const SourceId source = rule.reads[i] & ~table::kExpectActive;
-    const Atomic<ActivityWord>* word = pages_.find(source);
-    if (word == nullptr) return Pass::kBlind;
-    // SYNC POINT: activity-picture. Acquire, so that the second pass reads after the first.
-    const ActivityWord value = word->load(std::memory_order_acquire);
-    const bool seen = i < known_ && collected_[i] == value;
-    collected_[i] = value;
-    if (needs_clock(source, value, seen)) return read_clock(rule, i);
-    return is_active(value, clock_.reading()) ? Pass::kYes : Pass::kNo;
+  // The first pass over one source: is it active? kAgain: only a reading from now on can tell.
+  Pass collect(SourceId source, Word i) noexcept {
+    const Activity* activity = pages_.find(source);
+    if (activity == nullptr) return Pass::kBlind;
+    SeenActivity& seen = seen_[i];
+    if (i != kOwn && i == collected_) ++collected_;
+    // What an earlier pass has seen was held against the clock then; no T, not even one that a
+    // reload has changed since, makes it look newer than the reading now.
+    const bool settled = i == kOwn ? own_settled_ : i < settled_;
+    const SeenActivity look = SeenActivity::of(*activity);
+    if (!settled || !seen.stands(look, table_.timeout(source), clock_.reading())) {
+      seen = look;
+      if (needs_clock(source, look.word)) return Pass::kAgain;
+    }
+    return is_active(seen.word, clock_.reading()) ? Pass::kYes : Pass::kNo;
   }
 
-  // Sees all words before it reads the clock, so that no second reading is needed for the others.
-  Pass read_clock(const Rule& rule, Word from) noexcept {
-    for (Word i = from + 1; i < rule.reads.count; ++i) {
-      const Atomic<ActivityWord>* word = pages_.find(rule.reads[i] & ~table::kExpectActive);
-      if (word == nullptr) return Pass::kBlind;
-      collected_[i] = word->load(std::memory_order_acquire);
+  // Looks at the rest too before it reads the clock: then one reading settles them all.
+  Pass read_clock(const Rule& rule, Word next) noexcept {
+    for (; next < rule.reads.count; ++next) {
+      if (collect(source_of(rule, next), next) == Pass::kBlind) return Pass::kBlind;
     }
-    known_ = rule.reads.count;
     clock_.read();
     return Pass::kAgain;
   }
 
+  // Whether a word can be judged only by a reading of the clock that is taken after it was seen.
+  [[nodiscard]] bool needs_clock(SourceId source, ActivityWord word) const noexcept {
+    const bool may_end = is_finite(word) && is_active(word, clock_.reading());
+    if (!clock_.is_fresh()) return may_end;
+    if (is_finite(word) && !may_end) return false;
+    const Nanoseconds timeout = may_end ? table_.timeout(source) : kForever;
+    return is_newer_than(word, timeout, clock_.reading());
+  }
+
+  // The second pass over one source.
+  [[nodiscard]] bool stands(SourceId source, Word i) const noexcept {
+    const Activity* activity = pages_.find(source);
+    if (activity == nullptr) return false;  // the table was overwritten meanwhile
+    return seen_[i].stands(SeenActivity::of(*activity), table_.timeout(source), clock_.reading());
+  }
+
+  // One word alone is a picture already.
+  [[nodiscard]] bool all_stand(const Rule& rule) const noexcept {
+    if (rule.reads.count < 2) return true;
+    for (Word i = 0; i < rule.reads.count; ++i) {
+      if (!stands(source_of(rule, i), i)) return false;
+    }
+    return true;
+  }
+
+  static SourceId source_of(const Rule& rule, Word i) noexcept {
+    return rule.reads[i] & ~table::kExpectActive;
+  }
+
   Pass conjunction(const Rule& rule) noexcept {
     for (Word i = 0; i < rule.reads.count; ++i) {
-      const Pass pass = collect(rule, i);
-      if (pass == Pass::kAgain || pass == Pass::kBlind) return pass;
+      const Pass pass = collect(source_of(rule, i), i);
+      if (pass == Pass::kAgain) return read_clock(rule, i + 1);
+      if (pass == Pass::kBlind) return pass;
       if ((pass == Pass::kYes) != ((rule.reads[i] & table::kExpectActive) != 0)) return Pass::kNo;
     }
-    return unchanged(rule) ? Pass::kYes : Pass::kAgain;
+    return all_stand(rule) ? Pass::kYes : Pass::kAgain;
   }
 
   Pass diagram(const Rule& rule) noexcept {
     std::array<std::uint64_t, kMaxSourcesPerPort / 64> active{};
     for (Word i = 0; i < rule.reads.count; ++i) {
-      const Pass pass = collect(rule, i);
-      if (pass == Pass::kAgain || pass == Pass::kBlind) return pass;
+      const Pass pass = collect(source_of(rule, i), i);
+      if (pass == Pass::kAgain) return read_clock(rule, i + 1);
+      if (pass == Pass::kBlind) return pass;
       if (pass == Pass::kYes) active[i / 64] |= std::uint64_t{1} << (i % 64);
     }
-    if (!unchanged(rule)) return Pass::kAgain;
+    if (!all_stand(rule)) return Pass::kAgain;
     // Each step goes to a node further on, so a whole table ends the walk; a torn one is cut short.
     Word node = 0;
     for (Word steps = 0; steps <= rule.reads.count; ++steps) {
@@ -195,22 +237,13 @@ class Decider {
     return Pass::kNo;
   }
 
-  // The second pass. One word alone is a picture already.
-  [[nodiscard]] bool unchanged(const Rule& rule) const noexcept {
-    if (rule.reads.count < 2) return true;
-    for (Word i = 0; i < rule.reads.count; ++i) {
-      const Atomic<ActivityWord>* word = pages_.find(rule.reads[i] & ~table::kExpectActive);
-      if (word == nullptr) return false;  // the table was overwritten meanwhile
-      if (word->load(std::memory_order_relaxed) != collected_[i]) return false;
-    }
-    return true;
-  }
-
   const TableView& table_;
   const ActivityPages& pages_;
   Clock& clock_;
-  Word known_ = 0;  // how many words of collected_ were seen before the clock was last read
-  std::array<ActivityWord, kMaxSourcesPerPort> collected_;  // of the last pass; written before read
+  Word collected_ = 0;        // how many of seen_ are of this decision
+  Word settled_ = 0;          // how many of them are of an earlier pass
+  bool own_settled_ = false;  // the same of our own
+  std::array<SeenActivity, kMaxSourcesPerPort + 1> seen_;  // the last is our own
 };
 
 }  // namespace arbiter::shm

@@ -137,13 +137,14 @@ class TableView {
     const Word record = source_record(id);
     return record != kNone && at(record + table::kSourceKnown) != 0;
   }
-  // T of a source: how long an arrival keeps it active.
+  // T of a source: how long an arrival keeps it active. Always one that arrival() can be given.
   [[nodiscard]] Nanoseconds timeout(SourceId id) const noexcept {
     const Word record = source_record(id);
-    if (record == kNone || at(record + table::kSourceKnown) == 0) {
-      return capacity_ == 0 ? kDefaultTimeout : span_at(table::kDefaultTimeoutLowAt);
-    }
-    return span_at(record + table::kTimeoutLow);
+    const bool known = record != kNone && at(record + table::kSourceKnown) != 0;
+    const Nanoseconds span =
+        span_at(known ? record + table::kTimeoutLow : Word{table::kDefaultTimeoutLowAt});
+    const bool possible = span > 0 && (span <= kMaxTime || span == kForever);
+    return possible ? span : kDefaultTimeout;
   }
   // The connections from a source, as connection indices.
   [[nodiscard]] WordList connections_of_source(SourceId id) const noexcept {

@@ -82,6 +82,8 @@ struct OutputHeader {
   std::uint64_t payload_offset;  // of payload[0]
   std::uint64_t total_size;
   TypeInfo type;
+  // How often an input port has joined: one that waits to be joined looks at this word alone.
+  alignas(kCacheLine) Atomic<std::uint64_t> joins;
   alignas(kCacheLine) OutputCounters counters;
 };
 static_assert(sizeof(OutputHeader) <= kPageSize);

@@ -69,8 +69,8 @@ TEST(Condition, HasTheStructureThatPrecedenceGives) {
 
 TEST(Condition, TakesEverySpellingOfEachOperator) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> spellings{
-      {"iff", {"iff", "<->", "↔"}},  {"implies", {"implies", "->", "→"}},
-      {"or", {"or", "|", "||", "∨"}}, {"xor", {"xor"}},
+      {"iff", {"iff", "<->", "↔"}},     {"implies", {"implies", "->", "→"}},
+      {"or", {"or", "|", "||", "∨"}},   {"xor", {"xor"}},
       {"and", {"and", "&", "&&", "∧"}},
   };
   for (const auto& [name, all] : spellings) {
@@ -88,12 +88,18 @@ TEST(Condition, TakesEverySpellingOfEachOperator) {
 
 TEST(Condition, NeedsNoBlanksWhereNothingElseCanBeMeant) {
   const std::vector<std::pair<std::string, std::string>> cases{
-      {"/a->/b", "(/a implies /b)"},      {"/a-b", "/a-b"},
-      {"/a<->/b", "(/a iff /b)"},         {"/a-->/b", "(/a- implies /b)"},
-      {"/a-b->/c-d", "(/a-b implies /c-d)"}, {"/a-/b", "/a-/b"},
-      {"/a&/b|/c", "((/a and /b) or /c)"}, {"/a&&!/b", "(/a and not(/b))"},
-      {"not/a", "not(/a)"},               {"!(/a)or(/b)", "(not(/a) or /b)"},
-      {"/a∧/b∨¬/c", "((/a and /b) or not(/c))"}, {"\"/a\"and\"/b\"", "(/a and /b)"},
+      {"/a->/b", "(/a implies /b)"},
+      {"/a-b", "/a-b"},
+      {"/a<->/b", "(/a iff /b)"},
+      {"/a-->/b", "(/a- implies /b)"},
+      {"/a-b->/c-d", "(/a-b implies /c-d)"},
+      {"/a-/b", "/a-/b"},
+      {"/a&/b|/c", "((/a and /b) or /c)"},
+      {"/a&&!/b", "(/a and not(/b))"},
+      {"not/a", "not(/a)"},
+      {"!(/a)or(/b)", "(not(/a) or /b)"},
+      {"/a∧/b∨¬/c", "((/a and /b) or not(/c))"},
+      {"\"/a\"and\"/b\"", "(/a and /b)"},
   };
   for (const auto& [condition, structure] : cases) {
     EXPECT_EQ(parse(condition).shown(), structure) << condition;

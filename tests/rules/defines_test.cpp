@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <chrono>
 #include <string>
 #include <vector>
 
@@ -30,9 +29,8 @@ TEST(Defines, WorkInEveryTextAndAttribute) {
     <arbiter at="${p}" conflict="${how}"><select from="${s}/c">${c} and ${c}</select></arbiter>
   </behaviors>)");
   EXPECT_THAT(loaded.findings(), IsEmpty()) << loaded.message();
-  EXPECT_THAT(show_rules(loaded, "/p"),
-              ElementsAre("/s/a: true", "/s/b: (not(/s/x) and not(/s/a))",
-                          "/s/c: (not(/s/x) and not(/s/x))"));
+  EXPECT_THAT(show_rules(loaded, "/p"), ElementsAre("/s/a: true", "/s/b: (not(/s/x) and not(/s/a))",
+                                                    "/s/c: (not(/s/x) and not(/s/x))"));
   EXPECT_EQ(loaded.rules.timeouts.at("/s/x"), 2'000'000'000);
   EXPECT_TRUE(loaded.port("/p")->first_wins);
 }
@@ -77,8 +75,8 @@ TEST(Defines, MistakesAreReportedAtTheirPlace) {
        "used before it is defined, at "},
       {"<define name='b'>${b}</define>", "1:18 error unknown-define", "used before it is defined"},
       {"<source port='/a${b'/>", "1:17 error unterminated-define", "close it with '}'"},
-      {"<define name='b'>b</define>\n<source port='/a${b/${b}'/>",
-       "2:17 error unterminated-define", "close it with '}'"},
+      {"<define name='b'>b</define>\n<source port='/a${b/${b}'/>", "2:17 error unterminated-define",
+       "close it with '}'"},
       {"<define name=' '>b</define>", "1:15 error empty-name", "the name of a define is empty"},
       {"<define>b</define>", "1:1 error missing-attribute", "lacks the attribute name"},
       {"<define name='a}b'>b</define>", "1:15 error invalid-name", "$ { }"},
@@ -110,9 +108,9 @@ TEST(Defines, ThatDoubleEachOtherEndAtALimit) {
     const std::string use = "${a" + std::to_string(i - 1) + "}";
     model += "\n<define name='a" + std::to_string(i) + "'>" + use + use + "</define>";
   }
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch stopwatch;
   const Loaded loaded = load_text(model + "\n<source port='/${a59}'/>");
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
+  EXPECT_LT(stopwatch.seconds(), 2.0);
   ASSERT_EQ(loaded.items.size(), 1u) << "those that use it are no further mistakes";
   EXPECT_EQ(loaded.items[0].code, "limit-exceeded");
   EXPECT_THAT(loaded.message(), HasSubstr("more than the limit of 64 KiB"));
@@ -121,9 +119,9 @@ TEST(Defines, ThatDoubleEachOtherEndAtALimit) {
 TEST(Defines, OfManyTextsTogetherEndAtALimit) {
   std::string model = "<define name='a'>" + std::string(60'000, 'x') + "</define>\n";
   for (int i = 0; i < 100'000; ++i) model += "<source port='/${a}'/>";
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch stopwatch;
   const Loaded loaded = load_text(model);
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
+  EXPECT_LT(stopwatch.seconds(), 10.0);
   EXPECT_EQ(loaded.items.back().code, "limit-exceeded");
   EXPECT_THAT(loaded.items.back().message, HasSubstr("the limit of 64 MiB in all"));
 }

@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <chrono>
 #include <string>
 #include <vector>
 
@@ -35,20 +34,18 @@ std::string condition(const std::string& text) { return "<condition>" + text + "
 // The paper's section V and its figures, as the example in the repository has them.
 TEST(Extraction, GivesTheRulesOfSearchAndTrack) {
   const std::string folder = std::string(ARBITER_TEST_DATA) + "/../../examples/search_and_track/";
-  const Loaded loaded =
-      load_files({{folder + "search_and_track.xml"}, folder + "application.xml"});
+  const Loaded loaded = load_files({{folder + "search_and_track.xml"}, folder + "application.xml"});
   EXPECT_THAT(loaded.findings(), IsEmpty()) << loaded.message();
   EXPECT_THAT(show_rules(loaded, "/Gaze/pos:i"),
               ElementsAre("/RandomLook/pos:o: (not(/Face/pos:o) and not(/Object/pos:o))",
                           "/Face/pos:o: not(/Object/pos:o)", "/Object/pos:o: not(/collision:o)"));
-  EXPECT_THAT(show_rules(loaded, "/Arm/pos:i"),
-              ElementsAre("/Object/pos:o: not(/collision:o)", "/RestArm/pos:o: not(/Object/pos:o)"));
+  EXPECT_THAT(show_rules(loaded, "/Arm/pos:i"), ElementsAre("/Object/pos:o: not(/collision:o)",
+                                                            "/RestArm/pos:o: not(/Object/pos:o)"));
   EXPECT_EQ(loaded.rules.ports.size(), 2u);
   EXPECT_EQ(loaded.rules.timeout, 500'000'000);
   EXPECT_THAT(loaded.rules.timeouts, IsEmpty());
-  EXPECT_THAT(loaded.rules.sources, ElementsAre("/Face/pos:o", "/Object/pos:o",
-                                                "/RandomLook/pos:o", "/RestArm/pos:o",
-                                                "/collision:o"));
+  EXPECT_THAT(loaded.rules.sources, ElementsAre("/Face/pos:o", "/Object/pos:o", "/RandomLook/pos:o",
+                                                "/RestArm/pos:o", "/collision:o"));
   ASSERT_EQ(loaded.rules.other_connections.size(), 2u);
   EXPECT_EQ(loaded.rules.other_connections[0].port, "/Face/img:i");
 
@@ -79,11 +76,10 @@ TEST(Extraction, InhibitionOfAMetaBehaviourReachesAllBehavioursInIt) {
 }
 
 TEST(Extraction, InhibitionByAMetaBehaviourIsByAllBehavioursInIt) {
-  const Loaded loaded =
-      load_text(behaviour("A", config("/a", "/p") + config("/a", "/q")) +
-                meta("M", {"N", "X"}, inhibition("A")) + meta("N", {"Y"}) +
-                behaviour("X", config("/x", "/p") + config("/x2", "/r")) +
-                behaviour("Y", config("/y", "/p") + config("/y", "/q")));
+  const Loaded loaded = load_text(behaviour("A", config("/a", "/p") + config("/a", "/q")) +
+                                  meta("M", {"N", "X"}, inhibition("A")) + meta("N", {"Y"}) +
+                                  behaviour("X", config("/x", "/p") + config("/x2", "/r")) +
+                                  behaviour("Y", config("/y", "/p") + config("/y", "/q")));
   EXPECT_THAT(loaded.findings(), IsEmpty()) << loaded.message();
   EXPECT_THAT(show_rules(loaded, "/p"),
               ElementsAre("/a: (not(/x) and not(/y))", "/x: true", "/y: true"));
@@ -92,9 +88,9 @@ TEST(Extraction, InhibitionByAMetaBehaviourIsByAllBehavioursInIt) {
 }
 
 TEST(Extraction, InhibitionAcrossPortsIsByAllSourcesAndIsNoted) {
-  const Loaded loaded = load_text(behaviour("A", config("/a", "/p") + config("/a", "/q")) +
-                                  behaviour("X", config("/x", "/q") + config("/z", "/r") +
-                                                     inhibition("A")));
+  const Loaded loaded =
+      load_text(behaviour("A", config("/a", "/p") + config("/a", "/q")) +
+                behaviour("X", config("/x", "/q") + config("/z", "/r") + inhibition("A")));
   EXPECT_THAT(loaded.findings(), ElementsAre("2:86 note inhibition-across-ports"));
   EXPECT_THAT(loaded.message(), HasSubstr("\"X\" inhibits \"A\" at /p without a connection there; "
                                           "it does so while /x or /z is active"));
@@ -103,11 +99,10 @@ TEST(Extraction, InhibitionAcrossPortsIsByAllSourcesAndIsNoted) {
 }
 
 TEST(Extraction, InhibitionAcrossPortsIsNotedOnceForEachPort) {
-  const Loaded loaded =
-      load_text(meta("M", {"A", "B"}) +
-                behaviour("A", config("/a", "/p") + config("/a2", "/p") + config("/a", "/q")) +
-                behaviour("B", config("/b", "/p")) +
-                behaviour("X", config("/x", "/r") + inhibition("M")));
+  const Loaded loaded = load_text(
+      meta("M", {"A", "B"}) +
+      behaviour("A", config("/a", "/p") + config("/a2", "/p") + config("/a", "/q")) +
+      behaviour("B", config("/b", "/p")) + behaviour("X", config("/x", "/r") + inhibition("M")));
   EXPECT_THAT(loaded.findings(), ElementsAre("4:59 note inhibition-across-ports",
                                              "4:59 note inhibition-across-ports"));
   EXPECT_THAT(loaded.message(0), HasSubstr("\"M\" at /p"));
@@ -117,12 +112,11 @@ TEST(Extraction, InhibitionAcrossPortsIsNotedOnceForEachPort) {
 TEST(Extraction, AnInhibitorWithoutSourcesInhibitsNothing) {
   const Loaded loaded = load_text(behaviour("A", config("/a", "/p")) +
                                   behaviour("X", inhibition("A")) + meta("M", {"X"}));
-  EXPECT_THAT(loaded.findings(),
-              ElementsAre("2:17 warning no-config", "2:32 error not-a-sibling"));
-  EXPECT_THAT(show_rules(load_text(behaviour("A", config("/a", "/p")) +
-                                   behaviour("X", inhibition("A"))),
-                         "/p"),
-              ElementsAre("/a: true"));
+  EXPECT_THAT(loaded.findings(), ElementsAre("2:17 warning no-config", "2:32 error not-a-sibling"));
+  EXPECT_THAT(
+      show_rules(load_text(behaviour("A", config("/a", "/p")) + behaviour("X", inhibition("A"))),
+                 "/p"),
+      ElementsAre("/a: true"));
 }
 
 TEST(Extraction, ARuleMayBeInhibitedByItsOwnSource) {
@@ -133,10 +127,9 @@ TEST(Extraction, ARuleMayBeInhibitedByItsOwnSource) {
 }
 
 TEST(Extraction, SeveralBehavioursWithOneConnectionMakeADisjunction) {
-  const Loaded loaded =
-      load_text(behaviour("A", config("/s", "/p") + condition("/a")) +
-                behaviour("B", config("/t", "/p")) +
-                behaviour("C", config("/s", "/p") + condition("/c") + inhibition("B")));
+  const Loaded loaded = load_text(
+      behaviour("A", config("/s", "/p") + condition("/a")) + behaviour("B", config("/t", "/p")) +
+      behaviour("C", config("/s", "/p") + condition("/c") + inhibition("B")));
   EXPECT_THAT(loaded.findings(), IsEmpty()) << loaded.message();
   EXPECT_THAT(show_rules(loaded, "/p"), ElementsAre("/s: (/a or /c)", "/t: not(/s)"));
   const ConnectionRule& rule = loaded.port("/p")->rules[0];
@@ -147,8 +140,7 @@ TEST(Extraction, SeveralBehavioursWithOneConnectionMakeADisjunction) {
 }
 
 TEST(Extraction, ATermStandsInARuleOnce) {
-  const Loaded loaded = load_text(meta("M", {"A", "X"}) +
-                                  behaviour("A", config("/a", "/p")) +
+  const Loaded loaded = load_text(meta("M", {"A", "X"}) + behaviour("A", config("/a", "/p")) +
                                   behaviour("X", config("/x", "/p") + inhibition("A, A")) +
                                   behaviour("Y", config("/x", "/p") + inhibition("M")));
   EXPECT_FALSE(loaded.has_errors);
@@ -161,8 +153,8 @@ TEST(Extraction, RulesStandInDocumentOrder) {
        behaviour("A", config("/b", "/p") + config("/a", "/q") + config("/a", "/p")) +
            behaviour("B", config("/c", "/p")) + "<arbiter at='/p'><select from='/0'/></arbiter>"});
   EXPECT_FALSE(loaded.has_errors);
-  EXPECT_THAT(show_rules(loaded, "/p"), ElementsAre("/d: true", "/c: (true or true)", "/b: true",
-                                                    "/a: true", "/0: true"));
+  EXPECT_THAT(show_rules(loaded, "/p"),
+              ElementsAre("/d: true", "/c: (true or true)", "/b: true", "/a: true", "/0: true"));
   std::vector<std::string> ports;
   for (const PortRules& port : loaded.rules.ports) ports.push_back(port.port);
   EXPECT_THAT(ports, ElementsAre("/p", "/q"));
@@ -174,8 +166,9 @@ TEST(Extraction, AConnectionGetsItsRuleFromOnePlace) {
   EXPECT_THAT(both.findings(), ElementsAre("2:1 error rule-from-both"));
   EXPECT_THAT(both.message(), HasSubstr("from /s to /p has a rule from the behaviour \"B\""));
 
-  const Loaded twice = load_text("<arbiter at='/p'><select from='/s'/>\n<select from='/s'/>\n"
-                                 "</arbiter><arbiter at='/p'><select from='/s'/></arbiter>");
+  const Loaded twice = load_text(
+      "<arbiter at='/p'><select from='/s'/>\n<select from='/s'/>\n"
+      "</arbiter><arbiter at='/p'><select from='/s'/></arbiter>");
   EXPECT_THAT(twice.findings(),
               ElementsAre("2:1 error duplicate-select", "3:28 error duplicate-select"));
   EXPECT_THAT(twice.message(), HasSubstr("from /s to /p has a rule already, at "));
@@ -210,15 +203,12 @@ TEST(Extraction, OfTenThousandBehavioursIsQuick) {
   }
   const Folder folder;
   const std::string path = folder.write("a.xml", model + "</behaviors>");
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch stopwatch;
   const Loaded loaded = load_files({{path}, {}});
-  const auto spent = std::chrono::steady_clock::now() - start;
+  const double spent = stopwatch.seconds();
   EXPECT_FALSE(loaded.has_errors) << loaded.message();
   EXPECT_EQ(loaded.rules.behaviours.size(), 10'000u);
-  EXPECT_LT(spent, std::chrono::seconds(10)) << "0.3 s where this was written";
-  RecordProperty("milliseconds",
-                 static_cast<int>(
-                     std::chrono::duration_cast<std::chrono::milliseconds>(spent).count()));
+  EXPECT_LT(spent, 10.0) << "0.2 s where this was written, without sanitizers";
 }
 
 TEST(Extraction, OfAModelThatWouldExplodeEndsAtALimit) {
@@ -231,9 +221,9 @@ TEST(Extraction, OfAModelThatWouldExplodeEndsAtALimit) {
     model += behaviour(name, config("/a", "/p"));
     inhibitors += behaviour("X" + std::to_string(i), config("/x", "/p") + inhibition("M"));
   }
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch stopwatch;
   const Loaded loaded = load_text(meta("M", inside) + model + inhibitors);
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
+  EXPECT_LT(stopwatch.seconds(), 10.0);
   ASSERT_EQ(loaded.items.size(), 1u);
   EXPECT_EQ(loaded.items[0].code, "limit-exceeded");
   EXPECT_THAT(loaded.message(), HasSubstr("more terms than the limit of 16777216"));

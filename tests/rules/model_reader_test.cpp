@@ -230,8 +230,8 @@ TEST(ModelReader, NamesThatAreNoneAreErrors) {
        "2:14 error invalid-port-name", "write \"/p\" for \"p\""},
       {"<behavior name='B'>\n<config at='/p'>\n /s /t </config></behavior>",
        "3:4 error invalid-port-name", "\"/s /t\" has white space in it"},
-      {"<behavior name='B'>\n<config at='/p'>s</config></behavior>",
-       "2:17 error invalid-port-name", "write \"/s\" for \"s\""},
+      {"<behavior name='B'>\n<config at='/p'>s</config></behavior>", "2:17 error invalid-port-name",
+       "write \"/s\" for \"s\""},
       {"<source port='/a&quot;b'/>", "1:17 error invalid-port-name", "a double quote"},
       {"<source port='a'/>", "1:15 error invalid-port-name", "begins with '/'"},
       {"<arbiter at='/p'>\n<select from='s'/></arbiter>", "2:15 error invalid-port-name",
@@ -264,8 +264,8 @@ TEST(ModelReader, WrongValuesAreErrors) {
        "2:28 error invalid-timeout", "a fraction; take a smaller unit (in the text of ${t})"},
       {"<arbiter at='/p' conflict='last'><select from='/s'/></arbiter>",
        "1:28 error invalid-conflict", "write conflict=\"first\""},
-      {"<arbiter at='/p' conflict=''><select from='/s'/></arbiter>",
-       "1:28 error invalid-conflict", "write conflict=\"first\""},
+      {"<arbiter at='/p' conflict=''><select from='/s'/></arbiter>", "1:28 error invalid-conflict",
+       "write conflict=\"first\""},
       {"<behavior name='B'><config at='/p'>/s</config>\n<condition>/a and\n</condition></behavior>",
        "3:1 error malformed-condition", "the condition ends"},
       {"<arbiter at='/p'><select from='/s'>\n/a b</select></arbiter>",
@@ -314,9 +314,10 @@ TEST(ModelReader, ReportsEverythingThatIsWrongInOneGo) {
 
 TEST(ModelReader, WhatIsRefusedMakesItsMentionsNoFurtherMistakes) {
   // The second line defines what the others mention, and is wrong each time.
-  const std::string mentions = "<meta_behavior name='M'><behavior>A</behavior></meta_behavior>"
-                               "<behavior name='B'><config at='/p'>/b</config>"
-                               "<inhibition>A</inhibition></behavior>\n";
+  const std::string mentions =
+      "<meta_behavior name='M'><behavior>A</behavior></meta_behavior>"
+      "<behavior name='B'><config at='/p'>/b</config>"
+      "<inhibition>A</inhibition></behavior>\n";
   for (const std::string wrong : {
            "<behavor name='A'><config at='/p'>/a</config></behavor>",
            "<behavior nme='A'><config at='/p'>/a</config></behavior>",

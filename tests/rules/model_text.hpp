@@ -3,9 +3,10 @@
 
 #include <stdlib.h>
 
+#include <ctime>
 #include <filesystem>
 #include <fstream>
-#include <functional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -36,6 +37,17 @@ class Folder {
 
  private:
   std::filesystem::path path_;
+};
+
+// Seconds of processor time since it was made: other programs on the machine do not count.
+class Stopwatch {
+ public:
+  [[nodiscard]] double seconds() const {
+    return static_cast<double>(std::clock() - start_) / CLOCKS_PER_SEC;
+  }
+
+ private:
+  std::clock_t start_ = std::clock();
 };
 
 struct Loaded {
@@ -95,7 +107,7 @@ inline Loaded load_with_application(const std::string& model, const std::string&
 
 // Fully parenthesised, so that a test sees the structure: (/a and not(/b)).
 inline std::string show(const ExpressionPtr& expression) {
-  static constexpr const char* kNames[] = {"false", "true", "",        "not", "and", "or",
+  static constexpr const char* kNames[] = {"false", "true",    "",    "not", "and", "or",
                                            "xor",   "implies", "iff", "any", "all", "none"};
   const std::string name = kNames[static_cast<int>(expression->op)];
   switch (expression->op) {

@@ -18,8 +18,8 @@ TEST(Names, AreTrimmedAndInnerWhiteSpaceIsOneBlank) {
 }
 
 TEST(Names, OfPortsTakeAnyPrintableCharacter) {
-  for (const std::string name : {"/a", "/", "/Face/pos:o", "/a-b_c.d/0", "/größe+1@x,y*", "/日本",
-                                 "//", "/&<>'"}) {
+  for (const std::string name :
+       {"/a", "/", "/Face/pos:o", "/a-b_c.d/0", "/größe+1@x,y*", "/日本", "//", "/&<>'"}) {
     EXPECT_FALSE(find_problem_in_port(name)) << name;
   }
   EXPECT_FALSE(find_problem_in_port("/" + std::string(254, 'x')));

@@ -61,7 +61,7 @@ TEST(PrintRules, PutsParenthesesOnlyWhereThePrecedencesAskForThem) {
 }
 
 TEST(PrintRules, QuotesNamesThatAConditionCouldNotTakeOtherwise) {
-  EXPECT_EQ(to_string(*active("/left arm/pos:o")), "\"/left arm/pos:o\"");
+  EXPECT_EQ(to_string(*active("/left,arm/pos:o")), "\"/left,arm/pos:o\"");
   EXPECT_EQ(to_string(*active("/Kopf/größe:o")), "\"/Kopf/größe:o\"");
   EXPECT_EQ(to_string(*active("/icub/head_0.5-b:o")), "/icub/head_0.5-b:o");
 }
@@ -89,13 +89,13 @@ TEST(PrintRules, WritesTimeoutsInTheLargestUnitWithoutAFraction) {
 
 TEST(PrintRules, WritesJson) {
   std::ostringstream out;
-  write_rules_json(out, RulesByHand()
-                            .port("/p", {{"/a", inactive("/b")}})
-                            .behaviour("First", "/p", "/a", always())
-                            .behaviour("Second", "/p", "/a", always())
-                            .other("/x", "/p")
-                            .other("/x", "/q")
-                            .timeout("/b", shm::kForever));
+  rules::write_rules_json(out, RulesByHand()
+                                   .port("/p", {{"/a", inactive("/b")}})
+                                   .behaviour("First", "/p", "/a", always())
+                                   .behaviour("Second", "/p", "/a", always())
+                                   .other("/x", "/p")
+                                   .other("/x", "/q")
+                                   .timeout("/b", shm::kForever));
   const auto expected = nlohmann::json::parse(R"({
     "timeout": "500ms", "timeouts": {"/b": "forever"},
     "ports": [

@@ -19,18 +19,30 @@ TEST(Glob, KnowsNoSpecialCharacterButTheStar) {
     bool fits;
   };
   const std::vector<Case> cases{
-      {"*", "/Face/pos:o", true},      {"*", "", true},
-      {"", "", true},                  {"", "/a", false},
-      {"/Face/*", "/Face/pos:o", true}, {"/Face/*", "/Face/", true},
-      {"/Face/*", "/Face", false},     {"/Face*", "/Face", true},
-      {"*:o", "/a/b/c:o", true},       {"*:o", "/a:i", false},
-      {"/*/pos:o", "/a/b/pos:o", true}, {"/a", "/a", true},
-      {"/a", "/ab", false},            {"/a", "/A", false},
-      {"/a?", "/ab", false},           {"/a?", "/a?", true},
-      {"/[ab]", "/a", false},          {"/a.c", "/abc", false},
-      {"**/**", "/", true},            {"*a*b*", "/xaxxbx", true},
-      {"*a*b*", "/xbxxax", false},     {"/aa*aa", "/aaa", false},
-      {"/aa*aa", "/aaaa", true},       {"\\*", "*", false},
+      {"*", "/Face/pos:o", true},
+      {"*", "", true},
+      {"", "", true},
+      {"", "/a", false},
+      {"/Face/*", "/Face/pos:o", true},
+      {"/Face/*", "/Face/", true},
+      {"/Face/*", "/Face", false},
+      {"/Face*", "/Face", true},
+      {"*:o", "/a/b/c:o", true},
+      {"*:o", "/a:i", false},
+      {"/*/pos:o", "/a/b/pos:o", true},
+      {"/a", "/a", true},
+      {"/a", "/ab", false},
+      {"/a", "/A", false},
+      {"/a?", "/ab", false},
+      {"/a?", "/a?", true},
+      {"/[ab]", "/a", false},
+      {"/a.c", "/abc", false},
+      {"**/**", "/", true},
+      {"*a*b*", "/xaxxbx", true},
+      {"*a*b*", "/xbxxax", false},
+      {"/aa*aa", "/aaa", false},
+      {"/aa*aa", "/aaaa", true},
+      {"\\*", "*", false},
   };
   for (const Case& c : cases) {
     EXPECT_EQ(matches(c.pattern, c.name), c.fits) << c.pattern << " on " << c.name;
@@ -108,9 +120,9 @@ TEST(Quantifiers, MayStandInsideOtherOperators) {
 }
 
 TEST(Quantifiers, RangeOverTheSourcesOfAllFiles) {
-  const Loaded loaded = load_texts(
-      {"<arbiter at='/p'><select from='/a/1'>none(/a/*)</select></arbiter>",
-       "<source port='/a/2'/>"});
+  const Loaded loaded =
+      load_texts({"<arbiter at='/p'><select from='/a/1'>none(/a/*)</select></arbiter>",
+                  "<source port='/a/2'/>"});
   EXPECT_THAT(show_rules(loaded, "/p"), ElementsAre("/a/1: (not(/a/1) and not(/a/2))"));
   EXPECT_THAT(loaded.rules.sources, ElementsAre("/a/1", "/a/2"));
 }

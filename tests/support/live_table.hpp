@@ -24,7 +24,6 @@ class LiveTable {
         activity_(3 * model.sources.size() + 3),
         pages_(std::make_unique<shm::ActivityPages>()) {
     for (std::size_t id = 0; id < activity_.size(); ++id) {
-      activity_[id] = shm::kNeverActive;
       pages_->attach(static_cast<shm::SourceId>(id), &activity_[id]);
     }
   }
@@ -39,7 +38,7 @@ class LiveTable {
 
   void activate_only(const std::set<std::string>& active) {
     for (const auto& [name, id] : source_ids_) {
-      activity_[id] = active.contains(name) ? shm::arrival(clock_.now, shm::kForever)
+      activity_[id].word = active.contains(name) ? shm::arrival(clock_.now, shm::kForever)
                                             : shm::deactivation(clock_.now);
     }
   }
@@ -103,7 +102,7 @@ class LiveTable {
 
   std::map<std::string, std::uint32_t> source_ids_, port_ids_;
   std::vector<shm::Atomic<shm::Word>> words_;
-  std::vector<shm::Atomic<shm::ActivityWord>> activity_;
+  std::vector<shm::Activity> activity_;
   std::unique_ptr<shm::ActivityPages> pages_;
   Clock clock_;
 };

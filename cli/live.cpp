@@ -1,0 +1,79 @@
+#include "cli/live.hpp"
+
+#include <poll.h>
+#include <signal.h>
+#include <sys/signalfd.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "shm/clock.hpp"
+
+namespace arbiter::cli {
+
+void add_instance_option(CLI::App& verb, std::string& instance) {
+  verb.add_option("--instance", instance,
+                  "Which daemon; without it $ARBITER_INSTANCE, else \"default\"")
+      ->type_name("NAME");
+}
+
+NodeOptions live_options(const std::string& instance) {
+  NodeOptions options;
+  options.instance = instance;
+  options.connect_timeout = kConnectTimeout;
+  return options;
+}
+
+std::shared_ptr<detail::NodeCore> connect(const std::string& verb, const std::string& instance) {
+  return detail::make_node("arbiter-" + verb, live_options(instance));
+}
+
+nlohmann::json fetch_status(detail::NodeCore& node) {
+  shm::Message question;
+  question.kind = shm::MessageKind::kStatus;
+  const shm::Received reply = node.ask(question, {-1, -1});
+  const int document = reply.descriptors[0].get();
+  struct stat status {};
+  if (document < 0 || fstat(document, &status) != 0) throw Error("the daemon sent no status");
+  std::string text(static_cast<std::size_t>(status.st_size), '\0');
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const ssize_t got = pread(document, text.data() + at, text.size() - at, static_cast<off_t>(at));
+    if (got <= 0) throw Error("the daemon's status cannot be read");
+    at += static_cast<std::size_t>(got);
+  }
+  return nlohmann::json::parse(text);
+}
+
+shm::FileDescriptor catch_interrupts() {
+  sigset_t caught;
+  sigemptyset(&caught);
+  sigaddset(&caught, SIGINT);
+  sigaddset(&caught, SIGTERM);
+  sigprocmask(SIG_BLOCK, &caught, nullptr);
+  return shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
+}
+
+bool sleep_until(shm::Nanoseconds time, const shm::FileDescriptor& interrupts) {
+  for (;;) {
+    const shm::Nanoseconds left = time - shm::monotonic_now();
+    pollfd interrupt{interrupts.get(), POLLIN, 0};
+    const timespec span{std::max<shm::Nanoseconds>(left, 0) / 1'000'000'000,
+                        std::max<shm::Nanoseconds>(left, 0) % 1'000'000'000};
+    if (ppoll(&interrupt, 1, &span, nullptr) == 1) return true;
+    if (left <= 0) return false;
+  }
+}
+
+std::string seconds_text(shm::Nanoseconds span) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.3f s", static_cast<double>(span) / 1e9);
+  return text;
+}
+
+}  // namespace arbiter::cli

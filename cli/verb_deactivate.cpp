@@ -1,0 +1,41 @@
+// arbiter deactivate: ends the activity of a source whose process is gone.
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/live.hpp"
+#include "cli/verbs.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+struct DeactivateOptions {
+  std::string source;
+  std::string instance;
+};
+
+int deactivate(const DeactivateOptions& options) {
+  const auto node = connect("deactivate", options.instance);
+  shm::Message question;
+  question.kind = shm::MessageKind::kDeactivate;
+  question.set_name(options.source);
+  const bool was_active = node->ask(question, {-1, -1}).message.value != 0;
+  std::cout << options.source << (was_active ? " is inactive now\n" : " was not active\n");
+  return 0;
+}
+
+}  // namespace
+
+void add_deactivate(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<DeactivateOptions>();
+  CLI::App* verb =
+      app.add_subcommand("deactivate", "End the activity of a source whose process is gone");
+  verb->add_option("SOURCE", options->source, "An output port's name")->required();
+  add_instance_option(*verb, options->instance);
+  verb->footer("Example:\n  arbiter deactivate /collision:o");
+  verb->callback([options, &exit_code] { exit_code = deactivate(*options); });
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,87 @@
+// arbiter pub: publishes on an output port, to try things out.
+#include <cstdint>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/live.hpp"
+#include "cli/verbs.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+struct PubOptions {
+  std::string port;
+  std::string instance;
+  double rate_hz = 1;
+  std::uint64_t count = 0;  // 0: until interrupted
+  std::size_t size = 8;
+  std::string text;
+  bool quiet = false;
+};
+
+std::vector<std::byte> payload_of(const PubOptions& options) {
+  if (options.text.empty()) return std::vector<std::byte>(options.size);
+  const auto* bytes = reinterpret_cast<const std::byte*>(options.text.data());
+  return {bytes, bytes + options.text.size()};
+}
+
+int pub(const PubOptions& options) {
+  const auto interrupts = catch_interrupts();
+  const std::vector<std::byte> payload = payload_of(options);
+  Node node("arbiter-pub", live_options(options.instance));
+  OutputPortOptions port_options;
+  port_options.max_size = payload.size();
+  auto out = node.output_port(options.port, port_options);
+  const auto period = static_cast<shm::Nanoseconds>(1e9 / options.rate_hz);
+  shm::Nanoseconds next = shm::monotonic_now();
+  std::uint64_t published = 0;
+  std::uint64_t delivered = 0;
+  std::uint64_t discarded = 0;
+  std::uint64_t refused = 0;
+  while (options.count == 0 || published < options.count) {
+    if (sleep_until(next, interrupts)) break;
+    const Outcome outcome = out.publish(Bytes(payload.data(), payload.size()));
+    ++published;
+    delivered += outcome.delivered;
+    discarded += outcome.discarded;
+    refused += outcome.refused;
+    if (!options.quiet) {
+      std::cout << '#' << published << "  delivered " << outcome.delivered << "  discarded "
+                << outcome.discarded << "  refused " << outcome.refused << std::endl;
+      if (!std::cout) break;
+    }
+    next += period;
+  }
+  std::cout << "published " << published << " samples of " << payload.size() << " bytes: delivered "
+            << delivered << ", discarded " << discarded << ", refused " << refused << '\n';
+  return 0;
+}
+
+}  // namespace
+
+void add_pub(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<PubOptions>();
+  CLI::App* verb = app.add_subcommand("pub", "Publish on an output port");
+  verb->add_option("PORT", options->port, "The output port's name")->required();
+  verb->add_option("--rate", options->rate_hz, "Samples in a second (default 1)")
+      ->type_name("HZ")
+      ->check(CLI::Range(1e-3, 1e6));
+  verb->add_option("--count", options->count, "How many (default: until interrupted)")
+      ->type_name("N")
+      ->check(CLI::PositiveNumber);
+  auto* size = verb->add_option("--size", options->size, "Bytes of a sample (default 8), zeroed")
+                   ->type_name("BYTES")
+                   ->check(CLI::Range(std::size_t{0}, std::size_t{1} << 32));
+  verb->add_option("--text", options->text, "The sample, as text")->excludes(size);
+  verb->add_flag("--quiet", options->quiet, "Print the summary only");
+  add_instance_option(*verb, options->instance);
+  verb->footer("Example:\n  arbiter pub /Face/pos:o --rate 10 --count 50 --text hello");
+  verb->callback([options, &exit_code] { exit_code = pub(*options); });
+}
+
+}  // namespace arbiter::cli

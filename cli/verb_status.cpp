@@ -1,0 +1,133 @@
+// arbiter status: ports, connections, who is active, who wins, and the counters.
+#include <cstdint>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/live.hpp"
+#include "cli/verbs.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+using nlohmann::json;
+
+struct StatusOptions {
+  std::string instance;
+  bool json = false;
+};
+
+std::string holder(const json& port) {
+  if (!port.at("open").get<bool>()) return "not open";
+  const json& component = port.at("component");
+  return component.at("node").get<std::string>() + " (pid " +
+         std::to_string(component.at("pid").get<int>()) + ")";
+}
+
+std::string type_of(const json& port) {
+  const auto type = port.find("type");
+  if (type == port.end()) return "";
+  return type->is_null() ? ", untyped" : ", " + type->at("name").get<std::string>();
+}
+
+// "  key 3" for each of the counters that is worth saying.
+std::string counts(const json& of, std::initializer_list<const char*> keys, bool zeros) {
+  std::string text;
+  for (const char* key : keys) {
+    const auto value = of.value(key, std::uint64_t{0});
+    if (value != 0 || zeros) text += std::string("  ") + key + ' ' + std::to_string(value);
+  }
+  return text;
+}
+
+void print_model(const json& status) {
+  const json& model = status.at("model");
+  std::cout << "instance " << status.at("instance").get<std::string>() << ", pid "
+            << status.at("pid") << ", model " << model.at("generation");
+  for (const auto& file : model.at("files")) std::cout << ' ' << file.get<std::string>();
+  if (!model.at("application").is_null()) {
+    std::cout << ", application " << model.at("application").get<std::string>();
+  }
+  std::cout << '\n';
+  if (model.at("reloads_refused") != 0) {
+    std::cout << "  " << model.at("reloads_refused")
+              << " reloads refused: the daemon's log says why\n";
+  }
+}
+
+void print_source(const json& source) {
+  std::cout << "  " << (source.at("active").get<bool>() ? "active   " : "inactive ")
+            << source.at("name").get<std::string>() << "  [" << holder(source) << type_of(source)
+            << ']';
+  if (source.at("open").get<bool>()) {
+    std::cout << counts(source, {"published"}, true)
+              << counts(source, {"signals", "blind", "unsettled", "no_slot"}, false);
+  }
+  std::cout << '\n';
+}
+
+void print_connection(const json& connection) {
+  const bool wins = connection.at("winner").get<bool>();
+  const char* mark = wins ? "  * " : connection.at("active").get<bool>() ? "  - " : "    ";
+  std::cout << mark << connection.at("source").get<std::string>();
+  if (connection.at("state") == "mismatch") {
+    std::cout << "  MISMATCH: " << connection.at("mismatch").get<std::string>() << '\n';
+    return;
+  }
+  if (connection.at("state") != "connected") {
+    std::cout << "  (" << connection.at("state").get<std::string>() << ")\n";
+    return;
+  }
+  std::cout << counts(connection, {"accepted", "discarded", "taken"}, true)
+            << counts(connection, {"dropped", "overtaken", "refused", "waiting"}, false) << '\n';
+}
+
+void print_input(const json& input) {
+  std::cout << input.at("name").get<std::string>() << "  [" << holder(input) << type_of(input)
+            << "]  ";
+  if (!input.at("arbitrated").get<bool>()) {
+    std::cout << "not arbitrated";
+  } else if (input.at("winner").is_null()) {
+    std::cout << "idle";
+  } else {
+    std::cout << "winner " << input.at("winner").get<std::string>();
+  }
+  std::cout << counts(input, {"blind", "unsettled", "misbehaved"}, false) << '\n';
+  for (const auto& connection : input.at("connections")) print_connection(connection);
+  for (const auto& sensed : input.at("senses")) {
+    std::cout << (sensed.at("active").get<bool>() ? "  ! " : "    ")
+              << sensed.at("source").get<std::string>() << "  (sensed)\n";
+  }
+}
+
+int status(const StatusOptions& options) {
+  const auto node = connect("status", options.instance);
+  const json document = fetch_status(*node);
+  if (options.json) {
+    std::cout << document.dump(2) << '\n';
+    return 0;
+  }
+  print_model(document);
+  std::cout << "\nsources\n";
+  for (const auto& source : document.at("sources")) print_source(source);
+  std::cout << "\ninput ports  (* winner, - active and overridden, ! active and sensed)\n";
+  for (const auto& input : document.at("inputs")) print_input(input);
+  return 0;
+}
+
+}  // namespace
+
+void add_status(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<StatusOptions>();
+  CLI::App* verb = app.add_subcommand("status", "Show ports, connections, winners and counters");
+  verb->add_flag("--json", options->json, "As the daemon's JSON document");
+  add_instance_option(*verb, options->instance);
+  verb->footer("Example:\n  arbiter status");
+  verb->callback([options, &exit_code] { exit_code = status(*options); });
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,182 @@
+// search-and-track-demo: the paper's Search and Track with real processes, and who wins.
+#include <signal.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <iostream>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "places.hpp"
+#include "processes.hpp"
+#include "scene.hpp"
+#include "summary.hpp"
+#include "terminal.hpp"
+#include "view.hpp"
+
+namespace search_and_track {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+namespace fs = std::filesystem;
+
+constexpr double kFrame = 1.0 / 12;
+
+struct Options {
+  double seconds = kUsualSeconds;
+  std::string model;  // empty: the paper's
+  bool lines = false;
+};
+
+// What ends the demo early, as a descriptor.
+class Signals {
+ public:
+  Signals() {
+    sigset_t caught;
+    sigemptyset(&caught);
+    for (const int number : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&caught, number);
+    sigprocmask(SIG_BLOCK, &caught, nullptr);
+    descriptor_ = signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK);
+    signal(SIGPIPE, SIG_IGN);
+  }
+  ~Signals() { close(descriptor_); }
+  Signals(const Signals&) = delete;
+  Signals& operator=(const Signals&) = delete;
+
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+  [[nodiscard]] std::optional<int> caught() const {
+    signalfd_siginfo info{};
+    if (read(descriptor_, &info, sizeof info) != static_cast<ssize_t>(sizeof info)) return {};
+    return static_cast<int>(info.ssi_signo);
+  }
+
+ private:
+  int descriptor_;
+};
+
+class Demo {
+ public:
+  explicit Demo(const Options& options)
+      : model_(options.model.empty() ? papers_model() : fs::path(options.model)),
+        is_papers_model_(options.model.empty()),
+        lines_(options.lines || !Terminal::is_there()),
+        scene_(scene_of(options.seconds)) {}
+
+  // Returns the exit code.
+  int run() {
+    std::optional<int> signal;
+    {
+      Processes processes;
+      processes.start_daemon(daemon_program(), model_);
+      start_ = Clock::now();
+      start_components(processes);
+      signal = watch(processes);
+    }
+    if (signal) std::cout << "\nStopped after " << std::lround(seconds()) << " s.\n";
+    std::cout << "\nWho commanded:\n\n" << table_of(story_) << '\n';
+    if (signal) return 128 + *signal;
+    if (!is_papers_model_) return 0;
+    std::cout << verdict_on(story_);
+    return is_as_in_the_paper(story_) ? 0 : 1;
+  }
+
+ private:
+  [[nodiscard]] double seconds() const {
+    return std::chrono::duration<double>(Clock::now() - start_).count();
+  }
+
+  // The receivers come first: as listen() numbers them.
+  void start_components(Processes& processes) {
+    for (const Receiver& receiver : kReceivers) {
+      processes.start_component(component_program(receiver.program), {});
+    }
+    for (std::size_t i = 0; i < kSenders.size(); ++i) {
+      std::vector<std::string> arguments{"--start",
+                                         std::to_string(start_.time_since_epoch().count())};
+      const Interval* const active = i == kFace        ? &scene_.face
+                                     : i == kObject    ? &scene_.object
+                                     : i == kCollision ? &scene_.collision
+                                                       : nullptr;
+      if (active != nullptr) {
+        arguments.insert(arguments.end(), {"--active", std::to_string(active->from) + "-" +
+                                                           std::to_string(active->to)});
+      }
+      processes.start_component(component_program(kSenders[i].program), arguments);
+    }
+  }
+
+  // Until the scene is over, or a signal says so; then which.
+  std::optional<int> watch(Processes& processes) {
+    const ViewOptions options{scene_.seconds, title(), is_papers_model_};
+    const auto view = lines_ ? make_lines(options) : make_picture(options);
+    double next_frame = 0;
+    for (double now = seconds(); now < scene_.seconds; now = seconds()) {
+      if (now >= next_frame) {
+        processes.check_all_run();
+        view->tick(story_, now);
+        next_frame = now + kFrame;
+      }
+      const int wait_ms = static_cast<int>((next_frame - now) * 1000) + 1;
+      processes.listen(
+          signals_.descriptor(), wait_ms,
+          [&](std::size_t component, std::string_view line) { heard(*view, component, line); });
+      if (const auto signal = signals_.caught()) return signal;
+    }
+    return {};
+  }
+
+  void heard(View& view, std::size_t component, std::string_view line) {
+    if (component >= kReceivers.size()) {
+      story_.sender_said(component - kReceivers.size(), line, seconds());
+    } else if (story_.receiver_said(component, line, seconds())) {
+      view.changed(story_, component);
+    }
+  }
+
+  [[nodiscard]] std::string title() const {
+    return is_papers_model_ ? "Search and Track" : model_.filename().string();
+  }
+
+  Signals signals_;
+  fs::path model_;
+  bool is_papers_model_;
+  bool lines_;
+  Scene scene_;
+  Clock::time_point start_;
+  Story story_;
+};
+
+}  // namespace
+}  // namespace search_and_track
+
+int main(int argc, char** argv) {
+  using namespace search_and_track;
+  CLI::App app("Runs the paper's Search and Track with real processes, and shows who wins",
+               "search-and-track-demo");
+  app.footer(
+      "\nExits with 0 if the winners were those of the paper's model, in its order; with another\n"
+      "model, always. Without a terminal it prints a line for each change of winner.");
+  Options options;
+  app.add_option("--seconds", options.seconds, "How long the scene lasts")
+      ->capture_default_str()
+      ->check(CLI::Range(kLeastSeconds, 3600.0));
+  app.add_option("--model", options.model, "Another model for the same components")
+      ->type_name("FILE")
+      ->check(CLI::ExistingFile);
+  app.add_flag("--lines", options.lines, "Print lines in a terminal too");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    return Demo(options).run();
+  } catch (const std::exception& error) {
+    std::cerr << "search-and-track-demo: " << error.what() << '\n';
+    return 1;
+  }
+}

@@ -1,0 +1,28 @@
+// The arbiter program, as it is run by hand.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tests/support/run_program.hpp"
+
+namespace arbiter::test {
+
+inline ProgramResult arbiter(std::vector<std::string> arguments, const char* out_path = nullptr) {
+  arguments.insert(arguments.begin(), std::string(ARBITER_PROGRAMS) + "/arbiter");
+  return run_program(arguments, {}, out_path);
+}
+
+inline const std::string kOverrideModel = R"(<behaviors>
+  <behavior name="Low"><config at="/p">/low</config></behavior>
+  <behavior name="High"><config at="/p">/high</config><inhibition>Low</inhibition></behavior>
+</behaviors>
+)";
+
+inline const std::string kConflictModel = R"(<behaviors>
+  <behavior name="A"><config at="/p">/a</config></behavior>
+  <behavior name="B"><config at="/p">/b</config><condition>not /c</condition></behavior>
+</behaviors>
+)";
+
+}  // namespace arbiter::test

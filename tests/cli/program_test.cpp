@@ -1,0 +1,87 @@
+// What holds for every verb of the program.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::MatchesRegex;
+
+TEST(Program, TellsItsVersion) {
+  const auto result = arbiter({"--version"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, MatchesRegex("arbiter [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+TEST(Program, ExplainsEachVerbWithAnExample) {
+  EXPECT_EQ(arbiter({"--help"}).exit_code, 0);
+  for (const std::string verb : {"check", "rules", "simulate"}) {
+    EXPECT_THAT(arbiter({"--help"}).out, HasSubstr(verb));
+    const auto result = arbiter({verb, "--help"});
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_EQ(result.err, "");
+    EXPECT_THAT(result.out, HasSubstr("Example:\n  arbiter " + verb));
+  }
+}
+
+TEST(Program, ExitsWith2WhereItIsUsedWrongly) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const std::vector<std::vector<std::string>> wrong = {
+      {},
+      {"no-such-verb"},
+      {"check"},
+      {"rules"},
+      {"check", "--no-such-option", model},
+      {"check", model, "--application"},
+      {"check", model, "--application", model, "--application", model},
+      {"simulate", model},
+      {"simulate", "--trace", model},
+      {"check", model, "rules", model}};
+  for (const auto& arguments : wrong) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(arguments);
+    EXPECT_EQ(result.out, "");
+    EXPECT_NE(result.err, "");
+  }
+}
+
+TEST(Program, ExitsWith2WhereAFileCannotBeOpened) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const std::vector<std::vector<std::string>> wrong = {
+      {"check", "/nowhere/m.xml"},
+      {"check", "/nowhere/m.xml", "--json"},
+      {"check", model, "/nowhere/m.xml"},
+      {"check", model, "--application", "/nowhere/m.xml"},
+      {"check", directory.path()},
+      {"rules", "/nowhere/m.xml"},
+      {"simulate", "/nowhere/m.xml", "--trace", "/nowhere/m.xml"},
+      {"simulate", model, "--trace", "/nowhere/m.xml"}};
+  for (const auto& arguments : wrong) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(arguments);
+    EXPECT_EQ(result.out, "");
+    EXPECT_THAT(result.err, MatchesRegex("arbiter: cannot (open|read) .+: .+\n"));
+  }
+}
+
+TEST(Program, NoticesThatItsOutputCannotBeWritten) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const auto trace = directory.write("t.csv", "t_ns,source\n0,/low\n");
+  const std::vector<std::vector<std::string>> verbs = {
+      {"check", model}, {"rules", model}, {"simulate", model, "--trace", trace}};
+  for (const auto& arguments : verbs) {
+    const auto result = arbiter(arguments, "/dev/full");
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_EQ(result.err, "arbiter: cannot write to standard output\n");
+  }
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,71 @@
+// A component in a process of its own (component_main.cpp), as a test speaks to it.
+#pragma once
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "tests/support/child_process.hpp"
+
+namespace arbiter::test {
+
+class Component {
+ public:
+  // Starts the process and makes its node.
+  explicit Component(const std::string& node) {
+    int in[2];
+    int out[2];
+    if (::pipe2(in, O_CLOEXEC) != 0 || ::pipe2(out, O_CLOEXEC) != 0) {
+      throw std::runtime_error("pipe2");
+    }
+    const shm::FileDescriptor child_in(in[0]);
+    const shm::FileDescriptor child_out(out[1]);
+    say_.reset(in[1]);
+    hear_.reset(out[0]);
+    process_ = ChildProcess({ARBITER_COMPONENT}, {}, {child_in.get(), child_out.get(), -1});
+    if (const auto answer = tell("node " + node); answer != "done") {
+      throw std::runtime_error(answer);
+    }
+  }
+
+  // Does one thing, and answers how it went.
+  std::string tell(const std::string& line) {
+    begin(line);
+    return answer();
+  }
+  // The two halves of tell().
+  void begin(const std::string& line) const {
+    const std::string whole = line + "\n";
+    if (::write(say_.get(), whole.data(), whole.size()) != static_cast<ssize_t>(whole.size())) {
+      throw std::runtime_error("the component does not listen");
+    }
+  }
+  // "dead" if it has ended.
+  std::string answer() {
+    for (;;) {
+      if (const auto end = heard_.find('\n'); end != std::string::npos) {
+        const std::string line = heard_.substr(0, end);
+        heard_.erase(0, end + 1);
+        return line;
+      }
+      char buffer[512];
+      const ssize_t size = ::read(hear_.get(), buffer, sizeof buffer);
+      if (size <= 0) return "dead";
+      heard_.append(buffer, static_cast<std::size_t>(size));
+    }
+  }
+
+  [[nodiscard]] ChildProcess& process() { return process_; }
+  // At whatever instruction it is.
+  void kill() { process_.kill(); }
+
+ private:
+  shm::FileDescriptor say_;
+  shm::FileDescriptor hear_;
+  std::string heard_;
+  ChildProcess process_;
+};
+
+}  // namespace arbiter::test

@@ -1,0 +1,148 @@
+// Files that are broken, or made to break their reader: there is always an answer, and soon.
+#include <gmock/gmock.h>
+
+#include <random>
+#include <string>
+
+#include "rules/load.hpp"
+#include "tests/rules/model_text.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+using testing::HasSubstr;
+
+void expect_places(const Loaded& loaded) {
+  for (const Diagnostic& item : loaded.items) {
+    ASSERT_GE(item.where.line, 1u);
+    ASSERT_GE(item.where.column, 1u);
+    ASSERT_FALSE(item.message.empty());
+    ASSERT_FALSE(item.code.empty());
+    ASSERT_FALSE(item.where.file.empty());
+  }
+}
+
+TEST(HostileInput, Listing1CutAnywhereIsAnError) {
+  const std::string listing(kListing1);
+  const std::string with_root = "<behaviors>\n" + listing + "</behaviors>";
+  for (std::size_t length = 0; length < with_root.size(); ++length) {
+    const Loaded loaded = load_text(with_root.substr(0, length));
+    ASSERT_TRUE(loaded.has_errors) << with_root.substr(0, length);
+    expect_places(loaded);
+  }
+  // Without a root, what is cut between two elements may happen to be a model.
+  const std::size_t define = listing.find("</define>") + std::string("</define>").size();
+  const std::size_t meta_behaviour = listing.find("<meta_behavior");
+  for (std::size_t length = 0; length < listing.size() - 1; ++length) {
+    const Loaded loaded = load_text(listing.substr(0, length));
+    const bool is_model = length >= define && length <= meta_behaviour;
+    ASSERT_EQ(loaded.has_errors, !is_model) << listing.substr(0, length);
+    expect_places(loaded);
+  }
+}
+
+TEST(HostileInput, AnApplicationCutAnywhereIsAnError) {
+  const std::string whole =
+      "<?xml version='1.0'?><!-- c --><application><name>x &amp; y</name><connection id='1'>"
+      "<from>/s</from><to><![CDATA[/p]]></to></connection></application>";
+  for (std::size_t length = 0; length < whole.size(); ++length) {
+    const Loaded loaded = load_with_application("<behaviors/>", whole.substr(0, length));
+    ASSERT_TRUE(loaded.has_errors) << whole.substr(0, length);
+    expect_places(loaded);
+  }
+}
+
+TEST(HostileInput, AnyByteChangedGivesAnAnswer) {
+  constexpr unsigned kSeed = 90210;
+  std::mt19937 random(kSeed);
+  const Folder folder;
+  const std::string base =
+      "<behaviors timeout='1s'>" + std::string(kListing1) +
+      "<source port='/x' timeout='forever'/><arbiter at='/p' conflict='first'>"
+      "<select from='/s'>any(/a*) &amp;&amp; (/b -> \"/c\") <![CDATA[<-> /d]]></select></arbiter>"
+      "<!-- c --></behaviors>";
+  static constexpr std::string_view kBytes = "<>&;'\"/=!-[]?#${}() \n\t,*a0\xc3\xa4\xff\x01";
+  for (int i = 0; i < 1'500; ++i) {
+    std::string model = base;
+    for (auto left = 1 + random() % 3; left > 0; --left) {
+      const std::size_t at = random() % model.size();
+      const char byte = kBytes[random() % kBytes.size()];
+      switch (random() % 3) {
+        case 0:
+          model[at] = byte;
+          break;
+        case 1:
+          model.insert(at, 1, byte);
+          break;
+        default:
+          model.erase(at, 1 + random() % 5);
+          break;
+      }
+    }
+    const std::string path = folder.write("a.xml", model);
+    expect_places(load_files({{path}, {}}));
+    expect_places(load_files({{}, path}));
+    if (HasFatalFailure()) FAIL() << "seed " << kSeed << ", model " << i << ":\n" << model;
+  }
+}
+
+std::string repeat(const std::string& text, int times) {
+  std::string result;
+  for (int i = 0; i < times; ++i) result += text;
+  return result;
+}
+
+TEST(HostileInput, MadeToBeDeepOrLongEndsSoonWithAnError) {
+  const int many = 100'000;
+  const std::string select = "<arbiter at='/p'><select from='/s'>";
+  const std::string end = "</select></arbiter>";
+  for (const std::string& model : {
+           repeat("<a>", many) + repeat("</a>", many),
+           repeat("<behaviors>", many),
+           repeat("<meta_behavior name='M'>", many) + repeat("</meta_behavior>", many),
+           repeat("<!--", many),
+           repeat("<![CDATA[", many),
+           repeat("<?", many),
+           repeat("<!DOCTYPE a [", many),
+           repeat("&lt;", many),
+           repeat("<a ", many),
+           repeat("\"", many),
+           "<a " + repeat("a='' ", many) + "/>",
+           "<source " + repeat("port='/a' ", 3'000) + "/>",
+           "<" + repeat("a", many) + "/>",
+           "<behavior name='" + repeat("a", many) + "'/>",
+           "<behavior name='B'><inhibition>" + repeat("X,", many) + "</inhibition></behavior>",
+           "<source port='/" + repeat("${", many) + "'/>",
+           "<source port='/" + repeat("${a}", many) + "'/>",
+           "<define name='a'>" + repeat("a", many) + "</define><source port='/${a}'/>",
+           select + repeat("(", many) + end,
+           select + repeat("not ", many) + end,
+           select + repeat("/a -> ", many) + "/a" + end,
+           select + repeat("/a xor ", many) + "/a" + end,
+           select + "\"" + repeat("a", many) + end,
+           select + "/" + repeat("a", many) + end,
+           repeat("<x/>", many),
+           repeat("<behavior/>", many),
+       }) {
+    const Stopwatch stopwatch;
+    const Loaded loaded = load_text(model);
+    EXPECT_TRUE(loaded.has_errors) << model.substr(0, 40);
+    EXPECT_LT(stopwatch.seconds(), 15.0) << model.substr(0, 40);
+    expect_places(loaded);
+    std::size_t bytes = 0;
+    for (const Diagnostic& item : loaded.items) bytes += item.message.size();
+    EXPECT_LT(bytes / loaded.items.size(), 1'000u) << "messages of a length that can be read";
+  }
+}
+
+TEST(HostileInput, EntitiesOfADocumentTypeAreNotExpanded) {
+  const Loaded loaded = load_text(
+      "<!DOCTYPE b [<!ENTITY lol \"lol\"><!ENTITY x SYSTEM \"/etc/passwd\">]>\n"
+      "<behaviors><source port='/&lol;'/><source port='/&x;'/></behaviors>");
+  EXPECT_THAT(loaded.findings(),
+              testing::ElementsAre("2:27 error malformed-xml", "2:50 error malformed-xml"));
+  EXPECT_THAT(loaded.message(), HasSubstr("&lol; names no character"));
+}
+
+}  // namespace
+}  // namespace arbiter::rules

@@ -1,0 +1,212 @@
+#include "rules/load.hpp"
+
+#include <gmock/gmock.h>
+
+#include <string>
+#include <vector>
+
+#include "rules/text_file.hpp"
+#include "shm/limits.hpp"
+#include "tests/rules/model_text.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+TEST(Load, SeveralFilesFormOneModel) {
+  const Loaded loaded = load_texts({
+      "<behaviors timeout='1s'><meta_behavior name='M'><behavior>B</behavior></meta_behavior>"
+      "<behavior name='A'><config at='/p'>/a</config><inhibition>M</inhibition></behavior>"
+      "</behaviors>",
+      "<behavior name='B'><config at='/p'>/b</config></behavior>",
+      "<behaviors timeout='1000ms'><source port='/c' timeout='2s'/></behaviors>",
+  });
+  EXPECT_THAT(loaded.findings(), IsEmpty()) << loaded.message();
+  EXPECT_THAT(show_rules(loaded, "/p"), ElementsAre("/a: true", "/b: not(/a)"));
+  EXPECT_EQ(loaded.rules.timeout, 1'000'000'000);
+  EXPECT_THAT(loaded.rules.timeouts, SizeIs(1));
+}
+
+TEST(Load, WhatSeveralFilesSayTwiceIsAnErrorThatNamesTheOtherPlace) {
+  struct Case {
+    std::string first, second, finding, other_place;
+  };
+  const std::vector<Case> cases{
+      {"<define name='d'/>", "\n<define name='d'/>", "b.xml:2:15 error duplicate-define", ":1:15"},
+      {"<source port='/a'/>", "\n<source port='/a'/>", "b.xml:2:1 error duplicate-source", ":1:1"},
+      {"<behavior name='B'><config at='/p'>/s</config></behavior>",
+       "<behavior name='B'><config at='/p'>/s</config></behavior>",
+       "b.xml:1:17 error duplicate-name", ":1:17"},
+      {"<arbiter at='/p'><select from='/s'/></arbiter>",
+       "\n<arbiter at='/p'><select from='/s'/></arbiter>", "b.xml:2:18 error duplicate-select",
+       ":1:18"},
+      {"<behaviors timeout='1s'/>", "<behaviors timeout='2s'/>",
+       "b.xml:1:21 error conflicting-timeout", ":1:21"},
+  };
+  for (const Case& c : cases) {
+    const Loaded loaded = load_texts({c.first, c.second});
+    EXPECT_THAT(loaded.findings(true), ElementsAre(c.finding)) << c.second;
+    EXPECT_THAT(loaded.message(), AllOf(HasSubstr("a.xml" + c.other_place), HasSubstr("; ")));
+  }
+}
+
+TEST(Load, ReportsInTheOrderOfFilesLinesAndColumns) {
+  const Folder folder;
+  const std::string late = folder.write("z.xml", "<source port='a'/>\n<x/> y");
+  const std::string early = folder.write("a.xml",
+                                         "<behavior name='B'><inhibition>C, D</inhibition>"
+                                         "</behavior>\n<source port='b'/>");
+  const std::string application = folder.write("0.xml", "<application><connection/></application>");
+  const Loaded loaded = load_files({{late, early}, application});
+  EXPECT_THAT(
+      loaded.findings(true),
+      ElementsAre("z.xml:1:15 error invalid-port-name", "z.xml:2:1 error unknown-element",
+                  "z.xml:2:6 error stray-text", "a.xml:1:17 warning no-config",
+                  "a.xml:2:15 error invalid-port-name", "0.xml:1:14 error incomplete-connection",
+                  "0.xml:1:14 error incomplete-connection"))
+      << "C and D may be what <x> was meant to be";
+}
+
+TEST(Load, AddsToWhatTheDiagnosticsHoldAlready) {
+  const Folder folder;
+  Diagnostics diagnostics;
+  diagnostics.note("before", {"z", 9, 9}, "m");
+  load({{folder.write("a.xml", "")}, {}}, diagnostics);
+  ASSERT_EQ(diagnostics.items().size(), 2u);
+  EXPECT_EQ(diagnostics.items()[0].code, "before");
+}
+
+TEST(Load, AFileGivenTwiceIsAnError) {
+  const Folder folder;
+  const std::string path = folder.write("a.xml", "<behavior name='B'/>");
+  const Loaded loaded = load_files({{path, path}, {}});
+  EXPECT_THAT(loaded.findings(), ElementsAre("1:1 error duplicate-file", "1:17 warning no-config"));
+  EXPECT_THAT(loaded.message(), HasSubstr("given twice; give it once"));
+}
+
+TEST(Load, AFileThatCannotBeReadIsThrown) {
+  const Folder folder;
+  const std::string good = folder.write("a.xml", "<behaviors/>");
+  EXPECT_THROW(load_files({{folder.file("none.xml")}, {}}), FileError);
+  EXPECT_THROW(load_files({{good, folder.file("")}, {}}), FileError);
+  EXPECT_THROW(load_files({{good}, folder.file("none.xml")}), FileError);
+}
+
+TEST(Load, AFileBeyondTheLimitIsRefused) {
+  const std::string blanks(kMaxFileBytes, ' ');
+  EXPECT_THAT(load_text("<behaviors>" + blanks.substr(23) + "</behaviors>").findings(), IsEmpty());
+  const Loaded loaded = load_text("<behaviors>" + blanks.substr(22) + "</behaviors>");
+  EXPECT_THAT(loaded.findings(), ElementsAre("1:1 error limit-exceeded"));
+  EXPECT_THAT(loaded.message(), HasSubstr("the limit of 16 MiB"));
+  EXPECT_THAT(load_with_application("<behaviors/>", blanks + " ").findings(true),
+              ElementsAre("app.xml:1:1 error limit-exceeded"));
+}
+
+TEST(Load, ReportsNoMoreThanCanBeRead) {
+  std::string model;
+  for (int i = 0; i < 20'000; ++i) model += "<x/>\n";
+  const Loaded loaded = load_text(model);
+  ASSERT_EQ(loaded.items.size(), Diagnostics::kMaxItems);
+  EXPECT_EQ(loaded.items[9'998].where.line, 9'999u);
+  EXPECT_EQ(loaded.items.back().code, "too-many-problems");
+  EXPECT_THAT(loaded.items.back().message, HasSubstr("10001 more problems are not shown"));
+}
+
+// A model with so many connections, from so many sources, to so many ports.
+std::string grid(unsigned sources, unsigned ports, const std::string& condition = "") {
+  std::string model = "<behaviors>\n";
+  for (unsigned p = 0; p < ports; ++p) {
+    model += "<arbiter at='/p" + std::to_string(p) + "'>";
+    for (unsigned s = 0; s < sources; ++s) {
+      model += "<select from='/s" + std::to_string(s) + "'>" + condition + "</select>";
+    }
+    model += "</arbiter>\n";
+  }
+  return model + "</behaviors>";
+}
+
+std::string application(unsigned sources, unsigned ports) {
+  std::string result = "<application>\n";
+  for (unsigned p = 0; p < ports; ++p) {
+    for (unsigned s = 0; s < sources; ++s) {
+      result += "<connection><from>/s" + std::to_string(s) + "</from><to>/p" + std::to_string(p) +
+                "</to></connection>\n";
+    }
+  }
+  return result + "</application>";
+}
+
+TEST(Load, HoldsToTheLimitOfSourcesAtOnePort) {
+  EXPECT_THAT(load_text(grid(shm::kMaxSourcesPerPort, 1)).findings(), IsEmpty());
+  const Loaded connected = load_text(grid(shm::kMaxSourcesPerPort + 1, 1));
+  EXPECT_THAT(connected.findings(), ElementsAre("2:1 error limit-exceeded"));
+  EXPECT_THAT(connected.message(), HasSubstr("there are 257 sources at /p0, connected or read by "
+                                             "its rules, more than the limit of 256; "));
+
+  // Connected ones and read ones count together, each once, quantifiers expanded.
+  std::string sources;
+  for (int i = 0; i < 255; ++i) sources += "<source port='/s/" + std::to_string(i) + "'/>";
+  const std::string reads = "any(/s/*)";
+  EXPECT_THAT(load_texts({grid(1, 1, reads), sources}).findings(), IsEmpty());
+  EXPECT_THAT(load_texts({grid(2, 1, reads), sources}).findings(),
+              ElementsAre("2:1 error limit-exceeded"));
+  EXPECT_THAT(load_texts({grid(1, 1, reads + " and /s0"), sources}).findings(), IsEmpty());
+  EXPECT_THAT(load_texts({grid(1, 1, reads + " and /t"), sources}).findings(),
+              ElementsAre("2:1 error limit-exceeded"));
+
+  EXPECT_THAT(load_with_application(grid(1, 1), application(256, 1)).findings(), IsEmpty());
+  EXPECT_THAT(load_with_application(grid(1, 1, "/t"), application(256, 1)).findings(true),
+              ElementsAre("a.xml:2:1 error limit-exceeded"));
+  EXPECT_THAT(load_with_application("<behaviors/>", application(257, 1)).findings(true),
+              ElementsAre("app.xml:2:1 error limit-exceeded"));
+}
+
+TEST(Load, HoldsToTheLimitOfDestinationsOfOneOutputPort) {
+  EXPECT_THAT(load_text(grid(1, shm::kMaxDestinations)).findings(), IsEmpty());
+  const Loaded loaded = load_text(grid(1, shm::kMaxDestinations + 1));
+  EXPECT_THAT(loaded.findings(), ElementsAre("66:20 error limit-exceeded"))
+      << "at the first connection that is one too many";
+  EXPECT_THAT(loaded.message(), HasSubstr("there are 65 destinations of /s0, more than the limit "
+                                          "of 64; connect it to fewer"));
+  EXPECT_THAT(load_with_application("<behaviors/>", application(1, 65)).findings(true),
+              ElementsAre("app.xml:66:1 error limit-exceeded"));
+}
+
+TEST(Load, HoldsToTheLimitOfConnections) {
+  EXPECT_THAT(load_text(grid(64, 64)).findings(), IsEmpty());
+  const Loaded loaded =
+      load_texts({grid(64, 64), "<arbiter at='/q'><select from='/t'/></arbiter>"});
+  EXPECT_THAT(loaded.findings(true), ElementsAre("b.xml:1:18 error limit-exceeded"));
+  EXPECT_THAT(loaded.message(),
+              HasSubstr("there are 4097 connections, more than the limit of 4096"));
+}
+
+TEST(Load, HoldsToTheLimitOfSourcesAndInputPorts) {
+  std::string sources = "<behaviors>";
+  for (unsigned i = 0; i < shm::kMaxSources; ++i) {
+    sources += "<source port='/" + std::to_string(i) + "'/>";
+  }
+  EXPECT_THAT(load_text(sources + "</behaviors>").findings(), IsEmpty());
+  const Loaded loaded = load_with_application(
+      sources + "</behaviors>",
+      "<application><connection><from>/x</from><to>/y</to></connection></application>");
+  EXPECT_THAT(loaded.findings(true), ElementsAre("a.xml:1:1 error limit-exceeded"));
+  EXPECT_THAT(loaded.message(), HasSubstr("there are 8193 sources, more than the limit of 8192"));
+
+  std::string ports = "<behaviors>";
+  for (unsigned i = 0; i <= shm::kMaxInputPorts; ++i) {
+    const std::string n = std::to_string(i);
+    ports += "<arbiter at='/p" + n + "'><select from='/s" + n + "'/></arbiter>";
+  }
+  const Loaded wide = load_text(ports + "</behaviors>");
+  EXPECT_EQ(wide.items.size(), 2u) << "connections as well as ports";
+  EXPECT_THAT(wide.message(0), HasSubstr("4097 input ports, more than the limit of 4096"));
+}
+
+}  // namespace
+}  // namespace arbiter::rules

@@ -1,0 +1,254 @@
+#include "shm/channel.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+
+namespace arbiter::shm {
+namespace {
+
+constexpr PortInstance kPublisher = 5, kReceiver = 7, kOther = 9;
+
+// An output port's segment in plain memory.
+class Channels : public testing::Test {
+ protected:
+  Channels() : layout_(plan()), memory_(std::aligned_alloc(kPageSize, layout_.total_size)) {
+    std::memset(memory_.get(), 0, layout_.total_size);
+    segment_ = OutputSegment(static_cast<std::byte*>(memory_.get()), layout_);
+  }
+  static OutputLayout plan() {
+    TypeInfo type;
+    type.size = 8;
+    return OutputLayout::plan(type, 100);
+  }
+
+  ChannelWriter join(std::uint32_t depth, PortInstance receiver = kReceiver,
+                     std::uint32_t index = 0) {
+    ChannelWriter writer(segment_, index);
+    writer.join(receiver, 1, depth);
+    return writer;
+  }
+  ChannelReader reader(PortInstance receiver = kReceiver) {
+    return ChannelReader(segment_, kPublisher, receiver);
+  }
+  static void push(ChannelWriter& writer, std::uint32_t slot) {
+    static_cast<void>(writer.push(slot));
+  }
+  // Takes the oldest entry; its slot, or kNoSlot.
+  static std::uint32_t take(ChannelReader& reader, std::uint64_t& lost) {
+    const Entry entry = reader.peek(lost);
+    if (entry == 0) return kNoSlot;
+    Atomic<Hold> hold{0};
+    if (!reader.hold(entry, hold)) return kNoSlot;
+    EXPECT_EQ(hold.load(), make_hold(kPublisher, slot_of(entry)));
+    ChannelReader::release(hold);
+    reader.consume();
+    return slot_of(entry);
+  }
+
+  struct Free {
+    void operator()(void* memory) const { std::free(memory); }
+  };
+  OutputLayout layout_;
+  std::unique_ptr<void, Free> memory_;
+  OutputSegment segment_;
+};
+
+TEST_F(Channels, a_queue_gives_its_samples_in_order_and_then_nothing) {
+  ChannelWriter writer = join(4);
+  ChannelReader receiver = reader();
+  ASSERT_TRUE(receiver.join());
+  std::uint64_t lost = 0;
+  EXPECT_EQ(take(receiver, lost), kNoSlot);
+  for (std::uint32_t slot = 10; slot < 14; ++slot) EXPECT_EQ(writer.push(slot), kNoSlot);
+  for (std::uint32_t slot = 10; slot < 14; ++slot) EXPECT_EQ(take(receiver, lost), slot);
+  EXPECT_EQ(take(receiver, lost), kNoSlot);
+  EXPECT_EQ(lost, 0u);
+}
+
+TEST_F(Channels, depth_and_losses_are_exact_however_many_come_between_takes) {
+  for (std::uint32_t depth = 1; depth <= 5; ++depth) {
+    for (std::uint32_t pushes = 0; pushes <= 3 * depth + 2; ++pushes) {
+      ChannelWriter writer = join(depth, kReceiver, depth);
+      ChannelReader receiver = reader();
+      ASSERT_TRUE(receiver.join());
+      std::uint32_t evictions = 0;
+      std::uint64_t lost = 0;
+      push(writer, 99);
+      ASSERT_EQ(take(receiver, lost), 99u);  // not at the beginning of the ring
+      for (std::uint32_t i = 0; i < pushes; ++i) evictions += writer.push(i) != kNoSlot;
+      EXPECT_EQ(evictions, pushes + 1 > depth ? pushes + 1 - depth : 0);
+      const std::uint32_t kept = std::min(pushes, depth);
+      EXPECT_EQ(receiver.backlog(receiver.backlog_end()), kept);
+      for (std::uint32_t i = pushes - kept; i < pushes; ++i) EXPECT_EQ(take(receiver, lost), i);
+      EXPECT_EQ(take(receiver, lost), kNoSlot);
+      EXPECT_EQ(lost, pushes - kept);
+      writer.leave([](std::uint32_t) {});
+    }
+  }
+}
+
+TEST_F(Channels, each_slot_that_went_in_comes_out_once_by_eviction_or_when_the_queue_ends) {
+  for (std::uint32_t depth = 1; depth <= 4; ++depth) {
+    for (std::uint32_t pushes = 0; pushes <= 9; ++pushes) {
+      ChannelWriter writer = join(depth);
+      std::vector<int> out(pushes, 0);
+      for (std::uint32_t slot = 0; slot < pushes; ++slot) {
+        const std::uint32_t evicted = writer.push(slot);
+        if (evicted != kNoSlot) ++out[evicted];
+      }
+      writer.leave([&](std::uint32_t slot) { ++out[slot]; });
+      for (const int times : out) EXPECT_EQ(times, 1);
+    }
+  }
+}
+
+TEST_F(Channels, one_that_is_not_named_has_no_queue) {
+  join(4, kOther);
+  ChannelReader receiver = reader();
+  EXPECT_FALSE(receiver.join());
+  std::uint64_t lost = 0;
+  EXPECT_EQ(receiver.peek(lost), 0u);
+  join(4, kReceiver, 63);
+  EXPECT_TRUE(receiver.join());
+}
+
+// A receiver restarts: its successor must find none of what the predecessor had in its queue, nor
+// take the beginning of its own for something old.
+TEST_F(Channels, a_channel_used_again_gives_only_what_came_for_the_new_receiver) {
+  for (std::uint32_t before = 1; before <= 6; ++before) {
+    for (std::uint32_t after = 1; after <= 6; ++after) {
+      {
+        ChannelWriter writer = join(before);
+        for (std::uint32_t slot = 0; slot < 7; ++slot) push(writer, slot);
+        writer.leave([](std::uint32_t) {});
+      }
+      ChannelWriter writer = join(after, kOther);  // as a port does: a new writer for a new queue
+      ChannelReader receiver = reader(kOther);
+      ASSERT_TRUE(receiver.join());
+      std::uint64_t lost = 0;
+      ASSERT_EQ(take(receiver, lost), kNoSlot) << before << " -> " << after;
+      push(writer, 50);
+      EXPECT_EQ(take(receiver, lost), 50u);
+      EXPECT_EQ(lost, 0u);
+      EXPECT_EQ(receiver.state(), ChannelReader::State::kJoined);
+      writer.leave([](std::uint32_t) {});
+    }
+  }
+}
+
+TEST_F(Channels, no_hold_is_taken_once_the_queue_has_ended) {
+  ChannelWriter writer = join(2);
+  ChannelReader receiver = reader();
+  ASSERT_TRUE(receiver.join());
+  push(writer, 3);
+  std::uint64_t lost = 0;
+  const Entry entry = receiver.peek(lost);
+  ASSERT_NE(entry, 0u);
+  writer.leave([](std::uint32_t) {});
+  Atomic<Hold> hold{0};
+  EXPECT_FALSE(receiver.hold(entry, hold));
+  EXPECT_EQ(hold.load(), 0u) << "what was announced is taken back";
+  EXPECT_EQ(receiver.state(), ChannelReader::State::kLeft);
+}
+
+TEST_F(Channels, no_hold_is_taken_on_an_entry_that_was_overtaken) {
+  ChannelWriter writer = join(1);
+  ChannelReader receiver = reader();
+  ASSERT_TRUE(receiver.join());
+  push(writer, 3);
+  std::uint64_t lost = 0;
+  const Entry entry = receiver.peek(lost);
+  EXPECT_EQ(writer.push(4), 3u);
+  Atomic<Hold> hold{0};
+  EXPECT_FALSE(receiver.hold(entry, hold));
+  EXPECT_EQ(hold.load(), 0u);
+  EXPECT_EQ(take(receiver, lost), 4u);
+  EXPECT_EQ(lost, 1u);
+}
+
+TEST_F(Channels, a_queue_is_full_when_depth_samples_wait) {
+  ChannelWriter writer = join(3);
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    EXPECT_FALSE(writer.is_full(0));
+    push(writer, 0);
+  }
+  EXPECT_TRUE(writer.is_full(0));
+  EXPECT_FALSE(writer.is_full(1));
+  EXPECT_FALSE(writer.is_full(100)) << "a receiver that lies is not refused anything";
+}
+
+// What no honest publisher writes.
+
+TEST_F(Channels, a_publisher_that_names_an_impossible_depth_is_given_up) {
+  for (const std::uint32_t depth : {0u, kMaxDepth + 1, UINT32_MAX}) {
+    join(depth);
+    ChannelReader receiver = reader();
+    EXPECT_FALSE(receiver.join());
+    EXPECT_EQ(receiver.state(), ChannelReader::State::kMisbehaved);
+    std::uint64_t lost = 0;
+    EXPECT_EQ(receiver.peek(lost), 0u);
+  }
+}
+
+TEST_F(Channels, a_publisher_that_names_a_slot_it_does_not_have_is_given_up) {
+  ChannelWriter writer = join(2);
+  ChannelReader receiver = reader();
+  ASSERT_TRUE(receiver.join());
+  push(writer, 100);
+  std::uint64_t lost = 0;
+  EXPECT_EQ(receiver.peek(lost), 0u);
+  EXPECT_EQ(receiver.state(), ChannelReader::State::kMisbehaved);
+}
+
+TEST_F(Channels, a_publisher_that_jumps_by_another_step_than_its_depth_is_given_up) {
+  ChannelWriter writer = join(4);
+  ChannelReader receiver = reader();
+  ASSERT_TRUE(receiver.join());
+  push(writer, 1);
+  segment_.ring(0)[0] = make_entry(1 + 6, 1);
+  std::uint64_t lost = 0;
+  EXPECT_EQ(receiver.peek(lost), 0u);
+  EXPECT_EQ(receiver.state(), ChannelReader::State::kMisbehaved);
+}
+
+TEST_F(Channels, garbage_in_a_ring_never_leads_outside_it_and_every_look_ends) {
+  for (const std::uint32_t depth : {1u, 2u, 3u, kMaxDepth}) {
+    for (const Entry garbage : {Entry{1}, ~Entry{0}, make_entry(kSequenceMask / 2, 0),
+                                make_entry(kSequenceMask / 2 + 2, 0), make_entry(1 + depth, 0),
+                                make_entry(1 + 1000 * std::uint64_t{depth}, 99)}) {
+      join(depth);
+      ChannelReader receiver = reader();
+      ASSERT_TRUE(receiver.join());
+      for (std::uint32_t i = 0; i < kMaxDepth; ++i) segment_.ring(0)[i] = garbage;
+      segment_.channel(0).accepted = garbage;
+      std::uint64_t lost = 0;
+      for (int looks = 0; looks < 10; ++looks) {
+        const Entry entry = receiver.peek(lost);
+        EXPECT_LT(slot_of(entry), layout_.slot_count);
+        EXPECT_LE(receiver.backlog(receiver.backlog_end()), depth);
+        if (entry != 0) receiver.consume();
+      }
+      for (std::uint32_t i = 0; i < kMaxDepth; ++i) segment_.ring(0)[i] = 0;
+      segment_.channel(0).accepted = 0;
+    }
+  }
+}
+
+TEST_F(Channels, sequences_pass_the_end_of_their_bits) {
+  segment_.channel(0).accepted = kSequenceMask - 2;
+  ChannelWriter writer = join(3);
+  ChannelReader receiver = reader();
+  ASSERT_TRUE(receiver.join());
+  std::uint64_t lost = 0;
+  for (std::uint32_t slot = 0; slot < 9; ++slot) {
+    push(writer, slot);
+    EXPECT_EQ(take(receiver, lost), slot);
+  }
+  EXPECT_EQ(lost, 0u);
+}
+
+}  // namespace
+}  // namespace arbiter::shm

@@ -1,0 +1,167 @@
+#include "shm/rendezvous.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <stdexcept>
+
+namespace arbiter::shm {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// A directory and an environment of its own for each test; both are as before afterwards.
+class Rendezvous : public testing::Test {
+ protected:
+  Rendezvous() {
+    for (const char* name :
+         {"RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR", "TMPDIR", "ARBITER_INSTANCE"}) {
+      const char* value = std::getenv(name);
+      before_[name] = value == nullptr ? std::string() : value;
+      unsetenv(name);
+    }
+    char pattern[] = "/tmp/arbiter-rendezvous-XXXXXX";
+    directory_ = mkdtemp(pattern);
+    setenv("TMPDIR", directory_.c_str(), 1);
+  }
+  ~Rendezvous() override {
+    std::filesystem::remove_all(directory_);
+    for (const auto& [name, value] : before_) {
+      value.empty() ? unsetenv(name.c_str()) : setenv(name.c_str(), value.c_str(), 1);
+    }
+  }
+
+  std::string make(const std::string& name, mode_t mode = 0755) const {
+    const std::string path = directory_ + "/" + name;
+    EXPECT_EQ(mkdir(path.c_str(), 0700), 0);
+    EXPECT_EQ(chmod(path.c_str(), mode), 0);
+    return path;
+  }
+  template <class Attempt>
+  static std::string refusal(Attempt attempt) {
+    try {
+      attempt();
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "not refused";
+  }
+
+  std::string directory_;
+
+ private:
+  std::map<std::string, std::string> before_;
+};
+
+TEST_F(Rendezvous, an_instance_is_named_by_the_argument_then_the_environment_then_by_default) {
+  EXPECT_EQ(instance_name(""), "default");
+  setenv("ARBITER_INSTANCE", "lab", 1);
+  EXPECT_EQ(instance_name(""), "lab");
+  EXPECT_EQ(instance_name("arm-2.b_C"), "arm-2.b_C");
+}
+
+TEST_F(Rendezvous, a_name_that_is_no_plain_file_name_is_refused) {
+  for (const std::string name : {".", "..", ".hidden", "a/b", "../x", "a b", "a\n", "ä"}) {
+    EXPECT_THROW(instance_name(name), std::invalid_argument) << name;
+  }
+  EXPECT_EQ(instance_name(std::string(64, 'x')).size(), 64u);
+  EXPECT_THROW(instance_name(std::string(65, 'x')), std::invalid_argument);
+  EXPECT_THROW(instance_name(std::string("a\0b", 3)), std::invalid_argument);
+  setenv("ARBITER_INSTANCE", "../escape", 1);
+  EXPECT_THROW(instance_name(""), std::invalid_argument);
+}
+
+TEST_F(Rendezvous, the_service_managers_directory_goes_before_the_sessions) {
+  const std::string given = make("given"), session = make("session");
+  setenv("XDG_RUNTIME_DIR", session.c_str(), 1);
+  EXPECT_EQ(daemon_directory(), session + "/arbiter");
+  setenv("RUNTIME_DIRECTORY", (given + ":" + session).c_str(), 1);
+  EXPECT_EQ(daemon_directory(), given);
+}
+
+TEST_F(Rendezvous, a_client_looks_in_each_place_where_a_daemon_may_be_in_order) {
+  setenv("XDG_RUNTIME_DIR", "/session", 1);
+  setenv("RUNTIME_DIRECTORY", "/given:/other", 1);
+  const auto directories = client_directories();
+  ASSERT_GE(directories.size(), 4u);
+  EXPECT_EQ(directories[0], "/given");
+  EXPECT_EQ(directories[1], "/session/arbiter");
+  EXPECT_EQ(directories[2], "/run/arbiter");
+  EXPECT_EQ(directories[3], directory_ + "/arbiter-" + std::to_string(geteuid()));
+}
+
+TEST_F(Rendezvous, a_directory_that_others_may_write_in_is_refused) {
+  for (const mode_t mode : {0775u, 0757u, 0777u, 01777u}) {
+    const std::string unsafe = make("unsafe" + std::to_string(mode), mode);
+    setenv("RUNTIME_DIRECTORY", unsafe.c_str(), 1);
+    EXPECT_THAT(refusal([] { daemon_directory(); }), HasSubstr("others may write in " + unsafe));
+  }
+}
+
+TEST_F(Rendezvous, a_link_to_a_directory_or_a_file_in_its_place_is_refused) {
+  const std::string target = make("target");
+  const std::string link = directory_ + "/link";
+  ASSERT_EQ(symlink(target.c_str(), link.c_str()), 0);
+  setenv("RUNTIME_DIRECTORY", link.c_str(), 1);
+  EXPECT_THAT(refusal([] { daemon_directory(); }), HasSubstr("is not a directory"));
+}
+
+TEST_F(Rendezvous, a_directory_of_another_user_is_refused) {
+  if (geteuid() == 0) {
+    const std::string theirs = make("theirs");
+    ASSERT_EQ(chown(theirs.c_str(), 65534, 65534), 0);
+    setenv("RUNTIME_DIRECTORY", theirs.c_str(), 1);
+  } else {
+    setenv("RUNTIME_DIRECTORY", "/usr", 1);
+  }
+  EXPECT_THAT(refusal([] { daemon_directory(); }), HasSubstr("belongs to user"));
+}
+
+TEST_F(Rendezvous, one_listener_at_a_time_and_the_next_one_when_it_is_gone) {
+  {
+    const Listener first = listen_at(directory_, "one");
+    EXPECT_EQ(first.path, directory_ + "/one.sock");
+    EXPECT_THAT(refusal([&] { listen_at(directory_, "one"); }), HasSubstr("running already"));
+    const Listener other = listen_at(directory_, "two");
+    EXPECT_TRUE(other.socket);
+  }
+  EXPECT_TRUE(listen_at(directory_, "one").socket) << "the socket file was left behind";
+}
+
+TEST_F(Rendezvous, a_client_finds_the_daemon_of_its_instance_and_no_other) {
+  setenv("RUNTIME_DIRECTORY", directory_.c_str(), 1);
+  const Listener listener = listen_at(directory_, "mine");
+  std::string why_not;
+  EXPECT_TRUE(connect_to_daemon("mine", why_not).has_value());
+  EXPECT_FALSE(connect_to_daemon("another-" + std::to_string(getpid()), why_not).has_value());
+  EXPECT_EQ(why_not, "");
+}
+
+TEST_F(Rendezvous, paths_longer_than_an_address_work) {
+  std::string deep = directory_;
+  for (int i = 0; i < 4; ++i) {
+    deep += "/" + std::string(60, static_cast<char>('a' + i));
+    ASSERT_EQ(mkdir(deep.c_str(), 0755), 0);
+  }
+  setenv("RUNTIME_DIRECTORY", deep.c_str(), 1);
+  const std::string instance(64, 'i');
+  const Listener listener = listen_at(deep, instance);
+  std::string why_not;
+  EXPECT_TRUE(connect_to_daemon(instance, why_not).has_value());
+}
+
+TEST_F(Rendezvous, a_directory_that_is_not_there_is_no_error_for_a_client) {
+  setenv("RUNTIME_DIRECTORY", (directory_ + "/" + std::string(200, 'x')).c_str(), 1);
+  std::string why_not;
+  EXPECT_FALSE(connect_to_daemon("nobody-" + std::to_string(getpid()), why_not).has_value());
+}
+
+}  // namespace
+}  // namespace arbiter::shm

@@ -1,0 +1,128 @@
+// What the kernel must do for us.
+#include "shm/segment.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+
+#include "shm/bell.hpp"
+
+namespace arbiter::shm {
+namespace {
+
+constexpr std::size_t kSize = 2 * 4096;
+
+void* map(int fd, int protection) { return mmap(nullptr, kSize, protection, MAP_SHARED, fd, 0); }
+
+class SealedSegment : public testing::Test {
+ protected:
+  SealedSegment() : segment_(make_segment("arbiter-test", kSize)) {
+    mapping_ = Mapping(segment_, kSize, Access::kReadWrite);
+    mapping_.data()[0] = std::byte{1};
+    seal(segment_, Seals::kOneWriter);
+  }
+
+  FileDescriptor segment_;
+  Mapping mapping_;
+};
+
+TEST_F(SealedSegment, its_owner_writes_on_through_the_mapping_it_has) {
+  mapping_.data()[0] = std::byte{42};
+  const Mapping reader(reopen(segment_, O_RDONLY), kSize, Access::kReadOnly);
+  EXPECT_EQ(reader.data()[0], std::byte{42});
+}
+
+TEST_F(SealedSegment, cannot_be_mapped_writable_again_not_even_by_its_owner) {
+  EXPECT_EQ(map(segment_.get(), PROT_READ | PROT_WRITE), MAP_FAILED);
+  EXPECT_THROW(Mapping(segment_, kSize, Access::kReadWrite), std::system_error);
+}
+
+TEST_F(SealedSegment, cannot_be_made_writable_after_it_was_mapped_to_be_read) {
+  void* const read_only = map(segment_.get(), PROT_READ);
+  ASSERT_NE(read_only, MAP_FAILED);
+  EXPECT_NE(mprotect(read_only, kSize, PROT_READ | PROT_WRITE), 0);
+  EXPECT_EQ(errno, EACCES);
+  munmap(read_only, kSize);
+}
+
+TEST_F(SealedSegment, cannot_be_written_by_a_system_call) {
+  const char byte = 9;
+  EXPECT_LT(pwrite(segment_.get(), &byte, 1, 0), 0);
+  EXPECT_EQ(errno, EPERM);
+}
+
+TEST_F(SealedSegment, can_neither_shrink_nor_grow) {
+  EXPECT_NE(ftruncate(segment_.get(), 0), 0);
+  EXPECT_NE(ftruncate(segment_.get(), 2 * kSize), 0);
+  EXPECT_NE(fallocate(segment_.get(), 0, 0, 2 * kSize), 0);
+  EXPECT_EQ(checked_size(segment_, Seals::kOneWriter), kSize);
+}
+
+TEST_F(SealedSegment, takes_no_further_seals_and_gives_none_back) {
+  EXPECT_NE(fcntl(segment_.get(), F_ADD_SEALS, F_SEAL_WRITE), 0);
+  EXPECT_EQ(errno, EPERM);
+}
+
+TEST_F(SealedSegment, opened_anew_for_writing_it_still_cannot_be_mapped_writable) {
+  const FileDescriptor again = reopen(segment_, O_RDWR);
+  EXPECT_EQ(map(again.get(), PROT_READ | PROT_WRITE), MAP_FAILED);
+}
+
+TEST_F(SealedSegment, its_memory_can_still_be_allocated) {
+  EXPECT_FALSE(allocate(segment_, 0, kSize));
+  EXPECT_TRUE(allocate(segment_, kSize, 1)) << "but not beyond its end";
+}
+
+TEST(Segment, one_handed_out_read_only_cannot_be_mapped_writable) {
+  const FileDescriptor page = make_segment("arbiter-test", kSize);
+  seal(page, Seals::kFixedSize);
+  const FileDescriptor reader = reopen(page, O_RDONLY);
+  EXPECT_EQ(map(reader.get(), PROT_READ | PROT_WRITE), MAP_FAILED);
+  void* const read_only = map(reader.get(), PROT_READ);
+  ASSERT_NE(read_only, MAP_FAILED);
+  EXPECT_NE(mprotect(read_only, kSize, PROT_READ | PROT_WRITE), 0);
+  munmap(read_only, kSize);
+  const Mapping successor(page, kSize, Access::kReadWrite);  // its writer may map it again
+  EXPECT_EQ(successor.size(), kSize);
+}
+
+TEST(Segment, its_mode_lets_nobody_else_write) {
+  const FileDescriptor segment = make_segment("arbiter-test", kSize);
+  struct stat status {};
+  ASSERT_EQ(fstat(segment.get(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777u, 0644u);
+}
+
+TEST(Segment, of_another_kind_or_without_its_seals_it_is_not_taken) {
+  const FileDescriptor unsealed = make_segment("arbiter-test", kSize);
+  EXPECT_THROW(checked_size(unsealed, Seals::kFixedSize), std::runtime_error);
+  seal(unsealed, Seals::kFixedSize);
+  EXPECT_EQ(checked_size(unsealed, Seals::kFixedSize), kSize);
+  EXPECT_THROW(checked_size(unsealed, Seals::kOneWriter), std::runtime_error);
+  const Bell bell;
+  EXPECT_THROW(checked_size(bell.write_end(), Seals::kFixedSize), std::runtime_error);
+  EXPECT_THROW(checked_size(FileDescriptor(), Seals::kFixedSize), std::runtime_error);
+}
+
+TEST(Segment, a_child_does_not_inherit_a_writable_mapping) {
+  const FileDescriptor segment = make_segment("arbiter-test", kSize);
+  const Mapping writable(segment, kSize, Access::kReadWrite);
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    unsigned char resident[2];
+    // ENOMEM: nothing is mapped there.
+    _exit(mincore(writable.data(), kSize, resident) != 0 && errno == ENOMEM ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, 0);
+}
+
+}  // namespace
+}  // namespace arbiter::shm

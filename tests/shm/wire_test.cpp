@@ -1,0 +1,179 @@
+#include "shm/wire.hpp"
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cstddef>
+#include <cstring>
+#include <vector>
+
+namespace arbiter::shm {
+namespace {
+
+std::size_t open_descriptors() {
+  std::size_t count = 0;
+  DIR* const directory = opendir("/proc/self/fd");
+  while (readdir(directory) != nullptr) ++count;
+  closedir(directory);
+  return count;
+}
+
+class Wire : public testing::Test {
+ protected:
+  Wire() {
+    int ends[2];
+    EXPECT_EQ(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends), 0);
+    sender_.reset(ends[0]);
+    receiver_.reset(ends[1]);
+  }
+
+  // Sends bytes as they are, with copies of a descriptor.
+  void send_raw(const void* bytes, std::size_t size, std::size_t descriptors = 0) const {
+    iovec data{const_cast<void*>(bytes), size};
+    msghdr header{};
+    header.msg_iov = &data;
+    header.msg_iovlen = 1;
+    std::vector<std::byte> control(CMSG_SPACE(sizeof(int) * descriptors));
+    if (descriptors != 0) {
+      header.msg_control = control.data();
+      header.msg_controllen = control.size();
+      cmsghdr* const part = CMSG_FIRSTHDR(&header);
+      part->cmsg_level = SOL_SOCKET;
+      part->cmsg_type = SCM_RIGHTS;
+      part->cmsg_len = CMSG_LEN(sizeof(int) * descriptors);
+      const std::vector<int> copies(descriptors, sender_.get());
+      std::memcpy(CMSG_DATA(part), copies.data(), sizeof(int) * descriptors);
+    }
+    ASSERT_GE(sendmsg(sender_.get(), &header, MSG_NOSIGNAL), 0);
+  }
+  ReceiveResult receive() { return receive_message(receiver_.get(), received_, false); }
+
+  FileDescriptor sender_;
+  FileDescriptor receiver_;
+  Received received_;
+};
+
+TEST_F(Wire, a_message_arrives_as_it_was_sent) {
+  Message message;
+  message.kind = MessageKind::kOpenOutput;
+  message.flags = 3;
+  message.request = 4;
+  message.port = 5;
+  message.peer = 6;
+  message.id = 7;
+  message.value = 8;
+  message.type.set_name("Twist");
+  message.type.size = 48;
+  message.type.alignment = 16;
+  message.set_name("/Face/pos:o");
+  message.set_text("because");
+  ASSERT_EQ(send_message(sender_.get(), message, {sender_.get(), receiver_.get()}),
+            SendResult::kSent);
+  ASSERT_EQ(receive(), ReceiveResult::kReceived);
+  EXPECT_EQ(std::memcmp(&received_.message, &message, sizeof message), 0);
+  EXPECT_EQ(received_.descriptor_count, 2u);
+}
+
+TEST_F(Wire, what_a_message_leaves_out_is_empty_whatever_came_before_it) {
+  Message first;
+  first.set_name("/a");
+  first.set_text("a long explanation");
+  ASSERT_EQ(send_message(sender_.get(), first, {sender_.get(), -1}), SendResult::kSent);
+  ASSERT_EQ(send_message(sender_.get(), Message{}), SendResult::kSent);
+  ASSERT_EQ(receive(), ReceiveResult::kReceived);
+  ASSERT_EQ(receive(), ReceiveResult::kReceived);
+  EXPECT_TRUE(received_.message.name_view().empty());
+  EXPECT_TRUE(received_.message.text_view().empty());
+  EXPECT_EQ(received_.descriptor_count, 0u);
+  EXPECT_FALSE(received_.descriptors[0]);
+}
+
+TEST_F(Wire, names_and_texts_of_any_length_are_cut_and_ended) {
+  const std::string endless(5000, 'x');
+  Message message;
+  message.set_name(endless);
+  message.set_text(endless);
+  message.type.set_name(endless);
+  ASSERT_EQ(send_message(sender_.get(), message), SendResult::kSent);
+  ASSERT_EQ(receive(), ReceiveResult::kReceived);
+  EXPECT_EQ(received_.message.name_view().size(), kMaxNameLength);
+  EXPECT_EQ(received_.message.text_view().size(), sizeof message.text - 1);
+  EXPECT_EQ(received_.message.type.type_name().size(), kMaxTypeName);
+}
+
+TEST_F(Wire, a_name_without_an_end_is_given_one) {
+  Message message;
+  std::memset(message.name, 'n', sizeof message.name);
+  std::memset(message.text, 't', sizeof message.text);
+  std::memset(message.type.name, 'y', sizeof message.type.name);
+  send_raw(&message, sizeof message);
+  ASSERT_EQ(receive(), ReceiveResult::kReceived);
+  EXPECT_EQ(received_.message.name[sizeof message.name - 1], '\0');
+  EXPECT_EQ(received_.message.text[sizeof message.text - 1], '\0');
+  EXPECT_EQ(received_.message.type.name[kMaxTypeName], '\0');
+}
+
+TEST_F(Wire, a_message_cut_before_its_fixed_part_ends_is_malformed) {
+  const Message message;
+  for (std::size_t size = 1; size < offsetof(Message, type); ++size) {
+    send_raw(&message, size);
+    EXPECT_EQ(receive(), ReceiveResult::kMalformed) << size;
+  }
+  for (const std::size_t size : {offsetof(Message, type), offsetof(Message, type) + 1,
+                                 offsetof(Message, name) + 3, sizeof message}) {
+    send_raw(&message, size);
+    EXPECT_EQ(receive(), ReceiveResult::kReceived) << size;
+  }
+}
+
+TEST_F(Wire, a_message_that_is_too_long_is_malformed) {
+  const std::vector<std::byte> bytes(sizeof(Message) + 1);
+  send_raw(bytes.data(), bytes.size());
+  EXPECT_EQ(receive(), ReceiveResult::kMalformed);
+}
+
+TEST_F(Wire, descriptors_that_were_not_asked_for_are_closed) {
+  const std::size_t before = open_descriptors();
+  const Message message;
+  for (const std::size_t descriptors : {3u, 4u, 10u, 253u}) {
+    send_raw(&message, sizeof message, descriptors);
+    EXPECT_EQ(receive(), ReceiveResult::kMalformed) << descriptors;
+  }
+  send_raw(&message, 4, 2);
+  EXPECT_EQ(receive(), ReceiveResult::kMalformed) << "too short, with descriptors";
+  send_raw(&message, sizeof message, 2);
+  EXPECT_EQ(receive(), ReceiveResult::kReceived);
+  received_ = {};
+  EXPECT_EQ(open_descriptors(), before);
+}
+
+TEST_F(Wire, descriptors_are_not_inherited_by_a_program_that_is_started) {
+  ASSERT_EQ(send_message(sender_.get(), {}, {sender_.get(), -1}), SendResult::kSent);
+  ASSERT_EQ(receive(), ReceiveResult::kReceived);
+  EXPECT_NE(fcntl(received_.descriptors[0].get(), F_GETFD) & FD_CLOEXEC, 0);
+}
+
+TEST_F(Wire, with_nothing_to_receive_it_does_not_block) {
+  EXPECT_EQ(receive(), ReceiveResult::kNothing);
+}
+
+TEST_F(Wire, a_socket_that_nobody_reads_gets_full_and_goes_on_later) {
+  SendResult result = SendResult::kSent;
+  int sent = 0;
+  while ((result = send_message(sender_.get(), {})) == SendResult::kSent) ++sent;
+  EXPECT_EQ(result, SendResult::kFull);
+  for (int i = 0; i < sent; ++i) EXPECT_EQ(receive(), ReceiveResult::kReceived);
+  EXPECT_EQ(send_message(sender_.get(), {}), SendResult::kSent);
+}
+
+TEST_F(Wire, a_peer_that_is_gone_is_told_apart_and_raises_no_signal) {
+  receiver_.reset();
+  EXPECT_EQ(send_message(sender_.get(), {}), SendResult::kClosed);
+  EXPECT_EQ(receive_message(sender_.get(), received_, true), ReceiveResult::kClosed);
+}
+
+}  // namespace
+}  // namespace arbiter::shm

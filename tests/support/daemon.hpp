@@ -1,0 +1,229 @@
+// A real arbiterd in a runtime directory of its own.
+#pragma once
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tests/support/child_process.hpp"
+#include "tests/support/raw_client.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace arbiter::test {
+
+// Sets a variable of this process for as long as it lives; nullopt: not set.
+class ScopedVariable {
+ public:
+  ScopedVariable(const char* name, const std::optional<std::string>& value) : name_(name) {
+    if (const char* before = std::getenv(name)) before_ = before;
+    set(value);
+  }
+  ScopedVariable(const ScopedVariable&) = delete;
+  ScopedVariable& operator=(const ScopedVariable&) = delete;
+  ~ScopedVariable() { set(before_); }
+
+ private:
+  void set(const std::optional<std::string>& value) const {
+    if (value) {
+      ::setenv(name_, value->c_str(), 1);
+    } else {
+      ::unsetenv(name_);
+    }
+  }
+
+  const char* name_;
+  std::optional<std::string> before_;
+};
+
+// Where a service manager would hear that the daemon is ready.
+class NotifySocket {
+ public:
+  explicit NotifySocket(std::string path) : path_(std::move(path)) {
+    socket_.reset(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strncpy(address.sun_path, path_.c_str(), sizeof address.sun_path - 1);
+    if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+      throw std::runtime_error("cannot listen at " + path_);
+    }
+  }
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+  // True: a message that contains `text` has come; false: the process ended before it.
+  bool wait_for(const std::string& text, const ChildProcess& process) {
+    for (;;) {
+      pollfd polled[2]{{socket_.get(), POLLIN, 0}, {process.descriptor(), POLLIN, 0}};
+      if (::poll(polled, 2, -1) < 0) continue;
+      char message[512];
+      const ssize_t size = ::recv(socket_.get(), message, sizeof message, MSG_DONTWAIT);
+      if (size > 0) {
+        if (std::string(message, static_cast<std::size_t>(size)).find(text) != std::string::npos) {
+          return true;
+        }
+        continue;
+      }
+      if (polled[1].revents != 0) return false;
+    }
+  }
+
+ private:
+  std::string path_;
+  shm::FileDescriptor socket_;
+};
+
+inline std::string arbiterd_path() { return std::string(ARBITER_PROGRAMS) + "/arbiterd"; }
+
+inline const std::string kNoRules = "<behaviors/>";
+
+// Starts a daemon and lets this process, and those that it starts, find it: while one lives,
+// XDG_RUNTIME_DIR and ARBITER_INSTANCE are set to its own.
+class Daemon {
+ public:
+  struct Options {
+    std::string instance = "test";
+    std::optional<std::string> application;
+    std::vector<std::string> arguments;
+    bool without_model = false;
+  };
+
+  explicit Daemon(const std::string& model = kNoRules) : Daemon(model, Options()) {}
+  Daemon(const std::string& model, Options options)
+      : options_(std::move(options)),
+        runtime_("XDG_RUNTIME_DIR", directory_.path()),
+        instance_("ARBITER_INSTANCE", options_.instance),
+        own_("RUNTIME_DIRECTORY", std::nullopt),
+        notify_(directory_.path() + "/notify") {
+    write_model(model);
+    if (options_.application) directory_.write("application.xml", *options_.application);
+    start();
+    require_ready();
+  }
+  ~Daemon() {
+    if (!process_.runs()) return;
+    process_.signal(SIGTERM);
+    EXPECT_EQ(process_.wait(), 0) << log();
+  }
+  Daemon(const Daemon&) = delete;
+  Daemon& operator=(const Daemon&) = delete;
+
+  void write_model(const std::string& text) { directory_.write("model.xml", text); }
+  void write_application(const std::string& text) { directory_.write("application.xml", text); }
+
+  // Puts a model in force; returns when it is.
+  void load(const std::string& model) {
+    const auto before = generation();
+    write_model(model);
+    hang_up();
+    while (generation() == before) {
+    }
+  }
+  // The same with one that must be refused.
+  void load_bad(const std::string& model) {
+    const auto before = refused();
+    write_model(model);
+    hang_up();
+    while (refused() == before) {
+    }
+  }
+  void hang_up() const { process_.signal(SIGHUP); }
+  int terminate() {
+    process_.signal(SIGTERM);
+    return process_.wait();
+  }
+  void kill() { process_.kill(); }
+  // After it has ended.
+  void restart() {
+    start();
+    require_ready();
+  }
+
+  nlohmann::json status() {
+    RawClient client(options_.instance);
+    client.hello("status");
+    return client.status();
+  }
+  nlohmann::json source(const std::string& name) { return named(status()["sources"], name); }
+  nlohmann::json input(const std::string& name) { return named(status()["inputs"], name); }
+  nlohmann::json connection(const std::string& from, const std::string& to) {
+    for (const auto& each : input(to)["connections"]) {
+      if (each["source"] == from) return each;
+    }
+    return nullptr;
+  }
+  std::uint64_t generation() { return status()["model"]["generation"]; }
+  std::uint64_t refused() { return status()["model"]["reloads_refused"]; }
+
+  [[nodiscard]] const std::string& instance() const { return options_.instance; }
+  [[nodiscard]] std::string directory() const { return directory_.path(); }
+  [[nodiscard]] std::string socket_path() const {
+    return directory() + "/arbiter/" + instance() + ".sock";
+  }
+  [[nodiscard]] ChildProcess& process() { return process_; }
+  [[nodiscard]] NotifySocket& notify() { return notify_; }
+  [[nodiscard]] std::string log() const {
+    std::ifstream file(directory() + "/log");
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  [[nodiscard]] std::size_t open_descriptors() const {
+    std::size_t count = 0;
+    DIR* const listing = ::opendir(("/proc/" + std::to_string(process_.pid()) + "/fd").c_str());
+    if (listing == nullptr) return 0;
+    while (::readdir(listing) != nullptr) ++count;
+    ::closedir(listing);
+    return count;
+  }
+
+ private:
+  static nlohmann::json named(const nlohmann::json& list, const std::string& name) {
+    for (const auto& each : list) {
+      if (each["name"] == name) return each;
+    }
+    return nullptr;
+  }
+
+  void start() {
+    std::vector<std::string> argv{arbiterd_path(), "--instance", options_.instance, "--log-level",
+                                  "debug"};
+    if (!options_.without_model) {
+      argv.insert(argv.end(), {"--model", directory_.path() + "/model.xml"});
+    }
+    if (options_.application) {
+      argv.insert(argv.end(), {"--application", directory_.path() + "/application.xml"});
+    }
+    argv.insert(argv.end(), options_.arguments.begin(), options_.arguments.end());
+    const shm::FileDescriptor log(::open((directory_.path() + "/log").c_str(),
+                                         O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600));
+    process_ = ChildProcess(argv, {{"NOTIFY_SOCKET", notify_.path()}}, {-1, -1, log.get()});
+  }
+  void require_ready() {
+    if (!notify_.wait_for("READY=1", process_)) {
+      throw std::runtime_error("arbiterd did not become ready:\n" + log());
+    }
+  }
+
+  Options options_;
+  TemporaryDirectory directory_;
+  ScopedVariable runtime_;
+  ScopedVariable instance_;
+  ScopedVariable own_;
+  NotifySocket notify_;
+  ChildProcess process_;
+};
+
+}  // namespace arbiter::test

@@ -1,0 +1,105 @@
+// A client of the daemon that says what it likes, below the client library.
+#pragma once
+
+#include <fcntl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+
+#include "shm/rendezvous.hpp"
+#include "shm/segment.hpp"
+#include "shm/wire.hpp"
+
+namespace arbiter::test {
+
+class RawClient {
+ public:
+  using Descriptors = std::array<int, shm::kMaxDescriptors>;
+
+  explicit RawClient(const std::string& instance) {
+    std::string why_not;
+    auto socket = shm::connect_to_daemon(instance, why_not);
+    if (!socket) throw std::runtime_error("no daemon of instance " + instance + " " + why_not);
+    socket_ = std::move(*socket);
+  }
+
+  static shm::Message message(shm::MessageKind kind, const std::string& name = {}) {
+    shm::Message result;
+    result.kind = kind;
+    result.request = 77;
+    result.set_name(name);
+    return result;
+  }
+
+  shm::SendResult send(const shm::Message& message, Descriptors descriptors = {-1, -1}) {
+    return shm::send_message(socket_.get(), message, descriptors);
+  }
+  bool send_bytes(const void* data, std::size_t size) {
+    return ::send(socket_.get(), data, size, MSG_NOSIGNAL) == static_cast<ssize_t>(size);
+  }
+  // Blocks. False: the daemon has closed the connection.
+  bool receive(shm::Received& received) {
+    return shm::receive_message(socket_.get(), received, true) == shm::ReceiveResult::kReceived;
+  }
+  // Waits for the next message of that kind, and lets others pass.
+  shm::Received expect(shm::MessageKind kind) {
+    shm::Received received;
+    while (receive(received)) {
+      if (received.message.kind == kind) return received;
+      if (received.message.kind == shm::MessageKind::kRefused) {
+        throw std::runtime_error(std::string(received.message.text_view()));
+      }
+    }
+    throw std::runtime_error("the daemon has hung up");
+  }
+  // The text of the refusal that comes next.
+  std::string expect_refusal() {
+    shm::Received received;
+    while (receive(received)) {
+      if (received.message.kind == shm::MessageKind::kRefused) {
+        return std::string(received.message.text_view());
+      }
+    }
+    return "(hung up)";
+  }
+  // True once the daemon has closed the connection.
+  bool is_hung_up_on() {
+    shm::Received received;
+    while (receive(received)) {
+    }
+    return true;
+  }
+
+  void hello(const std::string& name = "raw", bool has_service_thread = false) {
+    auto hello = message(shm::MessageKind::kHello, name);
+    hello.value = shm::kWireVersion;
+    hello.flags = has_service_thread ? shm::kHasServiceThread : 0u;
+    send(hello);
+    expect(shm::MessageKind::kWelcome);
+  }
+
+  nlohmann::json status() {
+    send(message(shm::MessageKind::kStatus));
+    const shm::Received reply = expect(shm::MessageKind::kStatusReply);
+    std::string text;
+    std::array<char, 65536> buffer;
+    ssize_t count = 0;
+    off_t at = 0;
+    while ((count = ::pread(reply.descriptors[0].get(), buffer.data(), buffer.size(), at)) > 0) {
+      text.append(buffer.data(), static_cast<std::size_t>(count));
+      at += count;
+    }
+    return nlohmann::json::parse(text);
+  }
+
+  [[nodiscard]] int socket() const { return socket_.get(); }
+
+ private:
+  shm::FileDescriptor socket_;
+};
+
+}  // namespace arbiter::test
