@@ -8,9 +8,11 @@ namespace arbiter::cli {
 
 void add_model_options(CLI::App& verb, rules::ModelFiles& files) {
   verb.add_option("MODEL", files.models, "Files of behaviours and rules; together one model")
+      ->type_name("FILE")
       ->required();
   verb.add_option("--application", files.application,
-                  "File that says which connections exist; without it, those of the model");
+                  "File that says which connections exist; without it, those of the model")
+      ->type_name("FILE");
 }
 
 std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics) {

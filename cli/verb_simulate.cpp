@@ -58,7 +58,9 @@ void add_simulate(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<SimulateOptions>();
   CLI::App* verb = app.add_subcommand("simulate", "Replay a trace: who would have been heard?");
   add_model_options(*verb, options->files);
-  verb->add_option("--trace", options->trace, "CSV: t_ns,source or t_ns,source,event")->required();
+  verb->add_option("--trace", options->trace, "CSV: t_ns,source or t_ns,source,event")
+      ->type_name("FILE")
+      ->required();
   verb->footer("Example:\n  arbiter simulate search_and_track.xml --trace trace.csv");
   verb->callback([options, &exit_code] { exit_code = simulate(*options); });
 }

@@ -102,7 +102,7 @@ void InputCore::accept_view() {
     Queue queue;
     queue.peer = link.peer;
     queue.gone = link.gone;
-    queue.reader = shm::ChannelReader(link.peer->segment, link.peer->instance, instance_);
+    queue.reader = shm::ChannelReader(link.peer->segment, link.peer->instance, link.peer->link);
     queue.lane = free_lane();
     if (queue.lane == nullptr) continue;
     queue.lane->source.store(link.peer->source, std::memory_order_relaxed);
@@ -127,8 +127,13 @@ shm::Lane* InputCore::free_lane() noexcept {
 
 // What the queue still has is lost: its connection is gone, or a later publisher of the same source
 // has closed since.
-void InputCore::retire_queue(Queue& queue) noexcept {
+void InputCore::retire_queue(Queue& queue) {
   count(segment_->header.counters.dropped, queue.reader.backlog(queue.reader.backlog_end()));
+  if (std::find(held_from_.begin(), held_from_.end(), queue.peer.get()) != held_from_.end()) {
+    auto kept = std::make_unique<InputView>();
+    kept->links.push_back({queue.peer, true});
+    lingering_.push_back(std::move(kept));
+  }
   queue.peer->drained.store(true, std::memory_order_relaxed);
   queue.lane->publisher.store(0, std::memory_order_release);
   queue.lane = nullptr;

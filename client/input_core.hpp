@@ -4,6 +4,7 @@
 // ports, maps them, and offers the result as a view.
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
@@ -82,13 +83,14 @@ class InputCore {
   void offer_view();
   void accept_view();
   shm::Lane* free_lane() noexcept;
-  void retire_queue(Queue& queue) noexcept;
+  void retire_queue(Queue& queue);
   void bind_rules(const shm::TableSnapshot& snapshot);
   void refresh();
 
   // take() in parts: look at the queues, decide, hold.
   Queue* look() noexcept;
   bool look_at(Queue& queue) noexcept;
+  void join(Queue& queue) noexcept;
   void yield_to_successor(Queue& queue) noexcept;
   enum class Choice : std::uint8_t { kTake, kNothing, kAgain };
   Choice choose(Queue*& oldest) noexcept;
@@ -98,6 +100,7 @@ class InputCore {
   bool hold(Queue& queue, HeldSample& sample) noexcept;
   [[nodiscard]] std::uint32_t free_hold() const;
   void consume(Queue& queue) noexcept;
+  void let_go_of(const OutputPeer* peer) noexcept;
 
   // wait() in parts.
   [[nodiscard]] bool is_selected() noexcept;
@@ -139,6 +142,9 @@ class InputCore {
   std::vector<shm::Nanoseconds> ends_;      // scratch
   shm::Nanoseconds last_reading_ = 0;       // of the clock, by this port
   std::uint32_t held_ = 0;
+  std::array<const OutputPeer*, shm::kMaxHeld> held_from_{};  // by hold
+  // Publishers that are gone and of whom samples are held: kept mapped, each in a view of its own.
+  std::vector<std::unique_ptr<InputView>> lingering_;
   bool commanded_ = false;  // seen selected since idle was last told
   shm::FileDescriptor epoll_;
   shm::FileDescriptor timer_;

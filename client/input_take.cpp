@@ -19,6 +19,9 @@ namespace {
 // How often a take starts again because publishers overtook it, or changed the picture, meanwhile.
 constexpr int kMaxTakes = 64;
 
+// How often a take looks for the oldest entry of a queue whose publisher overtakes it.
+constexpr int kMaxPeeks = 64;
+
 }  // namespace
 
 HeldSample InputCore::take() {
@@ -67,17 +70,25 @@ InputCore::Queue* InputCore::look() noexcept {
   return oldest;
 }
 
+void InputCore::join(Queue& queue) noexcept {
+  if (queue.reader.state() != shm::ChannelReader::State::kUnjoined) return;
+  if (!queue.reader.join()) return;
+  queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_release);
+}
+
 bool InputCore::look_at(Queue& queue) noexcept {
   using State = shm::ChannelReader::State;
   queue.head = 0;
   queue.head_stamp = 0;
-  if (queue.reader.state() == State::kUnjoined) {
-    if (!queue.reader.join()) return false;
-    queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_release);
-  }
+  join(queue);
   if (queue.gone) yield_to_successor(queue);
+  // A reader that was overtaken goes forward by steps; each call takes a bounded number of them.
   std::uint64_t lost = 0;
-  queue.head = queue.reader.peek(lost);
+  for (int tries = 0; tries < kMaxPeeks; ++tries) {
+    const std::uint64_t before = lost;
+    queue.head = queue.reader.peek(lost);
+    if (queue.head != 0 || lost == before) break;
+  }
   if (lost != 0) {
     count(queue.lane->overtaken, lost);
     count(segment_->header.counters.overtaken, lost);
@@ -102,6 +113,7 @@ void InputCore::yield_to_successor(Queue& queue) noexcept {
   for (Queue& other : queues_) {
     if (&other == &queue || other.peer->source != queue.peer->source) continue;
     if (other.peer->instance < queue.peer->instance) continue;
+    join(other);
     behind += other.reader.backlog(other.reader.backlog_end());
   }
   const std::uint64_t depth = segment_->header.depth;
@@ -236,13 +248,28 @@ bool InputCore::hold(Queue& queue, HeldSample& sample) noexcept {
   consume(queue);
   count(queue.lane->taken);
   count(segment_->header.counters.taken);
+  held_from_[index] = queue.peer.get();
   ++held_;
   return true;
 }
 
 void InputCore::give_back(std::uint32_t hold) noexcept {
   shm::ChannelReader::release(segment_->header.holds[hold]);
+  const OutputPeer* const from = std::exchange(held_from_[hold], nullptr);
   --held_;
+  if (!lingering_.empty()) let_go_of(from);
+}
+
+// Of a publisher that is gone, with its last sample. The service thread unmaps it.
+void InputCore::let_go_of(const OutputPeer* peer) noexcept {
+  if (std::find(held_from_.begin(), held_from_.end(), peer) != held_from_.end()) return;
+  const auto kept = std::find_if(
+      lingering_.begin(), lingering_.end(),
+      [&](const std::unique_ptr<InputView>& view) { return view->links[0].peer.get() == peer; });
+  if (kept == lingering_.end()) return;
+  handover_.retire(std::move(*kept));
+  lingering_.erase(kept);
+  memory_->service_bell().ring();
 }
 
 }  // namespace arbiter::detail

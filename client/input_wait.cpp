@@ -66,7 +66,9 @@ bool InputCore::arm(HeldSample& sample, bool& selected) {
   header.believed.store(selected ? shm::Selection::kSelected : shm::Selection::kIdle,
                         std::memory_order_relaxed);
   // Release, with the acquire of publishers: who sees us wait sees what we believe.
-  header.wait.store(header.wait.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+  // A take that throws leaves the last wait as it was, odd.
+  header.wait.store((header.wait.load(std::memory_order_relaxed) + 1) | 1,
+                    std::memory_order_release);
   shm::full_fence();
   sample = take_once();
   if (sample.data != nullptr) return false;

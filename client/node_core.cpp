@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <thread>
@@ -26,6 +27,11 @@ using Clock = std::chrono::steady_clock;
 
 // How often a client looks for a daemon that does not answer yet.
 constexpr auto kConnectInterval = std::chrono::milliseconds(20);
+// The longest time to wait for one; longer means for ever.
+constexpr std::chrono::milliseconds kMaxConnectTimeout = std::chrono::hours(24 * 365);
+// The longest wait for an answer before looking for another daemon.
+constexpr std::chrono::milliseconds kMaxAnswerTime = std::chrono::seconds(60);
+constexpr std::chrono::milliseconds kMinAnswerTime{100};
 // How much less than a normal thread the service thread presses for the processor.
 constexpr int kServiceNiceness = 5;
 
@@ -59,9 +65,19 @@ std::string readable(const char* type_name) {
   return result;
 }
 
+// A name that is too long ends in a hash of the whole, so that two that differ stay different.
+std::string fitting(std::string name) {
+  if (name.size() <= shm::kMaxTypeName) return name;
+  std::uint64_t hash = 0xcbf29ce484222325;  // FNV-1a: the same in every program
+  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
+  char tail[20];
+  const int length = std::snprintf(tail, sizeof tail, "...%016llx", 0ULL + hash);
+  return name.substr(0, shm::kMaxTypeName - static_cast<std::size_t>(length)) + tail;
+}
+
 shm::TypeInfo type_info(const PortType& type) {
   shm::TypeInfo info;
-  if (type.name != nullptr) info.set_name(readable(type.name));
+  if (type.name != nullptr) info.set_name(fitting(readable(type.name)));
   info.size = type.size;
   info.alignment = type.alignment;
   return info;
@@ -105,7 +121,7 @@ NodeCore::~NodeCore() {
 }
 
 void NodeCore::connect(std::string_view name, const NodeOptions& options) {
-  const auto give_up = Clock::now() + options.connect_timeout;
+  const auto give_up = Clock::now() + std::min(options.connect_timeout, kMaxConnectTimeout);
   std::string why_not;
   for (;;) {
     if (auto socket = shm::connect_to_daemon(instance_, why_not)) {
@@ -115,10 +131,11 @@ void NodeCore::connect(std::string_view name, const NodeOptions& options) {
       hello.flags = options.service_thread ? shm::kHasServiceThread : 0u;
       shm::Received welcome;
       pollfd readable{socket_.get(), POLLIN, 0};
-      const auto left =
-          std::chrono::duration_cast<std::chrono::milliseconds>(give_up - Clock::now());
+      const auto left = std::clamp(
+          std::chrono::duration_cast<std::chrono::milliseconds>(give_up - Clock::now()),
+          kMinAnswerTime, kMaxAnswerTime);
       if (shm::send_message(socket_.get(), hello) == shm::SendResult::kSent &&
-          ::poll(&readable, 1, static_cast<int>(std::max<std::int64_t>(left.count(), 100))) == 1 &&
+          ::poll(&readable, 1, static_cast<int>(left.count())) == 1 &&
           shm::receive_message(socket_.get(), welcome, false) == shm::ReceiveResult::kReceived) {
         if (welcome.message.kind == shm::MessageKind::kRefused) {
           throw Error("the daemon refuses: " + std::string(welcome.message.text_view()));
@@ -173,7 +190,9 @@ void NodeCore::run_service_thread() {
   }
 }
 
+// Where there is a service thread, it does this.
 void NodeCore::service() {
+  if (service_thread_.joinable()) return;
   const std::lock_guard pumping(pump_mutex_);
   pump(0);
 }
@@ -268,7 +287,7 @@ void NodeCore::handle_peer(shm::Received& received) {
     OutputCore& core = *output->second;
     if (message.kind == shm::MessageKind::kInputPeer) {
       core.add_peer(map_input_peer(received, core.type()),
-                    (message.flags & shm::kIsConnected) != 0);
+                    (message.flags & shm::kIsConnected) != 0 ? message.link : 0);
     } else if (message.kind == shm::MessageKind::kPeerGone) {
       core.remove_peer(message.peer);
     } else if (message.kind == shm::MessageKind::kDisconnected) {
@@ -307,6 +326,9 @@ void NodeCore::handle_reply(shm::Received& received) {
       reply.opened = true;
     } catch (const std::exception& error) {
       reply.refusal = error.what();
+      shm::Message close = message_of(shm::MessageKind::kClosePort);
+      close.port = message.port;
+      static_cast<void>(shm::send_message(socket_.get(), close));
     }
     return;
   }
@@ -364,6 +386,9 @@ std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const P
   check_port_name(name);
   check_bounds<std::uint32_t>(name, "max_loans", options.max_loans, 1, shm::kMaxLoans);
   check_bounds<std::size_t>(name, "max_size", type.size, 0, std::size_t{1} << 40);
+  check_bounds<std::size_t>(name, "max_memory", options.max_memory,
+                            OutputCore::least_memory(type_info(type), options.max_loans),
+                            std::size_t{1} << 46);
   try {
     auto core = std::make_shared<OutputCore>(std::string(name), type_info(type), options, memory_);
     core->node = shared_from_this();

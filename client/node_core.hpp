@@ -37,7 +37,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
                                         const InputPortOptions& options);
   void close(shm::PortInstance port) noexcept;
 
-  // Takes up what the daemon has said so far, without blocking.
+  // Without a service thread: takes up what the daemon has said so far, without blocking.
   void service();
   // Readable when there is something to take up.
   [[nodiscard]] int service_fd() const noexcept { return epoll_.get(); }

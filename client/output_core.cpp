@@ -12,18 +12,22 @@ namespace {
 // Beside the loans, one slot for publish() with a copy.
 std::uint32_t slots_of_our_own(std::uint32_t max_loans) { return max_loans + 1; }
 
+std::uint64_t stride_of(const shm::TypeInfo& type) { return shm::OutputLayout::plan(type, 1).stride; }
+
 std::uint32_t reserved_slots(const shm::TypeInfo& type, const OutputPortOptions& options) {
-  const std::uint64_t stride = shm::OutputLayout::plan(type, 1).stride;
-  const std::uint64_t fit = options.max_memory / stride;
-  const std::uint64_t least = slots_of_our_own(options.max_loans) + std::uint64_t{2};
-  return static_cast<std::uint32_t>(
-      std::clamp<std::uint64_t>(fit, least, std::uint64_t{shm::kMaxSlots}));
+  const std::uint64_t fit = options.max_memory / stride_of(type);
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(fit, shm::kMaxSlots));
 }
 
 // How often a decision is taken anew because seven models were loaded during it.
 constexpr int kMaxTableRetries = 3;
 
 }  // namespace
+
+// One sample to be held and one to wait, beside our own.
+std::uint64_t OutputCore::least_memory(const shm::TypeInfo& type, std::uint32_t max_loans) {
+  return stride_of(type) * (slots_of_our_own(max_loans) + std::uint64_t{2});
+}
 
 OutputCore::OutputCore(std::string name, const shm::TypeInfo& type,
                        const OutputPortOptions& options, std::shared_ptr<SharedMemory> memory)
@@ -66,14 +70,15 @@ void OutputCore::bind(shm::PortInstance instance, shm::SourceId source,
 
 // Service thread.
 
-void OutputCore::add_peer(std::shared_ptr<const InputPeer> peer, bool connected) {
+void OutputCore::add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t number) {
   const auto instance = peer->instance;
   InputLink& link = links_[instance];
   if (link.peer == nullptr) link.peer = std::move(peer);
-  link.connected = connected;
+  link.connected = number != 0;
+  link.number = number;
   link.depth = link.peer->depth;
   try {
-    if (connected) assign_channel(link);
+    if (link.connected) assign_channel(link);
     allocate_slots();
   } catch (...) {
     link.connected = false;
@@ -168,9 +173,12 @@ void OutputCore::accept_view() noexcept {
     destination.peer = link.peer.get();
     if (link.channel != shm::kNone && !destination.joined) {
       destination.joined = true;
+      destination.link = link.number;
       destination.channel = link.channel;
       destination.writer = shm::ChannelWriter(segment_, link.channel);
-      destination.writer.join(link.peer->instance, link.peer->port, link.depth);
+      // What the ring names its reader by: another for each link, lest a port that was disconnected
+      // and connected again takes the old queue for the new one.
+      destination.writer.join(link.number, link.peer->port, link.depth);
     }
     destinations.push_back(std::move(destination));
   }
@@ -187,7 +195,8 @@ void OutputCore::leave_all_but(const OutputView& view) noexcept {
     if (!destination.joined) continue;
     const bool stays =
         std::any_of(view.links.begin(), view.links.end(), [&](const InputLink& link) {
-          return link.peer.get() == destination.peer && link.channel == destination.channel;
+          return link.peer.get() == destination.peer && link.number == destination.link &&
+                 link.channel == destination.channel;
         });
     if (stays) continue;
     destination.writer.leave([&](std::uint32_t slot) { pool_.evict(slot); });

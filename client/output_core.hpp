@@ -27,11 +27,15 @@ class OutputCore {
   OutputCore(std::string name, const shm::TypeInfo& type, const OutputPortOptions& options,
              std::shared_ptr<SharedMemory> memory);
 
+  // What max_memory must be at least: the loans, a copy, and the smallest queue.
+  static std::uint64_t least_memory(const shm::TypeInfo& type, std::uint32_t max_loans);
+
   // Service thread.
 
   // The port is open: the daemon has given it its place.
   void bind(shm::PortInstance instance, shm::SourceId source, const shm::FileDescriptor& page);
-  void add_peer(std::shared_ptr<const InputPeer> peer, bool connected);
+  // `link`: its number if they are connected, else 0.
+  void add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t link);
   void remove_peer(shm::PortInstance peer);
   void disconnect_peer(shm::PortInstance peer);
   // Unmaps what the port's thread has let go of.
@@ -66,6 +70,7 @@ class OutputCore {
   struct Destination {
     const InputPeer* peer = nullptr;  // kept alive by view_
     bool joined = false;  // it has a queue of ours; else it senses, or holds old samples
+    std::uint64_t link = 0;
     std::uint32_t channel = shm::kNone;
     shm::ChannelWriter writer;
     shm::Rule rule;  // of the connection, under bound_generation_

@@ -36,6 +36,7 @@ std::shared_ptr<const OutputPeer> map_output_peer(const shm::Received& announced
                                                   const shm::TypeInfo& own) {
   auto peer = std::make_shared<OutputPeer>();
   peer->instance = announced.message.peer;
+  peer->link = announced.message.link;
   peer->source = announced.message.id;
   const shm::FileDescriptor& segment = announced.descriptors[0];
   const std::size_t size = shm::checked_size(segment, shm::Seals::kOneWriter);

@@ -31,6 +31,7 @@ struct InputLink {
   std::shared_ptr<const InputPeer> peer;
   // Else the port only senses the source, or was disconnected and may still hold samples.
   bool connected = false;
+  std::uint64_t number = 0;            // the daemon's: each time that it is connected another
   std::uint32_t channel = shm::kNone;  // none: waits until another link's is free
   std::uint32_t depth = 1;             // of the queue: the peer's, or less where memory is short
 };
@@ -44,6 +45,7 @@ struct OutputView {
 // An output port, as an input port sees it.
 struct OutputPeer {
   shm::PortInstance instance = 0;
+  std::uint64_t link = 0;  // as InputLink::number: the queue that is ours bears it
   shm::SourceId source = shm::kNone;
   shm::Mapping mapping;
   shm::OutputSegment segment;

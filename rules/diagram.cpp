@@ -26,7 +26,7 @@ std::jmp_buf recovery;
 int failure = 0;
 
 // BuDDy calls this in the midst of a recursion, and carries on with wrong results if it returns.
-// The jump skips frames of C only (see run()), and happens before BuDDy stores anything wrong.
+// The jump skips frames of C only (see attempt()), and happens before BuDDy stores anything wrong.
 extern "C" void leave_buddy(int code) {
   failure = code;
   std::longjmp(recovery, 1);

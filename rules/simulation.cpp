@@ -68,9 +68,12 @@ void Simulation::apply(const TraceEvent& event) {
   clock_.now = event.at;
   if (event.kind == TraceKind::kTick || !knows(event.source)) return;
   const shm::SourceId source = ids_.at(event.source);
-  activity_[source].word = event.kind == TraceKind::kArrival
-                               ? shm::arrival(event.at, table_.timeout(source))
-                               : shm::deactivation(event.at);
+  auto& activity = activity_[source];
+  if (event.kind == TraceKind::kDeactivation) {
+    activity.word = shm::deactivation(event.at);
+  } else {
+    activity.arrive(activity.word, shm::arrival(event.at, table_.timeout(source)));
+  }
 }
 
 PortOutcome Simulation::outcome_at(shm::PortId port, const TraceEvent& event) {

@@ -6,7 +6,9 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cstring>
 #include <system_error>
 
 #include "service/log.hpp"
@@ -52,7 +54,7 @@ void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescript
       return;
     }
   }
-  if (queue_.size() == kMaxQueue) {
+  if (queue_.size() == kMaxQueue || queued_descriptors_ >= kMaxQueuedDescriptors) {
     log::warn("{} does not read its messages: {} wait; giving it up", description(), queue_.size());
     lost_ = true;
     return;
@@ -61,6 +63,12 @@ void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescript
   queued->message = message;
   for (std::size_t i = 0; i < descriptors.size() && descriptors[i] >= 0; ++i) {
     queued->descriptors[i].reset(fcntl(descriptors[i], F_DUPFD_CLOEXEC, 0));
+    if (!queued->descriptors[i]) {
+      log::warn("{} cannot be told: {}", description(), std::strerror(errno));
+      lost_ = true;
+      return;
+    }
+    ++queued_descriptors_;
   }
   queue_.push_back(std::move(queued));
 }
@@ -73,8 +81,42 @@ void Client::flush() {
     const shm::SendResult result = shm::send_message(socket_.get(), next.message, descriptors);
     if (result == shm::SendResult::kFull) return;
     if (result == shm::SendResult::kClosed) lost_ = true;
+    queued_descriptors_ -= static_cast<std::size_t>(
+        std::count_if(descriptors.begin(), descriptors.end(), [](int fd) { return fd >= 0; }));
     queue_.pop_front();
   }
+}
+
+shm::ReceiveResult Client::receive(shm::Received& received) {
+  if (!ahead_.empty()) {
+    received = std::move(*ahead_.front());
+    ahead_.pop_front();
+    return shm::ReceiveResult::kReceived;
+  }
+  if (ahead_ended_) return *ahead_ended_;
+  return shm::receive_message(socket_.get(), received, false);
+}
+
+void Client::read_ahead() {
+  while (!ahead_ended_ && ahead_.size() < kMaxReadAhead) {
+    auto received = std::make_unique<shm::Received>();
+    const shm::ReceiveResult result = shm::receive_message(socket_.get(), *received, false);
+    if (result == shm::ReceiveResult::kNothing) return;
+    if (result == shm::ReceiveResult::kReceived) {
+      ahead_.push_back(std::move(received));
+    } else {
+      ahead_ended_ = result;
+    }
+  }
+}
+
+bool Client::take_closing_of(shm::PortInstance port) {
+  const auto closing = std::find_if(ahead_.begin(), ahead_.end(), [&](const auto& received) {
+    return received->message.kind == shm::MessageKind::kClosePort && received->message.port == port;
+  });
+  if (closing == ahead_.end()) return ahead_ended_.has_value();
+  ahead_.erase(closing);
+  return true;
 }
 
 bool Client::has_died() const {

@@ -5,7 +5,9 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -27,6 +29,14 @@ class Client {
             std::array<int, shm::kMaxDescriptors> descriptors = {-1, -1});
   // Sends what is queued, as far as it goes.
   void flush();
+  // The next message that it has sent; those that were read ahead come first.
+  [[nodiscard]] shm::ReceiveResult receive(shm::Received& received);
+  // Reads what it has sent by now, at most kMaxReadAhead messages, and sets it aside.
+  void read_ahead();
+  // Of what was read ahead: takes out the closing of a port, if it is there.
+  [[nodiscard]] bool take_closing_of(shm::PortInstance port);
+  // Whether anything was read ahead, be it that the client has hung up.
+  [[nodiscard]] bool has_read_ahead() const { return !ahead_.empty() || ahead_ended_; }
   [[nodiscard]] bool has_queue() const { return !queue_.empty(); }
   // The client has gone, or does not read what it is sent.
   [[nodiscard]] bool is_lost() const { return lost_; }
@@ -45,7 +55,7 @@ class Client {
   bool has_service_thread = false;
   bool observes = false;
   bool watches_queue = false;         // the loop waits until it can be written
-  std::set<shm::SourceId> pages;      // those that it has been sent
+  std::map<shm::SourceId, std::uint64_t> pages;  // those that it has been sent, by their number
   std::set<shm::PortInstance> ports;  // that it has open
 
  private:
@@ -53,7 +63,9 @@ class Client {
     shm::Message message;
     std::array<shm::FileDescriptor, shm::kMaxDescriptors> descriptors;
   };
-  static constexpr std::size_t kMaxQueue = 65536;
+  static constexpr std::size_t kMaxReadAhead = 256;
+  static constexpr std::size_t kMaxQueue = 16384;
+  static constexpr std::size_t kMaxQueuedDescriptors = 4096;  // so that others find some left
 
   const ClientId id_;
   shm::FileDescriptor socket_;
@@ -62,6 +74,9 @@ class Client {
   uid_t user_ = 0;
   bool lost_ = false;
   std::deque<std::unique_ptr<Queued>> queue_;
+  std::size_t queued_descriptors_ = 0;
+  std::deque<std::unique_ptr<shm::Received>> ahead_;
+  std::optional<shm::ReceiveResult> ahead_ended_;  // how the conversation ends after `ahead_`
 };
 
 }  // namespace arbiter::service

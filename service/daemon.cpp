@@ -10,7 +10,9 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstring>
 #include <stdexcept>
+#include <string_view>
 
 #include "service/log.hpp"
 #include "service/status.hpp"
@@ -22,11 +24,28 @@ namespace {
 // How long a component that does not run may hold up the opening of a port, or a new model.
 constexpr shm::Nanoseconds kMaxWaitForClients = 200'000'000;
 
+// How many messages of one client are handled before it is the next one's turn.
+constexpr int kMaxMessagesAtOnce = 64;
+
 shm::Message reply_to(std::uint64_t request, shm::MessageKind kind) {
   shm::Message message;
   message.kind = kind;
   message.request = request;
   return message;
+}
+
+// Logs and status are read by people and by programs: no name may break a line of theirs.
+bool is_printable(std::string_view name) {
+  return std::all_of(name.begin(), name.end(), [](char c) {
+    return static_cast<unsigned char>(c) > ' ' && c != '\x7f';
+  });
+}
+
+std::string port_name(const shm::Message& message) {
+  const std::string_view name = message.name_view();
+  if (name.empty() || name[0] != '/') throw std::runtime_error("a port's name begins with '/'");
+  if (!is_printable(name)) throw std::runtime_error("a port's name has no white space");
+  return std::string(name);
 }
 
 std::uint64_t event_key(std::uint32_t tag, ClientId client) {
@@ -45,6 +64,7 @@ Daemon::Daemon(const DaemonOptions& options)
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   if (!epoll_) throw std::system_error(errno, std::generic_category(), "epoll_create1");
   watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
+  reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
 }
 
 Daemon::~Daemon() { unlink(listener_.path.c_str()); }
@@ -60,6 +80,9 @@ void Daemon::watch(int fd, Tag tag, ClientId client, std::uint32_t events) {
 }
 
 int Daemon::timeout_ms() const {
+  const bool is_behind = std::any_of(clients_.begin(), clients_.end(),
+                                     [](const auto& each) { return each.second->has_read_ahead(); });
+  if (is_behind) return 0;
   const shm::Nanoseconds deadline = barriers_.next_deadline();
   if (deadline == shm::kForever) return -1;
   const shm::Nanoseconds left = std::max<shm::Nanoseconds>(deadline - shm::monotonic_now(), 0);
@@ -112,7 +135,11 @@ void Daemon::accept_client() {
     shm::FileDescriptor socket(
         accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!socket) {
-      if (errno != EAGAIN && errno != ECONNABORTED) log::warn("accept: {}", std::strerror(errno));
+      if (errno == EMFILE || errno == ENFILE) {
+        turn_away_client();
+      } else if (errno != EAGAIN && errno != ECONNABORTED) {
+        log::warn("accept: {}", std::strerror(errno));
+      }
       return;
     }
     try {
@@ -128,11 +155,19 @@ void Daemon::accept_client() {
   }
 }
 
+// Else it would stay in the listener's queue, and the loop would never rest.
+void Daemon::turn_away_client() {
+  reserve_.reset();
+  const shm::FileDescriptor socket(accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  log::warn("a client was turned away: no descriptors are left");
+  reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
+}
+
 void Daemon::serve(Client& client) {
   const ClientId id = client.id();
   shm::Received received;
-  for (;;) {
-    switch (shm::receive_message(client.socket(), received, false)) {
+  for (int i = 0; i < kMaxMessagesAtOnce; ++i) {
+    switch (client.receive(received)) {
       case shm::ReceiveResult::kNothing:
         return;
       case shm::ReceiveResult::kReceived:
@@ -169,6 +204,14 @@ void Daemon::drop(ClientId id) {
 
 // After each round: sends what is queued, and drops who is lost.
 void Daemon::settle() {
+  std::vector<ClientId> read_ahead;
+  for (const auto& [id, client] : clients_) {
+    if (client->has_read_ahead()) read_ahead.push_back(id);
+  }
+  for (const ClientId id : read_ahead) {
+    const auto client = clients_.find(id);
+    if (client != clients_.end()) serve(*client->second);
+  }
   std::vector<ClientId> lost;
   for (const auto& [id, client] : clients_) {
     if (client->is_lost()) {
@@ -236,32 +279,41 @@ void Daemon::hello(Client& client, const shm::Message& message) {
     throw std::runtime_error("the client speaks version " + std::to_string(message.value) +
                              ", this daemon version " + std::to_string(shm::kWireVersion));
   }
-  if (message.name_view().empty()) throw std::runtime_error("a client must have a name");
+  if (message.name_view().empty() || !is_printable(message.name_view())) {
+    throw std::runtime_error("a client must have a name, without white space");
+  }
   client.name = message.name_view();
   client.has_service_thread = (message.flags & shm::kHasServiceThread) != 0;
   client.send(reply_to(message.request, shm::MessageKind::kWelcome), {models_.board().get(), -1});
   log::debug("{} is here", client.description());
 }
 
-void Daemon::require_free(shm::PortInstance holder, const std::string& what) {
+void Daemon::require_free(const Client& asking, shm::PortInstance holder, const std::string& what) {
   if (holder == 0) return;
   Client* client = nullptr;
   if (const auto* output = switchboard_.output(holder)) client = output->client;
   if (const auto* input = switchboard_.input(holder)) client = input->client;
   if (client == nullptr) return;
-  if (client->has_died()) {
-    drop(client->id());
-    return;
+  if (client != &asking) {
+    if (client->has_died()) {
+      drop(client->id());
+      return;
+    }
+    // What others sent earlier may come later, for each has a socket of its own.
+    client->read_ahead();
+    if (client->take_closing_of(holder)) {
+      switchboard_.remove(holder);
+      return;
+    }
   }
   throw std::runtime_error(what + " is held by " + client->description());
 }
 
 void Daemon::open_output(Client& client, shm::Received& received) {
-  const std::string name(received.message.name_view());
-  if (name.empty() || name[0] != '/') throw std::runtime_error("a port's name begins with '/'");
+  const std::string name = port_name(received.message);
   auto port = adopt_output(received);
   Source& source = directory_.source(name);
-  require_free(source.open, "the output port " + name);
+  require_free(client, source.open, "the output port " + name);
   const OutputPort& opened = switchboard_.add(std::move(port), client, source);
   auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
   reply.port = opened.instance;
@@ -272,11 +324,10 @@ void Daemon::open_output(Client& client, shm::Received& received) {
 }
 
 void Daemon::open_input(Client& client, shm::Received& received) {
-  const std::string name(received.message.name_view());
-  if (name.empty() || name[0] != '/') throw std::runtime_error("a port's name begins with '/'");
+  const std::string name = port_name(received.message);
   auto port = adopt_input(received);
   InputName& input = directory_.input(name);
-  require_free(input.open, "the input port " + name);
+  require_free(client, input.open, "the input port " + name);
   const InputPort& opened = switchboard_.add(std::move(port), client, input);
   auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
   reply.port = opened.instance;
@@ -325,7 +376,7 @@ void Daemon::deactivate(Client& client, const shm::Message& message) {
   if (source == nullptr) {
     throw std::runtime_error("no model and no component has named the source " + name);
   }
-  require_free(source->open, "the output port " + name);
+  require_free(client, source->open, "the output port " + name);
   const shm::Nanoseconds now = shm::monotonic_now();
   const bool was_active =
       shm::is_active(source->activity().word.load(std::memory_order_relaxed), now);

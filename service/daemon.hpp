@@ -45,6 +45,8 @@ class Daemon {
   // True: stop.
   bool handle_signal(int signal_descriptor);
   void accept_client();
+  void turn_away_client();
+  // Handles what it has sent, a bounded part of it: others wait too.
   void serve(Client& client);
   void drop(ClientId id);
   void settle();
@@ -58,8 +60,9 @@ class Daemon {
   void send_status(Client& client, std::uint64_t request);
   void deactivate(Client& client, const shm::Message& message);
   void refuse(Client& client, std::uint64_t request, const std::string& why);
-  // Throws std::runtime_error if a live component has the name.
-  void require_free(shm::PortInstance holder, const std::string& what);
+  // Throws std::runtime_error if a live component has the name. One that has closed its port, or
+  // has ended, before `asking` asked, has not.
+  void require_free(const Client& asking, shm::PortInstance holder, const std::string& what);
 
   void reload();
   void put_in_force();
@@ -71,6 +74,7 @@ class Daemon {
   Barriers barriers_;
   shm::Listener listener_;
   shm::FileDescriptor epoll_;
+  shm::FileDescriptor reserve_;  // given up for a moment to turn a client away when none is left
   std::map<ClientId, std::unique_ptr<Client>> clients_;
   ClientId last_client_ = 0;
   bool swapping_ = false;       // a model waits for its barrier

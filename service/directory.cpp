@@ -11,6 +11,7 @@ namespace arbiter::service {
 namespace {
 
 void make_page(Source& source) {
+  ++source.page_number;
   source.writable = shm::make_segment("arbiter-activity", sizeof(shm::ActivityPage));
   if (const auto error = shm::allocate(source.writable, 0, sizeof(shm::ActivityPage))) {
     throw std::system_error(error, "allocating an activity page");

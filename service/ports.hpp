@@ -56,6 +56,7 @@ enum class LinkKind {
 
 struct Link {
   LinkKind kind = LinkKind::kSensing;
+  std::uint64_t number = 0;  // if connected: by it both ends know their queue; never given twice
   std::string mismatch;  // why they are not connected although there is a connection; else empty
 };
 

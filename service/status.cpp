@@ -26,14 +26,14 @@ json client_json(const Client& client) {
 }
 
 // What the publisher's and the receiver's segment say of one connection.
-json connection_counters(const OutputPort* output, const InputPort* input) {
+json connection_counters(const OutputPort* output, const InputPort* input, const Link* link) {
   json counters{{"accepted", 0}, {"discarded", 0}, {"refused", 0}, {"taken", 0},
                 {"dropped", 0},  {"overtaken", 0}, {"waiting", 0}};
-  if (output == nullptr || input == nullptr) return counters;
+  if (link == nullptr || link->number == 0) return counters;
   const shm::OutputSegment segment(output->mapping.data(), output->layout);
   for (std::uint32_t i = 0; i < shm::kMaxDestinations; ++i) {
     const shm::Channel& channel = segment.channel(i);
-    if (channel.receiver.load(std::memory_order_acquire) != input->instance) continue;
+    if (channel.receiver.load(std::memory_order_acquire) != link->number) continue;
     const std::uint64_t before = read(channel.first) - 1;
     const std::uint64_t accepted = read(channel.accepted);
     counters["accepted"] = accepted - before;
@@ -157,7 +157,8 @@ class Document {
       if (source == nullptr) continue;
       connected.insert(id);
       const OutputPort* output = of_.switchboard.output(source->open);
-      json connection = connection_counters(output, input);
+      const Link* link = link_between(output, input);
+      json connection = connection_counters(output, input, link);
       connection["source"] = source->name;
       connection["active"] = is_active(*source);
       connection["winner"] = id == winner && snapshot_.table.is_arbitrated(name.id);
@@ -166,12 +167,9 @@ class Document {
                             : input == nullptr                    ? "input port closed"
                                                                   : "connected";
       connection["mismatch"] = nullptr;
-      if (output != nullptr && input != nullptr) {
-        const auto link = of_.switchboard.links().find({output->instance, input->instance});
-        if (link != of_.switchboard.links().end() && !link->second.mismatch.empty()) {
-          connection["state"] = "mismatch";
-          connection["mismatch"] = link->second.mismatch;
-        }
+      if (link != nullptr && !link->mismatch.empty()) {
+        connection["state"] = "mismatch";
+        connection["mismatch"] = link->mismatch;
       }
       result["connections"].push_back(std::move(connection));
     }
@@ -181,6 +179,12 @@ class Document {
       const Source& source = *of_.directory.sources()[senses[i]];
       result["senses"].push_back({{"source", source.name}, {"active", is_active(source)}});
     }
+  }
+
+  [[nodiscard]] const Link* link_between(const OutputPort* output, const InputPort* input) const {
+    if (output == nullptr || input == nullptr) return nullptr;
+    const auto found = of_.switchboard.links().find({output->instance, input->instance});
+    return found == of_.switchboard.links().end() ? nullptr : &found->second;
   }
 
   [[nodiscard]] shm::SourceId winner_of(shm::PortId port) const {
@@ -202,7 +206,8 @@ class Document {
 }  // namespace
 
 std::string status_document(const StatusOf& of, shm::Nanoseconds now) {
-  return Document(of, now).build().dump(2) + "\n";
+  // Names may be any bytes; JSON may not.
+  return Document(of, now).build().dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace arbiter::service

@@ -157,12 +157,14 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
   auto to_output =
       message_to(shm::MessageKind::kInputPeer, output.instance, input.instance, input.name->id);
   to_output.flags = connects ? shm::kIsConnected : 0u;
+  to_output.link = link.number = connects ? ++last_link_ : 0;
   output.client->send(to_output, {input.segment.get(), input.bell.get()});
   told.insert(output.client);
   if (!connects) return;
-  input.client->send(
-      message_to(shm::MessageKind::kOutputPeer, input.instance, output.instance, output.source->id),
-      {output.segment.get(), -1});
+  auto to_input =
+      message_to(shm::MessageKind::kOutputPeer, input.instance, output.instance, output.source->id);
+  to_input.link = link.number;
+  input.client->send(to_input, {output.segment.get(), -1});
   told.insert(input.client);
 }
 
@@ -180,7 +182,7 @@ Switchboard::Told Switchboard::unlink(const shm::TableView& table) {
     input.client->send(message_to(shm::MessageKind::kDisconnected, key.second, key.first));
     told.insert(output.client);
     told.insert(input.client);
-    link = {kind, ""};
+    link = {kind, 0, ""};
   }
   return told;
 }
@@ -189,9 +191,7 @@ void Switchboard::send_pages(Client& client, shm::PortId port, const shm::TableV
                              Told& told) {
   const auto send = [&](shm::SourceId id) {
     const Source* source = directory_.source_by_id(id);
-    if (source == nullptr || !client.pages.insert(id).second) return;
-    send_page(client, *source);
-    told.insert(&client);
+    if (source != nullptr && send_page(client, *source)) told.insert(&client);
   };
   const auto read = table.sources_read(port);
   for (shm::Word i = 0; i < read.count; ++i) send(read[i]);
@@ -201,16 +201,19 @@ void Switchboard::send_pages(Client& client, shm::PortId port, const shm::TableV
   }
 }
 
-void Switchboard::send_page(Client& client, const Source& source) {
+// False: the client has it.
+bool Switchboard::send_page(Client& client, const Source& source) {
+  if (std::exchange(client.pages[source.id], source.page_number) == source.page_number) {
+    return false;
+  }
   auto message = message_to(shm::MessageKind::kSourcePage, 0, 0, source.id);
   message.set_name(source.name);
   client.send(message, {source.readable.get(), -1});
+  return true;
 }
 
 void Switchboard::show_everything(Client& client) {
-  for (const auto& source : directory_.sources()) {
-    if (client.pages.insert(source->id).second) send_page(client, *source);
-  }
+  for (const auto& source : directory_.sources()) send_page(client, *source);
   for (const auto& input : directory_.inputs()) {
     auto message = message_to(shm::MessageKind::kPortName, 0, 0, input->id);
     message.set_name(input->name);
@@ -223,9 +226,17 @@ void Switchboard::refuse(shm::PortInstance port, shm::PortInstance peer, const s
     const auto found = links_.find(key);
     if (found == links_.end()) continue;
     found->second.mismatch = why;
+    if (std::exchange(found->second.number, 0) != 0) disconnect(port, peer);
     log::warn("{} is not connected to {}: {}", outputs_.at(key.first)->source->name,
               inputs_.at(key.second)->name->name, why);
   }
+}
+
+// The one that refused knows.
+void Switchboard::disconnect(shm::PortInstance refused_by, shm::PortInstance port) {
+  const auto output = outputs_.find(port);
+  Client& client = output != outputs_.end() ? *output->second->client : *inputs_.at(port)->client;
+  client.send(message_to(shm::MessageKind::kDisconnected, port, refused_by));
 }
 
 void Switchboard::ring_all() const {

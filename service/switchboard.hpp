@@ -61,10 +61,12 @@ class Switchboard {
   void send_pages(const OutputPort& output, const shm::TableView& table, Told& told);
   void make_link(const OutputPort& output, const InputPort& input, LinkKind kind, Told& told);
   void send_pages(Client& client, shm::PortId port, const shm::TableView& table, Told& told);
-  void send_page(Client& client, const Source& source);
+  void disconnect(shm::PortInstance refused_by, shm::PortInstance port);
+  bool send_page(Client& client, const Source& source);
 
   Directory& directory_;
   shm::PortInstance last_instance_ = 0;
+  std::uint64_t last_link_ = 0;
   std::map<shm::PortInstance, std::unique_ptr<OutputPort>> outputs_;
   std::map<shm::PortInstance, std::unique_ptr<InputPort>> inputs_;
   std::map<LinkKey, Link> links_;

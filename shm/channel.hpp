@@ -168,7 +168,9 @@ class ChannelReader {
   // Announces a hold on the entry that peek() gave. False: it was overtaken, or the queue has
   // ended. SYNC POINT: slot-held. Fence (c) pairs with fence (b) of publish().
   [[nodiscard]] bool hold(Entry entry, Atomic<Hold>& word) noexcept {
-    word.store(make_hold(publisher_, slot_of(entry)), std::memory_order_relaxed);
+    // SYNC POINT: slot-released. Release as in release(): who sees this hold in the place of the
+    // last one must know as well that we are done reading that one's slot.
+    word.store(make_hold(publisher_, slot_of(entry)), std::memory_order_release);
     full_fence();  // (c)
     const bool named = channel_->receiver.load(std::memory_order_acquire) == self_;
     if (named && ring_[position_].load(std::memory_order_acquire) == entry) return true;

@@ -56,13 +56,14 @@ class ActivityPages {
 // One look at a source.
 struct SeenActivity {
   ActivityWord word;
-  std::uint64_t breaks;
+  std::uint64_t breaks;        // read before the word: none that comes later is among them
+  std::uint64_t breaks_until;  // read after it: all that came before the word are among them
 
-  // SYNC POINT: activity-picture. Acquire, so that a second look comes after the first; breaks
-  // before the word, so that a break that comes later is seen to (activity.hpp).
+  // SYNC POINT: activity-picture. Acquire, so that a second look comes after the first.
   static SeenActivity of(const Activity& activity) noexcept {
     const std::uint64_t breaks = activity.breaks.load(std::memory_order_acquire);
-    return {activity.word.load(std::memory_order_acquire), breaks};
+    const ActivityWord word = activity.word.load(std::memory_order_acquire);
+    return {word, breaks, activity.breaks.load(std::memory_order_relaxed)};
   }
 
   // Whether the source has stood as it was seen, at `now`, until a later look: nothing was written,
@@ -70,7 +71,7 @@ struct SeenActivity {
   [[nodiscard]] bool stands(const SeenActivity& later, Nanoseconds timeout,
                             Nanoseconds now) const noexcept {
     if (later.word == word) return true;
-    if (!is_active(word, now) || is_deactivation(later.word) || later.breaks != breaks)
+    if (!is_active(word, now) || is_deactivation(later.word) || later.breaks_until != breaks)
       return false;
     return !is_finite(word) || arrival_of(later.word, timeout) < word;
   }

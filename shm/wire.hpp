@@ -49,9 +49,9 @@ enum class MessageKind : std::uint32_t {
   kRefused,     // text: why
   kSourcePage,  // id, name: a source; descriptor: its activity page, read-only
   kPortName,    // id, name: an input port
-  kOutputPeer,  // to input `port`: peer, id = source; descriptor: its segment
-  kInputPeer,   // to output `port`: peer, id = port id, flags (kIsConnected); descriptors: segment,
-                // bell
+  kOutputPeer,  // to input `port`: peer, id = source, link; descriptor: its segment
+  kInputPeer,   // to output `port`: peer, id = port id, flags (kIsConnected), link; descriptors:
+                // segment, bell
   kPeerGone,    // `port` has lost `peer`: closed or dead
   kDisconnected,  // `port` is no longer connected to `peer`, which lives: the model has changed
   kSync,
@@ -70,6 +70,7 @@ struct Message {
   std::uint64_t request = 0;  // a reply bears that of its question
   PortInstance port = 0;      // of the receiver of the message
   PortInstance peer = 0;
+  std::uint64_t link = 0;  // number of the link; another each time that two ports are connected
   std::uint32_t id = 0;
   std::uint32_t value = 0;
   TypeInfo type;

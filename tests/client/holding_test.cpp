@@ -15,6 +15,11 @@
 namespace arbiter::test {
 namespace {
 
+// The service thread has tidied up once it has answered.
+void let_it_tidy_up(Node& node) {
+  for (int i = 0; i < 3; ++i) static_cast<void>(node.input_port("/elsewhere"));
+}
+
 TEST(Holding, AHeldSamplesMemoryIsNotUsedAgainHoweverMuchIsPublished) {
   Daemon daemon(single_model());
   Node node("test");
@@ -26,7 +31,7 @@ TEST(Holding, AHeldSamplesMemoryIsNotUsedAgainHoweverMuchIsPublished) {
   for (int i = 0; i < 5000; ++i) {
     ASSERT_EQ(out.publish(Number{i}).delivered, 1u);
     ASSERT_EQ((**held).value, -1);
-    if (i % 7 == 0) EXPECT_TRUE(in.take());
+    EXPECT_TRUE(i % 7 != 0 || in.take());
   }
   EXPECT_EQ(daemon.source("/out")["no_slot"], 0);
 }
@@ -109,6 +114,9 @@ TEST(Holding, ASampleOutlivesItsPublishersPort) {
   EXPECT_FALSE(in.take()) << "what the publisher left is used up";
   auto successor = node.output_port<Number>("/out");
   EXPECT_FALSE(in.take());
+  let_it_tidy_up(node);
+  EXPECT_FALSE(in.take());
+  let_it_tidy_up(node);
   EXPECT_EQ((**sample).value, -1);
   EXPECT_EQ(sample->source(), "/out");
 }
@@ -127,7 +135,9 @@ TEST(Holding, ASampleOutlivesItsPublishersProcess) {
   }
   auto successor = node.output_port<Number>("/out");
   EXPECT_FALSE(in.take());
+  let_it_tidy_up(node);
   EXPECT_FALSE(in.take());
+  let_it_tidy_up(node);
   EXPECT_EQ(samples[0]->value, 0);
   EXPECT_EQ(samples[1]->value, 1);
   samples.pop_back();

@@ -97,8 +97,8 @@ class Daemon {
  public:
   struct Options {
     std::string instance = "test";
-    std::optional<std::string> application;
-    std::vector<std::string> arguments;
+    std::optional<std::string> application{};
+    std::vector<std::string> arguments{};
     bool without_model = false;
   };
 
@@ -127,10 +127,11 @@ class Daemon {
 
   // Puts a model in force; returns when it is.
   void load(const std::string& model) {
-    const auto before = generation();
+    const auto before = status()["model"];
     write_model(model);
     hang_up();
-    while (generation() == before) {
+    for (auto now = before; now["generation"] == before["generation"]; now = status()["model"]) {
+      if (now["reloads_refused"] != before["reloads_refused"]) throw std::runtime_error(log());
     }
   }
   // The same with one that must be refused.
@@ -161,7 +162,8 @@ class Daemon {
   nlohmann::json source(const std::string& name) { return named(status()["sources"], name); }
   nlohmann::json input(const std::string& name) { return named(status()["inputs"], name); }
   nlohmann::json connection(const std::string& from, const std::string& to) {
-    for (const auto& each : input(to)["connections"]) {
+    const nlohmann::json port = input(to);
+    for (const auto& each : port["connections"]) {
       if (each["source"] == from) return each;
     }
     return nullptr;

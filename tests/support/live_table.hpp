@@ -39,7 +39,7 @@ class LiveTable {
   void activate_only(const std::set<std::string>& active) {
     for (const auto& [name, id] : source_ids_) {
       activity_[id].word = active.contains(name) ? shm::arrival(clock_.now, shm::kForever)
-                                            : shm::deactivation(clock_.now);
+                                                 : shm::deactivation(clock_.now);
     }
   }
 

@@ -10,7 +10,7 @@ namespace arbiter {
 
 struct NodeOptions {
   // Which daemon; empty: $ARBITER_INSTANCE, else "default".
-  std::string instance;
+  std::string instance{};
   // How long Node() waits for a daemon before it throws.
   std::chrono::milliseconds connect_timeout{5000};
   // Whether a thread of low priority takes up what the daemon announces (ports that come and go,

@@ -134,7 +134,9 @@ class OutputPort : public OutputPortBase {
   // port, and hands the sample to those where it wins. A loser wakes nobody. Wait-free; 50 ns and
   // up. Throws std::invalid_argument for a loan that is empty or another port's.
   Outcome publish(Loan<T> loan) {
-    if (loan.core_ != core_) throw std::invalid_argument("the loan is not one of this port");
+    if (loan.core_ == nullptr || loan.core_ != core_) {
+      throw std::invalid_argument("the loan is not one of this port");
+    }
     loan.core_ = nullptr;
     return detail::publish(*core_, loan.slot_.slot, sizeof(T));
   }
@@ -158,7 +160,9 @@ class OutputPort<void> : public OutputPortBase {
     return Loan<void>(core_, slot, size);
   }
   Outcome publish(Loan<void> loan) {
-    if (loan.core_ != core_) throw std::invalid_argument("the loan is not one of this port");
+    if (loan.core_ == nullptr || loan.core_ != core_) {
+      throw std::invalid_argument("the loan is not one of this port");
+    }
     loan.core_ = nullptr;
     return detail::publish(*core_, loan.slot_.slot, loan.size());
   }

@@ -37,7 +37,9 @@ std::size_t length_of_character(std::string_view text) {
 }  // namespace
 
 Canvas::Canvas(int rows, int columns)
-    : rows_(rows), columns_(columns), cells_(static_cast<std::size_t>(rows * columns)) {}
+    : rows_(rows),
+      columns_(columns),
+      cells_(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns)) {}
 
 int Canvas::put(int row, int column, std::string_view text, Style style) {
   while (!text.empty()) {
@@ -69,7 +71,7 @@ std::string Canvas::drawn(int rows, int columns, bool coloured) const {
     result += kReset;
     if (columns > columns_) result += "\x1b[K";
   }
-  return result;
+  return result + "\x1b[1;1H";  // what somebody types is soon drawn over there
 }
 
 }  // namespace search_and_track

@@ -54,6 +54,10 @@ class Diagram {
   }
 
  private:
+  [[nodiscard]] bool is_active(std::size_t sender) const {
+    const SenderState& state = story_.sender(sender);
+    return state.sends || now_ - state.silent_since < kActivity;
+  }
   [[nodiscard]] Wire wire(std::size_t sender, std::size_t receiver) const {
     if (story_.receiver(receiver).winner() == sender) return Wire::carries;
     return story_.sender(sender).sends ? Wire::cut : Wire::quiet;
@@ -77,7 +81,7 @@ class Diagram {
     const SenderState& state = story_.sender(sender);
     const int row = kRowOf[sender];
     const Colour colour = kSenders[sender].colour;
-    const bool lingers = !state.sends && now_ - state.silent_since < kActivity;
+    const bool lingers = !state.sends && is_active(sender);
     const char* const light = state.sends ? "●" : (lingers ? "◐" : "○");
     put(row, 1, light, state.sends || lingers ? Style{.colour = colour, .bold = true} : kDim);
     put(row, kName, kSenders[sender].name, state.sends ? kBold : kDim);
@@ -86,10 +90,9 @@ class Diagram {
 
   // It is connected to nothing: that it is active is all that counts.
   void draw_collision() {
-    const bool sends = story_.sender(kCollision).sends;
-    put(kRowOf[kCollision], kWire,
-        sends ? "/collision:o holds it off" : "/collision:o, only sensed",
-        sends ? Style{.colour = Colour::red, .bold = true} : kDim);
+    const bool active = is_active(kCollision);
+    put(kRowOf[kCollision], kWire, active ? "/collision:o is active" : "/collision:o, only sensed",
+        active ? Style{.colour = Colour::red, .bold = true} : kDim);
   }
 
   // From `from` up to, not including, `to`.
@@ -104,7 +107,7 @@ class Diagram {
         canvas_.repeat(top_ + row, from, to - from, "┈", style);
         canvas_.repeat(top_ + row, from, kBus - 15 - from, "─", style);
         put(row, kBus - 15, "✕", {.colour = Colour::red, .bold = true});
-        put(row, kBus - 13, " discarded ", style);
+        put(row, kBus - 14, " discarded ", style);
         break;
       }
       case Wire::carries:

@@ -114,7 +114,9 @@ class Demo {
     const ViewOptions options{scene_.seconds, title(), is_papers_model_};
     const auto view = lines_ ? make_lines(options) : make_picture(options);
     double next_frame = 0;
-    for (double now = seconds(); now < scene_.seconds; now = seconds()) {
+    for (;;) {
+      const double now = seconds();
+      if (now >= scene_.seconds) return {};
       if (now >= next_frame) {
         processes.check_all_run();
         view->tick(story_, now);
@@ -126,7 +128,6 @@ class Demo {
           [&](std::size_t component, std::string_view line) { heard(*view, component, line); });
       if (const auto signal = signals_.caught()) return signal;
     }
-    return {};
   }
 
   void heard(View& view, std::size_t component, std::string_view line) {

@@ -51,9 +51,9 @@ void draw_reigns(Canvas& canvas, int row, std::size_t receiver, const Scale& sca
     const int to = scale.column(i + 1 < reigns.size() ? reigns[i + 1].since : now);
     const Style style = block_style(reigns[i].winner);
     canvas.repeat(row, from, to - from, " ", style);
-    const auto room = static_cast<std::size_t>(std::max(to - from - 1, 0));
-    canvas.put(row, from + 1, mark_of(reigns[i].winner).substr(0, room), style);
-    if (i != 0 && to > from) canvas.put(row, from, "│", style);
+    const std::string_view mark = mark_of(reigns[i].winner);
+    if (static_cast<int>(mark.size()) < to - from) canvas.put(row, from + 1, mark, style);
+    if (i != 0 && to > from) canvas.put(row, from, "▏", style);
   }
 }
 
@@ -68,12 +68,14 @@ void draw_axis(Canvas& canvas, int row, const Scale& scale) {
 
 void draw_legend(Canvas& canvas, int row) {
   int column = 1;
+  const auto explain = [&](Winner winner, std::string_view meaning) {
+    canvas.put(row, column, "■", {.colour = block_style(winner).colour});
+    column = canvas.put(row, column + 2, meaning, kDim) + 2;
+  };
   for (const std::size_t sender : {kRandomLook, kFace, kObject, kRestArm}) {
-    canvas.put(row, column, " ", block_style(sender));
-    column = canvas.put(row, column + 2, kSenders[sender].name, kDim) + 2;
+    explain(sender, kSenders[sender].name);
   }
-  canvas.put(row, column, " ", block_style(kNobody));
-  canvas.put(row, column + 2, "nobody: stop", kDim);
+  explain(kNobody, "nobody: stop");
 }
 
 }  // namespace

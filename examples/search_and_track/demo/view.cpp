@@ -26,8 +26,10 @@ class Picture : public View {
     draw_header(canvas, now);
     draw_diagram(canvas, 2, story, now);
     const Caption& caption = captions_.at(story, now);
-    canvas.put(14, 1, caption.what, kBold);
-    canvas.put(15, 1, caption.why, kDim);
+    canvas.put(14, 1, "▌", kBold);
+    canvas.put(15, 1, "▌", kBold);
+    canvas.put(14, 3, caption.what, kBold);
+    canvas.put(15, 3, caption.why);
     draw_timeline(canvas, 17, story, now, options_.seconds);
     const Terminal::Size size = terminal_.size();
     Terminal::write(canvas.drawn(size.rows, size.columns, terminal_.is_coloured()));

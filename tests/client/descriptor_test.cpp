@@ -1,0 +1,177 @@
+// fd(): an input port in a loop of one's own.
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/epoll.h>
+
+#include <thread>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/client/component.hpp"
+#include "tests/client/models.hpp"
+#include "tests/client/samples.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+bool is_readable(int fd) {
+  pollfd polled{fd, POLLIN, 0};
+  return ::poll(&polled, 1, 0) == 1;
+}
+void wait_until_readable(int fd) {
+  pollfd polled{fd, POLLIN, 0};
+  while (::poll(&polled, 1, -1) != 1) {
+  }
+}
+
+TEST(Descriptor, BecomesReadableWhenASampleComes) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  const int fd = in.fd();
+  EXPECT_EQ(in.fd(), fd);
+  EXPECT_FALSE(in.take());
+  EXPECT_FALSE(is_readable(fd));
+  out.publish(Number{1});
+  EXPECT_TRUE(is_readable(fd));
+  EXPECT_EQ((*in.take())->value, 1);
+  EXPECT_FALSE(in.take());
+  EXPECT_FALSE(is_readable(fd));
+}
+
+TEST(Descriptor, IsReadableWhereASampleWaitedBeforeItWasAskedFor) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  out.publish(Number{1});
+  EXPECT_TRUE(is_readable(in.fd()));
+}
+
+TEST(Descriptor, StaysReadableUntilEverythingIsTaken) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  const int fd = in.fd();
+  EXPECT_FALSE(in.take());
+  for (int i = 0; i < 5; ++i) out.publish(Number{i});
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_TRUE(is_readable(fd));
+    EXPECT_TRUE(in.take());
+  }
+  EXPECT_FALSE(in.take());
+  EXPECT_FALSE(is_readable(fd));
+}
+
+TEST(Descriptor, BecomesReadableWhenThePortBecomesIdle) {
+  Daemon daemon(override_model());
+  Node node("test");
+  auto low = node.output_port<Number>("/low");
+  auto stop = node.output_port<Number>("/stop");
+  auto in = node.input_port<Number>("/in");
+  const int fd = in.fd();
+  low.publish(Number{1});
+  EXPECT_TRUE(in.take());
+  EXPECT_FALSE(in.take());
+  EXPECT_FALSE(is_readable(fd));
+  stop.signal();
+  EXPECT_TRUE(is_readable(fd));
+  EXPECT_FALSE(in.take());
+  EXPECT_TRUE(in.idle());
+  EXPECT_FALSE(is_readable(fd));
+}
+
+TEST(Descriptor, BecomesReadableWhenActivityRunsOut) {
+  Daemon daemon(single_model("20ms"));
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  const int fd = in.fd();
+  for (int i = 0; i < 3; ++i) {
+    out.publish(Number{i});
+    wait_until_readable(fd);
+    EXPECT_TRUE(in.take());
+    while (!in.idle()) {
+      EXPECT_FALSE(in.take());
+      if (!in.idle()) wait_until_readable(fd);
+    }
+    EXPECT_FALSE(in.take());
+    EXPECT_FALSE(is_readable(fd));
+  }
+}
+
+TEST(Descriptor, WorksBesideWaitFor) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  const int fd = in.fd();
+  for (int i = 0; i < 3; ++i) {
+    out.publish(Number{i});
+    EXPECT_TRUE(in.wait_for(std::chrono::hours::max()));
+    EXPECT_TRUE(in.wait_for(std::chrono::nanoseconds(1)).timed_out());
+    EXPECT_TRUE(is_readable(fd)) << "so that its loop arms it again";
+    EXPECT_FALSE(in.take());
+    EXPECT_FALSE(is_readable(fd));
+  }
+}
+
+// Edge-triggered, which forgives no lost wake-up: a sample that came while the descriptor was being
+// armed must ring again, or be found.
+TEST(Descriptor, LosesNoWakeUpHoweverTheTwoMeet) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in", {.depth = 4, .when_full = refuse_new});
+  constexpr std::int64_t kSamples = 30000;
+  const shm::FileDescriptor loop(epoll_create1(EPOLL_CLOEXEC));
+  epoll_event event{};
+  event.events = EPOLLIN;
+  ASSERT_EQ(epoll_ctl(loop.get(), EPOLL_CTL_ADD, in.fd(), &event), 0);
+  std::thread sender([&] {
+    for (std::int64_t i = 0; i < kSamples;) i += out.publish(Number{i}).delivered;
+  });
+  for (std::int64_t next = 0; next < kSamples;) {
+    while (::epoll_wait(loop.get(), &event, 1, -1) != 1) {
+    }
+    while (auto sample = in.take()) ASSERT_EQ((**sample).value, next++);
+  }
+  sender.join();
+}
+
+TEST(Descriptor, SeveralPortsWaitInOneLoop) {
+  constexpr std::uint64_t kPorts = 8;
+  Daemon daemon(fan_out_model(kPorts));
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  std::vector<InputPort<Number>> inputs;
+  const shm::FileDescriptor loop(epoll_create1(EPOLL_CLOEXEC));
+  for (std::uint64_t i = 0; i < kPorts; ++i) {
+    inputs.push_back(node.input_port<Number>("/in" + std::to_string(i)));
+    epoll_event event{};
+    event.events = EPOLLIN;
+    event.data.u64 = i;
+    ASSERT_EQ(epoll_ctl(loop.get(), EPOLL_CTL_ADD, inputs.back().fd(), &event), 0);
+    EXPECT_FALSE(inputs.back().take());
+  }
+  for (int round = 0; round < 100; ++round) {
+    EXPECT_EQ(out.publish(Number{round}).delivered, kPorts);
+    for (std::uint64_t received = 0; received < kPorts;) {
+      epoll_event events[kPorts];
+      const int count = ::epoll_wait(loop.get(), events, kPorts, -1);
+      for (int i = 0; i < count; ++i) {
+        auto& in = inputs[events[i].data.u64];
+        while (auto sample = in.take()) {
+          EXPECT_EQ((**sample).value, round);
+          ++received;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace arbiter::test

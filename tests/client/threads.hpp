@@ -1,0 +1,83 @@
+// A thread whose sleep can be watched from outside.
+#pragma once
+
+#include <pthread.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdint>
+#include <fstream>
+#include <functional>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <utility>
+
+namespace arbiter::test {
+
+// The state of a task as /proc tells it: 'S' is asleep.
+inline char state_of(pid_t process, pid_t task) {
+  std::ifstream file("/proc/" + std::to_string(process) + "/task/" + std::to_string(task) +
+                     "/stat");
+  std::string line;
+  std::getline(file, line);
+  const auto end = line.rfind(')');
+  return end == std::string::npos ? '?' : line[end + 2];
+}
+
+// How often a task has gone to sleep by itself: it grows by one each time that it was woken and
+// slept again.
+inline std::uint64_t sleeps_of(pid_t process, pid_t task) {
+  std::ifstream file("/proc/" + std::to_string(process) + "/task/" + std::to_string(task) +
+                     "/status");
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    std::string key;
+    std::uint64_t value = 0;
+    words >> key >> value;
+    if (key == "voluntary_ctxt_switches:") return value;
+  }
+  return 0;
+}
+
+// What a task sleeps in, as a system call's number; -1: it runs.
+inline long call_of(pid_t process, pid_t task) {
+  std::ifstream file("/proc/" + std::to_string(process) + "/task/" + std::to_string(task) +
+                     "/syscall");
+  std::string word;
+  file >> word;
+  return word.empty() || word == "running" ? -1 : std::stol(word);
+}
+
+// Returns once the task sleeps in poll().
+inline void wait_until_it_polls(pid_t process, pid_t task) {
+  while (call_of(process, task) != SYS_ppoll || state_of(process, task) != 'S') {
+  }
+}
+
+class Watched {
+ public:
+  explicit Watched(std::function<void()> run)
+      : thread_([this, run = std::move(run)] {
+          task_ = static_cast<pid_t>(::syscall(SYS_gettid));
+          run();
+        }) {
+    while (task_ == 0) {
+    }
+  }
+  ~Watched() {
+    if (thread_.joinable()) thread_.join();
+  }
+
+  void wait_until_asleep() const { wait_until_it_polls(::getpid(), task_); }
+  [[nodiscard]] std::uint64_t sleeps() const { return sleeps_of(::getpid(), task_); }
+  void signal(int number) { ::pthread_kill(thread_.native_handle(), number); }
+  void join() { thread_.join(); }
+
+ private:
+  std::atomic<pid_t> task_{0};
+  std::thread thread_;
+};
+
+}  // namespace arbiter::test

@@ -1,0 +1,133 @@
+// A slot is never written while a receiver reads it (shm/channel.hpp, shm/slot_pool.hpp).
+#include <gtest/gtest.h>
+
+#include "tests/explore/scenario.hpp"
+
+namespace arbiter::explore {
+namespace {
+
+constexpr shm::PortInstance kPublisher = 3, kReceiver = 4;
+
+struct World {
+  SegmentMemory memory;
+  Publisher publisher;
+  Receiver receiver;
+  shm::Atomic<shm::Hold> hold{0};
+  Plain<std::uint64_t> payloads[SegmentMemory::kSlots];
+
+  // A queue with as few slots as may be, full, and with some samples overtaken already.
+  void reset(std::uint32_t depth) {
+    const shm::OutputSegment segment = memory.fresh();
+    hold.store(0);
+    publisher = {segment, shm::ChannelWriter(segment, 0), {}, kPublisher, payloads, &hold, 1, 0};
+    publisher.pool.grow(depth + 1 + 1);  // queue, hold, loan
+    publisher.writer.join(kReceiver, 1, depth);
+    receiver = {shm::ChannelReader(segment, kPublisher, kReceiver), &hold, payloads, 0, 0};
+    receiver.reader.join();
+    for (std::uint32_t i = 0; i <= depth; ++i) publisher.publish();
+  }
+};
+
+Explorer::Scenario publish_and_take(World& world, std::uint32_t depth, int publishes, int takes) {
+  return [&world, depth, publishes, takes](Execution& execution) {
+    world.reset(depth);
+    execution.thread([&world, publishes] {
+      for (int i = 0; i < publishes; ++i) world.publisher.publish();
+    });
+    execution.thread([&world, takes] {
+      for (int i = 0; i < takes; ++i) world.receiver.take();
+    });
+    execution.finally([&world] {
+      while (world.receiver.take()) {
+      }
+      require(world.receiver.last == world.publisher.published, "the newest sample is not there");
+    });
+  };
+}
+
+constexpr Limits kLimits{3, 2};
+
+TEST(ChannelInterleavings, no_sample_is_written_while_it_is_read_with_depth_1) {
+  World world;
+  expect_holds("channel, depth 1", kLimits, publish_and_take(world, 1, 2, 2));
+}
+
+TEST(ChannelInterleavings, no_sample_is_written_while_it_is_read_with_depth_2) {
+  World world;
+  expect_holds("channel, depth 2", kLimits, publish_and_take(world, 2, 3, 2));
+}
+
+TEST(ChannelInterleavings, each_of_its_orders_is_needed) {
+  World world;
+  const auto scenario = publish_and_take(world, 1, 2, 2);
+  expect_fails_without("fence (b)", kLimits, {Weakness::kFullFence, "publish_fence"}, scenario);
+  expect_fails_without("fence (c)", kLimits, {Weakness::kFullFence, "hold"}, scenario);
+  expect_fails_without("entry-stored", kLimits, {Weakness::kRelease, "push"}, scenario);
+  expect_fails_without("slot-released", kLimits, {Weakness::kRelease, "release"}, scenario);
+  expect_fails_without("slot-released", kLimits, {Weakness::kRelease, "hold"}, scenario);
+  expect_fails_without("slot-released", kLimits, {Weakness::kAcquire, "reclaim"}, scenario);
+}
+
+// A queue ends while its receiver takes hold, and its slots are used again at once.
+Explorer::Scenario leave_and_reuse(World& world) {
+  return [&world](Execution& execution) {
+    world.reset(1);
+    execution.thread([&world] {
+      Publisher& publisher = world.publisher;
+      publisher.writer.leave([&](std::uint32_t slot) { publisher.pool.evict(slot); });
+      publisher.publish_fence();
+      for (int i = 0; i < 2; ++i) {  // the loans never to be published
+        publisher.write_sample();
+      }
+    });
+    execution.thread([&world] { world.receiver.take(); });
+  };
+}
+
+TEST(ChannelInterleavings, a_queue_that_ends_takes_its_samples_from_nobody_who_holds_one) {
+  World world;
+  expect_holds("leaving", {4, 3}, leave_and_reuse(world));
+  expect_fails_without("fence (b)", {4, 3}, {Weakness::kFullFence, "publish_fence"},
+                       leave_and_reuse(world));
+  expect_fails_without("fence (c)", {4, 3}, {Weakness::kFullFence, "hold"}, leave_and_reuse(world));
+}
+
+// A receiver looks for its queue while the publisher begins it, in a channel that another has used.
+Explorer::Scenario join_a_used_channel(World& world) {
+  return [&world](Execution& execution) {
+    world.reset(1);
+    Publisher& publisher = world.publisher;
+    publisher.writer.leave([&](std::uint32_t slot) { publisher.pool.evict(slot); });
+    world.receiver = {shm::ChannelReader(publisher.segment, kPublisher, kReceiver + 1), &world.hold,
+                      world.payloads, 0, publisher.published};
+    execution.thread([&world] {
+      Publisher& again = world.publisher;
+      again.writer = shm::ChannelWriter(again.segment, 0);
+      again.writer.join(kReceiver + 1, 1, 2);
+      again.publish();
+      again.publish();
+    });
+    execution.thread([&world] {
+      for (int i = 0; i < 2; ++i) {
+        if (!world.receiver.reader.join()) continue;
+        world.receiver.take();
+        break;
+      }
+      require(world.receiver.lost == 0, "samples that were never there count as lost");
+      require(world.receiver.reader.state() != shm::ChannelReader::State::kMisbehaved,
+              "an honest publisher looks like another");
+    });
+  };
+}
+
+TEST(ChannelInterleavings, a_receiver_finds_its_queue_whole_or_not_at_all) {
+  World world;
+  expect_holds("joining", {3, 2}, join_a_used_channel(world));
+  expect_fails_without("channel-joined", {3, 2}, {Weakness::kRelease, "ChannelWriter::join"},
+                       join_a_used_channel(world));
+  expect_fails_without("channel-joined", {3, 2}, {Weakness::kAcquire, "ChannelReader::join"},
+                       join_a_used_channel(world));
+}
+
+}  // namespace
+}  // namespace arbiter::explore

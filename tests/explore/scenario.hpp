@@ -1,0 +1,119 @@
+// What the cases share: running a scenario as it is, and with an order left out.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstdio>
+#include <cstring>
+#include <vector>
+
+#include "shm/channel.hpp"
+#include "shm/output_segment.hpp"
+#include "shm/slot_pool.hpp"
+#include "tests/explore/explorer.hpp"
+
+namespace arbiter::explore {
+
+// The property holds in all interleavings within the limits.
+inline void expect_holds(const char* name, Limits limits, const Explorer::Scenario& scenario) {
+  const Report report = Explorer(limits).run(scenario);
+  EXPECT_EQ(report.failure, "") << name;
+  EXPECT_TRUE(report.complete) << name << ": not all interleavings were seen";
+  std::printf("%s: %llu interleavings, at most %d preemptions and %d old values\n", name,
+              static_cast<unsigned long long>(report.executions), limits.preemptions,
+              limits.stale_reads);
+}
+
+// The property fails in some interleaving once the order is left out: the test has teeth, and the
+// order is needed.
+inline void expect_fails_without(const char* name, Limits limits, Weakening weakening,
+                                 const Explorer::Scenario& scenario) {
+  const std::string function = weakening.function;
+  const Report report = Explorer(limits).run(scenario, std::move(weakening));
+  EXPECT_TRUE(report.weakened) << name << ": there is no such order in " << function;
+  EXPECT_NE(report.failure, "") << name << " is not needed in " << function;
+  std::printf("without %s in %s: %s\n", name, function.c_str(), report.failure.c_str());
+}
+
+// An output port's segment at one address for all executions.
+class SegmentMemory {
+ public:
+  static constexpr std::uint32_t kSlots = 8;
+
+  // Zeroed as far as the scenarios use it.
+  shm::OutputSegment fresh() {
+    shm::TypeInfo type;
+    type.size = sizeof(std::uint64_t);
+    const auto layout = shm::OutputLayout::plan(type, kSlots);
+    if (memory_.empty()) memory_.resize(layout.total_size + shm::kPageSize);
+    const auto address = reinterpret_cast<std::uintptr_t>(memory_.data());
+    std::byte* const base = memory_.data() + (shm::kPageSize - address % shm::kPageSize);
+    std::memset(base, 0, layout.rings_offset + 2 * sizeof(shm::Entry) * shm::kMaxDepth);
+    std::memset(base + layout.headers_offset, 0, layout.total_size - layout.headers_offset);
+    return {base, layout};
+  }
+
+ private:
+  std::vector<std::byte> memory_;
+};
+
+// publish() and take() as the ports have them, reduced to one queue; the parts are the real ones,
+// in the same order.
+struct Publisher {
+  shm::OutputSegment segment;
+  shm::ChannelWriter writer;
+  shm::SlotPool pool;
+  shm::PortInstance instance = 0;
+  Plain<std::uint64_t>* payloads = nullptr;
+  const shm::Atomic<shm::Hold>* holds = nullptr;
+  std::uint32_t hold_count = 0;
+  std::uint64_t published = 0;
+
+  std::uint32_t acquire() {
+    const std::uint32_t slot =
+        pool.acquire(instance, [&](auto&& each) { each(holds, hold_count); });
+    require(slot != shm::kNoSlot, "no slot is free");
+    return slot;
+  }
+  std::uint32_t write_sample() {
+    const std::uint32_t slot = acquire();
+    payloads[slot].write(++published);
+    return slot;
+  }
+  void push(std::uint32_t slot) {
+    pool.add_reference(slot);
+    const std::uint32_t evicted = writer.push(slot);
+    if (evicted != shm::kNoSlot) pool.evict(evicted);
+  }
+  void publish_fence() { shm::full_fence(); }  // (b)
+  void publish() {
+    const std::uint32_t slot = write_sample();
+    push(slot);
+    publish_fence();
+    pool.end_loan(slot);
+  }
+};
+
+struct Receiver {
+  shm::ChannelReader reader;
+  shm::Atomic<shm::Hold>* hold = nullptr;
+  Plain<std::uint64_t>* payloads = nullptr;
+  std::uint64_t lost = 0;
+  std::uint64_t last = 0;
+
+  // Takes, reads and gives back one sample; what it reads must be what was published.
+  bool take() {
+    const shm::Entry entry = reader.peek(lost);
+    if (entry == 0 || !reader.hold(entry, *hold)) return false;
+    const std::uint64_t value = payloads[shm::slot_of(entry)].read();
+    require(value == shm::sequence_of(entry), "a sample was torn or replaced");
+    require(value > last, "a sample came twice, or late");
+    last = value;
+    reader.consume();
+    shm::ChannelReader::release(*hold);
+    return true;
+  }
+};
+
+}  // namespace arbiter::explore
