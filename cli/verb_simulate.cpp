@@ -29,7 +29,7 @@ void note_unknown_sources(const rules::Simulation& simulation, const std::string
     if (event.kind == rules::TraceKind::kTick || simulation.knows(event.source)) continue;
     if (!noted.insert(event.source).second) continue;
     diagnostics.note("unknown-source", {file, event.line, event.column},
-                     "the model does not know " + event.source + "; its lines have no effect");
+                     "the model does not know " + event.source + "; its arrivals have no effect");
   }
 }
 

@@ -12,6 +12,15 @@
 namespace arbiter::rules {
 namespace {
 
+constexpr bool is_prime(int n) {
+  for (int divisor = 2; divisor * divisor <= n; ++divisor) {
+    if (n % divisor == 0) return false;
+  }
+  return true;
+}
+static_assert(is_prime(kMaxWorkingNodes));
+static_assert(kMaxWorkingNodes > 2 * static_cast<int>(shm::kMaxNodesPerConnection));
+
 constexpr int kFirstNodes = 20000;
 constexpr int kNodesPerCacheEntry = 4;
 // Sifting starts by itself when the table has outgrown its first size, and again when it has

@@ -19,9 +19,11 @@
 
 namespace arbiter::rules {
 
-// Four times what one connection may have in the end, since what lies between is often larger than
-// the result. 262144 nodes and their caches take about 16 MiB.
-inline constexpr int kMaxWorkingNodes = 4 * static_cast<int>(shm::kMaxNodesPerConnection);
+// About four times what one connection may have in the end, since what lies between is often larger
+// than the result; with their caches they take some 16 MiB. A prime number: BuDDy only makes tables
+// of such sizes, and if sifting fills one that cannot grow to its limit for that reason alone, it
+// writes behind the table's end.
+inline constexpr int kMaxWorkingNodes = 262139;
 
 // A function outgrew the node table. The builder is as new afterwards: all its diagrams are lost.
 class DiagramLimit : public std::runtime_error {

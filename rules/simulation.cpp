@@ -43,8 +43,8 @@ Simulation::Simulation(const CompiledModel& model)
 
 std::vector<shm::PortId> Simulation::ports_of(const TraceEvent& event) const {
   std::vector<shm::PortId> result;
-  if (event.kind != TraceKind::kTick && !knows(event.source)) return result;
   if (event.kind == TraceKind::kArrival) {
+    if (!knows(event.source)) return result;
     const auto concerned = table_.ports_concerned(ids_.at(event.source));
     for (shm::Word i = 0; i < concerned.count; ++i) result.push_back(concerned[i]);
     return result;

@@ -37,8 +37,7 @@ class Simulation {
   [[nodiscard]] bool knows(const std::string& source) const { return ids_.contains(source); }
 
   // The ports that an event has a row for, in byte order: those that an arrival's source is
-  // connected to or that read it, for anything else each arbitrated port. None if it is of a source
-  // that the model does not know.
+  // connected to or that read it, for anything else each arbitrated port.
   [[nodiscard]] std::vector<shm::PortId> ports_of(const TraceEvent& event) const;
   [[nodiscard]] const std::string& port_name(shm::PortId port) const { return ports_[port]; }
 

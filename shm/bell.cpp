@@ -68,9 +68,13 @@ void Bell::wait(Nanoseconds deadline) const noexcept {
   ppoll(&bell, 1, &timeout, nullptr);
 }
 
+// Bounded, for a publisher that rings without end must not keep us here. What is left of a pipe
+// that somebody has made larger is taken for a new ring, no more.
 void Bell::silence() const noexcept {
-  char rings[64];
-  while (::read(read_.get(), rings, sizeof rings) == static_cast<ssize_t>(sizeof rings)) {
+  constexpr int kMaxReads = 16;  // 64 KiB, what a pipe holds
+  char rings[4096];
+  for (int i = 0; i < kMaxReads; ++i) {
+    if (::read(read_.get(), rings, sizeof rings) != static_cast<ssize_t>(sizeof rings)) return;
   }
 }
 

@@ -54,7 +54,7 @@ TEST_F(Simulate, NotesAnUnknownSourceOnce) {
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.out, "t_ns,source,destination,decision,winner\n2,/low,/p,delivered,/low\n");
   EXPECT_EQ(result.err, trace_ +
-                            ":2:3: note: the model does not know /who; its lines have no effect "
+                            ":2:3: note: the model does not know /who; its arrivals have no effect "
                             "[unknown-source]\n1 note\n");
 }
 

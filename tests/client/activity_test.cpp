@@ -90,7 +90,7 @@ TEST(Activity, DeactivatingEndsItAtOnce) {
   high.deactivate();
   EXPECT_FALSE(is_active(daemon, "/high"));
   EXPECT_EQ(low.publish(Number{2}).delivered, 1u);
-  EXPECT_EQ((*in.take())->value, 2);
+  EXPECT_EQ(take_from(in), 2);
 }
 
 TEST(Activity, EndsByItselfAfterItsTime) {
@@ -101,7 +101,7 @@ TEST(Activity, EndsByItselfAfterItsTime) {
   auto in = node.input_port<Number>("/in");
   high.signal();
   EXPECT_EQ(low.publish(Number{1}).delivered, 1u) << "1 ns after the override";
-  EXPECT_EQ((*in.take())->value, 1) << "its own expiry does not drop a sample";
+  EXPECT_EQ(take_from(in), 1) << "its own expiry does not drop a sample";
   EXPECT_TRUE(in.idle());
 }
 

@@ -100,8 +100,8 @@ TEST(Arbitration, APortThatKeepsReceivesAllThatWasAccepted) {
   low.publish(Number{2});
   high.signal();
   EXPECT_EQ(low.publish(Number{3}).discarded, 1u) << "it keeps what was accepted, no more";
-  EXPECT_EQ((*in.take())->value, 1);
-  EXPECT_EQ((*in.take())->value, 2);
+  EXPECT_EQ(take_from(in), 1);
+  EXPECT_EQ(take_from(in), 2);
   EXPECT_FALSE(in.take());
   EXPECT_EQ(daemon.input("/in")["dropped"], 0);
 }
@@ -136,8 +136,8 @@ TEST(Arbitration, APortThatNoRuleMentionsGetsEverything) {
   const Outcome outcome = low.publish(Number{2});
   EXPECT_EQ(outcome.delivered, 1u);
   EXPECT_EQ(outcome.discarded, 1u);
-  EXPECT_EQ((*log.take())->value, 1);
-  EXPECT_EQ((*log.take())->value, 2);
+  EXPECT_EQ(take_from(log), 1);
+  EXPECT_EQ(take_from(log), 2);
   EXPECT_EQ(log.winner(), std::nullopt) << "nothing is selected at a port without an arbiter";
   EXPECT_FALSE(log.idle());
   EXPECT_FALSE(daemon.input("/log")["arbitrated"]);
@@ -176,7 +176,7 @@ TEST(Arbitration, AnApplicationAloneConnectsWithoutAnArbiter) {
   auto out = node.output_port<Number>("/out");
   auto in = node.input_port<Number>("/in");
   EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
-  EXPECT_EQ((*in.take())->value, 1);
+  EXPECT_EQ(take_from(in), 1);
 }
 
 TEST(Arbitration, SamplesOfOneSourceComeInTheOrderInWhichTheyWerePublished) {

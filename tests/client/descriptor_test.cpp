@@ -36,7 +36,7 @@ TEST(Descriptor, BecomesReadableWhenASampleComes) {
   EXPECT_FALSE(is_readable(fd));
   out.publish(Number{1});
   EXPECT_TRUE(is_readable(fd));
-  EXPECT_EQ((*in.take())->value, 1);
+  EXPECT_EQ(take_from(in), 1);
   EXPECT_FALSE(in.take());
   EXPECT_FALSE(is_readable(fd));
 }

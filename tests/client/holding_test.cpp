@@ -48,7 +48,7 @@ TEST(Holding, TakingMoreThanMaxHeldThrows) {
   EXPECT_THROW(static_cast<void>(in.wait_for(std::chrono::hours(1))), Error);
   EXPECT_EQ((**first).value, 0);
   second.reset();
-  EXPECT_EQ((*in.take())->value, 2) << "the one that was not taken still waits";
+  EXPECT_EQ(take_from(in), 2) << "the one that was not taken still waits";
 }
 
 TEST(Holding, SamplesMoveAndAreGivenBackOnce) {
@@ -66,7 +66,7 @@ TEST(Holding, SamplesMoveAndAreGivenBackOnce) {
   first = std::move(self);
   EXPECT_EQ(first->value, 2);
   out.publish(Number{3});
-  EXPECT_EQ((*in.take())->value, 3) << "one of two is held";
+  EXPECT_EQ(take_from(in), 3) << "one of two is held";
 }
 
 TEST(Holding, ASampleOutlivesItsPort) {
@@ -142,7 +142,7 @@ TEST(Holding, ASampleOutlivesItsPublishersProcess) {
   EXPECT_EQ(samples[1]->value, 1);
   samples.pop_back();
   successor.publish(Number{7});
-  EXPECT_EQ((*in.take())->value, 7);
+  EXPECT_EQ(take_from(in), 7);
   EXPECT_EQ(samples[0]->value, 0);
 }
 
@@ -173,8 +173,8 @@ TEST(Holding, MoreLoansThanAllowedAreEmpty) {
   (*first)->value = 2;
   EXPECT_EQ(out.publish(std::move(*first)).delivered, 1u);
   EXPECT_TRUE(out.loan());
-  EXPECT_EQ((*in.take())->value, 1);
-  EXPECT_EQ((*in.take())->value, 2);
+  EXPECT_EQ(take_from(in), 1);
+  EXPECT_EQ(take_from(in), 2);
 }
 
 TEST(Holding, ALoanOutlivesItsPortButCannotBePublishedThere) {
@@ -209,11 +209,11 @@ TEST(Holding, PortsMove) {
   auto moved_out = std::move(out);
   auto moved_in = std::move(in);
   EXPECT_EQ(moved_out.publish(Number{1}).delivered, 1u);
-  EXPECT_EQ((*moved_in.take())->value, 1);
+  EXPECT_EQ(take_from(moved_in), 1);
   out = std::move(moved_out);
   in = std::move(moved_in);
   EXPECT_EQ(out.publish(Number{2}).delivered, 1u);
-  EXPECT_EQ((*in.take())->value, 2);
+  EXPECT_EQ(take_from(in), 2);
 }
 
 TEST(Holding, AssigningAPortClosesTheOneThatItWas) {
@@ -231,7 +231,7 @@ TEST(Holding, PortsOutliveTheirNode) {
   auto out = Node("a").output_port<Number>("/out");
   auto in = Node("b").input_port<Number>("/in");
   EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
-  EXPECT_EQ((*in.take())->value, 1);
+  EXPECT_EQ(take_from(in), 1);
 }
 
 TEST(Holding, UntypedSamplesHaveTheirSize) {

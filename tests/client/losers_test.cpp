@@ -7,7 +7,7 @@
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
-#include "tests/client/threads.hpp"
+#include "tests/support/threads.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::test {

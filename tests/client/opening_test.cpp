@@ -247,7 +247,7 @@ TEST(Opening, ManyPortsInOneNodeAndSeveralNodesInOneProcess) {
   }
   auto out = a.output_port<Number>("/out");
   EXPECT_EQ(out.publish(Number{7}).delivered, static_cast<std::uint32_t>(kPorts));
-  for (auto& in : inputs) EXPECT_EQ((*in.take())->value, 7);
+  for (auto& in : inputs) EXPECT_EQ(take_from(in), 7);
 }
 
 TEST(Opening, PortsMayBeOpenedByManyThreadsAtOnce) {
@@ -281,11 +281,11 @@ TEST(Opening, WithoutAServiceThreadTheNodeSeesChangesWhenItIsServiced) {
     EXPECT_EQ(::poll(&readable, 1, -1), 1);
     node.service();
     EXPECT_EQ(out.publish(Number{2}).delivered, 1u);
-    EXPECT_EQ((*in.take())->value, 2);
+    EXPECT_EQ(take_from(in), 2);
   }
   auto in = node.input_port<Number>("/in");
   EXPECT_EQ(out.publish(Number{3}).delivered, 1u);
-  EXPECT_EQ((*in.take())->value, 3);
+  EXPECT_EQ(take_from(in), 3);
 }
 
 TEST(Opening, ServicingANodeThatHasAThreadForItDoesNoHarm) {

@@ -43,7 +43,7 @@ TEST(Queue, OneThatRefusesTellsThePublisher) {
     EXPECT_EQ(outcome.discarded, 0u);
     EXPECT_EQ(outcome.refused, 1u);
   }
-  EXPECT_EQ((*in.take())->value, 1);
+  EXPECT_EQ(take_from(in), 1);
   EXPECT_EQ(out.publish(Number{6}).delivered, 1u);
   EXPECT_EQ(out.publish(Number{7}).refused, 1u);
   EXPECT_EQ(take_all(in), (std::vector<std::int64_t>{2, 3, 6}));
@@ -165,7 +165,7 @@ TEST(Queue, ANewReceiverGetsNothingOfItsPredecessors) {
     auto in = node.input_port<Number>("/in", {.depth = 8u - static_cast<unsigned>(generation)});
     EXPECT_FALSE(in.take());
     for (int i = 0; i < 3; ++i) out.publish(Number{10 * generation + i});
-    EXPECT_EQ((*in.take())->value, 10 * generation);
+    EXPECT_EQ(take_from(in), 10 * generation);
     for (int i = 3; i < 6; ++i) out.publish(Number{10 * generation + i});
   }
   auto in = node.input_port<Number>("/in");

@@ -8,11 +8,20 @@
 #include <sstream>
 #include <string>
 
+#include <arbiter/arbiter.hpp>
+
 namespace arbiter::test {
 
 struct Number {
   std::int64_t value = 0;
 };
+
+// The value that is taken, or that of no sample if there is none.
+inline constexpr std::int64_t kNothing = INT64_MIN;
+inline std::int64_t take_from(InputPort<Number>& in) {
+  const auto sample = in.take();
+  return sample ? (*sample)->value : kNothing;
+}
 
 // 4 MiB.
 struct Image {

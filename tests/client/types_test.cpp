@@ -173,7 +173,7 @@ TEST(Types, ASuccessorOfTheRightTypeConnects) {
   { auto wrong = node.output_port("/out"); }
   auto out = node.output_port<Number>("/out");
   EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
-  EXPECT_EQ((*in.take())->value, 1);
+  EXPECT_EQ(take_from(in), 1);
 }
 
 TEST(Types, AnUntypedInputGetsTheBytesOfATypedSample) {

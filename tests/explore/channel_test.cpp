@@ -47,17 +47,17 @@ Explorer::Scenario publish_and_take(World& world, std::uint32_t depth, int publi
 
 constexpr Limits kLimits{3, 2};
 
-TEST(ChannelInterleavings, no_sample_is_written_while_it_is_read_with_depth_1) {
+TEST(ChannelInterleavings, NoSampleIsWrittenWhileItIsReadWithDepth1) {
   World world;
   expect_holds("channel, depth 1", kLimits, publish_and_take(world, 1, 2, 2));
 }
 
-TEST(ChannelInterleavings, no_sample_is_written_while_it_is_read_with_depth_2) {
+TEST(ChannelInterleavings, NoSampleIsWrittenWhileItIsReadWithDepth2) {
   World world;
   expect_holds("channel, depth 2", kLimits, publish_and_take(world, 2, 3, 2));
 }
 
-TEST(ChannelInterleavings, each_of_its_orders_is_needed) {
+TEST(ChannelInterleavings, EachOfItsOrdersIsNeeded) {
   World world;
   const auto scenario = publish_and_take(world, 1, 2, 2);
   expect_fails_without("fence (b)", kLimits, {Weakness::kFullFence, "publish_fence"}, scenario);
@@ -84,7 +84,7 @@ Explorer::Scenario leave_and_reuse(World& world) {
   };
 }
 
-TEST(ChannelInterleavings, a_queue_that_ends_takes_its_samples_from_nobody_who_holds_one) {
+TEST(ChannelInterleavings, AQueueThatEndsTakesItsSamplesFromNobodyWhoHoldsOne) {
   World world;
   expect_holds("leaving", {4, 3}, leave_and_reuse(world));
   expect_fails_without("fence (b)", {4, 3}, {Weakness::kFullFence, "publish_fence"},
@@ -120,7 +120,7 @@ Explorer::Scenario join_a_used_channel(World& world) {
   };
 }
 
-TEST(ChannelInterleavings, a_receiver_finds_its_queue_whole_or_not_at_all) {
+TEST(ChannelInterleavings, AReceiverFindsItsQueueWholeOrNotAtAll) {
   World world;
   expect_holds("joining", {3, 2}, join_a_used_channel(world));
   expect_fails_without("channel-joined", {3, 2}, {Weakness::kRelease, "ChannelWriter::join"},

@@ -77,7 +77,7 @@ test::TableBuilder forever() {
   return builder;
 }
 
-TEST(DecisionInterleavings, two_that_override_each_other_are_not_both_accepted) {
+TEST(DecisionInterleavings, TwoThatOverrideEachOtherAreNotBothAccepted) {
   World world(forever().conjunction(kA, 0, {}, {kB}).conjunction(kB, 0, {}, {kA}));
   bool each_won[2] = {false, false};
   const Explorer::Scenario scenario = [&](Execution& execution) {
@@ -95,7 +95,7 @@ TEST(DecisionInterleavings, two_that_override_each_other_are_not_both_accepted) 
   expect_fails_without("fence (a)", {6, 4}, {Weakness::kFullFence, "stamp_fence"}, scenario);
 }
 
-TEST(DecisionInterleavings, after_an_override_has_returned_nothing_overridden_is_taken) {
+TEST(DecisionInterleavings, AfterAnOverrideHasReturnedNothingOverriddenIsTaken) {
   World world(forever().conjunction(kA, 0, {}, {kB}).connect({kB, 0, shm::table::kAlways, {}, {}}));
   const Explorer::Scenario scenario = [&](Execution& execution) {
     world.reset();
@@ -116,7 +116,7 @@ TEST(DecisionInterleavings, after_an_override_has_returned_nothing_overridden_is
 }
 
 // A and not B and not C. B is active; C arrives, then B is deactivated: never are both inactive.
-TEST(DecisionInterleavings, moments_are_not_mixed_where_activity_moves_from_one_to_another) {
+TEST(DecisionInterleavings, MomentsAreNotMixedWhereActivityMovesFromOneToAnother) {
   World world(forever().conjunction(kA, 0, {}, {kC, kB}));
   const Explorer::Scenario scenario = [&](Execution& execution) {
     world.reset();
@@ -132,7 +132,7 @@ TEST(DecisionInterleavings, moments_are_not_mixed_where_activity_moves_from_one_
 }
 
 // B and C, of which one is active at a time; each comes back after a break.
-TEST(DecisionInterleavings, an_activity_that_was_broken_off_does_not_count_as_renewed) {
+TEST(DecisionInterleavings, AnActivityThatWasBrokenOffDoesNotCountAsRenewed) {
   World world(forever().conjunction(kA, 0, {kB, kC}, {}));
   const Explorer::Scenario scenario = [&](Execution& execution) {
     world.reset();

@@ -50,7 +50,7 @@ class Tables : public testing::Test {
   shm::Board& board_;
 };
 
-TEST_F(Tables, one_that_is_overwritten_while_it_is_read_is_never_taken_for_whole) {
+TEST_F(Tables, OneThatIsOverwrittenWhileItIsReadIsNeverTakenForWhole) {
   constexpr Limits kLimits{3, 2};
   const auto scenario = read_while_swapping(shm::kTableSlots);
   expect_holds("table swaps", kLimits, scenario);

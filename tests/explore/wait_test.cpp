@@ -51,7 +51,7 @@ Explorer::Scenario publish_to_a_waiter(World& world) {
   };
 }
 
-TEST(WaitInterleavings, no_wake_up_is_lost) {
+TEST(WaitInterleavings, NoWakeUpIsLost) {
   World world;
   constexpr Limits kLimits{5, 3};
   const auto scenario = publish_to_a_waiter(world);

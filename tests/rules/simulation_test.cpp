@@ -112,8 +112,8 @@ TEST(Simulation, PortsThatNoRuleMentionsHaveNoRows) {
       "2,-,/p,-,/a\n");
 }
 
-TEST(Simulation, LinesOfAnUnknownSourceProduceNothing) {
-  EXPECT_EQ(simulate(override_rules(), "t_ns,source,event\n0,/who,\n1,/who,deactivate\n"), "");
+TEST(Simulation, ArrivalsOfAnUnknownSourceProduceNothing) {
+  EXPECT_EQ(simulate(override_rules(), "t_ns,source,event\n0,/who,\n1,/who,\n"), "");
 }
 
 TEST(Simulation, ListsPortsInByteOrderWhateverTheOrderOfTheModel) {

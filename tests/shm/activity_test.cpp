@@ -7,13 +7,13 @@ namespace {
 
 constexpr Nanoseconds kT = 500'000'000;
 
-TEST(Activity, a_source_that_never_published_is_inactive_at_every_time) {
+TEST(Activity, ASourceThatNeverPublishedIsInactiveAtEveryTime) {
   for (const Nanoseconds now : {Nanoseconds{0}, Nanoseconds{1}, kMaxTime}) {
     EXPECT_FALSE(is_active(kNeverActive, now));
   }
 }
 
-TEST(Activity, an_arrival_makes_active_for_the_half_open_interval_of_T) {
+TEST(Activity, AnArrivalMakesActiveForTheHalfOpenIntervalOfT) {
   for (const Nanoseconds at : {Nanoseconds{1}, Nanoseconds{123'456'789}, kMaxTime}) {
     for (const Nanoseconds timeout : {Nanoseconds{1}, kT, kMaxTime}) {
       const ActivityWord word = arrival(at, timeout);
@@ -26,14 +26,14 @@ TEST(Activity, an_arrival_makes_active_for_the_half_open_interval_of_T) {
   }
 }
 
-TEST(Activity, a_later_arrival_restarts_the_interval) {
+TEST(Activity, ALaterArrivalRestartsTheInterval) {
   const ActivityWord first = arrival(1000, kT);
   const ActivityWord second = arrival(1000 + kT - 1, kT);
   EXPECT_FALSE(is_active(first, 1000 + kT));
   EXPECT_TRUE(is_active(second, 1000 + kT));
 }
 
-TEST(Activity, forever_is_active_at_every_time_and_no_passing_of_time_can_end_it) {
+TEST(Activity, ForeverIsActiveAtEveryTimeAndNoPassingOfTimeCanEndIt) {
   for (const Nanoseconds at : {Nanoseconds{0}, Nanoseconds{1}, kMaxTime}) {
     const ActivityWord word = arrival(at, kForever);
     EXPECT_TRUE(is_active(word, 0));
@@ -42,12 +42,12 @@ TEST(Activity, forever_is_active_at_every_time_and_no_passing_of_time_can_end_it
   }
 }
 
-TEST(Activity, the_longest_finite_activity_is_not_forever) {
+TEST(Activity, TheLongestFiniteActivityIsNotForever) {
   EXPECT_TRUE(is_finite(arrival(kMaxTime, kMaxTime)));
   EXPECT_LT(arrival(kMaxTime, kMaxTime), kForeverFlag);
 }
 
-TEST(Activity, a_deactivation_makes_inactive_at_every_time) {
+TEST(Activity, ADeactivationMakesInactiveAtEveryTime) {
   for (const Nanoseconds at : {Nanoseconds{0}, Nanoseconds{1}, kMaxTime}) {
     const ActivityWord word = deactivation(at);
     EXPECT_FALSE(is_active(word, 0));
@@ -56,7 +56,7 @@ TEST(Activity, a_deactivation_makes_inactive_at_every_time) {
   }
 }
 
-TEST(Activity, values_of_different_times_and_kinds_differ) {
+TEST(Activity, ValuesOfDifferentTimesAndKindsDiffer) {
   EXPECT_NE(deactivation(5), deactivation(6));
   EXPECT_NE(arrival(5, kForever), arrival(6, kForever));
   EXPECT_NE(arrival(5, kT), arrival(6, kT));
@@ -64,7 +64,7 @@ TEST(Activity, values_of_different_times_and_kinds_differ) {
   EXPECT_NE(arrival(0, kForever), kNeverActive);
 }
 
-TEST(Activity, each_kind_of_word_tells_whether_it_was_written_after_a_reading) {
+TEST(Activity, EachKindOfWordTellsWhetherItWasWrittenAfterAReading) {
   EXPECT_FALSE(is_newer_than(arrival(1000, kT), kT, 1000));
   EXPECT_TRUE(is_newer_than(arrival(1001, kT), kT, 1000));
   EXPECT_FALSE(is_newer_than(arrival(1000, kForever), kForever, 1000));
@@ -74,7 +74,7 @@ TEST(Activity, each_kind_of_word_tells_whether_it_was_written_after_a_reading) {
   EXPECT_FALSE(is_newer_than(kNeverActive, kT, 1000));
 }
 
-TEST(Activity, a_finite_word_of_a_source_that_now_has_no_end_looks_old) {
+TEST(Activity, AFiniteWordOfASourceThatNowHasNoEndLooksOld) {
   EXPECT_FALSE(is_newer_than(arrival(1001, kT), kForever, 1000));
 }
 

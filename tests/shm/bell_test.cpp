@@ -6,9 +6,11 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <optional>
 #include <thread>
+#include <vector>
 
 #include "shm/clock.hpp"
 #include "shm/segment.hpp"
@@ -21,7 +23,7 @@ bool is_rung(const Bell& bell) {
   return poll(&readable, 1, 0) == 1;
 }
 
-TEST(Bell, rings_until_it_is_silenced) {
+TEST(Bell, RingsUntilItIsSilenced) {
   const Bell bell;
   const Ringer ringer(bell.write_end());
   EXPECT_FALSE(is_rung(bell));
@@ -32,7 +34,7 @@ TEST(Bell, rings_until_it_is_silenced) {
   EXPECT_FALSE(is_rung(bell));
 }
 
-TEST(Bell, wakes_one_that_waits_without_a_limit) {
+TEST(Bell, WakesOneThatWaitsWithoutALimit) {
   const Bell bell;
   const Ringer ringer(bell.write_end());
   std::thread waiter([&] { bell.wait(kForever); });
@@ -40,20 +42,20 @@ TEST(Bell, wakes_one_that_waits_without_a_limit) {
   waiter.join();
 }
 
-TEST(Bell, a_deadline_that_has_passed_is_not_waited_for) {
+TEST(Bell, ADeadlineThatHasPassedIsNotWaitedFor) {
   const Bell bell;
   bell.wait(monotonic_now() - 1);
   bell.wait(0);
 }
 
-TEST(Bell, a_wait_that_nobody_rings_for_ends_at_its_deadline) {
+TEST(Bell, AWaitThatNobodyRingsForEndsAtItsDeadline) {
   const Bell bell;
   const Nanoseconds deadline = monotonic_now() + 1'000'000;
   while (monotonic_now() < deadline) bell.wait(deadline);
   EXPECT_FALSE(is_rung(bell));
 }
 
-TEST(Bell, many_more_rings_than_a_pipe_holds_do_not_block_and_are_all_forgotten) {
+TEST(Bell, ManyMoreRingsThanAPipeHoldsDoNotBlockAndAreAllForgotten) {
   const Bell bell;
   const Ringer ringer(bell.write_end());
   for (int i = 0; i < 100'000; ++i) ringer.ring();
@@ -62,14 +64,26 @@ TEST(Bell, many_more_rings_than_a_pipe_holds_do_not_block_and_are_all_forgotten)
   EXPECT_FALSE(is_rung(bell));
 }
 
-TEST(Bell, a_publisher_can_neither_read_it_nor_open_it_to_be_read) {
+TEST(Bell, OneThatRingsWithoutEndDoesNotKeepTheReceiverFromItsWork) {
+  const Bell bell;
+  std::atomic<bool> stop{false};
+  std::thread hostile([&, end = reopen(bell.write_end(), O_WRONLY | O_NONBLOCK)] {
+    const std::vector<char> rings(1 << 16, 1);
+    while (!stop) static_cast<void>(!::write(end.get(), rings.data(), rings.size()));
+  });
+  for (int i = 0; i < 1000; ++i) bell.silence();
+  stop = true;
+  hostile.join();
+}
+
+TEST(Bell, APublisherCanNeitherReadItNorOpenItToBeRead) {
   if (geteuid() == 0) GTEST_SKIP() << "root may open anything";
   const Bell bell;
   EXPECT_THROW(reopen(bell.write_end(), O_RDONLY | O_NONBLOCK), std::system_error);
   EXPECT_THROW(reopen(bell.write_end(), O_RDWR | O_NONBLOCK), std::system_error);
 }
 
-TEST(Bell, the_end_that_a_publisher_has_cannot_be_read) {
+TEST(Bell, TheEndThatAPublisherHasCannotBeRead) {
   const Bell bell;
   const FileDescriptor end = reopen(bell.write_end(), O_WRONLY | O_NONBLOCK);
   ring_bell(end.get());
@@ -79,7 +93,7 @@ TEST(Bell, the_end_that_a_publisher_has_cannot_be_read) {
   EXPECT_TRUE(is_rung(bell));
 }
 
-TEST(Bell, a_publisher_that_switches_its_end_to_blocking_does_so_for_itself_alone) {
+TEST(Bell, APublisherThatSwitchesItsEndToBlockingDoesSoForItselfAlone) {
   const Bell bell;
   const FileDescriptor hostile = reopen(bell.write_end(), O_WRONLY | O_NONBLOCK);
   ASSERT_EQ(fcntl(hostile.get(), F_SETFL, 0), 0);
@@ -88,7 +102,7 @@ TEST(Bell, a_publisher_that_switches_its_end_to_blocking_does_so_for_itself_alon
   EXPECT_TRUE(is_rung(bell));
 }
 
-TEST(Bell, ringing_for_a_receiver_that_is_gone_raises_no_signal_and_leaves_errno_alone) {
+TEST(Bell, RingingForAReceiverThatIsGoneRaisesNoSignalAndLeavesErrnoAlone) {
   ASSERT_NE(signal(SIGPIPE, SIG_DFL), SIG_ERR);  // would end this process
   std::optional<Bell> bell(std::in_place);
   const Ringer ringer(bell->write_end());
@@ -101,7 +115,7 @@ TEST(Bell, ringing_for_a_receiver_that_is_gone_raises_no_signal_and_leaves_errno
   EXPECT_EQ(sigismember(&pending, SIGPIPE), 0);
 }
 
-TEST(Bell, a_component_that_has_the_signal_blocked_finds_it_blocked_afterwards) {
+TEST(Bell, AComponentThatHasTheSignalBlockedFindsItBlockedAfterwards) {
   sigset_t pipe, before, after;
   sigemptyset(&pipe);
   sigaddset(&pipe, SIGPIPE);

@@ -56,7 +56,7 @@ class Channels : public testing::Test {
   OutputSegment segment_;
 };
 
-TEST_F(Channels, a_queue_gives_its_samples_in_order_and_then_nothing) {
+TEST_F(Channels, AQueueGivesItsSamplesInOrderAndThenNothing) {
   ChannelWriter writer = join(4);
   ChannelReader receiver = reader();
   ASSERT_TRUE(receiver.join());
@@ -68,7 +68,7 @@ TEST_F(Channels, a_queue_gives_its_samples_in_order_and_then_nothing) {
   EXPECT_EQ(lost, 0u);
 }
 
-TEST_F(Channels, depth_and_losses_are_exact_however_many_come_between_takes) {
+TEST_F(Channels, DepthAndLossesAreExactHoweverManyComeBetweenTakes) {
   for (std::uint32_t depth = 1; depth <= 5; ++depth) {
     for (std::uint32_t pushes = 0; pushes <= 3 * depth + 2; ++pushes) {
       ChannelWriter writer = join(depth, kReceiver, depth);
@@ -90,7 +90,7 @@ TEST_F(Channels, depth_and_losses_are_exact_however_many_come_between_takes) {
   }
 }
 
-TEST_F(Channels, each_slot_that_went_in_comes_out_once_by_eviction_or_when_the_queue_ends) {
+TEST_F(Channels, EachSlotThatWentInComesOutOnceByEvictionOrWhenTheQueueEnds) {
   for (std::uint32_t depth = 1; depth <= 4; ++depth) {
     for (std::uint32_t pushes = 0; pushes <= 9; ++pushes) {
       ChannelWriter writer = join(depth);
@@ -105,7 +105,7 @@ TEST_F(Channels, each_slot_that_went_in_comes_out_once_by_eviction_or_when_the_q
   }
 }
 
-TEST_F(Channels, one_that_is_not_named_has_no_queue) {
+TEST_F(Channels, OneThatIsNotNamedHasNoQueue) {
   join(4, kOther);
   ChannelReader receiver = reader();
   EXPECT_FALSE(receiver.join());
@@ -117,7 +117,7 @@ TEST_F(Channels, one_that_is_not_named_has_no_queue) {
 
 // A receiver restarts: its successor must find none of what the predecessor had in its queue, nor
 // take the beginning of its own for something old.
-TEST_F(Channels, a_channel_used_again_gives_only_what_came_for_the_new_receiver) {
+TEST_F(Channels, AChannelUsedAgainGivesOnlyWhatCameForTheNewReceiver) {
   for (std::uint32_t before = 1; before <= 6; ++before) {
     for (std::uint32_t after = 1; after <= 6; ++after) {
       {
@@ -139,7 +139,7 @@ TEST_F(Channels, a_channel_used_again_gives_only_what_came_for_the_new_receiver)
   }
 }
 
-TEST_F(Channels, no_hold_is_taken_once_the_queue_has_ended) {
+TEST_F(Channels, NoHoldIsTakenOnceTheQueueHasEnded) {
   ChannelWriter writer = join(2);
   ChannelReader receiver = reader();
   ASSERT_TRUE(receiver.join());
@@ -154,7 +154,7 @@ TEST_F(Channels, no_hold_is_taken_once_the_queue_has_ended) {
   EXPECT_EQ(receiver.state(), ChannelReader::State::kLeft);
 }
 
-TEST_F(Channels, no_hold_is_taken_on_an_entry_that_was_overtaken) {
+TEST_F(Channels, NoHoldIsTakenOnAnEntryThatWasOvertaken) {
   ChannelWriter writer = join(1);
   ChannelReader receiver = reader();
   ASSERT_TRUE(receiver.join());
@@ -169,7 +169,7 @@ TEST_F(Channels, no_hold_is_taken_on_an_entry_that_was_overtaken) {
   EXPECT_EQ(lost, 1u);
 }
 
-TEST_F(Channels, a_queue_is_full_when_depth_samples_wait) {
+TEST_F(Channels, AQueueIsFullWhenDepthSamplesWait) {
   ChannelWriter writer = join(3);
   for (std::uint64_t i = 0; i < 3; ++i) {
     EXPECT_FALSE(writer.is_full(0));
@@ -182,7 +182,7 @@ TEST_F(Channels, a_queue_is_full_when_depth_samples_wait) {
 
 // What no honest publisher writes.
 
-TEST_F(Channels, a_publisher_that_names_an_impossible_depth_is_given_up) {
+TEST_F(Channels, APublisherThatNamesAnImpossibleDepthIsGivenUp) {
   for (const std::uint32_t depth : {0u, kMaxDepth + 1, UINT32_MAX}) {
     join(depth);
     ChannelReader receiver = reader();
@@ -193,7 +193,7 @@ TEST_F(Channels, a_publisher_that_names_an_impossible_depth_is_given_up) {
   }
 }
 
-TEST_F(Channels, a_publisher_that_names_a_slot_it_does_not_have_is_given_up) {
+TEST_F(Channels, APublisherThatNamesASlotItDoesNotHaveIsGivenUp) {
   ChannelWriter writer = join(2);
   ChannelReader receiver = reader();
   ASSERT_TRUE(receiver.join());
@@ -203,7 +203,7 @@ TEST_F(Channels, a_publisher_that_names_a_slot_it_does_not_have_is_given_up) {
   EXPECT_EQ(receiver.state(), ChannelReader::State::kMisbehaved);
 }
 
-TEST_F(Channels, a_publisher_that_jumps_by_another_step_than_its_depth_is_given_up) {
+TEST_F(Channels, APublisherThatJumpsByAnotherStepThanItsDepthIsGivenUp) {
   ChannelWriter writer = join(4);
   ChannelReader receiver = reader();
   ASSERT_TRUE(receiver.join());
@@ -214,7 +214,7 @@ TEST_F(Channels, a_publisher_that_jumps_by_another_step_than_its_depth_is_given_
   EXPECT_EQ(receiver.state(), ChannelReader::State::kMisbehaved);
 }
 
-TEST_F(Channels, garbage_in_a_ring_never_leads_outside_it_and_every_look_ends) {
+TEST_F(Channels, GarbageInARingNeverLeadsOutsideItAndEveryLookEnds) {
   for (const std::uint32_t depth : {1u, 2u, 3u, kMaxDepth}) {
     for (const Entry garbage : {Entry{1}, ~Entry{0}, make_entry(kSequenceMask / 2, 0),
                                 make_entry(kSequenceMask / 2 + 2, 0), make_entry(1 + depth, 0),
@@ -237,7 +237,7 @@ TEST_F(Channels, garbage_in_a_ring_never_leads_outside_it_and_every_look_ends) {
   }
 }
 
-TEST_F(Channels, sequences_pass_the_end_of_their_bits) {
+TEST_F(Channels, SequencesPassTheEndOfTheirBits) {
   segment_.channel(0).accepted = kSequenceMask - 2;
   ChannelWriter writer = join(3);
   ChannelReader receiver = reader();

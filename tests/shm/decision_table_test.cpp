@@ -78,7 +78,7 @@ class Reader {
   std::unique_ptr<ActivityPages> pages_ = std::make_unique<ActivityPages>();
 };
 
-TEST(DecisionTable, a_view_of_nothing_knows_nothing) {
+TEST(DecisionTable, AViewOfNothingKnowsNothing) {
   const TableView view;
   EXPECT_FALSE(view.is_table());
   EXPECT_EQ(view.timeout(0), kDefaultTimeout);
@@ -88,7 +88,7 @@ TEST(DecisionTable, a_view_of_nothing_knows_nothing) {
   Reader().read_all(view);
 }
 
-TEST(DecisionTable, a_view_reads_back_what_was_written) {
+TEST(DecisionTable, AViewReadsBackWhatWasWritten) {
   const TableWords words(sample_table());
   const TableView view = words.view();
   ASSERT_TRUE(view.is_table());
@@ -105,7 +105,7 @@ TEST(DecisionTable, a_view_reads_back_what_was_written) {
   Reader().read_all(view);
 }
 
-TEST(DecisionTable, a_table_cut_at_any_length_is_read_within_its_bounds) {
+TEST(DecisionTable, ATableCutAtAnyLengthIsReadWithinItsBounds) {
   const auto whole = sample_table();
   Reader reader;
   for (std::size_t length = 0; length <= whole.size(); ++length) {
@@ -113,7 +113,7 @@ TEST(DecisionTable, a_table_cut_at_any_length_is_read_within_its_bounds) {
   }
 }
 
-TEST(DecisionTable, any_single_word_may_be_garbage) {
+TEST(DecisionTable, AnySingleWordMayBeGarbage) {
   const auto whole = sample_table();
   Reader reader;
   for (std::size_t at = 0; at < whole.size(); ++at) {
@@ -126,7 +126,7 @@ TEST(DecisionTable, any_single_word_may_be_garbage) {
   }
 }
 
-TEST(DecisionTable, all_words_may_be_garbage) {
+TEST(DecisionTable, AllWordsMayBeGarbage) {
   constexpr unsigned kSeed = 20250101;
   std::mt19937 random(kSeed);
   Reader reader;
@@ -142,7 +142,7 @@ TEST(DecisionTable, all_words_may_be_garbage) {
   }
 }
 
-TEST(DecisionTable, a_diagram_that_runs_in_a_circle_is_cut_short) {
+TEST(DecisionTable, ADiagramThatRunsInACircleIsCutShort) {
   TableBuilder builder;
   builder.connect({0, 0, table::kDiagram, {1, 2}, {0, 1, 1, 1, 0, 0}});
   Reader().read_all(TableWords(builder.words(kSources, 1)).view());

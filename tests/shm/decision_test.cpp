@@ -64,13 +64,13 @@ class Decision : public testing::Test {
   std::unique_ptr<ActivityPages> pages_ = std::make_unique<ActivityPages>();
 };
 
-TEST_F(Decision, a_connection_without_a_rule_loses_and_one_without_a_condition_wins) {
+TEST_F(Decision, AConnectionWithoutARuleLosesAndOneWithoutAConditionWins) {
   builder_.connect({kA, 0, table::kNever, {}, {}}).connect({kB, 0, table::kAlways, {}, {}});
   EXPECT_EQ(decide_at(0, 1), Verdict::kLoses);
   EXPECT_EQ(decide_at(1, 1), Verdict::kWins);
 }
 
-TEST_F(Decision, its_own_activity_is_taken_as_given_unless_it_is_asked_for) {
+TEST_F(Decision, ItsOwnActivityIsTakenAsGivenUnlessItIsAskedFor) {
   builder_.connect({kA, 0, table::kAlways, {}, {}});
   EXPECT_EQ(decide_at(0, 1), Verdict::kWins);
   EXPECT_EQ(decide_at(0, 1, true), Verdict::kLoses);
@@ -79,7 +79,7 @@ TEST_F(Decision, its_own_activity_is_taken_as_given_unless_it_is_asked_for) {
   EXPECT_EQ(decide_at(0, 1 + kT, true), Verdict::kLoses) << "at exactly t + T it is inactive";
 }
 
-TEST_F(Decision, a_conjunction_holds_for_exactly_the_activities_it_asks_for) {
+TEST_F(Decision, AConjunctionHoldsForExactlyTheActivitiesItAsksFor) {
   builder_.conjunction(kA, 0, {kB}, {kC, kD});
   for (unsigned mask = 0; mask < 8; ++mask) {
     for (SourceId id = kB; id <= kD; ++id) {
@@ -89,7 +89,7 @@ TEST_F(Decision, a_conjunction_holds_for_exactly_the_activities_it_asks_for) {
   }
 }
 
-TEST_F(Decision, a_diagram_is_walked_to_its_end) {
+TEST_F(Decision, ADiagramIsWalkedToItsEnd) {
   // (B and C) or D
   constexpr Word t = table::kTrue, f = table::kFalse;
   builder_.connect({kA, 0, table::kDiagram, {kB, kC, kD}, {0, 2, 1, 1, 2, t, 2, f, t}});
@@ -102,7 +102,7 @@ TEST_F(Decision, a_diagram_is_walked_to_its_end) {
   }
 }
 
-TEST_F(Decision, a_source_without_a_page_makes_blind_what_reads_it_and_nothing_else) {
+TEST_F(Decision, ASourceWithoutAPageMakesBlindWhatReadsItAndNothingElse) {
   builder_.conjunction(kA, 0, {}, {kB, kC}).connect({kD, 0, table::kAlways, {}, {}});
   pages_->attach(kC, nullptr);
   EXPECT_EQ(decide_at(0, 1), Verdict::kBlind);
@@ -111,7 +111,7 @@ TEST_F(Decision, a_source_without_a_page_makes_blind_what_reads_it_and_nothing_e
   EXPECT_EQ(decide_at(1, 1, true), Verdict::kBlind);
 }
 
-TEST_F(Decision, an_old_reading_decides_as_a_fresh_one_does_for_all_combinations) {
+TEST_F(Decision, AnOldReadingDecidesAsAFreshOneDoesForAllCombinations) {
   builder_.conjunction(kA, 0, {kB}, {kC});
   const ActivityWord choices[] = {kNeverActive,     arrival(100, kForever), deactivation(100),
                                   arrival(0, kT),   arrival(50, kT),        arrival(100, kT),
@@ -132,7 +132,7 @@ TEST_F(Decision, an_old_reading_decides_as_a_fresh_one_does_for_all_combinations
   }
 }
 
-TEST_F(Decision, an_old_reading_costs_a_clock_only_where_activity_may_have_ended_since) {
+TEST_F(Decision, AnOldReadingCostsAClockOnlyWhereActivityMayHaveEndedSince) {
   builder_.conjunction(kA, 0, {}, {kB, kC});
   word(kB) = arrival(0, kT);  // ended at 100
   word(kC) = deactivation(100);
@@ -146,7 +146,7 @@ TEST_F(Decision, an_old_reading_costs_a_clock_only_where_activity_may_have_ended
 
 // B ended at 200; C was deactivated, or became active, at 300. The clock was read at 150, and then
 // we were held up. No moment has seen B and C as a naive reader would put them together.
-TEST_F(Decision, an_end_before_and_a_deactivation_after_a_reading_are_not_combined) {
+TEST_F(Decision, AnEndBeforeAndADeactivationAfterAReadingAreNotCombined) {
   builder_.conjunction(kA, 0, {kB}, {kC});
   word(kB) = arrival(100, kT);
   word(kC) = deactivation(300);
@@ -154,7 +154,7 @@ TEST_F(Decision, an_end_before_and_a_deactivation_after_a_reading_are_not_combin
   EXPECT_EQ(decide(0, clock), Verdict::kLoses);
 }
 
-TEST_F(Decision, an_end_before_and_an_endless_activity_after_a_reading_are_not_combined) {
+TEST_F(Decision, AnEndBeforeAndAnEndlessActivityAfterAReadingAreNotCombined) {
   builder_.conjunction(kA, 0, {kB, kC}, {});
   word(kB) = arrival(100, kT);
   word(kC) = arrival(300, kForever);
@@ -162,7 +162,7 @@ TEST_F(Decision, an_end_before_and_an_endless_activity_after_a_reading_are_not_c
   EXPECT_EQ(decide(0, clock), Verdict::kLoses);
 }
 
-TEST_F(Decision, an_end_before_and_an_arrival_after_a_reading_are_not_combined) {
+TEST_F(Decision, AnEndBeforeAndAnArrivalAfterAReadingAreNotCombined) {
   builder_.conjunction(kA, 0, {kB, kC}, {});
   word(kB) = arrival(100, kT);
   word(kC) = arrival(300, kT);
@@ -170,7 +170,7 @@ TEST_F(Decision, an_end_before_and_an_arrival_after_a_reading_are_not_combined) 
   EXPECT_EQ(decide(0, clock), Verdict::kLoses);
 }
 
-TEST_F(Decision, a_word_that_a_shorter_T_makes_look_newer_than_any_reading_is_judged_all_the_same) {
+TEST_F(Decision, AWordThatAShorterTMakesLookNewerThanAnyReadingIsJudgedAllTheSame) {
   builder_.conjunction(kA, 0, {kB, kC}, {kD});
   builder_.timeout(kB, 1).timeout(kC, 1).timeout(kD, 1);  // they had 1000 when they arrived
   word(kB) = arrival(500, 1000);
@@ -185,7 +185,7 @@ TEST_F(Decision, a_word_that_a_shorter_T_makes_look_newer_than_any_reading_is_ju
   EXPECT_EQ(decide_at(0, 1502), Verdict::kLoses);
 }
 
-TEST_F(Decision, many_words_that_look_newer_are_settled_within_the_bound) {
+TEST_F(Decision, ManyWordsThatLookNewerAreSettledWithinTheBound) {
   constexpr Word kMany = kMaxSourcesPerPort;
   std::vector<Activity> activities(kMany + 1);
   std::vector<SourceId> all;
@@ -204,7 +204,7 @@ TEST_F(Decision, many_words_that_look_newer_are_settled_within_the_bound) {
   EXPECT_EQ(decider.decide(view.rule(0)), Verdict::kWins);
 }
 
-TEST_F(Decision, a_source_that_changes_at_every_look_leaves_it_unsettled_after_a_bounded_time) {
+TEST_F(Decision, ASourceThatChangesAtEveryLookLeavesItUnsettledAfterABoundedTime) {
   builder_.conjunction(kA, 0, {kB, kC}, {});
   word(kB) = arrival(1, kForever);
   Nanoseconds time = 1000;
@@ -219,7 +219,7 @@ TEST_F(Decision, a_source_that_changes_at_every_look_leaves_it_unsettled_after_a
   EXPECT_LE(clock.readings, kMaxPictures);
 }
 
-TEST_F(Decision, pages_beyond_the_limit_are_not_found) {
+TEST_F(Decision, PagesBeyondTheLimitAreNotFound) {
   EXPECT_EQ(pages_->find(kMaxSources), nullptr);
   EXPECT_EQ(pages_->find(kNone), nullptr);
 }

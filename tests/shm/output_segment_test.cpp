@@ -16,7 +16,7 @@ TypeInfo type_of(std::uint64_t size, std::uint64_t alignment) {
   return type;
 }
 
-TEST(OutputLayout, parts_follow_each_other_without_overlap_and_aligned) {
+TEST(OutputLayout, PartsFollowEachOtherWithoutOverlapAndAligned) {
   for (const std::uint64_t size : {0u, 1u, 8u, 64u, 65u, 4096u, 100'000u}) {
     for (const std::uint64_t alignment : {1u, 8u, 64u, 128u, 4096u}) {
       for (const std::uint32_t slots : {1u, 5u, 1000u, kMaxSlots}) {
@@ -56,9 +56,9 @@ class OutputHeaderCheck : public testing::Test {
   std::uint64_t size_ = 0;
 };
 
-TEST_F(OutputHeaderCheck, accepts_what_an_honest_publisher_writes) { EXPECT_TRUE(accepted()); }
+TEST_F(OutputHeaderCheck, AcceptsWhatAnHonestPublisherWrites) { EXPECT_TRUE(accepted()); }
 
-TEST_F(OutputHeaderCheck, takes_the_layout_from_the_sizes_never_from_the_offsets_in_the_header) {
+TEST_F(OutputHeaderCheck, TakesTheLayoutFromTheSizesNeverFromTheOffsetsInTheHeader) {
   header_.stride = 1u << 30;
   header_.headers_offset = UINT64_MAX;
   header_.payload_offset = UINT64_MAX - 7;
@@ -68,7 +68,7 @@ TEST_F(OutputHeaderCheck, takes_the_layout_from_the_sizes_never_from_the_offsets
   EXPECT_LE(layout.payload_offset + layout.stride * layout.slot_count, size_);
 }
 
-TEST_F(OutputHeaderCheck, rejects_every_field_that_is_out_of_its_bounds) {
+TEST_F(OutputHeaderCheck, RejectsEveryFieldThatIsOutOfItsBounds) {
   const std::vector<std::pair<const char*, std::function<void(OutputHeader&)>>> corruptions = {
       {"magic", [](OutputHeader& h) { h.magic ^= 1; }},
       {"version", [](OutputHeader& h) { ++h.version; }},
@@ -92,13 +92,13 @@ TEST_F(OutputHeaderCheck, rejects_every_field_that_is_out_of_its_bounds) {
   EXPECT_TRUE(accepted());
 }
 
-TEST_F(OutputHeaderCheck, rejects_a_segment_of_any_other_size) {
+TEST_F(OutputHeaderCheck, RejectsASegmentOfAnyOtherSize) {
   for (const std::uint64_t other : {std::uint64_t{0}, size_ - kPageSize, size_ + kPageSize}) {
     EXPECT_EQ(OutputLayout::checked(header_, other).total_size, 0u);
   }
 }
 
-TEST(Entry, holds_a_sequence_and_a_slot_apart) {
+TEST(Entry, HoldsASequenceAndASlotApart) {
   for (const std::uint64_t sequence : {std::uint64_t{0}, std::uint64_t{1}, kSequenceMask}) {
     for (const std::uint32_t slot : {0u, 1u, kMaxSlots}) {
       const Entry entry = make_entry(sequence, slot);
@@ -108,7 +108,7 @@ TEST(Entry, holds_a_sequence_and_a_slot_apart) {
   }
 }
 
-TEST(Hold, holds_a_publisher_and_a_slot_apart_and_is_never_nothing) {
+TEST(Hold, HoldsAPublisherAndASlotApartAndIsNeverNothing) {
   const Hold hold = make_hold(1, 0);
   EXPECT_NE(hold, 0u);
   EXPECT_EQ(publisher_of(make_hold(kSequenceMask, kMaxSlots)), kSequenceMask);

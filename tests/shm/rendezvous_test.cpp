@@ -60,14 +60,14 @@ class Rendezvous : public testing::Test {
   std::map<std::string, std::string> before_;
 };
 
-TEST_F(Rendezvous, an_instance_is_named_by_the_argument_then_the_environment_then_by_default) {
+TEST_F(Rendezvous, AnInstanceIsNamedByTheArgumentThenTheEnvironmentThenByDefault) {
   EXPECT_EQ(instance_name(""), "default");
   setenv("ARBITER_INSTANCE", "lab", 1);
   EXPECT_EQ(instance_name(""), "lab");
   EXPECT_EQ(instance_name("arm-2.b_C"), "arm-2.b_C");
 }
 
-TEST_F(Rendezvous, a_name_that_is_no_plain_file_name_is_refused) {
+TEST_F(Rendezvous, ANameThatIsNoPlainFileNameIsRefused) {
   for (const std::string name : {".", "..", ".hidden", "a/b", "../x", "a b", "a\n", "ä"}) {
     EXPECT_THROW(instance_name(name), std::invalid_argument) << name;
   }
@@ -78,7 +78,7 @@ TEST_F(Rendezvous, a_name_that_is_no_plain_file_name_is_refused) {
   EXPECT_THROW(instance_name(""), std::invalid_argument);
 }
 
-TEST_F(Rendezvous, the_service_managers_directory_goes_before_the_sessions) {
+TEST_F(Rendezvous, TheServiceManagersDirectoryGoesBeforeTheSessions) {
   const std::string given = make("given"), session = make("session");
   setenv("XDG_RUNTIME_DIR", session.c_str(), 1);
   EXPECT_EQ(daemon_directory(), session + "/arbiter");
@@ -86,7 +86,7 @@ TEST_F(Rendezvous, the_service_managers_directory_goes_before_the_sessions) {
   EXPECT_EQ(daemon_directory(), given);
 }
 
-TEST_F(Rendezvous, a_client_looks_in_each_place_where_a_daemon_may_be_in_order) {
+TEST_F(Rendezvous, AClientLooksInEachPlaceWhereADaemonMayBeInOrder) {
   setenv("XDG_RUNTIME_DIR", "/session", 1);
   setenv("RUNTIME_DIRECTORY", "/given:/other", 1);
   const auto directories = client_directories();
@@ -97,7 +97,7 @@ TEST_F(Rendezvous, a_client_looks_in_each_place_where_a_daemon_may_be_in_order) 
   EXPECT_EQ(directories[3], directory_ + "/arbiter-" + std::to_string(geteuid()));
 }
 
-TEST_F(Rendezvous, a_directory_that_others_may_write_in_is_refused) {
+TEST_F(Rendezvous, ADirectoryThatOthersMayWriteInIsRefused) {
   for (const mode_t mode : {0775u, 0757u, 0777u, 01777u}) {
     const std::string unsafe = make("unsafe" + std::to_string(mode), mode);
     setenv("RUNTIME_DIRECTORY", unsafe.c_str(), 1);
@@ -105,7 +105,7 @@ TEST_F(Rendezvous, a_directory_that_others_may_write_in_is_refused) {
   }
 }
 
-TEST_F(Rendezvous, a_link_to_a_directory_or_a_file_in_its_place_is_refused) {
+TEST_F(Rendezvous, ALinkToADirectoryOrAFileInItsPlaceIsRefused) {
   const std::string target = make("target");
   const std::string link = directory_ + "/link";
   ASSERT_EQ(symlink(target.c_str(), link.c_str()), 0);
@@ -113,7 +113,7 @@ TEST_F(Rendezvous, a_link_to_a_directory_or_a_file_in_its_place_is_refused) {
   EXPECT_THAT(refusal([] { daemon_directory(); }), HasSubstr("is not a directory"));
 }
 
-TEST_F(Rendezvous, a_directory_of_another_user_is_refused) {
+TEST_F(Rendezvous, ADirectoryOfAnotherUserIsRefused) {
   if (geteuid() == 0) {
     const std::string theirs = make("theirs");
     ASSERT_EQ(chown(theirs.c_str(), 65534, 65534), 0);
@@ -124,7 +124,7 @@ TEST_F(Rendezvous, a_directory_of_another_user_is_refused) {
   EXPECT_THAT(refusal([] { daemon_directory(); }), HasSubstr("belongs to user"));
 }
 
-TEST_F(Rendezvous, one_listener_at_a_time_and_the_next_one_when_it_is_gone) {
+TEST_F(Rendezvous, OneListenerAtATimeAndTheNextOneWhenItIsGone) {
   {
     const Listener first = listen_at(directory_, "one");
     EXPECT_EQ(first.path, directory_ + "/one.sock");
@@ -135,7 +135,7 @@ TEST_F(Rendezvous, one_listener_at_a_time_and_the_next_one_when_it_is_gone) {
   EXPECT_TRUE(listen_at(directory_, "one").socket) << "the socket file was left behind";
 }
 
-TEST_F(Rendezvous, a_client_finds_the_daemon_of_its_instance_and_no_other) {
+TEST_F(Rendezvous, AClientFindsTheDaemonOfItsInstanceAndNoOther) {
   setenv("RUNTIME_DIRECTORY", directory_.c_str(), 1);
   const Listener listener = listen_at(directory_, "mine");
   std::string why_not;
@@ -144,7 +144,7 @@ TEST_F(Rendezvous, a_client_finds_the_daemon_of_its_instance_and_no_other) {
   EXPECT_EQ(why_not, "");
 }
 
-TEST_F(Rendezvous, paths_longer_than_an_address_work) {
+TEST_F(Rendezvous, PathsLongerThanAnAddressWork) {
   std::string deep = directory_;
   for (int i = 0; i < 4; ++i) {
     deep += "/" + std::string(60, static_cast<char>('a' + i));
@@ -157,7 +157,7 @@ TEST_F(Rendezvous, paths_longer_than_an_address_work) {
   EXPECT_TRUE(connect_to_daemon(instance, why_not).has_value());
 }
 
-TEST_F(Rendezvous, a_directory_that_is_not_there_is_no_error_for_a_client) {
+TEST_F(Rendezvous, ADirectoryThatIsNotThereIsNoErrorForAClient) {
   setenv("RUNTIME_DIRECTORY", (directory_ + "/" + std::string(200, 'x')).c_str(), 1);
   std::string why_not;
   EXPECT_FALSE(connect_to_daemon("nobody-" + std::to_string(getpid()), why_not).has_value());

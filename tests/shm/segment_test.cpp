@@ -31,18 +31,18 @@ class SealedSegment : public testing::Test {
   Mapping mapping_;
 };
 
-TEST_F(SealedSegment, its_owner_writes_on_through_the_mapping_it_has) {
+TEST_F(SealedSegment, ItsOwnerWritesOnThroughTheMappingItHas) {
   mapping_.data()[0] = std::byte{42};
   const Mapping reader(reopen(segment_, O_RDONLY), kSize, Access::kReadOnly);
   EXPECT_EQ(reader.data()[0], std::byte{42});
 }
 
-TEST_F(SealedSegment, cannot_be_mapped_writable_again_not_even_by_its_owner) {
+TEST_F(SealedSegment, CannotBeMappedWritableAgainNotEvenByItsOwner) {
   EXPECT_EQ(map(segment_.get(), PROT_READ | PROT_WRITE), MAP_FAILED);
   EXPECT_THROW(Mapping(segment_, kSize, Access::kReadWrite), std::system_error);
 }
 
-TEST_F(SealedSegment, cannot_be_made_writable_after_it_was_mapped_to_be_read) {
+TEST_F(SealedSegment, CannotBeMadeWritableAfterItWasMappedToBeRead) {
   void* const read_only = map(segment_.get(), PROT_READ);
   ASSERT_NE(read_only, MAP_FAILED);
   EXPECT_NE(mprotect(read_only, kSize, PROT_READ | PROT_WRITE), 0);
@@ -50,35 +50,35 @@ TEST_F(SealedSegment, cannot_be_made_writable_after_it_was_mapped_to_be_read) {
   munmap(read_only, kSize);
 }
 
-TEST_F(SealedSegment, cannot_be_written_by_a_system_call) {
+TEST_F(SealedSegment, CannotBeWrittenByASystemCall) {
   const char byte = 9;
   EXPECT_LT(pwrite(segment_.get(), &byte, 1, 0), 0);
   EXPECT_EQ(errno, EPERM);
 }
 
-TEST_F(SealedSegment, can_neither_shrink_nor_grow) {
+TEST_F(SealedSegment, CanNeitherShrinkNorGrow) {
   EXPECT_NE(ftruncate(segment_.get(), 0), 0);
   EXPECT_NE(ftruncate(segment_.get(), 2 * kSize), 0);
   EXPECT_NE(fallocate(segment_.get(), 0, 0, 2 * kSize), 0);
   EXPECT_EQ(checked_size(segment_, Seals::kOneWriter), kSize);
 }
 
-TEST_F(SealedSegment, takes_no_further_seals_and_gives_none_back) {
+TEST_F(SealedSegment, TakesNoFurtherSealsAndGivesNoneBack) {
   EXPECT_NE(fcntl(segment_.get(), F_ADD_SEALS, F_SEAL_WRITE), 0);
   EXPECT_EQ(errno, EPERM);
 }
 
-TEST_F(SealedSegment, opened_anew_for_writing_it_still_cannot_be_mapped_writable) {
+TEST_F(SealedSegment, OpenedAnewForWritingItStillCannotBeMappedWritable) {
   const FileDescriptor again = reopen(segment_, O_RDWR);
   EXPECT_EQ(map(again.get(), PROT_READ | PROT_WRITE), MAP_FAILED);
 }
 
-TEST_F(SealedSegment, its_memory_can_still_be_allocated) {
+TEST_F(SealedSegment, ItsMemoryCanStillBeAllocated) {
   EXPECT_FALSE(allocate(segment_, 0, kSize));
   EXPECT_TRUE(allocate(segment_, kSize, 1)) << "but not beyond its end";
 }
 
-TEST(Segment, one_handed_out_read_only_cannot_be_mapped_writable) {
+TEST(Segment, OneHandedOutReadOnlyCannotBeMappedWritable) {
   const FileDescriptor page = make_segment("arbiter-test", kSize);
   seal(page, Seals::kFixedSize);
   const FileDescriptor reader = reopen(page, O_RDONLY);
@@ -91,14 +91,14 @@ TEST(Segment, one_handed_out_read_only_cannot_be_mapped_writable) {
   EXPECT_EQ(successor.size(), kSize);
 }
 
-TEST(Segment, its_mode_lets_nobody_else_write) {
+TEST(Segment, ItsModeLetsNobodyElseWrite) {
   const FileDescriptor segment = make_segment("arbiter-test", kSize);
   struct stat status {};
   ASSERT_EQ(fstat(segment.get(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777u, 0644u);
 }
 
-TEST(Segment, of_another_kind_or_without_its_seals_it_is_not_taken) {
+TEST(Segment, OfAnotherKindOrWithoutItsSealsItIsNotTaken) {
   const FileDescriptor unsealed = make_segment("arbiter-test", kSize);
   EXPECT_THROW(checked_size(unsealed, Seals::kFixedSize), std::runtime_error);
   seal(unsealed, Seals::kFixedSize);
@@ -109,7 +109,7 @@ TEST(Segment, of_another_kind_or_without_its_seals_it_is_not_taken) {
   EXPECT_THROW(checked_size(FileDescriptor(), Seals::kFixedSize), std::runtime_error);
 }
 
-TEST(Segment, a_child_does_not_inherit_a_writable_mapping) {
+TEST(Segment, AChildDoesNotInheritAWritableMapping) {
   const FileDescriptor segment = make_segment("arbiter-test", kSize);
   const Mapping writable(segment, kSize, Access::kReadWrite);
   const pid_t child = fork();

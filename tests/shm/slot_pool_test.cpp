@@ -105,20 +105,20 @@ void play_all(std::uint32_t queues, std::uint32_t depth, std::uint32_t max_held,
   }
 }
 
-TEST(SlotPool, the_least_number_of_slots_is_always_enough_for_one_queue) {
+TEST(SlotPool, TheLeastNumberOfSlotsIsAlwaysEnoughForOneQueue) {
   play_all(1, 1, 1, 9);
   play_all(1, 2, 1, 9);
   play_all(1, 1, 2, 8);
   play_all(1, 2, 2, 8);
 }
 
-TEST(SlotPool, the_least_number_of_slots_is_always_enough_for_two_queues) {
+TEST(SlotPool, TheLeastNumberOfSlotsIsAlwaysEnoughForTwoQueues) {
   play_all(2, 1, 1, 6);
   play_all(2, 2, 1, 6);
   play_all(2, 1, 2, 5);
 }
 
-TEST(SlotPool, one_slot_less_is_not_enough) {
+TEST(SlotPool, OneSlotLessIsNotEnough) {
   Play play(1, 1, 1, 0);
   play.publish(play.loan(), 1);
   play.hold(0, 0);
@@ -128,7 +128,7 @@ TEST(SlotPool, one_slot_less_is_not_enough) {
   EXPECT_NE(play.loan(), kNoSlot);
 }
 
-TEST(SlotPool, several_loans_may_be_out_beside_full_queues_and_holds) {
+TEST(SlotPool, SeveralLoansMayBeOutBesideFullQueuesAndHolds) {
   Play play(2, 2, 2, 3);
   for (std::size_t round = 0; round < 50; ++round) {
     std::uint32_t slots[3];
@@ -144,7 +144,7 @@ TEST(SlotPool, several_loans_may_be_out_beside_full_queues_and_holds) {
   }
 }
 
-TEST(SlotPool, the_holds_of_another_publisher_do_not_count) {
+TEST(SlotPool, TheHoldsOfAnotherPublisherDoNotCount) {
   Play play(1, 1, 1, 0);
   play.publish(play.loan(), 1);
   play.publish(play.loan(), 1);
@@ -152,13 +152,13 @@ TEST(SlotPool, the_holds_of_another_publisher_do_not_count) {
   EXPECT_NE(play.loan(), kNoSlot);
 }
 
-TEST(SlotPool, a_loan_that_nobody_accepts_is_free_again) {
+TEST(SlotPool, ALoanThatNobodyAcceptsIsFreeAgain) {
   Play play(1, 1, 1, 1);
   for (int i = 0; i < 100; ++i) play.publish(play.loan(), 0);
   EXPECT_EQ(play.pool().free_count(), play.pool().size());
 }
 
-TEST(SlotPool, growing_keeps_what_is_in_use_and_never_shrinks) {
+TEST(SlotPool, GrowingKeepsWhatIsInUseAndNeverShrinks) {
   Play play(1, 1, 1, 0);
   const std::uint32_t first = play.loan();
   const std::uint32_t before = play.pool().size();

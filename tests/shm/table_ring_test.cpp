@@ -34,14 +34,14 @@ class TableRing : public testing::Test {
   TableReader reader_;
 };
 
-TEST_F(TableRing, before_the_first_model_there_is_no_table) {
+TEST_F(TableRing, BeforeTheFirstModelThereIsNoTable) {
   const TableSnapshot none = reader_.snapshot();
   EXPECT_EQ(none.generation, 0u);
   EXPECT_FALSE(none.table.is_table());
   EXPECT_TRUE(reader_.is_whole(none));
 }
 
-TEST_F(TableRing, a_table_counts_only_once_it_is_put_in_force) {
+TEST_F(TableRing, ATableCountsOnlyOnceItIsPutInForce) {
   writer_.write(std::vector<Word>(table::kHeaderWords, 1));
   EXPECT_EQ(reader_.generation(), 0u);
   EXPECT_EQ(writer_.next_table().source_count(), 1u);
@@ -49,7 +49,7 @@ TEST_F(TableRing, a_table_counts_only_once_it_is_put_in_force) {
   EXPECT_EQ(reader_.generation(), 1u);
 }
 
-TEST_F(TableRing, a_snapshot_is_whole_for_fewer_than_seven_swaps_and_then_not) {
+TEST_F(TableRing, ASnapshotIsWholeForFewerThanSevenSwapsAndThenNot) {
   for (Word before = 1; before <= 2 * kTableSlots; ++before) {
     swap(before);
     const TableSnapshot snapshot = reader_.snapshot();
@@ -65,7 +65,7 @@ TEST_F(TableRing, a_snapshot_is_whole_for_fewer_than_seven_swaps_and_then_not) {
   }
 }
 
-TEST_F(TableRing, the_table_that_is_being_written_is_never_one_that_counts_as_whole) {
+TEST_F(TableRing, TheTableThatIsBeingWrittenIsNeverOneThatCountsAsWhole) {
   swap(1);
   const TableSnapshot snapshot = reader_.snapshot();
   for (Word swaps = 0; swaps < kTableSlots; ++swaps) {
@@ -77,7 +77,7 @@ TEST_F(TableRing, the_table_that_is_being_written_is_never_one_that_counts_as_wh
   }
 }
 
-TEST_F(TableRing, the_offset_to_allocate_is_that_of_the_next_table) {
+TEST_F(TableRing, TheOffsetToAllocateIsThatOfTheNextTable) {
   for (int i = 0; i < 10; ++i) {
     const auto* next = reinterpret_cast<const std::byte*>(&board_) + writer_.next_offset();
     writer_.write(std::vector<Word>{0xabcd});

@@ -56,7 +56,7 @@ class Wire : public testing::Test {
   Received received_;
 };
 
-TEST_F(Wire, a_message_arrives_as_it_was_sent) {
+TEST_F(Wire, AMessageArrivesAsItWasSent) {
   Message message;
   message.kind = MessageKind::kOpenOutput;
   message.flags = 3;
@@ -77,7 +77,7 @@ TEST_F(Wire, a_message_arrives_as_it_was_sent) {
   EXPECT_EQ(received_.descriptor_count, 2u);
 }
 
-TEST_F(Wire, what_a_message_leaves_out_is_empty_whatever_came_before_it) {
+TEST_F(Wire, WhatAMessageLeavesOutIsEmptyWhateverCameBeforeIt) {
   Message first;
   first.set_name("/a");
   first.set_text("a long explanation");
@@ -91,7 +91,7 @@ TEST_F(Wire, what_a_message_leaves_out_is_empty_whatever_came_before_it) {
   EXPECT_FALSE(received_.descriptors[0]);
 }
 
-TEST_F(Wire, names_and_texts_of_any_length_are_cut_and_ended) {
+TEST_F(Wire, NamesAndTextsOfAnyLengthAreCutAndEnded) {
   const std::string endless(5000, 'x');
   Message message;
   message.set_name(endless);
@@ -104,7 +104,7 @@ TEST_F(Wire, names_and_texts_of_any_length_are_cut_and_ended) {
   EXPECT_EQ(received_.message.type.type_name().size(), kMaxTypeName);
 }
 
-TEST_F(Wire, a_name_without_an_end_is_given_one) {
+TEST_F(Wire, ANameWithoutAnEndIsGivenOne) {
   Message message;
   std::memset(message.name, 'n', sizeof message.name);
   std::memset(message.text, 't', sizeof message.text);
@@ -116,7 +116,7 @@ TEST_F(Wire, a_name_without_an_end_is_given_one) {
   EXPECT_EQ(received_.message.type.name[kMaxTypeName], '\0');
 }
 
-TEST_F(Wire, a_message_cut_before_its_fixed_part_ends_is_malformed) {
+TEST_F(Wire, AMessageCutBeforeItsFixedPartEndsIsMalformed) {
   const Message message;
   for (std::size_t size = 1; size < offsetof(Message, type); ++size) {
     send_raw(&message, size);
@@ -129,13 +129,13 @@ TEST_F(Wire, a_message_cut_before_its_fixed_part_ends_is_malformed) {
   }
 }
 
-TEST_F(Wire, a_message_that_is_too_long_is_malformed) {
+TEST_F(Wire, AMessageThatIsTooLongIsMalformed) {
   const std::vector<std::byte> bytes(sizeof(Message) + 1);
   send_raw(bytes.data(), bytes.size());
   EXPECT_EQ(receive(), ReceiveResult::kMalformed);
 }
 
-TEST_F(Wire, descriptors_that_were_not_asked_for_are_closed) {
+TEST_F(Wire, DescriptorsThatWereNotAskedForAreClosed) {
   const std::size_t before = open_descriptors();
   const Message message;
   for (const std::size_t descriptors : {3u, 4u, 10u, 253u}) {
@@ -150,17 +150,15 @@ TEST_F(Wire, descriptors_that_were_not_asked_for_are_closed) {
   EXPECT_EQ(open_descriptors(), before);
 }
 
-TEST_F(Wire, descriptors_are_not_inherited_by_a_program_that_is_started) {
+TEST_F(Wire, DescriptorsAreNotInheritedByAProgramThatIsStarted) {
   ASSERT_EQ(send_message(sender_.get(), {}, {sender_.get(), -1}), SendResult::kSent);
   ASSERT_EQ(receive(), ReceiveResult::kReceived);
   EXPECT_NE(fcntl(received_.descriptors[0].get(), F_GETFD) & FD_CLOEXEC, 0);
 }
 
-TEST_F(Wire, with_nothing_to_receive_it_does_not_block) {
-  EXPECT_EQ(receive(), ReceiveResult::kNothing);
-}
+TEST_F(Wire, WithNothingToReceiveItDoesNotBlock) { EXPECT_EQ(receive(), ReceiveResult::kNothing); }
 
-TEST_F(Wire, a_socket_that_nobody_reads_gets_full_and_goes_on_later) {
+TEST_F(Wire, ASocketThatNobodyReadsGetsFullAndGoesOnLater) {
   SendResult result = SendResult::kSent;
   int sent = 0;
   while ((result = send_message(sender_.get(), {})) == SendResult::kSent) ++sent;
@@ -169,7 +167,7 @@ TEST_F(Wire, a_socket_that_nobody_reads_gets_full_and_goes_on_later) {
   EXPECT_EQ(send_message(sender_.get(), {}), SendResult::kSent);
 }
 
-TEST_F(Wire, a_peer_that_is_gone_is_told_apart_and_raises_no_signal) {
+TEST_F(Wire, APeerThatIsGoneIsToldApartAndRaisesNoSignal) {
   receiver_.reset();
   EXPECT_EQ(send_message(sender_.get(), {}), SendResult::kClosed);
   EXPECT_EQ(receive_message(sender_.get(), received_, true), ReceiveResult::kClosed);

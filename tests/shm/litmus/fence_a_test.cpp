@@ -101,14 +101,14 @@ int rounds_in_which_both_missed() {
 
 #ifdef ARBITER_WITHOUT_FENCE
 
-TEST(FenceA, without_it_this_machine_lets_both_miss) {
+TEST(FenceA, WithoutItThisMachineLetsBothMiss) {
   std::printf("without fence (a) both missed in %d of %d rounds\n", rounds_in_which_both_missed(),
               kRounds);
 }
 
 #else
 
-TEST(FenceA, of_two_that_stamp_at_once_at_least_one_sees_the_other) {
+TEST(FenceA, OfTwoThatStampAtOnceAtLeastOneSeesTheOther) {
   EXPECT_EQ(rounds_in_which_both_missed(), 0);
 }
 

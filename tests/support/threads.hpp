@@ -41,19 +41,25 @@ inline std::uint64_t sleeps_of(pid_t process, pid_t task) {
   return 0;
 }
 
-// What a task sleeps in, as a system call's number; -1: it runs.
+// What a task sleeps in, as a system call's number; -1: it runs; -2: we are not told.
 inline long call_of(pid_t process, pid_t task) {
   std::ifstream file("/proc/" + std::to_string(process) + "/task/" + std::to_string(task) +
                      "/syscall");
   std::string word;
   file >> word;
-  return word.empty() || word == "running" ? -1 : std::stol(word);
+  if (word.empty()) return -2;
+  return word == "running" ? -1 : std::stol(word);
 }
 
-// Returns once the task sleeps in poll().
-inline void wait_until_it_polls(pid_t process, pid_t task) {
-  while (call_of(process, task) != SYS_ppoll || state_of(process, task) != 'S') {
+// Returns once the task sleeps in that system call.
+inline void wait_until_it_sleeps_in(long call, pid_t process, pid_t task) {
+  for (;;) {
+    const long now = call_of(process, task);
+    if ((now == call || now == -2) && state_of(process, task) == 'S') return;
   }
+}
+inline void wait_until_it_polls(pid_t process, pid_t task) {
+  wait_until_it_sleeps_in(SYS_ppoll, process, task);
 }
 
 class Watched {

@@ -1,0 +1,278 @@
+// Clients that say anything but what they should: they are refused or dropped, and nobody else
+// notices.
+#include <gtest/gtest.h>
+#include <sys/eventfd.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+
+#include <random>
+#include <thread>
+
+#include <arbiter/arbiter.hpp>
+
+#include "shm/input_segment.hpp"
+#include "shm/output_segment.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using shm::MessageKind;
+
+const std::string kModel =
+    "<behaviors><arbiter at='/in'><select from='/out'/></arbiter></behaviors>";
+
+// A daemon with two components that go on as if nothing were the matter.
+class HostileClient : public testing::Test {
+ protected:
+  void TearDown() override {
+    EXPECT_EQ(out_.publish(7).delivered, 1u);
+    auto sample = in_.take();
+    ASSERT_TRUE(sample);
+    EXPECT_EQ(**sample, 7);
+    Node newcomer("newcomer");
+    auto port = newcomer.output_port<int>("/newcomer");
+  }
+
+  RawClient client() {
+    RawClient result(daemon_.instance());
+    result.hello("hostile");
+    return result;
+  }
+  std::string refusal(const shm::Message& message, RawClient::Descriptors descriptors = {-1, -1}) {
+    RawClient hostile = client();
+    hostile.send(message, descriptors);
+    return hostile.expect_refusal();
+  }
+
+  Daemon daemon_{kModel};
+  Node node_{"good"};
+  OutputPort<int> out_ = node_.output_port<int>("/out");
+  InputPort<int> in_ = node_.input_port<int>("/in");
+};
+
+shm::FileDescriptor output_segment(shm::TypeInfo type, std::uint32_t slots = 4) {
+  const auto layout = shm::OutputLayout::plan(type, slots);
+  auto segment = shm::make_segment("test", layout.total_size);
+  const shm::Mapping mapping(segment, layout.total_size, shm::Access::kReadWrite);
+  auto& header = *mapping.as<shm::OutputHeader>();
+  header.magic = shm::OutputHeader::kMagic;
+  header.version = shm::OutputHeader::kVersion;
+  header.slot_count = slots;
+  header.type = type;
+  return segment;
+}
+
+shm::Message open_output(const std::string& name) {
+  auto message = RawClient::message(MessageKind::kOpenOutput, name);
+  message.type.size = 8;
+  return message;
+}
+
+TEST_F(HostileClient, ThatSendsNoiseIsDropped) {
+  std::mt19937 random(20251121);
+  for (int round = 0; round < 100; ++round) {
+    RawClient hostile(daemon_.instance());
+    std::vector<unsigned char> noise(random() % 3000 + 1);
+    for (auto& byte : noise) byte = static_cast<unsigned char>(random());
+    hostile.send_bytes(noise.data(), noise.size());
+    shm::Received received;
+    while (hostile.receive(received)) {
+      ASSERT_EQ(received.message.kind, MessageKind::kRefused);
+      break;
+    }
+  }
+}
+
+TEST_F(HostileClient, ThatSendsRandomMessagesAfterItsHelloHarmsNobody) {
+  std::mt19937_64 random(4711);
+  for (int round = 0; round < 50; ++round) {
+    RawClient hostile = client();
+    for (int i = 0; i < 40; ++i) {
+      shm::Message message;
+      message.kind = static_cast<MessageKind>(random() % 12);
+      message.flags = static_cast<std::uint32_t>(random());
+      message.request = random() % 8;
+      message.port = random() % 12;
+      message.peer = random() % 12;
+      message.id = static_cast<std::uint32_t>(random() % 8);
+      message.value = static_cast<std::uint32_t>(random());
+      if (random() % 2 == 0) message.set_name(random() % 2 == 0 ? "/out" : "/in");
+      if (random() % 4 == 0) message.set_text("why not");
+      if (hostile.send(message) != shm::SendResult::kSent) break;
+    }
+  }
+}
+
+TEST_F(HostileClient, ThatSendsTruncatedOrOversizedMessagesIsDropped) {
+  for (const std::size_t size : {std::size_t{1}, std::size_t{7}, sizeof(shm::Message) + 1,
+                                 std::size_t{60000}}) {
+    RawClient hostile = client();
+    const std::vector<char> bytes(size, 3);
+    hostile.send_bytes(bytes.data(), bytes.size());
+    EXPECT_TRUE(hostile.is_hung_up_on()) << size;
+  }
+}
+
+TEST_F(HostileClient, MustSayHelloFirstAndOnce) {
+  RawClient hostile(daemon_.instance());
+  hostile.send(open_output("/x"));
+  EXPECT_NE(hostile.expect_refusal().find("hello first"), std::string::npos);
+  hostile.hello();
+  hostile.send(RawClient::message(MessageKind::kHello, "again"));
+  EXPECT_NE(hostile.expect_refusal().find("hello once"), std::string::npos);
+}
+
+TEST_F(HostileClient, OfAnotherVersionIsToldSo) {
+  RawClient hostile(daemon_.instance());
+  auto hello = RawClient::message(MessageKind::kHello, "old");
+  hello.value = shm::kWireVersion + 1;
+  hostile.send(hello);
+  EXPECT_NE(hostile.expect_refusal().find("speaks version"), std::string::npos);
+}
+
+TEST_F(HostileClient, CannotTakeANameThatBreaksALine) {
+  for (const std::string name : {"/a\nb", "/a b", "x", ""}) {
+    const auto segment = output_segment({});
+    shm::seal(segment, shm::Seals::kOneWriter);
+    const std::string why = refusal(open_output(name), {segment.get(), -1});
+    EXPECT_NE(why.find("a port's name"), std::string::npos) << why;
+  }
+}
+
+TEST_F(HostileClient, CannotOpenAPortWithoutASegment) {
+  EXPECT_NE(refusal(open_output("/x")).find("0 descriptors instead of 1"), std::string::npos);
+  EXPECT_NE(refusal(RawClient::message(MessageKind::kOpenInput, "/x")).find("instead of 2"),
+            std::string::npos);
+}
+
+TEST_F(HostileClient, CannotPassOtherKindsOfDescriptorsForASegment) {
+  int ends[2];
+  ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+  const shm::FileDescriptor read_end(ends[0]);
+  const shm::FileDescriptor write_end(ends[1]);
+  const shm::FileDescriptor null(::open("/dev/zero", O_RDWR | O_CLOEXEC));
+  const shm::FileDescriptor event(::eventfd(0, EFD_CLOEXEC));
+  const shm::FileDescriptor directory(::open("/", O_RDONLY | O_CLOEXEC));
+  const auto unsealed = output_segment({});
+  const auto half_sealed = output_segment({});
+  shm::seal(half_sealed, shm::Seals::kFixedSize);
+  const auto empty = shm::make_segment("empty", 0);
+  shm::seal(empty, shm::Seals::kOneWriter);
+  const auto zeros = shm::make_segment("zeros", 1 << 20);
+  shm::seal(zeros, shm::Seals::kOneWriter);
+  for (const int fd : {write_end.get(), read_end.get(), null.get(), event.get(), directory.get(),
+                       unsealed.get(), half_sealed.get(), empty.get(), zeros.get()}) {
+    EXPECT_NE(refusal(open_output("/x"), {fd, -1}), "(hung up)");
+    EXPECT_NE(refusal(RawClient::message(MessageKind::kOpenInput, "/x"), {fd, write_end.get()}),
+              "(hung up)");
+  }
+}
+
+TEST_F(HostileClient, CannotPassAnotherThingForABell) {
+  const auto segment = shm::make_segment("input", sizeof(shm::InputSegment));
+  {
+    const shm::Mapping mapping(segment, sizeof(shm::InputSegment), shm::Access::kReadWrite);
+    auto& header = mapping.as<shm::InputSegment>()->header;
+    header.magic = shm::InputHeader::kMagic;
+    header.version = shm::InputHeader::kVersion;
+    header.depth = 1;
+    header.max_held = 1;
+  }
+  shm::seal(segment, shm::Seals::kOneWriter);
+  const shm::FileDescriptor event(::eventfd(0, EFD_CLOEXEC));
+  const std::string why =
+      refusal(RawClient::message(MessageKind::kOpenInput, "/x"), {segment.get(), event.get()});
+  EXPECT_NE(why.find("the bell is not a pipe"), std::string::npos) << why;
+}
+
+TEST_F(HostileClient, CannotClaimALayoutThatItsSegmentDoesNotHave) {
+  shm::TypeInfo type;
+  type.size = 64;
+  for (int what = 0; what < 4; ++what) {
+    const auto segment = output_segment(type);
+    {
+      const auto size = shm::OutputLayout::plan(type, 4).total_size;
+      const shm::Mapping mapping(segment, size, shm::Access::kReadWrite);
+      auto& header = *mapping.as<shm::OutputHeader>();
+      if (what == 0) header.slot_count = 60000;
+      if (what == 1) header.type.size = ~std::uint64_t{0};
+      if (what == 2) header.type.alignment = 3;
+      if (what == 3) header.version = 99;
+    }
+    shm::seal(segment, shm::Seals::kOneWriter);
+    EXPECT_NE(refusal(open_output("/x"), {segment.get(), -1}).find("segment"), std::string::npos);
+  }
+}
+
+TEST_F(HostileClient, CannotCloseOrRefuseOthersPorts) {
+  RawClient hostile = client();
+  for (shm::PortInstance port = 0; port < 10; ++port) {
+    auto close = RawClient::message(MessageKind::kClosePort);
+    close.port = port;
+    hostile.send(close);
+    for (shm::PortInstance peer = 0; peer < 10; ++peer) {
+      auto refuse = RawClient::message(MessageKind::kPeerRefused);
+      refuse.port = port;
+      refuse.peer = peer;
+      hostile.send(refuse);
+    }
+  }
+  EXPECT_EQ(hostile.status()["inputs"][0]["connections"][0]["state"], "connected");
+}
+
+TEST_F(HostileClient, CannotDeactivateASourceThatALiveComponentHas) {
+  EXPECT_NE(refusal(RawClient::message(MessageKind::kDeactivate, "/out")).find("held by"),
+            std::string::npos);
+  EXPECT_NE(refusal(RawClient::message(MessageKind::kDeactivate, "/nobody")).find("/nobody"),
+            std::string::npos);
+}
+
+// The port's name is asked for twice by the same client, which is dead by the time that the second
+// request is read.
+TEST_F(HostileClient, ThatAsksTwiceForANameAndHangsUpHarmsNobody) {
+  for (int round = 0; round < 20; ++round) {
+    RawClient hostile = client();
+    const auto segment = output_segment({});
+    shm::seal(segment, shm::Seals::kOneWriter);
+    for (int i = 0; i < 5; ++i) hostile.send(open_output("/twice"), {segment.get(), -1});
+  }
+}
+
+TEST_F(HostileClient, ThatNeverReadsIsGivenUpAndHoldsUpNobody) {
+  RawClient deaf = client();
+  const auto segment = output_segment({});
+  shm::seal(segment, shm::Seals::kOneWriter);
+  deaf.send(open_output("/deaf"), {segment.get(), -1});
+  auto observe = RawClient::message(MessageKind::kObserve);
+  deaf.send(observe);
+  // Each of these is told to the one who observes: far more than a socket takes.
+  for (int i = 0; i < 300; ++i) {
+    auto port = node_.input_port<int>("/many" + std::to_string(i));
+  }
+  EXPECT_EQ(daemon_.source("/deaf")["open"], true);
+}
+
+TEST_F(HostileClient, ThatAsksWithoutEndLetsOthersBeServed) {
+  std::atomic<bool> stop{false};
+  std::thread flood([&] {
+    RawClient hostile = client();
+    const auto status = RawClient::message(MessageKind::kClosePort);
+    while (!stop) hostile.send(status);
+  });
+  for (int i = 0; i < 50; ++i) {
+    Node node("busy");
+    auto port = node.output_port<int>("/busy");
+  }
+  stop = true;
+  flood.join();
+}
+
+TEST_F(HostileClient, ThatConnectsAndSaysNothingHarmsNobody) {
+  std::vector<RawClient> silent;
+  for (int i = 0; i < 200; ++i) silent.emplace_back(daemon_.instance());
+  Node node("test");
+}
+
+}  // namespace
+}  // namespace arbiter::test

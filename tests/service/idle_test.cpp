@@ -1,0 +1,107 @@
+// A daemon that nobody asks anything uses no processor time: it sleeps, with no time set for waking.
+#include <gtest/gtest.h>
+#include <sys/syscall.h>
+
+#include <filesystem>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/support/daemon.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/threads.hpp"
+
+namespace arbiter::test {
+namespace {
+
+std::vector<pid_t> tasks_of(pid_t process) {
+  std::vector<pid_t> tasks;
+  for (const auto& entry :
+       std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task")) {
+    tasks.push_back(std::stoi(entry.path().filename()));
+  }
+  return tasks;
+}
+
+// All of them sleep, and none has been awake since, though much has gone on elsewhere meanwhile.
+void expect_asleep(pid_t process) {
+  for (const pid_t task : tasks_of(process)) {
+    wait_until_it_sleeps_in(SYS_epoll_wait, process, task);
+    const auto before = sleeps_of(process, task);
+    std::ifstream file("/proc/" + std::to_string(process) + "/task/" + std::to_string(task) +
+                       "/syscall");
+    std::string call, epoll, events, count, timeout;
+    file >> call >> epoll >> events >> count >> timeout;
+    if (file) {
+      EXPECT_EQ(timeout.substr(timeout.size() - 8), "ffffffff") << "it would wake by itself";
+    }
+    for (int i = 0; i < 20; ++i) EXPECT_EQ(run_program({"/bin/true"}).exit_code, 0);
+    EXPECT_EQ(sleeps_of(process, task), before);
+  }
+}
+
+TEST(Idle, ADaemonThatNobodyRegistersWithSleeps) {
+  Daemon daemon;
+  expect_asleep(daemon.process().pid());
+}
+
+TEST(Idle, ItSleepsWhileComponentsExchangeData) {
+  Daemon daemon("<behaviors><arbiter at='/in'><select from='/out'/></arbiter></behaviors>");
+  Node node("test");
+  auto out = node.output_port<int>("/out");
+  auto in = node.input_port<int>("/in");
+  const pid_t process = daemon.process().pid();
+  wait_until_it_sleeps_in(SYS_epoll_wait, process, process);
+  const auto before = sleeps_of(process, process);
+  for (int i = 0; i < 10000; ++i) {
+    EXPECT_EQ(out.publish(i).delivered, 1u);
+    EXPECT_TRUE(in.take());
+  }
+  EXPECT_EQ(sleeps_of(process, process), before);
+  expect_asleep(process);
+}
+
+TEST(Idle, ItSleepsAgainWhenEverybodyHasLeft) {
+  Daemon daemon;
+  for (int i = 0; i < 3; ++i) {
+    Node node("test");
+    auto out = node.output_port<int>("/out");
+    auto in = node.input_port<int>("/in");
+  }
+  while (daemon.status()["clients"] != 1) {
+  }
+  expect_asleep(daemon.process().pid());
+}
+
+TEST(Idle, NoDescriptorIsLeftWhenEverybodyHasLeft) {
+  Daemon daemon("<behaviors><arbiter at='/in'><select from='/out'>not /stop</select></arbiter>"
+                "</behaviors>");
+  const auto come_and_go = [&] {
+    Node node("test");
+    auto out = node.output_port<int>("/out");
+    auto stop = node.output_port<int>("/stop");
+    auto in = node.input_port<int>("/in");
+    out.publish(1);
+  };
+  const auto count = [&] {
+    while (daemon.status()["clients"] != 1) {
+    }
+    for (;;) {  // the one that asked leaves too
+      const auto first = daemon.open_descriptors();
+      if (daemon.status()["clients"] == 1 && daemon.open_descriptors() == first) return first;
+    }
+  };
+  come_and_go();
+  const auto before = count();
+  for (int i = 0; i < 50; ++i) come_and_go();
+  EXPECT_LE(count(), before + 1) << "one that is asking may count";
+}
+
+TEST(Idle, AReloadLeavesNoDescriptorBehind) {
+  Daemon daemon;
+  const auto before = daemon.open_descriptors();
+  for (int i = 0; i < 20; ++i) daemon.load(kNoRules);
+  EXPECT_LE(daemon.open_descriptors(), before + 1);
+}
+
+}  // namespace
+}  // namespace arbiter::test

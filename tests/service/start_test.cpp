@@ -1,0 +1,224 @@
+// How arbiterd starts and stops, and what it tells whoever started it.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/support/daemon.hpp"
+#include "tests/support/run_program.hpp"
+
+namespace arbiter::test {
+namespace {
+
+ProgramResult arbiterd(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), arbiterd_path());
+  return run_program(arguments);
+}
+
+// Starts a daemon that must not become ready; tells its exit code and what it said.
+std::pair<int, std::string> start_in_vain(const std::vector<std::string>& arguments,
+                                          const Environment& environment) {
+  const TemporaryDirectory directory;
+  NotifySocket notify(directory.path() + "/notify");
+  const std::string log_path = directory.write("log", "");
+  const shm::FileDescriptor log(::open(log_path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
+  std::vector<std::string> argv{arbiterd_path()};
+  argv.insert(argv.end(), arguments.begin(), arguments.end());
+  Environment all = environment;
+  all["NOTIFY_SOCKET"] = notify.path();
+  ChildProcess daemon(argv, all, {-1, -1, log.get()});
+  EXPECT_FALSE(notify.wait_for("READY=1", daemon));
+  const int code = daemon.wait();
+  std::ifstream file(log_path);
+  return {code, std::string(std::istreambuf_iterator<char>(file), {})};
+}
+
+TEST(Start, TellsTheServiceManagerThatItIsReadyAndThatItStops) {
+  Daemon daemon;  // whose constructor has waited for READY=1
+  daemon.process().signal(SIGTERM);
+  EXPECT_TRUE(daemon.notify().wait_for("STOPPING=1", daemon.process()));
+  EXPECT_EQ(daemon.process().wait(), 0);
+}
+
+TEST(Start, StopsOnAnInterruptToo) {
+  Daemon daemon;
+  daemon.process().signal(SIGINT);
+  EXPECT_EQ(daemon.process().wait(), 0);
+}
+
+TEST(Start, LeavesNoSocketBehind) {
+  Daemon daemon;
+  EXPECT_TRUE(std::filesystem::exists(daemon.socket_path()));
+  EXPECT_EQ(daemon.terminate(), 0);
+  EXPECT_FALSE(std::filesystem::exists(daemon.socket_path()));
+  daemon.restart();
+}
+
+TEST(Start, StopsCleanlyWhileComponentsHavePorts) {
+  Daemon daemon("<behaviors><arbiter at='/in'><select from='/out'/></arbiter></behaviors>");
+  Node node("test");
+  auto out = node.output_port<int>("/out");
+  auto in = node.input_port<int>("/in");
+  EXPECT_EQ(daemon.terminate(), 0);
+  EXPECT_THROW(
+      {
+        // The node may learn of it while it asks.
+        auto other = node.output_port<int>("/other");
+      },
+      Error);
+  EXPECT_EQ(out.publish(1).delivered, 1u);
+  EXPECT_TRUE(in.take());
+}
+
+TEST(Start, TakesOverTheSocketOfADaemonThatWasKilled) {
+  Daemon daemon;
+  daemon.kill();
+  EXPECT_TRUE(std::filesystem::exists(daemon.socket_path()));
+  daemon.restart();
+  Node node("test");
+}
+
+TEST(Start, RefusesASecondDaemonOfTheSameInstance) {
+  Daemon daemon;
+  const auto [code, log] = start_in_vain({"--instance", daemon.instance()}, {});
+  EXPECT_EQ(code, 1);
+  EXPECT_NE(log.find("a daemon of instance \"test\" is running already"), std::string::npos) << log;
+  Node node("test");  // the first is not disturbed
+}
+
+TEST(Start, TwoInstancesLiveSideBySide) {
+  Daemon one(kNoRules, {.instance = "one"});
+  Daemon two(kNoRules, {.instance = "two"});
+  Node in_one("test", {.instance = "one"});
+  Node in_two("test", {.instance = "two"});
+  auto here = in_one.output_port<int>("/out");
+  auto there = in_two.output_port<int>("/out");
+  EXPECT_TRUE(one.source("/out")["open"]);
+  EXPECT_TRUE(two.source("/out")["open"]);
+}
+
+TEST(Start, TakesItsInstanceFromTheEnvironment) {
+  const TemporaryDirectory runtime;
+  const ScopedVariable directory("XDG_RUNTIME_DIR", runtime.path());
+  const ScopedVariable none("RUNTIME_DIRECTORY", std::nullopt);
+  for (const auto& [variable, socket] :
+       std::vector<std::pair<std::optional<std::string>, std::string>>{
+           {"from-environment", "from-environment.sock"}, {std::nullopt, "default.sock"}}) {
+    NotifySocket notify(runtime.path() + "/" + socket + ".notify");
+    ChildProcess daemon({arbiterd_path(), "--log-level", "error"},
+                        {{"NOTIFY_SOCKET", notify.path()}, {"ARBITER_INSTANCE", variable}}, {});
+    ASSERT_TRUE(notify.wait_for("READY=1", daemon));
+    EXPECT_TRUE(std::filesystem::exists(runtime.path() + "/arbiter/" + socket));
+    daemon.signal(SIGTERM);
+    EXPECT_EQ(daemon.wait(), 0);
+  }
+}
+
+TEST(Start, ABadModelEndsItBeforeItIsReady) {
+  const TemporaryDirectory directory;
+  const Environment runtime{{"XDG_RUNTIME_DIR", directory.path()}};
+  const std::vector<std::pair<std::string, std::string>> models{
+      {"empty.xml", ""},
+      {"malformed.xml", "<behaviors>"},
+      {"conflict.xml",
+       "<behaviors><arbiter at='/in'><select from='/a'/><select from='/b'/></arbiter></behaviors>"}};
+  for (const auto& [name, text] : models) {
+    const std::string path = directory.write(name, text);
+    const auto [code, log] = start_in_vain({"--model", path}, runtime);
+    EXPECT_EQ(code, 1) << name;
+    EXPECT_NE(log.find(path + ":1:"), std::string::npos) << log;
+  }
+  const auto [code, log] = start_in_vain({"--model", directory.path() + "/none.xml"}, runtime);
+  EXPECT_EQ(code, 1);
+  EXPECT_NE(log.find("none.xml"), std::string::npos) << log;
+  EXPECT_FALSE(std::filesystem::exists(directory.path() + "/arbiter/default.sock"));
+}
+
+TEST(Start, SeveralFilesFormOneModel) {
+  const TemporaryDirectory directory;
+  const auto first = directory.write(
+      "a.xml", "<behaviors><behavior name='A'><config at='/in'>/a</config></behavior></behaviors>");
+  const auto second = directory.write(
+      "b.xml",
+      "<behaviors><behavior name='B'><config at='/in'>/b</config><inhibition>A</inhibition>"
+      "</behavior></behaviors>");
+  Daemon daemon("", {.arguments = {"--model", first, second}, .without_model = true});
+  EXPECT_EQ(daemon.input("/in")["connections"].size(), 2u);
+}
+
+TEST(Start, WrongUsageIsExitCodeTwo) {
+  EXPECT_EQ(arbiterd({"--nonsense"}).exit_code, 2);
+  EXPECT_EQ(arbiterd({"--log-level", "loud"}).exit_code, 2);
+  const auto instance = arbiterd({"--instance", "../x"});
+  EXPECT_EQ(instance.exit_code, 2);
+  EXPECT_NE(instance.err.find("\"../x\" is not a name for an instance"), std::string::npos);
+}
+
+TEST(Start, ItsHelpAndItsVersionGoToStandardOutput) {
+  const auto help = arbiterd({"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  for (const char* option : {"--model", "--application", "--instance"}) {
+    EXPECT_NE(help.out.find(option), std::string::npos) << option;
+  }
+  const auto version = arbiterd({"--version"});
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_EQ(version.out.rfind("arbiterd ", 0), 0u);
+}
+
+TEST(Start, RunsUnprivileged) {
+  const std::string setpriv = "/usr/bin/setpriv";
+  if (::geteuid() != 0 || !std::filesystem::exists(setpriv)) {
+    GTEST_SKIP() << "this test runs as a user without privileges anyhow";
+  }
+  const TemporaryDirectory directory;
+  ASSERT_EQ(::chown(directory.path().c_str(), 65534, 65534), 0);
+  NotifySocket notify(directory.path() + "/notify");
+  ASSERT_EQ(::chmod(notify.path().c_str(), 0777), 0);
+  const std::string copy = directory.path() + "/arbiterd";  // where that user may read it
+  std::filesystem::copy_file(arbiterd_path(), copy);
+  ChildProcess daemon(
+      {setpriv, "--reuid=65534", "--regid=65534", "--clear-groups", copy, "--log-level", "error"},
+      {{"NOTIFY_SOCKET", notify.path()},
+       {"XDG_RUNTIME_DIR", directory.path()},
+       {"RUNTIME_DIRECTORY", std::nullopt},
+       {"ARBITER_INSTANCE", std::nullopt}},
+      {});
+  ASSERT_TRUE(notify.wait_for("READY=1", daemon));
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0);
+}
+
+TEST(Start, AHangUpReadsTheFilesAgain) {
+  Daemon daemon(kNoRules);
+  EXPECT_EQ(daemon.generation(), 1u);
+  daemon.load("<behaviors><arbiter at='/in'><select from='/a'/></arbiter></behaviors>");
+  EXPECT_EQ(daemon.generation(), 2u);
+  EXPECT_EQ(daemon.input("/in")["connections"].size(), 1u);
+  daemon.load_bad("<behaviors><arbiter at='/in'/>");
+  EXPECT_EQ(daemon.generation(), 2u);
+  EXPECT_EQ(daemon.refused(), 1u);
+  EXPECT_EQ(daemon.input("/in")["connections"].size(), 1u);
+  EXPECT_NE(daemon.log().find("the model in force stays"), std::string::npos);
+}
+
+TEST(Start, AHangUpReadsTheApplicationAgainToo) {
+  const auto connect = [](const std::string& from) {
+    return "<application><connection><from>" + from +
+           "</from><to>/in</to></connection></application>";
+  };
+  Daemon daemon(kNoRules, {.application = connect("/a")});
+  daemon.write_application(connect("/b"));
+  daemon.load(kNoRules);
+  EXPECT_EQ(daemon.input("/in")["connections"][0]["source"], "/b");
+}
+
+TEST(Start, AHangUpWithoutAModelIsHarmless) {
+  Daemon daemon("", {.without_model = true});
+  daemon.hang_up();
+  EXPECT_EQ(daemon.generation(), 0u);
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,106 @@
+// The status document: what it says of ports and connections.
+#include <gtest/gtest.h>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+const std::string kModel =
+    "<behaviors timeout='forever'><arbiter at='/in'>"
+    "<select from='/low'>not /high and not /stop</select><select from='/high'/>"
+    "</arbiter></behaviors>";
+
+TEST(Status, TellsWhatAModelNamesThoughNobodyIsThere) {
+  Daemon daemon(kModel);
+  const auto status = daemon.status();
+  EXPECT_EQ(status["instance"], "test");
+  EXPECT_EQ(status["pid"], daemon.process().pid());
+  EXPECT_EQ(status["model"]["generation"], 1);
+  EXPECT_EQ(status["sources"].size(), 3u);
+  ASSERT_EQ(status["inputs"].size(), 1u);
+  const auto in = status["inputs"][0];
+  EXPECT_EQ(in["open"], false);
+  EXPECT_EQ(in["idle"], true);
+  EXPECT_EQ(in["winner"], nullptr);
+  EXPECT_EQ(in["connections"].size(), 2u);
+  EXPECT_EQ(in["connections"][0]["state"], "both ends closed");
+  ASSERT_EQ(in["senses"].size(), 1u);
+  EXPECT_EQ(in["senses"][0]["source"], "/stop");
+}
+
+TEST(Status, TellsWhichEndIsMissing) {
+  Daemon daemon(kModel);
+  Node node("test");
+  {
+    auto low = node.output_port<int>("/low");
+    EXPECT_EQ(daemon.connection("/low", "/in")["state"], "input port closed");
+    auto in = node.input_port<int>("/in");
+    EXPECT_EQ(daemon.connection("/low", "/in")["state"], "connected");
+  }
+  auto in = node.input_port<int>("/in");
+  EXPECT_EQ(daemon.connection("/low", "/in")["state"], "output port closed");
+}
+
+TEST(Status, TellsWhoWinsAndWhoIsActive) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  auto in = node.input_port<int>("/in");
+  low.signal();
+  EXPECT_EQ(daemon.input("/in")["winner"], "/low");
+  EXPECT_EQ(daemon.connection("/low", "/in")["winner"], true);
+  high.signal();
+  EXPECT_EQ(daemon.input("/in")["winner"], "/high");
+  EXPECT_EQ(daemon.connection("/low", "/in")["winner"], false);
+  EXPECT_EQ(daemon.connection("/low", "/in")["active"], true);
+  EXPECT_EQ(daemon.source("/high")["active"], true);
+}
+
+TEST(Status, TellsWhoHasAPortAndWhatItCarries) {
+  Daemon daemon(kModel);
+  Node node("the-node");
+  auto low = node.output_port<double>("/low");
+  auto in = node.input_port("/in", {.depth = 5, .when_full = refuse_new, .keep = true});
+  const auto source = daemon.source("/low");
+  EXPECT_EQ(source["component"]["node"], "the-node");
+  EXPECT_EQ(source["component"]["pid"], ::getpid());
+  EXPECT_EQ(source["type"]["name"], "double");
+  EXPECT_EQ(source["type"]["size"], 8);
+  const auto input = daemon.input("/in");
+  EXPECT_EQ(input["type"], nullptr);
+  EXPECT_EQ(input["depth"], 5);
+  EXPECT_EQ(input["keep"], true);
+  EXPECT_EQ(input["when_full"], "refuse_new");
+}
+
+TEST(Status, CountsWhatBecomesOfSamples) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  auto in = node.input_port<int>("/in", {.depth = 2});
+  for (int i = 0; i < 5; ++i) low.publish(i);
+  EXPECT_TRUE(in.take());
+  high.signal();
+  low.publish(6);
+  EXPECT_FALSE(in.take());
+  const auto source = daemon.source("/low");
+  EXPECT_EQ(source["published"], 6);
+  EXPECT_EQ(source["delivered"], 5);
+  EXPECT_EQ(source["discarded"], 1);
+  EXPECT_EQ(daemon.source("/high")["signals"], 1);
+  const auto connection = daemon.connection("/low", "/in");
+  EXPECT_EQ(connection["accepted"], 5);
+  EXPECT_EQ(connection["overtaken"], 3);
+  EXPECT_EQ(connection["taken"], 1);
+  EXPECT_EQ(connection["dropped"], 1);
+  EXPECT_EQ(connection["discarded"], 1);
+  EXPECT_EQ(connection["waiting"], 0);
+}
+
+}  // namespace
+}  // namespace arbiter::test
