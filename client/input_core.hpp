@@ -89,6 +89,7 @@ class InputCore {
 
   // take() in parts: look at the queues, decide, hold.
   Queue* look() noexcept;
+  Queue* scan(bool& again) noexcept;
   bool look_at(Queue& queue) noexcept;
   void join(Queue& queue) noexcept;
   void yield_to_successor(Queue& queue) noexcept;
@@ -100,15 +101,14 @@ class InputCore {
   bool hold(Queue& queue, HeldSample& sample) noexcept;
   [[nodiscard]] std::uint32_t free_hold() const;
   void consume(Queue& queue) noexcept;
+  void count_overtaken(Queue& queue, std::uint64_t lost) noexcept;
   void let_go_of(const OutputPeer* peer) noexcept;
 
   // wait() in parts.
-  [[nodiscard]] bool is_selected() noexcept;
-  [[nodiscard]] shm::SourceId selected_source() noexcept;
-  [[nodiscard]] bool is_selected_at(shm::Nanoseconds time) noexcept;
-  [[nodiscard]] shm::Nanoseconds next_idle() noexcept;
+  [[nodiscard]] const shm::Rule* winning_rule() noexcept;
+  [[nodiscard]] shm::Nanoseconds next_change(const shm::Rule* winner) const noexcept;
   Waited wait_once(shm::Nanoseconds timeout, HeldSample& sample);
-  bool arm(HeldSample& sample, bool& selected);
+  bool arm(HeldSample& sample, const shm::Rule*& winner);
   void disarm() noexcept;
   void arm_descriptor(HeldSample& sample);
   HeldSample take_once();
@@ -139,7 +139,6 @@ class InputCore {
   std::vector<shm::Rule> rules_;            // of all connections to the port, in document order
   std::vector<shm::SourceId> sources_;      // those that the rules and connections name
   std::vector<shm::SeenActivity> picture_;  // scratch, parallel to sources_
-  std::vector<shm::Nanoseconds> ends_;      // scratch
   shm::Nanoseconds last_reading_ = 0;       // of the clock, by this port
   std::uint32_t held_ = 0;
   std::array<const OutputPeer*, shm::kMaxHeld> held_from_{};  // by hold

@@ -54,18 +54,35 @@ HeldSample InputCore::take_once() {
 // The queue with the oldest head, or null if nothing waits.
 InputCore::Queue* InputCore::look() noexcept {
   Queue* oldest = nullptr;
-  for (Queue& queue : queues_) {
+  bool again = true;
+  for (int tries = 0; again && tries < kMaxTakes; ++tries) oldest = scan(again);
+  return oldest;
+}
+
+// One look at each queue. `again`: it may have the wrong order, because a sample came to a queue
+// that was found empty before a later one was found behind it, or a head was overtaken as it was
+// looked at.
+InputCore::Queue* InputCore::scan(bool& again) noexcept {
+  again = false;
+  Queue* oldest = nullptr;
+  std::size_t found = 0;  // the queues before this one come before the last find
+  for (std::size_t i = 0; i < queues_.size(); ++i) {
+    Queue& queue = queues_[i];
     if (!look_at(queue)) continue;
+    found = i;
     if (oldest == nullptr) {
       oldest = &queue;
       continue;
     }
-    // Only now does the order matter. A head that was overtaken while we looked sorts as it stood.
-    if (oldest->head_stamp == 0) {
-      static_cast<void>(oldest->reader.peek_stamp(oldest->head, oldest->head_stamp));
+    // Only now does the order matter.
+    if (oldest->head_stamp == 0 && !oldest->reader.peek_stamp(oldest->head, oldest->head_stamp)) {
+      again = true;
     }
-    static_cast<void>(queue.reader.peek_stamp(queue.head, queue.head_stamp));
+    if (!queue.reader.peek_stamp(queue.head, queue.head_stamp)) again = true;
     if (queue.head_stamp < oldest->head_stamp) oldest = &queue;
+  }
+  for (std::size_t i = 0; i < found && !again; ++i) {
+    again = queues_[i].head == 0 && look_at(queues_[i]);
   }
   return oldest;
 }
@@ -89,11 +106,7 @@ bool InputCore::look_at(Queue& queue) noexcept {
     queue.head = queue.reader.peek(lost);
     if (queue.head != 0 || lost == before) break;
   }
-  if (lost != 0) {
-    count(queue.lane->overtaken, lost);
-    count(segment_->header.counters.overtaken, lost);
-    queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_release);
-  }
+  count_overtaken(queue, lost);
   if (queue.reader.state() == State::kMisbehaved &&
       queue.lane->source.load(std::memory_order_relaxed) != shm::kNone) {
     count(segment_->header.counters.misbehaved);
@@ -180,20 +193,21 @@ bool InputCore::decide_all() noexcept {
   };
   std::transform(sources_.begin(), sources_.end(), picture_.begin(), look_at_source);
   const shm::Nanoseconds now = shm::monotonic_now();
-  shm::DecisionClock clock(now, true);
+  // The time does not pass: the picture was begun before it, and is seen to stand after it.
+  shm::FixedClock clock(now);
   shm::Decider decider(snapshot_.table, memory_->pages(), clock);
   for (Queue& queue : queues_) {
     if (queue.head == 0) continue;
     queue.verdict = decider.decide(queue.rule);
     if (queue.verdict == shm::Verdict::kUnsettled) return false;
   }
-  last_reading_ = clock.reading();
+  last_reading_ = now;
   const bool stands =
       std::equal(sources_.begin(), sources_.end(), picture_.begin(),
                  [&](shm::SourceId source, const shm::SeenActivity& seen) {
                    return seen.stands(look_at_source(source), snapshot_.table.timeout(source), now);
                  });
-  return stands && clock.reading() == now && memory_->tables().is_whole(snapshot_);
+  return stands && memory_->tables().is_whole(snapshot_);
 }
 
 // Drops what waited in losing queues before the decision and is older than the sample that is
@@ -205,7 +219,8 @@ void InputCore::drop_losers(const Queue* winner) noexcept {
     while (waiting-- != 0) {
       std::uint64_t lost = 0;
       const shm::Entry entry = queue.reader.peek(lost);
-      if (entry == 0 || lost != 0) break;  // overtaken: the next take counts it
+      count_overtaken(queue, lost);
+      if (entry == 0 || lost != 0) break;  // what it has now came later than the decision
       shm::Nanoseconds stamp = 0;
       if (winner != nullptr &&
           (!queue.reader.peek_stamp(entry, stamp) || stamp > winner->head_stamp)) {
@@ -216,6 +231,13 @@ void InputCore::drop_losers(const Queue* winner) noexcept {
       count(segment_->header.counters.dropped);
     }
   }
+}
+
+void InputCore::count_overtaken(Queue& queue, std::uint64_t lost) noexcept {
+  if (lost == 0) return;
+  count(queue.lane->overtaken, lost);
+  count(segment_->header.counters.overtaken, lost);
+  queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_release);
 }
 
 void InputCore::consume(Queue& queue) noexcept {

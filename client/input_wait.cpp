@@ -17,9 +17,6 @@
 namespace arbiter::detail {
 namespace {
 
-// How many ends of activity a port looks ahead for the one that makes it idle; then it looks again.
-constexpr int kMaxLookAhead = 32;
-
 shm::Nanoseconds after(shm::Nanoseconds now, shm::Nanoseconds timeout) {
   return timeout > shm::kMaxTime - now ? shm::kForever : now + timeout;
 }
@@ -39,18 +36,18 @@ Waited InputCore::wait_once(shm::Nanoseconds timeout, HeldSample& sample) {
   for (;;) {
     sample = take_once();
     if (sample.data != nullptr) return Waited::kSample;
-    bool selected = is_selected();
-    if (commanded_ && !selected) {
+    const shm::Rule* winner = winning_rule();
+    if (commanded_ && winner == nullptr) {
       commanded_ = false;
       count(segment_->header.counters.idles);
       return Waited::kIdle;
     }
-    commanded_ = selected;
+    commanded_ = winner != nullptr;
     const shm::Nanoseconds now = shm::monotonic_now();
     if (deadline < 0) deadline = after(now, timeout);
     if (now >= deadline) return Waited::kTimeout;
-    if (arm(sample, selected)) {
-      bell_.wait(std::min(deadline, selected ? next_idle() : shm::kForever));
+    if (arm(sample, winner)) {
+      bell_.wait(std::min(deadline, next_change(winner)));
       count(segment_->header.counters.wakes);
     }
     disarm();
@@ -61,10 +58,10 @@ Waited InputCore::wait_once(shm::Nanoseconds timeout, HeldSample& sample) {
 // Says that we wait and what we believe, then looks once more; true if it is still so.
 // SYNC POINT: waiting. Fence (d), between our wait word and our last look. Pairs with fences (a)
 // and (b) of publishers: either we see what they did, or they see us wait.
-bool InputCore::arm(HeldSample& sample, bool& selected) {
+bool InputCore::arm(HeldSample& sample, const shm::Rule*& winner) {
   shm::InputHeader& header = segment_->header;
-  header.believed.store(selected ? shm::Selection::kSelected : shm::Selection::kIdle,
-                        std::memory_order_relaxed);
+  const shm::SourceId believed = winner == nullptr ? shm::kNone : winner->source;
+  header.believed.store(believed, std::memory_order_relaxed);
   // Release, with the acquire of publishers: who sees us wait sees what we believe.
   // A take that throws leaves the last wait as it was, odd.
   header.wait.store((header.wait.load(std::memory_order_relaxed) + 1) | 1,
@@ -72,7 +69,8 @@ bool InputCore::arm(HeldSample& sample, bool& selected) {
   shm::full_fence();
   sample = take_once();
   if (sample.data != nullptr) return false;
-  return is_selected() == selected;
+  winner = winning_rule();
+  return (winner == nullptr ? shm::kNone : winner->source) == believed;
 }
 
 // The next wait has another number. What rang for this one is forgotten before the next begins.
@@ -83,57 +81,44 @@ void InputCore::disarm() noexcept {
   bell_.silence();
 }
 
-shm::SourceId InputCore::selected_source() noexcept {
+// The rule of the connection that is selected now, or null.
+const shm::Rule* InputCore::winning_rule() noexcept {
+  refresh();
   shm::DecisionClock clock(shm::monotonic_now(), true);
   shm::Decider decider(snapshot_.table, memory_->pages(), clock);
-  shm::SourceId selected = shm::kNone;
-  for (const shm::Rule& rule : rules_) {
-    if (decider.decide_with_own(rule) != shm::Verdict::kWins) continue;
-    selected = rule.source;
-    break;
-  }
-  last_reading_ = clock.reading();
-  return selected;
-}
-
-bool InputCore::is_selected() noexcept {
-  refresh();
-  return selected_source() != shm::kNone;
-}
-
-bool InputCore::is_selected_at(shm::Nanoseconds time) noexcept {
-  shm::FixedClock clock(time);
-  shm::Decider decider(snapshot_.table, memory_->pages(), clock);
-  return std::any_of(rules_.begin(), rules_.end(), [&](const shm::Rule& rule) {
+  const auto winner = std::find_if(rules_.begin(), rules_.end(), [&](const shm::Rule& rule) {
     return decider.decide_with_own(rule) == shm::Verdict::kWins;
   });
+  last_reading_ = clock.reading();
+  return winner == rules_.end() ? nullptr : &*winner;
 }
 
-// When the port will be idle if nothing arrives until then; kForever: never.
-shm::Nanoseconds InputCore::next_idle() noexcept {
-  ends_.clear();
-  for (const shm::SourceId source : sources_) {
+// When the selection will change of itself: at the first end among the activities that the winning
+// rule reads. Whatever else happens rings: a sample, or a begin or an end that makes another the
+// winner. Then, or there, it is looked at anew.
+shm::Nanoseconds InputCore::next_change(const shm::Rule* winner) const noexcept {
+  shm::Nanoseconds next = shm::kForever;
+  if (winner == nullptr) return next;
+  const auto heed = [&](shm::SourceId source) {
     const auto* activity = memory_->pages().find(source);
-    if (activity == nullptr) continue;
+    if (activity == nullptr) return;
     const shm::ActivityWord word = activity->word.load(std::memory_order_acquire);
-    if (shm::is_finite(word) && word > last_reading_) ends_.push_back(word);
+    if (shm::is_finite(word) && word > last_reading_) next = std::min(next, word);
+  };
+  heed(winner->source);
+  for (shm::Word i = 0; i < winner->reads.count; ++i) {
+    heed(winner->reads[i] & ~shm::table::kExpectActive);
   }
-  std::sort(ends_.begin(), ends_.end());
-  for (std::size_t i = 0; i < ends_.size(); ++i) {
-    if (i == kMaxLookAhead || !is_selected_at(ends_[i])) return ends_[i];
-  }
-  return shm::kForever;
+  return next;
 }
 
 std::optional<std::string> InputCore::winner() {
-  refresh();
-  if (!snapshot_.table.is_arbitrated(port_)) return std::nullopt;
-  const shm::SourceId selected = selected_source();
-  if (selected == shm::kNone) return std::nullopt;
-  return memory_->source_name(selected);
+  const shm::Rule* winner = winning_rule();
+  if (winner == nullptr || !snapshot_.table.is_arbitrated(port_)) return std::nullopt;
+  return memory_->source_name(winner->source);
 }
 
-bool InputCore::is_idle() noexcept { return !is_selected(); }
+bool InputCore::is_idle() noexcept { return winning_rule() == nullptr; }
 
 // A descriptor for the user's own loop: the bell, and a timer for the time at which activity runs
 // out.
@@ -157,14 +142,14 @@ int InputCore::wait_descriptor() {
 void InputCore::arm_descriptor(HeldSample& sample) {
   for (;;) {
     disarm();
-    bool selected = is_selected();
-    const bool armed = arm(sample, selected);
+    const shm::Rule* winner = winning_rule();
+    const bool armed = arm(sample, winner);
     if (sample.data != nullptr) return;
     if (!armed) continue;
-    const shm::Nanoseconds idle_at = selected ? next_idle() : shm::kForever;
+    const shm::Nanoseconds change_at = next_change(winner);
     itimerspec at{};  // zero: no alarm
-    if (idle_at != shm::kForever) {
-      at.it_value = {idle_at / 1'000'000'000, idle_at % 1'000'000'000};
+    if (change_at != shm::kForever) {
+      at.it_value = {change_at / 1'000'000'000, change_at % 1'000'000'000};
     }
     timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &at, nullptr);
     return;

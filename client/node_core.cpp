@@ -131,9 +131,9 @@ void NodeCore::connect(std::string_view name, const NodeOptions& options) {
       hello.flags = options.service_thread ? shm::kHasServiceThread : 0u;
       shm::Received welcome;
       pollfd readable{socket_.get(), POLLIN, 0};
-      const auto left = std::clamp(
-          std::chrono::duration_cast<std::chrono::milliseconds>(give_up - Clock::now()),
-          kMinAnswerTime, kMaxAnswerTime);
+      const auto left =
+          std::clamp(std::chrono::duration_cast<std::chrono::milliseconds>(give_up - Clock::now()),
+                     kMinAnswerTime, kMaxAnswerTime);
       if (shm::send_message(socket_.get(), hello) == shm::SendResult::kSent &&
           ::poll(&readable, 1, static_cast<int>(left.count())) == 1 &&
           shm::receive_message(socket_.get(), welcome, false) == shm::ReceiveResult::kReceived) {
@@ -180,13 +180,16 @@ void NodeCore::run_service_thread() {
   }
   // The daemon is gone. Data flows on; only tidying up is left to do.
   for (;;) {
+    {
+      const std::lock_guard lock(mutex_);
+      memory_->service_bell().silence();
+      // Looked at after that: the ring may have been the one that tells us to stop.
+      if (stopping_) return;
+      for (auto& [instance, output] : outputs_) output->tidy();
+      for (auto& [instance, input] : inputs_) input->tidy();
+    }
     pollfd bell{memory_->service_bell().descriptor(), POLLIN, 0};
     ::poll(&bell, 1, -1);
-    const std::lock_guard lock(mutex_);
-    if (stopping_) return;
-    memory_->service_bell().silence();
-    for (auto& [instance, output] : outputs_) output->tidy();
-    for (auto& [instance, input] : inputs_) input->tidy();
   }
 }
 
@@ -247,6 +250,7 @@ void NodeCore::handle(shm::Received& received) {
     case shm::MessageKind::kSourcePage:
       try {
         memory_->add_page(message.id, std::string(message.name_view()), received.descriptors[0]);
+        wake_inputs();
       } catch (const std::exception& error) {
         refuse_peer(message, error.what());
       }
@@ -275,6 +279,14 @@ void NodeCore::handle(shm::Received& received) {
     default:
       handle_reply(received);
       break;
+  }
+}
+
+// A port that could not see a source may have held back a sample and gone to sleep.
+void NodeCore::wake_inputs() {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [instance, input] : inputs_) {
+    shm::ring_bell(input->bell().write_end().get());
   }
 }
 

@@ -66,6 +66,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   bool pump(int timeout_ms);
   void handle(shm::Received& received);
   void handle_reply(shm::Received& received);
+  void wake_inputs();
   void handle_peer(shm::Received& received);
   void refuse_peer(const shm::Message& announced, const std::string& why);
   void lose_daemon();

@@ -12,7 +12,9 @@ namespace {
 // Beside the loans, one slot for publish() with a copy.
 std::uint32_t slots_of_our_own(std::uint32_t max_loans) { return max_loans + 1; }
 
-std::uint64_t stride_of(const shm::TypeInfo& type) { return shm::OutputLayout::plan(type, 1).stride; }
+std::uint64_t stride_of(const shm::TypeInfo& type) {
+  return shm::OutputLayout::plan(type, 1).stride;
+}
 
 std::uint32_t reserved_slots(const shm::TypeInfo& type, const OutputPortOptions& options) {
   const std::uint64_t fit = options.max_memory / stride_of(type);
@@ -76,7 +78,6 @@ void OutputCore::add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t n
   if (link.peer == nullptr) link.peer = std::move(peer);
   link.connected = number != 0;
   link.number = number;
-  link.depth = link.peer->depth;
   try {
     if (link.connected) assign_channel(link);
     allocate_slots();
@@ -111,6 +112,7 @@ void OutputCore::assign_channel(InputLink& link) {
   }
   if (used == UINT64_MAX) return;  // until one is free: offer_view() tries again
   link.channel = static_cast<std::uint32_t>(__builtin_ctzll(~used));
+  link.depth = 0;  // for allocate_slots() to say
   const std::size_t ring = sizeof(shm::Atomic<shm::Entry>) * shm::kMaxDepth;
   const auto offset = segment_.layout().rings_offset + ring * link.channel;
   if (const auto error = shm::allocate(descriptor_, offset, ring)) {
@@ -119,13 +121,15 @@ void OutputCore::assign_channel(InputLink& link) {
 }
 
 // Allocates as many slots as all links can need at worst (slot_pool.hpp). Where max_memory does not
-// allow it, the last queues to come get a smaller depth.
+// allow it, the queues that have come last get a smaller depth; one that has begun keeps its own.
 void OutputCore::allocate_slots() {
   std::uint64_t needed = slots_of_our_own(max_loans_);
+  for (const auto& [instance, link] : links_) {
+    needed += link.peer->max_held + (link.channel == shm::kNone ? 0 : link.depth);
+  }
   const std::uint64_t reserved = segment_.layout().slot_count;
   for (auto& [instance, link] : links_) {
-    needed += link.peer->max_held;
-    if (link.channel == shm::kNone) continue;
+    if (link.channel == shm::kNone || link.depth != 0) continue;
     if (needed >= reserved) {
       throw std::runtime_error("max_memory of " + name_ + " leaves no room for another input port");
     }
@@ -145,10 +149,21 @@ void OutputCore::allocate_slots() {
   allocated_slots_ = wanted;
 }
 
+// For a link that found all channels in use when it came.
+void OutputCore::connect_waiting(InputLink& link) noexcept {
+  try {
+    assign_channel(link);
+    allocate_slots();
+  } catch (const std::exception&) {  // no memory: it stays unconnected
+    link.connected = false;
+    link.channel = shm::kNone;
+  }
+}
+
 void OutputCore::offer_view() {
   auto view = std::make_unique<OutputView>();
   for (auto& [instance, link] : links_) {
-    if (link.connected && link.channel == shm::kNone) assign_channel(link);
+    if (link.connected && link.channel == shm::kNone) connect_waiting(link);
     view->links.push_back(link);
   }
   view->slots = allocated_slots_;
@@ -205,13 +220,17 @@ void OutputCore::leave_all_but(const OutputView& view) noexcept {
   }
 }
 
-void OutputCore::bind_rules(const shm::TableSnapshot& snapshot) noexcept {
-  snapshot_ = snapshot;
-  bound_generation_ = snapshot.generation;
-  timeout_ = snapshot.table.timeout(source_);
-  for (Destination& destination : destinations_) {
-    const auto index = snapshot.table.find(source_, destination.peer->port);
-    destination.rule = snapshot.table.rule(index);
+// Again where seven models were loaded meanwhile, for T is used before a decision checks the table.
+void OutputCore::bind_rules() noexcept {
+  for (int tries = 0; tries <= kMaxTableRetries; ++tries) {
+    snapshot_ = memory_->tables().snapshot();
+    bound_generation_ = snapshot_.generation;
+    timeout_ = snapshot_.table.timeout(source_);
+    for (Destination& destination : destinations_) {
+      const auto index = snapshot_.table.find(source_, destination.peer->port);
+      destination.rule = snapshot_.table.rule(index);
+    }
+    if (memory_->tables().is_whole(snapshot_)) return;
   }
 }
 
@@ -256,8 +275,7 @@ void OutputCore::stamp(shm::ActivityWord word) noexcept {
 
 Outcome OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
-  const shm::TableSnapshot snapshot = memory_->tables().snapshot();
-  if (snapshot.generation != bound_generation_) bind_rules(snapshot);
+  if (memory_->tables().generation() != bound_generation_) bind_rules();
   const bool begins = !shm::is_active(own_word_, now);
   stamp(shm::arrival(now, timeout_));
   Outcome outcome;
@@ -280,7 +298,7 @@ void OutputCore::decide_all(shm::Nanoseconds now) noexcept {
     }
     if (memory_->tables().is_whole(snapshot_)) return;
     if (tries == kMaxTableRetries) break;
-    bind_rules(memory_->tables().snapshot());
+    bind_rules();
   }
   for (Destination& destination : destinations_) destination.verdict = shm::Verdict::kUnsettled;
 }
@@ -377,17 +395,19 @@ void OutputCore::ring_where_selection_changed(shm::Nanoseconds now) noexcept {
 }
 
 bool OutputCore::selection_differs(const Destination& destination, shm::Nanoseconds now) noexcept {
-  const auto believed = destination.peer->segment->header.believed.load(std::memory_order_relaxed);
+  const shm::SourceId believed =
+      destination.peer->segment->header.believed.load(std::memory_order_relaxed);
   const shm::TableView& table = snapshot_.table;
   shm::DecisionClock clock(now, true);
   shm::Decider decider(table, memory_->pages(), clock);
   const auto range = table.connections_to(destination.peer->port);
   for (auto index = range.first; index != range.first + range.count; ++index) {
-    const shm::Verdict verdict = decider.decide_with_own(table.rule(index));
-    if (verdict == shm::Verdict::kWins) return believed != shm::Selection::kSelected;
+    const shm::Rule rule = table.rule(index);
+    const shm::Verdict verdict = decider.decide_with_own(rule);
+    if (verdict == shm::Verdict::kWins) return believed != rule.source;
     if (verdict != shm::Verdict::kLoses) return true;  // not known here: let it look for itself
   }
-  return believed != shm::Selection::kIdle;
+  return believed != shm::kNone;
 }
 
 Outcome OutputCore::publish_loan(std::uint32_t slot, std::size_t size,
@@ -415,8 +435,7 @@ Outcome OutputCore::signal(shm::Nanoseconds now) noexcept { return arrive(shm::k
 
 void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
-  const shm::TableSnapshot snapshot = memory_->tables().snapshot();
-  if (snapshot.generation != bound_generation_) bind_rules(snapshot);
+  if (memory_->tables().generation() != bound_generation_) bind_rules();
   const bool ends = shm::is_active(own_word_, now);
   stamp(shm::deactivation(now));
   if (ends) ring_where_selection_changed(now);

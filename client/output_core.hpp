@@ -81,10 +81,11 @@ class OutputCore {
 
   void assign_channel(InputLink& link);
   void allocate_slots();
+  void connect_waiting(InputLink& link) noexcept;
   void offer_view();
   void accept_view() noexcept;
   void leave_all_but(const OutputView& view) noexcept;
-  void bind_rules(const shm::TableSnapshot& snapshot) noexcept;
+  void bind_rules() noexcept;
 
   // With the sample in `slot`, or without one (kNoSlot).
   Outcome arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;

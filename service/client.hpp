@@ -54,9 +54,10 @@ class Client {
   std::string name;  // of the node; empty until it has said hello
   bool has_service_thread = false;
   bool observes = false;
-  bool watches_queue = false;         // the loop waits until it can be written
-  std::map<shm::SourceId, std::uint64_t> pages;  // those that it has been sent, by their number
-  std::set<shm::PortInstance> ports;  // that it has open
+  bool watches_queue = false;                       // the loop waits until it can be written
+  std::map<shm::SourceId, std::uint64_t> pages;     // those that it has been sent, by their number
+  std::map<shm::PortId, std::uint64_t> port_names;  // the same of names of input ports
+  std::set<shm::PortInstance> ports;                // that it has open
 
  private:
   struct Queued {

@@ -36,9 +36,8 @@ shm::Message reply_to(std::uint64_t request, shm::MessageKind kind) {
 
 // Logs and status are read by people and by programs: no name may break a line of theirs.
 bool is_printable(std::string_view name) {
-  return std::all_of(name.begin(), name.end(), [](char c) {
-    return static_cast<unsigned char>(c) > ' ' && c != '\x7f';
-  });
+  return std::all_of(name.begin(), name.end(),
+                     [](char c) { return static_cast<unsigned char>(c) > ' ' && c != '\x7f'; });
 }
 
 std::string port_name(const shm::Message& message) {
@@ -80,8 +79,9 @@ void Daemon::watch(int fd, Tag tag, ClientId client, std::uint32_t events) {
 }
 
 int Daemon::timeout_ms() const {
-  const bool is_behind = std::any_of(clients_.begin(), clients_.end(),
-                                     [](const auto& each) { return each.second->has_read_ahead(); });
+  const bool is_behind = std::any_of(clients_.begin(), clients_.end(), [](const auto& each) {
+    return each.second->has_read_ahead();
+  });
   if (is_behind) return 0;
   const shm::Nanoseconds deadline = barriers_.next_deadline();
   if (deadline == shm::kForever) return -1;

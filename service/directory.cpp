@@ -80,6 +80,7 @@ InputName& Directory::input(const std::string& name) {
     input->used_by_generation = 0;
   }
   input->name = name;
+  ++input->name_number;
   input_ids_[name] = input->id;
   return *input;
 }

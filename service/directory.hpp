@@ -23,18 +23,17 @@ struct Source {
   shm::FileDescriptor writable;  // for the one that has the output port open
   shm::FileDescriptor readable;  // for all others
   shm::Mapping page;
-  std::uint64_t page_number = 0;  // another where an id got a page for another name
+  std::uint64_t page_number = 0;         // another where an id got a page for another name
   std::uint64_t used_by_generation = 0;  // the last model that named it
   shm::PortInstance open = 0;            // the live output port, if any
 
-  [[nodiscard]] shm::Activity& activity() const {
-    return page.as<shm::ActivityPage>()->activity;
-  }
+  [[nodiscard]] shm::Activity& activity() const { return page.as<shm::ActivityPage>()->activity; }
 };
 
 struct InputName {
   shm::PortId id = shm::kNone;
   std::string name;
+  std::uint64_t name_number = 0;  // another where an id got another name
   std::uint64_t used_by_generation = 0;
   shm::PortInstance open = 0;
 };

@@ -54,6 +54,7 @@ std::unique_ptr<InputPort> adopt_input(const shm::Received& open) {
     throw std::runtime_error("the bell is not a pipe");
   }
   port->bell = shm::reopen(open.descriptors[1], O_WRONLY | O_NONBLOCK);
+  port->bell_for_peers = shm::reopen(open.descriptors[1], O_WRONLY | O_NONBLOCK);
   port->type = open.message.type;
   return port;
 }

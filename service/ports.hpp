@@ -35,6 +35,8 @@ struct InputPort {
   shm::TypeInfo type;
   shm::FileDescriptor segment;  // read-only
   shm::FileDescriptor bell;     // its write end
+  // The same, opened anew, to be handed out: who gets it could make its writes block.
+  shm::FileDescriptor bell_for_peers;
   shm::Mapping mapping;
 
   [[nodiscard]] const shm::InputSegment& shared() const {

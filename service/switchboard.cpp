@@ -158,7 +158,7 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
       message_to(shm::MessageKind::kInputPeer, output.instance, input.instance, input.name->id);
   to_output.flags = connects ? shm::kIsConnected : 0u;
   to_output.link = link.number = connects ? ++last_link_ : 0;
-  output.client->send(to_output, {input.segment.get(), input.bell.get()});
+  output.client->send(to_output, {input.segment.get(), input.bell_for_peers.get()});
   told.insert(output.client);
   if (!connects) return;
   auto to_input =
@@ -215,6 +215,9 @@ bool Switchboard::send_page(Client& client, const Source& source) {
 void Switchboard::show_everything(Client& client) {
   for (const auto& source : directory_.sources()) send_page(client, *source);
   for (const auto& input : directory_.inputs()) {
+    if (std::exchange(client.port_names[input->id], input->name_number) == input->name_number) {
+      continue;
+    }
     auto message = message_to(shm::MessageKind::kPortName, 0, 0, input->id);
     message.set_name(input->name);
     client.send(message);
@@ -244,11 +247,14 @@ void Switchboard::ring_all() const {
 }
 
 void Switchboard::ring_concerned(const shm::TableView& table, shm::SourceId source) const {
-  const auto concerned = table.ports_concerned(source);
-  for (shm::Word i = 0; i < concerned.count; ++i) {
-    const InputName* name = directory_.input_by_id(concerned[i]);
+  const auto ring = [&](shm::PortId id) {
+    const InputName* name = directory_.input_by_id(id);
     if (name != nullptr && name->open != 0) shm::ring_bell(inputs_.at(name->open)->bell.get());
-  }
+  };
+  const auto concerned = table.ports_concerned(source);
+  for (shm::Word i = 0; i < concerned.count; ++i) ring(concerned[i]);
+  const auto connections = table.connections_of_source(source);
+  for (shm::Word i = 0; i < connections.count; ++i) ring(table.rule(connections[i]).port);
 }
 
 const OutputPort* Switchboard::output(shm::PortInstance instance) const {

@@ -34,7 +34,7 @@ class Switchboard {
   Told link_all(const shm::TableView& table);
   Told link_one(const shm::TableView& table, shm::PortInstance port);
   Told unlink(const shm::TableView& table);
-  // Sends a client every page and port name, for those who observe.
+  // Sends a client every page and port name that it does not have, for those who observe.
   void show_everything(Client& client);
   // A client could not take up a peer.
   void refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why);

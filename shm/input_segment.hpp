@@ -49,8 +49,6 @@ struct InputCounters {
   Atomic<std::uint64_t> wakes;       // times that a blocked wait_for() was woken
 };
 
-enum class Selection : std::uint32_t { kIdle, kSelected };
-
 struct InputHeader {
   static constexpr std::uint64_t kMagic = 0x31706e69'74696272;
   static constexpr std::uint32_t kVersion = 1;
@@ -65,10 +63,10 @@ struct InputHeader {
   TypeInfo type;
 
   // Odd while the component waits for its bell; each wait has a number of its own, so that a
-  // publisher rings once for it. `believed` is what the waiting component takes its port to be:
-  // publishers of sources that its rules read ring when the truth becomes another.
+  // publisher rings once for it. `believed` is the source that the waiting component takes for the
+  // winner, or kNone: publishers whose activity begins or ends ring when that is not so any more.
   alignas(kCacheLine) Atomic<std::uint64_t> wait;
-  Atomic<Selection> believed;
+  Atomic<SourceId> believed;
 
   alignas(kCacheLine) Atomic<Hold> holds[kMaxHeld];
   alignas(kCacheLine) InputCounters counters;

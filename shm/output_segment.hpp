@@ -46,8 +46,9 @@ struct SlotHeader {
   Atomic<std::uint64_t> size;      // bytes of the sample
 };
 
-// Written by the publisher. `receiver` says whose queue this is; it is written last when an input
-// port joins and first, to 0, when it leaves (channel.hpp).
+// Written by the publisher. `receiver` is the number of the link whose queue this is (the daemon
+// gives each another); it is written last when an input port joins and first, to 0, when it leaves
+// (channel.hpp).
 struct alignas(kCacheLine) Channel {
   Atomic<PortInstance> receiver;
   Atomic<std::uint64_t> first;      // sequence of the first entry that is this receiver's

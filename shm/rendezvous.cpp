@@ -115,7 +115,9 @@ std::string daemon_directory() {
   const std::string given = environment("RUNTIME_DIRECTORY");
   if (!given.empty()) return make_safe(given.substr(0, given.find(':')));
   const std::string session = environment("XDG_RUNTIME_DIR");
-  if (!session.empty()) return make_safe(session + "/arbiter");
+  // It may be left over from another session: su keeps the variable, not the directory.
+  if (!session.empty() && access(session.c_str(), F_OK) == 0)
+    return make_safe(session + "/arbiter");
   if (may_use_system_directory()) return make_safe(kSystemDirectory);
   return make_safe(temporary_directory(geteuid()));
 }

@@ -16,8 +16,9 @@ inline constexpr const char* kDefaultInstance = "default";
 std::string instance_name(const std::string& given);
 
 // The daemon's directory, made if need be: $RUNTIME_DIRECTORY (the first of several), else
-// $XDG_RUNTIME_DIR/arbiter, else /run/arbiter if we may write there, else arbiter-UID in $TMPDIR or
-// /tmp. Throws std::runtime_error where it is not ours, or others may write in it.
+// $XDG_RUNTIME_DIR/arbiter if that exists, else /run/arbiter if we may write there, else
+// arbiter-UID in $TMPDIR or /tmp. Throws std::runtime_error where it is not ours, or others may
+// write in it.
 std::string daemon_directory();
 
 // The directories in which a client looks, in this order.

@@ -22,7 +22,7 @@ struct TypeInfo {
   }
   void set_name(std::string_view text) noexcept {
     const std::size_t length = text.size() < kMaxTypeName ? text.size() : kMaxTypeName;
-    std::memcpy(name, text.data(), length);
+    if (length != 0) std::memcpy(name, text.data(), length);  // an empty view may point nowhere
     name[length] = '\0';
   }
 };

@@ -46,13 +46,13 @@ enum class MessageKind : std::uint32_t {
   kWelcome = 100,  // descriptor: the board, read-only
   kOpened,         // port: its instance; id: its source or port id; descriptor: an output's page
   kConnected,
-  kRefused,     // text: why
-  kSourcePage,  // id, name: a source; descriptor: its activity page, read-only
-  kPortName,    // id, name: an input port
-  kOutputPeer,  // to input `port`: peer, id = source, link; descriptor: its segment
-  kInputPeer,   // to output `port`: peer, id = port id, flags (kIsConnected), link; descriptors:
-                // segment, bell
-  kPeerGone,    // `port` has lost `peer`: closed or dead
+  kRefused,       // text: why
+  kSourcePage,    // id, name: a source; descriptor: its activity page, read-only
+  kPortName,      // id, name: an input port
+  kOutputPeer,    // to input `port`: peer, id = source, link; descriptor: its segment
+  kInputPeer,     // to output `port`: peer, id = port id, flags (kIsConnected), link; descriptors:
+                  // segment, bell
+  kPeerGone,      // `port` has lost `peer`: closed or dead
   kDisconnected,  // `port` is no longer connected to `peer`, which lives: the model has changed
   kSync,
   kStatusReply,  // descriptor: a memfd with JSON
@@ -89,7 +89,7 @@ struct Message {
  private:
   static void copy(std::string_view from, char* to, std::size_t capacity) noexcept {
     const std::size_t length = from.size() < capacity - 1 ? from.size() : capacity - 1;
-    std::memcpy(to, from.data(), length);
+    if (length != 0) std::memcpy(to, from.data(), length);  // an empty view may point nowhere
     to[length] = '\0';
   }
 };

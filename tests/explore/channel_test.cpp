@@ -45,7 +45,7 @@ Explorer::Scenario publish_and_take(World& world, std::uint32_t depth, int publi
   };
 }
 
-constexpr Limits kLimits{3, 2};
+constexpr Limits kLimits{5, 3};
 
 TEST(ChannelInterleavings, NoSampleIsWrittenWhileItIsReadWithDepth1) {
   World world;

@@ -111,7 +111,7 @@ TEST(DecisionInterleavings, AfterAnOverrideHasReturnedNothingOverriddenIsTaken) 
       }
     });
   };
-  expect_holds("takeover", {4, 2}, scenario);
+  expect_holds("takeover", {5, 3}, scenario);
   expect_fails_without("fence (a)", {4, 2}, {Weakness::kFullFence, "stamp_fence"}, scenario);
 }
 

@@ -239,7 +239,7 @@ TEST_F(HostileClient, ThatAsksTwiceForANameAndHangsUpHarmsNobody) {
   }
 }
 
-TEST_F(HostileClient, ThatNeverReadsIsGivenUpAndHoldsUpNobody) {
+TEST_F(HostileClient, ThatNeverReadsHoldsUpNobody) {
   RawClient deaf = client();
   const auto segment = output_segment({});
   shm::seal(segment, shm::Seals::kOneWriter);
@@ -251,6 +251,16 @@ TEST_F(HostileClient, ThatNeverReadsIsGivenUpAndHoldsUpNobody) {
     auto port = node_.input_port<int>("/many" + std::to_string(i));
   }
   EXPECT_EQ(daemon_.source("/deaf")["open"], true);
+}
+
+TEST_F(HostileClient, ThatAsksAndNeverReadsIsGivenUpInTheEnd) {
+  RawClient deaf = client();
+  int asked = 0;
+  while (asked < 100000 &&
+         deaf.send(RawClient::message(MessageKind::kStatus)) == shm::SendResult::kSent) {
+    ++asked;
+  }
+  EXPECT_LT(asked, 100000);
 }
 
 TEST_F(HostileClient, ThatAsksWithoutEndLetsOthersBeServed) {

@@ -72,9 +72,19 @@ TEST(Idle, ItSleepsAgainWhenEverybodyHasLeft) {
   expect_asleep(daemon.process().pid());
 }
 
+// Counts when nobody else is there and the daemon has nothing left to do.
+std::size_t descriptors_at_rest(Daemon& daemon, RawClient& watcher) {
+  while (watcher.status()["clients"] != 1) {
+  }
+  wait_until_it_sleeps_in(SYS_epoll_wait, daemon.process().pid(), daemon.process().pid());
+  return daemon.open_descriptors();
+}
+
 TEST(Idle, NoDescriptorIsLeftWhenEverybodyHasLeft) {
-  Daemon daemon("<behaviors><arbiter at='/in'><select from='/out'>not /stop</select></arbiter>"
-                "</behaviors>");
+  Daemon daemon(
+      "<behaviors><arbiter at='/in'><select from='/out'>not /stop</select></arbiter></behaviors>");
+  RawClient watcher(daemon.instance());
+  watcher.hello();
   const auto come_and_go = [&] {
     Node node("test");
     auto out = node.output_port<int>("/out");
@@ -82,25 +92,40 @@ TEST(Idle, NoDescriptorIsLeftWhenEverybodyHasLeft) {
     auto in = node.input_port<int>("/in");
     out.publish(1);
   };
-  const auto count = [&] {
-    while (daemon.status()["clients"] != 1) {
-    }
-    for (;;) {  // the one that asked leaves too
-      const auto first = daemon.open_descriptors();
-      if (daemon.status()["clients"] == 1 && daemon.open_descriptors() == first) return first;
-    }
-  };
   come_and_go();
-  const auto before = count();
+  const auto before = descriptors_at_rest(daemon, watcher);
   for (int i = 0; i < 50; ++i) come_and_go();
-  EXPECT_LE(count(), before + 1) << "one that is asking may count";
+  EXPECT_EQ(descriptors_at_rest(daemon, watcher), before);
+}
+
+TEST(Idle, NoDescriptorIsLeftOfPortsThatWereClosedOrRefused) {
+  Daemon daemon;
+  RawClient watcher(daemon.instance());
+  watcher.hello();
+  {
+    Node node("test");
+    auto out = node.output_port<int>("/out");
+    auto in = node.input_port<int>("/in");
+  }
+  const auto before = descriptors_at_rest(daemon, watcher);
+  {
+    Node node("test");
+    for (int i = 0; i < 50; ++i) {
+      auto out = node.output_port<int>("/out");
+      auto in = node.input_port<int>("/in");
+      EXPECT_THROW(static_cast<void>(node.output_port<int>("/out")), Error);
+    }
+  }
+  EXPECT_EQ(descriptors_at_rest(daemon, watcher), before);
 }
 
 TEST(Idle, AReloadLeavesNoDescriptorBehind) {
   Daemon daemon;
-  const auto before = daemon.open_descriptors();
+  RawClient watcher(daemon.instance());
+  watcher.hello();
+  const auto before = descriptors_at_rest(daemon, watcher);
   for (int i = 0; i < 20; ++i) daemon.load(kNoRules);
-  EXPECT_LE(daemon.open_descriptors(), before + 1);
+  EXPECT_EQ(descriptors_at_rest(daemon, watcher), before);
 }
 
 }  // namespace

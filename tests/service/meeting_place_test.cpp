@@ -21,7 +21,7 @@ int run_in(const TemporaryDirectory& directory, const Environment& environment,
   NotifySocket notify(directory.path() + "/notify");
   Environment all = environment;
   all["NOTIFY_SOCKET"] = notify.path();
-  ChildProcess daemon({arbiterd_path(), "--instance", "place", "--log-level", "off"}, all, {});
+  ChildProcess daemon({arbiterd_path(), "--instance", "place", "--log-level", "error"}, all, {});
   if (!notify.wait_for("READY=1", daemon)) {
     EXPECT_EQ(daemon.wait(), 1);
     fs::remove(notify.path());
@@ -39,33 +39,34 @@ TEST(MeetingPlace, IsTheRuntimeDirectoryThatTheServiceManagerGives) {
   const Environment environment{
       {"RUNTIME_DIRECTORY", directory.path() + "/given:" + directory.path() + "/second"},
       {"XDG_RUNTIME_DIR", directory.path() + "/session"}};
-  EXPECT_EQ(run_in(directory, environment, [&] {
-    EXPECT_TRUE(fs::exists(directory.path() + "/given/place.sock"));
-  }), 0);
+  const auto look = [&] { EXPECT_TRUE(fs::exists(directory.path() + "/given/place.sock")); };
+  EXPECT_EQ(run_in(directory, environment, look), 0);
 }
 
 TEST(MeetingPlace, IsElseOneInTheSessionsRuntimeDirectory) {
   const TemporaryDirectory directory;
   const Environment environment{{"RUNTIME_DIRECTORY", std::nullopt},
                                 {"XDG_RUNTIME_DIR", directory.path()}};
-  EXPECT_EQ(run_in(directory, environment, [&] {
+  const auto meet = [&] {
     EXPECT_TRUE(fs::exists(directory.path() + "/arbiter/place.sock"));
     const ScopedVariable session("XDG_RUNTIME_DIR", directory.path());
     Node node("test", {.instance = "place"});
-  }), 0);
+  };
+  EXPECT_EQ(run_in(directory, environment, meet), 0);
 }
 
 TEST(MeetingPlace, EveryUserMayConnectAndOnlyItsOwnerMayWriteThere) {
   const TemporaryDirectory directory;
   const Environment environment{{"RUNTIME_DIRECTORY", std::nullopt},
                                 {"XDG_RUNTIME_DIR", directory.path()}};
-  EXPECT_EQ(run_in(directory, environment, [&] {
+  const auto look = [&] {
     struct stat status {};
     ASSERT_EQ(::stat((directory.path() + "/arbiter/place.sock").c_str(), &status), 0);
     EXPECT_EQ(status.st_mode & 0777, 0666u);
     ASSERT_EQ(::stat((directory.path() + "/arbiter").c_str(), &status), 0);
     EXPECT_EQ(status.st_mode & 0022, 0u);
-  }), 0);
+  };
+  EXPECT_EQ(run_in(directory, environment, look), 0);
 }
 
 TEST(MeetingPlace, ThatOthersMayWriteToIsRefused) {
@@ -104,10 +105,11 @@ TEST(MeetingPlace, MayHaveALongPath) {
   for (int i = 0; i < 4; ++i) deep += "/" + std::string(60, 'd');
   fs::create_directories(deep);
   const Environment environment{{"RUNTIME_DIRECTORY", std::nullopt}, {"XDG_RUNTIME_DIR", deep}};
-  EXPECT_EQ(run_in(directory, environment, [&] {
+  const auto meet = [&] {
     const ScopedVariable session("XDG_RUNTIME_DIR", deep);
     Node node("test", {.instance = "place"});
-  }), 0);
+  };
+  EXPECT_EQ(run_in(directory, environment, meet), 0);
 }
 
 }  // namespace

@@ -89,8 +89,9 @@ TEST(Start, RefusesASecondDaemonOfTheSameInstance) {
 }
 
 TEST(Start, TwoInstancesLiveSideBySide) {
-  Daemon one(kNoRules, {.instance = "one"});
-  Daemon two(kNoRules, {.instance = "two"});
+  const TemporaryDirectory runtime;
+  Daemon one(kNoRules, {.instance = "one", .runtime_directory = runtime.path()});
+  Daemon two(kNoRules, {.instance = "two", .runtime_directory = runtime.path()});
   Node in_one("test", {.instance = "one"});
   Node in_two("test", {.instance = "two"});
   auto here = in_one.output_port<int>("/out");

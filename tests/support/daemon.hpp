@@ -100,12 +100,13 @@ class Daemon {
     std::optional<std::string> application{};
     std::vector<std::string> arguments{};
     bool without_model = false;
+    std::optional<std::string> runtime_directory{};  // else one of its own
   };
 
   explicit Daemon(const std::string& model = kNoRules) : Daemon(model, Options()) {}
   Daemon(const std::string& model, Options options)
       : options_(std::move(options)),
-        runtime_("XDG_RUNTIME_DIR", directory_.path()),
+        runtime_("XDG_RUNTIME_DIR", options_.runtime_directory.value_or(directory_.path())),
         instance_("ARBITER_INSTANCE", options_.instance),
         own_("RUNTIME_DIRECTORY", std::nullopt),
         notify_(directory_.path() + "/notify") {
@@ -172,9 +173,10 @@ class Daemon {
   std::uint64_t refused() { return status()["model"]["reloads_refused"]; }
 
   [[nodiscard]] const std::string& instance() const { return options_.instance; }
+  // Where its files are.
   [[nodiscard]] std::string directory() const { return directory_.path(); }
   [[nodiscard]] std::string socket_path() const {
-    return directory() + "/arbiter/" + instance() + ".sock";
+    return options_.runtime_directory.value_or(directory()) + "/arbiter/" + instance() + ".sock";
   }
   [[nodiscard]] ChildProcess& process() { return process_; }
   [[nodiscard]] NotifySocket& notify() { return notify_; }

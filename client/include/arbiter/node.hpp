@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <string_view>
+#include <type_traits>
 
 #include <arbiter/detail/cores.hpp>
 #include <arbiter/input_port.hpp>
@@ -26,7 +27,11 @@ class Node {
   template <class T>
   [[nodiscard]] OutputPort<T> output_port(std::string_view name,
                                           const OutputPortOptions& options = {}) {
-    return OutputPort<T>(detail::open_output(*core_, name, detail::port_type<T>(), options));
+    if constexpr (std::is_void_v<T>) {
+      return output_port(name, options);
+    } else {
+      return OutputPort<T>(detail::open_output(*core_, name, detail::port_type<T>(), options));
+    }
   }
   // An untyped one, for samples of up to options.max_size bytes.
   [[nodiscard]] OutputPort<void> output_port(std::string_view name,
@@ -39,7 +44,11 @@ class Node {
   template <class T>
   [[nodiscard]] InputPort<T> input_port(std::string_view name,
                                         const InputPortOptions& options = {}) {
-    return InputPort<T>(detail::open_input(*core_, name, detail::port_type<T>(), options));
+    if constexpr (std::is_void_v<T>) {
+      return input_port(name, options);
+    } else {
+      return InputPort<T>(detail::open_input(*core_, name, detail::port_type<T>(), options));
+    }
   }
   [[nodiscard]] InputPort<void> input_port(std::string_view name,
                                            const InputPortOptions& options = {}) {
