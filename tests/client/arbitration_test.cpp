@@ -123,10 +123,10 @@ TEST(Arbitration, ASensedSourceSilencesWithoutAConnection) {
 }
 
 TEST(Arbitration, APortThatNoRuleMentionsGetsEverything) {
-  Daemon daemon(override_model(), {.application = application(connection("/low", "/in") +
-                                                              connection("/high", "/in") +
-                                                              connection("/low", "/log") +
-                                                              connection("/high", "/log"))});
+  Daemon daemon(
+      override_model(),
+      {.application = application(connection("/low", "/in") + connection("/high", "/in") +
+                                  connection("/low", "/log") + connection("/high", "/log"))});
   Node node("test");
   auto low = node.output_port<Number>("/low");
   auto high = node.output_port<Number>("/high");

@@ -7,8 +7,8 @@
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
-#include "tests/support/threads.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/threads.hpp"
 
 namespace arbiter::test {
 namespace {

@@ -18,9 +18,9 @@ inline std::string arbiter_at(const std::string& port, const std::string& select
 // At /in: /high overrides /low; nobody gets through while /stop is active. Activity lasts until it
 // is ended.
 inline std::string override_model(const std::string& timeout = "forever") {
-  return rules(arbiter_at("/in", select("/low", "not /high and not /stop") +
-                                     select("/high", "not /stop")),
-               timeout);
+  return rules(
+      arbiter_at("/in", select("/low", "not /high and not /stop") + select("/high", "not /stop")),
+      timeout);
 }
 
 // One source, one port.

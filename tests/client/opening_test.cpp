@@ -132,8 +132,14 @@ TEST(Opening, AnInputAndAnOutputPortMayBearTheSameName) {
 TEST(Opening, AMalformedNameIsRefused) {
   Daemon daemon;
   Node node("test");
-  const std::vector<std::string> bad{"",      "x",     "/a b", "/a\tb", "/a\nb",
-                                     "/a\x7f", std::string("/a\0b", 4), "/" + std::string(255, 'a')};
+  const std::vector<std::string> bad{"",
+                                     "x",
+                                     "/a b",
+                                     "/a\tb",
+                                     "/a\nb",
+                                     "/a\x7f",
+                                     std::string("/a\0b", 4),
+                                     "/" + std::string(255, 'a')};
   for (const auto& name : bad) {
     EXPECT_THROW(static_cast<void>(node.output_port<Number>(name)), Error) << name;
     EXPECT_THROW(static_cast<void>(node.input_port<Number>(name)), Error) << name;

@@ -205,8 +205,8 @@ TEST(Swap, ABadModelChangesNothing) {
   auto in = node.input_port<Number>("/in");
   const auto generation = daemon.generation();
   a.publish(Number{1});
-  for (const std::string bad : {"", "<behaviors", "<behaviors><nonsense/></behaviors>",
-                                "<behaviors timeout='0s'/>"}) {
+  for (const std::string bad :
+       {"", "<behaviors", "<behaviors><nonsense/></behaviors>", "<behaviors timeout='0s'/>"}) {
     daemon.load_bad(bad);
   }
   EXPECT_EQ(daemon.generation(), generation);

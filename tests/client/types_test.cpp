@@ -81,7 +81,9 @@ TEST(Types, EqualTypesConnect) { EXPECT_EQ(mismatch(output<Number>(), input<Numb
 
 TEST(Types, TypedToUntypedConnects) { EXPECT_EQ(mismatch(output<Number>(), untyped_input()), ""); }
 
-TEST(Types, UntypedToUntypedConnects) { EXPECT_EQ(mismatch(untyped_output(), untyped_input()), ""); }
+TEST(Types, UntypedToUntypedConnects) {
+  EXPECT_EQ(mismatch(untyped_output(), untyped_input()), "");
+}
 
 TEST(Types, UntypedToTypedIsRefused) {
   const std::string why = mismatch(untyped_output(), input<Number>());

@@ -30,10 +30,10 @@ TEST(Consumer, BuildsAndRunsAgainstTheInstalledPackage) {
   EXPECT_TRUE(fs::exists(prefix + "/bin/arbiterd"));
   // The sources are copied, so that nothing of ours is found by the way.
   fs::copy(std::string(ARBITER_TEST_DATA) + "/project", directory.path() + "/project");
-  ASSERT_NO_FATAL_FAILURE(run({CONSUMER_CMAKE, "-S", directory.path() + "/project", "-B", build,
-                               "-G", CONSUMER_GENERATOR, "-DCMAKE_PREFIX_PATH=" + prefix,
-                               "-DCMAKE_CXX_COMPILER=" CONSUMER_COMPILER,
-                               "-DCMAKE_CXX_FLAGS=" CONSUMER_FLAGS}));
+  ASSERT_NO_FATAL_FAILURE(
+      run({CONSUMER_CMAKE, "-S", directory.path() + "/project", "-B", build, "-G",
+           CONSUMER_GENERATOR, "-DCMAKE_PREFIX_PATH=" + prefix,
+           "-DCMAKE_CXX_COMPILER=" CONSUMER_COMPILER, "-DCMAKE_CXX_FLAGS=" CONSUMER_FLAGS}));
   ASSERT_NO_FATAL_FAILURE(run({CONSUMER_CMAKE, "--build", build}));
   for (const char* program : {"/consumer17", "/consumer20"}) {
     Daemon daemon(kModel);

@@ -105,8 +105,8 @@ TEST_F(HostileClient, ThatSendsRandomMessagesAfterItsHelloHarmsNobody) {
 }
 
 TEST_F(HostileClient, ThatSendsTruncatedOrOversizedMessagesIsDropped) {
-  for (const std::size_t size : {std::size_t{1}, std::size_t{7}, sizeof(shm::Message) + 1,
-                                 std::size_t{60000}}) {
+  for (const std::size_t size :
+       {std::size_t{1}, std::size_t{7}, sizeof(shm::Message) + 1, std::size_t{60000}}) {
     RawClient hostile = client();
     const std::vector<char> bytes(size, 3);
     hostile.send_bytes(bytes.data(), bytes.size());

@@ -1,4 +1,5 @@
-// A daemon that nobody asks anything uses no processor time: it sleeps, with no time set for waking.
+// A daemon that nobody asks anything uses no processor time: it sleeps, with no time set for
+// waking.
 #include <gtest/gtest.h>
 #include <sys/syscall.h>
 

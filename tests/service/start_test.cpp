@@ -124,7 +124,8 @@ TEST(Start, ABadModelEndsItBeforeItIsReady) {
       {"empty.xml", ""},
       {"malformed.xml", "<behaviors>"},
       {"conflict.xml",
-       "<behaviors><arbiter at='/in'><select from='/a'/><select from='/b'/></arbiter></behaviors>"}};
+       "<behaviors><arbiter at='/in'><select from='/a'/><select "
+       "from='/b'/></arbiter></behaviors>"}};
   for (const auto& [name, text] : models) {
     const std::string path = directory.write(name, text);
     const auto [code, log] = start_in_vain({"--model", path}, runtime);

@@ -6,9 +6,10 @@
 #include <unistd.h>
 
 #include <array>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
+
+#include <nlohmann/json.hpp>
 
 #include "shm/rendezvous.hpp"
 #include "shm/segment.hpp"

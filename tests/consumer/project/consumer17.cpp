@@ -1,9 +1,10 @@
 // A C++17 program: options are filled member by member.
-#include <arbiter/arbiter.hpp>
 #include <chrono>
 #include <cstring>
 #include <utility>
 #include <vector>
+
+#include <arbiter/arbiter.hpp>
 
 #include "position.hpp"
 
@@ -20,8 +21,7 @@ int main(int, char** argv) {
   output_options.max_loans = 3;
   output_options.max_size = 256;
   output_options.max_memory = std::size_t{1} << 24;
-  arbiter::OutputPort<Position> out =
-      node.output_port<Position>("/Object/pos:o", output_options);
+  arbiter::OutputPort<Position> out = node.output_port<Position>("/Object/pos:o", output_options);
 
   arbiter::InputPortOptions input_options;
   input_options.depth = 4;

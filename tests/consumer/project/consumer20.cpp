@@ -1,8 +1,9 @@
 // The interface as its documentation shows it.
-#include <arbiter/arbiter.hpp>
 #include <chrono>
 #include <span>
 #include <utility>
+
+#include <arbiter/arbiter.hpp>
 
 #include "position.hpp"
 
