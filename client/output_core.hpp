@@ -66,6 +66,9 @@ class OutputCore {
       node;  // kept for as long as the port is, so that they may go in any order
 
  private:
+  // How often a decision is taken anew because seven models were loaded during it.
+  static constexpr int kMaxTableRetries = 3;
+
   // A link as the port's thread works with it.
   struct Destination {
     const InputPeer* peer = nullptr;  // kept alive by view_

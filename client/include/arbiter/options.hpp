@@ -26,7 +26,7 @@ struct OutputPortOptions {
   std::uint32_t max_loans = 2;
   // The most memory, in bytes, that this port's samples may take up. It is taken as input ports
   // connect: each needs its depth and what it may hold. One that does not fit gets a smaller depth.
-  std::size_t max_memory = std::size_t{256} << 20;
+  std::size_t max_memory = std::size_t{1} << 30;
 };
 
 // What gives way when `depth` samples of one connection wait already.

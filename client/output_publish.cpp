@@ -1,0 +1,222 @@
+// publish(), signal() and deactivate(): what becomes of an arrival.
+//
+//   stamp     the source's activity; from here on everybody sees it
+//   decide    at each connected port
+//   hand over to the queues of those where it wins, and ring for those that wait
+//   ring      where the activity's beginning or end changed the selection without a sample
+#include <algorithm>
+#include <cstring>
+
+#include "client/count.hpp"
+#include "client/output_core.hpp"
+
+namespace arbiter::detail {
+
+std::uint32_t OutputCore::acquire_slot() noexcept {
+  return pool_.acquire(instance_, [&](auto&& each) {
+    for (const Destination& destination : destinations_) {
+      each(destination.peer->segment->header.holds, destination.peer->max_held);
+    }
+  });
+}
+
+LoanedSlot OutputCore::loan(std::size_t size) noexcept {
+  if (handover_.has_offer()) accept_view();
+  if (size > type_.size || loans_ == max_loans_) return {};
+  const std::uint32_t slot = acquire_slot();
+  if (slot == shm::kNoSlot) {
+    count(segment_.header().counters.no_slot);
+    return {};
+  }
+  ++loans_;
+  return {segment_.payload(slot), slot};
+}
+
+void OutputCore::end_loan(std::uint32_t slot) noexcept {
+  --loans_;
+  pool_.end_loan(slot);
+}
+
+// SYNC POINT: stamped. Fence (a) stands between our stamp and our reading of other stamps, and
+// before publish() returns. It pairs with fence (a) of other publishers (of two that override each
+// other, at least one sees the other), with fence (d) of a receiver about to wait, and gives the
+// guarantee that no take() which begins after publish() has returned misses the stamp.
+void OutputCore::stamp(shm::ActivityWord word) noexcept {
+  if (shm::is_deactivation(word)) {
+    activity_->word.store(word, std::memory_order_relaxed);
+  } else {
+    activity_->arrive(own_word_, word);
+  }
+  own_word_ = word;
+  shm::full_fence();
+}
+
+Outcome OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
+  if (handover_.has_offer()) accept_view();
+  if (memory_->tables().generation() != bound_generation_) bind_rules();
+  const bool begins = !shm::is_active(own_word_, now);
+  stamp(shm::arrival(now, timeout_));
+  Outcome outcome;
+  if (!destinations_.empty()) {
+    decide_all(now);
+    outcome = hand_over(slot, size, now);
+    if (begins) ring_where_selection_changed(now);
+  }
+  auto& counters = segment_.header().counters;
+  count(slot == shm::kNoSlot ? counters.signals : counters.published);
+  return outcome;
+}
+
+void OutputCore::decide_all(shm::Nanoseconds now) noexcept {
+  for (int tries = 0;; ++tries) {
+    shm::DecisionClock clock(now, true);
+    shm::Decider decider(snapshot_.table, memory_->pages(), clock);
+    for (Destination& destination : destinations_) {
+      if (destination.joined) destination.verdict = decider.decide(destination.rule);
+    }
+    if (memory_->tables().is_whole(snapshot_)) return;
+    if (tries == kMaxTableRetries) break;
+    bind_rules();
+  }
+  for (Destination& destination : destinations_) destination.verdict = shm::Verdict::kUnsettled;
+}
+
+Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
+  Outcome outcome;
+  const bool is_sample = slot != shm::kNoSlot;
+  if (is_sample) {
+    shm::SlotHeader& header = segment_.slot_header(slot);
+    header.sequence.store(++sequence_, std::memory_order_relaxed);
+    header.stamp.store(now, std::memory_order_relaxed);
+    header.size.store(size, std::memory_order_relaxed);
+  }
+  std::uint64_t blind = 0;
+  std::uint64_t unsettled = 0;
+  for (Destination& destination : destinations_) {
+    if (!destination.joined || destination.rule.source == shm::kNone) continue;
+    blind += destination.verdict == shm::Verdict::kBlind;
+    unsettled += destination.verdict == shm::Verdict::kUnsettled;
+    if (destination.verdict != shm::Verdict::kWins) {
+      ++outcome.discarded;
+      if (is_sample) count(destination.writer.channel().discarded, 1);
+      continue;
+    }
+    if (!is_sample) continue;
+    if (destination.peer->refuse_new && is_full(destination)) {
+      destination.verdict = shm::Verdict::kLoses;  // nothing to ring for
+      ++outcome.refused;
+      count(destination.writer.channel().refused, 1);
+      continue;
+    }
+    ++outcome.delivered;
+    pool_.add_reference(slot);
+    const std::uint32_t evicted = destination.writer.push(slot);
+    if (evicted != shm::kNoSlot) pool_.evict(evicted);
+  }
+  if (outcome.delivered != 0) {
+    // SYNC POINT: entry-announced. Fence (b), between our entries and our reading of wait words and
+    // holds. Pairs with fence (d) of a receiver about to wait: either it sees the entry, or we see
+    // it wait; and with fence (c) of a receiver that takes hold (channel.hpp).
+    shm::full_fence();
+    for (Destination& destination : destinations_) {
+      if (destination.joined && destination.verdict == shm::Verdict::kWins)
+        ring_if_waiting(destination);
+    }
+  }
+  auto& counters = segment_.header().counters;
+  if (is_sample) {
+    count(counters.delivered, outcome.delivered);
+    count(counters.discarded, outcome.discarded);
+    count(counters.refused, outcome.refused);
+  }
+  count(counters.blind, blind);
+  count(counters.unsettled, unsettled);
+  return outcome;
+}
+
+// The receiver's lane for us tells how far it has read; until it has one, it has read nothing.
+bool OutputCore::is_full(Destination& destination) const noexcept {
+  const shm::InputSegment& segment = *destination.peer->segment;
+  const auto is_ours = [&](const shm::Lane& lane) {
+    return lane.publisher.load(std::memory_order_acquire) == instance_;
+  };
+  if (destination.lane == nullptr || !is_ours(*destination.lane)) {
+    destination.lane = nullptr;
+    for (const shm::Lane& lane : segment.lanes) {
+      if (is_ours(lane)) destination.lane = &lane;
+    }
+  }
+  const std::uint64_t nothing_read =
+      destination.writer.channel().first.load(std::memory_order_relaxed) - 1;
+  const std::uint64_t consumed = destination.lane == nullptr
+                                     ? nothing_read
+                                     : destination.lane->consumed.load(std::memory_order_acquire);
+  return destination.writer.is_full(std::max(consumed, nothing_read));
+}
+
+void OutputCore::ring_if_waiting(Destination& destination) noexcept {
+  const std::uint64_t wait = destination.peer->segment->header.wait.load(std::memory_order_acquire);
+  if ((wait & 1) == 0 || wait == destination.rung) return;
+  destination.rung = wait;
+  destination.peer->ringer.ring();
+}
+
+// Our activity has begun or ended. A component that waits, and believes of its port what is no
+// longer so, is woken: to stop its motor, or to know when it will have to.
+void OutputCore::ring_where_selection_changed(shm::Nanoseconds now) noexcept {
+  for (Destination& destination : destinations_) {
+    const std::uint64_t wait =
+        destination.peer->segment->header.wait.load(std::memory_order_acquire);
+    if ((wait & 1) == 0 || wait == destination.rung) continue;
+    if (selection_differs(destination, now)) ring_if_waiting(destination);
+  }
+}
+
+bool OutputCore::selection_differs(const Destination& destination, shm::Nanoseconds now) noexcept {
+  const shm::SourceId believed =
+      destination.peer->segment->header.believed.load(std::memory_order_relaxed);
+  const shm::TableView& table = snapshot_.table;
+  shm::DecisionClock clock(now, true);
+  shm::Decider decider(table, memory_->pages(), clock);
+  const auto range = table.connections_to(destination.peer->port);
+  for (auto index = range.first; index != range.first + range.count; ++index) {
+    const shm::Rule rule = table.rule(index);
+    const shm::Verdict verdict = decider.decide_with_own(rule);
+    if (verdict == shm::Verdict::kWins) return believed != rule.source;
+    if (verdict != shm::Verdict::kLoses) return true;  // not known here: let it look for itself
+  }
+  return believed != shm::kNone;
+}
+
+Outcome OutputCore::publish_loan(std::uint32_t slot, std::size_t size,
+                                 shm::Nanoseconds now) noexcept {
+  const Outcome outcome = arrive(slot, size, now);
+  end_loan(slot);
+  return outcome;
+}
+
+Outcome OutputCore::publish_copy(const void* data, std::size_t size,
+                                 shm::Nanoseconds now) noexcept {
+  if (handover_.has_offer()) accept_view();
+  const std::uint32_t slot = acquire_slot();
+  if (slot == shm::kNoSlot) {
+    count(segment_.header().counters.no_slot);
+    return signal(now);  // it did arrive
+  }
+  if (size != 0) std::memcpy(segment_.payload(slot), data, size);
+  const Outcome outcome = arrive(slot, size, now);
+  pool_.end_loan(slot);
+  return outcome;
+}
+
+Outcome OutputCore::signal(shm::Nanoseconds now) noexcept { return arrive(shm::kNoSlot, 0, now); }
+
+void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
+  if (handover_.has_offer()) accept_view();
+  if (memory_->tables().generation() != bound_generation_) bind_rules();
+  const bool ends = shm::is_active(own_word_, now);
+  stamp(shm::deactivation(now));
+  if (ends) ring_where_selection_changed(now);
+}
+
+}  // namespace arbiter::detail
