@@ -115,6 +115,8 @@ Processes::Child Processes::spawn(const std::filesystem::path& program,
   Child child{program.filename().string(), fork(), ends[0], ""};
   if (child.pid == 0) become(argv.data(), ends[1], log, self);
   const int fork_error = errno;
+  // Here too, lest a Ctrl-C reach the child before it has come to do so itself.
+  if (child.pid > 0) setpgid(child.pid, child.pid);
   for (const int descriptor : {ends[1], log}) {
     if (descriptor >= 0) close(descriptor);
   }
