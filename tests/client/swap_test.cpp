@@ -138,6 +138,37 @@ TEST(Swap, ANewModelMayReadSourcesThatNobodyHasSeenBefore) {
   EXPECT_EQ(daemon.input("/in")["blind"], 0);
 }
 
+// The node has no thread that would take up the page of the new source, so it holds back.
+TEST(Swap, APortThatCannotSeeASourceOfItsRulesDeliversNothingAndCountsIt) {
+  Daemon daemon(rules(arbiter_at("/in", select("/a"))));
+  Node sender("sender");
+  Node receiver("receiver", {.service_thread = false});
+  auto in = receiver.input_port<Number>("/in");
+  auto a = sender.output_port<Number>("/a");
+  receiver.service();
+  daemon.load(rules(arbiter_at("/in", select("/a", "not /new"))));
+  EXPECT_EQ(a.publish(Number{1}).delivered, 1u) << "the publisher sees it";
+  EXPECT_EQ(take_from(in), kNothing);
+  EXPECT_EQ(daemon.input("/in")["blind"], 1);
+  receiver.service();
+  EXPECT_EQ(take_from(in), 1) << "held back, not lost";
+}
+
+TEST(Swap, APublisherThatCannotSeeASourceOfTheRulesDeliversNothingAndCountsIt) {
+  Daemon daemon(rules(arbiter_at("/in", select("/a"))));
+  Node sender("sender", {.service_thread = false});
+  Node receiver("receiver");
+  auto a = sender.output_port<Number>("/a");
+  auto in = receiver.input_port<Number>("/in");
+  sender.service();
+  EXPECT_EQ(a.publish(Number{1}).delivered, 1u);
+  daemon.load(rules(arbiter_at("/in", select("/a", "not /new"))));
+  EXPECT_EQ(a.publish(Number{2}).discarded, 1u);
+  EXPECT_EQ(daemon.source("/a")["blind"], 1);
+  sender.service();
+  EXPECT_EQ(a.publish(Number{3}).delivered, 1u);
+}
+
 TEST(Swap, ASensedSourceMayBecomeAConnectionAndBack) {
   const std::string sensed = rules(arbiter_at("/in", select("/low", "not /high")));
   Daemon daemon(sensed);

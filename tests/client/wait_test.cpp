@@ -228,6 +228,34 @@ TEST(Wait, APublisherThatIsKilledBetweenDeliveringAndRingingStillWakes) {
   EXPECT_EQ((**in.wait_for(std::chrono::hours::max())).value, 5);
 }
 
+// A wait that ends in an exception must not leave the port believing that it does not wait when it
+// does.
+TEST(Wait, NoWakeUpIsLostAfterAWaitThatThrew) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  constexpr int kRounds = 3000;
+  std::atomic<int> turn{0};
+  std::thread sender([&] {
+    for (int i = 1; i <= 2 * kRounds; ++i) {
+      while (turn.load() < i) {
+      }
+      out.publish(Number{i});
+    }
+  });
+  for (int i = 0; i < kRounds; ++i) {
+    turn = 2 * i + 1;
+    {
+      const auto held = in.wait_for(std::chrono::hours::max());
+      turn = 2 * i + 2;
+      EXPECT_THROW(static_cast<void>(in.wait_for(std::chrono::hours::max())), Error);
+    }
+    EXPECT_TRUE(in.wait_for(std::chrono::hours::max()));
+  }
+  sender.join();
+}
+
 TEST(Wait, ASignalToTheProcessDoesNotEndAWait) {
   struct sigaction ignore {};
   ignore.sa_handler = [](int) {};

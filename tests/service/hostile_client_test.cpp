@@ -10,9 +10,11 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "shm/bell.hpp"
 #include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/threads.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -282,6 +284,75 @@ TEST_F(HostileClient, ThatConnectsAndSaysNothingHarmsNobody) {
   std::vector<RawClient> silent;
   for (int i = 0; i < 200; ++i) silent.emplace_back(daemon_.instance());
   Node node("test");
+}
+
+// An input port whose component could not take up its publisher: the publisher is told, and does
+// not count it any more.
+TEST_F(HostileClient, ThatRefusesItsPeerIsNotDeliveredTo) {
+  const auto segment = shm::make_segment("input", sizeof(shm::InputSegment));
+  {
+    const shm::Mapping mapping(segment, sizeof(shm::InputSegment), shm::Access::kReadWrite);
+    auto& header = mapping.as<shm::InputSegment>()->header;
+    header.magic = shm::InputHeader::kMagic;
+    header.version = shm::InputHeader::kVersion;
+    header.depth = 1;
+    header.max_held = 1;
+  }
+  shm::seal(segment, shm::Seals::kOneWriter);
+  { auto closed = std::move(in_); }
+  const shm::Bell bell;
+  RawClient refusing = client();
+  refusing.send(RawClient::message(MessageKind::kOpenInput, "/in"),
+                {segment.get(), bell.write_end().get()});
+  const auto peer = refusing.expect(MessageKind::kOutputPeer);
+  refusing.expect(MessageKind::kConnected);
+  EXPECT_EQ(out_.publish(1).delivered, 1u);
+  auto refusal = RawClient::message(MessageKind::kPeerRefused);
+  refusal.port = peer.message.port;
+  refusal.peer = peer.message.peer;
+  refusal.set_text("no memory");
+  refusing.send(refusal);
+  EXPECT_EQ(refusing.status()["inputs"][0]["connections"][0]["mismatch"], "no memory");
+  { auto elsewhere = node_.input_port<int>("/elsewhere"); }  // the node has heard of it by now
+  EXPECT_EQ(out_.publish(2).delivered, 0u);
+  auto close = RawClient::message(MessageKind::kClosePort);
+  close.port = peer.message.port;
+  refusing.send(close);
+  in_ = node_.input_port<int>("/in");
+}
+
+TEST_F(HostileClient, ThatObservesIsToldEachNameOnce) {
+  RawClient observer = client();
+  observer.send(RawClient::message(MessageKind::kObserve));
+  observer.expect(MessageKind::kDone);
+  std::vector<InputPort<int>> ports;
+  for (int i = 0; i < 20; ++i) {
+    ports.push_back(node_.input_port<int>("/many" + std::to_string(i)));
+  }
+  for (int i = 0; i < 20; ++i) {
+    const auto told = observer.expect(MessageKind::kPortName);
+    EXPECT_EQ(told.message.name_view(), "/many" + std::to_string(i));
+  }
+  observer.send(RawClient::message(MessageKind::kObserve));
+  shm::Received next;
+  ASSERT_TRUE(observer.receive(next));
+  EXPECT_EQ(next.message.kind, MessageKind::kDone) << "there is no more to tell";
+}
+
+TEST(Descriptors, WhenTheyRunOutClientsAreTurnedAwayAndTheDaemonRests) {
+  Daemon daemon(kModel, {.max_descriptors = 64});
+  Node node("test");
+  {
+    std::vector<RawClient> many;
+    for (int i = 0; i < 80; ++i) many.emplace_back(daemon.instance());
+    shm::Received received;
+    EXPECT_FALSE(many.back().receive(received)) << "turned away";
+    wait_until_it_sleeps_in(SYS_epoll_wait, daemon.process().pid(), daemon.process().pid());
+  }
+  Node other("other");
+  auto out = other.output_port<int>("/out");
+  auto in = node.input_port<int>("/in");
+  EXPECT_EQ(out.publish(1).delivered, 1u);
 }
 
 }  // namespace

@@ -101,6 +101,7 @@ class Daemon {
     std::vector<std::string> arguments{};
     bool without_model = false;
     std::optional<std::string> runtime_directory{};  // else one of its own
+    std::optional<int> max_descriptors{};
   };
 
   explicit Daemon(const std::string& model = kNoRules) : Daemon(model, Options()) {}
@@ -211,6 +212,10 @@ class Daemon {
       argv.insert(argv.end(), {"--application", directory_.path() + "/application.xml"});
     }
     argv.insert(argv.end(), options_.arguments.begin(), options_.arguments.end());
+    if (options_.max_descriptors) {
+      const std::string limit = "ulimit -n " + std::to_string(*options_.max_descriptors);
+      argv.insert(argv.begin(), {"/bin/sh", "-c", limit + R"( && exec "$0" "$@")"});
+    }
     const shm::FileDescriptor log(::open((directory_.path() + "/log").c_str(),
                                          O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600));
     process_ = ChildProcess(argv, {{"NOTIFY_SOCKET", notify_.path()}}, {-1, -1, log.get()});
