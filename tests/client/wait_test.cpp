@@ -228,6 +228,11 @@ TEST(Wait, APublisherThatIsKilledBetweenDeliveringAndRingingStillWakes) {
   EXPECT_EQ((**in.wait_for(std::chrono::hours::max())).value, 5);
 }
 
+void spin(int rounds) {
+  for (std::atomic<int> i{0}; i < rounds; ++i) {
+  }
+}
+
 // A wait that ends in an exception must not leave the port believing that it does not wait when it
 // does.
 TEST(Wait, NoWakeUpIsLostAfterAWaitThatThrew) {
@@ -241,6 +246,7 @@ TEST(Wait, NoWakeUpIsLostAfterAWaitThatThrew) {
     for (int i = 1; i <= 2 * kRounds; ++i) {
       while (turn.load() < i) {
       }
+      if (i % 2 != 0) spin(3000);  // so that it sleeps by now
       out.publish(Number{i});
     }
   });
@@ -249,6 +255,7 @@ TEST(Wait, NoWakeUpIsLostAfterAWaitThatThrew) {
     {
       const auto held = in.wait_for(std::chrono::hours::max());
       turn = 2 * i + 2;
+      spin(i % 100);  // so that the sample comes at any moment of the wait
       EXPECT_THROW(static_cast<void>(in.wait_for(std::chrono::hours::max())), Error);
     }
     EXPECT_TRUE(in.wait_for(std::chrono::hours::max()));

@@ -230,17 +230,6 @@ TEST_F(HostileClient, CannotDeactivateASourceThatALiveComponentHas) {
             std::string::npos);
 }
 
-// The port's name is asked for twice by the same client, which is dead by the time that the second
-// request is read.
-TEST_F(HostileClient, ThatAsksTwiceForANameAndHangsUpHarmsNobody) {
-  for (int round = 0; round < 20; ++round) {
-    RawClient hostile = client();
-    const auto segment = output_segment({});
-    shm::seal(segment, shm::Seals::kOneWriter);
-    for (int i = 0; i < 5; ++i) hostile.send(open_output("/twice"), {segment.get(), -1});
-  }
-}
-
 TEST_F(HostileClient, ThatNeverReadsHoldsUpNobody) {
   RawClient deaf = client();
   const auto segment = output_segment({});

@@ -1,0 +1,87 @@
+// Who has a port's name, where its component closes it or dies and the daemon hears of it late.
+#include <gtest/gtest.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+
+#include <arbiter/arbiter.hpp>
+
+#include "shm/output_segment.hpp"
+#include "tests/support/daemon.hpp"
+#include "tests/support/threads.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using shm::MessageKind;
+
+shm::FileDescriptor output_segment() {
+  const shm::TypeInfo type;
+  const auto layout = shm::OutputLayout::plan(type, 4);
+  auto segment = shm::make_segment("test", layout.total_size);
+  {
+    const shm::Mapping mapping(segment, layout.total_size, shm::Access::kReadWrite);
+    auto& header = *mapping.as<shm::OutputHeader>();
+    header.magic = shm::OutputHeader::kMagic;
+    header.version = shm::OutputHeader::kVersion;
+    header.slot_count = 4;
+    header.type = type;
+  }
+  shm::seal(segment, shm::Seals::kOneWriter);
+  return segment;
+}
+
+shm::Message open_output(const std::string& name) {
+  return RawClient::message(MessageKind::kOpenOutput, name);
+}
+
+// The port's name is asked for twice by the same client, which is dead by the time that the second
+// request is read.
+TEST(Names, AskedForTwiceByAComponentThatIsDeadByThenAreFree) {
+  Daemon daemon;
+  const pid_t child = ::fork();
+  if (child == 0) {
+    RawClient client(daemon.instance());
+    client.hello("doomed");
+    ::kill(daemon.process().pid(), SIGSTOP);
+    const auto segment = output_segment();
+    for (int i = 0; i < 2; ++i) client.send(open_output("/twice"), {segment.get(), -1});
+    ::_exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_EQ(status, 0);
+  daemon.process().signal(SIGCONT);
+  Node node("test");
+  auto port = node.output_port<int>("/twice");
+}
+
+// The daemon reads the sockets in an order of its own. A name is free once its port has been
+// closed, though the closing lies in a socket that is read later.
+TEST(Names, AreFreeInTheOrderInWhichComponentsSpoke) {
+  Daemon daemon;
+  for (int round = 0; round < 5; ++round) {
+    RawClient first(daemon.instance());
+    RawClient second(daemon.instance());
+    first.hello("first");
+    second.hello("second");
+    const auto segment = output_segment();
+    first.send(open_output("/x"), {segment.get(), -1});
+    auto close = RawClient::message(MessageKind::kClosePort);
+    close.port = first.expect(MessageKind::kOpened).message.port;
+    first.expect(MessageKind::kConnected);
+    wait_until_it_sleeps_in(SYS_epoll_wait, daemon.process().pid(), daemon.process().pid());
+    daemon.process().stop();
+    second.send(RawClient::message(MessageKind::kClosePort));  // now its socket comes first
+    if (round % 2 == 0) {
+      first.send(close);
+    } else {
+      first = RawClient(daemon.instance());  // hangs up
+    }
+    second.send(open_output("/x"), {segment.get(), -1});
+    daemon.process().signal(SIGCONT);
+    EXPECT_NO_THROW(second.expect(MessageKind::kOpened));
+  }
+}
+
+}  // namespace
+}  // namespace arbiter::test
