@@ -54,6 +54,14 @@ void InputCore::disconnect_peer(shm::PortInstance peer) {
   if (links_.erase(peer) != 0) offer_view();
 }
 
+std::vector<HeldLink> InputCore::held_links() const {
+  std::vector<HeldLink> held;
+  for (const auto& [peer, link] : links_) {
+    if (!link.gone) held.push_back({peer, link.peer->link});
+  }
+  return held;
+}
+
 void InputCore::tidy() {
   handover_.collect();
   const bool drained = std::any_of(links_.begin(), links_.end(), [](const auto& link) {

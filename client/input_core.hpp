@@ -37,6 +37,7 @@ class InputCore {
   void lose_peer(shm::PortInstance peer);
   // The model has disconnected it.
   void disconnect_peer(shm::PortInstance peer);
+  [[nodiscard]] std::vector<HeldLink> held_links() const;
   // Unmaps what the port's thread has let go of.
   void tidy();
 
@@ -52,6 +53,7 @@ class InputCore {
 
   // Either.
 
+  [[nodiscard]] shm::PortId port() const noexcept { return port_; }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] shm::PortInstance instance() const noexcept { return instance_; }
   [[nodiscard]] const shm::TypeInfo& type() const noexcept { return type_; }

@@ -5,10 +5,11 @@
 
 namespace arbiter::detail {
 
-SharedMemory::SharedMemory(const shm::FileDescriptor& board) {
-  const std::size_t size = shm::checked_size(board, shm::Seals::kFixedSize);
+SharedMemory::SharedMemory(shm::FileDescriptor board, shm::FileDescriptor registry)
+    : board_descriptor_(std::move(board)), registry_(std::move(registry)) {
+  const std::size_t size = shm::checked_size(board_descriptor_, shm::Seals::kFixedSize);
   if (size != sizeof(shm::Board)) throw std::runtime_error("the daemon's board has another size");
-  board_ = shm::Mapping(board, size, shm::Access::kReadOnly);
+  board_ = shm::Mapping(board_descriptor_, size, shm::Access::kReadOnly);
   const auto* mapped = board_.as<const shm::Board>();
   if (mapped->magic != shm::Board::kMagic || mapped->version != shm::Board::kVersion) {
     throw std::runtime_error("the daemon is of another version");
@@ -16,7 +17,7 @@ SharedMemory::SharedMemory(const shm::FileDescriptor& board) {
   tables_ = shm::TableReader(*mapped);
 }
 
-void SharedMemory::add_page(shm::SourceId id, std::string name, const shm::FileDescriptor& page) {
+void SharedMemory::add_page(shm::SourceId id, std::string name, shm::FileDescriptor page) {
   if (id >= shm::kMaxSources)
     throw std::runtime_error("the daemon names a source beyond its limit");
   if (shm::checked_size(page, shm::Seals::kFixedSize) != sizeof(shm::ActivityPage)) {
@@ -28,6 +29,9 @@ void SharedMemory::add_page(shm::SourceId id, std::string name, const shm::FileD
   }
   mappings_.emplace_back(page, sizeof(shm::ActivityPage), shm::Access::kReadOnly);
   pages_->attach(id, &mappings_.back().as<const shm::ActivityPage>()->activity);
+  if (page_descriptors_.size() < kMaxPageDescriptors || page_descriptors_.count(id) != 0) {
+    page_descriptors_[id] = std::move(page);
+  }
 }
 
 std::string SharedMemory::source_name(shm::SourceId id) const {

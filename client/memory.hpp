@@ -9,6 +9,7 @@
 
 #include "client/service_bell.hpp"
 #include "shm/decision.hpp"
+#include "shm/file_descriptor.hpp"
 #include "shm/segment.hpp"
 #include "shm/table_ring.hpp"
 
@@ -18,22 +19,35 @@ namespace arbiter::detail {
 // as long as this lives.
 class SharedMemory {
  public:
-  // Throws std::system_error, std::runtime_error.
-  explicit SharedMemory(const shm::FileDescriptor& board);
+  // The registry is kept for the daemon's successor. Throws std::system_error, std::runtime_error.
+  SharedMemory(shm::FileDescriptor board, shm::FileDescriptor registry);
 
-  void add_page(shm::SourceId id, std::string name, const shm::FileDescriptor& page);
+  void add_page(shm::SourceId id, std::string name, shm::FileDescriptor page);
   [[nodiscard]] std::string source_name(shm::SourceId id) const;
+
+  // Service thread: what a daemon that takes over is handed back.
+  [[nodiscard]] const shm::FileDescriptor& board() const noexcept { return board_descriptor_; }
+  [[nodiscard]] const shm::FileDescriptor& registry() const noexcept { return registry_; }
+  [[nodiscard]] const std::map<shm::SourceId, shm::FileDescriptor>& page_descriptors() const {
+    return page_descriptors_;
+  }
 
   [[nodiscard]] const shm::TableReader& tables() const noexcept { return tables_; }
   [[nodiscard]] const shm::ActivityPages& pages() const noexcept { return *pages_; }
   [[nodiscard]] const ServiceBell& service_bell() const noexcept { return service_bell_; }
 
  private:
+  // More need not be kept: others have them too, and a process has 1024 descriptors by default.
+  static constexpr std::size_t kMaxPageDescriptors = 256;
+
   ServiceBell service_bell_;
+  shm::FileDescriptor board_descriptor_;
+  shm::FileDescriptor registry_;
   shm::Mapping board_;
   shm::TableReader tables_;
   std::unique_ptr<shm::ActivityPages> pages_ = std::make_unique<shm::ActivityPages>();
   std::vector<shm::Mapping> mappings_;
+  std::map<shm::SourceId, shm::FileDescriptor> page_descriptors_;
 
   mutable std::mutex names_mutex_;
   std::map<shm::SourceId, std::string> names_;

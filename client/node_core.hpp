@@ -1,8 +1,12 @@
 // A node: the conversation with the daemon, and the registry of the ports that it concerns.
 //
+//   node_core.cpp     connecting; opening and closing ports; questions and answers
+//   node_service.cpp  what the daemon says, and the thread that hears it
+//   node_rejoin.cpp   losing the daemon, and coming back to another
+//
 // Thread safety: opening and closing ports may come from any thread; what the daemon says is
 // handled by one thread at a time, the service thread, or whoever calls service() where there is
-// none. `mutex_` guards the registry and the replies; nothing on the data path takes it.
+// none. `mutex_` guards the registry, the replies and the socket; nothing on the data path takes it.
 #pragma once
 
 #include <chrono>
@@ -42,7 +46,8 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // Readable when there is something to take up.
   [[nodiscard]] int service_fd() const noexcept { return epoll_.get(); }
 
-  // Asks the daemon and waits for the answer. Throws Error where it refuses, or is gone.
+  // Asks the daemon and waits for the answer; a daemon that takes over is asked again. Throws Error
+  // where it refuses, or none answers in time.
   shm::Received ask(const shm::Message& question,
                     std::array<int, shm::kMaxDescriptors> descriptors);
 
@@ -52,39 +57,72 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   [[nodiscard]] std::map<shm::PortId, std::string> port_names();
 
  private:
+  using Clock = std::chrono::steady_clock;
+  using Socket = std::shared_ptr<const shm::FileDescriptor>;
+
   struct Reply {
-    bool opened = false;  // kOpened came
+    shm::PortInstance opened = 0;  // kOpened came
     bool finished = false;
+    std::uint64_t asked_in = 0;  // the conversation in which the question was asked last
     std::string refusal;
     shm::Received received;
-    std::function<void(const shm::Received&)> on_opened;
+    std::function<void(shm::Received&)> on_opened;
   };
+  // kRejoining: a daemon has been handed back everything, and has not answered yet.
+  enum class Standing : std::uint8_t { kMember, kRejoining, kAlone };
 
-  void connect(std::string_view name, const NodeOptions& options);
+  void connect();
+  bool say_hello(Clock::time_point give_up);
+  void say_that_we_wait() const;
+  [[nodiscard]] shm::Message hello() const;
+  [[nodiscard]] std::string nobody_answers(const std::string& why_not) const;
+
   void run_service_thread();
-  // Waits up to `timeout_ms` for something to do and does it; false once the daemon is gone.
-  bool pump(int timeout_ms);
+  // Waits up to `timeout_ms` for something to do and does it.
+  void pump(int timeout_ms);
+  void tidy();
   void handle(shm::Received& received);
   void handle_reply(shm::Received& received);
   void wake_inputs();
   void handle_peer(shm::Received& received);
   void refuse_peer(const shm::Message& announced, const std::string& why);
+
+  [[nodiscard]] bool watch_socket() const;
   void lose_daemon();
-  void send(const shm::Message& message,
-            std::array<int, shm::kMaxDescriptors> descriptors = {-1, -1});
+  void be_alone(Clock::duration look_again_in);
+  void ring_timer_every(Clock::duration time) const;
+  void rejoin();
+  [[nodiscard]] bool hand_back(const shm::FileDescriptor& socket);
+  void be_welcomed(const shm::Received& welcome);
+  void be_turned_away(const shm::Message& refusal);
+
+  [[nodiscard]] Socket socket();
+  // Under mutex_. What is lost with the conversation, rejoining makes good.
+  void say(const shm::Message& message) noexcept;
+  void say_closed(shm::PortInstance port) noexcept;
+  void forget_port(shm::PortInstance port);
   shm::Received converse(const shm::Message& question,
                          std::array<int, shm::kMaxDescriptors> descriptors,
-                         std::function<void(const shm::Received&)> on_opened);
+                         std::function<void(shm::Received&)> on_opened);
+  // Until something may have changed; false: it is time to give up.
+  bool wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_point give_up);
 
+  const std::string name_;
+  const NodeOptions options_;
   std::string instance_;
-  shm::FileDescriptor socket_;
   shm::FileDescriptor epoll_;
+  shm::FileDescriptor timer_;  // rings while there is no daemon, to look for one
   std::shared_ptr<SharedMemory> memory_;
 
   std::mutex mutex_;
-  std::condition_variable replied_;
-  std::mutex pump_mutex_;  // without a service thread: one caller at a time
-  bool daemon_gone_ = false;
+  std::condition_variable news_;  // an answer, or a change of standing
+  std::mutex pump_mutex_;         // without a service thread: one caller at a time
+  Socket socket_;                 // null while alone
+  Standing standing_ = Standing::kMember;
+  std::uint64_t conversation_ = 1;  // counts the daemons that have welcomed us
+  std::uint64_t node_ = 0;          // our number among all nodes
+  std::string turned_away_;         // why the last daemon did not take us back
+  bool observes_ = false;
   bool stopping_ = false;
   std::uint64_t next_request_ = 1;
   std::map<std::uint64_t, Reply> replies_;

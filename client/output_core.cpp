@@ -54,13 +54,14 @@ OutputCore::OutputCore(std::string name, const shm::TypeInfo& type,
 }
 
 void OutputCore::bind(shm::PortInstance instance, shm::SourceId source,
-                      const shm::FileDescriptor& page) {
+                      shm::FileDescriptor page) {
   if (shm::checked_size(page, shm::Seals::kFixedSize) != sizeof(shm::ActivityPage)) {
     throw std::runtime_error("the activity page has another size");
   }
   page_ = shm::Mapping(page, sizeof(shm::ActivityPage), shm::Access::kReadWrite);
   activity_ = &page_.as<shm::ActivityPage>()->activity;
   own_word_ = activity_->word.load(std::memory_order_relaxed);  // a predecessor's: it carries on
+  page_descriptor_ = std::move(page);
   instance_ = instance;
   source_ = source;
 }
@@ -95,6 +96,12 @@ void OutputCore::disconnect_peer(shm::PortInstance peer) {
   found->second.connected = false;
   found->second.channel = shm::kNone;
   offer_view();
+}
+
+std::vector<HeldLink> OutputCore::held_links() const {
+  std::vector<HeldLink> held;
+  for (const auto& [peer, link] : links_) held.push_back({peer, link.connected ? link.number : 0});
+  return held;
 }
 
 void OutputCore::tidy() { handover_.collect(); }

@@ -33,11 +33,12 @@ class OutputCore {
   // Service thread.
 
   // The port is open: the daemon has given it its place.
-  void bind(shm::PortInstance instance, shm::SourceId source, const shm::FileDescriptor& page);
+  void bind(shm::PortInstance instance, shm::SourceId source, shm::FileDescriptor page);
   // `link`: its number if they are connected, else 0.
   void add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t link);
   void remove_peer(shm::PortInstance peer);
   void disconnect_peer(shm::PortInstance peer);
+  [[nodiscard]] std::vector<HeldLink> held_links() const;
   // Unmaps what the port's thread has let go of.
   void tidy();
 
@@ -59,6 +60,9 @@ class OutputCore {
   [[nodiscard]] const shm::TypeInfo& type() const noexcept { return type_; }
   [[nodiscard]] const shm::FileDescriptor& segment_descriptor() const noexcept {
     return descriptor_;
+  }
+  [[nodiscard]] const shm::FileDescriptor& page_descriptor() const noexcept {
+    return page_descriptor_;
   }
   [[nodiscard]] const SharedMemory& memory() const noexcept { return *memory_; }
 
@@ -112,6 +116,7 @@ class OutputCore {
   shm::OutputSegment segment_;
   shm::PortInstance instance_ = 0;
   shm::SourceId source_ = shm::kNone;
+  shm::FileDescriptor page_descriptor_;  // for a daemon that takes over
   shm::Mapping page_;
   shm::Activity* activity_ = nullptr;
 

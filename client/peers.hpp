@@ -63,6 +63,12 @@ struct InputView {
   InputView* next_retired = nullptr;
 };
 
+// A link as it is told to a daemon that takes over. Number 0: not connected.
+struct HeldLink {
+  shm::PortInstance peer = 0;
+  std::uint64_t number = 0;
+};
+
 // Map what the daemon has announced, and check it: the segment must be whole, and carry a type that
 // `own` can take or give. Throw std::runtime_error saying what is wrong.
 std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,

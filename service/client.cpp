@@ -39,6 +39,7 @@ Client::Client(ClientId id, shm::FileDescriptor socket) : id_(id), socket_(std::
   }
   pid_ = peer.pid;
   user_ = peer.uid;
+  started_ = start_of_process(pid_);
   process_ = open_process(socket_.get(), pid_);
   if (!process_)
     throw std::system_error(errno, std::generic_category(), "opening a client's process");
@@ -119,10 +120,12 @@ bool Client::take_closing_of(shm::PortInstance port) {
   return true;
 }
 
-bool Client::has_died() const {
-  pollfd process{process_.get(), POLLIN, 0};
-  return process_ && ::poll(&process, 1, 0) == 1;
+bool has_ended(const shm::FileDescriptor& process) {
+  pollfd polled{process.get(), POLLIN, 0};
+  return process && ::poll(&polled, 1, 0) == 1;
 }
+
+bool Client::has_died() const { return has_ended(process_); }
 
 std::string Client::description() const {
   return "node \"" + name + "\" (pid " + std::to_string(pid_) + ")";

@@ -11,6 +11,7 @@
 #include <set>
 #include <string>
 
+#include "service/registry.hpp"
 #include "shm/file_descriptor.hpp"
 #include "shm/ids.hpp"
 #include "shm/wire.hpp"
@@ -18,6 +19,9 @@
 namespace arbiter::service {
 
 using ClientId = std::uint64_t;
+
+// Whether the process of a pidfd has ended.
+[[nodiscard]] bool has_ended(const shm::FileDescriptor& process);
 
 class Client {
  public:
@@ -46,13 +50,22 @@ class Client {
   [[nodiscard]] ClientId id() const { return id_; }
   [[nodiscard]] int socket() const { return socket_.get(); }
   [[nodiscard]] int process() const { return process_.get(); }
+  // The same, to outlive this.
+  [[nodiscard]] shm::FileDescriptor release_process() { return std::move(process_); }
   [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] uid_t user() const { return user_; }
+  // When the process began (registry.hpp).
+  [[nodiscard]] std::uint64_t started() const { return started_; }
   // For messages to people: node "object-detector" (pid 4711).
   [[nodiscard]] std::string description() const;
 
   std::string name;  // of the node; empty until it has said hello
+  NodeId node = 0;   // 0 until it has been welcomed
+  bool is_turned_away = false;  // what it says after that is not heard
   bool has_service_thread = false;
+  bool comes_back = false;  // if the conversation is lost: then its ports are kept for it
+  bool is_returning = false;                // and has not handed back all yet:
+  std::set<shm::PortInstance> to_hand_back;  // these are missing
   bool observes = false;
   bool watches_queue = false;                       // the loop waits until it can be written
   std::map<shm::SourceId, std::uint64_t> pages;     // those that it has been sent, by their number
@@ -73,6 +86,7 @@ class Client {
   shm::FileDescriptor process_;  // a pidfd
   pid_t pid_ = 0;
   uid_t user_ = 0;
+  std::uint64_t started_ = 0;
   bool lost_ = false;
   std::deque<std::unique_ptr<Queued>> queue_;
   std::size_t queued_descriptors_ = 0;

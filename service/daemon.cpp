@@ -24,6 +24,10 @@ namespace {
 // How long a component that does not run may hold up the opening of a port, or a new model.
 constexpr shm::Nanoseconds kMaxWaitForClients = 200'000'000;
 
+// How long a name is asked for in vain that a component has whose conversation is lost: it may be
+// dying.
+constexpr shm::Nanoseconds kMaxWaitForDeath = 100'000'000;
+
 // How many messages of one client are handled before it is the next one's turn.
 constexpr int kMaxMessagesAtOnce = 64;
 
@@ -54,19 +58,24 @@ std::uint64_t event_key(std::uint32_t tag, ClientId client) {
 }  // namespace
 
 Daemon::Daemon(const DaemonOptions& options)
-    : instance_(options.instance), models_(options.files, directory_) {
-  if (models_.has_files()) {
-    models_.prepare();
-    models_.put_in_force();
-  }
+    : instance_(options.instance),
+      stores_(options.uses_descriptor_store),
+      models_(options.files, directory_),
+      state_(options.directory, options.instance) {
+  if (models_.has_files()) models_.read();
   listener_ = shm::listen_at(options.directory, instance_);
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   if (!epoll_) throw std::system_error(errno, std::generic_category(), "epoll_create1");
   watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
   reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
+  look_for_predecessor();
 }
 
-Daemon::~Daemon() { unlink(listener_.path.c_str()); }
+// Components that live on need the state file to come back by.
+Daemon::~Daemon() {
+  unlink(listener_.path.c_str());
+  if (phase_ == Phase::kServing && clients_.empty() && absentees_.empty()) state_.remove();
+}
 
 void Daemon::watch(int fd, Tag tag, ClientId client, std::uint32_t events) {
   epoll_event event{};
@@ -83,7 +92,8 @@ int Daemon::timeout_ms() const {
     return each.second->has_read_ahead();
   });
   if (is_behind) return 0;
-  const shm::Nanoseconds deadline = barriers_.next_deadline();
+  shm::Nanoseconds deadline = std::min(barriers_.next_deadline(), takeover_deadline());
+  for (const Postponed& request : postponed_) deadline = std::min(deadline, request.deadline);
   if (deadline == shm::kForever) return -1;
   const shm::Nanoseconds left = std::max<shm::Nanoseconds>(deadline - shm::monotonic_now(), 0);
   return static_cast<int>(left / 1'000'000 + 1);
@@ -102,6 +112,10 @@ void Daemon::run(int signal_descriptor) {
       const ClientId id = events[i].data.u64 & ((std::uint64_t{1} << 56) - 1);
       if (tag == Tag::kListener) accept_client();
       if (tag == Tag::kSignals && handle_signal(signal_descriptor)) return;
+      if (tag == Tag::kAbsentee) {
+        forget_absentee(id);
+        continue;
+      }
       const auto client = clients_.find(id);
       if (client == clients_.end()) continue;
       if (tag == Tag::kClient && (events[i].events & EPOLLOUT) != 0) client->second->flush();
@@ -112,8 +126,11 @@ void Daemon::run(int signal_descriptor) {
         drop(id);
       }
     }
-    barriers_.expire(shm::monotonic_now());
+    const shm::Nanoseconds now = shm::monotonic_now();
+    barriers_.expire(now);
+    serve_postponed(now);
     settle();
+    advance_takeover(now);
   }
 }
 
@@ -182,6 +199,10 @@ void Daemon::serve(Client& client) {
     }
     try {
       handle(client, received);
+    } catch (const NameIsKept&) {
+      postponed_.push_back({id, std::make_unique<shm::Received>(std::move(received)),
+                            shm::monotonic_now() + kMaxWaitForDeath});
+      received = {};
     } catch (const std::exception& error) {
       log::warn("{}: {}", client.description(), error.what());
       refuse(client, received.message.request, error.what());
@@ -198,7 +219,9 @@ void Daemon::drop(ClientId id) {
   if (!client->name.empty()) {
     log::info("{} left, {} ports with it", client->description(), client->ports.size());
   }
+  if (client->comes_back && !client->has_died()) set_away(*client);
   while (!client->ports.empty()) switchboard_.remove(*client->ports.begin());
+  for (const shm::PortInstance port : client->to_hand_back) switchboard_.forget_away(port);
   barriers_.forget(id);
 }
 
@@ -225,7 +248,7 @@ void Daemon::settle() {
     }
   }
   for (const ClientId id : lost) drop(id);
-  if (reload_wanted_ && !swapping_) {
+  if (reload_wanted_ && !swapping_ && phase_ == Phase::kServing) {
     reload_wanted_ = false;
     reload();
   }
@@ -233,12 +256,13 @@ void Daemon::settle() {
 
 void Daemon::handle(Client& client, shm::Received& received) {
   const shm::Message& message = received.message;
-  if (client.name.empty() && message.kind != shm::MessageKind::kHello) {
+  if (client.is_turned_away) return;
+  if (client.node == 0 && message.kind != shm::MessageKind::kHello) {
     throw std::runtime_error("a client must say hello first");
   }
   switch (message.kind) {
     case shm::MessageKind::kHello:
-      hello(client, message);
+      hello(client, received);
       break;
     case shm::MessageKind::kOpenOutput:
       open_output(client, received);
@@ -268,12 +292,30 @@ void Daemon::handle(Client& client, shm::Received& received) {
         switchboard_.refuse(message.port, message.peer, std::string(message.text_view()));
       }
       break;
+    case shm::MessageKind::kHandBackPage:
+      if (directory_.take_page(message.id, received.descriptors[0])) {
+        client.pages[message.id] = directory_.source_by_id(message.id)->page_number;
+      }
+      break;
+    case shm::MessageKind::kHandBackOutput:
+      take_back_output(client, received);
+      break;
+    case shm::MessageKind::kHandBackInput:
+      take_back_input(client, received);
+      break;
+    case shm::MessageKind::kHandBackLink:
+      take_back_link(client, message);
+      break;
+    case shm::MessageKind::kHandedBack:
+      finish_return(client);
+      break;
     default:
       throw std::runtime_error("an unknown kind of message");
   }
 }
 
-void Daemon::hello(Client& client, const shm::Message& message) {
+void Daemon::hello(Client& client, const shm::Received& received) {
+  const shm::Message& message = received.message;
   if (!client.name.empty()) throw std::runtime_error("a client says hello once");
   if (message.value != shm::kWireVersion) {
     throw std::runtime_error("the client speaks version " + std::to_string(message.value) +
@@ -284,7 +326,26 @@ void Daemon::hello(Client& client, const shm::Message& message) {
   }
   client.name = message.name_view();
   client.has_service_thread = (message.flags & shm::kHasServiceThread) != 0;
-  client.send(reply_to(message.request, shm::MessageKind::kWelcome), {models_.board().get(), -1});
+  client.comes_back = (message.flags & shm::kComesBack) != 0;
+  if ((message.flags & shm::kRejoins) != 0) {
+    try {
+      rejoin(client, received);
+    } catch (...) {
+      client.is_turned_away = true;
+      throw;
+    }
+  } else if (phase_ == Phase::kServing) {
+    welcome(client);
+  } else {
+    waiting_.push_back(client.id());
+  }
+}
+
+void Daemon::welcome(Client& client) {
+  if (client.node == 0) client.node = registry_.next_node();
+  auto welcome = reply_to(0, shm::MessageKind::kWelcome);
+  welcome.link = client.node;
+  client.send(welcome, {models_.board().get(), registry_.readable().get()});
   log::debug("{} is here", client.description());
 }
 
@@ -309,11 +370,29 @@ void Daemon::require_free(const Client& asking, shm::PortInstance holder, const 
   throw std::runtime_error(what + " is held by " + client->description());
 }
 
+void Daemon::require_not_kept(shm::PortInstance holder, const std::string& what) {
+  for (const auto& [node, absentee] : absentees_) {
+    if (absentee.ports.count(holder) == 0) continue;
+    if (has_ended(absentee.process)) {
+      forget_absentee(node);
+      return;
+    }
+    throw NameIsKept(what + " is kept for process " + std::to_string(absentee.pid) +
+                     ", which lives but does not answer");
+  }
+  for (const auto& [id, client] : clients_) {
+    if (client->to_hand_back.count(holder) != 0) {
+      throw NameIsKept(what + " is kept for " + client->description());
+    }
+  }
+}
+
 void Daemon::open_output(Client& client, shm::Received& received) {
   const std::string name = port_name(received.message);
   auto port = adopt_output(received);
   Source& source = directory_.source(name);
   require_free(client, source.open, "the output port " + name);
+  require_not_kept(source.away, "the output port " + name);
   const OutputPort& opened = switchboard_.add(std::move(port), client, source);
   auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
   reply.port = opened.instance;
@@ -328,6 +407,7 @@ void Daemon::open_input(Client& client, shm::Received& received) {
   auto port = adopt_input(received);
   InputName& input = directory_.input(name);
   require_free(client, input.open, "the input port " + name);
+  require_not_kept(input.away, "the input port " + name);
   const InputPort& opened = switchboard_.add(std::move(port), client, input);
   auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
   reply.port = opened.instance;
@@ -377,6 +457,8 @@ void Daemon::deactivate(Client& client, const shm::Message& message) {
     throw std::runtime_error("no model and no component has named the source " + name);
   }
   require_free(client, source->open, "the output port " + name);
+  require_not_kept(source->away, "the output port " + name);
+  if (!source->has_page()) throw std::runtime_error("nobody has the activity of " + name);
   const shm::Nanoseconds now = shm::monotonic_now();
   const bool was_active =
       shm::is_active(source->activity().word.load(std::memory_order_relaxed), now);
@@ -397,7 +479,7 @@ void Daemon::refuse(Client& client, std::uint64_t request, const std::string& wh
 
 // The new table is written and its clients are told before it counts; they switch all at once.
 void Daemon::reload() {
-  if (swapping_) {
+  if (swapping_ || phase_ != Phase::kServing) {
     reload_wanted_ = true;
     return;
   }
@@ -406,12 +488,17 @@ void Daemon::reload() {
     return;
   }
   try {
+    models_.read();
     models_.prepare();
   } catch (const std::exception& error) {
     ++reloads_refused_;
     log::error("the model in force stays: {}", error.what());
     return;
   }
+  begin_swap();
+}
+
+void Daemon::begin_swap() {
   swapping_ = true;
   const auto told = switchboard_.link_all(models_.prepared());
   barriers_.raise(told, shm::monotonic_now() + kMaxWaitForClients, [this] { put_in_force(); });
@@ -428,6 +515,7 @@ void Daemon::put_in_force() {
     if (client->observes) switchboard_.show_everything(*client);
   }
   log::info("model {} is in force", snapshot.generation);
+  welcome_waiting();
 }
 
 }  // namespace arbiter::service

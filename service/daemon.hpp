@@ -6,13 +6,19 @@
 
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "rules/load.hpp"
 #include "service/barriers.hpp"
 #include "service/client.hpp"
 #include "service/directory.hpp"
+#include "service/inheritance.hpp"
 #include "service/models.hpp"
+#include "service/registry.hpp"
 #include "service/switchboard.hpp"
 #include "shm/rendezvous.hpp"
 
@@ -22,6 +28,14 @@ struct DaemonOptions {
   rules::ModelFiles files;
   std::string instance;   // checked
   std::string directory;  // where to listen
+  // Whether the service manager keeps descriptors for the next daemon.
+  bool uses_descriptor_store = false;
+};
+
+// A component that lives, and may come back, has the name.
+class NameIsKept : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
 };
 
 class Daemon {
@@ -38,7 +52,7 @@ class Daemon {
   [[nodiscard]] const std::string& path() const { return listener_.path; }
 
  private:
-  enum class Tag : std::uint32_t { kListener, kSignals, kClient, kProcess };
+  enum class Tag : std::uint32_t { kListener, kSignals, kClient, kProcess, kAbsentee };
 
   void watch(int fd, Tag tag, ClientId client, std::uint32_t events);
   [[nodiscard]] int timeout_ms() const;
@@ -52,7 +66,7 @@ class Daemon {
   void settle();
 
   void handle(Client& client, shm::Received& received);
-  void hello(Client& client, const shm::Message& message);
+  void hello(Client& client, const shm::Received& received);
   void open_output(Client& client, shm::Received& received);
   void open_input(Client& client, shm::Received& received);
   void connect(Client& client, std::uint64_t request, shm::PortInstance port);
@@ -63,16 +77,63 @@ class Daemon {
   // Throws std::runtime_error if a live component has the name. One that has closed its port, or
   // has ended, before `asking` asked, has not.
   void require_free(const Client& asking, shm::PortInstance holder, const std::string& what);
+  // The same of one that is away. Throws NameIsKept.
+  void require_not_kept(shm::PortInstance holder, const std::string& what);
 
   void reload();
+  void begin_swap();
   void put_in_force();
 
+  // Taking over from a predecessor (daemon_takeover.cpp).
+
+  // kExpecting: there was a predecessor, and nobody has handed back its realm yet. kTakingOver: its
+  // components are coming back. Only then is our own model put in force and are others served.
+  enum class Phase : std::uint8_t { kExpecting, kTakingOver, kServing };
+  struct Absentee {
+    pid_t pid = 0;
+    shm::FileDescriptor process;
+    std::set<shm::PortInstance> ports;
+  };
+  struct Postponed {
+    ClientId client = 0;
+    std::unique_ptr<shm::Received> request;
+    shm::Nanoseconds deadline = 0;
+  };
+
+  void look_for_predecessor();
+  void inherit(const shm::FileDescriptor& board, const shm::FileDescriptor& registry);
+  void find_absentees();
+  void add_absentee(const Owner& owner);
+  void rejoin(Client& client, const shm::Received& hello);
+  void take_back_output(Client& client, const shm::Received& received);
+  void take_back_input(Client& client, const shm::Received& received);
+  void take_back_link(const Client& client, const shm::Message& message);
+  void finish_return(Client& client);
+  void set_away(Client& client);
+  void forget_absentee(NodeId node);
+  void finish_takeover();
+  void welcome(Client& client);
+  void welcome_waiting();
+  [[nodiscard]] shm::Nanoseconds takeover_deadline() const;
+  void advance_takeover(shm::Nanoseconds now);
+  void serve_postponed(shm::Nanoseconds now);
+
   const std::string instance_;
-  Directory directory_;
+  const bool stores_;
+  Registry registry_;
+  Directory directory_{registry_, stores_};
   Models models_;
-  Switchboard switchboard_{directory_};
+  Switchboard switchboard_{directory_, registry_};
   Barriers barriers_;
   shm::Listener listener_;
+  StateFile state_;
+  Phase phase_ = Phase::kServing;
+  std::optional<Realm> predecessor_;
+  shm::Nanoseconds takeover_ends_ = 0;
+  std::map<NodeId, Absentee> absentees_;
+  std::vector<ClientId> waiting_;     // have said hello, and are not welcomed yet
+  std::vector<Postponed> postponed_;  // requests for names of absentees, who may be dying
+  bool names_were_freed_ = false;     // maybe, since postponed_ was looked at
   shm::FileDescriptor epoll_;
   shm::FileDescriptor reserve_;  // given up for a moment to turn a client away when none is left
   std::map<ClientId, std::unique_ptr<Client>> clients_;

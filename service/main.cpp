@@ -20,6 +20,8 @@ Example:
 
 It runs in the foreground, needs no configuration and no privileges, and logs to standard error.
 SIGHUP reads the files again; a bad model changes nothing. SIGTERM and SIGINT stop it.
+Components go on without it. The next daemon of the instance takes them over, and puts its own model
+in force; without --model it keeps the one that is.
 It listens in $RUNTIME_DIRECTORY, else $XDG_RUNTIME_DIR/arbiter, else /run/arbiter if it may write
 there, else arbiter-UID in the temporary directory.)";
 
@@ -68,6 +70,8 @@ int main(int argc, char** argv) {
   app.add_option("--instance", instance,
                  "Name of this daemon; without it $ARBITER_INSTANCE, else \"default\"")
       ->type_name("NAME");
+  app.add_flag("--descriptor-store", options.uses_descriptor_store,
+               "Leave descriptors with the service manager for the next daemon");
   app.add_option("--log-level", level, "trace, debug, info, warn or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error"}));
   try {

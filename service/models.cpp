@@ -2,7 +2,7 @@
 
 #include <fcntl.h>
 
-#include "rules/compile.hpp"
+#include "service/inheritance.hpp"
 #include "service/log.hpp"
 
 namespace arbiter::service {
@@ -40,7 +40,21 @@ Models::Models(rules::ModelFiles files, Directory& directory)
   shm::TableWriter::initialize(*mapping_.as<shm::Board>());
 }
 
-void Models::prepare() {
+void Models::inherit(const shm::FileDescriptor& board) {
+  auto writable = reopen_inherited(board, sizeof(shm::Board));
+  shm::Mapping mapping(writable, sizeof(shm::Board), shm::Access::kReadWrite);
+  const auto& header = *mapping.as<shm::Board>();
+  if (header.magic != shm::Board::kMagic || header.version != shm::Board::kVersion) {
+    throw std::runtime_error("the board is one of another version");
+  }
+  readable_ = shm::reopen(writable, O_RDONLY);
+  writable_ = std::move(writable);
+  mapping_ = std::move(mapping);
+  writer_ = shm::TableWriter(*mapping_.as<shm::Board>());
+  reader_ = shm::TableReader(*mapping_.as<shm::Board>());
+}
+
+void Models::read() {
   rules::Diagnostics diagnostics;
   rules::CompiledModel model;
   try {
@@ -51,10 +65,14 @@ void Models::prepare() {
   }
   log_findings(diagnostics);
   if (diagnostics.has_errors()) throw BadModel("the model has errors");
+  compiled_ = std::move(model);
+}
+
+void Models::prepare() {
   const std::uint64_t generation = writer_.next_generation();
   std::vector<shm::Word> words;
   try {
-    words = rules::flatten(model, {[&](const std::string& name) {
+    words = rules::flatten(compiled_, {[&](const std::string& name) {
                                      Source& source = directory_.source(name);
                                      source.used_by_generation = generation;
                                      return source.id;

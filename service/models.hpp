@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "rules/compile.hpp"
 #include "rules/load.hpp"
 #include "service/directory.hpp"
 #include "shm/segment.hpp"
@@ -23,8 +24,14 @@ class Models {
   // Throws std::system_error.
   Models(rules::ModelFiles files, Directory& directory);
 
-  // Reads the files and writes their table behind the ones in use; put_in_force() makes it count.
-  // Logs every finding. Throws BadModel, std::system_error; then nothing has changed.
+  // A predecessor's board takes the place of the empty one, which nobody has been given yet. Throws
+  // std::runtime_error where it is not one.
+  void inherit(const shm::FileDescriptor& board);
+
+  // Reads and proves the files. Logs every finding. Throws BadModel; then nothing has changed.
+  void read();
+  // Writes the table of what was read behind the ones in use; put_in_force() makes it count. Throws
+  // BadModel, std::system_error; then nothing has changed.
   void prepare();
   void put_in_force();
 
@@ -32,12 +39,14 @@ class Models {
   [[nodiscard]] shm::TableView prepared() const { return writer_.next_table(); }
   // Read-only, for clients.
   [[nodiscard]] const shm::FileDescriptor& board() const { return readable_; }
+  [[nodiscard]] const shm::FileDescriptor& writable_board() const { return writable_; }
   [[nodiscard]] const rules::ModelFiles& files() const { return files_; }
   [[nodiscard]] bool has_files() const { return !files_.models.empty() || files_.application; }
 
  private:
   rules::ModelFiles files_;
   Directory& directory_;
+  rules::CompiledModel compiled_;
   shm::FileDescriptor writable_;
   shm::FileDescriptor readable_;
   shm::Mapping mapping_;

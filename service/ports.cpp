@@ -23,7 +23,8 @@ void require(const shm::Received& open, std::size_t descriptors) {
 }  // namespace
 
 std::unique_ptr<OutputPort> adopt_output(const shm::Received& open) {
-  require(open, 1);
+  // What is handed back comes with the activity page.
+  require(open, open.message.kind == shm::MessageKind::kHandBackOutput ? 2 : 1);
   auto port = std::make_unique<OutputPort>();
   const std::size_t size = shm::checked_size(open.descriptors[0], shm::Seals::kOneWriter);
   if (size < sizeof(shm::OutputHeader)) throw std::runtime_error("the segment is too small");

@@ -14,6 +14,10 @@
 
 namespace arbiter::service {
 
+// Links that a component had when it was lost to a daemon, or its peer was: the peer, and the link's
+// number (0: not connected). They stand, in shared memory, until both ends are here again.
+using Claims = std::map<shm::PortInstance, std::uint64_t>;
+
 struct OutputPort {
   shm::PortInstance instance = 0;
   Client* client = nullptr;
@@ -22,6 +26,7 @@ struct OutputPort {
   shm::FileDescriptor segment;  // read-only
   shm::Mapping mapping;
   shm::OutputLayout layout;
+  Claims claims;
 
   [[nodiscard]] const shm::OutputHeader& header() const {
     return *mapping.as<const shm::OutputHeader>();
@@ -38,6 +43,7 @@ struct InputPort {
   // The same, opened anew, to be handed out: who gets it could make its writes block.
   shm::FileDescriptor bell_for_peers;
   shm::Mapping mapping;
+  Claims claims;
 
   [[nodiscard]] const shm::InputSegment& shared() const {
     return *mapping.as<const shm::InputSegment>();

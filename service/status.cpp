@@ -74,7 +74,7 @@ class Document {
     }
     document["inputs"] = json::array();
     for (const auto& input : of_.directory.inputs()) {
-      if (input->open != 0 || snapshot_.table.knows_port(input->id)) {
+      if (input->open != 0 || input->away != 0 || snapshot_.table.knows_port(input->id)) {
         document["inputs"].push_back(input_json(*input));
       }
     }
@@ -83,10 +83,11 @@ class Document {
 
  private:
   [[nodiscard]] bool is_worth_showing(const Source& source) const {
-    return source.open != 0 || snapshot_.table.knows_source(source.id);
+    return source.open != 0 || source.away != 0 || snapshot_.table.knows_source(source.id);
   }
 
   [[nodiscard]] bool is_active(const Source& source) const {
+    if (!source.has_page()) return false;
     return shm::is_active(source.activity().word.load(std::memory_order_acquire), now_);
   }
 
@@ -97,6 +98,7 @@ class Document {
                 {"timeout_ns", timeout == shm::kForever ? json("forever") : json(timeout)}};
     const OutputPort* output = of_.switchboard.output(source.open);
     result["open"] = output != nullptr;
+    result["away"] = source.away != 0;
     if (output == nullptr) return result;
     const auto& counters = output->header().counters;
     result["component"] = client_json(*output->client);
@@ -125,6 +127,7 @@ class Document {
         {"senses", json::array()}};
     const InputPort* input = of_.switchboard.input(name.open);
     result["open"] = input != nullptr;
+    result["away"] = name.away != 0;
     if (input != nullptr) add_open(*input, result);
     add_connections(name, input, winner, result);
     return result;

@@ -16,24 +16,44 @@ shm::Message message_to(shm::MessageKind kind, shm::PortInstance port, shm::Port
   return message;
 }
 
+Owner owner(const Client& client, shm::PortInstance port) {
+  return {port, client.node, client.pid(), client.started()};
+}
+
 }  // namespace
 
 OutputPort& Switchboard::add(std::unique_ptr<OutputPort> port, Client& client, Source& source) {
-  port->instance = ++last_instance_;
-  port->client = &client;
-  port->source = &source;
-  source.open = port->instance;
-  client.ports.insert(port->instance);
-  return *(outputs_[port->instance] = std::move(port));
+  port->instance = registry_.next_instance();
+  OutputPort& added = *port;
+  insert(std::move(port), client, source);
+  registry_.source(source.id).set_owner(owner(client, added.instance));
+  return added;
 }
 
 InputPort& Switchboard::add(std::unique_ptr<InputPort> port, Client& client, InputName& name) {
-  port->instance = ++last_instance_;
+  port->instance = registry_.next_instance();
+  InputPort& added = *port;
+  insert(std::move(port), client, name);
+  registry_.input(name.id).set_owner(owner(client, added.instance));
+  return added;
+}
+
+void Switchboard::insert(std::unique_ptr<OutputPort> port, Client& client, Source& source) {
+  port->client = &client;
+  port->source = &source;
+  source.open = port->instance;
+  source.away = 0;
+  client.ports.insert(port->instance);
+  outputs_[port->instance] = std::move(port);
+}
+
+void Switchboard::insert(std::unique_ptr<InputPort> port, Client& client, InputName& name) {
   port->client = &client;
   port->name = &name;
   name.open = port->instance;
+  name.away = 0;
   client.ports.insert(port->instance);
-  return *(inputs_[port->instance] = std::move(port));
+  inputs_[port->instance] = std::move(port);
 }
 
 void Switchboard::remove(shm::PortInstance port) {
@@ -44,12 +64,21 @@ void Switchboard::remove(shm::PortInstance port) {
       continue;
     }
     const shm::PortInstance peer = output == port ? input : output;
-    Client& client = output == port ? *inputs_.at(peer)->client : *outputs_.at(peer)->client;
-    client.send(message_to(shm::MessageKind::kPeerGone, peer, port));
+    client_of(peer).send(message_to(shm::MessageKind::kPeerGone, peer, port));
     // A publisher may have died between delivering and ringing.
     if (output == port) shm::ring_bell(inputs_.at(peer)->bell.get());
     link = links_.erase(link);
   }
+  if (const auto found = outputs_.find(port); found != outputs_.end()) {
+    registry_.source(found->second->source->id).clear_owner();
+  }
+  if (const auto found = inputs_.find(port); found != inputs_.end()) {
+    registry_.input(found->second->name->id).clear_owner();
+  }
+  erase(port);
+}
+
+void Switchboard::erase(shm::PortInstance port) {
   if (const auto found = outputs_.find(port); found != outputs_.end()) {
     found->second->source->open = 0;
     found->second->client->ports.erase(port);
@@ -157,7 +186,7 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
   auto to_output =
       message_to(shm::MessageKind::kInputPeer, output.instance, input.instance, input.name->id);
   to_output.flags = connects ? shm::kIsConnected : 0u;
-  to_output.link = link.number = connects ? ++last_link_ : 0;
+  to_output.link = link.number = connects ? registry_.next_link() : 0;
   output.client->send(to_output, {input.segment.get(), input.bell_for_peers.get()});
   told.insert(output.client);
   if (!connects) return;
@@ -201,8 +230,9 @@ void Switchboard::send_pages(Client& client, shm::PortId port, const shm::TableV
   }
 }
 
-// False: the client has it.
+// False: the client has it, or nobody has yet.
 bool Switchboard::send_page(Client& client, const Source& source) {
+  if (!source.has_page()) return false;
   if (std::exchange(client.pages[source.id], source.page_number) == source.page_number) {
     return false;
   }
@@ -237,9 +267,12 @@ void Switchboard::refuse(shm::PortInstance port, shm::PortInstance peer, const s
 
 // The one that refused knows.
 void Switchboard::disconnect(shm::PortInstance refused_by, shm::PortInstance port) {
+  client_of(port).send(message_to(shm::MessageKind::kDisconnected, port, refused_by));
+}
+
+Client& Switchboard::client_of(shm::PortInstance port) const {
   const auto output = outputs_.find(port);
-  Client& client = output != outputs_.end() ? *output->second->client : *inputs_.at(port)->client;
-  client.send(message_to(shm::MessageKind::kDisconnected, port, refused_by));
+  return output != outputs_.end() ? *output->second->client : *inputs_.at(port)->client;
 }
 
 void Switchboard::ring_all() const {

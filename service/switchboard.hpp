@@ -18,7 +18,8 @@ namespace arbiter::service {
 
 class Switchboard {
  public:
-  explicit Switchboard(Directory& directory) : directory_(directory) {}
+  Switchboard(Directory& directory, Registry& registry)
+      : directory_(directory), registry_(registry) {}
 
   using LinkKey = std::pair<shm::PortInstance, shm::PortInstance>;  // output, input
   using Told = std::set<Client*>;  // clients that have news to take up
@@ -28,6 +29,19 @@ class Switchboard {
   InputPort& add(std::unique_ptr<InputPort> port, Client& client, InputName& name);
   // A port closes or dies: its peers are told, its name is free.
   void remove(shm::PortInstance port);
+
+  // The component lives, but its conversation is lost: its links stand, and become claims of its
+  // peers; its name is kept for it.
+  void set_away(shm::PortInstance port);
+  // It comes back, with the instance that it had.
+  OutputPort& readmit(std::unique_ptr<OutputPort> port, Client& client, Source& source);
+  InputPort& readmit(std::unique_ptr<InputPort> port, Client& client, InputName& name);
+  void claim(shm::PortInstance port, shm::PortInstance peer, std::uint64_t number);
+  // Makes links of the port's claims and its peers' where they agree. `is_away`: whether a port may
+  // still come back.
+  void settle_claims(shm::PortInstance port, const std::function<bool(shm::PortInstance)>& is_away);
+  // A port that was away will not come back.
+  void forget_away(shm::PortInstance port);
 
   // Sends the pages, and makes the links, that a table asks for: all of them, or those of one
   // port. Links that it does not ask for any more stay until unlink().
@@ -63,10 +77,15 @@ class Switchboard {
   void send_pages(Client& client, shm::PortId port, const shm::TableView& table, Told& told);
   void disconnect(shm::PortInstance refused_by, shm::PortInstance port);
   bool send_page(Client& client, const Source& source);
+  void insert(std::unique_ptr<OutputPort> port, Client& client, Source& source);
+  void insert(std::unique_ptr<InputPort> port, Client& client, InputName& name);
+  void erase(shm::PortInstance port);
+  void settle(OutputPort& output, InputPort& input);
+  [[nodiscard]] Claims& claims_of(shm::PortInstance port) const;
+  [[nodiscard]] Client& client_of(shm::PortInstance port) const;
 
   Directory& directory_;
-  shm::PortInstance last_instance_ = 0;
-  std::uint64_t last_link_ = 0;
+  Registry& registry_;
   std::map<shm::PortInstance, std::unique_ptr<OutputPort>> outputs_;
   std::map<shm::PortInstance, std::unique_ptr<InputPort>> inputs_;
   std::map<LinkKey, Link> links_;

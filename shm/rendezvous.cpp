@@ -5,6 +5,7 @@
 #include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -91,6 +92,9 @@ Address address_of(const std::string& directory, const std::string& file) {
 FileDescriptor make_socket() {
   FileDescriptor made(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
   if (!made) fail("cannot make a socket");
+  // A daemon that is stopped holds nobody up for longer than this, be it in connect() or sendmsg().
+  const timeval limit{1, 0};
+  setsockopt(made.get(), SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
   return made;
 }
 

@@ -11,6 +11,10 @@
 //
 // The daemon changes what a client sees: kSourcePage…, kInputPeer…, then kSync; the client answers
 // kSynced when it has taken up all that came before.
+//
+// A client that has lost its daemon looks for another, or the same, and says kHello with kRejoins; it
+// is answered kWelcome (or kRefused) and tells what it has: kHandBackPage…, for each port
+// kHandBackOutput or kHandBackInput with its kHandBackLink…, and then kHandedBack.
 #pragma once
 
 #include <sys/types.h>
@@ -28,11 +32,12 @@
 
 namespace arbiter::shm {
 
-inline constexpr std::uint32_t kWireVersion = 1;
+inline constexpr std::uint32_t kWireVersion = 2;
 
 enum class MessageKind : std::uint32_t {
   // From a client.
-  kHello = 1,    // name, flags (kHasServiceThread); value = kWireVersion
+  kHello = 1,    // name, flags (kHasServiceThread, kComesBack, kRejoins); value = kWireVersion; if it
+                 // rejoins, link: the node it was welcomed as; descriptors: board, registry
   kOpenOutput,   // name, type; descriptor: its segment
   kOpenInput,    // name, type; descriptors: its segment, its bell
   kClosePort,    // port
@@ -41,9 +46,14 @@ enum class MessageKind : std::uint32_t {
   kDeactivate,   // name: a source whose process is gone
   kObserve,      // send every page and every port name, now and as they come
   kPeerRefused,  // port, peer, text: the client could not take up a peer, for status
+  kHandBackPage = 40,  // id; descriptor: the activity page of a source
+  kHandBackOutput,     // port, id = source, type; descriptors: its segment, its page
+  kHandBackInput,      // port, id = port id, type; descriptors: its segment, its bell
+  kHandBackLink,       // port, peer; link: its number, 0 if not connected
+  kHandedBack,         // that was all
 
   // From the daemon.
-  kWelcome = 100,  // descriptor: the board, read-only
+  kWelcome = 100,  // link: the node's number; descriptors: the board, the registry, read-only
   kOpened,         // port: its instance; id: its source or port id; descriptor: an output's page
   kConnected,
   kRefused,       // text: why
@@ -62,6 +72,8 @@ enum class MessageKind : std::uint32_t {
 enum MessageFlag : std::uint32_t {
   kHasServiceThread = 1,
   kIsConnected = 2,  // else the input port only senses the output port
+  kComesBack = 4,    // the client will rejoin if the conversation is lost
+  kRejoins = 8,      // it does so now
 };
 
 struct Message {

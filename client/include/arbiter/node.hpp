@@ -1,4 +1,8 @@
 // A component's connection to the daemon, and the maker of its ports.
+//
+// If the daemon dies, data flows on between the ports that are open. The node looks for a new daemon of
+// the instance, about twenty times a second, and hands back what it has; it need not be told to. The
+// service thread does this, or service() where there is none.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +27,8 @@ class Node {
   // Opens an output port. Its name is the source of its connections. Blocks while the daemon
   // connects it with the input ports that are open, which takes below a millisecond, or up to 0.2 s
   // where a component at the other end does not run. Throws arbiter::Error: the name is taken or
-  // malformed, an option is out of bounds, there is no memory, the daemon is gone.
+  // malformed, an option is out of bounds, there is no memory, or no daemon has answered within
+  // NodeOptions::connect_timeout.
   template <class T>
   [[nodiscard]] OutputPort<T> output_port(std::string_view name,
                                           const OutputPortOptions& options = {}) {

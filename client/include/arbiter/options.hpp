@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 
 namespace arbiter {
@@ -11,8 +12,10 @@ namespace arbiter {
 struct NodeOptions {
   // Which daemon; empty: $ARBITER_INSTANCE, else "default".
   std::string instance{};
-  // How long Node() waits for a daemon before it throws.
+  // How long Node(), and the opening of a port, wait for a daemon before they throw.
   std::chrono::milliseconds connect_timeout{5000};
+  // Is told, once for each such wait, that no daemon answers yet. Empty: standard error is.
+  std::function<void(const std::string&)> on_waiting{};
   // Whether a thread of low priority takes up what the daemon announces (ports that come and go,
   // new models). Without it call Node::service() often: until you do, this node's ports do not see
   // changes.

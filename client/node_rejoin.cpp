@@ -1,0 +1,184 @@
+// Losing the daemon, and coming back to another.
+//
+// All that data needs to flow is mapped already, so for the ports nothing changes. The next daemon is
+// handed back the memory that the last one made, and told of each port and its links
+// (service/daemon_takeover.cpp).
+#include <fcntl.h>
+#include <sys/epoll.h>
+#include <sys/stat.h>
+#include <sys/timerfd.h>
+
+#include <optional>
+#include <vector>
+
+#include "client/node_core.hpp"
+#include "shm/rendezvous.hpp"
+
+namespace arbiter::detail {
+namespace {
+
+// How often a daemon is looked for.
+constexpr std::chrono::milliseconds kRejoinInterval{50};
+// How long until it is tried again with a daemon that does not want us.
+constexpr std::chrono::milliseconds kTurnedAwayInterval{1000};
+
+bool are_same(const shm::FileDescriptor& one, const shm::FileDescriptor& other) {
+  struct stat a {};
+  struct stat b {};
+  return fstat(one.get(), &a) == 0 && fstat(other.get(), &b) == 0 && a.st_ino == b.st_ino &&
+         a.st_dev == b.st_dev;
+}
+
+bool is_sent(const shm::FileDescriptor& socket, const shm::Message& message,
+             std::array<int, shm::kMaxDescriptors> descriptors = {-1, -1}) {
+  return shm::send_message(socket.get(), message, descriptors) == shm::SendResult::kSent;
+}
+
+// A descriptor of our own, for the port may be closed while it is on its way.
+shm::FileDescriptor duplicate(const shm::FileDescriptor& descriptor) {
+  return shm::FileDescriptor(fcntl(descriptor.get(), F_DUPFD_CLOEXEC, 0));
+}
+
+// A port as it is handed back.
+struct PortAtHand {
+  shm::Message message;
+  shm::FileDescriptor first;
+  shm::FileDescriptor second;
+  std::vector<HeldLink> links;
+};
+
+template <class Core>
+PortAtHand port_at_hand(shm::MessageKind kind, const Core& core, std::uint32_t id,
+                        const shm::FileDescriptor& second) {
+  PortAtHand port;
+  port.message.kind = kind;
+  port.message.port = core.instance();
+  port.message.id = id;
+  port.message.type = core.type();
+  port.message.set_name(core.name());
+  port.first = duplicate(core.segment_descriptor());
+  port.second = duplicate(second);
+  port.links = core.held_links();
+  return port;
+}
+
+bool is_handed_back(const shm::FileDescriptor& socket, const PortAtHand& port) {
+  if (!is_sent(socket, port.message, {port.first.get(), port.second.get()})) return false;
+  for (const HeldLink& link : port.links) {
+    shm::Message message;
+    message.kind = shm::MessageKind::kHandBackLink;
+    message.port = port.message.port;
+    message.peer = link.peer;
+    message.link = link.number;
+    if (!is_sent(socket, message)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool NodeCore::watch_socket() const {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  return epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, socket_->get(), &event) == 0;
+}
+
+// 0: never.
+void NodeCore::ring_timer_every(Clock::duration time) const {
+  const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(time).count();
+  itimerspec at{};
+  at.it_value = at.it_interval = {ns / 1'000'000'000, ns % 1'000'000'000};
+  timerfd_settime(timer_.get(), 0, &at, nullptr);
+}
+
+void NodeCore::lose_daemon() {
+  const std::lock_guard lock(mutex_);
+  be_alone(kRejoinInterval);
+}
+
+void NodeCore::be_alone(Clock::duration look_again_in) {
+  epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, socket_->get(), nullptr);
+  socket_ = nullptr;
+  standing_ = Standing::kAlone;
+  ring_timer_every(look_again_in);
+  news_.notify_all();
+}
+
+void NodeCore::rejoin() {
+  std::string why_not;
+  std::optional<shm::FileDescriptor> found;
+  try {
+    found = shm::connect_to_daemon(instance_, why_not);
+  } catch (const std::exception&) {  // no descriptors are left: another time
+  }
+  if (!found) return;
+  const auto socket = std::make_shared<const shm::FileDescriptor>(std::move(*found));
+  std::vector<PortAtHand> ports;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [instance, core] : outputs_) {
+      ports.push_back(port_at_hand(shm::MessageKind::kHandBackOutput, *core, core->source(),
+                                   core->page_descriptor()));
+    }
+    for (const auto& [instance, core] : inputs_) {
+      ports.push_back(port_at_hand(shm::MessageKind::kHandBackInput, *core, core->port(),
+                                   core->bell().write_end()));
+    }
+  }
+  shm::Message message = hello();
+  message.flags |= shm::kRejoins;
+  message.link = node_;
+  if (!is_sent(*socket, message, {memory_->board().get(), memory_->registry().get()})) return;
+  for (const auto& [id, page] : memory_->page_descriptors()) {
+    shm::Message handed;
+    handed.kind = shm::MessageKind::kHandBackPage;
+    handed.id = id;
+    if (!is_sent(*socket, handed, {page.get(), -1})) return;
+  }
+  for (const PortAtHand& port : ports) {
+    if (!is_handed_back(*socket, port)) return;
+  }
+  message = {};
+  message.kind = shm::MessageKind::kHandedBack;
+  if (!is_sent(*socket, message)) return;
+  const std::lock_guard lock(mutex_);
+  socket_ = socket;
+  if (!watch_socket()) {
+    be_alone(kTurnedAwayInterval);
+    return;
+  }
+  standing_ = Standing::kRejoining;
+  ring_timer_every({});
+  for (const PortAtHand& port : ports) {
+    const shm::PortInstance instance = port.message.port;  // closed meanwhile?
+    if (outputs_.count(instance) + inputs_.count(instance) == 0) say_closed(instance);
+  }
+}
+
+void NodeCore::be_welcomed(const shm::Received& welcome) {
+  const std::lock_guard lock(mutex_);
+  if (standing_ != Standing::kRejoining) return;
+  if (!are_same(welcome.descriptors[0], memory_->board())) {
+    turned_away_ = "the daemon has other memory";
+    be_alone(kTurnedAwayInterval);
+    return;
+  }
+  standing_ = Standing::kMember;
+  ++conversation_;
+  node_ = welcome.message.link;
+  turned_away_.clear();
+  if (observes_) {
+    shm::Message observe;
+    observe.kind = shm::MessageKind::kObserve;
+    say(observe);
+  }
+  news_.notify_all();
+}
+
+// The conversation is over; but the daemon may be replaced by one that knows us.
+void NodeCore::be_turned_away(const shm::Message& refusal) {
+  turned_away_ = refusal.text_view();
+  be_alone(kTurnedAwayInterval);
+}
+
+}  // namespace arbiter::detail

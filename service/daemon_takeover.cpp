@@ -1,0 +1,267 @@
+// How a daemon takes over from its predecessor: what was killed, or stopped, while its components
+// went on.
+//
+// All that decides lives in memory that the components map: tables, activity, queues. The new daemon
+// takes up that very memory and its numbers, so that for the components nothing changes; then it puts
+// its own model in force by an ordinary swap. A component that is not back when it is time for that
+// (it is stopped, or its user services the node late) comes back when it likes; until then its ports
+// and names are kept for it, for as long as its process lives.
+#include <sys/epoll.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "service/daemon.hpp"
+#include "service/log.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::service {
+namespace {
+
+// How long the predecessor's components may take to come back before others are served.
+constexpr shm::Nanoseconds kMaxWaitForReturn = 500'000'000;
+
+shm::FileDescriptor open_process(pid_t pid) {
+  return shm::FileDescriptor(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
+}
+
+}  // namespace
+
+void Daemon::look_for_predecessor() {
+  takeover_ends_ = shm::monotonic_now() + kMaxWaitForReturn;
+  predecessor_ = state_.read();
+  const auto stored = stores_ ? take_stored() : std::vector<StoredDescriptor>();
+  const auto find = [&](const char* name) {
+    return std::find_if(stored.begin(), stored.end(),
+                        [&](const StoredDescriptor& each) { return each.name == name; });
+  };
+  const auto board = find("board");
+  const auto registry = find("registry");
+  if (predecessor_ && board != stored.end() && registry != stored.end()) {
+    try {
+      inherit(board->descriptor, registry->descriptor);
+      for (const StoredDescriptor& each : stored) {
+        if (&each != &*board && &each != &*registry) directory_.take_page(each.descriptor);
+      }
+      return;
+    } catch (const std::exception& error) {
+      log::warn("what the service manager has kept is of no use: {}", error.what());
+    }
+  }
+  if (predecessor_) {
+    phase_ = Phase::kExpecting;
+  } else {
+    finish_takeover();
+  }
+}
+
+void Daemon::inherit(const shm::FileDescriptor& board, const shm::FileDescriptor& registry) {
+  if (!(Realm{Identity::of(board), Identity::of(registry)} == predecessor_)) {
+    throw std::runtime_error("this daemon's predecessor had other memory");
+  }
+  Registry inherited(registry);
+  models_.inherit(board);
+  registry_ = std::move(inherited);
+  directory_.restore(models_.in_force().generation);
+  find_absentees();
+  phase_ = Phase::kTakingOver;
+  log::info("taking over from the last daemon, {} components and model {}", absentees_.size(),
+            models_.in_force().generation);
+}
+
+void Daemon::find_absentees() {
+  for (const auto& source : directory_.sources()) {
+    if (source->away != 0) add_absentee(registry_.source(source->id).owner());
+  }
+  for (const auto& input : directory_.inputs()) {
+    if (input->away != 0) add_absentee(registry_.input(input->id).owner());
+  }
+}
+
+void Daemon::add_absentee(const Owner& owner) {
+  Absentee& absentee = absentees_[owner.node];
+  if (!absentee.process) {
+    absentee.pid = owner.pid;
+    absentee.process = open_process(owner.pid);
+    const bool is_other = start_of_process(owner.pid) != owner.started;
+    if (!absentee.process || is_other || has_ended(absentee.process)) {
+      absentees_.erase(owner.node);
+      switchboard_.forget_away(owner.port);
+      return;
+    }
+    watch(absentee.process.get(), Tag::kAbsentee, owner.node, EPOLLIN);
+  }
+  absentee.ports.insert(owner.port);
+}
+
+void Daemon::rejoin(Client& client, const shm::Received& hello) {
+  if (phase_ == Phase::kExpecting) {
+    inherit(hello.descriptors[0], hello.descriptors[1]);
+  } else if (!(Identity::of(hello.descriptors[0]) == Identity::of(models_.board()))) {
+    throw std::runtime_error(
+        "this daemon does not know the ports of \"" + client.name +
+        "\", which another daemon has opened; restart the component");
+  }
+  const NodeId node = hello.message.link;
+  // The conversation that it gave up may not have been seen to end.
+  const auto former = std::find_if(clients_.begin(), clients_.end(), [&](const auto& each) {
+    return each.second->node == node && each.second->pid() == client.pid();
+  });
+  if (former != clients_.end()) drop(former->first);
+  const auto absentee = absentees_.find(node);
+  if (absentee != absentees_.end() && absentee->second.pid == client.pid()) {
+    client.node = node;
+    client.to_hand_back = std::move(absentee->second.ports);
+    absentees_.erase(absentee);
+  }
+  client.is_returning = true;
+  welcome(client);
+}
+
+void Daemon::take_back_output(Client& client, const shm::Received& received) {
+  const shm::Message& message = received.message;
+  Source* source = directory_.source_by_id(message.id);
+  if (source == nullptr || source->away != message.port ||
+      client.to_hand_back.erase(message.port) == 0) {
+    throw std::runtime_error("an output port that it never had was handed back");
+  }
+  directory_.take_page(message.id, received.descriptors[1]);
+  switchboard_.readmit(adopt_output(received), client, *source);
+}
+
+void Daemon::take_back_input(Client& client, const shm::Received& received) {
+  const shm::Message& message = received.message;
+  InputName* input = directory_.input_by_id(message.id);
+  if (input == nullptr || input->away != message.port ||
+      client.to_hand_back.erase(message.port) == 0) {
+    throw std::runtime_error("an input port that it never had was handed back");
+  }
+  switchboard_.readmit(adopt_input(received), client, *input);
+}
+
+void Daemon::take_back_link(const Client& client, const shm::Message& message) {
+  if (client.is_returning && client.ports.count(message.port) != 0) {
+    switchboard_.claim(message.port, message.peer, message.link);
+  }
+}
+
+void Daemon::finish_return(Client& client) {
+  if (!client.is_returning) return;
+  client.is_returning = false;
+  const auto is_away = [&](shm::PortInstance port) {
+    return directory_.source_of(port) != nullptr || directory_.input_of(port) != nullptr;
+  };
+  for (const shm::PortInstance port : std::exchange(client.to_hand_back, {})) {
+    switchboard_.forget_away(port);  // closed meanwhile
+  }
+  for (const shm::PortInstance port : client.ports) switchboard_.settle_claims(port, is_away);
+  const auto table = models_.in_force().table;
+  switchboard_.link_all(table);
+  switchboard_.unlink(table);
+  names_were_freed_ = true;
+  log::info("{} is back, with {} ports", client.description(), client.ports.size());
+}
+
+void Daemon::set_away(Client& client) {
+  if (client.ports.empty() && client.to_hand_back.empty()) return;
+  Absentee& absentee = absentees_[client.node];
+  absentee.pid = client.pid();
+  absentee.ports = std::exchange(client.to_hand_back, {});
+  absentee.ports.insert(client.ports.begin(), client.ports.end());
+  while (!client.ports.empty()) switchboard_.set_away(*client.ports.begin());
+  absentee.process = client.release_process();
+  watch(absentee.process.get(), Tag::kAbsentee, client.node, EPOLLIN);
+}
+
+void Daemon::forget_absentee(NodeId node) {
+  const auto found = absentees_.find(node);
+  if (found == absentees_.end()) return;
+  const Absentee absentee = std::move(found->second);
+  absentees_.erase(found);
+  for (const shm::PortInstance port : absentee.ports) switchboard_.forget_away(port);
+  names_were_freed_ = true;
+  log::info("process {} has ended, {} ports with it", absentee.pid, absentee.ports.size());
+}
+
+// All who came in time are back. Our own model comes into force, and others are served.
+void Daemon::finish_takeover() {
+  const bool is_fresh = phase_ != Phase::kTakingOver;
+  if (is_fresh) {
+    if (predecessor_) log::warn("no component has handed back what the last daemon left");
+    state_.write({Identity::of(models_.board()), Identity::of(registry_.readable())});
+    if (stores_) {
+      discard_stored("board");
+      discard_stored("registry");
+      store("board", models_.writable_board());
+      store("registry", registry_.writable());
+    }
+  }
+  phase_ = Phase::kServing;
+  directory_.forget_lost_pages();
+  if (!models_.has_files()) {
+    if (!is_fresh) log::info("no model was given: the one in force stays");
+    switchboard_.link_all(models_.in_force().table);
+    welcome_waiting();
+    return;
+  }
+  try {
+    models_.prepare();
+  } catch (const std::exception& error) {
+    if (is_fresh) throw;
+    log::error("the model in force stays: {}", error.what());
+    welcome_waiting();
+    return;
+  }
+  begin_swap();
+}
+
+void Daemon::welcome_waiting() {
+  for (const ClientId id : std::exchange(waiting_, {})) {
+    const auto client = clients_.find(id);
+    if (client != clients_.end()) welcome(*client->second);
+  }
+}
+
+shm::Nanoseconds Daemon::takeover_deadline() const {
+  const bool waits = phase_ == Phase::kTakingOver ||
+                     (phase_ == Phase::kExpecting && !waiting_.empty());
+  return waits ? takeover_ends_ : shm::kForever;
+}
+
+void Daemon::advance_takeover(shm::Nanoseconds now) {
+  if (phase_ == Phase::kServing) return;
+  const bool all_are_back =
+      phase_ == Phase::kTakingOver && absentees_.empty() &&
+      std::none_of(clients_.begin(), clients_.end(),
+                   [](const auto& each) { return each.second->is_returning; });
+  if (all_are_back || now >= takeover_deadline()) finish_takeover();
+}
+
+void Daemon::serve_postponed(shm::Nanoseconds now) {
+  if (postponed_.empty()) return;
+  const bool anew = std::exchange(names_were_freed_, false);
+  for (Postponed& request : std::exchange(postponed_, {})) {
+    const auto client = clients_.find(request.client);
+    if (client == clients_.end()) continue;
+    try {
+      if (!anew && now < request.deadline) {
+        postponed_.push_back(std::move(request));
+      } else {
+        handle(*client->second, *request.request);
+      }
+    } catch (const NameIsKept& error) {
+      if (now < request.deadline) {
+        postponed_.push_back(std::move(request));
+      } else {
+        log::warn("{}: {}", client->second->description(), error.what());
+        refuse(*client->second, request.request->message.request, error.what());
+      }
+    } catch (const std::exception& error) {
+      log::warn("{}: {}", client->second->description(), error.what());
+      refuse(*client->second, request.request->message.request, error.what());
+    }
+  }
+}
+
+}  // namespace arbiter::service

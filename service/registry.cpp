@@ -1,0 +1,140 @@
+#include "service/registry.hpp"
+
+#include <fcntl.h>
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <stdexcept>
+
+#include "service/inheritance.hpp"
+
+namespace arbiter::service {
+
+struct Registry::Segment {
+  static constexpr std::uint64_t kMagic = 0x31676572'74696272;
+  static constexpr std::uint32_t kVersion = 1;
+
+  std::uint64_t magic;
+  std::uint32_t version;
+  shm::Atomic<std::uint64_t> last_instance;
+  shm::Atomic<std::uint64_t> last_link;
+  shm::Atomic<std::uint64_t> last_node;
+  shm::Atomic<std::uint32_t> sources_named;
+  shm::Atomic<std::uint32_t> inputs_named;
+  RegistryEntry sources[shm::kMaxSources];
+  RegistryEntry inputs[shm::kMaxInputPorts];
+};
+
+Owner RegistryEntry::owner() const noexcept {
+  Owner result;
+  result.port = port.load(std::memory_order_acquire);
+  result.node = node.load(std::memory_order_relaxed);
+  result.pid = static_cast<pid_t>(pid.load(std::memory_order_relaxed));
+  result.started = started.load(std::memory_order_relaxed);
+  return result.port == 0 ? Owner{} : result;
+}
+
+void RegistryEntry::set_owner(const Owner& owner) noexcept {
+  clear_owner();
+  node.store(owner.node, std::memory_order_release);
+  pid.store(static_cast<std::uint64_t>(owner.pid), std::memory_order_release);
+  started.store(owner.started, std::memory_order_release);
+  port.store(owner.port, std::memory_order_release);
+}
+
+Registry::Registry() : writable_(shm::make_segment("arbiter-registry", sizeof(Segment))) {
+  if (const auto error = shm::allocate(writable_, 0, offsetof(Segment, sources))) {
+    throw std::system_error(error, "allocating the registry");
+  }
+  shm::seal(writable_, shm::Seals::kFixedSize);
+  readable_ = shm::reopen(writable_, O_RDONLY);
+  mapping_ = shm::Mapping(writable_, sizeof(Segment), shm::Access::kReadWrite);
+  segment().magic = Segment::kMagic;
+  segment().version = Segment::kVersion;
+}
+
+Registry::Registry(const shm::FileDescriptor& handed_back)
+    : writable_(reopen_inherited(handed_back, sizeof(Segment))),
+      readable_(shm::reopen(writable_, O_RDONLY)),
+      mapping_(writable_, sizeof(Segment), shm::Access::kReadWrite) {
+  if (segment().magic != Segment::kMagic || segment().version != Segment::kVersion) {
+    throw std::runtime_error("the registry is one of another version");
+  }
+}
+
+Registry::Segment& Registry::segment() const noexcept { return *mapping_.as<Segment>(); }
+
+namespace {
+
+std::uint64_t next(shm::Atomic<std::uint64_t>& last) noexcept {
+  const std::uint64_t given = last.load(std::memory_order_relaxed) + 1;
+  last.store(given, std::memory_order_release);
+  return given;
+}
+
+}  // namespace
+
+std::uint64_t Registry::next_instance() noexcept { return next(segment().last_instance); }
+std::uint64_t Registry::next_link() noexcept { return next(segment().last_link); }
+NodeId Registry::next_node() noexcept { return next(segment().last_node); }
+
+void Registry::name(RegistryEntry& entry, const std::string& name, std::uint64_t page) {
+  const auto offset =
+      static_cast<std::size_t>(reinterpret_cast<std::byte*>(&entry) - mapping_.data());
+  if (const auto error = shm::allocate(writable_, offset, sizeof entry)) {
+    throw std::system_error(error, "allocating the registry");
+  }
+  entry.clear_owner();
+  entry.named.store(0, std::memory_order_release);
+  entry.page.store(page, std::memory_order_release);
+  const std::size_t length = std::min(name.size(), sizeof entry.name - 1);
+  std::memcpy(entry.name, name.data(), length);
+  entry.name[length] = '\0';
+  entry.named.store(1, std::memory_order_release);
+}
+
+void Registry::name_source(shm::SourceId id, const std::string& name, std::uint64_t page) {
+  this->name(source(id), name, page);
+  auto& count = segment().sources_named;
+  count.store(std::max(count.load(std::memory_order_relaxed), id + 1), std::memory_order_release);
+}
+
+void Registry::name_input(shm::PortId id, const std::string& name) {
+  this->name(input(id), name, 0);
+  auto& count = segment().inputs_named;
+  count.store(std::max(count.load(std::memory_order_relaxed), id + 1), std::memory_order_release);
+}
+
+void Registry::forget_source(shm::SourceId id) noexcept {
+  source(id).clear_owner();
+  source(id).named.store(0, std::memory_order_release);
+}
+
+RegistryEntry& Registry::source(shm::SourceId id) const noexcept { return segment().sources[id]; }
+RegistryEntry& Registry::input(shm::PortId id) const noexcept { return segment().inputs[id]; }
+
+std::uint32_t Registry::source_count() const noexcept {
+  return std::min(segment().sources_named.load(std::memory_order_acquire), shm::kMaxSources);
+}
+std::uint32_t Registry::input_count() const noexcept {
+  return std::min(segment().inputs_named.load(std::memory_order_acquire), shm::kMaxInputPorts);
+}
+
+// The 22nd field of /proc/PID/stat. The 2nd is a name in brackets, of any characters.
+std::uint64_t start_of_process(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const auto name_end = text.rfind(')');
+  if (name_end == std::string::npos) return 0;
+  std::istringstream fields(text.substr(name_end + 1));
+  std::string field;
+  for (int i = 3; i <= 21; ++i) fields >> field;
+  std::uint64_t started = 0;
+  fields >> started;
+  return started;
+}
+
+}  // namespace arbiter::service
