@@ -37,7 +37,7 @@ struct PlayOptions {
 class Player {
  public:
   Player(const PlayOptions& options, const std::vector<rules::TraceEvent>& events)
-      : options_(options), node_(connect("play", options.instance)), memory_(*node_->memory()) {
+      : options_(options), node_(connect("play", options.instance)), memory_(node_->memory()) {
     shm::Message observe;
     observe.kind = shm::MessageKind::kObserve;
     static_cast<void>(node_->ask(observe, {-1, -1}));
@@ -54,7 +54,7 @@ class Player {
   }
 
   void note_unknown_sources() const {
-    const auto table = memory_.tables().snapshot().table;
+    const auto table = memory_->tables().snapshot().table;
     for (const auto& [name, output] : outputs_) {
       if (table.knows_source(output->source())) continue;
       std::cerr << "arbiter: note: the daemon's model does not know " << name << '\n';
@@ -87,7 +87,7 @@ class Player {
     } else if (output != nullptr) {
       output->deactivate(at);
     }
-    const shm::TableSnapshot snapshot = memory_.tables().snapshot();
+    const shm::TableSnapshot snapshot = memory_->tables().snapshot();
     for (const auto& [name, port] : ports_of(event, output, snapshot.table)) {
       rules::write_outcome(std::cout,
                            {event, name, outcome_at(port, event, output, snapshot.table, at)});
@@ -120,7 +120,7 @@ class Player {
                                 const detail::OutputCore* output, const shm::TableView& table,
                                 shm::Nanoseconds at) const {
     shm::DecisionClock clock(at, true);
-    shm::Decider decider(table, memory_.pages(), clock);
+    shm::Decider decider(table, memory_->pages(), clock);
     rules::PortOutcome outcome;
     if (event.kind == rules::TraceKind::kArrival) {
       const shm::Rule own = table.rule(table.find(output->source(), port));
@@ -130,7 +130,7 @@ class Player {
     for (auto index = range.first; index != range.first + range.count; ++index) {
       const shm::Rule rule = table.rule(index);
       if (decider.decide_with_own(rule) != shm::Verdict::kWins) continue;
-      outcome.winner = memory_.source_name(rule.source);
+      outcome.winner = memory_->source_name(rule.source);
       break;
     }
     return outcome;
@@ -138,7 +138,7 @@ class Player {
 
   const PlayOptions& options_;
   std::shared_ptr<detail::NodeCore> node_;
-  const detail::SharedMemory& memory_;
+  const std::shared_ptr<const detail::SharedMemory> memory_;
   std::map<std::string, std::shared_ptr<detail::OutputCore>> outputs_;
   std::uint64_t counter_ = 0;
 };

@@ -5,8 +5,10 @@
 
 namespace arbiter::detail {
 
-SharedMemory::SharedMemory(shm::FileDescriptor board, shm::FileDescriptor registry)
-    : board_descriptor_(std::move(board)), registry_(std::move(registry)) {
+SharedMemory::SharedMemory(shm::FileDescriptor board, shm::FileDescriptor registry,
+                           std::shared_ptr<const ServiceBell> service_bell)
+    : service_bell_(std::move(service_bell)),
+      board_descriptor_(std::move(board)), registry_(std::move(registry)) {
   const std::size_t size = shm::checked_size(board_descriptor_, shm::Seals::kFixedSize);
   if (size != sizeof(shm::Board)) throw std::runtime_error("the daemon's board has another size");
   board_ = shm::Mapping(board_descriptor_, size, shm::Access::kReadOnly);

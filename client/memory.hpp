@@ -20,7 +20,8 @@ namespace arbiter::detail {
 class SharedMemory {
  public:
   // The registry is kept for the daemon's successor. Throws std::system_error, std::runtime_error.
-  SharedMemory(shm::FileDescriptor board, shm::FileDescriptor registry);
+  SharedMemory(shm::FileDescriptor board, shm::FileDescriptor registry,
+               std::shared_ptr<const ServiceBell> service_bell);
 
   void add_page(shm::SourceId id, std::string name, shm::FileDescriptor page);
   [[nodiscard]] std::string source_name(shm::SourceId id) const;
@@ -34,13 +35,13 @@ class SharedMemory {
 
   [[nodiscard]] const shm::TableReader& tables() const noexcept { return tables_; }
   [[nodiscard]] const shm::ActivityPages& pages() const noexcept { return *pages_; }
-  [[nodiscard]] const ServiceBell& service_bell() const noexcept { return service_bell_; }
+  [[nodiscard]] const ServiceBell& service_bell() const noexcept { return *service_bell_; }
 
  private:
   // More need not be kept: others have them too, and a process has 1024 descriptors by default.
   static constexpr std::size_t kMaxPageDescriptors = 256;
 
-  ServiceBell service_bell_;
+  const std::shared_ptr<const ServiceBell> service_bell_;
   shm::FileDescriptor board_descriptor_;
   shm::FileDescriptor registry_;
   shm::Mapping board_;

@@ -49,6 +49,7 @@ NodeCore::NodeCore(std::string_view name, const NodeOptions& options)
     : name_(name), options_(options) {
   check_name(name, "a node");
   try {
+    service_bell_ = std::make_shared<const ServiceBell>();
     instance_ = shm::instance_name(options.instance);
     connect();
   } catch (const Error&) {
@@ -65,7 +66,7 @@ NodeCore::~NodeCore() {
     stopping_ = true;
   }
   if (!service_thread_.joinable()) return;
-  memory_->service_bell().ring();
+  service_bell_->ring();
   // The last port may go on the service thread itself, if that was the last to use it.
   if (service_thread_.get_id() == std::this_thread::get_id()) {
     service_thread_.detach();
@@ -96,7 +97,7 @@ void NodeCore::connect() {
   timer_.reset(timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
   epoll_event event{};
   event.events = EPOLLIN;
-  if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, memory_->service_bell().descriptor(), &event) != 0 ||
+  if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, service_bell_->descriptor(), &event) != 0 ||
       epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, timer_.get(), &event) != 0 || !watch_socket()) {
     throw Error(std::string("no descriptor for the daemon's messages: ") + std::strerror(errno));
   }
@@ -117,7 +118,7 @@ bool NodeCore::say_hello(Clock::time_point give_up) {
     throw Error("the daemon refuses: " + std::string(welcome.message.text_view()));
   }
   memory_ = std::make_shared<SharedMemory>(std::move(welcome.descriptors[0]),
-                                           std::move(welcome.descriptors[1]));
+                                           std::move(welcome.descriptors[1]), service_bell_);
   node_ = welcome.message.link;
   return true;
 }
@@ -152,6 +153,11 @@ NodeCore::Socket NodeCore::socket() {
   return socket_;
 }
 
+std::shared_ptr<SharedMemory> NodeCore::memory() {
+  const std::lock_guard lock(mutex_);
+  return memory_;
+}
+
 void NodeCore::say(const shm::Message& message) noexcept {
   if (socket_ != nullptr) static_cast<void>(shm::send_message(socket_->get(), message));
 }
@@ -170,7 +176,7 @@ void NodeCore::forget_port(shm::PortInstance port) {
 
 shm::Received NodeCore::ask(const shm::Message& question,
                             std::array<int, shm::kMaxDescriptors> descriptors) {
-  shm::Received answer = converse(question, descriptors, nullptr);
+  shm::Received answer = converse(question, descriptors);
   if (question.kind == shm::MessageKind::kObserve) {
     const std::lock_guard lock(mutex_);
     observes_ = true;
@@ -195,6 +201,7 @@ bool NodeCore::wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_poi
 
 shm::Received NodeCore::converse(const shm::Message& question,
                                  std::array<int, shm::kMaxDescriptors> descriptors,
+                                 const SharedMemory* memory,
                                  std::function<void(shm::Received&)> on_opened) {
   const auto begin = Clock::now();
   const auto give_up =
@@ -206,6 +213,10 @@ shm::Received NodeCore::converse(const shm::Message& question,
   Reply& reply = replies_[numbered.request];
   reply.on_opened = std::move(on_opened);
   while (!reply.finished) {
+    if (memory != nullptr && memory != memory_.get()) {
+      replies_.erase(numbered.request);
+      throw MemoryIsNew();
+    }
     if (standing_ == Standing::kMember && reply.asked_in != conversation_) {
       // A port that another daemon has opened was handed back to this one.
       if (reply.opened != 0) break;
@@ -230,6 +241,18 @@ shm::Received NodeCore::converse(const shm::Message& question,
   return std::move(answered.mapped().received);
 }
 
+template <class Make>
+auto NodeCore::open(std::string_view name, Make make) {
+  for (;;) {
+    try {
+      return make(memory());
+    } catch (const MemoryIsNew&) {  // the next one is made for it
+    } catch (const std::system_error& error) {
+      throw Error(std::string(name) + ": " + error.what());
+    }
+  }
+}
+
 std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const PortType& type,
                                                   const OutputPortOptions& options) {
   check_port_name(name);
@@ -238,19 +261,19 @@ std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const P
   check_bounds<std::size_t>(name, "max_memory", options.max_memory,
                             OutputCore::least_memory(type_info(type), options.max_loans),
                             std::size_t{1} << 46);
-  try {
-    auto core = std::make_shared<OutputCore>(std::string(name), type_info(type), options, memory_);
+  return open(name, [&](const std::shared_ptr<SharedMemory>& memory) {
+    auto core = std::make_shared<OutputCore>(std::string(name), type_info(type), options, memory);
     core->node = shared_from_this();
-    shm::Message open = message_of(shm::MessageKind::kOpenOutput, name);
-    open.type = core->type();
-    converse(open, {core->segment_descriptor().get(), -1}, [&](shm::Received& opened) {
-      core->bind(opened.message.port, opened.message.id, std::move(opened.descriptors[0]));
-      outputs_[opened.message.port] = core;
-    });
+    shm::Message question = message_of(shm::MessageKind::kOpenOutput, name);
+    question.type = core->type();
+    converse(question, {core->segment_descriptor().get(), -1}, memory.get(),
+             [&](shm::Received& opened) {
+               core->bind(opened.message.port, opened.message.id,
+                          std::move(opened.descriptors[0]));
+               outputs_[opened.message.port] = core;
+             });
     return core;
-  } catch (const std::system_error& error) {
-    throw Error(std::string(name) + ": " + error.what());
-  }
+  });
 }
 
 std::shared_ptr<InputCore> NodeCore::open_input(std::string_view name, const PortType& type,
@@ -258,20 +281,18 @@ std::shared_ptr<InputCore> NodeCore::open_input(std::string_view name, const Por
   check_port_name(name);
   check_bounds<std::uint32_t>(name, "depth", options.depth, 1, shm::kMaxDepth);
   check_bounds<std::uint32_t>(name, "max_held", options.max_held, 1, shm::kMaxHeld);
-  try {
-    auto core = std::make_shared<InputCore>(std::string(name), type_info(type), options, memory_);
+  return open(name, [&](const std::shared_ptr<SharedMemory>& memory) {
+    auto core = std::make_shared<InputCore>(std::string(name), type_info(type), options, memory);
     core->node = shared_from_this();
-    shm::Message open = message_of(shm::MessageKind::kOpenInput, name);
-    open.type = core->type();
-    converse(open, {core->segment_descriptor().get(), core->bell().write_end().get()},
-             [&](shm::Received& opened) {
+    shm::Message question = message_of(shm::MessageKind::kOpenInput, name);
+    question.type = core->type();
+    converse(question, {core->segment_descriptor().get(), core->bell().write_end().get()},
+             memory.get(), [&](shm::Received& opened) {
                core->bind(opened.message.port, opened.message.id);
                inputs_[opened.message.port] = core;
              });
     return core;
-  } catch (const std::system_error& error) {
-    throw Error(std::string(name) + ": " + error.what());
-  }
+  });
 }
 
 void NodeCore::close(shm::PortInstance port) noexcept {

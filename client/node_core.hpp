@@ -27,6 +27,8 @@
 
 namespace arbiter::detail {
 
+struct PortAtHand;
+
 class NodeCore : public std::enable_shared_from_this<NodeCore> {
  public:
   // Connects. Throws Error.
@@ -52,7 +54,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
                     std::array<int, shm::kMaxDescriptors> descriptors);
 
   [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
-  [[nodiscard]] const std::shared_ptr<SharedMemory>& memory() const noexcept { return memory_; }
+  [[nodiscard]] std::shared_ptr<SharedMemory> memory();
   // Names of input ports, as far as the daemon has told them (kObserve).
   [[nodiscard]] std::map<shm::PortId, std::string> port_names();
 
@@ -68,6 +70,8 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
     shm::Received received;
     std::function<void(shm::Received&)> on_opened;
   };
+  // The daemon is one that has other memory: what was made for the old has to be made anew.
+  struct MemoryIsNew {};
   // kRejoining: a daemon has been handed back everything, and has not answered yet.
   enum class Standing : std::uint8_t { kMember, kRejoining, kAlone };
 
@@ -92,8 +96,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void be_alone(Clock::duration look_again_in);
   void ring_timer_every(Clock::duration time) const;
   void rejoin();
-  [[nodiscard]] bool hand_back(const shm::FileDescriptor& socket);
-  void be_welcomed(const shm::Received& welcome);
+  [[nodiscard]] bool hand_back(const shm::FileDescriptor& socket,
+                               const std::vector<PortAtHand>& ports) const;
+  void be_welcomed(shm::Received& welcome);
   void be_turned_away(const shm::Message& refusal);
 
   [[nodiscard]] Socket socket();
@@ -101,9 +106,14 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void say(const shm::Message& message) noexcept;
   void say_closed(shm::PortInstance port) noexcept;
   void forget_port(shm::PortInstance port);
+  // `memory`: that which the question is about, if any. Throws Error, MemoryIsNew.
   shm::Received converse(const shm::Message& question,
                          std::array<int, shm::kMaxDescriptors> descriptors,
-                         std::function<void(shm::Received&)> on_opened);
+                         const SharedMemory* memory = nullptr,
+                         std::function<void(shm::Received&)> on_opened = nullptr);
+  // Opens a port: calls make(memory) again where the memory is replaced meanwhile.
+  template <class Make>
+  auto open(std::string_view name, Make make);
   // Until something may have changed; false: it is time to give up.
   bool wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_point give_up);
 
@@ -112,9 +122,10 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::string instance_;
   shm::FileDescriptor epoll_;
   shm::FileDescriptor timer_;  // rings while there is no daemon, to look for one
-  std::shared_ptr<SharedMemory> memory_;
+  std::shared_ptr<const ServiceBell> service_bell_;
 
   std::mutex mutex_;
+  std::shared_ptr<SharedMemory> memory_;  // the service thread, which alone replaces it, needs no lock
   std::condition_variable news_;  // an answer, or a change of standing
   std::mutex pump_mutex_;         // without a service thread: one caller at a time
   Socket socket_;                 // null while alone
@@ -122,6 +133,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::uint64_t conversation_ = 1;  // counts the daemons that have welcomed us
   std::uint64_t node_ = 0;          // our number among all nodes
   std::string turned_away_;         // why the last daemon did not take us back
+  bool is_anew_ = false;            // rejoining with nothing to hand back
   bool observes_ = false;
   bool stopping_ = false;
   std::uint64_t next_request_ = 1;

@@ -15,6 +15,15 @@
 #include "shm/rendezvous.hpp"
 
 namespace arbiter::detail {
+
+// A port as it is handed back.
+struct PortAtHand {
+  shm::Message message;
+  shm::FileDescriptor first;
+  shm::FileDescriptor second;
+  std::vector<HeldLink> links;
+};
+
 namespace {
 
 // How often a daemon is looked for.
@@ -38,14 +47,6 @@ bool is_sent(const shm::FileDescriptor& socket, const shm::Message& message,
 shm::FileDescriptor duplicate(const shm::FileDescriptor& descriptor) {
   return shm::FileDescriptor(fcntl(descriptor.get(), F_DUPFD_CLOEXEC, 0));
 }
-
-// A port as it is handed back.
-struct PortAtHand {
-  shm::Message message;
-  shm::FileDescriptor first;
-  shm::FileDescriptor second;
-  std::vector<HeldLink> links;
-};
 
 template <class Core>
 PortAtHand port_at_hand(shm::MessageKind kind, const Core& core, std::uint32_t id,
@@ -125,22 +126,10 @@ void NodeCore::rejoin() {
                                    core->bell().write_end()));
     }
   }
-  shm::Message message = hello();
-  message.flags |= shm::kRejoins;
-  message.link = node_;
-  if (!is_sent(*socket, message, {memory_->board().get(), memory_->registry().get()})) return;
-  for (const auto& [id, page] : memory_->page_descriptors()) {
-    shm::Message handed;
-    handed.kind = shm::MessageKind::kHandBackPage;
-    handed.id = id;
-    if (!is_sent(*socket, handed, {page.get(), -1})) return;
-  }
-  for (const PortAtHand& port : ports) {
-    if (!is_handed_back(*socket, port)) return;
-  }
-  message = {};
-  message.kind = shm::MessageKind::kHandedBack;
-  if (!is_sent(*socket, message)) return;
+  // With nothing to hand back there is nothing to keep of the old memory either.
+  is_anew_ = ports.empty();
+  const bool is_said = is_anew_ ? is_sent(*socket, hello()) : hand_back(*socket, ports);
+  if (!is_said) return;
   const std::lock_guard lock(mutex_);
   socket_ = socket;
   if (!watch_socket()) {
@@ -155,13 +144,40 @@ void NodeCore::rejoin() {
   }
 }
 
-void NodeCore::be_welcomed(const shm::Received& welcome) {
+bool NodeCore::hand_back(const shm::FileDescriptor& socket,
+                         const std::vector<PortAtHand>& ports) const {
+  shm::Message message = hello();
+  message.flags |= shm::kRejoins;
+  message.link = node_;
+  if (!is_sent(socket, message, {memory_->board().get(), memory_->registry().get()})) return false;
+  for (const auto& [id, page] : memory_->page_descriptors()) {
+    message = {};
+    message.kind = shm::MessageKind::kHandBackPage;
+    message.id = id;
+    if (!is_sent(socket, message, {page.get(), -1})) return false;
+  }
+  for (const PortAtHand& port : ports) {
+    if (!is_handed_back(socket, port)) return false;
+  }
+  message = {};
+  message.kind = shm::MessageKind::kHandedBack;
+  return is_sent(socket, message);
+}
+
+void NodeCore::be_welcomed(shm::Received& welcome) {
   const std::lock_guard lock(mutex_);
   if (standing_ != Standing::kRejoining) return;
   if (!are_same(welcome.descriptors[0], memory_->board())) {
-    turned_away_ = "the daemon has other memory";
-    be_alone(kTurnedAwayInterval);
-    return;
+    try {
+      if (!is_anew_) throw std::runtime_error("the daemon has other memory");
+      memory_ = std::make_shared<SharedMemory>(std::move(welcome.descriptors[0]),
+                                               std::move(welcome.descriptors[1]), service_bell_);
+      port_names_.clear();
+    } catch (const std::exception& error) {
+      turned_away_ = error.what();
+      be_alone(kTurnedAwayInterval);
+      return;
+    }
   }
   standing_ = Standing::kMember;
   ++conversation_;

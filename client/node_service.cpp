@@ -71,7 +71,7 @@ void NodeCore::pump(int timeout_ms) {
 
 void NodeCore::tidy() {
   const std::lock_guard lock(mutex_);
-  memory_->service_bell().silence();
+  service_bell_->silence();
   for (auto& [instance, output] : outputs_) output->tidy();
   for (auto& [instance, input] : inputs_) input->tidy();
 }

@@ -54,8 +54,7 @@ class Client {
   [[nodiscard]] shm::FileDescriptor release_process() { return std::move(process_); }
   [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] uid_t user() const { return user_; }
-  // When the process began (registry.hpp).
-  [[nodiscard]] std::uint64_t started() const { return started_; }
+  [[nodiscard]] Process identity() const { return {pid_, started_}; }
   // For messages to people: node "object-detector" (pid 4711).
   [[nodiscard]] std::string description() const;
 
@@ -63,6 +62,7 @@ class Client {
   NodeId node = 0;   // 0 until it has been welcomed
   bool is_turned_away = false;  // what it says after that is not heard
   bool has_service_thread = false;
+  bool is_component = false;  // has opened a port once
   bool comes_back = false;  // if the conversation is lost: then its ports are kept for it
   bool is_returning = false;                // and has not handed back all yet:
   std::set<shm::PortInstance> to_hand_back;  // these are missing

@@ -51,6 +51,14 @@ std::string port_name(const shm::Message& message) {
   return std::string(name);
 }
 
+// What is not said while components come back to a new daemon.
+bool is_question(shm::MessageKind kind) {
+  using shm::MessageKind;
+  return kind == MessageKind::kOpenOutput || kind == MessageKind::kOpenInput ||
+         kind == MessageKind::kStatus || kind == MessageKind::kDeactivate ||
+         kind == MessageKind::kObserve;
+}
+
 std::uint64_t event_key(std::uint32_t tag, ClientId client) {
   return std::uint64_t{tag} << 56 | client;
 }
@@ -71,10 +79,10 @@ Daemon::Daemon(const DaemonOptions& options)
   look_for_predecessor();
 }
 
-// Components that live on need the state file to come back by.
+// Components that live on need the state file to come back by, as what the service manager keeps does.
 Daemon::~Daemon() {
   unlink(listener_.path.c_str());
-  if (phase_ == Phase::kServing && clients_.empty() && absentees_.empty()) state_.remove();
+  if (!stores_ && phase_ == Phase::kServing && clients_.empty() && absentees_.empty()) state_.remove();
 }
 
 void Daemon::watch(int fd, Tag tag, ClientId client, std::uint32_t events) {
@@ -91,7 +99,7 @@ int Daemon::timeout_ms() const {
   const bool is_behind = std::any_of(clients_.begin(), clients_.end(), [](const auto& each) {
     return each.second->has_read_ahead();
   });
-  if (is_behind) return 0;
+  if (is_behind || (try_postponed_ && !postponed_.empty())) return 0;
   shm::Nanoseconds deadline = std::min(barriers_.next_deadline(), takeover_deadline());
   for (const Postponed& request : postponed_) deadline = std::min(deadline, request.deadline);
   if (deadline == shm::kForever) return -1;
@@ -128,9 +136,9 @@ void Daemon::run(int signal_descriptor) {
     }
     const shm::Nanoseconds now = shm::monotonic_now();
     barriers_.expire(now);
+    advance_takeover(now);
     serve_postponed(now);
     settle();
-    advance_takeover(now);
   }
 }
 
@@ -197,18 +205,31 @@ void Daemon::serve(Client& client) {
         drop(id);
         return;
     }
-    try {
-      handle(client, received);
-    } catch (const NameIsKept&) {
-      postponed_.push_back({id, std::make_unique<shm::Received>(std::move(received)),
-                            shm::monotonic_now() + kMaxWaitForDeath});
-      received = {};
-    } catch (const std::exception& error) {
-      log::warn("{}: {}", client.description(), error.what());
-      refuse(client, received.message.request, error.what());
-    }
+    handle_or_refuse(client, received, shm::kForever);
     if (clients_.count(id) == 0) return;
   }
+}
+
+// `deadline`: of a request that was postponed.
+void Daemon::handle_or_refuse(Client& client, shm::Received& received, shm::Nanoseconds deadline) {
+  const std::uint64_t request = received.message.request;
+  std::string why;
+  try {
+    handle(client, received);
+    return;
+  } catch (const NotYet& not_yet) {
+    why = not_yet.what();
+    deadline = std::min(deadline, not_yet.deadline);
+    if (shm::monotonic_now() < deadline) {
+      auto postponed = std::make_unique<shm::Received>(std::move(received));
+      postponed_.push_back({client.id(), std::move(postponed), deadline});
+      return;
+    }
+  } catch (const std::exception& error) {
+    why = error.what();
+  }
+  log::warn("{}: {}", client.description(), why);
+  refuse(client, request, why);
 }
 
 void Daemon::drop(ClientId id) {
@@ -259,6 +280,9 @@ void Daemon::handle(Client& client, shm::Received& received) {
   if (client.is_turned_away) return;
   if (client.node == 0 && message.kind != shm::MessageKind::kHello) {
     throw std::runtime_error("a client must say hello first");
+  }
+  if (phase_ != Phase::kServing && is_question(message.kind)) {
+    throw NotYet("this daemon is taking over from another", shm::kForever);
   }
   switch (message.kind) {
     case shm::MessageKind::kHello:
@@ -377,12 +401,14 @@ void Daemon::require_not_kept(shm::PortInstance holder, const std::string& what)
       forget_absentee(node);
       return;
     }
-    throw NameIsKept(what + " is kept for process " + std::to_string(absentee.pid) +
-                     ", which lives but does not answer");
+    throw NotYet(what + " is kept for process " + std::to_string(absentee.pid) +
+                     ", which lives but does not answer",
+                 shm::monotonic_now() + kMaxWaitForDeath);
   }
   for (const auto& [id, client] : clients_) {
     if (client->to_hand_back.count(holder) != 0) {
-      throw NameIsKept(what + " is kept for " + client->description());
+      throw NotYet(what + " is kept for " + client->description(),
+                   shm::monotonic_now() + kMaxWaitForDeath);
     }
   }
 }
@@ -393,6 +419,7 @@ void Daemon::open_output(Client& client, shm::Received& received) {
   Source& source = directory_.source(name);
   require_free(client, source.open, "the output port " + name);
   require_not_kept(source.away, "the output port " + name);
+  remember_component(client);
   const OutputPort& opened = switchboard_.add(std::move(port), client, source);
   auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
   reply.port = opened.instance;
@@ -408,6 +435,7 @@ void Daemon::open_input(Client& client, shm::Received& received) {
   InputName& input = directory_.input(name);
   require_free(client, input.open, "the input port " + name);
   require_not_kept(input.away, "the input port " + name);
+  remember_component(client);
   const InputPort& opened = switchboard_.add(std::move(port), client, input);
   auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
   reply.port = opened.instance;

@@ -32,10 +32,12 @@ struct DaemonOptions {
   bool uses_descriptor_store = false;
 };
 
-// A component that lives, and may come back, has the name.
-class NameIsKept : public std::runtime_error {
+// A request that cannot be served yet, and why; it is tried again, at `deadline` for the last time.
+class NotYet : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  NotYet(const std::string& why, shm::Nanoseconds until)
+      : std::runtime_error(why), deadline(until) {}
+  const shm::Nanoseconds deadline;
 };
 
 class Daemon {
@@ -65,6 +67,7 @@ class Daemon {
   void drop(ClientId id);
   void settle();
 
+  void handle_or_refuse(Client& client, shm::Received& received, shm::Nanoseconds deadline);
   void handle(Client& client, shm::Received& received);
   void hello(Client& client, const shm::Received& received);
   void open_output(Client& client, shm::Received& received);
@@ -77,7 +80,7 @@ class Daemon {
   // Throws std::runtime_error if a live component has the name. One that has closed its port, or
   // has ended, before `asking` asked, has not.
   void require_free(const Client& asking, shm::PortInstance holder, const std::string& what);
-  // The same of one that is away. Throws NameIsKept.
+  // The same of one that is away. Throws NotYet.
   void require_not_kept(shm::PortInstance holder, const std::string& what);
 
   void reload();
@@ -112,6 +115,8 @@ class Daemon {
   void set_away(Client& client);
   void forget_absentee(NodeId node);
   void finish_takeover();
+  void remember_components();
+  void remember_component(Client& client);
   void welcome(Client& client);
   void welcome_waiting();
   [[nodiscard]] shm::Nanoseconds takeover_deadline() const;
@@ -128,12 +133,12 @@ class Daemon {
   shm::Listener listener_;
   StateFile state_;
   Phase phase_ = Phase::kServing;
-  std::optional<Realm> predecessor_;
-  shm::Nanoseconds takeover_ends_ = 0;
+  std::optional<Predecessor> predecessor_;
+  shm::Nanoseconds started_ = 0;
   std::map<NodeId, Absentee> absentees_;
   std::vector<ClientId> waiting_;     // have said hello, and are not welcomed yet
-  std::vector<Postponed> postponed_;  // requests for names of absentees, who may be dying
-  bool names_were_freed_ = false;     // maybe, since postponed_ was looked at
+  std::vector<Postponed> postponed_;
+  bool try_postponed_ = false;  // something has changed that they wait for
   shm::FileDescriptor epoll_;
   shm::FileDescriptor reserve_;  // given up for a moment to turn a client away when none is left
   std::map<ClientId, std::unique_ptr<Client>> clients_;

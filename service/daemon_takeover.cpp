@@ -21,6 +21,11 @@ namespace {
 
 // How long the predecessor's components may take to come back before others are served.
 constexpr shm::Nanoseconds kMaxWaitForReturn = 500'000'000;
+// The same where none of them has handed back its memory yet, though one lives. Later they must
+// start anew.
+constexpr shm::Nanoseconds kMaxWaitForRealm = 2'000'000'000;
+// How many components that have ended the state file may name.
+constexpr std::size_t kMaxForgotten = 64;
 
 shm::FileDescriptor open_process(pid_t pid) {
   return shm::FileDescriptor(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
@@ -29,7 +34,7 @@ shm::FileDescriptor open_process(pid_t pid) {
 }  // namespace
 
 void Daemon::look_for_predecessor() {
-  takeover_ends_ = shm::monotonic_now() + kMaxWaitForReturn;
+  started_ = shm::monotonic_now();
   predecessor_ = state_.read();
   const auto stored = stores_ ? take_stored() : std::vector<StoredDescriptor>();
   const auto find = [&](const char* name) {
@@ -38,7 +43,7 @@ void Daemon::look_for_predecessor() {
   };
   const auto board = find("board");
   const auto registry = find("registry");
-  if (predecessor_ && board != stored.end() && registry != stored.end()) {
+  if (board != stored.end() && registry != stored.end()) {
     try {
       inherit(board->descriptor, registry->descriptor);
       for (const StoredDescriptor& each : stored) {
@@ -49,7 +54,7 @@ void Daemon::look_for_predecessor() {
       log::warn("what the service manager has kept is of no use: {}", error.what());
     }
   }
-  if (predecessor_) {
+  if (predecessor_ && predecessor_->is_survived) {
     phase_ = Phase::kExpecting;
   } else {
     finish_takeover();
@@ -57,9 +62,6 @@ void Daemon::look_for_predecessor() {
 }
 
 void Daemon::inherit(const shm::FileDescriptor& board, const shm::FileDescriptor& registry) {
-  if (!(Realm{Identity::of(board), Identity::of(registry)} == predecessor_)) {
-    throw std::runtime_error("this daemon's predecessor had other memory");
-  }
   Registry inherited(registry);
   models_.inherit(board);
   registry_ = std::move(inherited);
@@ -82,10 +84,9 @@ void Daemon::find_absentees() {
 void Daemon::add_absentee(const Owner& owner) {
   Absentee& absentee = absentees_[owner.node];
   if (!absentee.process) {
-    absentee.pid = owner.pid;
-    absentee.process = open_process(owner.pid);
-    const bool is_other = start_of_process(owner.pid) != owner.started;
-    if (!absentee.process || is_other || has_ended(absentee.process)) {
+    absentee.pid = owner.process.pid;
+    absentee.process = open_process(owner.process.pid);
+    if (!absentee.process || !owner.process.lives() || has_ended(absentee.process)) {
       absentees_.erase(owner.node);
       switchboard_.forget_away(owner.port);
       return;
@@ -97,6 +98,10 @@ void Daemon::add_absentee(const Owner& owner) {
 
 void Daemon::rejoin(Client& client, const shm::Received& hello) {
   if (phase_ == Phase::kExpecting) {
+    if (!(Realm{Identity::of(hello.descriptors[0]), Identity::of(hello.descriptors[1])} ==
+          predecessor_->realm)) {
+      throw std::runtime_error("this daemon's predecessor had other memory");
+    }
     inherit(hello.descriptors[0], hello.descriptors[1]);
   } else if (!(Identity::of(hello.descriptors[0]) == Identity::of(models_.board()))) {
     throw std::runtime_error(
@@ -116,6 +121,7 @@ void Daemon::rejoin(Client& client, const shm::Received& hello) {
     absentees_.erase(absentee);
   }
   client.is_returning = true;
+  client.is_component = true;
   welcome(client);
 }
 
@@ -159,7 +165,7 @@ void Daemon::finish_return(Client& client) {
   const auto table = models_.in_force().table;
   switchboard_.link_all(table);
   switchboard_.unlink(table);
-  names_were_freed_ = true;
+  try_postponed_ = true;
   log::info("{} is back, with {} ports", client.description(), client.ports.size());
 }
 
@@ -180,16 +186,16 @@ void Daemon::forget_absentee(NodeId node) {
   const Absentee absentee = std::move(found->second);
   absentees_.erase(found);
   for (const shm::PortInstance port : absentee.ports) switchboard_.forget_away(port);
-  names_were_freed_ = true;
+  try_postponed_ = true;
   log::info("process {} has ended, {} ports with it", absentee.pid, absentee.ports.size());
 }
 
 // All who came in time are back. Our own model comes into force, and others are served.
 void Daemon::finish_takeover() {
   const bool is_fresh = phase_ != Phase::kTakingOver;
+  remember_components();
   if (is_fresh) {
-    if (predecessor_) log::warn("no component has handed back what the last daemon left");
-    state_.write({Identity::of(models_.board()), Identity::of(registry_.readable())});
+    if (phase_ == Phase::kExpecting) log::warn("no component has handed back what the last daemon left");
     if (stores_) {
       discard_stored("board");
       discard_stored("registry");
@@ -198,6 +204,7 @@ void Daemon::finish_takeover() {
     }
   }
   phase_ = Phase::kServing;
+  try_postponed_ = true;
   directory_.forget_lost_pages();
   if (!models_.has_files()) {
     if (!is_fresh) log::info("no model was given: the one in force stays");
@@ -216,6 +223,24 @@ void Daemon::finish_takeover() {
   begin_swap();
 }
 
+// For the next daemon.
+void Daemon::remember_components() {
+  std::vector<Process> components;
+  for (const auto& [id, client] : clients_) {
+    if (client->is_component) components.push_back(client->identity());
+  }
+  for (const auto& [node, absentee] : absentees_) {
+    components.push_back({absentee.pid, start_of_process(absentee.pid)});
+  }
+  state_.write({Identity::of(models_.board()), Identity::of(registry_.readable())}, components);
+}
+
+void Daemon::remember_component(Client& client) {
+  if (std::exchange(client.is_component, true)) return;
+  state_.add(client.identity());
+  if (state_.size() > kMaxForgotten + 2 * clients_.size()) remember_components();
+}
+
 void Daemon::welcome_waiting() {
   for (const ClientId id : std::exchange(waiting_, {})) {
     const auto client = clients_.find(id);
@@ -224,9 +249,9 @@ void Daemon::welcome_waiting() {
 }
 
 shm::Nanoseconds Daemon::takeover_deadline() const {
-  const bool waits = phase_ == Phase::kTakingOver ||
-                     (phase_ == Phase::kExpecting && !waiting_.empty());
-  return waits ? takeover_ends_ : shm::kForever;
+  if (phase_ == Phase::kTakingOver) return started_ + kMaxWaitForReturn;
+  if (phase_ == Phase::kExpecting && !waiting_.empty()) return started_ + kMaxWaitForRealm;
+  return shm::kForever;
 }
 
 void Daemon::advance_takeover(shm::Nanoseconds now) {
@@ -239,27 +264,14 @@ void Daemon::advance_takeover(shm::Nanoseconds now) {
 }
 
 void Daemon::serve_postponed(shm::Nanoseconds now) {
-  if (postponed_.empty()) return;
-  const bool anew = std::exchange(names_were_freed_, false);
+  const bool all = std::exchange(try_postponed_, false);
   for (Postponed& request : std::exchange(postponed_, {})) {
     const auto client = clients_.find(request.client);
     if (client == clients_.end()) continue;
-    try {
-      if (!anew && now < request.deadline) {
-        postponed_.push_back(std::move(request));
-      } else {
-        handle(*client->second, *request.request);
-      }
-    } catch (const NameIsKept& error) {
-      if (now < request.deadline) {
-        postponed_.push_back(std::move(request));
-      } else {
-        log::warn("{}: {}", client->second->description(), error.what());
-        refuse(*client->second, request.request->message.request, error.what());
-      }
-    } catch (const std::exception& error) {
-      log::warn("{}: {}", client->second->description(), error.what());
-      refuse(*client->second, request.request->message.request, error.what());
+    if (all || now >= request.deadline) {
+      handle_or_refuse(*client->second, *request.request, request.deadline);
+    } else {
+      postponed_.push_back(std::move(request));
     }
   }
 }

@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <cstdio>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <stdexcept>
 #include <system_error>
 
@@ -27,7 +29,23 @@ Identity Identity::of(const shm::FileDescriptor& file) {
 StateFile::StateFile(const std::string& directory, const std::string& instance)
     : path_(directory + "/" + instance + ".state") {}
 
-std::optional<Realm> StateFile::read() const {
+// The 22nd field of /proc/PID/stat. The 2nd is a name in brackets, of any characters.
+std::uint64_t start_of_process(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const auto name_end = text.rfind(')');
+  if (name_end == std::string::npos) return 0;
+  std::istringstream fields(text.substr(name_end + 1));
+  std::string field;
+  for (int i = 3; i <= 21; ++i) fields >> field;
+  std::uint64_t started = 0;
+  fields >> started;
+  return started;
+}
+
+bool Process::lives() const { return pid > 0 && start_of_process(pid) == started; }
+
+std::optional<Predecessor> StateFile::read() const {
   std::ifstream file(path_);
   std::string board;
   std::string registry;
@@ -35,15 +53,24 @@ std::optional<Realm> StateFile::read() const {
   file >> board >> realm.board.device >> realm.board.inode;
   file >> registry >> realm.registry.device >> realm.registry.inode;
   if (!file || board != "board" || registry != "registry") return {};
-  return realm;
+  std::string word;
+  Process component;
+  bool is_survived = false;
+  while (!is_survived && file >> word >> component.pid >> component.started) {
+    is_survived = component.lives();
+  }
+  return Predecessor{realm, is_survived};
 }
 
-void StateFile::write(const Realm& realm) const {
+void StateFile::write(const Realm& realm, const std::vector<Process>& components) {
   const std::string draft = path_ + ".new";
   {
     std::ofstream file(draft);
     file << "board " << realm.board.device << ' ' << realm.board.inode << "\nregistry "
          << realm.registry.device << ' ' << realm.registry.inode << '\n';
+    for (const Process& each : components) {
+      file << "component " << each.pid << ' ' << each.started << '\n';
+    }
     if (!file.flush()) {
       throw std::system_error(errno, std::generic_category(), "writing " + draft);
     }
@@ -51,6 +78,13 @@ void StateFile::write(const Realm& realm) const {
   if (std::rename(draft.c_str(), path_.c_str()) != 0) {
     throw std::system_error(errno, std::generic_category(), "writing " + path_);
   }
+  size_ = components.size();
+}
+
+void StateFile::add(const Process& component) noexcept {
+  std::ofstream(path_, std::ios::app)
+      << "component " << component.pid << ' ' << component.started << std::endl;
+  ++size_;
 }
 
 void StateFile::remove() const noexcept { unlink(path_.c_str()); }

@@ -8,6 +8,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,18 +33,39 @@ struct Realm {
   friend bool operator==(const Realm&, const Realm&) = default;
 };
 
-// Remembers, beside the socket, which realm the instance's clients live in.
+// A process, told from later ones with the same pid by when it began.
+struct Process {
+  pid_t pid = 0;
+  std::uint64_t started = 0;
+
+  [[nodiscard]] bool lives() const;
+};
+// When a process began, in clock ticks since boot; 0 where that cannot be told.
+std::uint64_t start_of_process(pid_t pid);
+
+// What a daemon that is gone has left behind.
+struct Predecessor {
+  Realm realm;
+  bool is_survived = false;  // a component of its lives, and may hand back the realm
+};
+
+// Remembers, beside the socket, which realm the instance's components live in, and who they are.
 class StateFile {
  public:
   StateFile(const std::string& directory, const std::string& instance);
-  // Nothing, too, where the file is not one.
-  [[nodiscard]] std::optional<Realm> read() const;
+  // Nothing, too, where it is not such a file.
+  [[nodiscard]] std::optional<Predecessor> read() const;
   // Replaces it at once. Throws std::system_error.
-  void write(const Realm& realm) const;
+  void write(const Realm& realm, const std::vector<Process>& components);
+  // One more component. Whoever it cannot be told of may have to start anew after a restart.
+  void add(const Process& component) noexcept;
+  // How many components it names, some of which may have ended.
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
   void remove() const noexcept;
 
  private:
   std::string path_;
+  std::size_t size_ = 0;
 };
 
 // Opens for writing what a daemon of this user made and clients may only read. Throws

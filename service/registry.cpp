@@ -4,12 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
-#include <fstream>
-#include <iterator>
-#include <sstream>
 #include <stdexcept>
-
-#include "service/inheritance.hpp"
 
 namespace arbiter::service {
 
@@ -32,16 +27,16 @@ Owner RegistryEntry::owner() const noexcept {
   Owner result;
   result.port = port.load(std::memory_order_acquire);
   result.node = node.load(std::memory_order_relaxed);
-  result.pid = static_cast<pid_t>(pid.load(std::memory_order_relaxed));
-  result.started = started.load(std::memory_order_relaxed);
+  result.process.pid = static_cast<pid_t>(pid.load(std::memory_order_relaxed));
+  result.process.started = started.load(std::memory_order_relaxed);
   return result.port == 0 ? Owner{} : result;
 }
 
 void RegistryEntry::set_owner(const Owner& owner) noexcept {
   clear_owner();
   node.store(owner.node, std::memory_order_release);
-  pid.store(static_cast<std::uint64_t>(owner.pid), std::memory_order_release);
-  started.store(owner.started, std::memory_order_release);
+  pid.store(static_cast<std::uint64_t>(owner.process.pid), std::memory_order_release);
+  started.store(owner.process.started, std::memory_order_release);
   port.store(owner.port, std::memory_order_release);
 }
 
@@ -121,20 +116,6 @@ std::uint32_t Registry::source_count() const noexcept {
 }
 std::uint32_t Registry::input_count() const noexcept {
   return std::min(segment().inputs_named.load(std::memory_order_acquire), shm::kMaxInputPorts);
-}
-
-// The 22nd field of /proc/PID/stat. The 2nd is a name in brackets, of any characters.
-std::uint64_t start_of_process(pid_t pid) {
-  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  const auto name_end = text.rfind(')');
-  if (name_end == std::string::npos) return 0;
-  std::istringstream fields(text.substr(name_end + 1));
-  std::string field;
-  for (int i = 3; i <= 21; ++i) fields >> field;
-  std::uint64_t started = 0;
-  fields >> started;
-  return started;
 }
 
 }  // namespace arbiter::service

@@ -14,6 +14,7 @@
 #include <functional>
 #include <string>
 
+#include "service/inheritance.hpp"
 #include "shm/atomic.hpp"
 #include "shm/ids.hpp"
 #include "shm/limits.hpp"
@@ -25,12 +26,11 @@ namespace arbiter::service {
 // twice.
 using NodeId = std::uint64_t;
 
-// Who has a port open. `started` tells a process from a later one with the same pid.
+// Who has a port open.
 struct Owner {
   shm::PortInstance port = 0;  // 0: nobody
   NodeId node = 0;
-  pid_t pid = 0;
-  std::uint64_t started = 0;
+  Process process;
 };
 
 struct RegistryEntry {
@@ -82,8 +82,5 @@ class Registry {
   shm::FileDescriptor readable_;
   shm::Mapping mapping_;
 };
-
-// When a process began, in clock ticks since boot; 0 where that cannot be told.
-std::uint64_t start_of_process(pid_t pid);
 
 }  // namespace arbiter::service

@@ -17,7 +17,7 @@ shm::Message message_to(shm::MessageKind kind, shm::PortInstance port, shm::Port
 }
 
 Owner owner(const Client& client, shm::PortInstance port) {
-  return {port, client.node, client.pid(), client.started()};
+  return {port, client.node, client.identity()};
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
-// A daemon dies, or is stopped, and another takes over.
+// A daemon dies, or is stopped, and another takes over: components notice nothing.
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <thread>
 
 #include <arbiter/arbiter.hpp>
 
+#include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
@@ -14,8 +16,18 @@
 namespace arbiter::test {
 namespace {
 
+constexpr auto kForEver = std::chrono::hours::max();
+
 std::string only(const std::string& source) {
   return rules(arbiter_at("/in", select("/" + source)));
+}
+
+// Waits for no daemon for long.
+NodeOptions impatient() {
+  NodeOptions options;
+  options.connect_timeout = std::chrono::milliseconds(1);
+  options.on_waiting = [](const std::string&) {};
+  return options;
 }
 
 TEST(Takeover, WhatIsOpenStaysOpenAndObeysTheNewModel) {
@@ -29,13 +41,326 @@ TEST(Takeover, WhatIsOpenStaysOpenAndObeysTheNewModel) {
   EXPECT_EQ(a.publish(Number{2}).delivered, 1u);
   daemon.write_model(only("b"));
   daemon.restart();
-  const auto status = daemon.status();
-  EXPECT_EQ(status["model"]["generation"], 2);
+  EXPECT_EQ(daemon.status()["model"]["generation"], 2);
   EXPECT_EQ(daemon.connection("/b", "/in")["state"], "connected");
   EXPECT_FALSE(in.take()) << "both are of /a, which is no longer selected";
   EXPECT_EQ(a.publish(Number{3}).delivered, 0u);
   EXPECT_EQ(b.publish(Number{4}).delivered, 1u);
   EXPECT_EQ(take_from(in), 4);
+}
+
+TEST(Takeover, OfAConnectionThatStaysKeepsItsQueueAndItsCounts) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  for (int i = 1; i <= 3; ++i) out.publish(Number{i});
+  EXPECT_EQ(take_from(in), 1);
+  for (const bool is_killed : {true, false}) {
+    is_killed ? daemon.kill() : void(daemon.terminate());
+    daemon.restart();
+    const auto connection = daemon.connection("/out", "/in");
+    EXPECT_EQ(connection["accepted"], 3);
+    EXPECT_EQ(connection["taken"], 1);
+    EXPECT_EQ(connection["waiting"], 2);
+  }
+  EXPECT_EQ(take_from(in), 2);
+  EXPECT_EQ(take_from(in), 3);
+  EXPECT_FALSE(in.take());
+}
+
+TEST(Takeover, UnderLoadLosesAndDelaysNothing) {
+  Daemon daemon(single_model());
+  Component sender("sender");
+  Node node("test");
+  auto in = node.input_port<Number>("/in", {.depth = 1024, .when_full = refuse_new});
+  ASSERT_EQ(sender.tell("output /out"), "open");
+  std::atomic<bool> stop{false};
+  std::int64_t next = 0;
+  std::thread receiver([&] {
+    while (!stop || next == 0) {
+      const auto result = in.wait_for(kForEver);
+      if (!result) continue;
+      const std::int64_t value = (**result).value;
+      if (value < 0) return;
+      // Refused ones are missing; nothing comes twice, or late.
+      EXPECT_GE(value, next);
+      next = value + 1;
+    }
+  });
+  sender.begin("publish /out 0 3000000");
+  for (int i = 0; i < 8; ++i) {
+    daemon.kill();
+    daemon.restart();
+    EXPECT_EQ(daemon.connection("/out", "/in")["state"], "connected");
+  }
+  EXPECT_NE(sender.answer(), "dead");
+  const auto source = daemon.source("/out");
+  EXPECT_EQ(source["published"], 3000000);
+  const std::uint64_t delivered = source["delivered"];
+  const std::uint64_t refused = source["refused"];
+  EXPECT_EQ(delivered + refused, 3000000u);
+  for (int tries = 0; tries < 100000 && sender.tell("publish /out -1") != "1 0 0"; ++tries) {
+  }
+  receiver.join();
+  const auto connection = daemon.connection("/out", "/in");
+  EXPECT_EQ(connection["taken"], connection["accepted"]);
+}
+
+TEST(Takeover, KeepsActivityThatNobodyRenews) {
+  Daemon daemon(override_model());
+  Node node("test");
+  auto low = node.output_port<Number>("/low");
+  auto in = node.input_port<Number>("/in");
+  {
+    Component other("other");
+    ASSERT_EQ(other.tell("output /stop"), "open");
+    other.tell("signal /stop");
+    other.kill();
+  }
+  for (int i = 0; i < 3; ++i) {
+    daemon.kill();
+    daemon.restart();
+    EXPECT_TRUE(daemon.source("/stop")["active"]);
+    EXPECT_EQ(low.publish(Number{1}).delivered, 0u);
+  }
+  auto stop = node.output_port<Number>("/stop");
+  stop.deactivate();
+  EXPECT_EQ(low.publish(Number{2}).delivered, 1u);
+  EXPECT_EQ(take_from(in), 2);
+}
+
+TEST(Takeover, FreesWhatDiedMeanwhileAndCarriesOnWithASuccessor) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto in = node.input_port<Number>("/in");
+  Component sender("sender");
+  ASSERT_EQ(sender.tell("output /out"), "open");
+  EXPECT_EQ(sender.tell("publish /out 1"), "1 0 0");
+  daemon.kill();
+  EXPECT_EQ(sender.tell("publish /out 2"), "1 0 0");
+  sender.kill();
+  daemon.restart();
+  auto successor = node.output_port<Number>("/out");
+  EXPECT_EQ(successor.publish(Number{3}).delivered, 1u);
+  for (int i = 1; i <= 3; ++i) EXPECT_EQ(take_from(in), i);
+}
+
+TEST(Takeover, ADeathAfterwardsIsNoticed) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out", {.max_memory = 5 * 64});
+  {
+    Component receiver("receiver");
+    ASSERT_EQ(receiver.tell("input /in 1 1 0"), "open");
+    out.publish(Number{1});
+    EXPECT_EQ(receiver.tell("hold /in"), "1");
+    daemon.kill();
+    daemon.restart();
+    EXPECT_TRUE(daemon.input("/in")["open"]);
+    for (int i = 2; i < 20; ++i) EXPECT_EQ(out.publish(Number{i}).delivered, 1u);
+    EXPECT_EQ(receiver.tell("held /in"), "1");
+  }
+  // Its slots come back, or there would be no room.
+  for (int i = 0; i < 3; ++i) {
+    auto in = node.input_port<Number>("/in", {.depth = 1});
+    EXPECT_EQ(out.publish(Number{i}).delivered, 1u);
+    EXPECT_EQ(take_from(in), i);
+  }
+}
+
+TEST(Takeover, WhatClosedMeanwhileIsClosed) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto in = node.input_port<Number>("/in");
+  {
+    auto out = node.output_port<Number>("/out");
+    daemon.kill();
+  }
+  daemon.restart();
+  EXPECT_FALSE(daemon.source("/out")["open"]);
+  auto out = node.output_port<Number>("/out");
+  EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
+}
+
+TEST(Takeover, OpeningWaitsForADaemon) {
+  Daemon daemon(single_model());
+  const auto patient = [](std::atomic<int>& told) {
+    NodeOptions options;
+    options.connect_timeout = std::chrono::hours(1);
+    options.on_waiting = [&told](const std::string& text) {
+      EXPECT_NE(text.find("waits for an arbiterd of instance \"test\""), std::string::npos) << text;
+      ++told;
+    };
+    return options;
+  };
+  std::atomic<int> early_told{0};
+  std::atomic<int> late_told{0};
+  Node node("early", patient(early_told));
+  daemon.kill();
+  std::thread opener([&] { auto out = node.output_port<Number>("/out"); });
+  std::thread starter([&] { Node("late", patient(late_told)); });
+  while (early_told == 0 || late_told == 0) {
+  }
+  daemon.restart();
+  opener.join();
+  starter.join();
+  EXPECT_EQ(early_told, 1);
+  EXPECT_EQ(late_told, 1);
+}
+
+TEST(Takeover, OpeningWithoutADaemonEndsInTime) {
+  Daemon daemon(single_model());
+  Node node("test", impatient());
+  daemon.kill();
+  try {
+    auto out = node.output_port<Number>("/out");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("no arbiterd of instance \"test\" answered"),
+              std::string::npos)
+        << error.what();
+  }
+  daemon.restart();
+  auto out = node.output_port<Number>("/out");
+}
+
+TEST(Takeover, OpeningWhileTheDaemonIsStoppedEndsInTime) {
+  Daemon daemon(single_model());
+  Node node("test", impatient());
+  daemon.process().stop();
+  try {
+    auto out = node.output_port<Number>("/out");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "the daemon is there, but has not answered in time");
+  }
+  daemon.process().signal(SIGCONT);
+  // What it opens too late is closed again.
+  auto out = node.output_port<Number>("/other");
+  while (daemon.source("/out")["open"] == true) {
+  }
+}
+
+TEST(Takeover, WithoutAServiceThreadComesWithTheNextCall) {
+  Daemon daemon(only("a"));
+  NodeOptions options;
+  options.service_thread = false;
+  Node node("test", options);
+  auto a = node.output_port<Number>("/a");
+  auto in = node.input_port<Number>("/in");
+  while (a.publish(Number{1}).delivered == 0) node.service();
+  daemon.kill();
+  daemon.restart();
+  EXPECT_EQ(a.publish(Number{2}).delivered, 1u);
+  auto b = node.output_port<Number>("/b");
+  EXPECT_TRUE(daemon.source("/a")["open"]);
+  EXPECT_TRUE(daemon.input("/in")["open"]);
+  daemon.kill();
+  daemon.restart();
+  std::atomic<bool> is_back{false};
+  std::thread status([&] {
+    EXPECT_TRUE(daemon.source("/a")["open"]);
+    is_back = true;
+  });
+  while (!is_back) node.service();
+  status.join();
+}
+
+TEST(Takeover, WithoutAModelKeepsTheOneInForce) {
+  Daemon daemon(only("a"));
+  Node node("test");
+  auto a = node.output_port<Number>("/a");
+  auto in = node.input_port<Number>("/in");
+  daemon.kill();
+  daemon.restart_without_model();
+  EXPECT_EQ(daemon.generation(), 1u);
+  EXPECT_TRUE(daemon.input("/in")["arbitrated"]);
+  EXPECT_EQ(a.publish(Number{1}).delivered, 1u);
+  EXPECT_EQ(take_from(in), 1);
+}
+
+TEST(Takeover, AStoppedComponentIsWaitedForButNotForLong) {
+  Daemon daemon(fan_out_model(2));
+  Component stopped("stopped");
+  ASSERT_EQ(stopped.tell("input /in0 8 1 0"), "open");
+  Node node("test", impatient());
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in1");
+  out.publish(Number{1});
+  EXPECT_EQ(stopped.tell("hold /in0"), "1");
+  daemon.kill();
+  stopped.process().stop();
+  daemon.restart();
+  EXPECT_EQ(daemon.generation(), 2u);
+  EXPECT_TRUE(daemon.input("/in0")["away"]);
+  // It holds a sample, and samples wait for it.
+  for (int i = 2; i < 200; ++i) EXPECT_EQ(out.publish(Number{i}).delivered, 2u);
+  try {
+    auto thief = node.input_port<Number>("/in0");
+    ADD_FAILURE();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("is kept for process"), std::string::npos)
+        << error.what();
+  }
+  stopped.process().signal(SIGCONT);
+  EXPECT_EQ(stopped.tell("held /in0"), "1");
+  stopped.tell("give /in0");
+  EXPECT_EQ(stopped.tell("take /in0"), "192");
+  while (daemon.input("/in0")["away"] == true) {
+  }
+  EXPECT_EQ(daemon.connection("/out", "/in0")["state"], "connected");
+}
+
+TEST(Takeover, TheNameOfOneThatDiesWhileItIsAwayIsFree) {
+  Daemon daemon(single_model());
+  Component stopped("stopped");
+  ASSERT_EQ(stopped.tell("output /out"), "open");
+  Node node("test");
+  auto in = node.input_port<Number>("/in");
+  daemon.kill();
+  stopped.process().stop();
+  daemon.restart();
+  EXPECT_TRUE(daemon.source("/out")["away"]);
+  stopped.kill();
+  auto out = node.output_port<Number>("/out");
+  EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
+  EXPECT_EQ(take_from(in), 1);
+}
+
+TEST(Takeover, ABadModelStopsTheNewDaemonAndHarmsNobody) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  daemon.kill();
+  daemon.write_model("<behaviors>");
+  EXPECT_THROW(daemon.restart(), std::runtime_error);
+  EXPECT_EQ(daemon.process().wait(), 1);
+  EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
+  daemon.write_model(single_model());
+  daemon.restart();
+  EXPECT_EQ(daemon.connection("/out", "/in")["accepted"], 1);
+}
+
+// The service manager keeps what nobody else has any more.
+TEST(Takeover, ByTheDescriptorStoreKeepsActivityThoughNobodyIsThere) {
+  Daemon::Options options;
+  options.arguments = {"--descriptor-store"};
+  Daemon daemon(override_model(), options);
+  {
+    Component other("other");
+    ASSERT_EQ(other.tell("output /stop"), "open");
+    other.tell("signal /stop");
+  }
+  daemon.kill();
+  daemon.restart_with_stored();
+  EXPECT_TRUE(daemon.source("/stop")["active"]);
+  EXPECT_EQ(daemon.generation(), 2u);
+  Node node("test");
+  auto low = node.output_port<Number>("/low");
+  auto in = node.input_port<Number>("/in");
+  EXPECT_EQ(low.publish(Number{1}).delivered, 0u);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <memory>
 #include <optional>
 #include <sstream>
@@ -70,19 +71,42 @@ class NotifySocket {
     for (;;) {
       pollfd polled[2]{{socket_.get(), POLLIN, 0}, {process.descriptor(), POLLIN, 0}};
       if (::poll(polled, 2, -1) < 0) continue;
-      char message[512];
-      const ssize_t size = ::recv(socket_.get(), message, sizeof message, MSG_DONTWAIT);
-      if (size > 0) {
-        if (std::string(message, static_cast<std::size_t>(size)).find(text) != std::string::npos) {
-          return true;
-        }
-        continue;
-      }
-      if (polled[1].revents != 0) return false;
+      const std::string message = receive();
+      if (message.find(text) != std::string::npos) return true;
+      if (message.empty() && polled[1].revents != 0) return false;
     }
+  }
+  // What the daemon has asked to be kept (FDSTORE=1), by name.
+  const std::map<std::string, shm::FileDescriptor>& stored() {
+    while (!receive().empty()) {
+    }
+    return stored_;
   }
 
  private:
+  // Empty: there is none.
+  std::string receive() {
+    char text[512];
+    alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))];
+    iovec data{text, sizeof text};
+    msghdr header{};
+    header.msg_iov = &data;
+    header.msg_iovlen = 1;
+    header.msg_control = control;
+    header.msg_controllen = sizeof control;
+    const ssize_t size = ::recvmsg(socket_.get(), &header, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+    if (size <= 0) return {};
+    const std::string message(text, static_cast<std::size_t>(size));
+    if (const cmsghdr* part = CMSG_FIRSTHDR(&header); part != nullptr) {
+      int fd = -1;
+      std::memcpy(&fd, CMSG_DATA(part), sizeof fd);
+      const auto name = message.find("FDNAME=") + std::strlen("FDNAME=");
+      stored_[message.substr(name, message.find('\n', name) - name)].reset(fd);
+    }
+    return message;
+  }
+
+  std::map<std::string, shm::FileDescriptor> stored_;
   std::string path_;
   shm::FileDescriptor socket_;
 };
@@ -173,6 +197,28 @@ class Daemon {
   std::uint64_t generation() { return status()["model"]["generation"]; }
   std::uint64_t refused() { return status()["model"]["reloads_refused"]; }
 
+  void restart_without_model() {
+    options_.without_model = true;
+    restart();
+  }
+  // The same, with what the last one has stored, as a service manager would.
+  void restart_with_stored() {
+    std::string redirections = "exec";
+    std::string names;
+    std::vector<shm::FileDescriptor> inherited;
+    int number = 3;
+    for (const auto& [name, descriptor] : notify_.stored()) {
+      inherited.emplace_back(::fcntl(descriptor.get(), F_DUPFD, 100));
+      redirections += " " + std::to_string(number++) + "<&" +
+                      std::to_string(inherited.back().get());
+      names += (names.empty() ? "" : ":") + name;
+    }
+    start({"/bin/bash", "-c",
+           redirections + "; LISTEN_PID=$$ LISTEN_FDS=" + std::to_string(number - 3) +
+               " LISTEN_FDNAMES=" + names + R"( exec "$0" "$@")"});
+    require_ready();
+  }
+
   [[nodiscard]] const std::string& instance() const { return options_.instance; }
   // Where its files are.
   [[nodiscard]] std::string directory() const { return directory_.path(); }
@@ -202,7 +248,7 @@ class Daemon {
     return nullptr;
   }
 
-  void start() {
+  void start(const std::vector<std::string>& by = {}) {
     std::vector<std::string> argv{arbiterd_path(), "--instance", options_.instance, "--log-level",
                                   "debug"};
     if (!options_.without_model) {
@@ -216,6 +262,7 @@ class Daemon {
       const std::string limit = "ulimit -n " + std::to_string(*options_.max_descriptors);
       argv.insert(argv.begin(), {"/bin/sh", "-c", limit + R"( && exec "$0" "$@")"});
     }
+    argv.insert(argv.begin(), by.begin(), by.end());
     const shm::FileDescriptor log(::open((directory_.path() + "/log").c_str(),
                                          O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600));
     process_ = ChildProcess(argv, {{"NOTIFY_SOCKET", notify_.path()}}, {-1, -1, log.get()});
