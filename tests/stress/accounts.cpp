@@ -1,14 +1,6 @@
 #include "tests/stress/accounts.hpp"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <set>
-#include <sstream>
 #include <utility>
 
 namespace arbiter::stress {
@@ -16,36 +8,8 @@ namespace {
 
 using nlohmann::json;
 
-// The segments that a process may write, by inode: its own. Those of others pass through its
-// descriptors too.
-std::set<ino_t> own_segments(pid_t process) {
-  std::set<ino_t> own;
-  std::ifstream maps("/proc/" + std::to_string(process) + "/maps");
-  for (std::string line; std::getline(maps, line);) {
-    std::istringstream words(line);
-    std::string range, access, offset, device;
-    ino_t inode = 0;
-    words >> range >> access >> offset >> device >> inode;
-    if (access == "rw-s" && line.find("/memfd:arbiter-") != std::string::npos) own.insert(inode);
-  }
-  return own;
-}
-
 std::uint64_t read(const shm::Atomic<std::uint64_t>& counter) {
   return counter.load(std::memory_order_acquire);
-}
-
-// How many samples the queue has accepted since its reader joined. The ring is the truth: a
-// publisher may have died between storing an entry and counting it.
-std::uint64_t accepted(const shm::OutputSegment& segment, std::uint32_t index) {
-  const shm::Channel& channel = segment.channel(index);
-  const std::uint64_t before = read(channel.first) - 1;
-  std::uint64_t last = before;
-  const std::uint32_t depth = channel.depth.load();
-  for (std::uint32_t i = 0; i < depth && i < shm::kMaxDepth; ++i) {
-    last = std::max(last, shm::sequence_of(segment.ring(index)[i].load(std::memory_order_acquire)));
-  }
-  return last - before;
 }
 
 void require(std::vector<std::string>& errors, const std::string& what, std::uint64_t left,
@@ -58,28 +22,9 @@ void require(std::vector<std::string>& errors, const std::string& what, std::uin
 }  // namespace
 
 void Accounts::watch(std::uint32_t component, pid_t process) {
-  const std::string directory = "/proc/" + std::to_string(process) + "/fd";
-  const std::set<ino_t> own = own_segments(process);
-  std::error_code gone;  // the process may have ended of itself: then it has said why
-  for (const auto& entry : std::filesystem::directory_iterator(directory, gone)) {
-    const std::string target = std::filesystem::read_symlink(entry.path(), gone).string();
-    const bool output = target.rfind("/memfd:arbiter-output", 0) == 0;
-    const bool input = target.rfind("/memfd:arbiter-input", 0) == 0;
-    if (!output && !input) continue;
-    const shm::FileDescriptor fd(::open(entry.path().c_str(), O_RDONLY | O_CLOEXEC));
-    struct stat status {};
-    if (!fd || fstat(fd.get(), &status) != 0 || own.count(status.st_ino) == 0) continue;
-    const std::size_t size = shm::checked_size(fd, shm::Seals::kOneWriter);
-    shm::Mapping mapping(fd, size, shm::Access::kReadOnly);
-    if (output) {
-      const auto layout = shm::OutputLayout::checked(*mapping.as<shm::OutputHeader>(), size);
-      const shm::OutputSegment segment(mapping.data(), layout);
-      outputs_.push_back({component, std::move(mapping), segment});
-    } else {
-      const auto* segment = mapping.as<const shm::InputSegment>();
-      inputs_.push_back({component, std::move(mapping), segment});
-    }
-  }
+  test::OwnSegments own = test::map_segments_of(process);
+  for (auto& output : own.outputs) outputs_.push_back({component, std::move(output)});
+  for (auto& input : own.inputs) inputs_.push_back({component, std::move(input)});
 }
 
 const Accounts::Output* Accounts::living_output(std::uint32_t component) const {
@@ -100,7 +45,7 @@ std::vector<std::string> Accounts::errors_in_segments(const PortIds& ids) const 
         errors.push_back(source_name(what.source) + " has no segment");
         continue;
       }
-      const shm::OutputCounters& counters = output->segment.header().counters;
+      const shm::OutputCounters& counters = output->own.segment.header().counters;
       const std::string name = source_name(what.source) + "'s ";
       require(errors, name + "published", read(counters.published), state.published.load());
       require(errors, name + "signals", read(counters.signals), state.signals.load());
@@ -119,14 +64,9 @@ std::vector<std::string> Accounts::errors_in_segments(const PortIds& ids) const 
     if (all != 1 || id == ids.end()) continue;
     std::uint64_t sum = 0;
     for (const Output& output : outputs_) {
-      for (std::uint32_t i = 0; i < shm::kMaxDestinations; ++i) {
-        const shm::Channel& channel = output.segment.channel(i);
-        if (read(channel.receiver) != 0 && channel.port.load() == id->second) {
-          sum += accepted(output.segment, i);
-        }
-      }
+      sum += test::accepted_for(output.own.segment, id->second);
     }
-    const shm::InputCounters& counters = input->segment->header.counters;
+    const shm::InputCounters& counters = input->own.segment->header.counters;
     const std::string name = port_name(what.port) + "'s ";
     require(errors, name + "taken", read(counters.taken), state.taken.load());
     require(errors, name + "misbehaved", read(counters.misbehaved), 0);
@@ -182,7 +122,7 @@ std::vector<std::string> Accounts::errors_in_status(const json& status, bool all
 std::uint64_t Accounts::undecided() const {
   std::uint64_t sum = 0;
   for (const Output& output : outputs_) {
-    const shm::OutputCounters& counters = output.segment.header().counters;
+    const shm::OutputCounters& counters = output.own.segment.header().counters;
     sum += read(counters.blind) + read(counters.unsettled);
   }
   return sum;

@@ -13,11 +13,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "shm/input_segment.hpp"
-#include "shm/output_segment.hpp"
-#include "shm/segment.hpp"
 #include "tests/stress/plan.hpp"
 #include "tests/stress/records.hpp"
+#include "tests/support/segments.hpp"
 
 namespace arbiter::stress {
 
@@ -42,13 +40,11 @@ class Accounts {
  private:
   struct Output {
     std::uint32_t component;
-    shm::Mapping mapping;
-    shm::OutputSegment segment;
+    test::OwnOutput own;
   };
   struct Input {
     std::uint32_t component;
-    shm::Mapping mapping;
-    const shm::InputSegment* segment;
+    test::OwnInput own;
   };
   [[nodiscard]] const Output* living_output(std::uint32_t component) const;
 

@@ -1,0 +1,143 @@
+// A component is killed before each atomic operation, and each system call, of all that it does:
+// point 0, point 1, and so on until it comes through unharmed. Each time the survivors must go on
+// at once, no slot or port may be lost, its names must be free for a successor, and the counters
+// must balance.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <string>
+
+#include "tests/kill/scene.hpp"
+#include "tests/support/threads.hpp"
+
+namespace {
+
+using namespace std::chrono_literals;
+using arbiter::test::make_number;
+using arbiter::test::map_segments_of;
+using arbiter::test::Scene;
+using arbiter::test::Victim;
+
+struct Case {
+  const char* name;
+  const char* phase;        // of the victim
+  void (*prepare)(Scene&);  // when it is about to begin
+  void (*meanwhile)(Scene&, Victim&);
+  std::uint64_t least_points;  // else the test has lost its points
+};
+
+void nothing(Scene&) {}
+void just_wait(Scene&, Victim&) {}
+void deliver(Scene& scene) {
+  for (int i = 0; i < 3; ++i) static_cast<void>(scene.first().publish(make_number(10)));
+}
+// The oldest head loses then.
+void override(Scene& scene) {
+  deliver(scene);
+  static_cast<void>(scene.second().publish(make_number(20)));
+}
+// What waits in one queue loses, and nothing else waits.
+void silence(Scene& scene) {
+  deliver(scene);
+  static_cast<void>(scene.second().signal());
+}
+void wake(Scene& scene, Victim& victim) {
+  victim.wait_until_it_polls_or_ends();
+  static_cast<void>(scene.first().publish(make_number(10)));
+}
+// The survivor waits while the victim publishes; it must be woken, if not by the victim then by
+// what comes after it.
+bool wait_too(Scene& scene, Victim& victim) {
+  arbiter::test::Watched waiting([&] {
+    for (;;) {
+      auto sample = scene.in().wait_for(10s);
+      if (sample && (*sample)->value == 10) return;
+      if (sample.timed_out()) ADD_FAILURE() << "was not woken";
+      if (sample.timed_out()) return;
+    }
+  });
+  waiting.wait_until_asleep();
+  victim.go();
+  const bool unharmed = victim.is_unharmed();
+  victim.kill();
+  arbiter::test::RawClient client("test");
+  client.hello("undertaker");
+  client.send(
+      arbiter::test::RawClient::message(arbiter::shm::MessageKind::kDeactivate, "/victim:o"));
+  client.expect(arbiter::shm::MessageKind::kDone);
+  static_cast<void>(scene.first().publish(make_number(10)));
+  waiting.join();
+  return unharmed;
+}
+
+class KilledAtEachPointOf : public testing::TestWithParam<Case> {};
+
+TEST_P(KilledAtEachPointOf, AComponentLeavesAllWell) {
+  const Case& what = GetParam();
+  Scene scene;
+  bool unharmed = false;
+  std::uint64_t point = 0;
+  for (; !unharmed && !HasFailure(); ++point) {
+    SCOPED_TRACE("killed at point " + std::to_string(point));
+    scene.open_survivors();
+    Victim victim(what.phase, point);
+    victim.prepare();
+    const auto dead = map_segments_of(victim.pid());
+    arbiter::shm::Activity before;
+    before.word = scene.page().word.load();
+    before.breaks = scene.page().breaks.load();
+    what.prepare(scene);
+    victim.go();
+    what.meanwhile(scene, victim);
+    unharmed = victim.is_unharmed();
+    victim.kill();
+    scene.require_all_is_well(dead, before);
+    scene.close_survivors();
+  }
+  std::printf("%s: %llu points; the slowest successor had both names after %lld us\n", what.name,
+              static_cast<unsigned long long>(point - 1),
+              static_cast<long long>(scene.slowest_succession().count()));
+  EXPECT_GE(point - 1, what.least_points);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, KilledAtEachPointOf,
+    testing::Values(Case{"Meeting", "meet", nothing, just_wait, 5},
+                    Case{"OpeningAnOutputPort", "open-output", nothing, just_wait, 20},
+                    Case{"OpeningAnInputPort", "open-input", nothing, just_wait, 10},
+                    Case{"ClosingAnOutputPort", "close-output", nothing, just_wait, 3},
+                    Case{"ClosingAnInputPort", "close-input", deliver, just_wait, 3},
+                    Case{"Joining", "join", nothing, just_wait, 50},
+                    Case{"Publishing", "publish", nothing, just_wait, 20},
+                    Case{"PublishingALoan", "publish-loan", nothing, just_wait, 20},
+                    Case{"PublishingIntoAFullQueue", "publish-overtaking", nothing, just_wait, 50},
+                    Case{"Signalling", "signal", nothing, just_wait, 8},
+                    Case{"Deactivating", "deactivate", nothing, just_wait, 3},
+                    Case{"Taking", "take", deliver, just_wait, 15},
+                    Case{"TakingAndHolding", "take-and-hold", deliver, just_wait, 40},
+                    Case{"TakingWhatOverrides", "take", override, just_wait, 20},
+                    Case{"DroppingWhatIsOverridden", "take", silence, just_wait, 10},
+                    Case{"Waiting", "wait", nothing, wake, 30},
+                    Case{"WaitingInVain", "wait-in-vain", nothing, just_wait, 20},
+                    Case{"UsingADescriptor", "descriptor", deliver, just_wait, 30},
+                    Case{"Relaying", "relay", deliver, just_wait, 40}),
+    [](const auto& its) { return its.param.name; });
+
+// Wakes a waiting survivor, or not quite.
+TEST(KilledAtEachPointOfWaking, AComponentLeavesNobodyAsleep) {
+  Scene scene;
+  bool unharmed = false;
+  std::uint64_t point = 0;
+  for (; !unharmed && !HasFailure(); ++point) {
+    SCOPED_TRACE("killed at point " + std::to_string(point));
+    scene.open_survivors();
+    Victim victim("publish", point);
+    victim.prepare();
+    unharmed = wait_too(scene, victim);
+    scene.close_survivors();
+  }
+  std::printf("Waking: %llu points\n", static_cast<unsigned long long>(point - 1));
+  EXPECT_GE(point - 1, 20u);
+}
+
+}  // namespace
