@@ -1,0 +1,124 @@
+// An honest component, and all that a client legitimately gets hold of who connects to it: the
+// descriptors to attack.
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include <arbiter/arbiter.hpp>
+
+#include "shm/bell.hpp"
+#include "shm/input_segment.hpp"
+#include "shm/output_segment.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+
+class Prey {
+ public:
+  // Output segments, input segments and bells come with introductions; board and pages from the
+  // daemon itself.
+  shm::FileDescriptor board;
+  shm::FileDescriptor page;  // of the prey's source
+  shm::FileDescriptor output;
+  shm::FileDescriptor input;
+  shm::FileDescriptor bell;
+
+  Prey()
+      : daemon_(
+            "<behaviors>"
+            "<arbiter at='/prey:i'><select from='/attacker:o'>not /prey:o</select></arbiter>"
+            "<arbiter at='/attacker:i'><select from='/prey:o'/></arbiter>"
+            "</behaviors>"),
+        node_("prey"),
+        out_(node_.output_port<int>("/prey:o")),
+        in_(node_.input_port<int>("/prey:i")),
+        attacker_(daemon_.instance()) {
+    auto hello = RawClient::message(shm::MessageKind::kHello, "attacker");
+    hello.value = shm::kWireVersion;
+    attacker_.send(hello);
+    board = std::move(attacker_.expect(shm::MessageKind::kWelcome).descriptors[0]);
+    open_ports();
+  }
+
+  Daemon& daemon() { return daemon_; }
+  OutputPort<int>& out() { return out_; }
+  InputPort<int>& in() { return in_; }
+
+ private:
+  void open_ports() {
+    // Segments that are well made; no attack yet.
+    const auto type = in_type();
+    const auto layout = shm::OutputLayout::plan(type, 8);
+    own_output_ = shm::make_segment("attacker-output", layout.total_size);
+    const shm::Mapping mapped(own_output_, layout.total_size, shm::Access::kReadWrite);
+    auto& header = *mapped.as<shm::OutputHeader>();
+    header.magic = shm::OutputHeader::kMagic;
+    header.version = shm::OutputHeader::kVersion;
+    header.slot_count = layout.slot_count;
+    header.type = type;
+    shm::seal(own_output_, shm::Seals::kOneWriter);
+    auto open = RawClient::message(shm::MessageKind::kOpenOutput, "/attacker:o");
+    open.type = type;
+    attacker_.send(open, {own_output_.get(), -1});
+    collect();
+
+    own_input_ = shm::make_segment("attacker-input", sizeof(shm::InputSegment));
+    const shm::Mapping mapped_input(own_input_, sizeof(shm::InputSegment), shm::Access::kReadWrite);
+    auto& input_header = mapped_input.as<shm::InputSegment>()->header;
+    input_header.magic = shm::InputHeader::kMagic;
+    input_header.version = shm::InputHeader::kVersion;
+    input_header.depth = 1;
+    input_header.max_held = 1;
+    input_header.type = type;
+    shm::seal(own_input_, shm::Seals::kOneWriter);
+    auto open_input = RawClient::message(shm::MessageKind::kOpenInput, "/attacker:i");
+    open_input.type = type;
+    attacker_.send(open_input, {own_input_.get(), own_bell_.write_end().get()});
+    collect();
+    if (!page || !output || !input || !bell) throw std::runtime_error("not all has come");
+  }
+
+  static shm::TypeInfo in_type() {
+    shm::TypeInfo type;
+    type.set_name("int");
+    type.size = sizeof(int);
+    type.alignment = alignof(int);
+    return type;
+  }
+
+  void collect() {
+    shm::Received received;
+    while (attacker_.receive(received)) {
+      switch (received.message.kind) {
+        case shm::MessageKind::kSourcePage:
+          if (received.message.name_view() == "/prey:o") page = std::move(received.descriptors[0]);
+          break;
+        case shm::MessageKind::kOutputPeer:
+          output = std::move(received.descriptors[0]);
+          break;
+        case shm::MessageKind::kInputPeer:
+          input = std::move(received.descriptors[0]);
+          bell = std::move(received.descriptors[1]);
+          break;
+        case shm::MessageKind::kRefused:
+          throw std::runtime_error(std::string(received.message.text_view()));
+        case shm::MessageKind::kConnected:
+          return;
+        default:
+          break;
+      }
+    }
+  }
+
+  Daemon daemon_;
+  Node node_;
+  OutputPort<int> out_;
+  InputPort<int> in_;
+  RawClient attacker_;
+  shm::FileDescriptor own_output_;
+  shm::FileDescriptor own_input_;
+  shm::Bell own_bell_;
+};
+
+}  // namespace arbiter::test
