@@ -1,0 +1,312 @@
+// What a hostile publisher or receiver can do to honest ones, by what it writes into its own
+// memory.
+//
+// The input decides what the honest ports do, step by step, and what each of their loads from
+// hostile memory yields: the truth, or garbage, this once or from then on. That is stronger than
+// any process that writes as fast as it can. Required of the honest ports:
+//   - no crash, no undefined behaviour, no step outside of a segment (sanitizers, guard pages)
+//   - each call ends after a bounded number of loads
+//   - what they take is allowed by the rules whose sources are honest
+//   - samples among them are whole, in order, and counted; no slot is lost
+#include <algorithm>
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "tests/fuzz/segments/guarded_mapping.hpp"
+#include "tests/fuzz/segments/seam.hpp"
+#include "tests/fuzz/segments/world.hpp"
+#include "tests/support/segments.hpp"
+
+namespace arbiter::fuzz {
+namespace {
+
+// No call of an honest port may load more often, whatever it is told.
+constexpr std::uint64_t kMostLoads = 2'000'000;
+constexpr std::size_t kMostSeen = 4096;
+
+class Input {
+ public:
+  Input(const std::uint8_t* data, std::size_t size) noexcept : data_(data), size_(size) {}
+  [[nodiscard]] bool is_at_end() const noexcept { return at_ == size_; }
+  std::uint8_t byte() noexcept { return at_ < size_ ? data_[at_++] : 0; }
+  std::uint64_t word() noexcept {
+    std::uint64_t value = 0;
+    for (int i = 0; i < 8; ++i) value = value << 8 | byte();
+    return value;
+  }
+  Bytes bytes(std::size_t count) {
+    Bytes result;
+    while (count-- != 0 && !is_at_end()) result.push_back(byte());
+    return result;
+  }
+
+ private:
+  const std::uint8_t* data_;
+  std::size_t size_;
+  std::size_t at_ = 0;
+};
+
+// Stands between the honest ports and hostile memory.
+class Liar : public Seam {
+ public:
+  explicit Liar(Input& input) : input_(input) {}
+
+  std::uint64_t load(const void* address, std::uint64_t value, std::size_t size) override {
+    if (++loads_ > kMostLoads) die("a call does not come to an end");
+    if (!is_hostile(address)) return value;
+    if (seen_.size() < kMostSeen) seen_.push_back({address, value});
+    const auto stuck = stuck_.find(address);
+    if (stuck != stuck_.end()) value = stuck->second;
+    const std::uint64_t told = tell(address, value);
+    last_ = told;
+    return size == 8 ? told : told & ((std::uint64_t{1} << 8 * size) - 1);
+  }
+  void begin_call() noexcept { loads_ = 0; }
+  // From now on one of the words that were loaded lately is garbage.
+  void stick(std::size_t which) {
+    if (seen_.empty()) return;
+    const Seen& seen = seen_[seen_.size() - 1 - which % seen_.size()];
+    stuck_[seen.address] = garbage(seen.value);
+  }
+
+ private:
+  std::uint64_t garbage(std::uint64_t value) {
+    switch (input_.byte() % 12) {
+      case 0:
+        return input_.word();
+      case 1:
+        return value + input_.byte();
+      case 2:
+        return value - input_.byte();
+      case 3:
+        return value ^ std::uint64_t{1} << (input_.byte() % 64);
+      case 4:
+        return last_;
+      case 5:
+        return 0;
+      case 6:
+        return ~std::uint64_t{0};
+      case 7:
+        return value + (std::uint64_t{input_.byte()} << 16);  // a sequence ahead
+      case 8:
+        return (value & ~std::uint64_t{0xffff}) | input_.byte();  // another slot
+      case 9:
+        return (value & ~std::uint64_t{0xffff}) | input_.word() >> 48;
+      case 10:
+        return std::uint64_t{input_.byte()} << (input_.byte() % 64);
+      default:
+        return value ^ std::uint64_t{1} << 63;
+    }
+  }
+
+  // The truth, a lie, or one that stays. 0, when the input is used up: the truth.
+  std::uint64_t tell(const void* address, std::uint64_t value) {
+    switch (input_.byte() % 16) {
+      case 3:
+      case 7:
+        return garbage(value);
+      case 11:
+        return stuck_[address] = garbage(value);
+      case 15:
+        stuck_.erase(address);
+        return value;
+      default:
+        return value;
+    }
+  }
+
+  struct Seen {
+    const void* address;
+    std::uint64_t value;
+  };
+
+  Input& input_;
+  std::uint64_t loads_ = 0;
+  std::uint64_t last_ = 0;
+  std::vector<Seen> seen_;
+  std::unordered_map<const void*, std::uint64_t> stuck_;
+};
+
+class Run {
+ public:
+  Run(Input& steps, Input& lies)
+      : steps_(steps),
+        liar_(lies),
+        world_({1 + steps.byte() % 4u, steps.byte() % 2 == 1, steps.byte() % 2 == 1}) {
+    Seam::current = &liar_;
+  }
+  ~Run() { Seam::current = nullptr; }
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
+
+  void go() {
+    for (int i = 0; i < 200 && !steps_.is_at_end(); ++i) {
+      liar_.begin_call();
+      step();
+    }
+    finish();
+  }
+
+ private:
+  struct Held {
+    detail::InputCore* port;
+    detail::HeldSample sample;
+  };
+
+  void step() {
+    switch (steps_.byte() % 24) {
+      case 0:
+      case 1:
+        world_.publish(world_.p, false, steps_.byte());
+        break;
+      case 2:
+        world_.publish(world_.p, true, steps_.byte());
+        break;
+      case 3:
+      case 4:
+        take(world_.r);
+        break;
+      case 5:
+        take(world_.r2);
+        break;
+      case 6:
+        give_back();
+        break;
+      case 7:
+        wait(world_.r);
+        break;
+      case 8:
+        wait(world_.r2);
+        break;
+      case 9:
+        static_cast<void>(world_.r.winner()), static_cast<void>(world_.r2.is_idle());
+        break;
+      case 10:
+        world_.s.signal(shm::monotonic_now()), s_active_ = true;
+        break;
+      case 11:
+        world_.s.deactivate(shm::monotonic_now()), s_active_ = false;
+        break;
+      case 12:
+      case 13:
+        world_.publish(world_.h, steps_.byte() % 2 == 0, steps_.byte());
+        break;
+      case 14:
+        world_.h.deactivate(shm::monotonic_now());
+        break;
+      case 15:
+        x_takes();
+        break;
+      case 16:
+        world_.r.tidy(), world_.r2.tidy(), world_.p.tidy();
+        break;
+      case 17:
+        world_.r.lose_peer(world_.h.instance());
+        break;
+      case 18:
+        world_.disconnect(world_.h, world_.r), world_.connect(world_.h, world_.r);
+        break;
+      case 19:
+        world_.disconnect(world_.p, world_.x), world_.connect(world_.p, world_.x);
+        break;
+      case 20:
+        world_.publish(world_.p, false, 1), world_.p.deactivate(shm::monotonic_now());
+        break;
+      case 21:
+        liar_.stick(steps_.byte());
+        break;
+      case 22:
+        introduce_output();
+        break;
+      case 23:
+        world_.introduce_input(steps_.bytes(512));
+        break;
+      default:
+        break;
+    }
+  }
+
+  // Only what the honest sources allow; the picture does not change while we take.
+  void require_allowed(const detail::InputCore& port, const detail::HeldSample& sample) {
+    if (&port != &world_.r) return;  // the rules of /r2 read a source that lies
+    if ((sample.source == world_.h.source()) != s_active_) {
+      die("/r took a sample of source " + std::to_string(sample.source) + " while /s was " +
+          (s_active_ ? "active" : "not active"));
+    }
+  }
+  void keep(detail::InputCore& port, const detail::HeldSample& sample) {
+    require_allowed(port, sample);
+    const std::uint64_t number = world_.require_whole(sample);
+    std::uint64_t& last = &port == &world_.r ? last_r_ : last_r2_;
+    if (number != 0 && number <= last) die("a sample of /p came twice, or out of order");
+    last = std::max(last, number);
+    held_.push_back({&port, sample});
+  }
+  void take(detail::InputCore& port) {
+    if (port.held() == 2) give_back_one_of(port);
+    const detail::HeldSample sample = port.take();
+    if (sample.data != nullptr) keep(port, sample);
+  }
+  void wait(detail::InputCore& port) {
+    if (port.held() == 2) give_back_one_of(port);
+    detail::HeldSample sample;
+    if (port.wait(0, sample) == detail::Waited::kSample) keep(port, sample);
+  }
+  void give_back(std::size_t index = 0) {
+    if (index >= held_.size()) return;
+    const Held held = held_[index];
+    held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(index));
+    world_.require_whole(held.sample);
+    held.port->give_back(held.sample.hold);
+  }
+  void give_back_one_of(const detail::InputCore& port) {
+    for (std::size_t i = 0; i < held_.size(); ++i) {
+      if (held_[i].port == &port) return give_back(i);
+    }
+  }
+  void x_takes() {
+    if (world_.x.held() == 2) {
+      world_.x.give_back(0);
+      world_.x.give_back(1);
+    }
+    static_cast<void>(world_.x.take());
+  }
+
+  void introduce_output() {
+    const auto slots = 1 + steps_.byte() % 20u;
+    shm::TypeInfo type;
+    type.size = 1 + steps_.byte();
+    type.alignment = std::uint64_t{1} << steps_.byte() % 13;
+    const auto size = shm::OutputLayout::plan(type, slots).total_size + steps_.byte() % 2;
+    world_.introduce_output(size, steps_.bytes(640));
+  }
+
+  // With the truth from now on, everything among the honest ports must add up.
+  void finish() {
+    Seam::current = nullptr;
+    while (!held_.empty()) give_back();
+    world_.require_accounts();
+  }
+
+  Input& steps_;
+  Liar liar_;
+  World world_;
+  bool s_active_ = false;
+  std::uint64_t last_r_ = 0;
+  std::uint64_t last_r2_ = 0;
+  std::deque<Held> held_;
+};
+
+}  // namespace
+}  // namespace arbiter::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using arbiter::fuzz::Input;
+  Input steps(data, size / 2);
+  Input lies(data + size / 2, size - size / 2);
+  arbiter::fuzz::Run(steps, lies).go();
+  return 0;
+}

@@ -1,0 +1,83 @@
+// Ports without a daemon, put together by hand: honest ones, and a publisher and a receiver whose
+// memory is not to be trusted.
+//
+//   /r   takes from /p while /s is not active, from /h while it is
+//   /r2  takes from /p while /h is not active, else from /h
+//   /x   takes from /p
+//
+// /h and /x are hostile. They run the honest code too, so that they get far; what others see of
+// their memory is the fuzzer's.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/input_core.hpp"
+#include "client/output_core.hpp"
+#include "shm/table_ring.hpp"
+
+namespace arbiter::fuzz {
+
+using Bytes = std::vector<std::uint8_t>;
+
+inline constexpr std::uint64_t kSampleWords = 8;
+
+// Fails the run, loudly, with what is wrong.
+[[noreturn]] void die(const std::string& what);
+
+struct Choices {
+  std::uint32_t depth = 2;
+  bool refuse_new = false;
+  bool timeouts = false;  // finite ones
+};
+
+class World {
+ private:
+  // Before the ports that use them.
+  static const shm::FileDescriptor& board_for(const Choices& choices);
+  static shm::FileDescriptor make_board(const Choices& choices);
+  static shm::FileDescriptor make_page(bool hostile);
+  void require_account_of(const detail::InputCore& port, std::uint32_t id) const;
+  static shm::FileDescriptor make_hostile(std::size_t size, const Bytes& bytes);
+  std::shared_ptr<detail::SharedMemory> make_memory();
+
+  const shm::FileDescriptor& board_;
+  shm::FileDescriptor pages_[3];
+  std::shared_ptr<detail::SharedMemory> honest_;
+  std::shared_ptr<detail::SharedMemory> hostile_;
+
+ public:
+  explicit World(const Choices& choices);
+
+  detail::OutputCore p;
+  detail::OutputCore s;
+  detail::OutputCore h;
+  detail::InputCore r;
+  detail::InputCore r2;
+  detail::InputCore x;
+
+  // As the daemon does it; each time under another number.
+  void connect(detail::OutputCore& from, detail::InputCore& to);
+  void disconnect(detail::OutputCore& from, detail::InputCore& to);
+  // An output port, to /r, or an input port, to /p, that is nothing but the given bytes.
+  void introduce_output(std::size_t size, const Bytes& bytes);
+  void introduce_input(const Bytes& bytes);
+
+  // Publishes a sample that tells whether it is whole; says what became of it.
+  Outcome publish(detail::OutputCore& from, bool loan, std::uint32_t words);
+  // Requires that the sample is one that /p published, if it says that it comes from there, and
+  // anyhow that it lies in memory; returns its number.
+  std::uint64_t require_whole(const detail::HeldSample& sample) const;
+  // What /p has delivered to honest ports is taken, or counted where it went; and it has all its
+  // slots.
+  void require_accounts();
+
+ private:
+  std::uint64_t published_ = 0;
+  std::uint64_t last_link_ = 0;
+  std::uint64_t last_instance_ = 100;
+};
+
+}  // namespace arbiter::fuzz
