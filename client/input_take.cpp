@@ -215,16 +215,17 @@ bool InputCore::decide_all() noexcept {
 void InputCore::drop_losers(const Queue* winner) noexcept {
   for (Queue& queue : queues_) {
     if (queue.head == 0 || queue.verdict != shm::Verdict::kLoses) continue;
-    std::uint64_t waiting = queue.reader.backlog(queue.end);
-    while (waiting-- != 0) {
+    const auto waits = [&] { return queue.reader.backlog(queue.end) != 0; };
+    // Each step passes one of them at least: dropped here, or overtaken.
+    for (auto left = queue.reader.backlog(queue.end); left != 0 && waits(); --left) {
       std::uint64_t lost = 0;
       const shm::Entry entry = queue.reader.peek(lost);
       count_overtaken(queue, lost);
-      if (entry == 0 || lost != 0) break;  // what it has now came later than the decision
+      if (entry == 0 || !waits()) break;  // what it has now came later than the decision
       shm::Nanoseconds stamp = 0;
-      if (winner != nullptr &&
-          (!queue.reader.peek_stamp(entry, stamp) || stamp > winner->head_stamp)) {
-        break;
+      if (winner != nullptr) {
+        if (!queue.reader.peek_stamp(entry, stamp)) continue;  // overtaken just now
+        if (stamp > winner->head_stamp) break;
       }
       consume(queue);
       count(queue.lane->dropped);
