@@ -19,7 +19,8 @@ class Prey {
   // Output segments, input segments and bells come with introductions; board and pages from the
   // daemon itself.
   shm::FileDescriptor board;
-  shm::FileDescriptor page;  // of the prey's source
+  shm::FileDescriptor registry;  // what a daemon that takes over finds
+  shm::FileDescriptor page;      // of the prey's source
   shm::FileDescriptor output;
   shm::FileDescriptor input;
   shm::FileDescriptor bell;
@@ -37,7 +38,9 @@ class Prey {
     auto hello = RawClient::message(shm::MessageKind::kHello, "attacker");
     hello.value = shm::kWireVersion;
     attacker_.send(hello);
-    board = std::move(attacker_.expect(shm::MessageKind::kWelcome).descriptors[0]);
+    shm::Received welcome = attacker_.expect(shm::MessageKind::kWelcome);
+    board = std::move(welcome.descriptors[0]);
+    registry = std::move(welcome.descriptors[1]);
     open_ports();
   }
 

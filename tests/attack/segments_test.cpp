@@ -85,11 +85,13 @@ struct Named {
   FileDescriptor Prey::*descriptor;
 };
 constexpr Named kAll[]{{"board", &Prey::board},
+                       {"registry", &Prey::registry},
                        {"activity page", &Prey::page},
                        {"output segment", &Prey::output},
                        {"input segment", &Prey::input}};
 constexpr Named kOfComponents[]{{"output segment", &Prey::output}, {"input segment", &Prey::input}};
-constexpr Named kOfTheDaemon[]{{"board", &Prey::board}, {"activity page", &Prey::page}};
+constexpr Named kOfTheDaemon[]{
+    {"board", &Prey::board}, {"registry", &Prey::registry}, {"activity page", &Prey::page}};
 
 TEST(ForeignMemory, FaultsWhenItIsStoredTo) {
   Prey prey;

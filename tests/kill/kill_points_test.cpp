@@ -102,7 +102,7 @@ TEST_P(KilledAtEachPointOf, AComponentLeavesAllWell) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, KilledAtEachPointOf,
-    testing::Values(Case{"Meeting", "meet", nothing, just_wait, 5},
+    testing::Values(Case{"Meeting", "meet", nothing, just_wait, 3},
                     Case{"OpeningAnOutputPort", "open-output", nothing, just_wait, 20},
                     Case{"OpeningAnInputPort", "open-input", nothing, just_wait, 10},
                     Case{"ClosingAnOutputPort", "close-output", nothing, just_wait, 3},

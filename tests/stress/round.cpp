@@ -179,11 +179,14 @@ void Round::work(std::uint64_t kills, std::uint64_t stops, bool kill_the_daemon)
   // A round with kills lasts for as many as its records have room for.
   const double seconds = kills != 0 ? 10 : std::min(kRoundSeconds, options_.seconds);
   const auto until = begin + static_cast<std::int64_t>(seconds * kSecond);
-  if (kill_the_daemon) kill_daemon();
+  if (kill_the_daemon && options_.keep_daemon_dead) kill_daemon();
   for (; stops != 0 && !is_full() && !records_.has_failed(); --stops) stop_one();
   const bool swaps = options_.swaps && daemon_lives_ && random_.one_in(2);
   while (read_clock() < until && !is_full() && !records_.has_failed()) {
     if (swaps && (kills == 0 || random_.one_in(8))) swap_model();
+    if (kill_the_daemon && daemon_lives_ && totals_.daemon_kills < options_.daemon_kills) {
+      replace_daemon();
+    }
     if (kills != 0) {
       if (kill_one() && --kills == 0) break;
       usleep(50 + random_.below(500));
@@ -273,6 +276,28 @@ void Round::kill_daemon() {
   daemon_lives_ = false;
   ++totals_.daemon_kills;
   wait_for_steps(kAdvance, kNobody);
+}
+
+// All flows go on without a daemon; then another takes over, whose status must list all ports.
+void Round::replace_daemon() {
+  kill_daemon();
+  const std::int64_t begin = read_clock();
+  daemon_.restart();
+  daemon_lives_ = true;
+  meet_daemon();
+  const Deadline deadline("the new daemon should know all ports");
+  while (!has_all_ports(daemon_.status())) deadline.wait();
+  totals_.readoptions.add(static_cast<std::uint64_t>(read_clock() - begin));
+  wait_for_steps(kAdvance, kNobody);
+}
+
+bool Round::has_all_ports(const nlohmann::json& status) const {
+  const auto open = [](const nlohmann::json& ports) {
+    return static_cast<std::size_t>(std::count_if(
+        ports.begin(), ports.end(), [](const auto& port) { return port["open"] == true; }));
+  };
+  return open(status["sources"]) == plan_.sources.size() &&
+         open(status["inputs"]) == plan_.ports.size();
 }
 
 void Round::wait_for_all_done(Phase phase) {

@@ -45,6 +45,7 @@ struct Totals {
   std::uint64_t killed_relays = 0;
   std::uint64_t stops = 0;
   std::uint64_t daemon_kills = 0;
+  Distribution readoptions;        // from a new daemon's start until it knew all ports
   Distribution takeovers;          // from a kill until the successor's ports were open
   Distribution pauses;             // of all components, in rounds without trouble
   Distribution pauses_in_trouble;  // of those that were not killed or stopped themselves
@@ -73,6 +74,8 @@ class Round {
   void note_takeovers();
   void stop_one();
   void kill_daemon();
+  void replace_daemon();
+  [[nodiscard]] bool has_all_ports(const nlohmann::json& status) const;
   void wait_for_steps(std::uint64_t count, std::uint32_t of_all_but) const;
   void wait_for_all_done(Phase phase);
   void meet_daemon();

@@ -40,6 +40,7 @@ void report(const Totals& totals, const Records& records, double seconds) {
   if (totals.stops != 0) std::printf("%llu stopped and continued\n", number(totals.stops));
   if (totals.daemon_kills != 0) {
     std::printf("the daemon was killed %llu times\n", number(totals.daemon_kills));
+    print("from a new daemon's start until it knew all ports", totals.readoptions);
   }
   print("pauses between two steps, nobody killed or stopped", totals.pauses);
   print("pauses of the others while some are", totals.pauses_in_trouble);
@@ -51,6 +52,7 @@ void run(const Options& options, Records& records, Totals& totals) {
   const auto seconds = [&] { return static_cast<double>(read_clock() - begin) / 1e9; };
   const auto goes_on = [&] {
     if (options.kills != 0) return totals.kills < options.kills;
+    if (options.daemon_kills != 0) return totals.daemon_kills < options.daemon_kills;
     if (options.stops != 0) return totals.stops < options.stops;
     if (options.operations != 0) return totals.operations() < options.operations;
     return seconds() < options.seconds;
@@ -62,7 +64,7 @@ void run(const Options& options, Records& records, Totals& totals) {
     Round round(options, plan, records, totals);
     round.run(peace ? 0 : options.kills - std::min(options.kills, totals.kills),
               peace ? 0 : options.stops - std::min(options.stops, totals.stops),
-              options.keep_daemon_dead);
+              options.keep_daemon_dead || options.daemon_kills != 0);
   }
   report(totals, records, seconds());
 }

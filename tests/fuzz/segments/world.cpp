@@ -92,10 +92,11 @@ shm::FileDescriptor World::make_page(bool hostile) {
 }
 
 std::shared_ptr<detail::SharedMemory> World::make_memory() {
-  auto memory = std::make_shared<detail::SharedMemory>(board_);
+  auto memory = std::make_shared<detail::SharedMemory>(copy_of(board_.get()), shm::FileDescriptor(),
+                                                       std::make_shared<detail::ServiceBell>());
   const char* const names[]{"/p", "/h", "/s"};
   for (std::uint32_t source = 0; source < kSources; ++source) {
-    memory->add_page(source, names[source], pages_[source]);
+    memory->add_page(source, names[source], copy_of(pages_[source].get()));
   }
   return memory;
 }
@@ -113,9 +114,9 @@ World::World(const Choices& choices)
       x("/x", type(), input_options(choices, choices.refuse_new), hostile_) {
   declare_hostile(h.segment_descriptor().get());
   declare_hostile(x.segment_descriptor().get());
-  p.bind(++last_instance_, kP, pages_[kP]);
-  s.bind(++last_instance_, kS, pages_[kS]);
-  h.bind(++last_instance_, kH, pages_[kH]);
+  p.bind(++last_instance_, kP, copy_of(pages_[kP].get()));
+  s.bind(++last_instance_, kS, copy_of(pages_[kS].get()));
+  h.bind(++last_instance_, kH, copy_of(pages_[kH].get()));
   r.bind(++last_instance_, kR);
   r2.bind(++last_instance_, kR2);
   x.bind(++last_instance_, kX);
