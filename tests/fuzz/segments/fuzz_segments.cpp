@@ -37,11 +37,6 @@ class Input {
     for (int i = 0; i < 8; ++i) value = value << 8 | byte();
     return value;
   }
-  Bytes bytes(std::size_t count) {
-    Bytes result;
-    while (count-- != 0 && !is_at_end()) result.push_back(byte());
-    return result;
-  }
 
  private:
   const std::uint8_t* data_;
@@ -201,7 +196,7 @@ class Run {
         x_takes();
         break;
       case 16:
-        world_.r.tidy(), world_.r2.tidy(), world_.p.tidy();
+        tidy();
         break;
       case 17:
         world_.r.lose_peer(world_.h.instance());
@@ -222,11 +217,21 @@ class Run {
         introduce_output();
         break;
       case 23:
-        world_.introduce_input(steps_.bytes(512));
+        world_.introduce_input(patches());
         break;
       default:
         break;
     }
+  }
+
+  // What the service thread does.
+  void tidy() {
+    for (auto* port : {&world_.r, &world_.r2}) {
+      port->tidy();
+      static_cast<void>(port->misbehaving());
+    }
+    world_.p.tidy();
+    static_cast<void>(world_.p.misbehaving());
   }
 
   // Only what the honest sources allow; the picture does not change while we take.
@@ -275,13 +280,18 @@ class Run {
     static_cast<void>(world_.x.take());
   }
 
+  std::vector<Patch> patches() {
+    std::vector<Patch> result(steps_.byte() % 3);
+    for (Patch& patch : result) {
+      patch.word = steps_.byte();
+      patch.value = steps_.word();
+    }
+    return result;
+  }
   void introduce_output() {
     const auto slots = 1 + steps_.byte() % 20u;
-    shm::TypeInfo type;
-    type.size = 1 + steps_.byte();
-    type.alignment = std::uint64_t{1} << steps_.byte() % 13;
-    const auto size = shm::OutputLayout::plan(type, slots).total_size + steps_.byte() % 2;
-    world_.introduce_output(size, steps_.bytes(640));
+    const int more = steps_.byte() % 4 - 1;
+    world_.introduce_output(slots, more, patches());
   }
 
   // With the truth from now on, everything among the honest ports must add up.

@@ -149,34 +149,55 @@ void World::disconnect(detail::OutputCore& from, detail::InputCore& to) {
   to.disconnect_peer(from.instance());
 }
 
-// A segment of the right size, or not, full of the given bytes from its beginning.
-shm::FileDescriptor World::make_hostile(std::size_t size, const Bytes& bytes) {
+shm::FileDescriptor World::make_hostile(std::size_t size, const void* header,
+                                        std::size_t header_size,
+                                        const std::vector<Patch>& patches) {
   auto segment = shm::make_segment("hostile", size);
-  const std::size_t used = std::min(bytes.size(), size);
+  std::vector<char> bytes(header_size);
+  std::memcpy(bytes.data(), header, header_size);
+  for (const Patch& patch : patches) {
+    const std::size_t at = patch.word % (header_size / 8) * 8;
+    std::memcpy(bytes.data() + at, &patch.value, 8);
+  }
+  const std::size_t used = std::min(header_size, size);
   if (::pwrite(segment.get(), bytes.data(), used, 0) != static_cast<ssize_t>(used)) die("pwrite");
   shm::seal(segment, shm::Seals::kOneWriter);
   declare_hostile(segment.get());
   return segment;
 }
 
-void World::introduce_output(std::size_t size, const Bytes& bytes) {
+void World::introduce_output(std::uint32_t slots, int more, const std::vector<Patch>& patches) {
+  const auto layout = shm::OutputLayout::plan(type(), slots);
+  shm::OutputHeader header{};
+  header.magic = shm::OutputHeader::kMagic;
+  header.version = shm::OutputHeader::kVersion;
+  header.slot_count = slots;
+  header.type = type();
   shm::Received received;
   received.message.peer = ++last_instance_;
   received.message.id = kH;
   received.message.link = ++last_link_;
-  received.descriptors[0] = make_hostile(size, bytes);
+  received.descriptors[0] = make_hostile(layout.total_size + static_cast<std::size_t>(more),
+                                         &header, offsetof(shm::OutputHeader, joins), patches);
   try {
     r.add_peer(detail::map_output_peer(received, type()));
   } catch (const std::runtime_error&) {  // it says what is wrong with it
   }
 }
 
-void World::introduce_input(const Bytes& bytes) {
+void World::introduce_input(const std::vector<Patch>& patches) {
+  shm::InputHeader header{};
+  header.magic = shm::InputHeader::kMagic;
+  header.version = shm::InputHeader::kVersion;
+  header.depth = 2;
+  header.max_held = 2;
+  header.type = type();
   shm::Received received;
   received.message.peer = ++last_instance_;
   received.message.id = kX;
   received.message.flags = shm::kIsConnected;
-  received.descriptors[0] = make_hostile(sizeof(shm::InputSegment), bytes);
+  received.descriptors[0] =
+      make_hostile(sizeof(shm::InputSegment), &header, offsetof(shm::InputHeader, wait), patches);
   received.descriptors[1] = copy_of(x.bell().write_end().get());
   try {
     p.add_peer(detail::map_input_peer(received, type()), ++last_link_);

@@ -20,7 +20,11 @@
 
 namespace arbiter::fuzz {
 
-using Bytes = std::vector<std::uint8_t>;
+// A word of a header that is not what it should be.
+struct Patch {
+  std::uint8_t word;
+  std::uint64_t value;
+};
 
 inline constexpr std::uint64_t kSampleWords = 8;
 
@@ -40,7 +44,9 @@ class World {
   static shm::FileDescriptor make_board(const Choices& choices);
   static shm::FileDescriptor make_page(bool hostile);
   void require_account_of(const detail::InputCore& port, std::uint32_t id) const;
-  static shm::FileDescriptor make_hostile(std::size_t size, const Bytes& bytes);
+  static shm::FileDescriptor make_hostile(std::size_t size, const void* header,
+                                          std::size_t header_size,
+                                          const std::vector<Patch>& patches);
   std::shared_ptr<detail::SharedMemory> make_memory();
 
   const shm::FileDescriptor& board_;
@@ -61,9 +67,10 @@ class World {
   // As the daemon does it; each time under another number.
   void connect(detail::OutputCore& from, detail::InputCore& to);
   void disconnect(detail::OutputCore& from, detail::InputCore& to);
-  // An output port, to /r, or an input port, to /p, that is nothing but the given bytes.
-  void introduce_output(std::size_t size, const Bytes& bytes);
-  void introduce_input(const Bytes& bytes);
+  // An output port, to /r, or an input port, to /p, whose segment is as it should be, but for some
+  // words of its header; and an output's has as many bytes more or less as it says.
+  void introduce_output(std::uint32_t slots, int more, const std::vector<Patch>& patches);
+  void introduce_input(const std::vector<Patch>& patches);
 
   // Publishes a sample that tells whether it is whole; says what became of it.
   Outcome publish(detail::OutputCore& from, bool loan, std::uint32_t words);
