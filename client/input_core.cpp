@@ -70,6 +70,16 @@ void InputCore::tidy() {
   if (drained) offer_view();
 }
 
+std::vector<shm::PortInstance> InputCore::misbehaving() {
+  std::vector<shm::PortInstance> found;
+  for (auto& [instance, link] : links_) {
+    if (link.reported || !link.peer->misbehaved.load(std::memory_order_relaxed)) continue;
+    link.reported = true;
+    found.push_back(instance);
+  }
+  return found;
+}
+
 // A receiver that waits must look again: a publisher may have delivered to it already.
 void InputCore::offer_view() {
   auto view = std::make_unique<InputView>();

@@ -40,6 +40,8 @@ class InputCore {
   [[nodiscard]] std::vector<HeldLink> held_links() const;
   // Unmaps what the port's thread has let go of.
   void tidy();
+  // Those that have begun to misbehave, once each. Nothing is taken from them any more.
+  std::vector<shm::PortInstance> misbehaving();
 
   // Port's thread.
 

@@ -111,6 +111,8 @@ bool InputCore::look_at(Queue& queue) noexcept {
       queue.lane->source.load(std::memory_order_relaxed) != shm::kNone) {
     count(segment_->header.counters.misbehaved);
     queue.lane->source.store(shm::kNone, std::memory_order_relaxed);
+    queue.peer->misbehaved.store(true, std::memory_order_relaxed);
+    memory_->service_bell().ring();
   }
   if (queue.head == 0 && queue.gone && !queue.peer->drained.load(std::memory_order_relaxed)) {
     queue.peer->drained.store(true, std::memory_order_relaxed);

@@ -90,6 +90,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void wake_inputs();
   void handle_peer(shm::Received& received);
   void refuse_peer(const shm::Message& announced, const std::string& why);
+  void say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
 
   [[nodiscard]] bool watch_socket() const;
   void lose_daemon();

@@ -72,8 +72,20 @@ void NodeCore::pump(int timeout_ms) {
 void NodeCore::tidy() {
   const std::lock_guard lock(mutex_);
   service_bell_->silence();
-  for (auto& [instance, output] : outputs_) output->tidy();
-  for (auto& [instance, input] : inputs_) input->tidy();
+  for (auto& [instance, output] : outputs_) {
+    output->tidy();
+    for (const shm::PortInstance peer : output->misbehaving()) {
+      say_refused(instance, peer,
+                  "the input port misbehaves: it says that it has read what was never published");
+    }
+  }
+  for (auto& [instance, input] : inputs_) {
+    input->tidy();
+    for (const shm::PortInstance peer : input->misbehaving()) {
+      say_refused(instance, peer,
+                  "the output port misbehaves: its queue has what no honest publisher writes");
+    }
+  }
 }
 
 void NodeCore::handle(shm::Received& received) {
@@ -157,12 +169,16 @@ void NodeCore::handle_peer(shm::Received& received) {
 
 // Tells the daemon, so that it shows in its status.
 void NodeCore::refuse_peer(const shm::Message& announced, const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  say_refused(announced.port, announced.peer, why);
+}
+
+void NodeCore::say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
   shm::Message refusal;
   refusal.kind = shm::MessageKind::kPeerRefused;
-  refusal.port = announced.port;
-  refusal.peer = announced.peer;
+  refusal.port = port;
+  refusal.peer = peer;
   refusal.set_text(why);
-  const std::lock_guard lock(mutex_);
   say(refusal);
 }
 

@@ -53,8 +53,7 @@ OutputCore::OutputCore(std::string name, const shm::TypeInfo& type,
   shm::seal(descriptor_, shm::Seals::kOneWriter);
 }
 
-void OutputCore::bind(shm::PortInstance instance, shm::SourceId source,
-                      shm::FileDescriptor page) {
+void OutputCore::bind(shm::PortInstance instance, shm::SourceId source, shm::FileDescriptor page) {
   if (shm::checked_size(page, shm::Seals::kFixedSize) != sizeof(shm::ActivityPage)) {
     throw std::runtime_error("the activity page has another size");
   }
@@ -105,6 +104,17 @@ std::vector<HeldLink> OutputCore::held_links() const {
 }
 
 void OutputCore::tidy() { handover_.collect(); }
+
+std::vector<shm::PortInstance> OutputCore::misbehaving() {
+  std::vector<shm::PortInstance> found;
+  for (const auto& [instance, link] : links_) {
+    if (link.connected && link.peer->misbehaved.load(std::memory_order_relaxed)) {
+      found.push_back(instance);
+    }
+  }
+  for (const shm::PortInstance peer : found) disconnect_peer(peer);
+  return found;
+}
 
 void OutputCore::assign_channel(InputLink& link) {
   if (link.channel != shm::kNone) return;

@@ -41,6 +41,8 @@ class OutputCore {
   [[nodiscard]] std::vector<HeldLink> held_links() const;
   // Unmaps what the port's thread has let go of.
   void tidy();
+  // Those that have begun to misbehave; they are disconnected.
+  std::vector<shm::PortInstance> misbehaving();
 
   // Port's thread.
 

@@ -151,6 +151,10 @@ bool OutputCore::is_full(Destination& destination) const noexcept {
   const std::uint64_t consumed = destination.lane == nullptr
                                      ? nothing_read
                                      : destination.lane->consumed.load(std::memory_order_acquire);
+  if (consumed > destination.writer.accepted() &&
+      !destination.peer->misbehaved.exchange(true, std::memory_order_relaxed)) {
+    memory_->service_bell().ring();
+  }
   return destination.writer.is_full(std::max(consumed, nothing_read));
 }
 

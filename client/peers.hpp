@@ -25,6 +25,8 @@ struct InputPeer {
   std::uint32_t depth = 1;
   std::uint32_t max_held = 1;
   bool refuse_new = false;
+  // Set by the port's thread once its memory says what no honest one writes.
+  mutable shm::Atomic<bool> misbehaved{false};
 };
 
 struct InputLink {
@@ -51,11 +53,13 @@ struct OutputPeer {
   shm::OutputSegment segment;
   // Set by the port's thread once a publisher that is gone has nothing left to be taken.
   mutable shm::Atomic<bool> drained{false};
+  mutable shm::Atomic<bool> misbehaved{false};  // as InputPeer::misbehaved
 };
 
 struct OutputLink {
   std::shared_ptr<const OutputPeer> peer;
-  bool gone = false;  // closed or dead: drain it
+  bool gone = false;      // closed or dead: drain it
+  bool reported = false;  // that it misbehaves
 };
 
 struct InputView {

@@ -8,6 +8,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "shm/bell.hpp"
+#include "shm/clock.hpp"
 #include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
 #include "tests/support/daemon.hpp"
@@ -24,6 +25,19 @@ class Prey {
   shm::FileDescriptor output;
   shm::FileDescriptor input;
   shm::FileDescriptor bell;
+
+  // The attacker's own memory.
+  shm::OutputSegment attackers_output;
+  shm::InputSegment* attackers_input = nullptr;
+  std::uint64_t link_to_prey = 0;
+  shm::PortInstance preys_output = 0;
+
+  // The attacker's source says that it is active.
+  void activate_attacker() const {
+    const shm::Mapping mapped(own_page_, sizeof(shm::ActivityPage), shm::Access::kReadWrite);
+    mapped.as<shm::ActivityPage>()->activity.word =
+        shm::arrival(shm::monotonic_now(), shm::kForever);
+  }
 
   Prey()
       : daemon_(
@@ -54,8 +68,9 @@ class Prey {
     const auto type = in_type();
     const auto layout = shm::OutputLayout::plan(type, 8);
     own_output_ = shm::make_segment("attacker-output", layout.total_size);
-    const shm::Mapping mapped(own_output_, layout.total_size, shm::Access::kReadWrite);
-    auto& header = *mapped.as<shm::OutputHeader>();
+    own_output_mapping_ = shm::Mapping(own_output_, layout.total_size, shm::Access::kReadWrite);
+    attackers_output = shm::OutputSegment(own_output_mapping_.data(), layout);
+    auto& header = attackers_output.header();
     header.magic = shm::OutputHeader::kMagic;
     header.version = shm::OutputHeader::kVersion;
     header.slot_count = layout.slot_count;
@@ -67,12 +82,15 @@ class Prey {
     collect();
 
     own_input_ = shm::make_segment("attacker-input", sizeof(shm::InputSegment));
-    const shm::Mapping mapped_input(own_input_, sizeof(shm::InputSegment), shm::Access::kReadWrite);
-    auto& input_header = mapped_input.as<shm::InputSegment>()->header;
+    own_input_mapping_ =
+        shm::Mapping(own_input_, sizeof(shm::InputSegment), shm::Access::kReadWrite);
+    attackers_input = own_input_mapping_.as<shm::InputSegment>();
+    auto& input_header = attackers_input->header;
     input_header.magic = shm::InputHeader::kMagic;
     input_header.version = shm::InputHeader::kVersion;
     input_header.depth = 1;
     input_header.max_held = 1;
+    input_header.refuse_new = 1;
     input_header.type = type;
     shm::seal(own_input_, shm::Seals::kOneWriter);
     auto open_input = RawClient::message(shm::MessageKind::kOpenInput, "/attacker:i");
@@ -97,10 +115,15 @@ class Prey {
         case shm::MessageKind::kSourcePage:
           if (received.message.name_view() == "/prey:o") page = std::move(received.descriptors[0]);
           break;
+        case shm::MessageKind::kOpened:
+          if (received.descriptors[0]) own_page_ = std::move(received.descriptors[0]);
+          break;
         case shm::MessageKind::kOutputPeer:
+          preys_output = received.message.peer;
           output = std::move(received.descriptors[0]);
           break;
         case shm::MessageKind::kInputPeer:
+          link_to_prey = received.message.link;
           input = std::move(received.descriptors[0]);
           bell = std::move(received.descriptors[1]);
           break;
@@ -120,6 +143,9 @@ class Prey {
   InputPort<int> in_;
   RawClient attacker_;
   shm::FileDescriptor own_output_;
+  shm::Mapping own_output_mapping_;
+  shm::Mapping own_input_mapping_;
+  shm::FileDescriptor own_page_;
   shm::FileDescriptor own_input_;
   shm::Bell own_bell_;
 };
