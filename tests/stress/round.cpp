@@ -278,8 +278,10 @@ void Round::kill_daemon() {
   wait_for_steps(kAdvance, kNobody);
 }
 
-// All flows go on without a daemon; then another takes over, whose status must list all ports.
+// All flows go on without a daemon; then another takes over, whose status must list all ports, and
+// which puts the model that it is given in force: the same.
 void Round::replace_daemon() {
+  const std::uint64_t generation = board_.as<const shm::Board>()->generation.load();
   kill_daemon();
   const std::int64_t begin = read_clock();
   daemon_.restart();
@@ -288,6 +290,8 @@ void Round::replace_daemon() {
   const Deadline deadline("the new daemon should know all ports");
   while (!has_all_ports(daemon_.status())) deadline.wait();
   totals_.readoptions.add(static_cast<std::uint64_t>(read_clock() - begin));
+  const Deadline swap("the new daemon's model should be in force");
+  while (board_.as<const shm::Board>()->generation.load() == generation) swap.wait();
   wait_for_steps(kAdvance, kNobody);
 }
 
