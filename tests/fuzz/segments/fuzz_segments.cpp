@@ -284,7 +284,9 @@ class Run {
     std::vector<Patch> result(steps_.byte() % 3);
     for (Patch& patch : result) {
       patch.word = steps_.byte();
-      patch.value = steps_.word();
+      // Small, or anything.
+      patch.value = steps_.byte();
+      if (steps_.byte() % 2 == 0) patch.value = static_cast<std::uint32_t>(steps_.word());
     }
     return result;
   }

@@ -156,8 +156,8 @@ shm::FileDescriptor World::make_hostile(std::size_t size, const void* header,
   std::vector<char> bytes(header_size);
   std::memcpy(bytes.data(), header, header_size);
   for (const Patch& patch : patches) {
-    const std::size_t at = patch.word % (header_size / 8) * 8;
-    std::memcpy(bytes.data() + at, &patch.value, 8);
+    const std::size_t at = patch.word % (header_size / sizeof patch.value) * sizeof patch.value;
+    std::memcpy(bytes.data() + at, &patch.value, sizeof patch.value);
   }
   const std::size_t used = std::min(header_size, size);
   if (::pwrite(segment.get(), bytes.data(), used, 0) != static_cast<ssize_t>(used)) die("pwrite");

@@ -20,10 +20,10 @@
 
 namespace arbiter::fuzz {
 
-// A word of a header that is not what it should be.
+// A word of a header, of 32 bits, that is not what it should be.
 struct Patch {
   std::uint8_t word;
-  std::uint64_t value;
+  std::uint32_t value;
 };
 
 inline constexpr std::uint64_t kSampleWords = 8;
