@@ -292,7 +292,7 @@ class Run {
   }
   void introduce_output() {
     const auto slots = 1 + steps_.byte() % 20u;
-    const int more = steps_.byte() % 4 - 1;
+    const int more = (steps_.byte() % 4 - 1) * 4096;
     world_.introduce_output(slots, more, patches());
   }
 

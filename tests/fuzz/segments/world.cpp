@@ -150,8 +150,8 @@ void World::disconnect(detail::OutputCore& from, detail::InputCore& to) {
 }
 
 shm::FileDescriptor World::make_hostile(std::size_t size, const void* header,
-                                        std::size_t header_size,
-                                        const std::vector<Patch>& patches) {
+                                        std::size_t header_size, const std::vector<Patch>& patches,
+                                        const std::map<std::size_t, std::uint64_t>& words) {
   auto segment = shm::make_segment("hostile", size);
   std::vector<char> bytes(header_size);
   std::memcpy(bytes.data(), header, header_size);
@@ -161,6 +161,11 @@ shm::FileDescriptor World::make_hostile(std::size_t size, const void* header,
   }
   const std::size_t used = std::min(header_size, size);
   if (::pwrite(segment.get(), bytes.data(), used, 0) != static_cast<ssize_t>(used)) die("pwrite");
+  for (const auto& [at, value] : words) {
+    if (at + 8 <= size && ::pwrite(segment.get(), &value, 8, static_cast<off_t>(at)) != 8) {
+      die("pwrite");
+    }
+  }
   shm::seal(segment, shm::Seals::kOneWriter);
   declare_hostile(segment.get());
   return segment;
@@ -177,8 +182,18 @@ void World::introduce_output(std::uint32_t slots, int more, const std::vector<Pa
   received.message.peer = ++last_instance_;
   received.message.id = kH;
   received.message.link = ++last_link_;
-  received.descriptors[0] = make_hostile(layout.total_size + static_cast<std::size_t>(more),
-                                         &header, offsetof(shm::OutputHeader, joins), patches);
+  // A queue for /r, with a sample in the last slot.
+  const std::size_t channel = layout.channels_offset;
+  const std::map<std::size_t, std::uint64_t> words{
+      {offsetof(shm::OutputHeader, joins), 1},
+      {channel + offsetof(shm::Channel, first), 1},
+      {channel + offsetof(shm::Channel, depth), 2},
+      {channel + offsetof(shm::Channel, accepted), 1},
+      {channel + offsetof(shm::Channel, receiver), received.message.link},
+      {layout.rings_offset, shm::make_entry(1, slots - 1)}};
+  received.descriptors[0] =
+      make_hostile(layout.total_size + static_cast<std::size_t>(more), &header,
+                   offsetof(shm::OutputHeader, joins), patches, words);
   try {
     r.add_peer(detail::map_output_peer(received, type()));
   } catch (const std::runtime_error&) {  // it says what is wrong with it

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -46,7 +47,8 @@ class World {
   void require_account_of(const detail::InputCore& port, std::uint32_t id) const;
   static shm::FileDescriptor make_hostile(std::size_t size, const void* header,
                                           std::size_t header_size,
-                                          const std::vector<Patch>& patches);
+                                          const std::vector<Patch>& patches,
+                                          const std::map<std::size_t, std::uint64_t>& words = {});
   std::shared_ptr<detail::SharedMemory> make_memory();
 
   const shm::FileDescriptor& board_;
