@@ -135,7 +135,11 @@ void World::connect(detail::OutputCore& from, detail::InputCore& to) {
   to_output.message.flags = shm::kIsConnected;
   to_output.descriptors[0] = copy_of(to.segment_descriptor().get());
   to_output.descriptors[1] = copy_of(to.bell().write_end().get());
-  from.add_peer(detail::map_input_peer(to_output, type()), link);
+  try {
+    from.add_peer(detail::map_input_peer(to_output, type()), link);
+  } catch (const std::runtime_error&) {  // others have taken up its max_memory
+    return;
+  }
   shm::Received to_input;
   to_input.message.peer = from.instance();
   to_input.message.id = from.source();
