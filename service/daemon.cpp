@@ -173,6 +173,7 @@ void Daemon::accept_client() {
       watch(client->socket(), Tag::kClient, id, EPOLLIN | EPOLLRDHUP);
       if (client->process() >= 0) watch(client->process(), Tag::kProcess, id, EPOLLIN);
       clients_.emplace(id, std::move(client));
+      drop_oldest_silent_client();
     } catch (const std::exception& error) {
       log::warn("a client was turned away: {}", error.what());
     }
@@ -186,6 +187,35 @@ void Daemon::turn_away_client() {
   const shm::FileDescriptor socket(accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
   log::warn("a client was turned away: no descriptors are left");
   reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
+}
+
+// Whoever connects and says nothing costs two descriptors, and gives way to those who come later.
+void Daemon::drop_oldest_silent_client() {
+  ClientId oldest = 0;
+  std::size_t count = 0;
+  for (const auto& [id, client] : clients_) {
+    if (!client->name.empty()) continue;
+    if (count++ == 0) oldest = id;
+  }
+  if (count > shm::kMaxSilentClients) drop(oldest);
+}
+
+void Daemon::require_room_for(const Client& newcomer) const {
+  std::size_t count = 0;
+  std::size_t of_the_user = 0;
+  for (const auto& [id, client] : clients_) {
+    if (client->node == 0) continue;
+    ++count;
+    if (client->user() == newcomer.user()) ++of_the_user;
+  }
+  const auto refuse = [](const char* what, std::uint32_t limit) {
+    throw std::length_error("limit-exceeded: there are " + std::to_string(limit) + " clients " +
+                            what + " already, the most there can be");
+  };
+  if (count >= shm::kMaxClients) refuse("(kMaxClients)", shm::kMaxClients);
+  if (of_the_user >= shm::kMaxClientsPerUser) {
+    refuse("of this user (kMaxClientsPerUser)", shm::kMaxClientsPerUser);
+  }
 }
 
 void Daemon::serve(Client& client) {
@@ -317,9 +347,7 @@ void Daemon::handle(Client& client, shm::Received& received) {
       }
       break;
     case shm::MessageKind::kHandBackPage:
-      if (directory_.take_page(message.id, received.descriptors[0])) {
-        client.pages[message.id] = directory_.source_by_id(message.id)->page_number;
-      }
+      take_back_page(client, received);
       break;
     case shm::MessageKind::kHandBackOutput:
       take_back_output(client, received);
@@ -348,6 +376,7 @@ void Daemon::hello(Client& client, const shm::Received& received) {
   if (message.name_view().empty() || !is_printable(message.name_view())) {
     throw std::runtime_error("a client must have a name, without white space");
   }
+  require_room_for(client);
   client.name = message.name_view();
   client.has_service_thread = (message.flags & shm::kHasServiceThread) != 0;
   client.comes_back = (message.flags & shm::kComesBack) != 0;

@@ -62,6 +62,9 @@ class Daemon {
   bool handle_signal(int signal_descriptor);
   void accept_client();
   void turn_away_client();
+  // Throws std::length_error where there is no room for another.
+  void require_room_for(const Client& newcomer) const;
+  void drop_oldest_silent_client();
   // Handles what it has sent, a bounded part of it: others wait too.
   void serve(Client& client);
   void drop(ClientId id);
@@ -108,6 +111,7 @@ class Daemon {
   void find_absentees();
   void add_absentee(const Owner& owner);
   void rejoin(Client& client, const shm::Received& hello);
+  void take_back_page(Client& client, const shm::Received& received);
   void take_back_output(Client& client, const shm::Received& received);
   void take_back_input(Client& client, const shm::Received& received);
   void take_back_link(const Client& client, const shm::Message& message);
@@ -141,7 +145,7 @@ class Daemon {
   bool try_postponed_ = false;  // something has changed that they wait for
   shm::FileDescriptor epoll_;
   shm::FileDescriptor reserve_;  // given up for a moment to turn a client away when none is left
-  std::map<ClientId, std::unique_ptr<Client>> clients_;
+  std::map<ClientId, std::unique_ptr<Client>> clients_;  // the oldest first
   ClientId last_client_ = 0;
   bool swapping_ = false;       // a model waits for its barrier
   bool reload_wanted_ = false;  // another SIGHUP came meanwhile

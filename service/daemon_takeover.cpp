@@ -111,7 +111,8 @@ void Daemon::rejoin(Client& client, const shm::Received& hello) {
   const NodeId node = hello.message.link;
   // The conversation that it gave up may not have been seen to end.
   const auto former = std::find_if(clients_.begin(), clients_.end(), [&](const auto& each) {
-    return each.second->node == node && each.second->pid() == client.pid();
+    return each.second->node == node && each.second->pid() == client.pid() &&
+           each.second.get() != &client;
   });
   if (former != clients_.end()) drop(former->first);
   const auto absentee = absentees_.find(node);
@@ -123,6 +124,15 @@ void Daemon::rejoin(Client& client, const shm::Received& hello) {
   client.is_returning = true;
   client.is_component = true;
   welcome(client);
+}
+
+void Daemon::take_back_page(Client& client, const shm::Received& received) {
+  const shm::SourceId id = received.message.id;
+  if (!directory_.take_page(id, received.descriptors[0])) {
+    throw std::runtime_error("what was handed back is not the page of source " +
+                             std::to_string(id));
+  }
+  client.pages[id] = directory_.source_by_id(id)->page_number;
 }
 
 void Daemon::take_back_output(Client& client, const shm::Received& received) {

@@ -5,6 +5,7 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 
+#include <deque>
 #include <random>
 #include <thread>
 
@@ -92,7 +93,7 @@ TEST_F(HostileClient, ThatSendsRandomMessagesAfterItsHelloHarmsNobody) {
     RawClient hostile = client();
     for (int i = 0; i < 40; ++i) {
       shm::Message message;
-      message.kind = static_cast<MessageKind>(random() % 12);
+      message.kind = static_cast<MessageKind>(random() % 4 == 0 ? 40 + random() % 6 : random() % 14);
       message.flags = static_cast<std::uint32_t>(random());
       message.request = random() % 8;
       message.port = random() % 12;
@@ -277,6 +278,37 @@ TEST_F(HostileClient, ThatConnectsAndSaysNothingHarmsNobody) {
 
 // An input port whose component could not take up its publisher: the publisher is told, and does
 // not count it any more.
+// More than it may: the oldest give way, and whoever speaks is served.
+TEST_F(HostileClient, TenThousandThatConnectAndSayNothingHarmNobody) {
+  std::deque<RawClient> silent;
+  for (int i = 0; i < 10'000; ++i) {
+    silent.emplace_back(daemon_.instance());
+    if (silent.size() > 400) silent.pop_front();
+    if (i % 1000 == 0) client();
+  }
+  EXPECT_LE(daemon_.open_descriptors(), 2 * shm::kMaxSilentClients + 2 * 400 + 64);
+  EXPECT_TRUE(silent.front().is_hung_up_on());
+}
+
+TEST_F(HostileClient, CannotBeMoreThanTheLimitOfItsUser) {
+  std::deque<RawClient> many;
+  std::string refusal;
+  while (refusal.empty() && many.size() < 2 * shm::kMaxClientsPerUser) {
+    many.emplace_back(daemon_.instance());
+    auto hello = RawClient::message(MessageKind::kHello, "many");
+    hello.value = shm::kWireVersion;
+    many.back().send(hello);
+    shm::Received answer;
+    ASSERT_TRUE(many.back().receive(answer));
+    if (answer.message.kind == MessageKind::kRefused) refusal = answer.message.text_view();
+  }
+  EXPECT_NE(refusal.find("kMaxClientsPerUser"), std::string::npos) << refusal;
+  EXPECT_EQ(many.size(), shm::kMaxClientsPerUser);  // with the good one, and without this
+  many.clear();
+  while (daemon_.open_descriptors() > 100) {
+  }
+}
+
 TEST_F(HostileClient, ThatRefusesItsPeerIsNotDeliveredTo) {
   const auto segment = shm::make_segment("input", sizeof(shm::InputSegment));
   {

@@ -1,0 +1,214 @@
+// Clients that come back from somewhere that they never were, or claim what was never theirs.
+#include <gtest/gtest.h>
+#include <dirent.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+
+#include <set>
+
+#include <arbiter/arbiter.hpp>
+
+#include "service/registry.hpp"
+#include "shm/activity.hpp"
+#include "shm/output_segment.hpp"
+#include "shm/table_ring.hpp"
+#include "tests/client/component.hpp"
+#include "tests/client/models.hpp"
+#include "tests/client/samples.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using shm::MessageKind;
+
+shm::Message return_as(std::uint64_t node) {
+  auto message = RawClient::message(MessageKind::kHello, "impostor");
+  message.value = shm::kWireVersion;
+  message.flags = shm::kComesBack | shm::kRejoins;
+  message.link = node;
+  return message;
+}
+
+// A board and a registry as the daemon gives them to everybody.
+struct Given {
+  shm::FileDescriptor board;
+  shm::FileDescriptor registry;
+  std::uint64_t node = 0;
+
+  explicit Given(const Daemon& daemon) {
+    RawClient client(daemon.instance());
+    auto hello = RawClient::message(MessageKind::kHello, "curious");
+    hello.value = shm::kWireVersion;
+    client.send(hello);
+    shm::Received welcome = client.expect(MessageKind::kWelcome);
+    board = std::move(welcome.descriptors[0]);
+    registry = std::move(welcome.descriptors[1]);
+    node = welcome.message.link;
+  }
+};
+
+shm::FileDescriptor sealed(std::size_t size) {
+  auto segment = shm::make_segment("forged", size);
+  shm::seal(segment, shm::Seals::kFixedSize);
+  return segment;
+}
+
+TEST(HostileReturn, WithAnythingButTheBoardIsRefused) {
+  Daemon daemon(single_model());
+  const Given given(daemon);
+  const auto forged = sealed(sizeof(shm::Board));
+  const shm::FileDescriptor event(eventfd(0, 0));
+  const std::vector<RawClient::Descriptors> tries{
+      {-1, -1},
+      {forged.get(), given.registry.get()},
+      {given.registry.get(), given.board.get()},
+      {event.get(), event.get()},
+  };
+  for (const auto& descriptors : tries) {
+    RawClient impostor(daemon.instance());
+    impostor.send(return_as(1), descriptors);
+    EXPECT_NE(impostor.expect_refusal(), "(hung up)");
+    // It is not heard any more.
+    impostor.send(RawClient::message(MessageKind::kStatus));
+  }
+  EXPECT_EQ(daemon.status()["clients"], 1);
+}
+
+// All of this is said by a process that has the board, as any client has it, but never had the port.
+TEST(HostileReturn, GetsNoPortOfAnotherProcess) {
+  Daemon daemon(single_model());
+  Component victim("victim");
+  ASSERT_EQ(victim.tell("output /out"), "open");
+  Component receiver("receiver");
+  ASSERT_EQ(receiver.tell("input /in 8 1 0"), "open");
+  const Given given(daemon);
+  const auto segment = sealed(4096);
+  for (const bool is_away : {false, true}) {
+    if (is_away) {
+      victim.process().stop();
+      daemon.kill();
+      daemon.restart();
+      EXPECT_TRUE(daemon.source("/out")["away"]);
+    }
+    for (std::uint64_t id = 0; id <= given.node; ++id) {
+      RawClient impostor(daemon.instance());
+      ASSERT_EQ(impostor.send(return_as(id), {given.board.get(), given.registry.get()}),
+                shm::SendResult::kSent);
+      impostor.expect(MessageKind::kWelcome);
+      for (std::uint64_t port = 0; port < 4; ++port) {
+        auto claim = RawClient::message(MessageKind::kHandBackOutput, "/out");
+        claim.port = port;
+        impostor.send(claim, {segment.get(), segment.get()});
+        EXPECT_NE(impostor.expect_refusal().find("never had"), std::string::npos);
+        claim.kind = MessageKind::kHandBackInput;
+        impostor.send(claim, {segment.get(), segment.get()});
+        EXPECT_NE(impostor.expect_refusal().find("never had"), std::string::npos);
+        claim.kind = MessageKind::kHandBackLink;
+        claim.peer = port + 1;
+        claim.link = 1;
+        impostor.send(claim);
+        claim.kind = MessageKind::kClosePort;
+        impostor.send(claim);
+      }
+      impostor.send(RawClient::message(MessageKind::kHandedBack));
+    }
+    if (is_away) victim.process().signal(SIGCONT);
+    EXPECT_EQ(victim.tell("publish /out 5"), "1 0 0");
+    EXPECT_EQ(receiver.tell("take /in"), "5");
+    while (daemon.source("/out")["open"] != true) {
+    }
+  }
+}
+
+// Pages that it may write, or has made, in place of one that others read.
+TEST(HostileReturn, PutsNoPageInPlaceOfAnother) {
+  Daemon daemon(override_model());
+  Node node("good");
+  auto low = node.output_port<Number>("/low");
+  auto stop = node.output_port<Number>("/stop");
+  auto in = node.input_port<Number>("/in");
+  stop.signal();
+  const Given given(daemon);
+  const auto forged = sealed(sizeof(shm::ActivityPage));
+  daemon.kill();
+  daemon.restart();
+  RawClient impostor(daemon.instance());
+  impostor.send(return_as(99), {given.board.get(), given.registry.get()});
+  impostor.expect(MessageKind::kWelcome);
+  for (std::uint32_t id = 0; id < 5; ++id) {
+    auto message = RawClient::message(MessageKind::kHandBackPage);
+    message.id = id;
+    for (const int fd : {forged.get(), given.board.get(), -1}) {
+      impostor.send(message, {fd, -1});
+      EXPECT_NE(impostor.expect_refusal(), "(hung up)");
+    }
+  }
+  impostor.send(RawClient::message(MessageKind::kHandedBack));
+  EXPECT_TRUE(daemon.source("/stop")["active"]);
+  EXPECT_EQ(low.publish(Number{1}).delivered, 0u);
+  stop.deactivate();
+  EXPECT_FALSE(daemon.source("/stop")["active"]);
+  EXPECT_EQ(low.publish(Number{1}).delivered, 1u);
+}
+
+// What a successor believes is what the predecessor wrote down, not what comes first.
+TEST(HostileReturn, ToANewDaemonWithAnOldBoardIsRefusedAndOthersAreTakenBack) {
+  Daemon daemon(single_model());
+  const Given old(daemon);
+  daemon.terminate();  // nobody had a port: the next one begins anew
+  daemon.restart();
+  Component component("component");
+  ASSERT_EQ(component.tell("output /out"), "open");
+  daemon.kill();
+  component.process().stop();
+  daemon.restart();
+  RawClient impostor(daemon.instance());
+  impostor.send(return_as(1), {old.board.get(), old.registry.get()});
+  EXPECT_EQ(impostor.expect_refusal(), "this daemon's predecessor had other memory");
+  component.process().signal(SIGCONT);
+  EXPECT_TRUE(daemon.source("/out")["open"]);
+  EXPECT_EQ(daemon.generation(), 2u);
+}
+
+std::set<int> sockets() {
+  std::set<int> found;
+  for (int fd = 0; fd < 1024; ++fd) {
+    int type = 0;
+    socklen_t size = sizeof type;
+    if (::getsockopt(fd, SOL_SOCKET, SO_TYPE, &type, &size) == 0) found.insert(fd);
+  }
+  return found;
+}
+
+// A component that the daemon drops although it lives keeps its ports, and what it holds.
+TEST(HostileReturn, OfAComponentThatWasDroppedKeepsWhatItHas) {
+  Daemon daemon(single_model());
+  Component sender("sender");
+  ASSERT_EQ(sender.tell("output /out"), "open");
+  const std::set<int> before = sockets();
+  Node node("babbler");
+  std::set<int> of_the_node = sockets();
+  for (const int fd : before) of_the_node.erase(fd);
+  ASSERT_EQ(of_the_node.size(), 1u);
+  auto in = node.input_port<Number>("/in", {.depth = 1});
+  sender.tell("publish /out 1");
+  auto held = in.take();
+  ASSERT_TRUE(held);
+  for (int i = 0; i < 5; ++i) {
+    const char noise[] = "noise";
+    ::send(*of_the_node.begin(), noise, sizeof noise, MSG_NOSIGNAL);
+    EXPECT_EQ(sender.tell("publish /out 2 50"), "1 0 0");
+    EXPECT_EQ((**held).value, 1);
+    while (daemon.input("/in")["open"] != true) {
+    }
+    EXPECT_EQ(daemon.connection("/out", "/in")["state"], "connected");
+    of_the_node = sockets();
+    for (const int fd : before) of_the_node.erase(fd);
+  }
+  held.reset();
+  EXPECT_EQ(take_from(in), 51);
+}
+
+}  // namespace
+}  // namespace arbiter::test
