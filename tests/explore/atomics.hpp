@@ -44,6 +44,17 @@ class Atomic {
     value_ = value;
     return before;
   }
+  T fetch_add(T by, std::memory_order order = std::memory_order_seq_cst,
+              const Where& where = Where::current()) noexcept {
+    auto* explorer = explore::Explorer::current();
+    T before = value_;
+    if (explorer != nullptr) {
+      before = value_of(explorer->begin_update(this, bits_of(value_), order, where));
+      explorer->update(this, bits_of(before + by), order, where);
+    }
+    value_ = before + by;
+    return before;
+  }
   bool compare_exchange_weak(T& expected, T value, std::memory_order success,
                              std::memory_order failure,
                              const Where& where = Where::current()) noexcept {

@@ -1,7 +1,11 @@
 #include "tests/explore/explorer.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <stdexcept>
+#include <utility>
+
+#include "tests/explore/image.hpp"
 
 namespace arbiter::explore {
 namespace {
@@ -19,17 +23,17 @@ bool releases(std::memory_order order) {
 
 Report Explorer::run(const Scenario& scenario) {
   report_ = {};
-  shared_.clear();
-  newly_shared_.clear();
   path_.clear();
+  words_.clear();
+  rehash();
   bool search_again = false;
   do {
+    learned_ = false;
     run_once(scenario);
     ++report_.executions;
     if (!report_.failure.empty() || report_.executions == limits_.executions) return report_;
     // Which words are shared is learned on the way; the search begins again with each.
-    if (!newly_shared_.empty()) {
-      shared_.merge(newly_shared_);
+    if (learned_) {
       path_.clear();
       search_again = true;
     } else {
@@ -38,13 +42,6 @@ Report Explorer::run(const Scenario& scenario) {
   } while (search_again);
   report_.complete = true;
   return report_;
-}
-
-Report Explorer::run(const Scenario& scenario, Weakening weakening) {
-  weakening_ = &weakening;
-  Report report = run(scenario);
-  weakening_ = nullptr;
-  return report;
 }
 
 // The next path in depth-first order: the last choice that has an alternative left takes it.
@@ -58,80 +55,118 @@ bool Explorer::next_path() {
 std::uint32_t Explorer::choose(std::uint32_t count) {
   if (count <= 1) return 0;
   if (step_ == path_.size()) path_.push_back({0, count});
-  Choice& choice = path_[step_++];
+  const Choice& choice = path_[step_++];
   if (choice.count != count) throw std::logic_error("the scenario is not deterministic");
   return choice.taken;
 }
 
 void Explorer::run_once(const Scenario& scenario) {
   Execution execution;
+  running_ = this;
   scenario(execution);
-  if (execution.threads_.size() > kMaxThreads) throw std::logic_error("too many threads");
+  thread_count_ = execution.threads_.size();
+  if (thread_count_ > View::kThreads) throw std::logic_error("too many threads");
+  ++execution_;
   step_ = 0;
-  preemptions_ = stale_reads_ = 0;
-  words_.clear();
-  index_of_.clear();
-  plain_.clear();
-  users_.clear();
+  preemptions_ = stale_reads_ = halts_ = uninterrupted = 0;
+  operations_ = 0;
+  store_count_ = 0;
+  shared_count_ = View::kThreads;
   fence_view_.clear();
   abandoned_ = false;
-  // The first words are the threads' own clocks, by which plain data is ordered.
-  words_.resize(kMaxThreads);
-  running_ = this;
-  threads_.clear();
-  for (auto& body : execution.threads_) add_thread(std::move(body));
-  active_ = choose(static_cast<std::uint32_t>(threads_.size()));
+  for (std::size_t i = 0; i < thread_count_; ++i) add_thread(i, std::move(execution.threads_[i]));
+  active_ = choose(static_cast<std::uint32_t>(thread_count_));
   current_ = this;
   swapcontext(&main_, &threads_[active_]->context);
   current_ = nullptr;
-  if (!abandoned_) execution.finally_();
+  if (!abandoned_) {
+    const Image::Inside inside;
+    execution.finally_();
+  }
   running_ = nullptr;
 }
 
-void Explorer::add_thread(std::function<void()> body) {
+void Explorer::add_thread(std::size_t index, Execution::Body body) {
   static std::vector<std::unique_ptr<std::byte[]>> stacks;
-  const std::size_t index = threads_.size();
   if (stacks.size() == index) stacks.push_back(std::make_unique<std::byte[]>(kStackSize));
-  auto thread = std::make_unique<Thread>();
-  thread->body = std::move(body);
-  set(thread->view, index, 1);
-  getcontext(&thread->context);
-  thread->context.uc_stack.ss_sp = stacks[index].get();
-  thread->context.uc_stack.ss_size = kStackSize;
-  thread->context.uc_link = nullptr;
-  makecontext(&thread->context, reinterpret_cast<void (*)()>(&Explorer::enter), 1,
+  if (threads_.size() == index) threads_.push_back(std::make_unique<Thread>());
+  Thread& thread = *threads_[index];
+  thread.body = std::move(body.run);
+  thread.mortal = body.mortal;
+  thread.ready = nullptr;
+  thread.finished = thread.halted = false;
+  thread.view.clear();
+  thread.acquired.clear();
+  thread.released.clear();
+  thread.view.set(index, 1);
+  getcontext(&thread.context);
+  thread.context.uc_stack.ss_sp = stacks[index].get();
+  thread.context.uc_stack.ss_size = kStackSize;
+  thread.context.uc_link = nullptr;
+  makecontext(&thread.context, reinterpret_cast<void (*)()>(&Explorer::enter), 1,
               static_cast<unsigned>(index));
-  threads_.push_back(std::move(thread));
 }
 
 void Explorer::enter(unsigned index) {
   Explorer& explorer = *running_;
-  explorer.threads_[index]->body();
+  {
+    const Image::Inside inside;
+    explorer.threads_[index]->body();
+  }
   explorer.threads_[index]->finished = true;
   explorer.resume_another();
 }
 
 bool Explorer::can_run(std::size_t thread) const {
   const Thread& candidate = *threads_[thread];
-  return !candidate.finished && (!candidate.ready || candidate.ready());
+  return !candidate.finished && !candidate.halted && (!candidate.ready || candidate.ready());
 }
 
-// The active thread has finished, or has to wait.
+// Those that could go on but the active one. What they wait for is looked up as it stands.
+std::uint32_t Explorer::find_others(std::size_t* others) const {
+  std::uint32_t count = 0;
+  Explorer* const before = std::exchange(current_, nullptr);
+  for (std::size_t i = 0; i < thread_count_; ++i) {
+    if (i != active_ && can_run(i)) others[count++] = i;
+  }
+  current_ = before;
+  return count;
+}
+
+// The active thread has finished, is halted, or has to wait.
 void Explorer::resume_another() {
-  std::vector<std::size_t> candidates;
-  bool all_finished = true;
-  current_ = nullptr;  // what they wait for is looked up as it stands
-  for (std::size_t i = 0; i < threads_.size(); ++i) {
-    all_finished = all_finished && threads_[i]->finished;
-    if (can_run(i)) candidates.push_back(i);
+  std::size_t candidates[View::kThreads + 1];
+  std::uint32_t count = find_others(candidates);
+  const auto self_can_run = [&] {
+    Explorer* const before = std::exchange(current_, nullptr);
+    const bool can = can_run(active_);
+    current_ = before;
+    return can;
+  };
+  if (self_can_run()) candidates[count++] = active_;
+  while (count == 0) {
+    if (!pass_time()) leave();
+    count = find_others(candidates);
+    if (self_can_run()) candidates[count++] = active_;
   }
-  current_ = this;
-  if (candidates.empty()) {
-    if (!all_finished) fail("nobody can go on: a wake-up was lost");
-    leave();
-  }
-  const std::size_t next = candidates[choose(static_cast<std::uint32_t>(candidates.size()))];
+  const std::size_t next = candidates[choose(count)];
   if (next != active_) switch_to(next);
+}
+
+// False: all have ended.
+bool Explorer::pass_time() {
+  std::int64_t first = INT64_MAX;
+  bool all_ended = true;
+  for (std::size_t i = 0; i < thread_count_; ++i) {
+    const Thread& thread = *threads_[i];
+    if (thread.finished || thread.halted) continue;
+    all_ended = false;
+    first = std::min(first, thread.deadline);
+  }
+  if (all_ended) return false;
+  if (first == INT64_MAX) fail("nobody can go on: a wake-up was lost");
+  time_passes(first);
+  return true;
 }
 
 void Explorer::switch_to(std::size_t thread) {
@@ -143,6 +178,7 @@ void Explorer::switch_to(std::size_t thread) {
 void Explorer::leave() {
   current_ = nullptr;
   setcontext(&main_);
+  throw std::logic_error("setcontext");
 }
 
 void Explorer::fail(const std::string& what) {
@@ -156,177 +192,228 @@ void Explorer::fail(const std::string& what) {
   if (current_ != nullptr) leave();
 }
 
-void Explorer::wait_until(std::function<bool()> ready) {
-  Thread& self = *threads_[active_];
-  self.ready = std::move(ready);
+void Explorer::wait_until(std::function<bool()> ready, std::int64_t deadline) {
+  const Image::Outside outside;
+  self().ready = std::move(ready);
+  self().deadline = deadline;
   resume_another();
-  threads_[active_]->ready = nullptr;
+  self().ready = nullptr;
+  self().deadline = INT64_MAX;
 }
 
-// Before an operation: may another thread go first?
-void Explorer::point(const void* address, bool writes) {
-  if (address != nullptr) {
-    Users& users = users_[address];
-    (writes ? users.writers : users.readers) |= 1u << active_;
-    const std::uint32_t all = users.readers | users.writers;
-    const bool is_shared = users.writers != 0 && (all & (all - 1)) != 0;
-    if (shared_.count(address) == 0) {
-      if (is_shared) newly_shared_.insert(address);
-      return;
-    }
+void Explorer::wait_for_end_of(std::size_t thread) {
+  const Image::Outside outside;
+  const Thread& other = *threads_[thread];
+  wait_until([&other] { return other.finished || other.halted; });
+  self().view.join(other.view);
+}
+
+// Before an operation: may another thread go first, or this one stop here for ever?
+void Explorer::take_turns() {
+  if (++operations_ == kMaxOperations) fail("it goes on for ever");
+  if (uninterrupted != 0) return;
+  std::size_t others[View::kThreads];
+  std::uint32_t count = preemptions_ == limits_.preemptions ? 0 : find_others(others);
+  const bool may_halt = self().mortal && halts_ != limits_.halts;
+  const std::uint32_t chosen = choose(1 + count + (may_halt ? 1 : 0));
+  if (chosen == 0) return;
+  if (chosen <= count) {
+    ++preemptions_;
+    switch_to(others[chosen - 1]);
+    return;
   }
-  if (preemptions_ == limits_.preemptions) return;
-  std::vector<std::size_t> candidates{active_};
-  current_ = nullptr;
-  for (std::size_t i = 0; i < threads_.size(); ++i) {
-    if (i != active_ && can_run(i)) candidates.push_back(i);
+  ++halts_;
+  self().halted = true;
+  resume_another();
+}
+
+void Explorer::rehash() {
+  const std::size_t size = std::max<std::size_t>(1024, words_.size() * 8);
+  table_.assign(size, 0);
+  for (std::size_t i = 0; i < words_.size(); ++i) {
+    std::size_t at = (reinterpret_cast<std::uintptr_t>(words_[i].address) >> 2) * 0x9e3779b1u;
+    while (table_[at & (table_.size() - 1)] != 0) ++at;
+    table_[at & (table_.size() - 1)] = static_cast<std::uint32_t>(i + 1);
   }
-  current_ = this;
-  const std::size_t next = candidates[choose(static_cast<std::uint32_t>(candidates.size()))];
-  if (next == active_) return;
-  ++preemptions_;
-  switch_to(next);
 }
 
-Explorer::Word& Explorer::word(const void* address, std::uint64_t bits, std::size_t& index) {
-  const auto [found, is_new] = index_of_.try_emplace(address, words_.size());
-  index = found->second;
-  if (is_new) words_.push_back({{{bits, {}}}});
-  return words_[index];
-}
-
-bool Explorer::is_weak(Weakness kind, const std::source_location& where) {
-  if (weakening_ == nullptr || weakening_->kind != kind) return false;
-  if (std::string_view(where.function_name()).find(weakening_->function) ==
-      std::string_view::npos) {
-    return false;
+Explorer::Word& Explorer::find(const void* address) {
+  std::size_t at = (reinterpret_cast<std::uintptr_t>(address) >> 2) * 0x9e3779b1u;
+  for (;; ++at) {
+    const std::uint32_t entry = table_[at & (table_.size() - 1)];
+    if (entry == 0) break;
+    if (words_[entry - 1].address == address) return words_[entry - 1];
   }
-  report_.weakened = true;
-  return true;
+  words_.emplace_back().address = address;
+  if (words_.size() * 4 > table_.size()) {
+    rehash();
+  } else {
+    table_[at & (table_.size() - 1)] = static_cast<std::uint32_t>(words_.size());
+  }
+  return words_.back();
 }
 
-void Explorer::join(View& into, const View& from) {
-  if (into.size() < from.size()) into.resize(from.size(), 0);
-  for (std::size_t i = 0; i < from.size(); ++i) into[i] = std::max(into[i], from[i]);
+Explorer::Word* Explorer::visit(const void* address, bool writes, std::uint64_t bits) {
+  std::size_t at = static_cast<std::size_t>(&find(address) - words_.data());
+  Word* word = &words_[at];
+  if (word->execution != execution_) {
+    word->execution = execution_;
+    word->readers = word->writers = 0;
+    word->history.clear();
+  }
+  (writes ? word->writers : word->readers) |= 1u << active_;
+  if (!word->shared) {
+    const std::uint32_t all = word->readers | word->writers;
+    word->shared = word->writers != 0 && (all & (all - 1)) != 0;
+    if (word->shared) learned_ = true;
+    return nullptr;  // from its next visit on it has a history
+  }
+  take_turns();
+  word = &words_[at];
+  if (word->history.empty()) {
+    word->index = shared_count_++;
+    if (stores_.size() == store_count_) stores_.emplace_back();
+    Store& initial = stores_[store_count_];
+    initial.bits = bits;
+    initial.view.clear();
+    word->history.push_back(store_count_++);
+  }
+  return word;
+}
+
+bool Explorer::is_weak(Weakness kind, const Where& where) {
+  if (met_ != nullptr) met_->insert({where.file_name(), where.line(), where.column(), kind});
+  return weakening_ != nullptr && weakening_->line == where.line() &&
+         weakening_->column == where.column() && weakening_->kind == kind &&
+         weakening_->file == where.file_name();
 }
 
 std::uint64_t Explorer::load(const void* address, std::uint64_t bits, std::memory_order order,
-                             const std::source_location& where) {
-  point(address, false);
-  std::size_t index = 0;
-  Word& from = word(address, bits, index);
-  Thread& self = *threads_[active_];
-  const auto newest = static_cast<std::uint32_t>(from.history.size() - 1);
+                             const Where& where) {
+  const Image::Outside outside;
+  const bool takes = acquires(order) && !is_weak(Weakness::kAcquire, where);
+  const Word* const from = visit(address, false, bits);
+  if (from == nullptr) return bits;
+  const auto newest = static_cast<std::uint32_t>(from->history.size() - 1);
   std::uint32_t age = 0;
-  if (const std::uint32_t oldest = at(self.view, index);
+  if (const std::uint32_t oldest = self().view.at(from->index);
       oldest < newest && stale_reads_ < limits_.stale_reads) {
     age = choose(newest - oldest + 1);
   }
   if (age != 0) ++stale_reads_;
-  const Store& seen = from.history[newest - age];
-  set(self.view, index, newest - age);
-  const bool takes = acquires(order) && !is_weak(Weakness::kAcquire, where);
-  join(takes ? self.view : self.acquired, seen.view);
+  const Store& seen = stores_[from->history[newest - age]];
+  self().view.set(from->index, newest - age);
+  (takes ? self().view : self().acquired).join(seen.view);
   return seen.bits;
 }
 
-void Explorer::append(std::size_t index, std::uint64_t bits, bool release, const View* inherited) {
-  Thread& self = *threads_[active_];
-  Word& to = words_[index];
-  set(self.view, index, static_cast<std::uint32_t>(to.history.size()));
-  View view = release ? self.view : self.released;
-  if (inherited != nullptr) join(view, *inherited);
-  set(view, index, static_cast<std::uint32_t>(to.history.size()));
-  to.history.push_back({bits, std::move(view)});
+void Explorer::append(Word& to, std::uint64_t bits, bool release, const View* inherited) {
+  const auto time = static_cast<std::uint32_t>(to.history.size());
+  self().view.set(to.index, time);
+  if (stores_.size() == store_count_) stores_.emplace_back();
+  Store& store = stores_[store_count_];
+  store.bits = bits;
+  store.view = release ? self().view : self().released;
+  if (inherited != nullptr) store.view.join(*inherited);
+  store.view.set(to.index, time);
+  to.history.push_back(store_count_++);
+  // What the thread does from now on is not covered by what it has released so far.
+  self().view.set(active_, self().view.at(active_) + 1);
 }
 
 void Explorer::store(const void* address, std::uint64_t before, std::uint64_t bits,
-                     std::memory_order order, const std::source_location& where) {
-  point(address, true);
-  std::size_t index = 0;
-  word(address, before, index);
-  append(index, bits, releases(order) && !is_weak(Weakness::kRelease, where), nullptr);
-  advance_clock();
+                     std::memory_order order, const Where& where) {
+  const Image::Outside outside;
+  const bool gives = releases(order) && !is_weak(Weakness::kRelease, where);
+  if (Word* const word = visit(address, true, before)) append(*word, bits, gives, nullptr);
 }
 
 std::uint64_t Explorer::begin_update(const void* address, std::uint64_t bits,
-                                     std::memory_order order, const std::source_location& where) {
-  point(address, true);
-  std::size_t index = 0;
-  const Word& from = word(address, bits, index);
-  Thread& self = *threads_[active_];
-  set(self.view, index, static_cast<std::uint32_t>(from.history.size() - 1));
+                                     std::memory_order order, const Where& where) {
+  const Image::Outside outside;
   const bool takes = acquires(order) && !is_weak(Weakness::kAcquire, where);
-  join(takes ? self.view : self.acquired, from.history.back().view);
-  return from.history.back().bits;
+  const Word* const from = visit(address, true, bits);
+  if (from == nullptr) return bits;
+  self().view.set(from->index, static_cast<std::uint32_t>(from->history.size() - 1));
+  const Store& seen = stores_[from->history.back()];
+  (takes ? self().view : self().acquired).join(seen.view);
+  return seen.bits;
 }
 
 void Explorer::update(const void* address, std::uint64_t bits, std::memory_order order,
-                      const std::source_location& where) {
-  const std::size_t index = index_of_.at(address);
-  const View inherited = words_[index].history.back().view;
-  append(index, bits, releases(order) && !is_weak(Weakness::kRelease, where), &inherited);
-  advance_clock();
+                      const Where& where) {
+  const Image::Outside outside;
+  const bool gives = releases(order) && !is_weak(Weakness::kRelease, where);
+  Word& word = find(address);
+  if (word.history.empty()) return;  // it has none yet
+  const View inherited = stores_[word.history.back()].view;
+  append(word, bits, gives, &inherited);
 }
 
-void Explorer::full_fence(const std::source_location& where) {
-  if (is_weak(Weakness::kFullFence, where)) return;
-  point(nullptr, true);
-  Thread& self = *threads_[active_];
-  join(self.view, self.acquired);
-  join(self.view, fence_view_);
-  fence_view_ = self.released = self.view;
-  advance_clock();
+void Explorer::full_fence(const Where& where) {
+  const Image::Outside outside;
+  if (is_weak(Weakness::kFence, where)) return;
+  take_turns();
+  self().view.join(self().acquired);
+  self().view.join(fence_view_);
+  fence_view_ = self().released = self().view;
+  self().view.set(active_, self().view.at(active_) + 1);
 }
 
-void Explorer::acquire_fence(const std::source_location& where) {
-  if (is_weak(Weakness::kAcquireFence, where)) return;
-  Thread& self = *threads_[active_];
-  join(self.view, self.acquired);
+void Explorer::acquire_fence(const Where& where) {
+  const Image::Outside outside;
+  if (is_weak(Weakness::kFence, where)) return;
+  self().view.join(self().acquired);
 }
 
-void Explorer::release_fence(const std::source_location& where) {
-  if (is_weak(Weakness::kReleaseFence, where)) return;
-  Thread& self = *threads_[active_];
-  self.released = self.view;
-  advance_clock();
-}
-
-// What a thread does from now on is not covered by what it has released so far.
-void Explorer::advance_clock() {
-  View& view = threads_[active_]->view;
-  set(view, active_, at(view, active_) + 1);
+void Explorer::release_fence(const Where& where) {
+  const Image::Outside outside;
+  if (is_weak(Weakness::kFence, where)) return;
+  self().released = self().view;
+  self().view.set(active_, self().view.at(active_) + 1);
 }
 
 void Explorer::read_plain(const void* address) {
-  const View& view = threads_[active_]->view;
-  PlainState& state = plain_[address];
-  if (state.write > at(view, state.writer)) fail("data was read that was still being written");
-  state.reads.resize(kMaxThreads, 0);
-  state.reads[active_] = at(view, active_);
+  const Image::Outside outside;
+  Word& data = find_plain(address);
+  const View& view = self().view;
+  if (data.write > view.at(data.writer)) fail("data was read that was still being written");
+  data.reads[active_] = view.at(active_);
 }
 
 void Explorer::write_plain(const void* address) {
-  const View& view = threads_[active_]->view;
-  PlainState& state = plain_[address];
-  state.reads.resize(kMaxThreads, 0);
-  for (std::size_t i = 0; i < kMaxThreads; ++i) {
-    if (i != active_ && state.reads[i] > at(view, i)) {
+  const Image::Outside outside;
+  Word& data = find_plain(address);
+  const View& view = self().view;
+  for (std::size_t i = 0; i < thread_count_; ++i) {
+    if (i != active_ && data.reads[i] > view.at(i)) {
       fail("data was written that was still being read");
     }
   }
-  if (state.writer != active_ && state.write > at(view, state.writer)) {
+  if (data.writer != active_ && data.write > view.at(data.writer)) {
     fail("data was written by two at once");
   }
-  state.writer = active_;
-  state.write = at(view, active_);
+  data.writer = active_;
+  data.write = view.at(active_);
 }
 
-void require(bool holds, const std::string& what) {
-  if (holds) return;
-  Explorer::running()->fail(what);
+Explorer::Word& Explorer::find_plain(const void* address) {
+  Word& data = find(address);
+  if (data.execution != execution_) {
+    data.execution = execution_;
+    std::fill(std::begin(data.reads), std::end(data.reads), 0);
+    data.writer = active_;
+    data.write = 0;
+  }
+  return data;
+}
+
+void require(bool holds, const char* what) {
+  if (!holds) Explorer::running()->fail(what);
 }
 
 void wait_until(std::function<bool()> ready) { Explorer::current()->wait_until(std::move(ready)); }
+
+void wait_for_end_of(std::size_t thread) { Explorer::current()->wait_for_end_of(thread); }
 
 }  // namespace arbiter::explore

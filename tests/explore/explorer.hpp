@@ -5,7 +5,8 @@
 // are coroutines of one thread, so that a run is a list of choices, and can be replayed. The search
 // is depth first over these choices:
 //   - before each operation on a word that several threads use: which thread goes on. Taking the
-//     turn from a thread that could go on costs one of `preemptions`;
+//     turn from a thread that could go on costs one of `preemptions`; stopping it for ever, as a
+//     kill does, costs one of `halts`;
 //   - at each load: which of the values that it may see. Any but the newest costs one of
 //     `stale_reads`.
 //
@@ -13,7 +14,8 @@
 // store of each word that it may still see. A release store carries its thread's view along, an
 // acquire load takes it up; fences as the standard has them. It contains all that x86 does with its
 // store buffers, and what weaker machines do, except that a load never sees a store that comes
-// after it in a cycle. Plain data (Plain<T>) has no history: two unordered accesses are an error.
+// after it in a cycle. Plain data (Plain<T>, payloads) has no history: two unordered accesses are
+// an error.
 #pragma once
 
 #include <ucontext.h>
@@ -23,55 +25,70 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <set>
 #include <source_location>
 #include <string>
-#include <unordered_map>
-#include <unordered_set>
 #include <vector>
+
+#include "tests/explore/view.hpp"
 
 namespace arbiter::explore {
 
 struct Limits {
   int preemptions = 2;
   int stale_reads = 1;
-  std::uint64_t executions = 5'000'000;
+  int halts = 0;  // of threads that may die
+  std::uint64_t executions = 20'000'000;
 };
 
-enum class Weakness { kFullFence, kAcquireFence, kReleaseFence, kAcquire, kRelease };
+// What an operation loses when it is weakened: it becomes relaxed, or a fence nothing.
+enum class Weakness : std::uint8_t { kAcquire, kRelease, kFence };
 
-// Which order is to be left out, to see that the test would notice: that of `kind` in functions
-// whose name contains `function`.
-struct Weakening {
-  Weakness kind;
-  std::string function;
+// An order in the source, as it can be left out.
+struct Location {
+  std::string file;
+  std::uint32_t line = 0;
+  std::uint32_t column = 0;
+  Weakness kind = Weakness::kFence;
+
+  auto operator<=>(const Location&) const = default;
 };
 
 struct Report {
   std::uint64_t executions = 0;
   bool complete = false;
-  bool weakened = false;  // the order to be left out was met
-  std::string failure;    // empty: none
+  std::string failure;  // empty: none
 };
 
-// One run of a scenario: set it up, name its threads and what must hold at the end.
+// One run of a scenario: its threads, and what must hold at the end.
 class Execution {
  public:
-  void thread(std::function<void()> body) { threads_.push_back(std::move(body)); }
+  void thread(std::function<void()> body) { threads_.push_back({std::move(body), false}); }
+  // One that may be stopped for ever before any of its operations.
+  void mortal_thread(std::function<void()> body) { threads_.push_back({std::move(body), true}); }
   void finally(std::function<void()> check) { finally_ = std::move(check); }
 
  private:
   friend class Explorer;
-  std::vector<std::function<void()>> threads_;
+  struct Body {
+    std::function<void()> run;
+    bool mortal;
+  };
+  std::vector<Body> threads_;
   std::function<void()> finally_ = [] {};
 };
 
 class Explorer {
  public:
   using Scenario = std::function<void(Execution&)>;
+  using Where = std::source_location;
 
   explicit Explorer(Limits limits) : limits_(limits) {}
   Report run(const Scenario& scenario);
-  Report run(const Scenario& scenario, Weakening weakening);
+
+  void weaken(const Location& location) { weakening_ = &location; }
+  // Collects what could be weakened.
+  void collect(std::set<Location>& met) { met_ = &met; }
 
   // Null outside of a thread of a scenario: then atomics are plain words.
   static Explorer* current() noexcept { return current_; }
@@ -79,35 +96,46 @@ class Explorer {
 
   // Operations of the thread that runs; `bits` is the word's value, newest at `address`.
   std::uint64_t load(const void* address, std::uint64_t bits, std::memory_order order,
-                     const std::source_location& where);
+                     const Where& where);
   void store(const void* address, std::uint64_t before, std::uint64_t bits, std::memory_order order,
-             const std::source_location& where);
+             const Where& where);
   // The newest value, and the right to replace it at once by update().
   std::uint64_t begin_update(const void* address, std::uint64_t bits, std::memory_order order,
-                             const std::source_location& where);
-  void update(const void* address, std::uint64_t bits, std::memory_order order,
-              const std::source_location& where);
-  void full_fence(const std::source_location& where);
-  void acquire_fence(const std::source_location& where);
-  void release_fence(const std::source_location& where);
+                             const Where& where);
+  void update(const void* address, std::uint64_t bits, std::memory_order order, const Where& where);
+  void full_fence(const Where& where);
+  void acquire_fence(const Where& where);
+  void release_fence(const Where& where);
   void read_plain(const void* address);
   void write_plain(const void* address);
 
-  // The thread goes on only once `ready` holds. If none can go on, that is a failure.
-  void wait_until(std::function<bool()> ready);
+  // The thread goes on only once `ready` holds. If none can go on, the first deadline is reached
+  // (`time_passes` is called with it); without one, that is a failure.
+  void wait_until(std::function<bool()> ready, std::int64_t deadline = INT64_MAX);
+  // The thread goes on once another has ended, and knows all that it did, as if the kernel told it.
+  void wait_for_end_of(std::size_t thread);
+  [[nodiscard]] bool is_halted(std::size_t thread) const { return threads_[thread]->halted; }
   void fail(const std::string& what);
 
+  // While it is positive no turn is taken from the thread that runs.
+  int uninterrupted = 0;
+  static inline std::function<void(std::int64_t)> time_passes;
+
  private:
-  using View = std::vector<std::uint32_t>;  // by word; what is beyond its end is 0
   struct Store {
-    std::uint64_t bits;
+    std::uint64_t bits = 0;
     View view;
   };
+  // A word, or plain data. What is of one execution is void in the next.
   struct Word {
-    std::vector<Store> history;
-  };
-  struct PlainState {
-    std::vector<std::uint32_t> reads;  // by thread: its time then
+    const void* address = nullptr;
+    std::uint64_t execution = 0;
+    std::uint32_t readers = 0, writers = 0;  // bits by thread
+    bool shared = false;  // several threads use it, one of them writing: learned on the way
+    std::uint32_t index = 0;
+    std::vector<std::uint32_t> history;  // in stores_
+    // Plain data: by thread, its time at its last read; the last write.
+    std::uint32_t reads[View::kThreads] = {};
     std::size_t writer = 0;
     std::uint32_t write = 0;
   };
@@ -115,7 +143,10 @@ class Explorer {
     ucontext_t context;
     std::function<void()> body;
     std::function<bool()> ready;
+    std::int64_t deadline = INT64_MAX;
+    bool mortal = false;
     bool finished = false;
+    bool halted = false;
     View view, acquired, released;
   };
   struct Choice {
@@ -124,69 +155,86 @@ class Explorer {
   };
 
   void run_once(const Scenario& scenario);
-  void add_thread(std::function<void()> body);
+  void add_thread(std::size_t index, Execution::Body body);
   static void enter(unsigned index);
   bool next_path();
   std::uint32_t choose(std::uint32_t count);
-  void point(const void* address, bool writes);
+  void take_turns();
   bool can_run(std::size_t thread) const;
+  [[nodiscard]] std::uint32_t find_others(std::size_t* others) const;
   void resume_another();
+  bool pass_time();
   void switch_to(std::size_t thread);
-  void leave();
-  Word& word(const void* address, std::uint64_t bits, std::size_t& index);
-  bool is_weak(Weakness kind, const std::source_location& where);
-  void append(std::size_t index, std::uint64_t bits, bool release, const View* inherited);
-  void advance_clock();
-  static void join(View& into, const View& from);
-  static std::uint32_t at(const View& view, std::size_t index) {
-    return index < view.size() ? view[index] : 0;
-  }
-  static void set(View& view, std::size_t index, std::uint32_t time) {
-    if (index >= view.size()) view.resize(index + 1, 0);
-    view[index] = time;
-  }
+  [[noreturn]] void leave();
+  Word& find(const void* address);
+  Word& find_plain(const void* address);
+  void rehash();
+  // Of a word that is shared; null for one that is not: it needs no history.
+  Word* visit(const void* address, bool writes, std::uint64_t bits);
+  bool is_weak(Weakness kind, const Where& where);
+  void append(Word& to, std::uint64_t bits, bool release, const View* inherited);
+  Thread& self() { return *threads_[active_]; }
 
   static inline Explorer* current_ = nullptr;
   static inline Explorer* running_ = nullptr;
   static constexpr std::size_t kStackSize = 256 * 1024;
-  static constexpr std::size_t kMaxThreads = 4;
+  static constexpr std::uint32_t kMaxOperations = 200'000;
 
   const Limits limits_;
-  const Weakening* weakening_ = nullptr;
+  const Location* weakening_ = nullptr;
+  std::set<Location>* met_ = nullptr;
   Report report_;
 
   // Of the search.
   std::vector<Choice> path_;
-  std::unordered_set<const void*> shared_;  // words that several threads use, one of them writing
-  std::unordered_set<const void*> newly_shared_;
+  std::vector<std::uint32_t> table_;  // words_ by hash of address, plus 1
+  std::vector<Word> words_;
+  bool learned_ = false;  // that another word is shared
+  std::uint64_t execution_ = 0;
 
   // Of the execution under way.
   std::size_t step_ = 0;
   int preemptions_ = 0;
   int stale_reads_ = 0;
+  int halts_ = 0;
+  std::uint32_t operations_ = 0;
   std::vector<std::unique_ptr<Thread>> threads_;
+  std::size_t thread_count_ = 0;
   std::size_t active_ = 0;
   ucontext_t main_;
-  std::vector<Word> words_;
-  std::unordered_map<const void*, std::size_t> index_of_;
-  std::unordered_map<const void*, PlainState> plain_;
-  struct Users {
-    std::uint32_t readers = 0, writers = 0;  // bits by thread
-  };
-  std::unordered_map<const void*, Users> users_;
+  std::vector<Store> stores_;
+  std::uint32_t store_count_ = 0;
+  std::uint32_t shared_count_ = 0;
   View fence_view_;  // of all full fences so far
   bool abandoned_ = false;
 };
 
 // Fails the execution under way unless it holds.
-void require(bool holds, const std::string& what);
+void require(bool holds, const char* what);
 void wait_until(std::function<bool()> ready);
+void wait_for_end_of(std::size_t thread);
+
+// The thread is not interrupted in this scope: for what is long and of no interest, or stands for
+// something that the kernel does.
+class Uninterrupted {
+ public:
+  Uninterrupted() { change(1); }
+  Uninterrupted(const Uninterrupted&) = delete;
+  Uninterrupted& operator=(const Uninterrupted&) = delete;
+  ~Uninterrupted() { change(-1); }
+
+ private:
+  static void change(int by) {
+    if (Explorer* explorer = Explorer::current()) explorer->uninterrupted += by;
+  }
+};
 
 // Data that no atomic protects: it must be ordered by those that do.
 template <class T>
 class Plain {
  public:
   Plain() = default;
+  explicit Plain(T value) : value_(value) {}
   T read() const {
     if (Explorer* explorer = Explorer::current()) explorer->read_plain(this);
     return value_;

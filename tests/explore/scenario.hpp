@@ -1,10 +1,7 @@
-// What the cases share: running a scenario as it is, and with an order left out.
+// A queue and a slot pool without the ports around them, which can be explored further.
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include <cstddef>
-#include <cstdio>
 #include <cstring>
 #include <vector>
 
@@ -14,27 +11,6 @@
 #include "tests/explore/explorer.hpp"
 
 namespace arbiter::explore {
-
-// The property holds in all interleavings within the limits.
-inline void expect_holds(const char* name, Limits limits, const Explorer::Scenario& scenario) {
-  const Report report = Explorer(limits).run(scenario);
-  EXPECT_EQ(report.failure, "") << name;
-  EXPECT_TRUE(report.complete) << name << ": not all interleavings were seen";
-  std::printf("%s: %llu interleavings, at most %d preemptions and %d old values\n", name,
-              static_cast<unsigned long long>(report.executions), limits.preemptions,
-              limits.stale_reads);
-}
-
-// The property fails in some interleaving once the order is left out: the test has teeth, and the
-// order is needed.
-inline void expect_fails_without(const char* name, Limits limits, Weakening weakening,
-                                 const Explorer::Scenario& scenario) {
-  const std::string function = weakening.function;
-  const Report report = Explorer(limits).run(scenario, std::move(weakening));
-  EXPECT_TRUE(report.weakened) << name << ": there is no such order in " << function;
-  EXPECT_NE(report.failure, "") << name << " is not needed in " << function;
-  std::printf("without %s in %s: %s\n", name, function.c_str(), report.failure.c_str());
-}
 
 // An output port's segment at one address for all executions.
 class SegmentMemory {

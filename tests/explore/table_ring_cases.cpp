@@ -1,21 +1,19 @@
 // A table that is overwritten while it is read is noticed (shm/table_ring.hpp).
-#include "shm/table_ring.hpp"
-
-#include <gtest/gtest.h>
 #include <sys/mman.h>
 
-#include "tests/explore/scenario.hpp"
+#include "shm/table_ring.hpp"
+#include "tests/explore/case.hpp"
 
 namespace arbiter::explore {
 namespace {
 
-class Tables : public testing::Test {
- protected:
+class Tables {
+ public:
   Tables()
       : board_(
             *static_cast<shm::Board*>(mmap(nullptr, sizeof(shm::Board), PROT_READ | PROT_WRITE,
                                            MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0))) {}
-  ~Tables() override { munmap(&board_, sizeof board_); }
+  ~Tables() { munmap(&board_, sizeof board_); }
 
   // Each table tells its own generation, twice.
   void swap(shm::TableWriter& writer) {
@@ -47,19 +45,15 @@ class Tables : public testing::Test {
     };
   }
 
+ private:
   shm::Board& board_;
 };
 
-TEST_F(Tables, OneThatIsOverwrittenWhileItIsReadIsNeverTakenForWhole) {
-  constexpr Limits kLimits{3, 2};
-  const auto scenario = read_while_swapping(shm::kTableSlots);
-  expect_holds("table swaps", kLimits, scenario);
-  expect_fails_without("table-in-force", kLimits, {Weakness::kRelease, "put_in_force"}, scenario);
-  expect_fails_without("table-in-force", kLimits, {Weakness::kAcquire, "snapshot"}, scenario);
-  expect_fails_without("table-overwritten", kLimits, {Weakness::kReleaseFence, "write"}, scenario);
-  expect_fails_without("table-overwritten", kLimits, {Weakness::kAcquireFence, "is_whole"},
-                       scenario);
-}
+const Register kSwaps("ATableThatIsOverwrittenWhileItIsReadIsNeverTakenForWhole", {3, 2},
+                      [](const Explore& explore) {
+                        Tables tables;
+                        explore(tables.read_while_swapping(shm::kTableSlots));
+                      });
 
 }  // namespace
 }  // namespace arbiter::explore

@@ -1,6 +1,5 @@
 // A slot is never written while a receiver reads it (shm/channel.hpp, shm/slot_pool.hpp).
-#include <gtest/gtest.h>
-
+#include "tests/explore/case.hpp"
 #include "tests/explore/scenario.hpp"
 
 namespace arbiter::explore {
@@ -45,28 +44,16 @@ Explorer::Scenario publish_and_take(World& world, std::uint32_t depth, int publi
   };
 }
 
-constexpr Limits kLimits{5, 3};
-
-TEST(ChannelInterleavings, NoSampleIsWrittenWhileItIsReadWithDepth1) {
-  World world;
-  expect_holds("channel, depth 1", kLimits, publish_and_take(world, 1, 2, 2));
-}
-
-TEST(ChannelInterleavings, NoSampleIsWrittenWhileItIsReadWithDepth2) {
-  World world;
-  expect_holds("channel, depth 2", kLimits, publish_and_take(world, 2, 3, 2));
-}
-
-TEST(ChannelInterleavings, EachOfItsOrdersIsNeeded) {
-  World world;
-  const auto scenario = publish_and_take(world, 1, 2, 2);
-  expect_fails_without("fence (b)", kLimits, {Weakness::kFullFence, "publish_fence"}, scenario);
-  expect_fails_without("fence (c)", kLimits, {Weakness::kFullFence, "hold"}, scenario);
-  expect_fails_without("entry-stored", kLimits, {Weakness::kRelease, "push"}, scenario);
-  expect_fails_without("slot-released", kLimits, {Weakness::kRelease, "release"}, scenario);
-  expect_fails_without("slot-released", kLimits, {Weakness::kRelease, "hold"}, scenario);
-  expect_fails_without("slot-released", kLimits, {Weakness::kAcquire, "reclaim"}, scenario);
-}
+const Register kDepth1("TheQueueAloneKeepsItsPromiseWithDepth1", {5, 3},
+                       [](const Explore& explore) {
+                         World world;
+                         explore(publish_and_take(world, 1, 2, 2));
+                       });
+const Register kDepth2("TheQueueAloneKeepsItsPromiseWithDepth2", {5, 3},
+                       [](const Explore& explore) {
+                         World world;
+                         explore(publish_and_take(world, 2, 3, 2));
+                       });
 
 // A queue ends while its receiver takes hold, and its slots are used again at once.
 Explorer::Scenario leave_and_reuse(World& world) {
@@ -84,13 +71,11 @@ Explorer::Scenario leave_and_reuse(World& world) {
   };
 }
 
-TEST(ChannelInterleavings, AQueueThatEndsTakesItsSamplesFromNobodyWhoHoldsOne) {
-  World world;
-  expect_holds("leaving", {4, 3}, leave_and_reuse(world));
-  expect_fails_without("fence (b)", {4, 3}, {Weakness::kFullFence, "publish_fence"},
-                       leave_and_reuse(world));
-  expect_fails_without("fence (c)", {4, 3}, {Weakness::kFullFence, "hold"}, leave_and_reuse(world));
-}
+const Register kEnds("AQueueThatEndsTakesItsSamplesFromNobodyWhoHoldsOne", {4, 3},
+                     [](const Explore& explore) {
+                       World world;
+                       explore(leave_and_reuse(world));
+                     });
 
 // A receiver looks for its queue while the publisher begins it, in a channel that another has used.
 Explorer::Scenario join_a_used_channel(World& world) {
@@ -120,14 +105,11 @@ Explorer::Scenario join_a_used_channel(World& world) {
   };
 }
 
-TEST(ChannelInterleavings, AReceiverFindsItsQueueWholeOrNotAtAll) {
-  World world;
-  expect_holds("joining", {3, 2}, join_a_used_channel(world));
-  expect_fails_without("channel-joined", {3, 2}, {Weakness::kRelease, "ChannelWriter::join"},
-                       join_a_used_channel(world));
-  expect_fails_without("channel-joined", {3, 2}, {Weakness::kAcquire, "ChannelReader::join"},
-                       join_a_used_channel(world));
-}
+const Register kJoining("AReceiverFindsItsQueueWholeOrNotAtAll", {3, 2},
+                        [](const Explore& explore) {
+                          World world;
+                          explore(join_a_used_channel(world));
+                        });
 
 }  // namespace
 }  // namespace arbiter::explore

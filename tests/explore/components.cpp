@@ -1,0 +1,169 @@
+#include "tests/explore/components.hpp"
+
+#include <cstring>
+#include <numeric>
+
+#include "client/peers.hpp"
+
+namespace arbiter::explore {
+namespace {
+
+shm::TypeInfo sample_type() {
+  shm::TypeInfo type;
+  type.size = sizeof(std::uint64_t);
+  type.alignment = alignof(std::uint64_t);
+  return type;
+}
+
+}  // namespace
+
+Outcome Output::publish() {
+  const std::uint64_t sample = ++published;
+  const Outcome outcome = core->publish_copy(&sample, sizeof sample, shm::monotonic_now());
+  delivered += outcome.delivered;
+  discarded += outcome.discarded;
+  refused += outcome.refused;
+  require(counters().no_slot.load(std::memory_order_relaxed) == 0, "no slot was free");
+  return outcome;
+}
+
+const shm::OutputCounters& Output::counters() const {
+  return mapping.as<const shm::OutputHeader>()->counters;
+}
+
+void Input::read(const detail::HeldSample& sample) {
+  if (Explorer* explorer = Explorer::current()) explorer->read_plain(sample.data);
+  std::uint64_t which = 0;
+  std::memcpy(&which, sample.data, sizeof which);
+  require(which == sample.sequence, "a sample was torn or replaced");
+}
+
+detail::HeldSample Input::hold() {
+  const detail::HeldSample sample = core->take();
+  if (sample.data == nullptr) return sample;
+  read(sample);
+  require(sample.sequence > last[sample.source], "a sample came twice, or late");
+  last[sample.source] = sample.sequence;
+  ++taken[sample.source];
+  return sample;
+}
+
+void Input::read_again(const detail::HeldSample& sample) { read(sample); }
+
+bool Input::take() {
+  const detail::HeldSample sample = hold();
+  if (sample.data == nullptr) return false;
+  core->give_back(sample.hold);
+  return true;
+}
+
+detail::Waited Input::wait(shm::Nanoseconds timeout) {
+  detail::HeldSample sample;
+  const detail::Waited waited = core->wait(timeout, sample);
+  if (waited == detail::Waited::kSample) {
+    read(sample);
+    require(sample.sequence > last[sample.source], "a sample came twice, or late");
+    last[sample.source] = sample.sequence;
+    ++taken[sample.source];
+    core->give_back(sample.hold);
+  }
+  return waited;
+}
+
+const shm::InputCounters& Input::counters() const {
+  return mapping.as<const shm::InputSegment>()->header.counters;
+}
+
+std::uint64_t Input::taken_of_all() const {
+  return std::accumulate(std::begin(taken), std::end(taken), std::uint64_t{0});
+}
+
+Instance::Instance(const test::TableBuilder& model)
+    : board_(shm::make_segment("board", sizeof(shm::Board))),
+      board_mapping_(board_, sizeof(shm::Board), shm::Access::kReadWrite) {
+  shm::TableWriter::initialize(*board_mapping_.as<shm::Board>());
+  for (SourceId id = 0; id < kSources; ++id) {
+    pages_.push_back(shm::make_segment("page", sizeof(shm::ActivityPage)));
+    page_mappings_.emplace_back(pages_.back(), sizeof(shm::ActivityPage), shm::Access::kReadWrite);
+  }
+  load(model);
+}
+
+std::shared_ptr<detail::SharedMemory> Instance::make_memory() {
+  auto memory = std::make_shared<detail::SharedMemory>(board_);
+  for (SourceId id = 0; id < kSources; ++id) {
+    memory->add_page(id, std::string(1, static_cast<char>('A' + id)), pages_[id]);
+  }
+  return memory;
+}
+
+std::unique_ptr<Output> Instance::make_output(std::uint32_t slots) {
+  auto output = std::make_unique<Output>();
+  output->memory = make_memory();
+  OutputPortOptions options;
+  options.max_loans = 0;  // publish() copies; so there is not one slot to spare
+  options.max_memory = shm::kCacheLine * std::size_t{slots == 0 ? 64 : slots};
+  output->core =
+      std::make_unique<detail::OutputCore>("output", sample_type(), options, output->memory);
+  const auto layout = shm::OutputLayout::plan(sample_type(), slots == 0 ? 64 : slots);
+  output->mapping =
+      shm::Mapping(output->core->segment_descriptor(), layout.total_size, shm::Access::kReadOnly);
+  return output;
+}
+
+void Instance::bind(Output& output, SourceId source) {
+  output.core->bind(next_instance_++, source, pages_[source]);
+}
+
+std::unique_ptr<Input> Instance::make_input(shm::PortId port, const InputPortOptions& options) {
+  auto input = std::make_unique<Input>();
+  input->memory = make_memory();
+  input->core = std::make_unique<detail::InputCore>("input", sample_type(), options, input->memory);
+  input->core->bind(next_instance_++, port);
+  input->port = port;
+  input->mapping = shm::Mapping(input->core->segment_descriptor(), sizeof(shm::InputSegment),
+                                shm::Access::kReadOnly);
+  return input;
+}
+
+// Descriptors that the message carries, lent for the time of the call.
+void Instance::tell_output(Output& output, const Input& input, std::uint64_t link) {
+  shm::Received received;
+  received.message.peer = input.core->instance();
+  received.message.id = input.port;
+  if (link != 0) received.message.flags = shm::kIsConnected;
+  received.descriptors[0] = shm::FileDescriptor(input.core->segment_descriptor().get());
+  received.descriptors[1] = shm::FileDescriptor(input.core->bell().write_end().get());
+  output.core->add_peer(detail::map_input_peer(received, output.core->type()), link);
+  for (auto& lent : received.descriptors) static_cast<void>(lent.release());
+}
+
+void Instance::tell_input(Input& input, const Output& output, std::uint64_t link) {
+  shm::Received received;
+  received.message.peer = output.core->instance();
+  received.message.id = output.core->source();
+  received.message.link = link;
+  received.descriptors[0] = shm::FileDescriptor(output.core->segment_descriptor().get());
+  input.core->add_peer(detail::map_output_peer(received, input.core->type()));
+  for (auto& lent : received.descriptors) static_cast<void>(lent.release());
+}
+
+void Instance::connect(Output& output, Input& input) {
+  const std::uint64_t link = next_link_++;
+  tell_output(output, input, link);
+  tell_input(input, output, link);
+}
+
+void Instance::load(const test::TableBuilder& model) {
+  shm::TableWriter writer(*board_mapping_.as<shm::Board>());
+  writer.write(model.words(kSources, kPorts));
+  writer.put_in_force();
+}
+
+test::TableBuilder forever() {
+  test::TableBuilder builder;
+  for (SourceId id = 0; id < kSources; ++id) builder.timeout(id, shm::kForever);
+  return builder;
+}
+
+}  // namespace arbiter::explore

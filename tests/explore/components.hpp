@@ -1,0 +1,101 @@
+// The real ports (client/), put together as the daemon and the service threads do it, without
+// either. What a service thread does can be done in the set-up, or by a thread of the scenario.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "client/input_core.hpp"
+#include "client/output_core.hpp"
+#include "shm/table_ring.hpp"
+#include "tests/explore/explorer.hpp"
+#include "tests/explore/image.hpp"
+#include "tests/shm/table_builder.hpp"
+
+namespace arbiter::explore {
+
+using shm::SourceId;
+inline constexpr SourceId kA = 0, kB = 1, kC = 2, kSources = 3;
+inline constexpr shm::PortId kPort = 0, kOther = 1, kPorts = 2;
+
+// An output port. A sample says which it is, counted by the port.
+struct Output {
+  Outcome publish();
+  Outcome signal() { return core->signal(shm::monotonic_now()); }
+  void deactivate() { core->deactivate(shm::monotonic_now()); }
+  // Takes up what the service thread has offered.
+  void settle() { static_cast<void>(core->loan(sizeof published)); }
+  [[nodiscard]] const shm::OutputCounters& counters() const;
+
+  std::shared_ptr<detail::SharedMemory> memory;
+  std::unique_ptr<detail::OutputCore> core;
+  shm::Mapping mapping;
+  std::uint64_t published = 0;
+  std::uint64_t delivered = 0;  // the sum of what publish() said, as the next two
+  std::uint64_t discarded = 0;
+  std::uint64_t refused = 0;
+};
+
+// An input port, and what it has taken.
+struct Input {
+  // Takes and reads a sample and gives it back; false: there was none.
+  bool take();
+  // Takes and reads a sample, and keeps it.
+  detail::HeldSample hold();
+  // Reads it once more.
+  void read_again(const detail::HeldSample& sample);
+  // As take(), of what the wait has brought.
+  detail::Waited wait(shm::Nanoseconds timeout = shm::kForever);
+
+  [[nodiscard]] const shm::InputCounters& counters() const;
+  [[nodiscard]] std::uint64_t taken_of_all() const;
+
+  std::shared_ptr<detail::SharedMemory> memory;
+  std::unique_ptr<detail::InputCore> core;
+  shm::PortId port = shm::kNone;
+  shm::Mapping mapping;
+  std::uint64_t taken[kSources] = {};
+  std::uint64_t last[kSources] = {};
+
+ private:
+  void read(const detail::HeldSample& sample);
+};
+
+// What belongs to one instance of Arbiter. Its ports see the pages of all sources.
+class Instance {
+ public:
+  explicit Instance(const test::TableBuilder& model);
+
+  // With room for `slots` samples; 0: for as many as are needed at worst, and no more.
+  std::unique_ptr<Output> make_output(std::uint32_t slots = 0);
+  std::unique_ptr<Input> make_input(shm::PortId port, const InputPortOptions& options);
+  // The port is open from here on: it may write its source's activity.
+  void bind(Output& output, SourceId source);
+
+  // What the service threads do when the daemon has introduced two ports.
+  static void tell_output(Output& output, const Input& input, std::uint64_t link);
+  static void tell_input(Input& input, const Output& output, std::uint64_t link);
+  void connect(Output& output, Input& input);
+
+  // Puts a model in force.
+  void load(const test::TableBuilder& model);
+  [[nodiscard]] shm::Activity& activity(SourceId source) const {
+    return page_mappings_[source].as<shm::ActivityPage>()->activity;
+  }
+
+ private:
+  std::shared_ptr<detail::SharedMemory> make_memory();
+
+  shm::FileDescriptor board_;
+  shm::Mapping board_mapping_;
+  std::vector<shm::FileDescriptor> pages_;
+  std::vector<shm::Mapping> page_mappings_;
+  shm::PortInstance next_instance_ = 1;
+  std::uint64_t next_link_ = 1;
+};
+
+// A model in which activity has no end of itself.
+test::TableBuilder forever();
+
+}  // namespace arbiter::explore

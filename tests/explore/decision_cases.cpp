@@ -1,0 +1,93 @@
+// A decision sees one picture of activities that change meanwhile (shm/decision.hpp).
+#include <memory>
+
+#include "shm/clock.hpp"
+#include "shm/decision.hpp"
+#include "tests/explore/case.hpp"
+#include "tests/explore/components.hpp"
+
+namespace arbiter::explore {
+namespace {
+
+constexpr shm::Nanoseconds kNow = 1000;
+
+// Sources without an end, a table, and each source's publisher.
+struct World {
+  explicit World(const test::TableBuilder& builder)
+      : words(builder.words(kSources, 1)), view(words.view()) {
+    for (SourceId id = 0; id < kSources; ++id) pages->attach(id, &activities[id]);
+  }
+  void reset() {
+    time = 1;
+    for (SourceId id = 0; id < kSources; ++id) {
+      activities[id].word.store(shm::kNeverActive);
+      activities[id].breaks.store(0);
+      own[id] = shm::kNeverActive;
+    }
+  }
+
+  // As OutputCore::stamp(), for each source by its one publisher.
+  void stamp_fence() { shm::full_fence(); }  // (a)
+  void arrive(SourceId id) {
+    const shm::ActivityWord next = shm::arrival(++time, shm::kForever);
+    activities[id].arrive(own[id], next);
+    own[id] = next;
+    stamp_fence();
+  }
+  void deactivate(SourceId id) {
+    own[id] = shm::deactivation(++time);
+    activities[id].word.store(own[id], std::memory_order_relaxed);
+    stamp_fence();
+  }
+  bool wins(SourceId id) {
+    shm::FixedClock clock(kNow);
+    shm::Decider decider(view, *pages, clock);
+    return decider.decide(view.rule(view.find(id, 0))) == shm::Verdict::kWins;
+  }
+  test::TableWords words;
+  shm::TableView view;
+  std::unique_ptr<shm::ActivityPages> pages = std::make_unique<shm::ActivityPages>();
+  shm::Activity activities[kSources];
+  shm::ActivityWord own[kSources];
+  shm::Nanoseconds time = 1;
+};
+
+// A and not B and not C. B is active; C arrives, then B is deactivated: never are both inactive.
+void move_activity(const Explore& explore) {
+  World world(forever().conjunction(kA, 0, {}, {kC, kB}));
+  explore([&](Execution& execution) {
+    world.reset();
+    world.arrive(kB);
+    execution.thread([&] {
+      world.arrive(kC);
+      world.deactivate(kB);
+    });
+    execution.thread([&] { require(!world.wins(kA), "two moments were mixed"); });
+  });
+}
+const Register kMoved("MomentsAreNotMixedWhereActivityMovesFromOneToAnother", {8, 8},
+                      move_activity);
+
+// B and C, of which one is active at a time; each comes back after a break.
+void break_off(const Explore& explore) {
+  World world(forever().conjunction(kA, 0, {kB, kC}, {}));
+  explore([&](Execution& execution) {
+    world.reset();
+    world.arrive(kB);
+    execution.thread([&] {
+      world.deactivate(kB);
+      world.arrive(kC);
+      world.deactivate(kC);
+      world.arrive(kB);
+      world.deactivate(kB);
+      world.arrive(kC);
+    });
+    execution.thread([&] { require(!world.wins(kA), "two moments were mixed"); });
+  });
+}
+const Register kBroken("AnActivityThatWasBrokenOffDoesNotCountAsRenewed", {9, 0}, break_off);
+const Register kBrokenAndOld(
+    "AnActivityThatWasBrokenOffDoesNotCountAsRenewedThoughOldValuesAreSeen", {4, 3}, break_off);
+
+}  // namespace
+}  // namespace arbiter::explore
