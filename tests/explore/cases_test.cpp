@@ -14,7 +14,7 @@ TEST_P(Interleavings, Hold) {
   const Case& each = GetParam();
   each.body([&](const Explorer::Scenario& scenario) {
     const Report report = Explorer(each.limits).run(scenario);
-    EXPECT_EQ(report.failure, "");
+    EXPECT_EQ(report.failure, "") << report.trace;
     EXPECT_TRUE(report.complete) << "not all interleavings were seen";
     std::printf("%s: %llu interleavings; at most %d preemptions, %d old values, %d halts\n",
                 each.name, static_cast<unsigned long long>(report.executions),

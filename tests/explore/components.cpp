@@ -1,5 +1,6 @@
 #include "tests/explore/components.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <numeric>
 
@@ -31,24 +32,26 @@ const shm::OutputCounters& Output::counters() const {
   return mapping.as<const shm::OutputHeader>()->counters;
 }
 
-void Input::read(const detail::HeldSample& sample) {
+void Input::read_again(const detail::HeldSample& sample) const {
   if (Explorer* explorer = Explorer::current()) explorer->read_plain(sample.data);
   std::uint64_t which = 0;
   std::memcpy(&which, sample.data, sizeof which);
   require(which == sample.sequence, "a sample was torn or replaced");
 }
 
-detail::HeldSample Input::hold() {
-  const detail::HeldSample sample = core->take();
-  if (sample.data == nullptr) return sample;
-  read(sample);
+void Input::note(const detail::HeldSample& sample) {
+  read_again(sample);
   require(sample.sequence > last[sample.source], "a sample came twice, or late");
   last[sample.source] = sample.sequence;
+  last_stamp = sample.stamp_ns;
   ++taken[sample.source];
-  return sample;
 }
 
-void Input::read_again(const detail::HeldSample& sample) { read(sample); }
+detail::HeldSample Input::hold() {
+  const detail::HeldSample sample = core->take();
+  if (sample.data != nullptr) note(sample);
+  return sample;
+}
 
 bool Input::take() {
   const detail::HeldSample sample = hold();
@@ -61,10 +64,7 @@ detail::Waited Input::wait(shm::Nanoseconds timeout) {
   detail::HeldSample sample;
   const detail::Waited waited = core->wait(timeout, sample);
   if (waited == detail::Waited::kSample) {
-    read(sample);
-    require(sample.sequence > last[sample.source], "a sample came twice, or late");
-    last[sample.source] = sample.sequence;
-    ++taken[sample.source];
+    note(sample);
     core->give_back(sample.hold);
   }
   return waited;
@@ -86,7 +86,8 @@ Instance::Instance(const test::TableBuilder& model)
     pages_.push_back(shm::make_segment("page", sizeof(shm::ActivityPage)));
     page_mappings_.emplace_back(pages_.back(), sizeof(shm::ActivityPage), shm::Access::kReadWrite);
   }
-  load(model);
+  prepare(model);
+  put_in_force();
 }
 
 std::shared_ptr<detail::SharedMemory> Instance::make_memory() {
@@ -154,16 +155,50 @@ void Instance::connect(Output& output, Input& input) {
   tell_input(input, output, link);
 }
 
-void Instance::load(const test::TableBuilder& model) {
-  shm::TableWriter writer(*board_mapping_.as<shm::Board>());
-  writer.write(model.words(kSources, kPorts));
-  writer.put_in_force();
+void Instance::prepare(const test::TableBuilder& model) {
+  shm::TableWriter(*board_mapping_.as<shm::Board>()).write(model.words(kSources, kPorts));
 }
+void Instance::put_in_force() { shm::TableWriter(*board_mapping_.as<shm::Board>()).put_in_force(); }
+
 
 test::TableBuilder forever() {
   test::TableBuilder builder;
   for (SourceId id = 0; id < kSources; ++id) builder.timeout(id, shm::kForever);
   return builder;
+}
+
+InputPortOptions depth(std::uint32_t samples) {
+  InputPortOptions options;
+  options.depth = samples;
+  return options;
+}
+
+Scene::Scene(const test::TableBuilder& model, const InputPortOptions& options,
+             std::initializer_list<SourceId> connected)
+    : instance(model), input(instance.make_input(kPort, options)) {
+  for (SourceId id = 0; id < kSources; ++id) {
+    outputs[id] = instance.make_output();
+    instance.bind(*outputs[id], id);
+    if (std::find(connected.begin(), connected.end(), id) != connected.end()) {
+      instance.connect(*outputs[id], *input);
+    } else {
+      Instance::tell_output(*outputs[id], *input, 0);
+    }
+    outputs[id]->settle();
+  }
+  input->take();
+}
+
+void Scene::drain() {
+  while (input->take()) {
+  }
+  std::uint64_t delivered = 0;
+  for (const auto& output : outputs) delivered += output->delivered;
+  const shm::InputCounters& counters = input->counters();
+  const std::uint64_t done = input->taken_of_all() +
+                             counters.dropped.load(std::memory_order_relaxed) +
+                             counters.overtaken.load(std::memory_order_relaxed);
+  require(delivered == done, "the account does not balance");
 }
 
 }  // namespace arbiter::explore

@@ -3,12 +3,16 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <initializer_list>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "client/input_core.hpp"
 #include "client/output_core.hpp"
 #include "shm/table_ring.hpp"
+#include "tests/explore/case.hpp"
 #include "tests/explore/explorer.hpp"
 #include "tests/explore/image.hpp"
 #include "tests/shm/table_builder.hpp"
@@ -43,8 +47,8 @@ struct Input {
   bool take();
   // Takes and reads a sample, and keeps it.
   detail::HeldSample hold();
-  // Reads it once more.
-  void read_again(const detail::HeldSample& sample);
+  // Reads it once more: it must be as it was.
+  void read_again(const detail::HeldSample& sample) const;
   // As take(), of what the wait has brought.
   detail::Waited wait(shm::Nanoseconds timeout = shm::kForever);
 
@@ -57,9 +61,10 @@ struct Input {
   shm::Mapping mapping;
   std::uint64_t taken[kSources] = {};
   std::uint64_t last[kSources] = {};
+  shm::Nanoseconds last_stamp = 0;
 
  private:
-  void read(const detail::HeldSample& sample);
+  void note(const detail::HeldSample& sample);
 };
 
 // What belongs to one instance of Arbiter. Its ports see the pages of all sources.
@@ -78,8 +83,9 @@ class Instance {
   static void tell_input(Input& input, const Output& output, std::uint64_t link);
   void connect(Output& output, Input& input);
 
-  // Puts a model in force.
-  void load(const test::TableBuilder& model);
+  // As the daemon does it: writes a model's table behind the one in force, and puts it in force.
+  void prepare(const test::TableBuilder& model);
+  void put_in_force();
   [[nodiscard]] shm::Activity& activity(SourceId source) const {
     return page_mappings_[source].as<shm::ActivityPage>()->activity;
   }
@@ -97,5 +103,34 @@ class Instance {
 
 // A model in which activity has no end of itself.
 test::TableBuilder forever();
+
+// Options of a port with queues of that depth.
+InputPortOptions depth(std::uint32_t samples);
+
+// An input port and the output ports of all sources. Some are connected to it; it sees the activity
+// of all, and they see whether it waits.
+struct Scene {
+  Scene(const test::TableBuilder& model, const InputPortOptions& options,
+        std::initializer_list<SourceId> connected);
+
+  Output& a() { return *outputs[kA]; }
+  Output& b() { return *outputs[kB]; }
+  Output& c() { return *outputs[kC]; }
+  // Takes what is there; then each sample that was delivered must be accounted for.
+  void drain();
+
+  Instance instance;
+  std::unique_ptr<Output> outputs[kSources];
+  std::unique_ptr<Input> input;
+  shm::Atomic<std::uint32_t> returned{0};  // what a thread tells the others once a call is back
+};
+
+// Explores with a scene of its own for each execution.
+template <class World, class... Arguments>
+void explore_anew(const Explore& explore, std::function<void(World&, Execution&)> scenario,
+                  Arguments&&... arguments) {
+  Restored<World> world(std::forward<Arguments>(arguments)...);
+  explore([&](Execution& execution) { scenario(world.restore(), execution); });
+}
 
 }  // namespace arbiter::explore

@@ -1,8 +1,10 @@
 #include "tests/explore/explorer.hpp"
 
 #include <algorithm>
+#include <cstdio>
 #include <cstring>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "tests/explore/image.hpp"
@@ -31,7 +33,15 @@ Report Explorer::run(const Scenario& scenario) {
     learned_ = false;
     run_once(scenario);
     ++report_.executions;
-    if (!report_.failure.empty() || report_.executions == limits_.executions) return report_;
+    // Nothing is said of an execution in which a word had no history yet.
+    if (learned_) report_.failure.clear();
+    if (!report_.failure.empty()) {
+      tracing_ = true;
+      run_once(scenario);
+      tracing_ = false;
+      return report_;
+    }
+    if (report_.executions == limits_.executions) return report_;
     // Which words are shared is learned on the way; the search begins again with each.
     if (learned_) {
       path_.clear();
@@ -176,13 +186,14 @@ void Explorer::switch_to(std::size_t thread) {
 }
 
 void Explorer::leave() {
+  Image::leave();
   current_ = nullptr;
   setcontext(&main_);
   throw std::logic_error("setcontext");
 }
 
 void Explorer::fail(const std::string& what) {
-  if (report_.failure.empty()) {
+  if (const Image::Outside outside; report_.failure.empty()) {
     report_.failure = what + "; schedule:";
     for (std::size_t i = 0; i < step_; ++i) {
       report_.failure += " " + std::to_string(path_[i].taken);
@@ -288,6 +299,20 @@ bool Explorer::is_weak(Weakness kind, const Where& where) {
          weakening_->file == where.file_name();
 }
 
+// Words are named in the order in which they are met first.
+void Explorer::trace(const char* what, const void* address, std::uint64_t bits,
+                     const Where& where) {
+  if (!tracing_) return;
+  const std::string_view file = where.file_name();
+  char line[256];
+  std::snprintf(
+      line, sizeof line, "  thread %zu  %-8s %-28s word %-4td = %llx\n", active_, what,
+      (std::string(file.substr(file.rfind('/') + 1)) + ":" + std::to_string(where.line())).c_str(),
+      address == nullptr ? 0 : &find(address) - words_.data(),
+      static_cast<unsigned long long>(bits));
+  report_.trace += line;
+}
+
 std::uint64_t Explorer::load(const void* address, std::uint64_t bits, std::memory_order order,
                              const Where& where) {
   const Image::Outside outside;
@@ -304,6 +329,7 @@ std::uint64_t Explorer::load(const void* address, std::uint64_t bits, std::memor
   const Store& seen = stores_[from->history[newest - age]];
   self().view.set(from->index, newest - age);
   (takes ? self().view : self().acquired).join(seen.view);
+  trace(age == 0 ? "load" : "load old", address, seen.bits, where);
   return seen.bits;
 }
 
@@ -325,7 +351,10 @@ void Explorer::store(const void* address, std::uint64_t before, std::uint64_t bi
                      std::memory_order order, const Where& where) {
   const Image::Outside outside;
   const bool gives = releases(order) && !is_weak(Weakness::kRelease, where);
-  if (Word* const word = visit(address, true, before)) append(*word, bits, gives, nullptr);
+  if (Word* const word = visit(address, true, before)) {
+    append(*word, bits, gives, nullptr);
+    trace("store", address, bits, where);
+  }
 }
 
 std::uint64_t Explorer::begin_update(const void* address, std::uint64_t bits,
@@ -348,12 +377,14 @@ void Explorer::update(const void* address, std::uint64_t bits, std::memory_order
   if (word.history.empty()) return;  // it has none yet
   const View inherited = stores_[word.history.back()].view;
   append(word, bits, gives, &inherited);
+  trace("update", address, bits, where);
 }
 
 void Explorer::full_fence(const Where& where) {
   const Image::Outside outside;
   if (is_weak(Weakness::kFence, where)) return;
   take_turns();
+  trace("fence", nullptr, 0, where);
   self().view.join(self().acquired);
   self().view.join(fence_view_);
   fence_view_ = self().released = self().view;
@@ -373,16 +404,18 @@ void Explorer::release_fence(const Where& where) {
   self().view.set(active_, self().view.at(active_) + 1);
 }
 
-void Explorer::read_plain(const void* address) {
+void Explorer::read_plain(const void* address, const Where& where) {
   const Image::Outside outside;
+  trace("read", address, 0, where);
   Word& data = find_plain(address);
   const View& view = self().view;
   if (data.write > view.at(data.writer)) fail("data was read that was still being written");
   data.reads[active_] = view.at(active_);
 }
 
-void Explorer::write_plain(const void* address) {
+void Explorer::write_plain(const void* address, const Where& where) {
   const Image::Outside outside;
+  trace("write", address, 0, where);
   Word& data = find_plain(address);
   const View& view = self().view;
   for (std::size_t i = 0; i < thread_count_; ++i) {

@@ -58,6 +58,7 @@ struct Report {
   std::uint64_t executions = 0;
   bool complete = false;
   std::string failure;  // empty: none
+  std::string trace;    // of the execution that failed: what each thread did, line by line
 };
 
 // One run of a scenario: its threads, and what must hold at the end.
@@ -106,8 +107,8 @@ class Explorer {
   void full_fence(const Where& where);
   void acquire_fence(const Where& where);
   void release_fence(const Where& where);
-  void read_plain(const void* address);
-  void write_plain(const void* address);
+  void read_plain(const void* address, const Where& where = Where::current());
+  void write_plain(const void* address, const Where& where = Where::current());
 
   // The thread goes on only once `ready` holds. If none can go on, the first deadline is reached
   // (`time_passes` is called with it); without one, that is a failure.
@@ -172,6 +173,7 @@ class Explorer {
   // Of a word that is shared; null for one that is not: it needs no history.
   Word* visit(const void* address, bool writes, std::uint64_t bits);
   bool is_weak(Weakness kind, const Where& where);
+  void trace(const char* what, const void* address, std::uint64_t bits, const Where& where);
   void append(Word& to, std::uint64_t bits, bool release, const View* inherited);
   Thread& self() { return *threads_[active_]; }
 
@@ -207,6 +209,7 @@ class Explorer {
   std::uint32_t shared_count_ = 0;
   View fence_view_;  // of all full fences so far
   bool abandoned_ = false;
+  bool tracing_ = false;
 };
 
 // Fails the execution under way unless it holds.

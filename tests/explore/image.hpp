@@ -47,6 +47,9 @@ class Image {
   // Zeroed pages, for a segment.
   static std::byte* allocate_pages(std::size_t size);
 
+  // What a thread was inside of is void when its execution ends before it.
+  static void leave() noexcept { inside_ = false; }
+
   // For operator new and delete.
   static bool is_inside() noexcept { return inside_; }
   static void* allocate(std::size_t size, std::size_t alignment);

@@ -2,10 +2,11 @@
 // an acquire or a release becomes relaxed, a fence nothing. Prints a table: which order, what was
 // left out, the case that turned red, and how.
 //
-//   weaken_each [--jobs N] [--met FILE]
+//   weaken_each [--jobs N] [--met FILE] [--only TEXT]
 //
 // Exits with 1, naming it, if one may be left out unnoticed. `--met` writes down the lines that
-// were met, for .ci/weaken to compare with all that the sources have.
+// were met, for .ci/weaken to compare with all that the sources have; `--only` leaves out only those
+// orders in whose row TEXT occurs.
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -153,14 +154,17 @@ bool finish(const Job& job, int status) {
   return !red.empty();
 }
 
-int weaken_each(unsigned jobs, const char* met_file) {
-  const MetBy all = meet_all();
+int weaken_each(unsigned jobs, const char* met_file, const std::string& only) {
+  MetBy all = meet_all();
   if (met_file != nullptr) {
     std::ofstream file(met_file);
     for (const auto& [location, by] : all) {
       file << short_name(location.file) << ':' << location.line << '\n';
     }
   }
+  std::erase_if(all, [&](const auto& each) {
+    return describe(each.first).find(only) == std::string::npos;
+  });
   std::vector<Job> running;
   std::vector<std::string> green;
   const auto wait_for_one = [&] {
@@ -188,12 +192,15 @@ int weaken_each(unsigned jobs, const char* met_file) {
 int main(int count, char** arguments) {
   unsigned jobs = 2;
   const char* met_file = nullptr;
+  std::string only;
   for (int i = 1; i + 1 < count; i += 2) {
     if (std::strcmp(arguments[i], "--jobs") == 0) {
       jobs = static_cast<unsigned>(std::max(1, std::atoi(arguments[i + 1])));
     } else if (std::strcmp(arguments[i], "--met") == 0) {
       met_file = arguments[i + 1];
+    } else if (std::strcmp(arguments[i], "--only") == 0) {
+      only = arguments[i + 1];
     }
   }
-  return arbiter::explore::weaken_each(jobs, met_file);
+  return arbiter::explore::weaken_each(jobs, met_file, only);
 }

@@ -1,0 +1,109 @@
+// Arbitration at both ends: overrides, deactivation, other models, while ports publish and take.
+#include "tests/explore/components.hpp"
+
+namespace arbiter::explore {
+namespace {
+
+test::TableBuilder b_overrides_a() {
+  return forever().conjunction(kA, kPort, {}, {kB}).connect(
+      {kB, kPort, shm::table::kAlways, {}, {}});
+}
+
+void override_each_other(const Explore& explore) {
+  explore_anew<Scene>(
+      explore,
+      [](Scene& scene, Execution& execution) {
+        execution.thread([&scene] { scene.a().publish(); });
+        execution.thread([&scene] { scene.b().publish(); });
+        execution.finally([&scene] {
+          require(scene.a().delivered == 0 || scene.b().delivered == 0, "both were accepted");
+        });
+      },
+      forever().conjunction(kA, kPort, {}, {kB}).conjunction(kB, kPort, {}, {kA}), depth(1),
+      std::initializer_list<SourceId>{kA, kB});
+}
+const Register kMutual("TwoThatOverrideEachOtherAreNotBothAccepted", {5, 3}, override_each_other);
+
+// What has been waiting, and what is on its way in.
+void take_over(const Explore& explore) {
+  explore_anew<Scene>(
+      explore,
+      [](Scene& scene, Execution& execution) {
+        scene.a().publish();
+        execution.thread([&scene] { scene.a().publish(); });
+        execution.thread([&scene] {
+          scene.b().signal();
+          scene.returned.store(1, std::memory_order_relaxed);
+        });
+        execution.thread([&scene] {
+          for (int i = 0; i < 2; ++i) {
+            const bool overridden = scene.returned.load(std::memory_order_acquire) != 0;
+            require(!scene.input->take() || !overridden, "an overridden sample was taken");
+          }
+        });
+        execution.finally([&scene] { scene.drain(); });
+      },
+      b_overrides_a(), depth(2), std::initializer_list<SourceId>{kA, kB});
+}
+const Register kTakeover("AfterAnOverrideHasReturnedNothingOverriddenIsTaken", {3, 2}, take_over);
+
+// A sample that was accepted after an override's end is not dropped by a decision from before it.
+void deactivate(const Explore& explore) {
+  explore_anew<Scene>(
+      explore,
+      [](Scene& scene, Execution& execution) {
+        scene.a().publish();
+        scene.b().signal();
+        execution.thread([&scene] {
+          scene.b().deactivate();
+          scene.a().publish();
+        });
+        execution.thread([&scene] {
+          scene.input->take();
+          scene.input->take();
+        });
+        execution.finally([&scene] {
+          require(scene.a().delivered == 2, "an override was seen after its end");
+          scene.drain();
+          require(scene.input->last[kA] == 2, "what was accepted after the override was dropped");
+        });
+      },
+      b_overrides_a(), depth(2), std::initializer_list<SourceId>{kA, kB});
+}
+const Register kDeactivate("WhatIsAcceptedAfterADeactivationIsNotDroppedForWhatWasBefore", {4, 3},
+                           deactivate);
+
+// A model that takes A's connection away; then one that gives it to B.
+void swap_tables(const Explore& explore) {
+  explore_anew<Scene>(
+      explore,
+      [](Scene& scene, Execution& execution) {
+        scene.a().publish();
+        execution.thread([&scene] {
+          {
+            const Uninterrupted at_once;
+            scene.instance.prepare(
+                forever().connect({kB, kPort, shm::table::kAlways, {}, {}}));
+          }
+          scene.instance.put_in_force();
+          scene.returned.store(1, std::memory_order_release);
+        });
+        execution.thread([&scene] {
+          const bool over = scene.returned.load(std::memory_order_acquire) != 0;
+          require(scene.a().publish().delivered == 0 || !over, "accepted against the model");
+        });
+        execution.thread([&scene] {
+          for (int i = 0; i < 2; ++i) {
+            const bool over = scene.returned.load(std::memory_order_acquire) != 0;
+            require(!scene.input->take() || !over, "taken against the model in force");
+          }
+        });
+        execution.finally([&scene] { scene.drain(); });
+      },
+      forever().connect({kA, kPort, shm::table::kAlways, {}, {}}), depth(2),
+      std::initializer_list<SourceId>{kA, kB});
+}
+const Register kSwap("OnceAModelIsInForceNothingIsTakenAgainstIt", {3, 2}, swap_tables);
+
+}  // namespace
+}  // namespace arbiter::explore
