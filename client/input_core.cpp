@@ -92,6 +92,10 @@ void InputCore::offer_view() {
     ++link;
   }
   handover_.offer(std::move(view));
+  // SYNC POINT: view-announced. Between our offer and our ring; pairs with fence (d) of the port's
+  // thread: having heard the ring, it sees the offer at its next last look, whatever the pipe
+  // orders.
+  shm::full_fence();
   shm::ring_bell(bell_.write_end().get());
 }
 
@@ -128,6 +132,7 @@ void InputCore::accept_view() {
     queue.lane->taken.store(0, std::memory_order_relaxed);
     queue.lane->dropped.store(0, std::memory_order_relaxed);
     queue.lane->overtaken.store(0, std::memory_order_relaxed);
+    // SYNC POINT: lane-given. Release, with the acquire in OutputCore::is_full().
     queue.lane->publisher.store(link.peer->instance, std::memory_order_release);
     queues_.push_back(std::move(queue));
   }
@@ -153,7 +158,7 @@ void InputCore::retire_queue(Queue& queue) {
     lingering_.push_back(std::move(kept));
   }
   queue.peer->drained.store(true, std::memory_order_relaxed);
-  queue.lane->publisher.store(0, std::memory_order_release);
+  queue.lane->publisher.store(0, std::memory_order_relaxed);
   queue.lane = nullptr;
 }
 
