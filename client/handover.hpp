@@ -21,16 +21,17 @@ class Handover {
   Handover() = default;
   Handover(const Handover&) = delete;
   Handover& operator=(const Handover&) = delete;
+  // Relaxed is enough: whoever ends this has seen the end of both threads.
   ~Handover() {
-    delete offered_.load(std::memory_order_acquire);
+    delete offered_.load(std::memory_order_relaxed);
     collect();
   }
 
   // By the service thread. A view that was never accepted is replaced.
   // SYNC POINT: view-offered. Release, with the acquire in accept(): who takes a view sees it
-  // whole.
+  // whole. What comes back was our own offer: nothing to acquire.
   void offer(std::unique_ptr<View> view) {
-    delete offered_.exchange(view.release(), std::memory_order_acq_rel);
+    delete offered_.exchange(view.release(), std::memory_order_release);
     collect();
   }
 

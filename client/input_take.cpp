@@ -90,7 +90,7 @@ InputCore::Queue* InputCore::scan(bool& again) noexcept {
 void InputCore::join(Queue& queue) noexcept {
   if (queue.reader.state() != shm::ChannelReader::State::kUnjoined) return;
   if (!queue.reader.join()) return;
-  queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_release);
+  queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_relaxed);
 }
 
 bool InputCore::look_at(Queue& queue) noexcept {
@@ -240,12 +240,12 @@ void InputCore::count_overtaken(Queue& queue, std::uint64_t lost) noexcept {
   if (lost == 0) return;
   count(queue.lane->overtaken, lost);
   count(segment_->header.counters.overtaken, lost);
-  queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_release);
+  queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_relaxed);
 }
 
 void InputCore::consume(Queue& queue) noexcept {
   queue.reader.consume();
-  queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_release);
+  queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_relaxed);
 }
 
 std::uint32_t InputCore::free_hold() const {

@@ -62,10 +62,11 @@ bool InputCore::arm(HeldSample& sample, const shm::Rule*& winner) {
   shm::InputHeader& header = segment_->header;
   const shm::SourceId believed = winner == nullptr ? shm::kNone : winner->source;
   header.believed.store(believed, std::memory_order_relaxed);
-  // Release, with the acquire of publishers: who sees us wait sees what we believe.
+  // Relaxed is enough: a publisher that sees us wait and does not see what we believe has passed
+  // its fence before ours; then our last look sees what it has done, and we do not sleep.
   // A take that throws leaves the last wait as it was, odd.
   header.wait.store((header.wait.load(std::memory_order_relaxed) + 1) | 1,
-                    std::memory_order_release);
+                    std::memory_order_relaxed);
   shm::full_fence();
   sample = take_once();
   if (sample.data != nullptr) return false;
@@ -102,7 +103,7 @@ shm::Nanoseconds InputCore::next_change(const shm::Rule* winner) const noexcept 
   const auto heed = [&](shm::SourceId source) {
     const auto* activity = memory_->pages().find(source);
     if (activity == nullptr) return;
-    const shm::ActivityWord word = activity->word.load(std::memory_order_acquire);
+    const shm::ActivityWord word = activity->word.load(std::memory_order_relaxed);
     if (shm::is_finite(word) && word > last_reading_) next = std::min(next, word);
   };
   heed(winner->source);

@@ -135,6 +135,9 @@ Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanosec
 }
 
 // The receiver's lane for us tells how far it has read; until it has one, it has read nothing.
+// SYNC POINT: lane-given. The acquire pairs with the release in InputCore::accept_view(): who finds
+// a lane its own finds no earlier publisher's count in it. Relaxed is enough for the count: it says
+// what may be pushed; what may be written, the holds say.
 bool OutputCore::is_full(Destination& destination) const noexcept {
   const shm::InputSegment& segment = *destination.peer->segment;
   const auto is_ours = [&](const shm::Lane& lane) {
@@ -150,7 +153,7 @@ bool OutputCore::is_full(Destination& destination) const noexcept {
       destination.writer.channel().first.load(std::memory_order_relaxed) - 1;
   const std::uint64_t consumed = destination.lane == nullptr
                                      ? nothing_read
-                                     : destination.lane->consumed.load(std::memory_order_acquire);
+                                     : destination.lane->consumed.load(std::memory_order_relaxed);
   if (consumed > destination.writer.accepted() &&
       !destination.peer->misbehaved.exchange(true, std::memory_order_relaxed)) {
     memory_->service_bell().ring();
@@ -158,8 +161,9 @@ bool OutputCore::is_full(Destination& destination) const noexcept {
   return destination.writer.is_full(std::max(consumed, nothing_read));
 }
 
+// Relaxed is enough for the wait word: fence (b) comes before, and nothing is read by it.
 void OutputCore::ring_if_waiting(Destination& destination) noexcept {
-  const std::uint64_t wait = destination.peer->segment->header.wait.load(std::memory_order_acquire);
+  const std::uint64_t wait = destination.peer->segment->header.wait.load(std::memory_order_relaxed);
   if ((wait & 1) == 0 || wait == destination.rung) return;
   destination.rung = wait;
   destination.peer->ringer.ring();
@@ -170,7 +174,7 @@ void OutputCore::ring_if_waiting(Destination& destination) noexcept {
 void OutputCore::ring_where_selection_changed(shm::Nanoseconds now) noexcept {
   for (Destination& destination : destinations_) {
     const std::uint64_t wait =
-        destination.peer->segment->header.wait.load(std::memory_order_acquire);
+        destination.peer->segment->header.wait.load(std::memory_order_relaxed);
     if ((wait & 1) == 0 || wait == destination.rung) continue;
     if (selection_differs(destination, now)) ring_if_waiting(destination);
   }

@@ -62,7 +62,8 @@ class ChannelWriter {
   // hold from fence (b) of the next publish on; it sees itself gone when it reads `receiver` again.
   template <class Evicted>
   void leave(Evicted evicted) noexcept {
-    channel_->receiver.store(0, std::memory_order_release);
+    // Relaxed is enough: fence (b) comes before the slots are used again.
+    channel_->receiver.store(0, std::memory_order_relaxed);
     for (; live_ != 0; --live_) {
       next_ = (next_ == 0 ? depth_ : next_) - 1;
       evicted(slot_of(ring_[next_].load(std::memory_order_relaxed)));
@@ -172,8 +173,10 @@ class ChannelReader {
     // last one must know as well that we are done reading that one's slot.
     word.store(make_hold(publisher_, slot_of(entry)), std::memory_order_release);
     full_fence();  // (c)
-    const bool named = channel_->receiver.load(std::memory_order_acquire) == self_;
-    if (named && ring_[position_].load(std::memory_order_acquire) == entry) return true;
+    // Relaxed is enough for both: they come after the fence, in either order, and an entry that is
+    // the same was seen with its sample by peek(), for entries never repeat.
+    const bool named = channel_->receiver.load(std::memory_order_relaxed) == self_;
+    if (named && ring_[position_].load(std::memory_order_relaxed) == entry) return true;
     release(word);
     if (!named) state_ = State::kLeft;
     return false;

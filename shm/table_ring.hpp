@@ -50,8 +50,9 @@ class TableReader {
     return {generation, TableView(board_->tables[generation % kTableSlots], kMaxTableWords)};
   }
 
+  // To look whether there is a newer one, which snapshot() then reads. Relaxed is enough.
   [[nodiscard]] std::uint64_t generation() const noexcept {
-    return board_->generation.load(std::memory_order_acquire);
+    return board_->generation.load(std::memory_order_relaxed);
   }
 
   // Whether all that was read from the snapshot so far was the table's own.

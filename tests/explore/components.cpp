@@ -160,7 +160,6 @@ void Instance::prepare(const test::TableBuilder& model) {
 }
 void Instance::put_in_force() { shm::TableWriter(*board_mapping_.as<shm::Board>()).put_in_force(); }
 
-
 test::TableBuilder forever() {
   test::TableBuilder builder;
   for (SourceId id = 0; id < kSources; ++id) builder.timeout(id, shm::kForever);

@@ -5,8 +5,9 @@ namespace arbiter::explore {
 namespace {
 
 test::TableBuilder b_overrides_a() {
-  return forever().conjunction(kA, kPort, {}, {kB}).connect(
-      {kB, kPort, shm::table::kAlways, {}, {}});
+  return forever()
+      .conjunction(kA, kPort, {}, {kB})
+      .connect({kB, kPort, shm::table::kAlways, {}, {}});
 }
 
 void override_each_other(const Explore& explore) {
@@ -73,6 +74,27 @@ void deactivate(const Explore& explore) {
 const Register kDeactivate("WhatIsAcceptedAfterADeactivationIsNotDroppedForWhatWasBefore", {4, 3},
                            deactivate);
 
+// The same where another ends it: the publisher has seen that, so the receiver must.
+void deactivate_elsewhere(const Explore& explore) {
+  explore_anew<Scene>(
+      explore,
+      [](Scene& scene, Execution& execution) {
+        scene.a().publish();
+        scene.b().signal();
+        execution.thread([&scene] { scene.b().deactivate(); });
+        execution.thread([&scene] { scene.a().publish(); });
+        execution.thread([&scene] { scene.input->take(); });
+        execution.finally([&scene] {
+          scene.drain();
+          require(scene.a().delivered == 1 || scene.input->last[kA] == 2,
+                  "what was accepted after the override was dropped");
+        });
+      },
+      b_overrides_a(), depth(2), std::initializer_list<SourceId>{kA, kB});
+}
+const Register kElsewhere("WhatOneDeactivationLetsThroughNoEarlierDecisionDrops", {4, 3},
+                          deactivate_elsewhere);
+
 // A model that takes A's connection away; then one that gives it to B.
 void swap_tables(const Explore& explore) {
   explore_anew<Scene>(
@@ -82,8 +104,7 @@ void swap_tables(const Explore& explore) {
         execution.thread([&scene] {
           {
             const Uninterrupted at_once;
-            scene.instance.prepare(
-                forever().connect({kB, kPort, shm::table::kAlways, {}, {}}));
+            scene.instance.prepare(forever().connect({kB, kPort, shm::table::kAlways, {}, {}}));
           }
           scene.instance.put_in_force();
           scene.returned.store(1, std::memory_order_release);

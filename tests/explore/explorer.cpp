@@ -1,6 +1,7 @@
 #include "tests/explore/explorer.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstdio>
 #include <cstring>
 #include <stdexcept>
@@ -8,6 +9,7 @@
 #include <utility>
 
 #include "tests/explore/image.hpp"
+#include "tests/explore/kernel.hpp"
 
 namespace arbiter::explore {
 namespace {
@@ -19,6 +21,10 @@ bool acquires(std::memory_order order) {
 bool releases(std::memory_order order) {
   return order == std::memory_order_release || order == std::memory_order_acq_rel ||
          order == std::memory_order_seq_cst;
+}
+
+std::size_t hash(const void* address) {
+  return reinterpret_cast<std::uintptr_t>(address) * 0x9e3779b97f4a7c15u >> 40;
 }
 
 }  // namespace
@@ -175,7 +181,7 @@ bool Explorer::pass_time() {
   }
   if (all_ended) return false;
   if (first == INT64_MAX) fail("nobody can go on: a wake-up was lost");
-  time_passes(first);
+  set_virtual_time(first);
   return true;
 }
 
@@ -239,17 +245,17 @@ void Explorer::take_turns() {
 }
 
 void Explorer::rehash() {
-  const std::size_t size = std::max<std::size_t>(1024, words_.size() * 8);
+  const std::size_t size = std::bit_ceil(std::max<std::size_t>(1024, words_.size() * 8));
   table_.assign(size, 0);
   for (std::size_t i = 0; i < words_.size(); ++i) {
-    std::size_t at = (reinterpret_cast<std::uintptr_t>(words_[i].address) >> 2) * 0x9e3779b1u;
+    std::size_t at = hash(words_[i].address);
     while (table_[at & (table_.size() - 1)] != 0) ++at;
     table_[at & (table_.size() - 1)] = static_cast<std::uint32_t>(i + 1);
   }
 }
 
 Explorer::Word& Explorer::find(const void* address) {
-  std::size_t at = (reinterpret_cast<std::uintptr_t>(address) >> 2) * 0x9e3779b1u;
+  std::size_t at = hash(address);
   for (;; ++at) {
     const std::uint32_t entry = table_[at & (table_.size() - 1)];
     if (entry == 0) break;

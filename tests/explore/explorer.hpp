@@ -110,8 +110,8 @@ class Explorer {
   void read_plain(const void* address, const Where& where = Where::current());
   void write_plain(const void* address, const Where& where = Where::current());
 
-  // The thread goes on only once `ready` holds. If none can go on, the first deadline is reached
-  // (`time_passes` is called with it); without one, that is a failure.
+  // The thread goes on only once `ready` holds. If none can go on, time passes until the first
+  // deadline; without one, that is a failure.
   void wait_until(std::function<bool()> ready, std::int64_t deadline = INT64_MAX);
   // The thread goes on once another has ended, and knows all that it did, as if the kernel told it.
   void wait_for_end_of(std::size_t thread);
@@ -120,7 +120,6 @@ class Explorer {
 
   // While it is positive no turn is taken from the thread that runs.
   int uninterrupted = 0;
-  static inline std::function<void(std::int64_t)> time_passes;
 
  private:
   struct Store {

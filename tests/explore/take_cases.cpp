@@ -39,7 +39,8 @@ const Register kDepth1 =
     publish_and_take("NoSampleIsWrittenWhileItIsReadWithDepth1", {4, 2}, 1, 2, 2);
 const Register kDepth2 =
     publish_and_take("NoSampleIsWrittenWhileItIsReadWithDepth2", {3, 2}, 2, 3, 2);
-const Register kSlow = publish_and_take("ASlowReceiverIsOvertakenAndLosesTheOldest", {4, 2}, 2, 4, 1);
+const Register kSlow =
+    publish_and_take("ASlowReceiverIsOvertakenAndLosesTheOldest", {4, 2}, 2, 4, 1);
 
 // Two publishers, one of which overrides the other, and a receiver.
 Register two_publishers(const char* name, Limits limits, std::uint32_t samples) {
@@ -59,8 +60,9 @@ Register two_publishers(const char* name, Limits limits, std::uint32_t samples) 
                   });
                   execution.finally([&scene] { scene.drain(); });
                 },
-                forever().conjunction(kA, kPort, {}, {kB}).connect(
-                    {kB, kPort, shm::table::kAlways, {}, {}}),
+                forever()
+                    .conjunction(kA, kPort, {}, {kB})
+                    .connect({kB, kPort, shm::table::kAlways, {}, {}}),
                 depth(samples), std::initializer_list<SourceId>{kA, kB});
           }};
 }
@@ -73,7 +75,8 @@ void keep_order(const Explore& explore) {
   explore_anew<Scene>(
       explore,
       [](Scene& scene, Execution& execution) {
-        for (int i = 0; i < 4; ++i) scene.a().publish();  // each slot has been used
+        for (int i = 0; i < 5; ++i)
+          scene.a().publish();  // one slot is free, those in the queue follow
         scene.b().publish();
         execution.thread([&scene] {
           scene.a().publish();

@@ -5,8 +5,8 @@
 //   weaken_each [--jobs N] [--met FILE] [--only TEXT]
 //
 // Exits with 1, naming it, if one may be left out unnoticed. `--met` writes down the lines that
-// were met, for .ci/weaken to compare with all that the sources have; `--only` leaves out only those
-// orders in whose row TEXT occurs.
+// were met, for .ci/weaken to compare with all that the sources have; `--only` leaves out only
+// those orders in whose row TEXT occurs.
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -162,9 +162,8 @@ int weaken_each(unsigned jobs, const char* met_file, const std::string& only) {
       file << short_name(location.file) << ':' << location.line << '\n';
     }
   }
-  std::erase_if(all, [&](const auto& each) {
-    return describe(each.first).find(only) == std::string::npos;
-  });
+  std::erase_if(
+      all, [&](const auto& each) { return describe(each.first).find(only) == std::string::npos; });
   std::vector<Job> running;
   std::vector<std::string> green;
   const auto wait_for_one = [&] {

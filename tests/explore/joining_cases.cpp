@@ -1,0 +1,169 @@
+// Ports that come and go while others work: views, queues that begin and end, lanes, pages.
+#include "tests/explore/components.hpp"
+
+namespace arbiter::explore {
+namespace {
+
+test::TableBuilder everything() {
+  return forever()
+      .connect({kA, kPort, shm::table::kAlways, {}, {}})
+      .connect({kB, kPort, shm::table::kAlways, {}, {}})
+      .connect({kA, kOther, shm::table::kAlways, {}, {}});
+}
+
+// The publisher delivers to another port, and its slots go round, when a receiver joins.
+struct Joining : Scene {
+  Joining() : Scene(everything(), depth(1), {}), other(instance.make_input(kOther, depth(1))) {
+    instance.connect(a(), *other);
+    for (int i = 0; i < 3; ++i) a().publish();
+    other->take();
+    delivered_before = a().delivered;
+  }
+  std::unique_ptr<Input> other;
+  std::uint64_t delivered_before = 0;
+};
+
+void join(const Explore& explore) {
+  explore_anew<Joining>(explore, [](Joining& scene, Execution& execution) {
+    execution.mortal_thread([&scene] {
+      Instance::tell_output(scene.a(), *scene.input, 9);
+      Instance::tell_input(*scene.input, scene.a(), 9);
+    });
+    execution.thread([&scene] {
+      for (int i = 0; i < 3; ++i) scene.a().publish();
+    });
+    execution.thread([&scene] {
+      for (int i = 0; i < 2; ++i) scene.input->take();
+    });
+    execution.finally([&scene] {
+      if (Explorer::running()->is_halted(0)) return;
+      scene.a().publish();
+      const std::uint64_t twice = scene.a().delivered - scene.delivered_before;
+      const std::uint64_t to_other = scene.a().published - 3;
+      while (scene.input->take()) {
+      }
+      require(scene.input->last[kA] == scene.a().published, "a receiver that joined has no queue");
+      const auto overtaken = scene.input->counters().overtaken.load(std::memory_order_relaxed);
+      require(scene.input->taken[kA] + overtaken == twice - to_other, "a sample of before counts");
+    });
+  });
+}
+const Register kJoin("AReceiverThatJoinsGetsAllFromThereOn", {2, 2, 1}, join);
+
+// A connection ends by another model, while its sample is being taken; its slot is used again.
+struct Leaving : Scene {
+  Leaving() : Scene(everything(), depth(1), {kA}), other(instance.make_input(kOther, depth(1))) {
+    instance.connect(a(), *other);
+    for (int i = 0; i < 5; ++i) a().publish();
+    other->take();
+  }
+  std::unique_ptr<Input> other;
+};
+
+void leave(const Explore& explore) {
+  explore_anew<Leaving>(explore, [](Leaving& scene, Execution& execution) {
+    execution.thread([&scene] {
+      scene.a().core->disconnect_peer(scene.input->core->instance());
+      for (int i = 0; i < 3; ++i) scene.a().publish();
+    });
+    execution.thread([&scene] { scene.input->take(); });
+  });
+}
+const Register kLeave("AConnectionThatEndsTakesItsSampleFromNobodyWhoHoldsIt", {4, 3}, leave);
+
+// A receiver's lane is given to another publisher, which must not take the old one's word for its
+// own.
+struct Lanes : Scene {
+  Lanes() : Scene(everything(), refusing(), {kA}) {
+    for (int i = 0; i < 3; ++i) {
+      a().publish();
+      input->take();
+    }
+    instance.connect(b(), *input);
+    b().publish();
+    input->core->disconnect_peer(a().core->instance());
+  }
+  static InputPortOptions refusing() {
+    InputPortOptions options = depth(1);
+    options.when_full = WhenFull::refuse_new;
+    return options;
+  }
+};
+
+void reuse_lane(const Explore& explore) {
+  explore_anew<Lanes>(explore, [](Lanes& scene, Execution& execution) {
+    execution.thread([&scene] {
+      scene.b().publish();
+      scene.b().publish();
+    });
+    execution.thread([&scene] { scene.input->take(); });
+    execution.finally([&scene] {
+      scene.drain();
+      require(scene.b().delivered == scene.input->taken[kB], "an accepted sample was lost");
+    });
+  });
+}
+const Register kLane("AReceiversWordToOnePublisherIsNotTakenForItsWordToTheNext", {5, 3},
+                     reuse_lane);
+
+// client/handover.hpp by itself: a view is taken up whole, and disposed of after its last use.
+struct Offered {
+  explicit Offered(int which) : number(which) {}
+  ~Offered() { content.write(0); }
+  int number;
+  Plain<int> content;
+  Offered* next_retired = nullptr;
+};
+
+struct Views {
+  detail::Handover<Offered> handover;
+};
+
+void hand_over(const Explore& explore) {
+  explore_anew<Views>(explore, [](Views& views, Execution& execution) {
+    execution.thread([&views] {
+      for (int i = 1; i <= 2; ++i) {
+        auto view = std::make_unique<Offered>(i);
+        view->content.write(i);
+        views.handover.offer(std::move(view));
+      }
+      views.handover.collect();
+    });
+    execution.thread([&views] {
+      std::unique_ptr<Offered> current;
+      for (int i = 0; i < 2; ++i) {
+        if (!views.handover.has_offer()) continue;
+        auto view = views.handover.accept();
+        require(view != nullptr, "what was offered was withdrawn");
+        require(view->content.read() == view->number, "a view is not whole");
+        views.handover.retire(std::exchange(current, std::move(view)));
+      }
+      views.handover.retire(std::move(current));
+    });
+  });
+}
+const Register kViews("AViewIsTakenUpWholeAndDisposedOfAfterItsLastUse", {6, 4}, hand_over);
+
+// A page is found once it is mapped. The mapping, which is the kernel's, is plain data here.
+struct Pages {
+  shm::ActivityPages pages;
+  shm::Activity activity;
+  Plain<bool> is_mapped;
+};
+
+void attach(const Explore& explore) {
+  explore_anew<Pages>(explore, [](Pages& pages, Execution& execution) {
+    execution.thread([&pages] {
+      pages.is_mapped.write(true);
+      pages.pages.attach(kA, &pages.activity);
+    });
+    execution.thread([&pages] {
+      if (pages.pages.find(kA) == nullptr) return;
+      require(pages.is_mapped.read(), "a page was found before it was mapped");
+    });
+  });
+}
+const Register kPages("APageIsFoundOnceItIsMapped", {6, 4}, attach);
+
+}  // namespace
+}  // namespace arbiter::explore
