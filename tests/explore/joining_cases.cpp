@@ -50,12 +50,18 @@ void join(const Explore& explore) {
 }
 const Register kJoin("AReceiverThatJoinsGetsAllFromThereOn", {2, 2, 1}, join);
 
-// A connection ends by another model, while its sample is being taken; its slot is used again.
+InputPortOptions refusing() {
+  InputPortOptions options = depth(1);
+  options.when_full = WhenFull::refuse_new;
+  return options;
+}
+
+// A connection ends by another model, while its sample is being taken; its slot is used again at
+// once, for there is no other.
 struct Leaving : Scene {
-  Leaving() : Scene(everything(), depth(1), {kA}), other(instance.make_input(kOther, depth(1))) {
+  Leaving() : Scene(everything(), refusing(), {kA}), other(instance.make_input(kOther, depth(1))) {
     instance.connect(a(), *other);
     for (int i = 0; i < 5; ++i) a().publish();
-    other->take();
   }
   std::unique_ptr<Input> other;
 };
@@ -82,11 +88,6 @@ struct Lanes : Scene {
     instance.connect(b(), *input);
     b().publish();
     input->core->disconnect_peer(a().core->instance());
-  }
-  static InputPortOptions refusing() {
-    InputPortOptions options = depth(1);
-    options.when_full = WhenFull::refuse_new;
-    return options;
   }
 };
 

@@ -26,8 +26,9 @@ namespace arbiter {
 namespace explore {
 namespace {
 
-// Descriptors of segments; the real kernel has none of these.
-constexpr int kFirstSegment = 1'000'000;
+// Descriptors of segments, and of bells opened anew; the real kernel has none of these.
+constexpr int kFirstSegment = 100'000'000;
+constexpr int kFirstRinger = 200'000'000;
 
 struct Segment {
   std::byte* base;
@@ -127,7 +128,7 @@ void Bell::silence() const noexcept {
   explore::bells.at(read_.get())->exchange(0, std::memory_order_relaxed);
 }
 
-Ringer::Ringer(const FileDescriptor& write_end) : write_(eventfd(0, EFD_CLOEXEC)) {
+Ringer::Ringer(const FileDescriptor& write_end) : write_(explore::kFirstRinger + write_end.get()) {
   const Image::Outside outside;
   explore::bells[write_.get()] = explore::bells.at(write_end.get());
 }

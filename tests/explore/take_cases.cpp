@@ -40,7 +40,7 @@ const Register kDepth1 =
 const Register kDepth2 =
     publish_and_take("NoSampleIsWrittenWhileItIsReadWithDepth2", {3, 2}, 2, 3, 2);
 const Register kSlow =
-    publish_and_take("ASlowReceiverIsOvertakenAndLosesTheOldest", {4, 2}, 2, 4, 1);
+    publish_and_take("ASlowReceiverIsOvertakenAndLosesTheOldest", {3, 2}, 2, 4, 1);
 
 // Two publishers, one of which overrides the other, and a receiver.
 Register two_publishers(const char* name, Limits limits, std::uint32_t samples) {
