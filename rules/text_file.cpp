@@ -95,7 +95,7 @@ bool check_characters(const TextFile& file, Diagnostics& diagnostics) {
     if (is_control(character.code) && !is_blank(content[i])) {
       diagnostics.error("invalid-character", file.locate(i),
                         "the control character " + in_hex(character.code) +
-                            " must not occur in a model; remove it");
+                            " must not occur in this file; remove it");
       return false;
     }
     i += character.length;

@@ -2,8 +2,8 @@
 
 #include <fcntl.h>
 
+#include "service/findings.hpp"
 #include "service/inheritance.hpp"
-#include "service/log.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -15,16 +15,6 @@ shm::FileDescriptor make_board() {
   }
   shm::seal(board, shm::Seals::kFixedSize);
   return board;
-}
-
-void log_findings(const rules::Diagnostics& diagnostics) {
-  for (const rules::Diagnostic& finding : diagnostics.items()) {
-    const auto level = finding.severity == rules::Severity::kError     ? log::level::err
-                       : finding.severity == rules::Severity::kWarning ? log::level::warn
-                                                                       : log::level::info;
-    log::log(level, "{}:{}:{}: {} [{}]", finding.where.file, finding.where.line,
-             finding.where.column, finding.message, finding.code);
-  }
 }
 
 }  // namespace
@@ -64,7 +54,7 @@ void Models::read() {
     throw BadModel(error.what());
   }
   log_findings(diagnostics);
-  if (diagnostics.has_errors()) throw BadModel("the model has errors");
+  if (diagnostics.has_errors()) throw BadModel("the model has errors: " + first_error(diagnostics));
   compiled_ = std::move(model);
 }
 

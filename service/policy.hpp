@@ -1,0 +1,93 @@
+// Who may do what: a file of rules, of which the first that matches decides.
+//
+// One rule stands on each line:   allow|deny  WHO  ACTION[,ACTION…]  [GLOB…]
+//
+//   WHO      everyone, owner (the user that the daemon runs as), user NAME, group NAME; numbers
+//            serve as names, too
+//   ACTION   output, input, deactivate: each on the ports whose names match one of the globs;
+//            observe, reload, stop: without globs; all: every action on every port
+//
+// Behind the last line stand, unwritten: allow user root all; allow owner all; deny everyone all.
+// docs/policy.md has the reasons.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "rules/diagnostic.hpp"
+#include "rules/text_file.hpp"
+
+namespace arbiter::service {
+
+enum class Action : std::uint8_t { kOutput, kInput, kDeactivate, kObserve, kReload, kStop };
+inline constexpr std::size_t kActionCount = 6;
+
+// Who asks, as the kernel knows him.
+struct Identity {
+  uid_t user = 0;
+  std::vector<gid_t> groups;  // the primary one and the supplementary ones
+};
+
+// Where names become numbers: the accounts of this machine, or a test's.
+struct Accounts {
+  std::function<std::optional<uid_t>(const std::string& name)> user;
+  std::function<std::optional<gid_t>(const std::string& name)> group;
+};
+Accounts accounts_of_this_machine();
+
+class Policy {
+ public:
+  struct Verdict {
+    bool allowed = false;
+    std::string reason;  // names the line that decided
+  };
+
+  // Bounds of a policy file, so that a question takes microseconds.
+  static constexpr std::size_t kMaxRules = 1024;  // a line counts once for each of its globs
+
+  // What holds where no file is given.
+  explicit Policy(uid_t owner);
+  // Reports all problems in one go; the result is to be used only if there is no error.
+  static Policy parse(const rules::TextFile& file, uid_t owner, const Accounts& accounts,
+                      rules::Diagnostics& diagnostics);
+
+  // Whether `who` may do it, with the port of that name where the action is about one.
+  [[nodiscard]] Verdict may(const Identity& who, Action action, std::string_view port = {}) const;
+
+  [[nodiscard]] std::size_t size() const { return rules_.size(); }
+
+ private:
+  friend class PolicyReader;
+
+  struct Subject {
+    enum class Kind : std::uint8_t { kEveryone, kUser, kGroup };
+    Kind kind = Kind::kEveryone;
+    std::uint32_t id = 0;
+
+    friend bool operator==(const Subject&, const Subject&) = default;
+    [[nodiscard]] bool includes(const Identity& who) const;
+    [[nodiscard]] bool covers(const Subject& other) const;
+  };
+  struct Rule {
+    bool allows = false;
+    Subject who;
+    std::uint8_t actions = 0;  // a bit for each
+    std::string glob;          // of ports; what is about no port does not look at it
+    std::uint32_t line = 1;
+    std::string text;  // as written, for messages
+
+    [[nodiscard]] bool covers(const Rule& later) const;
+  };
+
+  std::string path_;  // empty: the default
+  uid_t owner_;
+  std::vector<Rule> rules_;
+};
+
+}  // namespace arbiter::service
