@@ -27,6 +27,8 @@ int run(int argc, char** argv) {
   arbiter::cli::add_pub(app, exit_code);
   arbiter::cli::add_status(app, exit_code);
   arbiter::cli::add_deactivate(app, exit_code);
+  arbiter::cli::add_reload(app, exit_code);
+  arbiter::cli::add_stop(app, exit_code);
   try {
     app.parse(argc, argv);  // runs the verb
   } catch (const CLI::ParseError& error) {

@@ -17,5 +17,7 @@ void add_echo(CLI::App& app, int& exit_code);
 void add_pub(CLI::App& app, int& exit_code);
 void add_status(CLI::App& app, int& exit_code);
 void add_deactivate(CLI::App& app, int& exit_code);
+void add_reload(CLI::App& app, int& exit_code);
+void add_stop(CLI::App& app, int& exit_code);
 
 }  // namespace arbiter::cli

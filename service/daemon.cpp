@@ -13,6 +13,7 @@
 #include <cstring>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include "service/log.hpp"
 #include "service/status.hpp"
@@ -68,8 +69,11 @@ std::uint64_t event_key(std::uint32_t tag, ClientId client) {
 Daemon::Daemon(const DaemonOptions& options)
     : instance_(options.instance),
       stores_(options.uses_descriptor_store),
+      gate_(options.policy),
       models_(options.files, directory_),
       state_(options.directory, options.instance) {
+  gate_.prepare();
+  gate_.put_in_force();
   if (models_.has_files()) models_.read();
   listener_ = shm::listen_at(options.directory, instance_);
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
@@ -139,6 +143,7 @@ void Daemon::run(int signal_descriptor) {
     advance_takeover(now);
     serve_postponed(now);
     settle();
+    if (stop_wanted_) return;
   }
 }
 
@@ -331,12 +336,14 @@ void Daemon::handle(Client& client, shm::Received& received) {
       barriers_.synced(client.id(), message.request);
       break;
     case shm::MessageKind::kStatus:
+      gate_.require(client, Action::kObserve);
       send_status(client, message.request);
       break;
     case shm::MessageKind::kDeactivate:
       deactivate(client, message);
       break;
     case shm::MessageKind::kObserve:
+      gate_.require(client, Action::kObserve);
       client.observes = true;
       switchboard_.show_everything(client);
       client.send(reply_to(message.request, shm::MessageKind::kDone));
@@ -360,6 +367,16 @@ void Daemon::handle(Client& client, shm::Received& received) {
       break;
     case shm::MessageKind::kHandedBack:
       finish_return(client);
+      break;
+    case shm::MessageKind::kReload:
+      gate_.require(client, Action::kReload);
+      reload(client.id(), message.request);
+      break;
+    case shm::MessageKind::kStop:
+      gate_.require(client, Action::kStop);
+      log::info("stopping: {} asks for it", client.description());
+      client.send(reply_to(message.request, shm::MessageKind::kDone));
+      stop_wanted_ = true;
       break;
     default:
       throw std::runtime_error("an unknown kind of message");
@@ -444,6 +461,7 @@ void Daemon::require_not_kept(shm::PortInstance holder, const std::string& what)
 
 void Daemon::open_output(Client& client, shm::Received& received) {
   const std::string name = port_name(received.message);
+  gate_.require(client, Action::kOutput, name);
   auto port = adopt_output(received);
   Source& source = directory_.source(name);
   require_free(client, source.open, "the output port " + name);
@@ -460,6 +478,7 @@ void Daemon::open_output(Client& client, shm::Received& received) {
 
 void Daemon::open_input(Client& client, shm::Received& received) {
   const std::string name = port_name(received.message);
+  gate_.require(client, Action::kInput, name);
   auto port = adopt_input(received);
   InputName& input = directory_.input(name);
   require_free(client, input.open, "the input port " + name);
@@ -508,7 +527,8 @@ void Daemon::send_status(Client& client, std::uint64_t request) {
 }
 
 void Daemon::deactivate(Client& client, const shm::Message& message) {
-  const std::string name(message.name_view());
+  const std::string name = port_name(message);
+  gate_.require(client, Action::kDeactivate, name);
   Source* source = directory_.find_source(name);
   if (source == nullptr) {
     throw std::runtime_error("no model and no component has named the source " + name);
@@ -534,22 +554,36 @@ void Daemon::refuse(Client& client, std::uint64_t request, const std::string& wh
   client.send(reply);
 }
 
+void Daemon::reload(ClientId asking, std::uint64_t request) {
+  reloads_asked_.push_back({asking, request});
+  reload();
+}
+
 // The new table is written and its clients are told before it counts; they switch all at once.
 void Daemon::reload() {
   if (swapping_ || phase_ != Phase::kServing) {
     reload_wanted_ = true;
     return;
   }
-  if (!models_.has_files()) {
-    log::warn("there is no model file to read again; start with --model");
-    return;
-  }
+  reloads_running_ = std::exchange(reloads_asked_, {});
   try {
-    models_.read();
-    models_.prepare();
+    if (!models_.has_files() && !gate_.has_file()) {
+      throw std::runtime_error("there is no file to read again; start with --model");
+    }
+    gate_.prepare();
+    if (models_.has_files()) {
+      models_.read();
+      models_.prepare();
+    }
   } catch (const std::exception& error) {
     ++reloads_refused_;
     log::error("the model in force stays: {}", error.what());
+    answer_reloads(error.what());
+    return;
+  }
+  if (!models_.has_files()) {
+    gate_.put_in_force();
+    answer_reloads({});
     return;
   }
   begin_swap();
@@ -562,6 +596,7 @@ void Daemon::begin_swap() {
 }
 
 void Daemon::put_in_force() {
+  gate_.put_in_force();
   models_.put_in_force();
   swapping_ = false;
   const auto snapshot = models_.in_force();
@@ -573,6 +608,21 @@ void Daemon::put_in_force() {
   }
   log::info("model {} is in force", snapshot.generation);
   welcome_waiting();
+  answer_reloads({});
+}
+
+void Daemon::answer_reloads(const std::string& why_not) {
+  for (const ReloadRequest& each : std::exchange(reloads_running_, {})) {
+    const auto client = clients_.find(each.client);
+    if (client == clients_.end()) continue;
+    if (!why_not.empty()) {
+      refuse(*client->second, each.request, why_not);
+      continue;
+    }
+    auto reply = reply_to(each.request, shm::MessageKind::kDone);
+    reply.value = static_cast<std::uint32_t>(models_.in_force().generation);
+    client->second->send(reply);
+  }
 }
 
 }  // namespace arbiter::service

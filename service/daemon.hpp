@@ -16,6 +16,7 @@
 #include "service/barriers.hpp"
 #include "service/client.hpp"
 #include "service/directory.hpp"
+#include "service/gate.hpp"
 #include "service/inheritance.hpp"
 #include "service/models.hpp"
 #include "service/registry.hpp"
@@ -26,8 +27,9 @@ namespace arbiter::service {
 
 struct DaemonOptions {
   rules::ModelFiles files;
-  std::string instance;   // checked
-  std::string directory;  // where to listen
+  std::string instance;               // checked
+  std::string directory;              // where to listen
+  std::optional<std::string> policy;  // a file; without one the default policy holds
   // Whether the service manager keeps descriptors for the next daemon.
   bool uses_descriptor_store = false;
 };
@@ -86,9 +88,11 @@ class Daemon {
   // The same of one that is away. Throws NotYet.
   void require_not_kept(shm::PortInstance holder, const std::string& what);
 
+  void reload(ClientId asking, std::uint64_t request);  // answered when it is over
   void reload();
   void begin_swap();
   void put_in_force();
+  void answer_reloads(const std::string& why_not);  // empty: all is in force
 
   // Taking over from a predecessor (daemon_takeover.cpp).
 
@@ -129,6 +133,7 @@ class Daemon {
 
   const std::string instance_;
   const bool stores_;
+  Gate gate_;
   Registry registry_;
   Directory directory_{registry_, stores_};
   Models models_;
@@ -150,6 +155,13 @@ class Daemon {
   bool swapping_ = false;       // a model waits for its barrier
   bool reload_wanted_ = false;  // another SIGHUP came meanwhile
   std::uint64_t reloads_refused_ = 0;
+  bool stop_wanted_ = false;
+  struct ReloadRequest {
+    ClientId client;
+    std::uint64_t request;
+  };
+  std::vector<ReloadRequest> reloads_asked_;    // for the reload that begins next
+  std::vector<ReloadRequest> reloads_running_;  // for the one that waits for its barrier
 };
 
 }  // namespace arbiter::service

@@ -19,7 +19,9 @@ Example:
   arbiterd --model search_and_track.xml
 
 It runs in the foreground, needs no configuration and no privileges, and logs to standard error.
-SIGHUP reads the files again; a bad model changes nothing. SIGTERM and SIGINT stop it.
+SIGHUP and `arbiter reload` read the files again; a bad one changes nothing. SIGTERM, SIGINT and
+`arbiter stop` stop it. Without --policy every user may open ports and observe, and only root and the
+daemon's own user may reload and stop.
 Components go on without it. The next daemon of the instance takes them over, and puts its own model
 in force; without --model it keeps the one that is.
 It listens in $RUNTIME_DIRECTORY, else $XDG_RUNTIME_DIR/arbiter, else /run/arbiter if it may write
@@ -61,11 +63,14 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", std::string("arbiterd ") + ARBITER_VERSION);
   arbiter::service::DaemonOptions options;
   std::string application;
+  std::string policy;
   std::string instance;
   std::string level = "info";
   app.add_option("--model", options.files.models, "Model file; several form one model")
       ->type_name("FILE");
   app.add_option("--application", application, "Application file: which connections exist")
+      ->type_name("FILE");
+  app.add_option("--policy", policy, "Policy file: who may open which ports, reload, stop, observe")
       ->type_name("FILE");
   app.add_option("--instance", instance,
                  "Name of this daemon; without it $ARBITER_INSTANCE, else \"default\"")
@@ -82,6 +87,7 @@ int main(int argc, char** argv) {
   log::set_default_logger(log::stderr_logger_mt("arbiterd"));
   log::set_level(log::level::from_str(level));
   if (!application.empty()) options.files.application = application;
+  if (!policy.empty()) options.policy = policy;
   try {
     options.instance = arbiter::shm::instance_name(instance);
     options.directory = arbiter::shm::daemon_directory();

@@ -46,6 +46,8 @@ enum class MessageKind : std::uint32_t {
   kDeactivate,   // name: a source whose process is gone
   kObserve,      // send every page and every port name, now and as they come
   kPeerRefused,  // port, peer, text: the client could not take up a peer, for status
+  kReload,       // read the files again; kDone (value: the generation) once they are in force
+  kStop,         // kDone, and then the daemon ends
   kHandBackPage = 40,  // id; descriptor: the activity page of a source
   kHandBackOutput,     // port, id = source, type; descriptors: its segment, its page
   kHandBackInput,      // port, id = port id, type; descriptors: its segment, its bell

@@ -1,0 +1,149 @@
+// arbiter reload, arbiter stop, and daemons that get a policy that they cannot use.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/stat.h>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/support/daemon.hpp"
+#include "tests/support/other_user.hpp"
+#include "tests/support/run_program.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using shm::MessageKind;
+using testing::HasSubstr;
+
+ProgramResult arbiter(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), std::string(ARBITER_PROGRAMS) + "/arbiter");
+  return run_program(arguments);
+}
+
+std::string model_from(const std::string& source) {
+  return "<behaviors><arbiter at='/in'><select from='" + source + "'/></arbiter></behaviors>";
+}
+
+TEST(Control, ReloadAnswersWhenTheModelIsInForce) {
+  Daemon daemon(model_from("/a"));
+  Node node("component");  // whose service thread has to be told first
+  auto in = node.input_port<int>("/in");
+  daemon.write_model(model_from("/b"));
+  const auto result = arbiter({"reload"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out, "model 2 is in force\n");
+  EXPECT_EQ(daemon.input("/in")["connections"][0]["source"], "/b");
+}
+
+TEST(Control, ReloadTellsWhyAModelIsRefused) {
+  Daemon daemon(model_from("/a"));
+  daemon.write_model("<behaviors>\n<nonsense/><source/></behaviors>");
+  const auto result = arbiter({"reload"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, HasSubstr("model.xml:2:1: <nonsense> is not known here"));
+  EXPECT_THAT(result.err, HasSubstr("(and 1 more; see the log)"));
+  EXPECT_EQ(daemon.generation(), 1u);
+  EXPECT_EQ(daemon.refused(), 1u);
+}
+
+TEST(Control, ReloadNeedsAFile) {
+  Daemon daemon("", {.without_model = true});
+  const auto result = arbiter({"reload"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("there is no file to read again"));
+}
+
+TEST(Control, ReloadReadsAPolicyWhereThereIsNoModel) {
+  const TemporaryDirectory files;
+  const auto policy = files.write("policy", "deny everyone input *\n");
+  Daemon daemon("", {.arguments = {"--policy", policy}, .without_model = true});
+  Node node("component");
+  EXPECT_THROW({ auto in = node.input_port<int>("/in"); }, Error);
+  files.write("policy", "allow everyone input *\n");
+  EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
+  auto in = node.input_port<int>("/in");
+}
+
+// Each is told of a reading that began after it asked.
+TEST(Control, EveryReloadIsAnswered) {
+  Daemon daemon(model_from("/a"));
+  Node node("component");
+  auto in = node.input_port<int>("/in");
+  std::vector<RawClient> clients;
+  for (int i = 0; i < 4; ++i) {
+    clients.emplace_back(daemon.instance());
+    clients.back().hello("asks");
+  }
+  daemon.process().stop();
+  for (RawClient& client : clients) client.send(RawClient::message(MessageKind::kReload));
+  daemon.process().signal(SIGCONT);
+  for (RawClient& client : clients) {
+    EXPECT_GE(client.expect(MessageKind::kDone).message.value, 2u);
+  }
+  EXPECT_GE(daemon.generation(), 2u);
+}
+
+TEST(Control, StopReturnsWhenTheDaemonIsGone) {
+  Daemon daemon(model_from("/a"));
+  Node node("component");
+  auto out = node.output_port<int>("/a");
+  auto in = node.input_port<int>("/in");
+  const auto result = arbiter({"stop"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  pollfd ended{daemon.process().descriptor(), POLLIN, 0};
+  EXPECT_EQ(::poll(&ended, 1, 0), 1);
+  EXPECT_EQ(daemon.process().wait(), 0);
+  EXPECT_EQ(out.publish(1).delivered, 1u);
+  EXPECT_TRUE(in.take());
+}
+
+TEST(Control, TheVerbsTellThatThereIsNoDaemon) {
+  const TemporaryDirectory empty;
+  const ScopedVariable runtime("XDG_RUNTIME_DIR", empty.path());
+  for (const std::string verb : {"reload", "stop"}) {
+    const auto result = arbiter({verb, "--instance", "no-such-daemon"});
+    EXPECT_EQ(result.exit_code, 1) << verb;
+    EXPECT_THAT(result.err, HasSubstr("no arbiterd of instance \"no-such-daemon\"")) << verb;
+    const auto help = arbiter({verb, "--help"});
+    EXPECT_EQ(help.exit_code, 0);
+    EXPECT_THAT(help.out, HasSubstr("Example:\n  arbiter " + verb));
+  }
+}
+
+TEST(Control, TheVerbsTellThatThePolicyRefuses) {
+  const TemporaryDirectory files;
+  const auto policy = files.write("policy", "deny everyone reload,stop\n");
+  Daemon daemon(kNoRules, {.arguments = {"--policy", policy}});
+  for (const std::string verb : {"reload", "stop"}) {
+    const auto result = arbiter({verb});
+    EXPECT_EQ(result.exit_code, 1) << verb;
+    EXPECT_THAT(result.err, HasSubstr(policy + ":1 says: deny everyone reload,stop")) << verb;
+  }
+}
+
+TEST(Control, ADaemonDoesNotStartWithAPolicyThatItCannotUse) {
+  const TemporaryDirectory files;
+  const ScopedVariable runtime("XDG_RUNTIME_DIR", files.path());
+  const ScopedVariable own("RUNTIME_DIRECTORY", std::nullopt);
+  const auto writable = files.write("writable", "allow everyone all\n");
+  ASSERT_EQ(::chmod(writable.c_str(), 0666), 0);
+  const std::vector<std::pair<std::string, std::string>> unusable{
+      {files.write("bad", "# x\nallow bob stop\n"),
+       "bad:2:7: \"bob\" stands where it must say who"},
+      {files.write("empty", ""), "empty:1:1: the policy has no line"},
+      {files.path() + "/none", "cannot open " + files.path() + "/none: No such file"},
+      {files.path(), "cannot read " + files.path() + ": Is a directory"},
+      {"/dev/zero", "/dev/zero:1:1: the file is larger than the limit of 16 MiB"},
+      {writable, "every user may write the policy " + writable + "; run: chmod o-w "}};
+  for (const auto& [path, message] : unusable) {
+    const auto result =
+        run_program({arbiterd_path(), "--instance", "unusable-policy", "--policy", path});
+    EXPECT_EQ(result.exit_code, 1) << path;
+    EXPECT_THAT(result.err, HasSubstr(message)) << path;
+  }
+}
+
+}  // namespace
+}  // namespace arbiter::test
