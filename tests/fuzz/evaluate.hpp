@@ -1,0 +1,42 @@
+// What a condition means, by the book: slow, and nothing of it shared with what is tested.
+#pragma once
+
+#include <algorithm>
+#include <set>
+#include <string>
+
+#include "rules/expression.hpp"
+
+namespace arbiter::fuzz {
+
+using Active = std::set<std::string>;
+
+// Of an expression without quantifiers.
+inline bool holds(const rules::Expression& expression, const Active& active) {
+  using rules::Operator;
+  const auto operand = [&](std::size_t i) { return holds(*expression.operands.at(i), active); };
+  const auto each = [&](const rules::ExpressionPtr& part) { return holds(*part, active); };
+  const auto& operands = expression.operands;
+  switch (expression.op) {
+    case Operator::kTrue:
+      return true;
+    case Operator::kSource:
+      return active.contains(expression.name);
+    case Operator::kNot:
+      return !operand(0);
+    case Operator::kAnd:
+      return std::all_of(operands.begin(), operands.end(), each);
+    case Operator::kOr:
+      return std::any_of(operands.begin(), operands.end(), each);
+    case Operator::kXor:
+      return operand(0) != operand(1);
+    case Operator::kImplies:
+      return !operand(0) || operand(1);
+    case Operator::kIff:
+      return operand(0) == operand(1);
+    default:
+      return false;
+  }
+}
+
+}  // namespace arbiter::fuzz
