@@ -128,6 +128,7 @@ void InputCore::accept_view() {
     queue.lane = free_lane();
     if (queue.lane == nullptr) continue;
     queue.lane->source.store(link.peer->source, std::memory_order_relaxed);
+    queue.lane->link.store(link.peer->link, std::memory_order_relaxed);
     queue.lane->consumed.store(0, std::memory_order_relaxed);
     queue.lane->taken.store(0, std::memory_order_relaxed);
     queue.lane->dropped.store(0, std::memory_order_relaxed);

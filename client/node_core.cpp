@@ -209,18 +209,24 @@ shm::Received NodeCore::converse(const shm::Message& question,
   bool said = false;
   shm::Message numbered = question;
   std::unique_lock lock(mutex_);
-  numbered.request = next_request_++;
-  Reply& reply = replies_[numbered.request];
+  const std::uint64_t request = numbered.request = next_request_++;
+  Reply& reply = replies_[request];
   reply.on_opened = std::move(on_opened);
   while (!reply.finished) {
     if (memory != nullptr && memory != memory_.get()) {
-      replies_.erase(numbered.request);
+      replies_.erase(request);
       throw MemoryIsNew();
     }
     if (standing_ == Standing::kMember && reply.asked_in != conversation_) {
-      // A port that another daemon has opened was handed back to this one.
-      if (reply.opened != 0) break;
       reply.asked_in = conversation_;
+      // A port that another daemon has opened was handed back to this one: what is left is to be
+      // connected.
+      if (reply.opened != 0) {
+        numbered = message_of(shm::MessageKind::kConnect);
+        numbered.request = request;
+        numbered.port = reply.opened;
+        descriptors = {-1, -1};
+      }
       // If it cannot be sent the conversation is over, and the next one asks again.
       static_cast<void>(shm::send_message(socket_->get(), numbered, descriptors));
     }
@@ -232,11 +238,11 @@ shm::Received NodeCore::converse(const shm::Message& question,
     if (wait_for_news(lock, until) || until < give_up) continue;
     if (reply.opened != 0) forget_port(reply.opened);
     const bool is_there = standing_ == Standing::kMember;
-    replies_.erase(numbered.request);
+    replies_.erase(request);
     throw Error(is_there ? "the daemon is there, but has not answered in time"
                          : nobody_answers(turned_away_));
   }
-  const auto answered = replies_.extract(numbered.request);
+  const auto answered = replies_.extract(request);
   if (!answered.mapped().refusal.empty()) throw Error(answered.mapped().refusal);
   return std::move(answered.mapped().received);
 }

@@ -141,7 +141,8 @@ Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanosec
 bool OutputCore::is_full(Destination& destination) const noexcept {
   const shm::InputSegment& segment = *destination.peer->segment;
   const auto is_ours = [&](const shm::Lane& lane) {
-    return lane.publisher.load(std::memory_order_acquire) == instance_;
+    return lane.publisher.load(std::memory_order_acquire) == instance_ &&
+           lane.link.load(std::memory_order_relaxed) == destination.link;
   };
   if (destination.lane == nullptr || !is_ours(*destination.lane)) {
     destination.lane = nullptr;

@@ -56,6 +56,7 @@ std::string port_name(const shm::Message& message) {
 bool is_question(shm::MessageKind kind) {
   using shm::MessageKind;
   return kind == MessageKind::kOpenOutput || kind == MessageKind::kOpenInput ||
+         kind == MessageKind::kConnect || kind == MessageKind::kReload ||
          kind == MessageKind::kStatus || kind == MessageKind::kDeactivate ||
          kind == MessageKind::kObserve;
 }
@@ -367,6 +368,10 @@ void Daemon::handle(Client& client, shm::Received& received) {
       break;
     case shm::MessageKind::kHandedBack:
       finish_return(client);
+      break;
+    case shm::MessageKind::kConnect:
+      if (client.ports.count(message.port) == 0) throw std::runtime_error("the port is not open");
+      connect(client, message.request, message.port);
       break;
     case shm::MessageKind::kReload:
       gate_.require(client, Action::kReload);

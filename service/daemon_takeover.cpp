@@ -98,12 +98,12 @@ void Daemon::add_absentee(const Owner& owner) {
 
 void Daemon::rejoin(Client& client, const shm::Received& hello) {
   if (phase_ == Phase::kExpecting) {
-    if (!(Realm{Identity::of(hello.descriptors[0]), Identity::of(hello.descriptors[1])} ==
+    if (!(Realm{FileIdentity::of(hello.descriptors[0]), FileIdentity::of(hello.descriptors[1])} ==
           predecessor_->realm)) {
       throw std::runtime_error("this daemon's predecessor had other memory");
     }
     inherit(hello.descriptors[0], hello.descriptors[1]);
-  } else if (!(Identity::of(hello.descriptors[0]) == Identity::of(models_.board()))) {
+  } else if (!(FileIdentity::of(hello.descriptors[0]) == FileIdentity::of(models_.board()))) {
     throw std::runtime_error(
         "this daemon does not know the ports of \"" + client.name +
         "\", which another daemon has opened; restart the component");
@@ -242,7 +242,7 @@ void Daemon::remember_components() {
   for (const auto& [node, absentee] : absentees_) {
     components.push_back({absentee.pid, start_of_process(absentee.pid)});
   }
-  state_.write({Identity::of(models_.board()), Identity::of(registry_.readable())}, components);
+  state_.write({FileIdentity::of(models_.board()), FileIdentity::of(registry_.readable())}, components);
 }
 
 void Daemon::remember_component(Client& client) {

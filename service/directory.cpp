@@ -80,7 +80,7 @@ void Directory::restore(std::uint64_t generation) {
 bool Directory::take_page(shm::SourceId id, const shm::FileDescriptor& page) {
   Source* source = source_by_id(id);
   if (source == nullptr || source->name.empty() ||
-      Identity::of(page).inode != registry_.source(id).page.load(std::memory_order_acquire)) {
+      FileIdentity::of(page).inode != registry_.source(id).page.load(std::memory_order_acquire)) {
     return false;
   }
   if (source->has_page()) return true;
@@ -118,7 +118,7 @@ Source& Directory::source(const std::string& name) {
   }
   // A page of its own: who had the old one open may still write there.
   make_page(*source);
-  registry_.name_source(source->id, name, Identity::of(source->writable).inode);
+  registry_.name_source(source->id, name, FileIdentity::of(source->writable).inode);
   if (stores_) {
     discard_stored(stored_name(source->id));
     store(stored_name(source->id), source->writable);

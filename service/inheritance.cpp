@@ -18,7 +18,7 @@
 
 namespace arbiter::service {
 
-Identity Identity::of(const shm::FileDescriptor& file) {
+FileIdentity FileIdentity::of(const shm::FileDescriptor& file) {
   struct stat status {};
   if (fstat(file.get(), &status) != 0) {
     throw std::system_error(errno, std::generic_category(), "looking at a segment");

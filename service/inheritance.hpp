@@ -18,18 +18,18 @@
 namespace arbiter::service {
 
 // Which file a descriptor is open on.
-struct Identity {
+struct FileIdentity {
   dev_t device = 0;
   ino_t inode = 0;
 
-  static Identity of(const shm::FileDescriptor& file);
-  friend bool operator==(const Identity&, const Identity&) = default;
+  static FileIdentity of(const shm::FileDescriptor& file);
+  friend bool operator==(const FileIdentity&, const FileIdentity&) = default;
 };
 
 // The board and the registry that the clients of an instance map.
 struct Realm {
-  Identity board;
-  Identity registry;
+  FileIdentity board;
+  FileIdentity registry;
   friend bool operator==(const Realm&, const Realm&) = default;
 };
 

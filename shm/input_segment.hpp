@@ -35,6 +35,7 @@ struct alignas(kCacheLine) Lane {
   Atomic<std::uint64_t> dropped;    // at the take, because the connection was not the winner then
   Atomic<std::uint64_t> overtaken;  // lost to newer ones because the queue was full
   Atomic<std::uint32_t> source;     // id, for status
+  Atomic<std::uint64_t> link;       // the number of the link that this is about
 };
 static_assert(sizeof(Lane) == kCacheLine);
 

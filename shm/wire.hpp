@@ -53,6 +53,7 @@ enum class MessageKind : std::uint32_t {
   kHandBackInput,      // port, id = port id, type; descriptors: its segment, its bell
   kHandBackLink,       // port, peer; link: its number, 0 if not connected
   kHandedBack,         // that was all
+  kConnect,  // port: opened by a daemon that has gone since; asks for the kConnected that is missing
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; descriptors: the board, the registry, read-only
