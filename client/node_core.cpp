@@ -274,8 +274,7 @@ std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const P
     question.type = core->type();
     converse(question, {core->segment_descriptor().get(), -1}, memory.get(),
              [&](shm::Received& opened) {
-               core->bind(opened.message.port, opened.message.id,
-                          std::move(opened.descriptors[0]));
+               core->bind(opened.message.port, opened.message.id, std::move(opened.descriptors[0]));
                outputs_[opened.message.port] = core;
              });
     return core;

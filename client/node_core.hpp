@@ -6,7 +6,8 @@
 //
 // Thread safety: opening and closing ports may come from any thread; what the daemon says is
 // handled by one thread at a time, the service thread, or whoever calls service() where there is
-// none. `mutex_` guards the registry, the replies and the socket; nothing on the data path takes it.
+// none. `mutex_` guards the registry, the replies and the socket; nothing on the data path takes
+// it.
 #pragma once
 
 #include <chrono>
@@ -126,7 +127,8 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::shared_ptr<const ServiceBell> service_bell_;
 
   std::mutex mutex_;
-  std::shared_ptr<SharedMemory> memory_;  // the service thread, which alone replaces it, needs no lock
+  std::shared_ptr<SharedMemory>
+      memory_;                    // the service thread, which alone replaces it, needs no lock
   std::condition_variable news_;  // an answer, or a change of standing
   std::mutex pump_mutex_;         // without a service thread: one caller at a time
   Socket socket_;                 // null while alone

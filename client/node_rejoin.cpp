@@ -1,7 +1,7 @@
 // Losing the daemon, and coming back to another.
 //
-// All that data needs to flow is mapped already, so for the ports nothing changes. The next daemon is
-// handed back the memory that the last one made, and told of each port and its links
+// All that data needs to flow is mapped already, so for the ports nothing changes. The next daemon
+// is handed back the memory that the last one made, and told of each port and its links
 // (service/daemon_takeover.cpp).
 #include <fcntl.h>
 #include <sys/epoll.h>

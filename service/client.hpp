@@ -58,13 +58,13 @@ class Client {
   // For messages to people: node "object-detector" (pid 4711).
   [[nodiscard]] std::string description() const;
 
-  std::string name;  // of the node; empty until it has said hello
-  NodeId node = 0;   // 0 until it has been welcomed
+  std::string name;             // of the node; empty until it has said hello
+  NodeId node = 0;              // 0 until it has been welcomed
   bool is_turned_away = false;  // what it says after that is not heard
   bool has_service_thread = false;
   bool is_component = false;  // has opened a port once
-  bool comes_back = false;  // if the conversation is lost: then its ports are kept for it
-  bool is_returning = false;                // and has not handed back all yet:
+  bool comes_back = false;    // if the conversation is lost: then its ports are kept for it
+  bool is_returning = false;  // and has not handed back all yet:
   std::set<shm::PortInstance> to_hand_back;  // these are missing
   bool observes = false;
   bool watches_queue = false;                       // the loop waits until it can be written
@@ -93,5 +93,13 @@ class Client {
   std::deque<std::unique_ptr<shm::Received>> ahead_;
   std::optional<shm::ReceiveResult> ahead_ended_;  // how the conversation ends after `ahead_`
 };
+
+// An answer to a client's question.
+inline shm::Message reply_to(std::uint64_t request, shm::MessageKind kind) {
+  shm::Message message;
+  message.kind = kind;
+  message.request = request;
+  return message;
+}
 
 }  // namespace arbiter::service

@@ -2,6 +2,11 @@
 // other.
 //
 // One thread, one epoll. It is off the data path: what it does slowly makes nobody publish slowly.
+//
+//   daemon.cpp           the loop, and clients that come and go
+//   daemon_requests.cpp  what they ask
+//   daemon_reload.cpp    another model, or policy
+//   daemon_takeover.cpp  what a predecessor has left
 #pragma once
 
 #include <map>
@@ -24,6 +29,9 @@
 #include "shm/rendezvous.hpp"
 
 namespace arbiter::service {
+
+// How long a component that does not run may hold up the opening of a port, or a new model.
+constexpr shm::Nanoseconds kMaxWaitForClients = 200'000'000;
 
 struct DaemonOptions {
   rules::ModelFiles files;
@@ -145,7 +153,7 @@ class Daemon {
   std::optional<Predecessor> predecessor_;
   shm::Nanoseconds started_ = 0;
   std::map<NodeId, Absentee> absentees_;
-  std::vector<ClientId> waiting_;     // have said hello, and are not welcomed yet
+  std::vector<ClientId> waiting_;  // have said hello, and are not welcomed yet
   std::vector<Postponed> postponed_;
   bool try_postponed_ = false;  // something has changed that they wait for
   shm::FileDescriptor epoll_;

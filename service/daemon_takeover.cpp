@@ -1,11 +1,11 @@
 // How a daemon takes over from its predecessor: what was killed, or stopped, while its components
 // went on.
 //
-// All that decides lives in memory that the components map: tables, activity, queues. The new daemon
-// takes up that very memory and its numbers, so that for the components nothing changes; then it puts
-// its own model in force by an ordinary swap. A component that is not back when it is time for that
-// (it is stopped, or its user services the node late) comes back when it likes; until then its ports
-// and names are kept for it, for as long as its process lives.
+// All that decides lives in memory that the components map: tables, activity, queues. The new
+// daemon takes up that very memory and its numbers, so that for the components nothing changes;
+// then it puts its own model in force by an ordinary swap. A component that is not back when it is
+// time for that (it is stopped, or its user services the node late) comes back when it likes; until
+// then its ports and names are kept for it, for as long as its process lives.
 #include <sys/epoll.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -104,9 +104,8 @@ void Daemon::rejoin(Client& client, const shm::Received& hello) {
     }
     inherit(hello.descriptors[0], hello.descriptors[1]);
   } else if (!(FileIdentity::of(hello.descriptors[0]) == FileIdentity::of(models_.board()))) {
-    throw std::runtime_error(
-        "this daemon does not know the ports of \"" + client.name +
-        "\", which another daemon has opened; restart the component");
+    throw std::runtime_error("this daemon does not know the ports of \"" + client.name +
+                             "\", which another daemon has opened; restart the component");
   }
   const NodeId node = hello.message.link;
   // The conversation that it gave up may not have been seen to end.
@@ -205,7 +204,8 @@ void Daemon::finish_takeover() {
   const bool is_fresh = phase_ != Phase::kTakingOver;
   remember_components();
   if (is_fresh) {
-    if (phase_ == Phase::kExpecting) log::warn("no component has handed back what the last daemon left");
+    if (phase_ == Phase::kExpecting)
+      log::warn("no component has handed back what the last daemon left");
     if (stores_) {
       discard_stored("board");
       discard_stored("registry");
@@ -242,7 +242,8 @@ void Daemon::remember_components() {
   for (const auto& [node, absentee] : absentees_) {
     components.push_back({absentee.pid, start_of_process(absentee.pid)});
   }
-  state_.write({FileIdentity::of(models_.board()), FileIdentity::of(registry_.readable())}, components);
+  state_.write({FileIdentity::of(models_.board()), FileIdentity::of(registry_.readable())},
+               components);
 }
 
 void Daemon::remember_component(Client& client) {
@@ -266,10 +267,10 @@ shm::Nanoseconds Daemon::takeover_deadline() const {
 
 void Daemon::advance_takeover(shm::Nanoseconds now) {
   if (phase_ == Phase::kServing) return;
-  const bool all_are_back =
-      phase_ == Phase::kTakingOver && absentees_.empty() &&
-      std::none_of(clients_.begin(), clients_.end(),
-                   [](const auto& each) { return each.second->is_returning; });
+  const bool all_are_back = phase_ == Phase::kTakingOver && absentees_.empty() &&
+                            std::none_of(clients_.begin(), clients_.end(), [](const auto& each) {
+                              return each.second->is_returning;
+                            });
   if (all_are_back || now >= takeover_deadline()) finish_takeover();
 }
 

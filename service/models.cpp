@@ -63,15 +63,15 @@ void Models::prepare() {
   std::vector<shm::Word> words;
   try {
     words = rules::flatten(compiled_, {[&](const std::string& name) {
-                                     Source& source = directory_.source(name);
-                                     source.used_by_generation = generation;
-                                     return source.id;
-                                   },
-                                   [&](const std::string& name) {
-                                     InputName& input = directory_.input(name);
-                                     input.used_by_generation = generation;
-                                     return input.id;
-                                   }});
+                                         Source& source = directory_.source(name);
+                                         source.used_by_generation = generation;
+                                         return source.id;
+                                       },
+                                       [&](const std::string& name) {
+                                         InputName& input = directory_.input(name);
+                                         input.used_by_generation = generation;
+                                         return input.id;
+                                       }});
   } catch (const std::length_error& error) {
     throw BadModel(error.what());
   }

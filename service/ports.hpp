@@ -14,8 +14,8 @@
 
 namespace arbiter::service {
 
-// Links that a component had when it was lost to a daemon, or its peer was: the peer, and the link's
-// number (0: not connected). They stand, in shared memory, until both ends are here again.
+// Links that a component had when it was lost to a daemon, or its peer was: the peer, and the
+// link's number (0: not connected). They stand, in shared memory, until both ends are here again.
 using Claims = std::map<shm::PortInstance, std::uint64_t>;
 
 struct OutputPort {

@@ -19,7 +19,8 @@ shm::Message message_to(shm::MessageKind kind, shm::PortInstance port, shm::Port
   return message;
 }
 
-// Takes a claim out: its number, 0 where it is not one of a connection, nothing where there is none.
+// Takes a claim out: its number, 0 where it is not one of a connection, nothing where there is
+// none.
 std::optional<std::uint64_t> take(Claims& claims, shm::PortInstance peer) {
   const auto found = claims.find(peer);
   if (found == claims.end()) return {};
@@ -46,8 +47,7 @@ void Switchboard::set_away(shm::PortInstance port) {
   if (name != nullptr) name->away = port;
 }
 
-OutputPort& Switchboard::readmit(std::unique_ptr<OutputPort> port, Client& client,
-                                 Source& source) {
+OutputPort& Switchboard::readmit(std::unique_ptr<OutputPort> port, Client& client, Source& source) {
   OutputPort& readmitted = *port;
   port->instance = source.away;
   insert(std::move(port), client, source);
@@ -106,7 +106,8 @@ void Switchboard::settle(OutputPort& output, InputPort& input) {
         message_to(shm::MessageKind::kDisconnected, output.instance, input.instance));
   }
   if (by_input) {
-    input.client->send(message_to(shm::MessageKind::kDisconnected, input.instance, output.instance));
+    input.client->send(
+        message_to(shm::MessageKind::kDisconnected, input.instance, output.instance));
   }
   // The publisher knows the port, and heeds what it holds.
   if (by_output) links_[{output.instance, input.instance}] = {LinkKind::kLapsed, 0, ""};

@@ -1,0 +1,311 @@
+// What clients ask of the daemon.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <string_view>
+
+#include "service/daemon.hpp"
+#include "service/log.hpp"
+#include "service/status.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::service {
+namespace {
+
+// How long a name is asked for in vain that a component has whose conversation is lost: it may be
+// dying.
+constexpr shm::Nanoseconds kMaxWaitForDeath = 100'000'000;
+
+// Logs and status are read by people and by programs: no name may break a line of theirs.
+bool is_printable(std::string_view name) {
+  return std::all_of(name.begin(), name.end(),
+                     [](char c) { return static_cast<unsigned char>(c) > ' ' && c != '\x7f'; });
+}
+
+std::string port_name(const shm::Message& message) {
+  const std::string_view name = message.name_view();
+  if (name.empty() || name[0] != '/') throw std::runtime_error("a port's name begins with '/'");
+  if (!is_printable(name)) throw std::runtime_error("a port's name has no white space");
+  return std::string(name);
+}
+
+// What is not said while components come back to a new daemon.
+bool is_question(shm::MessageKind kind) {
+  using shm::MessageKind;
+  return kind == MessageKind::kOpenOutput || kind == MessageKind::kOpenInput ||
+         kind == MessageKind::kConnect || kind == MessageKind::kReload ||
+         kind == MessageKind::kStatus || kind == MessageKind::kDeactivate ||
+         kind == MessageKind::kObserve;
+}
+
+}  // namespace
+
+void Daemon::handle(Client& client, shm::Received& received) {
+  const shm::Message& message = received.message;
+  if (client.is_turned_away) return;
+  if (client.node == 0 && message.kind != shm::MessageKind::kHello) {
+    throw std::runtime_error("a client must say hello first");
+  }
+  if (phase_ != Phase::kServing && is_question(message.kind)) {
+    throw NotYet("this daemon is taking over from another", shm::kForever);
+  }
+  switch (message.kind) {
+    case shm::MessageKind::kHello:
+      hello(client, received);
+      break;
+    case shm::MessageKind::kOpenOutput:
+      open_output(client, received);
+      break;
+    case shm::MessageKind::kOpenInput:
+      open_input(client, received);
+      break;
+    case shm::MessageKind::kClosePort:
+      close_port(client, message.port);
+      break;
+    case shm::MessageKind::kSynced:
+      barriers_.synced(client.id(), message.request);
+      break;
+    case shm::MessageKind::kStatus:
+      gate_.require(client, Action::kObserve);
+      send_status(client, message.request);
+      break;
+    case shm::MessageKind::kDeactivate:
+      deactivate(client, message);
+      break;
+    case shm::MessageKind::kObserve:
+      gate_.require(client, Action::kObserve);
+      client.observes = true;
+      switchboard_.show_everything(client);
+      client.send(reply_to(message.request, shm::MessageKind::kDone));
+      break;
+    case shm::MessageKind::kPeerRefused:
+      if (client.ports.count(message.port) != 0) {
+        switchboard_.refuse(message.port, message.peer, std::string(message.text_view()));
+      }
+      break;
+    case shm::MessageKind::kHandBackPage:
+      take_back_page(client, received);
+      break;
+    case shm::MessageKind::kHandBackOutput:
+      take_back_output(client, received);
+      break;
+    case shm::MessageKind::kHandBackInput:
+      take_back_input(client, received);
+      break;
+    case shm::MessageKind::kHandBackLink:
+      take_back_link(client, message);
+      break;
+    case shm::MessageKind::kHandedBack:
+      finish_return(client);
+      break;
+    case shm::MessageKind::kConnect:
+      if (client.ports.count(message.port) == 0) throw std::runtime_error("the port is not open");
+      connect(client, message.request, message.port);
+      break;
+    case shm::MessageKind::kReload:
+      gate_.require(client, Action::kReload);
+      reload(client.id(), message.request);
+      break;
+    case shm::MessageKind::kStop:
+      gate_.require(client, Action::kStop);
+      log::info("stopping: {} asks for it", client.description());
+      client.send(reply_to(message.request, shm::MessageKind::kDone));
+      stop_wanted_ = true;
+      break;
+    default:
+      throw std::runtime_error("an unknown kind of message");
+  }
+}
+
+void Daemon::require_room_for(const Client& newcomer) const {
+  std::size_t count = 0;
+  std::size_t of_the_user = 0;
+  for (const auto& [id, client] : clients_) {
+    if (client->node == 0) continue;
+    ++count;
+    if (client->user() == newcomer.user()) ++of_the_user;
+  }
+  const auto refuse = [](const char* what, std::uint32_t limit) {
+    throw std::length_error("limit-exceeded: there are " + std::to_string(limit) + " clients " +
+                            what + " already, the most there can be");
+  };
+  if (count >= shm::kMaxClients) refuse("(kMaxClients)", shm::kMaxClients);
+  if (of_the_user >= shm::kMaxClientsPerUser) {
+    refuse("of this user (kMaxClientsPerUser)", shm::kMaxClientsPerUser);
+  }
+}
+
+void Daemon::hello(Client& client, const shm::Received& received) {
+  const shm::Message& message = received.message;
+  if (!client.name.empty()) throw std::runtime_error("a client says hello once");
+  if (message.value != shm::kWireVersion) {
+    throw std::runtime_error("the client speaks version " + std::to_string(message.value) +
+                             ", this daemon version " + std::to_string(shm::kWireVersion));
+  }
+  if (message.name_view().empty() || !is_printable(message.name_view())) {
+    throw std::runtime_error("a client must have a name, without white space");
+  }
+  require_room_for(client);
+  client.name = message.name_view();
+  client.has_service_thread = (message.flags & shm::kHasServiceThread) != 0;
+  client.comes_back = (message.flags & shm::kComesBack) != 0;
+  if ((message.flags & shm::kRejoins) != 0) {
+    try {
+      rejoin(client, received);
+    } catch (...) {
+      client.is_turned_away = true;
+      throw;
+    }
+  } else if (phase_ == Phase::kServing) {
+    welcome(client);
+  } else {
+    waiting_.push_back(client.id());
+  }
+}
+
+void Daemon::welcome(Client& client) {
+  if (client.node == 0) client.node = registry_.next_node();
+  auto welcome = reply_to(0, shm::MessageKind::kWelcome);
+  welcome.link = client.node;
+  client.send(welcome, {models_.board().get(), registry_.readable().get()});
+  log::debug("{} is here", client.description());
+}
+
+void Daemon::require_free(const Client& asking, shm::PortInstance holder, const std::string& what) {
+  if (holder == 0) return;
+  Client* client = nullptr;
+  if (const auto* output = switchboard_.output(holder)) client = output->client;
+  if (const auto* input = switchboard_.input(holder)) client = input->client;
+  if (client == nullptr) return;
+  if (client != &asking) {
+    if (client->has_died()) {
+      drop(client->id());
+      return;
+    }
+    // What others sent earlier may come later, for each has a socket of its own.
+    client->read_ahead();
+    if (client->take_closing_of(holder)) {
+      switchboard_.remove(holder);
+      return;
+    }
+  }
+  throw std::runtime_error(what + " is held by " + client->description());
+}
+
+void Daemon::require_not_kept(shm::PortInstance holder, const std::string& what) {
+  for (const auto& [node, absentee] : absentees_) {
+    if (absentee.ports.count(holder) == 0) continue;
+    if (has_ended(absentee.process)) {
+      forget_absentee(node);
+      return;
+    }
+    throw NotYet(what + " is kept for process " + std::to_string(absentee.pid) +
+                     ", which lives but does not answer",
+                 shm::monotonic_now() + kMaxWaitForDeath);
+  }
+  for (const auto& [id, client] : clients_) {
+    if (client->to_hand_back.count(holder) != 0) {
+      throw NotYet(what + " is kept for " + client->description(),
+                   shm::monotonic_now() + kMaxWaitForDeath);
+    }
+  }
+}
+
+void Daemon::open_output(Client& client, shm::Received& received) {
+  const std::string name = port_name(received.message);
+  gate_.require(client, Action::kOutput, name);
+  auto port = adopt_output(received);
+  Source& source = directory_.source(name);
+  require_free(client, source.open, "the output port " + name);
+  require_not_kept(source.away, "the output port " + name);
+  remember_component(client);
+  const OutputPort& opened = switchboard_.add(std::move(port), client, source);
+  auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
+  reply.port = opened.instance;
+  reply.id = source.id;
+  client.send(reply, {source.writable.get(), -1});
+  log::info("{} opened output port {}", client.description(), name);
+  connect(client, received.message.request, opened.instance);
+}
+
+void Daemon::open_input(Client& client, shm::Received& received) {
+  const std::string name = port_name(received.message);
+  gate_.require(client, Action::kInput, name);
+  auto port = adopt_input(received);
+  InputName& input = directory_.input(name);
+  require_free(client, input.open, "the input port " + name);
+  require_not_kept(input.away, "the input port " + name);
+  remember_component(client);
+  const InputPort& opened = switchboard_.add(std::move(port), client, input);
+  auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
+  reply.port = opened.instance;
+  reply.id = input.id;
+  client.send(reply);
+  log::info("{} opened input port {}", client.description(), name);
+  connect(client, received.message.request, opened.instance);
+}
+
+// Introduces a new port to its peers, and tells its component once they know it.
+void Daemon::connect(Client& client, std::uint64_t request, shm::PortInstance port) {
+  auto told = switchboard_.link_one(models_.in_force().table, port);
+  told.erase(&client);  // hears of it in order, before the kConnected
+  for (const auto& [id, other] : clients_) {
+    if (other->observes) switchboard_.show_everything(*other);
+  }
+  barriers_.raise(told, shm::monotonic_now() + kMaxWaitForClients,
+                  [this, id = client.id(), request] {
+                    const auto found = clients_.find(id);
+                    if (found == clients_.end()) return;
+                    found->second->send(reply_to(request, shm::MessageKind::kConnected));
+                  });
+}
+
+void Daemon::close_port(Client& client, shm::PortInstance port) {
+  if (client.ports.count(port) == 0) return;
+  switchboard_.remove(port);
+}
+
+void Daemon::send_status(Client& client, std::uint64_t request) {
+  const std::string document = status_document(
+      {instance_, models_, directory_, switchboard_, clients_.size(), reloads_refused_},
+      shm::monotonic_now());
+  const auto file = shm::make_segment("arbiter-status", document.size());
+  if (pwrite(file.get(), document.data(), document.size(), 0) !=
+      static_cast<ssize_t>(document.size())) {
+    throw std::runtime_error("the status document could not be written");
+  }
+  client.send(reply_to(request, shm::MessageKind::kStatusReply),
+              {shm::reopen(file, O_RDONLY).get(), -1});
+}
+
+void Daemon::deactivate(Client& client, const shm::Message& message) {
+  const std::string name = port_name(message);
+  gate_.require(client, Action::kDeactivate, name);
+  Source* source = directory_.find_source(name);
+  if (source == nullptr) {
+    throw std::runtime_error("no model and no component has named the source " + name);
+  }
+  require_free(client, source->open, "the output port " + name);
+  require_not_kept(source->away, "the output port " + name);
+  if (!source->has_page()) throw std::runtime_error("nobody has the activity of " + name);
+  const shm::Nanoseconds now = shm::monotonic_now();
+  const bool was_active =
+      shm::is_active(source->activity().word.load(std::memory_order_relaxed), now);
+  source->activity().word.store(shm::deactivation(now), std::memory_order_relaxed);
+  shm::full_fence();  // (a): as a publisher's own deactivate()
+  switchboard_.ring_concerned(models_.in_force().table, source->id);
+  auto reply = reply_to(message.request, shm::MessageKind::kDone);
+  reply.value = was_active ? 1 : 0;
+  client.send(reply);
+  log::info("{} deactivated {}", client.description(), name);
+}
+
+void Daemon::refuse(Client& client, std::uint64_t request, const std::string& why) {
+  auto reply = reply_to(request, shm::MessageKind::kRefused);
+  reply.set_text(why);
+  client.send(reply);
+}
+
+}  // namespace arbiter::service
