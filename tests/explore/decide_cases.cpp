@@ -126,5 +126,34 @@ void swap_tables(const Explore& explore) {
 }
 const Register kSwap("OnceAModelIsInForceNothingIsTakenAgainstIt", {3, 2}, swap_tables);
 
+// So many models are loaded during one call that its table is overwritten: by one whose words, read
+// with the old table's, would let A win, which it does under none of them.
+Register overwrite_table(const char* name, std::function<void(Scene&)> call) {
+  return {name, {2, 0}, [=](const Explore& explore) {
+            explore_anew<Scene>(
+                explore,
+                [=](Scene& scene, Execution& execution) {
+                  scene.a().publish();
+                  scene.b().signal();
+                  execution.thread([&scene] {
+                    for (shm::Word i = 1; i < shm::kTableSlots; ++i) {
+                      scene.instance.prepare(forever().conjunction(kA, kPort, {}, {kB}));
+                      scene.instance.put_in_force();
+                    }
+                    scene.instance.prepare(forever().conjunction(kA, kPort, {}, {kC, kB}));
+                  });
+                  execution.thread([&scene, call] { call(scene); });
+                },
+                forever().conjunction(kA, kPort, {}, {kB}), depth(2),
+                std::initializer_list<SourceId>{kA});
+          }};
+}
+const Register kTakeTorn =
+    overwrite_table("ATakeIsNotDecidedByATableThatIsOverwritten",
+                    [](Scene& scene) { require(!scene.input->take(), "two tables were mixed"); });
+const Register kPublishTorn = overwrite_table(
+    "APublishIsNotDecidedByATableThatIsOverwritten",
+    [](Scene& scene) { require(scene.a().publish().delivered == 0, "two tables were mixed"); });
+
 }  // namespace
 }  // namespace arbiter::explore

@@ -39,6 +39,7 @@ Report Explorer::run(const Scenario& scenario) {
     // Which words are shared is learned on the way; the search begins again with each.
     if (learned_) {
       path_.clear();
+      report_.executions = 0;
       search_again = true;
     } else {
       search_again = next_path();

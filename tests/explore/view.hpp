@@ -13,7 +13,7 @@ namespace arbiter::explore {
 class View {
  public:
   static constexpr std::size_t kThreads = 4;
-  static constexpr std::size_t kMaxWords = 512;
+  static constexpr std::size_t kMaxWords = 1024;
 
   View() noexcept = default;
   View(const View& other) noexcept { *this = other; }
