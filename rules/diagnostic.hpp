@@ -59,15 +59,9 @@ class Diagnostics {
   [[nodiscard]] std::size_t dropped() const { return dropped_; }
 
  private:
+  // Control characters in the message are made visible.
   void add(Severity severity, std::string code, Location where, std::string message,
-           std::optional<Witness> witness) {
-    if (items_.size() == kMaxItems) {
-      ++dropped_;
-      return;
-    }
-    items_.push_back(
-        {severity, std::move(code), std::move(where), std::move(message), std::move(witness)});
-  }
+           std::optional<Witness> witness);
 
   std::vector<Diagnostic> items_;
   std::size_t dropped_ = 0;

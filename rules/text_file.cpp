@@ -34,14 +34,6 @@ class Descriptor {
   int fd_;
 };
 
-bool check_size(const TextFile& file, Diagnostics& diagnostics) {
-  if (file.content().size() <= kMaxFileBytes) return true;
-  diagnostics.error("limit-exceeded", file.locate(0),
-                    "the file is larger than the limit of " + std::to_string(kMaxFileBytes >> 20) +
-                        " MiB; split it into several files");
-  return false;
-}
-
 std::string in_hex(unsigned value) {
   static constexpr char kDigits[] = "0123456789abcdef";
   return {'0', 'x', kDigits[value >> 4 & 15], kDigits[value & 15]};
@@ -65,11 +57,11 @@ Location TextFile::locate(std::size_t offset) const {
   return {path_, line, static_cast<std::uint32_t>(offset - *(next - 1) + 1)};
 }
 
-std::string read_bytes(const std::string& path) {
+std::string read_bytes(const std::string& path, std::size_t limit) {
   const Descriptor file(path);
   std::string content;
   std::array<char, 65536> buffer;
-  while (content.size() <= kMaxFileBytes) {
+  while (content.size() <= limit) {
     const ssize_t count = ::read(file.get(), buffer.data(), buffer.size());
     if (count == 0) break;
     if (count > 0) {
@@ -81,8 +73,16 @@ std::string read_bytes(const std::string& path) {
   return content;
 }
 
+bool check_size(const TextFile& file, std::size_t limit, Diagnostics& diagnostics) {
+  if (file.content().size() <= limit) return true;
+  diagnostics.error("limit-exceeded", file.locate(0),
+                    "the file is larger than the limit of " + std::to_string(limit >> 20) +
+                        " MiB; split it into several files");
+  return false;
+}
+
 bool check_characters(const TextFile& file, Diagnostics& diagnostics) {
-  if (!check_size(file, diagnostics)) return false;
+  if (!check_size(file, kMaxFileBytes, diagnostics)) return false;
   const std::string_view content = file.content();
   for (std::size_t i = 0; i < content.size();) {
     const Utf8Character character = decode_utf8(content.substr(i));
@@ -104,7 +104,7 @@ bool check_characters(const TextFile& file, Diagnostics& diagnostics) {
 }
 
 bool check_readable(const TextFile& file, Diagnostics& diagnostics) {
-  if (!check_size(file, diagnostics)) return false;
+  if (!check_size(file, kMaxFileBytes, diagnostics)) return false;
   const std::size_t nul = file.content().find('\0');
   if (nul == std::string_view::npos) return true;
   diagnostics.error("invalid-character", file.locate(nul),

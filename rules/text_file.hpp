@@ -36,9 +36,12 @@ class TextFile {
   std::vector<std::size_t> line_starts_;
 };
 
-// The whole of a file, but not much more than kMaxFileBytes of it: a device may have no end.
-// Throws FileError.
-std::string read_bytes(const std::string& path);
+// The whole of a file, but not much more than `limit` bytes of it: a device or a pipe may have no
+// end. Throws FileError.
+std::string read_bytes(const std::string& path, std::size_t limit = kMaxFileBytes);
+
+// Reports a file that is larger than the limit, and returns false.
+bool check_size(const TextFile& file, std::size_t limit, Diagnostics& diagnostics);
 
 // Whether a model may consist of these bytes: UTF-8 within the limit, without control characters
 // (some of which end a file early in a careless reader). Reports the first place where it may not.

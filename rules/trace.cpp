@@ -1,16 +1,11 @@
 #include "rules/trace.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
-#include <cstring>
-#include <fstream>
 #include <optional>
-#include <sstream>
 #include <utility>
 
 #include "rules/csv.hpp"
-#include "rules/load.hpp"
 #include "rules/names.hpp"
 
 namespace arbiter::rules {
@@ -45,8 +40,14 @@ void TraceParser::error(const char* code, const CsvField& field, std::string mes
 
 std::vector<TraceEvent> TraceParser::parse() {
   std::vector<TraceEvent> events;
-  if (!read_header()) return events;
+  if (!check_size(file_, kMaxTraceBytes, diagnostics_) || !read_header()) return events;
   while (const auto record = records_.next()) {
+    if (events.size() == kMaxTraceEvents) {
+      error("limit-exceeded", record->front(),
+            "the trace has more events than the limit of " + std::to_string(kMaxTraceEvents) +
+                "; split it into several");
+      break;
+    }
     if (auto event = read_event(*record)) events.push_back(std::move(*event));
   }
   return events;
@@ -133,18 +134,6 @@ std::optional<TraceKind> TraceParser::read_kind(const CsvRecord& record) {
   return TraceKind::kDeactivation;
 }
 
-// Traces may be much longer than models, so the limit of read_bytes() is not for them.
-std::string read_all(const std::string& path) {
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream content;
-  if (file && file.peek() != std::ifstream::traits_type::eof()) content << file.rdbuf();
-  if (!file.is_open() || file.bad() || (file.fail() && !file.eof())) {
-    throw FileError("cannot read " + path + ": " + std::strerror(errno != 0 ? errno : EIO));
-  }
-  return std::move(content).str();
-}
-
 }  // namespace
 
 std::vector<TraceEvent> parse_trace(const TextFile& file, Diagnostics& diagnostics) {
@@ -152,7 +141,7 @@ std::vector<TraceEvent> parse_trace(const TextFile& file, Diagnostics& diagnosti
 }
 
 std::vector<TraceEvent> read_trace(const std::string& path, Diagnostics& diagnostics) {
-  const TextFile file(path, read_all(path));
+  const TextFile file(path, read_bytes(path, kMaxTraceBytes));
   return parse_trace(file, diagnostics);
 }
 

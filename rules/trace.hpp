@@ -1,6 +1,7 @@
 // A trace: what arrived when, as CSV with the header t_ns,source or t_ns,source,event.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -10,6 +11,10 @@
 #include "shm/activity.hpp"
 
 namespace arbiter::rules {
+
+// A trace may be longer than a model, but is read as a whole.
+inline constexpr std::size_t kMaxTraceBytes = 64u << 20;
+inline constexpr std::size_t kMaxTraceEvents = 4u << 20;
 
 enum class TraceKind : std::uint8_t {
   kArrival,
