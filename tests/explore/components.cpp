@@ -78,6 +78,15 @@ std::uint64_t Input::taken_of_all() const {
   return std::accumulate(std::begin(taken), std::end(taken), std::uint64_t{0});
 }
 
+namespace {
+
+// A segment's descriptor is but a number here (kernel.cpp), which several may have.
+shm::FileDescriptor alias(const shm::FileDescriptor& segment) {
+  return shm::FileDescriptor(segment.get());
+}
+
+}  // namespace
+
 Instance::Instance(const test::TableBuilder& model)
     : board_(shm::make_segment("board", sizeof(shm::Board))),
       board_mapping_(board_, sizeof(shm::Board), shm::Access::kReadWrite) {
@@ -91,9 +100,10 @@ Instance::Instance(const test::TableBuilder& model)
 }
 
 std::shared_ptr<detail::SharedMemory> Instance::make_memory() {
-  auto memory = std::make_shared<detail::SharedMemory>(board_);
+  auto memory = std::make_shared<detail::SharedMemory>(
+      alias(board_), shm::FileDescriptor(), std::make_shared<const detail::ServiceBell>());
   for (SourceId id = 0; id < kSources; ++id) {
-    memory->add_page(id, std::string(1, static_cast<char>('A' + id)), pages_[id]);
+    memory->add_page(id, std::string(1, static_cast<char>('A' + id)), alias(pages_[id]));
   }
   return memory;
 }
@@ -113,7 +123,7 @@ std::unique_ptr<Output> Instance::make_output(std::uint32_t slots) {
 }
 
 void Instance::bind(Output& output, SourceId source) {
-  output.core->bind(next_instance_++, source, pages_[source]);
+  output.core->bind(next_instance_++, source, alias(pages_[source]));
 }
 
 std::unique_ptr<Input> Instance::make_input(shm::PortId port, const InputPortOptions& options) {
