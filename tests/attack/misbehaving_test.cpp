@@ -41,9 +41,13 @@ TEST(AMisbehavingPublisher, IsNamed) {
 
 TEST(AMisbehavingReceiver, IsNamed) {
   Prey prey;
-  auto& lane = prey.attackers_input->lanes[0];
-  lane.consumed = 1'000'000'000;
-  lane.publisher = prey.preys_output;
+  // Of whichever number the link between them is.
+  for (std::uint64_t number = 0; number < 16; ++number) {
+    auto& lane = prey.attackers_input->lanes[number];
+    lane.link = number;
+    lane.consumed = 1'000'000'000;
+    lane.publisher = prey.preys_output;
+  }
   EXPECT_EQ(prey.out().publish(1).delivered, 1u);
   const std::string why = complaint(prey, "/prey:o", "/attacker:i");
   EXPECT_NE(why.find("the input port misbehaves"), std::string::npos) << why;
