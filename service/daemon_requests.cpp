@@ -149,6 +149,7 @@ void Daemon::hello(Client& client, const shm::Received& received) {
   }
   require_room_for(client);
   client.name = message.name_view();
+  client.hello_request = message.request;
   client.has_service_thread = (message.flags & shm::kHasServiceThread) != 0;
   client.comes_back = (message.flags & shm::kComesBack) != 0;
   if ((message.flags & shm::kRejoins) != 0) {
@@ -167,7 +168,7 @@ void Daemon::hello(Client& client, const shm::Received& received) {
 
 void Daemon::welcome(Client& client) {
   if (client.node == 0) client.node = registry_.next_node();
-  auto welcome = reply_to(0, shm::MessageKind::kWelcome);
+  auto welcome = reply_to(client.hello_request, shm::MessageKind::kWelcome);
   welcome.link = client.node;
   client.send(welcome, {models_.board().get(), registry_.readable().get()});
   log::debug("{} is here", client.description());
