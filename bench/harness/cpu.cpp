@@ -1,0 +1,56 @@
+#include "bench/harness/cpu.hpp"
+
+#include <sched.h>
+
+#include <cerrno>
+#include <system_error>
+
+namespace arbiter::bench {
+namespace {
+
+int try_fifo(int priority) {
+  sched_param parameters{};
+  parameters.sched_priority = priority;
+  return ::sched_setscheduler(0, priority == 0 ? SCHED_OTHER : SCHED_FIFO, &parameters);
+}
+
+}  // namespace
+
+std::vector<int> processors() {
+  static const std::vector<int> allowed = [] {
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    std::vector<int> found;
+    if (::sched_getaffinity(0, sizeof set, &set) != 0) return found;
+    for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+      if (CPU_ISSET(cpu, &set)) found.push_back(cpu);
+    }
+    return found;
+  }();
+  return allowed;
+}
+
+void pin(int n) {
+  const std::vector<int> all = processors();
+  if (all.empty()) return;
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  CPU_SET(all[static_cast<std::size_t>(n) % all.size()], &set);
+  if (::sched_setaffinity(0, sizeof set, &set) != 0) {
+    throw std::system_error(errno, std::generic_category(), "sched_setaffinity");
+  }
+}
+
+bool may_use_fifo() {
+  if (try_fifo(1) != 0) return false;
+  try_fifo(0);
+  return true;
+}
+
+void use_fifo(int priority) {
+  if (try_fifo(priority) != 0) {
+    throw std::system_error(errno, std::generic_category(), "SCHED_FIFO");
+  }
+}
+
+}  // namespace arbiter::bench

@@ -1,0 +1,70 @@
+// What was measured, as it is written to report.json and drawn in report.html.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "bench/harness/histogram.hpp"
+
+namespace arbiter::bench {
+
+enum class Role {
+  kOurs,
+  kPeer,   // what one would use instead
+  kFloor,  // what the machine does without anybody's help: nothing of the kind can be faster
+};
+
+// Of one system in one case.
+struct Result {
+  std::string system;
+  Role role = Role::kOurs;
+  Histogram ns;                   // durations; empty where it is `value` that was measured
+  std::optional<double> value{};  // in the measure's unit
+  std::string note{};             // why there is no result, or what to know about it
+};
+
+// The systems side by side under the same circumstances.
+struct Case {
+  std::string name;           // "64 B, spinning"
+  std::optional<double> x{};  // where the cases of a measure form a curve: bytes, sources, ...
+  std::vector<Result> results{};
+
+  [[nodiscard]] const Result* find(const std::string& system) const;
+};
+
+struct Measure {
+  std::string name;         // "delivery": for --only, and in the JSON
+  std::string title;        // "One-way delivery"
+  std::string explanation;  // what exactly was measured, in a sentence or two
+  std::string unit = "ns";  // of values
+  std::string x_label{};    // "bytes"
+  std::vector<Case> cases{};
+
+  [[nodiscard]] const Case* find(const std::string& name) const;
+};
+
+// Something that the project has promised, and whether it held in this run.
+struct Verdict {
+  std::string name;  // "64 B spinning, p50, to iceoryx"
+  double limit = 0;
+  std::optional<double> measured{};  // empty: could not be measured
+  std::string unit{};                // "x" for ratios
+
+  [[nodiscard]] bool is_met() const { return measured && *measured <= limit; }
+};
+
+struct Report {
+  bool quick = false;
+  nlohmann::json machine;             // machine.hpp
+  std::vector<std::string> warnings;  // what may have spoilt the figures
+  std::vector<Measure> measures;
+  std::vector<Verdict> targets;
+
+  [[nodiscard]] const Measure* find(const std::string& name) const;
+  [[nodiscard]] nlohmann::json json() const;
+};
+
+}  // namespace arbiter::bench
