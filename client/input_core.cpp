@@ -7,6 +7,11 @@
 #include "client/count.hpp"
 
 namespace arbiter::detail {
+namespace {
+
+const shm::Atomic<std::uint64_t> kNothingSeen{0};
+
+}  // namespace
 
 InputCore::InputCore(std::string name, const shm::TypeInfo& type, const InputPortOptions& options,
                      std::shared_ptr<SharedMemory> memory)
@@ -137,6 +142,10 @@ void InputCore::accept_view() {
     queue.lane->publisher.store(link.peer->instance, std::memory_order_release);
     queues_.push_back(std::move(queue));
   }
+  // Nothing is known of them yet: no word says so.
+  watches_.assign(queues_.size(), {&kNothingSeen, 1});
+  waiting_.clear();
+  waiting_.reserve(queues_.size());
   handover_.retire(std::exchange(view_, std::move(view)));
   memory_->service_bell().ring();  // to dispose of the old one
   bound_generation_ = UINT64_MAX;
@@ -163,21 +172,19 @@ void InputCore::retire_queue(Queue& queue) {
   queue.lane = nullptr;
 }
 
-void InputCore::bind_rules(const shm::TableSnapshot& snapshot) {
-  snapshot_ = snapshot;
-  bound_generation_ = snapshot.generation;
-  const shm::TableView& table = snapshot.table;
+void InputCore::bind_rules() {
+  bound_pages_ = memory_->pages().changes();
+  snapshot_ = memory_->tables().snapshot();
+  bound_generation_ = snapshot_.generation;
+  const shm::TableView& table = snapshot_.table;
   rules_.clear();
   sources_.clear();
-  for (Queue& queue : queues_) queue.rule = {};
   const auto range = table.connections_to(port_);
   for (auto index = range.first; index != range.first + range.count; ++index) {
     rules_.push_back(table.rule(index));
     sources_.push_back(rules_.back().source);
-    for (Queue& queue : queues_) {
-      if (queue.peer->source == rules_.back().source) queue.rule = rules_.back();
-    }
   }
+  bind_queues();
   const shm::WordList read = table.sources_read(port_);
   for (shm::Word i = 0; i < read.count && i < shm::kMaxSourcesPerPort; ++i) {
     sources_.push_back(read[i]);
@@ -187,10 +194,29 @@ void InputCore::bind_rules(const shm::TableSnapshot& snapshot) {
   picture_.resize(sources_.size());
 }
 
+void InputCore::bind_queues() {
+  const auto rule_of = [&](const Queue& queue) {
+    const auto found = std::find_if(rules_.begin(), rules_.end(), [&](const shm::Rule& rule) {
+      return rule.source == queue.peer->source;
+    });
+    return found == rules_.end() ? shm::Rule{} : *found;
+  };
+  std::size_t reads = 0;
+  for (const Queue& queue : queues_) reads += shm::BoundRule::reads_of(rule_of(queue));
+  reads_.resize(std::max(reads_.size(), reads));
+  shm::Read* next = reads_.data();
+  for (Queue& queue : queues_) {
+    const shm::Rule rule = rule_of(queue);
+    queue.rule.bind(rule, memory_->pages(), next, false);
+    next += shm::BoundRule::reads_of(rule);
+  }
+}
+
 void InputCore::refresh() {
   if (handover_.has_offer()) accept_view();
-  if (memory_->tables().generation() != bound_generation_) {
-    bind_rules(memory_->tables().snapshot());
+  if (memory_->tables().generation() != bound_generation_ ||
+      memory_->pages().changes() != bound_pages_) {
+    bind_rules();
   }
 }
 

@@ -76,7 +76,7 @@ class InputCore {
     bool gone = false;
     shm::ChannelReader reader;
     shm::Lane* lane = nullptr;
-    shm::Rule rule;  // of the connection, under snapshot_
+    shm::BoundRule rule;  // of the connection, under snapshot_
     // Of the take under way.
     shm::Entry head = 0;
     shm::Nanoseconds head_stamp = 0;
@@ -88,17 +88,21 @@ class InputCore {
   void accept_view();
   shm::Lane* free_lane() noexcept;
   void retire_queue(Queue& queue);
-  void bind_rules(const shm::TableSnapshot& snapshot);
+  void bind_rules();
+  void bind_queues();
   void refresh();
 
   // take() in parts: look at the queues, decide, hold.
+  [[nodiscard]] bool nothing_is_new() const noexcept;
   Queue* look() noexcept;
   Queue* scan(bool& again) noexcept;
   bool look_at(Queue& queue) noexcept;
+  bool look_closely(Queue& queue) noexcept;
   void join(Queue& queue) noexcept;
   void yield_to_successor(Queue& queue) noexcept;
-  enum class Choice : std::uint8_t { kTake, kNothing, kAgain };
+  enum class Choice : std::uint8_t { kTake, kNothing, kAgain, kLoses };
   Choice choose(Queue*& oldest) noexcept;
+  Choice decide_alone(Queue& queue) noexcept;
   Choice choose_among_all(Queue*& chosen) noexcept;
   bool decide_all() noexcept;
   void drop_losers(const Queue* winner) noexcept;
@@ -138,9 +142,13 @@ class InputCore {
   // Port's thread.
   std::unique_ptr<InputView> view_;
   std::vector<Queue> queues_;
+  std::vector<shm::ChannelReader::Watch> watches_;  // by queue: what says that nothing is new
+  std::vector<Queue*> waiting_;  // those in which the take under way found a head
   shm::TableSnapshot snapshot_;
   std::uint64_t bound_generation_ = UINT64_MAX;
+  std::uint64_t bound_pages_ = 0;
   std::vector<shm::Rule> rules_;            // of all connections to the port, in document order
+  std::vector<shm::Read> reads_;            // what the queues' rules have bound
   std::vector<shm::SourceId> sources_;      // those that the rules and connections name
   std::vector<shm::SeenActivity> picture_;  // scratch, parallel to sources_
   shm::Nanoseconds last_reading_ = 0;       // of the clock, by this port

@@ -25,6 +25,7 @@ constexpr int kMaxPeeks = 64;
 }  // namespace
 
 HeldSample InputCore::take() {
+  if (!epoll_ && nothing_is_new()) return {};
   HeldSample sample = take_once();
   if (sample.data == nullptr && epoll_) arm_descriptor(sample);
   return sample;
@@ -51,6 +52,14 @@ HeldSample InputCore::take_once() {
   return sample;
 }
 
+// Since the last take has found nothing.
+bool InputCore::nothing_is_new() const noexcept {
+  if (handover_.has_offer()) return false;
+  bool unchanged = true;
+  for (const auto& watch : watches_) unchanged = watch.is_unchanged() && unchanged;
+  return unchanged;
+}
+
 // The queue with the oldest head, or null if nothing waits.
 InputCore::Queue* InputCore::look() noexcept {
   Queue* oldest = nullptr;
@@ -64,11 +73,14 @@ InputCore::Queue* InputCore::look() noexcept {
 // looked at.
 InputCore::Queue* InputCore::scan(bool& again) noexcept {
   again = false;
+  for (Queue* const queue : waiting_) queue->head = 0;
+  waiting_.clear();
   Queue* oldest = nullptr;
   std::size_t found = 0;  // the queues before this one come before the last find
   for (std::size_t i = 0; i < queues_.size(); ++i) {
     Queue& queue = queues_[i];
     if (!look_at(queue)) continue;
+    waiting_.push_back(&queue);
     found = i;
     if (oldest == nullptr) {
       oldest = &queue;
@@ -82,7 +94,9 @@ InputCore::Queue* InputCore::scan(bool& again) noexcept {
     if (queue.head_stamp < oldest->head_stamp) oldest = &queue;
   }
   for (std::size_t i = 0; i < found && !again; ++i) {
-    again = queues_[i].head == 0 && look_at(queues_[i]);
+    if (queues_[i].head != 0 || !look_at(queues_[i])) continue;
+    queues_[i].head = 0;  // for the next scan to find
+    again = true;
   }
   return oldest;
 }
@@ -94,6 +108,15 @@ void InputCore::join(Queue& queue) noexcept {
 }
 
 bool InputCore::look_at(Queue& queue) noexcept {
+  shm::ChannelReader::Watch& watch = watches_[static_cast<std::size_t>(&queue - queues_.data())];
+  if (watch.is_unchanged()) return false;
+  if (look_closely(queue)) return true;
+  // Of a publisher that is gone, what there is to do depends on its successor too.
+  if (!queue.gone) watch = queue.reader.watch();
+  return false;
+}
+
+bool InputCore::look_closely(Queue& queue) noexcept {
   using State = shm::ChannelReader::State;
   queue.head = 0;
   queue.head_stamp = 0;
@@ -141,31 +164,35 @@ void InputCore::yield_to_successor(Queue& queue) noexcept {
 }
 
 InputCore::Choice InputCore::choose(Queue*& oldest) noexcept {
-  bool others = false;
-  for (Queue& queue : queues_) {
-    queue.end = queue.head == 0 ? 0 : queue.reader.backlog_end();
-    others = others || (queue.head != 0 && &queue != oldest);
-  }
+  Choice choice = decide_alone(*oldest);
+  if (choice != Choice::kLoses) return choice;
+  // What a decision drops was there before it. So it is taken again, now that the ends are known: a
+  // winner's take need not know them, and saves itself the publisher's cache line.
+  for (Queue* const queue : waiting_) queue->end = queue->reader.backlog_end();
+  if (waiting_.size() > 1) return choose_among_all(oldest);
+  choice = decide_alone(*oldest);
+  if (choice != Choice::kLoses) return choice;
+  drop_losers(nullptr);
+  return Choice::kNothing;
+}
+
+InputCore::Choice InputCore::decide_alone(Queue& queue) noexcept {
   shm::DecisionClock clock(last_reading_, false);
-  shm::Decider decider(snapshot_.table, memory_->pages(), clock);
-  const shm::Verdict verdict = decider.decide(oldest->rule);
+  queue.verdict = queue.rule.decide(snapshot_.table, clock);
   last_reading_ = clock.reading();
   if (!memory_->tables().is_whole(snapshot_)) return Choice::kAgain;
-  switch (verdict) {
+  switch (queue.verdict) {
     case shm::Verdict::kWins:
       return Choice::kTake;
+    case shm::Verdict::kLoses:
+      return Choice::kLoses;
     case shm::Verdict::kBlind:
       count(segment_->header.counters.blind);
       return Choice::kNothing;
     case shm::Verdict::kUnsettled:
       count(segment_->header.counters.unsettled);
       return Choice::kNothing;
-    case shm::Verdict::kLoses:
-      break;
   }
-  if (others) return choose_among_all(oldest);
-  oldest->verdict = verdict;
-  drop_losers(nullptr);
   return Choice::kNothing;
 }
 
@@ -175,14 +202,13 @@ InputCore::Choice InputCore::choose(Queue*& oldest) noexcept {
 InputCore::Choice InputCore::choose_among_all(Queue*& chosen) noexcept {
   if (!decide_all()) return Choice::kAgain;
   chosen = nullptr;
-  for (Queue& queue : queues_) {
-    if (queue.head == 0) continue;
-    if (queue.verdict == shm::Verdict::kBlind) {
+  for (Queue* const queue : waiting_) {
+    if (queue->verdict == shm::Verdict::kBlind) {
       count(segment_->header.counters.blind);
       return Choice::kNothing;
     }
-    if (queue.verdict != shm::Verdict::kWins) continue;
-    if (chosen == nullptr || queue.head_stamp < chosen->head_stamp) chosen = &queue;
+    if (queue->verdict != shm::Verdict::kWins) continue;
+    if (chosen == nullptr || queue->head_stamp < chosen->head_stamp) chosen = queue;
   }
   drop_losers(chosen);
   return chosen == nullptr ? Choice::kNothing : Choice::kTake;
@@ -196,14 +222,12 @@ bool InputCore::decide_all() noexcept {
   std::transform(sources_.begin(), sources_.end(), picture_.begin(), look_at_source);
   const shm::Nanoseconds now = shm::monotonic_now();
   // The time does not pass: the picture was begun before it, and is seen to stand after it.
-  shm::FixedClock clock(now);
-  shm::Decider decider(snapshot_.table, memory_->pages(), clock);
-  for (Queue& queue : queues_) {
-    if (queue.head == 0) continue;
-    queue.verdict = decider.decide(queue.rule);
-    if (queue.verdict == shm::Verdict::kUnsettled) return false;
-  }
   last_reading_ = now;
+  shm::FixedClock clock(now);
+  for (Queue* const queue : waiting_) {
+    queue->verdict = queue->rule.decide(snapshot_.table, clock);
+    if (queue->verdict == shm::Verdict::kUnsettled) return false;
+  }
   const bool stands =
       std::equal(sources_.begin(), sources_.end(), picture_.begin(),
                  [&](shm::SourceId source, const shm::SeenActivity& seen) {
@@ -215,8 +239,9 @@ bool InputCore::decide_all() noexcept {
 // Drops what waited in losing queues before the decision and is older than the sample that is
 // taken.
 void InputCore::drop_losers(const Queue* winner) noexcept {
-  for (Queue& queue : queues_) {
-    if (queue.head == 0 || queue.verdict != shm::Verdict::kLoses) continue;
+  for (Queue* const waiting : waiting_) {
+    Queue& queue = *waiting;
+    if (queue.verdict != shm::Verdict::kLoses) continue;
     const auto waits = [&] { return queue.reader.backlog(queue.end) != 0; };
     // Each step passes one of them at least: dropped here, or overtaken.
     for (auto left = queue.reader.backlog(queue.end); left != 0 && waits(); --left) {

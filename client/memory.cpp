@@ -8,7 +8,8 @@ namespace arbiter::detail {
 SharedMemory::SharedMemory(shm::FileDescriptor board, shm::FileDescriptor registry,
                            std::shared_ptr<const ServiceBell> service_bell)
     : service_bell_(std::move(service_bell)),
-      board_descriptor_(std::move(board)), registry_(std::move(registry)) {
+      board_descriptor_(std::move(board)),
+      registry_(std::move(registry)) {
   const std::size_t size = shm::checked_size(board_descriptor_, shm::Seals::kFixedSize);
   if (size != sizeof(shm::Board)) throw std::runtime_error("the daemon's board has another size");
   board_ = shm::Mapping(board_descriptor_, size, shm::Access::kReadOnly);
@@ -30,7 +31,7 @@ void SharedMemory::add_page(shm::SourceId id, std::string name, shm::FileDescrip
     names_[id] = std::move(name);
   }
   mappings_.emplace_back(page, sizeof(shm::ActivityPage), shm::Access::kReadOnly);
-  pages_->attach(id, &mappings_.back().as<const shm::ActivityPage>()->activity);
+  pages_->attach(id, &mappings_.back().as<const shm::ActivityPage>()->of(id));
   if (page_descriptors_.size() < kMaxPageDescriptors || page_descriptors_.count(id) != 0) {
     page_descriptors_[id] = std::move(page);
   }

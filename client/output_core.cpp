@@ -58,7 +58,7 @@ void OutputCore::bind(shm::PortInstance instance, shm::SourceId source, shm::Fil
     throw std::runtime_error("the activity page has another size");
   }
   page_ = shm::Mapping(page, sizeof(shm::ActivityPage), shm::Access::kReadWrite);
-  activity_ = &page_.as<shm::ActivityPage>()->activity;
+  activity_ = &page_.as<shm::ActivityPage>()->of(source);
   own_word_ = activity_->word.load(std::memory_order_relaxed);  // a predecessor's: it carries on
   page_descriptor_ = std::move(page);
   instance_ = instance;
@@ -125,9 +125,8 @@ void OutputCore::assign_channel(InputLink& link) {
   if (used == UINT64_MAX) return;  // until one is free: offer_view() tries again
   link.channel = static_cast<std::uint32_t>(__builtin_ctzll(~used));
   link.depth = 0;  // for allocate_slots() to say
-  const std::size_t ring = sizeof(shm::Atomic<shm::Entry>) * shm::kMaxDepth;
-  const auto offset = segment_.layout().rings_offset + ring * link.channel;
-  if (const auto error = shm::allocate(descriptor_, offset, ring)) {
+  const auto offset = segment_.layout().rings_offset + shm::kRingBytes * link.channel;
+  if (const auto error = shm::allocate(descriptor_, offset, shm::kRingBytes)) {
     throw std::system_error(error, "allocating a queue");
   }
 }
@@ -192,6 +191,7 @@ void OutputCore::accept_view() noexcept {
   pool_.grow(view->slots);
   std::vector<Destination> destinations;
   destinations.reserve(view->links.size());
+  decisions_.reserve(view->links.size());
   for (const InputLink& link : view->links) {
     Destination destination;
     for (const Destination& old : destinations_) {
@@ -232,17 +232,44 @@ void OutputCore::leave_all_but(const OutputView& view) noexcept {
   }
 }
 
+bool OutputCore::rules_are_bound() const noexcept {
+  return memory_->tables().generation() == bound_generation_ &&
+         memory_->pages().changes() == bound_pages_;
+}
+
 // Again where seven models were loaded meanwhile, for T is used before a decision checks the table.
 void OutputCore::bind_rules() noexcept {
   for (int tries = 0; tries <= kMaxTableRetries; ++tries) {
+    bound_pages_ = memory_->pages().changes();
     snapshot_ = memory_->tables().snapshot();
     bound_generation_ = snapshot_.generation;
     timeout_ = snapshot_.table.timeout(source_);
-    for (Destination& destination : destinations_) {
-      const auto index = snapshot_.table.find(source_, destination.peer->port);
-      destination.rule = snapshot_.table.rule(index);
-    }
+    bind_decisions();
     if (memory_->tables().is_whole(snapshot_)) return;
+  }
+}
+
+void OutputCore::bind_decisions() noexcept {
+  decisions_.clear();
+  std::size_t reads = 0;
+  for (Destination& destination : destinations_) {
+    if (!destination.joined) continue;
+    const shm::TableView& table = snapshot_.table;
+    const shm::Rule rule = table.rule(table.find(source_, destination.peer->port));
+    destination.has_rule = rule.source != shm::kNone;
+    const auto same = std::find_if(
+        decisions_.begin(), decisions_.end(),
+        [&](const SharedDecision& decision) { return decision.rule.decides_as(rule); });
+    destination.decision = static_cast<std::uint32_t>(same - decisions_.begin());
+    if (same != decisions_.end()) continue;
+    decisions_.push_back({rule, {}, {}});
+    reads += shm::BoundRule::reads_of(rule);
+  }
+  reads_.resize(std::max(reads_.size(), reads));
+  shm::Read* next = reads_.data();
+  for (SharedDecision& decision : decisions_) {
+    decision.bound.bind(decision.rule, memory_->pages(), next, false);
+    next += shm::BoundRule::reads_of(decision.rule);
   }
 }
 

@@ -82,7 +82,8 @@ class OutputCore {
     std::uint64_t link = 0;
     std::uint32_t channel = shm::kNone;
     shm::ChannelWriter writer;
-    shm::Rule rule;  // of the connection, under bound_generation_
+    bool has_rule = false;  // the connection, under bound_generation_
+    std::uint32_t decision = 0;
     shm::Verdict verdict = shm::Verdict::kLoses;
     std::uint64_t rung = 0;           // the wait that we rang for last
     const shm::Lane* lane = nullptr;  // ours in the peer's segment, once found
@@ -94,7 +95,9 @@ class OutputCore {
   void offer_view();
   void accept_view() noexcept;
   void leave_all_but(const OutputView& view) noexcept;
+  [[nodiscard]] bool rules_are_bound() const noexcept;
   void bind_rules() noexcept;
+  void bind_decisions() noexcept;
 
   // With the sample in `slot`, or without one (kNoSlot).
   Outcome arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
@@ -131,11 +134,20 @@ class OutputCore {
   // Port's thread.
   std::unique_ptr<OutputView> view_;
   std::vector<Destination> destinations_;
+  // Connections whose rules are the same are decided together.
+  struct SharedDecision {
+    shm::Rule rule;
+    shm::BoundRule bound;
+    shm::Verdict verdict = shm::Verdict::kLoses;
+  };
+  std::vector<SharedDecision> decisions_;
+  std::vector<shm::Read> reads_;  // what decisions_ have bound
   shm::SlotPool pool_;
   std::uint32_t loans_ = 0;
   std::uint64_t sequence_ = 0;
   shm::ActivityWord own_word_ = shm::kNeverActive;
   std::uint64_t bound_generation_ = UINT64_MAX;
+  std::uint64_t bound_pages_ = 0;
   shm::TableSnapshot snapshot_;
   shm::Nanoseconds timeout_ = shm::kDefaultTimeout;
 };

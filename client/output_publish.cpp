@@ -13,11 +13,14 @@
 namespace arbiter::detail {
 
 std::uint32_t OutputCore::acquire_slot() noexcept {
-  return pool_.acquire(instance_, [&](auto&& each) {
+  const std::uint32_t slot = pool_.acquire(instance_, [&](auto&& each) {
     for (const Destination& destination : destinations_) {
       each(destination.peer->segment->header.holds, destination.peer->max_held);
     }
   });
+  // Its last receiver has it in its cache: let it come back while the sample is written.
+  if (slot != shm::kNoSlot) __builtin_prefetch(&segment_.slot_header(slot), 1);
+  return slot;
 }
 
 LoanedSlot OutputCore::loan(std::size_t size) noexcept {
@@ -53,7 +56,7 @@ void OutputCore::stamp(shm::ActivityWord word) noexcept {
 
 Outcome OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
-  if (memory_->tables().generation() != bound_generation_) bind_rules();
+  if (!rules_are_bound()) bind_rules();
   const bool begins = !shm::is_active(own_word_, now);
   stamp(shm::arrival(now, timeout_));
   Outcome outcome;
@@ -70,15 +73,14 @@ Outcome OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanosecond
 void OutputCore::decide_all(shm::Nanoseconds now) noexcept {
   for (int tries = 0;; ++tries) {
     shm::DecisionClock clock(now, true);
-    shm::Decider decider(snapshot_.table, memory_->pages(), clock);
-    for (Destination& destination : destinations_) {
-      if (destination.joined) destination.verdict = decider.decide(destination.rule);
+    for (SharedDecision& decision : decisions_) {
+      decision.verdict = decision.bound.decide(snapshot_.table, clock);
     }
     if (memory_->tables().is_whole(snapshot_)) return;
     if (tries == kMaxTableRetries) break;
     bind_rules();
   }
-  for (Destination& destination : destinations_) destination.verdict = shm::Verdict::kUnsettled;
+  for (SharedDecision& decision : decisions_) decision.verdict = shm::Verdict::kUnsettled;
 }
 
 Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
@@ -93,7 +95,12 @@ Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanosec
   std::uint64_t blind = 0;
   std::uint64_t unsettled = 0;
   for (Destination& destination : destinations_) {
-    if (!destination.joined || destination.rule.source == shm::kNone) continue;
+    if (!destination.joined) continue;
+    if (!destination.has_rule) {
+      destination.verdict = shm::Verdict::kLoses;
+      continue;
+    }
+    destination.verdict = decisions_[destination.decision].verdict;
     blind += destination.verdict == shm::Verdict::kBlind;
     unsettled += destination.verdict == shm::Verdict::kUnsettled;
     if (destination.verdict != shm::Verdict::kWins) {
@@ -222,7 +229,7 @@ Outcome OutputCore::signal(shm::Nanoseconds now) noexcept { return arrive(shm::k
 
 void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
-  if (memory_->tables().generation() != bound_generation_) bind_rules();
+  if (!rules_are_bound()) bind_rules();
   const bool ends = shm::is_active(own_word_, now);
   stamp(shm::deactivation(now));
   if (ends) ring_where_selection_changed(now);

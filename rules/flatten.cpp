@@ -61,6 +61,8 @@ class Flattener {
 
   // Opens a list at the table's end: writes {first, count} into the record's field.
   void begin_list(Word field, std::size_t count);
+  // Writes a list, or leads to an equal one: rules that are the same are seen to be.
+  void share_list(Word field, std::size_t count, const std::vector<Word>& list);
   void append(Word word) { words_.push_back(word); }
 
   const CompiledModel& model_;
@@ -69,6 +71,7 @@ class Flattener {
   Word source_count_ = 0, port_count_ = 0, connection_count_ = 0;
   Word sources_ = 0, ports_ = 0, connections_ = 0;
   std::map<std::string, std::vector<shm::ConnectionIndex>> links_;  // by source
+  std::map<std::vector<Word>, Word> shared_;                        // where each list begins
 };
 
 shm::SourceId Flattener::source_id(const std::string& source) const {
@@ -136,6 +139,13 @@ void Flattener::begin_list(Word field, std::size_t count) {
   words_[field + 1] = to_word(count);
 }
 
+void Flattener::share_list(Word field, std::size_t count, const std::vector<Word>& list) {
+  const auto [known, is_new] = shared_.try_emplace(list, to_word(words_.size()));
+  words_[field] = known->second;
+  words_[field + 1] = to_word(count);
+  if (is_new) words_.insert(words_.end(), list.begin(), list.end());
+}
+
 void Flattener::write_ports() {
   Word connection = 0;
   for (const auto& port : model_.ports) {
@@ -159,17 +169,16 @@ void Flattener::write_rule(Word record, const CompiledRule& rule, shm::PortId po
   words_[record + table::kConnectionSource] = source_id(rule.source);
   words_[record + table::kConnectionPort] = port;
   words_[record + table::kRuleKind] = rule.kind;
-  begin_list(record + table::kFirstRead, rule.reads.size());
+  std::vector<Word> reads;
   for (std::size_t i = 0; i < rule.reads.size(); ++i) {
     const bool expect_active = rule.kind == table::kConjunction && rule.expected[i];
-    append(source_id(rule.reads[i]) | (expect_active ? table::kExpectActive : Word{0}));
+    reads.push_back(source_id(rule.reads[i]) | (expect_active ? table::kExpectActive : Word{0}));
   }
-  begin_list(record + table::kFirstNode, rule.nodes.size());
-  for (const auto& node : rule.nodes) {
-    append(node.position);
-    append(node.low);
-    append(node.high);
-  }
+  share_list(record + table::kFirstRead, rule.reads.size(), reads);
+  std::vector<Word> nodes;
+  for (const auto& node : rule.nodes)
+    nodes.insert(nodes.end(), {node.position, node.low, node.high});
+  share_list(record + table::kFirstNode, rule.nodes.size(), nodes);
 }
 
 void Flattener::write_sources() {

@@ -32,7 +32,7 @@ struct Source {
 
   // After a restart nobody may have handed back the page yet.
   [[nodiscard]] bool has_page() const { return static_cast<bool>(writable); }
-  [[nodiscard]] shm::Activity& activity() const { return page.as<shm::ActivityPage>()->activity; }
+  [[nodiscard]] shm::Activity& activity() const { return page.as<shm::ActivityPage>()->of(id); }
 };
 
 struct InputName {

@@ -21,6 +21,7 @@
 #include <cstdint>
 
 #include "shm/atomic.hpp"
+#include "shm/ids.hpp"
 #include "shm/limits.hpp"
 
 namespace arbiter::shm {
@@ -67,7 +68,7 @@ struct Activity {
 
   // By the one writer. Relaxed is enough for the word: what it must come before, a fence orders.
   // SYNC POINT: break-counted. The release, and the order of the two stores, pair with the acquires
-  // in Decider::collect() and continues(): who sees the arrival sees the break before it.
+  // in SeenActivity::of(): who sees the arrival sees the break before it.
   void arrive(ActivityWord before, ActivityWord next) noexcept {
     if (!is_deactivation(before)) {
       word.store(next, std::memory_order_relaxed);
@@ -79,8 +80,20 @@ struct Activity {
 };
 
 // The page that the daemon makes for each source; a page, because that is what the kernel protects.
+// Where in its page an activity lies depends on the source: at one place in all pages, they would
+// compete for the few cache lines that the address's low bits lead to.
 struct alignas(kPageSize) ActivityPage {
-  Activity activity;
+  struct alignas(kCacheLine) Place {
+    Activity activity;
+  };
+  static constexpr std::size_t kPlaces = kPageSize / kCacheLine;
+
+  [[nodiscard]] Activity& of(SourceId source) noexcept { return places[source % kPlaces].activity; }
+  [[nodiscard]] const Activity& of(SourceId source) const noexcept {
+    return places[source % kPlaces].activity;
+  }
+
+  Place places[kPlaces];
 };
 static_assert(sizeof(ActivityPage) == kPageSize);
 

@@ -37,8 +37,9 @@ class ChannelWriter {
  public:
   ChannelWriter() = default;
   ChannelWriter(const OutputSegment& segment, std::uint32_t index) noexcept
-      : channel_(&segment.channel(index)),
-        ring_(segment.ring(index)),
+      : segment_(segment),
+        index_(index),
+        channel_(&segment.channel(index)),
         joins_(&segment.header().joins),
         accepted_(channel_->accepted.load(std::memory_order_relaxed)) {}
 
@@ -46,6 +47,7 @@ class ChannelWriter {
   // SYNC POINT: channel-joined. The release pairs with the acquire in ChannelReader::join(): who
   // finds itself named finds `first` and `depth`.
   void join(PortInstance receiver, PortId port, std::uint32_t depth) noexcept {
+    ring_ = segment_.ring(index_, receiver);
     depth_ = depth;
     next_ = 0;
     live_ = 0;
@@ -98,8 +100,10 @@ class ChannelWriter {
   [[nodiscard]] Channel& channel() const noexcept { return *channel_; }
 
  private:
+  OutputSegment segment_;
+  std::uint32_t index_ = 0;
   Channel* channel_ = nullptr;
-  Atomic<Entry>* ring_ = nullptr;
+  Atomic<Entry>* ring_ = nullptr;  // once joined
   Atomic<std::uint64_t>* joins_ = nullptr;
   std::uint64_t accepted_ = 0;
   std::uint32_t depth_ = 1;
@@ -131,7 +135,7 @@ class ChannelReader {
       }
       next_ = channel.first.load(std::memory_order_relaxed) & kSequenceMask;
       channel_ = &channel;
-      ring_ = segment_.ring(index);
+      ring_ = segment_.ring(index, self_);
       position_ = 0;
       state_ = State::kJoined;
       return true;
@@ -148,11 +152,19 @@ class ChannelReader {
       const Entry entry = ring_[position_].load(std::memory_order_acquire);
       const std::uint64_t ahead = (sequence_of(entry) - next_) & kSequenceMask;
       if (ahead == 0) {
-        if (slot_of(entry) < segment_.layout().slot_count) return entry;
+        if (slot_of(entry) < segment_.layout().slot_count) {
+          // Both will be needed, and lie in the publisher's cache: let them come while we decide.
+          __builtin_prefetch(&segment_.slot_header(slot_of(entry)));
+          __builtin_prefetch(segment_.payload(slot_of(entry)));
+          return entry;
+        }
         state_ = State::kMisbehaved;
         return 0;
       }
-      if (ahead > kSequenceMask / 2) return 0;  // an older one: nothing new yet
+      if (ahead > kSequenceMask / 2) {  // an older one: nothing new yet
+        nothing_new_ = entry;
+        return 0;
+      }
       if (ahead % depth_ != 0) {
         state_ = State::kMisbehaved;
         return 0;
@@ -164,6 +176,21 @@ class ChannelReader {
       advance(1);
     }
     return 0;
+  }
+
+  // After peek() has found nothing: the word that changes when there is something, or when a queue
+  // may have been begun, and what it says as long as there is not. Neither value ever comes back.
+  struct Watch {
+    const Atomic<std::uint64_t>* word;
+    std::uint64_t seen;
+
+    [[nodiscard]] bool is_unchanged() const noexcept {
+      return word->load(std::memory_order_relaxed) == seen;
+    }
+  };
+  [[nodiscard]] Watch watch() const noexcept {
+    if (state_ == State::kJoined) return {&ring_[position_], nothing_new_};
+    return {&segment_.header().joins, seen_joins_};
   }
 
   // Announces a hold on the entry that peek() gave. False: it was overtaken, or the queue has
@@ -235,6 +262,7 @@ class ChannelReader {
   std::uint32_t depth_ = 1;
   State state_ = State::kUnjoined;
   std::uint64_t seen_joins_ = 0;
+  Entry nothing_new_ = 0;
   OutputSegment segment_;
   PortInstance publisher_ = 0;
   PortInstance self_ = 0;

@@ -44,13 +44,21 @@ class ActivityPages {
  public:
   void attach(SourceId id, const Activity* activity) noexcept {
     activities_[id].store(activity, std::memory_order_release);
+    changes_.store(changes_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
+  }
+  // Another after each attach(): what was bound before must be bound again.
+  // SYNC POINT: page-attached. Acquire; pairs with the release in attach(): who sees the change
+  // finds the page.
+  [[nodiscard]] std::uint64_t changes() const noexcept {
+    return changes_.load(std::memory_order_acquire);
   }
   [[nodiscard]] const Activity* find(SourceId id) const noexcept {
     return id < kMaxSources ? activities_[id].load(std::memory_order_acquire) : nullptr;
   }
 
  private:
-  std::array<Atomic<const Activity*>, kMaxSources> activities_{};
+  alignas(kCacheLine) Atomic<std::uint64_t> changes_{0};
+  alignas(kCacheLine) std::array<Atomic<const Activity*>, kMaxSources> activities_{};
 };
 
 // One look at a source.
@@ -82,7 +90,200 @@ struct SeenActivity {
 // can hold up a receiver.
 inline constexpr int kMaxPictures = 64;
 
-// Clock: Nanoseconds reading() const; bool is_fresh() const; void read().
+// A source that a rule reads, and how it was last seen.
+struct Read {
+  const Activity* activity;  // null: it has no page here
+  ActivityWord word;
+  std::uint64_t breaks;
+  SourceId source;
+  bool expect_active;  // in a conjunction
+};
+
+// A rule, bound to the activities that it reads, and its last verdict.
+//
+// Where nothing has changed since the last decision, looking once is enough: each word stood from
+// then until now, so all stood together when this decision began. Time can change the verdict too:
+// not before the first of the activities ends. And a conjunction that was denied is denied still
+// while the one that denied it has not changed. Hence most decisions cost a load for each source
+// that is read, most of those of losers a load in all, and only what has changed is looked at
+// twice.
+//
+// Clock: Nanoseconds reading() const; bool is_fresh() const; void read(). Its readings never go
+// back from one decision to the next.
+// Thread safety: none; it belongs to its port's thread.
+class BoundRule {
+ public:
+  BoundRule() = default;
+
+  // How much memory bind() is to be given. At most kMaxSourcesPerPort.
+  static Word reads_of(const Rule& rule) noexcept {
+    const bool reads_others = rule.kind == table::kConjunction || rule.kind == table::kDiagram;
+    return reads_others ? rule.reads.count : 0;
+  }
+
+  // `reads`: memory for reads_of() of them, and for one more with the connection's own activity,
+  // which is otherwise taken as given.
+  void bind(const Rule& rule, const ActivityPages& pages, Read* reads, bool with_own) noexcept {
+    kind_ = rule.kind;
+    nodes_ = rule.nodes;
+    reads_ = reads;
+    count_ = 0;
+    is_blind_ = false;
+    was_collected_ = false;
+    own_ = with_own ? 1 : 0;
+    if (with_own && kind_ != table::kNever) add(rule.source, true, pages);
+    for (Word i = 0; i < reads_of(rule); ++i) {
+      const Word read = rule.reads[i];
+      add(read & ~table::kExpectActive, (read & table::kExpectActive) != 0, pages);
+    }
+    // Those that deny a rule each by itself.
+    literals_ = kind_ == table::kConjunction ? count_ : own_;
+    if (count_ == 0) {
+      verdict_ = kind_ == table::kAlways || kind_ == table::kConjunction ? Verdict::kWins
+                                                                         : Verdict::kLoses;
+    }
+  }
+
+  // Whether the rule selects its connection. `table` is the one that the rule is of.
+  // Wait-free: at most kMaxPictures times two passes over at most kMaxSourcesPerPort words.
+  template <class Clock>
+  [[nodiscard]] Verdict decide(const TableView& table, Clock& clock) noexcept {
+    if (count_ == 0) return verdict_;
+    if (is_blind_) return Verdict::kBlind;
+    for (int i = 0; i < kMaxPictures; ++i) {
+      if (was_collected_ && stands(table, clock)) return verdict_;
+      collect(table, clock);
+    }
+    return Verdict::kUnsettled;
+  }
+
+ private:
+  static constexpr Word kNobody = UINT32_MAX;
+
+  void add(SourceId source, bool expect_active, const ActivityPages& pages) noexcept {
+    Read& read = reads_[count_++];
+    read.activity = pages.find(source);
+    read.source = source;
+    read.expect_active = expect_active;
+    is_blind_ = is_blind_ || read.activity == nullptr;
+  }
+
+  // The first pass. What it collects may be of several moments; they stood together if the next
+  // look finds the same. Where a word needs a reading of the clock that is taken after it was seen,
+  // one reading does for all.
+  template <class Clock>
+  void collect(const TableView& table, Clock& clock) noexcept {
+    bool needs_reading = false;
+    for (Word i = 0; i < count_; ++i) {
+      Read& read = reads_[i];
+      const SeenActivity seen = SeenActivity::of(*read.activity);
+      read.word = seen.word;
+      read.breaks = seen.breaks;
+      needs_reading = needs_reading || needs_clock(table, read, clock);
+    }
+    if (needs_reading) clock.read();
+    evaluate(clock.reading());
+    was_collected_ = true;
+  }
+
+  // Whether a word can be judged only by a reading of the clock that is taken after it was seen.
+  template <class Clock>
+  static bool needs_clock(const TableView& table, const Read& read, const Clock& clock) noexcept {
+    const bool may_end = is_finite(read.word) && is_active(read.word, clock.reading());
+    if (!clock.is_fresh()) return may_end;
+    if (is_finite(read.word) && !may_end) return false;
+    const Nanoseconds timeout = may_end ? table.timeout(read.source) : kForever;
+    return is_newer_than(read.word, timeout, clock.reading());
+  }
+
+  // The second pass, and the only one where nothing has changed: whether all sources have stood as
+  // they were collected until now, and the verdict holds at this time. The loads are relaxed: the
+  // acquires of the first pass put them behind it, and it does not matter in which order they come.
+  template <class Clock>
+  bool stands(const TableView& table, Clock& clock) noexcept {
+    if (denied_by_ != kNobody && still_denies(reads_[denied_by_], clock)) return true;
+    ActivityWord differences = 0;
+    for (Word i = 0; i < count_; ++i) {
+      differences |= reads_[i].activity->word.load(std::memory_order_relaxed) ^ reads_[i].word;
+    }
+    if (differences != 0 && !were_renewed(table, clock)) return false;
+    if (until_ == kForever) return true;
+    if (!clock.is_fresh()) clock.read();
+    if (clock.reading() >= until_) evaluate(clock.reading());
+    return true;
+  }
+
+  template <class Clock>
+  static bool still_denies(const Read& by, const Clock& clock) noexcept {
+    if (by.activity->word.load(std::memory_order_relaxed) != by.word) return false;
+    if (by.expect_active || !is_finite(by.word)) return true;
+    return clock.is_fresh() && is_active(by.word, clock.reading());
+  }
+
+  // Whether those that have changed were active, and still are without a break.
+  template <class Clock>
+  bool were_renewed(const TableView& table, const Clock& clock) noexcept {
+    for (Word i = 0; i < count_; ++i) {
+      Read& read = reads_[i];
+      const SeenActivity now = SeenActivity::of(*read.activity);
+      if (now.word == read.word) continue;
+      const SeenActivity before{read.word, read.breaks, read.breaks};
+      if (!before.stands(now, table.timeout(read.source), clock.reading())) return false;
+      read.word = now.word;
+      read.breaks = now.breaks;
+    }
+    return true;
+  }
+
+  // The verdict at `time`, if all stand together as they were collected.
+  void evaluate(Nanoseconds time) noexcept {
+    std::array<std::uint64_t, kActiveWords> active{};
+    until_ = kForever;
+    denied_by_ = kNobody;
+    for (Word i = 0; i < count_; ++i) {
+      const Read& read = reads_[i];
+      const bool is = is_active(read.word, time);
+      if (is) active[i / 64] |= std::uint64_t{1} << (i % 64);
+      if (is && is_finite(read.word) && read.word < until_) until_ = read.word;
+      if (i < literals_ && is != read.expect_active && denied_by_ == kNobody) denied_by_ = i;
+    }
+    const bool holds = denied_by_ == kNobody && (kind_ != table::kDiagram || walk_holds(active));
+    verdict_ = holds ? Verdict::kWins : Verdict::kLoses;
+  }
+
+  // Each step goes to a node further on, so a whole table ends the walk; a torn one is cut short.
+  static constexpr std::size_t kActiveWords = kMaxSourcesPerPort / 64 + 1;
+  [[nodiscard]] bool walk_holds(
+      const std::array<std::uint64_t, kActiveWords>& active) const noexcept {
+    Word node = 0;
+    for (Word steps = 0; steps <= count_; ++steps) {
+      if (node >= nodes_.count / table::kNodeWords) return false;
+      const Word base = node * table::kNodeWords;
+      const std::uint64_t position = std::uint64_t{nodes_[base + table::kNodePosition]} + own_;
+      if (position >= count_) return false;
+      const bool high = (active[position / 64] >> (position % 64) & 1) != 0;
+      const Word next = nodes_[base + (high ? table::kNodeHigh : table::kNodeLow)];
+      if (next == table::kTrue) return true;
+      if (next == table::kFalse) return false;
+      node = next;
+    }
+    return false;
+  }
+
+  Read* reads_ = nullptr;
+  Word count_ = 0;
+  Word denied_by_ = kNobody;      // the literal that denies the rule, if one does
+  Nanoseconds until_ = kForever;  // when the first of the activities ends
+  Verdict verdict_ = Verdict::kLoses;
+  bool is_blind_ = false;
+  bool was_collected_ = false;
+  Word kind_ = table::kNever;
+  Word own_ = 0;  // whether the first of reads_ is the connection's own
+  Word literals_ = 0;
+  WordList nodes_;
+};
+
+// Decides rules that are not kept bound: for a look now and then.
 template <class Clock>
 class Decider {
  public:
@@ -90,161 +291,21 @@ class Decider {
       : table_(table), pages_(pages), clock_(clock) {}
 
   // Whether `rule` selects its connection, whose own activity is taken as given.
-  // Wait-free: at most kMaxPictures passes over at most kMaxSourcesPerPort words.
-  [[nodiscard]] Verdict decide(const Rule& rule) noexcept {
-    return repeat([&] { return once(rule); });
-  }
-
+  [[nodiscard]] Verdict decide(const Rule& rule) noexcept { return decide(rule, false); }
   // The same with the connection's own activity read too: is it the winner?
-  [[nodiscard]] Verdict decide_with_own(const Rule& rule) noexcept {
-    if (rule.kind == table::kNever) return Verdict::kLoses;
-    return repeat([&] {
-      const Pass own = collect(rule.source, kOwn);
-      if (own == Pass::kAgain) return read_clock({}, 0);
-      if (own != Pass::kYes) return own;
-      const Pass rest = once(rule);
-      if (rest != Pass::kYes || rule.reads.count == 0) return rest;
-      return stands(rule.source, kOwn) ? rest : Pass::kAgain;
-    });
-  }
+  [[nodiscard]] Verdict decide_with_own(const Rule& rule) noexcept { return decide(rule, true); }
 
  private:
-  enum class Pass : std::uint8_t { kNo, kYes, kAgain, kBlind };
-
-  static constexpr Word kOwn = kMaxSourcesPerPort;
-
-  template <class Attempt>
-  Verdict repeat(Attempt attempt) noexcept {
-    collected_ = 0;
-    settled_ = 0;
-    own_settled_ = false;
-    for (int i = 0; i < kMaxPictures; ++i) {
-      switch (attempt()) {
-        case Pass::kNo:
-          return Verdict::kLoses;
-        case Pass::kYes:
-          return Verdict::kWins;
-        case Pass::kBlind:
-          return Verdict::kBlind;
-        case Pass::kAgain:
-          settled_ = collected_;
-          own_settled_ = true;
-          break;
-      }
-    }
-    return Verdict::kUnsettled;
-  }
-
-  Pass once(const Rule& rule) noexcept {
-    switch (rule.kind) {
-      case table::kAlways:
-        return Pass::kYes;
-      case table::kConjunction:
-        return conjunction(rule);
-      case table::kDiagram:
-        return diagram(rule);
-      default:
-        return Pass::kNo;
-    }
-  }
-
-  // The first pass over one source: is it active? kAgain: only a reading from now on can tell.
-  Pass collect(SourceId source, Word i) noexcept {
-    const Activity* activity = pages_.find(source);
-    if (activity == nullptr) return Pass::kBlind;
-    SeenActivity& seen = seen_[i];
-    if (i != kOwn && i == collected_) ++collected_;
-    // What an earlier pass has seen was held against the clock then; no T, not even one that a
-    // reload has changed since, makes it look newer than the reading now.
-    const bool settled = i == kOwn ? own_settled_ : i < settled_;
-    const SeenActivity look = SeenActivity::of(*activity);
-    if (!settled || !seen.stands(look, table_.timeout(source), clock_.reading())) {
-      seen = look;
-      if (needs_clock(source, look.word)) return Pass::kAgain;
-    }
-    return is_active(seen.word, clock_.reading()) ? Pass::kYes : Pass::kNo;
-  }
-
-  // Looks at the rest too before it reads the clock: then one reading settles them all.
-  Pass read_clock(const Rule& rule, Word next) noexcept {
-    for (; next < rule.reads.count; ++next) {
-      if (collect(source_of(rule, next), next) == Pass::kBlind) return Pass::kBlind;
-    }
-    clock_.read();
-    return Pass::kAgain;
-  }
-
-  // Whether a word can be judged only by a reading of the clock that is taken after it was seen.
-  [[nodiscard]] bool needs_clock(SourceId source, ActivityWord word) const noexcept {
-    const bool may_end = is_finite(word) && is_active(word, clock_.reading());
-    if (!clock_.is_fresh()) return may_end;
-    if (is_finite(word) && !may_end) return false;
-    const Nanoseconds timeout = may_end ? table_.timeout(source) : kForever;
-    return is_newer_than(word, timeout, clock_.reading());
-  }
-
-  // The second pass over one source.
-  [[nodiscard]] bool stands(SourceId source, Word i) const noexcept {
-    const Activity* activity = pages_.find(source);
-    if (activity == nullptr) return false;  // the table was overwritten meanwhile
-    return seen_[i].stands(SeenActivity::of(*activity), table_.timeout(source), clock_.reading());
-  }
-
-  // One word alone is a picture already.
-  [[nodiscard]] bool all_stand(const Rule& rule) const noexcept {
-    if (rule.reads.count < 2) return true;
-    for (Word i = 0; i < rule.reads.count; ++i) {
-      if (!stands(source_of(rule, i), i)) return false;
-    }
-    return true;
-  }
-
-  static SourceId source_of(const Rule& rule, Word i) noexcept {
-    return rule.reads[i] & ~table::kExpectActive;
-  }
-
-  Pass conjunction(const Rule& rule) noexcept {
-    for (Word i = 0; i < rule.reads.count; ++i) {
-      const Pass pass = collect(source_of(rule, i), i);
-      if (pass == Pass::kAgain) return read_clock(rule, i + 1);
-      if (pass == Pass::kBlind) return pass;
-      if ((pass == Pass::kYes) != ((rule.reads[i] & table::kExpectActive) != 0)) return Pass::kNo;
-    }
-    return all_stand(rule) ? Pass::kYes : Pass::kAgain;
-  }
-
-  Pass diagram(const Rule& rule) noexcept {
-    std::array<std::uint64_t, kMaxSourcesPerPort / 64> active{};
-    for (Word i = 0; i < rule.reads.count; ++i) {
-      const Pass pass = collect(source_of(rule, i), i);
-      if (pass == Pass::kAgain) return read_clock(rule, i + 1);
-      if (pass == Pass::kBlind) return pass;
-      if (pass == Pass::kYes) active[i / 64] |= std::uint64_t{1} << (i % 64);
-    }
-    if (!all_stand(rule)) return Pass::kAgain;
-    // Each step goes to a node further on, so a whole table ends the walk; a torn one is cut short.
-    Word node = 0;
-    for (Word steps = 0; steps <= rule.reads.count; ++steps) {
-      if (node >= rule.nodes.count / table::kNodeWords) return Pass::kNo;
-      const Word base = node * table::kNodeWords;
-      const Word position = rule.nodes[base + table::kNodePosition];
-      if (position >= rule.reads.count) return Pass::kNo;
-      const bool high = (active[position / 64] >> (position % 64) & 1) != 0;
-      const Word next = rule.nodes[base + (high ? table::kNodeHigh : table::kNodeLow)];
-      if (next == table::kTrue) return Pass::kYes;
-      if (next == table::kFalse) return Pass::kNo;
-      node = next;
-    }
-    return Pass::kNo;
+  Verdict decide(const Rule& rule, bool with_own) noexcept {
+    BoundRule bound;
+    bound.bind(rule, pages_, reads_.data(), with_own);
+    return bound.decide(table_, clock_);
   }
 
   const TableView& table_;
   const ActivityPages& pages_;
   Clock& clock_;
-  Word collected_ = 0;        // how many of seen_ are of this decision
-  Word settled_ = 0;          // how many of them are of an earlier pass
-  bool own_settled_ = false;  // the same of our own
-  std::array<SeenActivity, kMaxSourcesPerPort + 1> seen_;  // the last is our own
+  std::array<Read, kMaxSourcesPerPort + 1> reads_;
 };
 
 }  // namespace arbiter::shm

@@ -107,6 +107,9 @@ struct WordList {
   Word count = 0;
 
   Word operator[](Word i) const noexcept { return words[i].load(std::memory_order_relaxed); }
+  [[nodiscard]] bool is(const WordList& other) const noexcept {
+    return count == other.count && (words == other.words || count == 0);
+  }
 };
 
 struct Rule {
@@ -115,6 +118,11 @@ struct Rule {
   Word kind = table::kNever;
   WordList reads;
   WordList nodes;  // count in words
+
+  // Whether it is the same condition. A table has equal lists once.
+  [[nodiscard]] bool decides_as(const Rule& other) const noexcept {
+    return kind == other.kind && reads.is(other.reads) && nodes.is(other.nodes);
+  }
 };
 
 // Thread safety: none of its own; a view of words that one writer owns. All loads are relaxed:

@@ -40,7 +40,8 @@ constexpr std::uint32_t slot_of(Entry entry) noexcept {
   return static_cast<std::uint32_t>(entry & ((1u << kSlotBits) - 1));
 }
 
-struct SlotHeader {
+// A line of its own: a receiver reads one while the publisher writes the next.
+struct alignas(kCacheLine) SlotHeader {
   Atomic<std::uint64_t> sequence;  // of the source: counts its samples from 1
   Atomic<Nanoseconds> stamp;       // arrival time
   Atomic<std::uint64_t> size;      // bytes of the sample
@@ -48,17 +49,23 @@ struct SlotHeader {
 
 // Written by the publisher. `receiver` is the number of the link whose queue this is (the daemon
 // gives each another); it is written last when an input port joins and first, to 0, when it leaves
-// (channel.hpp).
+// (channel.hpp). What every publish writes is kept apart from what every take reads.
 struct alignas(kCacheLine) Channel {
   Atomic<PortInstance> receiver;
-  Atomic<std::uint64_t> first;      // sequence of the first entry that is this receiver's
-  Atomic<std::uint32_t> depth;      // entries in use of the ring
-  Atomic<std::uint32_t> port;       // id of the input port, for status
-  Atomic<std::uint64_t> accepted;   // sequence of the last entry; never reset
+  Atomic<std::uint64_t> first;  // sequence of the first entry that is this receiver's
+  Atomic<std::uint32_t> depth;  // entries in use of the ring
+  Atomic<std::uint32_t> port;   // id of the input port, for status
+  // Sequence of the last entry; never reset.
+  alignas(kCacheLine) Atomic<std::uint64_t> accepted;
   Atomic<std::uint64_t> discarded;  // by the decision; this and the next since `receiver` joined
   Atomic<std::uint64_t> refused;    // because the queue was full (refuse_new)
 };
-static_assert(sizeof(Channel) == kCacheLine);
+static_assert(sizeof(Channel) == 2 * kCacheLine);
+
+// Room for a ring. Where in it the ring begins depends on the link: at one place in all segments,
+// the rings that a receiver polls would compete for the few cache lines that the address's low bits
+// lead to.
+inline constexpr std::size_t kRingBytes = sizeof(Atomic<Entry>) * kMaxDepth + kPageSize;
 
 struct OutputCounters {
   Atomic<std::uint64_t> published;  // samples given to publish()
@@ -73,7 +80,7 @@ struct OutputCounters {
 
 struct OutputHeader {
   static constexpr std::uint64_t kMagic = 0x31747562'74696272;
-  static constexpr std::uint32_t kVersion = 1;
+  static constexpr std::uint32_t kVersion = 2;
 
   std::uint64_t magic;
   std::uint32_t version;
@@ -93,8 +100,7 @@ static_assert(sizeof(OutputHeader) <= kPageSize);
 struct OutputLayout {
   std::uint64_t channels_offset = kPageSize;
   std::uint64_t rings_offset = kPageSize + sizeof(Channel) * kMaxDestinations;
-  std::uint64_t headers_offset =
-      rings_offset + sizeof(Atomic<Entry>) * kMaxDestinations * std::uint64_t{kMaxDepth};
+  std::uint64_t headers_offset = rings_offset + kRingBytes * kMaxDestinations;
   std::uint64_t payload_offset = 0;
   std::uint64_t stride = 0;
   std::uint32_t slot_count = 0;
@@ -141,9 +147,11 @@ class OutputSegment {
   [[nodiscard]] Channel& channel(std::uint32_t index) const noexcept {
     return reinterpret_cast<Channel*>(base_ + layout_.channels_offset)[index];
   }
-  [[nodiscard]] Atomic<Entry>* ring(std::uint32_t channel) const noexcept {
-    return reinterpret_cast<Atomic<Entry>*>(base_ + layout_.rings_offset) +
-           std::size_t{channel} * kMaxDepth;
+  // The channel's ring, for a link.
+  [[nodiscard]] Atomic<Entry>* ring(std::uint32_t channel, PortInstance link) const noexcept {
+    const std::size_t place = link % (kPageSize / kCacheLine) * kCacheLine;
+    return reinterpret_cast<Atomic<Entry>*>(base_ + layout_.rings_offset +
+                                            kRingBytes * std::size_t{channel} + place);
   }
   [[nodiscard]] SlotHeader& slot_header(std::uint32_t slot) const noexcept {
     return reinterpret_cast<SlotHeader*>(base_ + layout_.headers_offset)[slot];

@@ -12,8 +12,8 @@
 // The daemon changes what a client sees: kSourcePage…, kInputPeer…, then kSync; the client answers
 // kSynced when it has taken up all that came before.
 //
-// A client that has lost its daemon looks for another, or the same, and says kHello with kRejoins; it
-// is answered kWelcome (or kRefused) and tells what it has: kHandBackPage…, for each port
+// A client that has lost its daemon looks for another, or the same, and says kHello with kRejoins;
+// it is answered kWelcome (or kRefused) and tells what it has: kHandBackPage…, for each port
 // kHandBackOutput or kHandBackInput with its kHandBackLink…, and then kHandedBack.
 #pragma once
 
@@ -32,28 +32,29 @@
 
 namespace arbiter::shm {
 
-inline constexpr std::uint32_t kWireVersion = 2;
+inline constexpr std::uint32_t kWireVersion = 3;
 
 enum class MessageKind : std::uint32_t {
   // From a client.
-  kHello = 1,    // name, flags (kHasServiceThread, kComesBack, kRejoins); value = kWireVersion; if it
-                 // rejoins, link: the node it was welcomed as; descriptors: board, registry
-  kOpenOutput,   // name, type; descriptor: its segment
-  kOpenInput,    // name, type; descriptors: its segment, its bell
-  kClosePort,    // port
-  kSynced,       // request: that of the kSync
-  kStatus,       // ask for a status document
-  kDeactivate,   // name: a source whose process is gone
-  kObserve,      // send every page and every port name, now and as they come
-  kPeerRefused,  // port, peer, text: the client could not take up a peer, for status
-  kReload,       // read the files again; kDone (value: the generation) once they are in force
-  kStop,         // kDone, and then the daemon ends
+  kHello = 1,  // name, flags (kHasServiceThread, kComesBack, kRejoins); value = kWireVersion; if it
+               // rejoins, link: the node it was welcomed as; descriptors: board, registry
+  kOpenOutput,         // name, type; descriptor: its segment
+  kOpenInput,          // name, type; descriptors: its segment, its bell
+  kClosePort,          // port
+  kSynced,             // request: that of the kSync
+  kStatus,             // ask for a status document
+  kDeactivate,         // name: a source whose process is gone
+  kObserve,            // send every page and every port name, now and as they come
+  kPeerRefused,        // port, peer, text: the client could not take up a peer, for status
+  kReload,             // read the files again; kDone (value: the generation) once they are in force
+  kStop,               // kDone, and then the daemon ends
   kHandBackPage = 40,  // id; descriptor: the activity page of a source
   kHandBackOutput,     // port, id = source, type; descriptors: its segment, its page
   kHandBackInput,      // port, id = port id, type; descriptors: its segment, its bell
   kHandBackLink,       // port, peer; link: its number, 0 if not connected
   kHandedBack,         // that was all
-  kConnect,  // port: opened by a daemon that has gone since; asks for the kConnected that is missing
+  kConnect,  // port: opened by a daemon that has gone since; asks for the kConnected that is
+             // missing
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; descriptors: the board, the registry, read-only

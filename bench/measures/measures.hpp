@@ -21,11 +21,19 @@ struct MeasureEntry {
   std::function<Measure(const Effort&)> run;
 };
 
+inline const char* const kClockRead = "clock read";
+
 Measure measure_delivery(const Effort& effort);
+Measure measure_publish(const Effort& effort);
+Measure measure_take(const Effort& effort);
+Measure measure_decide(const Effort& effort);
 
 inline std::vector<MeasureEntry> all_measures() {
   return {
       {"delivery", measure_delivery},
+      {"publish", measure_publish},
+      {"take", measure_take},
+      {"decide", measure_decide},
   };
 }
 

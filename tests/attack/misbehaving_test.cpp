@@ -24,7 +24,8 @@ TEST(AMisbehavingPublisher, IsNamed) {
   const auto& segment = prey.attackers_output;
   segment.channel(0).first = 1;
   segment.channel(0).depth = 4;
-  segment.ring(0)[0] = arbiter::shm::make_entry(1, 60'000);  // a slot that does not exist
+  segment.ring(0, prey.link_to_prey)[0] =
+      arbiter::shm::make_entry(1, 60'000);  // a slot that does not exist
   segment.channel(0).accepted = 1;
   segment.channel(0).receiver = prey.link_to_prey;
   segment.header().joins = 1;
@@ -35,7 +36,7 @@ TEST(AMisbehavingPublisher, IsNamed) {
   EXPECT_NE(prey.daemon().log().find("/attacker:o is not connected to /prey:i: " + why),
             std::string::npos);
   // What it writes now is its own affair.
-  segment.ring(0)[1] = arbiter::shm::make_entry(2, 0);
+  segment.ring(0, prey.link_to_prey)[1] = arbiter::shm::make_entry(2, 0);
   EXPECT_FALSE(prey.in().take());
 }
 

@@ -35,7 +35,7 @@ class Prey {
   // The attacker's source says that it is active.
   void activate_attacker() const {
     const shm::Mapping mapped(own_page_, sizeof(shm::ActivityPage), shm::Access::kReadWrite);
-    mapped.as<shm::ActivityPage>()->activity.word =
+    mapped.as<shm::ActivityPage>()->of(own_source_).word =
         shm::arrival(shm::monotonic_now(), shm::kForever);
   }
 
@@ -116,7 +116,9 @@ class Prey {
           if (received.message.name_view() == "/prey:o") page = std::move(received.descriptors[0]);
           break;
         case shm::MessageKind::kOpened:
-          if (received.descriptors[0]) own_page_ = std::move(received.descriptors[0]);
+          if (!received.descriptors[0]) break;
+          own_page_ = std::move(received.descriptors[0]);
+          own_source_ = received.message.id;
           break;
         case shm::MessageKind::kOutputPeer:
           preys_output = received.message.peer;
@@ -146,6 +148,7 @@ class Prey {
   shm::Mapping own_output_mapping_;
   shm::Mapping own_input_mapping_;
   shm::FileDescriptor own_page_;
+  shm::SourceId own_source_ = shm::kNone;
   shm::FileDescriptor own_input_;
   shm::Bell own_bell_;
 };

@@ -79,16 +79,18 @@ const Register kEnds("AQueueThatEndsTakesItsSamplesFromNobodyWhoHoldsOne", {4, 3
 
 // A receiver looks for its queue while the publisher begins it, in a channel that another has used.
 Explorer::Scenario join_a_used_channel(World& world) {
+  // One whose ring lies where the other's did.
+  static constexpr shm::PortInstance kNext = kReceiver + shm::kPageSize / shm::kCacheLine;
   return [&world](Execution& execution) {
     world.reset(1);
     Publisher& publisher = world.publisher;
     publisher.writer.leave([&](std::uint32_t slot) { publisher.pool.evict(slot); });
-    world.receiver = {shm::ChannelReader(publisher.segment, kPublisher, kReceiver + 1), &world.hold,
+    world.receiver = {shm::ChannelReader(publisher.segment, kPublisher, kNext), &world.hold,
                       world.payloads, 0, publisher.published};
     execution.thread([&world] {
       Publisher& again = world.publisher;
       again.writer = shm::ChannelWriter(again.segment, 0);
-      again.writer.join(kReceiver + 1, 1, 2);
+      again.writer.join(kNext, 1, 2);
       again.publish();
       again.publish();
     });

@@ -87,7 +87,7 @@ class Instance {
   void prepare(const test::TableBuilder& model);
   void put_in_force();
   [[nodiscard]] shm::Activity& activity(SourceId source) const {
-    return page_mappings_[source].as<shm::ActivityPage>()->activity;
+    return page_mappings_[source].as<shm::ActivityPage>()->of(source);
   }
 
  private:

@@ -25,7 +25,7 @@ class SegmentMemory {
     if (memory_.empty()) memory_.resize(layout.total_size + shm::kPageSize);
     const auto address = reinterpret_cast<std::uintptr_t>(memory_.data());
     std::byte* const base = memory_.data() + (shm::kPageSize - address % shm::kPageSize);
-    std::memset(base, 0, layout.rings_offset + 2 * sizeof(shm::Entry) * shm::kMaxDepth);
+    std::memset(base, 0, layout.rings_offset + shm::kRingBytes);
     std::memset(base + layout.headers_offset, 0, layout.total_size - layout.headers_offset);
     return {base, layout};
   }

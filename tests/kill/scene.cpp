@@ -89,6 +89,7 @@ void Scene::meet_daemon() {
   while (observer_.receive(received) && received.message.kind != shm::MessageKind::kDone) {
     const auto name = received.message.name_view();
     if (received.message.kind == shm::MessageKind::kSourcePage && name == "/victim:o") {
+      source_id_ = received.message.id;
       page_ =
           shm::Mapping(received.descriptors[0], sizeof(shm::ActivityPage), shm::Access::kReadOnly);
     }

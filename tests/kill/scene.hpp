@@ -51,7 +51,7 @@ class Scene {
   // The victim is dead: everything that must be so.
   void require_all_is_well(const OwnSegments& dead, const shm::Activity& before);
 
-  [[nodiscard]] shm::Activity& page() { return page_.as<shm::ActivityPage>()->activity; }
+  [[nodiscard]] shm::Activity& page() { return page_.as<shm::ActivityPage>()->of(source_id_); }
   OutputPort<Number>& first() { return *first_; }
   OutputPort<Number>& second() { return *second_; }
   InputPort<Number>& in() { return *in_; }
@@ -78,6 +78,7 @@ class Scene {
   RawClient observer_;
   shm::Mapping page_;  // of the victim's source
   std::uint32_t port_id_ = shm::kNone;
+  shm::SourceId source_id_ = shm::kNone;
   std::optional<Node> node_;
   std::optional<OutputPort<Number>> first_;
   std::optional<OutputPort<Number>> second_;

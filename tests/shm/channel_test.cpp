@@ -208,7 +208,7 @@ TEST_F(Channels, APublisherThatJumpsByAnotherStepThanItsDepthIsGivenUp) {
   ChannelReader receiver = reader();
   ASSERT_TRUE(receiver.join());
   push(writer, 1);
-  segment_.ring(0)[0] = make_entry(1 + 6, 1);
+  segment_.ring(0, kReceiver)[0] = make_entry(1 + 6, 1);
   std::uint64_t lost = 0;
   EXPECT_EQ(receiver.peek(lost), 0u);
   EXPECT_EQ(receiver.state(), ChannelReader::State::kMisbehaved);
@@ -222,7 +222,7 @@ TEST_F(Channels, GarbageInARingNeverLeadsOutsideItAndEveryLookEnds) {
       join(depth);
       ChannelReader receiver = reader();
       ASSERT_TRUE(receiver.join());
-      for (std::uint32_t i = 0; i < kMaxDepth; ++i) segment_.ring(0)[i] = garbage;
+      for (std::uint32_t i = 0; i < kMaxDepth; ++i) segment_.ring(0, kReceiver)[i] = garbage;
       segment_.channel(0).accepted = garbage;
       std::uint64_t lost = 0;
       for (int looks = 0; looks < 10; ++looks) {
@@ -231,7 +231,7 @@ TEST_F(Channels, GarbageInARingNeverLeadsOutsideItAndEveryLookEnds) {
         EXPECT_LE(receiver.backlog(receiver.backlog_end()), depth);
         if (entry != 0) receiver.consume();
       }
-      for (std::uint32_t i = 0; i < kMaxDepth; ++i) segment_.ring(0)[i] = 0;
+      for (std::uint32_t i = 0; i < kMaxDepth; ++i) segment_.ring(0, kReceiver)[i] = 0;
       segment_.channel(0).accepted = 0;
     }
   }

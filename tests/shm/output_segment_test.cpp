@@ -23,8 +23,7 @@ TEST(OutputLayout, PartsFollowEachOtherWithoutOverlapAndAligned) {
         const auto layout = OutputLayout::plan(type_of(size, alignment), slots);
         EXPECT_GE(layout.channels_offset, sizeof(OutputHeader));
         EXPECT_GE(layout.rings_offset, layout.channels_offset + sizeof(Channel) * kMaxDestinations);
-        EXPECT_GE(layout.headers_offset,
-                  layout.rings_offset + sizeof(Entry) * kMaxDestinations * kMaxDepth);
+        EXPECT_GE(layout.headers_offset, layout.rings_offset + kRingBytes * kMaxDestinations);
         EXPECT_GE(layout.payload_offset, layout.headers_offset + sizeof(SlotHeader) * slots);
         EXPECT_GE(layout.total_size, layout.payload_offset + layout.stride * slots);
         EXPECT_GE(layout.stride, size);

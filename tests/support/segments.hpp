@@ -84,7 +84,7 @@ inline std::uint64_t accepted_by(const shm::OutputSegment& segment, std::uint32_
   std::uint64_t last = before;
   const std::uint32_t depth = channel.depth.load();
   for (std::uint32_t i = 0; i < depth && i < shm::kMaxDepth; ++i) {
-    last = std::max(last, shm::sequence_of(segment.ring(index)[i].load()));
+    last = std::max(last, shm::sequence_of(segment.ring(index, channel.receiver.load())[i].load()));
   }
   return last - before;
 }

@@ -194,7 +194,9 @@ void World::introduce_output(std::uint32_t slots, int more, const std::vector<Pa
       {channel + offsetof(shm::Channel, depth), 2},
       {channel + offsetof(shm::Channel, accepted), 1},
       {channel + offsetof(shm::Channel, receiver), received.message.link},
-      {layout.rings_offset, shm::make_entry(1, slots - 1)}};
+      {layout.rings_offset +
+           received.message.link % (shm::kPageSize / shm::kCacheLine) * shm::kCacheLine,
+       shm::make_entry(1, slots - 1)}};
   received.descriptors[0] =
       make_hostile(layout.total_size + static_cast<std::size_t>(more), &header,
                    offsetof(shm::OutputHeader, joins), patches, words);
