@@ -26,6 +26,7 @@ InputCore::InputCore(std::string name, const shm::TypeInfo& type, const InputPor
   if (const auto error = shm::allocate(descriptor_, 0, sizeof(shm::InputSegment))) {
     throw std::system_error(error, "allocating an input port");
   }
+  shm::make_resident(mapping_, 0, sizeof(shm::InputSegment), memory_->residence());
   shm::InputHeader& header = segment_->header;
   header.magic = shm::InputHeader::kMagic;
   header.version = shm::InputHeader::kVersion;
@@ -46,6 +47,12 @@ void InputCore::add_peer(std::shared_ptr<const OutputPeer> peer) {
   const auto instance = peer->instance;
   links_[instance] = {std::move(peer), false};
   offer_view();
+}
+
+void InputCore::map_growth(shm::PortInstance peer, const shm::FileDescriptor& segment) {
+  const auto found = links_.find(peer);
+  if (found == links_.end()) return;
+  shm::make_written_resident(segment, found->second.peer->mapping, memory_->residence());
 }
 
 void InputCore::lose_peer(shm::PortInstance peer) {

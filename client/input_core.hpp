@@ -33,6 +33,8 @@ class InputCore {
 
   void bind(shm::PortInstance instance, shm::PortId port);
   void add_peer(std::shared_ptr<const OutputPeer> peer);
+  // The peer uses more of its segment now. Throws std::system_error where that cannot be locked.
+  void map_growth(shm::PortInstance peer, const shm::FileDescriptor& segment);
   // The peer has closed or died; what it has delivered can still be taken.
   void lose_peer(shm::PortInstance peer);
   // The model has disconnected it.

@@ -6,8 +6,10 @@
 namespace arbiter::detail {
 
 SharedMemory::SharedMemory(shm::FileDescriptor board, shm::FileDescriptor registry,
-                           std::shared_ptr<const ServiceBell> service_bell)
+                           std::shared_ptr<const ServiceBell> service_bell,
+                           shm::Residence residence)
     : service_bell_(std::move(service_bell)),
+      residence_(residence),
       board_descriptor_(std::move(board)),
       registry_(std::move(registry)) {
   const std::size_t size = shm::checked_size(board_descriptor_, shm::Seals::kFixedSize);
@@ -18,6 +20,11 @@ SharedMemory::SharedMemory(shm::FileDescriptor board, shm::FileDescriptor regist
     throw std::runtime_error("the daemon is of another version");
   }
   tables_ = shm::TableReader(*mapped);
+  make_tables_resident();
+}
+
+void SharedMemory::make_tables_resident() const {
+  shm::make_written_resident(board_descriptor_, board_, residence_);
 }
 
 void SharedMemory::add_page(shm::SourceId id, std::string name, shm::FileDescriptor page) {
@@ -35,6 +42,7 @@ void SharedMemory::add_page(shm::SourceId id, std::string name, shm::FileDescrip
   if (page_descriptors_.size() < kMaxPageDescriptors || page_descriptors_.count(id) != 0) {
     page_descriptors_[id] = std::move(page);
   }
+  shm::make_resident(mappings_.back(), 0, sizeof(shm::ActivityPage), residence_);
 }
 
 std::string SharedMemory::source_name(shm::SourceId id) const {

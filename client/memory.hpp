@@ -10,6 +10,7 @@
 #include "client/service_bell.hpp"
 #include "shm/decision.hpp"
 #include "shm/file_descriptor.hpp"
+#include "shm/residence.hpp"
 #include "shm/segment.hpp"
 #include "shm/table_ring.hpp"
 
@@ -21,8 +22,13 @@ class SharedMemory {
  public:
   // The registry is kept for the daemon's successor. Throws std::system_error, std::runtime_error.
   SharedMemory(shm::FileDescriptor board, shm::FileDescriptor registry,
-               std::shared_ptr<const ServiceBell> service_bell);
+               std::shared_ptr<const ServiceBell> service_bell,
+               shm::Residence residence = shm::Residence::kMapped);
 
+  // Of the daemon's memory what the data path reads, as far as it has been written by now: the
+  // tables, the next one among them. Throws std::system_error.
+  void make_tables_resident() const;
+  // A page that cannot be locked is used nevertheless: std::system_error is thrown once it is.
   void add_page(shm::SourceId id, std::string name, shm::FileDescriptor page);
   [[nodiscard]] std::string source_name(shm::SourceId id) const;
 
@@ -36,12 +42,15 @@ class SharedMemory {
   [[nodiscard]] const shm::TableReader& tables() const noexcept { return tables_; }
   [[nodiscard]] const shm::ActivityPages& pages() const noexcept { return *pages_; }
   [[nodiscard]] const ServiceBell& service_bell() const noexcept { return *service_bell_; }
+  // Of all that this node maps.
+  [[nodiscard]] shm::Residence residence() const noexcept { return residence_; }
 
  private:
   // More need not be kept: others have them too, and a process has 1024 descriptors by default.
   static constexpr std::size_t kMaxPageDescriptors = 256;
 
   const std::shared_ptr<const ServiceBell> service_bell_;
+  const shm::Residence residence_;
   shm::FileDescriptor board_descriptor_;
   shm::FileDescriptor registry_;
   shm::Mapping board_;

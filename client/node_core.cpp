@@ -52,28 +52,15 @@ NodeCore::NodeCore(std::string_view name, const NodeOptions& options)
     service_bell_ = std::make_shared<const ServiceBell>();
     instance_ = shm::instance_name(options.instance);
     connect();
+    if (options.service_thread) start_service_thread();
   } catch (const Error&) {
     throw;
   } catch (const std::exception& error) {
     throw Error(error.what());
   }
-  if (options.service_thread) service_thread_ = std::thread([this] { run_service_thread(); });
 }
 
-NodeCore::~NodeCore() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-  }
-  if (!service_thread_.joinable()) return;
-  service_bell_->ring();
-  // The last port may go on the service thread itself, if that was the last to use it.
-  if (service_thread_.get_id() == std::this_thread::get_id()) {
-    service_thread_.detach();
-  } else {
-    service_thread_.join();
-  }
-}
+NodeCore::~NodeCore() { stop_service_thread(); }
 
 void NodeCore::connect() {
   const auto begin = Clock::now();
@@ -117,10 +104,15 @@ bool NodeCore::say_hello(Clock::time_point give_up) {
   if (welcome.message.kind == shm::MessageKind::kRefused) {
     throw Error("the daemon refuses: " + std::string(welcome.message.text_view()));
   }
-  memory_ = std::make_shared<SharedMemory>(std::move(welcome.descriptors[0]),
-                                           std::move(welcome.descriptors[1]), service_bell_);
+  memory_ =
+      std::make_shared<SharedMemory>(std::move(welcome.descriptors[0]),
+                                     std::move(welcome.descriptors[1]), service_bell_, residence());
   node_ = welcome.message.link;
   return true;
+}
+
+shm::Residence NodeCore::residence() const noexcept {
+  return options_.lock_memory ? shm::Residence::kLocked : shm::Residence::kMapped;
 }
 
 shm::Message NodeCore::hello() const {
@@ -243,7 +235,10 @@ shm::Received NodeCore::converse(const shm::Message& question,
                          : nobody_answers(turned_away_));
   }
   const auto answered = replies_.extract(request);
-  if (!answered.mapped().refusal.empty()) throw Error(answered.mapped().refusal);
+  if (!answered.mapped().refusal.empty()) {
+    if (answered.mapped().opened != 0) forget_port(answered.mapped().opened);
+    throw Error(answered.mapped().refusal);
+  }
   return std::move(answered.mapped().received);
 }
 

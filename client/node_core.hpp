@@ -82,7 +82,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   [[nodiscard]] shm::Message hello() const;
   [[nodiscard]] std::string nobody_answers(const std::string& why_not) const;
 
+  void start_service_thread();
   void run_service_thread();
+  void stop_service_thread();
   // Waits up to `timeout_ms` for something to do and does it.
   void pump(int timeout_ms);
   void tidy();
@@ -91,6 +93,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void wake_inputs();
   void handle_peer(shm::Received& received);
   void refuse_peer(const shm::Message& announced, const std::string& why);
+  void make_tables_resident();
+  void map_growth(const shm::Received& received);
+  void say_not_locked(shm::PortInstance port, const std::string& why);
   void say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
 
   [[nodiscard]] bool watch_socket() const;
@@ -116,6 +121,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // Opens a port: calls make(memory) again where the memory is replaced meanwhile.
   template <class Make>
   auto open(std::string_view name, Make make);
+  [[nodiscard]] shm::Residence residence() const noexcept;
   // Until something may have changed; false: it is time to give up.
   bool wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_point give_up);
 

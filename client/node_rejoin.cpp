@@ -171,7 +171,8 @@ void NodeCore::be_welcomed(shm::Received& welcome) {
     try {
       if (!is_anew_) throw std::runtime_error("the daemon has other memory");
       memory_ = std::make_shared<SharedMemory>(std::move(welcome.descriptors[0]),
-                                               std::move(welcome.descriptors[1]), service_bell_);
+                                               std::move(welcome.descriptors[1]), service_bell_,
+                                               residence());
       port_names_.clear();
     } catch (const std::exception& error) {
       turned_away_ = error.what();

@@ -7,6 +7,10 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <cstdio>
+#include <cstring>
+#include <system_error>
+
 #include "client/node_core.hpp"
 
 namespace arbiter::detail {
@@ -17,14 +21,46 @@ constexpr int kServiceNiceness = 5;
 
 }  // namespace
 
-// Of low priority whatever its maker's is: a real-time component must not be disturbed by it.
+// Of low priority whatever its maker's is: a real-time component must not be disturbed by it. A new
+// thread has its maker's policy and processors. It is not left to change them itself: beside a
+// maker of SCHED_FIFO that spins from now on it would never come to it.
+void NodeCore::start_service_thread() {
+  service_thread_ = std::thread([this] { run_service_thread(); });
+  const pthread_t thread = service_thread_.native_handle();
+  const sched_param normal{};
+  pthread_setschedparam(thread, SCHED_OTHER, &normal);
+  if (options_.service_cpus.empty()) return;
+  cpu_set_t cpus;
+  CPU_ZERO(&cpus);
+  for (const unsigned cpu : options_.service_cpus) {
+    if (cpu < CPU_SETSIZE) CPU_SET(cpu, &cpus);
+  }
+  if (const int error = pthread_setaffinity_np(thread, sizeof cpus, &cpus); error != 0) {
+    stop_service_thread();
+    throw Error(std::string("service_cpus: no thread can run there: ") + std::strerror(error));
+  }
+}
+
+void NodeCore::stop_service_thread() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  if (!service_thread_.joinable()) return;
+  service_bell_->ring();
+  // The last port may go on the service thread itself, if that was the last to use it.
+  if (service_thread_.get_id() == std::this_thread::get_id()) {
+    service_thread_.detach();
+  } else {
+    service_thread_.join();
+  }
+}
+
 void NodeCore::run_service_thread() {
   sigset_t all;
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
   pthread_setname_np(pthread_self(), "arbiter-service");
-  const sched_param normal{};
-  pthread_setschedparam(pthread_self(), SCHED_OTHER, &normal);
   setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), kServiceNiceness);
   for (;;) {
     {
@@ -99,8 +135,18 @@ void NodeCore::handle(shm::Received& received) {
         memory_->add_page(message.id, std::string(message.name_view()),
                           std::move(received.descriptors[0]));
         wake_inputs();
+      } catch (const std::system_error& error) {
+        say_not_locked(0, error.what());
+        wake_inputs();
       } catch (const std::exception& error) {
         refuse_peer(message, error.what());
+      }
+      break;
+    case shm::MessageKind::kOutputGrown:
+      try {
+        map_growth(received);
+      } catch (const std::system_error& error) {
+        say_not_locked(message.port, error.what());
       }
       break;
     case shm::MessageKind::kPortName: {
@@ -114,11 +160,15 @@ void NodeCore::handle(shm::Received& received) {
     case shm::MessageKind::kDisconnected:
       try {
         handle_peer(received);
+      } catch (const std::system_error& error) {
+        refuse_peer(message, error.what());
+        if (options_.lock_memory) say_not_locked(message.port, error.what());
       } catch (const std::exception& error) {
         refuse_peer(message, error.what());
       }
       break;
     case shm::MessageKind::kSync: {
+      make_tables_resident();
       shm::Message synced;
       synced.kind = shm::MessageKind::kSynced;
       synced.request = message.request;
@@ -126,6 +176,10 @@ void NodeCore::handle(shm::Received& received) {
       say(synced);
       break;
     }
+    case shm::MessageKind::kOpened:
+      make_tables_resident();
+      handle_reply(received);
+      break;
     default:
       handle_reply(received);
       break;
@@ -140,6 +194,35 @@ void NodeCore::wake_inputs() {
   }
 }
 
+// As far as the daemon's tables have been written: the one in force, and one that is to come.
+void NodeCore::make_tables_resident() {
+  try {
+    memory_->make_tables_resident();
+  } catch (const std::system_error& error) {
+    say_not_locked(0, error.what());
+  }
+}
+
+// Memory that came with the opening of a port makes the opening fail. What comes later is used as
+// it is: a node that runs must not go blind for a limit. `port`: whose it is; 0: the node's.
+void NodeCore::say_not_locked(shm::PortInstance port, const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  bool is_told = false;
+  for (auto& [request, reply] : replies_) {
+    if (reply.opened == 0 || (port != 0 && reply.opened != port)) continue;
+    reply.refusal = why;
+    is_told = true;
+  }
+  if (!is_told) std::fprintf(stderr, "arbiter: \"%s\": %s\n", name_.c_str(), why.c_str());
+}
+
+void NodeCore::map_growth(const shm::Received& received) {
+  const std::lock_guard lock(mutex_);
+  const auto input = inputs_.find(received.message.port);
+  if (input == inputs_.end()) return;
+  input->second->map_growth(received.message.peer, received.descriptors[0]);
+}
+
 void NodeCore::handle_peer(shm::Received& received) {
   const shm::Message& message = received.message;
   const std::lock_guard lock(mutex_);
@@ -148,7 +231,7 @@ void NodeCore::handle_peer(shm::Received& received) {
   if (output != outputs_.end()) {
     OutputCore& core = *output->second;
     if (message.kind == shm::MessageKind::kInputPeer) {
-      core.add_peer(map_input_peer(received, core.type()),
+      core.add_peer(map_input_peer(received, core.type(), residence()),
                     (message.flags & shm::kIsConnected) != 0 ? message.link : 0);
     } else if (message.kind == shm::MessageKind::kPeerGone) {
       core.remove_peer(message.peer);
@@ -158,7 +241,7 @@ void NodeCore::handle_peer(shm::Received& received) {
   } else if (input != inputs_.end()) {
     InputCore& core = *input->second;
     if (message.kind == shm::MessageKind::kOutputPeer) {
-      core.add_peer(map_output_peer(received, core.type()));
+      core.add_peer(map_output_peer(received, core.type(), residence()));
     } else if (message.kind == shm::MessageKind::kPeerGone) {
       core.lose_peer(message.peer);
     } else if (message.kind == shm::MessageKind::kDisconnected) {

@@ -39,6 +39,7 @@ OutputCore::OutputCore(std::string name, const shm::TypeInfo& type,
   if (const auto error = shm::allocate(descriptor_, 0, layout.rings_offset)) {
     throw std::system_error(error, "allocating an output port");
   }
+  shm::make_resident(mapping_, 0, layout.rings_offset, memory_->residence());
   shm::OutputHeader& header = segment_.header();
   header.magic = shm::OutputHeader::kMagic;
   header.version = shm::OutputHeader::kVersion;
@@ -60,6 +61,7 @@ void OutputCore::bind(shm::PortInstance instance, shm::SourceId source, shm::Fil
   page_ = shm::Mapping(page, sizeof(shm::ActivityPage), shm::Access::kReadWrite);
   activity_ = &page_.as<shm::ActivityPage>()->of(source);
   own_word_ = activity_->word.load(std::memory_order_relaxed);  // a predecessor's: it carries on
+  shm::make_resident(page_, 0, sizeof(shm::ActivityPage), memory_->residence());
   page_descriptor_ = std::move(page);
   instance_ = instance;
   source_ = source;
@@ -129,6 +131,7 @@ void OutputCore::assign_channel(InputLink& link) {
   if (const auto error = shm::allocate(descriptor_, offset, shm::kRingBytes)) {
     throw std::system_error(error, "allocating a queue");
   }
+  shm::make_resident(mapping_, offset, ring, memory_->residence());
 }
 
 // Allocates as many slots as all links can need at worst (slot_pool.hpp). Where max_memory does not
@@ -157,6 +160,12 @@ void OutputCore::allocate_slots() {
   if (headers || payload) {
     throw std::system_error(headers ? headers : payload, "allocating samples of " + name_);
   }
+  const std::uint64_t added = wanted - allocated_slots_;
+  shm::make_resident(
+      mapping_, layout.headers_offset + sizeof(shm::SlotHeader) * std::size_t{allocated_slots_},
+      sizeof(shm::SlotHeader) * added, memory_->residence());
+  shm::make_resident(mapping_, layout.payload_offset + layout.stride * allocated_slots_,
+                     layout.stride * added, memory_->residence());
   allocated_slots_ = wanted;
 }
 

@@ -5,7 +5,8 @@
 namespace arbiter::detail {
 
 std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
-                                                const shm::TypeInfo& own) {
+                                                const shm::TypeInfo& own,
+                                                shm::Residence residence) {
   auto peer = std::make_shared<InputPeer>();
   peer->instance = announced.message.peer;
   peer->port = announced.message.id;
@@ -29,11 +30,13 @@ std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
     throw std::runtime_error(mismatch);
   }
   peer->ringer = shm::Ringer(announced.descriptors[1]);
+  shm::make_resident(peer->mapping, 0, sizeof(shm::InputSegment), residence);
   return peer;
 }
 
 std::shared_ptr<const OutputPeer> map_output_peer(const shm::Received& announced,
-                                                  const shm::TypeInfo& own) {
+                                                  const shm::TypeInfo& own,
+                                                  shm::Residence residence) {
   auto peer = std::make_shared<OutputPeer>();
   peer->instance = announced.message.peer;
   peer->link = announced.message.link;
@@ -52,6 +55,7 @@ std::shared_ptr<const OutputPeer> map_output_peer(const shm::Received& announced
     throw std::runtime_error(mismatch);
   }
   peer->segment = shm::OutputSegment(peer->mapping.data(), layout);
+  shm::make_written_resident(segment, peer->mapping, residence);
   return peer;
 }
 

@@ -9,6 +9,7 @@
 #include "shm/ids.hpp"
 #include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
+#include "shm/residence.hpp"
 #include "shm/segment.hpp"
 #include "shm/wire.hpp"
 
@@ -74,10 +75,13 @@ struct HeldLink {
 };
 
 // Map what the daemon has announced, and check it: the segment must be whole, and carry a type that
-// `own` can take or give. Throw std::runtime_error saying what is wrong.
+// `own` can take or give. Throw std::runtime_error saying what is wrong, std::system_error where it
+// cannot be locked.
 std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
-                                                const shm::TypeInfo& own);
-std::shared_ptr<const OutputPeer> map_output_peer(const shm::Received& announced,
-                                                  const shm::TypeInfo& own);
+                                                const shm::TypeInfo& own,
+                                                shm::Residence residence = shm::Residence::kMapped);
+std::shared_ptr<const OutputPeer> map_output_peer(
+    const shm::Received& announced, const shm::TypeInfo& own,
+    shm::Residence residence = shm::Residence::kMapped);
 
 }  // namespace arbiter::detail

@@ -68,7 +68,8 @@ int Daemon::timeout_ms() const {
     return each.second->has_read_ahead();
   });
   if (is_behind || (try_postponed_ && !postponed_.empty())) return 0;
-  shm::Nanoseconds deadline = std::min(barriers_.next_deadline(), takeover_deadline());
+  shm::Nanoseconds deadline =
+      std::min({barriers_.next_deadline(), takeover_deadline(), show_growth_at_});
   for (const Postponed& request : postponed_) deadline = std::min(deadline, request.deadline);
   if (deadline == shm::kForever) return -1;
   const shm::Nanoseconds left = std::max<shm::Nanoseconds>(deadline - shm::monotonic_now(), 0);
@@ -104,6 +105,10 @@ void Daemon::run(int signal_descriptor) {
     }
     const shm::Nanoseconds now = shm::monotonic_now();
     barriers_.expire(now);
+    if (now >= show_growth_at_) {
+      switchboard_.show_growth();
+      show_growth_at_ = switchboard_.has_growth_to_show() ? now + kShowGrowthAfter : shm::kForever;
+    }
     advance_takeover(now);
     serve_postponed(now);
     settle();

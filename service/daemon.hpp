@@ -32,6 +32,9 @@ namespace arbiter::service {
 
 // How long a component that does not run may hold up the opening of a port, or a new model.
 constexpr shm::Nanoseconds kMaxWaitForClients = 200'000'000;
+// How long after a connection was made the publisher's other receivers are told that it uses more
+// memory: so long that they are told once of many.
+constexpr shm::Nanoseconds kShowGrowthAfter = 250'000'000;
 
 struct DaemonOptions {
   rules::ModelFiles files;
@@ -86,6 +89,7 @@ class Daemon {
   void open_output(Client& client, shm::Received& received);
   void open_input(Client& client, shm::Received& received);
   void connect(Client& client, std::uint64_t request, shm::PortInstance port);
+  void introduce(const Switchboard::Told& told, std::function<void()> passed);
   void close_port(Client& client, shm::PortInstance port);
   void send_status(Client& client, std::uint64_t request);
   void deactivate(Client& client, const shm::Message& message);
@@ -147,6 +151,7 @@ class Daemon {
   Models models_;
   Switchboard switchboard_{directory_, registry_};
   Barriers barriers_;
+  shm::Nanoseconds show_growth_at_ = shm::kForever;
   shm::Listener listener_;
   StateFile state_;
   Phase phase_ = Phase::kServing;

@@ -42,8 +42,12 @@ void Daemon::reload() {
 
 void Daemon::begin_swap() {
   swapping_ = true;
-  const auto told = switchboard_.link_all(models_.prepared());
-  barriers_.raise(told, shm::monotonic_now() + kMaxWaitForClients, [this] { put_in_force(); });
+  auto told = switchboard_.link_all(models_.prepared());
+  // The table itself, all who will read it have to map.
+  for (const auto& [id, client] : clients_) {
+    if (!client->ports.empty()) told.insert(client.get());
+  }
+  introduce(told, [this] { put_in_force(); });
 }
 
 void Daemon::put_in_force() {
@@ -51,7 +55,7 @@ void Daemon::put_in_force() {
   models_.put_in_force();
   swapping_ = false;
   const auto snapshot = models_.in_force();
-  switchboard_.link_all(snapshot.table);  // ports that were opened meanwhile
+  introduce(switchboard_.link_all(snapshot.table), [] {});  // ports that were opened meanwhile
   switchboard_.unlink(snapshot.table);
   switchboard_.ring_all();
   for (const auto& [id, client] : clients_) {

@@ -251,16 +251,29 @@ void Daemon::open_input(Client& client, shm::Received& received) {
 // Introduces a new port to its peers, and tells its component once they know it.
 void Daemon::connect(Client& client, std::uint64_t request, shm::PortInstance port) {
   auto told = switchboard_.link_one(models_.in_force().table, port);
-  told.erase(&client);  // hears of it in order, before the kConnected
+  // Hears of it in order, before the kConnected. But its receivers have to wait for an output port.
+  if (switchboard_.output(port) == nullptr) told.erase(&client);
   for (const auto& [id, other] : clients_) {
     if (other->observes) switchboard_.show_everything(*other);
   }
-  barriers_.raise(told, shm::monotonic_now() + kMaxWaitForClients,
-                  [this, id = client.id(), request] {
-                    const auto found = clients_.find(id);
-                    if (found == clients_.end()) return;
-                    found->second->send(reply_to(request, shm::MessageKind::kConnected));
-                  });
+  introduce(told, [this, id = client.id(), request] {
+    const auto found = clients_.find(id);
+    if (found == clients_.end()) return;
+    found->second->send(reply_to(request, shm::MessageKind::kConnected));
+  });
+}
+
+// Calls `passed` once clients have taken up what they were told: first the publishers, which
+// thereby use more of their segments, then the receivers that map it.
+void Daemon::introduce(const Switchboard::Told& told, std::function<void()> passed) {
+  const shm::Nanoseconds deadline = shm::monotonic_now() + kMaxWaitForClients;
+  barriers_.raise(told, deadline, [this, deadline, passed = std::move(passed)] {
+    const auto receivers = switchboard_.show_segments();
+    if (switchboard_.has_growth_to_show() && show_growth_at_ == shm::kForever) {
+      show_growth_at_ = shm::monotonic_now() + kShowGrowthAfter;
+    }
+    barriers_.raise(receivers, deadline, passed);
+  });
 }
 
 void Daemon::close_port(Client& client, shm::PortInstance port) {

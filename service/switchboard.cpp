@@ -195,6 +195,56 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
   to_input.link = link.number;
   input.client->send(to_input, {output.segment.get(), -1});
   told.insert(input.client);
+  fresh_.emplace_back(output.instance, input.instance);
+}
+
+void Switchboard::show_segment(const LinkKey& key, Client& receiver) const {
+  receiver.send(message_to(shm::MessageKind::kOutputGrown, key.second, key.first),
+                {outputs_.at(key.first)->segment.get(), -1});
+}
+
+Switchboard::Told Switchboard::show_segments() {
+  Told told;
+  for (const LinkKey& key : std::exchange(fresh_, {})) {
+    if (!is_connected(key)) continue;
+    Client& receiver = client_of(key.second);
+    show_segment(key, receiver);
+    told.insert(&receiver);
+    for (auto link = links_.lower_bound({key.first, 0});
+         link != links_.end() && link->first.first == key.first; ++link) {
+      if (link->first != key) growth_.insert(link->first);
+    }
+  }
+  return told;
+}
+
+// It is worth a page fault to them, and no more: one that does not read is passed over, for its
+// queue must not fill up with this.
+void Switchboard::show_growth() {
+  constexpr int kMostAtOnce = 512;
+  std::map<const Client*, int> room;
+  for (auto each = growth_.begin(); each != growth_.end();) {
+    if (!is_connected(*each)) {
+      each = growth_.erase(each);
+      continue;
+    }
+    Client& receiver = client_of(each->second);
+    int& left = room.try_emplace(&receiver, receiver.has_queue() ? -1 : kMostAtOnce).first->second;
+    if (left == 0) {
+      ++each;
+      continue;
+    }
+    if (left > 0) {
+      show_segment(*each, receiver);
+      --left;
+    }
+    each = growth_.erase(each);
+  }
+}
+
+bool Switchboard::is_connected(const LinkKey& key) const {
+  const auto link = links_.find(key);
+  return link != links_.end() && link->second.number != 0;
 }
 
 Switchboard::Told Switchboard::unlink(const shm::TableView& table) {

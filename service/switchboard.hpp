@@ -10,6 +10,7 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "service/ports.hpp"
 #include "shm/decision_table.hpp"
@@ -48,6 +49,12 @@ class Switchboard {
   Told link_all(const shm::TableView& table);
   Told link_one(const shm::TableView& table, shm::PortInstance port);
   Told unlink(const shm::TableView& table);
+  // An output port takes up a receiver by using more of its segment. Once it has, receivers must be
+  // told, to map it before they need it: the one that is new, at once; the others by and by, once
+  // for all that have come meanwhile (show_growth(), for as long as there is some to show).
+  Told show_segments();
+  void show_growth();
+  [[nodiscard]] bool has_growth_to_show() const { return !growth_.empty(); }
   // Sends a client every page and port name that it does not have, for those who observe.
   void show_everything(Client& client);
   // A client could not take up a peer.
@@ -75,6 +82,8 @@ class Switchboard {
   void send_pages(const OutputPort& output, const shm::TableView& table, Told& told);
   void make_link(const OutputPort& output, const InputPort& input, LinkKind kind, Told& told);
   void send_pages(Client& client, shm::PortId port, const shm::TableView& table, Told& told);
+  void show_segment(const LinkKey& key, Client& receiver) const;
+  [[nodiscard]] bool is_connected(const LinkKey& key) const;
   void disconnect(shm::PortInstance refused_by, shm::PortInstance port);
   bool send_page(Client& client, const Source& source);
   void insert(std::unique_ptr<OutputPort> port, Client& client, Source& source);
@@ -89,6 +98,8 @@ class Switchboard {
   std::map<shm::PortInstance, std::unique_ptr<OutputPort>> outputs_;
   std::map<shm::PortInstance, std::unique_ptr<InputPort>> inputs_;
   std::map<LinkKey, Link> links_;
+  std::vector<LinkKey> fresh_;  // links whose receivers are to be shown the segment
+  std::set<LinkKey> growth_;    // links whose receivers are to be shown that it has grown
 };
 
 }  // namespace arbiter::service

@@ -25,9 +25,9 @@ class SlotPool {
     const auto before = static_cast<std::uint32_t>(references_.size());
     if (count <= before) return;
     references_.resize(count);
-    free_.reserve(count);
-    retired_.reserve(count);
-    held_.reserve(kMaxHeld * kMaxDestinations);
+    make_room(free_, count);
+    make_room(retired_, count);
+    make_room(held_, kMaxHeld * kMaxDestinations);
     for (std::uint32_t slot = count; slot-- > before;) free_.push_back(slot);
   }
 
@@ -60,6 +60,13 @@ class SlotPool {
   [[nodiscard]] std::size_t retired_count() const noexcept { return retired_.size(); }
 
  private:
+  // Written, not only reserved: a later use must not be the memory's first.
+  static void make_room(std::vector<std::uint32_t>& list, std::size_t capacity) {
+    const std::size_t size = list.size();
+    list.resize(capacity);
+    list.resize(size);
+  }
+
   template <class ForEachHolds>
   void reclaim(PortInstance publisher, ForEachHolds for_each_holds) {
     held_.clear();

@@ -10,7 +10,8 @@
 // kConnected says that the peers have mapped the new port too, or were given up waiting for.
 //
 // The daemon changes what a client sees: kSourcePage…, kInputPeer…, then kSync; the client answers
-// kSynced when it has taken up all that came before.
+// kSynced when it has taken up all that came before. An output port takes up a peer by writing more
+// of its segment; once it has, its receivers hear kOutputGrown.
 //
 // A client that has lost its daemon looks for another, or the same, and says kHello with kRejoins;
 // it is answered kWelcome (or kRefused) and tells what it has: kHandBackPage…, for each port
@@ -71,6 +72,7 @@ enum class MessageKind : std::uint32_t {
   kSync,
   kStatusReply,  // descriptor: a memfd with JSON
   kDone,
+  kOutputGrown,  // to input `port`: `peer` uses more of its segment now; descriptor: the segment
 };
 
 enum MessageFlag : std::uint32_t {

@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "shm/bell.hpp"
+#include "shm/residence.hpp"
 #include "shm/segment.hpp"
 #include "tests/explore/explorer.hpp"
 #include "tests/explore/image.hpp"
@@ -76,6 +77,8 @@ FileDescriptor make_segment(const char*, std::size_t size) {
 }
 void seal(const FileDescriptor&, Seals) {}
 std::error_code allocate(const FileDescriptor&, std::size_t, std::size_t) noexcept { return {}; }
+void make_resident(const Mapping&, std::size_t, std::size_t, Residence) {}
+void make_written_resident(const FileDescriptor&, const Mapping&, Residence) {}
 FileDescriptor reopen(const FileDescriptor& segment, int) {
   const Image::Outside outside;
   const int fd = explore::next_segment++;

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 namespace arbiter {
 
@@ -20,6 +21,20 @@ struct NodeOptions {
   // new models). Without it call Node::service() often: until you do, this node's ports do not see
   // changes.
   bool service_thread = true;
+  // The processors on which that thread may run, numbered as by the kernel. Empty: those of the
+  // thread that makes the node, which must then leave it some of their time: beside a thread of
+  // SCHED_FIFO that never sleeps, it never runs.
+  std::vector<unsigned> service_cpus{};
+  // Whether all shared memory that this node uses is locked into memory as it is mapped (mlock).
+  // Without it the memory is mapped before it is used, but the kernel may page it out. Takes of the
+  // limit on locked memory (RLIMIT_MEMLOCK; 8 MiB on Debian): 8 KiB and the model's table for the
+  // node, 4 KiB for each source that the rules of its ports read, 36 KiB for each input port, here
+  // or connected to; and for each output port, here or connected to, 12 KiB, 8 KiB for each
+  // receiver, and its samples. Where that is too little, Node() and the opening of ports throw
+  // arbiter::Error, which names the limit; a port at the other end that comes later is not
+  // connected
+  // (`arbiter status` says why).
+  bool lock_memory = false;
 };
 
 struct OutputPortOptions {
