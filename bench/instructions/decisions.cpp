@@ -1,0 +1,106 @@
+// The decision alone, as publish() and take() make it: over a table that the compiler of rules
+// made.
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "bench/instructions/counting.hpp"
+#include "rules/compile.hpp"
+#include "shm/clock.hpp"
+#include "shm/decision.hpp"
+
+namespace arbiter::bench {
+namespace {
+
+constexpr int kTimes = 5000;
+constexpr shm::Nanoseconds kNow = 1'000'000'000;
+constexpr shm::Nanoseconds kHour = 3'600'000'000'000;
+
+std::string source(std::size_t i) { return "/s" + std::to_string(1000 + i); }
+
+// One connection, "/from" at "/to", whose rule reads `reads` sources. Every second one is active.
+class Table {
+ public:
+  explicit Table(rules::CompiledRule rule) : activities_(rule.reads.size() + 1) {
+    rules::CompiledModel model;
+    model.timeout = kHour;
+    model.sources = rule.reads;
+    model.sources.push_back("/from");
+    rule.source = "/from";
+    model.ports.push_back({"/to", true, rule.reads, {rule}});
+    const auto words = rules::flatten(model, {id_of, [](const std::string&) { return 0u; }});
+    words_ = std::vector<shm::Atomic<shm::Word>>(words.size());
+    for (std::size_t i = 0; i < words.size(); ++i) words_[i] = words[i];
+    view_ = shm::TableView(words_.data(), static_cast<shm::Word>(words_.size()));
+    rule_ = view_.rule(0);
+    for (shm::SourceId id = 0; id < activities_.size(); ++id) {
+      pages_->attach(id, &activities_[id].activity);
+      activities_[id].activity.word =
+          id % 2 != 0 ? shm::arrival(kNow - 1, kHour) : shm::deactivation(kNow - 1);
+    }
+  }
+
+  shm::Verdict decide() const {
+    shm::DecisionClock clock(kNow, true);
+    return shm::Decider(view_, *pages_, clock).decide(rule_);
+  }
+
+ private:
+  static shm::SourceId id_of(const std::string& name) {
+    return name == "/from" ? 0 : static_cast<shm::SourceId>(std::stoi(name.substr(2)) - 999);
+  }
+
+  std::vector<shm::ActivityPage> activities_;
+  std::unique_ptr<shm::ActivityPages> pages_ = std::make_unique<shm::ActivityPages>();
+  std::vector<shm::Atomic<shm::Word>> words_;
+  shm::TableView view_;
+  shm::Rule rule_;
+};
+
+// All must be as they are: nothing denies it early.
+rules::CompiledRule conjunction(std::size_t size) {
+  rules::CompiledRule rule;
+  rule.kind = shm::table::kConjunction;
+  for (std::size_t i = 0; i < size; ++i) {
+    rule.reads.push_back(source(i));
+    rule.expected.push_back(i % 2 == 0);  // source(i) has id i + 1
+  }
+  return rule;
+}
+
+// Whether an even number is active: the diagram that needs every source on each of its paths. Two
+// nodes for each source but the first: for "even so far" and for "odd so far".
+rules::CompiledRule parity(shm::Word size) {
+  rules::CompiledRule rule;
+  rule.kind = shm::table::kDiagram;
+  for (shm::Word i = 0; i < size; ++i) {
+    rule.reads.push_back(source(i));
+    const bool last = i + 1 == size;
+    const shm::Word even = last ? shm::table::kTrue : 2 * i + 1;
+    const shm::Word odd = last ? shm::table::kFalse : 2 * i + 2;
+    rule.nodes.push_back({i, even, odd});
+    if (i != 0) rule.nodes.push_back({i, odd, even});
+  }
+  return rule;
+}
+
+void count_decision(const std::string& measure, const rules::CompiledRule& rule) {
+  const Table table(rule);
+  shm::Verdict verdict = shm::Verdict::kBlind;
+  count_after(10, measure, kTimes, [&] { verdict = table.decide(); });
+  if (verdict != shm::Verdict::kWins) throw std::runtime_error("must win: " + measure);
+}
+
+}  // namespace
+
+void count_decisions() {
+  for (const std::size_t size : {1, 8, 64, 256}) {
+    count_decision("decide, conjunction of " + std::to_string(size), conjunction(size));
+  }
+  for (const shm::Word size : {8, 64}) {
+    count_decision("decide, diagram of " + std::to_string(size), parity(size));
+  }
+}
+
+}  // namespace arbiter::bench
