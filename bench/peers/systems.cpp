@@ -11,6 +11,11 @@ Systems all_systems() {
   systems.push_back(eventfd_system());
   systems.push_back(futex_system());
   systems.push_back(unix_datagram_system());
+  systems.push_back(iceoryx_system());
+  systems.push_back(cyclone_system());
+  systems.push_back(zeromq_system());
+  systems.push_back(message_queue_system());
+  systems.push_back(relay_system());
   return systems;
 }
 

@@ -1,0 +1,100 @@
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "bench/peers/cyclone.hpp"
+#include "bench/peers/spin.hpp"
+#include "dds_sample.h"
+
+namespace arbiter::bench {
+namespace {
+
+// Out of the way of applications, which begin at 0. Port numbers allow up to 232.
+constexpr dds_domainid_t kDomain = 217;
+
+// The settings are Cyclone's own but for where it listens. CYCLONEDDS_URI is not looked at:
+// whatever stands there is meant for others.
+constexpr const char* kConfiguration = R"(
+<General>
+  <Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>
+  <AllowMulticast>false</AllowMulticast>
+  <MaxMessageSize>65500B</MaxMessageSize>
+</General>
+<Discovery>
+  <ParticipantIndex>auto</ParticipantIndex>
+  <MaxAutoParticipantIndex>30</MaxAutoParticipantIndex>
+  <Peers><Peer address="127.0.0.1"/></Peers>
+</Discovery>
+<Tracing><Verbosity>none</Verbosity></Tracing>)";
+
+struct DeleteQos {
+  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+};
+using Qos = std::unique_ptr<dds_qos_t, DeleteQos>;
+
+// Of both ends.
+Qos qos(const DdsOptions& options) {
+  Qos result(dds_create_qos());
+  dds_qset_reliability(result.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(10));
+  dds_qset_history(result.get(), DDS_HISTORY_KEEP_LAST, 8);
+  dds_qset_ownership(result.get(), DDS_OWNERSHIP_EXCLUSIVE);
+  if (options.lease_ns != 0) {
+    dds_qset_liveliness(result.get(), DDS_LIVELINESS_MANUAL_BY_TOPIC, options.lease_ns);
+  }
+  return result;
+}
+
+}  // namespace
+
+DdsEntity::DdsEntity(dds_entity_t entity, const char* what) : entity_(entity) {
+  if (entity < 0) throw BenchError(std::string(what) + ": " + dds_strretcode(-entity));
+}
+DdsEntity::DdsEntity(DdsEntity&& other) noexcept : entity_(std::exchange(other.entity_, 0)) {}
+DdsEntity& DdsEntity::operator=(DdsEntity&& other) noexcept {
+  std::swap(entity_, other.entity_);
+  return *this;
+}
+DdsEntity::~DdsEntity() {
+  if (entity_ > 0) dds_delete(entity_);
+}
+
+DdsParticipant::DdsParticipant()
+    : domain_(dds_create_domain(kDomain, kConfiguration), "dds_create_domain"),
+      participant_(dds_create_participant(kDomain, nullptr, nullptr), "dds_create_participant") {}
+
+DdsEntity DdsParticipant::topic(std::string name) const {
+  std::replace(name.begin(), name.end(), '-', '_');  // which DDS does not allow
+  return {dds_create_topic(participant_.get(), &arbiter_bench_DdsSample_desc, name.c_str(), nullptr,
+                           nullptr),
+          "dds_create_topic"};
+}
+
+DdsEntity DdsParticipant::writer(const DdsEntity& topic, const DdsOptions& options) const {
+  const Qos wanted = qos(options);
+  dds_qset_ownership_strength(wanted.get(), options.strength);
+  return {dds_create_writer(participant_.get(), topic.get(), wanted.get(), nullptr),
+          "dds_create_writer"};
+}
+
+DdsEntity DdsParticipant::reader(const DdsEntity& topic, const DdsOptions& options) const {
+  return {dds_create_reader(participant_.get(), topic.get(), qos(options).get(), nullptr),
+          "dds_create_reader"};
+}
+
+void await_readers(const DdsEntity& writer, std::uint32_t readers) {
+  spin_until([&] {
+    dds_publication_matched_status_t status{};
+    dds_get_publication_matched_status(writer.get(), &status);
+    return status.current_count >= readers;
+  });
+}
+
+void await_writers(const DdsEntity& reader, std::uint32_t writers) {
+  spin_until([&] {
+    dds_subscription_matched_status_t status{};
+    dds_get_subscription_matched_status(reader.get(), &status);
+    return status.current_count >= writers;
+  });
+}
+
+}  // namespace arbiter::bench
