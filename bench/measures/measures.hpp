@@ -27,6 +27,8 @@ Measure measure_delivery(const Effort& effort);
 Measure measure_publish(const Effort& effort);
 Measure measure_take(const Effort& effort);
 Measure measure_decide(const Effort& effort);
+Measure measure_takeover(const Effort& effort);
+Measure measure_failover(const Effort& effort);
 
 inline std::vector<MeasureEntry> all_measures() {
   return {
@@ -34,6 +36,8 @@ inline std::vector<MeasureEntry> all_measures() {
       {"publish", measure_publish},
       {"take", measure_take},
       {"decide", measure_decide},
+      {"takeover", measure_takeover},
+      {"failover", measure_failover},
   };
 }
 
