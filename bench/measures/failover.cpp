@@ -74,7 +74,9 @@ Case run_case(const std::string& name, const Roles& roles, const Budget& budget)
   Case one{name};
   std::vector<Contender> contenders;
   std::vector<Result> absent_ones;
-  for (const ContestSystem& system : contest_systems()) {
+  std::vector<ContestSystem> systems = contest_systems();
+  systems.push_back({"pipe and timer", Role::kFloor, pipe_and_timer});
+  for (const ContestSystem& system : systems) {
     try {
       auto pair = std::make_shared<ContestPair>(system, contest(kTimeoutNs, true), roles);
       contenders.push_back({system.name, system.role, [pair](double seconds) {
@@ -101,7 +103,11 @@ Measure measure_failover(const Effort& effort) {
       "The commander falls silent, with a timeout of 20 ms (for Cyclone DDS: the lease of its "
       "liveliness, by topic). From the expiry, which is 20 ms after the beginning of its last "
       "publish(), to when the blocking destination has the next one's sample, which comes every 50 "
-      "us; and, where there is no next one, to when it is told that nobody commands."};
+      "us; and, where there is no next one, to when it is told that nobody commands. The floor is "
+      "a source "
+      "that knows when it may write to a pipe, and a destination that sets itself a timer: after "
+      "so "
+      "long a sleep a core wakes slowly."};
   // A trial takes 20 ms whatever is measured.
   const Budget budget = effort.quick ? Budget{4, 0.25} : Budget{10, 1};
   measure.cases.push_back(

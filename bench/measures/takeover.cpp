@@ -1,5 +1,6 @@
 // An override comes while the one that it overrides publishes as fast as it can: for how long is
 // the old winner still obeyed?
+#include <algorithm>
 #include <memory>
 #include <random>
 
@@ -13,7 +14,7 @@ namespace {
 
 // How long the old winner goes on after the override has been seen: what has not come out by then
 // was dropped.
-constexpr std::int64_t kAftermathNs = 50'000;
+constexpr std::int64_t kAftermathNs = 200'000;
 
 void override_old(Sources& sources, Stage& stage, std::uint64_t trial) {
   static std::minstd_rand random(1);
@@ -67,8 +68,8 @@ class OldTakes {
 
 // Three words: nanoseconds from the override's publish() to the old winner's last sample and to the
 // override's first one, and how many of the old winner's were taken by takes that began after that
-// publish() had returned.
-Words watch(Destination& destination, Stage& stage, std::uint64_t trial) {
+// publish() had returned. `work_ns` is what the destination does with each sample.
+Words watch(Destination& destination, Stage& stage, std::uint64_t trial, std::int64_t work_ns) {
   static OldTakes old_takes;
   old_takes.clear();
   std::int64_t override_taken = 0;
@@ -76,7 +77,8 @@ Words watch(Destination& destination, Stage& stage, std::uint64_t trial) {
   spin_until([&] {
     const Taken taken = destination.take();
     const std::int64_t after = now_ns();
-    if (taken.kind == Taken::Kind::kSample && taken.number == trial) {
+    const bool is_sample = taken.kind == Taken::Kind::kSample;
+    if (is_sample && taken.number == trial) {
       if (taken.party == Party::kOld) {
         old_takes.add({before, after});
         stage.old_seen.store(trial, std::memory_order_release);
@@ -86,6 +88,7 @@ Words watch(Destination& destination, Stage& stage, std::uint64_t trial) {
       }
     }
     before = after;
+    while (is_sample && work_ns != 0 && before < after + work_ns) before = now_ns();
     return stage.ended.load(std::memory_order_acquire) == trial;
   });
 
@@ -124,25 +127,19 @@ struct Found {
   }
 };
 
-}  // namespace
-
-Measure measure_takeover(const Effort& effort) {
-  Measure measure{
-      "takeover", "Takeover",
-      "A source publishes as fast as it can; then another, which overrides it, publishes once. "
-      "From "
-      "the beginning of the override's publish(): to the last sample of the old winner that the "
-      "spinning destination takes, 0 where none comes any more, and to the override's sample. And "
-      "how many samples of the old winner come, for each takeover, from takes that begin after the "
-      "override's publish() has returned.",
-      "samples"};
+// Three cases, of the same takeovers.
+void add_cases(Measure& measure, const std::string& circumstances, std::int64_t work_ns,
+               const Budget& budget) {
+  const Roles roles{override_old,
+                    [work_ns](Destination& destination, Stage& stage, std::uint64_t trial) {
+                      return watch(destination, stage, trial, work_ns);
+                    }};
   std::vector<Contender> contenders;
   std::vector<std::shared_ptr<Found>> found;
   std::vector<Result> absent_ones;
   for (const ContestSystem& system : contest_systems()) {
     try {
-      auto pair = std::make_shared<ContestPair>(system, contest(500'000'000, false),
-                                                Roles{override_old, watch});
+      auto pair = std::make_shared<ContestPair>(system, contest(500'000'000, false), roles);
       auto kept = std::make_shared<Found>();
       contenders.push_back({system.name, system.role, [pair, kept](double seconds) {
                               return kept->add(pair->run(seconds));
@@ -152,11 +149,11 @@ Measure measure_takeover(const Effort& effort) {
       absent_ones.push_back(absent(system.name, system.role, error.what()));
     }
   }
-  std::vector<Result> results = run_rounds(std::move(contenders), effort.budget());
+  const std::vector<Result> results = run_rounds(std::move(contenders), budget);
 
-  Case old_last{"the old winner's last sample"};
-  Case override_first{"the override's sample"};
-  Case past_override{"samples past the override"};
+  Case old_last{"the old winner's last sample" + circumstances};
+  Case override_first{"the override's sample" + circumstances};
+  Case past_override{"samples past the override" + circumstances};
   for (std::size_t i = 0; i < results.size(); ++i) {
     Result result = results[i];
     result.ns = found[i]->old_last;
@@ -174,6 +171,23 @@ Measure measure_takeover(const Effort& effort) {
     each->results.insert(each->results.end(), absent_ones.begin(), absent_ones.end());
     measure.cases.push_back(std::move(*each));
   }
+}
+
+}  // namespace
+
+Measure measure_takeover(const Effort& effort) {
+  Measure measure{
+      "takeover", "Takeover",
+      "A source publishes as fast as it can; then another, which overrides it, publishes once. "
+      "From "
+      "the beginning of the override's publish(): to the last sample of the old winner that the "
+      "spinning destination takes, 0 where none comes any more, and to the override's sample. And "
+      "how many samples of the old winner come, for each takeover, from takes that begin after the "
+      "override's publish() has returned. Where the destination works on each sample, a backlog of "
+      "the old winner's waits when the override comes.",
+      "samples"};
+  add_cases(measure, "", 0, effort.budget());
+  add_cases(measure, ", 10 us of work on each", 10'000, effort.budget());
   return measure;
 }
 

@@ -76,7 +76,10 @@ std::unique_ptr<ContestSession> arbiter_contest(const Contest& contest);
 std::unique_ptr<ContestSession> cyclone_contest(const Contest& contest);
 std::unique_ptr<ContestSession> relay_contest(const Contest& contest);
 
-// All of them.
+// The floor of failover: nobody arbitrates, each party knows when its time has come.
+std::unique_ptr<ContestSession> pipe_and_timer(const Contest& contest);
+
+// All but the floor.
 const std::vector<ContestSystem>& contest_systems();
 
 // How parties and numbers go into a sample of 64 bytes, where there are but bytes.
