@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "bench/harness/cpu.hpp"
+#include "bench/harness/program.hpp"
 #include "bench/measures/measures.hpp"
 #include "bench/targets.hpp"
 
@@ -67,10 +68,12 @@ int main(int argc, char** argv) {
   app.add_option("--only", arguments.only, "Measure these only")->type_name("NAME");
   app.add_option("--json", arguments.json, "Where the report is written")->type_name("FILE");
   CLI11_PARSE(app, argc, argv);
-  try {
-    return arbiter::bench::run(arguments);
-  } catch (const std::exception& error) {
-    std::cerr << "arbiter-bench: " << error.what() << "\n";
-    return 1;
-  }
+  return arbiter::bench::run_and_clear_up([&] {
+    try {
+      return arbiter::bench::run(arguments);
+    } catch (const std::exception& error) {
+      std::cerr << "arbiter-bench: " << error.what() << "\n";
+      return 1;
+    }
+  });
 }

@@ -7,12 +7,23 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
+#include <cstdlib>
 #include <filesystem>
 #include <system_error>
 #include <utility>
 
 namespace arbiter::bench {
+
+namespace {
+
+std::atomic<pid_t> supervised{0};
+static_assert(std::atomic<pid_t>::is_always_lock_free, "for a signal handler");
+
+void pass_on(int number) { ::kill(supervised.load(), number); }
+
+}  // namespace
 
 Program::Program(const std::vector<std::string>& argv,
                  const std::map<std::string, std::string>& variables, const std::string& log) {
@@ -67,6 +78,32 @@ ScratchDirectory::ScratchDirectory() {
 ScratchDirectory::~ScratchDirectory() {
   std::error_code ignored;
   std::filesystem::remove_all(path_, ignored);
+}
+
+int run_and_clear_up(const std::function<int()>& work) {
+  const ScratchDirectory scratch;
+  ::prctl(PR_SET_CHILD_SUBREAPER, 1);  // what outlives its parent becomes a child of ours
+  const pid_t parent = ::getpid();
+  const pid_t child = ::fork();
+  if (child < 0) throw std::system_error(errno, std::generic_category(), "fork");
+  if (child == 0) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) ::_exit(1);
+    ::setenv("TMPDIR", scratch.path().c_str(), 1);
+    std::exit(work());
+  }
+  supervised = child;
+  ::signal(SIGTERM, pass_on);
+  ::signal(SIGINT, SIG_IGN);  // the terminal has sent it to the child as well
+  ::signal(SIGHUP, SIG_IGN);
+  int result = 1;
+  for (;;) {
+    int status = 0;
+    const pid_t ended = ::waitpid(-1, &status, 0);
+    if (ended < 0 && errno == EINTR) continue;
+    if (ended < 0) return result;
+    if (ended == child) result = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
 }
 
 std::string program_directory() {

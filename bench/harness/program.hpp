@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -42,6 +43,11 @@ class ScratchDirectory {
  private:
   std::string path_;
 };
+
+// Runs `work` in a process of its own, whose temporary directory goes with it, and returns its exit
+// code. All that it starts has ended when this returns, and nothing of it is left in the file
+// system: also where it was killed, or Ctrl-C was pressed.
+int run_and_clear_up(const std::function<int()>& work);
 
 // Where the benchmark's own program lies, and so the other programs too.
 std::string program_directory();
