@@ -2,11 +2,14 @@
 
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <filesystem>
+#include <thread>
 
 #include <iceoryx_hoofs/log/logmanager.hpp>
 #include <iceoryx_hoofs/posix_wrapper/file_lock.hpp>
@@ -19,7 +22,7 @@ namespace arbiter::bench {
 namespace {
 
 constexpr std::uint32_t kKiB = 1024;
-constexpr std::uint64_t kNeeded = 300ull * kKiB * kKiB;
+constexpr std::uint64_t kNeeded = 200ull * kKiB * kKiB;
 
 // What it would otherwise answer by ending the process.
 void check_that_it_can_run() {
@@ -33,9 +36,12 @@ void check_that_it_can_run() {
   if (lock.has_error()) refused(lock.get_error());
   struct statvfs shm {};
   if (::statvfs("/dev/shm", &shm) == 0 && std::uint64_t{shm.f_bavail} * shm.f_frsize < kNeeded) {
-    throw BenchError("RouDi needs 300 MiB in /dev/shm (in a container: --shm-size)");
+    throw BenchError("RouDi needs 200 MiB in /dev/shm (in a container: --shm-size)");
   }
 }
+
+// Whose name the shared memory bears.
+std::string group() { return iox::posix::PosixGroup::getGroupOfCurrentProcess().getName().c_str(); }
 
 iox::RouDiConfig_t memory() {
   iox::mepoo::MePooConfig pools;
@@ -44,9 +50,9 @@ iox::RouDiConfig_t memory() {
   pools.addMemPool({64 * kKiB, 64});
   pools.addMemPool({kKiB * kKiB, 16});
   pools.addMemPool({4 * kKiB * kKiB, 16});
-  const auto group = iox::posix::PosixGroup::getGroupOfCurrentProcess().getName();
+  const iox::posix::PosixGroup::string_t name(iox::cxx::TruncateToCapacity, group());
   iox::RouDiConfig_t config;
-  config.m_sharedMemorySegments.push_back({group, group, pools});
+  config.m_sharedMemorySegments.push_back({name, name, pools});
   return config;
 }
 
@@ -59,6 +65,21 @@ void remove_traces(const std::string& prefix) {
     if (!file.path().filename().string().starts_with(prefix)) continue;
     std::filesystem::remove(file.path(), ignored);
   }
+}
+
+// A worker that is killed in the middle of a publish leaves a mutex locked for ever, and RouDi may
+// wait for it when it ends. Then what it would have removed is removed without it.
+void bound_the_end(const std::string& prefix) {
+  std::thread([prefix] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    ::shm_unlink("/iceoryx_mgmt");
+    ::shm_unlink(("/" + group()).c_str());
+    ::unlink("/tmp/roudi");
+    ::unlink("/tmp/roudi.lock");
+    ::unlink("/tmp/iox-unique-roudi.lock");
+    remove_traces(prefix);
+    ::_exit(1);
+  }).detach();
 }
 
 // RouDi tells how it is doing whatever the log level. What can go wrong is checked before.
@@ -86,6 +107,7 @@ void run(Conversation& with, const std::string& prefix) {
     std::uint64_t word = 0;
     while (with.hear_or_end(word)) {
     }
+    bound_the_end(prefix);
   }
   remove_traces(prefix);
 }
