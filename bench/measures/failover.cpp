@@ -109,7 +109,7 @@ Measure measure_failover(const Effort& effort) {
       "so "
       "long a sleep a core wakes slowly."};
   // A trial takes 20 ms whatever is measured.
-  const Budget budget = effort.quick ? Budget{4, 0.25} : Budget{10, 1};
+  const Budget budget = effort.quick ? Budget{4, 0.25} : Budget{10, 0.5};
   measure.cases.push_back(
       run_case("the next one's sample", {fall_silent_beside_another, watch_for_next}, budget));
   measure.cases.push_back(

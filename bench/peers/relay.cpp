@@ -169,9 +169,10 @@ void Relay::run() {
       if (size <= 0) continue;
       const std::int64_t now = now_ns();
       if (!coordinator.may_pass(i, source.name, now)) continue;
-      // A destination that does not keep up loses samples; the relay waits for nobody.
+      // Where the destination does not keep up, the relay waits, as over a stream: a datagram that
+      // is dropped in its place might be the override's only one.
       ::send(out_[source.destination].write.get(), buffer.data(), static_cast<std::size_t>(size),
-             MSG_DONTWAIT);
+             MSG_NOSIGNAL);
       falls_silent[source.destination] = now + options_.timeout_ns;
     }
     if (options_.tells_idle) tell_idle(now_ns());
