@@ -122,7 +122,7 @@ class Player {
     shm::DecisionClock clock(at, true);
     shm::Decider decider(table, memory_->pages(), clock);
     rules::PortOutcome outcome;
-    if (event.kind == rules::TraceKind::kArrival) {
+    if (event.kind == rules::TraceKind::kArrival && output != nullptr) {
       const shm::Rule own = table.rule(table.find(output->source(), port));
       outcome.delivered = decider.decide(own) == shm::Verdict::kWins;
     }

@@ -251,7 +251,7 @@ void PortCompiler::report_conflict(const Proof::Pair& pair) {
                         " when " + describe(witness) +
                         "; let one inhibit the other, give one a condition that excludes the "
                         "other, or let document order decide with <arbiter at=\"" +
-                        port_.port + "\" conflict=\"first\"/>";
+                        port_.port + R"(" conflict="first"/>)";
   context_.diagnostics.error("both-can-win", second.where, std::move(message), std::move(witness));
 }
 

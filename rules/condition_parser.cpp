@@ -167,7 +167,7 @@ class Parser {
     }
   }
 
-  Parsed combine(Operator op, std::vector<Parsed> operands, std::size_t at) const {
+  [[nodiscard]] Parsed combine(Operator op, std::vector<Parsed> operands, std::size_t at) const {
     int depth = 0;
     std::vector<ExpressionPtr> expressions;
     for (Parsed& operand : operands) {

@@ -39,10 +39,7 @@ ParsedDuration parse_duration(std::string_view text) {
   const shm::Nanoseconds most = shm::kMaxTime / known->second;
   shm::Nanoseconds value = 0;
   for (const char digit : text.substr(0, digits)) {
-    if (value <= most / 10)
-      value = value * 10 + (digit - '0');
-    else
-      value = most + 1;
+    value = value <= most / 10 ? value * 10 + (digit - '0') : most + 1;
     if (value > most) {
       return refuse(text, "is longer than the limit of " + std::to_string(shm::kMaxTime) + "ns",
                     "shorten it, or write forever");

@@ -50,8 +50,8 @@ class Flattener {
   std::vector<Word> flatten();
 
  private:
-  shm::SourceId source_id(const std::string& source) const;
-  shm::PortId port_id(const std::string& port) const;
+  [[nodiscard]] shm::SourceId source_id(const std::string& source) const;
+  [[nodiscard]] shm::PortId port_id(const std::string& port) const;
   void lay_out_records();
   void write_header();
   void write_sources();

@@ -4,6 +4,9 @@
 #include <sys/signalfd.h>
 #include <systemd/sd-daemon.h>
 
+#include <cstdio>
+#include <exception>
+
 #include <CLI/CLI.hpp>
 
 #include "service/daemon.hpp"
@@ -55,9 +58,7 @@ int serve(const arbiter::service::DaemonOptions& options, const std::string& ins
   return 0;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App app("arbiterd: decides at each input port whose data gets through", "arbiterd");
   app.footer(kExample);
   app.set_version_flag("--version", std::string("arbiterd ") + ARBITER_VERSION);
@@ -97,6 +98,17 @@ int main(int argc, char** argv) {
     return 2;
   } catch (const std::exception& error) {
     log::error("{}", error.what());
+    return 1;
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "arbiterd: %s\n", error.what());
     return 1;
   }
 }

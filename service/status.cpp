@@ -91,7 +91,7 @@ class Document {
     return shm::is_active(source.activity().word.load(std::memory_order_acquire), now_);
   }
 
-  json source_json(const Source& source) const {
+  [[nodiscard]] json source_json(const Source& source) const {
     const shm::Nanoseconds timeout = snapshot_.table.timeout(source.id);
     json result{{"name", source.name},
                 {"active", is_active(source)},

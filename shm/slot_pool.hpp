@@ -27,7 +27,7 @@ class SlotPool {
     references_.resize(count);
     make_room(free_, count);
     make_room(retired_, count);
-    make_room(held_, kMaxHeld * kMaxDestinations);
+    make_room(held_, std::size_t{kMaxHeld} * kMaxDestinations);
     for (std::uint32_t slot = count; slot-- > before;) free_.push_back(slot);
   }
 

@@ -151,11 +151,7 @@ class Demo {
   Story story_;
 };
 
-}  // namespace
-}  // namespace search_and_track
-
-int main(int argc, char** argv) {
-  using namespace search_and_track;
+int run(int argc, char** argv) {
   CLI::App app("Runs the paper's Search and Track with real processes, and shows who wins",
                "search-and-track-demo");
   app.footer(
@@ -174,8 +170,15 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
+  return Demo(options).run();
+}
+
+}  // namespace
+}  // namespace search_and_track
+
+int main(int argc, char** argv) {
   try {
-    return Demo(options).run();
+    return search_and_track::run(argc, argv);
   } catch (const std::exception& error) {
     std::cerr << "search-and-track-demo: " << error.what() << '\n';
     return 1;
