@@ -93,7 +93,8 @@ TEST_F(HostileClient, ThatSendsRandomMessagesAfterItsHelloHarmsNobody) {
     RawClient hostile = client();
     for (int i = 0; i < 40; ++i) {
       shm::Message message;
-      message.kind = static_cast<MessageKind>(random() % 4 == 0 ? 40 + random() % 6 : random() % 14);
+      message.kind =
+          static_cast<MessageKind>(random() % 4 == 0 ? 40 + random() % 6 : random() % 14);
       if (message.kind == MessageKind::kStop) continue;  // this user may, and would
       message.flags = static_cast<std::uint32_t>(random());
       message.request = random() % 8;

@@ -1,6 +1,6 @@
 // Clients that come back from somewhere that they never were, or claim what was never theirs.
-#include <gtest/gtest.h>
 #include <dirent.h>
+#include <gtest/gtest.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 
@@ -75,7 +75,8 @@ TEST(HostileReturn, WithAnythingButTheBoardIsRefused) {
   EXPECT_EQ(daemon.status()["clients"], 1);
 }
 
-// All of this is said by a process that has the board, as any client has it, but never had the port.
+// All of this is said by a process that has the board, as any client has it, but never had the
+// port.
 TEST(HostileReturn, GetsNoPortOfAnotherProcess) {
   Daemon daemon(single_model());
   Component victim("victim");

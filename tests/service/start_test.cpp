@@ -62,11 +62,7 @@ TEST(Start, StopsCleanlyWhileComponentsHavePorts) {
   auto out = node.output_port<int>("/out");
   auto in = node.input_port<int>("/in");
   EXPECT_EQ(daemon.terminate(), 0);
-  EXPECT_THROW(
-      {
-        auto other = node.output_port<int>("/other");
-      },
-      Error);
+  EXPECT_THROW({ auto other = node.output_port<int>("/other"); }, Error);
   EXPECT_EQ(out.publish(1).delivered, 1u);
   EXPECT_TRUE(in.take());
 }

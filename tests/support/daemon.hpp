@@ -209,8 +209,8 @@ class Daemon {
     int number = 3;
     for (const auto& [name, descriptor] : notify_.stored()) {
       inherited.emplace_back(::fcntl(descriptor.get(), F_DUPFD, 100));
-      redirections += " " + std::to_string(number++) + "<&" +
-                      std::to_string(inherited.back().get());
+      redirections +=
+          " " + std::to_string(number++) + "<&" + std::to_string(inherited.back().get());
       names += (names.empty() ? "" : ":") + name;
     }
     start({"/bin/bash", "-c",

@@ -1,8 +1,8 @@
 // A component's connection to the daemon, and the maker of its ports.
 //
-// If the daemon dies, data flows on between the ports that are open. The node looks for a new daemon of
-// the instance, about twenty times a second, and hands back what it has; it need not be told to. The
-// service thread does this, or service() where there is none.
+// If the daemon dies, data flows on between the ports that are open. The node looks for a new
+// daemon of the instance, about twenty times a second, and hands back what it has; it need not be
+// told to. The service thread does this, or service() where there is none.
 #pragma once
 
 #include <cstddef>
