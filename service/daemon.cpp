@@ -198,7 +198,6 @@ void Daemon::serve(Client& client) {
 
 // `deadline`: of a request that was postponed.
 void Daemon::handle_or_refuse(Client& client, shm::Received& received, shm::Nanoseconds deadline) {
-  const std::uint64_t request = received.message.request;
   std::string why;
   try {
     handle(client, received);
@@ -215,7 +214,7 @@ void Daemon::handle_or_refuse(Client& client, shm::Received& received, shm::Nano
     why = error.what();
   }
   log::warn("{}: {}", client.description(), why);
-  refuse(client, request, why);
+  refuse(client, received.message.request, why);
 }
 
 void Daemon::drop(ClientId id) {

@@ -10,8 +10,8 @@ constexpr std::string_view kReset = "\x1b[0m";
 
 // The terminal's own colours, so that they suit its background.
 int colour_number(Colour colour) {
-  constexpr std::array<int, 6> numbers{9, 1, 2, 3, 5, 6};
-  return numbers[static_cast<std::size_t>(colour)];
+  constexpr std::array<int, 6> kNumbers{9, 1, 2, 3, 5, 6};
+  return kNumbers[static_cast<std::size_t>(colour)];
 }
 
 std::string escape_for(Style style, bool coloured) {

@@ -216,26 +216,26 @@ class Diagram {
   void draw_head(int row) {
     const ReceiverState& gaze = story_.receiver(kGaze);
     if (gaze.winner() == kNotYetKnown) return;
-    constexpr int width = 15;
+    constexpr int kWidth = 15;
     int column = canvas_.put(row, kBox + 2, "left ", kDim);
-    canvas_.repeat(row, column, width, "·", kDim);
+    canvas_.repeat(row, column, kWidth, "·", kDim);
     const double part = std::clamp(0.5 - gaze.position[1], 0.0, 1.0);
-    canvas_.put(row, column + static_cast<int>(std::lround(part * (width - 1))), "◉",
+    canvas_.put(row, column + static_cast<int>(std::lround(part * (kWidth - 1))), "◉",
                 style_of_winner(kGaze));
-    canvas_.put(row, column + width, " right", kDim);
+    canvas_.put(row, column + kWidth, " right", kDim);
   }
 
   // How far the arm reaches.
   void draw_hand(int row) {
     const ReceiverState& arm = story_.receiver(kArm);
     if (arm.winner() == kNotYetKnown) return;
-    constexpr double full_reach = 0.4;
-    constexpr int width = 25;
-    const double part = std::clamp(arm.position[0] / full_reach, 0.0, 1.0);
-    const int length = static_cast<int>(std::lround(part * width));
+    constexpr double kFullReach = 0.4;
+    constexpr int kWidth = 25;
+    const double part = std::clamp(arm.position[0] / kFullReach, 0.0, 1.0);
+    const int length = static_cast<int>(std::lround(part * kWidth));
     const Style style = style_of_winner(kArm);
     canvas_.put(row, kBox + 2, "▐", style);
-    canvas_.repeat(row, kBox + 3, width, "·", kDim);
+    canvas_.repeat(row, kBox + 3, kWidth, "·", kDim);
     canvas_.repeat(row, kBox + 3, length - 1, "═", style);
     canvas_.put(row, kBox + 2 + length, "◖", style);
   }

@@ -28,9 +28,9 @@ fs::path component_program(std::string_view name) {
 }
 
 fs::path papers_model() {
-  constexpr const char* file = "search_and_track.xml";
+  constexpr const char* kFile = "search_and_track.xml";
   return first_of(
-      {fs::path(DEMO_SOURCE_DIRECTORY) / file, own_directory() / DEMO_DATA_FROM_BIN / file});
+      {fs::path(DEMO_SOURCE_DIRECTORY) / kFile, own_directory() / DEMO_DATA_FROM_BIN / kFile});
 }
 
 }  // namespace search_and_track
