@@ -1,0 +1,381 @@
+// Clients of the daemon that say what they like, with whatever descriptors, and hang up as they
+// like.
+//
+// The input is a script: what the hostile ones do, step by step. The daemon is the real one, on
+// real sockets (loop.hpp says what is not). Required, whatever the script:
+//   - no crash, no undefined behaviour; the daemon's loop rests when there is nothing to do
+//   - those who keep to the protocol are served in time, and keep their ports and each other
+//   - once the hostile ones are gone, no client, port or descriptor of theirs is left
+#include <fcntl.h>
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "tests/fuzz/daemon/stage.hpp"
+#include "tests/fuzz/fuzz.hpp"
+
+namespace arbiter::fuzz {
+namespace {
+
+using shm::MessageKind;
+
+// They bound what an input costs, not what the daemon must bear.
+constexpr std::size_t kMostHostile = 6;
+constexpr int kMostSteps = 300;
+constexpr std::size_t kMostRemembered = 16;
+
+// Beyond any process that there is.
+constexpr pid_t kHostilePid = 1 << 23;
+constexpr uid_t kHostileUser = 4'000'000;
+
+constexpr const char* kNames[] = {"/high", "/stop", "/third", "/other", "/low",     "/in",
+                                  "/a",    "/b",    "x",      "",       "/with it", "/new\nline"};
+
+constexpr MessageKind kKinds[] = {
+    MessageKind::kHello,          MessageKind::kOpenOutput,    MessageKind::kOpenInput,
+    MessageKind::kClosePort,      MessageKind::kSynced,        MessageKind::kStatus,
+    MessageKind::kDeactivate,     MessageKind::kObserve,       MessageKind::kPeerRefused,
+    MessageKind::kReload,         MessageKind::kStop,          MessageKind::kHandBackPage,
+    MessageKind::kHandBackOutput, MessageKind::kHandBackInput, MessageKind::kHandBackLink,
+    MessageKind::kHandedBack,     MessageKind::kConnect,       MessageKind::kWelcome,
+    MessageKind::kSync,           MessageKind::kOpened};
+
+class Script {
+ public:
+  Script(const std::uint8_t* data, std::size_t size) noexcept : data_(data), size_(size) {}
+  [[nodiscard]] bool is_at_end() const noexcept { return at_ == size_; }
+  std::uint8_t byte() noexcept { return at_ < size_ ? data_[at_++] : 0; }
+  std::uint64_t word() noexcept {
+    std::uint64_t value = 0;
+    for (int i = 0; i < 8; ++i) value = value << 8 | byte();
+    return value;
+  }
+  // Mostly a small number.
+  std::uint64_t number() noexcept {
+    const std::uint8_t value = byte();
+    return value == 255 ? word() : value;
+  }
+
+ private:
+  const std::uint8_t* data_;
+  std::size_t size_;
+  std::size_t at_ = 0;
+};
+
+// What a hostile process has been sent and said.
+struct Hostile {
+  Hostile(const std::string& path, std::size_t who)
+      : process(kHostilePid + static_cast<pid_t>(who), kHostileUser + static_cast<uid_t>(who / 2)),
+        connection(std::make_unique<Connection>(path, process)) {}
+
+  Process process;
+  std::unique_ptr<Connection> connection;
+  std::vector<std::pair<shm::Message, std::vector<int>>> said;
+  std::vector<shm::PortInstance> ports;
+  std::vector<std::uint64_t> numbers;  // of nodes, links and barriers
+};
+
+class Run {
+ public:
+  explicit Run(Script& script) : script_(script) {}
+
+  void go() {
+    for (int step = 0; step < kMostSteps && !script_.is_at_end(); ++step) act();
+    for (Hostile& each : hostile_) leave(each);
+    hostile_.clear();
+    given_.clear();
+    made_.clear();
+    stage_.run(1'000'000'000);
+    stage_.require_as_before();
+  }
+
+ private:
+  void act() {
+    switch (script_.byte() % 16) {
+      case 0:
+        return connect();
+      case 1:
+        return say_hello();
+      case 2:
+        return open(MessageKind::kOpenOutput);
+      case 3:
+        return open(MessageKind::kOpenInput);
+      case 4:
+      case 5:
+      case 6:
+        return say_anything();
+      case 7:
+        return say_noise();
+      case 8:
+        return say_again();
+      case 9:
+        return half_close();
+      case 10:
+        return hang_up();
+      case 11:
+      case 12:
+        return read(script_.byte() % 4 != 0);
+      case 13:
+        return stage_.run();
+      case 14:
+        return stage_.run(script_.byte() * shm::Nanoseconds{2'000'000});
+      default:
+        return script_.byte() % 4 == 0 ? stage_.reload() : stage_.serve_newcomer();
+    }
+  }
+
+  void connect() {
+    if (hostile_.size() >= kMostHostile) return;
+    hostile_.emplace_back(stage_.path(), script_.byte() % 4);
+    stage_.run();
+  }
+
+  Hostile* who() {
+    if (hostile_.empty()) connect();
+    Hostile& each = hostile_[script_.byte() % hostile_.size()];
+    return each.connection ? &each : nullptr;
+  }
+
+  void say(Hostile& who, const shm::Message& message, std::vector<int> descriptors) {
+    if (who.said.size() < kMostRemembered) who.said.emplace_back(message, descriptors);
+    who.connection->send(message, std::move(descriptors));
+  }
+
+  void say_hello() {
+    Hostile* const hostile = who();
+    if (hostile == nullptr) return;
+    shm::Message message;
+    message.kind = MessageKind::kHello;
+    message.value = shm::kWireVersion;
+    message.flags = script_.byte() % 16;
+    message.set_name("hostile");
+    std::vector<int> descriptors;
+    if ((message.flags & shm::kRejoins) != 0) {
+      message.link = one_of(hostile->numbers);
+      descriptors = {given(0), given(1)};
+    }
+    say(*hostile, message, descriptors);
+    stage_.run();
+  }
+
+  void open(MessageKind kind) {
+    Hostile* const hostile = who();
+    if (hostile == nullptr) return;
+    shm::Message message;
+    message.kind = kind;
+    message.set_name(kNames[script_.byte() % std::size(kNames)]);
+    message.type.size = script_.byte() % 16;
+    std::vector<int> descriptors;
+    if (kind == MessageKind::kOpenOutput) {
+      descriptors = {make(make_output_segment(message.type, 1 + script_.byte() % 8u))};
+    } else {
+      descriptors = {make(make_input_segment(1 + script_.byte() % 8u)), bell_.write_end().get()};
+    }
+    say(*hostile, message, descriptors);
+  }
+
+  shm::Message anything(const Hostile& hostile) {
+    shm::Message message;
+    message.kind = static_cast<MessageKind>(script_.byte());
+    if (static_cast<std::size_t>(message.kind) < 250) {
+      message.kind = kKinds[static_cast<std::size_t>(message.kind) % std::size(kKinds)];
+    }
+    message.flags = static_cast<std::uint32_t>(script_.number());
+    message.request = script_.number();
+    message.port = port(hostile);
+    message.peer = port(hostile);
+    message.link = script_.byte() % 2 == 0 ? one_of(hostile.numbers) : script_.number();
+    message.id = static_cast<std::uint32_t>(script_.number());
+    message.value =
+        script_.byte() % 2 == 0 ? shm::kWireVersion : static_cast<std::uint32_t>(script_.number());
+    message.set_name(kNames[script_.byte() % std::size(kNames)]);
+    if (script_.byte() % 4 == 0) {
+      message.set_name(std::string(script_.byte(), static_cast<char>(script_.byte())));
+      message.set_text(std::string(script_.byte() * 4u, static_cast<char>(script_.byte())));
+    }
+    if (script_.byte() % 4 == 0) {
+      message.type.size = script_.number();
+      message.type.alignment = script_.number();
+      message.type.set_name(std::string(script_.byte(), static_cast<char>(script_.byte())));
+    }
+    return message;
+  }
+
+  void say_anything() {
+    Hostile* const hostile = who();
+    if (hostile == nullptr) return;
+    const shm::Message message = anything(*hostile);
+    say(*hostile, message, descriptors(*hostile));
+  }
+
+  // A message cut off, too long, or altered at some place.
+  void say_noise() {
+    Hostile* const hostile = who();
+    if (hostile == nullptr) return;
+    const shm::Message message = anything(*hostile);
+    std::vector<std::uint8_t> bytes(4096);
+    std::memcpy(bytes.data(), &message, sizeof message);
+    for (int i = script_.byte() % 8; i > 0; --i) {
+      bytes[script_.word() % bytes.size()] = script_.byte();
+    }
+    const std::size_t size = script_.word() % bytes.size();
+    hostile->connection->send_bytes(bytes.data(), size, descriptors(*hostile));
+  }
+
+  void say_again() {
+    Hostile* const hostile = who();
+    if (hostile == nullptr || hostile->said.empty()) return;
+    const auto& [message, descriptors] = hostile->said[script_.byte() % hostile->said.size()];
+    for (int times = script_.byte(); times >= 0; --times) {
+      if (hostile->connection->send(message, descriptors) != shm::SendResult::kSent) break;
+    }
+  }
+
+  void half_close() {
+    Hostile* const hostile = who();
+    if (hostile == nullptr) return;
+    constexpr int kHow[] = {SHUT_RD, SHUT_WR, SHUT_RDWR};
+    hostile->connection->half_close(kHow[script_.byte() % 3]);
+  }
+
+  // It lives on, dies first, or dies at the same time.
+  void hang_up() {
+    Hostile* const hostile = who();
+    if (hostile == nullptr) return;
+    const std::uint8_t how = script_.byte() % 4;
+    if (how == 0) {
+      hostile->process.end();
+      if (script_.byte() % 2 == 0) stage_.run();
+    }
+    hostile->connection.reset();
+    if (how == 1) hostile->process.end();
+    if (how != 2) return;
+    // The same process again.
+    hostile->connection = std::make_unique<Connection>(stage_.path(), hostile->process);
+    stage_.run();
+  }
+
+  void leave(Hostile& hostile) {
+    hostile.connection.reset();
+    hostile.process.end();
+  }
+
+  // Takes up what it is sent; answers what it is asked, or not.
+  void read(bool answers) {
+    Hostile* const hostile = who();
+    if (hostile == nullptr) return;
+    shm::Received received;
+    while (shm::receive_message(hostile->connection->socket(), received, false) ==
+           shm::ReceiveResult::kReceived) {
+      const shm::Message& message = received.message;
+      if (message.kind == MessageKind::kOpened) hostile->ports.push_back(message.port);
+      if (message.peer != 0) hostile->ports.push_back(message.peer);
+      if (message.link != 0) hostile->numbers.push_back(message.link);
+      if (message.kind == MessageKind::kSync) {
+        hostile->numbers.push_back(message.request);
+        shm::Message synced;
+        synced.kind = MessageKind::kSynced;
+        synced.request = message.request;
+        if (answers) hostile->connection->send(synced);
+      }
+      for (std::size_t i = 0; i < received.descriptor_count && given_.size() < 64; ++i) {
+        given_.push_back(std::move(received.descriptors[i]));
+      }
+    }
+  }
+
+  shm::PortInstance port(const Hostile& hostile) {
+    const std::uint8_t choice = script_.byte();
+    if (choice % 2 == 0 && !hostile.ports.empty()) {
+      return hostile.ports[choice / 2 % hostile.ports.size()];
+    }
+    return choice == 255 ? script_.word() : choice / 2;
+  }
+  std::uint64_t one_of(const std::vector<std::uint64_t>& numbers) {
+    return numbers.empty() ? script_.number() : numbers[script_.byte() % numbers.size()];
+  }
+  int given(std::size_t index) { return given_.empty() ? -1 : given_[index % given_.size()].get(); }
+
+  int make(shm::FileDescriptor descriptor) {
+    made_.push_back(std::move(descriptor));
+    return made_.back().get();
+  }
+
+  std::vector<int> descriptors(const Hostile& hostile) {
+    std::size_t count = script_.byte() % 4;
+    if (count == 3) count = script_.byte() % 40u;
+    std::vector<int> result;
+    while (result.size() < count) {
+      const int one = descriptor(hostile);
+      if (one < 0) return {};
+      result.push_back(one);
+    }
+    return result;
+  }
+  int descriptor(const Hostile& hostile) {
+    const std::uint8_t kind = script_.byte();
+    switch (kind % 18) {
+      case 0:
+        return make(make_output_segment({}, 1 + script_.byte() % 8u));
+      case 1:
+        return make(make_input_segment(1 + script_.byte() % 8u));
+      case 2:
+        return make(make_output_segment(1 + script_.byte() % 8u, script_.byte(), script_.number()));
+      case 3:
+        return make(make_input_segment(script_.byte(), script_.number()));
+      case 4:
+        return bell_.write_end().get();
+      case 5:
+        return bell_.read_end();
+      case 6:
+        return hostile.process.identity().process;  // an end of a pipe
+      case 7:
+        return hostile.connection->socket();
+      case 8:
+        return make(shm::FileDescriptor(::open("/dev/zero", O_RDWR | O_CLOEXEC)));
+      case 9:
+        return make(shm::FileDescriptor(::open("/", O_RDONLY | O_DIRECTORY | O_CLOEXEC)));
+      case 10:
+        return make(shm::FileDescriptor(::open("/", O_PATH | O_CLOEXEC)));
+      case 11:
+        return make(shm::FileDescriptor(::epoll_create1(EPOLL_CLOEXEC)));
+      case 12:
+        return make(shm::make_segment("fuzz", script_.word() % (1u << 24)));
+      case 13: {
+        auto segment = shm::make_segment("fuzz", script_.number() % (1u << 24));
+        shm::seal(segment,
+                  script_.byte() % 2 == 0 ? shm::Seals::kFixedSize : shm::Seals::kOneWriter);
+        return make(std::move(segment));
+      }
+      default:
+        return given_.empty() ? -1 : given_[script_.byte() % given_.size()].get();
+    }
+  }
+
+  Script& script_;
+  const shm::Bell bell_;
+  Stage stage_;
+  std::vector<Hostile> hostile_;
+  std::vector<shm::FileDescriptor> given_;  // by the daemon, to any of them
+  std::vector<shm::FileDescriptor> made_;
+};
+
+}  // namespace
+}  // namespace arbiter::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::size_t before = arbiter::fuzz::count_descriptors();
+  {
+    arbiter::fuzz::Script script(data, size);
+    arbiter::fuzz::Run(script).go();
+  }
+  arbiter::fuzz::require(arbiter::fuzz::count_descriptors() == before,
+                         "a daemon that has ended leaves no descriptor behind");
+  return 0;
+}
