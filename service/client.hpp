@@ -68,6 +68,7 @@ class Client {
   bool is_returning = false;  // and has not handed back all yet:
   std::set<shm::PortInstance> to_hand_back;  // these are missing
   bool observes = false;
+  std::uint32_t postponed = 0;                      // requests that cannot be served yet
   bool watches_queue = false;                       // the loop waits until it can be written
   std::map<shm::SourceId, std::uint64_t> pages;     // those that it has been sent, by their number
   std::map<shm::PortId, std::uint64_t> port_names;  // the same of names of input ports

@@ -205,7 +205,11 @@ void Daemon::handle_or_refuse(Client& client, shm::Received& received, shm::Nano
   } catch (const NotYet& not_yet) {
     why = not_yet.what();
     deadline = std::min(deadline, not_yet.deadline);
-    if (shm::monotonic_now() < deadline) {
+    if (client.postponed == shm::kMaxPostponed) {
+      why = "limit-exceeded: " + std::to_string(shm::kMaxPostponed) +
+            " requests of this client wait already (kMaxPostponed): " + why;
+    } else if (shm::monotonic_now() < deadline) {
+      ++client.postponed;
       auto postponed = std::make_unique<shm::Received>(std::move(received));
       postponed_.push_back({client.id(), std::move(postponed), deadline});
       return;

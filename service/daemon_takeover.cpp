@@ -280,6 +280,7 @@ void Daemon::serve_postponed(shm::Nanoseconds now) {
     const auto client = clients_.find(request.client);
     if (client == clients_.end()) continue;
     if (all || now >= request.deadline) {
+      --client->second->postponed;
       handle_or_refuse(*client->second, *request.request, request.deadline);
     } else {
       postponed_.push_back(std::move(request));

@@ -25,6 +25,7 @@ inline constexpr std::uint32_t kMaxLoans = 64;                  // samples being
 inline constexpr std::uint32_t kMaxSlots = 65535;               // payload slots of one output port
 inline constexpr std::uint32_t kMaxClients = 4096;              // of one daemon
 inline constexpr std::uint32_t kMaxClientsPerUser = 2048;       // so that none can shut others out
+inline constexpr std::uint32_t kMaxPostponed = 64;              // requests of one client
 inline constexpr std::uint32_t kMaxSilentClients = 256;         // that have not said who they are
 
 }  // namespace arbiter::shm
