@@ -85,7 +85,7 @@ function percentileChart(look, results) {
   const shown = results.filter((result) => result.curve);
   const frame = frameFor(shown.length);
   const nines = Math.min(5, Math.max(2, ...shown.map((each) => Math.log10(each.count))));
-  const maximum = nines + 0.45;
+  const maximum = nines + 0.7;
   const x = (value) => frame.x0 + (frame.x1 - frame.x0) * value / maximum;
   const y = logScale(shown.flatMap((each) => [Math.max(each.min, 0.5), each.max]), frame.y0, frame.y1);
   const names = ["0", "90 %", "99 %", "99.9 %", "99.99 %", "99.999 %"];
