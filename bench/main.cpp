@@ -35,7 +35,7 @@ void print(const Measure& measure) {
       char line[160];
       if (result.value) {
         std::snprintf(line, sizeof line, "    %-34s %14.4g %s", result.system.c_str(),
-                      *result.value, measure.unit.c_str());
+                      *result.value, (each.unit.empty() ? measure.unit : each.unit).c_str());
       } else if (result.ns.count() != 0) {
         std::snprintf(line, sizeof line, "    %-34s p50 %9.1f  p99 %9.1f  p99.9 %9.1f  max %11.1f",
                       result.system.c_str(), result.ns.quantile(0.5), result.ns.quantile(0.99),

@@ -21,11 +21,18 @@ struct MeasureEntry {
   std::function<Measure(const Effort&)> run;
 };
 
+Measure measure_compile(const Effort& effort);
 Measure measure_delivery(const Effort& effort);
+Measure measure_load(const Effort& effort);
+Measure measure_scale(const Effort& effort);
+Measure measure_swap(const Effort& effort);
+Measure measure_throughput(const Effort& effort);
 
 inline std::vector<MeasureEntry> all_measures() {
   return {
-      {"delivery", measure_delivery},
+      {"delivery", measure_delivery}, {"throughput", measure_throughput},
+      {"swap", measure_swap},         {"load", measure_load},
+      {"scale", measure_scale},       {"compile", measure_compile},
   };
 }
 
