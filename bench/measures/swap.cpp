@@ -18,15 +18,16 @@ namespace {
 
 constexpr int kBehaviours = 100;
 
-// The publisher's connection wins in every other model, so that its publish() itself tells when it
-// first meets a new one.
-std::string model_where(bool publisher_wins) {
-  std::string behaviours = behaviour("/swap:o", "/swap:i", 8);
-  if (!publisher_wins) {
+// The publisher always wins at /swap:i, and in every other model at /mark:i too, so that its
+// publish() itself tells when it first meets a new one.
+std::string model_where(bool is_marked) {
+  std::string marked = behaviour("/swap:o", "/mark:i", 8);
+  if (!is_marked) {
     const std::string condition = "<condition>";
-    behaviours.insert(behaviours.find(condition) + condition.size(), "/never:o and ");
+    marked.insert(marked.find(condition) + condition.size(), "/never:o and ");
   }
-  for (int i = 1; i < kBehaviours; ++i) {
+  std::string behaviours = behaviour("/swap:o", "/swap:i", 8) + marked;
+  for (int i = 2; i < kBehaviours; ++i) {
     const std::string n = std::to_string(i);
     behaviours += behaviour("/other" + n + ":o", "/other" + n + ":i", 8);
   }
@@ -72,7 +73,7 @@ void publish_without_pause(Conversation& with, const Robot& robot, const Count& 
   Node node = robot.node("publisher");
   auto output = node.output_port<std::array<std::uint64_t, 8>>("/swap:o");
   const std::array<std::uint64_t, 8> sample{};
-  bool had_won = output.publish(sample).delivered == 1;
+  std::uint32_t delivered_before = output.publish(sample).delivered;
   pin(0);
   with.say(1);
   for (std::uint64_t duration = 0; with.hear_or_end(duration);) {
@@ -80,15 +81,15 @@ void publish_without_pause(Conversation& with, const Robot& robot, const Count& 
     std::int64_t before = now_ns();
     const std::int64_t end = before + static_cast<std::int64_t>(duration);
     for (double last_gap = 0; before < end;) {
-      const bool wins = output.publish(sample).delivered == 1;
+      const std::uint32_t delivered = output.publish(sample).delivered;
       const std::int64_t now = now_ns();
       const auto gap = static_cast<double>(now - before);
       gaps.all.add(gap);
-      if (wins != had_won) {
+      if (delivered != delivered_before) {
         gaps.first.add(gap);
-        gaps.before.add(last_gap);
+        if (last_gap > 0) gaps.before.add(last_gap);
         (*met).fetch_add(1, std::memory_order_relaxed);
-        had_won = wins;
+        delivered_before = delivered;
       }
       last_gap = gap;
       before = now_ns();
@@ -107,6 +108,7 @@ class Swaps {
                   [this](Conversation& with) {
                     Node node = robot_.node("receiver");
                     const auto input = node.input_port<std::array<std::uint64_t, 8>>("/swap:i");
+                    const auto mark = node.input_port<std::array<std::uint64_t, 8>>("/mark:i");
                     with.say(1);
                     for (std::uint64_t word = 0; with.hear_or_end(word);) {
                     }
@@ -140,8 +142,8 @@ class Swaps {
     const std::uint64_t before = *met_;
     while (now_ns() < until) {
       const std::uint64_t seen = *met_;
-      wins_ = !wins_;
-      robot_.load(model_where(wins_));
+      is_marked_ = !is_marked_;
+      robot_.load(model_where(is_marked_));
       while (*met_ == seen && now_ns() < until) {
         throw_if_interrupted();
         nap(100'000);
@@ -174,7 +176,7 @@ class Swaps {
   // The last model may have come after the publisher's time: what follows begins with the first one
   // in force.
   void settle() {
-    wins_ = true;
+    is_marked_ = true;
     robot_.load(model_where(true));
     nap(3 * swap_ns_);
     begin(0.001);
@@ -183,7 +185,7 @@ class Swaps {
 
   Robot robot_;
   Count met_;
-  bool wins_ = true;
+  bool is_marked_ = true;
   std::int64_t swap_ns_ = 10'000'000;
   Worker receiver_;
   Worker publisher_;
@@ -194,11 +196,12 @@ class Swaps {
 Measure measure_swap(const Effort& effort) {
   Measure measure{
       "swap", "Model swap under load",
-      "One component publishes 64 B without a pause; meanwhile arbiterd puts one model of 100 "
-      "behaviours after another in force, as fast as it can; under every other one the component "
-      "is a loser, whose publish() is the cheaper. Beside it, the same with nothing "
-      "loaded, "
-      "and with models that are read, proved and refused: the noise of a daemon that works."};
+      "One component publishes 64 B without a pause, and wins at an input port or two; meanwhile "
+      "arbiterd puts one model of 100 behaviours after another in force, as fast as it can. Beside "
+      "it, "
+      "the same with models that are read, proved and refused (the noise of a daemon that works), "
+      "and "
+      "with nothing loaded."};
   Swaps swaps;
   Gaps with_swaps;
   Case all{"time of a publish()"};

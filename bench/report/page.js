@@ -1,25 +1,25 @@
 // The page, from the report.
 
 const report = JSON.parse(document.getElementById("data").textContent);
-const kRoles = {ours: "ours", peer: "peer", floor: "floor"};
 const kDashes = ["", "7 4", "2 4", "9 3 2 3"];
 const kFactsFirst = ["date", "processor", "processors", "usable processors", "SMT", "virtualised", "kernel",
   "clock source", "governor", "isolated processors", "nohz_full", "transparent hugepages", "SCHED_FIFO",
   "load before", "used by others", "stolen", "arbiter", "compiler", "build"];
 
-// Each system has one colour in the whole report.
+// Each system has one colour in the whole report; new ones of a measure take what is free in it.
 const look = (() => {
   const looks = new Map();
-  const seen = {ours: 0, peer: 0, floor: 0};
   const counts = {ours: 4, peer: 8, floor: 4};
   for (const measure of report.measures) {
-    for (const each of measure.cases) {
-      for (const {system, role} of each.results) {
-        if (looks.has(system)) continue;
-        const n = seen[role]++;
-        looks.set(system, {role, colour: `var(--${role}-${n % counts[role]})`,
-          dash: role === "floor" ? kDashes[1 + n % 3] : kDashes[Math.floor(n / counts[role]) % 4]});
-      }
+    const results = measure.cases.flatMap((each) => each.results);
+    const taken = (role) => results.map(({system}) => looks.get(system))
+      .filter((each) => each?.role === role).map((each) => each.n);
+    for (const {system, role} of results) {
+      if (looks.has(system)) continue;
+      let n = 0;
+      while (taken(role).includes(n)) ++n;
+      looks.set(system, {role, n, colour: `var(--${role}-${n % counts[role]})`,
+        dash: role === "floor" ? kDashes[1 + n % 3] : kDashes[Math.floor(n / counts[role]) % 4]});
     }
   }
   return (system) => looks.get(system);
@@ -70,9 +70,9 @@ function targetRow({name, limit, measured, unit, met}) {
     element("td", {class: "text"}, element("span", {class: `badge ${verdict[0]}`}, verdict[1])));
 }
 
-function table(titles, rows) {
+function table(titles, rows, kind = "") {
   const head = titles.map((title) => element("th", {}, title));
-  return element("div", {class: "scroll"}, element("table", {},
+  return element("div", {class: "scroll"}, element("table", {class: kind},
     element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rows)));
 }
 
@@ -86,32 +86,30 @@ function targets() {
 // Our first system in a case is what the others are compared with.
 const reference = (one) => one.results.find((each) => each.role === "ours" && figureOf(each) > 0);
 
-function resultRow(measure, one, result, hasTimes) {
-  const ours = reference(one);
-  const {colour} = look(result.system);
-  const name = element("td", {}, element("span", {class: "chip", style: `background:${colour}`}),
-    result.system, element("span", {class: "role"}, kRoles[result.role]));
-  const ratio = (key) => ours && ours !== result && ours[key] > 0 && result[key] > 0 ?
+function resultRow(result, unit, ours, {hasTimes, hasRatios}) {
+  const name = element("td", {},
+    element("span", {class: "chip", style: `background:${look(result.system).colour}`}),
+    result.system, element("span", {class: "role"}, result.role));
+  const ratio = (key) => result.role !== "ours" && ours?.[key] > 0 && result[key] > 0 ?
     `${digits(ours[key] / result[key])} ×` : "";
-  const cells = [];
-  if (result.value !== undefined) {
-    cells.push(amount(result.value, unitOf(measure, one)), ...(hasTimes ? ["", "", "", ""] : []), ratio("value"));
-  } else if (hasTimes) {
-    for (const key of ["p50", "p99", "p99.9", "max"]) cells.push(amount(result[key], "ns"));
-    cells.push(result.count?.toLocaleString("en") ?? "", ratio("p50"));
-  } else {
-    cells.push("", "");
-  }
-  if (hasTimes) cells.push(ratio("p99"));
+  const hasValue = result.value !== undefined;
+  const cells = hasTimes ?
+    [...["p50", "p99", "p99.9", "max"].map((key) => amount(result[key], "ns")),
+      result.count?.toLocaleString("en") ?? ""] :
+    [hasValue ? amount(result.value, unit) : ""];
+  if (hasTimes && hasValue) cells[0] = amount(result.value, unit);
+  if (hasRatios) cells.push(ratio(hasValue ? "value" : "p50"));
+  if (hasRatios && hasTimes) cells.push(ratio("p99"));
   return element("tr", {class: result.role}, name, ...cells.map((cell) => element("td", {}, cell)),
     element("td", {class: "note"}, result.note ?? ""));
 }
 
 function resultTable(measure, one) {
-  const hasTimes = one.results.some((each) => each.count);
-  const titles = hasTimes ? ["system", "p50", "p99", "p99.9", "max", "samples", "ours ÷ it, p50", "p99", ""] :
-    ["system", "value", "ours ÷ it", ""];
-  return table(titles, one.results.map((each) => resultRow(measure, one, each, hasTimes)));
+  const has = {hasTimes: one.results.some((each) => each.count), hasRatios: ratios(one).length > 0};
+  const titles = has.hasTimes ? ["system", "p50", "p99", "p99.9", "max", "samples"] : ["system", "value"];
+  if (has.hasRatios) titles.push(...(has.hasTimes ? ["ours ÷ it, p50", "p99"] : ["ours ÷ it"]));
+  const rows = one.results.map((each) => resultRow(each, unitOf(measure, one), reference(one), has));
+  return table([...titles, ""], rows, has.hasTimes ? "" : "values");
 }
 
 function ratios(one) {
@@ -121,8 +119,8 @@ function ratios(one) {
     .map((each) => ({system: each.system, ratio: figureOf(ours) / figureOf(each)}));
 }
 
-function figure(caption, chart) {
-  return element("figure", {}, element("figcaption", {}, caption), chart);
+function figure(caption, chart, kind = "curves") {
+  return element("figure", {class: kind}, element("figcaption", {}, caption), chart);
 }
 
 function caseSection(measure, one, isOpen) {
@@ -135,7 +133,7 @@ function caseSection(measure, one, isOpen) {
     const better = isRate(unitOf(measure, one)) ? "right" : "left";
     const of = one.results.some((each) => each.curve) ? "p50 of " : "";
     figures.push(figure(`${of}${reference(one).system} ÷ theirs: ${better} of 1, ours is faster`,
-      ratioBars(look, rows)));
+      ratioBars(look, rows), "bars"));
   }
   const section = element("details", isOpen ? {open: ""} : {},
     element("summary", {}, element("h3", {}, one.name)));
