@@ -8,6 +8,9 @@
 #include <CLI/CLI.hpp>
 
 #include "bench/harness/cpu.hpp"
+#include "bench/harness/html.hpp"
+#include "bench/harness/interruption.hpp"
+#include "bench/harness/machine.hpp"
 #include "bench/harness/program.hpp"
 #include "bench/measures/measures.hpp"
 #include "bench/targets.hpp"
@@ -19,7 +22,11 @@ struct Arguments {
   bool quick = false;
   std::vector<std::string> only;
   std::string json = "report.json";
+  std::string html = "report.html";
 };
+
+constexpr int kWrongUse = 2;
+constexpr int kInterrupted = 130;  // as a shell says it
 
 void print(const Measure& measure) {
   std::cout << "\n" << measure.title << "\n";
@@ -29,7 +36,7 @@ void print(const Measure& measure) {
       char line[160];
       if (result.value) {
         std::snprintf(line, sizeof line, "    %-34s %14.4g %s", result.system.c_str(),
-                      *result.value, measure.unit.c_str());
+                      *result.value, (each.unit.empty() ? measure.unit : each.unit).c_str());
       } else if (result.ns.count() != 0) {
         std::snprintf(line, sizeof line, "    %-34s p50 %9.1f  p99 %9.1f  p99.9 %9.1f  max %11.1f",
                       result.system.c_str(), result.ns.quantile(0.5), result.ns.quantile(0.99),
@@ -43,37 +50,116 @@ void print(const Measure& measure) {
   std::cout << std::flush;
 }
 
-int run(const Arguments& arguments) {
+void print(const std::vector<Verdict>& targets) {
+  if (targets.empty()) return;
+  std::cout << "\nTargets\n";
+  for (const Verdict& each : targets) {
+    char line[160];
+    if (each.measured) {
+      std::snprintf(line, sizeof line, "%-50s %9.3g of %9.3g %s", each.name.c_str(), *each.measured,
+                    each.limit, each.unit.c_str());
+    } else {
+      std::snprintf(line, sizeof line, "%-50s not measured", each.name.c_str());
+    }
+    std::cout << (each.is_met()   ? "  met     "
+                  : each.measured ? "  MISSED  "
+                                  : "          ")
+              << line << "\n";
+  }
+}
+
+// So that it is known before ten minutes have passed.
+std::ofstream open(const std::string& file) {
+  std::ofstream stream(file);
+  if (!stream) throw std::runtime_error("cannot write " + file);
+  return stream;
+}
+
+void list() {
+  for (const MeasureEntry& entry : all_measures()) std::cout << entry.name << "\n";
+}
+
+// Empty where all are known.
+std::string first_unknown(const std::vector<std::string>& names) {
+  const auto measures = all_measures();
+  for (const std::string& name : names) {
+    const auto is_it = [&](const MeasureEntry& each) { return each.name == name; };
+    if (std::none_of(measures.begin(), measures.end(), is_it)) return name;
+  }
+  return "";
+}
+
+void run(const Arguments& arguments) {
+  std::ofstream json_file = open(arguments.json);
+  std::ofstream html_file = open(arguments.html);
   Report report;
   report.quick = arguments.quick;
   processors();  // as they are now, before anything is pinned
+  const MachineWatch watch;
   for (const MeasureEntry& entry : all_measures()) {
     const auto& only = arguments.only;
     if (!only.empty() && std::find(only.begin(), only.end(), entry.name) == only.end()) continue;
+    throw_if_interrupted();
     report.measures.push_back(entry.run({arguments.quick}));
     print(report.measures.back());
   }
+  report.machine = watch.finish(report.warnings);
   report.targets = judge(report);
-  std::ofstream(arguments.json) << report.json().dump(1) << "\n";
-  return 0;
+  print(report.targets);
+  for (const std::string& warning : report.warnings) std::cout << "\nWarning: " << warning;
+  const nlohmann::json json = report.json();
+  json_file << json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
+  html_file << html(json);
+  if (!json_file.flush() || !html_file.flush()) throw std::runtime_error("cannot write the report");
+  std::cout << "\n\nThe report is in " << arguments.json << " and " << arguments.html << "\n";
+}
+
+int run_or_explain(const Arguments& arguments) {
+  try {
+    run(arguments);
+    return 0;
+  } catch (const Interrupted&) {
+    std::cerr << "\narbiter-bench: interrupted\n";
+    return kInterrupted;
+  } catch (const std::exception& error) {
+    std::cerr << "arbiter-bench: " << error.what() << "\n";
+    return 1;
+  }
 }
 
 }  // namespace
 }  // namespace arbiter::bench
 
 int main(int argc, char** argv) {
+  using namespace arbiter::bench;
   CLI::App app("arbiter-bench: what arbitration costs here, beside what one would use instead");
-  arbiter::bench::Arguments arguments;
-  app.add_flag("--quick", arguments.quick, "About a minute, in place of about ten");
-  app.add_option("--only", arguments.only, "Measure these only")->type_name("NAME");
-  app.add_option("--json", arguments.json, "Where the report is written")->type_name("FILE");
-  CLI11_PARSE(app, argc, argv);
-  return arbiter::bench::run_and_clear_up([&] {
-    try {
-      return arbiter::bench::run(arguments);
-    } catch (const std::exception& error) {
-      std::cerr << "arbiter-bench: " << error.what() << "\n";
-      return 1;
-    }
+  Arguments arguments;
+  bool is_full = false;
+  bool is_list = false;
+  auto* const quick = app.add_flag("--quick", arguments.quick, "About a minute, not about ten");
+  app.add_flag("--full", is_full, "About ten minutes (default)")->excludes(quick);
+  app.add_option("--only", arguments.only, "These measures only")
+      ->type_name("NAME")
+      ->delimiter(',');
+  app.add_flag("--list", is_list, "Name the measures, and end");
+  app.add_option("--json", arguments.json, "Where the figures are written")->type_name("FILE");
+  app.add_option("--html", arguments.html, "Where the page is written")->type_name("FILE");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kWrongUse;
+  }
+  if (is_list) {
+    list();
+    return 0;
+  }
+  if (const std::string unknown = first_unknown(arguments.only); !unknown.empty()) {
+    std::cerr << "arbiter-bench: there is no measure \"" << unknown << "\"; these are:\n";
+    for (const MeasureEntry& entry : all_measures()) std::cerr << "  " << entry.name << "\n";
+    return kWrongUse;
+  }
+  return run_and_clear_up([&] {
+    remember_interruptions();
+    return run_or_explain(arguments);
   });
 }

@@ -33,6 +33,7 @@ Program::Program(const std::vector<std::string>& argv,
   if (pid_ != 0) return;
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(126);
+  ::setpgid(0, 0);  // Ctrl-C is the benchmark's to hear; it ends its programs in order
   for (const auto& [name, value] : variables) ::setenv(name.c_str(), value.c_str(), 1);
   const int in = ::open("/dev/null", O_RDONLY);
   const int out = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);

@@ -83,6 +83,7 @@ nlohmann::json Report::json() const {
       nlohmann::json one{
           {"name", each.name}, {"results", results}, {"p50_ratios", ratios_of(each)}};
       if (each.x) one["x"] = *each.x;
+      if (!each.unit.empty()) one["unit"] = each.unit;
       cases.push_back(std::move(one));
     }
     json["measures"].push_back({{"name", measure.name},

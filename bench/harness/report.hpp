@@ -31,6 +31,7 @@ struct Case {
   std::string name;           // "64 B, spinning"
   std::optional<double> x{};  // where the cases of a measure form a curve: bytes, sources, ...
   std::vector<Result> results{};
+  std::string unit{};  // of values, where it is another than the measure's
 
   [[nodiscard]] const Result* find(const std::string& system) const;
 };

@@ -2,6 +2,8 @@
 
 #include <exception>
 
+#include "bench/harness/interruption.hpp"
+
 namespace arbiter::bench {
 
 std::vector<Result> run_rounds(std::vector<Contender> contenders, const Budget& budget) {
@@ -12,6 +14,7 @@ std::vector<Result> run_rounds(std::vector<Contender> contenders, const Budget& 
       // Each round begins with another, so that none always follows the same.
       const std::size_t index = (i + static_cast<std::size_t>(round)) % contenders.size();
       if (!contenders[index].round) continue;
+      throw_if_interrupted();
       const bool warms_up = round == 0;
       try {
         const Histogram seen =

@@ -14,6 +14,8 @@
 #include <system_error>
 #include <utility>
 
+#include "bench/harness/interruption.hpp"
+
 namespace arbiter::bench {
 namespace {
 
@@ -30,6 +32,7 @@ bool read_all(int fd, void* data, std::size_t size) {
   auto* at = static_cast<char*>(data);
   while (size != 0) {
     pollfd polled{fd, POLLIN, 0};
+    throw_if_interrupted();
     const int ready = ::poll(&polled, 1, kPatienceMs);
     if (ready < 0 && errno == EINTR) continue;
     if (ready == 0) throw BenchError("does not answer");
@@ -110,6 +113,10 @@ Worker::Worker(std::string name, const Work& work) : name_(std::move(name)) {
   if (pid_ == 0) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) ::_exit(1);
+    // Ctrl-C is the benchmark's to hear; it ends its workers in order.
+    ::setpgid(0, 0);
+    ::signal(SIGINT, SIG_DFL);
+    ::signal(SIGTERM, SIG_DFL);
     ours = {};
     Conversation with(std::move(theirs));
     try {

@@ -23,12 +23,17 @@ struct MeasureEntry {
 
 inline const char* const kClockRead = "clock read";
 
-Measure measure_delivery(const Effort& effort);
-Measure measure_publish(const Effort& effort);
-Measure measure_take(const Effort& effort);
+Measure measure_compile(const Effort& effort);
 Measure measure_decide(const Effort& effort);
-Measure measure_takeover(const Effort& effort);
+Measure measure_delivery(const Effort& effort);
 Measure measure_failover(const Effort& effort);
+Measure measure_load(const Effort& effort);
+Measure measure_publish(const Effort& effort);
+Measure measure_scale(const Effort& effort);
+Measure measure_swap(const Effort& effort);
+Measure measure_take(const Effort& effort);
+Measure measure_takeover(const Effort& effort);
+Measure measure_throughput(const Effort& effort);
 
 inline std::vector<MeasureEntry> all_measures() {
   return {
@@ -38,6 +43,11 @@ inline std::vector<MeasureEntry> all_measures() {
       {"decide", measure_decide},
       {"takeover", measure_takeover},
       {"failover", measure_failover},
+      {"swap", measure_swap},
+      {"load", measure_load},
+      {"throughput", measure_throughput},
+      {"scale", measure_scale},
+      {"compile", measure_compile},
   };
 }
 
