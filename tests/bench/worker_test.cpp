@@ -10,6 +10,7 @@
 namespace arbiter::bench {
 namespace {
 
+using namespace std::chrono_literals;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -60,16 +61,17 @@ TEST(Worker, GoesWithItsObjectInOrderAndLeavesNoChild) {
     const Worker worker("waiter", [&](Conversation& with) {
       for (std::uint64_t word = 0; with.hear_or_end(word);) {
       }
+      std::this_thread::sleep_for(100ms);  // as a middleware does that takes down what it has
       [[maybe_unused]] const auto written = ::write(ends[1], "e", 1);
     });
     pid = worker.pid();
     EXPECT_TRUE(is_there(pid));
   }
   EXPECT_FALSE(is_there(pid));
+  ::close(ends[1]);
   char end = 0;
   EXPECT_EQ(::read(ends[0], &end, 1), 1) << "it was not killed: it came to its end";
   ::close(ends[0]);
-  ::close(ends[1]);
 }
 
 TEST(Worker, OneThatHearsNothingIsKilled) {
