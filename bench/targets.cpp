@@ -1,5 +1,6 @@
 #include "bench/targets.hpp"
 
+#include "bench/measures/measures.hpp"
 #include "bench/peers/systems.hpp"
 
 namespace arbiter::bench {
@@ -32,12 +33,53 @@ struct Ratio {
   std::string their_case{};  // else the same
 };
 
+const std::string kSpinning = "64 B, spinning";
+const std::string kBlocking = "64 B, blocking";
+const std::string kOne = "1 input port";
+const std::string kMany = "64 input ports";
+const std::string kLoser = "loses, 8 activities";
+const std::string kWinner = "wins, 8 activities";
+
 const std::vector<Ratio> kRatios{
-    {"64 B spinning, p50, to a cache line", "delivery", "64 B, spinning", kArbiter, kCacheLine,
-     kP50, 3},
-    {"64 B blocking, p50, to a pipe", "delivery", "64 B, blocking", kArbiter, kPipe, kP50, 1.5},
+    {"64 B spinning, p50, to iceoryx", "delivery", kSpinning, kArbiter, kIceoryx, kP50, 0.30},
+    {"64 B spinning, p99, to iceoryx", "delivery", kSpinning, kArbiter, kIceoryx, kP99, 0.35},
+    {"64 B spinning, p99.9, to iceoryx", "delivery", kSpinning, kArbiter, kIceoryx, kP999, 0.7},
+    {"64 B spinning, p50, to a cache line", "delivery", kSpinning, kArbiter, kCacheLine, kP50, 3},
+    {"64 B blocking, p50, to iceoryx", "delivery", kBlocking, kArbiter, kIceoryx, kP50, 0.65},
+    {"64 B blocking, p50, to a pipe", "delivery", kBlocking, kArbiter, kPipe, kP50, 1.5},
+    {"64 B blocking, p50, to Cyclone DDS", "delivery", kBlocking, kArbiter, kCyclone, kP50, 0.5},
     {"4 MiB to 64 B, spinning, p50", "delivery", "4 MiB, spinning", kArbiter, kArbiter, kP50, 1.2,
-     "64 B, spinning"},
+     kSpinning},
+    {"a loser's publish(), p50, to a clock read", "publish", kOne, kLoser, kClockRead, kP50, 2},
+    {"publish() to 64 ports, p50, to iceoryx", "publish", kMany, kWinner, kIceoryx, kP50, 0.05},
+};
+
+// `ours` is at most `limit` more than `theirs`, or than nothing.
+struct Excess {
+  std::string name;
+  std::string measure;
+  std::string of;
+  std::string ours;
+  std::string theirs;
+  double limit;
+  std::string unit = "ns";
+  std::string their_case{};  // else the same
+};
+
+const std::vector<Excess> kExcesses{
+    {"a loser's publish() at 64 ports, p50", "publish", kMany, kLoser, {}, 150},
+    {"take(), nothing waits, 1 source, p50", "take", "1 source", "nothing waits", {}, 5},
+    {"take(), nothing waits, 64 sources, p50", "take", "64 sources", "nothing waits", {}, 110},
+    {"take() of a sample, p50, over its cache lines", "hit", "8 samples wait", kArbiter,
+     "its cache lines alone", 30},
+    {"decision, conjunction of 8, p50", "decide", "8 sources", "conjunction", {}, 15},
+    {"decision, conjunction of 64, p50", "decide", "64 sources", "conjunction", {}, 40},
+    {"first publish() under a new model, p50, over others", "swap",
+     "the publish() that first meets a new model", "first under a new model", "models refused",
+     1000, "ns", "time of a publish()"},
+    {"attach of 1000 ports", "scale", "attach", "arbiter: 1000 ports", {}, 1e9},
+    {"CPU of an idle daemon", "scale", "daemon idle", "arbiterd", {}, 0, "%"},
+    {"10 000 behaviours compiled and proved", "compile", "10000 behaviours", "arbiter", {}, 5e9},
 };
 
 }  // namespace
@@ -52,6 +94,18 @@ std::vector<Verdict> judge(const Report& report) {
         figure(report, each.measure, each.their_case.empty() ? each.of : each.their_case,
                each.theirs, each.quantile);
     if (ours && theirs && *theirs > 0) verdict.measured = *ours / *theirs;
+    verdicts.push_back(std::move(verdict));
+  }
+  for (const Excess& each : kExcesses) {
+    if (report.find(each.measure) == nullptr) continue;
+    Verdict verdict{each.name, each.limit, {}, each.unit};
+    const auto ours = figure(report, each.measure, each.of, each.ours, kP50);
+    const auto theirs =
+        each.theirs.empty()
+            ? 0.0
+            : figure(report, each.measure, each.their_case.empty() ? each.of : each.their_case,
+                     each.theirs, kP50);
+    if (ours && theirs) verdict.measured = *ours - *theirs;
     verdicts.push_back(std::move(verdict));
   }
   return verdicts;

@@ -1,23 +1,19 @@
 #include "bench/measures/contest_pair.hpp"
 
-#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <system_error>
 
 #include "bench/harness/cpu.hpp"
+#include "bench/harness/shared.hpp"
 #include "bench/peers/spin.hpp"
 
 namespace arbiter::bench {
 namespace {
 
 std::shared_ptr<Stage> shared_stage() {
-  void* const memory = ::mmap(nullptr, sizeof(Stage), PROT_READ | PROT_WRITE,
-                              MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
-  if (memory == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "mmap");
-  return {new (memory) Stage, [](Stage* stage) { ::munmap(stage, sizeof *stage); }};
+  const auto shared = std::make_shared<Shared<Stage>>();
+  return {shared, &**shared};
 }
 
 void play_sources(Conversation& with, ContestSession& session, Stage& stage, const Roles& roles) {

@@ -27,6 +27,7 @@ Measure measure_compile(const Effort& effort);
 Measure measure_decide(const Effort& effort);
 Measure measure_delivery(const Effort& effort);
 Measure measure_failover(const Effort& effort);
+Measure measure_hit(const Effort& effort);
 Measure measure_load(const Effort& effort);
 Measure measure_publish(const Effort& effort);
 Measure measure_scale(const Effort& effort);
@@ -37,17 +38,12 @@ Measure measure_throughput(const Effort& effort);
 
 inline std::vector<MeasureEntry> all_measures() {
   return {
-      {"delivery", measure_delivery},
-      {"publish", measure_publish},
-      {"take", measure_take},
-      {"decide", measure_decide},
-      {"takeover", measure_takeover},
-      {"failover", measure_failover},
-      {"swap", measure_swap},
-      {"load", measure_load},
-      {"throughput", measure_throughput},
-      {"scale", measure_scale},
-      {"compile", measure_compile},
+      {"delivery", measure_delivery}, {"publish", measure_publish},
+      {"take", measure_take},         {"hit", measure_hit},
+      {"decide", measure_decide},     {"takeover", measure_takeover},
+      {"failover", measure_failover}, {"swap", measure_swap},
+      {"load", measure_load},         {"throughput", measure_throughput},
+      {"scale", measure_scale},       {"compile", measure_compile},
   };
 }
 

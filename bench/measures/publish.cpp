@@ -6,6 +6,7 @@
 #include "bench/harness/robot.hpp"
 #include "bench/measures/batches.hpp"
 #include "bench/measures/measures.hpp"
+#include "bench/peers/systems.hpp"
 
 namespace arbiter::bench {
 namespace {
@@ -93,7 +94,14 @@ Measure measure_publish(const Effort& effort) {
     }
     contenders.push_back(publisher("loses, 8 activities", {ports, 8, true}));
     contenders.push_back(publisher("wins, 8 activities", {ports, 8, false}));
+    std::vector<Result> absent_ones;
+    try {
+      contenders.push_back(iceoryx_fan_out(ports, kBatch));
+    } catch (const std::exception& error) {
+      absent_ones.push_back(absent(kIceoryx, Role::kPeer, error.what()));
+    }
     one.results = run_rounds(std::move(contenders), effort.budget());
+    one.results.insert(one.results.end(), absent_ones.begin(), absent_ones.end());
     measure.cases.push_back(std::move(one));
   }
   return measure;

@@ -1,15 +1,13 @@
 // Models swapped under a publisher that publishes without a pause: does it feel it?
-#include <sys/mman.h>
 #include <time.h>
 
 #include <array>
 #include <atomic>
-#include <cerrno>
-#include <system_error>
 
 #include "bench/harness/cpu.hpp"
 #include "bench/harness/interruption.hpp"
 #include "bench/harness/robot.hpp"
+#include "bench/harness/shared.hpp"
 #include "bench/harness/worker.hpp"
 #include "bench/measures/measures.hpp"
 
@@ -41,22 +39,7 @@ std::string refused_model() {
 }
 
 // How many models the publisher has met. Shared with it.
-class Count {
- public:
-  Count() {
-    void* const memory = ::mmap(nullptr, sizeof(std::atomic<std::uint64_t>), PROT_READ | PROT_WRITE,
-                                MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
-    if (memory == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "mmap");
-    count_ = new (memory) std::atomic<std::uint64_t>{0};
-  }
-  Count(const Count&) = delete;
-  Count& operator=(const Count&) = delete;
-  ~Count() { ::munmap(count_, sizeof *count_); }
-  std::atomic<std::uint64_t>& operator*() const { return *count_; }
-
- private:
-  std::atomic<std::uint64_t>* count_;
-};
+using Count = Shared<std::atomic<std::uint64_t>>;
 
 struct Gaps {
   Histogram all;

@@ -1,10 +1,7 @@
 // The floor of all that spins: one core writes a cache line, the other sees it.
-#include <sys/mman.h>
-
 #include <atomic>
-#include <cerrno>
-#include <system_error>
 
+#include "bench/harness/shared.hpp"
 #include "bench/peers/spin.hpp"
 #include "bench/peers/systems.hpp"
 #include "shm/limits.hpp"
@@ -40,14 +37,6 @@ class CacheLineEndpoint : public Endpoint {
 
 class CacheLineSession : public Session {
  public:
-  CacheLineSession() {
-    void* const memory = ::mmap(nullptr, sizeof(Lines), PROT_READ | PROT_WRITE,
-                                MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
-    if (memory == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "mmap");
-    lines_ = new (memory) Lines;
-  }
-  ~CacheLineSession() override { ::munmap(lines_, sizeof(Lines)); }
-
   std::unique_ptr<Endpoint> open(Side side) override {
     if (side == Side::kInitiator) {
       return std::make_unique<CacheLineEndpoint>(lines_->ping, lines_->pong);
@@ -56,7 +45,7 @@ class CacheLineSession : public Session {
   }
 
  private:
-  Lines* lines_ = nullptr;
+  Shared<Lines> lines_;
 };
 
 class CacheLineSystem : public System {

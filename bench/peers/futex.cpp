@@ -1,13 +1,11 @@
 // The floor of waking a process without a descriptor.
 #include <linux/futex.h>
-#include <sys/mman.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include <atomic>
-#include <cerrno>
-#include <system_error>
 
+#include "bench/harness/shared.hpp"
 #include "bench/peers/systems.hpp"
 #include "shm/limits.hpp"
 
@@ -49,14 +47,6 @@ class FutexEndpoint : public Endpoint {
 
 class FutexSession : public Session {
  public:
-  FutexSession() {
-    void* const memory = ::mmap(nullptr, sizeof(Words), PROT_READ | PROT_WRITE,
-                                MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
-    if (memory == MAP_FAILED) throw std::system_error(errno, std::generic_category(), "mmap");
-    words_ = new (memory) Words;
-  }
-  ~FutexSession() override { ::munmap(words_, sizeof(Words)); }
-
   std::unique_ptr<Endpoint> open(Side side) override {
     if (side == Side::kInitiator) {
       return std::make_unique<FutexEndpoint>(words_->ping, words_->pong);
@@ -65,7 +55,7 @@ class FutexSession : public Session {
   }
 
  private:
-  Words* words_ = nullptr;
+  Shared<Words> words_;
 };
 
 class FutexSystem : public System {

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "bench/harness/rounds.hpp"
 #include "bench/peers/system.hpp"
 
 namespace arbiter::bench {
@@ -31,5 +32,8 @@ std::unique_ptr<System> message_queue_system();
 std::unique_ptr<System> relay_system();  // its rule reads eight activities
 
 Systems all_systems();
+
+// iceoryx's publish() to so many subscribers that take nothing; by batches.
+Contender iceoryx_fan_out(int subscribers, int batch);
 
 }  // namespace arbiter::bench
