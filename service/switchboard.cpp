@@ -69,6 +69,7 @@ void Switchboard::remove(shm::PortInstance port) {
     if (output == port) shm::ring_bell(inputs_.at(peer)->bell.get());
     link = links_.erase(link);
   }
+  end_claims_on(port);
   if (const auto found = outputs_.find(port); found != outputs_.end()) {
     registry_.source(found->second->source->id).clear_owner();
   }
@@ -150,6 +151,8 @@ Switchboard::Told Switchboard::link_one(const shm::TableView& table, shm::PortIn
 
 void Switchboard::make_links(const Wanted& wanted, Told& told) {
   for (const auto& [key, kind] : wanted) {
+    // It may have such a link, and be about to say so.
+    if (client_of(key.first).is_returning || client_of(key.second).is_returning) continue;
     const auto known = links_.find(key);
     const bool stands = known != links_.end() && known->second.kind != LinkKind::kLapsed &&
                         (known->second.kind == kind || kind == LinkKind::kSensing);

@@ -84,6 +84,8 @@ class Switchboard {
   void send_pages(Client& client, shm::PortId port, const shm::TableView& table, Told& told);
   void show_segment(const LinkKey& key, Client& receiver) const;
   [[nodiscard]] bool is_connected(const LinkKey& key) const;
+  // Whoever claims a link with that port is told that it has gone.
+  void end_claims_on(shm::PortInstance port);
   void disconnect(shm::PortInstance refused_by, shm::PortInstance port);
   bool send_page(Client& client, const Source& source);
   void insert(std::unique_ptr<OutputPort> port, Client& client, Source& source);

@@ -2,7 +2,9 @@
 //
 // A link lives in shared memory, not here: two components go on using it though no daemon knows of
 // it. So when one end comes back it claims the links that it has. Once both ends are here, a link
-// that they agree upon stands as it is; where only one of them has heard of it, it is ended.
+// that they agree upon stands as it is; where only one of them has heard of it, it is ended. An end
+// is here once it has said all (kHandedBack): nothing is concluded before from what it has not
+// claimed.
 #include <optional>
 
 #include "service/switchboard.hpp"
@@ -86,7 +88,7 @@ void Switchboard::settle_claims(shm::PortInstance port,
     const auto output = outputs_.find(is_output ? port : peer);
     const auto input = inputs_.find(is_output ? peer : port);
     if (output != outputs_.end() && input != inputs_.end()) {
-      settle(*output->second, *input->second);
+      if (!client_of(peer).is_returning) settle(*output->second, *input->second);
     } else if (!is_away(peer)) {
       claims_of(port).erase(peer);
       client_of(port).send(message_to(shm::MessageKind::kPeerGone, port, peer));
@@ -113,7 +115,7 @@ void Switchboard::settle(OutputPort& output, InputPort& input) {
   if (by_output) links_[{output.instance, input.instance}] = {LinkKind::kLapsed, 0, ""};
 }
 
-void Switchboard::forget_away(shm::PortInstance port) {
+void Switchboard::end_claims_on(shm::PortInstance port) {
   for (const auto& [instance, output] : outputs_) {
     if (!take(output->claims, port)) continue;
     output->client->send(message_to(shm::MessageKind::kPeerGone, instance, port));
@@ -123,6 +125,10 @@ void Switchboard::forget_away(shm::PortInstance port) {
     input->client->send(message_to(shm::MessageKind::kPeerGone, instance, port));
     shm::ring_bell(input->bell.get());  // it may have died between delivering and ringing
   }
+}
+
+void Switchboard::forget_away(shm::PortInstance port) {
+  end_claims_on(port);
   if (Source* source = directory_.source_of(port)) {
     source->away = 0;
     registry_.source(source->id).clear_owner();

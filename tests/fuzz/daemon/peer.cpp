@@ -188,6 +188,10 @@ void Honest::hear(const shm::Received& received) {
       require(message.port == port_, "peers are those of the client's own port");
       peers_[message.peer] = message.id;
       break;
+    case MessageKind::kOutputGrown:
+      has(1);
+      require(peers_.count(message.peer) == 1, "only a peer grows");
+      break;
     case MessageKind::kPeerGone:
       require(peers_.erase(message.peer) == 1, "only a peer goes");
       break;

@@ -17,9 +17,11 @@ namespace {
 constexpr const char* kModels[] = {
     "<behaviors timeout='1s'><arbiter at='/in'><select from='/low'>not /high</select>"
     "<select from='/high'>not /stop</select></arbiter>"
-    "<arbiter at='/other'><select from='/low'/></arbiter></behaviors>",
+    "<arbiter at='/other'><select from='/low'/></arbiter>"
+    "<arbiter at='/b'><select from='/a'/></arbiter></behaviors>",
     "<behaviors><arbiter at='/in'><select from='/low'>not /high and not /third</select>"
-    "<select from='/high'/></arbiter></behaviors>"};
+    "<select from='/high'/></arbiter>"
+    "<arbiter at='/b'><select from='/a'/></arbiter></behaviors>"};
 
 // What the daemon grants to those who are slow, and some more.
 constexpr shm::Nanoseconds kMostTime = service::kMaxWaitForClients + 50'000'000;
