@@ -131,7 +131,7 @@ void OutputCore::assign_channel(InputLink& link) {
   if (const auto error = shm::allocate(descriptor_, offset, shm::kRingBytes)) {
     throw std::system_error(error, "allocating a queue");
   }
-  shm::make_resident(mapping_, offset, ring, memory_->residence());
+  shm::make_resident(mapping_, offset, shm::kRingBytes, memory_->residence());
 }
 
 // Allocates as many slots as all links can need at worst (slot_pool.hpp). Where max_memory does not
