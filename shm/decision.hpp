@@ -231,6 +231,7 @@ class BoundRule {
       if (!before.stands(now, table.timeout(read.source), clock.reading())) return false;
       read.word = now.word;
       read.breaks = now.breaks;
+      if (is_finite(now.word) && now.word < until_) until_ = now.word;
     }
     return true;
   }

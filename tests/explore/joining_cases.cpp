@@ -166,5 +166,18 @@ void attach(const Explore& explore) {
 }
 const Register kPages("APageIsFoundOnceItIsMapped", {6, 4}, attach);
 
+// What a rule is bound to is looked up again when the pages have changed: then it must be found.
+void attach_under_a_bound_rule(const Explore& explore) {
+  explore_anew<Pages>(explore, [](Pages& pages, Execution& execution) {
+    const std::uint64_t bound = pages.pages.changes();
+    execution.thread([&pages] { pages.pages.attach(kA, &pages.activity); });
+    execution.thread([&pages, bound] {
+      if (pages.pages.changes() == bound) return;
+      require(pages.pages.find(kA) != nullptr, "a rule is bound again, and stays blind");
+    });
+  });
+}
+const Register kChanges("WhoSeesThatPagesHaveChangedFindsThem", {6, 4}, attach_under_a_bound_rule);
+
 }  // namespace
 }  // namespace arbiter::explore

@@ -4,6 +4,8 @@
 
 #include <functional>
 #include <memory>
+#include <random>
+#include <vector>
 
 #include "shm/clock.hpp"
 #include "tests/shm/table_builder.hpp"
@@ -217,6 +219,111 @@ TEST_F(Decision, ASourceThatChangesAtEveryLookLeavesItUnsettledAfterABoundedTime
   clock.on_read();
   EXPECT_EQ(decide(0, clock), Verdict::kUnsettled);
   EXPECT_LE(clock.readings, kMaxPictures);
+}
+
+// A rule that is kept bound, and one that is decided anew each time.
+class KeptBound : public Decision {
+ protected:
+  void bind(const TableView& view, bool with_own = false) {
+    reads_.resize(BoundRule::reads_of(view.rule(0)) + 1);
+    rule_.bind(view.rule(0), *pages_, reads_.data(), with_own);
+  }
+  Verdict decide_bound(const TableView& view, Nanoseconds now) {
+    ScriptedClock clock{now, true, now, 0, [] {}};
+    return rule_.decide(view, clock);
+  }
+
+  std::vector<Read> reads_;
+  BoundRule rule_;
+};
+
+TEST_F(KeptBound, ItDecidesAsOneThatIsBoundAnewWhateverHappensInBetween) {
+  constexpr Word t = table::kTrue, f = table::kFalse;
+  const std::function<void(TableBuilder&)> rules[] = {
+      [](TableBuilder& builder) {
+        builder.conjunction(kA, 0, {kB}, {kC, kD});
+      },
+      [](TableBuilder& builder) {
+        builder.conjunction(kA, 0, {}, {kB, kC, kD});
+      },
+      [](TableBuilder& builder) {  // (B and C) or D
+        builder.connect({kA, 0, table::kDiagram, {kB, kC, kD}, {0, 2, 1, 1, 2, t, 2, f, t}});
+      }};
+  std::mt19937 random(7);
+  const auto draw = [&](unsigned below) { return static_cast<unsigned>(random() % below); };
+  for (const auto& make_rule : rules) {
+    for (const bool with_own : {false, true}) {
+      TableBuilder builder = builder_;
+      make_rule(builder);
+      const TableWords words(builder.words(kSources, 1));
+      const TableView view = words.view();
+      bind(view, with_own);
+      Nanoseconds now = 1;
+      for (int step = 0; step < 20'000; ++step) {
+        for (unsigned changes = draw(3); changes != 0; --changes) {
+          Activity& activity = activities_[draw(kSources)];
+          const Nanoseconds timeout = draw(5) == 0 ? kForever : kT;
+          activity.arrive(activity.word, draw(3) == 0 ? deactivation(now) : arrival(now, timeout));
+          now += 1 + draw(5);
+        }
+        now += draw(2) == 0 ? draw(150) : 0;
+        // Where a source had another T, a clock that was read later may be asked for.
+        ScriptedClock anew{now, true, now, 0, [] {}};
+        Decider decider(view, *pages_, anew);
+        const Rule rule = view.rule(0);
+        const Verdict expected = with_own ? decider.decide_with_own(rule) : decider.decide(rule);
+        ASSERT_EQ(decide_bound(view, now), expected) << "step " << step;
+      }
+    }
+  }
+}
+
+TEST_F(KeptBound, AnOldReadingServesAsLongAsNothingMayHaveEnded) {
+  TableBuilder builder = builder_;
+  builder.conjunction(kA, 0, {}, {kB, kC});
+  const TableWords words(builder.words(kSources, 1));
+  const TableView view = words.view();
+  bind(view);
+  word(kB) = arrival(0, kT);  // ended at 100
+  ScriptedClock clock{100, false, 500, 0, [] {}};
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(rule_.decide(view, clock), Verdict::kWins);
+  EXPECT_EQ(clock.readings, 0);
+  word(kC) = arrival(450, kT);  // it denies the rule until 550
+  EXPECT_EQ(rule_.decide(view, clock), Verdict::kLoses);
+  EXPECT_EQ(clock.readings, 1);
+  clock = {500, false, 550, 0, [] {}};
+  EXPECT_EQ(rule_.decide(view, clock), Verdict::kWins);
+  EXPECT_EQ(clock.readings, 1);
+}
+
+TEST_F(KeptBound, TheOneThatDeniesItMayChangeItsReason) {
+  TableBuilder builder = builder_;
+  builder.conjunction(kA, 0, {kB}, {kC});
+  const TableWords words(builder.words(kSources, 1));
+  const TableView view = words.view();
+  bind(view);
+  EXPECT_EQ(decide_bound(view, 1), Verdict::kLoses) << "B is not active";
+  word(kC) = arrival(10, kT);
+  word(kB) = arrival(10, kT);
+  EXPECT_EQ(decide_bound(view, 20), Verdict::kLoses) << "C is";
+  word(kC) = deactivation(30);
+  EXPECT_EQ(decide_bound(view, 40), Verdict::kWins);
+  EXPECT_EQ(decide_bound(view, 10 + kT), Verdict::kLoses) << "B has run out";
+}
+
+TEST_F(KeptBound, APageThatIsAttachedLaterIsSeenOnceItIsBoundAgain) {
+  TableBuilder builder = builder_;
+  builder.conjunction(kA, 0, {}, {kB});
+  const TableWords words(builder.words(kSources, 1));
+  const TableView view = words.view();
+  pages_->attach(kB, nullptr);
+  bind(view);
+  EXPECT_EQ(decide_bound(view, 1), Verdict::kBlind);
+  const std::uint64_t before = pages_->changes();
+  pages_->attach(kB, &activities_[kB]);
+  EXPECT_NE(pages_->changes(), before);
+  bind(view);
+  EXPECT_EQ(decide_bound(view, 1), Verdict::kWins);
 }
 
 TEST_F(Decision, PagesBeyondTheLimitAreNotFound) {
