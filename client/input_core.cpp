@@ -9,7 +9,7 @@
 namespace arbiter::detail {
 namespace {
 
-const shm::Atomic<std::uint64_t> kNothingSeen{0};
+const shm::Atomic<std::uint64_t> nothing_seen{0};
 
 }  // namespace
 
@@ -150,7 +150,7 @@ void InputCore::accept_view() {
     queues_.push_back(std::move(queue));
   }
   // Nothing is known of them yet: no word says so.
-  watches_.assign(queues_.size(), {&kNothingSeen, 1});
+  watches_.assign(queues_.size(), {&nothing_seen, 1});
   waiting_.clear();
   waiting_.reserve(queues_.size());
   handover_.retire(std::exchange(view_, std::move(view)));
