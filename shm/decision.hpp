@@ -8,13 +8,13 @@
 // inactive, yet never were both. So the words are collected, then read again, and count only if
 // each still says the same: its value is unchanged, and values never repeat (activity.hpp), or an
 // active source was renewed in time, without a break. Hence at the end of the first pass all of
-// them stood as collected, and a source that publishes flat out unsettles nobody. A reading that
-// denies a conjunction needs no second look: at the instant of that one load the conjunction was
-// false.
+// them stood as collected, and a source that publishes flat out unsettles nobody. Where one of them
+// denies a conjunction, a second look at that one is enough.
 //
 // Time. `now` is a reading of the clock that the caller took before. Where a word was written after
 // that reading, an activity that ended in between would be combined with one that began later; so
-// the clock is read again and the picture taken anew. A caller may pass an old reading
+// the clock is read again once all were seen, and they are looked at again. A caller may pass an
+// old reading
 // (`Clock::is_fresh` false): what ended before it is over whatever the time is, what never ends
 // holds, and only a word between the two makes us read the clock. This saves most takes a clock
 // read and is exact.
