@@ -7,22 +7,12 @@
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/error_of.hpp"
 
 namespace arbiter::test {
 namespace {
 
 using namespace std::chrono_literals;
-
-// What the error says that `act` throws.
-template <class Act>
-std::string error_of(Act act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 bool delivers(OutputPort<Number>& out, InputPort<Number>& in) {
   static std::int64_t value = 0;

@@ -5,11 +5,14 @@
 #include "rules/print_rules.hpp"
 #include "rules/quantifiers.hpp"
 #include "rules/text.hpp"
-#include "tests/fuzz/evaluate.hpp"
 #include "tests/fuzz/fuzz.hpp"
+#include "tests/support/meaning.hpp"
 
 namespace arbiter::fuzz {
 namespace {
+
+using test::Active;
+using test::holds;
 
 constexpr std::size_t kMaxCompared = 20'000;  // bytes
 constexpr int kActivations = 16;

@@ -6,13 +6,16 @@
 #include "rules/compile.hpp"
 #include "rules/load.hpp"
 #include "rules/print_rules.hpp"
-#include "tests/fuzz/evaluate.hpp"
 #include "tests/fuzz/file_in_memory.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/support/live_table.hpp"
+#include "tests/support/meaning.hpp"
 
 namespace arbiter::fuzz {
 namespace {
+
+using test::Active;
+using test::holds;
 
 // Larger ones are read, but neither compiled nor compared: that would be a test of patience.
 constexpr std::size_t kMaxSources = 40, kMaxRules = 60, kMaxExpressions = 2'000;

@@ -15,6 +15,7 @@
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/error_of.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -89,16 +90,6 @@ class ScopedLimit {
   __user_cap_header_struct header_{_LINUX_CAPABILITY_VERSION_3, 0};
   __user_cap_data_struct capabilities_[2]{};
 };
-
-template <class Act>
-std::string error_of(Act act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 TEST(Locking, NothingIsLockedUnlessItIsAskedFor) {
   Daemon daemon(override_model());

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/rules/model_text.hpp"
+#include "tests/support/meaning.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -167,28 +168,12 @@ class NaiveEvaluation {
   unsigned active_ = 0;
 };
 
-bool evaluate(const ExpressionPtr& expression, unsigned active) {
-  const auto operand = [&](std::size_t i) { return evaluate(expression->operands.at(i), active); };
-  const auto holds = [&](const ExpressionPtr& e) { return evaluate(e, active); };
-  const auto& operands = expression->operands;
-  switch (expression->op) {
-    case Operator::kSource:
-      return (active >> (expression->name.at(1) - 'a') & 1) != 0;
-    case Operator::kNot:
-      return !operand(0);
-    case Operator::kAnd:
-      return std::all_of(operands.begin(), operands.end(), holds);
-    case Operator::kOr:
-      return std::any_of(operands.begin(), operands.end(), holds);
-    case Operator::kXor:
-      return operand(0) != operand(1);
-    case Operator::kImplies:
-      return !operand(0) || operand(1);
-    case Operator::kIff:
-      return operand(0) == operand(1);
-    default:
-      return expression->op == Operator::kTrue;
+test::Active names_of(unsigned active) {
+  test::Active names;
+  for (char letter = 'a'; letter <= 'z'; ++letter) {
+    if ((active >> (letter - 'a') & 1) != 0) names.insert(std::string("/") + letter);
   }
+  return names;
 }
 
 void expect_same_meaning(const std::string& condition, unsigned sources) {
@@ -196,7 +181,7 @@ void expect_same_meaning(const std::string& condition, unsigned sources) {
   ASSERT_TRUE(parsed.expression) << condition << ": " << parsed.shown();
   NaiveEvaluation naive(condition);
   for (unsigned active = 0; active < 1u << sources; ++active) {
-    ASSERT_EQ(evaluate(*parsed.expression, active), naive.result(active))
+    ASSERT_EQ(test::holds(**parsed.expression, names_of(active)), naive.result(active))
         << condition << " with " << active;
   }
 }

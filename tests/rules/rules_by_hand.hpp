@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rules/rule_set.hpp"
+#include "tests/support/meaning.hpp"
 
 namespace arbiter::test {
 
@@ -29,39 +30,6 @@ inline ExpressionPtr any_of(std::vector<ExpressionPtr> operands) {
 }
 inline ExpressionPtr binary(Operator op, ExpressionPtr left, ExpressionPtr right) {
   return rules::make_operation(op, {std::move(left), std::move(right)});
-}
-
-// What an expression means, by its definition.
-inline bool holds(const rules::Expression& e, const std::set<std::string>& active) {
-  const auto operand = [&](std::size_t i) { return holds(*e.operands[i], active); };
-  switch (e.op) {
-    case Operator::kFalse:
-      return false;
-    case Operator::kTrue:
-      return true;
-    case Operator::kSource:
-      return active.contains(e.name);
-    case Operator::kNot:
-      return !operand(0);
-    case Operator::kAnd:
-      for (std::size_t i = 0; i < e.operands.size(); ++i) {
-        if (!operand(i)) return false;
-      }
-      return true;
-    case Operator::kOr:
-      for (std::size_t i = 0; i < e.operands.size(); ++i) {
-        if (operand(i)) return true;
-      }
-      return false;
-    case Operator::kXor:
-      return operand(0) != operand(1);
-    case Operator::kImplies:
-      return !operand(0) || operand(1);
-    case Operator::kIff:
-      return operand(0) == operand(1);
-    default:
-      throw std::logic_error("a quantifier");
-  }
 }
 
 inline bool holds(const rules::ConnectionRule& rule, const std::set<std::string>& active) {

@@ -19,6 +19,7 @@
 
 #include "tests/fuzz/daemon/stage.hpp"
 #include "tests/fuzz/fuzz.hpp"
+#include "tests/fuzz/script.hpp"
 
 namespace arbiter::fuzz {
 namespace {
@@ -45,28 +46,6 @@ constexpr MessageKind kKinds[] = {
     MessageKind::kHandBackOutput, MessageKind::kHandBackInput, MessageKind::kHandBackLink,
     MessageKind::kHandedBack,     MessageKind::kConnect,       MessageKind::kWelcome,
     MessageKind::kSync,           MessageKind::kOpened};
-
-class Script {
- public:
-  Script(const std::uint8_t* data, std::size_t size) noexcept : data_(data), size_(size) {}
-  [[nodiscard]] bool is_at_end() const noexcept { return at_ == size_; }
-  std::uint8_t byte() noexcept { return at_ < size_ ? data_[at_++] : 0; }
-  std::uint64_t word() noexcept {
-    std::uint64_t value = 0;
-    for (int i = 0; i < 8; ++i) value = value << 8 | byte();
-    return value;
-  }
-  // Mostly a small number.
-  std::uint64_t number() noexcept {
-    const std::uint8_t value = byte();
-    return value == 255 ? word() : value;
-  }
-
- private:
-  const std::uint8_t* data_;
-  std::size_t size_;
-  std::size_t at_ = 0;
-};
 
 // What a hostile process has been sent and said.
 struct Hostile {

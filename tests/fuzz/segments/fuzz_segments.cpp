@@ -15,6 +15,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "tests/fuzz/script.hpp"
 #include "tests/fuzz/segments/guarded_mapping.hpp"
 #include "tests/fuzz/segments/seam.hpp"
 #include "tests/fuzz/segments/world.hpp"
@@ -27,27 +28,10 @@ namespace {
 constexpr std::uint64_t kMostLoads = 2'000'000;
 constexpr std::size_t kMostSeen = 4096;
 
-class Input {
- public:
-  Input(const std::uint8_t* data, std::size_t size) noexcept : data_(data), size_(size) {}
-  [[nodiscard]] bool is_at_end() const noexcept { return at_ == size_; }
-  std::uint8_t byte() noexcept { return at_ < size_ ? data_[at_++] : 0; }
-  std::uint64_t word() noexcept {
-    std::uint64_t value = 0;
-    for (int i = 0; i < 8; ++i) value = value << 8 | byte();
-    return value;
-  }
-
- private:
-  const std::uint8_t* data_;
-  std::size_t size_;
-  std::size_t at_ = 0;
-};
-
 // Stands between the honest ports and hostile memory.
 class Liar : public Seam {
  public:
-  explicit Liar(Input& input) : input_(input) {}
+  explicit Liar(Script& input) : input_(input) {}
 
   std::uint64_t load(const void* address, std::uint64_t value, std::size_t size) override {
     if (++loads_ > kMostLoads) die("a call does not come to an end");
@@ -118,7 +102,7 @@ class Liar : public Seam {
     std::uint64_t value;
   };
 
-  Input& input_;
+  Script& input_;
   std::uint64_t loads_ = 0;
   std::uint64_t last_ = 0;
   std::vector<Seen> seen_;
@@ -127,7 +111,7 @@ class Liar : public Seam {
 
 class Run {
  public:
-  Run(Input& steps, Input& lies)
+  Run(Script& steps, Script& lies)
       : steps_(steps),
         liar_(lies),
         world_({1 + steps.byte() % 4u, steps.byte() % 2 == 1, steps.byte() % 2 == 1}) {
@@ -303,7 +287,7 @@ class Run {
     world_.require_accounts();
   }
 
-  Input& steps_;
+  Script& steps_;
   Liar liar_;
   World world_;
   bool s_active_ = false;
@@ -316,9 +300,9 @@ class Run {
 }  // namespace arbiter::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using arbiter::fuzz::Input;
-  Input steps(data, size / 2);
-  Input lies(data + size / 2, size - size / 2);
+  using arbiter::fuzz::Script;
+  Script steps(data, size / 2);
+  Script lies(data + size / 2, size - size / 2);
   arbiter::fuzz::Run(steps, lies).go();
   return 0;
 }

@@ -3,21 +3,24 @@
 
 #include <algorithm>
 #include <set>
+#include <stdexcept>
 #include <string>
 
 #include "rules/expression.hpp"
 
-namespace arbiter::fuzz {
+namespace arbiter::test {
 
 using Active = std::set<std::string>;
 
 // Of an expression without quantifiers.
 inline bool holds(const rules::Expression& expression, const Active& active) {
   using rules::Operator;
-  const auto operand = [&](std::size_t i) { return holds(*expression.operands.at(i), active); };
-  const auto each = [&](const rules::ExpressionPtr& part) { return holds(*part, active); };
   const auto& operands = expression.operands;
+  const auto operand = [&](std::size_t i) { return holds(*operands.at(i), active); };
+  const auto each = [&](const rules::ExpressionPtr& part) { return holds(*part, active); };
   switch (expression.op) {
+    case Operator::kFalse:
+      return false;
     case Operator::kTrue:
       return true;
     case Operator::kSource:
@@ -35,8 +38,8 @@ inline bool holds(const rules::Expression& expression, const Active& active) {
     case Operator::kIff:
       return operand(0) == operand(1);
     default:
-      return false;
+      throw std::logic_error("a quantifier");
   }
 }
 
-}  // namespace arbiter::fuzz
+}  // namespace arbiter::test

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+
+#include <arbiter/arbiter.hpp>
+
+namespace arbiter::test {
+
+// What the error says that `act` throws.
+template <class Act>
+std::string error_of(Act act) {
+  try {
+    act();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+}  // namespace arbiter::test
