@@ -4,13 +4,14 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <thread>
+
 #include "bench/harness/interruption.hpp"
 #include "bench/harness/program.hpp"
 
 namespace arbiter::bench {
 namespace {
 
-using namespace std::chrono_literals;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -55,13 +56,22 @@ TEST(Worker, OneThatReturnsWithoutAWordIsNamed) {
 
 TEST(Worker, GoesWithItsObjectInOrderAndLeavesNoChild) {
   int ends[2];
+  int answers[2];
   ASSERT_EQ(::pipe(ends), 0);
+  ASSERT_EQ(::pipe(answers), 0);
+  // Takes its time to take down what it has: until another thread has answered it.
+  std::thread other([&] {
+    char begun = 0;
+    EXPECT_EQ(::read(ends[0], &begun, 1), 1);
+    EXPECT_EQ(::write(answers[1], "a", 1), 1);
+  });
   pid_t pid = 0;
   {
     const Worker worker("waiter", [&](Conversation& with) {
       for (std::uint64_t word = 0; with.hear_or_end(word);) {
       }
-      std::this_thread::sleep_for(100ms);  // as a middleware does that takes down what it has
+      char answer = 0;
+      if (::write(ends[1], "b", 1) != 1 || ::read(answers[0], &answer, 1) != 1) return;
       [[maybe_unused]] const auto written = ::write(ends[1], "e", 1);
     });
     pid = worker.pid();
@@ -69,9 +79,11 @@ TEST(Worker, GoesWithItsObjectInOrderAndLeavesNoChild) {
   }
   EXPECT_FALSE(is_there(pid));
   ::close(ends[1]);
+  other.join();
   char end = 0;
   EXPECT_EQ(::read(ends[0], &end, 1), 1) << "it was not killed: it came to its end";
   ::close(ends[0]);
+  for (const int each : answers) ::close(each);
 }
 
 TEST(Worker, OneThatHearsNothingIsKilled) {

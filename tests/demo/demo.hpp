@@ -1,15 +1,20 @@
 // The demo, told to keep its things in a directory of the test's, and what it leaves there.
 #pragma once
 
+#include <poll.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
-#include <thread>
+#include <system_error>
+#include <utility>
 #include <vector>
 
+#include "shm/file_descriptor.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::test {
@@ -36,28 +41,35 @@ class Demo {
   // The processes that have the test's directory in their environment: the demo and its children.
   [[nodiscard]] std::vector<std::string> processes() const {
     std::vector<std::string> programs;
+    for (const auto& [pid, program] : own()) programs.push_back(program);
+    std::sort(programs.begin(), programs.end());
+    return programs;
+  }
+
+  // The kernel takes its time to end those whose parent was killed: ten seconds for each at most.
+  [[nodiscard]] std::vector<std::string> processes_after_a_while() const {
+    for (const auto& [pid, program] : own()) {
+      const shm::FileDescriptor process(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
+      pollfd ended{process.get(), POLLIN, 0};
+      if (process) ::poll(&ended, 1, 10'000);
+    }
+    return processes();
+  }
+
+ private:
+  [[nodiscard]] std::vector<std::pair<pid_t, std::string>> own() const {
+    std::vector<std::pair<pid_t, std::string>> found;
     std::error_code gone;
     for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
       std::ifstream file(entry.path() / "environ", std::ios::binary);
       const std::string environment{std::istreambuf_iterator<char>(file), {}};
       if (environment.find(directory_.path()) == std::string::npos) continue;
       const auto program = std::filesystem::read_symlink(entry.path() / "exe", gone);
-      if (!gone) programs.push_back(program.filename());
+      if (!gone) found.emplace_back(std::stoi(entry.path().filename()), program.filename());
     }
-    std::sort(programs.begin(), programs.end());
-    return programs;
+    return found;
   }
 
-  // The kernel takes its time to end those whose parent was killed.
-  [[nodiscard]] std::vector<std::string> processes_after_a_while() const {
-    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-    while (!processes().empty() && std::chrono::steady_clock::now() < give_up) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    return processes();
-  }
-
- private:
   TemporaryDirectory directory_;
 };
 
