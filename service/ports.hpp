@@ -66,6 +66,9 @@ struct Link {
   LinkKind kind = LinkKind::kSensing;
   std::uint64_t number = 0;  // if connected: by it both ends know their queue; never given twice
   std::string mismatch;  // why they are not connected although there is a connection; else empty
+
+  // Both ends have been told of each other; else the publisher alone knows the input port.
+  [[nodiscard]] bool is_mutual() const { return number != 0; }
 };
 
 }  // namespace arbiter::service

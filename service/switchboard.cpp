@@ -64,7 +64,9 @@ void Switchboard::remove(shm::PortInstance port) {
       continue;
     }
     const shm::PortInstance peer = output == port ? input : output;
-    client_of(peer).send(message_to(shm::MessageKind::kPeerGone, peer, port));
+    if (input == port || link->second.is_mutual()) {
+      client_of(peer).send(message_to(shm::MessageKind::kPeerGone, peer, port));
+    }
     // A publisher may have died between delivering and ringing.
     if (output == port) shm::ring_bell(inputs_.at(peer)->bell.get());
     link = links_.erase(link);
@@ -247,7 +249,7 @@ void Switchboard::show_growth() {
 
 bool Switchboard::is_connected(const LinkKey& key) const {
   const auto link = links_.find(key);
-  return link != links_.end() && link->second.number != 0;
+  return link != links_.end() && link->second.is_mutual();
 }
 
 Switchboard::Told Switchboard::unlink(const shm::TableView& table) {
@@ -258,12 +260,14 @@ Switchboard::Told Switchboard::unlink(const shm::TableView& table) {
     const auto still = wanted.find(key);
     const LinkKind kind = still == wanted.end() ? LinkKind::kLapsed : still->second;
     if (kind == link.kind) continue;
-    const OutputPort& output = *outputs_.at(key.first);
-    const InputPort& input = *inputs_.at(key.second);
-    output.client->send(message_to(shm::MessageKind::kDisconnected, key.first, key.second));
-    input.client->send(message_to(shm::MessageKind::kDisconnected, key.second, key.first));
-    told.insert(output.client);
-    told.insert(input.client);
+    if (link.is_mutual()) {
+      const OutputPort& output = *outputs_.at(key.first);
+      const InputPort& input = *inputs_.at(key.second);
+      output.client->send(message_to(shm::MessageKind::kDisconnected, key.first, key.second));
+      input.client->send(message_to(shm::MessageKind::kDisconnected, key.second, key.first));
+      told.insert(output.client);
+      told.insert(input.client);
+    }
     link = {kind, 0, ""};
   }
   return told;

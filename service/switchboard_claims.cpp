@@ -36,7 +36,7 @@ std::optional<std::uint64_t> take(Claims& claims, shm::PortInstance peer) {
 void Switchboard::set_away(shm::PortInstance port) {
   for (auto link = links_.begin(); link != links_.end();) {
     const auto [output, input] = link->first;
-    if (output == port && link->second.number != 0) {
+    if (output == port && link->second.is_mutual()) {
       inputs_.at(input)->claims[port] = link->second.number;
     }
     if (input == port) outputs_.at(output)->claims[port] = link->second.number;

@@ -216,8 +216,11 @@ void Honest::hear(const shm::Received& received) {
     case MessageKind::kDone:
       ++done_;
       break;
-    case MessageKind::kPortName:
     case MessageKind::kDisconnected:
+      require(peers_.count(message.peer) == 1, "only a peer is disconnected");
+      if (is_input_) peers_.erase(message.peer);
+      break;
+    case MessageKind::kPortName:
       break;
     default:
       require(false, "the daemon says nothing but what it may");
@@ -238,6 +241,7 @@ void Honest::open_output(const std::string& name) {
   message.set_name(name);
   message.type.size = 8;
   const auto segment = make_output_segment(message.type, kDepth);
+  is_input_ = false;
   open(message, {segment.get()});
 }
 
@@ -247,6 +251,7 @@ void Honest::open_input(const std::string& name) {
   message.set_name(name);
   message.type.size = 8;
   const auto segment = make_input_segment(kDepth);
+  is_input_ = true;
   open(message, {segment.get(), bell_.write_end().get()});
 }
 

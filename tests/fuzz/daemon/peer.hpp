@@ -85,6 +85,7 @@ class Honest {
   bool welcome_ = false;
   bool connected_ = false;
   shm::PortInstance port_ = 0;
+  bool is_input_ = false;
   std::map<shm::SourceId, std::string> pages_;
   std::map<shm::PortInstance, std::uint32_t> peers_;
   std::uint64_t done_ = 0;
