@@ -84,8 +84,8 @@ ReceiveResult receive_message(int socket, Received& received, bool wait) noexcep
     if (errno == EINTR) continue;
     return errno == EAGAIN ? ReceiveResult::kNothing : ReceiveResult::kClosed;
   }
+  take_descriptors(header, received);  // of an empty message too
   if (size == 0) return ReceiveResult::kClosed;
-  take_descriptors(header, received);
   const bool cut = (header.msg_flags & (MSG_TRUNC | MSG_CTRUNC)) != 0;
   if (cut || static_cast<std::size_t>(size) < kShortest) return ReceiveResult::kMalformed;
   Message& message = received.message;

@@ -150,6 +150,14 @@ TEST_F(Wire, DescriptorsThatWereNotAskedForAreClosed) {
   EXPECT_EQ(open_descriptors(), before);
 }
 
+TEST_F(Wire, DescriptorsOfAnEmptyMessageAreClosed) {
+  const std::size_t before = open_descriptors();
+  send_raw("", 0, 2);
+  EXPECT_EQ(receive(), ReceiveResult::kClosed);
+  received_ = {};
+  EXPECT_EQ(open_descriptors(), before);
+}
+
 TEST_F(Wire, DescriptorsAreNotInheritedByAProgramThatIsStarted) {
   ASSERT_EQ(send_message(sender_.get(), {}, {sender_.get(), -1}), SendResult::kSent);
   ASSERT_EQ(receive(), ReceiveResult::kReceived);
