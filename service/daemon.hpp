@@ -76,7 +76,7 @@ class Daemon {
   void accept_client();
   void turn_away_client();
   // Throws std::length_error where there is no room for another.
-  void require_room_for(const Client& newcomer) const;
+  void require_room_for(const Client& newcomer, NodeId returning) const;
   void drop_oldest_silent_client();
   // Handles what it has sent, a bounded part of it: others wait too.
   void serve(Client& client);
@@ -113,6 +113,7 @@ class Daemon {
   enum class Phase : std::uint8_t { kExpecting, kTakingOver, kServing };
   struct Absentee {
     pid_t pid = 0;
+    uid_t user = 0;
     shm::FileDescriptor process;
     std::set<shm::PortInstance> ports;
   };

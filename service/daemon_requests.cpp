@@ -119,13 +119,19 @@ void Daemon::handle(Client& client, shm::Received& received) {
   }
 }
 
-void Daemon::require_room_for(const Client& newcomer) const {
+// `returning`: the node that the newcomer says it was, if it was here before.
+void Daemon::require_room_for(const Client& newcomer, NodeId returning) const {
   std::size_t count = 0;
   std::size_t of_the_user = 0;
   for (const auto& [id, client] : clients_) {
     if (client->node == 0) continue;
     ++count;
     if (client->user() == newcomer.user()) ++of_the_user;
+  }
+  for (const auto& [node, absentee] : absentees_) {
+    if (node == returning) continue;
+    ++count;
+    if (absentee.user == newcomer.user()) ++of_the_user;
   }
   const auto refuse = [](const char* what, std::uint32_t limit) {
     throw std::length_error("limit-exceeded: there are " + std::to_string(limit) + " clients " +
@@ -147,7 +153,7 @@ void Daemon::hello(Client& client, const shm::Received& received) {
   if (message.name_view().empty() || !is_printable(message.name_view())) {
     throw std::runtime_error("a client must have a name, without white space");
   }
-  require_room_for(client);
+  require_room_for(client, (message.flags & shm::kRejoins) != 0 ? message.link : 0);
   client.name = message.name_view();
   client.hello_request = message.request;
   client.has_service_thread = (message.flags & shm::kHasServiceThread) != 0;

@@ -7,6 +7,7 @@
 // time for that (it is stopped, or its user services the node late) comes back when it likes; until
 // then its ports and names are kept for it, for as long as its process lives.
 #include <sys/epoll.h>
+#include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -29,6 +30,13 @@ constexpr std::size_t kMaxForgotten = 64;
 
 shm::FileDescriptor open_process(pid_t pid) {
   return shm::FileDescriptor(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
+}
+
+// Nobody's, where that cannot be told.
+uid_t user_of_process(pid_t pid) {
+  struct stat status {};
+  if (::stat(("/proc/" + std::to_string(pid)).c_str(), &status) != 0) return uid_t(-1);
+  return status.st_uid;
 }
 
 }  // namespace
@@ -85,6 +93,7 @@ void Daemon::add_absentee(const Owner& owner) {
   Absentee& absentee = absentees_[owner.node];
   if (!absentee.process) {
     absentee.pid = owner.process.pid;
+    absentee.user = user_of_process(owner.process.pid);
     absentee.process = open_process(owner.process.pid);
     if (!absentee.process || !owner.process.lives() || has_ended(absentee.process)) {
       absentees_.erase(owner.node);
@@ -182,6 +191,7 @@ void Daemon::set_away(Client& client) {
   if (client.ports.empty() && client.to_hand_back.empty()) return;
   Absentee& absentee = absentees_[client.node];
   absentee.pid = client.pid();
+  absentee.user = client.user();
   absentee.ports = std::exchange(client.to_hand_back, {});
   absentee.ports.insert(client.ports.begin(), client.ports.end());
   while (!client.ports.empty()) switchboard_.set_away(*client.ports.begin());
@@ -249,7 +259,9 @@ void Daemon::remember_components() {
 void Daemon::remember_component(Client& client) {
   if (std::exchange(client.is_component, true)) return;
   state_.add(client.identity());
-  if (state_.size() > kMaxForgotten + 2 * clients_.size()) remember_components();
+  if (state_.size() > kMaxForgotten + 2 * (clients_.size() + absentees_.size())) {
+    remember_components();
+  }
 }
 
 void Daemon::welcome_waiting() {

@@ -1,0 +1,68 @@
+// What the daemon keeps for those who hang up and live is bounded as what it has for those who are
+// here. On the fuzz target's stage, where thousands of processes cost nothing.
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <string>
+
+#include "tests/fuzz/daemon/stage.hpp"
+
+namespace arbiter::fuzz {
+namespace {
+
+using shm::MessageKind;
+
+shm::Message message(MessageKind kind, const std::string& name) {
+  shm::Message result;
+  result.kind = kind;
+  result.value = shm::kWireVersion;
+  result.flags = shm::kComesBack;
+  result.set_name(name);
+  return result;
+}
+
+// As arbiterd does at its start.
+void allow_as_many_descriptors_as_may_be() {
+  rlimit limit{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &limit), 0);
+  limit.rlim_cur = limit.rlim_max;
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &limit), 0);
+}
+
+// Why a newcomer of that process is not welcome; empty if it is.
+std::string refusal(Stage& stage, const Process& process) {
+  const Connection connection(stage.path(), process);
+  stage.run();
+  connection.send(message(MessageKind::kHello, "newcomer"));
+  stage.run();
+  shm::Received received;
+  EXPECT_EQ(shm::receive_message(connection.socket(), received, false),
+            shm::ReceiveResult::kReceived);
+  return std::string(received.message.text_view());
+}
+
+TEST(Absentees, CountAmongTheClientsOfTheirUser) {
+  allow_as_many_descriptors_as_may_be();
+  Stage stage;
+  const Process process(1 << 23, 4'000'000);
+  const Process another(1 << 23, 4'000'001);
+  const auto segment = make_input_segment(1);
+  const shm::Bell bell;
+  for (std::uint32_t i = 0; i < shm::kMaxClientsPerUser; ++i) {
+    const Connection connection(stage.path(), process);
+    stage.run();
+    connection.send(message(MessageKind::kHello, "away"));
+    connection.send(message(MessageKind::kOpenInput, "/away/" + std::to_string(i)),
+                    {segment.get(), bell.write_end().get()});
+    stage.run();
+    if (i + 2 == shm::kMaxClientsPerUser) {
+      EXPECT_EQ(refusal(stage, process), "");
+    }
+  }
+  stage.run();
+  EXPECT_NE(refusal(stage, process).find("kMaxClientsPerUser"), std::string::npos);
+  EXPECT_EQ(refusal(stage, another), "");
+}
+
+}  // namespace
+}  // namespace arbiter::fuzz
