@@ -20,6 +20,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   int exit_code = 0;
   arbiter::cli::add_check(app, exit_code);
+  arbiter::cli::add_diff(app, exit_code);
   arbiter::cli::add_rules(app, exit_code);
   arbiter::cli::add_simulate(app, exit_code);
   arbiter::cli::add_play(app, exit_code);

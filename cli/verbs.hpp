@@ -10,6 +10,7 @@ class App;
 namespace arbiter::cli {
 
 void add_check(CLI::App& app, int& exit_code);
+void add_diff(CLI::App& app, int& exit_code);
 void add_rules(CLI::App& app, int& exit_code);
 void add_simulate(CLI::App& app, int& exit_code);
 void add_play(CLI::App& app, int& exit_code);

@@ -31,6 +31,7 @@ struct CompiledPort {
   bool arbitrated = true;
   std::vector<std::string> reads;   // each source written in its rules, in byte order
   std::vector<CompiledRule> rules;  // in document order; those that no rule selects come last
+  bool first_wins = false;          // conflict="first"; the rules have it in them already
 };
 
 struct CompiledModel {

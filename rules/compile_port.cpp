@@ -71,7 +71,7 @@ class PortCompiler {
 std::optional<PortResult> PortCompiler::compile() {
   context_.builder.restore_order();
   if (!mention_sources()) return std::nullopt;
-  PortResult result{{port_.port, true, {}, {}}, {}};
+  PortResult result{{port_.port, true, {}, {}, port_.first_wins}, {}};
   try {
     build_rules();
     if (!compile_rules(result.port)) return std::nullopt;

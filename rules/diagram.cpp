@@ -1,7 +1,9 @@
 #include "rules/diagram.hpp"
 
 #include <bdd.h>
-#undef bdd_ithvar  // of the two interfaces, that of C is used: BDD is an int
+// Of the two interfaces, that of C is used: BDD is an int.
+#undef bdd_ithvar
+#undef bdd_nithvar
 
 #include <algorithm>
 #include <csetjmp>
@@ -98,7 +100,9 @@ Diagram::~Diagram() {
   if (instance_ == current_instance) bdd_delref(node_);
 }
 
-DiagramBuilder::DiagramBuilder() : only_one_(one_instance) { start(); }
+DiagramBuilder::DiagramBuilder(int variables) : only_one_(one_instance), variables_(variables) {
+  start();
+}
 
 DiagramBuilder::~DiagramBuilder() { stop(); }
 
@@ -112,10 +116,11 @@ void DiagramBuilder::start() {
   bdd_error_hook(leave_buddy);
   bdd_gbc_hook(nullptr);  // the default one writes to standard error
   bdd_reorder_hook(note_reordering);
-  const auto set_up = [] {
+  const int variables = variables_;
+  const auto set_up = [variables] {
     bdd_setmaxnodenum(kMaxWorkingNodes);
     bdd_setcacheratio(kNodesPerCacheEntry);
-    bdd_setvarnum(kVariables);
+    bdd_setvarnum(variables);
     bdd_varblockall();  // sifting moves blocks: each variable is one
     return bdd_autoreorder_times(BDD_REORDER_SIFT, kAutomaticSifts);
   };
@@ -170,6 +175,16 @@ Diagram DiagramBuilder::negate(const Diagram& a) {
 Diagram DiagramBuilder::when(const Diagram& a, int variable) {
   const int node = node_of(a);
   return keep(run([=] { return bdd_restrict(node, bdd_ithvar(variable)); }));
+}
+
+Diagram DiagramBuilder::when_not(const Diagram& a, int variable) {
+  const int node = node_of(a);
+  return keep(run([=] { return bdd_restrict(node, bdd_nithvar(variable)); }));
+}
+
+Diagram DiagramBuilder::choose(int variable, const Diagram& high, const Diagram& low) {
+  const int then = node_of(high), otherwise = node_of(low);
+  return keep(run([=] { return bdd_ite(bdd_ithvar(variable), then, otherwise); }));
 }
 
 void DiagramBuilder::sift() {

@@ -71,8 +71,10 @@ enum class Connective { kAnd, kOr, kXor, kImplies, kIff, kAndNot };
 class DiagramBuilder {
  public:
   static constexpr int kVariables = static_cast<int>(shm::kMaxSourcesPerPort);
+  static constexpr int kMaxVariables = 4 * kVariables;  // for what is asked of several ports
 
-  DiagramBuilder();
+  DiagramBuilder() : DiagramBuilder(kVariables) {}
+  explicit DiagramBuilder(int variables);
   ~DiagramBuilder();
   DiagramBuilder(const DiagramBuilder&) = delete;
   DiagramBuilder& operator=(const DiagramBuilder&) = delete;
@@ -81,6 +83,9 @@ class DiagramBuilder {
   [[nodiscard]] Diagram combine(Connective connective, const Diagram& a, const Diagram& b);
   [[nodiscard]] Diagram negate(const Diagram& a);
   [[nodiscard]] Diagram when(const Diagram& a, int variable);  // `variable` taken as true
+  [[nodiscard]] Diagram when_not(const Diagram& a, int variable);
+  // `high` where the variable is true, `low` where it is not.
+  [[nodiscard]] Diagram choose(int variable, const Diagram& high, const Diagram& low);
   // Looks for an order of the variables that makes all living diagrams together smaller.
   void sift();
 
@@ -107,6 +112,7 @@ class DiagramBuilder {
   static Diagram keep(int node);
 
   std::unique_lock<std::mutex> only_one_;
+  const int variables_;
   bool order_changed_ = false;
   std::vector<shm::Word> index_of_node_;  // scratch of nodes(), by BuDDy's node
 };

@@ -6,9 +6,9 @@ namespace arbiter::rules {
 namespace {
 
 constexpr std::uint32_t kImpossible = 1u << 30;
-constexpr std::uint32_t kLiteral = 1024;  // more than there can be active literals
+constexpr std::uint32_t kLiteral = 4096;  // more than there can be active literals
 constexpr std::uint32_t kActiveLiteral = kLiteral + 1;
-static_assert(kLiteral > DiagramBuilder::kVariables);
+static_assert(kLiteral > DiagramBuilder::kMaxVariables);
 
 struct BoundMet {};
 
@@ -37,17 +37,28 @@ std::uint32_t ShortestImplicant::cost(const Diagram& function) {
 }
 
 std::optional<Literals> ShortestImplicant::find(const Diagram& function) {
+  const auto literals = find_literals(function);
+  if (!literals) return std::nullopt;
+  Literals result;
+  for (const Literal& literal : *literals) {
+    (literal.active ? result.active : result.inactive)
+        .set(static_cast<std::size_t>(literal.variable));
+  }
+  return result;
+}
+
+std::optional<std::vector<Literal>> ShortestImplicant::find_literals(const Diagram& function) {
   try {
     cost(function);
   } catch (const BoundMet&) {
     return std::nullopt;
   }
-  Literals result;
+  std::vector<Literal> result;
   for (Diagram rest = function; !rest.is_true();) {
     const Best& best = best_.at(rest.id());
-    const auto variable = static_cast<std::size_t>(best.variable);
-    if (best.choice == Choice::kActive) result.active.set(variable);
-    if (best.choice == Choice::kInactive) result.inactive.set(variable);
+    if (best.choice != Choice::kLeaveOut) {
+      result.push_back({best.variable, best.choice == Choice::kActive});
+    }
     rest = best.rest;
   }
   return result;

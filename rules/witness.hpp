@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <unordered_map>
+#include <vector>
 
 #include "rules/diagram.hpp"
 #include "rules/proof.hpp"
@@ -14,6 +15,11 @@ namespace arbiter::rules {
 // search follows the definition instead: an implicant of f with top variable x either leaves x out,
 // and is then one of (f where x is false) and (f where x is true); or says which, and its rest is
 // one of that half. Functions seen are remembered; there may be many, so they are bounded.
+struct Literal {
+  int variable;
+  bool active;
+};
+
 class ShortestImplicant {
  public:
   // Functions that the searches of one object look at together.
@@ -24,6 +30,8 @@ class ShortestImplicant {
   // Fewest literals, then fewest that are active; always the same one. Nothing if the bound is met.
   // Throws DiagramLimit, after which it can't be used again. For a function that can be true.
   std::optional<Literals> find(const Diagram& function);
+  // The same, whatever the number of variables.
+  std::optional<std::vector<Literal>> find_literals(const Diagram& function);
 
  private:
   enum class Choice : std::uint8_t { kNone, kLeaveOut, kInactive, kActive };

@@ -1,0 +1,82 @@
+// arbiter diff: in which states two models decide differently.
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/model_files.hpp"
+#include "cli/verbs.hpp"
+#include "rules/model_diff.hpp"
+#include "rules/report.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+struct DiffOptions {
+  std::string before, after;
+  std::string application, application_before, application_after;
+  bool json = false;
+};
+
+// One file, or several that form a model, with commas between them.
+std::vector<std::string> files_of(const std::string& argument) {
+  if (argument.find(',') == std::string::npos || std::filesystem::exists(argument)) {
+    return {argument};
+  }
+  return CLI::detail::split(argument, ',');
+}
+
+std::optional<Model> load_side(const DiffOptions& options, const std::string& files,
+                               const std::string& application) {
+  rules::ModelFiles model{files_of(files), {}};
+  const std::string& given = application.empty() ? options.application : application;
+  if (!given.empty()) model.application = given;
+  rules::Diagnostics diagnostics;
+  auto loaded = load_model(model, diagnostics);
+  // What a check finds beside errors is not what was asked for here.
+  if (!loaded) rules::write_text(std::cerr, diagnostics);
+  return loaded;
+}
+
+int diff(const DiffOptions& options) {
+  constexpr int kEqual = 0, kDiffers = 1, kCannot = 2;
+  const auto before = load_side(options, options.before, options.application_before);
+  const auto after = load_side(options, options.after, options.application_after);
+  if (!before || !after) return kCannot;
+  const auto found = rules::diff(before->compiled, after->compiled);
+  if (options.json) {
+    rules::write_json(std::cout, found);
+  } else {
+    rules::write_text(std::cout, found);
+  }
+  if (found.is_open()) return kCannot;
+  return found.differs() ? kDiffers : kEqual;
+}
+
+}  // namespace
+
+void add_diff(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<DiffOptions>();
+  CLI::App* verb = app.add_subcommand("diff", "Show in which states two models decide differently");
+  verb->add_option("BEFORE", options->before, "A model; several files of one: a.xml,b.xml")
+      ->type_name("FILE")
+      ->required();
+  verb->add_option("AFTER", options->after, "The model to compare it with")
+      ->type_name("FILE")
+      ->required();
+  verb->add_option("--application", options->application, "Connections of both models")
+      ->type_name("FILE");
+  verb->add_option("--application-before", options->application_before, "Connections of BEFORE")
+      ->type_name("FILE");
+  verb->add_option("--application-after", options->application_after, "Connections of AFTER")
+      ->type_name("FILE");
+  verb->add_flag("--json", options->json, "Write what is found as JSON");
+  verb->footer(
+      "Exit code 0: they decide alike in every state; 1: they differ; 2: that cannot be told.\n"
+      "Example:\n  arbiter diff search_and_track.xml new.xml");
+  verb->callback([options, &exit_code] { exit_code = diff(*options); });
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,185 @@
+#include "rules/winners.hpp"
+
+#include <algorithm>
+#include <queue>
+#include <set>
+
+#include "rules/witness.hpp"
+#include "shm/decision_table.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+// The order of the variables in a port's diagrams, as far as these show it: each list of reads
+// follows it. Of what they leave open, the first mentioned comes first.
+std::vector<std::string> order_of(const CompiledPort& port) {
+  std::vector<std::string> names;
+  std::unordered_map<std::string, std::size_t> index;
+  const auto index_of = [&](const std::string& name) {
+    const auto [found, is_new] = index.emplace(name, names.size());
+    if (is_new) names.push_back(name);
+    return found->second;
+  };
+  std::vector<std::set<std::size_t>> after;
+  const auto make_room = [&] { after.resize(names.size()); };
+  for (const auto& rule : port.rules) {
+    index_of(rule.source);
+    for (const auto& read : rule.reads) index_of(read);
+  }
+  for (const auto& read : port.reads) index_of(read);
+  make_room();
+  std::vector<std::size_t> before(names.size());
+  for (const auto& rule : port.rules) {
+    for (std::size_t i = 1; i < rule.reads.size(); ++i) {
+      const std::size_t from = index.at(rule.reads[i - 1]), to = index.at(rule.reads[i]);
+      if (after[from].insert(to).second) ++before[to];
+    }
+  }
+  std::priority_queue<std::size_t, std::vector<std::size_t>, std::greater<>> ready;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (before[i] == 0) ready.push(i);
+  }
+  std::vector<std::string> result;
+  while (!ready.empty()) {
+    const std::size_t next = ready.top();
+    ready.pop();
+    result.push_back(names[next]);
+    for (const std::size_t follower : after[next]) {
+      if (--before[follower] == 0) ready.push(follower);
+    }
+  }
+  return result;
+}
+
+std::string enumerate(const std::vector<std::string>& names) {
+  constexpr std::size_t kMaxNames = 6;  // that a sentence spells out
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i == kMaxNames) return text + " and " + std::to_string(names.size() - i) + " more";
+    if (i > 0) text += i + 1 == names.size() ? " and " : ", ";
+    text += names[i];
+  }
+  return text;
+}
+
+}  // namespace
+
+void SourceOrder::add(const CompiledPort& port) {
+  std::unordered_map<std::string, std::size_t> known;
+  for (std::size_t i = 0; i < names_.size(); ++i) known.emplace(names_[i], i);
+  // What is new goes behind the one that it follows in its port.
+  std::vector<std::vector<std::string>> behind(names_.size() + 1);
+  std::size_t last = 0;
+  for (auto& name : order_of(port)) {
+    const auto found = known.find(name);
+    if (found != known.end()) {
+      last = found->second + 1;
+    } else {
+      behind[last].push_back(std::move(name));
+    }
+  }
+  std::vector<std::string> merged = std::move(behind[0]);
+  for (std::size_t i = 0; i < names_.size(); ++i) {
+    merged.push_back(std::move(names_[i]));
+    for (auto& name : behind[i + 1]) merged.push_back(std::move(name));
+  }
+  names_ = std::move(merged);
+}
+
+void SourceOrder::add(const std::string& source) {
+  if (std::find(names_.begin(), names_.end(), source) == names_.end()) names_.push_back(source);
+}
+
+Winners::Winners(const SourceOrder& order, std::uint64_t max_work)
+    : names_(order.names()),
+      builder_(std::clamp(static_cast<int>(names_.size()), 1, DiagramBuilder::kMaxVariables)),
+      max_work_(max_work) {
+  if (names_.size() > static_cast<std::size_t>(DiagramBuilder::kMaxVariables)) {
+    throw WorkLimit("more than " + std::to_string(DiagramBuilder::kMaxVariables) + " sources");
+  }
+  for (std::size_t i = 0; i < names_.size(); ++i) {
+    variables_.emplace(names_[i], static_cast<int>(i));
+  }
+}
+
+void Winners::take_account_of(std::uint64_t work) {
+  work_ += work;
+  if (work_ > max_work_) throw WorkLimit("more than " + std::to_string(max_work_) + " steps");
+}
+
+Diagram Winners::combine(Connective connective, const Diagram& a, const Diagram& b) {
+  Diagram result = builder_.combine(connective, a, b);
+  take_account_of(1 + (result.is_false() || result.is_true() ? 0 : builder_.node_count(result)));
+  return result;
+}
+
+Diagram Winners::winner(const CompiledRule& rule) {
+  using shm::table::kTrue;
+  const Diagram own = active(rule.source);
+  if (rule.kind == shm::table::kNever) return constant(false);
+  if (rule.kind == shm::table::kAlways) return own;
+  Diagram condition;
+  take_account_of(rule.reads.size() + rule.nodes.size());
+  if (rule.kind == shm::table::kConjunction) {
+    condition = constant(true);
+    for (std::size_t i = rule.reads.size(); i-- > 0;) {
+      const int variable = variables_.at(rule.reads[i]);
+      const Diagram never = constant(false);
+      condition = rule.expected[i] ? builder_.choose(variable, condition, never)
+                                   : builder_.choose(variable, never, condition);
+    }
+  } else {
+    std::vector<Diagram> built(rule.nodes.size());
+    const auto of = [&](shm::Word node) {
+      return node < shm::table::kFalse ? built[node] : constant(node == kTrue);
+    };
+    for (std::size_t i = rule.nodes.size(); i-- > 0;) {
+      const auto& node = rule.nodes[i];
+      built[i] =
+          builder_.choose(variables_.at(rule.reads[node.position]), of(node.high), of(node.low));
+    }
+    condition = built[0];
+  }
+  return combine(Connective::kAnd, own, condition);
+}
+
+Diagram Winners::given(const Diagram& function, const std::string& source, bool active) {
+  const int variable = variables_.at(source);
+  Diagram result =
+      active ? builder_.when(function, variable) : builder_.when_not(function, variable);
+  take_account_of(1 + (result.is_false() || result.is_true() ? 0 : builder_.node_count(result)));
+  return result;
+}
+
+Witness Winners::witness(const Diagram& function) {
+  ShortestImplicant shortest(builder_);
+  auto literals = shortest.find_literals(function);
+  if (!literals) {
+    literals.emplace();
+    for (Diagram rest = function; !rest.is_true();) {
+      const Diagram low = builder_.low(rest);
+      literals->push_back({builder_.top_variable(rest), low.is_false()});
+      rest = low.is_false() ? builder_.high(rest) : low;
+    }
+  }
+  Witness witness;
+  for (const Literal& literal : *literals) {
+    (literal.active ? witness.active : witness.inactive)
+        .push_back(names_[static_cast<std::size_t>(literal.variable)]);
+  }
+  std::sort(witness.active.begin(), witness.active.end());
+  std::sort(witness.inactive.begin(), witness.inactive.end());
+  return witness;
+}
+
+std::string in_words(const Witness& witness) {
+  if (witness.active.empty() && witness.inactive.empty()) return "nothing active";
+  std::string text;
+  if (!witness.active.empty()) text = enumerate(witness.active) + " active";
+  if (!witness.inactive.empty()) {
+    text += (text.empty() ? "" : " and ") + enumerate(witness.inactive) + " inactive";
+  }
+  return text;
+}
+
+}  // namespace arbiter::rules

@@ -1,0 +1,81 @@
+// Who wins at a port in which states of the sources, as decision diagrams: what the questions asked
+// of compiled models are answered with.
+//
+// A state says of each source whether it is active. With the rules of a port compiled and proved,
+// at most one of winner(rule) holds in any state. There is no diagram of a whole port, which would
+// explode where connections are inhibited by a few others each (rules/proof.hpp).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "rules/compile.hpp"
+#include "rules/diagram.hpp"
+
+namespace arbiter::rules {
+
+// A question took more than its bound of work. Unlike after DiagramLimit, diagrams stay valid; but
+// whoever asks drops them in both cases.
+class WorkLimit : public DiagramLimit {
+ public:
+  using DiagramLimit::DiagramLimit;
+};
+
+// The sources that ports read or are connected to, as variables, in an order that keeps the
+// diagrams of all of them as small as it can: that of the first port, with what others add.
+class SourceOrder {
+ public:
+  void add(const CompiledPort& port);
+  void add(const std::string& source);
+
+  [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
+
+ private:
+  std::vector<std::string> names_;
+};
+
+class Winners {
+ public:
+  // Nodes of all results of one question together: a second or two.
+  static constexpr std::uint64_t kMaxWork = 20'000'000;
+
+  // Throws DiagramLimit if there are more sources than DiagramBuilder::kMaxVariables.
+  explicit Winners(const SourceOrder& order, std::uint64_t max_work = kMaxWork);
+
+  [[nodiscard]] const std::vector<std::string>& sources() const { return names_; }
+  [[nodiscard]] std::uint64_t work() const { return work_; }
+
+  // All of these throw DiagramLimit.
+  Diagram combine(Connective connective, const Diagram& a, const Diagram& b);
+  Diagram negate(const Diagram& a) { return combine(Connective::kXor, a, constant(true)); }
+  Diagram constant(bool value) { return builder_.constant(value); }
+  Diagram active(const std::string& source) { return builder_.variable(variables_.at(source)); }
+  // The states in which the rule's source is active, and wins.
+  Diagram winner(const CompiledRule& rule);
+  // The function in the states that differ from each one only in that the source is (not) active.
+  Diagram given(const Diagram& function, const std::string& source, bool active);
+
+  // A shortest conjunction that implies the function, which can be true; or, where that takes too
+  // long, some conjunction.
+  Witness witness(const Diagram& function);
+
+  DiagramNodes nodes(const Diagram& function) { return builder_.nodes(function); }
+
+ private:
+  void take_account_of(std::uint64_t work);
+
+  std::vector<std::string> names_;
+  std::unordered_map<std::string, int> variables_;
+  DiagramBuilder builder_;
+  const std::uint64_t max_work_;
+  std::uint64_t work_ = 0;
+};
+
+// "/a and /b active and /c inactive"; "nothing active" if there are no literals.
+std::string in_words(const Witness& witness);
+
+}  // namespace arbiter::rules
