@@ -1,43 +1,87 @@
-// arbiter check: what loading a model would say of it.
+// arbiter check: what loading a model would say of it, and what else can be proved about it.
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/model_files.hpp"
 #include "cli/verbs.hpp"
+#include "rules/findings.hpp"
 #include "rules/report.hpp"
+#include "rules/verdict.hpp"
 
 namespace arbiter::cli {
 namespace {
 
 struct CheckOptions {
   rules::ModelFiles files;
+  std::vector<std::string> statements;  // files
+  std::vector<std::string> silenced;    // codes
   bool json = false;
+};
+
+struct Statements {
+  std::size_t proved = 0, refuted = 0, open = 0;
 };
 
 std::string counted(std::size_t count, const std::string& thing) {
   return std::to_string(count) + ' ' + thing + (count == 1 ? "" : "s");
 }
 
-void write_summary(std::ostream& out, const rules::CompiledModel& model) {
+std::string summary_of(const rules::CompiledModel& model) {
   std::size_t connections = 0;
   for (const auto& port : model.ports) connections += port.rules.size();
-  out << "ok: " << counted(model.ports.size(), "port") << ", " << counted(connections, "connection")
-      << ", " << counted(model.sources.size(), "source") << '\n';
+  return counted(model.ports.size(), "port") + ", " + counted(connections, "connection") + ", " +
+         counted(model.sources.size(), "source");
+}
+
+// Statements are read even where there is no model that they could be true of: all problems are
+// reported in one go.
+Statements judge_statements(const CheckOptions& options, const rules::CompiledModel* model,
+                            rules::Diagnostics& diagnostics) {
+  Statements result;
+  for (const auto& path : options.statements) {
+    const rules::TextFile file(path, rules::read_bytes(path));
+    const auto statements = rules::read_statements(file, diagnostics);
+    if (model == nullptr) continue;
+    const auto verdicts = rules::judge(statements, *model, diagnostics);
+    rules::report(verdicts, diagnostics, options.json);
+    for (const auto& verdict : verdicts) {
+      using Kind = rules::Verdict::Kind;
+      result.proved += verdict.kind == Kind::kProved ? 1 : 0;
+      result.refuted += verdict.kind == Kind::kRefuted ? 1 : 0;
+      result.open += verdict.kind == Kind::kOpen ? 1 : 0;
+    }
+  }
+  return result;
 }
 
 int check(const CheckOptions& options) {
   rules::Diagnostics diagnostics;
   const auto model = load_model(options.files, diagnostics);
+  if (model) rules::find_more(model->rules, model->compiled, diagnostics);
+  const auto statements =
+      judge_statements(options, model ? &model->compiled : nullptr, diagnostics);
+  diagnostics.silence(options.silenced);
+  const bool failed = diagnostics.has_errors();
   if (options.json) {
     rules::write_json(std::cout, diagnostics);
-  } else {
-    rules::write_text(std::cerr, diagnostics);
-    if (model) write_summary(std::cout, model->compiled);
+    return failed ? 1 : 0;
   }
-  return model ? 0 : 1;
+  rules::write_text(std::cerr, diagnostics);
+  if (!options.statements.empty() && model) {
+    std::cout << counted(statements.proved + statements.refuted + statements.open, "statement")
+              << ": " << statements.proved << " proved, " << statements.refuted << " refuted, "
+              << statements.open << " left open\n";
+  }
+  if (failed) {
+    std::cout << "failed: " << rules::counts(diagnostics) << '\n';
+  } else {
+    std::cout << "ok: " << summary_of(model->compiled) << '\n';
+  }
+  return failed ? 1 : 0;
 }
 
 }  // namespace
@@ -46,8 +90,24 @@ void add_check(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<CheckOptions>();
   CLI::App* verb = app.add_subcommand("check", "Check a model, and prove that one wins at most");
   add_model_options(*verb, options->files);
+  verb->add_option("--assert", options->statements,
+                   "File of statements that must be true in every state, one on each line")
+      ->type_name("FILE")
+      ->allow_extra_args(false);
+  verb->add_option("--silence", options->silenced,
+                   "Say nothing of warnings and notes of this code, such as nobody-wins")
+      ->type_name("CODE")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   verb->add_flag("--json", options->json, "Write what is found as JSON, to standard output");
-  verb->footer("Example:\n  arbiter check search_and_track.xml --application application.xml");
+  verb->footer(
+      "Statements speak of sources and winners:\n"
+      "  /collision:o -> idle(/Arm/pos:i)\n"
+      "  winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o\n"
+      "Exit code 0: no error; 1: an error, or a statement that is not proved; 2: wrong use.\n"
+      "Examples:\n"
+      "  arbiter check search_and_track.xml --application application.xml\n"
+      "  arbiter check search_and_track.xml --assert safety.txt --silence nobody-wins,starved");
   verb->callback([options, &exit_code] { exit_code = check(*options); });
 }
 

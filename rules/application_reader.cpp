@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "rules/element_reader.hpp"
@@ -45,8 +46,39 @@ class ApplicationReader {
     bool fine = true;
     for (const XmlNode& element : Elements(root.first_child)) {
       if (element.text == "connection") fine = read_connection(element) && fine;
+      if (element.text == "module") read_module(element);
     }
     return fine;
+  }
+
+  // Of what is not ours nothing is an error: a text that cannot be read tells nothing.
+  void read_module(const XmlNode& module) {
+    for (const XmlNode& element : Elements(module.first_child)) {
+      if (element.text == "prefix" || element.text == "name") {
+        add_prefix(read_text(element));
+      } else if (element.text == "parameters") {
+        const std::string parameters = collapse_blanks(read_text(element)) + " ";
+        const std::size_t at = (" " + parameters).find(" --name ");
+        if (at == std::string::npos) continue;
+        const std::size_t first = at + std::string_view("--name ").size();
+        add_prefix(parameters.substr(first, parameters.find(' ', first) - first));
+      }
+    }
+  }
+
+  void add_prefix(std::string_view text) {
+    const std::string_view prefix = trim(text);
+    if (prefix.empty()) return;
+    application_.prefixes.push_back((prefix[0] == '/' ? "" : "/") + std::string(prefix));
+  }
+
+  std::string read_text(const XmlNode& element) {
+    Text text(file_, file_.offset_of(element.text.data()) - 1);
+    Diagnostics ignored;
+    for (const XmlNode* child = element.first_child; child != nullptr; child = child->next) {
+      if (child->kind == XmlKind::kText && !decode(file_, child->text, text, ignored)) return {};
+    }
+    return text.bytes();
   }
 
   bool read_connection(const XmlNode& element) {

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <set>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
 
 #include "rules/compile_port.hpp"
+#include "rules/contradiction.hpp"
+#include "rules/names.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -26,6 +29,7 @@ class ModelCompiler {
   void compile_arbitrated_ports();
   void add_unarbitrated_ports();
   void report_never_running();
+  void report_unreachable_children();
   void check_limits();
   void limit_exceeded(const Location& where, std::string_view what, std::string_view limit,
                       std::size_t value);
@@ -46,6 +50,7 @@ CompiledModel ModelCompiler::compile() {
   compile_arbitrated_ports();
   add_unarbitrated_ports();
   report_never_running();
+  report_unreachable_children();
   check_limits();
   return std::move(model_);
 }
@@ -117,14 +122,73 @@ void ModelCompiler::add_unarbitrated_ports() {
 }
 
 void ModelCompiler::report_never_running() {
+  constexpr int kMaxExplained = 100;  // each takes some diagrams
+  int explained = 0;
   for (std::size_t i = 0; i < rules_.behaviours.size(); ++i) {
     const auto& behaviour = rules_.behaviours[i];
     if (may_run_[i] || behaviour.rules.empty()) continue;
+    std::string reasons;
+    if (explained < kMaxExplained) {
+      ++explained;
+      reasons = why_it_never_runs(context_.builder, behaviour, rules_);
+    }
     context_.diagnostics.warning(
         "never-runs", behaviour.where,
-        "no activity of the sources lets the behaviour \"" + behaviour.name +
-            "\" run: none of its connections can ever be selected for it; look for a condition or "
-            "an inhibition, its own or inherited, that contradicts another one");
+        "no activity of the sources lets the behaviour " + quote(behaviour.name) +
+            " run: none of its connections can ever be selected for it" + reasons +
+            "; look for a condition or an inhibition, its own or inherited, that contradicts "
+            "another one");
+  }
+}
+
+// A meta-behaviour can be reached if one of its children can.
+void ModelCompiler::report_unreachable_children() {
+  std::unordered_map<std::string_view, bool> reached;
+  for (std::size_t i = 0; i < rules_.behaviours.size(); ++i) {
+    reached.emplace(rules_.behaviours[i].name, may_run_[i] || rules_.behaviours[i].rules.empty());
+  }
+  std::unordered_map<std::string_view, const MetaBehaviour*> metas;
+  std::unordered_map<std::string_view, std::size_t> missing;  // children of which nothing is known
+  std::unordered_map<std::string_view, std::string_view> parents;
+  std::vector<const MetaBehaviour*> known;
+  for (const auto& meta : rules_.meta_behaviours) metas.emplace(meta.name, &meta);
+  for (const auto& meta : rules_.meta_behaviours) {
+    for (const auto& child : meta.children) {
+      parents.emplace(child, meta.name);
+      if (metas.contains(child)) ++missing[meta.name];
+    }
+    if (missing[meta.name] == 0) known.push_back(&meta);
+  }
+  // From the innermost outwards; whatever their depth, without recursion.
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const auto is_reached = [&](const std::string& child) { return reached[child]; };
+    const auto& children = known[i]->children;
+    reached[known[i]->name] =
+        children.empty() || std::any_of(children.begin(), children.end(), is_reached);
+    const auto parent = parents.find(known[i]->name);
+    if (parent == parents.end() || --missing[parent->second] > 0) continue;
+    known.push_back(metas.at(parent->second));
+  }
+  for (const auto& meta : rules_.meta_behaviours) {
+    std::vector<std::string> lost;
+    for (const auto& child : meta.children) {
+      if (!reached[child]) lost.push_back(child);
+    }
+    if (lost.empty()) continue;
+    std::string names;
+    constexpr std::size_t kMaxNames = 6;
+    for (std::size_t i = 0; i < std::min(lost.size(), kMaxNames); ++i) {
+      names += (i > 0 ? ", " : "") + quote(lost[i]);
+    }
+    if (lost.size() > kMaxNames)
+      names += " and " + std::to_string(lost.size() - kMaxNames) + " more";
+    context_.diagnostics.warning(
+        "unreachable-children", meta.where,
+        std::to_string(lost.size()) + " of the " + std::to_string(meta.children.size()) +
+            (meta.children.size() == 1 ? " child" : " children") + " of " + quote(meta.name) +
+            " can never run: " + names +
+            "; see what is said of each, or look at the conditions and inhibitions of " +
+            quote(meta.name));
   }
 }
 

@@ -46,18 +46,32 @@ constexpr std::array<Spelling, 11> kWords{{
     {"none", TokenKind::kNone},
 }};
 
+constexpr std::array<Spelling, 2> kComparisons{{
+    {"!=", TokenKind::kDiffers},  // before "!" is looked for
+    {"=", TokenKind::kEquals},
+}};
+
+constexpr std::array<Spelling, 2> kStatementWords{{
+    {"winner", TokenKind::kWinner},
+    {"idle", TokenKind::kIdle},
+}};
+
 bool is_letter_or_digit(char byte) {
   return (byte >= 'a' && byte <= 'z') || (byte >= 'A' && byte <= 'Z') ||
          (byte >= '0' && byte <= '9');
 }
 
-[[noreturn]] void fail_at_word(std::size_t at, std::string_view word) {
+[[noreturn]] void fail_at_word(std::size_t at, std::string_view word, Language language) {
   std::string lower;
   for (const char byte : word.substr(0, word.find('/'))) {
     lower += static_cast<char>(std::tolower(static_cast<unsigned char>(byte)));
   }
   std::vector<std::string_view> known;
-  for (const auto& [spelling, kind] : kWords) {
+  std::vector<Spelling> words(kWords.begin(), kWords.end());
+  if (language == Language::kStatement) {
+    words.insert(words.end(), kStatementWords.begin(), kStatementWords.end());
+  }
+  for (const auto& [spelling, kind] : words) {
     if (spelling == lower) {
       throw ConditionError{at,
                            "keywords are in lower case; write " + lower + " for " + quote(word)};
@@ -106,6 +120,11 @@ void ConditionLexer::skip_blanks() {
 }
 
 Token ConditionLexer::read_operator() const {
+  if (language_ == Language::kStatement) {
+    for (const auto& [spelling, kind] : kComparisons) {
+      if (rest().starts_with(spelling)) return {kind, next_, spelling, {}};
+    }
+  }
   for (const auto& [spelling, kind] : kOperators) {
     if (rest().starts_with(spelling)) return {kind, next_, spelling, {}};
   }
@@ -126,9 +145,11 @@ Token ConditionLexer::read_word() const {
   const std::string_view word = bare_name("");
   if (word.empty()) {
     const std::size_t length = decode_utf8(rest()).length;
-    throw ConditionError{next_, quote(rest().substr(0, length)) +
-                                    " has no meaning in a condition; remove it, or put the name " +
-                                    "that it belongs to in double quotes"};
+    const std::string where =
+        language_ == Language::kStatement ? "in a statement" : "in a condition";
+    throw ConditionError{next_, quote(rest().substr(0, length)) + " has no meaning " + where +
+                                    "; remove it, or put the name that it belongs to in double "
+                                    "quotes"};
   }
   if (word.starts_with('/')) return {TokenKind::kPort, next_, word, word};
   // Nothing but letters makes a keyword, so that not/a is understood.
@@ -136,7 +157,12 @@ Token ConditionLexer::read_word() const {
   for (const auto& [spelling, kind] : kWords) {
     if (spelling == letters) return {kind, next_, spelling, {}};
   }
-  fail_at_word(next_, word);
+  if (language_ == Language::kStatement) {
+    for (const auto& [spelling, kind] : kStatementWords) {
+      if (spelling == letters) return {kind, next_, spelling, {}};
+    }
+  }
+  fail_at_word(next_, word, language_);
 }
 
 std::string_view ConditionLexer::bare_name(std::string_view more_characters) const {

@@ -23,7 +23,14 @@ enum class TokenKind {
   kNone,
   kOpen,
   kClose,
+  kWinner,  // in statements only, as those that follow
+  kIdle,
+  kEquals,
+  kDiffers,
 };
+
+// Statements (rules/statement.hpp) are conditions that may speak of winners, too.
+enum class Language { kCondition, kStatement };
 
 struct Token {
   TokenKind kind = TokenKind::kEnd;
@@ -41,7 +48,10 @@ struct ConditionError {
 
 class ConditionLexer {
  public:
-  explicit ConditionLexer(std::string_view condition) : condition_(condition) { advance(); }
+  explicit ConditionLexer(std::string_view condition, Language language = Language::kCondition)
+      : condition_(condition), language_(language) {
+    advance();
+  }
 
   [[nodiscard]] const Token& peek() const { return token_; }
   Token take();
@@ -60,6 +70,7 @@ class ConditionLexer {
   [[nodiscard]] std::string_view rest() const { return condition_.substr(next_); }
 
   std::string_view condition_;
+  Language language_;
   std::size_t next_ = 0;
   Token token_;
 };

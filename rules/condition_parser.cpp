@@ -58,6 +58,8 @@ Operator operator_of(TokenKind kind) {
 class Parser {
  public:
   explicit Parser(const Text& text) : text_(text), lexer_(text.bytes()) {}
+  Parser(const Text& text, ParsedStatement& statement)
+      : text_(text), statement_(&statement), lexer_(text.bytes(), Language::kStatement) {}
 
   ExpressionPtr parse_all() {
     Parsed parsed = parse_binary(0);
@@ -115,6 +117,7 @@ class Parser {
       case TokenKind::kPort:
         check_port(token);
         lexer_.take();
+        if (statement_ != nullptr) statement_->sources.push_back(mention(token));
         return {make_source(std::string(token.name))};
       case TokenKind::kOpen: {
         lexer_.take();
@@ -127,12 +130,18 @@ class Parser {
       case TokenKind::kAll:
       case TokenKind::kNone:
         return parse_quantifier();
+      case TokenKind::kWinner:
+      case TokenKind::kIdle:
+        return parse_winner();
       default:
         break;
     }
     const std::string expected =
         " where a port's name, true, false, a quantifier or '(' is expected; write one";
-    if (token.kind == TokenKind::kEnd) fail(token.at, "the condition ends" + expected);
+    if (token.kind == TokenKind::kEnd) {
+      fail(token.at,
+           (statement_ != nullptr ? "the statement ends" : "the condition ends") + expected);
+    }
     fail(token.at, quote(token.spelling) + " stands" + expected + " before it");
   }
 
@@ -144,8 +153,53 @@ class Parser {
       fail(open.at, word + " takes a pattern in parentheses; write " + word + "(/Face/*)");
     }
     const Token glob = lexer_.take_glob();
+    if (statement_ != nullptr) statement_->globs.push_back(mention(glob));
     expect_close(open);
     return {make_quantifier(operator_of(quantifier.kind), std::string(glob.name))};
+  }
+
+  Parsed parse_winner() {
+    const Token word = lexer_.take();
+    const std::string example =
+        word.kind == TokenKind::kIdle ? "idle(/Arm/pos:i)" : "winner(/Arm/pos:i) = /Teleop/pos:o";
+    const Token open = lexer_.peek();
+    if (open.kind != TokenKind::kOpen) {
+      fail(open.at, std::string(word.spelling) + " takes a port in parentheses; write " + example);
+    }
+    lexer_.take();
+    WinnerTerm term{take_port("an input port's name, as in " + example), {}};
+    expect_close(open);
+    bool differs = false;
+    if (word.kind == TokenKind::kWinner) {
+      const Token comparison = lexer_.peek();
+      differs = comparison.kind == TokenKind::kDiffers;
+      if (!differs && comparison.kind != TokenKind::kEquals) {
+        fail(comparison.at,
+             "'=' or '!=' is missing behind winner(" + term.port.name + "); write " + example);
+      }
+      lexer_.take();
+      if (lexer_.peek().kind == TokenKind::kNone) {
+        lexer_.take();
+      } else {
+        term.source = take_port("a source or none, as in " + example);
+      }
+    }
+    ExpressionPtr expression = make_source(term_name(statement_->terms.size()));
+    statement_->terms.push_back(std::move(term));
+    if (!differs) return {expression};
+    return {make_operation(Operator::kNot, {std::move(expression)}), 2};
+  }
+
+  Mention take_port(const std::string& expected) {
+    const Token token = lexer_.peek();
+    if (token.kind != TokenKind::kPort) fail(token.at, "expected " + expected);
+    check_port(token);
+    lexer_.take();
+    return mention(token);
+  }
+
+  [[nodiscard]] Mention mention(const Token& token) const {
+    return {std::string(token.name), text_.where(token.at)};
   }
 
   void expect_close(const Token& open) {
@@ -205,9 +259,15 @@ class Parser {
   }
 
   const Text& text_;
+  ParsedStatement* statement_ = nullptr;  // none while a condition is parsed
   ConditionLexer lexer_;
   int nesting_ = 0;
 };
+
+void report(ConditionError& error, const Text& text, Diagnostics& diagnostics) {
+  diagnostics.error(std::move(error.code), text.where(error.at),
+                    std::move(error.message) + text.origin(error.at));
+}
 
 }  // namespace
 
@@ -215,8 +275,19 @@ std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diag
   try {
     return Parser(text).parse_all();
   } catch (ConditionError& error) {
-    diagnostics.error(std::move(error.code), text.where(error.at),
-                      std::move(error.message) + text.origin(error.at));
+    report(error, text, diagnostics);
+    return {};
+  }
+}
+
+std::optional<ParsedStatement> parse_statement(const Text& text, Diagnostics& diagnostics) {
+  try {
+    ParsedStatement statement;
+    statement.expression = Parser(text, statement).parse_all();
+    return statement;
+  } catch (ConditionError& error) {
+    if (error.code == "malformed-condition") error.code = "malformed-statement";
+    report(error, text, diagnostics);
     return {};
   }
 }

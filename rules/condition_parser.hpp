@@ -12,10 +12,14 @@
 // names stand in double quotes. A name says that this source is active.
 #pragma once
 
+#include <cstddef>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "rules/diagnostic.hpp"
 #include "rules/expression.hpp"
+#include "rules/model.hpp"
 #include "rules/text.hpp"
 
 namespace arbiter::rules {
@@ -26,5 +30,25 @@ inline constexpr int kMaxConditionDepth = 500;
 // The text must not be blank: what an absent condition means is the caller's to know. Empty where
 // it is malformed, which was then reported.
 std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diagnostics);
+
+// What a statement says of the winner at a port, with "winner(/p) = /s", "winner(/p) != /s",
+// "winner(/p) = none" or "idle(/p)", which mean an operand each.
+struct WinnerTerm {
+  Mention port;
+  std::optional<Mention> source;  // none: nobody wins
+};
+
+struct ParsedStatement {
+  ExpressionPtr expression;       // has the term i as a source named term_name(i)
+  std::vector<WinnerTerm> terms;  // in order
+  std::vector<Mention> sources;   // each mention of one outside of the terms
+  std::vector<Mention> globs;     // each pattern of a quantifier
+};
+
+// No source is called so.
+inline std::string term_name(std::size_t term) { return "=" + std::to_string(term); }
+
+// Conditions that may speak of winners.
+std::optional<ParsedStatement> parse_statement(const Text& text, Diagnostics& diagnostics);
 
 }  // namespace arbiter::rules

@@ -27,6 +27,13 @@ std::string in_one_line(std::string text) {
 
 }  // namespace
 
+void Diagnostics::silence(const std::vector<std::string>& codes) {
+  std::erase_if(items_, [&](const Diagnostic& item) {
+    return item.severity != Severity::kError &&
+           std::find(codes.begin(), codes.end(), item.code) != codes.end();
+  });
+}
+
 void Diagnostics::add(Severity severity, std::string code, Location where, std::string message,
                       std::optional<Witness> witness) {
   if (items_.size() == kMaxItems) {

@@ -31,7 +31,7 @@ struct Diagnostic {
   Severity severity = Severity::kError;
   std::string code;  // stable, kebab-case: "both-can-win"
   Location where;
-  std::string message;  // what is wrong, and what to do
+  std::string message;  // what is wrong, and behind the last "; " what to do
   std::optional<Witness> witness;
 };
 
@@ -49,9 +49,12 @@ class Diagnostics {
   void warning(std::string code, Location where, std::string message) {
     add(Severity::kWarning, std::move(code), std::move(where), std::move(message), {});
   }
-  void note(std::string code, Location where, std::string message) {
-    add(Severity::kNote, std::move(code), std::move(where), std::move(message), {});
+  void note(std::string code, Location where, std::string message,
+            std::optional<Witness> witness = {}) {
+    add(Severity::kNote, std::move(code), std::move(where), std::move(message), std::move(witness));
   }
+  // Without those of these codes; errors stay.
+  void silence(const std::vector<std::string>& codes);
 
   [[nodiscard]] bool has_errors() const { return has_errors_; }
   [[nodiscard]] const std::vector<Diagnostic>& items() const { return items_; }

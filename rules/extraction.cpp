@@ -47,7 +47,11 @@ class Extraction {
     }
     expand_conditions();
     for (std::size_t b = 0; b < model_.behaviours.size(); ++b) {
-      if (!model_.behaviours[b].is_meta) extract_behaviour(b);
+      if (model_.behaviours[b].is_meta) {
+        list_children(b);
+      } else {
+        extract_behaviour(b);
+      }
     }
     for (const Select& select : model_.selects) extract_select(select);
     gather_ports();
@@ -74,6 +78,14 @@ class Extraction {
     for (const Select& select : model_.selects) {
       select_conditions_.push_back(expansion.expand(select.condition));
     }
+  }
+
+  void list_children(std::size_t b) {
+    MetaBehaviour meta{model_.behaviours[b].name, model_.behaviours[b].where, {}};
+    for (const std::size_t child : hierarchy_.children(b)) {
+      meta.children.push_back(model_.behaviours[child].name);
+    }
+    rules_.meta_behaviours.push_back(std::move(meta));
   }
 
   void extract_behaviour(std::size_t b) {

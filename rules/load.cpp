@@ -58,7 +58,7 @@ void hand_over_sorted(const Diagnostics& found, const DocumentOrder& order,
         diagnostics.warning(item->code, item->where, item->message);
         break;
       case Severity::kNote:
-        diagnostics.note(item->code, item->where, item->message);
+        diagnostics.note(item->code, item->where, item->message, item->witness);
         break;
     }
   }

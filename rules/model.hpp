@@ -88,7 +88,10 @@ struct Application {
     Location where;
   };
   std::vector<Link> connections;  // each once
-  bool is_incomplete = false;     // some connection could not be read
+  // What the names of its modules' ports begin with: <prefix>, <name>, and --name among their
+  // parameters.
+  std::vector<std::string> prefixes;
+  bool is_incomplete = false;  // some connection could not be read
 };
 
 }  // namespace arbiter::rules

@@ -118,6 +118,42 @@ class LimitCheck {
   std::map<std::string_view, std::vector<Place>> of_source_;
 };
 
+// Sources that rules read and that nobody publishes, as far as the application tells: they have no
+// connection, and no module has ports that are called so. Without modules it tells nothing.
+void warn_of_unpublished(const Application& application, const RuleSet& rules,
+                         Diagnostics& diagnostics) {
+  if (application.prefixes.empty() || application.is_incomplete) return;
+  std::set<std::string_view> published;
+  for (const Application::Link& link : application.connections) published.insert(link.source);
+  const auto has_module = [&](std::string_view source) {
+    return std::any_of(application.prefixes.begin(), application.prefixes.end(),
+                       [&](const std::string& prefix) {
+                         if (!source.starts_with(prefix)) return false;
+                         const auto rest = source.substr(prefix.size());
+                         return rest.empty() || rest[0] == '/' || rest[0] == ':';
+                       });
+  };
+  std::set<std::string_view> known;  // that are fine, or reported
+  std::unordered_set<const Expression*> seen;
+  for (const PortRules& port : rules.ports) {
+    for (const ConnectionRule& rule : port.rules) {
+      std::unordered_set<std::string_view> reads;
+      collect_reads(rule.condition, seen, reads);
+      for (const std::string_view source : std::set(reads.begin(), reads.end())) {
+        if (!known.insert(source).second || published.contains(source) || has_module(source)) {
+          continue;
+        }
+        diagnostics.warning("never-published", rule.where,
+                            "the rule of " + rule.source + " at " + port.port + " reads " +
+                                std::string(source) +
+                                ", which no connection and no module of the application "
+                                "publishes: it will never be active; correct the name, or add "
+                                "the module whose <prefix> or <name> it begins with");
+      }
+    }
+  }
+}
+
 }  // namespace
 
 void check_sources(const Model& model, Diagnostics& diagnostics) {
@@ -146,6 +182,7 @@ void check_application(const Application& application, RuleSet& rules, Diagnosti
                             port.port + "; add it there, or correct the names here");
     }
   }
+  warn_of_unpublished(application, rules, diagnostics);
   for (const Application::Link& link : application.connections) {
     if (selected.count({link.source, link.port}) == 0) {
       rules.other_connections.push_back({link.source, link.port});

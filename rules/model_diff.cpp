@@ -13,9 +13,6 @@ namespace {
 
 using PortDiff = ModelDiff::PortDiff;
 
-// Of all ports together; one that outgrows the diagrams counts as Winners::kMaxWork.
-constexpr std::uint64_t kMaxWork = 4 * Winners::kMaxWork;
-
 bool is_same(const CompiledRule& a, const CompiledRule& b) {
   const auto same_node = [](const CompiledRule::Node& x, const CompiledRule::Node& y) {
     return x.position == y.position && x.low == y.low && x.high == y.high;
@@ -41,7 +38,8 @@ class PortComparison {
   PortComparison(const CompiledPort& before, const CompiledPort& after, PortDiff& result)
       : before_(before), after_(after), result_(result) {}
 
-  // Takes what it needs from the work that is left.
+  // Takes what it needs from the work that is left; what outgrows the diagrams counts as all that a
+  // port may take.
   void compare(std::uint64_t& work_left) {
     SourceOrder order;
     order.add(before_);
@@ -266,13 +264,13 @@ bool ModelDiff::is_open() const {
                                    [](const PortDiff& port) { return !port.open.empty(); });
 }
 
-ModelDiff diff(const CompiledModel& before, const CompiledModel& after) {
+ModelDiff diff(const CompiledModel& before, const CompiledModel& after, std::uint64_t max_work) {
   std::map<std::string, std::pair<const CompiledPort*, const CompiledPort*>> ports;
   for (const auto& port : before.ports) ports[port.port].first = &port;
   for (const auto& port : after.ports) ports[port.port].second = &port;
   ModelDiff result;
   result.compared_ports = ports.size();
-  std::uint64_t work_left = kMaxWork;
+  std::uint64_t work_left = max_work;
   for (const auto& [name, sides] : ports) {
     PortDiff port = compare_ports(sides.first, sides.second, work_left);
     const bool handles_conflicts_alike = port.first_wins_before == port.first_wins_after;

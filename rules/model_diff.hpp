@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <ostream>
 #include <string>
@@ -61,7 +62,11 @@ struct ModelDiff {
   [[nodiscard]] bool is_open() const;
 };
 
-ModelDiff diff(const CompiledModel& before, const CompiledModel& after);
+// Nodes of the diagrams of one comparison together: some seconds.
+inline constexpr std::uint64_t kMaxDiffWork = 80'000'000;
+
+ModelDiff diff(const CompiledModel& before, const CompiledModel& after,
+               std::uint64_t max_work = kMaxDiffWork);
 
 // For people. Says "no difference" where there is none.
 void write_text(std::ostream& out, const ModelDiff& diff);

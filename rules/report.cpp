@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
 
 #include <nlohmann/json.hpp>
+
+#include "rules/excerpt.hpp"
+#include "rules/winners.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -47,33 +51,49 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
-void write_counts(std::ostream& out, const Diagnostics& diagnostics) {
-  const char* separator = "";
+bool is_short(const Witness& witness) {
+  return std::max(witness.active.size(), witness.inactive.size()) <= kMaxNamesInWords;
+}
+
+// What to do stands behind the last semicolon of a message.
+std::optional<std::string> help_of(const Diagnostic& item) {
+  const std::size_t at = item.message.rfind("; ");
+  if (at == std::string::npos) return std::nullopt;
+  return item.message.substr(at + 2);
+}
+
+}  // namespace
+
+std::string counts(const Diagnostics& diagnostics) {
+  std::string text;
   for (const Severity severity : {Severity::kError, Severity::kWarning, Severity::kNote}) {
     const auto& items = diagnostics.items();
     const auto count = std::count_if(items.begin(), items.end(), [&](const Diagnostic& item) {
       return item.severity == severity;
     });
     if (count == 0) continue;
-    out << separator << count << ' ' << name_of(severity) << (count == 1 ? "" : "s");
-    separator = ", ";
+    text += (text.empty() ? "" : ", ") + std::to_string(count) + ' ' + name_of(severity) +
+            (count == 1 ? "" : "s");
   }
-  out << '\n';
+  return text;
 }
-
-}  // namespace
 
 void write_text(std::ostream& out, const Diagnostics& diagnostics) {
   if (diagnostics.items().empty()) return;
+  Excerpts excerpts;
   for (const Diagnostic* item : in_reading_order(diagnostics)) {
     out << item->where.file << ':' << item->where.line << ':' << item->where.column << ": "
-        << name_of(item->severity) << ": " << item->message << " [" << item->code << "]\n";
-    if (item->witness) {
+        << name_of(item->severity) << ": " << item->message << " [" << item->code << "]\n"
+        << excerpts.at(item->where);
+    // A sentence that has all of it in words says it better.
+    const bool is_told = item->witness && is_short(*item->witness) &&
+                         item->message.find(in_words(*item->witness)) != std::string::npos;
+    if (item->witness && !is_told) {
       out << "  active: " << joined(item->witness->active)
           << "; inactive: " << joined(item->witness->inactive) << '\n';
     }
   }
-  write_counts(out, diagnostics);
+  out << counts(diagnostics) << '\n';
 }
 
 void write_json(std::ostream& out, const Diagnostics& diagnostics) {
@@ -86,7 +106,9 @@ void write_json(std::ostream& out, const Diagnostics& diagnostics) {
                    {"line", item->where.line},
                    {"column", item->where.column},
                    {"message", item->message},
+                   {"help", nullptr},
                    {"witness", nullptr}};
+    if (const auto help = help_of(*item)) object["help"] = *help;
     if (item->witness) {
       object["witness"] = {{"active", item->witness->active},
                            {"inactive", item->witness->inactive}};

@@ -2,17 +2,21 @@
 #pragma once
 
 #include <ostream>
+#include <string>
 
 #include "rules/diagnostic.hpp"
 
 namespace arbiter::rules {
 
-// file:line:column: error: message [code], with a line for the witness where there is one, and a
-// count of all at the end. Nothing if nothing was found.
+// file:line:column: error: message [code], with the line of the file and a caret below the place,
+// a line for the witness where there is one, and a count of all at the end. Nothing if nothing was
+// found.
 void write_text(std::ostream& out, const Diagnostics& diagnostics);
 
-// One array of {severity, code, file, line, column, message, witness}; the witness is
-// {"active": […], "inactive": […]} or null.
+// One array of {severity, code, file, line, column, message, help, witness}; the witness is
+// {"active": […], "inactive": […]} or null, and so may be the help.
 void write_json(std::ostream& out, const Diagnostics& diagnostics);
+// "2 errors, 1 note"; "" if nothing was found.
+std::string counts(const Diagnostics& diagnostics);
 
 }  // namespace arbiter::rules

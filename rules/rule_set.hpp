@@ -41,6 +41,13 @@ struct BehaviourRules {
   std::vector<std::pair<std::string, ConnectionRule>> rules;  // by port
 };
 
+// A meta-behaviour, for what is said about it; the rules have all that it means in them.
+struct MetaBehaviour {
+  std::string name;
+  Location where;
+  std::vector<std::string> children;  // behaviours and meta-behaviours
+};
+
 struct RuleSet {
   shm::Nanoseconds timeout = shm::kDefaultTimeout;   // T of all others
   std::map<std::string, shm::Nanoseconds> timeouts;  // T of sources that have their own
@@ -50,6 +57,7 @@ struct RuleSet {
   // deliver) and to others (they always do).
   std::vector<Connection> other_connections;
   std::vector<BehaviourRules> behaviours;  // in document order; a check asks whether each can run
+  std::vector<MetaBehaviour> meta_behaviours;  // in document order
 };
 
 }  // namespace arbiter::rules

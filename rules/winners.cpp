@@ -52,10 +52,9 @@ std::vector<std::string> order_of(const CompiledPort& port) {
 }
 
 std::string enumerate(const std::vector<std::string>& names) {
-  constexpr std::size_t kMaxNames = 6;  // that a sentence spells out
   std::string text;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (i == kMaxNames) return text + " and " + std::to_string(names.size() - i) + " more";
+    if (i == kMaxNamesInWords) return text + " and " + std::to_string(names.size() - i) + " more";
     if (i > 0) text += i + 1 == names.size() ? " and " : ", ";
     text += names[i];
   }
@@ -154,6 +153,7 @@ Diagram Winners::given(const Diagram& function, const std::string& source, bool 
 Witness Winners::witness(const Diagram& function) {
   ShortestImplicant shortest(builder_);
   auto literals = shortest.find_literals(function);
+  take_account_of(shortest.functions());
   if (!literals) {
     literals.emplace();
     for (Diagram rest = function; !rest.is_true();) {
@@ -170,6 +170,23 @@ Witness Winners::witness(const Diagram& function) {
   std::sort(witness.active.begin(), witness.active.end());
   std::sort(witness.inactive.begin(), witness.inactive.end());
   return witness;
+}
+
+const CompiledRule* find_winner(const CompiledPort& port, const std::set<std::string>& active) {
+  const auto holds = [&](const CompiledRule& rule) {
+    if (rule.kind == shm::table::kNever || !active.contains(rule.source)) return false;
+    for (std::size_t i = 0; i < rule.expected.size(); ++i) {
+      if (active.contains(rule.reads[i]) != rule.expected[i]) return false;
+    }
+    shm::Word at = rule.nodes.empty() ? shm::table::kTrue : 0;
+    while (at < shm::table::kFalse) {
+      const auto& node = rule.nodes[at];
+      at = active.contains(rule.reads[node.position]) ? node.high : node.low;
+    }
+    return at == shm::table::kTrue;
+  };
+  const auto found = std::find_if(port.rules.begin(), port.rules.end(), holds);
+  return found == port.rules.end() ? nullptr : &*found;
 }
 
 std::string in_words(const Witness& witness) {

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -74,6 +75,12 @@ class Winners {
   const std::uint64_t max_work_;
   std::uint64_t work_ = 0;
 };
+
+// The rule that selects its connection in that state; null if nobody wins.
+const CompiledRule* find_winner(const CompiledPort& port, const std::set<std::string>& active);
+
+// Names that a sentence spells out, of those that are active and of those that are not.
+inline constexpr std::size_t kMaxNamesInWords = 6;
 
 // "/a and /b active and /c inactive"; "nothing active" if there are no literals.
 std::string in_words(const Witness& witness);

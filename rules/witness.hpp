@@ -33,6 +33,9 @@ class ShortestImplicant {
   // The same, whatever the number of variables.
   std::optional<std::vector<Literal>> find_literals(const Diagram& function);
 
+  // How many functions the searches have looked at.
+  [[nodiscard]] std::size_t functions() const { return best_.size(); }
+
  private:
   enum class Choice : std::uint8_t { kNone, kLeaveOut, kInactive, kActive };
   struct Best {

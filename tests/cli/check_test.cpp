@@ -9,6 +9,7 @@
 namespace arbiter::test {
 namespace {
 
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -43,10 +44,14 @@ TEST(Check, ExplainsAConflictWithItsWitness) {
   const auto model = directory.write("m.xml", kConflictModel);
   const auto result = arbiter({"check", model});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.out, "");
+  EXPECT_EQ(result.out, "failed: 1 error\n");
   EXPECT_THAT(result.err, StartsWith(model + ":3:"));
   EXPECT_THAT(result.err, HasSubstr(": error: /b and /a (" + model + ":2:"));
-  EXPECT_THAT(result.err, HasSubstr("[both-can-win]\n  active: /a, /b; inactive: /c\n1 error\n"));
+  EXPECT_THAT(result.err, HasSubstr("[both-can-win]\n"
+                                    "    3 |   <behavior name=\"B\"><config at=\"/p\">/b</config>"
+                                    "<condition>not /c</condition></behavior>\n"
+                                    "      |                      ^\n"
+                                    "  active: /a, /b; inactive: /c\n"));
 }
 
 TEST(Check, WritesTheSameAsJson) {
@@ -61,6 +66,9 @@ TEST(Check, WritesTheSameAsJson) {
   EXPECT_EQ(found[0]["code"], "both-can-win");
   EXPECT_EQ(found[0]["file"], model);
   EXPECT_EQ(found[0]["line"], 3);
+  EXPECT_EQ(found[0]["help"],
+            "let one inhibit the other, give one a condition that excludes the other, or let "
+            "document order decide with <arbiter at=\"/p\" conflict=\"first\"/>");
   EXPECT_EQ(found[0]["witness"], nlohmann::json::parse(R"({"active": ["/a", "/b"],
                                                            "inactive": ["/c"]})"));
 }
@@ -80,7 +88,7 @@ TEST(Check, AWarningIsNoError) {
                     "m.xml", R"(<arbiter at="/p"><select from="/a">not /a</select></arbiter>)")});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.err, HasSubstr("warning: /a can never win at /p"));
-  EXPECT_THAT(result.err, HasSubstr("[never-selected]\n1 warning\n"));
+  EXPECT_THAT(result.err, HasSubstr("[never-selected]\n    1 | "));
   EXPECT_EQ(result.out, "ok: 1 port, 1 connection, 1 source\n");
 }
 
@@ -89,9 +97,102 @@ TEST(Check, ReportsMalformedFiles) {
   const auto model = directory.write("m.xml", "<behaviors>");
   const auto result = arbiter({"check", model});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.out, "");
+  EXPECT_EQ(result.out, "failed: 1 error\n");
   EXPECT_THAT(result.err, HasSubstr(model + ":1:"));
   EXPECT_THAT(result.err, HasSubstr("error: "));
+}
+
+// The paper's arm: with object and collision both active nobody wins, on purpose.
+const std::string kTrackModel = R"(<behaviors>
+  <behavior name="Rest"><config at="/arm">/rest</config></behavior>
+  <behavior name="Track"><config at="/arm">/object</config>
+    <condition>not /collision</condition><inhibition>Rest</inhibition></behavior>
+</behaviors>
+)";
+
+TEST(Check, NotesWhereNobodyWinsAndWhoIsStarved) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  const auto result = arbiter({"check", model});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.out, "ok: 1 port, 2 connections, 3 sources\n");
+  EXPECT_THAT(result.err, HasSubstr("note: with /collision and /object active, nobody wins at /arm "
+                                    "although /object is connected there and active; "));
+  EXPECT_THAT(result.err, HasSubstr("note: at /arm, /object silences /rest even while /collision "
+                                    "silences /object: with /collision, /object and /rest active, "
+                                    "nobody wins; "));
+  EXPECT_THAT(result.err, EndsWith("2 notes\n"));
+}
+
+TEST(Check, NotesAndWarningsCanBeSilencedAndErrorsCannot) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  auto result = arbiter({"check", model, "--silence", "nobody-wins,starved"});
+  EXPECT_EQ(result.err, "");
+  EXPECT_EQ(result.exit_code, 0);
+  result = arbiter({"check", "--silence", "nobody-wins", "--silence", "starved", model});
+  EXPECT_EQ(result.err, "");
+  result =
+      arbiter({"check", directory.write("c.xml", kConflictModel), "--silence", "both-can-win"});
+  EXPECT_THAT(result.err, HasSubstr("[both-can-win]"));
+  EXPECT_EQ(result.exit_code, 1);
+}
+
+TEST(Check, StatementsThatAreTrueAreProved) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  const auto statements = directory.write("s.txt", "/object -> winner(/arm) != /rest\n");
+  const auto result =
+      arbiter({"check", model, "--assert", statements, "--silence", "nobody-wins,starved"});
+  EXPECT_EQ(result.err, "");
+  EXPECT_EQ(result.out,
+            "1 statement: 1 proved, 0 refuted, 0 left open\n"
+            "ok: 1 port, 2 connections, 3 sources\n");
+  EXPECT_EQ(result.exit_code, 0);
+}
+
+TEST(Check, AStatementThatIsNotTrueEndsWithOneAndSaysWhen) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  const auto statements = directory.write("s.txt", "# stop\n  /collision ->\n  idle(/arm)\n");
+  const auto more = directory.write("t.txt", "/object or not /object\n");
+  const std::vector<std::string> command = {"check",    model, "--assert",  statements,
+                                            "--assert", more,  "--silence", "nobody-wins,starved"};
+  auto result = arbiter(command);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err,
+              StartsWith(statements + ":2:3: error: this is false with /collision and /rest active "
+                                      "and /object inactive, whatever else is; /rest wins at /arm "
+                                      "if nothing else is active; "));
+  EXPECT_THAT(result.err, HasSubstr("[refuted]\n    2 |   /collision ->\n      |   ^\n1 error\n"));
+  EXPECT_EQ(result.out, "2 statements: 1 proved, 1 refuted, 0 left open\nfailed: 1 error\n");
+  auto with_json = command;
+  with_json.push_back("--json");
+  result = arbiter(with_json);
+  EXPECT_EQ(result.exit_code, 1);
+  const auto found = nlohmann::json::parse(result.out);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0]["code"], "refuted");
+  EXPECT_EQ(found[0]["witness"]["active"], (std::vector<std::string>{"/collision", "/rest"}));
+  EXPECT_EQ(found[1]["code"], "proved");
+  EXPECT_EQ(found[1]["severity"], "note");
+}
+
+TEST(Check, StatementsAreReadEvenIfTheModelHasErrors) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kConflictModel);
+  const auto statements = directory.write("s.txt", "/a and\n");
+  const auto result = arbiter({"check", model, "--assert", statements});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("[both-can-win]"));
+  EXPECT_THAT(result.err, HasSubstr(statements + ":1:7: error: the statement ends where"));
+  EXPECT_EQ(result.out, "failed: 2 errors\n");
+}
+
+TEST(Check, StatementsThatCannotBeOpenedAreWrongUse) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  EXPECT_EQ(arbiter({"check", model, "--assert", directory.path() + "/none"}).exit_code, 2);
 }
 
 }  // namespace

@@ -143,6 +143,56 @@ TEST(Compile, WarnsOfABehaviourThatNoActivityLetsRun) {
   EXPECT_THAT(diagnostics.items()[0].message, HasSubstr("\"Dead\""));
 }
 
+TEST(Compile, SaysWhichDemandsKeepABehaviourFromRunning) {
+  Diagnostics diagnostics;
+  const auto impossible =
+      all_of({active("/x"), inactive("/c"), any_of({active("/c"), inactive("/a")})});
+  compile(RulesByHand()
+              .port("/p", {{"/a", any_of({impossible, active("/y")})}})
+              .behaviour("Dead", "/p", "/a", impossible),
+          diagnostics);
+  ASSERT_THAT(codes(diagnostics), ElementsAre("never-runs"));
+  EXPECT_THAT(diagnostics.items()[0].message,
+              HasSubstr("its connection from /a to /p asks for /a and ¬/c and (/c ∨ ¬/a), which is "
+                        "never so; "));
+}
+
+TEST(Compile, SaysThatEarlierConnectionsKeepABehaviourFromRunning) {
+  Diagnostics diagnostics;
+  compile(RulesByHand()
+              .port("/p", {{"/b", always()}, {"/a", active("/b")}}, true)
+              .behaviour("Dead", "/p", "/a", active("/b")),
+          diagnostics);
+  ASSERT_THAT(codes(diagnostics), ElementsAre("never-selected", "never-runs"));
+  EXPECT_THAT(diagnostics.items()[1].message, HasSubstr("an earlier one wins there"));
+}
+
+TEST(Compile, AMetaBehaviourIsReachedThroughAnyOfItsChildren) {
+  rules::RuleSet set = RulesByHand()
+                           .port("/p", {{"/a", always()}})
+                           .port("/q", {{"/b", inactive("/b")}})
+                           .behaviour("Alive", "/p", "/a", always())
+                           .behaviour("Dead", "/q", "/b", inactive("/b"));
+  const auto meta = [&](const std::string& name, std::vector<std::string> children) {
+    set.meta_behaviours.push_back({name, {"model.xml", 1, 1}, std::move(children)});
+  };
+  meta("Top", {"Half", "Alone"});
+  meta("Half", {"Alive", "Dead"});
+  meta("Alone", {"Dead"});
+  meta("Fine", {"Half"});
+  Diagnostics diagnostics;
+  compile(set, diagnostics);
+  ASSERT_THAT(codes(diagnostics),
+              ElementsAre("never-selected", "never-runs", "unreachable-children",
+                          "unreachable-children", "unreachable-children"));
+  EXPECT_THAT(diagnostics.items()[2].message,
+              HasSubstr("1 of the 2 children of \"Top\" can never run: \"Alone\""));
+  EXPECT_THAT(diagnostics.items()[3].message,
+              HasSubstr("of the 2 children of \"Half\" can never run: \"Dead\""));
+  EXPECT_THAT(diagnostics.items()[4].message,
+              HasSubstr("1 of the 1 child of \"Alone\" can never run: \"Dead\""));
+}
+
 TEST(Compile, ABehaviourThatRunsAtOnePortRuns) {
   Diagnostics diagnostics;
   const auto impossible = inactive("/a");

@@ -208,5 +208,33 @@ TEST(Load, HoldsToTheLimitOfSourcesAndInputPorts) {
   EXPECT_THAT(wide.message(0), HasSubstr("4097 input ports, more than the limit of 4096"));
 }
 
+// Modules as YARP writes them; the connections are those of the model.
+std::vector<std::string> published_by(const std::string& modules, const std::string& sensed) {
+  const auto loaded = load_with_application(
+      "<behavior name='A'><config at='/p'>/a</config><condition>not " + sensed +
+          "</condition></behavior>",
+      "<application>" + modules + "<connection><from>/a</from><to>/p</to></connection>" +
+          "<connection><from>/x</from><to>/unrelated</to></connection></application>");
+  return loaded.findings(true);
+}
+
+TEST(Load, ASourceThatIsSensedMustBelongToAModuleOrAConnection) {
+  const std::string modules =
+      "<module><name>laser</name><prefix>/front</prefix></module>"
+      "<module><name>bumper</name><parameters>--rate 5 --name /hull --x 1</parameters></module>";
+  for (const auto* fine : {"/x", "/a", "/front/scan:o", "/front:o", "/front", "/laser/scan:o",
+                           "/bumper:o", "/hull/hit:o"}) {
+    EXPECT_THAT(published_by(modules, fine), IsEmpty()) << fine;
+  }
+  for (const auto* lost : {"/fronts:o", "/rear/scan:o", "/rate", "/hul"}) {
+    EXPECT_THAT(published_by(modules, lost), ElementsAre("a.xml:1:20 warning never-published"))
+        << lost;
+  }
+}
+
+TEST(Load, WithoutModulesAnApplicationDoesNotTellWhoPublishes) {
+  EXPECT_THAT(published_by("", "/anything"), IsEmpty());
+}
+
 }  // namespace
 }  // namespace arbiter::rules

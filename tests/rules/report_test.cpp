@@ -6,6 +6,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "rules/winners.hpp"
+
 namespace arbiter::test {
 namespace {
 
@@ -43,6 +45,32 @@ TEST(Report, WritesAsCompilersDoAndCounts) {
             "2 errors, 1 note\n");
 }
 
+TEST(Report, DoesNotRepeatAWitnessThatTheMessageHasInWords) {
+  Diagnostics diagnostics;
+  diagnostics.note("n", {"m.xml", 1, 1}, "with /a active and /b inactive, nobody wins",
+                   rules::Witness{{"/a"}, {"/b"}});
+  std::vector<std::string> many;
+  for (int i = 0; i < 8; ++i) many.push_back("/s" + std::to_string(i));
+  const rules::Witness large{many, {}};
+  diagnostics.note("n", {"m.xml", 2, 1}, "with " + in_words(large), large);
+  EXPECT_EQ(text_of(diagnostics),
+            "m.xml:1:1: note: with /a active and /b inactive, nobody wins [n]\n"
+            "m.xml:2:1: note: with /s0, /s1, /s2, /s3, /s4, /s5 and 2 more active [n]\n"
+            "  active: /s0, /s1, /s2, /s3, /s4, /s5, /s6, /s7; inactive: none\n"
+            "2 notes\n");
+}
+
+TEST(Report, SilencesWhatIsNoError) {
+  Diagnostics diagnostics;
+  diagnostics.error("a", {"m.xml", 1, 1}, "one");
+  diagnostics.warning("a", {"m.xml", 2, 1}, "two");
+  diagnostics.note("b", {"m.xml", 3, 1}, "three");
+  diagnostics.note("c", {"m.xml", 4, 1}, "four");
+  diagnostics.silence({"a", "b", "unknown"});
+  EXPECT_EQ(counts(diagnostics), "1 error, 1 note");
+  EXPECT_TRUE(diagnostics.has_errors());
+}
+
 TEST(Report, CountsOneAsOne) {
   Diagnostics diagnostics;
   diagnostics.error("e", {"m.xml", 1, 1}, "one");
@@ -65,12 +93,12 @@ TEST(Report, GoesThroughEachFileFromTheTop) {
 TEST(Report, WritesJsonForPrograms) {
   Diagnostics diagnostics;
   diagnostics.warning("never-selected", {"m.xml", 3, 4}, "a \"quoted\" message");
-  diagnostics.error("both-can-win", {"m.xml", 5, 6}, "both", rules::Witness{{"/a"}, {}});
+  diagnostics.error("both-can-win", {"m.xml", 5, 6}, "both; mend it", rules::Witness{{"/a"}, {}});
   EXPECT_EQ(json_of(diagnostics), nlohmann::json::parse(R"([
     {"severity": "warning", "code": "never-selected", "file": "m.xml", "line": 3, "column": 4,
-     "message": "a \"quoted\" message", "witness": null},
+     "message": "a \"quoted\" message", "help": null, "witness": null},
     {"severity": "error", "code": "both-can-win", "file": "m.xml", "line": 5, "column": 6,
-     "message": "both", "witness": {"active": ["/a"], "inactive": []}}])"));
+     "message": "both; mend it", "help": "mend it", "witness": {"active": ["/a"], "inactive": []}}])"));
 }
 
 TEST(Report, WritesJsonEvenIfAFilesNameIsNotUtf8) {

@@ -1,0 +1,33 @@
+// Statements: what must be true of a model in every state of its sources, in the language of
+// conditions, which may also speak of who wins.
+//
+//   # Who has collided does not move.
+//   /collision:o -> idle(/Arm/pos:i)
+//   winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o
+//
+// One on each line; a line that begins with a blank goes on with the one above. '#' begins a
+// comment, except in quotes. winner(PORT) = SOURCE, winner(PORT) != SOURCE, winner(PORT) = none and
+// idle(PORT), which means the same, are operands like a source's name.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "rules/condition_parser.hpp"
+#include "rules/diagnostic.hpp"
+#include "rules/text_file.hpp"
+
+namespace arbiter::rules {
+
+inline constexpr std::size_t kMaxStatements = 10'000;
+
+struct Statement {
+  std::string text;  // on one line, without comments
+  Location where;
+  ParsedStatement parsed;
+};
+
+// Reports all that is malformed; the others are returned.
+std::vector<Statement> read_statements(const TextFile& file, Diagnostics& diagnostics);
+
+}  // namespace arbiter::rules

@@ -1,0 +1,49 @@
+// Whether a statement is true of a compiled model in every state of its sources.
+//
+// A state says of each source whether it is active. The winner at an arbitrated port is the one
+// that the port's rules select in that state, with conflict="first" if the port has it. Quantifiers
+// range over all sources that the model or its application names.
+//
+// Thread safety: as rules/model_diff.hpp.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "rules/compile.hpp"
+#include "rules/diagnostic.hpp"
+#include "rules/statement.hpp"
+
+namespace arbiter::rules {
+
+// Nodes of the diagrams of one statement together: a second or two.
+inline constexpr std::uint64_t kMaxStatementWork = 20'000'000;
+
+struct Verdict {
+  enum class Kind { kProved, kRefuted, kOpen };
+
+  Kind kind = Kind::kProved;
+  std::string statement;
+  Location where;
+  // Where refuted: a shortest conjunction under which the statement is false, whatever the other
+  // sources do; and who wins at each port of the statement if they are inactive.
+  std::optional<Witness> witness;
+  std::vector<std::pair<std::string, std::optional<std::string>>> winners;
+  std::string limit;  // where open: what was exceeded
+};
+
+// Verdicts on all statements that have a meaning in the model, in their order. Ports and sources
+// that it does not know, ports that are not arbitrated, and winners that are not connected are
+// reported as errors; patterns that nothing matches as warnings.
+std::vector<Verdict> judge(const std::vector<Statement>& statements, const CompiledModel& model,
+                           Diagnostics& diagnostics, std::uint64_t max_work = kMaxStatementWork);
+
+// An error for each statement that is refuted or left open; if asked for, a note "proved" for each
+// that is true.
+void report(const std::vector<Verdict>& verdicts, Diagnostics& diagnostics,
+            bool with_proved = false);
+
+}  // namespace arbiter::rules

@@ -1,0 +1,195 @@
+// What check finds beside errors, and that it keeps to its bounds whatever the rules.
+#include "rules/findings.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <random>
+
+#include "rules/compile.hpp"
+#include "tests/rules/rules_by_hand.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using rules::Diagnostic;
+using rules::Diagnostics;
+using rules::FindingsAccount;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+struct Found {
+  FindingsAccount account;
+  std::vector<Diagnostic> items;
+
+  [[nodiscard]] std::vector<std::string> codes() const {
+    std::vector<std::string> result;
+    for (const auto& item : items) result.push_back(item.code);
+    return result;
+  }
+};
+
+Found found_in(const rules::RuleSet& set, std::uint64_t max_work = rules::kMaxFindingsWork) {
+  Diagnostics diagnostics;
+  const auto model = compile(set, diagnostics);
+  EXPECT_FALSE(diagnostics.has_errors());
+  Diagnostics more;
+  const auto account = find_more(set, model, more, max_work);
+  return {account, more.items()};
+}
+
+std::string name(int i) { return "/s" + std::to_string(i); }
+
+TEST(Findings, NothingIsSaidOfPrioritiesThatLeaveNobodyOut) {
+  const auto found =
+      found_in(RulesByHand().port("/p", {{"/low", inactive("/high")}, {"/high", always()}}));
+  EXPECT_THAT(found.items, IsEmpty());
+  EXPECT_EQ(found.account.ports, 1u);
+}
+
+TEST(Findings, NameAShortestStateWithoutAWinnerAndItsPlace) {
+  const auto found = found_in(
+      RulesByHand().port("/p", {{"/low", all_of({inactive("/high"), inactive("/off")})},
+                                {"/high", all_of({inactive("/stop"), inactive("/off")})}}));
+  ASSERT_THAT(found.codes(), ElementsAre("nobody-wins", "starved"));
+  EXPECT_EQ(found.items[0].message,
+            "with /high and /off active, nobody wins at /p although /high is connected there and "
+            "active (one of 3 such causes); if somebody should win then, connect it in a behaviour "
+            "that nothing keeps from running in this state");
+  EXPECT_EQ(found.items[0].where.line, 3u);
+  EXPECT_EQ(found.items[1].message,
+            "at /p, /high silences /low even while /stop silences /high: with /high, /low and "
+            "/stop active and /off inactive, nobody wins; if /low should win then, let no "
+            "inhibition but its condition \"not /high or /stop\" keep it out");
+  EXPECT_EQ(found.items[1].where.line, 3u);
+}
+
+TEST(Findings, ASourceThatWinsNowhereIsToldOnce) {
+  const auto never = [](const std::string& source) { return inactive(source); };
+  const auto found = found_in(RulesByHand()
+                                  .port("/p", {{"/a", never("/a")}, {"/b", always()}}, true)
+                                  .port("/q", {{"/a", never("/a")}, {"/c", never("/c")}})
+                                  .other("/x", "/p")
+                                  .other("/y", "/p")
+                                  .other("/y", "/free"));
+  ASSERT_THAT(found.codes(), ElementsAre("never-wins", "never-wins"));
+  EXPECT_THAT(found.items[0].message, HasSubstr("/a is connected to /p and /q, and there is no"));
+  EXPECT_THAT(found.items[1].message, HasSubstr("/x is connected to /p, and there is no state in "
+                                                "which it wins anywhere, partly since no rule"));
+}
+
+TEST(Findings, AQuestionThatOutgrowsItsBoundIsLeftOpenAndSaysSo) {
+  const rules::RuleSet set =
+      RulesByHand().port("/p", {{"/a", inactive("/b")}}).port("/q", {{"/a", inactive("/b")}});
+  const auto found = found_in(set, 2);
+  EXPECT_EQ(found.account.ports, 2u);
+  EXPECT_EQ(found.account.open, 2u);
+  ASSERT_THAT(found.codes(), ElementsAre("left-open"));
+  EXPECT_THAT(found.items[0].message, HasSubstr("it takes more than 2 steps"));
+  EXPECT_EQ(found_in(set).account.open, 0u);
+}
+
+// Inhibition graphs of one port, each source of which also has a condition of its own.
+using Graph = std::function<std::vector<int>(int source)>;
+
+rules::RuleSet inhibited(int ports, int sources, const Graph& inhibitors, bool first_wins = true) {
+  RulesByHand by_hand;
+  for (int port = 0; port < ports; ++port) {
+    std::vector<std::pair<std::string, ExpressionPtr>> rules;
+    for (int i = 0; i < sources; ++i) {
+      std::vector<ExpressionPtr> literals;
+      for (const int other : inhibitors(i)) literals.push_back(inactive(name(other)));
+      rules.emplace_back(name(i), all_of(std::move(literals)));
+    }
+    by_hand.port("/p" + std::to_string(port), std::move(rules), first_wins);
+  }
+  return by_hand;
+}
+
+void expect_within_bounds(const Found& found, std::size_t ports) {
+  EXPECT_EQ(found.account.ports, ports);
+  EXPECT_LE(found.account.work, rules::kMaxFindingsWork);
+  EXPECT_LE(found.account.open, ports);
+  const auto codes = found.codes();
+  EXPECT_EQ(std::count(codes.begin(), codes.end(), "left-open"), found.account.open > 0 ? 1 : 0);
+}
+
+constexpr int kSources = 256;  // kMaxSourcesPerPort
+constexpr int kPorts = 16;     // 4096 connections
+
+TEST(FindingsScale, AllInhibitAll) {
+  const auto found = found_in(inhibited(
+      kPorts, kSources,
+      [](int i) {
+        std::vector<int> others;
+        for (int j = 0; j < kSources; ++j) {
+          if (j != i) others.push_back(j);
+        }
+        return others;
+      },
+      false));
+  expect_within_bounds(found, kPorts);
+  EXPECT_EQ(found.account.open, 0u);
+}
+
+TEST(FindingsScale, ChainsOfPriorities) {
+  const auto found = found_in(inhibited(
+      kPorts, kSources,
+      [](int i) {
+        std::vector<int> others;
+        for (int j = i + 1; j < kSources; ++j) others.push_back(j);
+        return others;
+      },
+      false));
+  expect_within_bounds(found, kPorts);
+  EXPECT_EQ(found.account.open, 0u);
+  EXPECT_THAT(found.items, IsEmpty());
+}
+
+TEST(FindingsScale, NeighboursTreesAndCycles) {
+  for (const Graph& graph : {Graph([](int i) { return std::vector<int>{(i + 1) % kSources}; }),
+                             Graph([](int i) { return std::vector<int>{i / 2}; }), Graph([](int i) {
+                               return std::vector<int>{2 * i % kSources, (2 * i + 1) % kSources};
+                             })}) {
+    expect_within_bounds(found_in(inhibited(2, kSources, graph)), 2);
+  }
+}
+
+TEST(FindingsScale, RandomInhibitions) {
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const int reach = seed % 2 == 0 ? 12 : kSources - 1;
+    const auto found = found_in(inhibited(2, 96, [&](int i) {
+      std::vector<int> others;
+      for (int j = 0; j < 3; ++j)
+        others.push_back((i + 1 + static_cast<int>(random() % static_cast<unsigned>(reach))) % 96);
+      return others;
+    }));
+    expect_within_bounds(found, 2);
+  }
+}
+
+TEST(FindingsScale, ParitiesAndEqualitiesFarApart) {
+  ExpressionPtr parity = active(name(0));
+  std::vector<ExpressionPtr> mention, equal;
+  for (int i = 1; i < 200; ++i) parity = binary(Operator::kXor, parity, active(name(i)));
+  for (int i = 0; i < 12; ++i) {
+    mention.push_back(active("/x" + std::to_string(i)));
+    equal.push_back(
+        binary(Operator::kIff, active("/x" + std::to_string(i)), active("/y" + std::to_string(i))));
+  }
+  const auto found =
+      found_in(RulesByHand()
+                   .port("/p", {{"/odd", parity}, {"/even", negation(parity)}})
+                   .port("/q", {{"/a", all_of({any_of(mention), all_of(equal)})},
+                                {"/b", negation(all_of({any_of(mention), all_of(equal)}))}}));
+  expect_within_bounds(found, 2);
+  EXPECT_EQ(found.account.open, 0u);
+}
+
+}  // namespace
+}  // namespace arbiter::test
