@@ -101,13 +101,13 @@ void add_check(CLI::App& app, int& exit_code) {
       ->allow_extra_args(false);
   verb->add_flag("--json", options->json, "Write what is found as JSON, to standard output");
   verb->footer(
+      "Example:\n"
+      "  arbiter check search_and_track.xml --application application.xml\n"
+      "  arbiter check search_and_track.xml --assert safety.txt --silence nobody-wins,starved\n"
       "Statements speak of sources and winners:\n"
       "  /collision:o -> idle(/Arm/pos:i)\n"
       "  winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o\n"
-      "Exit code 0: no error; 1: an error, or a statement that is not proved; 2: wrong use.\n"
-      "Examples:\n"
-      "  arbiter check search_and_track.xml --application application.xml\n"
-      "  arbiter check search_and_track.xml --assert safety.txt --silence nobody-wins,starved");
+      "Exit code 0: no error; 1: an error, or a statement that is not proved; 2: wrong use.");
   verb->callback([options, &exit_code] { exit_code = check(*options); });
 }
 

@@ -172,21 +172,14 @@ void ModelCompiler::report_unreachable_children() {
   for (const auto& meta : rules_.meta_behaviours) {
     std::vector<std::string> lost;
     for (const auto& child : meta.children) {
-      if (!reached[child]) lost.push_back(child);
+      if (!reached[child]) lost.push_back(quote(child));
     }
     if (lost.empty()) continue;
-    std::string names;
-    constexpr std::size_t kMaxNames = 6;
-    for (std::size_t i = 0; i < std::min(lost.size(), kMaxNames); ++i) {
-      names += (i > 0 ? ", " : "") + quote(lost[i]);
-    }
-    if (lost.size() > kMaxNames)
-      names += " and " + std::to_string(lost.size() - kMaxNames) + " more";
     context_.diagnostics.warning(
         "unreachable-children", meta.where,
         std::to_string(lost.size()) + " of the " + std::to_string(meta.children.size()) +
             (meta.children.size() == 1 ? " child" : " children") + " of " + quote(meta.name) +
-            " can never run: " + names +
+            " can never run: " + enumerate(lost) +
             "; see what is said of each, or look at the conditions and inhibitions of " +
             quote(meta.name));
   }

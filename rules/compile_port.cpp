@@ -14,19 +14,6 @@ constexpr std::size_t kNodesWorthSifting = 1000;
 constexpr std::size_t kMaxUnionNodes = 2000;
 // Pairs reported for one port; more would not help to mend it.
 constexpr std::size_t kMaxReportedPairs = 16;
-// Names that a message spells out; a witness has them all.
-constexpr std::size_t kMaxNamesInMessage = 6;
-
-std::string enumerate(const std::vector<std::string>& names) {
-  std::string text;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (i == kMaxNamesInMessage) return text + " and " + std::to_string(names.size() - i) + " more";
-    if (i > 0) text += i + 1 == names.size() ? " and " : ", ";
-    text += names[i];
-  }
-  return text;
-}
-
 std::string describe(const Witness& witness) {
   std::string text = enumerate(witness.active);
   text += witness.active.size() == 1 ? " is active" : " are active";

@@ -41,6 +41,9 @@ struct PortResult {
 // Nothing if a limit was met, which is reported.
 std::optional<PortResult> compile_port(CompileContext& context, const PortTask& task);
 
+// Of an operator with two operands or more.
+Connective connective_of(Operator op);
+
 // Turns expressions into diagrams.
 class RuleBuilder {
  public:

@@ -100,7 +100,8 @@ Diagram::~Diagram() {
   if (instance_ == current_instance) bdd_delref(node_);
 }
 
-DiagramBuilder::DiagramBuilder(int variables) : only_one_(one_instance), variables_(variables) {
+DiagramBuilder::DiagramBuilder(int variables, bool sifts)
+    : only_one_(one_instance), variables_(variables), sifts_(sifts) {
   start();
 }
 
@@ -117,12 +118,13 @@ void DiagramBuilder::start() {
   bdd_gbc_hook(nullptr);  // the default one writes to standard error
   bdd_reorder_hook(note_reordering);
   const int variables = variables_;
-  const auto set_up = [variables] {
+  const int method = sifts_ ? BDD_REORDER_SIFT : BDD_REORDER_NONE;
+  const auto set_up = [variables, method] {
     bdd_setmaxnodenum(kMaxWorkingNodes);
     bdd_setcacheratio(kNodesPerCacheEntry);
     bdd_setvarnum(variables);
     bdd_varblockall();  // sifting moves blocks: each variable is one
-    return bdd_autoreorder_times(BDD_REORDER_SIFT, kAutomaticSifts);
+    return bdd_autoreorder_times(method, kAutomaticSifts);
   };
   if (const int error = attempt(set_up); error < 0) {
     stop();

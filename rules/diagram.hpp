@@ -74,7 +74,9 @@ class DiagramBuilder {
   static constexpr int kMaxVariables = 4 * kVariables;  // for what is asked of several ports
 
   DiagramBuilder() : DiagramBuilder(kVariables) {}
-  explicit DiagramBuilder(int variables);
+  // Without sifting, diagrams that outgrow the table are given up at once: where the question is
+  // not worth the second that each attempt to find a better order may take.
+  explicit DiagramBuilder(int variables, bool sifts = true);
   ~DiagramBuilder();
   DiagramBuilder(const DiagramBuilder&) = delete;
   DiagramBuilder& operator=(const DiagramBuilder&) = delete;
@@ -113,6 +115,7 @@ class DiagramBuilder {
 
   std::unique_lock<std::mutex> only_one_;
   const int variables_;
+  const bool sifts_;
   bool order_changed_ = false;
   std::vector<shm::Word> index_of_node_;  // scratch of nodes(), by BuDDy's node
 };

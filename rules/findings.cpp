@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "rules/names.hpp"
+#include "rules/proof.hpp"
 #include "rules/winners.hpp"
 
 namespace arbiter::rules {
@@ -17,17 +19,6 @@ namespace {
 constexpr std::size_t kMaxCauses = 16;
 // Chains reported for one port; there may be as many as cubes of sources.
 constexpr std::size_t kMaxChains = 4;
-
-std::string joined(const std::vector<std::string>& names, std::string_view last) {
-  constexpr std::size_t kMaxNames = 6;  // that a sentence spells out
-  std::string text;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (i == kMaxNames) return text + " and " + std::to_string(names.size() - i) + " more";
-    if (i > 0) text += i + 1 == names.size() ? std::string(last) : std::string(", ");
-    text += names[i];
-  }
-  return text;
-}
 
 // The states of one port in which somebody wants to win and nobody does.
 class PortFindings {
@@ -39,12 +30,13 @@ class PortFindings {
   std::uint64_t find(std::uint64_t max_work) {
     SourceOrder order;
     order.add(port_);
-    Winners winners(order, max_work);
+    Winners winners(order, max_work, false);
     winners_ = &winners;
     const Forget forget{*this};
     for (const auto& rule : port_.rules) {
       Diagram wins = winners.winner(rule);
-      if (!wins.is_false()) candidates_.push_back({&rule, std::move(wins)});
+      if (wins.is_false()) continue;
+      candidates_.push_back({&rule, std::move(wins)});
     }
     find_states();
     if (!nobody_.is_false()) {
@@ -59,7 +51,8 @@ class PortFindings {
     const CompiledRule* rule;
     Diagram wins;
   };
-  struct Forget {  // diagrams must not outlive their builder
+  using Candidates = VariableSet;  // by their place in candidates_, as bits
+  struct Forget {                  // diagrams must not outlive their builder
     PortFindings& findings;
     ~Forget() {
       findings.candidates_.clear();
@@ -98,8 +91,8 @@ class PortFindings {
     }
     const auto losers = active_candidates(witness);
     std::string message = "with " + in_words(witness) + ", nobody wins at " + port_.port +
-                          " although " + joined(losers, " and ") +
-                          (losers.size() == 1 ? " is" : " are") + " connected there and active";
+                          " although " + enumerate(losers) + (losers.size() == 1 ? " is" : " are") +
+                          " connected there and active";
     if (causes > 1) {
       message += " (one of " + std::string(rest.is_false() ? "" : "more than ") +
                  std::to_string(causes) + " such causes)";
@@ -149,57 +142,69 @@ class PortFindings {
   // y alone were inactive, and y would win if z alone were. Those that share y and z make one
   // finding.
   void note_chains() {
+    index_inhibitions();
     std::size_t chains = 0;
-    for (const auto& y : candidates_) {
-      const std::string& by = y.rule->source;
-      const Diagram with_y = winners_->combine(Connective::kAnd, nobody_, winners_->active(by));
-      if (with_y.is_false()) continue;
-      const auto silenced = silenced_by(y, with_y);
-      if (silenced.empty()) continue;
-      for (const auto& z : y.rule->reads) {
+    for (std::size_t y = 0; y < candidates_.size(); ++y) {
+      const auto& reads = candidates_[y].rule->reads;
+      std::optional<Diagram> with_y;
+      for (const auto& z : reads) {
         if (chains == kMaxChains) return;
-        chains += note_chain(y, z, with_y, silenced) ? 1 : 0;
+        const Candidates silenced = may_be_silenced(y, z);
+        if (silenced.none()) continue;
+        if (!with_y) {
+          const auto& source = candidates_[y].rule->source;
+          with_y = winners_->combine(Connective::kAnd, nobody_, winners_->active(source));
+        }
+        chains += note_chain(candidates_[y], z, *with_y, silenced) ? 1 : 0;
       }
     }
   }
 
-  struct Silenced {
-    const CompiledRule* rule;
-    Diagram states;
-  };
+  void index_inhibitions() {
+    for (std::size_t x = 0; x < candidates_.size(); ++x) {
+      const auto& rule = *candidates_[x].rule;
+      place_of_[rule.source].set(x);
+      for (const auto& read : rule.reads) readers_of_[read].set(x);
+      const auto implied = implied_literals(winners_->nodes(candidates_[x].wins));
+      for (std::size_t i = 0; i < winners_->sources().size(); ++i) {
+        if (implied.inactive[i]) inhibited_by_[winners_->sources()[i]].set(x);
+      }
+    }
+  }
 
-  std::vector<Silenced> silenced_by(const Candidate& y, const Diagram& with_y) {
-    std::vector<Silenced> result;
-    for (const auto& x : candidates_) {
-      const auto& reads = x.rule->reads;
-      const std::string& by = y.rule->source;
-      if (&x == &y || std::find(reads.begin(), reads.end(), by) == reads.end()) continue;
-      const Diagram otherwise = winners_->given(x.wins, by, false);
-      Diagram states = winners_->combine(Connective::kAnd, with_y, otherwise);
-      if (!states.is_false()) result.push_back({x.rule, std::move(states)});
+  // The x of chains x, y, z as far as single literals tell: x reads y, and neither do x or y
+  // exclude each other's neighbour in the chain. Where all inhibit all, there would be cubes of
+  // chains to look at, and none passes this.
+  Candidates may_be_silenced(std::size_t y, const std::string& z) {
+    const std::string& by = candidates_[y].rule->source;
+    Candidates result = readers_of_[by] & ~inhibited_by_[z] & ~place_of_[z];
+    result.reset(y);
+    for (std::size_t x = 0; x < candidates_.size(); ++x) {
+      if (result[x] && inhibited_by_[candidates_[x].rule->source][y]) result.reset(x);
     }
     return result;
   }
 
   bool note_chain(const Candidate& y, const std::string& z, const Diagram& with_y,
-                  const std::vector<Silenced>& silenced) {
-    if (z == y.rule->source) return false;
+                  const Candidates& silenced) {
+    const std::string& by = y.rule->source;
     Diagram blocked = winners_->combine(Connective::kAnd, with_y, winners_->active(z));
     blocked = winners_->combine(Connective::kAnd, blocked, winners_->given(y.wins, z, false));
-    if (blocked.is_false()) return false;
     std::vector<std::string> names;
     std::optional<Witness> shortest;
-    for (const auto& x : silenced) {
-      if (x.rule->source == z) continue;
-      const Diagram states = winners_->combine(Connective::kAnd, x.states, blocked);
+    for (std::size_t i = 0; i < candidates_.size(); ++i) {
+      if (blocked.is_false()) return false;
+      if (!silenced[i]) continue;
+      const Candidate* x = &candidates_[i];
+      const Diagram states =
+          winners_->combine(Connective::kAnd, blocked, winners_->given(x->wins, by, false));
       if (states.is_false()) continue;
       const Witness witness = winners_->witness(states);
       if (!shortest || size(witness) < size(*shortest)) shortest = witness;
-      names.push_back(x.rule->source);
+      names.push_back(x->rule->source);
     }
     if (!shortest) return false;
-    const std::string& by = y.rule->source;
-    const std::string others = joined(names, " and ");
+    const std::string others = enumerate(names);
     diagnostics_.note("starved", where_of(by),
                       "at " + port_.port + ", " + by + " silences " + others + " even while " + z +
                           " silences " + by + ": with " + in_words(*shortest) +
@@ -220,6 +225,9 @@ class PortFindings {
   Winners* winners_ = nullptr;
   std::vector<Candidate> candidates_;  // connections that can win
   Diagram nobody_;
+  std::unordered_map<std::string, Candidates> place_of_;      // by source: the candidate that it is
+  std::unordered_map<std::string, Candidates> readers_of_;    // by source: whose rules read it
+  std::unordered_map<std::string, Candidates> inhibited_by_;  // by source: that win only without it
 };
 
 // Sources that are connected to arbitrated ports only, and win at none of them. Where it is one
@@ -251,7 +259,7 @@ void warn_of_losers(const RuleSet& rules, const CompiledModel& model, Diagnostic
   for (const auto& [source, losing] : sources) {
     if (losing.wins || (losing.ports.size() == 1 && !losing.lacks_rule)) continue;
     diagnostics.warning("never-wins", losing.where,
-                        source + " is connected to " + joined(losing.ports, " and ") +
+                        source + " is connected to " + enumerate(losing.ports) +
                             ", and there is no state in which it wins anywhere" +
                             (losing.lacks_rule ? ", partly since no rule selects it" : "") +
                             "; give it a behaviour that can run, or remove its connections");
@@ -264,6 +272,7 @@ FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
                           Diagnostics& diagnostics, std::uint64_t max_work) {
   warn_of_losers(rules, model, diagnostics);
   FindingsAccount account;
+  std::pair<const PortRules*, std::string> first_open;
   std::map<std::string, const CompiledPort*> compiled;
   for (const auto& port : model.ports) compiled.emplace(port.port, &port);
   for (const auto& port : rules.ports) {
@@ -281,10 +290,14 @@ FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
         limit = std::string("it takes ") + reached.what();
       }
     }
-    if (account.open++ > 0) continue;  // one note tells enough
-    diagnostics.note("left-open", port.where,
-                     "whether there are states in which nobody wins at " + port.port +
-                         ", or where else, was not found out: " + limit +
+    if (account.open++ == 0) first_open = {&port, limit};
+  }
+  if (account.open > 0) {
+    const std::string more = std::to_string(account.open - 1);
+    diagnostics.note("left-open", first_open.first->where,
+                     "not all states in which nobody wins at " + first_open.first->port +
+                         (account.open > 1 ? ", nor at " + more + " other ports," : "") +
+                         " were looked at: " + first_open.second +
                          "; the model is in order, this is only not known");
   }
   return account;

@@ -69,6 +69,16 @@ std::string quote(std::string_view name) {
   return '"' + std::string(name.substr(0, end)) + "…\"";
 }
 
+std::string enumerate(const std::vector<std::string>& names) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i == kMaxNamesInWords) return text + " and " + std::to_string(names.size() - i) + " more";
+    if (i > 0) text += i + 1 == names.size() ? " and " : ", ";
+    text += names[i];
+  }
+  return text;
+}
+
 std::string describe(const Location& where) {
   return where.file + ':' + std::to_string(where.line) + ':' + std::to_string(where.column);
 }

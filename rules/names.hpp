@@ -19,6 +19,12 @@ std::string collapse_blanks(std::string_view text);
 // In double quotes, and cut where it is too long for a message.
 std::string quote(std::string_view name);
 
+// Names that a sentence spells out; of more it says how many.
+inline constexpr std::size_t kMaxNamesInWords = 6;
+
+// "/a, /b and /c".
+std::string enumerate(const std::vector<std::string>& names);
+
 // file:line:column, to point at a second place from within a message.
 std::string describe(const Location& where);
 

@@ -4,16 +4,21 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "rules/excerpt.hpp"
+#include "rules/names.hpp"
 #include "rules/winners.hpp"
 
 namespace arbiter::rules {
 namespace {
+
+// Of one code. What is true of each of a thousand ports is read of a few.
+constexpr std::size_t kMaxNotesShown = 10;
 
 const char* name_of(Severity severity) {
   switch (severity) {
@@ -81,7 +86,9 @@ std::string counts(const Diagnostics& diagnostics) {
 void write_text(std::ostream& out, const Diagnostics& diagnostics) {
   if (diagnostics.items().empty()) return;
   Excerpts excerpts;
+  std::map<std::string_view, std::size_t> notes;  // by code
   for (const Diagnostic* item : in_reading_order(diagnostics)) {
+    if (item->severity == Severity::kNote && ++notes[item->code] > kMaxNotesShown) continue;
     out << item->where.file << ':' << item->where.line << ':' << item->where.column << ": "
         << name_of(item->severity) << ": " << item->message << " [" << item->code << "]\n"
         << excerpts.at(item->where);
@@ -92,6 +99,11 @@ void write_text(std::ostream& out, const Diagnostics& diagnostics) {
       out << "  active: " << joined(item->witness->active)
           << "; inactive: " << joined(item->witness->inactive) << '\n';
     }
+  }
+  for (const auto& [code, count] : notes) {
+    if (count <= kMaxNotesShown) continue;
+    out << count - kMaxNotesShown << " more notes [" << code
+        << "] are not shown; arbiter check --json has them\n";
   }
   out << counts(diagnostics) << '\n';
 }

@@ -9,8 +9,8 @@
 namespace arbiter::rules {
 
 // file:line:column: error: message [code], with the line of the file and a caret below the place,
-// a line for the witness where there is one, and a count of all at the end. Nothing if nothing was
-// found.
+// a line for the witness where there is one, and a count of all at the end; of the notes of each
+// code the first ones only. Nothing if nothing was found.
 void write_text(std::ostream& out, const Diagnostics& diagnostics);
 
 // One array of {severity, code, file, line, column, message, help, witness}; the witness is

@@ -25,6 +25,15 @@ void flatten_operands(const ExpressionPtr& expression, Operator op,
   for (const auto& operand : expression->operands) flatten_operands(operand, op, operands);
 }
 
+void visit_sources(const Expression& expression, std::unordered_set<const Expression*>& seen,
+                   const std::function<void(const std::string&)>& visit) {
+  if (!seen.insert(&expression).second) return;
+  if (expression.op == Operator::kSource) visit(expression.name);
+  for (const auto& operand : expression.operands) visit_sources(*operand, seen, visit);
+}
+
+}  // namespace
+
 Connective connective_of(Operator op) {
   switch (op) {
     case Operator::kAnd:
@@ -41,15 +50,6 @@ Connective connective_of(Operator op) {
       throw std::logic_error("a quantifier in a rule that should have been expanded");
   }
 }
-
-void visit_sources(const Expression& expression, std::unordered_set<const Expression*>& seen,
-                   const std::function<void(const std::string&)>& visit) {
-  if (!seen.insert(&expression).second) return;
-  if (expression.op == Operator::kSource) visit(expression.name);
-  for (const auto& operand : expression.operands) visit_sources(*operand, seen, visit);
-}
-
-}  // namespace
 
 void RuleBuilder::mention(const std::string& source) {
   if (variables_.emplace(source, static_cast<int>(names_.size())).second) names_.push_back(source);

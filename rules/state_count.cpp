@@ -1,5 +1,6 @@
 #include "rules/state_count.hpp"
 
+#include <algorithm>
 #include <vector>
 
 namespace arbiter::rules {
@@ -11,6 +12,12 @@ StateCount power_of_two(std::size_t exponent) { return StateCount(1) << exponent
 StateCount count_states(const DiagramNodes& function, std::size_t variables) {
   using shm::table::kFalse;
   const StateCount all = power_of_two(variables);
+  // A conjunction says something of each of its variables, and nothing of the others.
+  if (!function.nodes.empty() &&
+      std::all_of(function.nodes.begin(), function.nodes.end(),
+                  [](const auto& node) { return node.low == kFalse || node.high == kFalse; })) {
+    return power_of_two(variables - function.nodes.size());
+  }
   std::vector<StateCount> counts(function.nodes.size());
   const auto of = [&](shm::Word node) -> StateCount {
     if (node < kFalse) return counts[node];

@@ -5,6 +5,7 @@
 #include <set>
 #include <unordered_map>
 
+#include "rules/compile_port.hpp"
 #include "rules/names.hpp"
 #include "rules/quantifiers.hpp"
 #include "rules/winners.hpp"
@@ -13,21 +14,6 @@ namespace arbiter::rules {
 namespace {
 
 using Active = std::set<std::string>;
-
-Connective connective_of(Operator op) {
-  switch (op) {
-    case Operator::kOr:
-      return Connective::kOr;
-    case Operator::kXor:
-      return Connective::kXor;
-    case Operator::kImplies:
-      return Connective::kImplies;
-    case Operator::kIff:
-      return Connective::kIff;
-    default:
-      return Connective::kAnd;
-  }
-}
 
 struct Term {
   const CompiledPort* port;

@@ -4,6 +4,7 @@
 #include <queue>
 #include <set>
 
+#include "rules/names.hpp"
 #include "rules/witness.hpp"
 #include "shm/decision_table.hpp"
 
@@ -51,16 +52,6 @@ std::vector<std::string> order_of(const CompiledPort& port) {
   return result;
 }
 
-std::string enumerate(const std::vector<std::string>& names) {
-  std::string text;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (i == kMaxNamesInWords) return text + " and " + std::to_string(names.size() - i) + " more";
-    if (i > 0) text += i + 1 == names.size() ? " and " : ", ";
-    text += names[i];
-  }
-  return text;
-}
-
 }  // namespace
 
 void SourceOrder::add(const CompiledPort& port) {
@@ -89,9 +80,10 @@ void SourceOrder::add(const std::string& source) {
   if (std::find(names_.begin(), names_.end(), source) == names_.end()) names_.push_back(source);
 }
 
-Winners::Winners(const SourceOrder& order, std::uint64_t max_work)
+Winners::Winners(const SourceOrder& order, std::uint64_t max_work, bool sifts)
     : names_(order.names()),
-      builder_(std::clamp(static_cast<int>(names_.size()), 1, DiagramBuilder::kMaxVariables)),
+      builder_(std::clamp(static_cast<int>(names_.size()), 1, DiagramBuilder::kMaxVariables),
+               sifts),
       max_work_(max_work) {
   if (names_.size() > static_cast<std::size_t>(DiagramBuilder::kMaxVariables)) {
     throw WorkLimit("more than " + std::to_string(DiagramBuilder::kMaxVariables) + " sources");
@@ -106,9 +98,15 @@ void Winners::take_account_of(std::uint64_t work) {
   if (work_ > max_work_) throw WorkLimit("more than " + std::to_string(max_work_) + " steps");
 }
 
+std::uint64_t Winners::size_of(const Diagram& function) const {
+  return function.is_false() || function.is_true() ? 0 : builder_.node_count(function);
+}
+
 Diagram Winners::combine(Connective connective, const Diagram& a, const Diagram& b) {
   Diagram result = builder_.combine(connective, a, b);
-  take_account_of(1 + (result.is_false() || result.is_true() ? 0 : builder_.node_count(result)));
+  // That the result is constant is found out by walking through what it is made of.
+  const std::uint64_t size = size_of(result);
+  take_account_of(1 + (size > 0 ? size : std::min(size_of(a), size_of(b))));
   return result;
 }
 
@@ -146,7 +144,7 @@ Diagram Winners::given(const Diagram& function, const std::string& source, bool 
   const int variable = variables_.at(source);
   Diagram result =
       active ? builder_.when(function, variable) : builder_.when_not(function, variable);
-  take_account_of(1 + (result.is_false() || result.is_true() ? 0 : builder_.node_count(result)));
+  take_account_of(1 + size_of(result));
   return result;
 }
 

@@ -45,7 +45,7 @@ class Winners {
   static constexpr std::uint64_t kMaxWork = 20'000'000;
 
   // Throws DiagramLimit if there are more sources than DiagramBuilder::kMaxVariables.
-  explicit Winners(const SourceOrder& order, std::uint64_t max_work = kMaxWork);
+  explicit Winners(const SourceOrder& order, std::uint64_t max_work = kMaxWork, bool sifts = true);
 
   [[nodiscard]] const std::vector<std::string>& sources() const { return names_; }
   [[nodiscard]] std::uint64_t work() const { return work_; }
@@ -67,6 +67,7 @@ class Winners {
   DiagramNodes nodes(const Diagram& function) { return builder_.nodes(function); }
 
  private:
+  [[nodiscard]] std::uint64_t size_of(const Diagram& function) const;
   void take_account_of(std::uint64_t work);
 
   std::vector<std::string> names_;
@@ -78,9 +79,6 @@ class Winners {
 
 // The rule that selects its connection in that state; null if nobody wins.
 const CompiledRule* find_winner(const CompiledPort& port, const std::set<std::string>& active);
-
-// Names that a sentence spells out, of those that are active and of those that are not.
-inline constexpr std::size_t kMaxNamesInWords = 6;
 
 // "/a and /b active and /c inactive"; "nothing active" if there are no literals.
 std::string in_words(const Witness& witness);

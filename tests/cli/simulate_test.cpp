@@ -55,7 +55,7 @@ TEST_F(Simulate, NotesAnUnknownSourceOnce) {
   EXPECT_EQ(result.out, "t_ns,source,destination,decision,winner\n2,/low,/p,delivered,/low\n");
   EXPECT_EQ(result.err, trace_ +
                             ":2:3: note: the model does not know /who; its arrivals have no effect "
-                            "[unknown-source]\n1 note\n");
+                            "[unknown-source]\n    2 | 0,/who\n      |   ^\n1 note\n");
 }
 
 TEST_F(Simulate, WritesNoResultOfABadTrace) {

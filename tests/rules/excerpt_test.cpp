@@ -45,7 +45,7 @@ TEST_F(Excerpt, WhatATerminalWouldActUponIsNotShown) {
                "c",
                1, 11),
             "    1 | a\xef\xbf\xbd[31mb\xef\xbf\xbd\xef\xbf\xbd"
-            "c\n      |         ^\n");
+            "c\n      |          ^\n");
 }
 
 TEST_F(Excerpt, OfALongLineAsMuchAsFitsAroundThePlace) {

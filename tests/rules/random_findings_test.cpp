@@ -23,20 +23,16 @@ class ExhaustiveFindings {
       : model_(model), words_(words), naive_(model), states_(subsets(words.sources)) {
     for (const auto& port : words.ports) {
       auto& winners = winners_[port];
-      for (const auto& now : states_) winners.emplace(now, naive_.winner(port, now));
+      for (const auto& now : states_) winners.push_back(index_of(naive_.winner(port, now)));
     }
   }
 
   const std::vector<Active>& states() const { return states_; }
-  std::optional<std::string> winner(const std::string& port, const Active& now) const {
-    return winners_.at(port).at(now);
-  }
 
   // Connected, and there is a state in which it wins there.
   bool can_win(const std::string& port, const std::string& source) const {
     const auto& winners = winners_.at(port);
-    return std::any_of(winners.begin(), winners.end(),
-                       [&](const auto& each) { return each.second == source; });
+    return std::find(winners.begin(), winners.end(), index_of(source)) != winners.end();
   }
 
   std::set<std::string> never_runs() const {
@@ -60,27 +56,29 @@ class ExhaustiveFindings {
     return result;
   }
 
-  bool is_of_nobody(const std::string& port, const Active& now) const {
-    if (winner(port, now)) return false;
-    return std::any_of(now.begin(), now.end(),
-                       [&](const auto& source) { return can_win(port, source); });
+  // Of the state of that number: a candidate is active, and nobody wins.
+  bool is_of_nobody(const std::string& port, std::size_t state) const {
+    return winners_.at(port)[state] == kNone && (state & candidates(port)) != 0;
   }
 
   // "port y z": some x is silenced by y, which is silenced by z.
   std::set<std::string> chains(const std::string& port) const {
     std::set<std::string> result;
-    for (const auto& now : states_) {
-      if (winner(port, now)) continue;
-      const auto would_win = [&](const std::string& source, const std::string& without) {
-        Active other = now;
-        other.erase(without);
-        return source != without && winner(port, other) == source;
+    const auto& winners = winners_.at(port);
+    const auto count = static_cast<int>(words_.sources.size());
+    for (std::size_t state = 0; state < states_.size(); ++state) {
+      if (!is_of_nobody(port, state)) continue;
+      const auto would_win = [&](int source, int without) {
+        return source != without && winners[state & ~bit(without)] == source;
       };
-      for (const auto& x : now) {
-        for (const auto& y : now) {
-          if (x == y || !can_win(port, y) || !would_win(x, y)) continue;
-          for (const auto& z : now) {
-            if (z != x && would_win(y, z)) result.insert(port + " " + y + " " + z);
+      for (int y = 0; y < count; ++y) {
+        if ((state & candidates(port) & bit(y)) == 0) continue;
+        for (int z = 0; z < count; ++z) {
+          if ((state & bit(z)) == 0 || !would_win(y, z)) continue;
+          for (int x = 0; x < count; ++x) {
+            if (x == z || (state & bit(x)) == 0 || !would_win(x, y)) continue;
+            result.insert(port + " " + words_.sources[static_cast<std::size_t>(y)] + " " +
+                          words_.sources[static_cast<std::size_t>(z)]);
           }
         }
       }
@@ -92,8 +90,10 @@ class ExhaustiveFindings {
   bool runs(int behaviour) const {
     for (const auto& [port, source] :
          model_.elements[static_cast<std::size_t>(behaviour)].configs) {
-      for (const auto& now : states_) {
-        if (winner(port, now) == source && naive_.may_run_at(behaviour, port, now)) return true;
+      const auto& winners = winners_.at(port);
+      for (std::size_t state = 0; state < states_.size(); ++state) {
+        if (winners[state] != index_of(source)) continue;
+        if (naive_.may_run_at(behaviour, port, states_[state])) return true;
       }
     }
     return false;
@@ -106,11 +106,30 @@ class ExhaustiveFindings {
                        [&](const int child) { return is_reached(child); });
   }
 
+  static std::size_t bit(int source) { return std::size_t{1} << source; }
+
+  int index_of(const std::optional<std::string>& source) const {
+    const auto found = std::find(words_.sources.begin(), words_.sources.end(), source);
+    return found == words_.sources.end() ? kNone : static_cast<int>(found - words_.sources.begin());
+  }
+
+  std::size_t candidates(const std::string& port) const {
+    auto& candidates = candidates_[port];
+    if (!candidates) {
+      candidates = 0;
+      for (const int winner : winners_.at(port)) {
+        if (winner != kNone) *candidates |= bit(winner);
+      }
+    }
+    return *candidates;
+  }
+
   const RandomModel& model_;
   const Vocabulary& words_;
   const NaiveEvaluator naive_;
-  const std::vector<Active> states_;
-  std::map<std::string, std::map<Active, std::optional<std::string>>> winners_;
+  const std::vector<Active> states_;                 // by number: bit i stands for source i
+  std::map<std::string, std::vector<int>> winners_;  // by state; kNone: nobody
+  mutable std::map<std::string, std::optional<std::size_t>> candidates_;
 };
 
 bool agrees(const Active& now, const rules::Witness& witness) {
@@ -154,7 +173,8 @@ void compare(const RandomModel& random, const Vocabulary& words,
   const auto never_runs = first_matches(items, "never-runs", "the behaviour \"([^\"]*)\"");
   EXPECT_EQ(never_runs, expected.never_runs());
   seen.never_runs += static_cast<int>(never_runs.size());
-  const auto unreachable = first_matches(items, "unreachable-children", "child(?:ren)? of \"([^\"]*)\"");
+  const auto unreachable =
+      first_matches(items, "unreachable-children", "child(?:ren)? of \"([^\"]*)\"");
   EXPECT_EQ(unreachable, expected.with_unreachable_children());
   seen.unreachable += static_cast<int>(unreachable.size());
 
@@ -173,8 +193,9 @@ void compare(const RandomModel& random, const Vocabulary& words,
 
   std::set<std::string> nobody;
   for (const auto& port : words.ports) {
-    const auto is_it = [&](const auto& now) { return expected.is_of_nobody(port, now); };
-    if (std::any_of(expected.states().begin(), expected.states().end(), is_it)) nobody.insert(port);
+    for (std::size_t state = 0; state < expected.states().size(); ++state) {
+      if (expected.is_of_nobody(port, state)) nobody.insert(port);
+    }
   }
   const std::string at_port = "nobody wins at (\\S+) although";
   EXPECT_EQ(first_matches(items, "nobody-wins", at_port), nobody);
@@ -185,8 +206,9 @@ void compare(const RandomModel& random, const Vocabulary& words,
     ASSERT_TRUE(std::regex_search(item.message, match, std::regex("at (/[pq]:i)")));
     const std::string port = match[1];
     ASSERT_TRUE(item.witness.has_value());
-    for (const auto& now : expected.states()) {
-      EXPECT_TRUE(!agrees(now, *item.witness) || expected.is_of_nobody(port, now));
+    for (std::size_t state = 0; state < expected.states().size(); ++state) {
+      if (!agrees(expected.states()[state], *item.witness)) continue;
+      EXPECT_TRUE(expected.is_of_nobody(port, state));
     }
   }
 

@@ -60,6 +60,20 @@ TEST(Report, DoesNotRepeatAWitnessThatTheMessageHasInWords) {
             "2 notes\n");
 }
 
+TEST(Report, ShowsTheFirstNotesOfACodeAndCountsTheRest) {
+  Diagnostics diagnostics;
+  for (std::uint32_t i = 0; i < 25; ++i) diagnostics.note("n", {"m.xml", i + 1, 1}, "a note");
+  for (std::uint32_t i = 0; i < 12; ++i) diagnostics.warning("w", {"m.xml", i + 1, 1}, "careful");
+  const std::string text = text_of(diagnostics);
+  EXPECT_NE(text.find("m.xml:10:1: note"), std::string::npos);
+  EXPECT_EQ(text.find("m.xml:11:1: note"), std::string::npos);
+  EXPECT_NE(text.find("m.xml:12:1: warning"), std::string::npos);
+  EXPECT_TRUE(
+      text.ends_with("\n15 more notes [n] are not shown; arbiter check --json has them\n"
+                     "12 warnings, 25 notes\n"));
+  EXPECT_EQ(json_of(diagnostics).size(), 37u);
+}
+
 TEST(Report, SilencesWhatIsNoError) {
   Diagnostics diagnostics;
   diagnostics.error("a", {"m.xml", 1, 1}, "one");
