@@ -16,7 +16,7 @@ namespace arbiter::rules {
 namespace {
 
 // More causes than these are not counted.
-constexpr std::size_t kMaxCauses = 16;
+constexpr std::size_t kMaxCauses = 5;
 // Chains reported for one port; there may be as many as cubes of sources.
 constexpr std::size_t kMaxChains = 4;
 

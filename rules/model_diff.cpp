@@ -5,6 +5,7 @@
 #include <set>
 #include <unordered_map>
 
+#include "rules/proof.hpp"
 #include "rules/state_count.hpp"
 #include "rules/winners.hpp"
 
@@ -69,6 +70,7 @@ class PortComparison {
     const CompiledRule* rule = nullptr;
     Diagram wins;
     StateCount states = 0;
+    Literals implied;        // by `wins`; none where there are too many sources
     StateCount decided = 0;  // of these, in which some connection of the other model wins
   };
   struct Candidate {
@@ -102,7 +104,10 @@ class PortComparison {
   }
 
   void build(Side& side) {
-    if (side.rule != nullptr) side.wins = winners_->winner(*side.rule);
+    if (side.rule == nullptr) return;
+    side.wins = winners_->winner(*side.rule);
+    if (result_.sources > VariableSet().size()) return;
+    side.implied = implied_literals(winners_->nodes(side.wins));
   }
 
   void count_pairs() {
@@ -119,7 +124,9 @@ class PortComparison {
     for (auto& a : candidates_) {
       if (a.before.wins.is_false()) continue;
       for (auto& b : candidates_) {
-        if (b.after.wins.is_false()) continue;
+        if (b.after.wins.is_false() || exclude_each_other(a.before.implied, b.after.implied)) {
+          continue;
+        }
         const Diagram both = winners_->combine(Connective::kAnd, a.before.wins, b.after.wins);
         if (both.is_false()) continue;
         const StateCount states = count(both);

@@ -30,11 +30,11 @@ std::vector<Literals> implied_by_each(const DiagramNodes& function) {
   return implied;
 }
 
+}  // namespace
+
 bool exclude_each_other(const Literals& a, const Literals& b) {
   return (a.active & b.inactive).any() || (a.inactive & b.active).any();
 }
-
-}  // namespace
 
 Literals implied_literals(const DiagramNodes& function) {
   if (function.root >= kFalse) return {};

@@ -31,6 +31,9 @@ struct Literals {
 // All literals that the function implies; none if it is false, since it then implies everything.
 Literals implied_literals(const DiagramNodes& function);
 
+// Whether one says of some variable the opposite of the other.
+bool exclude_each_other(const Literals& a, const Literals& b);
+
 // Whether the function holds under each activation in which `given` holds.
 bool holds_given(const DiagramNodes& function, const Literals& given);
 
