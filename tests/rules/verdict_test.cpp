@@ -146,6 +146,9 @@ TEST(Verdict, IdlenessThatExplodesAsOneDiagramIsProvedByCases) {
   EXPECT_EQ(kind_of(model, "/stop -> idle(/p)"), Verdict::Kind::kProved);
   EXPECT_EQ(kind_of(model, "winner(/p) != none -> not /stop"), Verdict::Kind::kProved);
   EXPECT_EQ(kind_of(model, "/s3 -> idle(/p)"), Verdict::Kind::kRefuted);
+  std::string others = "/stop";
+  for (int i = 0; i + 1 < kCount; ++i) others += " or /s" + std::to_string(i);
+  EXPECT_EQ(kind_of(model, "idle(/p) and /s63 -> " + others), Verdict::Kind::kProved);
 }
 
 TEST(Verdict, AStatementMayReadManyPortsOfManySources) {
