@@ -36,15 +36,18 @@ std::shared_ptr<detail::NodeCore> connect(const std::string& verb, const std::st
 nlohmann::json fetch_status(detail::NodeCore& node) {
   shm::Message question;
   question.kind = shm::MessageKind::kStatus;
-  const shm::Received reply = node.ask(question, {-1, -1});
-  const int document = reply.descriptors[0].get();
+  return read_document(node.ask(question, {-1, -1}).descriptors[0]);
+}
+
+nlohmann::json read_document(const shm::FileDescriptor& descriptor) {
+  const int document = descriptor.get();
   struct stat status {};
-  if (document < 0 || fstat(document, &status) != 0) throw Error("the daemon sent no status");
+  if (document < 0 || fstat(document, &status) != 0) throw Error("the daemon sent no document");
   std::string text(static_cast<std::size_t>(status.st_size), '\0');
   std::size_t at = 0;
   while (at < text.size()) {
     const ssize_t got = pread(document, text.data() + at, text.size() - at, static_cast<off_t>(at));
-    if (got <= 0) throw Error("the daemon's status cannot be read");
+    if (got <= 0) throw Error("the daemon's document cannot be read");
     at += static_cast<std::size_t>(got);
   }
   return nlohmann::json::parse(text);

@@ -32,6 +32,9 @@ std::shared_ptr<detail::NodeCore> connect(const std::string& verb, const std::st
 // The daemon's status document. Throws arbiter::Error.
 nlohmann::json fetch_status(detail::NodeCore& node);
 
+// A document that the daemon has sent. Throws arbiter::Error.
+nlohmann::json read_document(const shm::FileDescriptor& descriptor);
+
 // SIGINT and SIGTERM as a descriptor, so that a stream ends with its summary. Call before threads
 // start.
 shm::FileDescriptor catch_interrupts();

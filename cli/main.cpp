@@ -29,6 +29,9 @@ int run(int argc, char** argv) {
   arbiter::cli::add_status(app, exit_code);
   arbiter::cli::add_deactivate(app, exit_code);
   arbiter::cli::add_reload(app, exit_code);
+  arbiter::cli::add_switch(app, exit_code);
+  arbiter::cli::add_rollback(app, exit_code);
+  arbiter::cli::add_history(app, exit_code);
   arbiter::cli::add_stop(app, exit_code);
   try {
     app.parse(argc, argv);  // runs the verb

@@ -4,31 +4,67 @@
 #include <string>
 
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
+#include "cli/conversation.hpp"
 #include "cli/live.hpp"
 #include "cli/verbs.hpp"
 
 namespace arbiter::cli {
 namespace {
 
-int reload(const std::string& instance) {
-  const auto node = connect("reload", instance);
+struct ReloadOptions {
+  std::string instance;
+  bool dry_run = false;
+  bool json = false;
+};
+
+// One model of several, in a dry run.
+void write_changes(const nlohmann::json& model, bool is_alone) {
+  const auto& changes = model.at("changes");
+  if (!is_alone) {
+    std::cout << model.at("name").get<std::string>()
+              << (model.at("in_force").get<bool>() ? " (in force)" : "") << ": ";
+  }
+  if (changes.is_null()) {
+    std::cout << "not compared: what is in force is a former daemon's\n";
+    return;
+  }
+  std::cout << changes.at("summary").get<std::string>() << '\n'
+            << changes.at("text").get<std::string>();
+}
+
+int reload(const ReloadOptions& options) {
   shm::Message question;
   question.kind = shm::MessageKind::kReload;
-  const auto generation = node->ask(question, {-1, -1}).message.value;
-  std::cout << "model " << generation << " is in force\n";
+  question.flags = options.dry_run ? shm::kDryRun : 0u;
+  const auto report =
+      Conversation("reload", options.instance).ask_for_change(question, options.json);
+  if (!options.dry_run || options.json || !report.at("ok").get<bool>()) {
+    return write_result(report, options.json);
+  }
+  const auto& models = report.at("models");
+  for (const auto& model : models) write_changes(model, models.size() == 1);
+  std::cout << "nothing was changed; arbiter reload puts it in force\n";
   return 0;
 }
 
 }  // namespace
 
 void add_reload(CLI::App& app, int& exit_code) {
-  const auto instance = std::make_shared<std::string>();
+  const auto options = std::make_shared<ReloadOptions>();
   CLI::App* verb = app.add_subcommand(
-      "reload", "Have the daemon read its model and its policy again; a bad one changes nothing");
-  add_instance_option(*verb, *instance);
-  verb->footer("Example:\n  arbiter reload");
-  verb->callback([instance, &exit_code] { exit_code = reload(*instance); });
+      "reload", "Have the daemon read its models and its policy again; a bad one changes nothing");
+  verb->add_flag("--dry-run", options->dry_run,
+                 "Only check the files, and show what would be decided differently");
+  verb->add_flag("--json", options->json, "Write the daemon's report as JSON");
+  add_instance_option(*verb, options->instance);
+  verb->footer(R"(Example:
+  arbiter reload
+  arbiter reload --dry-run     # 0: the files are good; 1: a reload would be refused
+
+What is found in the files is shown as `arbiter check` does. To go back: arbiter rollback.)");
+  verb->callback([options, &exit_code] { exit_code = reload(*options); });
 }
 
 }  // namespace arbiter::cli

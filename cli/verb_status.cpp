@@ -48,6 +48,7 @@ void print_model(const json& status) {
   const json& model = status.at("model");
   std::cout << "instance " << status.at("instance").get<std::string>() << ", pid "
             << status.at("pid") << ", model " << model.at("generation");
+  if (status.at("models").size() > 1) std::cout << ' ' << model.at("name").get<std::string>();
   for (const auto& file : model.at("files")) std::cout << ' ' << file.get<std::string>();
   if (!model.at("application").is_null()) {
     std::cout << ", application " << model.at("application").get<std::string>();

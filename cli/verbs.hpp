@@ -19,6 +19,9 @@ void add_pub(CLI::App& app, int& exit_code);
 void add_status(CLI::App& app, int& exit_code);
 void add_deactivate(CLI::App& app, int& exit_code);
 void add_reload(CLI::App& app, int& exit_code);
+void add_switch(CLI::App& app, int& exit_code);
+void add_rollback(CLI::App& app, int& exit_code);
+void add_history(CLI::App& app, int& exit_code);
 void add_stop(CLI::App& app, int& exit_code);
 
 }  // namespace arbiter::cli

@@ -10,6 +10,12 @@ std::shared_ptr<NodeCore> make_node(std::string_view name, const NodeOptions& op
 }
 void service(NodeCore& node) { node.service(); }
 int service_fd(const NodeCore& node) noexcept { return node.service_fd(); }
+void switch_model(NodeCore& node, std::string_view name) {
+  shm::Message question;
+  question.kind = shm::MessageKind::kSwitch;
+  question.set_name(name);  // one that is cut off is no model's
+  node.ask(question, {-1, -1});
+}
 
 std::shared_ptr<OutputCore> open_output(NodeCore& node, std::string_view name, const PortType& type,
                                         const OutputPortOptions& options) {

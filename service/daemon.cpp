@@ -32,11 +32,14 @@ Daemon::Daemon(const DaemonOptions& options)
     : instance_(options.instance),
       stores_(options.uses_descriptor_store),
       gate_(options.policy),
-      models_(options.files, directory_),
+      files_(options.models),
       state_(options.directory, options.instance) {
-  gate_.prepare();
-  gate_.put_in_force();
-  if (models_.has_files()) models_.read();
+  if (!files_.empty() || gate_.has_file()) {
+    Reading reading = read_files();
+    if (reading.findings.has_errors()) throw BadModel(reading.findings.first_error());
+    if (reading.policy) gate_.put_in_force(*reading.policy);
+    read_at_start_ = std::move(reading.models);
+  }
   listener_ = shm::listen_at(options.directory, instance_);
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   if (!epoll_) throw std::system_error(errno, std::generic_category(), "epoll_create1");
@@ -67,7 +70,8 @@ int Daemon::timeout_ms() const {
   const bool is_behind = std::any_of(clients_.begin(), clients_.end(), [](const auto& each) {
     return each.second->has_read_ahead();
   });
-  if (is_behind || (try_postponed_ && !postponed_.empty())) return 0;
+  const bool may_change = !swap_ && phase_ == Phase::kServing && !changes_.empty();
+  if (is_behind || may_change || (try_postponed_ && !postponed_.empty())) return 0;
   shm::Nanoseconds deadline =
       std::min({barriers_.next_deadline(), takeover_deadline(), show_growth_at_});
   for (const Postponed& request : postponed_) deadline = std::min(deadline, request.deadline);
@@ -111,6 +115,7 @@ void Daemon::run(int signal_descriptor) {
     }
     advance_takeover(now);
     serve_postponed(now);
+    advance_changes();
     settle();
     if (stop_wanted_) return;
   }
@@ -120,7 +125,8 @@ bool Daemon::handle_signal(int signal_descriptor) {
   signalfd_siginfo info{};
   while (::read(signal_descriptor, &info, sizeof info) == static_cast<ssize_t>(sizeof info)) {
     if (info.ssi_signo == SIGHUP) {
-      reload();
+      reload_for_signal("a signal of process " + std::to_string(info.ssi_pid) + ", user " +
+                        describe_user(info.ssi_uid));
       continue;
     }
     log::info("stopping: signal {}", info.ssi_signo);
@@ -258,10 +264,6 @@ void Daemon::settle() {
     }
   }
   for (const ClientId id : lost) drop(id);
-  if (reload_wanted_ && !swapping_ && phase_ == Phase::kServing) {
-    reload_wanted_ = false;
-    reload();
-  }
 }
 
 }  // namespace arbiter::service

@@ -5,7 +5,7 @@
 //
 //   daemon.cpp           the loop, and clients that come and go
 //   daemon_requests.cpp  what they ask
-//   daemon_reload.cpp    another model, or policy
+//   daemon_reload.cpp    another model, or policy: reload, switch, rollback
 //   daemon_takeover.cpp  what a predecessor has left
 #pragma once
 
@@ -17,12 +17,14 @@
 #include <string>
 #include <vector>
 
-#include "rules/load.hpp"
 #include "service/barriers.hpp"
+#include "service/changes.hpp"
 #include "service/client.hpp"
 #include "service/directory.hpp"
 #include "service/gate.hpp"
+#include "service/history.hpp"
 #include "service/inheritance.hpp"
+#include "service/library.hpp"
 #include "service/models.hpp"
 #include "service/registry.hpp"
 #include "service/switchboard.hpp"
@@ -37,12 +39,19 @@ constexpr shm::Nanoseconds kMaxWaitForClients = 200'000'000;
 constexpr shm::Nanoseconds kShowGrowthAfter = 250'000'000;
 
 struct DaemonOptions {
-  rules::ModelFiles files;
+  std::vector<NamedFiles> models;     // the first is put in force at the start
   std::string instance;               // checked
   std::string directory;              // where to listen
   std::optional<std::string> policy;  // a file; without one the default policy holds
   // Whether the service manager keeps descriptors for the next daemon.
   bool uses_descriptor_store = false;
+};
+
+// What the files say now.
+struct Reading {
+  Findings findings;  // the rest is to be used only if there is no error
+  std::optional<Policy> policy;
+  std::vector<ModelPointer> models;
 };
 
 // A request that cannot be served yet, and why; it is tried again, at `deadline` for the last time.
@@ -65,6 +74,19 @@ class Daemon {
   void run(int signal_descriptor);
 
   [[nodiscard]] const std::string& path() const { return listener_.path; }
+
+  // A change of the model, from when it is prepared until those who asked are answered.
+  struct Swap {
+    Change change;
+    Findings findings;
+    LoadedModel to;
+    std::string how;            // as in the history
+    std::uint64_t content = 0;  // likewise
+    bool is_compared = false;   // with what was in force before
+    // Of a reload: what else changes with it.
+    std::optional<Library> library{};
+    std::optional<Policy> policy{};
+  };
 
  private:
   enum class Tag : std::uint32_t { kListener, kSignals, kClient, kProcess, kAbsentee };
@@ -100,11 +122,23 @@ class Daemon {
   // The same of one that is away. Throws NotYet.
   void require_not_kept(shm::PortInstance holder, const std::string& what);
 
-  void reload(ClientId asking, std::uint64_t request);  // answered when it is over
-  void reload();
-  void begin_swap();
+  // Changes of the model (daemon_reload.cpp): each is answered when it is over.
+  void ask_for(Change change, const Client& client, const shm::Message& message);
+  void reload_for_signal(const std::string& by);
+  void advance_changes();
+  [[nodiscard]] Reading read_files() const;
+  void prepare_reload(Swap& swap);
+  void prepare_switch(Swap& swap);
+  void prepare_rollback(Swap& swap);
+  void compare_with_files(Swap& swap);
+  void reserve_tables(const Library& library);
+  void begin_swap(Swap swap);  // whose table the board has
   void put_in_force();
-  void answer_reloads(const std::string& why_not);  // empty: all is in force
+  void answer_done(const Swap& swap, const std::string& changes);
+  void answer_refused(const Swap& swap, const std::string& why);
+  void answer(const Swap& swap, const std::string& report, const std::string& why_not = {});
+  void send_document(Client& client, std::uint64_t request, shm::MessageKind kind,
+                     const std::string& document);
 
   // Taking over from a predecessor (daemon_takeover.cpp).
 
@@ -136,6 +170,7 @@ class Daemon {
   void set_away(Client& client);
   void forget_absentee(NodeId node);
   void finish_takeover();
+  [[nodiscard]] Swap first_swap();
   void remember_components();
   void remember_component(Client& client);
   void welcome(Client& client);
@@ -149,7 +184,12 @@ class Daemon {
   Gate gate_;
   Registry registry_;
   Directory directory_{registry_, stores_};
-  Models models_;
+  Models models_{directory_, registry_};
+  const std::vector<NamedFiles> files_;
+  std::vector<ModelPointer> read_at_start_;  // until they are put into the library
+  Library library_;
+  ModelPointer in_force_;  // null: none, or a predecessor's
+  History history_;
   Switchboard switchboard_{directory_, registry_};
   Barriers barriers_;
   shm::Nanoseconds show_growth_at_ = shm::kForever;
@@ -166,16 +206,10 @@ class Daemon {
   shm::FileDescriptor reserve_;  // given up for a moment to turn a client away when none is left
   std::map<ClientId, std::unique_ptr<Client>> clients_;  // the oldest first
   ClientId last_client_ = 0;
-  bool swapping_ = false;       // a model waits for its barrier
-  bool reload_wanted_ = false;  // another SIGHUP came meanwhile
+  Changes changes_;
+  std::optional<Swap> swap_;  // the one that waits for its barrier
   std::uint64_t reloads_refused_ = 0;
   bool stop_wanted_ = false;
-  struct ReloadRequest {
-    ClientId client;
-    std::uint64_t request;
-  };
-  std::vector<ReloadRequest> reloads_asked_;    // for the reload that begins next
-  std::vector<ReloadRequest> reloads_running_;  // for the one that waits for its barrier
 };
 
 }  // namespace arbiter::service

@@ -1,47 +1,154 @@
-// How another model, and another policy, come into force.
+// How another model, and another policy, come into force: read again, switched to, or gone back to.
+//
+// Whatever it is, it ends in one swap: the new table is written and its clients are told before it
+// counts; they switch all at once. Changes wait for each other.
+#include <algorithm>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "service/comparison.hpp"
 #include "service/daemon.hpp"
 #include "service/log.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
+namespace {
 
-void Daemon::reload(ClientId asking, std::uint64_t request) {
-  reloads_asked_.push_back({asking, request});
-  reload();
+// What came of it, for those who want all of it. File names may be any bytes; JSON may not.
+std::string report(const Daemon::Swap& swap, nlohmann::json document) {
+  document["text"] = swap.findings.text();
+  document["findings"] = swap.findings.json();
+  return document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-// The new table is written and its clients are told before it counts; they switch all at once.
-void Daemon::reload() {
-  if (swapping_ || phase_ != Phase::kServing) {
-    reload_wanted_ = true;
-    return;
-  }
-  reloads_running_ = std::exchange(reloads_asked_, {});
+}  // namespace
+
+void Daemon::ask_for(Change change, const Client& client, const shm::Message& message) {
+  change.by = client.description() + ", user " + describe_user(client.user());
+  change.asking = {
+      {client.id(), message.request, (message.flags & shm::kWantsReport) != 0}};
+  changes_.add(std::move(change));
+}
+
+void Daemon::reload_for_signal(const std::string& by) {
+  changes_.add({Change::Kind::kReload, {}, 0, by, {}});
+}
+
+// One at a time, so that others are served in between.
+void Daemon::advance_changes() {
+  if (swap_ || phase_ != Phase::kServing || changes_.empty()) return;
+  Swap swap;
+  swap.change = changes_.take_next();
   try {
-    if (!models_.has_files() && !gate_.has_file()) {
-      throw std::runtime_error("there is no file to read again; start with --model");
-    }
-    gate_.prepare();
-    if (models_.has_files()) {
-      models_.read();
-      models_.prepare();
+    switch (swap.change.kind) {
+      case Change::Kind::kReload:
+        return prepare_reload(swap);
+      case Change::Kind::kCompare:
+        return compare_with_files(swap);
+      case Change::Kind::kSwitch:
+        return prepare_switch(swap);
+      case Change::Kind::kRollback:
+        return prepare_rollback(swap);
     }
   } catch (const std::exception& error) {
-    ++reloads_refused_;
+    if (swap.change.kind == Change::Kind::kReload) ++reloads_refused_;
     log::error("the model in force stays: {}", error.what());
-    answer_reloads(error.what());
-    return;
+    answer_refused(swap, error.what());
   }
-  if (!models_.has_files()) {
-    gate_.put_in_force();
-    answer_reloads({});
-    return;
-  }
-  begin_swap();
 }
 
-void Daemon::begin_swap() {
-  swapping_ = true;
+Reading Daemon::read_files() const {
+  if (files_.empty() && !gate_.has_file()) {
+    throw std::runtime_error("there is no file to read again; start with --model");
+  }
+  Reading reading;
+  reading.policy = gate_.read(reading.findings);
+  reading.models = read_models(files_, reading.findings);
+  return reading;
+}
+
+// Throws; then nothing has changed, and `swap` knows the findings.
+void Daemon::prepare_reload(Swap& swap) {
+  Reading reading = read_files();
+  swap.findings = std::move(reading.findings);
+  if (swap.findings.has_errors()) throw BadModel(swap.findings.first_error());
+  if (files_.empty()) {
+    gate_.put_in_force(std::move(*reading.policy));
+    answer_done(swap, {});
+    return;
+  }
+  Library library(std::move(reading.models), directory_);
+  const LoadedModel* next = library.find(models_.name());
+  if (next == nullptr) next = library.first();
+  const LoadedModel* const last = library_.find(next->model->name);
+  swap.to = *next;
+  swap.how = "reload";
+  swap.is_compared = true;
+  // What was in force, and is now as it was, is no step for a rollback.
+  if (last != nullptr && last->model == in_force_ &&
+      last->layout->words() == next->layout->words() && history_.latest() != nullptr) {
+    swap.content = history_.latest()->content;
+  }
+  reserve_tables(library);
+  swap.policy = std::move(reading.policy);
+  swap.library = std::move(library);
+  models_.prepare(*swap.to.layout, swap.to.model->name);
+  begin_swap(std::move(swap));
+}
+
+// So that a switch does not fail for want of memory, either.
+void Daemon::reserve_tables(const Library& library) {
+  if (library.models().size() < 2) return;
+  std::size_t words = 0;
+  for (const LoadedModel& each : library.models()) {
+    words = std::max(words, each.layout->words().size());
+  }
+  models_.reserve(words);
+}
+
+void Daemon::prepare_switch(Swap& swap) {
+  const LoadedModel* const next = library_.find(swap.change.name);
+  if (next == nullptr) {
+    throw std::runtime_error("there is no model \"" + swap.change.name +
+                             (library_.models().empty() ? "\"; none is loaded"
+                                                        : "\"; there are: " + library_.names()));
+  }
+  if (next->model == in_force_) {
+    answer_done(swap, {});
+    return;
+  }
+  swap.to = *next;
+  swap.how = "switch";
+  models_.prepare(*swap.to.layout, swap.to.model->name);
+  begin_swap(std::move(swap));
+}
+
+void Daemon::prepare_rollback(Swap& swap) {
+  const std::uint64_t asked = swap.change.generation;
+  const PastModel* const past = asked == 0 ? history_.previous() : history_.find(asked);
+  if (past == nullptr && asked == 0) {
+    throw std::runtime_error("there is no model to go back to; arbiter history shows all");
+  }
+  if (past == nullptr) {
+    throw std::runtime_error("model " + std::to_string(asked) +
+                             " is not in the history; arbiter history shows what is");
+  }
+  if (past->model == nullptr) {
+    throw std::runtime_error("model " + std::to_string(past->generation) +
+                             " is not kept any longer, or was another daemon's; only its name is "
+                             "known");
+  }
+  swap.to = {past->model, std::make_shared<const Layout>(past->model->compiled, directory_)};
+  swap.how = "rollback to " + std::to_string(past->generation);
+  swap.content = past->content;
+  swap.is_compared = true;
+  models_.prepare(*swap.to.layout, swap.to.model->name);
+  begin_swap(std::move(swap));
+}
+
+void Daemon::begin_swap(Swap swap) {
+  swap_ = std::move(swap);
   auto told = switchboard_.link_all(models_.prepared());
   // The table itself, all who will read it have to map.
   for (const auto& [id, client] : clients_) {
@@ -51,9 +158,11 @@ void Daemon::begin_swap() {
 }
 
 void Daemon::put_in_force() {
-  gate_.put_in_force();
+  const Swap swap = std::move(*std::exchange(swap_, std::nullopt));
+  if (swap.policy) gate_.put_in_force(*swap.policy);
   models_.put_in_force();
-  swapping_ = false;
+  const ModelPointer before = std::exchange(in_force_, swap.to.model);
+  if (swap.library) library_ = *swap.library;
   const auto snapshot = models_.in_force();
   introduce(switchboard_.link_all(snapshot.table), [] {});  // ports that were opened meanwhile
   switchboard_.unlink(snapshot.table);
@@ -61,22 +170,65 @@ void Daemon::put_in_force() {
   for (const auto& [id, client] : clients_) {
     if (client->observes) switchboard_.show_everything(*client);
   }
-  log::info("model {} is in force", snapshot.generation);
+  log::info("model {} is in force: {} \"{}\"{}", snapshot.generation, swap.how, in_force_->name,
+            swap.change.by.empty() ? "" : ", by " + swap.change.by);
+  history_.add({snapshot.generation, swap.content, in_force_->name, in_force_->files, calendar_ms(),
+                swap.how, swap.change.by, {}, in_force_});
   welcome_waiting();
-  answer_reloads({});
+  std::string changes;
+  if (swap.is_compared && before != nullptr) {
+    changes = summary_of_changes(before->compiled, in_force_->compiled);
+    log::info("model {} compared with the last: {}", snapshot.generation, changes);
+    history_.set_changes(snapshot.generation, changes);
+  }
+  answer_done(swap, changes);
 }
 
-void Daemon::answer_reloads(const std::string& why_not) {
-  for (const ReloadRequest& each : std::exchange(reloads_running_, {})) {
-    const auto client = clients_.find(each.client);
-    if (client == clients_.end()) continue;
-    if (!why_not.empty()) {
-      refuse(*client->second, each.request, why_not);
-      continue;
+// What `arbiter reload --dry-run` shows.
+void Daemon::compare_with_files(Swap& swap) {
+  Reading reading = read_files();
+  swap.findings = std::move(reading.findings);
+  if (swap.findings.has_errors()) throw BadModel(swap.findings.first_error());
+  nlohmann::json models = nlohmann::json::array();
+  for (const ModelPointer& read : reading.models) {
+    const bool is_in_force = read->name == models_.name();
+    const LoadedModel* const loaded = library_.find(read->name);
+    ModelPointer before = loaded == nullptr ? nullptr : loaded->model;
+    if (is_in_force) before = in_force_;
+    nlohmann::json model{{"name", read->name}, {"in_force", is_in_force}, {"changes", nullptr}};
+    if (before != nullptr) model["changes"] = changes_json(before->compiled, read->compiled);
+    models.push_back(std::move(model));
+  }
+  answer(swap, report(swap, {{"ok", true}, {"models", std::move(models)}}));
+}
+
+void Daemon::answer_done(const Swap& swap, const std::string& changes) {
+  answer(swap, report(swap, {{"ok", true},
+                             {"generation", models_.in_force().generation},
+                             {"name", models_.name()},
+                             {"changes", changes.empty() ? nlohmann::json(nullptr)
+                                                         : nlohmann::json(changes)}}));
+}
+
+void Daemon::answer_refused(const Swap& swap, const std::string& why) {
+  answer(swap, report(swap, {{"ok", false}, {"why", why}}), why);
+}
+
+// `why_not`: of what was refused.
+void Daemon::answer(const Swap& swap, const std::string& report, const std::string& why_not) {
+  for (const Change::Asking& each : swap.change.asking) {
+    const auto found = clients_.find(each.client);
+    if (found == clients_.end()) continue;
+    Client& client = *found->second;
+    if (each.wants_report) {
+      send_document(client, each.request, shm::MessageKind::kReport, report);
+    } else if (!why_not.empty()) {
+      refuse(client, each.request, why_not);
+    } else {
+      auto reply = reply_to(each.request, shm::MessageKind::kDone);
+      reply.value = static_cast<std::uint32_t>(models_.in_force().generation);
+      client.send(reply);
     }
-    auto reply = reply_to(each.request, shm::MessageKind::kDone);
-    reply.value = static_cast<std::uint32_t>(models_.in_force().generation);
-    client->second->send(reply);
   }
 }
 

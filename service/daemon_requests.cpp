@@ -37,7 +37,8 @@ bool is_question(shm::MessageKind kind) {
   return kind == MessageKind::kOpenOutput || kind == MessageKind::kOpenInput ||
          kind == MessageKind::kConnect || kind == MessageKind::kReload ||
          kind == MessageKind::kStatus || kind == MessageKind::kDeactivate ||
-         kind == MessageKind::kObserve;
+         kind == MessageKind::kObserve || kind == MessageKind::kSwitch ||
+         kind == MessageKind::kRollback;
 }
 
 }  // namespace
@@ -106,7 +107,17 @@ void Daemon::handle(Client& client, shm::Received& received) {
       break;
     case shm::MessageKind::kReload:
       gate_.require(client, Action::kReload);
-      reload(client.id(), message.request);
+      ask_for({(message.flags & shm::kDryRun) != 0 ? Change::Kind::kCompare : Change::Kind::kReload,
+               {}, 0, {}, {}},
+              client, message);
+      break;
+    case shm::MessageKind::kSwitch:
+      gate_.require(client, Action::kSwitch);
+      ask_for({Change::Kind::kSwitch, std::string(message.name_view()), 0, {}, {}}, client, message);
+      break;
+    case shm::MessageKind::kRollback:
+      gate_.require(client, Action::kReload);
+      ask_for({Change::Kind::kRollback, {}, message.link, {}, {}}, client, message);
       break;
     case shm::MessageKind::kStop:
       gate_.require(client, Action::kStop);
@@ -289,15 +300,20 @@ void Daemon::close_port(Client& client, shm::PortInstance port) {
 
 void Daemon::send_status(Client& client, std::uint64_t request) {
   const std::string document = status_document(
-      {instance_, models_, directory_, switchboard_, clients_.size(), reloads_refused_},
+      {instance_, models_, library_, in_force_, history_, directory_, switchboard_, clients_.size(),
+       reloads_refused_},
       shm::monotonic_now());
-  const auto file = shm::make_segment("arbiter-status", document.size());
+  send_document(client, request, shm::MessageKind::kStatusReply, document);
+}
+
+void Daemon::send_document(Client& client, std::uint64_t request, shm::MessageKind kind,
+                           const std::string& document) {
+  const auto file = shm::make_segment("arbiter-document", document.size());
   if (pwrite(file.get(), document.data(), document.size(), 0) !=
       static_cast<ssize_t>(document.size())) {
-    throw std::runtime_error("the status document could not be written");
+    throw std::runtime_error("the document could not be written");
   }
-  client.send(reply_to(request, shm::MessageKind::kStatusReply),
-              {shm::reopen(file, O_RDONLY).get(), -1});
+  client.send(reply_to(request, kind), {shm::reopen(file, O_RDONLY).get(), -1});
 }
 
 void Daemon::deactivate(Client& client, const shm::Message& message) {

@@ -226,21 +226,47 @@ void Daemon::finish_takeover() {
   phase_ = Phase::kServing;
   try_postponed_ = true;
   directory_.forget_lost_pages();
-  if (!models_.has_files()) {
+  const auto inherited = models_.in_force().generation;
+  if (inherited != 0) {
+    history_.add({inherited, 0, models_.name(), {}, calendar_ms(), "takeover", {}, {}, nullptr});
+  }
+  if (files_.empty()) {
     if (!is_fresh) log::info("no model was given: the one in force stays");
     switchboard_.link_all(models_.in_force().table);
     welcome_waiting();
     return;
   }
+  Swap swap;
   try {
-    models_.prepare();
+    swap = first_swap();
   } catch (const std::exception& error) {
     if (is_fresh) throw;
     log::error("the model in force stays: {}", error.what());
     welcome_waiting();
     return;
   }
-  begin_swap();
+  begin_swap(std::move(swap));
+}
+
+// The model that the last daemon had in force, if this one has it by that name, too.
+Daemon::Swap Daemon::first_swap() {
+  Library library(std::exchange(read_at_start_, {}), directory_);
+  const std::string last = models_.name();
+  const LoadedModel* next = library.find(last);
+  if (next == nullptr) {
+    next = library.first();
+    if (!last.empty()) {
+      log::warn("the last daemon's model \"{}\" is not among those given: \"{}\" takes its place",
+                last, next->model->name);
+    }
+  }
+  Swap swap;
+  swap.to = *next;
+  swap.how = "start";
+  reserve_tables(library);
+  models_.prepare(*swap.to.layout, next->model->name);
+  swap.library = std::move(library);
+  return swap;
 }
 
 // For the next daemon.

@@ -12,13 +12,13 @@
 namespace arbiter::service {
 namespace {
 
-// An entry that no table in the ring names, and no live port.
+// An entry that no table in the ring names, nor one that may come, and no live port.
 template <class Entry>
 Entry* find_unused(const std::vector<std::unique_ptr<Entry>>& entries, std::uint64_t generation) {
   for (const auto& entry : entries) {
     const bool named =
         entry->used_by_generation != 0 && generation - entry->used_by_generation < shm::kTableSlots;
-    if (entry->open == 0 && entry->away == 0 && !named) return entry.get();
+    if (entry->open == 0 && entry->away == 0 && entry->pins == 0 && !named) return entry.get();
   }
   return nullptr;
 }

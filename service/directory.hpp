@@ -1,6 +1,6 @@
 // Who is who: the ids of sources and input ports, and the activity page of each source.
 //
-// A name keeps its id for as long as a model or a live port uses it, across models and daemons, and
+// A name keeps its id for as long as a model (in force, or loaded) or a live port uses it, across models and daemons, and
 // in practice for ever; only where ids run out is one taken from a name that nobody uses any more.
 // What a successor must know of it stands in the registry.
 #pragma once
@@ -27,6 +27,7 @@ struct Source {
   shm::Mapping page;
   std::uint64_t page_number = 0;         // another where an id got a page for another name
   std::uint64_t used_by_generation = 0;  // the last model that named it
+  std::uint32_t pins = 0;                // of layouts of models that may come into force
   shm::PortInstance open = 0;            // the live output port, if any
   shm::PortInstance away = 0;            // of a component that lives and has not come back yet
 
@@ -40,6 +41,7 @@ struct InputName {
   std::string name;
   std::uint64_t name_number = 0;  // another where an id got another name
   std::uint64_t used_by_generation = 0;
+  std::uint32_t pins = 0;
   shm::PortInstance open = 0;
   shm::PortInstance away = 0;
 };

@@ -1,7 +1,11 @@
 #include "service/findings.hpp"
 
 #include <algorithm>
+#include <sstream>
 
+#include <nlohmann/json.hpp>
+
+#include "rules/report.hpp"
 #include "service/log.hpp"
 
 namespace arbiter::service {
@@ -10,8 +14,6 @@ namespace {
 std::string place(const rules::Location& where) {
   return where.file + ":" + std::to_string(where.line) + ":" + std::to_string(where.column);
 }
-
-}  // namespace
 
 void log_findings(const rules::Diagnostics& diagnostics) {
   for (const rules::Diagnostic& finding : diagnostics.items()) {
@@ -22,16 +24,69 @@ void log_findings(const rules::Diagnostics& diagnostics) {
   }
 }
 
-std::string first_error(const rules::Diagnostics& diagnostics) {
-  const auto is_error = [](const rules::Diagnostic& finding) {
-    return finding.severity == rules::Severity::kError;
-  };
-  const auto& items = diagnostics.items();
-  const auto first = std::find_if(items.begin(), items.end(), is_error);
-  if (first == items.end()) return "more than can be shown";
-  const auto more = std::count_if(first + 1, items.end(), is_error);
-  return place(first->where) + ": " + first->message +
-         (more == 0 ? "" : " (and " + std::to_string(more) + " more; see the log)");
+bool is_error(const rules::Diagnostic& finding) {
+  return finding.severity == rules::Severity::kError;
+}
+
+}  // namespace
+
+void Findings::add(std::string of, rules::Diagnostics diagnostics) {
+  log_findings(diagnostics);
+  parts_.push_back({std::move(of), std::move(diagnostics)});
+}
+
+void Findings::add_failure(std::string why) { failures_.push_back(std::move(why)); }
+
+bool Findings::has_errors() const {
+  return !failures_.empty() || std::any_of(parts_.begin(), parts_.end(), [](const Part& part) {
+    return part.diagnostics.has_errors();
+  });
+}
+
+std::string Findings::first_error() const {
+  std::string first;
+  std::size_t count = failures_.size();
+  if (count != 0) first = failures_.front();
+  for (const Part& part : parts_) {
+    const auto& items = part.diagnostics.items();
+    const auto found = std::find_if(items.begin(), items.end(), is_error);
+    if (found == items.end()) {
+      if (part.diagnostics.has_errors() && count++ == 0) {
+        first = part.of + " has errors: more than can be shown";
+      }
+      continue;
+    }
+    if (count == 0) {
+      first = part.of + " has errors: " + place(found->where) + ": " + found->message;
+    }
+    count += static_cast<std::size_t>(std::count_if(items.begin(), items.end(), is_error));
+  }
+  if (count > 1) first += " (and " + std::to_string(count - 1) + " more; see the log)";
+  return first;
+}
+
+std::string Findings::text() const {
+  std::ostringstream text;
+  for (const std::string& why : failures_) text << "error: " << why << '\n';
+  for (const Part& part : parts_) {
+    if (part.diagnostics.items().empty()) continue;
+    if (parts_.size() > 1) text << part.of << ":\n";
+    rules::write_text(text, part.diagnostics);
+  }
+  return text.str();
+}
+
+nlohmann::json Findings::json() const {
+  nlohmann::json result = nlohmann::json::array();
+  for (const std::string& why : failures_) {
+    result.push_back({{"of", why}, {"findings", nlohmann::json::array()}});
+  }
+  for (const Part& part : parts_) {
+    std::ostringstream text;
+    rules::write_json(text, part.diagnostics);
+    result.push_back({{"of", part.of}, {"findings", nlohmann::json::parse(text.str())}});
+  }
+  return result;
 }
 
 }  // namespace arbiter::service

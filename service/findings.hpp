@@ -2,14 +2,39 @@
 #pragma once
 
 #include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
 
 #include "rules/diagnostic.hpp"
 
 namespace arbiter::service {
 
-void log_findings(const rules::Diagnostics& diagnostics);
+// Of several files that are read together: a policy and models.
+class Findings {
+ public:
+  // Logs them too. `of` is what was read, as in a sentence: "the policy", "the model work".
+  void add(std::string of, rules::Diagnostics diagnostics);
+  // It could not be read at all; the sentence says why.
+  void add_failure(std::string why);
 
-// file:line:column: message, of the first error, and how many more there are.
-std::string first_error(const rules::Diagnostics& diagnostics);
+  [[nodiscard]] bool has_errors() const;
+  // "the model has errors: file:line:column: message", of the first error, and how many more there
+  // are.
+  [[nodiscard]] std::string first_error() const;
+  // All of it, as `arbiter check` shows it.
+  [[nodiscard]] std::string text() const;
+  // [{"of", "findings": […]}], each list as `arbiter check --json` writes it.
+  [[nodiscard]] nlohmann::json json() const;
+
+ private:
+  struct Part {
+    std::string of;
+    rules::Diagnostics diagnostics;
+  };
+  std::vector<std::string> failures_;
+  std::vector<Part> parts_;
+};
 
 }  // namespace arbiter::service

@@ -10,22 +10,10 @@
 #include <system_error>
 #include <utility>
 
-#include "service/findings.hpp"
 #include "service/log.hpp"
 
 namespace arbiter::service {
 namespace {
-
-// "nobody (65534)"; the number alone where it has no name.
-std::string describe_user(uid_t user) {
-  passwd entry{};
-  passwd* found = nullptr;
-  std::vector<char> buffer(4096);
-  if (getpwuid_r(user, &entry, buffer.data(), buffer.size(), &found) != 0 || found == nullptr) {
-    return std::to_string(user);
-  }
-  return entry.pw_name + (" (" + std::to_string(user) + ")");
-}
 
 std::string describe(Action action, std::string_view port) {
   const std::string name(port);
@@ -40,6 +28,8 @@ std::string describe(Action action, std::string_view port) {
       return "observe";
     case Action::kReload:
       return "reload the files";
+    case Action::kSwitch:
+      return "switch to another model";
     case Action::kStop:
       return "stop the daemon";
   }
@@ -57,6 +47,16 @@ void require_protected(const std::string& path) {
 }
 
 }  // namespace
+
+std::string describe_user(uid_t user) {
+  passwd entry{};
+  passwd* found = nullptr;
+  std::vector<char> buffer(4096);
+  if (getpwuid_r(user, &entry, buffer.data(), buffer.size(), &found) != 0 || found == nullptr) {
+    return std::to_string(user);
+  }
+  return entry.pw_name + (" (" + std::to_string(user) + ")");
+}
 
 Identity peer_identity(int socket) {
   ucred peer{};
@@ -80,24 +80,23 @@ Identity peer_identity(int socket) {
 
 Gate::Gate(std::optional<std::string> file) : file_(std::move(file)), policy_(geteuid()) {}
 
-void Gate::prepare() {
-  prepared_.reset();
-  if (!file_) return;
-  require_protected(*file_);
-  rules::Diagnostics diagnostics;
-  const rules::TextFile text(*file_, rules::read_bytes(*file_));
-  Policy policy = Policy::parse(text, geteuid(), accounts_of_this_machine(), diagnostics);
-  log_findings(diagnostics);
-  if (diagnostics.has_errors()) {
-    throw std::runtime_error("the policy has errors: " + first_error(diagnostics));
+std::optional<Policy> Gate::read(Findings& findings) const {
+  if (!file_) return {};
+  try {
+    require_protected(*file_);
+    rules::Diagnostics diagnostics;
+    const rules::TextFile text(*file_, rules::read_bytes(*file_));
+    Policy policy = Policy::parse(text, geteuid(), accounts_of_this_machine(), diagnostics);
+    findings.add("the policy", std::move(diagnostics));
+    return policy;
+  } catch (const std::runtime_error& error) {
+    findings.add_failure(error.what());
+    return {};
   }
-  prepared_ = std::move(policy);
 }
 
-void Gate::put_in_force() {
-  if (!prepared_) return;
-  policy_ = std::move(*prepared_);
-  prepared_.reset();
+void Gate::put_in_force(const Policy& policy) {
+  policy_ = policy;
   log::info("the policy of {} is in force, {} rules", *file_, policy_.size());
 }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "service/client.hpp"
+#include "service/findings.hpp"
 #include "service/policy.hpp"
 
 namespace arbiter::service {
@@ -15,15 +16,17 @@ namespace arbiter::service {
 // Throws std::system_error.
 Identity peer_identity(int socket);
 
+// "nobody (65534)"; the number alone where it has no name.
+std::string describe_user(uid_t user);
+
 class Gate {
  public:
   // Without a file the default policy holds.
   explicit Gate(std::optional<std::string> file);
 
-  // Reads the file again, if there is one; put_in_force() makes it count. Logs every finding.
-  // Throws std::runtime_error; then nothing has changed.
-  void prepare();
-  void put_in_force();
+  // What the file says now, if there is one; to be used only if nothing is found to be wrong.
+  [[nodiscard]] std::optional<Policy> read(Findings& findings) const;
+  void put_in_force(const Policy& policy);
   [[nodiscard]] bool has_file() const { return file_.has_value(); }
 
   // Throws std::runtime_error if the client may not do it. The message says who may not do what,
@@ -33,7 +36,6 @@ class Gate {
  private:
   std::optional<std::string> file_;
   Policy policy_;
-  std::optional<Policy> prepared_;
 };
 
 }  // namespace arbiter::service

@@ -20,13 +20,14 @@ namespace log = arbiter::service::log;
 constexpr const char* kExample = R"(
 Example:
   arbiterd --model search_and_track.xml
+  arbiterd --model search=search.xml --model dance=dance.xml     # and then: arbiter switch dance
 
 It runs in the foreground, needs no configuration and no privileges, and logs to standard error.
-SIGHUP and `arbiter reload` read the files again; a bad one changes nothing. SIGTERM, SIGINT and
+SIGHUP and `arbiter reload` read all files again; a bad one changes nothing. SIGTERM, SIGINT and
 `arbiter stop` stop it. Without --policy every user may open ports and observe, and only root and the
-daemon's own user may reload and stop.
+daemon's own user may reload, switch and stop.
 Components go on without it. The next daemon of the instance takes them over, and puts its own model
-in force; without --model it keeps the one that is.
+in force, of several the one of the name that was; without --model it keeps the one that is.
 It listens in $RUNTIME_DIRECTORY, else $XDG_RUNTIME_DIR/arbiter, else /run/arbiter if it may write
 there, else arbiter-UID in the temporary directory.)";
 
@@ -63,15 +64,19 @@ int run(int argc, char** argv) {
   app.footer(kExample);
   app.set_version_flag("--version", std::string("arbiterd ") + ARBITER_VERSION);
   arbiter::service::DaemonOptions options;
-  std::string application;
+  std::vector<std::string> models;
+  std::vector<std::string> applications;
   std::string policy;
   std::string instance;
   std::string level = "info";
-  app.add_option("--model", options.files.models, "Model file; several form one model")
-      ->type_name("FILE");
-  app.add_option("--application", application, "Application file: which connections exist")
-      ->type_name("FILE");
-  app.add_option("--policy", policy, "Policy file: who may open which ports, reload, stop, observe")
+  app.add_option("--model", models,
+                 "Model file; several of one NAME, or without one, form one model. The first model "
+                 "is put in force, `arbiter switch` goes to the others")
+      ->type_name("[NAME=]FILE");
+  app.add_option("--application", applications,
+                 "Application file: which connections exist; without NAME for all models")
+      ->type_name("[NAME=]FILE");
+  app.add_option("--policy", policy, "Policy file: who may open which ports, reload, switch, stop, observe")
       ->type_name("FILE");
   app.add_option("--instance", instance,
                  "Name of this daemon; without it $ARBITER_INSTANCE, else \"default\"")
@@ -87,9 +92,9 @@ int run(int argc, char** argv) {
   }
   log::set_default_logger(log::stderr_logger_mt("arbiterd"));
   log::set_level(log::level::from_str(level));
-  if (!application.empty()) options.files.application = application;
   if (!policy.empty()) options.policy = policy;
   try {
+    options.models = arbiter::service::named_files(models, applications);
     options.instance = arbiter::shm::instance_name(instance);
     options.directory = arbiter::shm::daemon_directory();
     return serve(options, options.instance);

@@ -2,7 +2,9 @@
 
 #include <fcntl.h>
 
-#include "service/findings.hpp"
+#include <stdexcept>
+#include <system_error>
+
 #include "service/inheritance.hpp"
 
 namespace arbiter::service {
@@ -19,9 +21,9 @@ shm::FileDescriptor make_board() {
 
 }  // namespace
 
-Models::Models(rules::ModelFiles files, Directory& directory)
-    : files_(std::move(files)),
-      directory_(directory),
+Models::Models(Directory& directory, Registry& registry)
+    : directory_(directory),
+      registry_(registry),
       writable_(make_board()),
       readable_(shm::reopen(writable_, O_RDONLY)),
       mapping_(writable_, sizeof(shm::Board), shm::Access::kReadWrite),
@@ -44,47 +46,36 @@ void Models::inherit(const shm::FileDescriptor& board) {
   reader_ = shm::TableReader(*mapping_.as<shm::Board>());
 }
 
-void Models::read() {
-  rules::Diagnostics diagnostics;
-  rules::CompiledModel model;
-  try {
-    const rules::RuleSet rules = rules::load(files_, diagnostics);
-    if (!diagnostics.has_errors()) model = rules::compile(rules, diagnostics);
-  } catch (const rules::FileError& error) {
-    throw BadModel(error.what());
+void Models::reserve(std::size_t words) {
+  for (std::size_t slot = 0; slot < shm::kTableSlots; ++slot) {
+    const std::size_t offset =
+        offsetof(shm::Board, tables) + slot * sizeof(shm::Word) * shm::kMaxTableWords;
+    if (const auto error = shm::allocate(writable_, offset, words * sizeof(shm::Word))) {
+      throw std::system_error(error, "allocating decision tables");
+    }
   }
-  log_findings(diagnostics);
-  if (diagnostics.has_errors()) throw BadModel("the model has errors: " + first_error(diagnostics));
-  compiled_ = std::move(model);
 }
 
-void Models::prepare() {
-  const std::uint64_t generation = writer_.next_generation();
-  std::vector<shm::Word> words;
-  try {
-    words = rules::flatten(compiled_, {[&](const std::string& name) {
-                                         Source& source = directory_.source(name);
-                                         source.used_by_generation = generation;
-                                         return source.id;
-                                       },
-                                       [&](const std::string& name) {
-                                         InputName& input = directory_.input(name);
-                                         input.used_by_generation = generation;
-                                         return input.id;
-                                       }});
-  } catch (const std::length_error& error) {
-    throw BadModel(error.what());
-  }
+void Models::prepare(const Layout& layout, const std::string& name) {
+  const auto& words = layout.words();
   if (const auto error =
           shm::allocate(writable_, writer_.next_offset(), words.size() * sizeof(shm::Word))) {
     throw std::system_error(error, "allocating a decision table");
   }
+  const std::uint64_t generation = writer_.next_generation();
+  layout.mark_used(generation);
+  registry_.name_model(generation, name);
   writer_.write(words);
 }
 
 void Models::put_in_force() {
   writer_.put_in_force();
   directory_.set_generation(reader_.generation());
+}
+
+std::string Models::name() const {
+  const std::uint64_t generation = reader_.generation();
+  return generation == 0 ? "" : registry_.model(generation);
 }
 
 }  // namespace arbiter::service

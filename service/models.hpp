@@ -1,52 +1,42 @@
-// The model in force: read, proved, compiled and written into the board that all clients map.
+// The board that all clients map: which table is in force, and which comes next.
 #pragma once
 
 #include <cstdint>
-#include <string>
-#include <vector>
 
-#include "rules/compile.hpp"
-#include "rules/load.hpp"
 #include "service/directory.hpp"
+#include "service/library.hpp"
 #include "shm/segment.hpp"
 #include "shm/table_ring.hpp"
 
 namespace arbiter::service {
 
-// A model that was refused; the findings have been logged.
-class BadModel : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
 class Models {
  public:
-  // Throws std::system_error.
-  Models(rules::ModelFiles files, Directory& directory);
+  // An empty board. Throws std::system_error.
+  Models(Directory& directory, Registry& registry);
 
   // A predecessor's board takes the place of the empty one, which nobody has been given yet. Throws
   // std::runtime_error where it is not one.
   void inherit(const shm::FileDescriptor& board);
 
-  // Reads and proves the files. Logs every finding. Throws BadModel; then nothing has changed.
-  void read();
-  // Writes the table of what was read behind the ones in use; put_in_force() makes it count. Throws
-  // BadModel, std::system_error; then nothing has changed.
-  void prepare();
+  // So that tables of that many words can be written at any time. Throws std::system_error.
+  void reserve(std::size_t words);
+  // Writes a model's table behind the ones in use; put_in_force() makes it count. `name`: what a
+  // successor will know it by. Throws std::system_error; then nothing has changed.
+  void prepare(const Layout& layout, const std::string& name);
   void put_in_force();
 
   [[nodiscard]] shm::TableSnapshot in_force() const { return reader_.snapshot(); }
+  // The name of the one in force, be it a predecessor's; empty where there is none.
+  [[nodiscard]] std::string name() const;
   [[nodiscard]] shm::TableView prepared() const { return writer_.next_table(); }
   // Read-only, for clients.
   [[nodiscard]] const shm::FileDescriptor& board() const { return readable_; }
   [[nodiscard]] const shm::FileDescriptor& writable_board() const { return writable_; }
-  [[nodiscard]] const rules::ModelFiles& files() const { return files_; }
-  [[nodiscard]] bool has_files() const { return !files_.models.empty() || files_.application; }
 
  private:
-  rules::ModelFiles files_;
   Directory& directory_;
-  rules::CompiledModel compiled_;
+  Registry& registry_;
   shm::FileDescriptor writable_;
   shm::FileDescriptor readable_;
   shm::Mapping mapping_;

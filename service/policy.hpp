@@ -5,7 +5,7 @@
 //   WHO      everyone, owner (the user that the daemon runs as), user NAME, group NAME; numbers
 //            serve as names, too
 //   ACTION   output, input, deactivate: each on the ports whose names match one of the globs;
-//            observe, reload, stop: without globs; all: every action on every port
+//            observe, reload, switch, stop: without globs; all: every action on every port
 //
 // Behind the last line stand, unwritten: allow user root all; allow owner all; deny everyone all.
 // docs/policy.md has the reasons.
@@ -25,8 +25,16 @@
 
 namespace arbiter::service {
 
-enum class Action : std::uint8_t { kOutput, kInput, kDeactivate, kObserve, kReload, kStop };
-inline constexpr std::size_t kActionCount = 6;
+enum class Action : std::uint8_t {
+  kOutput,
+  kInput,
+  kDeactivate,
+  kObserve,
+  kReload,
+  kSwitch,
+  kStop
+};
+inline constexpr std::size_t kActionCount = 7;
 
 // Who asks, as the kernel knows him.
 struct Identity {

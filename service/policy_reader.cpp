@@ -29,6 +29,7 @@ constexpr std::array<NamedAction, kActionCount> kActions{{
     {"deactivate", Action::kDeactivate, true},
     {"observe", Action::kObserve, false},
     {"reload", Action::kReload, false},
+    {"switch", Action::kSwitch, false},
     {"stop", Action::kStop, false},
 }};
 constexpr std::string_view kShape = "a line is: allow|deny WHO ACTION[,ACTION...] [GLOB...]";

@@ -6,11 +6,14 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "service/model_files.hpp"
+#include "shm/table_ring.hpp"
+
 namespace arbiter::service {
 
 struct Registry::Segment {
   static constexpr std::uint64_t kMagic = 0x31676572'74696272;
-  static constexpr std::uint32_t kVersion = 1;
+  static constexpr std::uint32_t kVersion = 2;
 
   std::uint64_t magic;
   std::uint32_t version;
@@ -19,6 +22,7 @@ struct Registry::Segment {
   shm::Atomic<std::uint64_t> last_node;
   shm::Atomic<std::uint32_t> sources_named;
   shm::Atomic<std::uint32_t> inputs_named;
+  char models[shm::kTableSlots][kMaxModelName + 1];
   RegistryEntry sources[shm::kMaxSources];
   RegistryEntry inputs[shm::kMaxInputPorts];
 };
@@ -106,6 +110,20 @@ void Registry::name_input(shm::PortId id, const std::string& name) {
 void Registry::forget_source(shm::SourceId id) noexcept {
   source(id).clear_owner();
   source(id).named.store(0, std::memory_order_release);
+}
+
+// A name that cannot be one is of nobody: the segment may have been made by anyone of our user.
+std::string Registry::model(std::uint64_t generation) const {
+  const char* const text = segment().models[generation % shm::kTableSlots];
+  std::string name(text, strnlen(text, kMaxModelName));
+  return is_model_name(name) ? name : std::string();
+}
+
+void Registry::name_model(std::uint64_t generation, const std::string& name) noexcept {
+  char* const text = segment().models[generation % shm::kTableSlots];
+  const std::size_t length = std::min(name.size(), kMaxModelName);
+  std::memcpy(text, name.data(), length);
+  text[length] = '\0';
 }
 
 RegistryEntry& Registry::source(shm::SourceId id) const noexcept { return segment().sources[id]; }

@@ -65,6 +65,10 @@ class Registry {
   // That a name has been given.
   [[nodiscard]] RegistryEntry& source(shm::SourceId id) const noexcept;
   [[nodiscard]] RegistryEntry& input(shm::PortId id) const noexcept;
+  // What the model of a generation is called. The generation in force says which of them counts, so
+  // it is to be told before that. Kept for as many as the board keeps tables.
+  void name_model(std::uint64_t generation, const std::string& name) noexcept;
+  [[nodiscard]] std::string model(std::uint64_t generation) const;
   // Up to which ids names have been given.
   [[nodiscard]] std::uint32_t source_count() const noexcept;
   [[nodiscard]] std::uint32_t input_count() const noexcept;

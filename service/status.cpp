@@ -61,12 +61,12 @@ class Document {
     json document;
     document["instance"] = of_.instance;
     document["pid"] = getpid();
-    document["model"] = {
-        {"generation", snapshot_.generation},
-        {"files", of_.models.files().models},
-        {"application",
-         of_.models.files().application ? json(*of_.models.files().application) : json(nullptr)},
-        {"reloads_refused", of_.reloads_refused}};
+    document["model"] = model_json();
+    document["models"] = json::array();
+    for (const LoadedModel& each : of_.library.models()) {
+      document["models"].push_back(loaded_json(*each.model));
+    }
+    document["history"] = of_.history.json();
     document["clients"] = of_.clients;
     document["sources"] = json::array();
     for (const auto& source : of_.directory.sources()) {
@@ -82,6 +82,29 @@ class Document {
   }
 
  private:
+  static void add_files(const rules::ModelFiles& files, json& result) {
+    result["files"] = files.models;
+    result["application"] = files.application ? json(*files.application) : json(nullptr);
+  }
+
+  [[nodiscard]] json model_json() const {
+    const std::string name = of_.models.name();
+    json result{{"generation", snapshot_.generation},
+                {"name", name.empty() ? json(nullptr) : json(name)},
+                {"reloads_refused", of_.reloads_refused}};
+    add_files(of_.model == nullptr ? rules::ModelFiles() : of_.model->files, result);
+    return result;
+  }
+
+  // After a rollback the model in force has the name of one that is loaded, but is not that one.
+  [[nodiscard]] json loaded_json(const Model& model) const {
+    json result{{"name", model.name},
+                {"in_force", model.name == of_.models.name()},
+                {"as_loaded", &model == of_.model.get()}};
+    add_files(model.files, result);
+    return result;
+  }
+
   [[nodiscard]] bool is_worth_showing(const Source& source) const {
     return source.open != 0 || source.away != 0 || snapshot_.table.knows_source(source.id);
   }

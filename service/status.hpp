@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "service/history.hpp"
 #include "service/models.hpp"
 #include "service/switchboard.hpp"
 
@@ -12,6 +13,9 @@ namespace arbiter::service {
 struct StatusOf {
   const std::string& instance;
   const Models& models;
+  const Library& library;
+  const ModelPointer& model;  // in force; null: none, or a predecessor's
+  const History& history;
   const Directory& directory;
   const Switchboard& switchboard;
   std::size_t clients = 0;

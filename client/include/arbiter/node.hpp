@@ -60,6 +60,21 @@ class Node {
     return InputPort<void>(detail::open_input(*core_, name, {}, options));
   }
 
+  // Puts another of the models in force that the daemon has loaded (arbiterd --model NAME=FILE):
+  // the same components, coordinated as another application (paper, section V). Returns when it
+  // is: every publish() and take() that begins afterwards, in any process, obeys it. All ports
+  // change at one instant; no component is stopped. The one that is in force already changes
+  // nothing.
+  //
+  // Blocks while components take up what they need to know, typically below a millisecond, or up to
+  // 0.2 s where one does not run; behind reloads and switches that were asked for before, as long
+  // as they take. Throws arbiter::Error: there is no such model (the message names those that there
+  // are), the policy does not allow `switch` to this user, or no daemon has answered within
+  // NodeOptions::connect_timeout (at least a second); then it may come into force yet. Where the
+  // daemon dies meanwhile, the next one is asked again. Any thread may call it; not for the data
+  // path: it allocates, and talks to the daemon.
+  void switch_model(std::string_view name) { detail::switch_model(*core_, name); }
+
   // Without a service thread: takes up what the daemon has announced. Does not block. service_fd()
   // is readable when there is something to do.
   void service() { detail::service(*core_); }

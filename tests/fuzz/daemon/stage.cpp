@@ -51,7 +51,7 @@ Stage::Stage() : owner_(::getpid(), ::geteuid()) {
   Loop::now = 1'000'000'000;
   write_model(0);
   service::DaemonOptions options;
-  options.files.models = {directory_.path() + "/model.xml"};
+  options.models = {{service::kDefaultModel, {{directory_.path() + "/model.xml"}, {}}}};
   options.instance = "fuzz";
   options.directory = directory_.path();
   daemon_ = std::make_unique<service::Daemon>(options);

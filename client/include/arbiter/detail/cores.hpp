@@ -45,6 +45,7 @@ enum class Waited : std::uint8_t { kSample, kIdle, kTimeout };
 std::shared_ptr<NodeCore> make_node(std::string_view name, const NodeOptions& options);
 void service(NodeCore& node);
 int service_fd(const NodeCore& node) noexcept;
+void switch_model(NodeCore& node, std::string_view name);
 
 std::shared_ptr<OutputCore> open_output(NodeCore& node, std::string_view name, const PortType& type,
                                         const OutputPortOptions& options);

@@ -1,0 +1,73 @@
+// arbiter switch: puts another of the models in force that the daemon has loaded.
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/conversation.hpp"
+#include "cli/live.hpp"
+#include "cli/verbs.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+struct SwitchOptions {
+  std::string instance;
+  std::string model;
+  bool json = false;
+};
+
+int list(const SwitchOptions& options) {
+  const auto status = fetch_status(*connect("switch", options.instance));
+  const auto& models = status.at("models");
+  if (options.json) {
+    std::cout << models.dump(2) << '\n';
+    return 0;
+  }
+  for (const auto& model : models) {
+    const bool is_in_force = model.at("in_force").get<bool>();
+    std::cout << (is_in_force ? "* " : "  ") << model.at("name").get<std::string>();
+    for (const auto& file : model.at("files")) std::cout << ' ' << file.get<std::string>();
+    if (!model.at("application").is_null()) {
+      std::cout << ", application " << model.at("application").get<std::string>();
+    }
+    if (is_in_force && !model.at("as_loaded").get<bool>()) {
+      std::cout << "  (in force is an older one: a rollback)";
+    }
+    std::cout << '\n';
+  }
+  if (models.empty()) std::cout << "no model is loaded; start the daemon with --model\n";
+  return 0;
+}
+
+int switch_model(const SwitchOptions& options) {
+  if (options.model.empty()) return list(options);
+  shm::Message question;
+  question.kind = shm::MessageKind::kSwitch;
+  question.set_name(options.model);
+  return write_result(
+      Conversation("switch", options.instance).ask_for_change(question, options.json),
+      options.json);
+}
+
+}  // namespace
+
+void add_switch(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<SwitchOptions>();
+  CLI::App* verb = app.add_subcommand(
+      "switch", "Put another of the loaded models in force; without NAME, list them");
+  verb->add_option("NAME", options->model, "As in arbiterd --model NAME=FILE")->type_name("NAME");
+  verb->add_flag("--json", options->json, "Write the list, or the daemon's report, as JSON");
+  add_instance_option(*verb, options->instance);
+  verb->footer(R"(Example:
+  arbiter switch          # * marks the one in force
+  arbiter switch dance    # returns when it is in force, for all ports at once
+
+The models were read and proved when the daemon started, or at the last arbiter reload; a switch
+reads no file.)");
+  verb->callback([options, &exit_code] { exit_code = switch_model(*options); });
+}
+
+}  // namespace arbiter::cli

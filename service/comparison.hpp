@@ -1,0 +1,19 @@
+// What decides differently under another model, as far as a daemon can tell between two messages.
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "rules/compile.hpp"
+
+namespace arbiter::service {
+
+// One line, for the log and the history.
+[[nodiscard]] std::string summary_of_changes(const rules::CompiledModel& before,
+                                             const rules::CompiledModel& after);
+// {"summary", "text"}: that line, and all of it for people.
+[[nodiscard]] nlohmann::json changes_json(const rules::CompiledModel& before,
+                                          const rules::CompiledModel& after);
+
+}  // namespace arbiter::service
