@@ -54,7 +54,9 @@ nlohmann::json Conversation::ask_for_change(shm::Message question, bool json) {
     return report;
   }
   std::cerr << report.at("text").get<std::string>();
-  if (!report.at("ok").get<bool>()) {
+  if (report.at("has_errors").get<bool>()) {
+    std::cerr << "arbiter: refused; nothing has changed\n";
+  } else if (!report.at("ok").get<bool>()) {
     std::cerr << "arbiter: " << report.at("why").get<std::string>() << '\n';
   }
   return report;

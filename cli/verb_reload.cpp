@@ -30,8 +30,7 @@ void write_changes(const nlohmann::json& model, bool is_alone) {
     std::cout << "not compared: what is in force is a former daemon's\n";
     return;
   }
-  std::cout << changes.at("summary").get<std::string>() << '\n'
-            << changes.at("text").get<std::string>();
+  std::cout << changes.at("text").get<std::string>();
 }
 
 int reload(const ReloadOptions& options) {

@@ -1,18 +1,31 @@
 #include "service/comparison.hpp"
 
+#include <sstream>
+
 #include <nlohmann/json.hpp>
 
+#include "rules/model_diff.hpp"
+
 namespace arbiter::service {
+namespace {
+
+// Nodes of decision diagrams: some hundredths of a second, in which the daemon serves nobody.
+constexpr std::uint64_t kMaxWork = 500'000;
+
+}  // namespace
 
 std::string summary_of_changes(const rules::CompiledModel& before,
                                const rules::CompiledModel& after) {
-  return std::to_string(before.ports.size()) + " ports before, " +
-         std::to_string(after.ports.size()) + " after";
+  return rules::summary(rules::diff(before, after, kMaxWork));
 }
 
 nlohmann::json changes_json(const rules::CompiledModel& before, const rules::CompiledModel& after) {
-  return {{"summary", summary_of_changes(before, after)},
-          {"text", summary_of_changes(before, after)}};
+  const rules::ModelDiff diff = rules::diff(before, after, kMaxWork);
+  std::ostringstream text;
+  rules::write_text(text, diff);
+  std::ostringstream json;
+  rules::write_json(json, diff);
+  return {{"text", text.str()}, {"diff", nlohmann::json::parse(json.str())}};
 }
 
 }  // namespace arbiter::service

@@ -12,7 +12,7 @@ namespace arbiter::service {
 // One line, for the log and the history.
 [[nodiscard]] std::string summary_of_changes(const rules::CompiledModel& before,
                                              const rules::CompiledModel& after);
-// {"summary", "text"}: that line, and all of it for people.
+// {"text", "diff"}: all of it, as `arbiter diff` and `arbiter diff --json` show it.
 [[nodiscard]] nlohmann::json changes_json(const rules::CompiledModel& before,
                                           const rules::CompiledModel& after);
 

@@ -18,8 +18,18 @@ namespace {
 // What came of it, for those who want all of it. File names may be any bytes; JSON may not.
 std::string report(const Daemon::Swap& swap, nlohmann::json document) {
   document["text"] = swap.findings.text();
+  document["has_errors"] = swap.findings.has_errors();  // told in the text, in full
   document["findings"] = swap.findings.json();
   return document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+// The model is in force: nothing may come of this but words.
+std::string summary_or_why_not(const Model& before, const Model& after) {
+  try {
+    return summary_of_changes(before.compiled, after.compiled);
+  } catch (const std::exception& error) {
+    return std::string("not compared: ") + error.what();
+  }
 }
 
 }  // namespace
@@ -53,7 +63,11 @@ void Daemon::advance_changes() {
     }
   } catch (const std::exception& error) {
     if (swap.change.kind == Change::Kind::kReload) ++reloads_refused_;
-    log::error("the model in force stays: {}", error.what());
+    if (swap.change.kind == Change::Kind::kCompare) {
+      log::info("{} asks what a reload would do: {}", swap.change.by, error.what());
+    } else {
+      log::error("the model in force stays: {}", error.what());
+    }
     answer_refused(swap, error.what());
   }
 }
@@ -177,7 +191,7 @@ void Daemon::put_in_force() {
   welcome_waiting();
   std::string changes;
   if (swap.is_compared && before != nullptr) {
-    changes = summary_of_changes(before->compiled, in_force_->compiled);
+    changes = summary_or_why_not(*before, *in_force_);
     log::info("model {} compared with the last: {}", snapshot.generation, changes);
     history_.set_changes(snapshot.generation, changes);
   }
@@ -221,7 +235,13 @@ void Daemon::answer(const Swap& swap, const std::string& report, const std::stri
     if (found == clients_.end()) continue;
     Client& client = *found->second;
     if (each.wants_report) {
-      send_document(client, each.request, shm::MessageKind::kReport, report);
+      try {
+        send_document(client, each.request, shm::MessageKind::kReport, report);
+      } catch (const std::exception& error) {  // no descriptors are left
+        refuse(client, each.request,
+               (why_not.empty() ? "it is done" : why_not) +
+                   "; the report could not be sent: " + error.what());
+      }
     } else if (!why_not.empty()) {
       refuse(client, each.request, why_not);
     } else {

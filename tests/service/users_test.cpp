@@ -129,12 +129,17 @@ TEST_F(Users, AreToldApartInTheLog) {
 TEST_F(Users, ReloadStopDeactivateAndObserveAsThePolicySays) {
   Daemon& daemon = start(
       "allow user nobody reload,observe\nallow user 54321 deactivate /Arm/*\n"
+      "allow user 54321 switch\n"
       "allow group 4242 stop\n");
   EXPECT_EQ(ask(kNobody, MessageKind::kReload), "done");
   EXPECT_EQ(daemon.generation(), 2u);
   EXPECT_EQ(ask(kNobody, MessageKind::kStatus), "done");
   EXPECT_EQ(ask(kNobody, MessageKind::kObserve), "done");
   EXPECT_EQ(ask(kStranger, MessageKind::kDeactivate, "/Arm/out"), "done");
+  EXPECT_EQ(ask(kStranger, MessageKind::kSwitch, "default"), "done");
+  EXPECT_THAT(ask(kNobody, MessageKind::kSwitch, "default"),
+              HasSubstr("may not switch to another model")) << "reload does not imply it";
+  EXPECT_THAT(ask(kStranger, MessageKind::kRollback), HasSubstr("may not reload the files"));
   for (const MessageKind kind :
        {MessageKind::kReload, MessageKind::kStatus, MessageKind::kObserve}) {
     EXPECT_THAT(ask(kStranger, kind), StartsWith("user 54321 may not "));
@@ -157,6 +162,8 @@ TEST_F(Users, WithoutAPolicyMayDoAllButReloadAndStop) {
   EXPECT_THAT(ask(kNobody, MessageKind::kReload),
               HasSubstr("the default policy allows it to root"));
   EXPECT_THAT(ask(kNobody, MessageKind::kStop), HasSubstr("may not stop the daemon"));
+  EXPECT_THAT(ask(kNobody, MessageKind::kSwitch, "default"),
+              HasSubstr("may not switch to another model"));
   EXPECT_EQ(ask({0}, MessageKind::kReload), "done");
   EXPECT_EQ(daemon.generation(), 2u);
 }

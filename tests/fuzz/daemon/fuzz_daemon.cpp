@@ -47,6 +47,10 @@ constexpr MessageKind kKinds[] = {
     MessageKind::kHandedBack,     MessageKind::kConnect,       MessageKind::kWelcome,
     MessageKind::kSync,           MessageKind::kOpened};
 
+// Those that came later have bytes of their own, so that the corpus still means what it did.
+constexpr MessageKind kLaterKinds[] = {MessageKind::kSwitch, MessageKind::kRollback,
+                                       MessageKind::kReport};
+
 // What a hostile process has been sent and said.
 struct Hostile {
   Hostile(const std::string& path, std::size_t who)
@@ -105,8 +109,16 @@ class Run {
       case 14:
         return stage_.run(script_.byte() * shm::Nanoseconds{2'000'000});
       default:
-        return script_.byte() % 4 == 0 ? stage_.reload() : stage_.serve_newcomer();
+        return act_as_owner();
     }
+  }
+
+  void act_as_owner() {
+    const std::uint8_t what = script_.byte();
+    if (what % 4 == 0) return stage_.reload();
+    if (what % 16 == 1) return stage_.switch_model();
+    if (what % 16 == 2) return stage_.roll_back();
+    stage_.serve_newcomer();
   }
 
   void connect() {
@@ -162,7 +174,10 @@ class Run {
   shm::Message anything(const Hostile& hostile) {
     shm::Message message;
     message.kind = static_cast<MessageKind>(script_.byte());
-    if (static_cast<std::size_t>(message.kind) < 250) {
+    if (static_cast<std::size_t>(message.kind) >= 240 &&
+        static_cast<std::size_t>(message.kind) < 250) {
+      message.kind = kLaterKinds[static_cast<std::size_t>(message.kind) % std::size(kLaterKinds)];
+    } else if (static_cast<std::size_t>(message.kind) < 250) {
       message.kind = kKinds[static_cast<std::size_t>(message.kind) % std::size(kKinds)];
     }
     message.flags = static_cast<std::uint32_t>(script_.number());

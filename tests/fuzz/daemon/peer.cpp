@@ -264,9 +264,10 @@ void Honest::close_port() {
   peers_.clear();
 }
 
-void Honest::ask(MessageKind kind) {
+void Honest::ask(MessageKind kind, const std::string& name) {
   shm::Message message;
   message.kind = kind;
+  message.set_name(name);
   refusal_.clear();
   require(connection_.send(message) == shm::SendResult::kSent, "an honest client can ask");
 }

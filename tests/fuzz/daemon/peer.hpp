@@ -63,7 +63,7 @@ class Honest {
   void open_output(const std::string& name);
   void open_input(const std::string& name);
   void close_port();
-  void ask(shm::MessageKind kind);
+  void ask(shm::MessageKind kind, const std::string& name = {});
 
   [[nodiscard]] bool is_welcome() const { return welcome_; }
   [[nodiscard]] shm::PortInstance port() const { return port_; }

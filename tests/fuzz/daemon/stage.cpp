@@ -51,7 +51,8 @@ Stage::Stage() : owner_(::getpid(), ::geteuid()) {
   Loop::now = 1'000'000'000;
   write_model(0);
   service::DaemonOptions options;
-  options.models = {{service::kDefaultModel, {{directory_.path() + "/model.xml"}, {}}}};
+  options.models = {{"one", {{directory_.path() + "/model.xml"}, {}}},
+                    {"other", {{directory_.write("other.xml", kModels[1])}, {}}}};
   options.instance = "fuzz";
   options.directory = directory_.path();
   daemon_ = std::make_unique<service::Daemon>(options);
@@ -98,6 +99,27 @@ void Stage::reload() {
   run();
   run(kMostTime);
   require(sender_->done() == before + 1, "a model comes into force");
+}
+
+void Stage::switch_model() {
+  const std::uint64_t before = sender_->done();
+  is_other_ = !is_other_;
+  sender_->ask(shm::MessageKind::kSwitch, is_other_ ? "other" : "one");
+  run();
+  run(kMostTime);
+  require(sender_->done() == before + 1, "a model is switched to");
+}
+
+void Stage::roll_back() {
+  const std::uint64_t before = sender_->done();
+  sender_->ask(shm::MessageKind::kRollback);
+  run();
+  run(kMostTime);
+  require((sender_->done() == before + 1) == sender_->refusal().empty(),
+          "a rollback is made, or refused");
+  sender_->ask(shm::MessageKind::kStatus);
+  run();
+  is_other_ = nlohmann::json::parse(sender_->status())["model"]["name"] == "other";
 }
 
 void Stage::serve_newcomer() {

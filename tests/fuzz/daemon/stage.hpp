@@ -26,6 +26,9 @@ class Stage {
   void run(shm::Nanoseconds time = 0);
   // Another model comes into force, within the time that the daemon grants to those who are slow.
   void reload();
+  // The other of two that are loaded does, likewise; or one that was, if there was one.
+  void switch_model();
+  void roll_back();
   // A component comes, opens a port, closes it and goes.
   void serve_newcomer();
   // Once all hostile clients are gone: nothing of them is left.
@@ -46,6 +49,7 @@ class Stage {
   std::unique_ptr<Honest> receiver_;
   std::unique_ptr<Honest> newcomer_;
   int model_ = 0;
+  bool is_other_ = false;
   std::size_t descriptors_ = 0;
   std::size_t sources_ = 0;
 };

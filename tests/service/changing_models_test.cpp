@@ -1,0 +1,322 @@
+// arbiter reload, switch, rollback and history, and what the next daemon makes of it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/inotify.h>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/client/component.hpp"
+#include "tests/client/models.hpp"
+#include "tests/client/samples.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using shm::MessageKind;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+std::string only(const std::string& source) {
+  return rules(arbiter_at("/in", select("/" + source)));
+}
+
+// The models "default", which takes /a, and "other", which takes /b.
+class ChangingModels : public testing::Test {
+ protected:
+  Daemon& start(const std::vector<std::string>& arguments = {}) {
+    Daemon::Options options;
+    options.arguments = {"--model", "other=" + files_.write("other.xml", only("b"))};
+    options.arguments.insert(options.arguments.end(), arguments.begin(), arguments.end());
+    return daemon_.emplace(only("a"), options);
+  }
+  void write_other(const std::string& text) { files_.write("other.xml", text); }
+
+  std::string source_in_force() { return daemon_->input("/in")["connections"][0]["source"]; }
+  std::string name_in_force() { return daemon_->status()["model"]["name"]; }
+
+  TemporaryDirectory files_;
+  std::optional<Daemon> daemon_;
+};
+
+void expect_success(const ProgramResult& result, const std::string& out) {
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out, out);
+  EXPECT_EQ(result.err, "");
+}
+void expect_refusal(const ProgramResult& result, const std::string& err) {
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.out, "");
+  EXPECT_EQ(result.err, "arbiter: " + err + "\n");
+}
+
+TEST_F(ChangingModels, SwitchGoesToAnotherModelAndListsAll) {
+  start();
+  const std::string default_files = "default " + daemon_->directory() + "/model.xml\n";
+  const std::string other_files = "other " + files_.path() + "/other.xml\n";
+  expect_success(arbiter({"switch"}), "* " + default_files + "  " + other_files);
+  expect_success(arbiter({"switch", "other"}), "model 2 is in force\n");
+  EXPECT_EQ(source_in_force(), "/b");
+  expect_success(arbiter({"switch"}), "  " + default_files + "* " + other_files);
+  EXPECT_THAT(arbiter({"status"}).out, HasSubstr(", model 2 other " + files_.path()));
+  expect_refusal(arbiter({"switch", "third"}),
+                 "there is no model \"third\"; there are: default and other");
+  EXPECT_EQ(name_in_force(), "other");
+}
+
+TEST_F(ChangingModels, SwitchReadsNoFile) {
+  start();
+  write_other("<nonsense/>");
+  const int watch = ::inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
+  ASSERT_GE(::inotify_add_watch(watch, (files_.path() + "/other.xml").c_str(), IN_OPEN), 0);
+  expect_success(arbiter({"switch", "other"}), "model 2 is in force\n");
+  char event[512];
+  EXPECT_EQ(::read(watch, event, sizeof event), -1) << "it was opened";
+  ::close(watch);
+  EXPECT_EQ(source_in_force(), "/b");
+}
+
+TEST_F(ChangingModels, SwitchWithoutAModelSaysSo) {
+  daemon_.emplace("", Daemon::Options{.without_model = true});
+  expect_success(arbiter({"switch"}), "no model is loaded; start the daemon with --model\n");
+  expect_refusal(arbiter({"switch", "a"}), "there is no model \"a\"; none is loaded");
+  expect_success(arbiter({"history"}), "no model has been in force\n");
+  expect_refusal(arbiter({"rollback"}),
+                 "there is no model to go back to; arbiter history shows all");
+}
+
+TEST_F(ChangingModels, ReloadReadsAllAndStaysWithTheOneInForce) {
+  start();
+  ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
+  daemon_->write_model(only("c"));
+  write_other(only("d"));
+  const auto result = arbiter({"reload"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out, "model 3 is in force\n  1 of 1 port decides differently (/in)\n");
+  EXPECT_EQ(source_in_force(), "/d");
+  ASSERT_EQ(arbiter({"switch", "default"}).exit_code, 0);
+  EXPECT_EQ(source_in_force(), "/c");
+}
+
+TEST_F(ChangingModels, OneBadModelRefusesTheWholeReload) {
+  start();
+  daemon_->write_model(only("c"));
+  write_other("<behaviors>\n<nonsense/><source/></behaviors>");
+  const auto result = arbiter({"reload"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, AllOf(HasSubstr("the model other:\n"),
+                                HasSubstr("other.xml:2:1: error: <nonsense> is not known here"),
+                                HasSubstr("other.xml:2:12: error: "), HasSubstr("2 errors"),
+                                HasSubstr("arbiter: refused; nothing has changed\n")));
+  EXPECT_EQ(source_in_force(), "/a");
+  ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
+  EXPECT_EQ(source_in_force(), "/b") << "as it was read before";
+}
+
+TEST_F(ChangingModels, ADryRunShowsWhatAReloadWouldDo) {
+  start();
+  ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
+  write_other(only("b") + " ");
+  auto result = arbiter({"reload", "--dry-run"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, AllOf(HasSubstr("default: no difference: 1 port decides alike"),
+                                HasSubstr("other (in force): no difference"),
+                                HasSubstr("nothing was changed")));
+  write_other(only("d"));
+  result = arbiter({"reload", "--dry-run"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, AllOf(HasSubstr("other (in force): "), HasSubstr("/d"),
+                                HasSubstr("1 of 1 port decides differently (/in)")));
+  const auto report = nlohmann::json::parse(arbiter({"reload", "--dry-run", "--json"}).out);
+  EXPECT_EQ(report["ok"], true);
+  EXPECT_EQ(report["models"][1]["changes"]["diff"]["differs"], true);
+  write_other("<nonsense/>");
+  result = arbiter({"reload", "--dry-run"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("nonsense"));
+  EXPECT_EQ(daemon_->generation(), 2u);
+  EXPECT_EQ(daemon_->refused(), 0u);
+  ASSERT_EQ(arbiter({"switch", "default"}).exit_code, 0);
+  ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
+  EXPECT_EQ(source_in_force(), "/b");
+}
+
+TEST_F(ChangingModels, RollbackGoesBackStepByStepOrToOneByItsNumber) {
+  Daemon& daemon = start();
+  daemon.load(only("b"));
+  daemon.load(only("c"));
+  auto result = arbiter({"rollback"});
+  EXPECT_EQ(result.out, "model 4 is in force\n  1 of 1 port decides differently (/in)\n");
+  EXPECT_EQ(source_in_force(), "/b");
+  EXPECT_THAT(arbiter({"switch"}).out, HasSubstr("(in force is an older one: a rollback)"));
+  ASSERT_EQ(arbiter({"rollback"}).exit_code, 0);
+  EXPECT_EQ(source_in_force(), "/a");
+  expect_refusal(arbiter({"rollback"}),
+                 "there is no model to go back to; arbiter history shows all");
+  ASSERT_EQ(arbiter({"rollback", "3"}).exit_code, 0);
+  EXPECT_EQ(source_in_force(), "/c");
+  expect_refusal(arbiter({"rollback", "9"}),
+                 "model 9 is not in the history; arbiter history shows what is");
+  EXPECT_EQ(arbiter({"rollback", "0"}).exit_code, 2);
+  EXPECT_EQ(daemon.generation(), 6u);
+  ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  EXPECT_EQ(source_in_force(), "/c") << "what the file says";
+}
+
+TEST_F(ChangingModels, HistoryTellsWhatWhenHowAndByWhom) {
+  start();
+  daemon_->load(only("c"));
+  ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
+  ASSERT_EQ(arbiter({"rollback", "1"}).exit_code, 0);
+  const auto history = nlohmann::json::parse(arbiter({"history", "--json"}).out);
+  ASSERT_EQ(history.size(), 4u);
+  const std::vector<std::string> how{"rollback to 1", "switch", "reload", "start"};
+  const std::vector<std::string> by{"node \"arbiter-rollback\" (pid ", "node \"arbiter-switch\"",
+                                    "a signal of process " + std::to_string(::getpid()), ""};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(history[i]["generation"], 4 - i);
+    EXPECT_EQ(history[i]["how"], how[i]);
+    EXPECT_EQ(history[i]["name"], i == 1 ? "other" : "default");
+    EXPECT_GT(history[i]["since_ms"], 1'600'000'000'000);
+    if (i == 3) {
+      EXPECT_EQ(history[i]["by"], nullptr);
+    } else {
+      EXPECT_THAT(history[i]["by"].get<std::string>(), HasSubstr(by[i]));
+    }
+  }
+  EXPECT_EQ(history[2]["changes"], "1 of 1 port decides differently (/in)");
+  EXPECT_EQ(history[1]["changes"], nullptr);
+  EXPECT_EQ(history[0]["content"], 1);
+  EXPECT_THAT(arbiter({"history"}).out, HasSubstr("  other  switch, by node \"arbiter-switch\""));
+  EXPECT_THAT(daemon_->log(), HasSubstr("model 2 is in force: reload \"default\", by a signal"));
+  EXPECT_THAT(daemon_->log(), HasSubstr("model 2 compared with the last: 1 of 1 port decides"));
+}
+
+// A policy that was refused together with a model must not slip in with the next swap.
+TEST_F(ChangingModels, ARefusedPolicyStaysRefused) {
+  const auto policy = files_.write("policy", "allow everyone all\n");
+  start({"--policy", policy});
+  files_.write("policy", "deny everyone reload\n");
+  write_other("<nonsense/>");
+  EXPECT_EQ(arbiter({"reload"}).exit_code, 1);
+  EXPECT_EQ(arbiter({"switch", "other"}).exit_code, 0);
+  write_other(only("b"));
+  files_.write("policy", "deny everyone switch\nallow everyone all\n");
+  EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
+  EXPECT_EQ(arbiter({"switch", "default"}).exit_code, 1);
+}
+
+// Changes are made in the order in which they are asked for, though one cannot be made yet.
+TEST_F(ChangingModels, WaitForEachOther) {
+  start();
+  RawClient client(daemon_->instance());
+  client.hello("asks");
+  const auto ask = [&](MessageKind kind, std::uint64_t request, const std::string& name = {}) {
+    auto message = RawClient::message(kind, name);
+    message.request = request;
+    client.send(message);
+  };
+  daemon_->process().stop();
+  ask(MessageKind::kSwitch, 1, "other");
+  ask(MessageKind::kReload, 2);
+  ask(MessageKind::kReload, 3);
+  ask(MessageKind::kSwitch, 4, "default");
+  ask(MessageKind::kRollback, 5);
+  ask(MessageKind::kSwitch, 6, "none");
+  daemon_->process().signal(SIGCONT);
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> answers;
+  for (int i = 0; i < 6; ++i) {
+    shm::Received received;
+    ASSERT_TRUE(client.receive(received));
+    answers.emplace_back(received.message.request, received.message.value);
+    if (i == 5) {
+      EXPECT_EQ(received.message.kind, MessageKind::kRefused);
+    }
+  }
+  const std::vector<std::pair<std::uint64_t, std::uint32_t>> expected{{1, 2}, {2, 3}, {3, 3},
+                                                                      {4, 4}, {5, 5}, {6, 0}};
+  EXPECT_EQ(answers, expected);
+  EXPECT_EQ(name_in_force(), "other");
+}
+
+TEST_F(ChangingModels, TheNextDaemonGoesOnWithTheModelOfThatName) {
+  Daemon& daemon = start();
+  Node node("test");
+  auto b = node.output_port<Number>("/b");
+  auto in = node.input_port<Number>("/in");
+  ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
+  daemon.kill();
+  daemon.restart();
+  EXPECT_EQ(name_in_force(), "other");
+  EXPECT_EQ(b.publish(Number{1}).delivered, 1u);
+  EXPECT_EQ(take_from(in), 1);
+  const auto history = daemon.status()["history"];
+  ASSERT_EQ(history.size(), 2u);
+  EXPECT_EQ(history[0]["how"], "start");
+  EXPECT_EQ(history[1]["how"], "takeover");
+  EXPECT_EQ(history[1]["name"], "other");
+  expect_refusal(arbiter({"rollback"}),
+                 "model 2 is not kept any longer, or was another daemon's; only its name is known");
+}
+
+TEST_F(ChangingModels, TheNextDaemonThatLacksTheModelBeginsWithItsFirst) {
+  Daemon& daemon = start();
+  Node node("test");
+  auto in = node.input_port<Number>("/in");
+  daemon.write_model(only("c"));
+  ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
+  daemon.kill();
+  daemon.restart_without_model();  // it has "other" yet
+  EXPECT_EQ(name_in_force(), "other");
+  EXPECT_EQ(source_in_force(), "/b");
+}
+
+// Whenever it dies, what was in force goes on under its name.
+TEST_F(ChangingModels, ADaemonKilledInTheMiddleOfASwitchLeavesOneOfTheTwo) {
+  Daemon& daemon = start();
+  Node node("test");
+  auto a = node.output_port<Number>("/a");
+  auto b = node.output_port<Number>("/b");
+  auto in = node.input_port<Number>("/in");
+  Component stopped("stopped");
+  ASSERT_EQ(stopped.tell("output /c"), "open");
+  for (int i = 0; i < 3; ++i) {
+    RawClient client(daemon.instance());
+    client.hello("asks");
+    stopped.process().stop();  // what the switch waits for
+    client.send(RawClient::message(MessageKind::kSwitch, i % 2 == 0 ? "other" : "default"));
+    while (a.publish(Number{1}).delivered + b.publish(Number{2}).delivered == 0) {
+    }
+    daemon.kill();
+    stopped.process().signal(SIGCONT);
+    daemon.restart();
+    const auto history = daemon.status()["history"];
+    ASSERT_EQ(history.size(), 2u);
+    EXPECT_EQ(history[0]["name"], history[1]["name"]);
+    const bool is_other = history[0]["name"] == "other";
+    EXPECT_EQ(a.publish(Number{1}).delivered, is_other ? 0u : 1u);
+    EXPECT_EQ(b.publish(Number{2}).delivered, is_other ? 1u : 0u);
+  }
+}
+
+TEST_F(ChangingModels, TheDescriptorStoreKeepsTheNameToo) {
+  Daemon& daemon = start({"--descriptor-store"});
+  ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
+  daemon.kill();
+  daemon.restart_with_stored();
+  EXPECT_EQ(name_in_force(), "other");
+}
+
+TEST(ModelOptions, ThatAreWrongEndTheDaemonAtOnce) {
+  const TemporaryDirectory files;
+  const ScopedVariable runtime("XDG_RUNTIME_DIR", files.path());
+  const auto result = run_program({arbiterd_path(), "--model", "a="});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("\"a=\" names no file"));
+}
+
+}  // namespace
+}  // namespace arbiter::test
