@@ -32,8 +32,7 @@ Conversation::Conversation(const std::string& verb, const std::string& given) {
 
 shm::Received Conversation::ask(shm::Message question) {
   question.request = ++last_request_;
-  const bool is_sent =
-      shm::send_message(socket_.get(), question) == shm::SendResult::kSent;
+  const bool is_sent = shm::send_message(socket_.get(), question) == shm::SendResult::kSent;
   shm::Received reply;
   while (is_sent &&
          shm::receive_message(socket_.get(), reply, true) == shm::ReceiveResult::kReceived) {

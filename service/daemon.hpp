@@ -132,7 +132,7 @@ class Daemon {
   void prepare_rollback(Swap& swap);
   void compare_with_files(Swap& swap);
   void reserve_tables(const Library& library);
-  void begin_swap(Swap swap);  // whose table the board has
+  void begin_swap(Swap& swap);
   void put_in_force();
   void answer_done(const Swap& swap, const std::string& changes);
   void answer_refused(const Swap& swap, const std::string& why);

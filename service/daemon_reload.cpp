@@ -36,8 +36,7 @@ std::string summary_or_why_not(const Model& before, const Model& after) {
 
 void Daemon::ask_for(Change change, const Client& client, const shm::Message& message) {
   change.by = client.description() + ", user " + describe_user(client.user());
-  change.asking = {
-      {client.id(), message.request, (message.flags & shm::kWantsReport) != 0}};
+  change.asking = {{client.id(), message.request, (message.flags & shm::kWantsReport) != 0}};
   changes_.add(std::move(change));
 }
 
@@ -88,7 +87,7 @@ void Daemon::prepare_reload(Swap& swap) {
   swap.findings = std::move(reading.findings);
   if (swap.findings.has_errors()) throw BadModel(swap.findings.first_error());
   if (files_.empty()) {
-    gate_.put_in_force(std::move(*reading.policy));
+    gate_.put_in_force(*reading.policy);
     answer_done(swap, {});
     return;
   }
@@ -107,8 +106,7 @@ void Daemon::prepare_reload(Swap& swap) {
   reserve_tables(library);
   swap.policy = std::move(reading.policy);
   swap.library = std::move(library);
-  models_.prepare(*swap.to.layout, swap.to.model->name);
-  begin_swap(std::move(swap));
+  begin_swap(swap);
 }
 
 // So that a switch does not fail for want of memory, either.
@@ -124,9 +122,10 @@ void Daemon::reserve_tables(const Library& library) {
 void Daemon::prepare_switch(Swap& swap) {
   const LoadedModel* const next = library_.find(swap.change.name);
   if (next == nullptr) {
-    throw std::runtime_error("there is no model \"" + swap.change.name +
-                             (library_.models().empty() ? "\"; none is loaded"
-                                                        : "\"; there are: " + library_.names()));
+    const std::string& name = swap.change.name;  // from a client: it must not break lines
+    throw std::runtime_error(
+        "there is no model " + (is_model_name(name) ? '"' + name + '"' : "of that name") +
+        (library_.models().empty() ? "; none is loaded" : "; there are: " + library_.names()));
   }
   if (next->model == in_force_) {
     answer_done(swap, {});
@@ -134,8 +133,7 @@ void Daemon::prepare_switch(Swap& swap) {
   }
   swap.to = *next;
   swap.how = "switch";
-  models_.prepare(*swap.to.layout, swap.to.model->name);
-  begin_swap(std::move(swap));
+  begin_swap(swap);
 }
 
 void Daemon::prepare_rollback(Swap& swap) {
@@ -157,11 +155,12 @@ void Daemon::prepare_rollback(Swap& swap) {
   swap.how = "rollback to " + std::to_string(past->generation);
   swap.content = past->content;
   swap.is_compared = true;
-  models_.prepare(*swap.to.layout, swap.to.model->name);
-  begin_swap(std::move(swap));
+  begin_swap(swap);
 }
 
-void Daemon::begin_swap(Swap swap) {
+// Throws, and then nothing has changed, `swap` neither.
+void Daemon::begin_swap(Swap& swap) {
+  models_.prepare(*swap.to.layout, swap.to.model->name);
   swap_ = std::move(swap);
   auto told = switchboard_.link_all(models_.prepared());
   // The table itself, all who will read it have to map.
@@ -186,8 +185,15 @@ void Daemon::put_in_force() {
   }
   log::info("model {} is in force: {} \"{}\"{}", snapshot.generation, swap.how, in_force_->name,
             swap.change.by.empty() ? "" : ", by " + swap.change.by);
-  history_.add({snapshot.generation, swap.content, in_force_->name, in_force_->files, calendar_ms(),
-                swap.how, swap.change.by, {}, in_force_});
+  history_.add({snapshot.generation,
+                swap.content,
+                in_force_->name,
+                in_force_->files,
+                calendar_ms(),
+                swap.how,
+                swap.change.by,
+                {},
+                in_force_});
   welcome_waiting();
   std::string changes;
   if (swap.is_compared && before != nullptr) {

@@ -108,12 +108,16 @@ void Daemon::handle(Client& client, shm::Received& received) {
     case shm::MessageKind::kReload:
       gate_.require(client, Action::kReload);
       ask_for({(message.flags & shm::kDryRun) != 0 ? Change::Kind::kCompare : Change::Kind::kReload,
-               {}, 0, {}, {}},
+               {},
+               0,
+               {},
+               {}},
               client, message);
       break;
     case shm::MessageKind::kSwitch:
       gate_.require(client, Action::kSwitch);
-      ask_for({Change::Kind::kSwitch, std::string(message.name_view()), 0, {}, {}}, client, message);
+      ask_for({Change::Kind::kSwitch, std::string(message.name_view()), 0, {}, {}}, client,
+              message);
       break;
     case shm::MessageKind::kRollback:
       gate_.require(client, Action::kReload);
@@ -299,10 +303,10 @@ void Daemon::close_port(Client& client, shm::PortInstance port) {
 }
 
 void Daemon::send_status(Client& client, std::uint64_t request) {
-  const std::string document = status_document(
-      {instance_, models_, library_, in_force_, history_, directory_, switchboard_, clients_.size(),
-       reloads_refused_},
-      shm::monotonic_now());
+  const std::string document =
+      status_document({instance_, models_, library_, in_force_, history_, directory_, switchboard_,
+                       clients_.size(), reloads_refused_},
+                      shm::monotonic_now());
   send_document(client, request, shm::MessageKind::kStatusReply, document);
 }
 

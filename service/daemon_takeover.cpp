@@ -236,16 +236,14 @@ void Daemon::finish_takeover() {
     welcome_waiting();
     return;
   }
-  Swap swap;
   try {
-    swap = first_swap();
+    Swap swap = first_swap();
+    begin_swap(swap);
   } catch (const std::exception& error) {
     if (is_fresh) throw;
     log::error("the model in force stays: {}", error.what());
     welcome_waiting();
-    return;
   }
-  begin_swap(std::move(swap));
 }
 
 // The model that the last daemon had in force, if this one has it by that name, too.
@@ -264,7 +262,6 @@ Daemon::Swap Daemon::first_swap() {
   swap.to = *next;
   swap.how = "start";
   reserve_tables(library);
-  models_.prepare(*swap.to.layout, next->model->name);
   swap.library = std::move(library);
   return swap;
 }

@@ -1,8 +1,8 @@
 // Who is who: the ids of sources and input ports, and the activity page of each source.
 //
-// A name keeps its id for as long as a model (in force, or loaded) or a live port uses it, across models and daemons, and
-// in practice for ever; only where ids run out is one taken from a name that nobody uses any more.
-// What a successor must know of it stands in the registry.
+// A name keeps its id for as long as a model (in force, or loaded) or a live port uses it, across
+// models and daemons, and in practice for ever; only where ids run out is one taken from a name
+// that nobody uses any more. What a successor must know of it stands in the registry.
 #pragma once
 
 #include <cstdint>

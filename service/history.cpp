@@ -51,10 +51,9 @@ const PastModel* History::find(std::uint64_t generation) const {
 
 const PastModel* History::previous() const {
   if (models_.empty()) return nullptr;
-  const auto before =
-      std::find_if(models_.rbegin(), models_.rend(), [&](const PastModel& entry) {
-        return entry.generation < models_.back().content;
-      });
+  const auto before = std::find_if(models_.rbegin(), models_.rend(), [&](const PastModel& entry) {
+    return entry.generation < models_.back().content;
+  });
   return before == models_.rend() ? nullptr : &*before;
 }
 

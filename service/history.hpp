@@ -42,7 +42,9 @@ class History {
   void set_changes(std::uint64_t generation, const std::string& changes);
 
   // Null where it is empty.
-  [[nodiscard]] const PastModel* latest() const { return models_.empty() ? nullptr : &models_.back(); }
+  [[nodiscard]] const PastModel* latest() const {
+    return models_.empty() ? nullptr : &models_.back();
+  }
   [[nodiscard]] const PastModel* find(std::uint64_t generation) const;
   // Where a rollback goes that names no generation: to what was in force before the latest; after
   // a rollback one step further back. Null: nowhere.

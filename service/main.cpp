@@ -76,7 +76,8 @@ int run(int argc, char** argv) {
   app.add_option("--application", applications,
                  "Application file: which connections exist; without NAME for all models")
       ->type_name("[NAME=]FILE");
-  app.add_option("--policy", policy, "Policy file: who may open which ports, reload, switch, stop, observe")
+  app.add_option("--policy", policy,
+                 "Policy file: who may open which ports, reload, switch, stop, observe")
       ->type_name("FILE");
   app.add_option("--instance", instance,
                  "Name of this daemon; without it $ARBITER_INSTANCE, else \"default\"")

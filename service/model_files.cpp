@@ -29,8 +29,8 @@ Given given_by(const std::string& argument) {
 }
 
 NamedFiles* find(std::vector<NamedFiles>& models, const std::string& name) {
-  const auto found =
-      std::find_if(models.begin(), models.end(), [&](const auto& each) { return each.name == name; });
+  const auto found = std::find_if(models.begin(), models.end(),
+                                  [&](const auto& each) { return each.name == name; });
   return found == models.end() ? nullptr : &*found;
 }
 

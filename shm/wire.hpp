@@ -39,19 +39,19 @@ enum class MessageKind : std::uint32_t {
   // From a client.
   kHello = 1,  // name, flags (kHasServiceThread, kComesBack, kRejoins); value = kWireVersion; if it
                // rejoins, link: the node it was welcomed as; descriptors: board, registry
-  kOpenOutput,         // name, type; descriptor: its segment
-  kOpenInput,          // name, type; descriptors: its segment, its bell
-  kClosePort,          // port
-  kSynced,             // request: that of the kSync
-  kStatus,             // ask for a status document
-  kDeactivate,         // name: a source whose process is gone
-  kObserve,            // send every page and every port name, now and as they come
-  kPeerRefused,        // port, peer, text: the client could not take up a peer, for status
-  kReload,             // read the files again; kDone (value: the generation) once they are in force.
-                       // flags: kWantsReport, kDryRun (with it)
-  kStop,               // kDone, and then the daemon ends
-  kSwitch,             // name: a model that is loaded; kDone (value: the generation) in force
-  kRollback,           // link: a generation of the history, 0: the one before; as kReload
+  kOpenOutput,   // name, type; descriptor: its segment
+  kOpenInput,    // name, type; descriptors: its segment, its bell
+  kClosePort,    // port
+  kSynced,       // request: that of the kSync
+  kStatus,       // ask for a status document
+  kDeactivate,   // name: a source whose process is gone
+  kObserve,      // send every page and every port name, now and as they come
+  kPeerRefused,  // port, peer, text: the client could not take up a peer, for status
+  kReload,       // read the files again; kDone (value: the generation) once they are in force.
+                 // flags: kWantsReport, kDryRun (with it)
+  kStop,         // kDone, and then the daemon ends
+  kSwitch,       // name: a model that is loaded; kDone (value: the generation) in force
+  kRollback,     // link: a generation of the history, 0: the one before; as kReload
   kHandBackPage = 40,  // id; descriptor: the activity page of a source
   kHandBackOutput,     // port, id = source, type; descriptors: its segment, its page
   kHandBackInput,      // port, id = port id, type; descriptors: its segment, its bell
@@ -81,9 +81,9 @@ enum class MessageKind : std::uint32_t {
 
 enum MessageFlag : std::uint32_t {
   kHasServiceThread = 1,
-  kIsConnected = 2,  // else the input port only senses the output port
-  kComesBack = 4,    // the client will rejoin if the conversation is lost
-  kRejoins = 8,      // it does so now
+  kIsConnected = 2,   // else the input port only senses the output port
+  kComesBack = 4,     // the client will rejoin if the conversation is lost
+  kRejoins = 8,       // it does so now
   kWantsReport = 16,  // of a change of the model: kReport is the answer, whatever comes of it
   kDryRun = 32,       // of a reload: only say what it would do
 };

@@ -229,6 +229,47 @@ TEST(Swap, UnderAPublisherAndAReceiverThatRunFlatOut) {
   EXPECT_EQ(daemon.input("/in")["misbehaved"], 0);
 }
 
+TEST(Swap, APortThatTheNewModelDoesNotMentionStaysOpenAndGetsNothing) {
+  Daemon daemon(only("a"));
+  Node node("test");
+  auto a = node.output_port<Number>("/a");
+  auto in = node.input_port<Number>("/in");
+  a.publish(Number{1});
+  daemon.load(rules(arbiter_at("/elsewhere", select("/a"))));
+  EXPECT_FALSE(in.take());
+  const Outcome outcome = a.publish(Number{2});
+  EXPECT_EQ(outcome.delivered + outcome.discarded, 0u);
+  EXPECT_FALSE(in.take());
+  const auto port = daemon.input("/in");
+  EXPECT_EQ(port["open"], true);
+  EXPECT_EQ(port["arbitrated"], false);
+  EXPECT_TRUE(port["connections"].empty());
+  daemon.load(only("a"));
+  a.publish(Number{3});
+  EXPECT_EQ(take_from(in), 3) << "and is as before when a model mentions it again";
+}
+
+// What the application connects is delivered, whoever else is active.
+TEST(Swap, APortThatTheNewModelDoesNotMentionIsNoLongerArbitrated) {
+  Daemon daemon(override_model(), {.application = application(connection("/low", "/in") +
+                                                              connection("/high", "/in"))});
+  Node node("test");
+  auto low = node.output_port<Number>("/low");
+  auto high = node.output_port<Number>("/high");
+  auto in = node.input_port<Number>("/in");
+  high.publish(Number{1});
+  EXPECT_EQ(low.publish(Number{2}).discarded, 1u);
+  EXPECT_EQ(take_from(in), 1);
+  daemon.load("<behaviors/>");
+  EXPECT_EQ(low.publish(Number{3}).delivered, 1u);
+  EXPECT_EQ(high.publish(Number{4}).delivered, 1u);
+  EXPECT_EQ(daemon.input("/in")["arbitrated"], false);
+  EXPECT_EQ(take_from(in), 3);
+  EXPECT_EQ(take_from(in), 4);
+  daemon.load(override_model());
+  EXPECT_EQ(low.publish(Number{5}).discarded, 1u);
+}
+
 TEST(Swap, ABadModelChangesNothing) {
   Daemon daemon(only("a"));
   Node node("test");

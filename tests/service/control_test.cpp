@@ -118,8 +118,8 @@ TEST(Control, TheVerbsTellThatThePolicyRefuses) {
   const auto policy = files.write("policy", "deny everyone reload,stop,switch,observe\n");
   Daemon daemon(kNoRules, {.arguments = {"--policy", policy}});
   const std::vector<std::vector<std::string>> refused{
-      {"reload"}, {"reload", "--dry-run"}, {"rollback"}, {"stop"}, {"switch", "a"},
-      {"switch"}, {"history"}};
+      {"reload"}, {"reload", "--dry-run"}, {"rollback"}, {"stop"}, {"switch", "a"}, {"switch"},
+      {"history"}};
   for (const auto& verb : refused) {
     const auto result = arbiter(verb);
     EXPECT_EQ(result.exit_code, 1) << verb[0];

@@ -52,9 +52,12 @@ TEST(ModelFiles, AnApplicationAloneIsAModelToo) {
 
 TEST(ModelFiles, SayWhatIsWrong) {
   EXPECT_THAT(refusal_of([] { named_files({"a="}, {}); }), HasSubstr("\"a=\" names no file"));
-  EXPECT_THAT(refusal_of([] { named_files({"a=x"}, {"b=y"}); }), HasSubstr("there is no model \"b\""));
+  EXPECT_THAT(refusal_of([] { named_files({"a=x"}, {"b=y"}); }),
+              HasSubstr("there is no model \"b\""));
   EXPECT_THAT(refusal_of([] { named_files({"x"}, {"y", "z"}); }), HasSubstr("two applications"));
-  EXPECT_THAT(refusal_of([] { named_files({"a=x"}, {"a=y", "a=z"}); }),
+  EXPECT_THAT(refusal_of([] {
+                named_files({"a=x"}, {"a=y", "a=z"});
+              }),
               HasSubstr("two applications"));
   std::vector<std::string> many;
   for (std::size_t i = 0; i <= kMaxModels; ++i) many.push_back("m" + std::to_string(i) + "=x");
@@ -62,7 +65,8 @@ TEST(ModelFiles, SayWhatIsWrong) {
 }
 
 TEST(ModelFiles, NamesArePlain) {
-  for (const char* name : {"a", "Search_and-Track.2", "9"}) EXPECT_TRUE(is_model_name(name)) << name;
+  for (const char* name : {"a", "Search_and-Track.2", "9"})
+    EXPECT_TRUE(is_model_name(name)) << name;
   for (const char* name : {"", "-a", "a b", "a/b", "ä", "a="}) {
     EXPECT_FALSE(is_model_name(name)) << name;
   }
@@ -98,7 +102,8 @@ TEST(Changes, AreBounded) {
   for (std::size_t i = 0; i < Changes::kMaxWaiting; ++i) {
     changes.add(switch_for(i, i % 2 == 0 ? "a" : "b"));
   }
-  EXPECT_THAT(refusal_of([&] { changes.add(switch_for(1, "a")); }), HasSubstr("limit-exceeded: 64"));
+  EXPECT_THAT(refusal_of([&] { changes.add(switch_for(1, "a")); }),
+              HasSubstr("limit-exceeded: 64"));
   changes.add(switch_for(1, "b"));  // joins the last
   changes.add({Change::Kind::kReload, {}, 0, "a signal", {}});
   changes.add({Change::Kind::kReload, {}, 0, "a signal", {}});

@@ -138,7 +138,8 @@ TEST_F(Users, ReloadStopDeactivateAndObserveAsThePolicySays) {
   EXPECT_EQ(ask(kStranger, MessageKind::kDeactivate, "/Arm/out"), "done");
   EXPECT_EQ(ask(kStranger, MessageKind::kSwitch, "default"), "done");
   EXPECT_THAT(ask(kNobody, MessageKind::kSwitch, "default"),
-              HasSubstr("may not switch to another model")) << "reload does not imply it";
+              HasSubstr("may not switch to another model"))
+      << "reload does not imply it";
   EXPECT_THAT(ask(kStranger, MessageKind::kRollback), HasSubstr("may not reload the files"));
   for (const MessageKind kind :
        {MessageKind::kReload, MessageKind::kStatus, MessageKind::kObserve}) {
