@@ -25,6 +25,12 @@ std::string refusal_of(Act act) {
   return "no error";
 }
 
+// What naming them so throws.
+std::string refusal_of_files(const std::vector<std::string>& models,
+                             const std::vector<std::string>& applications) {
+  return refusal_of([&] { return named_files(models, applications); });
+}
+
 TEST(ModelFiles, WithoutANameFormTheDefaultModel) {
   const auto named = named_files({"a.xml", "dir/b=c.xml", "./x=y.xml"}, {});
   ASSERT_EQ(named.size(), 1u);
@@ -51,17 +57,13 @@ TEST(ModelFiles, AnApplicationAloneIsAModelToo) {
 }
 
 TEST(ModelFiles, SayWhatIsWrong) {
-  EXPECT_THAT(refusal_of([] { named_files({"a="}, {}); }), HasSubstr("\"a=\" names no file"));
-  EXPECT_THAT(refusal_of([] { named_files({"a=x"}, {"b=y"}); }),
-              HasSubstr("there is no model \"b\""));
-  EXPECT_THAT(refusal_of([] { named_files({"x"}, {"y", "z"}); }), HasSubstr("two applications"));
-  EXPECT_THAT(refusal_of([] {
-                named_files({"a=x"}, {"a=y", "a=z"});
-              }),
-              HasSubstr("two applications"));
+  EXPECT_THAT(refusal_of_files({"a="}, {}), HasSubstr("\"a=\" names no file"));
+  EXPECT_THAT(refusal_of_files({"a=x"}, {"b=y"}), HasSubstr("there is no model \"b\""));
+  EXPECT_THAT(refusal_of_files({"x"}, {"y", "z"}), HasSubstr("two applications"));
+  EXPECT_THAT(refusal_of_files({"a=x"}, {"a=y", "a=z"}), HasSubstr("two applications"));
   std::vector<std::string> many;
   for (std::size_t i = 0; i <= kMaxModels; ++i) many.push_back("m" + std::to_string(i) + "=x");
-  EXPECT_THAT(refusal_of([&] { named_files(many, {}); }), HasSubstr("there are 65 models"));
+  EXPECT_THAT(refusal_of_files(many, {}), HasSubstr("there are 65 models"));
 }
 
 TEST(ModelFiles, NamesArePlain) {
