@@ -97,6 +97,7 @@ class OutputCore {
   void leave_all_but(const OutputView& view) noexcept;
   [[nodiscard]] bool rules_are_bound() const noexcept;
   void bind_rules() noexcept;
+  void bind_rules_and_view() noexcept;
   void bind_decisions() noexcept;
 
   // With the sample in `slot`, or without one (kNoSlot).

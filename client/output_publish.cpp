@@ -63,7 +63,7 @@ void OutputCore::stamp(shm::ActivityWord word) noexcept {
 
 Outcome OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
-  if (!rules_are_bound()) bind_rules();
+  if (!rules_are_bound()) bind_rules_and_view();
   const bool begins = !shm::is_active(own_word_, now);
   stamp(shm::arrival(now, timeout_));
   Outcome outcome;
@@ -77,6 +77,17 @@ Outcome OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanosecond
   return outcome;
 }
 
+// A model comes into force once its connections have been offered to us: under its table they count,
+// be it that we looked for them a moment too early. Relaxed is enough for that look: the table was
+// acquired, and was put in force after the offer.
+void OutputCore::bind_rules_and_view() noexcept {
+  bind_rules();
+  while (handover_.has_offer()) {
+    accept_view();
+    bind_rules();
+  }
+}
+
 void OutputCore::decide_all(shm::Nanoseconds now) noexcept {
   for (int tries = 0;; ++tries) {
     shm::DecisionClock clock(now, true);
@@ -85,7 +96,7 @@ void OutputCore::decide_all(shm::Nanoseconds now) noexcept {
     }
     if (memory_->tables().is_whole(snapshot_)) return;
     if (tries == kMaxTableRetries) break;
-    bind_rules();
+    bind_rules_and_view();
   }
   for (SharedDecision& decision : decisions_) decision.verdict = shm::Verdict::kUnsettled;
 }
