@@ -77,9 +77,9 @@ Outcome OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanosecond
   return outcome;
 }
 
-// A model comes into force once its connections have been offered to us: under its table they count,
-// be it that we looked for them a moment too early. Relaxed is enough for that look: the table was
-// acquired, and was put in force after the offer.
+// A model comes into force once its connections have been offered to us: under its table they
+// count, be it that we looked for them a moment too early. Relaxed is enough for that look: the
+// table was acquired, and was put in force after the offer.
 void OutputCore::bind_rules_and_view() noexcept {
   bind_rules();
   while (handover_.has_offer()) {
