@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "rules/application_reader.hpp"
@@ -18,25 +19,30 @@
 namespace arbiter::rules {
 namespace {
 
-Model read_models(const std::vector<std::string>& paths, Diagnostics& diagnostics) {
-  Model model;
+// An application with a model in it says which connections exist, unless another one is given.
+void add_application(const TextFile& file, LoadedModel& loaded, Diagnostics& diagnostics) {
+  Application read = read_application(file, diagnostics);
+  if (!loaded.application) loaded.application.emplace();
+  auto& known = loaded.application->connections;
+  known.insert(known.end(), read.connections.begin(), read.connections.end());
+  if (read.is_incomplete) loaded.application->is_incomplete = true;
+}
+
+void read_files(const ModelFiles& files, LoadedModel& loaded, Diagnostics& diagnostics) {
   Defines defines;
   std::set<std::string> read;
-  for (const std::string& path : paths) {
+  for (const std::string& path : files.models) {
     if (!read.insert(path).second) {
       diagnostics.error("duplicate-file", {path, 1, 1}, "this file is given twice; give it once");
       continue;
     }
-    read_model(TextFile(path, read_bytes(path)), defines, model, diagnostics);
+    const TextFile file(path, read_bytes(path));
+    const bool is_application = read_model(file, defines, loaded.model, diagnostics);
+    if (is_application && !files.application) add_application(file, loaded, diagnostics);
   }
-  return model;
-}
-
-std::optional<Application> read_application_if_any(const ModelFiles& files,
-                                                   Diagnostics& diagnostics) {
-  if (!files.application) return {};
-  return read_application(TextFile(*files.application, read_bytes(*files.application)),
-                          diagnostics);
+  if (!files.application) return;
+  const TextFile file(*files.application, read_bytes(*files.application));
+  loaded.application = read_application(file, diagnostics);
 }
 
 // Checks go through a model in various orders; the reader of their findings goes through files.
@@ -72,21 +78,26 @@ void hand_over_sorted(const Diagnostics& found, const DocumentOrder& order,
 }  // namespace
 
 RuleSet load(const ModelFiles& files, Diagnostics& diagnostics) {
+  return std::move(load_all(files, diagnostics).rules);
+}
+
+LoadedModel load_all(const ModelFiles& files, Diagnostics& diagnostics) {
   std::vector<std::string> paths = files.models;
   if (files.application) paths.push_back(*files.application);
   const DocumentOrder order(paths);
 
   Diagnostics found;
-  const Model model = read_models(files.models, found);
-  const std::optional<Application> application = read_application_if_any(files, found);
-  check_sources(model, found);
-  const Hierarchy hierarchy(model, found);
-  RuleSet rules = extract_rules(model, hierarchy, found);
+  LoadedModel loaded;
+  read_files(files, loaded, found);
+  const std::optional<Application>& application = loaded.application;
+  check_sources(loaded.model, found);
+  const Hierarchy hierarchy(loaded.model, found);
+  RuleSet& rules = loaded.rules = extract_rules(loaded.model, hierarchy, found);
   if (application) check_application(*application, rules, found);
   const Location whole{paths.empty() ? "" : paths.front(), 1, 1};
   check_limits(rules, application ? &*application : nullptr, whole, order, found);
   hand_over_sorted(found, order, diagnostics);
-  return rules;
+  return loaded;
 }
 
 }  // namespace arbiter::rules

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rules/diagnostic.hpp"
+#include "rules/model.hpp"
 #include "rules/rule_set.hpp"
 
 namespace arbiter::rules {
@@ -25,5 +26,13 @@ class FileError : public std::runtime_error {
 // Reports all problems of all files in one go; the result is to be used only if there is no error.
 // Throws FileError.
 RuleSet load(const ModelFiles& files, Diagnostics& diagnostics);
+
+// The rules, with what they were made of.
+struct LoadedModel {
+  Model model;
+  std::optional<Application> application;  // given, or a model's file is one itself
+  RuleSet rules;
+};
+LoadedModel load_all(const ModelFiles& files, Diagnostics& diagnostics);
 
 }  // namespace arbiter::rules

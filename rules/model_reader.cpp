@@ -21,6 +21,9 @@ bool is_blank_text(const XmlNode* first) {
   return true;
 }
 
+constexpr std::string_view kApplication = "application";
+constexpr std::string_view kArbitration = "arbitration";
+
 bool is_root(std::string_view tag) { return tag == "behaviors" || tag == "behaviours"; }
 
 class ModelReader {
@@ -32,43 +35,93 @@ class ModelReader {
         diagnostics_(diagnostics),
         reader_(file, defines, diagnostics) {}
 
-  void read() {
-    const auto document =
-        check_characters(file_, diagnostics_) ? parse_xml(file_, diagnostics_) : std::nullopt;
+  bool read() {
+    const auto document = check_bytes() ? parse_xml(file_, diagnostics_) : std::nullopt;
     if (!document) return give_up();
-    const Elements top(document->first());
-    if (top.begin() == top.end() && is_blank_text(document->first())) {
+    return read_tree(*document);
+  }
+
+ private:
+  bool read_tree(const XmlDocument& document) {
+    const Elements top(document.first());
+    if (top.begin() == top.end() && is_blank_text(document.first())) {
       diagnostics_.error("empty-file", file_.locate(0),
                          "the file is empty; a model without rules is <behaviors/>");
       return give_up();
     }
     if (top.begin() != top.end() && is_root((*top.begin()).text)) {
-      read_document(*document);
+      read_document(document);
+    } else if (top.begin() != top.end() && is_application(*top.begin())) {
+      read_arbitration(*top.begin());
+      return true;
     } else {
-      read_list(document->first());
+      read_list(document.first());
+    }
+    return false;
+  }
+
+  // Of an application only the model in it is ours to judge.
+  bool check_bytes() {
+    const auto written = outline(file_.content());
+    if (!written || written->root != kApplication) return check_characters(file_, diagnostics_);
+    if (!check_readable(file_, diagnostics_)) return false;
+    for (const auto& [name, extent] : written->children) {
+      if (name != kArbitration) continue;
+      if (!check_characters(file_, diagnostics_, extent.begin, extent.end)) return false;
+    }
+    return true;
+  }
+
+  static bool is_application(const XmlNode& root) {
+    if (root.text != kApplication) return false;
+    for (const XmlNode& element : Elements(root.first_child)) {
+      if (element.text == kArbitration) return true;
+    }
+    return false;
+  }
+
+  // The rules that arbiter compile has merged into an application, or whatever model somebody has
+  // put there. The rest of the file is the application's.
+  void read_arbitration(const XmlNode& application) {
+    const XmlNode* first = nullptr;
+    for (const XmlNode& element : Elements(application.first_child)) {
+      if (element.text != kArbitration) continue;
+      if (first != nullptr) {
+        reader_.error("duplicate-arbitration", reader_.where(element),
+                      "the application has its model already, at " +
+                          describe(reader_.where(*first)) + "; remove one of the two");
+        model_.has_unknown_gaps = true;
+        return;
+      }
+      first = &element;
+      read_root(element);
     }
   }
 
- private:
-  void give_up() {
+  bool give_up() {
     model_.has_unknown_gaps = true;
     defines_.expect_gaps();
+    return false;
   }
 
   void read_document(const XmlDocument& document) {
     reader_.check_no_text(document.first());
     Elements::Iterator at = Elements(document.first()).begin();
     const XmlNode& root = *at;
-    reader_.check_attributes(root, {"timeout"});
-    if (const auto text = reader_.optional_attribute(root, "timeout")) read_root_timeout(*text);
-    is_in_root_ = true;
-    read_list(root.first_child);
+    read_root(root);
     for (const Elements::Iterator end(nullptr); ++at != end;) {
       reader_.error("unknown-element", reader_.where(*at),
                     "<" + std::string((*at).text) + "> stands behind the root; move it into <" +
                         std::string(root.text) + ">");
       refuse(*at, model_);
     }
+  }
+
+  void read_root(const XmlNode& root) {
+    reader_.check_attributes(root, {"timeout"});
+    if (const auto text = reader_.optional_attribute(root, "timeout")) read_root_timeout(*text);
+    is_in_root_ = true;
+    read_list(root.first_child);
   }
 
   void read_root_timeout(const Text& text) {
@@ -104,8 +157,10 @@ class ModelReader {
   void report_unknown(const XmlNode& element) {
     refuse(element, model_);
     if (element.text == "application") {
-      reader_.error("unknown-element", reader_.where(element),
-                    "this is an application file, not a model; give it as the application");
+      reader_.error(
+          "unknown-element", reader_.where(element),
+          "this is an application file, not a model, for it has no <arbitration>; give it "
+          "as the application");
     } else if (is_root(element.text)) {
       reader_.error("unknown-element", reader_.where(element),
                     "<" + std::string(element.text) +
@@ -226,8 +281,8 @@ class ModelReader {
 
 }  // namespace
 
-void read_model(const TextFile& file, Defines& defines, Model& model, Diagnostics& diagnostics) {
-  ModelReader(file, defines, model, diagnostics).read();
+bool read_model(const TextFile& file, Defines& defines, Model& model, Diagnostics& diagnostics) {
+  return ModelReader(file, defines, model, diagnostics).read();
 }
 
 }  // namespace arbiter::rules

@@ -8,7 +8,8 @@
 
 namespace arbiter::rules {
 
-// Appends to `model`; `defines` are those of the files before, and then also of this one.
-void read_model(const TextFile& file, Defines& defines, Model& model, Diagnostics& diagnostics);
+// Appends to `model`; `defines` are those of the files before, and then also of this one. True
+// where the file is an application that has its model inside, in <arbitration>.
+bool read_model(const TextFile& file, Defines& defines, Model& model, Diagnostics& diagnostics);
 
 }  // namespace arbiter::rules

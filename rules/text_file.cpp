@@ -81,10 +81,11 @@ bool check_size(const TextFile& file, std::size_t limit, Diagnostics& diagnostic
   return false;
 }
 
-bool check_characters(const TextFile& file, Diagnostics& diagnostics) {
+bool check_characters(const TextFile& file, Diagnostics& diagnostics, std::size_t begin,
+                      std::size_t end) {
   if (!check_size(file, kMaxFileBytes, diagnostics)) return false;
-  const std::string_view content = file.content();
-  for (std::size_t i = 0; i < content.size();) {
+  const std::string_view content = file.content().substr(0, end);
+  for (std::size_t i = begin; i < content.size();) {
     const Utf8Character character = decode_utf8(content.substr(i));
     if (character.length == 0) {
       diagnostics.error("invalid-character", file.locate(i),

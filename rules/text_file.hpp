@@ -45,7 +45,9 @@ bool check_size(const TextFile& file, std::size_t limit, Diagnostics& diagnostic
 
 // Whether a model may consist of these bytes: UTF-8 within the limit, without control characters
 // (some of which end a file early in a careless reader). Reports the first place where it may not.
-bool check_characters(const TextFile& file, Diagnostics& diagnostics);
+// With `begin` and `end`, only the bytes between these are looked at.
+bool check_characters(const TextFile& file, Diagnostics& diagnostics, std::size_t begin = 0,
+                      std::size_t end = std::string_view::npos);
 
 // What an application file must hold to: the limit, and no NUL. Its other bytes are not ours to
 // judge; real ones have names of authors in Latin-1.

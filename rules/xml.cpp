@@ -46,28 +46,18 @@ std::size_t find_tag_end(std::string_view content, std::size_t begin) {
 // pugixml says where it stumbled, not over what: this finds out. The file is known to be
 // well-formed up to its last construct.
 Scan scan(std::string_view content) {
-  static constexpr std::array<std::array<std::string_view, 2>, 4> kSkipped{
-      {{"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}, {"<!", ">"}}};
   Scan result;
-  for (std::size_t i = 0; (i = content.find('<', i)) != std::string_view::npos;) {
-    result.construct = i;
-    const std::string_view rest = content.substr(i);
-    const auto* skipped = kSkipped.begin();
-    while (skipped != kSkipped.end() && !rest.starts_with((*skipped)[0])) ++skipped;
-    const bool is_tag = skipped == kSkipped.end();
-    const std::size_t end = is_tag ? find_tag_end(content, i + 1)
-                                   : content.find((*skipped)[1], i + (*skipped)[0].size());
-    if (end == std::string_view::npos) {
+  for (auto markup = find_markup(content, 0); markup; markup = find_markup(content, markup->end)) {
+    result.construct = markup->begin;
+    if (markup->end == std::string_view::npos) {
       result.finished = false;
       break;
     }
-    if (rest.starts_with("</")) {
+    if (markup->kind == Markup::Kind::kClosing) {
       if (!result.open.empty()) result.open.pop_back();
-    } else if (is_tag && content[end - 1] != '/') {
-      const std::string_view tag = content.substr(i + 1, end - i - 1);
-      result.open.push_back({tag.substr(0, tag.find_first_of(" \t\r\n")), i});
+    } else if (markup->kind == Markup::Kind::kOpening) {
+      result.open.push_back({markup->name, markup->begin});
     }
-    i = end;
   }
   return result;
 }
@@ -240,6 +230,58 @@ std::optional<XmlDocument> parse_xml(const TextFile& file, Diagnostics& diagnost
     if (at) at = at.next_sibling();
   }
   return document;
+}
+
+std::optional<Markup> find_markup(std::string_view content, std::size_t from) {
+  static constexpr std::array<std::array<std::string_view, 2>, 4> kSkipped{
+      {{"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}, {"<!", ">"}}};
+  Markup markup;
+  markup.begin = content.find('<', from);
+  if (markup.begin == std::string_view::npos) return {};
+  const std::string_view rest = content.substr(markup.begin);
+  for (const auto& [opening, closing] : kSkipped) {
+    if (!rest.starts_with(opening)) continue;
+    const std::size_t end = content.find(closing, markup.begin + opening.size());
+    markup.end = end == std::string_view::npos ? end : end + closing.size();
+    return markup;
+  }
+  const std::size_t close = find_tag_end(content, markup.begin + 1);
+  const std::size_t slash = rest.starts_with("</") ? 1 : 0;
+  markup.kind = slash == 1 ? Markup::Kind::kClosing
+                : close != std::string_view::npos && content[close - 1] == '/'
+                    ? Markup::Kind::kEmpty
+                    : Markup::Kind::kOpening;
+  markup.end = close == std::string_view::npos ? close : close + 1;
+  markup.name = content.substr(markup.begin + 1 + slash, close - markup.begin - 1 - slash);
+  markup.name = markup.name.substr(0, markup.name.find_first_of(" \t\r\n/"));
+  return markup;
+}
+
+std::optional<Outline> outline(std::string_view content) {
+  std::optional<Outline> result;
+  std::size_t depth = 0;
+  for (auto markup = find_markup(content, 0); markup; markup = find_markup(content, markup->end)) {
+    if (markup->end == std::string_view::npos) return {};
+    if (markup->kind == Markup::Kind::kOther) continue;
+    const bool opens = markup->kind != Markup::Kind::kClosing;
+    const Extent extent{markup->begin, markup->end, markup->end};
+    if (opens && depth == 0) {
+      if (result) return {};
+      result = Outline{markup->name, extent, {}};
+    } else if (opens && depth == 1) {
+      result->children.emplace_back(markup->name, extent);
+    }
+    if (markup->kind == Markup::Kind::kOpening) ++depth;
+    if (opens) continue;
+    if (depth == 0) return {};
+    --depth;
+    if (depth > 1) continue;
+    Extent& closed = depth == 0 ? result->extent : result->children.back().second;
+    closed.inner_end = markup->begin;
+    closed.end = markup->end;
+  }
+  if (depth > 0) return {};
+  return result;
 }
 
 Location locate(const TextFile& file, const XmlNode& element) {

@@ -8,6 +8,7 @@
 #include <deque>
 #include <optional>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "rules/diagnostic.hpp"
@@ -44,6 +45,33 @@ class XmlDocument {
 
 // A document, or a list of elements without a root. Reports what is malformed.
 std::optional<XmlDocument> parse_xml(const TextFile& file, Diagnostics& diagnostics);
+
+// A tag, comment, CDATA section, declaration or instruction, as a scan of the bytes finds it.
+struct Markup {
+  enum class Kind { kOpening, kClosing, kEmpty, kOther };
+  Kind kind = Kind::kOther;
+  std::string_view name;  // of a tag
+  std::size_t begin = 0;
+  std::size_t end = 0;  // behind its last byte; npos if it does not end
+};
+
+// The first that begins at or behind `from`, in content that is well-formed up to its end.
+std::optional<Markup> find_markup(std::string_view content, std::size_t from);
+
+// Where an element stands in the bytes of a file, its tags included.
+struct Extent {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  std::size_t inner_end = 0;  // where its closing tag begins; `end` if it has none: <a/>
+};
+
+// The root of a well-formed document and the elements right inside it, in order.
+struct Outline {
+  std::string_view root;
+  Extent extent;
+  std::vector<std::pair<std::string_view, Extent>> children;
+};
+std::optional<Outline> outline(std::string_view content);
 
 // Where an element's tag begins.
 Location locate(const TextFile& file, const XmlNode& element);
