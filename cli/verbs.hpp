@@ -12,6 +12,8 @@ namespace arbiter::cli {
 void add_check(CLI::App& app, int& exit_code);
 void add_diff(CLI::App& app, int& exit_code);
 void add_rules(CLI::App& app, int& exit_code);
+void add_compile(CLI::App& app, int& exit_code);
+void add_graph(CLI::App& app, int& exit_code);
 void add_simulate(CLI::App& app, int& exit_code);
 void add_play(CLI::App& app, int& exit_code);
 void add_echo(CLI::App& app, int& exit_code);

@@ -1,0 +1,100 @@
+// arbiter compile: the application with the rules of its arbiters merged in.
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/model_files.hpp"
+#include "cli/output_file.hpp"
+#include "cli/verbs.hpp"
+#include "rules/application_writer.hpp"
+#include "rules/report.hpp"
+#include "rules/text_file.hpp"
+#include "rules/xml.hpp"
+#include "shm/file_descriptor.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+struct CompileOptions {
+  rules::ModelFiles files;
+  std::string output;
+};
+
+bool is_application(const std::string& content) {
+  const auto outline = rules::outline(content);
+  return outline && outline->root == "application";
+}
+
+// The application given; else the one that the model is in already; else one made of the model.
+std::string merge(const rules::ModelFiles& files, const rules::RuleSet& rules) {
+  if (files.application) return rules::merge_rules(rules, rules::read_bytes(*files.application));
+  const std::string& model = files.models.front();
+  if (files.models.size() == 1) {
+    const std::string content = rules::read_bytes(model);
+    if (is_application(content)) return rules::merge_rules(rules, content);
+  }
+  return rules::write_application(rules, std::filesystem::path(model).stem().string());
+}
+
+// What was written is read as anybody will read it, before anybody does.
+void check_by_reading_back(const std::string& content, const rules::RuleSet& rules) {
+  const shm::FileDescriptor memory(memfd_create("arbiter-compile", MFD_CLOEXEC));
+  for (std::size_t at = 0; at < content.size();) {
+    const ssize_t written = write(memory.get(), content.data() + at, content.size() - at);
+    if (written <= 0) throw std::runtime_error("there is no memory to read the result back from");
+    at += static_cast<std::size_t>(written);
+  }
+  rules::Diagnostics diagnostics;
+  const rules::RuleSet read =
+      rules::load({{"/proc/self/fd/" + std::to_string(memory.get())}, {}}, diagnostics);
+  for (const auto& item : diagnostics.items()) {
+    if (item.severity != rules::Severity::kError) continue;
+    throw std::runtime_error("the rules cannot be written as a file that could be read again: " +
+                             item.message);
+  }
+  if (!rules::same_rules(read, rules)) {
+    throw std::logic_error("what was written reads back as other rules; this is a bug of arbiter");
+  }
+}
+
+int compile(const CompileOptions& options) {
+  rules::Diagnostics diagnostics;
+  const auto model = load_model(options.files, diagnostics);
+  rules::write_text(std::cerr, diagnostics);
+  if (!model) return 1;
+  const std::string content = merge(options.files, model->rules);
+  check_by_reading_back(content, model->rules);
+  write_output(options.output, content);
+  return 0;
+}
+
+}  // namespace
+
+void add_compile(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<CompileOptions>();
+  CLI::App* verb =
+      app.add_subcommand("compile", "Write the application with the rules merged into it");
+  add_model_options(*verb, options->files);
+  verb->add_option("-o,--output", options->output, kOutputHelp)->type_name("FILE");
+  verb->footer(
+      "The application file stays as it is and gets one element more, <arbitration>, with the "
+      "rules "
+      "of each\ninput port. The result can be given as an application, and as a model, which then "
+      "decides alike.\nWithout --application, one is made of the connections that the model "
+      "configures.\n\n"
+      "Exit codes: 0 written; 1 an error in the model; 2 a file cannot be opened or written\n\n"
+      "Examples:\n"
+      "  arbiter compile search_and_track.xml --application application.xml -o merged.xml\n"
+      "  arbiter check merged.xml\n"
+      "  arbiterd --model merged.xml");
+  verb->callback([options, &exit_code] { exit_code = compile(*options); });
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,96 @@
+#include "drawing/dot.hpp"
+
+#include "rules/utf8.hpp"
+
+namespace arbiter::drawing {
+namespace {
+
+// Each character of the text; U+FFFD for what cannot be drawn.
+template <typename Use>
+void for_each_character(std::string_view text, const Use& use) {
+  for (std::size_t i = 0; i < text.size();) {
+    const rules::Utf8Character character = rules::decode_utf8(text.substr(i));
+    const std::size_t length = character.length == 0 ? 1 : character.length;
+    const bool is_line_end = text[i] == '\n';
+    const bool can_be_drawn =
+        character.length != 0 && (is_line_end || !rules::is_control(character.code));
+    use(can_be_drawn ? text.substr(i, length) : std::string_view("\xef\xbf\xbd"));
+    i += length;
+  }
+}
+
+}  // namespace
+
+std::string quoted(std::string_view text) {
+  std::string result = "\"";
+  for_each_character(text, [&](std::string_view bytes) {
+    if (bytes == "\"" || bytes == "\\") {
+      result += '\\';
+      result += bytes;
+    } else if (bytes == "\n") {
+      result += "\\n";
+    } else if (bytes == "&") {
+      result += "&amp;";  // Graphviz takes references in any text
+    } else {
+      result += bytes;
+    }
+  });
+  return result + '"';
+}
+
+std::string html(std::string_view text) {
+  std::string result;
+  for_each_character(text, [&](std::string_view bytes) {
+    if (bytes == "&") {
+      result += "&amp;";
+    } else if (bytes == "<") {
+      result += "&lt;";
+    } else if (bytes == ">") {
+      result += "&gt;";
+    } else if (bytes == "\"") {
+      result += "&quot;";
+    } else if (bytes == "\n") {
+      result += "<BR/>";
+    } else {
+      result += bytes;
+    }
+  });
+  return result;
+}
+
+std::string place(const rules::Location& where) {
+  return where.file + ':' + std::to_string(where.line);
+}
+
+void DotWriter::indent() { text_.append(static_cast<std::size_t>(2 * depth_), ' '); }
+
+void DotWriter::open(std::string_view what) {
+  indent();
+  text_.append(what).append(" {\n");
+  ++depth_;
+}
+
+void DotWriter::close() {
+  --depth_;
+  indent();
+  text_ += "}\n";
+}
+
+void DotWriter::statement(std::string_view what, Attributes attributes) {
+  indent();
+  text_ += what;
+  const char* separator = " [";
+  for (const auto& [name, value] : attributes) {
+    if (value.empty()) continue;
+    text_.append(separator).append(name).append("=").append(value);
+    separator = " ";
+  }
+  text_ += separator[1] == '[' ? "\n" : "]\n";
+}
+
+void DotWriter::attribute(std::string_view name, std::string_view value) {
+  indent();
+  text_.append(name).append("=").append(value).append("\n");
+}
+
+}  // namespace arbiter::drawing

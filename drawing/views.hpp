@@ -1,0 +1,13 @@
+// The two kinds of pictures, each as statements within a graph.
+#pragma once
+
+#include "drawing/dot.hpp"
+#include "drawing/situation.hpp"
+#include "rules/load.hpp"
+
+namespace arbiter::drawing {
+
+void draw_behaviours(const rules::LoadedModel& model, const Situation* situation, DotWriter& out);
+void draw_connections(const rules::LoadedModel& model, const Situation* situation, DotWriter& out);
+
+}  // namespace arbiter::drawing
