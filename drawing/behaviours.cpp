@@ -121,11 +121,11 @@ class BehavioursView {
     if (situation_ == nullptr) return "";
     return states_[b] == State::kRuns ? "▶ " : states_[b] == State::kOverridden ? "✕ " : "○ ";
   }
-  [[nodiscard]] std::string fill(std::size_t b, const char* otherwise) const {
+  [[nodiscard]] std::string fill(std::size_t b) const {
     return std::string("\"") +
            (states_[b] == State::kRuns         ? colour::kPaleWins
             : states_[b] == State::kOverridden ? colour::kPaleOverridden
-                                               : otherwise) +
+                                               : colour::kPaper) +
            '"';
   }
 
@@ -164,7 +164,7 @@ class BehavioursView {
                            {"margin", "\"0.08,0.04\""},
                            {"color", std::string("\"") + colour::kPlain + '"'},
                            {"penwidth", states_[b] == State::kRuns ? "2.5" : "1"},
-                           {"fillcolor", fill(b, colour::kPaper)},
+                           {"fillcolor", fill(b)},
                            {"tooltip", quoted(behaviour.name + "\n" + place(behaviour.where))},
                            {"label", table(rows)}});
   }
@@ -173,8 +173,11 @@ class BehavioursView {
     const Behaviour& behaviour = model_.behaviours[b];
     out_.open("subgraph " + cluster(b));
     out_.attribute("style", "\"rounded,filled\"");
-    out_.attribute("color", std::string("\"") + colour::kPlain + '"');
-    out_.attribute("fillcolor", fill(b, depth % 2 == 0 ? "#F4F4F4" : colour::kShade));
+    // Its colour shows the depth; that it runs, its border.
+    const bool runs = states_[b] == State::kRuns;
+    out_.attribute("color", std::string("\"") + (runs ? colour::kWins : colour::kPlain) + '"');
+    out_.attribute("penwidth", runs ? "2.5" : "1");
+    out_.attribute("fillcolor", depth % 2 == 0 ? "\"#F4F4F4\"" : "\"#E4E4E4\"");
     out_.attribute("labeljust", "l");
     out_.attribute("margin", "12");
     out_.attribute("tooltip", quoted(behaviour.name + "\n" + place(behaviour.where)));

@@ -38,7 +38,9 @@ std::string draw(const rules::LoadedModel& model, View view, const Situation* si
                           {"fontname", kFont},
                           {"fontsize", "12"},
                           {"nodesep", "0.25"},
-                          {"ranksep", downwards ? "0.45" : is_large ? "3" : "1.2"},
+                          {"ranksep", downwards  ? "0.45"
+                                      : is_large ? "3"
+                                                 : "1.2"},
                           {"tooltip", "\" \""}});
   out.statement("node", {{"fontname", kFont}, {"fontsize", "11"}, {"shape", "plain"}});
   out.statement("edge", {{"fontname", kFont}, {"fontsize", "9"}, {"arrowsize", "0.8"}});

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "rules/application_writer.hpp"
 #include "rules/compile.hpp"
 #include "rules/load.hpp"
 #include "tests/rules/random_model.hpp"
@@ -33,6 +34,7 @@ std::size_t count_conflicts(const NaiveEvaluator& naive) {
 class RandomModels : public testing::TestWithParam<bool> {
  protected:
   void check(unsigned seed);
+  static void check_decisions(const rules::CompiledModel& model, const NaiveEvaluator& naive);
 
   int decided_ = 0, refused_ = 0;
 };
@@ -56,6 +58,17 @@ void RandomModels::check(unsigned seed) {
   EXPECT_EQ(diagnostics.has_errors(), expected_conflicts > 0);
   ++(expected_conflicts > 0 ? refused_ : decided_);
   if (expected_conflicts > 0) return;
+  check_decisions(model, naive);
+
+  // The rules, merged into an application, and that read as model and application in one.
+  const auto merged = rules::load(
+      {{directory.write("merged.xml", rules::write_application(set, "random"))}, {}}, diagnostics);
+  ASSERT_FALSE(diagnostics.has_errors()) << diagnostics.items().back().message;
+  EXPECT_TRUE(rules::same_rules(merged, set));
+  check_decisions(rules::compile(merged, diagnostics), naive);
+}
+
+void RandomModels::check_decisions(const rules::CompiledModel& model, const NaiveEvaluator& naive) {
   LiveTable live(model);
   for (const auto& active : subsets(kSources)) {
     live.activate_only(active);

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -156,6 +157,39 @@ TEST(Xml, OfAnyDepthIsReadWithoutRecursion) {
   for (int i = 0; i < 200'000; ++i) content += "</a>";
   const TextFile closed("f", content);
   EXPECT_TRUE(parse_xml(closed, diagnostics));
+}
+
+// Root, and what is in it: each with the bytes of the whole element, and where its end tag begins.
+std::string show(const std::optional<Outline>& outline, std::string_view content) {
+  if (!outline) return "none";
+  const auto element = [&](std::string_view name, const Extent& extent) {
+    return std::string(name) + "=" +
+           std::string(content.substr(extent.begin, extent.inner_end - extent.begin)) + "|" +
+           std::string(content.substr(extent.inner_end, extent.end - extent.inner_end));
+  };
+  std::string result = element(outline->root, outline->extent);
+  for (const auto& [name, extent] : outline->children) result += " + " + element(name, extent);
+  return result;
+}
+
+TEST(XmlOutline, TellsWhereElementsBeginAndEnd) {
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"<a/>", "a=<a/>|"},
+      {"<a></a>", "a=<a>|</a>"},
+      {"<?xml?><!-- <x> --><a b='>'/> ", "a=<a b='>'/>|"},
+      {"<a><b c='1'/>t<d><b/></d></a>",
+       "a=<a><b c='1'/>t<d><b/></d>|</a> + b=<b c='1'/>| + "
+       "d=<d><b/>|</d>"},
+      {"<a><![CDATA[</a>]]><!-- </a> --></a>", "a=<a><![CDATA[</a>]]><!-- </a> -->|</a>"},
+      {"", "none"},
+      {"<a>", "none"},
+      {"</a>", "none"},
+      {"<a/><b/>", "none"},
+      {"<a", "none"},
+      {"<a><!-- </a>", "none"}};
+  for (const auto& [content, expected] : cases) {
+    EXPECT_EQ(show(outline(content), content), expected) << content;
+  }
 }
 
 }  // namespace

@@ -1,0 +1,125 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/text_files.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+// Whatever a name or a file may be called.
+const std::string kNasty = R"(<behaviors>
+  <meta_behavior name="&quot;A&quot; &lt;B&gt; &amp;amp; \N"><behavior>größer</behavior></meta_behavior>
+  <behavior name="größer">
+    <config at="/p&lt;&amp;&gt;\">/a'{|}</config>
+    <condition>not "/ö&amp;" and not /c</condition>
+  </behavior>
+</behaviors>
+)";
+
+TEST(Graph, IsTheSameEachTime) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const auto result = arbiter({"graph", model, "--format", "dot"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, HasSubstr("<B>Low</B>"));
+  EXPECT_THAT(result.out, HasSubstr("b1 -> b0 "));
+  EXPECT_THAT(result.out, HasSubstr("High inhibits Low\\n" + model + ":3"));
+  EXPECT_EQ(arbiter({"graph", model, "--format", "dot"}).out, result.out);
+}
+
+TEST(Graph, ShowsConnectionsWhereThereAreNoBehaviours) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", R"(<arbiter at="/P/in:i">
+    <select from="/A/out:o">not /S/on:o</select></arbiter>)");
+  const auto result = arbiter({"graph", model, "--format", "dot"});
+  EXPECT_THAT(result.out, HasSubstr("/A/out:o ∧ ¬/S/on:o"));
+  EXPECT_THAT(result.out, HasSubstr("/S/on:o is sensed at /P/in:i"));
+}
+
+TEST(Graph, DrawsWhateverNamesThereAre) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m \"1\"\n.xml", kNasty);
+  for (const char* view : {"behaviours", "connections", "both"}) {
+    const auto result = arbiter({"graph", model, "--view", view});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+    EXPECT_THAT(result.out, HasSubstr("</svg>"));
+    if (std::string(view) == "connections") continue;
+    EXPECT_THAT(result.out, HasSubstr("&quot;A&quot; &lt;B&gt; &amp;amp; \\N"));
+    EXPECT_THAT(result.out, HasSubstr("größer"));
+    EXPECT_THAT(result.out, HasSubstr("¬&quot;/ö&amp;&quot;"));
+  }
+}
+
+TEST(Graph, ChoosesTheFormatByTheNameOfTheFile) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const auto drawn = [&](const std::string& name, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments{"graph", model, "-o", directory.path() + "/" + name};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    EXPECT_EQ(arbiter(arguments).exit_code, 0);
+    return content_of(directory.path() + "/" + name);
+  };
+  EXPECT_THAT(drawn("a.svg"), StartsWith("<?xml"));
+  EXPECT_THAT(drawn("a.png"), StartsWith("\x89PNG"));
+  EXPECT_THAT(drawn("a.dot"), StartsWith("digraph"));
+  EXPECT_THAT(drawn("a.gv"), StartsWith("digraph"));
+  EXPECT_THAT(drawn("a"), StartsWith("<?xml"));
+  EXPECT_THAT(drawn("b.svg", {"--format", "png"}), StartsWith("\x89PNG"));
+}
+
+TEST(Graph, SaysWhatToInstallWhereGraphvizIsMissing) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const std::string program = ARBITER_PROGRAMS "/arbiter";
+  const std::vector<std::string> without{"/usr/bin/env", "PATH=" + directory.path(), program,
+                                         "graph", model};
+  const auto result = run_program(without);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("apt install graphviz"));
+  auto as_dot = without;
+  as_dot.insert(as_dot.end(), {"--format", "dot"});
+  EXPECT_EQ(run_program(as_dot).exit_code, 0);
+}
+
+TEST(Graph, DrawsNothingOfAModelWithErrors) {
+  const TemporaryDirectory directory;
+  const auto result = arbiter({"graph", directory.write("m.xml", "<behaviors>")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, HasSubstr("error: "));
+}
+
+// To see why is what one looks at them for.
+TEST(Graph, DrawsRulesThatContradictEachOther) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kConflictModel);
+  EXPECT_EQ(arbiter({"graph", model, "--format", "dot"}).exit_code, 0);
+}
+
+TEST(Graph, NeedsAModelOrADaemon) {
+  EXPECT_EQ(arbiter({"graph"}).exit_code, 2);
+  EXPECT_EQ(arbiter({"graph", "--follow"}).exit_code, 2);  // and a file
+  EXPECT_EQ(arbiter({"graph", "m.xml", "--view", "upside-down"}).exit_code, 2);
+  const TemporaryDirectory directory;
+  const auto result = arbiter({"graph", "--live", "--instance", "nobody-has-this-one"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, Not(testing::IsEmpty()));
+}
+
+TEST(Graph, SaysWhichFileCannotBeWritten) {
+  const TemporaryDirectory directory;
+  const auto result = arbiter({"graph", directory.write("m.xml", kOverrideModel), "-o",
+                               directory.path() + "/missing/a.dot"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("cannot write"));
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,112 @@
+// arbiter graph --live, with a real daemon.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sched.h>
+
+#include <filesystem>
+
+#include <arbiter/arbiter.hpp>
+#include <nlohmann/json.hpp>
+
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/support/daemon.hpp"
+#include "tests/support/text_files.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string kModel = R"(<behaviors timeout="forever">
+  <behavior name="Low"><config at="/p">/low</config><condition>not /stop</condition></behavior>
+  <behavior name="High"><config at="/p">/high</config><inhibition>Low</inhibition></behavior>
+</behaviors>
+)";
+
+std::string live(const std::string& view) {
+  const auto result = arbiter({"graph", "--live", "--format", "dot", "--view", view});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.err, "");
+  return result.out;
+}
+
+TEST(LiveGraph, ShowsWhoRunsAndWhoIsOverridden) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  EXPECT_THAT(live("behaviours"), HasSubstr("○ Low"));
+  low.signal();
+  EXPECT_THAT(live("behaviours"), HasSubstr("▶ Low"));
+  EXPECT_THAT(live("behaviours"), HasSubstr("○ High"));
+  high.signal();
+  EXPECT_THAT(live("behaviours"), HasSubstr("✕ Low"));
+  EXPECT_THAT(live("behaviours"), HasSubstr("▶ High"));
+}
+
+TEST(LiveGraph, ShowsActiveSourcesAndTheWinningRule) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto stop = node.output_port<int>("/stop");
+  low.signal();
+  std::string now = live("connections");
+  EXPECT_THAT(now, HasSubstr("▶ /low ∧ ¬/stop"));
+  EXPECT_THAT(now, HasSubstr("● /low"));
+  EXPECT_THAT(now, HasSubstr("○ /stop"));
+  stop.signal();
+  now = live("connections");
+  EXPECT_THAT(now, HasSubstr("✕ /low ∧ ¬/stop"));
+  EXPECT_THAT(now, HasSubstr("● /stop"));
+  EXPECT_THAT(now, Not(HasSubstr("▶ /")));
+}
+
+TEST(LiveGraph, TellsOfADaemonThatDecidesOtherwise) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  low.signal();
+  const TemporaryDirectory directory;
+  const auto other = directory.write("other.xml", R"(<behaviors>
+    <behavior name="Low"><config at="/p">/low</config><condition>/stop</condition></behavior>
+  </behaviors>)");
+  const auto result = arbiter({"graph", other, "--live", "--format", "dot"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("decides otherwise"));
+}
+
+// Reads the picture again and again until somebody has written what it waits for.
+void wait_for_picture(const std::string& path, const std::string& text) {
+  for (;;) {
+    if (std::filesystem::exists(path)) {
+      const std::string content = content_of(path);
+      ASSERT_TRUE(content.starts_with("digraph") && content.ends_with("}\n"))
+          << "half a picture: " << content;
+      if (content.find(text) != std::string::npos) return;
+    }
+    sched_yield();
+  }
+}
+
+TEST(LiveGraph, FollowsEachChangeUntilItIsInterrupted) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  const TemporaryDirectory directory;
+  const auto path = directory.path() + "/now.dot";
+  ChildProcess follower({ARBITER_PROGRAMS "/arbiter", "graph", "--follow", "-o", path}, {}, {});
+  wait_for_picture(path, "○ Low");
+  low.signal();
+  wait_for_picture(path, "▶ Low");
+  high.signal();
+  wait_for_picture(path, "✕ Low");
+  high.deactivate();
+  wait_for_picture(path, "▶ Low");
+  follower.signal(SIGINT);
+  EXPECT_EQ(follower.wait(), 0);
+}
+
+}  // namespace
+}  // namespace arbiter::test
