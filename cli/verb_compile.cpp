@@ -5,8 +5,10 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
@@ -27,20 +29,23 @@ struct CompileOptions {
   std::string output;
 };
 
-bool is_application(const std::string& content) {
-  const auto outline = rules::outline(content);
-  return outline && outline->root == "application";
-}
-
 // The application given; else the one that the model is in already; else one made of the model.
 std::string merge(const rules::ModelFiles& files, const rules::RuleSet& rules) {
   if (files.application) return rules::merge_rules(rules, rules::read_bytes(*files.application));
-  const std::string& model = files.models.front();
-  if (files.models.size() == 1) {
-    const std::string content = rules::read_bytes(model);
-    if (is_application(content)) return rules::merge_rules(rules, content);
+  std::optional<std::string> application;
+  for (const std::string& file : files.models) {
+    std::string content = rules::read_bytes(file);
+    if (rules::root_name(content) != "application") continue;
+    if (application) {
+      throw std::runtime_error(
+          "the model is in more than one application; say by --application "
+          "which of them gets the rules");
+    }
+    application = std::move(content);
   }
-  return rules::write_application(rules, std::filesystem::path(model).stem().string());
+  if (application) return rules::merge_rules(rules, *application);
+  return rules::write_application(rules,
+                                  std::filesystem::path(files.models.front()).stem().string());
 }
 
 // What was written is read as anybody will read it, before anybody does.

@@ -4,6 +4,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -96,25 +97,30 @@ bool agrees(const json& status, const Situation& situation) {
   return true;
 }
 
+struct Look {
+  Situation situation;
+  bool fits = false;
+  json model;  // what the daemon has in force
+};
+
 // The daemon reads one activity after another while the robot goes on, so that a picture might
 // combine moments; what it says is taken when it fits together. Where it never does, the daemon has
 // other rules than this model.
-Situation take_situation(detail::NodeCore& node, const rules::RuleSet& rules, bool& fits) {
+Look look(detail::NodeCore& node, const rules::RuleSet& rules) {
   constexpr int kTries = 20;
-  Situation situation;
-  for (int i = 0; i < kTries; ++i) {
+  Look seen;
+  for (int i = 0; i < kTries && !seen.fits; ++i) {
     const json status = fetch_status(node);
-    situation = drawing::decide(rules, active_sources(status));
-    fits = agrees(status, situation);
-    if (fits) break;
+    seen.situation = drawing::decide(rules, active_sources(status));
+    seen.fits = agrees(status, seen.situation);
+    seen.model = status.at("model");
   }
-  return situation;
+  return seen;
 }
 
 // The files that the daemon has in force, where none are given.
-rules::ModelFiles files_in_force(detail::NodeCore& node, const rules::ModelFiles& given) {
+rules::ModelFiles files_in_force(const json& model, const rules::ModelFiles& given) {
   if (!given.models.empty()) return given;
-  const json model = fetch_status(node).at("model");
   rules::ModelFiles files;
   for (const auto& file : model.at("files")) files.models.push_back(file.get<std::string>());
   if (!model.at("application").is_null()) {
@@ -129,17 +135,22 @@ int draw_live(const GraphOptions& options) {
   if (options.follow) interrupts = catch_interrupts();
   const auto node = connect("graph", options.instance);
   Picture picture(options);
-  if (!picture.load(files_in_force(*node, options.files))) return 1;
+  json drawn;  // the generation of the model that the picture is of
   bool warned = false;
   for (shm::Nanoseconds next = shm::monotonic_now();; next += kFollowPeriod) {
-    bool fits = true;
-    const Situation situation = take_situation(*node, picture.rules(), fits);
-    if (!fits && !std::exchange(warned, true)) {
+    Look now = look(*node, picture.rules());
+    if (drawn != now.model.at("generation")) {
+      if (!picture.load(files_in_force(now.model, options.files))) return 1;
+      drawn = now.model.at("generation");
+      warned = false;
+      now = look(*node, picture.rules());
+    }
+    if (!now.fits && now.model.at("generation") == drawn && !std::exchange(warned, true)) {
       std::cerr << "arbiter: the daemon decides otherwise than this model does; is it the one in "
                    "force, and unchanged since? (arbiter status, arbiter reload)\n";
     }
-    picture.write(&situation);
-    if (!options.follow) return fits ? 0 : 1;
+    picture.write(&now.situation);
+    if (!options.follow) return now.fits ? 0 : 1;
     if (sleep_until(next + kFollowPeriod, *interrupts)) return 0;
   }
 }

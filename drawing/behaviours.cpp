@@ -1,5 +1,6 @@
 // The paper's figure 3: behaviours nested in meta-behaviours, red arrows for inhibitions.
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <set>
 #include <string>
@@ -33,10 +34,16 @@ class BehavioursView {
     find_states(loaded.rules);
     // Without recursion: the depth is the model's to choose.
     add_family(kNobody, std::move(roots));
-    for (std::size_t i = 0; i < families_.size(); ++i) {
-      for (const std::size_t child : std::vector<std::size_t>(families_[i].members)) {
-        if (is_box(child)) add_family(child, hierarchy_.children(child));
-      }
+    std::vector<std::size_t> boxes;
+    const auto note_boxes = [&] {
+      const auto& members = families_.back().members;
+      std::copy_if(members.rbegin(), members.rend(), std::back_inserter(boxes),
+                   [&](std::size_t member) { return is_box(member); });
+    };
+    for (note_boxes(); !boxes.empty(); note_boxes()) {
+      const std::size_t box = boxes.back();
+      boxes.pop_back();
+      add_family(box, hierarchy_.children(box));
     }
     find_edges_of_boxes();
   }
@@ -122,11 +129,9 @@ class BehavioursView {
     return states_[b] == State::kRuns ? "▶ " : states_[b] == State::kOverridden ? "✕ " : "○ ";
   }
   [[nodiscard]] std::string fill(std::size_t b) const {
-    return std::string("\"") +
-           (states_[b] == State::kRuns         ? colour::kPaleWins
-            : states_[b] == State::kOverridden ? colour::kPaleOverridden
-                                               : colour::kPaper) +
-           '"';
+    return quoted(states_[b] == State::kRuns         ? colour::kPaleWins
+                  : states_[b] == State::kOverridden ? colour::kPaleOverridden
+                                                     : colour::kPaper);
   }
 
   static std::string row(const std::string& content) {
@@ -145,7 +150,7 @@ class BehavioursView {
   }
 
   static std::string table(const std::string& rows) {
-    return "<<TABLE BORDER=\"0\" CELLBORDER=\"0\" CELLSPACING=\"0\" CELLPADDING=\"1\">" + rows +
+    return R"(<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1">)" + rows +
            "</TABLE>>";
   }
 
@@ -162,7 +167,7 @@ class BehavioursView {
     out_.statement(id(b), {{"shape", "box"},
                            {"style", "\"rounded,filled\""},
                            {"margin", "\"0.08,0.04\""},
-                           {"color", std::string("\"") + colour::kPlain + '"'},
+                           {"color", quoted(colour::kPlain)},
                            {"penwidth", states_[b] == State::kRuns ? "2.5" : "1"},
                            {"fillcolor", fill(b)},
                            {"tooltip", quoted(behaviour.name + "\n" + place(behaviour.where))},
@@ -175,9 +180,9 @@ class BehavioursView {
     out_.attribute("style", "\"rounded,filled\"");
     // Its colour shows the depth; that it runs, its border.
     const bool runs = states_[b] == State::kRuns;
-    out_.attribute("color", std::string("\"") + (runs ? colour::kWins : colour::kPlain) + '"');
+    out_.attribute("color", quoted(runs ? colour::kWins : colour::kPlain));
     out_.attribute("penwidth", runs ? "2.5" : "1");
-    out_.attribute("fillcolor", depth % 2 == 0 ? "\"#F4F4F4\"" : "\"#E4E4E4\"");
+    out_.attribute("fillcolor", quoted(depth % 2 == 0 ? "#F4F4F4" : colour::kShade));
     out_.attribute("labeljust", "l");
     out_.attribute("margin", "12");
     out_.attribute("tooltip", quoted(behaviour.name + "\n" + place(behaviour.where)));
@@ -218,7 +223,7 @@ class BehavioursView {
                      {{"ltail", is_box(who) ? cluster(who) : ""},
                       {"lhead", is_box(whom) ? cluster(whom) : ""},
                       {"minlen", is_box(who) || is_box(whom) ? "2" : ""},  // a box cuts its end off
-                      {"color", std::string("\"") + colour::kInhibition + (faint ? "70\"" : "\"")},
+                      {"color", quoted(std::string(colour::kInhibition) + (faint ? "70" : ""))},
                       {"penwidth", faint ? "0.8" : "1.8"},
                       {"tooltip", quoted(model_.behaviours[who].name + " inhibits " +
                                          model_.behaviours[whom].name + "\n" +

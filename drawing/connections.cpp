@@ -140,8 +140,8 @@ class ConnectionsView {
   }
 
   void draw_component(const std::string& name, const Component& component) {
-    std::string rows = "<TR><TD BGCOLOR=\"" + std::string(colour::kPlain) +
-                       "\"><FONT COLOR=\"white\"><B>" + html(name) + "</B></FONT></TD></TR>";
+    std::string rows = R"(<TR><TD BGCOLOR=")" + std::string(colour::kPlain) +
+                       R"("><FONT COLOR="white"><B>)" + html(name) + "</B></FONT></TD></TR>";
     for (const auto& [port, in] : component.inputs) rows += input_rows(port, in);
     for (const auto& [port, id] : component.outputs) {
       const std::string mark = situation_ == nullptr ? "" : is_active(port) ? "● " : "○ ";
@@ -155,16 +155,9 @@ class ConnectionsView {
                                        rows + "</TABLE>>"}});
   }
 
-  [[nodiscard]] std::string outlet(const std::string& source) const {
+  [[nodiscard]] std::string arrow(const std::string& source, const std::string& inlet) const {
     const Component& component = components_.at(component_of(source));
-    return component.id + ":" + component.outputs.at(source) + ":e";
-  }
-
-  static void collect(const rules::Expression& expression, std::set<std::string>& sources,
-                      std::set<const rules::Expression*>& seen) {
-    if (!seen.insert(&expression).second) return;
-    if (expression.op == rules::Operator::kSource) sources.insert(expression.name);
-    for (const auto& operand : expression.operands) collect(*operand, sources, seen);
+    return component.id + ":" + component.outputs.at(source) + ":e -> " + inlet;
   }
 
   void draw_edges(const std::string& component, const std::string& port, const Input& in) {
@@ -176,24 +169,23 @@ class ConnectionsView {
       for (std::size_t i = 0; i < in.rules->rules.size(); ++i) {
         const rules::ConnectionRule& rule = in.rules->rules[i];
         connected.insert(rule.source);
-        collect(*rule.condition, sensed, seen);
+        rules::add_sources_of(*rule.condition, sensed, seen);
         draw_selected(rule, port, inlet(in.id + "r" + std::to_string(i)));
       }
     }
     for (std::size_t i = 0; i < in.others.size(); ++i) {
       const bool arbitrated = in.rules != nullptr;
       out_.statement(
-          outlet(in.others[i]) + " -> " +
-              inlet(arbitrated ? in.id + "n" + std::to_string(i) : in.id),
-          {{"color", std::string("\"") + colour::kSilent + '"'},
+          arrow(in.others[i], inlet(arbitrated ? in.id + "n" + std::to_string(i) : in.id)),
+          {{"color", quoted(colour::kSilent)},
            {"style", arbitrated ? "dotted" : ""},
            {"tooltip", quoted(in.others[i] + " → " + port +
                               (arbitrated ? "\nno rule selects it" : "\nnot arbitrated"))}});
     }
     for (const std::string& source : sensed) {
       if (connected.contains(source)) continue;
-      out_.statement(outlet(source) + " -> " + inlet(in.id),
-                     {{"color", std::string("\"") + colour::kSensed + '"'},
+      out_.statement(arrow(source, inlet(in.id)),
+                     {{"color", quoted(colour::kSensed)},
                       {"style", "dashed"},
                       {"arrowhead", "odot"},
                       {"penwidth", is_active(source) ? "2.5" : "1"},
@@ -209,8 +201,8 @@ class ConnectionsView {
                             : winning             ? colour::kWins
                             : losing              ? colour::kOverridden
                                                   : colour::kSilent;
-    out_.statement(outlet(rule.source) + " -> " + inlet,
-                   {{"color", std::string("\"") + hue + '"'},
+    out_.statement(arrow(rule.source, inlet),
+                   {{"color", quoted(hue)},
                     {"penwidth", winning  ? "3"
                                  : losing ? "1.5"
                                           : "1"},

@@ -1,6 +1,7 @@
 #include "drawing/dot.hpp"
 
 #include "rules/utf8.hpp"
+#include "rules/xml.hpp"
 
 namespace arbiter::drawing {
 namespace {
@@ -41,14 +42,8 @@ std::string quoted(std::string_view text) {
 std::string html(std::string_view text) {
   std::string result;
   for_each_character(text, [&](std::string_view bytes) {
-    if (bytes == "&") {
-      result += "&amp;";
-    } else if (bytes == "<") {
-      result += "&lt;";
-    } else if (bytes == ">") {
-      result += "&gt;";
-    } else if (bytes == "\"") {
-      result += "&quot;";
+    if (const auto reference = rules::reference_for(bytes.front()); !reference.empty()) {
+      result += reference;
     } else if (bytes == "\n") {
       result += "<BR/>";
     } else {
@@ -62,7 +57,7 @@ std::string place(const rules::Location& where) {
   return where.file + ':' + std::to_string(where.line);
 }
 
-void DotWriter::indent() { text_.append(static_cast<std::size_t>(2 * depth_), ' '); }
+void DotWriter::indent() { text_.append(2 * depth_, ' '); }
 
 void DotWriter::open(std::string_view what) {
   indent();

@@ -1,6 +1,7 @@
 // The language of Graphviz: how text gets into it unharmed, and what all pictures look alike in.
 #pragma once
 
+#include <cstddef>
 #include <initializer_list>
 #include <string>
 #include <string_view>
@@ -52,7 +53,7 @@ class DotWriter {
   void indent();
 
   std::string text_;
-  int depth_ = 0;
+  std::size_t depth_ = 0;
 };
 
 }  // namespace arbiter::drawing

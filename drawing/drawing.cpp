@@ -9,11 +9,11 @@ constexpr const char* kFont = "\"Helvetica,Arial,sans-serif\"";
 
 void draw_legend(DotWriter& out) {
   const auto row = [](const char* fill, const char* text) {
-    return std::string("<TR><TD ALIGN=\"LEFT\" BGCOLOR=\"") + fill + "\">" + text + "</TD></TR>";
+    return std::string(R"(<TR><TD ALIGN="LEFT" BGCOLOR=")") + fill + "\">" + text + "</TD></TR>";
   };
   out.statement("legend", {{"shape", "plain"},
                            {"tooltip", "\"legend\""},
-                           {"label", "<<TABLE BORDER=\"0\" CELLBORDER=\"1\" CELLSPACING=\"0\">" +
+                           {"label", R"(<<TABLE BORDER="0" CELLBORDER="1" CELLSPACING="0">)" +
                                          row(colour::kPaleWins, "▶ wins, runs") +
                                          row(colour::kPaleOverridden, "✕ active, and overridden") +
                                          row(colour::kPaleActive, "● active") +

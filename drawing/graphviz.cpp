@@ -15,8 +15,6 @@
 
 #include "shm/file_descriptor.hpp"
 
-extern char** environ;
-
 namespace arbiter::drawing {
 namespace {
 

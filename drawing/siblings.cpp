@@ -62,7 +62,7 @@ std::vector<std::vector<std::size_t>> arrange_loners(std::size_t siblings,
   for (std::size_t i = 0; i < siblings; ++i) {
     if (!is_linked[i]) loners.push_back(i);
   }
-  const auto height = static_cast<std::size_t>(std::sqrt(static_cast<double>(loners.size())) + 0.5);
+  const auto height = static_cast<std::size_t>(std::lround(std::sqrt(loners.size())));
   std::vector<std::vector<std::size_t>> columns;
   for (std::size_t i = 0; i < loners.size(); ++i) {
     if (i % height == 0) columns.emplace_back();

@@ -61,7 +61,7 @@ Style style_of(std::string_view content, const Outline& outline) {
 
 class ArbitrationWriter {
  public:
-  ArbitrationWriter(const RuleSet& rules, const Style& style) : rules_(rules), style_(style) {
+  ArbitrationWriter(const RuleSet& rules, Style style) : rules_(rules), style_(std::move(style)) {
     for (const BehaviourRules& behaviour : rules.behaviours) {
       for (const auto& [port, rule] : behaviour.rules) {
         behaviours_[{port, rule.source}].push_back(behaviour.name);
@@ -91,14 +91,8 @@ class ArbitrationWriter {
       const std::size_t length = std::max<std::size_t>(character.length, 1);
       const std::string_view bytes = written.substr(i, length);
       i += length;
-      if (bytes == "&") {
-        result += "&amp;";
-      } else if (bytes == "<") {
-        result += "&lt;";
-      } else if (bytes == ">") {
-        result += "&gt;";
-      } else if (bytes == "\"") {
-        result += "&quot;";
+      if (const auto reference = reference_for(bytes.front()); !reference.empty()) {
+        result += reference;
       } else if (bytes == "$" && written.substr(i).starts_with('{')) {
         result += dollar;
       } else if (length > 1 && !style_.is_utf8) {
@@ -124,7 +118,7 @@ class ArbitrationWriter {
     for (const PortRules& port : rules_.ports) {
       for (const ConnectionRule& rule : port.rules) {
         mentioned.insert(rule.source);
-        collect(*rule.condition, mentioned, seen);
+        add_sources_of(*rule.condition, mentioned, seen);
       }
     }
     for (const std::string& source : rules_.sources) {
@@ -134,13 +128,6 @@ class ArbitrationWriter {
       line(2, "<source port=\"" + escape(source) + '"' +
                   (has_timeout ? " timeout=\"" + to_string(timeout->second) + '"' : "") + "/>");
     }
-  }
-
-  static void collect(const Expression& expression, std::set<std::string>& sources,
-                      std::set<const Expression*>& seen) {
-    if (!seen.insert(&expression).second) return;
-    if (expression.op == Operator::kSource) sources.insert(expression.name);
-    for (const ExpressionPtr& operand : expression.operands) collect(*operand, sources, seen);
   }
 
   void write_port(const PortRules& port) {
@@ -200,7 +187,10 @@ Extent with_its_line(std::string_view content, Extent extent) {
 
 std::string merge_rules(const RuleSet& rules, std::string_view application) {
   const auto found = outline(application);
-  if (!found || found->root != "application") throw std::logic_error("not an application");
+  if (!found || found->root != "application") {
+    throw std::invalid_argument(
+        "the application file is no <application> that rules can be put into");
+  }
   const Style style = style_of(application, *found);
   const std::string merged = ArbitrationWriter(rules, style).write();
   const Extent& root = found->extent;

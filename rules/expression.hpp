@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -46,6 +47,14 @@ inline ExpressionPtr make_operation(Operator op, std::vector<ExpressionPtr> oper
 }
 inline ExpressionPtr make_quantifier(Operator op, std::string glob) {
   return std::make_shared<Expression>(Expression{op, std::move(glob), {}});
+}
+
+// Expressions share much: what was seen already is not looked at again.
+inline void add_sources_of(const Expression& expression, std::set<std::string>& sources,
+                           std::set<const Expression*>& seen) {
+  if (!seen.insert(&expression).second) return;
+  if (expression.op == Operator::kSource) sources.insert(expression.name);
+  for (const ExpressionPtr& operand : expression.operands) add_sources_of(*operand, sources, seen);
 }
 
 }  // namespace arbiter::rules

@@ -62,8 +62,9 @@ class ModelReader {
 
   // Of an application only the model in it is ours to judge.
   bool check_bytes() {
-    const auto written = outline(file_.content());
-    if (!written || written->root != kApplication) return check_characters(file_, diagnostics_);
+    const bool is_application = root_name(file_.content()) == kApplication;
+    const auto written = is_application ? outline(file_.content()) : std::nullopt;
+    if (!written) return check_characters(file_, diagnostics_);
     if (!check_readable(file_, diagnostics_)) return false;
     for (const auto& [name, extent] : written->children) {
       if (name != kArbitration) continue;

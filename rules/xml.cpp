@@ -27,17 +27,25 @@ struct Scan {
   bool finished = true;       // whether that ends, too
 };
 
-// The end of a tag, or npos.
+// The end of a tag, or of a document type, which may have comments and others inside it; or npos.
 std::size_t find_tag_end(std::string_view content, std::size_t begin) {
   char quoted = 0;
+  std::size_t depth = 0;
   for (std::size_t i = begin; i < content.size(); ++i) {
     const char byte = content[i];
     if (quoted != 0) {
       if (byte == quoted) quoted = 0;
     } else if (byte == '"' || byte == '\'') {
       quoted = byte;
+    } else if (content[begin] == '!' && content.substr(i).starts_with("<!--")) {
+      i = content.find("-->", i + 4);
+      if (i == std::string_view::npos) break;
+      i += 2;
+    } else if (content[begin] == '!' && byte == '<') {
+      ++depth;
     } else if (byte == '>') {
-      return i;
+      if (depth == 0) return i;
+      --depth;
     }
   }
   return std::string_view::npos;
@@ -233,8 +241,8 @@ std::optional<XmlDocument> parse_xml(const TextFile& file, Diagnostics& diagnost
 }
 
 std::optional<Markup> find_markup(std::string_view content, std::size_t from) {
-  static constexpr std::array<std::array<std::string_view, 2>, 4> kSkipped{
-      {{"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}, {"<!", ">"}}};
+  static constexpr std::array<std::array<std::string_view, 2>, 3> kSkipped{
+      {{"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<?", "?>"}}};
   Markup markup;
   markup.begin = content.find('<', from);
   if (markup.begin == std::string_view::npos) return {};
@@ -246,12 +254,13 @@ std::optional<Markup> find_markup(std::string_view content, std::size_t from) {
     return markup;
   }
   const std::size_t close = find_tag_end(content, markup.begin + 1);
+  markup.end = close == std::string_view::npos ? close : close + 1;
+  if (rest.starts_with("<!")) return markup;
   const std::size_t slash = rest.starts_with("</") ? 1 : 0;
   markup.kind = slash == 1 ? Markup::Kind::kClosing
                 : close != std::string_view::npos && content[close - 1] == '/'
                     ? Markup::Kind::kEmpty
                     : Markup::Kind::kOpening;
-  markup.end = close == std::string_view::npos ? close : close + 1;
   markup.name = content.substr(markup.begin + 1 + slash, close - markup.begin - 1 - slash);
   markup.name = markup.name.substr(0, markup.name.find_first_of(" \t\r\n/"));
   return markup;
@@ -266,12 +275,12 @@ std::optional<Outline> outline(std::string_view content) {
     const bool opens = markup->kind != Markup::Kind::kClosing;
     const Extent extent{markup->begin, markup->end, markup->end};
     if (opens && depth == 0) {
-      if (result) return {};
       result = Outline{markup->name, extent, {}};
     } else if (opens && depth == 1) {
       result->children.emplace_back(markup->name, extent);
     }
     if (markup->kind == Markup::Kind::kOpening) ++depth;
+    if (opens && depth == 0) return result;  // <a/>
     if (opens) continue;
     if (depth == 0) return {};
     --depth;
@@ -279,9 +288,17 @@ std::optional<Outline> outline(std::string_view content) {
     Extent& closed = depth == 0 ? result->extent : result->children.back().second;
     closed.inner_end = markup->begin;
     closed.end = markup->end;
+    if (depth == 0) return result;
   }
-  if (depth > 0) return {};
-  return result;
+  return {};
+}
+
+std::string_view root_name(std::string_view content) {
+  auto markup = find_markup(content, 0);
+  while (markup && markup->kind == Markup::Kind::kOther) {
+    markup = find_markup(content, markup->end);
+  }
+  return markup ? markup->name : std::string_view();
 }
 
 Location locate(const TextFile& file, const XmlNode& element) {
@@ -315,6 +332,21 @@ bool decode(const TextFile& file, std::string_view written, Text& text, Diagnost
     written.remove_prefix(end + 1);
   }
   return true;
+}
+
+std::string_view reference_for(char character) {
+  switch (character) {
+    case '&':
+      return "&amp;";
+    case '<':
+      return "&lt;";
+    case '>':
+      return "&gt;";
+    case '"':
+      return "&quot;";
+    default:
+      return {};
+  }
 }
 
 }  // namespace arbiter::rules

@@ -65,7 +65,8 @@ struct Extent {
   std::size_t inner_end = 0;  // where its closing tag begins; `end` if it has none: <a/>
 };
 
-// The root of a well-formed document and the elements right inside it, in order.
+// The root of a well-formed document and the elements right inside it, in order. What stands behind
+// the root is not looked at.
 struct Outline {
   std::string_view root;
   Extent extent;
@@ -73,11 +74,18 @@ struct Outline {
 };
 std::optional<Outline> outline(std::string_view content);
 
+// The name of the first element; empty if there is none.
+std::string_view root_name(std::string_view content);
+
 // Where an element's tag begins.
 Location locate(const TextFile& file, const XmlNode& element);
 
 // Appends a piece of text or an attribute's value, its references decoded. Reports what is
 // malformed, once, and returns false.
 bool decode(const TextFile& file, std::string_view written, Text& text, Diagnostics& diagnostics);
+
+// "&amp;" for '&', and so for all that has a meaning in text or in an attribute's double quotes;
+// empty for what may stand there as it is.
+std::string_view reference_for(char character);
 
 }  // namespace arbiter::rules

@@ -67,6 +67,22 @@ TEST(Compile, TakesItsOwnResultAgain) {
   EXPECT_EQ(arbiter({"compile", twice}).out, content_of(twice));
 }
 
+TEST(Compile, TakesAnApplicationWithAModelInItBesideOtherFiles) {
+  const TemporaryDirectory directory;
+  const auto once = directory.path() + "/once.xml", both = directory.path() + "/both.xml";
+  arbiter({"compile", directory.write("m.xml", kOverrideModel), "--application",
+           directory.write("a.xml", kApplication), "-o", once});
+  const auto more = directory.write(
+      "more.xml", "<behaviors><arbiter at='/q'><select from='/other'/></arbiter></behaviors>");
+  EXPECT_EQ(arbiter({"compile", more, once, "-o", both}).exit_code, 0);
+  EXPECT_THAT(content_of(both), HasSubstr("<module>"));
+  EXPECT_EQ(arbiter({"rules", both}).out, arbiter({"rules", more, once}).out);
+  const auto copy = directory.write("copy.xml", "<application><arbitration/></application>");
+  const auto result = arbiter({"compile", once, copy});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("more than one application"));
+}
+
 // What no rule mentions has a meaning too: T of each source, and which connection comes first.
 TEST(Compile, KeepsTimeoutsAndTheOrderThatConflictsAreDecidedBy) {
   const TemporaryDirectory directory;

@@ -104,6 +104,14 @@ TEST(LiveGraph, FollowsEachChangeUntilItIsInterrupted) {
   wait_for_picture(path, "✕ Low");
   high.deactivate();
   wait_for_picture(path, "▶ Low");
+  daemon.load_bad("<behaviors>");
+  low.deactivate();
+  wait_for_picture(path, "○ Low");
+  daemon.load(R"(<behaviors timeout="forever">
+    <behavior name="Only"><config at="/p">/high</config></behavior></behaviors>)");
+  wait_for_picture(path, "○ Only");
+  high.signal();
+  wait_for_picture(path, "▶ Only");
   follower.signal(SIGINT);
   EXPECT_EQ(follower.wait(), 0);
 }

@@ -181,14 +181,19 @@ TEST(XmlOutline, TellsWhereElementsBeginAndEnd) {
        "a=<a><b c='1'/>t<d><b/></d>|</a> + b=<b c='1'/>| + "
        "d=<d><b/>|</d>"},
       {"<a><![CDATA[</a>]]><!-- </a> --></a>", "a=<a><![CDATA[</a>]]><!-- </a> -->|</a>"},
+      {"<!DOCTYPE a [<!-- > <x> --><!ENTITY y '<z>'>]><a/>", "a=<a/>|"},
       {"", "none"},
       {"<a>", "none"},
       {"</a>", "none"},
-      {"<a/><b/>", "none"},
+      {"<a/><b/>", "a=<a/>|"},
+      {"<a></a></b>", "a=<a>|</a>"},
       {"<a", "none"},
       {"<a><!-- </a>", "none"}};
   for (const auto& [content, expected] : cases) {
     EXPECT_EQ(show(outline(content), content), expected) << content;
+    if (expected != "none") {
+      EXPECT_EQ(root_name(content), "a") << content;
+    }
   }
 }
 
