@@ -23,8 +23,13 @@ namespace {
 void add_application(const TextFile& file, LoadedModel& loaded, Diagnostics& diagnostics) {
   Application read = read_application(file, diagnostics);
   if (!loaded.application) loaded.application.emplace();
-  auto& known = loaded.application->connections;
-  known.insert(known.end(), read.connections.begin(), read.connections.end());
+  auto& connections = loaded.application->connections;
+  std::set<std::pair<std::string, std::string>> known;
+  for (const Application::Link& link : connections) known.emplace(link.source, link.port);
+  for (Application::Link& link : read.connections) {
+    if (known.contains({link.source, link.port})) continue;
+    connections.push_back(std::move(link));
+  }
   if (read.is_incomplete) loaded.application->is_incomplete = true;
 }
 

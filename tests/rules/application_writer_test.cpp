@@ -160,6 +160,16 @@ TEST(Arbitration, MayOnlyUseConnectionsOfItsApplication) {
   EXPECT_THAT(load_with_application(model, other).findings(), testing::IsEmpty());
 }
 
+TEST(Arbitration, OfSeveralApplicationsTheConnectionsAddUp) {
+  const auto application = [](const std::string& source) {
+    return "<application><connection><from>/same</from><to>/p</to></connection><connection><from>" +
+           source + "</from><to>/p</to></connection><arbitration/></application>";
+  };
+  const Loaded loaded = load_texts({application("/a"), application("/b")});
+  EXPECT_THAT(loaded.findings(), testing::IsEmpty());
+  EXPECT_EQ(loaded.rules.other_connections.size(), 3u);
+}
+
 TEST(Arbitration, MistakesHaveTheirPlaces) {
   const auto findings = [](const std::string& text) { return load_text(text).findings(); };
   EXPECT_THAT(findings("<application>\n<arbitration/>\n<arbitration/></application>"),
