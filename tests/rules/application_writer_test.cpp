@@ -175,7 +175,7 @@ TEST(Arbitration, MistakesHaveTheirPlaces) {
   EXPECT_THAT(findings("<application>\n<arbitration/>\n<arbitration/></application>"),
               testing::ElementsAre("3:1 error duplicate-arbitration"));
   EXPECT_THAT(findings("<application>\n<arbitration wrong='1'><no/></arbitration></application>"),
-              testing::ElementsAre("2:14 error unknown-attribute", "2:25 error unknown-element"));
+              testing::ElementsAre("2:14 error unknown-attribute", "2:24 error unknown-element"));
   EXPECT_THAT(findings("<application>\n<arbitration>\xf6</arbitration></application>"),
               testing::ElementsAre("2:14 error invalid-character"));
   EXPECT_THAT(findings("<application><name>x</name></application>"),
