@@ -1,8 +1,10 @@
 #include "rules/load.hpp"
 
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "rules/application_reader.hpp"
@@ -13,29 +15,31 @@
 #include "rules/model.hpp"
 #include "rules/model_checks.hpp"
 #include "rules/model_reader.hpp"
+#include "rules/provenance.hpp"
 #include "rules/text_file.hpp"
 
 namespace arbiter::rules {
 namespace {
 
-Model read_models(const std::vector<std::string>& paths, Diagnostics& diagnostics) {
+Model read_models(const std::vector<FileText>& files, Diagnostics& diagnostics) {
   Model model;
   Defines defines;
   std::set<std::string> read;
-  for (const std::string& path : paths) {
-    if (!read.insert(path).second) {
-      diagnostics.error("duplicate-file", {path, 1, 1}, "this file is given twice; give it once");
+  for (const FileText& file : files) {
+    if (!read.insert(file.path).second) {
+      diagnostics.error("duplicate-file", {file.path, 1, 1},
+                        "this file is given twice; give it once");
       continue;
     }
-    read_model(TextFile(path, read_bytes(path)), defines, model, diagnostics);
+    read_model(TextFile(file.path, file.content), defines, model, diagnostics);
   }
   return model;
 }
 
-std::optional<Application> read_application_if_any(const ModelFiles& files,
+std::optional<Application> read_application_if_any(const ModelTexts& texts,
                                                    Diagnostics& diagnostics) {
-  if (!files.application) return {};
-  return read_application(TextFile(*files.application, read_bytes(*files.application)),
+  if (!texts.application) return {};
+  return read_application(TextFile(texts.application->path, texts.application->content),
                           diagnostics);
 }
 
@@ -71,22 +75,40 @@ void hand_over_sorted(const Diagnostics& found, const DocumentOrder& order,
 
 }  // namespace
 
-RuleSet load(const ModelFiles& files, Diagnostics& diagnostics) {
-  std::vector<std::string> paths = files.models;
-  if (files.application) paths.push_back(*files.application);
+ModelTexts read_texts(const ModelFiles& files) {
+  ModelTexts texts;
+  for (const std::string& path : files.models) texts.models.push_back({path, read_bytes(path)});
+  if (files.application) {
+    texts.application = FileText{*files.application, read_bytes(*files.application)};
+  }
+  return texts;
+}
+
+RuleSet load(ModelTexts texts, Diagnostics& diagnostics) {
+  std::vector<std::string> paths;
+  for (const FileText& file : texts.models) paths.push_back(file.path);
+  if (texts.application) paths.push_back(texts.application->path);
   const DocumentOrder order(paths);
 
   Diagnostics found;
-  const Model model = read_models(files.models, found);
-  const std::optional<Application> application = read_application_if_any(files, found);
+  Model model = read_models(texts.models, found);
+  const std::optional<Application> application = read_application_if_any(texts, found);
   check_sources(model, found);
-  const Hierarchy hierarchy(model, found);
+  Hierarchy hierarchy(model, found);
   RuleSet rules = extract_rules(model, hierarchy, found);
   if (application) check_application(*application, rules, found);
   const Location whole{paths.empty() ? "" : paths.front(), 1, 1};
   check_limits(rules, application ? &*application : nullptr, whole, order, found);
   hand_over_sorted(found, order, diagnostics);
+  Hierarchy::Relations relations = std::move(hierarchy).release();
+  rules.provenance =
+      std::make_shared<const Provenance>(Provenance{std::move(model), std::move(relations)});
+  rules.texts = std::make_shared<const ModelTexts>(std::move(texts));
   return rules;
+}
+
+RuleSet load(const ModelFiles& files, Diagnostics& diagnostics) {
+  return load(read_texts(files), diagnostics);
 }
 
 }  // namespace arbiter::rules

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rules/diagnostic.hpp"
+#include "rules/model_texts.hpp"
 #include "rules/rule_set.hpp"
 
 namespace arbiter::rules {
@@ -22,8 +23,12 @@ class FileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Reports all problems of all files in one go; the result is to be used only if there is no error.
 // Throws FileError.
+ModelTexts read_texts(const ModelFiles& files);
+
+// Reports all problems of all files in one go; the result is to be used only if there is no error.
+RuleSet load(ModelTexts texts, Diagnostics& diagnostics);
+// The same of files. Throws FileError.
 RuleSet load(const ModelFiles& files, Diagnostics& diagnostics);
 
 }  // namespace arbiter::rules

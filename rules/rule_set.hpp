@@ -3,15 +3,19 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "rules/diagnostic.hpp"
 #include "rules/expression.hpp"
+#include "rules/model_texts.hpp"
 #include "shm/activity.hpp"
 
 namespace arbiter::rules {
+
+struct Provenance;
 
 // The rule that selects the connection {source, port}: `source` active, and `condition`.
 struct ConnectionRule {
@@ -50,6 +54,9 @@ struct RuleSet {
   // deliver) and to others (they always do).
   std::vector<Connection> other_connections;
   std::vector<BehaviourRules> behaviours;  // in document order; a check asks whether each can run
+  // What it was all made of; null where rules were not read from files.
+  std::shared_ptr<const Provenance> provenance;
+  std::shared_ptr<const ModelTexts> texts;
 };
 
 }  // namespace arbiter::rules
