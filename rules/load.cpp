@@ -84,7 +84,7 @@ ModelTexts read_texts(const ModelFiles& files) {
   return texts;
 }
 
-RuleSet load(ModelTexts texts, Diagnostics& diagnostics) {
+RuleSet load(ModelTexts texts, Diagnostics& diagnostics, Keep keep) {
   std::vector<std::string> paths;
   for (const FileText& file : texts.models) paths.push_back(file.path);
   if (texts.application) paths.push_back(texts.application->path);
@@ -100,15 +100,17 @@ RuleSet load(ModelTexts texts, Diagnostics& diagnostics) {
   const Location whole{paths.empty() ? "" : paths.front(), 1, 1};
   check_limits(rules, application ? &*application : nullptr, whole, order, found);
   hand_over_sorted(found, order, diagnostics);
-  Hierarchy::Relations relations = std::move(hierarchy).release();
-  rules.provenance =
-      std::make_shared<const Provenance>(Provenance{std::move(model), std::move(relations)});
+  if (keep == Keep::kProvenance) {
+    Hierarchy::Relations relations = std::move(hierarchy).release();
+    rules.provenance =
+        std::make_shared<const Provenance>(Provenance{std::move(model), std::move(relations)});
+  }
   rules.texts = std::make_shared<const ModelTexts>(std::move(texts));
   return rules;
 }
 
-RuleSet load(const ModelFiles& files, Diagnostics& diagnostics) {
-  return load(read_texts(files), diagnostics);
+RuleSet load(const ModelFiles& files, Diagnostics& diagnostics, Keep keep) {
+  return load(read_texts(files), diagnostics, keep);
 }
 
 }  // namespace arbiter::rules

@@ -27,8 +27,10 @@ class FileError : public std::runtime_error {
 ModelTexts read_texts(const ModelFiles& files);
 
 // Reports all problems of all files in one go; the result is to be used only if there is no error.
-RuleSet load(ModelTexts texts, Diagnostics& diagnostics);
+// The provenance is kept for those who want to explain the rules: it is as large as the model.
+enum class Keep { kRules, kProvenance };
+RuleSet load(ModelTexts texts, Diagnostics& diagnostics, Keep keep = Keep::kRules);
 // The same of files. Throws FileError.
-RuleSet load(const ModelFiles& files, Diagnostics& diagnostics);
+RuleSet load(const ModelFiles& files, Diagnostics& diagnostics, Keep keep = Keep::kRules);
 
 }  // namespace arbiter::rules

@@ -54,7 +54,7 @@ struct RuleSet {
   // deliver) and to others (they always do).
   std::vector<Connection> other_connections;
   std::vector<BehaviourRules> behaviours;  // in document order; a check asks whether each can run
-  // What it was all made of; null where rules were not read from files.
+  // What it was all made of; null where that was not kept, or the rules were not read from files.
   std::shared_ptr<const Provenance> provenance;
   std::shared_ptr<const ModelTexts> texts;
 };

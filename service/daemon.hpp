@@ -23,6 +23,7 @@
 #include "service/directory.hpp"
 #include "service/gate.hpp"
 #include "service/inheritance.hpp"
+#include "service/model_copy.hpp"
 #include "service/models.hpp"
 #include "service/registry.hpp"
 #include "service/switchboard.hpp"
@@ -92,6 +93,7 @@ class Daemon {
   void introduce(const Switchboard::Told& told, std::function<void()> passed);
   void close_port(Client& client, shm::PortInstance port);
   void send_status(Client& client, std::uint64_t request);
+  void send_model(Client& client, std::uint64_t request);
   void deactivate(Client& client, const shm::Message& message);
   void refuse(Client& client, std::uint64_t request, const std::string& why);
   // Throws std::runtime_error if a live component has the name. One that has closed its port, or
@@ -150,6 +152,7 @@ class Daemon {
   Registry registry_;
   Directory directory_{registry_, stores_};
   Models models_;
+  ModelCopy model_copy_;
   Switchboard switchboard_{directory_, registry_};
   Barriers barriers_;
   shm::Nanoseconds show_growth_at_ = shm::kForever;

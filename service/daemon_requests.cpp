@@ -37,7 +37,7 @@ bool is_question(shm::MessageKind kind) {
   return kind == MessageKind::kOpenOutput || kind == MessageKind::kOpenInput ||
          kind == MessageKind::kConnect || kind == MessageKind::kReload ||
          kind == MessageKind::kStatus || kind == MessageKind::kDeactivate ||
-         kind == MessageKind::kObserve;
+         kind == MessageKind::kObserve || kind == MessageKind::kModel;
 }
 
 }  // namespace
@@ -70,6 +70,10 @@ void Daemon::handle(Client& client, shm::Received& received) {
     case shm::MessageKind::kStatus:
       gate_.require(client, Action::kObserve);
       send_status(client, message.request);
+      break;
+    case shm::MessageKind::kModel:
+      gate_.require(client, Action::kObserve);
+      send_model(client, message.request);
       break;
     case shm::MessageKind::kDeactivate:
       deactivate(client, message);
@@ -298,6 +302,11 @@ void Daemon::send_status(Client& client, std::uint64_t request) {
   }
   client.send(reply_to(request, shm::MessageKind::kStatusReply),
               {shm::reopen(file, O_RDONLY).get(), -1});
+}
+
+void Daemon::send_model(Client& client, std::uint64_t request) {
+  auto reply = reply_to(request, shm::MessageKind::kModelReply);
+  client.send(reply, {model_copy_.of(models_).get(), -1});
 }
 
 void Daemon::deactivate(Client& client, const shm::Message& message) {

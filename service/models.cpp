@@ -4,6 +4,7 @@
 
 #include "service/findings.hpp"
 #include "service/inheritance.hpp"
+#include "shm/clock.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -83,7 +84,9 @@ void Models::prepare() {
 }
 
 void Models::put_in_force() {
+  in_force_since_ = shm::monotonic_now();
   writer_.put_in_force();
+  texts_in_force_ = compiled_.texts;
   directory_.set_generation(reader_.generation());
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,13 @@ class Models {
   void put_in_force();
 
   [[nodiscard]] shm::TableSnapshot in_force() const { return reader_.snapshot(); }
+  // What the model in force was made of. Null: a predecessor has read it, and we have read no other
+  // since.
+  [[nodiscard]] const std::shared_ptr<const rules::ModelTexts>& texts_in_force() const {
+    return texts_in_force_;
+  }
+  // Since when; 0 where a predecessor has put it in force.
+  [[nodiscard]] shm::Nanoseconds in_force_since() const { return in_force_since_; }
   [[nodiscard]] shm::TableView prepared() const { return writer_.next_table(); }
   // Read-only, for clients.
   [[nodiscard]] const shm::FileDescriptor& board() const { return readable_; }
@@ -47,6 +55,8 @@ class Models {
   rules::ModelFiles files_;
   Directory& directory_;
   rules::CompiledModel compiled_;
+  std::shared_ptr<const rules::ModelTexts> texts_in_force_;
+  shm::Nanoseconds in_force_since_ = 0;
   shm::FileDescriptor writable_;
   shm::FileDescriptor readable_;
   shm::Mapping mapping_;

@@ -56,6 +56,7 @@ enum class MessageKind : std::uint32_t {
   kHandedBack,         // that was all
   kConnect,  // port: opened by a daemon that has gone since; asks for the kConnected that is
              // missing
+  kModel,    // ask for the texts of the model in force
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; descriptors: the board, the registry, read-only
@@ -73,6 +74,7 @@ enum class MessageKind : std::uint32_t {
   kStatusReply,  // descriptor: a memfd with JSON
   kDone,
   kOutputGrown,  // to input `port`: `peer` uses more of its segment now; descriptor: the segment
+  kModelReply,   // descriptor: a memfd with JSON
 };
 
 enum MessageFlag : std::uint32_t {

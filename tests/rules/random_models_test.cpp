@@ -381,7 +381,8 @@ TEST_P(RandomModels, AreExplainedAsTheDefinitionOfARuleSays) {
     SCOPED_TRACE("seed " + std::to_string(seed) + "\n" + xml);
     const TemporaryDirectory directory;
     rules::Diagnostics diagnostics;
-    const auto set = rules::load({{directory.write("model.xml", xml)}, {}}, diagnostics);
+    const auto set = rules::load({{directory.write("model.xml", xml)}, {}}, diagnostics,
+                                rules::Keep::kProvenance);
     ASSERT_FALSE(diagnostics.has_errors());
     Explanations explanations(random, set);
     for (const auto& port : set.ports) explanations.check(port.port);

@@ -45,7 +45,7 @@ constexpr MessageKind kKinds[] = {
     MessageKind::kReload,         MessageKind::kStop,          MessageKind::kHandBackPage,
     MessageKind::kHandBackOutput, MessageKind::kHandBackInput, MessageKind::kHandBackLink,
     MessageKind::kHandedBack,     MessageKind::kConnect,       MessageKind::kWelcome,
-    MessageKind::kSync,           MessageKind::kOpened};
+    MessageKind::kSync,           MessageKind::kOpened,        MessageKind::kModel};
 
 // What a hostile process has been sent and said.
 struct Hostile {
