@@ -33,21 +33,25 @@ std::shared_ptr<detail::NodeCore> connect(const std::string& verb, const std::st
   return detail::make_node("arbiter-" + verb, live_options(instance));
 }
 
-nlohmann::json fetch_status(detail::NodeCore& node) {
+nlohmann::json fetch_document(detail::NodeCore& node, shm::MessageKind kind) {
   shm::Message question;
-  question.kind = shm::MessageKind::kStatus;
+  question.kind = kind;
   const shm::Received reply = node.ask(question, {-1, -1});
   const int document = reply.descriptors[0].get();
   struct stat status {};
-  if (document < 0 || fstat(document, &status) != 0) throw Error("the daemon sent no status");
+  if (document < 0 || fstat(document, &status) != 0) throw Error("the daemon sent no document");
   std::string text(static_cast<std::size_t>(status.st_size), '\0');
   std::size_t at = 0;
   while (at < text.size()) {
     const ssize_t got = pread(document, text.data() + at, text.size() - at, static_cast<off_t>(at));
-    if (got <= 0) throw Error("the daemon's status cannot be read");
+    if (got <= 0) throw Error("the daemon's document cannot be read");
     at += static_cast<std::size_t>(got);
   }
   return nlohmann::json::parse(text);
+}
+
+nlohmann::json fetch_status(detail::NodeCore& node) {
+  return fetch_document(node, shm::MessageKind::kStatus);
 }
 
 shm::FileDescriptor catch_interrupts() {

@@ -19,5 +19,6 @@ void add_status(CLI::App& app, int& exit_code);
 void add_deactivate(CLI::App& app, int& exit_code);
 void add_reload(CLI::App& app, int& exit_code);
 void add_stop(CLI::App& app, int& exit_code);
+void add_why(CLI::App& app, int& exit_code);
 
 }  // namespace arbiter::cli
