@@ -242,14 +242,15 @@ class Answer {
       return ", since " + span_text(now - tenure_.at_least) +
              " ago: " + names_of(port_, tenure_.changed, look_);
     }
+    if (tenure_.at_least != 0 && tenure_.at_least == port_.in_force_since()) {
+      return ", since the model came into force " + span_text(now - tenure_.at_least) + " ago";
+    }
     std::string text;
     if (tenure_.at_least != 0) text += ", for at least " + span_text(now - tenure_.at_least);
     if (tenure_.not_before) {
       text += text.empty() ? ", " : "; ";
       text += "at the earliest since " + span_text(now - *tenure_.not_before) +
               " ago: " + names_of(port_, tenure_.changed, look_);
-    } else if (tenure_.at_least != 0 && tenure_.at_least == port_.in_force_since()) {
-      text += ": since this model came into force";
     } else if (tenure_.at_least == 0) {
       text += ": nothing has ever happened here";
     }

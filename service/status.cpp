@@ -39,14 +39,17 @@ json connection_counters(const OutputPort* output, const InputPort* input, const
     counters["accepted"] = accepted - before;
     counters["discarded"] = read(channel.discarded);
     counters["refused"] = read(channel.refused);
-    counters["depth"] = channel.depth.load(std::memory_order_relaxed);
+    const std::uint64_t depth = channel.depth.load(std::memory_order_relaxed);
+    counters["depth"] = depth;
+    // A receiver that has never taken has no lane yet.
+    counters["waiting"] = std::min(accepted - before, depth);
     for (const shm::Lane& lane : input->shared().lanes) {
       if (lane.publisher.load(std::memory_order_acquire) != output->instance) continue;
       const std::uint64_t consumed = std::max(read(lane.consumed), before);
       counters["taken"] = read(lane.taken);
       counters["dropped"] = read(lane.dropped);
       counters["overtaken"] = read(lane.overtaken);
-      counters["waiting"] = accepted - std::min(consumed, accepted);
+      counters["waiting"] = std::min(accepted - std::min(consumed, accepted), depth);
     }
   }
   return counters;
