@@ -39,17 +39,15 @@ json connection_counters(const OutputPort* output, const InputPort* input, const
     counters["accepted"] = accepted - before;
     counters["discarded"] = read(channel.discarded);
     counters["refused"] = read(channel.refused);
-    const std::uint64_t depth = channel.depth.load(std::memory_order_relaxed);
-    counters["depth"] = depth;
-    // A receiver that has never taken has no lane yet.
-    counters["waiting"] = std::min(accepted - before, depth);
+    counters["depth"] = channel.depth.load(std::memory_order_relaxed);
+    counters["waiting"] = accepted - before;  // a receiver that has never taken has no lane yet
     for (const shm::Lane& lane : input->shared().lanes) {
       if (lane.publisher.load(std::memory_order_acquire) != output->instance) continue;
       const std::uint64_t consumed = std::max(read(lane.consumed), before);
       counters["taken"] = read(lane.taken);
       counters["dropped"] = read(lane.dropped);
       counters["overtaken"] = read(lane.overtaken);
-      counters["waiting"] = std::min(accepted - std::min(consumed, accepted), depth);
+      counters["waiting"] = accepted - std::min(consumed, accepted);
     }
   }
   return counters;
