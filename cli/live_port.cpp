@@ -63,6 +63,9 @@ std::string LivePort::source_name(shm::SourceId source) const {
 // All words are collected, the clock is read, and all are looked at again: if they stand, they
 // stood together when the clock was read.
 Look LivePort::look() const {
+  if (node_->memory() != memory_) {
+    throw Error("another daemon has come, without the memory of the last one; ask again");
+  }
   Look look;
   for (int tries = 0; tries < shm::kMaxPictures; ++tries) {
     look = {};

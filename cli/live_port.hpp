@@ -38,6 +38,7 @@ class LivePort {
   // Throws Error where there is no such input port.
   LivePort(std::shared_ptr<detail::NodeCore> node, std::string port);
 
+  // Throws Error where a daemon has come that does not have the memory of the one we asked.
   [[nodiscard]] Look look() const;
   // By the texts of the model that the look was taken under; nothing if another one has come into
   // force since: look again.

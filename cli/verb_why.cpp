@@ -197,7 +197,7 @@ int answer(const WhyOptions& options) {
   for (;;) {
     Look look = port.look();
     auto explanation = port.explain(look);
-    if (!explanation) continue;  // another model has come into force
+    if (!explanation) continue;  // another model has come into force: that is rare
     const json status = fetch_status(*node);
     const Answer answer(options, port, std::move(look), std::move(*explanation), status);
     answer.check_source();

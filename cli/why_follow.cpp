@@ -25,7 +25,9 @@ class Follower {
         interrupts_(std::move(interrupts)),
         port_(connect("why", options.instance), options.port),
         started_(shm::monotonic_now()),
-        last_(port_.look()) {}
+        last_(port_.look()) {
+    static_cast<void>(port_.explain(last_));  // fetches the model while there is a daemon
+  }
 
   int run() {
     write_start();

@@ -379,5 +379,22 @@ TEST(Why, FollowsActivityThatRunsOutAndModelsThatComeIntoForce) {
   EXPECT_EQ(followed.process().wait(), 0);
 }
 
+TEST(Why, FollowsOnWhileNoDaemonRunsAndExplainsByTheModelThatDecides) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto random = node.output_port<int>("/random");
+  auto face = node.output_port<int>("/face");
+  Followed followed({"/gaze", "--follow"});
+  EXPECT_THAT(followed.line(), HasSubstr("  /gaze: idle"));
+  daemon.kill();
+  random.signal();
+  EXPECT_THAT(followed.line(), HasSubstr("  idle -> /random  because"));
+  face.signal();
+  EXPECT_THAT(followed.line(), HasSubstr("/random is inhibited by behaviour \"Follow\" ("));
+  daemon.restart();  // takes over what is open, and puts its own model in force
+  face.deactivate();
+  EXPECT_THAT(followed.line(), HasSubstr("  /face -> /random  because"));
+}
+
 }  // namespace
 }  // namespace arbiter::test
