@@ -33,9 +33,9 @@ std::shared_ptr<detail::NodeCore> connect(const std::string& verb, const std::st
   return detail::make_node("arbiter-" + verb, live_options(instance));
 }
 
-nlohmann::json fetch_status(detail::NodeCore& node) {
+nlohmann::json fetch_document(detail::NodeCore& node, shm::MessageKind kind) {
   shm::Message question;
-  question.kind = shm::MessageKind::kStatus;
+  question.kind = kind;
   return read_document(node.ask(question, {-1, -1}).descriptors[0]);
 }
 
@@ -51,6 +51,10 @@ nlohmann::json read_document(const shm::FileDescriptor& descriptor) {
     at += static_cast<std::size_t>(got);
   }
   return nlohmann::json::parse(text);
+}
+
+nlohmann::json fetch_status(detail::NodeCore& node) {
+  return fetch_document(node, shm::MessageKind::kStatus);
 }
 
 shm::FileDescriptor catch_interrupts() {

@@ -29,6 +29,8 @@ NodeOptions live_options(const std::string& instance);
 // Connects to the daemon. Throws arbiter::Error.
 std::shared_ptr<detail::NodeCore> connect(const std::string& verb, const std::string& instance);
 
+// A document that the daemon answers such a question with. Throws arbiter::Error.
+nlohmann::json fetch_document(detail::NodeCore& node, shm::MessageKind kind);
 // The daemon's status document. Throws arbiter::Error.
 nlohmann::json fetch_status(detail::NodeCore& node);
 

@@ -22,6 +22,7 @@ struct Model {
 };
 
 // Reads, compiles and proves a model; nothing if that finds an error.
-std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics);
+std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
+                                rules::Keep keep = rules::Keep::kRules);
 
 }  // namespace arbiter::cli

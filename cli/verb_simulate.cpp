@@ -1,6 +1,7 @@
 // arbiter simulate: what a model would have decided, sample by sample.
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 
 #include "cli/model_files.hpp"
 #include "cli/verbs.hpp"
+#include "cli/why_simulated.hpp"
 #include "rules/report.hpp"
 #include "rules/simulation.hpp"
 #include "rules/trace.hpp"
@@ -19,6 +21,8 @@ namespace {
 struct SimulateOptions {
   rules::ModelFiles files;
   std::string trace;
+  std::optional<std::string> why;  // the port; empty: all
+  bool json = false;
 };
 
 void note_unknown_sources(const rules::Simulation& simulation, const std::string& file,
@@ -36,7 +40,8 @@ void note_unknown_sources(const rules::Simulation& simulation, const std::string
 // All problems, those of the trace as well as those of the model, come before the first result.
 int simulate(const SimulateOptions& options) {
   rules::Diagnostics diagnostics;
-  const auto model = load_model(options.files, diagnostics);
+  const auto keep = options.why ? rules::Keep::kProvenance : rules::Keep::kRules;
+  const auto model = load_model(options.files, diagnostics, keep);
   const auto events = rules::read_trace(options.trace, diagnostics);
   if (!model || diagnostics.has_errors()) {
     rules::write_text(std::cerr, diagnostics);
@@ -45,6 +50,11 @@ int simulate(const SimulateOptions& options) {
   rules::Simulation simulation(model->compiled);
   note_unknown_sources(simulation, options.trace, events, diagnostics);
   rules::write_text(std::cerr, diagnostics);
+  if (options.why) {
+    WhySimulated why(model->rules, simulation, {*options.why, options.json});
+    for (const auto& event : events) why.step(event, std::cout);
+    return 0;
+  }
   rules::write_outcome_header(std::cout);
   for (const auto& event : events) {
     for (const auto& row : simulation.step(event)) rules::write_outcome(std::cout, row);
@@ -61,7 +71,18 @@ void add_simulate(CLI::App& app, int& exit_code) {
   verb->add_option("--trace", options->trace, "CSV: t_ns,source or t_ns,source,event")
       ->type_name("FILE")
       ->required();
-  verb->footer("Example:\n  arbiter simulate search_and_track.xml --trace trace.csv");
+  auto* why = verb->add_option_function<std::string>(
+                      "--why", [options](const std::string& port) { options->why = port; },
+                      "Instead of the CSV: each change of a winner and each arrival that was "
+                      "discarded, with its cause; of one PORT or of all")
+                  ->type_name("[PORT]")
+                  ->expected(0, 1)
+                  ->default_str("");
+  verb->add_flag("--json", options->json, "With --why: one object a line")->needs(why);
+  verb->footer(
+      "Example:\n"
+      "  arbiter simulate search_and_track.xml --trace trace.csv\n"
+      "  arbiter simulate search_and_track.xml --trace trace.csv --why=/Gaze/pos:i");
   verb->callback([options, &exit_code] { exit_code = simulate(*options); });
 }
 

@@ -25,5 +25,6 @@ void add_switch(CLI::App& app, int& exit_code);
 void add_rollback(CLI::App& app, int& exit_code);
 void add_history(CLI::App& app, int& exit_code);
 void add_stop(CLI::App& app, int& exit_code);
+void add_why(CLI::App& app, int& exit_code);
 
 }  // namespace arbiter::cli

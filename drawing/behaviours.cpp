@@ -142,9 +142,9 @@ class BehavioursView {
   [[nodiscard]] std::string heading(std::size_t b) const {
     const Behaviour& behaviour = model_.behaviours[b];
     std::string rows = row("<B>" + html(mark(b) + behaviour.name) + "</B>");
-    for (const rules::ExpressionPtr& condition : behaviour.conditions) {
-      rows +=
-          row("<FONT POINT-SIZE=\"9\"><I>" + html("if " + to_string(*condition)) + "</I></FONT>");
+    for (const rules::Condition& condition : behaviour.conditions) {
+      rows += row("<FONT POINT-SIZE=\"9\"><I>" + html("if " + to_string(*condition.expression)) +
+                  "</I></FONT>");
     }
     return rows;
   }

@@ -95,7 +95,9 @@ class BehaviourReader {
     const bool fine = reader_.check_attributes(element, {});
     const auto condition = read_condition(element, reader_, diagnostics_);
     if (!condition) return false;
-    if (*condition != nullptr) behaviour_.conditions.push_back(*condition);
+    if (*condition != nullptr) {
+      behaviour_.conditions.push_back({*condition, reader_.where(element)});
+    }
     return fine;
   }
 

@@ -46,6 +46,7 @@ CompiledModel ModelCompiler::compile() {
   model_.timeout = rules_.timeout;
   model_.timeouts = rules_.timeouts;
   model_.sources = all_sources();
+  model_.texts = rules_.texts;
   gather_parts();
   compile_arbitrated_ports();
   add_unarbitrated_ports();

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,7 @@ struct CompiledModel {
   std::map<std::string, shm::Nanoseconds> timeouts;
   std::vector<std::string> sources;
   std::vector<CompiledPort> ports;  // in byte order
+  std::shared_ptr<const ModelTexts> texts;  // what it was made of, as RuleSet has it
 };
 
 // Proves every port and reports what fails: two connections that can both win, with a shortest

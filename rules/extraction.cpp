@@ -71,8 +71,8 @@ class Extraction {
     QuantifierExpansion expansion(rules_.sources);
     for (const Behaviour& behaviour : model_.behaviours) {
       auto& expanded = conditions_.emplace_back();
-      for (const ExpressionPtr& condition : behaviour.conditions) {
-        expanded.push_back(expansion.expand(condition));
+      for (const Condition& condition : behaviour.conditions) {
+        expanded.push_back(expansion.expand(condition.expression));
       }
     }
     for (const Select& select : model_.selects) {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "rules/diagnostic.hpp"
@@ -24,6 +25,13 @@ class Hierarchy {
     std::size_t mention;    // in its list of inhibitions
   };
 
+  // What is found out, by behaviour.
+  struct Relations {
+    std::vector<std::size_t> parents;  // or kNobody
+    std::vector<std::vector<std::size_t>> children;
+    std::vector<std::vector<Inhibitor>> inhibitors;
+  };
+
   Hierarchy(const Model& model, Diagnostics& diagnostics);
 
   [[nodiscard]] std::size_t parent(std::size_t behaviour) const { return parents_[behaviour]; }
@@ -33,6 +41,10 @@ class Hierarchy {
   // Those that name this very behaviour, in document order.
   [[nodiscard]] const std::vector<Inhibitor>& inhibitors(std::size_t behaviour) const {
     return inhibitors_[behaviour];
+  }
+  // All of it, for those who keep it beyond the life of this.
+  [[nodiscard]] Relations release() && {
+    return {std::move(parents_), std::move(children_), std::move(inhibitors_)};
   }
 
  private:

@@ -1,6 +1,7 @@
 #include "rules/load.hpp"
 
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <set>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "rules/model.hpp"
 #include "rules/model_checks.hpp"
 #include "rules/model_reader.hpp"
+#include "rules/provenance.hpp"
 #include "rules/text_file.hpp"
 
 namespace arbiter::rules {
@@ -33,20 +35,21 @@ void add_application(const TextFile& file, LoadedModel& loaded, Diagnostics& dia
   if (read.is_incomplete) loaded.application->is_incomplete = true;
 }
 
-void read_files(const ModelFiles& files, LoadedModel& loaded, Diagnostics& diagnostics) {
+void read_all(const ModelTexts& texts, LoadedModel& loaded, Diagnostics& diagnostics) {
   Defines defines;
   std::set<std::string> read;
-  for (const std::string& path : files.models) {
-    if (!read.insert(path).second) {
-      diagnostics.error("duplicate-file", {path, 1, 1}, "this file is given twice; give it once");
+  for (const FileText& each : texts.models) {
+    if (!read.insert(each.path).second) {
+      diagnostics.error("duplicate-file", {each.path, 1, 1},
+                        "this file is given twice; give it once");
       continue;
     }
-    const TextFile file(path, read_bytes(path));
+    const TextFile file(each.path, each.content);
     const bool is_application = read_model(file, defines, loaded.model, diagnostics);
-    if (is_application && !files.application) add_application(file, loaded, diagnostics);
+    if (is_application && !texts.application) add_application(file, loaded, diagnostics);
   }
-  if (!files.application) return;
-  const TextFile file(*files.application, read_bytes(*files.application));
+  if (!texts.application) return;
+  const TextFile file(texts.application->path, texts.application->content);
   loaded.application = read_application(file, diagnostics);
 }
 
@@ -80,29 +83,58 @@ void hand_over_sorted(const Diagnostics& found, const DocumentOrder& order,
   }
 }
 
-}  // namespace
-
-RuleSet load(const ModelFiles& files, Diagnostics& diagnostics) {
-  return std::move(load_all(files, diagnostics).rules);
-}
-
-LoadedModel load_all(const ModelFiles& files, Diagnostics& diagnostics) {
-  std::vector<std::string> paths = files.models;
-  if (files.application) paths.push_back(*files.application);
+// `relations`: where they are to be put; null: nowhere.
+LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
+                     Hierarchy::Relations* relations) {
+  std::vector<std::string> paths;
+  for (const FileText& file : texts.models) paths.push_back(file.path);
+  if (texts.application) paths.push_back(texts.application->path);
   const DocumentOrder order(paths);
 
   Diagnostics found;
   LoadedModel loaded;
-  read_files(files, loaded, found);
+  read_all(texts, loaded, found);
   const std::optional<Application>& application = loaded.application;
   check_sources(loaded.model, found);
-  const Hierarchy hierarchy(loaded.model, found);
+  Hierarchy hierarchy(loaded.model, found);
   RuleSet& rules = loaded.rules = extract_rules(loaded.model, hierarchy, found);
   if (application) check_application(*application, rules, found);
   const Location whole{paths.empty() ? "" : paths.front(), 1, 1};
   check_limits(rules, application ? &*application : nullptr, whole, order, found);
   hand_over_sorted(found, order, diagnostics);
+  if (relations != nullptr) *relations = std::move(hierarchy).release();
   return loaded;
+}
+
+}  // namespace
+
+ModelTexts read_texts(const ModelFiles& files) {
+  ModelTexts texts;
+  for (const std::string& path : files.models) texts.models.push_back({path, read_bytes(path)});
+  if (files.application) {
+    texts.application = FileText{*files.application, read_bytes(*files.application)};
+  }
+  return texts;
+}
+
+LoadedModel load_all(const ModelFiles& files, Diagnostics& diagnostics) {
+  return load_all(read_texts(files), diagnostics, nullptr);
+}
+
+RuleSet load(ModelTexts texts, Diagnostics& diagnostics, Keep keep) {
+  const bool keeps_provenance = keep == Keep::kProvenance;
+  Hierarchy::Relations relations;
+  LoadedModel loaded = load_all(texts, diagnostics, keeps_provenance ? &relations : nullptr);
+  if (keeps_provenance) {
+    loaded.rules.provenance = std::make_shared<const Provenance>(
+        Provenance{std::move(loaded.model), std::move(relations)});
+  }
+  loaded.rules.texts = std::make_shared<const ModelTexts>(std::move(texts));
+  return std::move(loaded.rules);
+}
+
+RuleSet load(const ModelFiles& files, Diagnostics& diagnostics, Keep keep) {
+  return load(read_texts(files), diagnostics, keep);
 }
 
 }  // namespace arbiter::rules

@@ -8,6 +8,7 @@
 
 #include "rules/diagnostic.hpp"
 #include "rules/model.hpp"
+#include "rules/model_texts.hpp"
 #include "rules/rule_set.hpp"
 
 namespace arbiter::rules {
@@ -23,9 +24,15 @@ class FileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Reports all problems of all files in one go; the result is to be used only if there is no error.
 // Throws FileError.
-RuleSet load(const ModelFiles& files, Diagnostics& diagnostics);
+ModelTexts read_texts(const ModelFiles& files);
+
+// Reports all problems of all files in one go; the result is to be used only if there is no error.
+// The provenance is kept for those who want to explain the rules: it is as large as the model.
+enum class Keep { kRules, kProvenance };
+RuleSet load(ModelTexts texts, Diagnostics& diagnostics, Keep keep = Keep::kRules);
+// The same of files. Throws FileError.
+RuleSet load(const ModelFiles& files, Diagnostics& diagnostics, Keep keep = Keep::kRules);
 
 // The rules, with what they were made of.
 struct LoadedModel {

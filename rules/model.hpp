@@ -19,6 +19,11 @@ struct Mention {
   Location where;
 };
 
+struct Condition {
+  ExpressionPtr expression;
+  Location where;  // of the element
+};
+
 // A behaviour's wish that a connection be selected.
 struct Config {
   std::string source;
@@ -34,7 +39,7 @@ struct Behaviour {
   bool is_meta = false;
   std::vector<Config> configs;    // of a behaviour
   std::vector<Mention> children;  // of a meta-behaviour
-  std::vector<ExpressionPtr> conditions;
+  std::vector<Condition> conditions;
   std::vector<Mention> inhibitions;
   // Some part of it was refused, and is missing above: what seems to lack may not.
   bool is_incomplete = false;

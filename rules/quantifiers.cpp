@@ -38,7 +38,7 @@ std::vector<std::string> collect_sources(const Model& model) {
   for (const SourceDeclaration& source : model.sources) names.insert(source.name);
   for (const Behaviour& behaviour : model.behaviours) {
     for (const Config& config : behaviour.configs) names.insert(config.source);
-    for (const ExpressionPtr& condition : behaviour.conditions) collect(condition, names);
+    for (const Condition& condition : behaviour.conditions) collect(condition.expression, names);
   }
   for (const Select& select : model.selects) {
     names.insert(select.source);

@@ -3,15 +3,19 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "rules/diagnostic.hpp"
 #include "rules/expression.hpp"
+#include "rules/model_texts.hpp"
 #include "shm/activity.hpp"
 
 namespace arbiter::rules {
+
+struct Provenance;
 
 // The rule that selects the connection {source, port}: `source` active, and `condition`.
 struct ConnectionRule {
@@ -58,6 +62,9 @@ struct RuleSet {
   std::vector<Connection> other_connections;
   std::vector<BehaviourRules> behaviours;  // in document order; a check asks whether each can run
   std::vector<MetaBehaviour> meta_behaviours;  // in document order
+  // What it was all made of; null where that was not kept, or the rules were not read from files.
+  std::shared_ptr<const Provenance> provenance;
+  std::shared_ptr<const ModelTexts> texts;
 };
 
 }  // namespace arbiter::rules

@@ -36,6 +36,8 @@ class Simulation {
 
   [[nodiscard]] bool knows(const std::string& source) const { return ids_.contains(source); }
 
+  [[nodiscard]] shm::SourceId source_id(const std::string& source) const { return ids_.at(source); }
+
   // The ports that an event has a row for, in byte order: those that an arrival's source is
   // connected to or that read it, for anything else each arbitrated port.
   [[nodiscard]] std::vector<shm::PortId> ports_of(const TraceEvent& event) const;
@@ -43,6 +45,21 @@ class Simulation {
 
   // Takes an event, the time of which must not fall, and says what came of it at each of its ports.
   std::vector<OutcomeRow> step(const TraceEvent& event);
+
+  // Lets time pass without an event; it must not fall.
+  void advance_to(shm::Nanoseconds time) { clock_.now = time; }
+
+  // The state, for those who explain it.
+  [[nodiscard]] shm::Nanoseconds now() const { return clock_.now; }
+  [[nodiscard]] const shm::TableView& table() const { return table_; }
+  [[nodiscard]] std::size_t source_count() const { return sources_.size(); }
+  [[nodiscard]] const std::string& source_name(shm::SourceId source) const {
+    return sources_[source];
+  }
+  [[nodiscard]] shm::ActivityWord activity(shm::SourceId source) const {
+    return activity_[source].word.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] const std::vector<std::string>& port_names() const { return ports_; }  // by id
 
  private:
   struct Clock {

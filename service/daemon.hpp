@@ -25,6 +25,7 @@
 #include "service/history.hpp"
 #include "service/inheritance.hpp"
 #include "service/library.hpp"
+#include "service/model_copy.hpp"
 #include "service/models.hpp"
 #include "service/registry.hpp"
 #include "service/switchboard.hpp"
@@ -114,6 +115,7 @@ class Daemon {
   void introduce(const Switchboard::Told& told, std::function<void()> passed);
   void close_port(Client& client, shm::PortInstance port);
   void send_status(Client& client, std::uint64_t request);
+  void send_model(Client& client, std::uint64_t request);
   void deactivate(Client& client, const shm::Message& message);
   void refuse(Client& client, std::uint64_t request, const std::string& why);
   // Throws std::runtime_error if a live component has the name. One that has closed its port, or
@@ -190,6 +192,7 @@ class Daemon {
   Library library_;
   ModelPointer in_force_;  // null: none, or a predecessor's
   History history_;
+  ModelCopy model_copy_;
   Switchboard switchboard_{directory_, registry_};
   Barriers barriers_;
   shm::Nanoseconds show_growth_at_ = shm::kForever;

@@ -38,7 +38,7 @@ bool is_question(shm::MessageKind kind) {
          kind == MessageKind::kConnect || kind == MessageKind::kReload ||
          kind == MessageKind::kStatus || kind == MessageKind::kDeactivate ||
          kind == MessageKind::kObserve || kind == MessageKind::kSwitch ||
-         kind == MessageKind::kRollback;
+         kind == MessageKind::kRollback || kind == MessageKind::kModel;
 }
 
 }  // namespace
@@ -71,6 +71,10 @@ void Daemon::handle(Client& client, shm::Received& received) {
     case shm::MessageKind::kStatus:
       gate_.require(client, Action::kObserve);
       send_status(client, message.request);
+      break;
+    case shm::MessageKind::kModel:
+      gate_.require(client, Action::kObserve);
+      send_model(client, message.request);
       break;
     case shm::MessageKind::kDeactivate:
       deactivate(client, message);
@@ -318,6 +322,12 @@ void Daemon::send_document(Client& client, std::uint64_t request, shm::MessageKi
     throw std::runtime_error("the document could not be written");
   }
   client.send(reply_to(request, kind), {shm::reopen(file, O_RDONLY).get(), -1});
+}
+
+void Daemon::send_model(Client& client, std::uint64_t request) {
+  auto reply = reply_to(request, shm::MessageKind::kModelReply);
+  const rules::ModelTexts* texts = in_force_ == nullptr ? nullptr : in_force_->compiled.texts.get();
+  client.send(reply, {model_copy_.of(models_, texts).get(), -1});
 }
 
 void Daemon::deactivate(Client& client, const shm::Message& message) {

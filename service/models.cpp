@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "service/inheritance.hpp"
+#include "shm/clock.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -69,6 +70,7 @@ void Models::prepare(const Layout& layout, const std::string& name) {
 }
 
 void Models::put_in_force() {
+  in_force_since_ = shm::monotonic_now();
   writer_.put_in_force();
   directory_.set_generation(reader_.generation());
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "service/directory.hpp"
 #include "service/library.hpp"
@@ -29,6 +30,8 @@ class Models {
   [[nodiscard]] shm::TableSnapshot in_force() const { return reader_.snapshot(); }
   // The name of the one in force, be it a predecessor's; empty where there is none.
   [[nodiscard]] std::string name() const;
+  // Since when it is; 0 where a predecessor has put it in force.
+  [[nodiscard]] shm::Nanoseconds in_force_since() const { return in_force_since_; }
   [[nodiscard]] shm::TableView prepared() const { return writer_.next_table(); }
   // Read-only, for clients.
   [[nodiscard]] const shm::FileDescriptor& board() const { return readable_; }
@@ -37,6 +40,7 @@ class Models {
  private:
   Directory& directory_;
   Registry& registry_;
+  shm::Nanoseconds in_force_since_ = 0;
   shm::FileDescriptor writable_;
   shm::FileDescriptor readable_;
   shm::Mapping mapping_;

@@ -40,6 +40,7 @@ json connection_counters(const OutputPort* output, const InputPort* input, const
     counters["discarded"] = read(channel.discarded);
     counters["refused"] = read(channel.refused);
     counters["depth"] = channel.depth.load(std::memory_order_relaxed);
+    counters["waiting"] = accepted - before;  // a receiver that has never taken has no lane yet
     for (const shm::Lane& lane : input->shared().lanes) {
       if (lane.publisher.load(std::memory_order_acquire) != output->instance) continue;
       const std::uint64_t consumed = std::max(read(lane.consumed), before);

@@ -59,6 +59,7 @@ enum class MessageKind : std::uint32_t {
   kHandedBack,         // that was all
   kConnect,  // port: opened by a daemon that has gone since; asks for the kConnected that is
              // missing
+  kModel,    // ask for the texts of the model in force
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; descriptors: the board, the registry, read-only
@@ -77,6 +78,7 @@ enum class MessageKind : std::uint32_t {
   kDone,
   kOutputGrown,  // to input `port`: `peer` uses more of its segment now; descriptor: the segment
   kReport,       // in place of kDone and kRefused; descriptor: a memfd with JSON
+  kModelReply,   // descriptor: a memfd with JSON
 };
 
 enum MessageFlag : std::uint32_t {

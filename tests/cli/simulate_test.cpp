@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -11,9 +13,12 @@ using testing::HasSubstr;
 
 class Simulate : public testing::Test {
  protected:
-  ProgramResult simulate(const std::string& trace) {
+  ProgramResult simulate(const std::string& trace, const std::vector<std::string>& more = {}) {
     trace_ = directory_.write("trace.csv", trace);
-    return arbiter({"simulate", directory_.write("m.xml", model_), "--trace", trace_});
+    std::vector<std::string> arguments = {"simulate", directory_.write("m.xml", model_), "--trace",
+                                          trace_};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arbiter(arguments);
   }
 
   TemporaryDirectory directory_;
@@ -83,6 +88,39 @@ TEST_F(Simulate, PassesOnTheModelsWarnings) {
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.out, "t_ns,source,destination,decision,winner\n0,/a,/p,discarded,-\n");
   EXPECT_THAT(result.err, HasSubstr("[never-selected]"));
+}
+
+TEST_F(Simulate, ExplainsInsteadWithWhy) {
+  const auto result =
+      simulate("t_ns,source,event\n0,/low,\n1,/high,\n2,/low,\n3,/high,deactivate\n", {"--why"});
+  EXPECT_EQ(result.exit_code, 0);
+  const std::string inhibited =
+      "inhibited by behaviour \"High\" (" + directory_.path() + "/m.xml:3): ";
+  EXPECT_EQ(result.out,
+            "0.000 s  /p  idle -> /low  because /low became active\n"
+            "0.000000001 s  /p  /low -> /high  because /high became active; /low is " +
+                inhibited +
+                "/high is active (arrived just now, T 500ms)\n"
+                "0.000000002 s  /p  /low discarded: " +
+                inhibited +
+                "/high is active (arrived 0 us ago, T 500ms)\n"
+                "0.000000003 s  /p  /high -> /low  because /high was deactivated\n");
+}
+
+TEST_F(Simulate, ExplainsAsJsonToo) {
+  const auto result = simulate("t_ns,source\n0,/low\n1,/high\n2,/low\n", {"--why=/p", "--json"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, HasSubstr(R"("event":"change")"));
+  EXPECT_THAT(result.out, HasSubstr(R"("reason":[{"active":true,"source":"/high"}])"));
+  EXPECT_EQ(std::count(result.out.begin(), result.out.end(), '\n'), 3);
+}
+
+TEST_F(Simulate, RefusesToExplainAPortThatThereIsNot) {
+  const auto result = simulate("t_ns,source\n0,/low\n", {"--why=/q"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, HasSubstr("the model has no input port /q"));
+  EXPECT_EQ(simulate("t_ns,source\n", {"--json"}).exit_code, 2);
 }
 
 }  // namespace

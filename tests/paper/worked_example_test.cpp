@@ -48,5 +48,45 @@ TEST(WorkedExample, ComesOutOfTheProgramToo) {
   }
 }
 
+// `simulate --why`, all of it: what changed each winner, and why each arrival was discarded.
+TEST(WorkedExample, IsExplained) {
+  const std::string model = ARBITER_EXAMPLES "/search_and_track/search_and_track.xml";
+  const auto result = run_program(
+      {ARBITER_PROGRAMS "/arbiter", "simulate", model, "--trace", kTrace, "--why=/Gaze/pos:i"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err, "");
+  const std::string at = "  /Gaze/pos:i  ";
+  const std::string follow_face =
+      "inhibited by behaviour \"Follow Face\" (" + model + ":42): /Face/pos:o is active (arrived ";
+  const std::string track_object =
+      "inhibited by behaviour \"Track Object\" through meta-behaviour \"Be Curious\" (" + model +
+      ":52): /Object/pos:o is active (arrived ";
+  const std::string condition =
+      "the condition of behaviour \"Track Object\", ¬/collision:o, is false (" + model +
+      ":51): /collision:o is active (arrived ";
+  EXPECT_EQ(
+      result.out,
+      "0.000 s" + at + "idle -> /RandomLook/pos:o  because /RandomLook/pos:o became active\n" +
+          "0.100 s" + at +
+          "/RandomLook/pos:o -> /Face/pos:o  because /Face/pos:o became active; "
+          "/RandomLook/pos:o is " +
+          follow_face + "just now, T 500ms)\n" + "0.150 s" + at +
+          "/RandomLook/pos:o discarded: " + follow_face + "50 ms ago, T 500ms)\n" + "0.200 s" + at +
+          "/Face/pos:o -> /Object/pos:o  because /Object/pos:o became active; "
+          "/Face/pos:o is " +
+          track_object + "just now, T 500ms)\n" + "0.250 s" + at +
+          "/Face/pos:o discarded: " + track_object + "50 ms ago, T 500ms)\n" + "0.350 s" + at +
+          "/Object/pos:o -> idle  because /collision:o became active; "
+          "/Object/pos:o is out: " +
+          condition + "just now, T 500ms)\n" + "0.400 s" + at +
+          "/Object/pos:o discarded: " + condition + "50 ms ago, T 500ms)\n" + "0.850 s" + at +
+          "idle -> /Object/pos:o  because /collision:o went inactive, "
+          "500 ms after its last arrival\n" +
+          "1.350 s" + at +
+          "/Object/pos:o -> idle  because /Object/pos:o went inactive, "
+          "500 ms after its last arrival\n" +
+          "1.400 s" + at + "idle -> /RandomLook/pos:o  because /RandomLook/pos:o became active\n");
+}
+
 }  // namespace
 }  // namespace arbiter::test

@@ -81,7 +81,7 @@ struct Loaded {
 inline Loaded load_files(const ModelFiles& files) {
   Loaded loaded;
   Diagnostics diagnostics;
-  loaded.rules = load(files, diagnostics);
+  loaded.rules = load(files, diagnostics, Keep::kProvenance);
   loaded.items = diagnostics.items();
   loaded.has_errors = diagnostics.has_errors();
   return loaded;

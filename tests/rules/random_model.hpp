@@ -191,19 +191,26 @@ class NaiveEvaluator {
     return sources;
   }
 
-  // Whether the behaviour's conditions hold, and nothing inhibits it at the port.
-  bool may_run_at(int behaviour, const std::string& port, const Active& active) const {
+  // What keeps a behaviour from running at a port, in a line each.
+  std::multiset<std::string> obstacles(int behaviour, const std::string& port,
+                                       const Active& active) const {
+    std::multiset<std::string> result;
     for (int i = behaviour; i != kNone; i = element(i).parent) {
       for (const auto& condition : element(i).conditions) {
-        if (!holds(*condition, active)) return false;
+        if (!holds(*condition, active)) result.insert("condition of " + name_of(i));
       }
       for (std::size_t x = 0; x < model_.elements.size(); ++x) {
         const auto& named = model_.elements[x].inhibits;
         if (std::find(named.begin(), named.end(), i) == named.end()) continue;
-        if (is_active_at(static_cast<int>(x), port, active)) return false;
+        if (!is_active_at(static_cast<int>(x), port, active)) continue;
+        result.insert(name_of(static_cast<int>(x)) + " inhibits " + name_of(i));
       }
     }
-    return true;
+    return result;
+  }
+
+  bool may_run_at(int behaviour, const std::string& port, const Active& active) const {
+    return obstacles(behaviour, port, active).empty();
   }
 
  private:

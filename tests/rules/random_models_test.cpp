@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 
 #include "rules/application_writer.hpp"
 #include "rules/compile.hpp"
+#include "rules/explain.hpp"
 #include "rules/load.hpp"
 #include "tests/rules/random_model.hpp"
 #include "tests/support/live_table.hpp"
@@ -85,6 +87,106 @@ void RandomModels::check_decisions(const rules::CompiledModel& model, const Naiv
       }
     }
   }
+}
+
+// Explanations against the definition: what is said to keep a connection out does so by itself,
+// whatever all others do, and nothing that does is left out.
+class Explanations {
+ public:
+  Explanations(const RandomModel& random, const rules::RuleSet& set)
+      : naive_(random), explainer_(set) {}
+
+  void check(const std::string& port) {
+    for (const auto& active : activations_) {
+      SCOPED_TRACE(port + ' ' + testing::PrintToString(active));
+      const auto explained = explainer_.explain(
+          port, [&](const std::string& source) { return active.contains(source); });
+      const auto selected = naive_.selected(port, active);
+      EXPECT_EQ(explained.winner.value_or(""), selected.empty() ? "" : selected.front());
+      std::vector<std::string> sources;
+      for (const auto& connection : explained.connections) {
+        sources.push_back(connection.source);
+        EXPECT_EQ(connection.wins, explained.winner == connection.source);
+        check_reason(port, connection, active);
+        for (const auto& part : connection.parts) check_part(port, part, active);
+      }
+      EXPECT_EQ(sources, naive_.sources_at(port));
+    }
+  }
+
+  int reasons() const { return reasons_; }
+
+ private:
+  static bool agrees(const std::vector<rules::Literal>& literals, const Active& active) {
+    return std::all_of(literals.begin(), literals.end(), [&](const rules::Literal& literal) {
+      return active.contains(literal.source) == literal.active;
+    });
+  }
+
+  void check_reason(const std::string& port, const rules::ConnectionExplanation& connection,
+                    const Active& active) {
+    const auto reason = connection.reason();
+    ASSERT_EQ(reason.has_value(), !connection.wins);
+    if (!reason) return;
+    ++reasons_;
+    EXPECT_TRUE(agrees(*reason, active));
+    for (const auto& other : activations_) {
+      if (!agrees(*reason, other)) continue;
+      const auto selected = naive_.selected(port, other);
+      EXPECT_TRUE(selected.empty() || selected.front() != connection.source)
+          << "with " << testing::PrintToString(other);
+    }
+  }
+
+  void check_part(const std::string& port, const rules::Part& part, const Active& active) {
+    ASSERT_TRUE(part.behaviour);
+    const int behaviour = std::stoi(part.behaviour->name.substr(std::strlen("Element ")));
+    std::multiset<std::string> told;
+    for (const auto& cause : part.causes) {
+      ASSERT_TRUE(cause.of);
+      const bool inhibits = cause.kind == rules::Cause::Kind::kInhibited;
+      const std::string obstacle = inhibits ? cause.inhibitor->name + " inhibits " + cause.of->name
+                                            : "condition of " + cause.of->name;
+      told.insert(obstacle);
+      EXPECT_TRUE(agrees(cause.because, active));
+      for (const auto& other : activations_) {
+        if (!agrees(cause.because, other)) continue;
+        EXPECT_EQ(naive_.obstacles(behaviour, port, other).count(obstacle) > 0, true) << obstacle;
+      }
+      if (!inhibits) continue;
+      // Once all that it names are inactive, the inhibition is over.
+      auto after = active;
+      for (const auto& literal : cause.because) after.erase(literal.source);
+      for (const auto& source : cause.also) after.erase(source);
+      EXPECT_EQ(naive_.obstacles(behaviour, port, after).count(obstacle), 0u) << obstacle;
+    }
+    EXPECT_EQ(told, naive_.obstacles(behaviour, port, active));
+  }
+
+  const NaiveEvaluator naive_;
+  const rules::Explainer explainer_;
+  const std::vector<Active> activations_ = subsets(kSources);
+  int reasons_ = 0;
+};
+
+TEST_P(RandomModels, AreExplainedAsTheDefinitionOfARuleSays) {
+  int reasons = 0;
+  for (unsigned seed = 0; seed < 15; ++seed) {
+    const RandomModel random = Generator(seed).model();
+    const std::string xml = to_xml(
+        random, GetParam() ? std::set(kPorts.begin(), kPorts.end()) : std::set<std::string>());
+    SCOPED_TRACE("seed " + std::to_string(seed) + "\n" + xml);
+    const TemporaryDirectory directory;
+    rules::Diagnostics diagnostics;
+    const auto set = rules::load({{directory.write("model.xml", xml)}, {}}, diagnostics,
+                                 rules::Keep::kProvenance);
+    ASSERT_FALSE(diagnostics.has_errors());
+    Explanations explanations(random, set);
+    for (const auto& port : set.ports) explanations.check(port.port);
+    reasons += explanations.reasons();
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(reasons, 300);
 }
 
 TEST_P(RandomModels, DecideAsTheDefinitionOfARuleSays) {

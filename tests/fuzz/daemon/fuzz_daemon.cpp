@@ -45,7 +45,7 @@ constexpr MessageKind kKinds[] = {
     MessageKind::kReload,         MessageKind::kStop,          MessageKind::kHandBackPage,
     MessageKind::kHandBackOutput, MessageKind::kHandBackInput, MessageKind::kHandBackLink,
     MessageKind::kHandedBack,     MessageKind::kConnect,       MessageKind::kWelcome,
-    MessageKind::kSync,           MessageKind::kOpened};
+    MessageKind::kSync,           MessageKind::kOpened,        MessageKind::kModel};
 
 // Those that came later have bytes of their own, so that the corpus still means what it did.
 constexpr MessageKind kLaterKinds[] = {MessageKind::kSwitch, MessageKind::kRollback,

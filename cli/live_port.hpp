@@ -1,0 +1,68 @@
+// An input port of the running system, as an observer sees it: the model in force, the activity of
+// all sources that matter to the port, at one moment.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "cli/live.hpp"
+#include "cli/why_report.hpp"
+#include "rules/explain.hpp"
+#include "shm/ids.hpp"
+#include "shm/table_ring.hpp"
+
+namespace arbiter::cli {
+
+// One consistent picture, as decisions take it.
+struct Look {
+  shm::TableSnapshot snapshot;
+  bool is_arbitrated = false;
+  bool is_mentioned = false;  // the model in force knows the port
+  std::map<shm::SourceId, shm::ActivityWord> words;
+  Sources sources;         // the same by name, and the time
+  bool is_settled = true;  // else sources changed too fast for one picture
+  shm::SourceId winner = shm::kNone;
+
+  [[nodiscard]] bool is_active(shm::SourceId source) const {
+    const auto found = words.find(source);
+    return found != words.end() && shm::is_active(found->second, sources.now());
+  }
+  // When the first of the activities ends by itself.
+  [[nodiscard]] shm::Nanoseconds next_end() const;
+};
+
+class LivePort {
+ public:
+  // Throws Error where there is no such input port.
+  LivePort(std::shared_ptr<detail::NodeCore> node, std::string port);
+
+  // Throws Error where a daemon has come that does not have the memory of the one we asked.
+  [[nodiscard]] Look look() const;
+  // By the texts of the model that the look was taken under; nothing if another one has come into
+  // force since: look again.
+  std::optional<rules::PortExplanation> explain(const Look& look);
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] shm::PortId id() const { return id_; }
+  [[nodiscard]] std::string source_name(shm::SourceId source) const;
+  // Of the model that was explained last: whether the daemon knows its texts, and since when it is
+  // in force (0: not known).
+  [[nodiscard]] bool has_texts() const { return has_texts_; }
+  [[nodiscard]] shm::Nanoseconds in_force_since() const { return in_force_since_; }
+
+ private:
+  void fetch_model();
+
+  const std::shared_ptr<detail::NodeCore> node_;
+  const std::shared_ptr<const detail::SharedMemory> memory_;
+  const std::string name_;
+  const shm::PortId id_;
+  std::optional<std::uint64_t> generation_;  // of what follows
+  rules::RuleSet rules_;
+  bool has_texts_ = false;
+  shm::Nanoseconds in_force_since_ = 0;
+};
+
+}  // namespace arbiter::cli

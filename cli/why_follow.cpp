@@ -1,0 +1,141 @@
+#include "cli/why_follow.hpp"
+
+#include <algorithm>
+#include <iostream>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "rules/change.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+using nlohmann::json;
+
+// How often --follow looks, beside the times at which it knows that an activity ends: publishers do
+// not ring for those who merely observe.
+constexpr shm::Nanoseconds kLookEvery = 2'000'000;
+
+class Follower {
+ public:
+  Follower(const WhyOptions& options, shm::FileDescriptor interrupts)
+      : options_(options),
+        interrupts_(std::move(interrupts)),
+        port_(connect("why", options.instance), options.port),
+        started_(shm::monotonic_now()),
+        last_(port_.look()) {
+    static_cast<void>(port_.explain(last_));  // fetches the model while there is a daemon
+  }
+
+  int run() {
+    write_start();
+    std::uint64_t changes = 0;
+    while (std::cout) {
+      const shm::Nanoseconds soon = shm::monotonic_now() + kLookEvery;
+      if (sleep_until(std::min(soon, last_.next_end()), interrupts_)) return 0;
+      Look look = port_.look();
+      if (look.winner != last_.winner || look.is_arbitrated != last_.is_arbitrated) {
+        if (!write_change(look)) continue;
+        if (++changes == options_.count) return 0;
+      }
+      last_ = std::move(look);
+    }
+    return 0;
+  }
+
+ private:
+  [[nodiscard]] std::string name_of(const Look& look) const {
+    if (!look.is_arbitrated) return "not arbitrated";
+    return look.winner == shm::kNone ? "idle" : port_.source_name(look.winner);
+  }
+  [[nodiscard]] json winner_json(const Look& look) const {
+    return look.winner == shm::kNone ? json(nullptr) : json(port_.source_name(look.winner));
+  }
+
+  void write_start() const {
+    if (options_.json) {
+      write_line({{"at_ns", last_.sources.now()},
+                  {"port", port_.name()},
+                  {"arbitrated", last_.is_arbitrated},
+                  {"winner", winner_json(last_)}});
+      return;
+    }
+    std::cout << seconds_text(last_.sources.now() - started_) << "  " << port_.name() << ": "
+              << name_of(last_) << std::endl;
+  }
+
+  static void write_line(const json& line) {
+    std::cout << line.dump(-1, ' ', false, json::error_handler_t::replace) << std::endl;
+  }
+
+  // False: another model has come into force meanwhile, and it must be looked at again.
+  bool write_change(const Look& look) {
+    const auto explanation = port_.explain(look);
+    if (!explanation) return false;
+    const bool is_new_model = look.snapshot.generation != last_.snapshot.generation;
+    const auto causes = rules::causes_of_change(
+        look.snapshot.table, port_.id(),
+        [&](shm::SourceId source) { return last_.is_active(source); },
+        [&](shm::SourceId source) { return look.is_active(source); });
+    // What has happened has happened before it was seen.
+    shm::Nanoseconds at = look.sources.now();
+    for (const shm::SourceId source : causes) {
+      at = std::min(at,
+                    event_time(look.sources.state(port_.source_name(source)), look.sources.now()));
+    }
+    if (is_new_model) at = port_.in_force_since() != 0 ? port_.in_force_since() : at;
+    std::string because;
+    if (is_new_model) {
+      because = "model " + std::to_string(look.snapshot.generation) + " came into force";
+    }
+    if (!causes.empty() && !is_new_model) because = events_text(port_, causes, look);
+    const std::string loser = loss_text(*explanation, name_of(last_), look.sources);
+    if (options_.json) {
+      json events = json::array();
+      for (const shm::SourceId source : causes) {
+        const std::string name = port_.source_name(source);
+        events.push_back(event_json(name, look.sources.state(name), look.sources.now()));
+      }
+      write_line({{"at_ns", at},
+                  {"port", port_.name()},
+                  {"arbitrated", look.is_arbitrated},
+                  {"old", winner_json(last_)},
+                  {"winner", winner_json(look)},
+                  {"because", std::move(events)},
+                  {"model", is_new_model ? json(look.snapshot.generation) : json(nullptr)},
+                  {"old_loses", loser.empty() ? json(nullptr) : json(loser)}});
+      return true;
+    }
+    std::cout << seconds_text(at - started_) << "  " << name_of(last_) << " -> " << name_of(look)
+              << "  because " << because
+              << (loser.empty() ? "" : "; " + name_of(last_) + " is " + loser) << std::endl;
+    return true;
+  }
+
+  const WhyOptions& options_;
+  const shm::FileDescriptor interrupts_;
+  LivePort port_;
+  const shm::Nanoseconds started_;
+  Look last_;
+};
+
+}  // namespace
+
+std::string events_text(const LivePort& port, const std::vector<shm::SourceId>& sources,
+                        const Look& look) {
+  std::string text;
+  for (const shm::SourceId source : sources) {
+    const std::string name = port.source_name(source);
+    if (!text.empty()) text += " and ";
+    text += event_text(name, look.sources.state(name), look.sources.now());
+  }
+  return text;
+}
+
+int follow_winners(const WhyOptions& options) {
+  return Follower(options, catch_interrupts()).run();
+}
+
+}  // namespace arbiter::cli

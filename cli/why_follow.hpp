@@ -1,0 +1,28 @@
+// arbiter why --follow: each change of a port's winner, with its cause, as it comes.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "cli/live_port.hpp"
+
+namespace arbiter::cli {
+
+struct WhyOptions {
+  std::string port;
+  std::string source;
+  std::string instance;
+  bool follow = false;
+  bool json = false;
+  std::uint64_t count = 0;  // of changes; 0: until interrupted
+};
+
+// Returns the exit code. Throws Error.
+int follow_winners(const WhyOptions& options);
+
+// What happened to these sources last: "/a became active and /b was deactivated".
+std::string events_text(const LivePort& port, const std::vector<shm::SourceId>& sources,
+                        const Look& look);
+
+}  // namespace arbiter::cli

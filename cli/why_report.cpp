@@ -1,0 +1,240 @@
+#include "cli/why_report.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "rules/names.hpp"
+#include "rules/print_rules.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMaxNamed = 4;
+
+std::string place(const rules::Location& where) {
+  return where.file.empty() ? "" : " (" + where.file + ":" + std::to_string(where.line) + ")";
+}
+
+json place_json(const rules::Location& where) {
+  if (where.file.empty()) return nullptr;
+  return {{"file", where.file}, {"line", where.line}, {"column", where.column}};
+}
+
+json element_json(const std::optional<rules::Element>& element) {
+  if (!element) return nullptr;
+  return {{"name", element->name},
+          {"kind", element->is_meta ? "meta-behaviour" : "behaviour"},
+          {"where", place_json(element->where)}};
+}
+
+json literals_json(const std::vector<rules::Literal>& literals) {
+  json result = json::array();
+  for (const auto& each : literals) {
+    result.push_back({{"source", each.source}, {"active", each.active}});
+  }
+  return result;
+}
+
+std::string literals_text(const std::vector<rules::Literal>& literals, const Sources& sources) {
+  std::string text;
+  for (std::size_t i = 0; i < std::min(literals.size(), kMaxNamed); ++i) {
+    if (i != 0) text += i + 1 == literals.size() ? " and " : ", ";
+    text += literals[i].source + " is " + sources.describe(literals[i].source);
+  }
+  if (literals.size() > kMaxNamed) {
+    text += ", and " + std::to_string(literals.size() - kMaxNamed) + " more as they are";
+  }
+  return text;
+}
+
+std::string inhibition_text(const rules::Cause& cause, const Sources& sources) {
+  std::string text = "inhibited by " + describe(*cause.inhibitor);
+  if (cause.speaker) text += " (its behaviour \"" + cause.speaker->name + "\")";
+  if (cause.of && cause.of->is_meta) text += " through " + describe(*cause.of);
+  text += place(cause.where) + ": " + literals_text(cause.because, sources);
+  if (!cause.also.empty()) {
+    text += "; so " + std::string(cause.also.size() == 1 ? "is " : "are ");
+    for (std::size_t i = 0; i < std::min(cause.also.size(), kMaxNamed); ++i) {
+      text += (i == 0 ? "" : ", ") + cause.also[i];
+    }
+    if (cause.also.size() > kMaxNamed) text += ", …";
+  }
+  if (cause.across_ports) text += "; it has no connection here, and inhibits by all its sources";
+  return text;
+}
+
+}  // namespace
+
+SourceState Sources::state(const std::string& name) const {
+  const auto found = states_.find(name);
+  return found == states_.end() ? SourceState() : found->second;
+}
+
+std::string span_text(shm::Nanoseconds span) {
+  char text[64];
+  const auto value = static_cast<double>(std::max<shm::Nanoseconds>(span, 0));
+  if (value < 1e5) {
+    std::snprintf(text, sizeof text, "%.0f us", value / 1e3);
+  } else if (value < 1e6) {
+    std::snprintf(text, sizeof text, "%.1f ms", value / 1e6);
+  } else if (value < 1e9) {
+    std::snprintf(text, sizeof text, "%.0f ms", value / 1e6);
+  } else if (value < 1e11) {
+    std::snprintf(text, sizeof text, "%.1f s", value / 1e9);
+  } else {
+    std::snprintf(text, sizeof text, "%.0f s", value / 1e9);
+  }
+  return text;
+}
+
+std::string Sources::describe(const std::string& name) const {
+  const SourceState source = state(name);
+  if (!source.is_visible) return "not to be seen yet (the daemon has no page of its activity)";
+  if (source.word == shm::kNeverActive) return "inactive (it has never arrived)";
+  if (shm::is_deactivation(source.word)) {
+    return "inactive (deactivated " + span_text(now_ - (source.word & ~shm::kDeactivatedFlag)) +
+           " ago)";
+  }
+  const shm::Nanoseconds span = now_ - shm::arrival_of(source.word, source.timeout);
+  const std::string since = (span <= 0 ? "just now" : span_text(span) + " ago") + ", T " +
+                            rules::to_string(source.timeout) + ")";
+  return is_active(name) ? "active (arrived " + since : "inactive (last arrival " + since;
+}
+
+json Sources::to_json(const std::string& name) const {
+  const SourceState source = state(name);
+  json result = {
+      {"source", name},
+      {"active", is_active(name)},
+      {"timeout_ns", source.timeout == shm::kForever ? json("forever") : json(source.timeout)},
+      {"last_arrival_ns", nullptr},
+      {"deactivated_ns", nullptr},
+      {"ends_ns", nullptr}};
+  if (!source.is_visible) result["active"] = nullptr;
+  if (source.word == shm::kNeverActive) return result;
+  if (shm::is_deactivation(source.word)) {
+    result["deactivated_ns"] = source.word & ~shm::kDeactivatedFlag;
+    return result;
+  }
+  result["last_arrival_ns"] = shm::arrival_of(source.word, source.timeout);
+  if (shm::is_finite(source.word)) result["ends_ns"] = source.word;
+  return result;
+}
+
+std::string cause_text(const rules::Cause& cause, const Sources& sources) {
+  if (cause.kind == rules::Cause::Kind::kInhibited) return inhibition_text(cause, sources);
+  const std::string because = cause.because.empty() ? "no activity of the sources can make it true"
+                                                    : literals_text(cause.because, sources);
+  if (cause.kind == rules::Cause::Kind::kUnwritten) return "its rule does not hold: " + because;
+  const std::string whose = cause.of ? "the condition of " + describe(*cause.of) : "its condition";
+  return whose + ", " + cause.condition + ", is false" + place(cause.where) + ": " + because;
+}
+
+json cause_json(const rules::Cause& cause) {
+  static constexpr const char* kKinds[] = {"inhibited", "condition-false", "rule-false"};
+  json result = {{"kind", kKinds[static_cast<int>(cause.kind)]},
+                 {"where", place_json(cause.where)},
+                 {"because", literals_json(cause.because)}};
+  if (cause.of) result["of"] = element_json(cause.of);
+  if (cause.inhibitor) {
+    result["inhibitor"] = element_json(cause.inhibitor);
+    result["speaker"] = element_json(cause.speaker);
+    result["also"] = cause.also;
+    result["across_ports"] = cause.across_ports;
+  }
+  if (!cause.condition.empty()) result["condition"] = cause.condition;
+  return result;
+}
+
+std::string first_cause(const rules::ConnectionExplanation& connection, const Sources& sources) {
+  if (!connection.has_rule) return "no rule selects it, so that it never delivers here";
+  if (!connection.is_active) return "it is " + sources.describe(connection.source);
+  if (connection.earlier) {
+    return *connection.earlier + " comes before it in the model, and conflict=\"first\" is set";
+  }
+  for (const auto& part : connection.parts) {
+    if (!part.causes.empty()) return cause_text(part.causes.front(), sources);
+  }
+  return "nothing";
+}
+
+std::string loss_text(const rules::PortExplanation& port, const std::string& loser,
+                      const Sources& sources) {
+  if (!sources.is_active(loser)) return {};
+  for (const auto& each : port.connections) {
+    if (each.source != loser) continue;
+    const std::string cause = first_cause(each, sources);
+    return cause.starts_with("inhibited") ? cause : "out: " + cause;
+  }
+  return {};
+}
+
+void write_causes(std::ostream& out, const rules::ConnectionExplanation& connection,
+                  const Sources& sources) {
+  if (!connection.has_rule) {
+    out << "  no rule selects it, so that it never delivers here; its activity counts for others\n";
+    return;
+  }
+  if (!connection.is_active) out << "  " << sources.describe(connection.source) << '\n';
+  if (connection.earlier) {
+    out << "  " << *connection.earlier
+        << " comes before it in the model, and where two rules hold the first wins "
+           "(conflict=\"first\")\n";
+  }
+  for (const auto& part : connection.parts) {
+    const std::string who = part.behaviour ? describe(*part.behaviour) : std::string("its rule");
+    if (part.causes.empty()) {
+      if (connection.is_active) continue;
+      out << "  " << who << place(part.where) << " would select it, if it were active\n";
+      continue;
+    }
+    const std::string indent = connection.parts.size() > 1 ? "    " : "  ";
+    if (connection.parts.size() > 1) out << "  as " << who << place(part.where) << " has it:\n";
+    for (const auto& cause : part.causes) out << indent << cause_text(cause, sources) << '\n';
+  }
+}
+
+json connection_json(const rules::ConnectionExplanation& connection, const Sources& sources) {
+  json result = sources.to_json(connection.source);
+  result["winner"] = connection.wins;
+  result["has_rule"] = connection.has_rule;
+  result["rule_holds"] = connection.holds;
+  result["earlier"] = connection.earlier ? json(*connection.earlier) : json(nullptr);
+  const auto reason = connection.reason();
+  result["reason"] = reason ? literals_json(*reason) : json(nullptr);
+  result["behaviours"] = json::array();
+  for (const auto& part : connection.parts) {
+    json causes = json::array();
+    for (const auto& cause : part.causes) causes.push_back(cause_json(cause));
+    result["behaviours"].push_back(
+        {{"behaviour", part.behaviour ? json(part.behaviour->name) : json(nullptr)},
+         {"where", place_json(part.where)},
+         {"causes", std::move(causes)}});
+  }
+  return result;
+}
+
+shm::Nanoseconds event_time(const SourceState& state, shm::Nanoseconds now) {
+  if (shm::is_deactivation(state.word)) return state.word & ~shm::kDeactivatedFlag;
+  if (shm::is_active(state.word, now)) return shm::arrival_of(state.word, state.timeout);
+  return state.word;
+}
+
+std::string event_text(const std::string& source, const SourceState& state, shm::Nanoseconds now) {
+  if (shm::is_deactivation(state.word)) return source + " was deactivated";
+  if (shm::is_active(state.word, now)) return source + " became active";
+  return source + " went inactive, " +
+         span_text(state.word - shm::arrival_of(state.word, state.timeout)) +
+         " after its last arrival";
+}
+
+json event_json(const std::string& source, const SourceState& state, shm::Nanoseconds now) {
+  const char* what = shm::is_deactivation(state.word)  ? "deactivated"
+                     : shm::is_active(state.word, now) ? "active"
+                                                       : "expired";
+  return {{"source", source}, {"became", what}, {"at_ns", event_time(state, now)}};
+}
+
+}  // namespace arbiter::cli

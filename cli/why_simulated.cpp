@@ -1,0 +1,173 @@
+#include "cli/why_simulated.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <stdexcept>
+#include <string_view>
+
+#include "rules/change.hpp"
+#include "rules/names.hpp"
+#include "rules/tenure.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+using nlohmann::json;
+
+// Milliseconds, and what is finer only where it is there: "0.100 s", "0.100000001 s".
+std::string time_text(shm::Nanoseconds time) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%lld.%09lld", static_cast<long long>(time / 1'000'000'000),
+                static_cast<long long>(time % 1'000'000'000));
+  std::string result = text;
+  const std::size_t shortest = result.find('.') + 4;
+  while (result.size() > shortest && result.back() == '0') result.pop_back();
+  return result + " s";
+}
+
+void write_line(std::ostream& out, const json& line) {
+  out << line.dump(-1, ' ', false, json::error_handler_t::replace) << '\n';
+}
+
+}  // namespace
+
+WhySimulated::WhySimulated(const rules::RuleSet& rules, rules::Simulation& simulation,
+                           Options options)
+    : explainer_(rules),
+      simulation_(simulation),
+      options_(std::move(options)),
+      winners_(simulation.port_names().size(), shm::kNone),
+      was_active_(simulation.source_count(), false) {
+  const auto& ports = simulation.port_names();
+  if (options_.port.empty()) return;
+  if (std::find(ports.begin(), ports.end(), options_.port) != ports.end()) return;
+  const std::vector<std::string_view> known(ports.begin(), ports.end());
+  throw std::runtime_error("the model has no input port " + options_.port +
+                           rules::advise(options_.port, known, "`arbiter rules` shows its ports"));
+}
+
+void WhySimulated::step(const rules::TraceEvent& event, std::ostream& out) {
+  run_out_until(event.at, out);
+  const auto rows = simulation_.step(event);
+  schedule(event);
+  tell_changes(out);
+  if (event.kind != rules::TraceKind::kArrival) return;
+  for (const auto& row : rows) {
+    if (!row.outcome.delivered) tell_discarded(row, out);
+  }
+}
+
+void WhySimulated::run_out_until(shm::Nanoseconds time, std::ostream& out) {
+  while (!ends_.empty() && ends_.begin()->first <= time) {
+    simulation_.advance_to(ends_.begin()->first);
+    // All that ends at this moment ends at once.
+    while (!ends_.empty() && ends_.begin()->first == simulation_.now()) ends_.erase(ends_.begin());
+    tell_changes(out);
+  }
+}
+
+// An end that a renewal has put off is looked at in vain.
+void WhySimulated::schedule(const rules::TraceEvent& event) {
+  if (event.kind != rules::TraceKind::kArrival || !simulation_.knows(event.source)) return;
+  const shm::SourceId source = simulation_.source_id(event.source);
+  const shm::ActivityWord word = simulation_.activity(source);
+  if (shm::is_finite(word)) ends_.emplace(word, source);
+}
+
+bool WhySimulated::is_active(shm::SourceId source) const {
+  return shm::is_active(simulation_.activity(source), simulation_.now());
+}
+
+void WhySimulated::tell_changes(std::ostream& out) {
+  std::set<shm::PortId> concerned;
+  for (shm::SourceId source = 0; source < was_active_.size(); ++source) {
+    if (is_active(source) == was_active_[source]) continue;
+    const auto ports = simulation_.table().ports_concerned(source);
+    for (shm::Word i = 0; i < ports.count; ++i) concerned.insert(ports[i]);
+  }
+  for (const shm::PortId port : concerned) {
+    const shm::SourceId before = winners_[port];
+    const auto active = [this](shm::SourceId source) { return is_active(source); };
+    winners_[port] = rules::winner_at(simulation_.table(), port, active);
+    if (winners_[port] != before) tell_change(port, before, winners_[port], out);
+  }
+  for (shm::SourceId source = 0; source < was_active_.size(); ++source) {
+    was_active_[source] = is_active(source);
+  }
+}
+
+Sources WhySimulated::sources_at(shm::PortId port) const {
+  Sources sources;
+  sources.set_time(simulation_.now());
+  for (const shm::SourceId source : rules::sources_heeded(simulation_.table(), port)) {
+    sources.set(simulation_.source_name(source),
+                {simulation_.activity(source), simulation_.table().timeout(source)});
+  }
+  return sources;
+}
+
+std::string WhySimulated::name_of(shm::SourceId winner) const {
+  return winner == shm::kNone ? "idle" : simulation_.source_name(winner);
+}
+
+rules::PortExplanation WhySimulated::explain(shm::PortId port, const Sources& sources) const {
+  return explainer_.explain(simulation_.port_name(port),
+                            [&](const std::string& source) { return sources.is_active(source); });
+}
+
+void WhySimulated::tell_change(shm::PortId port, shm::SourceId before, shm::SourceId now,
+                               std::ostream& out) {
+  const std::string& name = simulation_.port_name(port);
+  if (!options_.port.empty() && options_.port != name) return;
+  const Sources sources = sources_at(port);
+  const auto causes = rules::causes_of_change(
+      simulation_.table(), port, [this](shm::SourceId source) { return was_active_[source]; },
+      [this](shm::SourceId source) { return is_active(source); });
+  const std::string loss = loss_text(explain(port, sources), name_of(before), sources);
+  if (options_.json) {
+    json because = json::array();
+    for (const shm::SourceId cause : causes) {
+      const std::string& source = simulation_.source_name(cause);
+      because.push_back(event_json(source, sources.state(source), simulation_.now()));
+    }
+    write_line(out, {{"t_ns", simulation_.now()},
+                     {"port", name},
+                     {"event", "change"},
+                     {"old", before == shm::kNone ? json(nullptr) : json(name_of(before))},
+                     {"winner", now == shm::kNone ? json(nullptr) : json(name_of(now))},
+                     {"because", std::move(because)},
+                     {"old_loses", loss.empty() ? json(nullptr) : json(loss)}});
+    return;
+  }
+  out << time_text(simulation_.now()) << "  " << name << "  " << name_of(before) << " -> "
+      << name_of(now) << "  because ";
+  for (std::size_t i = 0; i < causes.size(); ++i) {
+    const std::string& source = simulation_.source_name(causes[i]);
+    out << (i == 0 ? "" : " and ") << event_text(source, sources.state(source), simulation_.now());
+  }
+  if (!loss.empty()) out << "; " << name_of(before) << " is " << loss;
+  out << '\n';
+}
+
+void WhySimulated::tell_discarded(const rules::OutcomeRow& row, std::ostream& out) {
+  if (!options_.port.empty() && options_.port != row.port) return;
+  const auto& ports = simulation_.port_names();
+  const auto port = static_cast<shm::PortId>(
+      std::lower_bound(ports.begin(), ports.end(), row.port) - ports.begin());
+  const Sources sources = sources_at(port);
+  const rules::PortExplanation explanation = explain(port, sources);
+  for (const auto& connection : explanation.connections) {
+    if (connection.source != row.event.source) continue;
+    if (options_.json) {
+      write_line(out, {{"t_ns", row.event.at},
+                       {"port", row.port},
+                       {"event", "discarded"},
+                       {"connection", connection_json(connection, sources)}});
+    } else {
+      out << time_text(row.event.at) << "  " << row.port << "  " << connection.source
+          << " discarded: " << first_cause(connection, sources) << '\n';
+    }
+  }
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,50 @@
+// arbiter simulate --why: what changed the winners of a trace, and what kept arrivals out.
+#pragma once
+
+#include <ostream>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cli/why_report.hpp"
+#include "rules/explain.hpp"
+#include "rules/simulation.hpp"
+
+namespace arbiter::cli {
+
+// Two kinds of lines, in order of time; activity that runs out between two events has its own.
+//   0.100 s  /Gaze/pos:i  /RandomLook/pos:o -> /Face/pos:o  because /Face/pos:o became active; …
+//   0.150 s  /Gaze/pos:i  /RandomLook/pos:o discarded: inhibited by …
+class WhySimulated {
+ public:
+  struct Options {
+    std::string port;  // empty: all
+    bool json = false;
+  };
+
+  // Keeps references. Throws std::runtime_error where the model does not know the port.
+  WhySimulated(const rules::RuleSet& rules, rules::Simulation& simulation, Options options);
+
+  void step(const rules::TraceEvent& event, std::ostream& out);
+
+ private:
+  void run_out_until(shm::Nanoseconds time, std::ostream& out);
+  void schedule(const rules::TraceEvent& event);
+  void tell_changes(std::ostream& out);
+  void tell_change(shm::PortId port, shm::SourceId before, shm::SourceId now, std::ostream& out);
+  void tell_discarded(const rules::OutcomeRow& row, std::ostream& out);
+  [[nodiscard]] bool is_active(shm::SourceId source) const;
+  [[nodiscard]] Sources sources_at(shm::PortId port) const;
+  [[nodiscard]] std::string name_of(shm::SourceId winner) const;
+  [[nodiscard]] rules::PortExplanation explain(shm::PortId port, const Sources& sources) const;
+
+  const rules::Explainer explainer_;
+  rules::Simulation& simulation_;
+  const Options options_;
+  std::vector<shm::SourceId> winners_;                         // by port
+  std::vector<bool> was_active_;                               // by source, when last told
+  std::set<std::pair<shm::Nanoseconds, shm::SourceId>> ends_;  // of activity, as it was scheduled
+};
+
+}  // namespace arbiter::cli

@@ -1,0 +1,268 @@
+#include "rules/explain.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <map>
+#include <set>
+#include <unordered_map>
+#include <utility>
+
+#include "rules/print_rules.hpp"
+#include "rules/provenance.hpp"
+#include "rules/quantifiers.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+Element element(const Behaviour& behaviour) {
+  return {behaviour.name, behaviour.is_meta, behaviour.where};
+}
+
+// Explains the connections of one port, under one activation.
+class PortInquiry {
+ public:
+  PortInquiry(const RuleSet& rules, const std::string& port, const IsActive& is_active)
+      : rules_(rules), port_(port), is_active_(is_active), expansion_(rules.sources) {}
+
+  PortExplanation explain() {
+    PortExplanation result;
+    result.port = port_;
+    const auto at = std::find_if(rules_.ports.begin(), rules_.ports.end(),
+                                 [&](const PortRules& each) { return each.port == port_; });
+    if (at != rules_.ports.end()) {
+      result.is_known = result.is_arbitrated = true;
+      result.first_wins = at->first_wins;
+      gather_parts();
+      for (const ConnectionRule& rule : at->rules) add(rule, result);
+      add_senses(*at, result);
+    }
+    for (const Connection& connection : rules_.other_connections) {
+      if (connection.port != port_) continue;
+      result.is_known = true;
+      auto& added = result.connections.emplace_back();
+      added.source = connection.source;
+      added.is_active = is_active_(connection.source);
+    }
+    return result;
+  }
+
+ private:
+  // A source of a behaviour, as one that it may inhibit by.
+  struct Voice {
+    const std::string* source;
+    std::size_t behaviour;
+  };
+  struct Voices {
+    std::vector<Voice> active;
+    bool across_ports = false;
+  };
+  struct ConfigPlace {
+    std::size_t behaviour;
+    const Config* config;
+  };
+
+  // Which behaviours configure a connection to the port, and which rules are written by hand.
+  void gather_parts() {
+    if (rules_.provenance == nullptr) return;
+    const Model& model = rules_.provenance->model;
+    for (std::size_t b = 0; b < model.behaviours.size(); ++b) {
+      for (const Config& config : model.behaviours[b].configs) {
+        if (config.port == port_) configs_[config.source].push_back({b, &config});
+      }
+    }
+    for (const Select& select : model.selects) {
+      if (select.port == port_) selects_[select.source] = &select;
+    }
+  }
+
+  void add(const ConnectionRule& rule, PortExplanation& port) {
+    ConnectionExplanation result;
+    result.source = rule.source;
+    result.has_rule = true;
+    result.is_active = is_active_(rule.source);
+    result.parts = parts_of(rule);
+    result.holds =
+        result.is_active && std::any_of(result.parts.begin(), result.parts.end(),
+                                        [](const Part& part) { return part.causes.empty(); });
+    if (result.holds && !port.winner) {
+      result.wins = true;
+      port.winner = rule.source;
+      winner_ = &rule;
+    } else if (result.holds) {
+      result.earlier = port.winner;
+      result.earlier_because = reason_to_hold(*winner_);
+    }
+    port.connections.push_back(std::move(result));
+  }
+
+  [[nodiscard]] std::vector<Literal> reason_to_hold(const ConnectionRule& rule) const {
+    const ExpressionPtr whole =
+        make_operation(Operator::kAnd, {make_source(rule.source), rule.condition});
+    return sufficient_reason(*whole, is_active_);
+  }
+
+  std::vector<Part> parts_of(const ConnectionRule& rule) {
+    std::vector<Part> parts;
+    if (rules_.provenance == nullptr) {
+      parts.push_back({{}, rule.where, {}});
+      add_condition(rule.condition, {}, {}, Cause::Kind::kUnwritten, parts.back());
+      return parts;
+    }
+    if (const auto select = selects_.find(rule.source); select != selects_.end()) {
+      parts.push_back({{}, select->second->where, {}});
+      add_condition(select->second->condition, {}, select->second->where,
+                    Cause::Kind::kConditionFalse, parts.back());
+      return parts;
+    }
+    std::size_t last = Hierarchy::kNobody;
+    for (const ConfigPlace& place : configs_[rule.source]) {
+      if (std::exchange(last, place.behaviour) == place.behaviour) continue;  // configured twice
+      parts.push_back(part_of(place));
+    }
+    return parts;
+  }
+
+  // The terms of docs/semantics.md: conditions of the behaviour and of all above it, then
+  // inhibitions.
+  Part part_of(const ConfigPlace& place) {
+    const Model& model = rules_.provenance->model;
+    const Hierarchy::Relations& relations = rules_.provenance->relations;
+    Part part{element(model.behaviours[place.behaviour]), place.config->where, {}};
+    for (std::size_t b = place.behaviour; b != Hierarchy::kNobody; b = relations.parents[b]) {
+      for (const Condition& condition : model.behaviours[b].conditions) {
+        add_condition(condition.expression, element(model.behaviours[b]), condition.where,
+                      Cause::Kind::kConditionFalse, part);
+      }
+    }
+    for (std::size_t b = place.behaviour; b != Hierarchy::kNobody; b = relations.parents[b]) {
+      for (const auto& inhibitor : relations.inhibitors[b]) add_inhibition(inhibitor, b, part);
+    }
+    return part;
+  }
+
+  void add_condition(const ExpressionPtr& written, const std::optional<Element>& of,
+                     const Location& where, Cause::Kind kind, Part& part) {
+    const ExpressionPtr expanded = expansion_.expand(written);
+    if (evaluate(*expanded, is_active_)) return;
+    Cause cause;
+    cause.kind = kind;
+    cause.where = where;
+    cause.of = of;
+    if (kind == Cause::Kind::kConditionFalse) cause.condition = to_string(*written);
+    cause.because = sufficient_reason(*expanded, is_active_);
+    part.causes.push_back(std::move(cause));
+  }
+
+  void add_inhibition(const Hierarchy::Inhibitor& inhibitor, std::size_t inhibited, Part& part) {
+    const Voices& voices = voices_of(inhibitor.behaviour);
+    if (voices.active.empty()) return;
+    const auto& behaviours = rules_.provenance->model.behaviours;
+    const Behaviour& by = behaviours[inhibitor.behaviour];
+    Cause cause;
+    cause.kind = Cause::Kind::kInhibited;
+    cause.where = by.inhibitions[inhibitor.mention].where;
+    cause.of = element(behaviours[inhibited]);
+    cause.inhibitor = element(by);
+    const Voice& first = voices.active.front();
+    if (first.behaviour != inhibitor.behaviour)
+      cause.speaker = element(behaviours[first.behaviour]);
+    cause.across_ports = voices.across_ports;
+    cause.because = {{*first.source, true}};
+    for (const Voice& voice : voices.active) {
+      if (*voice.source != *first.source) cause.also.push_back(*voice.source);
+    }
+    std::sort(cause.also.begin(), cause.also.end());
+    cause.also.erase(std::unique(cause.also.begin(), cause.also.end()), cause.also.end());
+    part.causes.push_back(std::move(cause));
+  }
+
+  // The active ones among the sources that speak for a behaviour here: those of its behaviours at
+  // the port or, where there are none, all of them.
+  const Voices& voices_of(std::size_t behaviour) {
+    const auto [found, is_new] = voices_.try_emplace(behaviour);
+    Voices& result = found->second;
+    if (!is_new) return result;
+    const Provenance& provenance = *rules_.provenance;
+    std::vector<Voice> anywhere;
+    result.across_ports = true;
+    std::vector<std::size_t> pending{behaviour};
+    while (!pending.empty()) {
+      const std::size_t at = pending.back();
+      pending.pop_back();
+      const auto& children = provenance.relations.children[at];
+      pending.insert(pending.end(), children.rbegin(), children.rend());
+      for (const Config& config : provenance.model.behaviours[at].configs) {
+        const bool is_here = config.port == port_;
+        if (is_here) result.across_ports = false;
+        if (!is_active_(config.source)) continue;
+        (is_here ? result.active : anywhere).push_back({&config.source, at});
+      }
+    }
+    if (result.across_ports) result.active = std::move(anywhere);
+    return result;
+  }
+
+  void add_senses(const PortRules& port, PortExplanation& result) {
+    std::set<std::string> sources;
+    std::set<const Expression*> seen;
+    for (const ConnectionRule& rule : port.rules) collect(*rule.condition, seen, sources);
+    for (const ConnectionRule& rule : port.rules) sources.erase(rule.source);
+    for (const Connection& other : rules_.other_connections) {
+      if (other.port == port_) sources.erase(other.source);
+    }
+    result.senses.assign(sources.begin(), sources.end());
+  }
+
+  static void collect(const Expression& expression, std::set<const Expression*>& seen,
+                      std::set<std::string>& sources) {
+    if (!seen.insert(&expression).second) return;
+    if (expression.op == Operator::kSource) sources.insert(expression.name);
+    for (const auto& operand : expression.operands) collect(*operand, seen, sources);
+  }
+
+  const RuleSet& rules_;
+  const std::string& port_;
+  const IsActive& is_active_;
+  QuantifierExpansion expansion_;
+  std::unordered_map<std::string, std::vector<ConfigPlace>> configs_;  // by source
+  std::unordered_map<std::string, const Select*> selects_;             // by source
+  std::unordered_map<std::size_t, Voices> voices_;                     // by behaviour
+  const ConnectionRule* winner_ = nullptr;
+};
+
+}  // namespace
+
+std::optional<std::vector<Literal>> ConnectionExplanation::reason() const {
+  if (wins) return std::nullopt;
+  if (!has_rule) return std::vector<Literal>{};
+  if (!is_active) return std::vector<Literal>{{source, false}};
+  if (holds) return earlier_because;
+  std::map<std::string, bool> joined;
+  for (const Part& part : parts) {
+    const auto least = std::min_element(part.causes.begin(), part.causes.end(),
+                                        [](const Cause& left, const Cause& right) {
+                                          return left.because.size() < right.because.size();
+                                        });
+    for (const Literal& literal : least->because) joined[literal.source] = literal.active;
+  }
+  std::vector<Literal> result;
+  for (const auto& [name, active] : joined) result.push_back({name, active});
+  return result;
+}
+
+PortExplanation Explainer::explain(const std::string& port, const IsActive& is_active) const {
+  return PortInquiry(rules_, port, is_active).explain();
+}
+
+std::vector<std::string> Explainer::ports() const {
+  std::set<std::string> names;
+  for (const PortRules& port : rules_.ports) names.insert(port.port);
+  for (const Connection& connection : rules_.other_connections) names.insert(connection.port);
+  return {names.begin(), names.end()};
+}
+
+std::string describe(const Element& element) {
+  return (element.is_meta ? "meta-behaviour \"" : "behaviour \"") + element.name + '"';
+}
+
+}  // namespace arbiter::rules

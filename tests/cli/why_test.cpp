@@ -1,0 +1,400 @@
+// arbiter why, against a running daemon with real components: each kind of cause.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <arbiter/arbiter.hpp>
+#include <nlohmann/json.hpp>
+
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using nlohmann::json;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+// Activity ends only by deactivate(), so that no test depends on time.
+const std::string kModel = R"(<behaviors timeout="forever">
+<meta_behavior name="Curious"><behavior>Look</behavior><behavior>Follow</behavior></meta_behavior>
+<behavior name="Look"><config at="/gaze">/random</config></behavior>
+<behavior name="Follow"><config at="/gaze">/face</config><inhibition>Look</inhibition></behavior>
+<behavior name="Track"><config at="/gaze">/object</config>
+  <condition>not /collision</condition>
+  <inhibition>Curious</inhibition></behavior>
+</behaviors>)";
+
+json why_json(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "why");
+  arguments.emplace_back("--json");
+  const auto result = arbiter(arguments);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  return result.exit_code == 0 ? json::parse(result.out) : json();
+}
+
+json connection(const json& answer, const std::string& source) {
+  for (const auto& each : answer.at("connections")) {
+    if (each.at("source") == source) return each;
+  }
+  return nullptr;
+}
+
+std::vector<std::string> texts(const json& list) { return list.get<std::vector<std::string>>(); }
+
+std::string why(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "why");
+  const auto result = arbiter(arguments);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  return result.out;
+}
+
+TEST(Why, TellsWhoInhibitsThroughWhomAndWhereItIsWritten) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto random = node.output_port<int>("/random");
+  auto object = node.output_port<int>("/object");
+  random.signal();
+  object.signal();
+  const std::string file = daemon.directory() + "/model.xml";
+  const std::string text = why({"/gaze", "/random"});
+  EXPECT_THAT(text, HasSubstr("/gaze: /object wins"));
+  EXPECT_THAT(text, HasSubstr("\n/random is kept out\n  inhibited by behaviour \"Track\" through "
+                              "meta-behaviour \"Curious\" (" +
+                              file + ":7): /object is active (arrived "));
+  EXPECT_THAT(text, Not(HasSubstr("\n/face")));
+  const json answer = why_json({"/gaze"});
+  EXPECT_EQ(answer["winner"], "/object");
+  const json cause = connection(answer, "/random")["behaviours"][0]["causes"][0];
+  EXPECT_EQ(cause["kind"], "inhibited");
+  EXPECT_EQ(cause["inhibitor"]["name"], "Track");
+  EXPECT_EQ(cause["of"]["name"], "Curious");
+  EXPECT_EQ(cause["where"]["file"], file);
+  EXPECT_EQ(cause["where"]["line"], 7);
+  EXPECT_EQ(connection(answer, "/random")["reason"],
+            json::parse(R"([{"source": "/object", "active": true}])"));
+  EXPECT_EQ(connection(answer, "/object")["reason"], nullptr);
+}
+
+TEST(Why, TellsWhichConditionIsFalseAndWhatMakesItSo) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto object = node.output_port<int>("/object");
+  auto collision = node.output_port<int>("/collision");
+  object.signal();
+  collision.signal();
+  const std::string text = why({"/gaze"});
+  EXPECT_THAT(text, HasSubstr("/gaze: idle, nobody wins"));
+  EXPECT_THAT(text, HasSubstr("the condition of behaviour \"Track\", ¬/collision, is false (" +
+                              daemon.directory() + "/model.xml:6): /collision is active"));
+  EXPECT_THAT(text, HasSubstr("\n/collision is sensed"));
+}
+
+TEST(Why, TellsHowSomethingCameToBeInactive) {
+  Daemon daemon(
+      R"(<behaviors timeout="1ms"><arbiter at="/in">
+<select from="/never"/><select from="/over">not /never</select>
+<select from="/ended">not /never and not /over</select></arbiter></behaviors>)");
+  Node node("test");
+  auto over = node.output_port<int>("/over");
+  auto ended = node.output_port<int>("/ended");
+  over.signal();
+  ended.signal();
+  ended.deactivate();
+  while (daemon.source("/over")["active"] == true) {
+  }
+  EXPECT_THAT(why({"/in", "/never"}), HasSubstr("inactive (it has never arrived)"));
+  EXPECT_THAT(why({"/in", "/ended"}), HasSubstr("inactive (deactivated "));
+  EXPECT_THAT(why({"/in", "/over"}), AllOf(HasSubstr("inactive (last arrival "),
+                                           HasSubstr(" ago, T 1ms)"), HasSubstr("its rule (")));
+}
+
+TEST(Why, TellsSinceWhenWhereItCanBeKnown) {
+  Daemon daemon(kModel);
+  EXPECT_THAT(why({"/gaze"}), HasSubstr("idle, nobody wins, since the model came into force "));
+  Node node("test");
+  auto random = node.output_port<int>("/random");
+  auto face = node.output_port<int>("/face");
+  random.signal();
+  face.signal();
+  const json before = why_json({"/gaze"})["since"];
+  EXPECT_EQ(before["not_before_ns"], nullptr) << "/face may have been active before";
+  face.deactivate();
+  const json since = why_json({"/gaze"})["since"];
+  EXPECT_GT(since["at_least_ns"], before["at_least_ns"]);
+  EXPECT_THAT(why({"/gaze"}), HasSubstr("/random wins, for at least "));
+}
+
+TEST(Why, TellsThatSomethingWentInactiveAndMadeTheWinner) {
+  Daemon daemon(R"(<behaviors timeout="forever"><source port="/high" timeout="1ms"/>
+<arbiter at="/in"><select from="/low">not /high</select><select from="/high"/></arbiter>
+</behaviors>)");
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  low.signal();
+  high.signal();
+  while (daemon.source("/high")["active"] == true) {
+  }
+  const json since = why_json({"/in"})["since"];
+  EXPECT_EQ(since["exact"], true);
+  EXPECT_EQ(since["changed"][0]["source"], "/high");
+  EXPECT_EQ(since["changed"][0]["became"], "expired");
+  EXPECT_EQ(since["at_least_ns"], since["changed"][0]["at_ns"]);
+  EXPECT_THAT(why({"/in"}), AllOf(HasSubstr("/low wins, since "),
+                                  HasSubstr(" ago: /high went inactive, 1 ms after its last")));
+}
+
+TEST(Why, TellsOfPortsThatAreNotOpenAndOfTypesThatDoNotFit) {
+  Daemon daemon(kModel);
+  EXPECT_THAT(why({"/gaze"}), AllOf(HasSubstr("! no component has the port open"),
+                                    HasSubstr("! no component has the output port open")));
+  Node node("test");
+  auto random = node.output_port<int>("/random");
+  auto face = node.output_port<double>("/face");
+  auto in = node.input_port<int>("/gaze");
+  const json answer = why_json({"/gaze"});
+  EXPECT_THAT(texts(answer["obstacles"]), IsEmpty());
+  EXPECT_THAT(texts(connection(answer, "/random")["obstacles"]), IsEmpty());
+  EXPECT_THAT(texts(connection(answer, "/face")["obstacles"]),
+              ElementsAre(HasSubstr("the two ports do not fit")));
+}
+
+TEST(Why, TellsOfSamplesThatDidNotGetThrough) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto random = node.output_port<int>("/random");
+  auto face = node.output_port<int>("/face");
+  auto in = node.input_port<int>("/gaze", {.depth = 2, .when_full = refuse_new});
+  for (int i = 0; i < 5; ++i) random.publish(i);
+  EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
+              ElementsAre(HasSubstr("3 samples were refused, because the queue was full"),
+                          HasSubstr("2 samples wait to be taken"),
+                          HasSubstr("has not taken any of the 2 accepted samples")));
+  face.signal();
+  EXPECT_FALSE(in.take());
+  EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
+              testing::Contains(HasSubstr("2 samples that had been accepted were dropped")));
+}
+
+TEST(Why, TellsOfComponentsThatAreStoppedAndThatHaveDied) {
+  Daemon daemon(kModel);
+  const std::string program = std::string(ARBITER_PROGRAMS) + "/arbiter";
+  ChildProcess component({program, "pub", "/random", "--rate", "1000", "--quiet"}, {}, {});
+  while (daemon.source("/random")["active"] != true) {
+  }
+  component.stop();
+  EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
+              ElementsAre(AllOf(HasSubstr("its component arbiter-pub"), HasSubstr("is stopped"))));
+  component.kill();
+  while (daemon.source("/random")["open"] != false) {
+  }
+  const json random = connection(why_json({"/gaze"}), "/random");
+  EXPECT_EQ(random["winner"], true) << "activity belongs to the source, not to the process";
+  EXPECT_THAT(texts(random["obstacles"]), ElementsAre(HasSubstr("its process has died")));
+}
+
+TEST(Why, TellsOfConnectionsAndPortsWithoutRules) {
+  Daemon daemon(kModel, {.application = R"(<application>
+<connection><from>/random</from><to>/gaze</to></connection>
+<connection><from>/face</from><to>/gaze</to></connection>
+<connection><from>/object</from><to>/gaze</to></connection>
+<connection><from>/other</from><to>/gaze</to></connection>
+<connection><from>/other</from><to>/free</to></connection></application>)"});
+  EXPECT_THAT(why({"/gaze", "/other"}),
+              HasSubstr("/other is kept out\n  no rule selects it, so that it never delivers"));
+  EXPECT_THAT(why({"/free"}),
+              AllOf(HasSubstr("/free: not arbitrated"), HasSubstr("/other is delivered")));
+  Node node("test");
+  auto in = node.input_port<int>("/unheard-of");
+  EXPECT_THAT(why({"/unheard-of"}), HasSubstr("the model in force does not mention it"));
+  EXPECT_EQ(why_json({"/free"})["arbitrated"], false);
+}
+
+TEST(Why, RefusesNamesThatThereAreNotWithAdvice) {
+  Daemon daemon(kModel);
+  const auto refused = [](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "why");
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_EQ(result.out, "");
+    return result.err;
+  };
+  EXPECT_THAT(refused({"/gase"}), HasSubstr("did you mean \"/gaze\"?"));
+  EXPECT_THAT(refused({"/gase", "--follow"}), HasSubstr("did you mean \"/gaze\"?"));
+  EXPECT_THAT(refused({"/face"}), HasSubstr("/face is an output port"));
+  EXPECT_THAT(refused({"/gaze", "/fase"}), HasSubstr("did you mean \"/face\"?"));
+  EXPECT_EQ(arbiter({"why"}).exit_code, 2);
+  EXPECT_EQ(arbiter({"why", "/gaze", "/face", "--follow"}).exit_code, 2);
+  EXPECT_EQ(arbiter({"why", "/gaze", "--count", "1"}).exit_code, 2);
+}
+
+TEST(Why, TellsThatThereIsNoDaemonOrThatThePolicyForbidsIt) {
+  {
+    const TemporaryDirectory empty;
+    const ScopedVariable runtime("XDG_RUNTIME_DIR", empty.path());
+    const auto result = arbiter({"why", "/gaze", "--instance", "no-such-daemon"});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, HasSubstr("no arbiterd of instance \"no-such-daemon\""));
+  }
+  const TemporaryDirectory files;
+  const auto policy = files.write("policy", "deny everyone observe\n");
+  Daemon daemon(kModel, {.arguments = {"--policy", policy}});
+  const auto result = arbiter({"why", "/gaze"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("deny everyone observe"));
+  RawClient client(daemon.instance());
+  client.hello();
+  client.send(RawClient::message(shm::MessageKind::kModel));
+  EXPECT_THAT(client.expect_refusal(), HasSubstr("deny everyone observe"));
+}
+
+TEST(Why, SpeaksOfTheModelInForceNotOfTheFile) {
+  Daemon daemon(kModel);
+  daemon.write_model(
+      "<behaviors><arbiter at='/gaze'><select from='/random'>/never</select>"
+      "</arbiter></behaviors>");
+  Node node("test");
+  auto random = node.output_port<int>("/random");
+  random.signal();
+  EXPECT_THAT(why({"/gaze"}), AllOf(HasSubstr("/random wins"), HasSubstr("behaviour \"Look\"")));
+  EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
+  EXPECT_THAT(why({"/gaze", "/random"}),
+              AllOf(HasSubstr("idle"), HasSubstr("its condition, /never, is false"),
+                    HasSubstr("model.xml:1): /never is inactive (it has never arrived)")));
+}
+
+TEST(Why, TellsWhatItCanOfAModelThatThePredecessorHasRead) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto random = node.output_port<int>("/random");
+  auto object = node.output_port<int>("/object");
+  random.signal();
+  object.signal();
+  daemon.kill();
+  daemon.restart_without_model();
+  const json answer = why_json({"/gaze"});
+  EXPECT_EQ(answer["model"]["provenance_known"], false);
+  EXPECT_EQ(answer["winner"], "/object");
+  EXPECT_EQ(connection(answer, "/random")["reason"],
+            json::parse(R"([{"source": "/object", "active": true}])"));
+  EXPECT_THAT(why({"/gaze"}), AllOf(HasSubstr("not whose behaviours they come from"),
+                                    HasSubstr("its rule does not hold: /object is active")));
+}
+
+// A program whose output is read as it comes.
+class Followed {
+ public:
+  explicit Followed(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {std::string(ARBITER_PROGRAMS) + "/arbiter", "why"});
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error("pipe2");
+    out_.reset(ends[0]);
+    const shm::FileDescriptor in(ends[1]);
+    process_ = ChildProcess(arguments, {}, {-1, in.get(), -1});
+  }
+
+  std::string line() {
+    std::string text;
+    char c = 0;
+    while (::read(out_.get(), &c, 1) == 1 && c != '\n') text += c;
+    return text;
+  }
+  json object() { return json::parse(line()); }
+  [[nodiscard]] bool has_said_something() const {
+    pollfd readable{out_.get(), POLLIN, 0};
+    return ::poll(&readable, 1, 5) == 1;
+  }
+  ChildProcess& process() { return process_; }
+
+ private:
+  shm::FileDescriptor out_;
+  ChildProcess process_;
+};
+
+TEST(Why, FollowsTheWinnersOfThePapersScenario) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto random = node.output_port<int>("/random");
+  auto face = node.output_port<int>("/face");
+  auto object = node.output_port<int>("/object");
+  auto collision = node.output_port<int>("/collision");
+  Followed followed({"/gaze", "--follow", "--count", "6"});
+  EXPECT_THAT(followed.line(), HasSubstr("  /gaze: idle"));
+  random.signal();
+  EXPECT_THAT(followed.line(), HasSubstr("  idle -> /random  because /random became active"));
+  face.signal();
+  EXPECT_THAT(followed.line(),
+              HasSubstr("  /random -> /face  because /face became active; /random is inhibited by "
+                        "behaviour \"Follow\" (" +
+                        daemon.directory() + "/model.xml:4)"));
+  object.signal();
+  EXPECT_THAT(followed.line(), HasSubstr("  /face -> /object  because /object became active; /face "
+                                         "is inhibited by behaviour \"Track\" through"));
+  collision.signal();
+  EXPECT_THAT(followed.line(), HasSubstr("  /object -> idle  because /collision became active; "
+                                         "/object is out: the condition of"));
+  collision.deactivate();
+  EXPECT_THAT(followed.line(), HasSubstr("  idle -> /object  because /collision was deactivated"));
+  object.deactivate();
+  EXPECT_THAT(followed.line(), HasSubstr("  /object -> /face  because /object was deactivated"));
+  EXPECT_EQ(followed.process().wait(), 0);
+}
+
+TEST(Why, FollowsActivityThatRunsOutAndModelsThatComeIntoForce) {
+  const auto model = [](const std::string& condition) {
+    return "<behaviors timeout='forever'><source port='/high' timeout='30ms'/><arbiter at='/in'>"
+           "<select from='/low'>" +
+           condition + "</select><select from='/high'/></arbiter></behaviors>";
+  };
+  Daemon daemon(model("not /high"));
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  low.signal();
+  Followed followed({"/in", "--follow", "--json"});
+  EXPECT_EQ(followed.object()["winner"], "/low");
+  do {
+    high.signal();  // until it has been seen
+  } while (!followed.has_said_something());
+  EXPECT_EQ(followed.object()["winner"], "/high");
+  json change = followed.object();
+  EXPECT_EQ(change["old"], "/high");
+  EXPECT_EQ(change["winner"], "/low");
+  EXPECT_EQ(change["because"][0]["source"], "/high");
+  EXPECT_EQ(change["because"][0]["became"], "expired");
+  EXPECT_EQ(change["because"][0]["at_ns"], change["at_ns"]) << "exactly when it ended";
+  daemon.load(model("not /high and /never"));
+  change = followed.object();
+  EXPECT_EQ(change["winner"], nullptr);
+  EXPECT_EQ(change["model"], 2);
+  EXPECT_EQ(change["because"], json::array());
+  EXPECT_THAT(change["old_loses"].get<std::string>(), HasSubstr("/never is inactive"));
+  followed.process().signal(SIGINT);
+  EXPECT_EQ(followed.process().wait(), 0);
+}
+
+TEST(Why, FollowsOnWhileNoDaemonRunsAndExplainsByTheModelThatDecides) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto random = node.output_port<int>("/random");
+  auto face = node.output_port<int>("/face");
+  Followed followed({"/gaze", "--follow"});
+  EXPECT_THAT(followed.line(), HasSubstr("  /gaze: idle"));
+  daemon.kill();
+  random.signal();
+  EXPECT_THAT(followed.line(), HasSubstr("  idle -> /random  because"));
+  face.signal();
+  EXPECT_THAT(followed.line(), HasSubstr("/random is inhibited by behaviour \"Follow\" ("));
+  daemon.restart();  // takes over what is open, and puts its own model in force
+  face.deactivate();
+  EXPECT_THAT(followed.line(), HasSubstr("  /face -> /random  because"));
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,185 @@
+// What is told of a connection that loses: in the terms of the model, and where it is written.
+#include "rules/explain.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/rules/model_text.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+class Explained : public testing::Test {
+ protected:
+  // The connection from `source` at /p while just these are active.
+  ConnectionExplanation connection(const std::string& model, const std::string& source,
+                                   const std::set<std::string>& active,
+                                   const std::string& port = "/p") {
+    loaded_ = load_text(model);
+    EXPECT_FALSE(loaded_.has_errors) << loaded_.message();
+    port_ = Explainer(loaded_.rules).explain(port, [&](const std::string& name) {
+      return active.contains(name);
+    });
+    for (const auto& each : port_.connections) {
+      if (each.source == source) return each;
+    }
+    ADD_FAILURE() << "no connection from " << source;
+    return {};
+  }
+  static const Cause& only_cause(const ConnectionExplanation& connection) {
+    static const Cause kNone;
+    EXPECT_EQ(connection.parts.size(), 1u);
+    if (connection.parts.size() != 1) return kNone;
+    EXPECT_EQ(connection.parts[0].causes.size(), 1u);
+    return connection.parts[0].causes.empty() ? kNone : connection.parts[0].causes[0];
+  }
+  static std::vector<std::string> said(const std::vector<Literal>& literals) {
+    std::vector<std::string> result;
+    for (const auto& each : literals) result.push_back((each.active ? "" : "not ") + each.source);
+    return result;
+  }
+  static std::string place(const Location& where) {
+    return std::to_string(where.line) + ":" + std::to_string(where.column);
+  }
+
+  Loaded loaded_;
+  PortExplanation port_;
+};
+
+const std::string kThrough = R"(<behaviors>
+<meta_behavior name="Curious"><behavior>Low</behavior>
+  <condition>/ready or (/a and /b)</condition></meta_behavior>
+<behavior name="Low"><config at="/p">/low</config></behavior>
+<meta_behavior name="Alert"><behavior>High</behavior><behavior>Higher</behavior>
+  <inhibition>Curious</inhibition></meta_behavior>
+<behavior name="High"><config at="/p">/high</config></behavior>
+<behavior name="Higher"><config at="/p">/higher</config><inhibition>High</inhibition></behavior>
+</behaviors>)";
+
+TEST_F(Explained, AnInhibitionTellsByWhomThroughWhomAndWhere) {
+  const auto low = connection(kThrough, "/low", {"/low", "/high", "/higher", "/ready"});
+  EXPECT_FALSE(low.wins);
+  EXPECT_EQ(port_.winner, "/higher");
+  const Cause& cause = only_cause(low);
+  EXPECT_EQ(cause.kind, Cause::Kind::kInhibited);
+  EXPECT_EQ(cause.inhibitor->name, "Alert");
+  EXPECT_TRUE(cause.inhibitor->is_meta);
+  EXPECT_EQ(cause.speaker->name, "High");
+  EXPECT_EQ(cause.of->name, "Curious");
+  EXPECT_TRUE(cause.of->is_meta);
+  EXPECT_EQ(place(cause.where), "6:15");
+  EXPECT_FALSE(cause.across_ports);
+  EXPECT_THAT(said(cause.because), ElementsAre("/high"));
+  EXPECT_THAT(cause.also, ElementsAre("/higher"));
+}
+
+TEST_F(Explained, AConditionTellsWhoseItIsAndTheSmallestReason) {
+  const auto low = connection(kThrough, "/low", {"/low", "/b"});
+  const Cause& cause = only_cause(low);
+  EXPECT_EQ(cause.kind, Cause::Kind::kConditionFalse);
+  EXPECT_EQ(cause.of->name, "Curious");
+  EXPECT_EQ(cause.condition, "/ready ∨ /a ∧ /b");
+  EXPECT_EQ(place(cause.where), "3:3");
+  EXPECT_THAT(said(cause.because), ElementsAre("not /a", "not /ready"));
+  EXPECT_EQ(low.parts[0].behaviour->name, "Low");
+  EXPECT_EQ(place(low.parts[0].where), "4:22");
+}
+
+TEST_F(Explained, WhatIsInactiveLosesByThat) {
+  const auto low = connection(kThrough, "/low", {"/ready"});
+  EXPECT_FALSE(low.is_active);
+  EXPECT_THAT(low.parts[0].causes, IsEmpty()) << "else it would win";
+  EXPECT_THAT(said(*low.reason()), ElementsAre("not /low"));
+  EXPECT_FALSE(port_.winner);
+}
+
+TEST_F(Explained, AWinnerNeedsNoReason) {
+  const auto low = connection(kThrough, "/low", {"/low", "/ready"});
+  EXPECT_TRUE(low.wins);
+  EXPECT_FALSE(low.reason());
+  EXPECT_EQ(port_.winner, "/low");
+}
+
+TEST_F(Explained, WhatSeveralBehavioursConfigureLosesForEachOfThem) {
+  const auto shared = connection(R"(<behaviors>
+<behavior name="A"><config at="/p">/s</config><condition>/a</condition></behavior>
+<behavior name="B"><config at="/p">/s</config><condition>not /b</condition></behavior>
+</behaviors>)",
+                                 "/s", {"/s", "/b"});
+  ASSERT_EQ(shared.parts.size(), 2u);
+  EXPECT_EQ(shared.parts[0].behaviour->name, "A");
+  EXPECT_EQ(shared.parts[1].behaviour->name, "B");
+  EXPECT_THAT(said(*shared.reason()), ElementsAre("not /a", "/b"));
+}
+
+TEST_F(Explained, AnInhibitorFromAnotherPortIsToldAsOne) {
+  const auto low = connection(R"(<behaviors>
+<behavior name="Low"><config at="/p">/low</config></behavior>
+<behavior name="Stop"><config at="/q">/stop</config><inhibition>Low</inhibition></behavior>
+</behaviors>)",
+                              "/low", {"/low", "/stop"});
+  EXPECT_TRUE(only_cause(low).across_ports);
+  EXPECT_THAT(port_.senses, ElementsAre("/stop"));
+}
+
+TEST_F(Explained, AQuantifierIsToldAsItIsWritten) {
+  const auto low = connection(R"(<behaviors>
+<behavior name="Low"><config at="/p">/low</config><condition>none(/stop/*)</condition></behavior>
+<source port="/stop/1"/><source port="/stop/2"/></behaviors>)",
+                              "/low", {"/low", "/stop/2"});
+  EXPECT_EQ(only_cause(low).condition, "none(/stop/*)");
+  EXPECT_THAT(said(only_cause(low).because), ElementsAre("/stop/2"));
+}
+
+TEST_F(Explained, ASelectTellsWhereItIs) {
+  const auto low = connection(R"(<behaviors><arbiter at="/p">
+<select from="/low">not /high</select><select from="/high"/></arbiter></behaviors>)",
+                              "/low", {"/low", "/high"});
+  EXPECT_FALSE(low.parts.at(0).behaviour);
+  EXPECT_FALSE(only_cause(low).of);
+  EXPECT_EQ(place(only_cause(low).where), "2:1");
+  EXPECT_EQ(only_cause(low).condition, "¬/high");
+}
+
+TEST_F(Explained, WhereTheFirstWinsTheOthersAreToldWhoWasFirst) {
+  const auto low = connection(R"(<behaviors><arbiter at="/p" conflict="first">
+<select from="/high">/a or /b</select><select from="/low"/></arbiter></behaviors>)",
+                              "/low", {"/low", "/high", "/b"});
+  EXPECT_TRUE(port_.first_wins);
+  EXPECT_TRUE(low.holds);
+  EXPECT_FALSE(low.wins);
+  EXPECT_EQ(low.earlier, "/high");
+  EXPECT_THAT(said(*low.reason()), ElementsAre("/b", "/high"));
+}
+
+TEST_F(Explained, AConditionThatNothingSatisfiesHasAnEmptyReason) {
+  const auto low = connection(
+      R"(<arbiter at="/p"><select from="/low">/a and not /a</select></arbiter>)", "/low", {"/low"});
+  EXPECT_THAT(only_cause(low).because, IsEmpty());
+}
+
+TEST_F(Explained, AConnectionThatNoRuleSelectsSaysSo) {
+  const auto loaded =
+      load_with_application(R"(<behavior name="Low"><config at="/p">/low</config></behavior>)",
+                            R"(<application><connection><from>/low</from><to>/p</to></connection>
+<connection><from>/other</from><to>/p</to></connection>
+<connection><from>/other</from><to>/free</to></connection></application>)");
+  const Explainer explainer(loaded.rules);
+  const auto all = [](const std::string&) { return true; };
+  const auto port = explainer.explain("/p", all);
+  ASSERT_EQ(port.connections.size(), 2u);
+  EXPECT_FALSE(port.connections[1].has_rule);
+  EXPECT_THAT(*port.connections[1].reason(), IsEmpty());
+  const auto free = explainer.explain("/free", all);
+  EXPECT_TRUE(free.is_known);
+  EXPECT_FALSE(free.is_arbitrated);
+  EXPECT_EQ(free.connections.size(), 1u);
+  EXPECT_FALSE(explainer.explain("/nowhere", all).is_known);
+  EXPECT_THAT(explainer.ports(), ElementsAre("/free", "/p"));
+}
+
+}  // namespace
+}  // namespace arbiter::rules
