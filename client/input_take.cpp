@@ -37,6 +37,11 @@ HeldSample InputCore::take_once() {
     refresh();
     Queue* oldest = look();
     if (oldest == nullptr) return sample;
+    // A publisher that joined since may have delivered before this head was published: look again,
+    // with its queue. SYNC POINT: entry-stored. Relaxed is enough in has_offer(): a view is offered
+    // before its publisher delivers, and who publishes after that passes it on with the head, which
+    // peek() has acquired.
+    if (handover_.has_offer()) continue;
     if (held_ == max_held_) {
       throw Error(name_ + ": " + std::to_string(max_held_) +
                   " samples are held already; give one back first, or raise max_held");
