@@ -37,6 +37,11 @@ HeldSample InputCore::take_once() {
     refresh();
     Queue* oldest = look();
     if (oldest == nullptr) return sample;
+    // A publisher that joined since may have delivered before this head was published: look again,
+    // with its queue. SYNC POINT: entry-stored. Relaxed is enough in has_offer(): a view is offered
+    // before its publisher delivers, and who publishes after that passes it on with the head, which
+    // peek() has acquired.
+    if (handover_.has_offer()) continue;
     if (held_ == max_held_) {
       throw Error(name_ + ": " + std::to_string(max_held_) +
                   " samples are held already; give one back first, or raise max_held");
@@ -176,11 +181,19 @@ InputCore::Choice InputCore::choose(Queue*& oldest) noexcept {
   return Choice::kNothing;
 }
 
+// The table was in force until all was read that a decision looked at: ends of queues and
+// activities of a later time belong to another model's decisions. Relaxed is enough behind the
+// fence of is_whole() (SYNC POINT: table-overwritten).
+bool InputCore::table_stands() const noexcept {
+  const shm::TableReader& tables = memory_->tables();
+  return tables.is_whole(snapshot_) && tables.generation() == snapshot_.generation;
+}
+
 InputCore::Choice InputCore::decide_alone(Queue& queue) noexcept {
   shm::DecisionClock clock(last_reading_, false);
   queue.verdict = queue.rule.decide(snapshot_.table, clock);
   last_reading_ = clock.reading();
-  if (!memory_->tables().is_whole(snapshot_)) return Choice::kAgain;
+  if (!table_stands()) return Choice::kAgain;
   switch (queue.verdict) {
     case shm::Verdict::kWins:
       return Choice::kTake;
@@ -233,7 +246,7 @@ bool InputCore::decide_all() noexcept {
                  [&](shm::SourceId source, const shm::SeenActivity& seen) {
                    return seen.stands(look_at_source(source), snapshot_.table.timeout(source), now);
                  });
-  return stands && memory_->tables().is_whole(snapshot_);
+  return stands && table_stands();
 }
 
 // Drops what waited in losing queues before the decision and is older than the sample that is

@@ -10,13 +10,6 @@ namespace {
 // Beside the loans, one slot for publish() with a copy.
 std::uint32_t slots_of_our_own(std::uint32_t max_loans) { return max_loans + 1; }
 
-// More than are needed at worst, where they are small: the more there are, the seldomer the holds
-// are looked at, which their receivers write all the time.
-std::uint64_t spare_slots(std::uint64_t stride) {
-  constexpr std::uint64_t kMostMemory = 16384;
-  return std::min<std::uint64_t>(kMostMemory / stride, 16);
-}
-
 std::uint64_t stride_of(const shm::TypeInfo& type) {
   return shm::OutputLayout::plan(type, 1).stride;
 }
@@ -158,10 +151,9 @@ void OutputCore::allocate_slots() {
         static_cast<std::uint32_t>(std::min<std::uint64_t>(link.peer->depth, reserved - needed));
     needed += link.depth;
   }
-  const shm::OutputLayout& layout = segment_.layout();
-  const auto wanted =
-      static_cast<std::uint32_t>(std::min(needed + spare_slots(layout.stride), reserved));
+  const auto wanted = static_cast<std::uint32_t>(std::min(needed, reserved));
   if (wanted <= allocated_slots_) return;
+  const shm::OutputLayout& layout = segment_.layout();
   const auto headers = shm::allocate(descriptor_, layout.headers_offset,
                                      sizeof(shm::SlotHeader) * std::size_t{wanted});
   const auto payload = shm::allocate(descriptor_, layout.payload_offset, layout.stride * wanted);

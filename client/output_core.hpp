@@ -111,7 +111,6 @@ class OutputCore {
   [[nodiscard]] bool selection_differs(const Destination& destination,
                                        shm::Nanoseconds now) noexcept;
   std::uint32_t acquire_slot() noexcept;
-  void prefetch_next_slot() noexcept;
 
   // Constant once bound.
   const std::string name_;

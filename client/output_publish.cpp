@@ -9,25 +9,18 @@
 
 #include "client/count.hpp"
 #include "client/output_core.hpp"
-#include "shm/prefetch.hpp"
 
 namespace arbiter::detail {
 
 std::uint32_t OutputCore::acquire_slot() noexcept {
-  return pool_.acquire(instance_, [&](auto&& each) {
+  const std::uint32_t slot = pool_.acquire(instance_, [&](auto&& each) {
     for (const Destination& destination : destinations_) {
       each(destination.peer->segment->header.holds, destination.peer->max_held);
     }
   });
-}
-
-// Its last receiver has it in its cache: let it come back while the component makes its next
-// sample.
-void OutputCore::prefetch_next_slot() noexcept {
-  const std::uint32_t slot = pool_.next();
-  if (slot == shm::kNoSlot) return;
-  shm::prefetch_to_write(&segment_.slot_header(slot));
-  shm::prefetch_to_write(segment_.payload(slot));
+  // Its last receiver has it in its cache: let it come back while the sample is written.
+  if (slot != shm::kNoSlot) __builtin_prefetch(&segment_.slot_header(slot), 1);
+  return slot;
 }
 
 LoanedSlot OutputCore::loan(std::size_t size) noexcept {
@@ -226,7 +219,6 @@ Outcome OutputCore::publish_loan(std::uint32_t slot, std::size_t size,
                                  shm::Nanoseconds now) noexcept {
   const Outcome outcome = arrive(slot, size, now);
   end_loan(slot);
-  if (outcome.delivered != 0) prefetch_next_slot();
   return outcome;
 }
 
@@ -241,7 +233,6 @@ Outcome OutputCore::publish_copy(const void* data, std::size_t size,
   if (size != 0) std::memcpy(segment_.payload(slot), data, size);
   const Outcome outcome = arrive(slot, size, now);
   pool_.end_loan(slot);
-  if (outcome.delivered != 0) prefetch_next_slot();
   return outcome;
 }
 

@@ -28,7 +28,6 @@
 #include "shm/input_segment.hpp"
 #include "shm/limits.hpp"
 #include "shm/output_segment.hpp"
-#include "shm/prefetch.hpp"
 
 namespace arbiter::shm {
 
@@ -155,8 +154,8 @@ class ChannelReader {
       if (ahead == 0) {
         if (slot_of(entry) < segment_.layout().slot_count) {
           // Both will be needed, and lie in the publisher's cache: let them come while we decide.
-          prefetch_to_read(&segment_.slot_header(slot_of(entry)));
-          prefetch_to_read(segment_.payload(slot_of(entry)));
+          __builtin_prefetch(&segment_.slot_header(slot_of(entry)));
+          __builtin_prefetch(segment_.payload(slot_of(entry)));
           return entry;
         }
         state_ = State::kMisbehaved;

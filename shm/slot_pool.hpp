@@ -43,11 +43,6 @@ class SlotPool {
     return slot;
   }
 
-  // What acquire() would give next without looking at any hold, or kNoSlot.
-  [[nodiscard]] std::uint32_t next() const noexcept {
-    return free_.empty() ? kNoSlot : free_.back();
-  }
-
   void add_reference(std::uint32_t slot) noexcept { ++references_[slot]; }
   // One queue has let go of the slot.
   void evict(std::uint32_t slot) {

@@ -155,5 +155,55 @@ const Register kPublishTorn = overwrite_table(
     "APublishIsNotDecidedByATableThatIsOverwritten",
     [](Scene& scene) { require(scene.a().publish().delivered == 0, "two tables were mixed"); });
 
+// A model that gives A's connection to B, in force before B publishes: a take that began before it
+// must not drop by the old model what came after the new one.
+void swap_before_a_sample(const Explore& explore) {
+  explore_anew<Scene>(
+      explore,
+      [](Scene& scene, Execution& execution) {
+        scene.a().publish();
+        scene.instance.prepare(forever().connect({kB, kPort, shm::table::kAlways, {}, {}}));
+        execution.thread([&scene] {
+          scene.instance.put_in_force();
+          scene.b().publish();
+        });
+        execution.thread([&scene] {
+          for (int i = 0; i < 2; ++i) scene.input->take();
+        });
+        execution.finally([&scene] {
+          scene.drain();
+          require(scene.input->taken[kB] == scene.b().delivered,
+                  "what the model in force accepted was dropped by the one before");
+        });
+      },
+      forever().connect({kA, kPort, shm::table::kAlways, {}, {}}), depth(2),
+      std::initializer_list<SourceId>{kA, kB});
+}
+const Register kSwapBefore("WhatAModelInForceAcceptsIsNotDroppedByTheOneBefore", {4, 2},
+                           swap_before_a_sample);
+
+// B loses to an active C by the old model only, and C becomes active after the new one is in force:
+// B wins at every moment.
+void swap_before_an_override(const Explore& explore) {
+  explore_anew<Scene>(
+      explore,
+      [](Scene& scene, Execution& execution) {
+        scene.b().publish();
+        scene.instance.prepare(forever().connect({kB, kPort, shm::table::kAlways, {}, {}}));
+        execution.thread([&scene] {
+          scene.instance.put_in_force();
+          scene.c().signal();
+        });
+        execution.thread([&scene] { scene.input->take(); });
+        execution.finally([&scene] {
+          scene.drain();
+          require(scene.input->taken[kB] == 1, "one model decided on another's activities");
+        });
+      },
+      forever().conjunction(kB, kPort, {}, {kC}), depth(1), std::initializer_list<SourceId>{kB});
+}
+const Register kSwapOverride("NoModelDecidesOnActivitiesOfTheNextOne", {4, 2},
+                             swap_before_an_override);
+
 }  // namespace
 }  // namespace arbiter::explore

@@ -50,6 +50,36 @@ void join(const Explore& explore) {
 }
 const Register kJoin("AReceiverThatJoinsGetsAllFromThereOn", {2, 2, 1}, join);
 
+// A sample waits. While it is being taken a publisher joins and delivers, and only then another's
+// next sample takes the place of the one that waited. The take must not return that one before what
+// it did not know of when it began.
+struct Overtaking : Scene {
+  Overtaking() : Scene(everything(), depth(1), {kB}) { b().publish(); }
+};
+
+void join_amid_a_take(const Explore& explore) {
+  explore_anew<Overtaking>(explore, [](Overtaking& scene, Execution& execution) {
+    execution.thread([&scene] {
+      scene.instance.connect(scene.a(), *scene.input);
+      scene.a().publish();
+      scene.b().publish();
+    });
+    execution.thread([&scene] {
+      for (int i = 0; i < 2; ++i) {
+        scene.input->take();
+        require(scene.input->last[kB] != 2 || scene.input->taken[kA] == 1,
+                "a later sample came before that of a publisher that had joined");
+      }
+    });
+    execution.finally([&scene] {
+      scene.drain();
+      require(scene.input->taken[kA] == 1 && scene.input->last[kB] == 2, "a sample was lost");
+    });
+  });
+}
+const Register kOvertaking("ATakeReturnsNothingLaterThanWhatAPublisherThatJoinedHasDelivered",
+                           {3, 2}, join_amid_a_take);
+
 InputPortOptions refusing() {
   InputPortOptions options = depth(1);
   options.when_full = WhenFull::refuse_new;
