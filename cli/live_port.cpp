@@ -97,7 +97,7 @@ Look LivePort::look() const {
             ? rules::winner_at(table, id_,
                                [&](shm::SourceId source) { return look.is_active(source); })
             : shm::kNone;
-    if (memory_->tables().is_whole(look.snapshot) && look.is_settled) break;
+    if (memory_->tables().is_in_force(look.snapshot) && look.is_settled) break;
   }
   return look;
 }

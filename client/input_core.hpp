@@ -107,7 +107,6 @@ class InputCore {
   Choice decide_alone(Queue& queue) noexcept;
   Choice choose_among_all(Queue*& chosen) noexcept;
   bool decide_all() noexcept;
-  [[nodiscard]] bool table_stands() const noexcept;
   void drop_losers(const Queue* winner) noexcept;
   bool hold(Queue& queue, HeldSample& sample) noexcept;
   [[nodiscard]] std::uint32_t free_hold() const;

@@ -181,19 +181,11 @@ InputCore::Choice InputCore::choose(Queue*& oldest) noexcept {
   return Choice::kNothing;
 }
 
-// The table was in force until all was read that a decision looked at: ends of queues and
-// activities of a later time belong to another model's decisions. Relaxed is enough behind the
-// fence of is_whole() (SYNC POINT: table-overwritten).
-bool InputCore::table_stands() const noexcept {
-  const shm::TableReader& tables = memory_->tables();
-  return tables.is_whole(snapshot_) && tables.generation() == snapshot_.generation;
-}
-
 InputCore::Choice InputCore::decide_alone(Queue& queue) noexcept {
   shm::DecisionClock clock(last_reading_, false);
   queue.verdict = queue.rule.decide(snapshot_.table, clock);
   last_reading_ = clock.reading();
-  if (!table_stands()) return Choice::kAgain;
+  if (!memory_->tables().is_in_force(snapshot_)) return Choice::kAgain;
   switch (queue.verdict) {
     case shm::Verdict::kWins:
       return Choice::kTake;
@@ -246,7 +238,7 @@ bool InputCore::decide_all() noexcept {
                  [&](shm::SourceId source, const shm::SeenActivity& seen) {
                    return seen.stands(look_at_source(source), snapshot_.table.timeout(source), now);
                  });
-  return stands && table_stands();
+  return stands && memory_->tables().is_in_force(snapshot_);
 }
 
 // Drops what waited in losing queues before the decision and is older than the sample that is

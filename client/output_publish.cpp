@@ -45,11 +45,7 @@ void OutputCore::end_loan(std::uint32_t slot) noexcept {
 // other, at least one sees the other), with fence (d) of a receiver about to wait, and gives the
 // guarantee that no take() which begins after publish() has returned misses the stamp.
 void OutputCore::stamp(shm::ActivityWord word) noexcept {
-  if (shm::is_deactivation(word)) {
-    activity_->word.store(word, std::memory_order_relaxed);
-  } else {
-    activity_->arrive(own_word_, word);
-  }
+  activity_->write(own_word_, word);
   own_word_ = word;
   shm::full_fence();
 }
@@ -87,7 +83,7 @@ void OutputCore::decide_all(shm::Nanoseconds now) noexcept {
     for (SharedDecision& decision : decisions_) {
       decision.verdict = decision.bound.decide(snapshot_.table, clock);
     }
-    if (memory_->tables().is_whole(snapshot_)) return;
+    if (memory_->tables().is_in_force(snapshot_)) return;
     if (tries == kMaxTableRetries) break;
     bind_rules_and_view();
   }

@@ -69,11 +69,9 @@ void Simulation::apply(const TraceEvent& event) {
   if (event.kind == TraceKind::kTick || !knows(event.source)) return;
   const shm::SourceId source = ids_.at(event.source);
   auto& activity = activity_[source];
-  if (event.kind == TraceKind::kDeactivation) {
-    activity.word = shm::deactivation(event.at);
-  } else {
-    activity.arrive(activity.word, shm::arrival(event.at, table_.timeout(source)));
-  }
+  activity.write(activity.word, event.kind == TraceKind::kDeactivation
+                                    ? shm::deactivation(event.at)
+                                    : shm::arrival(event.at, table_.timeout(source)));
 }
 
 PortOutcome Simulation::outcome_at(shm::PortId port, const TraceEvent& event) {

@@ -341,9 +341,10 @@ void Daemon::deactivate(Client& client, const shm::Message& message) {
   require_not_kept(source->away, "the output port " + name);
   if (!source->has_page()) throw std::runtime_error("nobody has the activity of " + name);
   const shm::Nanoseconds now = shm::monotonic_now();
-  const bool was_active =
-      shm::is_active(source->activity().word.load(std::memory_order_relaxed), now);
-  source->activity().word.store(shm::deactivation(now), std::memory_order_relaxed);
+  shm::Activity& activity = source->activity();
+  const shm::ActivityWord before = activity.word.load(std::memory_order_relaxed);
+  const bool was_active = shm::is_active(before, now);
+  activity.write(before, shm::deactivation(now));
   shm::full_fence();  // (a): as a publisher's own deactivate()
   switchboard_.ring_concerned(models_.in_force().table, source->id);
   auto reply = reply_to(message.request, shm::MessageKind::kDone);

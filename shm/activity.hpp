@@ -66,15 +66,14 @@ struct Activity {
   Atomic<ActivityWord> word{kNeverActive};
   Atomic<std::uint64_t> breaks{0};  // how often an arrival has followed a deactivation
 
-  // By the one writer. Relaxed is enough for the word: what it must come before, a fence orders.
-  // SYNC POINT: break-counted. The release, and the order of the two stores, pair with the acquires
-  // in SeenActivity::of(): who sees the arrival sees the break before it.
-  void arrive(ActivityWord before, ActivityWord next) noexcept {
-    if (!is_deactivation(before)) {
-      word.store(next, std::memory_order_relaxed);
-      return;
+  // By the one writer; what the word must come before, a fence of its orders.
+  // SYNC POINT: activity-written. The release, and the order of the two stores, pair with the
+  // acquires in SeenActivity::of(): who sees the word sees the break before it, and the model that
+  // was in force for its writer.
+  void write(ActivityWord before, ActivityWord next) noexcept {
+    if (is_deactivation(before) && !is_deactivation(next)) {
+      breaks.store(breaks.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     }
-    breaks.store(breaks.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     word.store(next, std::memory_order_release);
   }
 };

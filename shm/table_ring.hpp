@@ -56,15 +56,24 @@ class TableReader {
   }
 
   // Whether all that was read from the snapshot so far was the table's own.
-  // SYNC POINT: table-overwritten. The acquire fence pairs with the release fence in
-  // TableWriter::write(): who has read a word of a newer table sees a newer generation here.
   [[nodiscard]] bool is_whole(const TableSnapshot& snapshot) const noexcept {
-    acquire_fence();
-    const std::uint64_t now = board_->generation.load(std::memory_order_relaxed);
-    return now - snapshot.generation < kTableSlots - 1;
+    return generation_by_now() - snapshot.generation < kTableSlots - 1;
+  }
+
+  // Whether no other came into force either until all was read that a decision looked at: ends of
+  // queues and activities of a later time belong to the next model's decisions.
+  [[nodiscard]] bool is_in_force(const TableSnapshot& snapshot) const noexcept {
+    return generation_by_now() == snapshot.generation;
   }
 
  private:
+  // SYNC POINT: table-overwritten. The acquire fence pairs with the release fence in
+  // TableWriter::write(): who has read a word of a newer table sees a newer generation here.
+  [[nodiscard]] std::uint64_t generation_by_now() const noexcept {
+    acquire_fence();
+    return board_->generation.load(std::memory_order_relaxed);
+  }
+
   const Board* board_ = nullptr;
 };
 

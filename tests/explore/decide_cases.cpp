@@ -184,26 +184,56 @@ const Register kSwapBefore("WhatAModelInForceAcceptsIsNotDroppedByTheOneBefore",
 
 // B loses to an active C by the old model only, and C becomes active after the new one is in force:
 // B wins at every moment.
-void swap_before_an_override(const Explore& explore) {
+Register swap_before_an_override(const char* name, std::function<void(Scene&)> before,
+                                 std::function<void(Scene&)> call) {
+  return {
+      name, {4, 2}, [=](const Explore& explore) {
+        explore_anew<Scene>(
+            explore,
+            [=](Scene& scene, Execution& execution) {
+              before(scene);
+              scene.instance.prepare(forever().connect({kB, kPort, shm::table::kAlways, {}, {}}));
+              execution.thread([&scene] {
+                scene.instance.put_in_force();
+                scene.c().signal();
+              });
+              execution.thread([&scene, call] { call(scene); });
+              execution.finally([&scene] {
+                scene.drain();
+                require(scene.input->taken[kB] == 1, "one model decided on another's activities");
+              });
+            },
+            forever().conjunction(kB, kPort, {}, {kC}), depth(1),
+            std::initializer_list<SourceId>{kB});
+      }};
+}
+const Register kSwapOverride = swap_before_an_override(
+    "NoTakeDecidesByOneModelOnActivitiesOfTheNext", [](Scene& scene) { scene.b().publish(); },
+    [](Scene& scene) { scene.input->take(); });
+const Register kPublishOverride = swap_before_an_override(
+    "NoPublishDecidesByOneModelOnActivitiesOfTheNext", [](Scene&) {},
+    [](Scene& scene) { scene.b().publish(); });
+
+// B loses to C by the old model, always by the new one, and C ends after that is in force: B wins
+// at no moment.
+void swap_before_a_deactivation(const Explore& explore) {
   explore_anew<Scene>(
       explore,
       [](Scene& scene, Execution& execution) {
-        scene.b().publish();
-        scene.instance.prepare(forever().connect({kB, kPort, shm::table::kAlways, {}, {}}));
+        scene.c().signal();
+        scene.instance.prepare(forever().connect({kA, kPort, shm::table::kAlways, {}, {}}));
         execution.thread([&scene] {
           scene.instance.put_in_force();
-          scene.c().signal();
+          scene.c().deactivate();
         });
-        execution.thread([&scene] { scene.input->take(); });
-        execution.finally([&scene] {
-          scene.drain();
-          require(scene.input->taken[kB] == 1, "one model decided on another's activities");
+        execution.thread([&scene] {
+          require(scene.b().publish().delivered == 0, "one model decided on another's activities");
         });
       },
       forever().conjunction(kB, kPort, {}, {kC}), depth(1), std::initializer_list<SourceId>{kB});
 }
-const Register kSwapOverride("NoModelDecidesOnActivitiesOfTheNextOne", {4, 2},
-                             swap_before_an_override);
+const Register kSwapDeactivation("NoModelDecidesOnADeactivationUnderTheNext", {4, 2},
+                                 swap_before_a_deactivation);
 
 }  // namespace
 }  // namespace arbiter::explore

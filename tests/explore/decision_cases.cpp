@@ -30,13 +30,14 @@ struct World {
   void stamp_fence() { shm::full_fence(); }  // (a)
   void arrive(SourceId id) {
     const shm::ActivityWord next = shm::arrival(++time, shm::kForever);
-    activities[id].arrive(own[id], next);
+    activities[id].write(own[id], next);
     own[id] = next;
     stamp_fence();
   }
   void deactivate(SourceId id) {
-    own[id] = shm::deactivation(++time);
-    activities[id].word.store(own[id], std::memory_order_relaxed);
+    const shm::ActivityWord next = shm::deactivation(++time);
+    activities[id].write(own[id], next);
+    own[id] = next;
     stamp_fence();
   }
   bool wins(SourceId id) {

@@ -39,8 +39,9 @@ std::vector<std::string> words_of(std::string line) {
   return words;
 }
 
-constexpr std::array<const char*, service::kActionCount> kActions{"output",  "input",  "deactivate",
-                                                                  "observe", "reload", "stop"};
+constexpr auto kActions = std::to_array<const char*>(
+    {"output", "input", "deactivate", "observe", "reload", "switch", "stop"});
+static_assert(kActions.size() == service::kActionCount);
 
 bool includes_action(const std::string& list, const std::string& action) {
   return list == "all" || ("," + list + ",").find("," + action + ",") != std::string::npos;

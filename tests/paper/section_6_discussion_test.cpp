@@ -41,7 +41,8 @@ TEST(Section7, ABehaviourThatCanNeverRunIsFoundToo) {
       <condition>/collision:o</condition></behavior>
   </behaviors>)");
   EXPECT_FALSE(model.diagnostics.has_errors());
-  EXPECT_THAT(model.codes(), testing::UnorderedElementsAre("never-selected", "never-runs"));
+  EXPECT_THAT(model.codes(), testing::UnorderedElementsAre("never-selected", "never-runs",
+                                                           "unreachable-children"));
 }
 
 }  // namespace

@@ -213,7 +213,7 @@ TEST_F(Decision, ASourceThatChangesAtEveryLookLeavesItUnsettledAfterABoundedTime
   ScriptedClock clock{0, true, 0, 0, [] {}};
   clock.on_read = [&] {  // always one step behind an activity that is deactivated in between
     time += 1000;
-    activities_[kC].arrive(deactivation(time), arrival(time + 10, kT));
+    activities_[kC].write(deactivation(time), arrival(time + 10, kT));
     clock.next = time;
   };
   clock.on_read();
@@ -263,7 +263,7 @@ TEST_F(KeptBound, ItDecidesAsOneThatIsBoundAnewWhateverHappensInBetween) {
         for (unsigned changes = draw(3); changes != 0; --changes) {
           Activity& activity = activities_[draw(kSources)];
           const Nanoseconds timeout = draw(5) == 0 ? kForever : kT;
-          activity.arrive(activity.word, draw(3) == 0 ? deactivation(now) : arrival(now, timeout));
+          activity.write(activity.word, draw(3) == 0 ? deactivation(now) : arrival(now, timeout));
           now += 1 + draw(5);
         }
         now += draw(2) == 0 ? draw(150) : 0;
