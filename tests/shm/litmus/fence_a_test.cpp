@@ -77,7 +77,7 @@ void publish_and_look(Race& race, int self) {
   for (int round = 1; round <= kRounds; ++round) {
     begin_together(race, self, round);
     own.activity.write(kNeverActive, arrival(round, kForever));  // as publish() stamps
-    full_fence();                                                 // (a)
+    full_fence();                                                // (a)
     const ActivityWord seen = other.activity.word.load(std::memory_order_acquire);
     race.saw_other[static_cast<std::size_t>(self)][static_cast<std::size_t>(round - 1)] =
         seen == arrival(round, kForever);
