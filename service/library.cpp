@@ -22,6 +22,10 @@ std::size_t size_of(const Model& model) {
   const rules::CompiledModel& compiled = model.compiled;
   std::size_t size = sizeof model + size_of(compiled.sources);
   size += compiled.timeouts.size() * 128;
+  if (compiled.texts) {
+    for (const auto& file : compiled.texts->models) size += file.content.capacity();
+    if (compiled.texts->application) size += compiled.texts->application->content.capacity();
+  }
   for (const auto& port : compiled.ports) {
     size += sizeof port + size_of(port.reads);
     for (const auto& rule : port.rules) {

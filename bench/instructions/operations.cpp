@@ -9,6 +9,7 @@
 #include <exception>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -29,8 +30,8 @@ struct Payload {
   std::array<char, 64> bytes{};
 };
 
-void require(bool is_so, const std::string& what) {
-  if (!is_so) throw std::runtime_error("not as it should be: " + what);
+void require(bool is_so, std::string_view what) {
+  if (!is_so) throw std::runtime_error("not as it should be: " + std::string(what));
 }
 
 class Scenes {
