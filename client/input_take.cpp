@@ -3,8 +3,7 @@
 // The oldest waiting sample whose connection is the winner now. Three steps:
 //   look    at the head of each queue, and at where each ends
 //   decide  for the oldest head; if it loses and other queues have samples too, for all of them in
-//   one
-//           picture, so that the whole take has one instant
+//           one picture, so that the whole take has one instant
 //   hold    the sample, and see that it is still there
 // A decision drops only what was there before it: a sample accepted later was accepted by a later
 // one.

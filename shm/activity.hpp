@@ -10,12 +10,11 @@
 //
 // Invariants
 //  1. One writer: the component that has the source's output port open, or its successor; the
-//  daemon
-//     while nobody has.
+//     daemon while nobody has.
 //  2. A value stands for one write: each kind carries its own time, so a reader that sees the same
 //     value twice knows that nothing happened in between (decision.hpp rests on this).
-//  3. Between two values that are not deactivations there was none, if `breaks` is the same for
-//  both.
+//  3. Between two values that are not deactivations there was
+//     none, if `breaks` is the same for both.
 #pragma once
 
 #include <cstdint>

@@ -9,11 +9,9 @@
 //  1. Entry n lies at index (n - first) % depth of the ring; storing it takes entry n - depth out.
 //  2. A slot is written only while no ring has an entry of it and no receiver holds it.
 //  3. A receiver reads a slot only while it holds it, and it holds it only if the entry was still
-//  in the
-//     ring after the hold could be seen.
+//     in the ring after the hold could be seen.
 //  4. A receiver reads only entries from `first` on, which the publisher stored when it had mapped
-//  the
-//     receiver's holds already.
+//     the receiver's holds already.
 //
 // Why 2 and 3 fit together: the receiver stores its hold, passes fence (c), and reads the entry
 // again; the publisher overwrites the entry, passes fence (b), and reads the holds. Of the two

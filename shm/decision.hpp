@@ -13,11 +13,11 @@
 //
 // Time. `now` is a reading of the clock that the caller took before. Where a word was written after
 // that reading, an activity that ended in between would be combined with one that began later; so
-// the clock is read again once all were seen, and they are looked at again. A caller may pass an
-// old reading
-// (`Clock::is_fresh` false): what ended before it is over whatever the time is, what never ends
-// holds, and only a word between the two makes us read the clock. This saves most takes a clock
-// read and is exact.
+// the clock is read again once all were seen, and they are looked at again.
+//
+// A caller may pass an old reading (`Clock::is_fresh` false): what ended before it is over whatever
+// the time is, what never ends holds, and only a word between the two makes us read the clock. This
+// saves most takes a clock read and is exact.
 #pragma once
 
 #include <array>

@@ -10,17 +10,17 @@
 //   sources[]     kSourceWords each, by source id: T, connections from it, ports it concerns
 //   ports[]       kPortWords each, by port id: flags, connections to it, sources it reads
 //   connections[] kConnectionWords each, those of a port side by side, in document order
-//   lists         connection indices, port ids, source ids, reads and nodes, that the above point
-//   to
+//   lists         connection indices, port ids, source ids, reads and nodes,
+//                 that the above point to
 //
 // A connection's rule leaves out the connection's own activity: it is implied (paper, section
 // III.A).
 //   kNever        no rule selects it
 //   kAlways       no other source matters
 //   kConjunction  reads: each source with the activity it must have
-//   kDiagram      reads: the sources that the nodes test, by position; nodes: {position, low,
-//   high},
-//                 node 0 is the root, successors lie behind their node, or are kFalse / kTrue
+//   kDiagram      reads: the sources that the nodes test, by position;
+//                 nodes: {position, low, high}, node 0 is the root,
+//                 successors lie behind their node, or are kFalse / kTrue
 #pragma once
 
 #include <cstdint>

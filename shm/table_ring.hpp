@@ -4,8 +4,8 @@
 // Invariants
 //  1. `generation` counts the models; the table of generation g lies in slot g % kTableSlots.
 //  2. While generation g is in force only slot (g + 1) % kTableSlots is written. So a table read
-//  under
-//     generation s is whole if the generation, read again afterwards, is below s + kTableSlots - 1.
+//     under generation s is whole if the generation, read again afterwards, is below
+//     s + kTableSlots - 1.
 //  3. Generation 0 has no table: no model has been loaded yet.
 #pragma once
 

@@ -5,8 +5,8 @@
 // are zero.
 //
 // A client opens a port:   kOpenOutput / kOpenInput  ->
-//                          <- kOpened (or kRefused), kSourcePage…, kInputPeer… / kOutputPeer…,
-//                          kConnected
+//                          <- kOpened (or kRefused), kSourcePage…,
+//                          kInputPeer… / kOutputPeer…, kConnected
 // kConnected says that the peers have mapped the new port too, or were given up waiting for.
 //
 // The daemon changes what a client sees: kSourcePage…, kInputPeer…, then kSync; the client answers

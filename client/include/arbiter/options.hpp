@@ -31,9 +31,8 @@ struct NodeOptions {
   // node, 4 KiB for each source that the rules of its ports read, 36 KiB for each input port, here
   // or connected to; and for each output port, here or connected to, 12 KiB, 8 KiB for each
   // receiver, and its samples. Where that is too little, Node() and the opening of ports throw
-  // arbiter::Error, which names the limit; a port at the other end that comes later is not
-  // connected
-  // (`arbiter status` says why).
+  // arbiter::Error, which names the limit. A port at the other end that comes later is then not
+  // connected (`arbiter status` says why).
   bool lock_memory = false;
 };
 
