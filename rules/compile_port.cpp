@@ -248,7 +248,9 @@ void PortCompiler::report_outgrown(const ConnectionRule* rule) {
       (rule != nullptr ? "the rule of " + rule->source : std::string("a rule")) + " at " +
           port_.port + " needs a decision diagram of more than kMaxNodesPerConnection (" +
           std::to_string(shm::kMaxNodesPerConnection) +
-          ") nodes; write a simpler condition, or one that reads fewer sources");
+          ") nodes, or the model too many steps to make its diagrams; write a simpler condition, "
+          "or "
+          "one that reads fewer sources");
 }
 
 }  // namespace

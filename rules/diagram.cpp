@@ -25,13 +25,13 @@ static_assert(kMaxWorkingNodes > 2 * static_cast<int>(shm::kMaxNodesPerConnectio
 
 constexpr int kFirstNodes = 20000;
 constexpr int kNodesPerCacheEntry = 4;
-// Sifting starts by itself when the table has outgrown its first size, and again when it has
-// doubled since; each time takes as long as a few hundred thousand nodes may.
+// Sifting starts by itself when there are so many nodes, and again when they have doubled since;
+// each time takes as long as a few hundred thousand nodes may.
+constexpr int kNodesToSift = 40000;
 constexpr int kAutomaticSifts = 2;
 
 std::mutex one_instance;
 std::uint32_t current_instance = 0;
-bool was_reordered = false;
 
 std::jmp_buf recovery;
 int failure = 0;
@@ -42,8 +42,6 @@ extern "C" void leave_buddy(int code) {
   failure = code;
   std::longjmp(recovery, 1);
 }
-
-extern "C" void note_reordering(int) { was_reordered = true; }
 
 int operator_of(Connective connective) {
   switch (connective) {
@@ -72,9 +70,10 @@ int attempt(Operation operation) {
 }
 
 [[noreturn]] void fail(int code) {
-  if (code == BDD_NODENUM) {
+  if (code == BDD_NODENUM || code == DiagramOperation::kTooManyNodes) {
     throw DiagramLimit("more than " + std::to_string(kMaxWorkingNodes) + " nodes");
   }
+  if (code == DiagramOperation::kTooManySteps) throw DiagramLimit("too many steps");
   if (code == BDD_MEMORY) throw std::bad_alloc();
   throw std::logic_error(std::string("decision diagrams: ") + bdd_errstring(code));
 }
@@ -109,22 +108,22 @@ DiagramBuilder::~DiagramBuilder() { stop(); }
 
 void DiagramBuilder::start() {
   ++current_instance;
-  was_reordered = false;
   order_changed_ = false;
+  sifts_left_ = sifts_ ? kAutomaticSifts : 0;
+  max_nodes_ = kNodesToSift;
   if (const int error = bdd_init(kFirstNodes, kFirstNodes / kNodesPerCacheEntry); error < 0) {
     fail(error);
   }
   bdd_error_hook(leave_buddy);
   bdd_gbc_hook(nullptr);  // the default one writes to standard error
-  bdd_reorder_hook(note_reordering);
+  bdd_reorder_hook(nullptr);
   const int variables = variables_;
-  const int method = sifts_ ? BDD_REORDER_SIFT : BDD_REORDER_NONE;
-  const auto set_up = [variables, method] {
+  const auto set_up = [variables] {
     bdd_setmaxnodenum(kMaxWorkingNodes);
     bdd_setcacheratio(kNodesPerCacheEntry);
     bdd_setvarnum(variables);
     bdd_varblockall();  // sifting moves blocks: each variable is one
-    return bdd_autoreorder_times(method, kAutomaticSifts);
+    return bdd_autoreorder(BDD_REORDER_NONE);
   };
   if (const int error = attempt(set_up); error < 0) {
     stop();
@@ -134,25 +133,50 @@ void DiagramBuilder::start() {
 
 void DiagramBuilder::stop() {
   ++current_instance;
+  steps_ += operation_.end(true);
   if (bdd_isrunning() != 0) bdd_done();
 }
 
 void DiagramBuilder::restore_order() {
-  if (!order_changed_ && !was_reordered) return;
+  if (!order_changed_) return;
   stop();
   start();
 }
 
-// After an error the instance may be half-way through a reordering, so none is worth keeping.
+// After an error the instance may be half-way through something, so nothing in it is worth keeping.
+void DiagramBuilder::start_anew(int error) {
+  stop();
+  start();
+  fail(error);
+}
+
 template <class Operation>
-int DiagramBuilder::run(Operation operation) {
-  const int result = attempt(operation);
-  if (result < 0) {
-    stop();
-    start();
-    fail(result);
+Diagram DiagramBuilder::operate(Operation operation) {
+  for (;;) {
+    DiagramOperation* const steps = &operation_;
+    const DiagramOperation::Bounds bounds{
+        std::min(kMaxSteps, kMaxStepsInAll - std::min(steps_, kMaxStepsInAll)),
+        sifts_left_ == 0 ? kMaxWorkingNodes : max_nodes_};
+    const int result = attempt([=] { return operation(*steps, bounds); });
+    if (result >= 0) {
+      Diagram kept = keep(result);
+      steps_ += operation_.end(false);
+      return kept;
+    }
+    if (result != DiagramOperation::kTooManyNodes || sifts_left_ == 0) start_anew(result);
+    begin_again();
   }
-  return result;
+}
+
+// Unless most nodes were garbage, with a better order of the variables.
+void DiagramBuilder::begin_again() {
+  bdd_gbc();
+  const bool is_in_use = bdd_getnodenum() >= max_nodes_ / 5 * 4;
+  steps_ += operation_.end(false);
+  if (!is_in_use) return;
+  --sifts_left_;
+  sift();
+  max_nodes_ = std::max(max_nodes_, 2 * bdd_getnodenum());
 }
 
 int DiagramBuilder::node_of(const Diagram& a) {
@@ -166,35 +190,41 @@ Diagram DiagramBuilder::keep(int node) { return {node, current_instance}; }
 
 Diagram DiagramBuilder::combine(Connective connective, const Diagram& a, const Diagram& b) {
   const int left = node_of(a), right = node_of(b), op = operator_of(connective);
-  return keep(run([=] { return bdd_apply(left, right, op); }));
+  return operate([=](DiagramOperation& operation, const DiagramOperation::Bounds& bounds) {
+    return operation.apply(left, right, op, bounds);
+  });
 }
 
 Diagram DiagramBuilder::negate(const Diagram& a) {
-  const int node = node_of(a);
-  return keep(run([=] { return bdd_not(node); }));
+  return combine(Connective::kXor, a, constant(true));
 }
 
-Diagram DiagramBuilder::when(const Diagram& a, int variable) {
+Diagram DiagramBuilder::restrict(const Diagram& a, int variable, bool value) {
   const int node = node_of(a);
-  return keep(run([=] { return bdd_restrict(node, bdd_ithvar(variable)); }));
+  return operate([=](DiagramOperation& operation, const DiagramOperation::Bounds& bounds) {
+    return operation.restrict(node, variable, value, bounds);
+  });
 }
+
+Diagram DiagramBuilder::when(const Diagram& a, int variable) { return restrict(a, variable, true); }
 
 Diagram DiagramBuilder::when_not(const Diagram& a, int variable) {
-  const int node = node_of(a);
-  return keep(run([=] { return bdd_restrict(node, bdd_nithvar(variable)); }));
+  return restrict(a, variable, false);
 }
 
 Diagram DiagramBuilder::choose(int variable, const Diagram& high, const Diagram& low) {
-  const int then = node_of(high), otherwise = node_of(low);
-  return keep(run([=] { return bdd_ite(bdd_ithvar(variable), then, otherwise); }));
+  const Diagram condition = this->variable(variable);
+  return combine(Connective::kOr, combine(Connective::kAnd, condition, high),
+                 combine(Connective::kAndNot, low, condition));
 }
 
 void DiagramBuilder::sift() {
   order_changed_ = true;
-  run([] {
+  const int result = attempt([] {
     bdd_reorder(BDD_REORDER_SIFT);
     return 0;
   });
+  if (result < 0) start_anew(result);
 }
 
 Diagram DiagramBuilder::constant(bool value) { return keep(value ? 1 : 0); }

@@ -1,8 +1,9 @@
 // Reduced, ordered binary decision diagrams (Bryant 1986; paper, section III.A), made by BuDDy.
 //
 // BuDDy keeps one instance in global variables, ends the program on an error unless told otherwise,
-// and reports an error by calling back in the middle of its work. diagram.cpp is the only file that
-// includes it: there its errors become exceptions, and its node table gets a bound.
+// and reports an error by calling back in the middle of its work. Only diagram.cpp, and the
+// operations of diagram_operation.cpp, include it: there its errors become exceptions, and its
+// nodes and steps get bounds.
 //
 // Thread safety: a builder holds the one instance for as long as it lives; another thread that
 // makes one waits. A builder and its diagrams are for one thread.
@@ -14,6 +15,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "rules/diagram_operation.hpp"
 #include "shm/decision_table.hpp"
 #include "shm/limits.hpp"
 
@@ -25,7 +27,8 @@ namespace arbiter::rules {
 // writes behind the table's end.
 inline constexpr int kMaxWorkingNodes = 262139;
 
-// A function outgrew the node table. The builder is as new afterwards: all its diagrams are lost.
+// A function outgrew the node table, or took too many steps. The builder is as new afterwards: all
+// its diagrams are lost. Once the steps of all its operations are used up, each of them fails.
 class DiagramLimit : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -106,10 +109,17 @@ class DiagramBuilder {
   void restore_order();
 
  private:
+  // Of one operation, and of all of a builder, which takes some seconds.
+  static constexpr std::size_t kMaxSteps = std::size_t{4} * kMaxWorkingNodes;
+  static constexpr std::size_t kMaxStepsInAll = 16 * kMaxSteps;
+
   template <class Operation>
-  int run(Operation operation);
+  Diagram operate(Operation operation);
+  Diagram restrict(const Diagram& a, int variable, bool value);
+  void begin_again();
   void start();
   void stop();
+  [[noreturn]] void start_anew(int error);
   static int node_of(const Diagram& a);
   static Diagram keep(int node);
 
@@ -117,6 +127,10 @@ class DiagramBuilder {
   const int variables_;
   const bool sifts_;
   bool order_changed_ = false;
+  DiagramOperation operation_;
+  std::size_t steps_ = 0;
+  int sifts_left_ = 0;                    // by itself
+  int max_nodes_ = 0;                     // before it sifts
   std::vector<shm::Word> index_of_node_;  // scratch of nodes(), by BuDDy's node
 };
 
