@@ -64,6 +64,10 @@ int check(const CheckOptions& options) {
   if (model) rules::find_more(model->rules, model->compiled, diagnostics);
   const auto statements =
       judge_statements(options, model ? &model->compiled : nullptr, diagnostics);
+  if (!model && !options.statements.empty()) {
+    diagnostics.note("left-open", {options.statements.front(), 1, 1},
+                     "whether the statements are true was not looked at: the model has errors");
+  }
   diagnostics.silence(options.silenced);
   const bool failed = diagnostics.has_errors();
   if (options.json) {

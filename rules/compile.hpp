@@ -39,7 +39,7 @@ struct CompiledModel {
   shm::Nanoseconds timeout = shm::kDefaultTimeout;
   std::map<std::string, shm::Nanoseconds> timeouts;
   std::vector<std::string> sources;
-  std::vector<CompiledPort> ports;  // in byte order
+  std::vector<CompiledPort> ports;          // in byte order
   std::shared_ptr<const ModelTexts> texts;  // what it was made of, as RuleSet has it
 };
 

@@ -73,10 +73,22 @@ class Extraction {
       auto& expanded = conditions_.emplace_back();
       for (const Condition& condition : behaviour.conditions) {
         expanded.push_back(expansion.expand(condition.expression));
+        warn_of_unmatched(expansion, condition.where);
       }
     }
     for (const Select& select : model_.selects) {
       select_conditions_.push_back(expansion.expand(select.condition));
+      warn_of_unmatched(expansion, select.where);
+    }
+  }
+
+  void warn_of_unmatched(QuantifierExpansion& expansion, const Location& where) {
+    for (const std::string& pattern : expansion.take_unmatched()) {
+      if (!gives_advice_) continue;
+      diagnostics_.warning("matches-nothing", where,
+                           "no source that the model names matches " + quote(pattern) +
+                               ": any() is false of it, all() and none() are true; correct it, or "
+                               "name the source with <source>");
     }
   }
 

@@ -106,9 +106,18 @@ std::string summary(const ModelDiff& diff) {
   const auto changed = list([](const PortDiff& port) { return port.differs(); });
   const auto open = list([](const PortDiff& port) { return !port.open.empty(); });
   std::string text;
+  const auto decides_alike = [](const PortDiff& port) {
+    return port.differs() && port.changes.empty();
+  };
   if (!changed.empty()) {
-    text = std::to_string(changed.size()) + " of " + counted(diff.compared_ports, "port") +
-           (changed.size() == 1 ? " decides" : " decide") + " differently" + named(changed);
+    const bool is_one = changed.size() == 1;
+    text = std::to_string(changed.size()) + " of " + counted(diff.compared_ports, "port");
+    if (std::any_of(diff.ports.begin(), diff.ports.end(), decides_alike)) {
+      text += is_one ? " differs" : " differ";
+    } else {
+      text += is_one ? " decides differently" : " decide differently";
+    }
+    text += named(changed);
   }
   if (!diff.timeouts.empty()) {
     text += (text.empty() ? "" : "; ") + counted(diff.timeouts.size(), "timeout") + " changed";

@@ -77,6 +77,7 @@ ExpressionPtr QuantifierExpansion::expand_quantifier(const Expression& quantifie
   }
   const bool is_any = quantifier.op == Operator::kAny;
   if (operands.empty()) {
+    unmatched_.push_back(quantifier.name);
     expanded = make_constant(!is_any);
   } else if (operands.size() == 1) {
     expanded = operands.front();

@@ -26,11 +26,15 @@ class QuantifierExpansion {
   // The expression itself where it has no quantifier.
   ExpressionPtr expand(const ExpressionPtr& expression);
 
+  // The patterns that have fitted nothing since this was asked last, each once.
+  std::vector<std::string> take_unmatched() { return std::exchange(unmatched_, {}); }
+
  private:
   ExpressionPtr expand_quantifier(const Expression& quantifier);
 
   const std::vector<std::string>& sources_;
   std::map<std::pair<Operator, std::string>, ExpressionPtr> expanded_;
+  std::vector<std::string> unmatched_;
 };
 
 }  // namespace arbiter::rules

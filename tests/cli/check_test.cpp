@@ -186,7 +186,8 @@ TEST(Check, StatementsAreReadEvenIfTheModelHasErrors) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("[both-can-win]"));
   EXPECT_THAT(result.err, HasSubstr(statements + ":1:7: error: the statement ends where"));
-  EXPECT_EQ(result.out, "failed: 2 errors\n");
+  EXPECT_THAT(result.err, HasSubstr("was not looked at: the model has errors [left-open]"));
+  EXPECT_EQ(result.out, "failed: 2 errors, 1 note\n");
 }
 
 TEST(Check, StatementsThatCannotBeOpenedAreWrongUse) {

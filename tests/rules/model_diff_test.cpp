@@ -269,7 +269,7 @@ TEST(ModelDiff, TellsPortsAndConnectionsThatOnlyOneModelHas) {
             "  connected only before: /a\n"
             "/p\n"
             "  connected only before: /x\n"
-            "3 of 3 ports decide differently (/free, /gone, /p)\n");
+            "3 of 3 ports differ (/free, /gone, /p)\n");
 }
 
 TEST(ModelDiff, ComparesTheTimeoutsOfSourcesThatDecideSomething) {

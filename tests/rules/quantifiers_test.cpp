@@ -114,6 +114,19 @@ TEST(Quantifiers, OverNoMatchAreFalseTrueTrue) {
   EXPECT_EQ(rule_for("none(/nothing/*)"), "true");
 }
 
+TEST(Quantifiers, OverNoMatchAreWarnedOf) {
+  const Loaded loaded = load_text(R"(<behaviors>
+    <source port="/Lock/a:o"/>
+    <behavior name="A"><config at="/P:i">/a:o</config>
+      <condition>none(/Lokc/*) or any(/Lock/*)</condition></behavior>
+  </behaviors>)");
+  ASSERT_EQ(loaded.items.size(), 1u);
+  const Diagnostic& warning = loaded.items[0];
+  EXPECT_EQ(warning.code, "matches-nothing");
+  EXPECT_THAT(warning.message, testing::HasSubstr("/Lokc/*"));
+  EXPECT_EQ(warning.where.line, 4u);
+}
+
 TEST(Quantifiers, MayStandInsideOtherOperators) {
   EXPECT_EQ(rule_for("/x and not any(/C/*)"), "(/x and not((/C/condition or /C/sensed)))");
   EXPECT_EQ(rule_for("any(\"/D/*\") -&gt; /x"), "(/D/declared implies /x)");
