@@ -32,12 +32,10 @@ shm::PortId find_port(detail::NodeCore& node, const std::string& name) {
       throw Error(name + " is an output port; give the input port first: arbiter why PORT " + name);
     }
   }
-  throw Error("no model and no component has named the input port " + name +
+  const auto model = ModelInForce::fetch(node);
+  throw Error("no model and no component has named the input port " + name + " (" + model.text() +
+              " is in force)" +
               rules::advise(name, known, "`arbiter status` shows those that there are"));
-}
-
-rules::FileText file_of(const nlohmann::json& document) {
-  return {document.at("path").get<std::string>(), document.at("text").get<std::string>()};
 }
 
 }  // namespace
@@ -103,19 +101,32 @@ Look LivePort::look() const {
 }
 
 void LivePort::fetch_model() {
-  const nlohmann::json document = fetch_document(*node_, shm::MessageKind::kModel);
-  generation_ = document.at("generation").get<std::uint64_t>();
-  in_force_since_ = document.at("in_force_since_ns").get<shm::Nanoseconds>();
-  has_texts_ = document.at("known").get<bool>();
+  model_ = ModelInForce::fetch(*node_);
+  generation_ = model_.generation();
   rules_ = {};
-  if (!has_texts_) return;
-  rules::ModelTexts texts;
-  for (const auto& file : document.at("models")) texts.models.push_back(file_of(file));
-  if (!document.at("application").is_null()) texts.application = file_of(document["application"]);
+  if (!model_.has_texts()) return;
   rules::Diagnostics diagnostics;
-  rules_ = rules::load(std::move(texts), diagnostics, rules::Keep::kProvenance);
+  rules_ = rules::load(model_.texts(), diagnostics, rules::Keep::kProvenance);
   if (diagnostics.has_errors()) {
     throw Error("the daemon's model is none to this program; are both of one version?");
+  }
+}
+
+void LivePort::add_timeouts(Look& look) const {
+  const rules::Explainer explainer(rules_);
+  for (const auto& [source, word] : look.words) {
+    const std::string name = source_name(source);
+    SourceState state = look.sources.state(name);
+    if (model_.has_texts()) {
+      const auto where = explainer.place_of_timeout(name);
+      state.timeout_place =
+          where.file.empty() ? "default" : where.file + ":" + std::to_string(where.line);
+    }
+    if (const auto before = model_.timeout_before(name)) {
+      state.timeout_before = before->timeout;
+      state.timeout_changed = before->until;
+    }
+    look.sources.set(name, state);
   }
 }
 
@@ -123,7 +134,7 @@ std::optional<rules::PortExplanation> LivePort::explain(const Look& look) {
   if (generation_ != look.snapshot.generation) fetch_model();
   if (generation_ != look.snapshot.generation) return std::nullopt;
   const auto is_active = [&](const std::string& source) { return look.sources.is_active(source); };
-  if (!has_texts_) {
+  if (!model_.has_texts()) {
     const auto source_name = [this](shm::SourceId source) { return this->source_name(source); };
     const auto rules = rules::rules_of_table(look.snapshot.table, id_, name_, source_name);
     return rules::Explainer(rules).explain(name_, is_active);

@@ -6,8 +6,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "cli/live.hpp"
+#include "cli/model_in_force.hpp"
 #include "cli/why_report.hpp"
 #include "rules/explain.hpp"
 #include "shm/ids.hpp"
@@ -47,10 +49,15 @@ class LivePort {
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] shm::PortId id() const { return id_; }
   [[nodiscard]] std::string source_name(shm::SourceId source) const;
-  // Of the model that was explained last: whether the daemon knows its texts, and since when it is
-  // in force (0: not known).
-  [[nodiscard]] bool has_texts() const { return has_texts_; }
-  [[nodiscard]] shm::Nanoseconds in_force_since() const { return in_force_since_; }
+  // That was explained last.
+  [[nodiscard]] const ModelInForce& model() const { return model_; }
+  // What it mentions; nothing where the daemon does not know its texts.
+  [[nodiscard]] const std::vector<std::string>& known_sources() const { return rules_.sources; }
+  [[nodiscard]] std::vector<std::string> known_ports() const {
+    return rules::Explainer(rules_).ports();
+  }
+  // With where T comes from, and what it was. `look` must be of that model.
+  void add_timeouts(Look& look) const;
 
  private:
   void fetch_model();
@@ -60,9 +67,8 @@ class LivePort {
   const std::string name_;
   const shm::PortId id_;
   std::optional<std::uint64_t> generation_;  // of what follows
+  ModelInForce model_;
   rules::RuleSet rules_;
-  bool has_texts_ = false;
-  shm::Nanoseconds in_force_since_ = 0;
 };
 
 }  // namespace arbiter::cli

@@ -1,27 +1,54 @@
 // What besides the rules keeps samples from getting through: what the daemon's status knows.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "cli/why_report.hpp"
+
 namespace arbiter::cli {
+
+struct Obstacle {
+  const char* code;  // docs/explaining.md has them
+  std::string text;  // for people
+};
 
 class Obstacles {
  public:
-  // Keeps a reference to the document.
-  Obstacles(const nlohmann::json& status, const std::string& port);
+  // Keeps references. `known_sources` and `known_ports`: those that the model mentions; empty where
+  // that is not known.
+  Obstacles(const nlohmann::json& status, const std::string& port, const Sources& sources,
+            std::vector<std::string> known_sources, std::vector<std::string> known_ports);
 
-  // Each in words, for people.
-  [[nodiscard]] std::vector<std::string> of_port() const;
-  [[nodiscard]] std::vector<std::string> of_connection(const std::string& source) const;
+  [[nodiscard]] std::vector<Obstacle> of_port() const;
+  [[nodiscard]] std::vector<Obstacle> of_connection(const std::string& source) const;
+  // Of one that need not have a connection.
+  [[nodiscard]] std::vector<Obstacle> of_source(const std::string& source) const;
+
+  // Why nothing of a winner reaches the port; empty where something does, as far as is known.
+  [[nodiscard]] std::string why_nothing_comes_of(const std::string& source) const;
+  // Nobody has it open, nothing has ever arrived, and nothing else could be meant by the name.
+  [[nodiscard]] bool was_never_started(const std::string& source) const;
+  // "nav (pid 12)", empty where nobody has it open.
+  [[nodiscard]] std::string component_of(const std::string& source) const;
 
  private:
-  void add_publisher(const std::string& source, std::vector<std::string>& result) const;
+  using Json = nlohmann::json;
+  [[nodiscard]] const Json* connection_of(const std::string& source) const;
+  void add_port_name(std::vector<Obstacle>& result) const;
+  void add_publisher(const std::string& source, std::vector<Obstacle>& result) const;
+  [[nodiscard]] std::optional<Obstacle> other_source(const std::string& name) const;
 
-  const nlohmann::json& status_;
-  const nlohmann::json* input_;  // null: the status does not have it
+  const Json& status_;
+  const std::string port_;
+  const Sources& sources_;
+  const std::vector<std::string> known_sources_, known_ports_;
+  const Json* input_;  // null: the status does not have it
 };
+
+nlohmann::json to_json(const std::vector<Obstacle>& obstacles);
 
 }  // namespace arbiter::cli

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/live.hpp"
+#include "cli/model_in_force.hpp"
 #include "cli/output_file.hpp"
 #include "cli/verbs.hpp"
 #include "drawing/drawing.hpp"
@@ -114,6 +115,7 @@ Look look(detail::NodeCore& node, const rules::RuleSet& rules) {
     seen.situation = drawing::decide(rules, active_sources(status));
     seen.fits = agrees(status, seen.situation);
     seen.model = status.at("model");
+    seen.model["directory"] = status.at("directory");
   }
   return seen;
 }
@@ -122,10 +124,11 @@ Look look(detail::NodeCore& node, const rules::RuleSet& rules) {
 rules::ModelFiles files_in_force(const json& model, const rules::ModelFiles& given) {
   if (!given.models.empty()) return given;
   rules::ModelFiles files;
-  for (const auto& file : model.at("files")) files.models.push_back(file.get<std::string>());
-  if (!model.at("application").is_null()) {
-    files.application = model.at("application").get<std::string>();
-  }
+  const auto from_here = [&](const json& file) {  // the daemon may run in another directory
+    return path_from_here(file.get<std::string>(), model.at("directory").get<std::string>());
+  };
+  for (const auto& file : model.at("files")) files.models.push_back(from_here(file));
+  if (!model.at("application").is_null()) files.application = from_here(model.at("application"));
   if (files.models.empty()) throw Error("the daemon has no model; give one: arbiter graph MODEL");
   return files;
 }

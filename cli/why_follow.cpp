@@ -63,7 +63,7 @@ class Follower {
       return;
     }
     std::cout << seconds_text(last_.sources.now() - started_) << "  " << port_.name() << ": "
-              << name_of(last_) << std::endl;
+              << name_of(last_) << " (" << port_.model().text() << ')' << std::endl;
   }
 
   static void write_line(const json& line) {
@@ -71,9 +71,10 @@ class Follower {
   }
 
   // False: another model has come into force meanwhile, and it must be looked at again.
-  bool write_change(const Look& look) {
+  bool write_change(Look& look) {
     const auto explanation = port_.explain(look);
     if (!explanation) return false;
+    port_.add_timeouts(look);
     const bool is_new_model = look.snapshot.generation != last_.snapshot.generation;
     const auto causes = rules::causes_of_change(
         look.snapshot.table, port_.id(),
@@ -85,10 +86,11 @@ class Follower {
       at = std::min(at,
                     event_time(look.sources.state(port_.source_name(source)), look.sources.now()));
     }
-    if (is_new_model) at = port_.in_force_since() != 0 ? port_.in_force_since() : at;
+    const ModelInForce& model = port_.model();
+    if (is_new_model && model.since() != 0) at = model.since();
     std::string because;
     if (is_new_model) {
-      because = "model " + std::to_string(look.snapshot.generation) + " came into force";
+      because = model.text() + " came into force" + model.how_text();
     }
     if (!causes.empty() && !is_new_model) because = events_text(port_, causes, look);
     const std::string loser = loss_text(*explanation, name_of(last_), look.sources);

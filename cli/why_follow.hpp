@@ -14,6 +14,7 @@ struct WhyOptions {
   std::string source;
   std::string instance;
   bool follow = false;
+  bool all = false;
   bool json = false;
   std::uint64_t count = 0;  // of changes; 0: until interrupted
 };

@@ -67,6 +67,18 @@ std::string inhibition_text(const rules::Cause& cause, const Sources& sources) {
 
 }  // namespace
 
+// The word tells the end; the arrival follows from the T that was in force then.
+std::optional<shm::Nanoseconds> SourceState::last_arrival() const {
+  if (word == shm::kNeverActive || shm::is_deactivation(word)) return std::nullopt;
+  if (timeout_before && shm::is_finite(word)) {
+    const bool is_of_before = timeout == shm::kForever || word - timeout < timeout_changed;
+    const bool may_be_of_before =
+        *timeout_before != shm::kForever && word - *timeout_before < timeout_changed;
+    if (is_of_before || may_be_of_before) return std::nullopt;
+  }
+  return shm::arrival_of(word, timeout);
+}
+
 SourceState Sources::state(const std::string& name) const {
   const auto found = states_.find(name);
   return found == states_.end() ? SourceState() : found->second;
@@ -89,6 +101,33 @@ std::string span_text(shm::Nanoseconds span) {
   return text;
 }
 
+namespace {
+
+std::string timeout_text(const SourceState& source) {
+  const std::string& place = source.timeout_place;
+  return "T " + rules::to_string(source.timeout) +
+         (place.empty()        ? ""
+          : place == "default" ? " by default"
+                               : " by " + place);
+}
+
+// Of one whose last arrival is not known.
+std::string past_timeout_text(const SourceState& source) {
+  return "T was " + rules::to_string(*source.timeout_before) +
+         " before the model changed it, so that when it arrived is not known; now " +
+         timeout_text(source) + ")";
+}
+
+}  // namespace
+
+std::string Sources::ending_text(const SourceState& source) const {
+  return "active (for " + span_text(source.word - now_) + " more; " + past_timeout_text(source);
+}
+
+std::string Sources::ended_text(const SourceState& source) const {
+  return "inactive (since " + span_text(now_ - source.word) + " ago; " + past_timeout_text(source);
+}
+
 std::string Sources::describe(const std::string& name) const {
   const SourceState source = state(name);
   if (!source.is_visible) return "not to be seen yet (the daemon has no page of its activity)";
@@ -97,9 +136,11 @@ std::string Sources::describe(const std::string& name) const {
     return "inactive (deactivated " + span_text(now_ - (source.word & ~shm::kDeactivatedFlag)) +
            " ago)";
   }
-  const shm::Nanoseconds span = now_ - shm::arrival_of(source.word, source.timeout);
-  const std::string since = (span <= 0 ? "just now" : span_text(span) + " ago") + ", T " +
-                            rules::to_string(source.timeout) + ")";
+  const auto arrival = source.last_arrival();
+  if (!arrival) return is_active(name) ? ending_text(source) : ended_text(source);
+  const shm::Nanoseconds span = now_ - *arrival;
+  const std::string since =
+      (span <= 0 ? "just now" : span_text(span) + " ago") + ", " + timeout_text(source) + ")";
   return is_active(name) ? "active (arrived " + since : "inactive (last arrival " + since;
 }
 
@@ -118,7 +159,7 @@ json Sources::to_json(const std::string& name) const {
     result["deactivated_ns"] = source.word & ~shm::kDeactivatedFlag;
     return result;
   }
-  result["last_arrival_ns"] = shm::arrival_of(source.word, source.timeout);
+  if (const auto arrival = source.last_arrival()) result["last_arrival_ns"] = *arrival;
   if (shm::is_finite(source.word)) result["ends_ns"] = source.word;
   return result;
 }
@@ -174,10 +215,12 @@ std::string loss_text(const rules::PortExplanation& port, const std::string& los
 void write_causes(std::ostream& out, const rules::ConnectionExplanation& connection,
                   const Sources& sources) {
   if (!connection.has_rule) {
-    out << "  no rule selects it, so that it never delivers here; its activity counts for others\n";
+    out << "  no rule selects it, so that it never delivers here" << place(connection.where)
+        << (connection.is_read ? "; its activity counts for the rules that read it"
+                               : "; nor does any rule read it")
+        << '\n';
     return;
   }
-  if (!connection.is_active) out << "  " << sources.describe(connection.source) << '\n';
   if (connection.earlier) {
     out << "  " << *connection.earlier
         << " comes before it in the model, and where two rules hold the first wins "
@@ -200,6 +243,10 @@ json connection_json(const rules::ConnectionExplanation& connection, const Sourc
   json result = sources.to_json(connection.source);
   result["winner"] = connection.wins;
   result["has_rule"] = connection.has_rule;
+  if (!connection.has_rule) {
+    result["where"] = place_json(connection.where);
+    result["is_read"] = connection.is_read;
+  }
   result["rule_holds"] = connection.holds;
   result["earlier"] = connection.earlier ? json(*connection.earlier) : json(nullptr);
   const auto reason = connection.reason();
@@ -218,16 +265,16 @@ json connection_json(const rules::ConnectionExplanation& connection, const Sourc
 
 shm::Nanoseconds event_time(const SourceState& state, shm::Nanoseconds now) {
   if (shm::is_deactivation(state.word)) return state.word & ~shm::kDeactivatedFlag;
-  if (shm::is_active(state.word, now)) return shm::arrival_of(state.word, state.timeout);
+  if (shm::is_active(state.word, now)) return state.last_arrival().value_or(now);
   return state.word;
 }
 
 std::string event_text(const std::string& source, const SourceState& state, shm::Nanoseconds now) {
   if (shm::is_deactivation(state.word)) return source + " was deactivated";
   if (shm::is_active(state.word, now)) return source + " became active";
-  return source + " went inactive, " +
-         span_text(state.word - shm::arrival_of(state.word, state.timeout)) +
-         " after its last arrival";
+  const auto arrival = state.last_arrival();
+  if (!arrival) return source + " went inactive";
+  return source + " went inactive, " + span_text(state.word - *arrival) + " after its last arrival";
 }
 
 json event_json(const std::string& source, const SourceState& state, shm::Nanoseconds now) {

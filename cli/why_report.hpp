@@ -19,7 +19,14 @@ namespace arbiter::cli {
 struct SourceState {
   shm::ActivityWord word = shm::kNeverActive;
   shm::Nanoseconds timeout = shm::kDefaultTimeout;
-  bool is_visible = true;  // else the daemon has no page of its activity yet
+  bool is_visible = true;       // else the daemon has no page of its activity yet
+  std::string timeout_place{};  // "model.xml:3", "default"; empty: not to be told
+  // Of a source whose T is another than before: which it was, and until when.
+  std::optional<shm::Nanoseconds> timeout_before{};
+  shm::Nanoseconds timeout_changed = 0;
+
+  // Nothing where it cannot be told, because T may have been another one then.
+  [[nodiscard]] std::optional<shm::Nanoseconds> last_arrival() const;
 };
 
 // The activities that an explanation is about.
@@ -38,6 +45,9 @@ class Sources {
   [[nodiscard]] nlohmann::json to_json(const std::string& name) const;
 
  private:
+  [[nodiscard]] std::string ending_text(const SourceState& source) const;
+  [[nodiscard]] std::string ended_text(const SourceState& source) const;
+
   std::map<std::string, SourceState> states_;
   shm::Nanoseconds now_ = 0;
 };
@@ -58,7 +68,7 @@ std::string first_cause(const rules::ConnectionExplanation& connection, const So
 std::string loss_text(const rules::PortExplanation& port, const std::string& loser,
                       const Sources& sources);
 
-// All of it, a line each, indented.
+// What of the rules keeps it out, a line each, indented.
 void write_causes(std::ostream& out, const rules::ConnectionExplanation& connection,
                   const Sources& sources);
 nlohmann::json connection_json(const rules::ConnectionExplanation& connection,

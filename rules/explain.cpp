@@ -42,6 +42,8 @@ class PortInquiry {
       auto& added = result.connections.emplace_back();
       added.source = connection.source;
       added.is_active = is_active_(connection.source);
+      added.where = connection.where;
+      added.is_read = is_read(connection.source);
     }
     return result;
   }
@@ -202,6 +204,18 @@ class PortInquiry {
     return result;
   }
 
+  // By a rule of any port.
+  bool is_read(const std::string& source) {
+    if (!read_) {
+      read_.emplace();
+      std::set<const Expression*> seen;
+      for (const PortRules& port : rules_.ports) {
+        for (const ConnectionRule& rule : port.rules) collect(*rule.condition, seen, *read_);
+      }
+    }
+    return read_->count(source) != 0;
+  }
+
   void add_senses(const PortRules& port, PortExplanation& result) {
     std::set<std::string> sources;
     std::set<const Expression*> seen;
@@ -227,6 +241,7 @@ class PortInquiry {
   std::unordered_map<std::string, std::vector<ConfigPlace>> configs_;  // by source
   std::unordered_map<std::string, const Select*> selects_;             // by source
   std::unordered_map<std::size_t, Voices> voices_;                     // by behaviour
+  std::optional<std::set<std::string>> read_;                          // by any rule
   const ConnectionRule* winner_ = nullptr;
 };
 
@@ -259,6 +274,15 @@ std::vector<std::string> Explainer::ports() const {
   for (const PortRules& port : rules_.ports) names.insert(port.port);
   for (const Connection& connection : rules_.other_connections) names.insert(connection.port);
   return {names.begin(), names.end()};
+}
+
+Location Explainer::place_of_timeout(const std::string& source) const {
+  if (rules_.provenance == nullptr) return {};
+  const Model& model = rules_.provenance->model;
+  for (const SourceDeclaration& each : model.sources) {
+    if (each.name == source && each.timeout) return each.where;
+  }
+  return model.timeout ? model.timeout->where : Location();
 }
 
 std::string describe(const Element& element) {

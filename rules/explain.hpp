@@ -57,6 +57,8 @@ struct ConnectionExplanation {
   std::string source;
   bool is_active = false;
   bool has_rule = false;
+  Location where;        // of a connection without a rule: in the application
+  bool is_read = false;  // of such a one: some rule reads its source, here or at another port
   bool holds = false;
   bool wins = false;  // holds, and no earlier one does where conflict="first"
   std::vector<Part> parts;
@@ -88,6 +90,9 @@ class Explainer {
 
   // The ports that the model names, for advice on a name that it does not.
   [[nodiscard]] std::vector<std::string> ports() const;
+
+  // Where T of a source is written; without a file where it is the default, or not known.
+  [[nodiscard]] Location place_of_timeout(const std::string& source) const;
 
  private:
   const RuleSet& rules_;

@@ -185,7 +185,7 @@ void check_application(const Application& application, RuleSet& rules, Diagnosti
   warn_of_unpublished(application, rules, diagnostics);
   for (const Application::Link& link : application.connections) {
     if (selected.count({link.source, link.port}) == 0) {
-      rules.other_connections.push_back({link.source, link.port});
+      rules.other_connections.push_back({link.source, link.port, link.where});
     }
   }
 }

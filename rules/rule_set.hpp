@@ -36,6 +36,7 @@ struct PortRules {
 struct Connection {
   std::string source;
   std::string port;
+  Location where = {};  // in the application file; without a file where it is not known
 };
 
 // What one behaviour asks for, before the rules of several are joined.

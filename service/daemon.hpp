@@ -20,6 +20,7 @@
 #include "service/barriers.hpp"
 #include "service/changes.hpp"
 #include "service/client.hpp"
+#include "service/continuity.hpp"
 #include "service/directory.hpp"
 #include "service/gate.hpp"
 #include "service/history.hpp"
@@ -192,6 +193,7 @@ class Daemon {
   Library library_;
   ModelPointer in_force_;  // null: none, or a predecessor's
   History history_;
+  Continuity continuity_;
   ModelCopy model_copy_;
   Switchboard switchboard_{directory_, registry_};
   Barriers barriers_;

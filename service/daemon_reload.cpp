@@ -173,10 +173,17 @@ void Daemon::begin_swap(Swap& swap) {
 void Daemon::put_in_force() {
   const Swap swap = std::move(*std::exchange(swap_, std::nullopt));
   if (swap.policy) gate_.put_in_force(*swap.policy);
+  const auto last = models_.in_force();
+  const shm::Nanoseconds last_since = models_.in_force_since();
   models_.put_in_force();
   const ModelPointer before = std::exchange(in_force_, swap.to.model);
   if (swap.library) library_ = *swap.library;
   const auto snapshot = models_.in_force();
+  continuity_.change(before == nullptr ? nullptr : &before->compiled, in_force_->compiled,
+                     last_since);
+  if (last.generation != 0) {
+    continuity_.change_timeouts(directory_, last.table, snapshot.table, models_.in_force_since());
+  }
   introduce(switchboard_.link_all(snapshot.table), [] {});  // ports that were opened meanwhile
   switchboard_.unlink(snapshot.table);
   switchboard_.ring_all();

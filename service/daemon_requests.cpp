@@ -326,8 +326,8 @@ void Daemon::send_document(Client& client, std::uint64_t request, shm::MessageKi
 
 void Daemon::send_model(Client& client, std::uint64_t request) {
   auto reply = reply_to(request, shm::MessageKind::kModelReply);
-  const rules::ModelTexts* texts = in_force_ == nullptr ? nullptr : in_force_->compiled.texts.get();
-  client.send(reply, {model_copy_.of(models_, texts).get(), -1});
+  const ModelCopyOf of{models_, library_, in_force_, history_, continuity_};
+  client.send(reply, {model_copy_.of(of).get(), -1});
 }
 
 void Daemon::deactivate(Client& client, const shm::Message& message) {
@@ -344,13 +344,17 @@ void Daemon::deactivate(Client& client, const shm::Message& message) {
   shm::Activity& activity = source->activity();
   const shm::ActivityWord before = activity.word.load(std::memory_order_relaxed);
   const bool was_active = shm::is_active(before, now);
-  activity.write(before, shm::deactivation(now));
-  shm::full_fence();  // (a): as a publisher's own deactivate()
-  switchboard_.ring_concerned(models_.in_force().table, source->id);
+  // What is not active stays as it is: that it ran out, and when, or that it has never arrived.
+  if (was_active) {
+    activity.write(before, shm::deactivation(now));
+    shm::full_fence();  // (a): as a publisher's own deactivate()
+    switchboard_.ring_concerned(models_.in_force().table, source->id);
+  }
   auto reply = reply_to(message.request, shm::MessageKind::kDone);
   reply.value = was_active ? 1 : 0;
   client.send(reply);
-  log::info("{} deactivated {}", client.description(), name);
+  log::info("{} deactivated {}{}", client.description(), name,
+            was_active ? "" : ", which was not active");
 }
 
 void Daemon::refuse(Client& client, std::uint64_t request, const std::string& why) {

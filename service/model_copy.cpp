@@ -3,8 +3,10 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include <nlohmann/json.hpp>
 
@@ -19,16 +21,59 @@ json file_json(const rules::FileText& file) {
   return {{"path", file.path}, {"text", file.content}};
 }
 
-std::string document_of(const Models& models, std::uint64_t generation,
-                        const rules::ModelTexts* texts) {
-  json document = {{"generation", generation},
-                   {"in_force_since_ns", models.in_force_since()},
-                   {"known", texts != nullptr},
-                   {"models", json::array()},
-                   {"application", nullptr}};
-  if (texts != nullptr) {
-    for (const auto& file : texts->models) document["models"].push_back(file_json(file));
-    if (texts->application) document["application"] = file_json(*texts->application);
+json timeout_json(shm::Nanoseconds timeout) {
+  return timeout == shm::kForever ? json("forever") : json(timeout);
+}
+
+json connections_json(const rules::CompiledModel& model) {
+  json ports = json::object();
+  for (const auto& port : model.ports) {
+    json& sources = ports[port.port] = json::array();
+    for (const auto& rule : port.rules) sources.push_back(rule.source);
+  }
+  return ports;
+}
+
+void add_origin(const ModelCopyOf& of, json& document) {
+  const std::string name = of.models.name();
+  const PastModel* latest = of.history.find(of.models.in_force().generation);
+  const bool is_named = !name.empty() && name != kDefaultModel;
+  document["name"] = is_named ? json(name) : json(nullptr);
+  document["how"] = latest == nullptr ? json(nullptr) : json(latest->how);
+  document["by"] = latest == nullptr || latest->by.empty() ? json(nullptr) : json(latest->by);
+  document["in_force_since_ns"] = of.models.in_force_since();
+}
+
+void add_texts(const ModelCopyOf& of, json& document) {
+  const auto* texts = of.model == nullptr ? nullptr : of.model->compiled.texts.get();
+  document["known"] = texts != nullptr;
+  document["directory"] = working_directory();
+  document["models"] = json::array();
+  document["application"] = nullptr;
+  if (texts == nullptr) return;
+  for (const auto& file : texts->models) document["models"].push_back(file_json(file));
+  if (texts->application) document["application"] = file_json(*texts->application);
+}
+
+void add_past(const ModelCopyOf& of, json& document) {
+  document["ports_since_ns"] = json::object();
+  for (const auto& [port, since] : of.continuity.ports()) document["ports_since_ns"][port] = since;
+  document["timeouts_before"] = json::object();
+  for (const auto& [source, past] : of.continuity.timeouts()) {
+    document["timeouts_before"][source] = {{"timeout_ns", timeout_json(past.timeout)},
+                                           {"until_ns", past.until}};
+  }
+}
+
+std::string document_of(const ModelCopyOf& of) {
+  json document = {{"generation", of.models.in_force().generation}, {"others", json::array()}};
+  add_origin(of, document);
+  add_texts(of, document);
+  add_past(of, document);
+  for (const LoadedModel& each : of.library.models()) {
+    if (each.model == of.model) continue;
+    document["others"].push_back(
+        {{"name", each.model->name}, {"ports", connections_json(each.model->compiled)}});
   }
   // Application files may be in Latin-1; JSON may not.
   return document.dump(-1, ' ', false, json::error_handler_t::replace);
@@ -36,10 +81,15 @@ std::string document_of(const Models& models, std::uint64_t generation,
 
 }  // namespace
 
-const shm::FileDescriptor& ModelCopy::of(const Models& models, const rules::ModelTexts* texts) {
-  const std::uint64_t generation = models.in_force().generation;
+std::string working_directory() {
+  std::error_code error;
+  return std::filesystem::current_path(error).string();
+}
+
+const shm::FileDescriptor& ModelCopy::of(const ModelCopyOf& of) {
+  const std::uint64_t generation = of.models.in_force().generation;
   if (generation_ == generation) return readable_;
-  const std::string document = document_of(models, generation, texts);
+  const std::string document = document_of(of);
   const auto file = shm::make_segment("arbiter-model", document.size());
   for (std::size_t at = 0; at < document.size();) {
     const ssize_t count =

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "service/model_copy.hpp"
 #include "shm/clock.hpp"
 #include "shm/decision.hpp"
 
@@ -25,10 +26,20 @@ json client_json(const Client& client) {
   return {{"node", client.name}, {"pid", client.pid()}, {"user", client.user()}};
 }
 
+// What a full queue had no room for is lost already, though its receiver counts it when it takes.
+void count_lost(json& counters) {
+  const auto waiting = counters["waiting"].get<std::uint64_t>();
+  const auto depth = counters["depth"].get<std::uint64_t>();
+  if (depth == 0 || waiting <= depth) return;
+  counters["waiting"] = depth;
+  counters["overtaken"] = counters["overtaken"].get<std::uint64_t>() + (waiting - depth);
+  counters["lost"] = waiting - depth;
+}
+
 // What the publisher's and the receiver's segment say of one connection.
 json connection_counters(const OutputPort* output, const InputPort* input, const Link* link) {
   json counters{{"accepted", 0}, {"discarded", 0}, {"refused", 0}, {"taken", 0},
-                {"dropped", 0},  {"overtaken", 0}, {"waiting", 0}};
+                {"dropped", 0},  {"overtaken", 0}, {"waiting", 0}, {"lost", 0}};
   if (link == nullptr || link->number == 0) return counters;
   const shm::OutputSegment segment(output->mapping.data(), output->layout);
   for (std::uint32_t i = 0; i < shm::kMaxDestinations; ++i) {
@@ -49,6 +60,7 @@ json connection_counters(const OutputPort* output, const InputPort* input, const
       counters["overtaken"] = read(lane.overtaken);
       counters["waiting"] = accepted - std::min(consumed, accepted);
     }
+    count_lost(counters);
   }
   return counters;
 }
@@ -62,6 +74,7 @@ class Document {
     json document;
     document["instance"] = of_.instance;
     document["pid"] = getpid();
+    document["directory"] = working_directory();  // that relative paths are meant from
     document["model"] = model_json();
     document["models"] = json::array();
     for (const LoadedModel& each : of_.library.models()) {
@@ -176,6 +189,7 @@ class Document {
   void add_connections(const InputName& name, const InputPort* input, shm::SourceId winner,
                        json& result) {
     std::set<shm::SourceId> connected;
+    std::uint64_t lost = 0;  // and not counted by the receiver yet
     const auto range = snapshot_.table.connections_to(name.id);
     for (auto index = range.first; index != range.first + range.count; ++index) {
       const shm::SourceId id = snapshot_.table.rule(index).source;
@@ -186,6 +200,8 @@ class Document {
       const OutputPort* output = of_.switchboard.output(source->open);
       const Link* link = link_between(output, input);
       json connection = connection_counters(output, input, link);
+      lost += connection["lost"].get<std::uint64_t>();
+      connection.erase("lost");
       connection["source"] = source->name;
       connection["active"] = is_active(*source);
       connection["winner"] = id == winner && snapshot_.table.is_arbitrated(name.id);
@@ -200,6 +216,7 @@ class Document {
       }
       result["connections"].push_back(std::move(connection));
     }
+    if (input != nullptr) result["overtaken"] = result["overtaken"].get<std::uint64_t>() + lost;
     const auto senses = snapshot_.table.sources_read(name.id);
     for (shm::Word i = 0; i < senses.count; ++i) {
       if (connected.count(senses[i]) != 0 || senses[i] >= of_.directory.sources().size()) continue;

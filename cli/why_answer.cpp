@@ -1,0 +1,313 @@
+#include "cli/why_answer.hpp"
+
+#include <algorithm>
+#include <iostream>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "rules/names.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+using nlohmann::json;
+using rules::ConnectionExplanation;
+
+// Of ports with more connections than this, inactive ones are told of in a line each.
+constexpr std::size_t kMaxTold = 8;
+
+// The sources that an explanation of a connection names as its reasons.
+std::vector<std::string> reasons_of(const ConnectionExplanation& connection) {
+  std::set<std::string> names;
+  for (const auto& part : connection.parts) {
+    for (const auto& cause : part.causes) {
+      for (const auto& literal : cause.because) names.insert(literal.source);
+    }
+  }
+  for (const auto& literal : connection.earlier_because) names.insert(literal.source);
+  names.erase(connection.source);
+  return {names.begin(), names.end()};
+}
+
+void write_obstacles(const std::vector<Obstacle>& obstacles, const std::string& of = {}) {
+  for (const auto& each : obstacles) std::cout << "  ! " << of << each.text << '\n';
+}
+
+// The winner first, then who would like to win.
+int rank(const ConnectionExplanation& connection) {
+  return connection.wins ? 0 : connection.is_active ? 1 : 2;
+}
+
+}  // namespace
+
+WhyAnswer::WhyAnswer(const WhyOptions& options, const LivePort& port, Look look,
+                     rules::PortExplanation explanation, const json& status)
+    : options_(options),
+      port_(port),
+      look_(std::move(look)),
+      explanation_(std::move(explanation)),
+      obstacles_(status, port.name(), look_.sources, port.known_sources(), port.known_ports()),
+      tenure_(rules::tenure_of(look_.snapshot.table, port.id(), look_.winner,
+                               {look_.sources.now(), port.model().since(port.name()),
+                                [this](shm::SourceId source) { return look_.words.at(source); }})),
+      shown_(explanation_.connections) {
+  const auto is_other = [&](const auto& each) { return each.source != options_.source; };
+  if (!options_.source.empty()) std::erase_if(shown_, is_other);
+  for (const auto& each : shown_) {
+    if (!each.is_active || each.wins) continue;
+    for (auto& name : reasons_of(each)) reasons_.push_back(std::move(name));
+  }
+}
+
+bool WhyAnswer::is_sensed(const std::string& source) const {
+  const auto& senses = explanation_.senses;
+  return std::find(senses.begin(), senses.end(), source) != senses.end();
+}
+
+void WhyAnswer::check_source() const {
+  if (options_.source.empty() || !shown_.empty() || is_sensed(options_.source)) return;
+  std::vector<std::string_view> known;
+  for (const auto& each : explanation_.connections) known.push_back(each.source);
+  for (const auto& each : explanation_.senses) known.push_back(each);
+  const ModelInForce& model = port_.model();
+  const auto other = model.other_that_mentions(port_.name(), options_.source);
+  const std::string advice =
+      other ? "; model \"" + *other + "\" has it: arbiter switch " + *other
+            : rules::advise(options_.source, known,
+                            "a behaviour's <config> or a <select> makes a connection");
+  throw Error("there is no connection from " + options_.source + " to " + port_.name() +
+              ", and its rules do not read it, in " + model.text() + ", which is in force" +
+              advice);
+}
+
+bool WhyAnswer::is_only_named(const std::string& source) const {
+  return options_.source.empty() && !options_.all && obstacles_.was_never_started(source) &&
+         std::find(reasons_.begin(), reasons_.end(), source) == reasons_.end();
+}
+
+bool WhyAnswer::is_short(const ConnectionExplanation& connection) const {
+  return options_.source.empty() && !options_.all && shown_.size() > kMaxTold &&
+         connection.has_rule && !connection.is_active;
+}
+
+void WhyAnswer::write_text() const {
+  write_port();
+  auto sorted = shown_;
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const auto& a, const auto& b) { return rank(a) < rank(b); });
+  for (const auto& each : sorted) {
+    if (!each.has_rule || !is_only_named(each.source)) write_connection(each);
+  }
+  if (is_sensed(options_.source)) write_sensed(options_.source);
+  if (!options_.source.empty()) return;
+  for (const auto& source : explanation_.senses) {
+    if (!is_only_named(source)) write_sensed(source);
+  }
+  write_only_named();
+}
+
+void WhyAnswer::write_only_named() const {
+  std::vector<std::string> names;
+  for (const auto& each : shown_) {
+    if (each.has_rule) names.push_back(each.source);
+  }
+  names.insert(names.end(), explanation_.senses.begin(), explanation_.senses.end());
+  std::erase_if(names, [this](const std::string& source) { return !is_only_named(source); });
+  if (names.empty()) return;
+  std::cout << "\nNever started, nobody has them open: " << rules::enumerate(names)
+            << (names.size() > rules::kMaxNamesInWords ? " (--all shows all)" : "") << '\n';
+}
+
+void WhyAnswer::write_port() const {
+  const ModelInForce& model = port_.model();
+  std::cout << port_.name();
+  if (model.is_none()) {
+    std::cout << ": no model is in force, so that no connection leads to it\n";
+  } else if (!look_.is_mentioned) {
+    std::cout << ": the model in force does not mention it, so that no connection leads to it\n";
+  } else if (!look_.is_arbitrated) {
+    std::cout << ": not arbitrated, for no rule mentions it; all that its connections bring is "
+                 "delivered\n";
+  } else {
+    std::cout << ": "
+              << (explanation_.winner ? *explanation_.winner + " wins"
+                                      : std::string("idle, nobody wins"))
+              << since_text();
+    if (explanation_.winner) {
+      const std::string why = obstacles_.why_nothing_comes_of(*explanation_.winner);
+      if (!why.empty()) std::cout << "; but nothing of it reaches the port: " << why;
+    }
+    std::cout << '\n';
+  }
+  write_model();
+  write_obstacles(obstacles_.of_port());
+  if (!look_.is_settled) {
+    std::cout << "  ! sources change faster than they can be looked at: this may be of several "
+                 "moments\n";
+  }
+  if (look_.is_arbitrated && !model.has_texts()) {
+    std::cout << "  ! the daemon has this model from its predecessor, and knows its decisions, but "
+                 "not whose behaviours they come from (started without --model)\n";
+  }
+}
+
+void WhyAnswer::write_model() const {
+  const ModelInForce& model = port_.model();
+  if (!model.is_none()) {
+    std::cout << "  by " << model.text() << model.origin_text(look_.sources.now()) << '\n';
+  }
+  for (const auto& file : model.changed_files()) {
+    std::cout << "  ! " << file << " has changed since; arbiter reload puts it in force\n";
+  }
+  if (look_.is_mentioned) return;
+  if (const auto other = model.other_that_mentions(port_.name())) {
+    std::cout << "  ! model \"" << *other << "\" mentions it: arbiter switch " << *other << '\n';
+  }
+}
+
+std::string WhyAnswer::since_text() const {
+  const shm::Nanoseconds now = look_.sources.now();
+  const ModelInForce& model = port_.model();
+  if (tenure_.is_exact()) {
+    return ", since " + span_text(now - tenure_.at_least) +
+           " ago: " + events_text(port_, tenure_.changed, look_);
+  }
+  const shm::Nanoseconds decided_since = model.since(port_.name());
+  if (tenure_.at_least != 0 && tenure_.at_least == decided_since) {
+    const std::string span = span_text(now - decided_since) + " ago";
+    return decided_since == model.since()
+               ? ", since model " + std::to_string(model.generation()) + " came into force " + span
+               : ", since a model came into force " + span +
+                     " that decides here as the one in force does";
+  }
+  std::string text;
+  if (tenure_.at_least != 0) text += ", for at least " + span_text(now - tenure_.at_least);
+  if (tenure_.not_before) {
+    text += text.empty() ? ", for " : " and ";
+    text += "at most " + span_text(now - *tenure_.not_before) + " (not before " +
+            events_text(port_, tenure_.changed, look_) + ')';
+  } else if (tenure_.at_least == 0) {
+    text += ": nothing has ever happened here";
+  }
+  return text;
+}
+
+json WhyAnswer::since_json() const {
+  json changed = json::array();
+  for (const shm::SourceId source : tenure_.changed) {
+    const std::string name = port_.source_name(source);
+    changed.push_back(event_json(name, look_.sources.state(name), look_.sources.now()));
+  }
+  return {{"exact", tenure_.is_exact()},
+          {"at_least_ns", tenure_.at_least},
+          {"not_before_ns", tenure_.not_before ? json(*tenure_.not_before) : json(nullptr)},
+          {"changed", std::move(changed)}};
+}
+
+std::string WhyAnswer::state_text(const std::string& source) const {
+  std::string text = look_.sources.describe(source);
+  const std::string component = obstacles_.component_of(source);
+  if (component.empty()) return text;
+  text += "; component " + component + " has it open";
+  return text + (look_.sources.is_active(source) ? "" : ", and is silent");
+}
+
+void WhyAnswer::write_connection(const ConnectionExplanation& connection) const {
+  std::cout << '\n' << connection.source;
+  if (!look_.is_arbitrated) {
+    std::cout << " is delivered\n  it is " << state_text(connection.source) << '\n';
+  } else if (connection.wins) {
+    std::cout << " wins\n  " << state_text(connection.source) << '\n';
+    write_selected(connection);
+  } else {
+    write_kept_out(connection);
+  }
+  write_obstacles(obstacles_.of_connection(connection.source));
+  if (!options_.source.empty()) write_reasons(connection);
+}
+
+void WhyAnswer::write_selected(const ConnectionExplanation& connection) const {
+  for (const auto& part : connection.parts) {
+    if (!part.causes.empty()) continue;
+    std::cout << "  selected by "
+              << (part.behaviour ? describe(*part.behaviour) : std::string("its rule"));
+    if (!part.where.file.empty()) {
+      std::cout << " (" << part.where.file << ':' << part.where.line << ')';
+    }
+    std::cout << '\n';
+  }
+}
+
+void WhyAnswer::write_kept_out(const ConnectionExplanation& connection) const {
+  std::cout << " is kept out\n";
+  if (connection.has_rule && !connection.is_active) {
+    std::cout << "  " << state_text(connection.source) << '\n';
+  }
+  if (!is_short(connection)) {
+    write_causes(std::cout, connection, look_.sources);
+    if (!connection.has_rule) std::cout << "  " << state_text(connection.source) << '\n';
+    return;
+  }
+  const auto has_cause = [](const auto& part) { return !part.causes.empty(); };
+  if (std::all_of(connection.parts.begin(), connection.parts.end(), has_cause)) {
+    std::cout << "  and by the rules: arbiter why " << port_.name() << ' ' << connection.source
+              << '\n';
+  }
+}
+
+// Where only one connection is told of, what there is to say of the sources that keep it out.
+void WhyAnswer::write_reasons(const ConnectionExplanation& connection) const {
+  if (connection.wins) return;
+  for (const auto& source : reasons_of(connection)) {
+    write_obstacles(obstacles_.of_source(source), source + ": ");
+  }
+}
+
+void WhyAnswer::write_sensed(const std::string& source) const {
+  std::cout << '\n'
+            << source << " is sensed: the rules read it, but it has no connection here\n  "
+            << state_text(source) << '\n';
+  write_obstacles(obstacles_.of_source(source));
+}
+
+json WhyAnswer::component_json(const std::string& source) const {
+  const std::string component = obstacles_.component_of(source);
+  return component.empty() ? json(nullptr) : json(component);
+}
+
+void WhyAnswer::write_json() const {
+  json document = {{"port", port_.name()},
+                   {"at_ns", look_.sources.now()},
+                   {"settled", look_.is_settled},
+                   {"model", port_.model().to_json()},
+                   {"arbitrated", look_.is_arbitrated},
+                   {"mentioned", look_.is_mentioned},
+                   {"winner", explanation_.winner ? json(*explanation_.winner) : json(nullptr)},
+                   {"nothing_comes_of_it", nullptr},
+                   {"since", nullptr},
+                   {"obstacles", to_json(obstacles_.of_port())},
+                   {"connections", json::array()},
+                   {"senses", json::array()}};
+  if (look_.is_arbitrated) document["since"] = since_json();
+  if (explanation_.winner) {
+    const std::string why = obstacles_.why_nothing_comes_of(*explanation_.winner);
+    if (!why.empty()) document["nothing_comes_of_it"] = why;
+  }
+  for (const auto& each : shown_) {
+    json connection = connection_json(each, look_.sources);
+    connection["component"] = component_json(each.source);
+    connection["obstacles"] = to_json(obstacles_.of_connection(each.source));
+    document["connections"].push_back(std::move(connection));
+  }
+  for (const auto& source : explanation_.senses) {
+    if (!options_.source.empty() && source != options_.source) continue;
+    json sensed = look_.sources.to_json(source);
+    sensed["component"] = component_json(source);
+    sensed["obstacles"] = to_json(obstacles_.of_source(source));
+    document["senses"].push_back(std::move(sensed));
+  }
+  std::cout << document.dump(2, ' ', false, json::error_handler_t::replace) << '\n';
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,57 @@
+// The answer of `arbiter why`: of one port, at one moment.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/live_port.hpp"
+#include "cli/obstacles.hpp"
+#include "cli/why_follow.hpp"
+#include "rules/explain.hpp"
+#include "rules/tenure.hpp"
+
+namespace arbiter::cli {
+
+class WhyAnswer {
+ public:
+  // Keeps references.
+  WhyAnswer(const WhyOptions& options, const LivePort& port, Look look,
+            rules::PortExplanation explanation, const nlohmann::json& status);
+
+  // Throws Error where the source is none of this port's.
+  void check_source() const;
+  void write_text() const;
+  void write_json() const;
+
+ private:
+  [[nodiscard]] bool is_sensed(const std::string& source) const;
+  // Of those that nobody has ever started, and that keep nobody out, the names are enough.
+  [[nodiscard]] bool is_only_named(const std::string& source) const;
+  [[nodiscard]] bool is_short(const rules::ConnectionExplanation& connection) const;
+  void write_port() const;
+  void write_model() const;
+  [[nodiscard]] std::string since_text() const;
+  [[nodiscard]] nlohmann::json since_json() const;
+  void write_connection(const rules::ConnectionExplanation& connection) const;
+  void write_selected(const rules::ConnectionExplanation& connection) const;
+  void write_kept_out(const rules::ConnectionExplanation& connection) const;
+  void write_reasons(const rules::ConnectionExplanation& connection) const;
+  void write_sensed(const std::string& source) const;
+  void write_only_named() const;
+  [[nodiscard]] nlohmann::json component_json(const std::string& source) const;
+  // "active (arrived …)", and who has it open.
+  [[nodiscard]] std::string state_text(const std::string& source) const;
+
+  const WhyOptions& options_;
+  const LivePort& port_;
+  const Look look_;
+  const rules::PortExplanation explanation_;
+  const Obstacles obstacles_;
+  const rules::Tenure tenure_;
+  std::vector<rules::ConnectionExplanation> shown_;  // as the model has them
+  std::vector<std::string> reasons_;                 // sources that keep active connections out
+};
+
+}  // namespace arbiter::cli

@@ -1,0 +1,191 @@
+// arbiter why, of names that models and components have differently, and of who has what open.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/cli/why_program.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using nlohmann::json;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+const std::string kModel = R"(<behaviors timeout="forever">
+<behavior name="Wander"><config at="/base">/wander</config></behavior>
+<behavior name="Follow"><config at="/base">/follow</config>
+  <condition>/deadmann</condition><inhibition>Wander</inhibition></behavior>
+</behaviors>)";
+
+const char* const kMeant = "which the model does not mention; is that the one meant?";
+
+std::string pid() { return std::to_string(::getpid()); }
+
+json sensed(const json& answer, const std::string& source) {
+  for (const auto& each : answer.at("senses")) {
+    if (each.at("source") == source) return each;
+  }
+  return nullptr;
+}
+
+TEST(WhyNames, TellsOfASourceThatIsOnlySensedWhatItWouldOfAConnection) {
+  Daemon daemon(kModel);
+  EXPECT_THAT(codes(sensed(why_json({"/base"}), "/deadmann")["obstacles"]),
+              ElementsAre("output-not-open"));
+  Node node("test");
+  auto follow = node.output_port<int>("/follow");
+  auto deadman = node.output_port<int>("/deadman");
+  follow.signal();
+  const auto near = "! component test (pid " + pid() + ") has /deadman open, " + kMeant;
+  EXPECT_THAT(why({"/base"}), HasSubstr(near));
+  EXPECT_THAT(why({"/base", "/follow"}),
+              HasSubstr("! /deadmann: component test (pid " + pid() + ") has /deadman open"));
+  EXPECT_THAT(codes(sensed(why_json({"/base"}), "/deadmann")["obstacles"]),
+              ElementsAre("output-not-open", "near-name"));
+  auto meant = node.output_port<int>("/deadmann");
+  EXPECT_THAT(why({"/base", "/deadmann"}),
+              AllOf(HasSubstr("component test (pid " + pid() + ") has it open, and is silent"),
+                    Not(HasSubstr("  ! /"))));
+}
+
+TEST(WhyNames, TellsOfPortsUnderANearName) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto in = node.input_port<int>("/bas");
+  auto out = node.output_port<int>("/wandr");
+  EXPECT_THAT(why({"/base"}), HasSubstr("component test (pid " + pid() + ") has /bas open, "));
+  EXPECT_THAT(why({"/bas"}), HasSubstr("! the model mentions /base; is that the one meant?"));
+  EXPECT_THAT(codes(connection(why_json({"/base"}), "/wander")["obstacles"]),
+              ElementsAre("output-not-open", "near-name"));
+  // What the model mentions is meant as it is.
+  auto named = node.output_port<int>("/follow");
+  EXPECT_THAT(why({"/base", "/wander"}), Not(HasSubstr("/follow open")));
+}
+
+TEST(WhyNames, TellsHowToEndALatchWhoseProcessIsGoneAndElseWhoHoldsIt) {
+  Daemon daemon(R"(<behaviors timeout="forever"><arbiter at="/base">
+<select from="/drive">not /stop</select></arbiter></behaviors>)");
+  Node node("test");
+  auto drive = node.output_port<int>("/drive");
+  drive.signal();
+  {
+    auto stop = node.output_port<int>("/stop");
+    stop.signal();
+    EXPECT_THAT(why({"/base"}), AllOf(HasSubstr("component test (pid " + pid() + ") has it open"),
+                                      Not(HasSubstr("arbiter deactivate"))));
+  }
+  EXPECT_THAT(why({"/base"}), AllOf(HasSubstr("arbiter deactivate /stop ends it"),
+                                    Not(HasSubstr("never started"))));
+  EXPECT_THAT(why({"/base", "/drive"}), HasSubstr("! /stop: T is forever"));
+  EXPECT_EQ(arbiter({"deactivate", "/stop"}).exit_code, 0);
+  EXPECT_THAT(why({"/base"}), HasSubstr("/drive wins"));
+}
+
+TEST(WhyNames, DeactivationOfWhatIsNotActiveLeavesItsRecord) {
+  Daemon daemon(R"(<behaviors timeout="1ms"><arbiter at="/base">
+<select from="/a">not /b</select><select from="/b"/></arbiter></behaviors>)");
+  {
+    Node node("test");
+    auto a = node.output_port<int>("/a");
+    auto b = node.output_port<int>("/b");
+    a.signal();
+    while (daemon.source("/a")["active"] == true) {
+    }
+  }
+  const json before = connection(why_json({"/base"}), "/a")["last_arrival_ns"];
+  EXPECT_NE(before, nullptr);
+  for (const char* source : {"/a", "/b"}) {
+    EXPECT_THAT(arbiter({"deactivate", source}).out, HasSubstr("was not active"));
+  }
+  EXPECT_EQ(connection(why_json({"/base"}), "/a")["last_arrival_ns"], before);
+  EXPECT_THAT(why({"/base", "/b"}), HasSubstr("it has never arrived"));
+}
+
+TEST(WhyNames, SaysOnTheFirstLineThatNothingOfTheWinnerArrives) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto wander = node.output_port<int>("/wander");
+  wander.signal();
+  const auto first_line = [] {
+    const std::string text = why({"/base"});
+    return text.substr(0, text.find('\n'));
+  };
+  const std::string nothing = "; but nothing of it reaches the port: ";
+  EXPECT_THAT(first_line(), HasSubstr(nothing + "no component has it open"));
+  {
+    auto in = node.input_port<double>("/base");
+    EXPECT_THAT(first_line(), HasSubstr(nothing + "the two ports do not fit"));
+  }
+  auto in = node.input_port<int>("/base");
+  EXPECT_THAT(first_line(), HasSubstr(nothing + "test (pid " + pid() + ") only signals"));
+  wander.publish(1);
+  EXPECT_THAT(first_line(), Not(HasSubstr(nothing)));
+  EXPECT_EQ(why_json({"/base"})["nothing_comes_of_it"], nullptr);
+}
+
+TEST(WhyNames, TellsWhereTheApplicationHasAConnectionWithoutARuleAndWhoReadsIt) {
+  Daemon daemon(kModel, {.application = R"(<application>
+<connection><from>/wander</from><to>/base</to></connection>
+<connection><from>/follow</from><to>/base</to></connection>
+<connection><from>/deadmann</from><to>/base</to></connection>
+<connection><from>/other</from><to>/base</to></connection></application>)"});
+  const std::string file = daemon.directory() + "/application.xml:";
+  EXPECT_THAT(why({"/base", "/other"}),
+              AllOf(HasSubstr("never delivers here (" + file + "5)"), HasSubstr("nor does any")));
+  EXPECT_THAT(why({"/base", "/deadmann"}),
+              AllOf(HasSubstr("(" + file + "4)"), HasSubstr("counts for the rules that read it"),
+                    HasSubstr("inactive (it has never arrived)")));
+  EXPECT_EQ(connection(why_json({"/base"}), "/other")["where"]["line"], 5);
+}
+
+TEST(WhyNames, TellsWhoWouldLikeToWinFirstAndOnlyNamesWhoWasNeverStarted) {
+  std::string rules;
+  for (int i = 0; i < 12; ++i) {
+    const std::string name = "/s" + std::to_string(100 + i);
+    rules += "<select from='" + name + "'>/go</select>";
+  }
+  Daemon daemon("<behaviors timeout='forever'><arbiter at='/base' conflict='first'>" + rules +
+                "</arbiter></behaviors>");
+  Node node("test");
+  auto ended = node.output_port<int>("/s100");
+  auto active = node.output_port<int>("/s111");
+  ended.signal();
+  ended.deactivate();
+  active.signal();
+  const std::string text = why({"/base"});
+  EXPECT_LT(text.find("\n/s111 is kept out"), text.find("\n/s100 is kept out"));
+  EXPECT_THAT(text, AllOf(HasSubstr("and by the rules: arbiter why /base /s100"),
+                          HasSubstr("Never started, nobody has them open: /s101, /s102"),
+                          HasSubstr("\n/go is sensed"), Not(HasSubstr("\n/s101"))));
+  EXPECT_THAT(why({"/base", "--all"}),
+              AllOf(HasSubstr("\n/s101 is kept out"), Not(HasSubstr("Never started"))));
+  EXPECT_THAT(why({"/base", "/s101"}), HasSubstr("\n/s101 is kept out"));
+  EXPECT_EQ(why_json({"/base"})["connections"].size(), 12u);
+}
+
+TEST(WhyNames, CountsAsWaitingNoMoreThanThereIsRoomFor) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto wander = node.output_port<int>("/wander");
+  auto in = node.input_port<int>("/base", {.depth = 2});
+  for (int i = 0; i < 5; ++i) wander.publish(i);
+  const json before = daemon.connection("/wander", "/base");
+  EXPECT_EQ(before["waiting"], 2);
+  EXPECT_EQ(before["overtaken"], 3);
+  EXPECT_EQ(daemon.input("/base")["overtaken"], 3);
+  EXPECT_TRUE(in.take());
+  const json after = daemon.connection("/wander", "/base");
+  EXPECT_EQ(after["waiting"], 1);
+  EXPECT_EQ(after["overtaken"], 3);
+  EXPECT_EQ(daemon.input("/base")["overtaken"], 3);
+}
+
+}  // namespace
+}  // namespace arbiter::test
