@@ -63,7 +63,7 @@ class Follower {
       return;
     }
     std::cout << seconds_text(last_.sources.now() - started_) << "  " << port_.name() << ": "
-              << name_of(last_) << " (" << port_.model().text() << ')' << std::endl;
+              << name_of(last_) << ", by " << port_.model().text() << std::endl;
   }
 
   static void write_line(const json& line) {

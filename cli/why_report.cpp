@@ -150,6 +150,7 @@ json Sources::to_json(const std::string& name) const {
       {"source", name},
       {"active", is_active(name)},
       {"timeout_ns", source.timeout == shm::kForever ? json("forever") : json(source.timeout)},
+      {"timeout_from", source.timeout_place.empty() ? json(nullptr) : json(source.timeout_place)},
       {"last_arrival_ns", nullptr},
       {"deactivated_ns", nullptr},
       {"ends_ns", nullptr}};

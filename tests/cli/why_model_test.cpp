@@ -148,6 +148,7 @@ TEST(WhyModel, TellsWhereTComesFrom) {
   b.signal();
   EXPECT_THAT(why({"/arm"}), HasSubstr("T forever by " + daemon.directory() + "/model.xml:2)"));
   EXPECT_THAT(why({"/leg"}), HasSubstr("T 500ms by default)"));
+  EXPECT_EQ(connection(why_json({"/leg"}), "/b")["timeout_from"], "default");
 }
 
 }  // namespace

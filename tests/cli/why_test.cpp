@@ -365,7 +365,7 @@ TEST(Why, FollowsOnWhileNoDaemonRunsAndExplainsByTheModelThatDecides) {
   auto random = node.output_port<int>("/random");
   auto face = node.output_port<int>("/face");
   Followed followed({"/gaze", "--follow"});
-  EXPECT_THAT(followed.line(), HasSubstr("  /gaze: idle"));
+  EXPECT_THAT(followed.line(), HasSubstr("  /gaze: idle, by model 1 ("));
   daemon.kill();
   random.signal();
   EXPECT_THAT(followed.line(), HasSubstr("  idle -> /random  because"));
@@ -374,6 +374,11 @@ TEST(Why, FollowsOnWhileNoDaemonRunsAndExplainsByTheModelThatDecides) {
   daemon.restart();  // takes over what is open, and puts its own model in force
   face.deactivate();
   EXPECT_THAT(followed.line(), HasSubstr("  /face -> /random  because"));
+  daemon.load(kNoRules);
+  EXPECT_THAT(followed.line(), AllOf(HasSubstr("  /random -> not arbitrated  because model "),
+                                     HasSubstr(" (" + daemon.directory() +
+                                               "/model.xml) came into "
+                                               "force (reload, by ")));
 }
 
 }  // namespace
