@@ -181,5 +181,38 @@ TEST_F(Explained, AConnectionThatNoRuleSelectsSaysSo) {
   EXPECT_THAT(explainer.ports(), ElementsAre("/free", "/p"));
 }
 
+TEST_F(Explained, AConnectionThatNoRuleSelectsHasAPlaceAndPerhapsAReader) {
+  const auto loaded = load_with_application(
+      R"(<behaviors><arbiter at="/p"><select from="/low"/></arbiter>
+<arbiter at="/q"><select from="/low">not /read</select></arbiter></behaviors>)",
+      R"(<application><connection><from>/low</from><to>/p</to></connection>
+<connection><from>/low</from><to>/q</to></connection>
+<connection><from>/read</from><to>/p</to></connection>
+<connection><from>/other</from><to>/p</to></connection></application>)");
+  const auto port = Explainer(loaded.rules).explain("/p", [](const std::string&) { return false; });
+  ASSERT_EQ(port.connections.size(), 3u);
+  EXPECT_TRUE(port.connections[1].is_read) << "at /q";
+  EXPECT_EQ(port.connections[1].where.line, 3u);
+  EXPECT_FALSE(port.connections[2].is_read);
+  EXPECT_EQ(port.connections[2].where.line, 4u);
+}
+
+TEST_F(Explained, ATimeoutHasThePlaceWhereItIsWrittenAndTheDefaultHasNone) {
+  const auto line = [](const Loaded& loaded, const std::string& source) {
+    const Location where = Explainer(loaded.rules).place_of_timeout(source);
+    return where.file.empty() ? 0u : where.line;
+  };
+  const std::string rest = R"(
+<source port="/own" timeout="1s"/><source port="/declared"/>
+<arbiter at="/p"><select from="/own"/></arbiter></behaviors>)";
+  const auto all = load_text("<behaviors timeout='2s'>" + rest);
+  EXPECT_EQ(line(all, "/own"), 2u);
+  EXPECT_EQ(line(all, "/declared"), 1u);
+  EXPECT_EQ(line(all, "/other"), 1u);
+  const auto own = load_text("<behaviors>" + rest);
+  EXPECT_EQ(line(own, "/own"), 2u);
+  EXPECT_EQ(line(own, "/declared"), 0u);
+}
+
 }  // namespace
 }  // namespace arbiter::rules
