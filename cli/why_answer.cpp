@@ -210,7 +210,9 @@ std::string WhyAnswer::state_text(const std::string& source) const {
   const std::string component = obstacles_.component_of(source);
   if (component.empty()) return text;
   text += "; component " + component + " has it open";
-  return text + (look_.sources.is_active(source) ? "" : ", and is silent");
+  if (look_.sources.is_active(source)) return text;
+  const bool has_arrived = look_.sources.state(source).word != shm::kNeverActive;
+  return text + ", and has sent nothing " + (has_arrived ? "since" : "yet");
 }
 
 void WhyAnswer::write_connection(const ConnectionExplanation& connection) const {
