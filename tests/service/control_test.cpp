@@ -1,8 +1,10 @@
-// arbiter reload, arbiter stop, and daemons that get a policy that they cannot use.
+// arbiter reload, arbiter stop, and daemons that get files that they cannot use.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/stat.h>
+
+#include <filesystem>
 
 #include <arbiter/arbiter.hpp>
 
@@ -65,6 +67,27 @@ TEST(Control, ReloadReadsAPolicyWhereThereIsNoModel) {
   files.write("policy", "allow everyone input *\n");
   EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
   auto in = node.input_port<int>("/in");
+}
+
+// Nobody writes to it: a daemon that opened it would not even end when it is told to.
+TEST(Control, AFifoInPlaceOfAFileIsRefusedAndHoldsNobodyUp) {
+  const TemporaryDirectory files;
+  const auto application = files.write(
+      "application.xml",
+      "<application><connection><from>/a</from><to>/in</to></connection></application>");
+  const auto policy = files.write("policy", "allow everyone all\n");
+  Daemon daemon(model_from("/a"),
+                {.arguments = {"--application", application, "--policy", policy}});
+  for (const std::string& path : {daemon.directory() + "/model.xml", application, policy}) {
+    std::filesystem::rename(path, path + ".good");
+    ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+    const auto result = arbiter({"reload"});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, HasSubstr("cannot read " + path + ": it is not a regular file"));
+    std::filesystem::rename(path + ".good", path);
+  }
+  EXPECT_EQ(daemon.generation(), 1u);
+  EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
 }
 
 // Each is told of a reading that began after it asked.
@@ -140,7 +163,7 @@ TEST(Control, ADaemonDoesNotStartWithAPolicyThatItCannotUse) {
       {files.write("empty", ""), "empty:1:1: the policy has no line"},
       {files.path() + "/none", "cannot open " + files.path() + "/none: No such file"},
       {files.path(), "cannot read " + files.path() + ": Is a directory"},
-      {"/dev/zero", "/dev/zero:1:1: the file is larger than the limit of 16 MiB"},
+      {"/dev/zero", "cannot read /dev/zero: it is not a regular file but a device"},
       {writable, "every user may write the policy " + writable + "; run: chmod o-w "}};
   for (const auto& [path, message] : unusable) {
     const auto result =
