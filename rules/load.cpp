@@ -118,8 +118,8 @@ ModelTexts read_texts(const ModelFiles& files, Accept accept) {
   return texts;
 }
 
-LoadedModel load_all(const ModelFiles& files, Diagnostics& diagnostics) {
-  return load_all(read_texts(files), diagnostics, nullptr);
+LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics) {
+  return load_all(texts, diagnostics, nullptr);
 }
 
 RuleSet load(ModelTexts texts, Diagnostics& diagnostics, Keep keep) {

@@ -41,6 +41,6 @@ struct LoadedModel {
   std::optional<Application> application;  // given, or a model's file is one itself
   RuleSet rules;
 };
-LoadedModel load_all(const ModelFiles& files, Diagnostics& diagnostics);
+LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics);
 
 }  // namespace arbiter::rules
