@@ -1,17 +1,70 @@
 // arbiter: the tool on the command line.
+#include <algorithm>
 #include <csignal>
 #include <exception>
 #include <iostream>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/verbs.hpp"
 #include "rules/load.hpp"
+#include "rules/names.hpp"
+#include "rules/utf8.hpp"
 
 namespace {
 
 constexpr int kFailed = 1;
 constexpr int kWrongUse = 2;
+
+// What was typed may hold anything; on a terminal, control characters would be obeyed.
+std::string printable(std::string_view text) {
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string result;
+  while (!text.empty()) {
+    const auto character = arbiter::rules::decode_utf8(text);
+    const auto byte = static_cast<unsigned char>(text.front());
+    if (character.length == 0 ||
+        (arbiter::rules::is_control(character.code) && byte != '\n' && byte != '\t')) {
+      const std::size_t length = std::max<std::size_t>(character.length, 1);
+      for (const char each : text.substr(0, length)) {
+        const auto value = static_cast<unsigned char>(each);
+        result += {'\\', 'x', kDigits[value >> 4], kDigits[value & 15]};
+      }
+      text.remove_prefix(length);
+      continue;
+    }
+    result += text.substr(0, character.length);
+    text.remove_prefix(character.length);
+  }
+  return result;
+}
+
+void say(const std::string& what) { std::cerr << "arbiter: " << printable(what) << '\n'; }
+
+// CLI11 would say that a verb is missing.
+bool knows_verb(const CLI::App& app, const std::string& word) {
+  if (word.empty() || word.front() == '-') return true;
+  std::vector<std::string> names;
+  for (const CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; })) {
+    names.push_back(verb->get_name());
+  }
+  if (std::find(names.begin(), names.end(), word) != names.end()) return true;
+  // Of a short word an edit is much; letters in the wrong order are one slip all the same.
+  std::string meant = word;
+  for (std::size_t i = 0; i + 1 < word.size(); ++i) {
+    std::string swapped = word;
+    std::swap(swapped[i], swapped[i + 1]);
+    if (std::find(names.begin(), names.end(), swapped) != names.end()) meant = swapped;
+  }
+  const std::vector<std::string_view> known(names.begin(), names.end());
+  say("there is no verb " + arbiter::rules::quote(word) +
+      arbiter::rules::advise(meant, known, "`arbiter --help` lists them"));
+  return false;
+}
 
 int run(int argc, char** argv) {
   CLI::App app("Port arbitration for robot components: at most one connection of a port wins.",
@@ -36,12 +89,16 @@ int run(int argc, char** argv) {
   arbiter::cli::add_rollback(app, exit_code);
   arbiter::cli::add_history(app, exit_code);
   arbiter::cli::add_stop(app, exit_code);
+  app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
+    return printable(CLI::FailureMessage::simple(failed, error));
+  });
+  if (argc > 1 && !knows_verb(app, argv[1])) return kWrongUse;
   try {
     app.parse(argc, argv);  // runs the verb
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kWrongUse;  // --help and --version come this way as well
   } catch (const arbiter::rules::FileError& error) {
-    std::cerr << "arbiter: " << error.what() << '\n';
+    say(error.what());
     return kWrongUse;
   }
   return exit_code;
@@ -56,7 +113,7 @@ int main(int argc, char** argv) {
   try {
     exit_code = run(argc, argv);
   } catch (const std::exception& error) {
-    std::cerr << "arbiter: " << error.what() << '\n';
+    say(error.what());
   }
   if (!std::cout.flush()) {
     std::cerr << "arbiter: cannot write to standard output\n";

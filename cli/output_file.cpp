@@ -1,5 +1,6 @@
 #include "cli/output_file.hpp"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -26,6 +27,22 @@ void write_to(const std::string& path, const std::string& content) {
 }
 
 }  // namespace
+
+void require_no_input(const std::string& output, const rules::ModelTexts& inputs) {
+  struct stat written {};
+  // A terminal may well be read and written.
+  if (stat(output.c_str(), &written) != 0 || !S_ISREG(written.st_mode)) return;
+  const auto require_other = [&](const std::string& input) {
+    struct stat read {};
+    if (stat(input.c_str(), &read) != 0) return;
+    if (read.st_dev != written.st_dev || read.st_ino != written.st_ino) return;
+    throw rules::FileError("--output " + output + " would overwrite " +
+                           (input == output ? "the input" : input + ", an input") +
+                           "; nothing was written: give another file");
+  };
+  for (const rules::FileText& input : inputs.models) require_other(input.path);
+  if (inputs.application) require_other(inputs.application->path);
+}
 
 void write_output(const std::string& path, const std::string& content) {
   namespace fs = std::filesystem;

@@ -3,7 +3,12 @@
 
 #include <string>
 
+#include "rules/model_texts.hpp"
+
 namespace arbiter::cli {
+
+// Throws rules::FileError where `output` is one of the files that were read, under whatever name.
+void require_no_input(const std::string& output, const rules::ModelTexts& inputs);
 
 // Whoever reads the file sees the old content or the new one, never a part. What is no regular file
 // is written as it is. Throws rules::FileError.

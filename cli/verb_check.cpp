@@ -1,7 +1,9 @@
 // arbiter check: what loading a model would say of it, and what else can be proved about it.
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -9,6 +11,7 @@
 #include "cli/model_files.hpp"
 #include "cli/verbs.hpp"
 #include "rules/findings.hpp"
+#include "rules/names.hpp"
 #include "rules/report.hpp"
 #include "rules/verdict.hpp"
 
@@ -25,6 +28,35 @@ struct CheckOptions {
 struct Statements {
   std::size_t proved = 0, refuted = 0, open = 0;
 };
+
+// Of the warnings and notes that reading, compiling and proving a model can bring.
+const std::vector<std::string_view> kSilenceable{"duplicate-config",
+                                                 "duplicate-connection",
+                                                 "inhibition-across-ports",
+                                                 "left-open",
+                                                 "matches-nothing",
+                                                 "more-conflicts",
+                                                 "never-published",
+                                                 "never-runs",
+                                                 "never-selected",
+                                                 "never-wins",
+                                                 "no-children",
+                                                 "no-config",
+                                                 "no-rule-at-port",
+                                                 "nobody-wins",
+                                                 "not-checked",
+                                                 "proved",
+                                                 "starved",
+                                                 "unreachable-children"};
+
+std::string problem_of_code(std::string& code) {
+  if (code == "both-can-win" || code == "refuted") return "";  // known, but errors: they stay
+  if (std::find(kSilenceable.begin(), kSilenceable.end(), code) != kSilenceable.end()) return "";
+  std::string all;
+  for (const auto& each : kSilenceable) all += (all.empty() ? "" : ", ") + std::string(each);
+  return "no warning and no note has the code " + rules::quote(code) +
+         rules::advise(code, kSilenceable, "errors stay") + " These are: " + all;
+}
 
 std::string counted(std::size_t count, const std::string& thing) {
   return std::to_string(count) + ' ' + thing + (count == 1 ? "" : "s");
@@ -102,7 +134,8 @@ void add_check(CLI::App& app, int& exit_code) {
                    "Say nothing of warnings and notes of this code, such as nobody-wins")
       ->type_name("CODE")
       ->delimiter(',')
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->check(CLI::Validator(problem_of_code, ""));
   verb->add_flag("--json", options->json, "Write what is found as JSON, to standard output");
   verb->footer(
       "Example:\n"

@@ -5,10 +5,8 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include <CLI/CLI.hpp>
 
@@ -17,7 +15,6 @@
 #include "cli/verbs.hpp"
 #include "rules/application_writer.hpp"
 #include "rules/report.hpp"
-#include "rules/text_file.hpp"
 #include "rules/xml.hpp"
 #include "shm/file_descriptor.hpp"
 
@@ -29,23 +26,24 @@ struct CompileOptions {
   std::string output;
 };
 
-// The application given; else the one that the model is in already; else one made of the model.
-std::string merge(const rules::ModelFiles& files, const rules::RuleSet& rules) {
-  if (files.application) return rules::merge_rules(rules, rules::read_bytes(*files.application));
-  std::optional<std::string> application;
-  for (const std::string& file : files.models) {
-    std::string content = rules::read_bytes(file);
-    if (rules::root_name(content) != "application") continue;
-    if (application) {
+// The application given; else the one that the model is in already; else one made of the model. All
+// as it was read for the rules: a pipe could not be read again, and a file may say something else.
+std::string merge(const rules::RuleSet& rules) {
+  const rules::ModelTexts& texts = *rules.texts;
+  if (texts.application) return rules::merge_rules(rules, texts.application->content);
+  const std::string* application = nullptr;
+  for (const rules::FileText& file : texts.models) {
+    if (rules::root_name(file.content) != "application") continue;
+    if (application != nullptr) {
       throw std::runtime_error(
           "the model is in more than one application; say by --application "
           "which of them gets the rules");
     }
-    application = std::move(content);
+    application = &file.content;
   }
-  if (application) return rules::merge_rules(rules, *application);
+  if (application != nullptr) return rules::merge_rules(rules, *application);
   return rules::write_application(rules,
-                                  std::filesystem::path(files.models.front()).stem().string());
+                                  std::filesystem::path(texts.models.front().path).stem().string());
 }
 
 // What was written is read as anybody will read it, before anybody does.
@@ -74,7 +72,8 @@ int compile(const CompileOptions& options) {
   const auto model = load_model(options.files, diagnostics);
   rules::write_text(std::cerr, diagnostics);
   if (!model) return 1;
-  const std::string content = merge(options.files, model->rules);
+  require_no_input(options.output, *model->rules.texts);
+  const std::string content = merge(model->rules);
   check_by_reading_back(content, model->rules);
   write_output(options.output, content);
   return 0;
@@ -95,8 +94,8 @@ void add_compile(CLI::App& app, int& exit_code) {
       "decides alike.\nWithout --application, one is made of the connections that the model "
       "configures.\n\n"
       "Exit codes: 0 written; 1 an error in the model, or rules too large to be read again; 2 "
-      "wrong use, or a\n"
-      "file cannot be opened or written\n\n"
+      "wrong use, a file\n"
+      "that cannot be opened or written, or an output that is one of the inputs\n\n"
       "Examples:\n"
       "  arbiter compile search_and_track.xml --application application.xml -o merged.xml\n"
       "  arbiter check merged.xml\n"

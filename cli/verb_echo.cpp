@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/live.hpp"
+#include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
 #include "rules/duration.hpp"
 #include "shm/clock.hpp"
@@ -140,7 +141,7 @@ void add_echo(CLI::App& app, int& exit_code) {
   verb->add_option("PORT", options->port, "The input port's name")->required();
   verb->add_option("--count", options->count, "End after so many samples")
       ->type_name("N")
-      ->check(CLI::PositiveNumber);
+      ->check(at_least_one());
   verb->add_option_function<std::string>(
           "--for", [options](const std::string& text) { options->duration = duration_of(text); },
           "End after this time: 500ms, 10s")

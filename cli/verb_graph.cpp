@@ -1,4 +1,7 @@
 // arbiter graph: a model as a picture, still or of the running system.
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -15,6 +18,7 @@
 #include "cli/verbs.hpp"
 #include "drawing/drawing.hpp"
 #include "drawing/graphviz.hpp"
+#include "rules/compile.hpp"
 #include "rules/report.hpp"
 #include "shm/clock.hpp"
 
@@ -37,28 +41,49 @@ struct GraphOptions {
   bool follow = false;
 };
 
+// All that Graphviz makes of it but dot, which is ours.
+const std::set<std::string> kFormats{"svg", "png", "dot", "pdf", "ps", "eps", "jpg"};
+
+// Throws CLI::ValidationError where the output's ending names no format.
 std::string format_of(const GraphOptions& options) {
   if (!options.format.empty()) return options.format;
-  if (options.output.ends_with(".png")) return "png";
-  if (options.output.ends_with(".dot") || options.output.ends_with(".gv")) return "dot";
-  return "svg";
+  std::string ending = std::filesystem::path(options.output).extension().string();
+  if (ending.empty()) return "svg";
+  ending.erase(0, 1);
+  for (char& each : ending)
+    each = static_cast<char>(std::tolower(static_cast<unsigned char>(each)));
+  if (ending == "gv") return "dot";
+  if (kFormats.contains(ending)) return ending;
+  throw CLI::ValidationError("--output", "no picture is made of the ending of " + options.output +
+                                             "; give --format, or one of .svg, .png, .pdf, .ps, "
+                                             ".eps, .jpg, .dot and .gv");
 }
 
 class Picture {
  public:
   explicit Picture(const GraphOptions& options) : options_(options), format_(format_of(options)) {}
 
-  // What is wrong with the model goes to standard error, once. False if it has errors.
-  bool load(const rules::ModelFiles& files) {
+  // What is wrong with the model goes to standard error. False if it cannot be drawn.
+  bool load(const rules::ModelTexts& texts) {
+    require_no_input(options_.output, texts);
     rules::Diagnostics diagnostics;
-    model_ = rules::load_all(files, diagnostics);
+    model_ = rules::load_all(texts, diagnostics);
     rules::write_text(std::cerr, diagnostics);
     view_ = options_.view == "behaviours"    ? View::kBehaviours
             : options_.view == "connections" ? View::kConnections
             : options_.view == "both"        ? View::kBoth
                                              : drawing::natural_view(model_);
-    return !diagnostics.has_errors();
+    is_good_ = !diagnostics.has_errors();
+    if (!is_good_) return false;
+    if (options_.view == "behaviours" && model_.model.behaviours.empty()) {
+      std::cerr << "arbiter: the model has no behaviours, only rules: --view connections draws "
+                   "them\n";
+    }
+    check();
+    return true;
   }
+  // Else rules contradict each other: to see where is what one may draw them for.
+  [[nodiscard]] bool is_good() const { return is_good_; }
 
   [[nodiscard]] const rules::RuleSet& rules() const { return model_.rules; }
 
@@ -71,10 +96,18 @@ class Picture {
   }
 
  private:
+  void check() {
+    rules::Diagnostics proof;
+    rules::compile(model_.rules, proof);
+    is_good_ = !proof.has_errors();
+    if (!is_good_) rules::write_text(std::cerr, proof);
+  }
+
   const GraphOptions& options_;
   const std::string format_;
   rules::LoadedModel model_;
   View view_ = View::kBehaviours;
+  bool is_good_ = false;
   std::string last_;
 };
 
@@ -120,9 +153,48 @@ Look look(detail::NodeCore& node, const rules::RuleSet& rules) {
   return seen;
 }
 
-// The files that the daemon has in force, where none are given.
-rules::ModelFiles files_in_force(const json& model, const rules::ModelFiles& given) {
-  if (!given.models.empty()) return given;
+// What the daemon has in force.
+struct ModelInForce {
+  json generation;
+  std::optional<rules::ModelTexts> texts;  // none: it has them from a former daemon, as a table
+};
+
+ModelInForce fetch_model(detail::NodeCore& node) {
+  const json document = fetch_document(node, shm::MessageKind::kModel);
+  ModelInForce model{document.at("generation"), {}};
+  if (!document.at("known").get<bool>()) return model;
+  const auto text_of = [](const json& file) {
+    return rules::FileText{file.at("path").get<std::string>(), file.at("text").get<std::string>()};
+  };
+  model.texts.emplace();
+  for (const auto& file : document.at("models")) model.texts->models.push_back(text_of(file));
+  if (const json& application = document.at("application"); !application.is_null()) {
+    model.texts->application = text_of(application);
+  }
+  return model;
+}
+
+// As the daemon sends it: what is not UTF-8 has been replaced.
+std::string as_sent(const std::string& text) {
+  return json(text).dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+bool same_text(const rules::FileText& ours, const rules::FileText& theirs) {
+  return as_sent(ours.content) == as_sent(theirs.content);
+}
+
+// An application that is not given may be left out: it decides nothing.
+bool same_texts(const rules::ModelTexts& ours, const rules::ModelTexts& theirs) {
+  if (ours.application &&
+      (!theirs.application || !same_text(*ours.application, *theirs.application))) {
+    return false;
+  }
+  return std::equal(ours.models.begin(), ours.models.end(), theirs.models.begin(),
+                    theirs.models.end(), same_text);
+}
+
+// The files that the daemon names, where it does not know what was in them.
+rules::ModelFiles files_of(const json& model) {
   rules::ModelFiles files;
   const auto from_here = [&](const json& file) {  // the daemon may run in another directory
     return path_from_here(file.get<std::string>(), model.at("directory").get<std::string>());
@@ -133,43 +205,111 @@ rules::ModelFiles files_in_force(const json& model, const rules::ModelFiles& giv
   return files;
 }
 
-int draw_live(const GraphOptions& options) {
-  std::optional<shm::FileDescriptor> interrupts;
-  if (options.follow) interrupts = catch_interrupts();
-  const auto node = connect("graph", options.instance);
-  Picture picture(options);
-  json drawn;  // the generation of the model that the picture is of
-  bool warned = false;
-  for (shm::Nanoseconds next = shm::monotonic_now();; next += kFollowPeriod) {
-    Look now = look(*node, picture.rules());
-    if (drawn != now.model.at("generation")) {
-      if (!picture.load(files_in_force(now.model, options.files))) return 1;
-      drawn = now.model.at("generation");
-      warned = false;
-      now = look(*node, picture.rules());
+class LivePicture {
+ public:
+  LivePicture(const GraphOptions& options, std::shared_ptr<detail::NodeCore> node)
+      : options_(options), node_(std::move(node)), picture_(options) {}
+
+  // False: the model cannot be drawn.
+  bool update() {
+    Look now = look(*node_, picture_.rules());
+    if (drawn_ != now.model.at("generation")) {
+      if (!load(now.model)) return false;
+      now = look(*node_, picture_.rules());
     }
-    if (!now.fits && now.model.at("generation") == drawn && !std::exchange(warned, true)) {
+    fits_ = now.fits;
+    if (!fits_ && is_same_ && now.model.at("generation") == drawn_ &&
+        !std::exchange(warned_, true)) {
       std::cerr << "arbiter: the daemon decides otherwise than this model does; is it the one in "
                    "force, and unchanged since? (arbiter status, arbiter reload)\n";
     }
-    picture.write(&now.situation);
-    if (!options.follow) return now.fits ? 0 : 1;
-    if (sleep_until(next + kFollowPeriod, *interrupts)) return 0;
+    picture_.write(&now.situation);
+    return true;
+  }
+  // Whether the picture is of what the daemon does.
+  [[nodiscard]] bool is_true() const { return fits_ && is_same_ && picture_.is_good(); }
+  // Another daemon may count its models from one again.
+  void forget_model() { drawn_ = nullptr; }
+
+ private:
+  bool load(const json& model) {
+    const ModelInForce in_force = fetch_model(*node_);
+    if (!options_.files.models.empty()) {
+      const rules::ModelTexts given = rules::read_texts(options_.files);
+      if (!picture_.load(given)) return false;
+      const bool is_none = in_force.generation == 0;
+      is_same_ = !is_none && (!in_force.texts || same_texts(given, *in_force.texts));
+      if (is_none) {
+        std::cerr << "arbiter: the daemon has no model in force\n";
+      } else if (!is_same_) {
+        std::cerr << "arbiter: this is not the text of the model in force, model "
+                  << in_force.generation << "; the daemon may decide otherwise than is shown "
+                  << "(arbiter status names its files; arbiter reload has them read again)\n";
+      }
+    } else {
+      const auto files = in_force.texts ? std::optional<rules::ModelFiles>() : files_of(model);
+      if (in_force.texts && in_force.texts->models.empty() && !in_force.texts->application) {
+        throw Error("the daemon has no model; give one: arbiter graph MODEL");
+      }
+      if (!picture_.load(files ? rules::read_texts(*files) : *in_force.texts)) return false;
+    }
+    drawn_ = in_force.generation;
+    warned_ = false;
+    return true;
+  }
+
+  const GraphOptions& options_;
+  const std::shared_ptr<detail::NodeCore> node_;
+  Picture picture_;
+  json drawn_;  // the generation of the model that the picture is of
+  bool fits_ = false;
+  bool is_same_ = true;  // as far as it is known: given is what is in force
+  bool warned_ = false;
+};
+
+int draw_live(const GraphOptions& options) {
+  const auto node = connect("graph", options.instance);
+  LivePicture picture(options, node);
+  if (!picture.update()) return 1;
+  return picture.is_true() ? 0 : 1;
+}
+
+int follow(const GraphOptions& options) {
+  const shm::FileDescriptor interrupts = catch_interrupts();
+  NodeOptions node_options = live_options(options.instance);
+  node_options.on_waiting = [](const std::string&) {};  // said below, once
+  const auto node = detail::make_node("arbiter-graph", node_options);
+  LivePicture picture(options, node);
+  if (!picture.update()) return 1;
+  bool is_alone = false;
+  for (shm::Nanoseconds next = shm::monotonic_now();;) {
+    next = std::max(next + kFollowPeriod, shm::monotonic_now());
+    if (sleep_until(next, interrupts)) return 0;
+    try {
+      if (!picture.update()) return 1;
+      if (std::exchange(is_alone, false)) std::cerr << "arbiter: a daemon is there again\n";
+    } catch (const Error& error) {
+      picture.forget_model();
+      if (std::exchange(is_alone, true)) continue;
+      std::cerr << "arbiter: the daemon has gone (" << error.what() << "); " << options.output
+                << " stays as it was until one comes\n";
+    }
   }
 }
 
 int draw_still(const GraphOptions& options) {
   Picture picture(options);
-  if (!picture.load(options.files)) return 1;
+  if (!picture.load(rules::read_texts(options.files))) return 1;
   picture.write(nullptr);
-  return 0;
+  return picture.is_good() ? 0 : 1;
 }
 
 int graph(const GraphOptions& options) {
   if (options.follow && options.output.empty()) {
     throw CLI::RequiredError("--output, the file that --follow writes anew,");
   }
-  if (options.live || options.follow) return draw_live(options);
+  if (options.follow) return follow(options);
+  if (options.live) return draw_live(options);
   if (options.files.models.empty()) throw CLI::RequiredError("MODEL, or --live,");
   return draw_still(options);
 }
@@ -191,17 +331,20 @@ void add_graph(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember({"auto", "behaviours", "connections", "both"}))
       ->type_name("WHICH");
   verb->add_option("--format", options->format,
-                   "svg, png or dot; without it by the ending of the file, else svg")
-      ->check(CLI::IsMember({"svg", "png", "dot"}))
+                   "svg, png, dot, pdf, ps, eps or jpg; without it by the ending of the file, svg "
+                   "where it has none")
+      ->check(CLI::IsMember(kFormats))
       ->type_name("FORMAT");
   verb->add_option("-o,--output", options->output, kOutputHelp)->type_name("FILE");
   verb->add_flag("--live", options->live, "Colour it by who is active and who wins now");
   verb->add_flag("--follow", options->follow, "As --live, and write it anew on each change");
   add_instance_option(*verb, options->instance);
   verb->footer(
-      "SVG and PNG are made by Graphviz (apt install graphviz); --format dot does without.\n\n"
-      "Exit codes: 0 drawn; 1 an error in the model, no daemon, no Graphviz, or a daemon that "
-      "decides\notherwise than the model; 2 wrong use, or a file cannot be opened or written\n\n"
+      "Pictures are made by Graphviz (apt install graphviz); --format dot does without.\n"
+      "Rules that contradict each other are drawn all the same.\n\n"
+      "Exit codes: 0 drawn; 1 an error in the model, no daemon, no Graphviz, or a model that is "
+      "not "
+      "the one\nin force; 2 wrong use, or a file cannot be opened or written\n\n"
       "Examples:\n"
       "  arbiter graph search_and_track.xml -o behaviours.svg\n"
       "  arbiter graph search_and_track.xml --view connections --application application.xml -o "

@@ -10,6 +10,7 @@
 
 #include "cli/conversation.hpp"
 #include "cli/live.hpp"
+#include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
 
 namespace arbiter::cli {
@@ -85,7 +86,7 @@ void add_rollback(CLI::App& app, int& exit_code) {
       "rollback", "Put a model in force again that was; without GENERATION, the one before");
   verb->add_option("GENERATION", options->generation, "As arbiter history shows it")
       ->type_name("N")
-      ->check(CLI::PositiveNumber);
+      ->check(at_least_one());
   verb->add_flag("--json", options->json, "Write the daemon's report as JSON");
   add_instance_option(*verb, options->instance);
   verb->footer(R"(Example:

@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/live.hpp"
+#include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
 #include "shm/clock.hpp"
 
@@ -73,7 +74,7 @@ void add_pub(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1e-3, 1e6));
   verb->add_option("--count", options->count, "How many (default: until interrupted)")
       ->type_name("N")
-      ->check(CLI::PositiveNumber);
+      ->check(at_least_one());
   auto* size = verb->add_option("--size", options->size, "Bytes of a sample (default 8), zeroed")
                    ->type_name("BYTES")
                    ->check(CLI::Range(std::size_t{0}, std::size_t{1} << 32));

@@ -1,9 +1,11 @@
 // arbiter simulate: what a model would have decided, sample by sample.
+#include <unistd.h>
+
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -11,6 +13,7 @@
 #include "cli/model_files.hpp"
 #include "cli/verbs.hpp"
 #include "cli/why_simulated.hpp"
+#include "rules/names.hpp"
 #include "rules/report.hpp"
 #include "rules/simulation.hpp"
 #include "rules/trace.hpp"
@@ -21,9 +24,33 @@ namespace {
 struct SimulateOptions {
   rules::ModelFiles files;
   std::string trace;
-  std::optional<std::string> why;  // the port; empty: all
+  std::string why;  // kAllPorts, or the port; empty: no
   bool json = false;
 };
+
+// What CLI11 takes a flag without a value for; no port is called so.
+const std::string kAllPorts = "true";
+
+// A blank in place of the '=' makes a file of the port.
+void require_no_port_among_files(const SimulateOptions& options) {
+  for (const std::string& file : options.files.models) {
+    if (options.why != kAllPorts || !file.starts_with('/') || access(file.c_str(), F_OK) == 0) {
+      continue;
+    }
+    throw rules::FileError("there is no file " + file + "; if it is the port: --why=" + file);
+  }
+}
+
+std::string suggestion(const std::string& source, const rules::Simulation& simulation,
+                       std::size_t count) {
+  if (count > rules::kMaxSuggestions) return "";
+  std::vector<std::string_view> known;
+  for (std::size_t i = 0; i < simulation.source_count(); ++i) {
+    known.push_back(simulation.source_name(static_cast<shm::SourceId>(i)));
+  }
+  const auto similar = rules::find_similar(source, known);
+  return similar ? "; did you mean " + rules::quote(*similar) + "?" : "";
+}
 
 void note_unknown_sources(const rules::Simulation& simulation, const std::string& file,
                           const std::vector<rules::TraceEvent>& events,
@@ -33,14 +60,17 @@ void note_unknown_sources(const rules::Simulation& simulation, const std::string
     if (event.kind == rules::TraceKind::kTick || simulation.knows(event.source)) continue;
     if (!noted.insert(event.source).second) continue;
     diagnostics.note("unknown-source", {file, event.line, event.column},
-                     "the model does not know " + event.source + "; its arrivals have no effect");
+                     "the model does not know " + event.source + "; its arrivals have no effect" +
+                         suggestion(event.source, simulation, noted.size()));
   }
 }
 
 // All problems, those of the trace as well as those of the model, come before the first result.
 int simulate(const SimulateOptions& options) {
+  require_no_port_among_files(options);
+  const bool is_why = !options.why.empty();
   rules::Diagnostics diagnostics;
-  const auto keep = options.why ? rules::Keep::kProvenance : rules::Keep::kRules;
+  const auto keep = is_why ? rules::Keep::kProvenance : rules::Keep::kRules;
   const auto model = load_model(options.files, diagnostics, keep);
   const auto events = rules::read_trace(options.trace, diagnostics);
   if (!model || diagnostics.has_errors()) {
@@ -50,8 +80,9 @@ int simulate(const SimulateOptions& options) {
   rules::Simulation simulation(model->compiled);
   note_unknown_sources(simulation, options.trace, events, diagnostics);
   rules::write_text(std::cerr, diagnostics);
-  if (options.why) {
-    WhySimulated why(model->rules, simulation, {*options.why, options.json});
+  if (is_why) {
+    const std::string port = options.why == kAllPorts ? "" : options.why;
+    WhySimulated why(model->rules, simulation, {port, options.json});
     for (const auto& event : events) why.step(event, std::cout);
     return 0;
   }
@@ -71,13 +102,10 @@ void add_simulate(CLI::App& app, int& exit_code) {
   verb->add_option("--trace", options->trace, "CSV: t_ns,source or t_ns,source,event")
       ->type_name("FILE")
       ->required();
-  auto* why = verb->add_option_function<std::string>(
-                      "--why", [options](const std::string& port) { options->why = port; },
-                      "Instead of the CSV: each change of a winner and each arrival that was "
-                      "discarded, with its cause; of one PORT or of all")
-                  ->type_name("[PORT]")
-                  ->expected(0, 1)
-                  ->default_str("");
+  // A flag takes a value only behind '=': what follows it may be the model.
+  auto* why = verb->add_flag("--why", options->why,
+                             "Instead of the CSV: each change of a winner and each arrival that "
+                             "was discarded, with its cause; --why=PORT: of this port only");
   verb->add_flag("--json", options->json, "With --why: one object a line")->needs(why);
   verb->footer(
       "Example:\n"

@@ -1,6 +1,4 @@
 // arbiter stop: ends the daemon, and returns when it is gone.
-#include <poll.h>
-
 #include <iostream>
 #include <memory>
 #include <string>
@@ -20,10 +18,7 @@ int stop(const std::string& instance) {
   shm::Message question;
   question.kind = shm::MessageKind::kStop;
   daemon.ask(question);
-  daemon.wait_until_hung_up();
-  pollfd ended{process.get(), POLLIN, 0};
-  while (process && ::poll(&ended, 1, -1) < 0) {
-  }
+  daemon.wait_until_gone(process);
   std::cout << "the daemon has stopped; ports that are connected work on\n";
   return 0;
 }

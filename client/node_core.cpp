@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "client/node_names.hpp"
+#include "shm/instances.hpp"
 #include "shm/rendezvous.hpp"
 
 namespace arbiter::detail {
@@ -43,6 +44,21 @@ shm::Message message_of(shm::MessageKind kind, std::string_view name = {}) {
   return message;
 }
 
+// Whether nobody has hung up.
+bool is_open(const shm::FileDescriptor& socket) {
+  pollfd hung_up{socket.get(), POLLRDHUP, 0};
+  return ::poll(&hung_up, 1, 0) == 0;
+}
+
+// What to say of a daemon that has accepted us and does not answer: it is stopped, or busy.
+std::string silence_of(const shm::FileDescriptor& socket, const std::string& instance,
+                       std::chrono::steady_clock::time_point since) {
+  const auto span =
+      std::chrono::duration_cast<milliseconds>(std::chrono::steady_clock::now() - since);
+  return shm::describe_daemon(socket.get(), instance) + " runs, but did not answer within " +
+         std::to_string(span.count()) + " ms: it is stopped, or busy";
+}
+
 }  // namespace
 
 NodeCore::NodeCore(std::string_view name, const NodeOptions& options)
@@ -66,14 +82,18 @@ void NodeCore::connect() {
   const auto begin = Clock::now();
   const auto give_up = begin + std::min(options_.connect_timeout, kMaxConnectTimeout);
   bool said = false;
-  std::string why_not;
+  std::string why_not, who_is_silent;
   for (;;) {
+    who_is_silent.clear();
     if (auto socket = shm::connect_to_daemon(instance_, why_not)) {
       socket_ = std::make_shared<const shm::FileDescriptor>(std::move(*socket));
+      const auto asked = Clock::now();
       if (say_hello(give_up)) break;
+      if (is_open(*socket_)) who_is_silent = silence_of(*socket_, instance_, asked);
     }
     const auto now = Clock::now();
-    if (now >= give_up) throw Error(nobody_answers(why_not));
+    if (now >= give_up && !who_is_silent.empty()) throw Error(who_is_silent);
+    if (now >= give_up) throw Error(nobody_answers(why_not) + shm::describe_listening_instances());
     if (!said && now - begin >= kQuietWait) {
       say_that_we_wait();
       said = true;

@@ -1,6 +1,5 @@
 #include "rules/excerpt.hpp"
 
-#include <filesystem>
 #include <string_view>
 
 #include "rules/load.hpp"
@@ -123,11 +122,9 @@ std::string Excerpts::at(const Location& where) {
 const Excerpts::File& Excerpts::file(const std::string& path) {
   const auto [found, is_new] = files_.try_emplace(path);
   File& file = found->second;
-  std::error_code ignored;
-  // Reading a pipe again would wait for ever.
-  if (!is_new || !std::filesystem::is_regular_file(path, ignored)) return file;
-  try {
-    const TextFile text(path, read_bytes(path));
+  if (!is_new) return file;
+  try {  // to read a pipe again would wait for ever
+    const TextFile text(path, read_bytes(path, kMaxFileBytes, Accept::kRegularFile));
     file.content = std::string(text.content());
   } catch (const FileError&) {
     return file;

@@ -108,17 +108,18 @@ LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
 
 }  // namespace
 
-ModelTexts read_texts(const ModelFiles& files) {
+ModelTexts read_texts(const ModelFiles& files, Accept accept) {
+  const auto read = [accept](const std::string& path) {
+    return FileText{path, read_bytes(path, kMaxFileBytes, accept)};
+  };
   ModelTexts texts;
-  for (const std::string& path : files.models) texts.models.push_back({path, read_bytes(path)});
-  if (files.application) {
-    texts.application = FileText{*files.application, read_bytes(*files.application)};
-  }
+  for (const std::string& path : files.models) texts.models.push_back(read(path));
+  if (files.application) texts.application = read(*files.application);
   return texts;
 }
 
-LoadedModel load_all(const ModelFiles& files, Diagnostics& diagnostics) {
-  return load_all(read_texts(files), diagnostics, nullptr);
+LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics) {
+  return load_all(texts, diagnostics, nullptr);
 }
 
 RuleSet load(ModelTexts texts, Diagnostics& diagnostics, Keep keep) {

@@ -10,6 +10,7 @@
 #include "rules/model.hpp"
 #include "rules/model_texts.hpp"
 #include "rules/rule_set.hpp"
+#include "rules/text_file.hpp"
 
 namespace arbiter::rules {
 
@@ -25,7 +26,7 @@ class FileError : public std::runtime_error {
 };
 
 // Throws FileError.
-ModelTexts read_texts(const ModelFiles& files);
+ModelTexts read_texts(const ModelFiles& files, Accept accept = Accept::kAnyFile);
 
 // Reports all problems of all files in one go; the result is to be used only if there is no error.
 // The provenance is kept for those who want to explain the rules: it is as large as the model.
@@ -40,6 +41,6 @@ struct LoadedModel {
   std::optional<Application> application;  // given, or a model's file is one itself
   RuleSet rules;
 };
-LoadedModel load_all(const ModelFiles& files, Diagnostics& diagnostics);
+LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics);
 
 }  // namespace arbiter::rules

@@ -1,6 +1,7 @@
 #include "rules/text_file.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -19,11 +20,47 @@ namespace {
   throw FileError("cannot " + std::string(what) + " " + path + ": " + std::strerror(error));
 }
 
+const char* kind_of(mode_t mode) {
+  if (S_ISFIFO(mode)) return "a FIFO";
+  if (S_ISSOCK(mode)) return "a socket";
+  return "a device";
+}
+
+void require_regular(const std::string& path, const struct stat& status) {
+  if (S_ISREG(status.st_mode)) return;
+  if (S_ISDIR(status.st_mode)) fail(path, "read", EISDIR);
+  throw FileError("cannot read " + path + ": it is not a regular file but " +
+                  kind_of(status.st_mode));
+}
+
+int open_any(const std::string& path) {
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) fail(path, "open", errno);
+  return fd;
+}
+
+// Looks before it opens, for that alone may set a device off; and again behind it, for it may have
+// become another file meanwhile, which O_NONBLOCK keeps from holding us up.
+int open_regular(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) fail(path, "open", errno);
+  require_regular(path, status);
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+  if (fd < 0) fail(path, "open", errno);
+  try {
+    if (::fstat(fd, &status) != 0) fail(path, "open", errno);
+    require_regular(path, status);
+  } catch (...) {
+    ::close(fd);
+    throw;
+  }
+  return fd;
+}
+
 class Descriptor {
  public:
-  explicit Descriptor(const std::string& path) : fd_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
-    if (fd_ < 0) fail(path, "open", errno);
-  }
+  Descriptor(const std::string& path, Accept accept)
+      : fd_(accept == Accept::kRegularFile ? open_regular(path) : open_any(path)) {}
   ~Descriptor() { ::close(fd_); }
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
@@ -57,8 +94,8 @@ Location TextFile::locate(std::size_t offset) const {
   return {path_, line, static_cast<std::uint32_t>(offset - *(next - 1) + 1)};
 }
 
-std::string read_bytes(const std::string& path, std::size_t limit) {
-  const Descriptor file(path);
+std::string read_bytes(const std::string& path, std::size_t limit, Accept accept) {
+  const Descriptor file(path, accept);
   std::string content;
   std::array<char, 65536> buffer;
   while (content.size() <= limit) {

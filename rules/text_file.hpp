@@ -36,9 +36,14 @@ class TextFile {
   std::vector<std::size_t> line_starts_;
 };
 
+// A pipe may stand for a file on a command line. Who must go on whatever the files are reads
+// regular ones only: to open or to read anything else may take for ever, or set a device off.
+enum class Accept { kAnyFile, kRegularFile };
+
 // The whole of a file, but not much more than `limit` bytes of it: a device or a pipe may have no
 // end. Throws FileError.
-std::string read_bytes(const std::string& path, std::size_t limit = kMaxFileBytes);
+std::string read_bytes(const std::string& path, std::size_t limit = kMaxFileBytes,
+                       Accept accept = Accept::kAnyFile);
 
 // Reports a file that is larger than the limit, and returns false.
 bool check_size(const TextFile& file, std::size_t limit, Diagnostics& diagnostics);

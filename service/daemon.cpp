@@ -36,7 +36,8 @@ Daemon::Daemon(const DaemonOptions& options)
       state_(options.directory, options.instance) {
   if (!files_.empty() || gate_.has_file()) {
     Reading reading = read_files();
-    if (reading.findings.has_errors()) throw BadModel(reading.findings.first_error());
+    if (reading.findings.has_errors())
+      throw BadModel("not started: the files have errors, told above");
     if (reading.policy) gate_.put_in_force(*reading.policy);
     read_at_start_ = std::move(reading.models);
   }

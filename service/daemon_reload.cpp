@@ -62,10 +62,13 @@ void Daemon::advance_changes() {
     }
   } catch (const std::exception& error) {
     if (swap.change.kind == Change::Kind::kReload) ++reloads_refused_;
+    // What is found in files is in the log when they have been read.
+    const char* const why =
+        swap.findings.has_errors() ? "the files have errors, told above" : error.what();
     if (swap.change.kind == Change::Kind::kCompare) {
-      log::info("{} asks what a reload would do: {}", swap.change.by, error.what());
+      log::info("{} asks what a reload would do: {}", swap.change.by, why);
     } else {
-      log::error("the model in force stays: {}", error.what());
+      log::error("the model in force stays: {}", why);
     }
     answer_refused(swap, error.what());
   }
@@ -140,7 +143,12 @@ void Daemon::prepare_rollback(Swap& swap) {
   const std::uint64_t asked = swap.change.generation;
   const PastModel* const past = asked == 0 ? history_.previous() : history_.find(asked);
   if (past == nullptr && asked == 0) {
-    throw std::runtime_error("there is no model to go back to; arbiter history shows all");
+    const PastModel* const oldest = history_.latest();
+    if (oldest == nullptr) {
+      throw std::runtime_error("there is no model to go back to: none has been in force");
+    }
+    throw std::runtime_error("model " + std::to_string(oldest->content) +
+                             " is the oldest that is kept; arbiter history shows all");
   }
   if (past == nullptr) {
     throw std::runtime_error("model " + std::to_string(asked) +

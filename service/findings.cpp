@@ -35,7 +35,10 @@ void Findings::add(std::string of, rules::Diagnostics diagnostics) {
   parts_.push_back({std::move(of), std::move(diagnostics)});
 }
 
-void Findings::add_failure(std::string why) { failures_.push_back(std::move(why)); }
+void Findings::add_failure(std::string why) {
+  log::error("{}", why);
+  failures_.push_back(std::move(why));
+}
 
 bool Findings::has_errors() const {
   return !failures_.empty() || std::any_of(parts_.begin(), parts_.end(), [](const Part& part) {

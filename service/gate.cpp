@@ -85,7 +85,8 @@ std::optional<Policy> Gate::read(Findings& findings) const {
   try {
     require_protected(*file_);
     rules::Diagnostics diagnostics;
-    const rules::TextFile text(*file_, rules::read_bytes(*file_));
+    const rules::TextFile text(
+        *file_, rules::read_bytes(*file_, rules::kMaxFileBytes, rules::Accept::kRegularFile));
     Policy policy = Policy::parse(text, geteuid(), accounts_of_this_machine(), diagnostics);
     findings.add("the policy", std::move(diagnostics));
     return policy;

@@ -44,7 +44,8 @@ std::vector<ModelPointer> read_models(const std::vector<NamedFiles>& named, Find
     model->name = each.name;
     model->files = each.files;
     try {
-      const rules::RuleSet rules = rules::load(each.files, diagnostics);
+      const rules::RuleSet rules =
+          rules::load(rules::read_texts(each.files, rules::Accept::kRegularFile), diagnostics);
       if (!diagnostics.has_errors()) model->compiled = rules::compile(rules, diagnostics);
     } catch (const rules::FileError& error) {
       findings.add_failure(error.what());

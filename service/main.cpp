@@ -23,9 +23,9 @@ Example:
   arbiterd --model search=search.xml --model dance=dance.xml     # and then: arbiter switch dance
 
 It runs in the foreground, needs no configuration and no privileges, and logs to standard error.
-SIGHUP and `arbiter reload` read all files again; a bad one changes nothing. SIGTERM, SIGINT and
-`arbiter stop` stop it. Without --policy every user may open ports and observe, and only root and the
-daemon's own user may reload, switch and stop.
+Files must be regular ones. SIGHUP and `arbiter reload` read all again; a bad one changes nothing.
+SIGTERM, SIGINT and `arbiter stop` stop it. Without --policy every user may open ports and observe,
+and only root and the daemon's own user may reload, switch and stop.
 Components go on without it. The next daemon of the instance takes them over, and puts its own model
 in force, of several the one of the name that was; without --model it keeps the one that is.
 It listens in $RUNTIME_DIRECTORY, else $XDG_RUNTIME_DIR/arbiter, else /run/arbiter if it may write

@@ -19,13 +19,20 @@ struct Given {
 
 Given given_by(const std::string& argument) {
   const auto equals = argument.find('=');
-  if (equals == std::string::npos || !is_model_name(argument.substr(0, equals))) {
-    return {"", argument};
+  const std::string name = argument.substr(0, equals);
+  if (equals == std::string::npos || name.find('/') != std::string::npos) return {"", argument};
+  if (!is_model_name(name)) {
+    throw std::invalid_argument("\"" + argument + "\": \"" + name +
+                                "\" is no name for a model: use at most " +
+                                std::to_string(kMaxModelName) +
+                                " letters, digits, '_', '.' and '-', not beginning with '-'; where "
+                                "this is the name of a file, write: ./" +
+                                argument);
   }
   if (equals + 1 == argument.size()) {
     throw std::invalid_argument("\"" + argument + "\" names no file; write: " + argument + "FILE");
   }
-  return {argument.substr(0, equals), argument.substr(equals + 1)};
+  return {name, argument.substr(equals + 1)};
 }
 
 NamedFiles* find(std::vector<NamedFiles>& models, const std::string& name) {

@@ -25,8 +25,9 @@ struct NamedFiles {
 
 // From what is written behind --model and --application: FILE, or NAME=FILE. Several files of one
 // name form one model; the models come in the order of their first files. An application without a
-// name is that of all models that have none of their own. A file whose name looks so is written
-// ./NAME=FILE. Throws std::invalid_argument saying what is wrong.
+// name is that of all models that have none of their own. What has a '='
+// before the first '/' is never a file; such a one is written ./NAME=FILE. Throws
+// std::invalid_argument saying what is wrong.
 [[nodiscard]] std::vector<NamedFiles> named_files(const std::vector<std::string>& models,
                                                   const std::vector<std::string>& applications);
 

@@ -171,7 +171,12 @@ std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std
     FileDescriptor socket = make_socket();
     const Address at = address_of(directory, instance + ".sock");
     const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
-    if (connect(socket.get(), address, sizeof at.address) != 0) continue;
+    if (connect(socket.get(), address, sizeof at.address) != 0) {
+      if (errno == EAGAIN) {
+        why_not = "one listens in " + directory + ", but lets nobody in: is it stopped?";
+      }
+      continue;
+    }
     ucred peer{};
     socklen_t size = sizeof peer;
     if (getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) continue;

@@ -1,10 +1,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <regex>
+#include <set>
+
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/text_files.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -136,6 +141,37 @@ TEST(Check, NotesAndWarningsCanBeSilencedAndErrorsCannot) {
       arbiter({"check", directory.write("c.xml", kConflictModel), "--silence", "both-can-win"});
   EXPECT_THAT(result.err, HasSubstr("[both-can-win]"));
   EXPECT_EQ(result.exit_code, 1);
+}
+
+TEST(Check, ACodeThatThereIsNotCannotBeSilenced) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  const auto result = arbiter({"check", model, "--silence", "nobody-wins,starving"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("\"starving\""));
+  EXPECT_THAT(result.err, HasSubstr("nobody-wins, not-checked, proved, starved"));
+  EXPECT_THAT(arbiter({"check", model, "--silence", "straved"}).err,
+              HasSubstr("did you mean \"starved\"?"));
+}
+
+// Whatever reading and checking may find, by the text of the program.
+TEST(Check, EachCodeOfAWarningOrANoteCanBeSilenced) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  const std::regex made(R"re((warning|note)\(\s*"([a-z-]+)")re");
+  std::set<std::string> codes;
+  for (const auto& file :
+       std::filesystem::directory_iterator(std::string(ARBITER_TEST_DATA) + "/../../rules")) {
+    if (file.path().extension() != ".cpp") continue;
+    const std::string text = content_of(file.path());
+    for (std::sregex_iterator each(text.begin(), text.end(), made), end; each != end; ++each) {
+      codes.insert((*each)[2]);
+    }
+  }
+  EXPECT_GE(codes.size(), 15u);
+  for (const std::string& code : codes) {
+    EXPECT_EQ(arbiter({"check", model, "--silence", code}).exit_code, 0) << code;
+  }
 }
 
 TEST(Check, StatementsThatAreTrueAreProved) {

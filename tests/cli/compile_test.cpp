@@ -57,6 +57,36 @@ TEST(Compile, MakesAnApplicationOfTheConnectionsThatAreConfigured) {
   EXPECT_EQ(arbiter({"check", out}).out, "ok: 1 port, 2 connections, 2 sources\n");
 }
 
+TEST(Compile, RefusesToOverwriteWhatItReads) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const auto application = directory.write("a.xml", kApplication);
+  const std::string link = directory.path() + "/link.xml", hard = directory.path() + "/hard.xml";
+  std::filesystem::create_symlink("m.xml", link);
+  std::filesystem::create_hard_link(application, hard);
+  for (const std::string& output :
+       {model, link, directory.path() + "/./m.xml", application, hard}) {
+    const auto result = arbiter({"compile", model, "--application", application, "-o", output});
+    EXPECT_EQ(result.exit_code, 2) << output;
+    EXPECT_THAT(result.err, HasSubstr("--output " + output + " would overwrite"));
+    EXPECT_EQ(content_of(model), kOverrideModel);
+    EXPECT_EQ(content_of(application), kApplication);
+  }
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+}
+
+TEST(Compile, TakesAModelThatCanBeReadOnce) {
+  const TemporaryDirectory directory;
+  const auto first = arbiter({"compile", directory.write("m.xml", kOverrideModel), "--application",
+                              directory.write("a.xml", kApplication)});
+  const auto expected = arbiter({"compile", directory.write("merged.xml", first.out)});
+  ASSERT_EQ(expected.exit_code, 0);
+  const auto result =
+      run_program({ARBITER_PROGRAMS "/arbiter", "compile", "/dev/stdin"}, first.out);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out, expected.out);
+}
+
 TEST(Compile, TakesItsOwnResultAgain) {
   const TemporaryDirectory directory;
   const auto once = directory.path() + "/once.xml", twice = directory.path() + "/twice.xml";

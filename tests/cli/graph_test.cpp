@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/text_files.hpp"
@@ -72,6 +74,14 @@ TEST(Graph, ChoosesTheFormatByTheNameOfTheFile) {
   EXPECT_THAT(drawn("a.gv"), StartsWith("digraph"));
   EXPECT_THAT(drawn("a"), StartsWith("<?xml"));
   EXPECT_THAT(drawn("b.svg", {"--format", "png"}), StartsWith("\x89PNG"));
+  EXPECT_THAT(drawn("B.PNG"), StartsWith("\x89PNG"));
+  EXPECT_THAT(drawn("a.pdf"), StartsWith("%PDF"));
+  EXPECT_THAT(drawn("a.txt", {"--format", "dot"}), StartsWith("digraph"));
+  const std::string other = directory.path() + "/a.svg.bak";
+  const auto result = arbiter({"graph", model, "-o", other});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("no picture is made of the ending of " + other));
+  EXPECT_FALSE(std::filesystem::exists(other));
 }
 
 TEST(Graph, SaysWhatToInstallWhereGraphvizIsMissing) {
@@ -97,10 +107,26 @@ TEST(Graph, DrawsNothingOfAModelWithErrors) {
 }
 
 // To see why is what one looks at them for.
-TEST(Graph, DrawsRulesThatContradictEachOther) {
+TEST(Graph, DrawsRulesThatContradictEachOtherAndSaysSo) {
   const TemporaryDirectory directory;
   const auto model = directory.write("m.xml", kConflictModel);
-  EXPECT_EQ(arbiter({"graph", model, "--format", "dot"}).exit_code, 0);
+  const auto result = arbiter({"graph", model, "--format", "dot"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, StartsWith("digraph"));
+  EXPECT_THAT(result.err, HasSubstr("[both-can-win]"));
+}
+
+TEST(Graph, SaysThatThereAreNoBehavioursToDraw) {
+  const TemporaryDirectory directory;
+  const auto rules =
+      directory.write("r.xml", R"(<arbiter at="/in"><select from="/out"/></arbiter>)");
+  const auto behaviours = directory.write("m.xml", kOverrideModel);
+  const auto said_of = [](const std::string& model, const std::string& view) {
+    return arbiter({"graph", model, "--view", view, "--format", "dot"}).err;
+  };
+  EXPECT_THAT(said_of(rules, "behaviours"), HasSubstr("no behaviours"));
+  EXPECT_EQ(said_of(rules, "connections"), "");
+  EXPECT_EQ(said_of(behaviours, "behaviours"), "");
 }
 
 TEST(Graph, NeedsAModelOrADaemon) {
@@ -111,6 +137,18 @@ TEST(Graph, NeedsAModelOrADaemon) {
   const auto result = arbiter({"graph", "--live", "--instance", "nobody-has-this-one"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, Not(testing::IsEmpty()));
+}
+
+TEST(Graph, RefusesToOverwriteTheModel) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.dot", kOverrideModel);
+  const auto result =
+      arbiter({"graph", model, "-o",
+               directory.path() + "/../" +
+                   directory.path().substr(directory.path().rfind('/') + 1) + "/m.dot"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("would overwrite " + model));
+  EXPECT_EQ(content_of(model), kOverrideModel);
 }
 
 TEST(Graph, SaysWhichFileCannotBeWritten) {

@@ -62,18 +62,27 @@ TEST(LiveGraph, ShowsActiveSourcesAndTheWinningRule) {
   EXPECT_THAT(now, Not(HasSubstr("▶ /")));
 }
 
-TEST(LiveGraph, TellsOfADaemonThatDecidesOtherwise) {
+// Nobody is active: who wins tells nothing.
+TEST(LiveGraph, TellsOfADaemonThatHasAnotherModel) {
   Daemon daemon(kModel);
-  Node node("test");
-  auto low = node.output_port<int>("/low");
-  low.signal();
   const TemporaryDirectory directory;
   const auto other = directory.write("other.xml", R"(<behaviors>
     <behavior name="Low"><config at="/p">/low</config><condition>/stop</condition></behavior>
   </behaviors>)");
   const auto result = arbiter({"graph", other, "--live", "--format", "dot"});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, HasSubstr("decides otherwise"));
+  EXPECT_THAT(result.err, HasSubstr("not the text of the model in force, model 1"));
+  const auto same =
+      arbiter({"graph", directory.write("same.xml", kModel), "--live", "--format", "dot"});
+  EXPECT_EQ(same.exit_code, 0);
+  EXPECT_EQ(same.err, "");
+}
+
+// The file may be another one by now.
+TEST(LiveGraph, DrawsTheTextThatTheDaemonHasRead) {
+  Daemon daemon(kModel);
+  daemon.write_model("<behaviors><behavior name=\"Other\"/></behaviors>");
+  EXPECT_THAT(live("behaviours"), HasSubstr("○ Low"));
 }
 
 // Reads the picture again and again until somebody has written what it waits for.
@@ -112,6 +121,34 @@ TEST(LiveGraph, FollowsEachChangeUntilItIsInterrupted) {
   wait_for_picture(path, "○ Only");
   high.signal();
   wait_for_picture(path, "▶ Only");
+  follower.signal(SIGINT);
+  EXPECT_EQ(follower.wait(), 0);
+}
+
+TEST(LiveGraph, SaysThatTheDaemonHasGoneAndFollowsTheNext) {
+  Daemon daemon(kModel);
+  const TemporaryDirectory directory;
+  const auto path = directory.path() + "/now.dot";
+  int ends[2];
+  ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+  const shm::FileDescriptor err(ends[0]);
+  shm::FileDescriptor their_err(ends[1]);
+  ChildProcess follower({ARBITER_PROGRAMS "/arbiter", "graph", "--follow", "-o", path}, {},
+                        {-1, -1, their_err.get()});
+  their_err.reset();
+  wait_for_picture(path, "○ Low");
+  daemon.terminate();
+  std::string said;
+  while (said.find("the daemon has gone") == std::string::npos) {
+    char part[512];
+    const ssize_t count = ::read(err.get(), part, sizeof part);
+    ASSERT_GT(count, 0) << said;
+    said.append(part, static_cast<std::size_t>(count));
+  }
+  daemon.write_model(R"(<behaviors timeout="forever">
+    <behavior name="Next"><config at="/p">/high</config></behavior></behaviors>)");
+  daemon.restart();
+  wait_for_picture(path, "○ Next");
   follower.signal(SIGINT);
   EXPECT_EQ(follower.wait(), 0);
 }

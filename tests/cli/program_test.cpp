@@ -50,6 +50,36 @@ TEST(Program, ExitsWith2WhereItIsUsedWrongly) {
   }
 }
 
+TEST(Program, SuggestsTheVerbThatWasMeant) {
+  const auto wrong = arbiter({"wyh", "/p"});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_EQ(wrong.err, "arbiter: there is no verb \"wyh\"; did you mean \"why\"?\n");
+  EXPECT_THAT(arbiter({"frobnicate"}).err, HasSubstr("`arbiter --help` lists"));
+}
+
+TEST(Program, ShowsControlCharactersInsteadOfSendingThem) {
+  for (const auto& arguments :
+       std::vector<std::vector<std::string>>{{"\x1b[31mred"},
+                                             {"check", "\x1b[31mred"},
+                                             {"check", "m.xml", "--\x1b[31mred"},
+                                             {"check", "\xc2\x9b[31mred"},
+                                             {"status", "--instance", "\x1b[31mred"}}) {
+    const auto result = arbiter(arguments);
+    EXPECT_THAT(result.err, HasSubstr("[31mred"));
+    EXPECT_THAT(result.err, Not(HasSubstr("\x1b")));
+    EXPECT_THAT(result.err, Not(HasSubstr("\xc2\x9b")));
+  }
+}
+
+TEST(Program, TellsTheBoundsOfNumbersShortly) {
+  for (const auto& arguments : std::vector<std::vector<std::string>>{
+           {"rollback", "0"}, {"echo", "/p", "--count", "0"}, {"pub", "/p", "--count", "x"}}) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr("is no whole number of at least 1\n"));
+  }
+}
+
 TEST(Program, ExitsWith2WhereAFileCannotBeOpened) {
   TemporaryDirectory directory;
   const auto model = directory.write("m.xml", kOverrideModel);

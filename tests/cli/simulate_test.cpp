@@ -107,6 +107,21 @@ TEST_F(Simulate, ExplainsInsteadWithWhy) {
                 "0.000000003 s  /p  /high -> /low  because /high was deactivated\n");
 }
 
+// The port is behind '=', or there is none.
+TEST_F(Simulate, TakesTheModelBehindWhy) {
+  const auto explained = simulate("t_ns,source\n0,/low\n", {"--why"});
+  ASSERT_EQ(explained.exit_code, 0);
+  const auto model = directory_.write("m.xml", model_);
+  EXPECT_EQ(arbiter({"simulate", "--trace", trace_, "--why", model}).out, explained.out);
+  const auto port = arbiter({"simulate", model, "--trace", trace_, "--why", "/p"});
+  EXPECT_EQ(port.exit_code, 2);
+  EXPECT_EQ(port.err, "arbiter: there is no file /p; if it is the port: --why=/p\n");
+}
+
+TEST_F(Simulate, SuggestsTheSourceThatWasMeant) {
+  EXPECT_THAT(simulate("t_ns,source\n0,/hihg\n").err, HasSubstr("did you mean \"/high\"?"));
+}
+
 TEST_F(Simulate, ExplainsAsJsonToo) {
   const auto result = simulate("t_ns,source\n0,/low\n1,/high\n2,/low\n", {"--why=/p", "--json"});
   EXPECT_EQ(result.exit_code, 0);

@@ -18,7 +18,7 @@ rules::LoadedModel load(const std::string& model, const std::string& application
   rules::Diagnostics diagnostics;
   rules::ModelFiles files{{folder.write("a.xml", model)}, {}};
   if (!application.empty()) files.application = folder.write("app.xml", application);
-  auto loaded = rules::load_all(files, diagnostics);
+  auto loaded = rules::load_all(rules::read_texts(files), diagnostics);
   EXPECT_FALSE(diagnostics.has_errors());
   return loaded;
 }

@@ -1,6 +1,7 @@
 #include "rules/text_file.hpp"
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <string>
 #include <utility>
@@ -51,6 +52,27 @@ TEST(TextFile, ThatCannotBeReadIsNamedWithTheReason) {
               AllOf(HasSubstr("none.xml"), HasSubstr("No such file or directory")));
   EXPECT_THAT(why_unreadable(folder.file("")), HasSubstr("Is a directory"));
   EXPECT_EQ(why_unreadable("/dev/null"), "");
+}
+
+std::string why_not_regular(const std::string& path) {
+  try {
+    read_bytes(path, kMaxFileBytes, Accept::kRegularFile);
+  } catch (const FileError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// Nobody writes to the FIFO: to open it would wait for ever.
+TEST(TextFile, ThatIsNotRegularIsRefusedWithoutOpeningIt) {
+  const Folder folder;
+  const std::string fifo = folder.file("fifo");
+  ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
+  EXPECT_EQ(why_not_regular(fifo), "cannot read " + fifo + ": it is not a regular file but a FIFO");
+  EXPECT_THAT(why_not_regular("/dev/null"), HasSubstr("not a regular file but a device"));
+  EXPECT_THAT(why_not_regular(folder.file("")), HasSubstr("Is a directory"));
+  EXPECT_THAT(why_not_regular(folder.file("none.xml")), HasSubstr("No such file or directory"));
+  EXPECT_EQ(why_not_regular("/proc/self/status"), "");
 }
 
 TEST(TextFile, WithoutAnEndIsReadUpToTheLimit) {

@@ -83,8 +83,7 @@ TEST_F(ChangingModels, SwitchWithoutAModelSaysSo) {
   expect_success(arbiter({"switch"}), "no model is loaded; start the daemon with --model\n");
   expect_refusal(arbiter({"switch", "a"}), "there is no model \"a\"; none is loaded");
   expect_success(arbiter({"history"}), "no model has been in force\n");
-  expect_refusal(arbiter({"rollback"}),
-                 "there is no model to go back to; arbiter history shows all");
+  expect_refusal(arbiter({"rollback"}), "there is no model to go back to: none has been in force");
 }
 
 TEST_F(ChangingModels, ReloadReadsAllAndStaysWithTheOneInForce) {
@@ -155,12 +154,14 @@ TEST_F(ChangingModels, RollbackGoesBackStepByStepOrToOneByItsNumber) {
   ASSERT_EQ(arbiter({"rollback"}).exit_code, 0);
   EXPECT_EQ(source_in_force(), "/a");
   expect_refusal(arbiter({"rollback"}),
-                 "there is no model to go back to; arbiter history shows all");
+                 "model 1 is the oldest that is kept; arbiter history shows all");
   ASSERT_EQ(arbiter({"rollback", "3"}).exit_code, 0);
   EXPECT_EQ(source_in_force(), "/c");
   expect_refusal(arbiter({"rollback", "9"}),
                  "model 9 is not in the history; arbiter history shows what is");
-  EXPECT_EQ(arbiter({"rollback", "0"}).exit_code, 2);
+  const auto wrong = arbiter({"rollback", "0"});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("\"0\" is no whole number of at least 1"));
   EXPECT_EQ(daemon.generation(), 6u);
   ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
   EXPECT_EQ(source_in_force(), "/c") << "what the file says";

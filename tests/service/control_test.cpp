@@ -1,8 +1,10 @@
-// arbiter reload, arbiter stop, and daemons that get a policy that they cannot use.
+// arbiter reload, arbiter stop, and daemons that get files that they cannot use.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/stat.h>
+
+#include <filesystem>
 
 #include <arbiter/arbiter.hpp>
 
@@ -15,6 +17,7 @@ namespace {
 
 using shm::MessageKind;
 using testing::HasSubstr;
+using testing::Not;
 
 ProgramResult arbiter(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), std::string(ARBITER_PROGRAMS) + "/arbiter");
@@ -67,6 +70,27 @@ TEST(Control, ReloadReadsAPolicyWhereThereIsNoModel) {
   auto in = node.input_port<int>("/in");
 }
 
+// Nobody writes to it: a daemon that opened it would not even end when it is told to.
+TEST(Control, AFifoInPlaceOfAFileIsRefusedAndHoldsNobodyUp) {
+  const TemporaryDirectory files;
+  const auto application = files.write(
+      "application.xml",
+      "<application><connection><from>/a</from><to>/in</to></connection></application>");
+  const auto policy = files.write("policy", "allow everyone all\n");
+  Daemon daemon(model_from("/a"),
+                {.arguments = {"--application", application, "--policy", policy}});
+  for (const std::string& path : {daemon.directory() + "/model.xml", application, policy}) {
+    std::filesystem::rename(path, path + ".good");
+    ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+    const auto result = arbiter({"reload"});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, HasSubstr("cannot read " + path + ": it is not a regular file"));
+    std::filesystem::rename(path + ".good", path);
+  }
+  EXPECT_EQ(daemon.generation(), 1u);
+  EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
+}
+
 // Each is told of a reading that began after it asked.
 TEST(Control, EveryReloadIsAnswered) {
   Daemon daemon(model_from("/a"));
@@ -113,6 +137,67 @@ TEST(Control, TheVerbsTellThatThereIsNoDaemon) {
   }
 }
 
+TEST(Control, AVerbThatFindsNoDaemonNamesTheInstancesThatRun) {
+  const TemporaryDirectory runtime;
+  const Daemon one(kNoRules, {.instance = "near-by", .runtime_directory = runtime.path()});
+  const Daemon two(kNoRules, {.instance = "robot-2", .runtime_directory = runtime.path()});
+  for (const std::string verb : {"status", "reload"}) {
+    const auto result = arbiter({verb, "--instance", "nearby"});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, HasSubstr("these instances run: near-by, robot-2")) << verb;
+  }
+}
+
+TEST(Control, ADaemonThatDoesNotAnswerIsNoneThatDoesNotRun) {
+  Daemon daemon;
+  daemon.process().stop();
+  for (const std::string verb : {"status", "reload"}) {
+    const auto result = arbiter({verb});
+    EXPECT_EQ(result.exit_code, 1) << verb;
+    EXPECT_THAT(result.err, HasSubstr("arbiterd (pid " + std::to_string(daemon.process().pid()) +
+                                      ") of instance \"test\" runs, but did not answer within "))
+        << verb;
+    EXPECT_THAT(result.err, Not(HasSubstr("start one"))) << verb;
+  }
+  daemon.process().signal(SIGCONT);
+  EXPECT_EQ(daemon.generation(), 1u);  // what was not asked does not come later
+}
+
+// Here the test is the daemon, which takes its time.
+TEST(Control, AVerbTellsWhomItWaitsFor) {
+  const TemporaryDirectory runtime;
+  const ScopedVariable directory("XDG_RUNTIME_DIR", runtime.path());
+  const ScopedVariable own("RUNTIME_DIRECTORY", std::nullopt);
+  std::filesystem::create_directory(runtime.path() + "/arbiter");
+  const auto listener = shm::listen_at(runtime.path() + "/arbiter", "slow");
+  int ends[2];
+  ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+  const shm::FileDescriptor err(ends[0]);
+  shm::FileDescriptor their_err(ends[1]);
+  ChildProcess verb({ARBITER_PROGRAMS "/arbiter", "reload", "--instance", "slow"}, {},
+                    {-1, -1, their_err.get()});
+  their_err.reset();
+  const shm::FileDescriptor client(::accept(listener.socket.get(), nullptr, nullptr));
+  const auto answer = [&](MessageKind kind, const std::string& text) {
+    shm::Received question;
+    ASSERT_EQ(shm::receive_message(client.get(), question, true), shm::ReceiveResult::kReceived);
+    std::string said;
+    while (said.find(text) == std::string::npos) {
+      char part[512];
+      const ssize_t count = ::read(err.get(), part, sizeof part);
+      ASSERT_GT(count, 0) << said;
+      said.append(part, static_cast<std::size_t>(count));
+    }
+    shm::Message reply = RawClient::message(kind);
+    reply.request = question.message.request;
+    ASSERT_EQ(shm::send_message(client.get(), reply), shm::SendResult::kSent);
+  };
+  answer(MessageKind::kWelcome, "");
+  answer(MessageKind::kRefused, "waiting for arbiterd (pid " + std::to_string(::getpid()) +
+                                    ") of instance \"slow\" to answer");
+  EXPECT_EQ(verb.wait(), 1);
+}
+
 TEST(Control, TheVerbsTellThatThePolicyRefuses) {
   const TemporaryDirectory files;
   const auto policy = files.write("policy", "deny everyone reload,stop,switch,observe\n");
@@ -140,7 +225,7 @@ TEST(Control, ADaemonDoesNotStartWithAPolicyThatItCannotUse) {
       {files.write("empty", ""), "empty:1:1: the policy has no line"},
       {files.path() + "/none", "cannot open " + files.path() + "/none: No such file"},
       {files.path(), "cannot read " + files.path() + ": Is a directory"},
-      {"/dev/zero", "/dev/zero:1:1: the file is larger than the limit of 16 MiB"},
+      {"/dev/zero", "cannot read /dev/zero: it is not a regular file but a device"},
       {writable, "every user may write the policy " + writable + "; run: chmod o-w "}};
   for (const auto& [path, message] : unusable) {
     const auto result =

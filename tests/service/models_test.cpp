@@ -11,6 +11,7 @@
 namespace arbiter::service {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -58,6 +59,9 @@ TEST(ModelFiles, AnApplicationAloneIsAModelToo) {
 
 TEST(ModelFiles, SayWhatIsWrong) {
   EXPECT_THAT(refusal_of_files({"a="}, {}), HasSubstr("\"a=\" names no file"));
+  EXPECT_THAT(refusal_of_files({"a b=two.xml"}, {}),
+              AllOf(HasSubstr("\"a b\" is no name for a model"), HasSubstr("./a b=two.xml")));
+  EXPECT_THAT(refusal_of_files({"a.xml"}, {"=b.xml"}), HasSubstr("\"\" is no name for a model"));
   EXPECT_THAT(refusal_of_files({"a=x"}, {"b=y"}), HasSubstr("there is no model \"b\""));
   EXPECT_THAT(refusal_of_files({"x"}, {"y", "z"}), HasSubstr("two applications"));
   EXPECT_THAT(refusal_of_files({"a=x"}, {"a=y", "a=z"}), HasSubstr("two applications"));

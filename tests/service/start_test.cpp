@@ -126,6 +126,8 @@ TEST(Start, ABadModelEndsItBeforeItIsReady) {
     const auto [code, log] = start_in_vain({"--model", path}, runtime);
     EXPECT_EQ(code, 1) << name;
     EXPECT_NE(log.find(path + ":1:"), std::string::npos) << log;
+    EXPECT_NE(log.find("not started"), std::string::npos) << log;
+    EXPECT_EQ(log.find("has errors: " + path), std::string::npos) << "told twice: " << log;
   }
   const auto [code, log] = start_in_vain({"--model", directory.path() + "/none.xml"}, runtime);
   EXPECT_EQ(code, 1);
