@@ -55,7 +55,7 @@ std::string problem_of_code(std::string& code) {
   std::string all;
   for (const auto& each : kSilenceable) all += (all.empty() ? "" : ", ") + std::string(each);
   return "no warning and no note has the code " + rules::quote(code) +
-         rules::advise(code, kSilenceable, "errors stay") + " These are: " + all;
+         rules::advise(code, kSilenceable, "errors stay.") + " These are: " + all;
 }
 
 std::string counted(std::size_t count, const std::string& thing) {
