@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/live_port.hpp"
+#include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
 #include "cli/why_answer.hpp"
 #include "cli/why_follow.hpp"
@@ -53,7 +54,7 @@ void add_why(CLI::App& app, int& exit_code) {
   verb->add_option("--count", options->count, "With --follow: end after so many changes")
       ->type_name("N")
       ->needs(follow)
-      ->check(CLI::PositiveNumber);
+      ->check(at_least_one());
   verb->add_flag("--all", options->all, "Tell all of every connection, of a port with many too")
       ->excludes(follow);
   verb->add_flag("--json", options->json, "As JSON; with --follow one object a line");

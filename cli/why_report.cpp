@@ -133,8 +133,8 @@ std::string Sources::describe(const std::string& name) const {
   if (!source.is_visible) return "not to be seen yet (the daemon has no page of its activity)";
   if (source.word == shm::kNeverActive) return "inactive (it has never arrived)";
   if (shm::is_deactivation(source.word)) {
-    return "inactive (deactivated " + span_text(now_ - (source.word & ~shm::kDeactivatedFlag)) +
-           " ago)";
+    const shm::Nanoseconds ago = now_ - (source.word & ~shm::kDeactivatedFlag);
+    return "inactive (deactivated " + (ago <= 0 ? "just now" : span_text(ago) + " ago") + ")";
   }
   const auto arrival = source.last_arrival();
   if (!arrival) return is_active(name) ? ending_text(source) : ended_text(source);
