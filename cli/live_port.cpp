@@ -29,7 +29,9 @@ shm::PortId find_port(detail::NodeCore& node, const std::string& name) {
   const nlohmann::json status = fetch_status(node);
   for (const auto& source : status.at("sources")) {
     if (source.at("name") == name) {
-      throw Error(name + " is an output port; give the input port first: arbiter why PORT " + name);
+      std::string message = name + " is an output port; give the input port first";
+      message += ": arbiter why PORT " + name;
+      throw Error(message);
     }
   }
   const auto model = ModelInForce::fetch(node);

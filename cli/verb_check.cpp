@@ -30,32 +30,32 @@ struct Statements {
 };
 
 // Of the warnings and notes that reading, compiling and proving a model can bring.
-const std::vector<std::string_view> kSilenceable{"duplicate-config",
-                                                 "duplicate-connection",
-                                                 "inhibition-across-ports",
-                                                 "left-open",
-                                                 "matches-nothing",
-                                                 "more-conflicts",
-                                                 "never-published",
-                                                 "never-runs",
-                                                 "never-selected",
-                                                 "never-wins",
-                                                 "no-children",
-                                                 "no-config",
-                                                 "no-rule-at-port",
-                                                 "nobody-wins",
-                                                 "not-checked",
-                                                 "proved",
-                                                 "starved",
-                                                 "unreachable-children"};
+const std::vector<std::string_view> silenceable{"duplicate-config",
+                                                "duplicate-connection",
+                                                "inhibition-across-ports",
+                                                "left-open",
+                                                "matches-nothing",
+                                                "more-conflicts",
+                                                "never-published",
+                                                "never-runs",
+                                                "never-selected",
+                                                "never-wins",
+                                                "no-children",
+                                                "no-config",
+                                                "no-rule-at-port",
+                                                "nobody-wins",
+                                                "not-checked",
+                                                "proved",
+                                                "starved",
+                                                "unreachable-children"};
 
 std::string problem_of_code(std::string& code) {
   if (code == "both-can-win" || code == "refuted") return "";  // known, but errors: they stay
-  if (std::find(kSilenceable.begin(), kSilenceable.end(), code) != kSilenceable.end()) return "";
+  if (std::find(silenceable.begin(), silenceable.end(), code) != silenceable.end()) return "";
   std::string all;
-  for (const auto& each : kSilenceable) all += (all.empty() ? "" : ", ") + std::string(each);
+  for (const auto& each : silenceable) all += (all.empty() ? "" : ", ") + std::string(each);
   return "no warning and no note has the code " + rules::quote(code) +
-         rules::advise(code, kSilenceable, "errors stay.") + " These are: " + all;
+         rules::advise(code, silenceable, "errors stay.") + " These are: " + all;
 }
 
 std::string counted(std::size_t count, const std::string& thing) {

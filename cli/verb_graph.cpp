@@ -42,7 +42,7 @@ struct GraphOptions {
 };
 
 // All that Graphviz makes of it but dot, which is ours.
-const std::set<std::string> kFormats{"svg", "png", "dot", "pdf", "ps", "eps", "jpg"};
+const std::set<std::string> formats{"svg", "png", "dot", "pdf", "ps", "eps", "jpg"};
 
 // Throws CLI::ValidationError where the output's ending names no format.
 std::string format_of(const GraphOptions& options) {
@@ -53,7 +53,7 @@ std::string format_of(const GraphOptions& options) {
   for (char& each : ending)
     each = static_cast<char>(std::tolower(static_cast<unsigned char>(each)));
   if (ending == "gv") return "dot";
-  if (kFormats.contains(ending)) return ending;
+  if (formats.contains(ending)) return ending;
   throw CLI::ValidationError("--output", "no picture is made of the ending of " + options.output +
                                              "; give --format, or one of .svg, .png, .pdf, .ps, "
                                              ".eps, .jpg, .dot and .gv");
@@ -131,24 +131,24 @@ bool agrees(const json& status, const Situation& situation) {
   return true;
 }
 
-struct Look {
+struct LiveSituation {
   Situation situation;
   bool fits = false;
-  json model;  // what the daemon has in force
+  std::shared_ptr<json> model;  // what the daemon has in force
 };
 
 // The daemon reads one activity after another while the robot goes on, so that a picture might
 // combine moments; what it says is taken when it fits together. Where it never does, the daemon has
 // other rules than this model.
-Look look(detail::NodeCore& node, const rules::RuleSet& rules) {
+LiveSituation look(detail::NodeCore& node, const rules::RuleSet& rules) {
   constexpr int kTries = 20;
-  Look seen;
+  LiveSituation seen;
   for (int i = 0; i < kTries && !seen.fits; ++i) {
     const json status = fetch_status(node);
     seen.situation = drawing::decide(rules, active_sources(status));
     seen.fits = agrees(status, seen.situation);
-    seen.model = status.at("model");
-    seen.model["directory"] = status.at("directory");
+    seen.model = std::make_shared<json>(status.at("model"));
+    seen.model->emplace("directory", status.at("directory"));
   }
   return seen;
 }
@@ -212,13 +212,13 @@ class LivePicture {
 
   // False: the model cannot be drawn.
   bool update() {
-    Look now = look(*node_, picture_.rules());
-    if (drawn_ != now.model.at("generation")) {
-      if (!load(now.model)) return false;
+    LiveSituation now = look(*node_, picture_.rules());
+    if (drawn_ != now.model->at("generation")) {
+      if (!load(*now.model)) return false;
       now = look(*node_, picture_.rules());
     }
     fits_ = now.fits;
-    if (!fits_ && is_same_ && now.model.at("generation") == drawn_ &&
+    if (!fits_ && is_same_ && now.model->at("generation") == drawn_ &&
         !std::exchange(warned_, true)) {
       std::cerr << "arbiter: the daemon decides otherwise than this model does; is it the one in "
                    "force, and unchanged since? (arbiter status, arbiter reload)\n";
@@ -333,7 +333,7 @@ void add_graph(CLI::App& app, int& exit_code) {
   verb->add_option("--format", options->format,
                    "svg, png, dot, pdf, ps, eps or jpg; without it by the ending of the file, svg "
                    "where it has none")
-      ->check(CLI::IsMember(kFormats))
+      ->check(CLI::IsMember(formats))
       ->type_name("FORMAT");
   verb->add_option("-o,--output", options->output, kOutputHelp)->type_name("FILE");
   verb->add_flag("--live", options->live, "Colour it by who is active and who wins now");

@@ -24,20 +24,22 @@ namespace {
 struct SimulateOptions {
   rules::ModelFiles files;
   std::string trace;
-  std::string why;  // kAllPorts, or the port; empty: no
+  std::string why;  // all_ports, or the port; empty: no
   bool json = false;
 };
 
 // What CLI11 takes a flag without a value for; no port is called so.
-const std::string kAllPorts = "true";
+const std::string all_ports = "true";
 
 // A blank in place of the '=' makes a file of the port.
 void require_no_port_among_files(const SimulateOptions& options) {
   for (const std::string& file : options.files.models) {
-    if (options.why != kAllPorts || !file.starts_with('/') || access(file.c_str(), F_OK) == 0) {
+    if (options.why != all_ports || !file.starts_with('/') || access(file.c_str(), F_OK) == 0) {
       continue;
     }
-    throw rules::FileError("there is no file " + file + "; if it is the port: --why=" + file);
+    std::string message = "there is no file " + file;
+    message += "; if it is the port: --why=" + file;
+    throw rules::FileError(message);
   }
 }
 
@@ -81,7 +83,7 @@ int simulate(const SimulateOptions& options) {
   note_unknown_sources(simulation, options.trace, events, diagnostics);
   rules::write_text(std::cerr, diagnostics);
   if (is_why) {
-    const std::string port = options.why == kAllPorts ? "" : options.why;
+    const std::string port = options.why == all_ports ? "" : options.why;
     WhySimulated why(model->rules, simulation, {port, options.json});
     for (const auto& event : events) why.step(event, std::cout);
     return 0;

@@ -184,12 +184,13 @@ class ConnectionsView {
     }
     for (const std::string& source : sensed) {
       if (connected.contains(source)) continue;
-      out_.statement(arrow(source, inlet(in.id)),
-                     {{"color", quoted(colour::kSensed)},
-                      {"style", "dashed"},
-                      {"arrowhead", "odot"},
-                      {"penwidth", is_active(source) ? "2.5" : "1"},
-                      {"tooltip", quoted(source + " is sensed at " + port)}});
+      std::string tooltip = source + " is sensed at ";
+      tooltip += port;
+      out_.statement(arrow(source, inlet(in.id)), {{"color", quoted(colour::kSensed)},
+                                                   {"style", "dashed"},
+                                                   {"arrowhead", "odot"},
+                                                   {"penwidth", is_active(source) ? "2.5" : "1"},
+                                                   {"tooltip", quoted(tooltip)}});
     }
   }
 

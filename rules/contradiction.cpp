@@ -86,8 +86,8 @@ std::string why_it_never_runs(DiagramBuilder& builder, const BehaviourRules& beh
     const std::string contradiction = contradiction_in(builder, rule);
     std::string reason;
     if (!contradiction.empty()) {
-      reason = "its connection from " + rule.source + " to " + port + " asks for " + contradiction +
-               ", which is never so";
+      reason = "its connection from " + rule.source + " to " + port + " asks for ";
+      reason += contradiction + ", which is never so";
     } else if (at != rules.ports.end() && at->first_wins) {
       reason = "whenever it asks for the connection from " + rule.source + " to " + port +
                ", an earlier one wins there, or one that conflict=\"first\" prefers";

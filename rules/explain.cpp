@@ -261,6 +261,7 @@ std::optional<std::vector<Literal>> ConnectionExplanation::reason() const {
     for (const Literal& literal : least->because) joined[literal.source] = literal.active;
   }
   std::vector<Literal> result;
+  result.reserve(joined.size());
   for (const auto& [name, active] : joined) result.push_back({name, active});
   return result;
 }

@@ -356,6 +356,7 @@ std::vector<Literal> sufficient_reason(const Expression& expression, const IsAct
   std::set<std::string> sources;
   collect_sources(expression, seen, sources);
   std::vector<Literal> literals;
+  literals.reserve(sources.size());
   for (const std::string& source : sources) literals.push_back({source, is_active(source)});
   return literals.size() <= kMaxSourcesForSmallest ? smallest_reason(expression, literals)
                                                    : large_reason(expression, literals);

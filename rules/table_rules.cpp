@@ -14,8 +14,8 @@ ExpressionPtr negate(ExpressionPtr operand) {
 ExpressionPtr diagram(const shm::Rule& rule, const std::vector<ExpressionPtr>& reads) {
   namespace table = shm::table;
   const shm::Word count = rule.nodes.count / table::kNodeWords;
-  const ExpressionPtr never = make_constant(false);
-  const ExpressionPtr always = make_constant(true);
+  ExpressionPtr never = make_constant(false);
+  ExpressionPtr always = make_constant(true);
   std::vector<ExpressionPtr> nodes(count);
   for (shm::Word node = count; node-- > 0;) {
     const shm::Word base = node * table::kNodeWords;

@@ -156,7 +156,8 @@ Tenure tenure_of(const shm::TableView& table, shm::PortId port, shm::SourceId wi
   Tenure tenure;
   tenure.at_least = moment.model_since;
   bool is_sure = true;
-  for (const auto& [time, sources] : changes) {
+  for (const auto& change : changes) {
+    const shm::Nanoseconds time = change.first;
     if (time <= moment.model_since) break;
     const auto before = is_selected(table, port, winner, [&](shm::SourceId source) {
       return pasts.at(source).just_before(time);
@@ -166,7 +167,7 @@ Tenure tenure_of(const shm::TableView& table, shm::PortId port, shm::SourceId wi
     is_sure = false;
     if (before == Activation::kUnknown) continue;
     tenure.not_before = time;
-    tenure.changed = sources;
+    tenure.changed = change.second;
     break;
   }
   return tenure;

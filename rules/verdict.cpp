@@ -162,8 +162,7 @@ class Question {
 class Judge {
  public:
   Judge(const CompiledModel& model, Diagnostics& diagnostics, std::uint64_t max_work)
-      : model_(model),
-        diagnostics_(diagnostics),
+      : diagnostics_(diagnostics),
         max_work_(max_work),
         expansion_(model.sources),
         sources_(model.sources.begin(), model.sources.end()) {
@@ -262,7 +261,6 @@ class Judge {
                              ": any() is false of it, all() and none() are true; correct it");
   }
 
-  const CompiledModel& model_;
   Diagnostics& diagnostics_;
   const std::uint64_t max_work_;
   QuantifierExpansion expansion_;

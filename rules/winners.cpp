@@ -112,7 +112,7 @@ Diagram Winners::combine(Connective connective, const Diagram& a, const Diagram&
 
 Diagram Winners::winner(const CompiledRule& rule) {
   using shm::table::kTrue;
-  const Diagram own = active(rule.source);
+  Diagram own = active(rule.source);
   if (rule.kind == shm::table::kNever) return constant(false);
   if (rule.kind == shm::table::kAlways) return own;
   Diagram condition;

@@ -254,7 +254,7 @@ Daemon::Swap Daemon::first_swap() {
   if (next == nullptr) {
     next = library.first();
     if (!last.empty()) {
-      log::warn("the last daemon's model \"{}\" is not among those given: \"{}\" takes its place",
+      log::warn(R"(the last daemon's model "{}" is not among those given: "{}" takes its place)",
                 last, next->model->name);
     }
   }

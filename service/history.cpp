@@ -60,19 +60,20 @@ const PastModel* History::previous() const {
 nlohmann::json History::json() const {
   using Json = nlohmann::json;
   Json result = Json::array();
-  for (auto entry = models_.rbegin(); entry != models_.rend(); ++entry) {
-    const auto& application = entry->files.application;
-    result.push_back({{"generation", entry->generation},
-                      {"content", entry->content},
-                      {"name", entry->name},
-                      {"files", entry->files.models},
+  for (const PastModel& entry : models_) {
+    const auto& application = entry.files.application;
+    result.push_back({{"generation", entry.generation},
+                      {"content", entry.content},
+                      {"name", entry.name},
+                      {"files", entry.files.models},
                       {"application", application ? Json(*application) : Json(nullptr)},
-                      {"since_ms", entry->since_ms},
-                      {"how", entry->how},
-                      {"by", entry->by.empty() ? Json(nullptr) : Json(entry->by)},
-                      {"changes", entry->changes.empty() ? Json(nullptr) : Json(entry->changes)},
-                      {"is_kept", entry->model != nullptr}});
+                      {"since_ms", entry.since_ms},
+                      {"how", entry.how},
+                      {"by", entry.by.empty() ? Json(nullptr) : Json(entry.by)},
+                      {"changes", entry.changes.empty() ? Json(nullptr) : Json(entry.changes)},
+                      {"is_kept", entry.model != nullptr}});
   }
+  std::reverse(result.begin(), result.end());
   return result;
 }
 
