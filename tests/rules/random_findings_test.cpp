@@ -183,10 +183,11 @@ void compare(const RandomModel& random, const Vocabulary& words,
   for (const auto& port : set.ports) {
     for (const auto& rule : port.rules) ++connections[rule.source];
   }
-  for (const auto& [source, count] : connections) {
+  for (const auto& each : connections) {
+    const std::string& source = each.first;
     const auto wins = [&](const auto& port) { return expected.can_win(port, source); };
     if (std::any_of(words.ports.begin(), words.ports.end(), wins)) continue;
-    if (count > 1) losers.insert(source);
+    if (each.second > 1) losers.insert(source);
   }
   EXPECT_EQ(first_matches(items, "never-wins", "^(\\S+) is connected to"), losers);
   seen.never_wins += static_cast<int>(losers.size());

@@ -87,8 +87,8 @@ Change switch_for(ClientId client, const std::string& name) {
 
 TEST(Changes, ThatAreTheSameAndStandBehindEachOtherAreOne) {
   Changes changes;
-  for (const ClientId client : {1, 2}) changes.add(reload_for(client));
-  for (const ClientId client : {3, 4}) changes.add(switch_for(client, "a"));
+  for (const ClientId client : {ClientId{1}, ClientId{2}}) changes.add(reload_for(client));
+  for (const ClientId client : {ClientId{3}, ClientId{4}}) changes.add(switch_for(client, "a"));
   changes.add(switch_for(5, "b"));
   changes.add(reload_for(6));
   std::vector<std::size_t> asking;
