@@ -221,6 +221,7 @@ void Honest::hear(const shm::Received& received) {
       if (is_input_) peers_.erase(message.peer);
       break;
     case MessageKind::kPortName:
+    case MessageKind::kModelReply:
       break;
     default:
       require(false, "the daemon says nothing but what it may");

@@ -65,6 +65,9 @@ Stage::Stage() : owner_(::getpid(), ::geteuid()) {
   run();
   require(sender_->is_connected() && receiver_->is_connected(), "ports open");
   sources_ = count_sources();
+  // The one copy of the model's texts that the daemon keeps once somebody has asked for it.
+  sender_->ask(shm::MessageKind::kModel);
+  run();
   descriptors_ = count_descriptors();
 }
 
