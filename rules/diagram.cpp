@@ -27,7 +27,7 @@ constexpr int kFirstNodes = 20000;
 constexpr int kNodesPerCacheEntry = 4;
 // Sifting starts by itself when there are so many nodes, and again when they have doubled since;
 // each time takes as long as a few hundred thousand nodes may.
-constexpr int kNodesToSift = 40000;
+constexpr int kNodesToSift = 80000;
 constexpr int kAutomaticSifts = 2;
 
 std::mutex one_instance;
