@@ -23,10 +23,16 @@ std::shared_ptr<OutputCore> open_output(NodeCore& node, std::string_view name, c
 }
 // Loans that are still out keep the core, but not the port.
 void close_output(std::shared_ptr<OutputCore> core) noexcept {
-  if (core != nullptr) core->node->close(core->instance());
+  if (core == nullptr) return;
+  core->node->close(core->instance());
+  if (core->loans() != 0) core->kept_by_loans = core;
 }
 LoanedSlot loan(OutputCore& core, std::size_t size) noexcept { return core.loan(size); }
-void end_loan(OutputCore& core, std::uint32_t slot) noexcept { core.end_loan(slot); }
+void end_loan(OutputCore& core, std::uint32_t slot) noexcept {
+  core.end_loan(slot);
+  std::shared_ptr<OutputCore> last;
+  if (core.loans() == 0) last.swap(core.kept_by_loans);
+}
 Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size) noexcept {
   return core.publish_loan(slot, size, shm::monotonic_now());
 }
@@ -46,7 +52,7 @@ std::shared_ptr<InputCore> open_input(NodeCore& node, std::string_view name, con
 void close_input(std::shared_ptr<InputCore> core) noexcept {
   if (core == nullptr) return;
   if (core->held() != 0) {
-    core->close_when_given_back = true;
+    core->kept_by_samples = core;
   } else {
     core->node->close(core->instance());
   }
@@ -57,7 +63,9 @@ Waited wait(InputCore& core, std::int64_t timeout_ns, HeldSample& sample) {
 }
 void give_back(InputCore& core, std::uint32_t hold) noexcept {
   core.give_back(hold);
-  if (core.close_when_given_back && core.held() == 0) core.node->close(core.instance());
+  if (core.kept_by_samples != nullptr && core.held() == 0) {
+    close_input(std::move(core.kept_by_samples));
+  }
 }
 int wait_descriptor(InputCore& core) { return core.wait_descriptor(); }
 std::optional<std::string> winner(InputCore& core) { return core.winner(); }

@@ -69,7 +69,7 @@ class InputCore {
 
   std::shared_ptr<NodeCore>
       node;  // kept for as long as the port is, so that they may go in any order
-  bool close_when_given_back = false;  // port's thread: the port is gone, samples of it are not
+  std::shared_ptr<InputCore> kept_by_samples;  // port's thread: the port is gone, they are not
 
  private:
   // A link as the port's thread works with it: one publisher's queue.
@@ -98,7 +98,7 @@ class InputCore {
   [[nodiscard]] bool nothing_is_new() const noexcept;
   Queue* look() noexcept;
   Queue* scan(bool& again) noexcept;
-  bool look_at(Queue& queue) noexcept;
+  bool look_at(std::size_t index) noexcept;
   bool look_closely(Queue& queue) noexcept;
   void join(Queue& queue) noexcept;
   void yield_to_successor(Queue& queue) noexcept;

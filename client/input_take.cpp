@@ -81,9 +81,9 @@ InputCore::Queue* InputCore::scan(bool& again) noexcept {
   waiting_.clear();
   Queue* oldest = nullptr;
   std::size_t found = 0;  // the queues before this one come before the last find
-  for (std::size_t i = 0; i < queues_.size(); ++i) {
+  for (std::size_t i = 0; i < watches_.size(); ++i) {
+    if (watches_[i].is_unchanged() || !look_at(i)) continue;
     Queue& queue = queues_[i];
-    if (!look_at(queue)) continue;
     waiting_.push_back(&queue);
     found = i;
     if (oldest == nullptr) {
@@ -98,7 +98,7 @@ InputCore::Queue* InputCore::scan(bool& again) noexcept {
     if (queue.head_stamp < oldest->head_stamp) oldest = &queue;
   }
   for (std::size_t i = 0; i < found && !again; ++i) {
-    if (queues_[i].head != 0 || !look_at(queues_[i])) continue;
+    if (queues_[i].head != 0 || watches_[i].is_unchanged() || !look_at(i)) continue;
     queues_[i].head = 0;  // for the next scan to find
     again = true;
   }
@@ -111,12 +111,11 @@ void InputCore::join(Queue& queue) noexcept {
   queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_relaxed);
 }
 
-bool InputCore::look_at(Queue& queue) noexcept {
-  shm::ChannelReader::Watch& watch = watches_[static_cast<std::size_t>(&queue - queues_.data())];
-  if (watch.is_unchanged()) return false;
+bool InputCore::look_at(std::size_t index) noexcept {
+  Queue& queue = queues_[index];
   if (look_closely(queue)) return true;
   // Of a publisher that is gone, what there is to do depends on its successor too.
-  if (!queue.gone) watch = queue.reader.watch();
+  if (!queue.gone) watches_[index] = queue.reader.watch();
   return false;
 }
 

@@ -48,6 +48,7 @@ class OutputCore {
 
   [[nodiscard]] LoanedSlot loan(std::size_t size) noexcept;
   void end_loan(std::uint32_t slot) noexcept;
+  [[nodiscard]] std::uint32_t loans() const noexcept { return loans_; }
   // Arrivals at `now`, a reading of the clock.
   Outcome publish_loan(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
   Outcome publish_copy(const void* data, std::size_t size, shm::Nanoseconds now) noexcept;
@@ -70,6 +71,7 @@ class OutputCore {
 
   std::shared_ptr<NodeCore>
       node;  // kept for as long as the port is, so that they may go in any order
+  std::shared_ptr<OutputCore> kept_by_loans;  // port's thread: the port is gone, they are not
 
  private:
   // How often a decision is taken anew because seven models were loaded during it.

@@ -9,6 +9,7 @@
 
 #include "client/count.hpp"
 #include "client/output_core.hpp"
+#include "shm/prefetch.hpp"
 
 namespace arbiter::detail {
 
@@ -19,7 +20,7 @@ std::uint32_t OutputCore::acquire_slot() noexcept {
     }
   });
   // Its last receiver has it in its cache: let it come back while the sample is written.
-  if (slot != shm::kNoSlot) __builtin_prefetch(&segment_.slot_header(slot), 1);
+  if (slot != shm::kNoSlot) shm::prefetch_to_write(&segment_.slot_header(slot));
   return slot;
 }
 

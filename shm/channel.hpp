@@ -26,6 +26,7 @@
 #include "shm/input_segment.hpp"
 #include "shm/limits.hpp"
 #include "shm/output_segment.hpp"
+#include "shm/prefetch.hpp"
 
 namespace arbiter::shm {
 
@@ -151,9 +152,8 @@ class ChannelReader {
       const std::uint64_t ahead = (sequence_of(entry) - next_) & kSequenceMask;
       if (ahead == 0) {
         if (slot_of(entry) < segment_.layout().slot_count) {
-          // Both will be needed, and lie in the publisher's cache: let them come while we decide.
-          __builtin_prefetch(&segment_.slot_header(slot_of(entry)));
-          __builtin_prefetch(segment_.payload(slot_of(entry)));
+          prefetch_sample(entry);
+          prefetch_next();
           return entry;
         }
         state_ = State::kMisbehaved;
@@ -247,6 +247,19 @@ class ChannelReader {
 
  private:
   static constexpr int kMaxTries = 64;
+
+  // A sample's lines lie in the publisher's cache: let them come while we decide.
+  void prefetch_sample(Entry entry) const noexcept {
+    prefetch(&segment_.slot_header(slot_of(entry)));
+    prefetch(segment_.payload(slot_of(entry)));
+  }
+  // And the next one's, if it is there, while this one is taken: fence (c) would keep them waiting.
+  // Relaxed is enough for what is only a guess.
+  void prefetch_next() const noexcept {
+    const std::uint32_t position = position_ + 1 == depth_ ? 0 : position_ + 1;
+    const Entry entry = ring_[position].load(std::memory_order_relaxed);
+    if (sequence_of(entry) == ((next_ + 1) & kSequenceMask)) prefetch_sample(entry);
+  }
 
   void advance(std::uint32_t by) noexcept {
     position_ += by;

@@ -20,17 +20,6 @@ namespace arbiter {
 // held.
 class SampleBase {
  public:
-  SampleBase(SampleBase&& other) noexcept = default;
-  SampleBase& operator=(SampleBase&& other) noexcept {
-    if (this != &other) {
-      give_back();
-      core_ = std::move(other.core_);
-      held_ = other.held_;
-    }
-    return *this;
-  }
-  ~SampleBase() { give_back(); }
-
   // The output port it came from.
   [[nodiscard]] std::string source() const { return detail::source_name(*core_, held_.source); }
   // The source's own count of its samples, from 1.
@@ -39,17 +28,12 @@ class SampleBase {
   [[nodiscard]] std::int64_t stamp_ns() const noexcept { return held_.stamp_ns; }
 
  protected:
-  SampleBase(std::shared_ptr<detail::InputCore> core, const detail::HeldSample& held) noexcept
-      : core_(std::move(core)), held_(held) {}
+  SampleBase(detail::InputCore& core, const detail::HeldSample& held) noexcept
+      : core_(&core, {held.hold}), held_(held) {}
   [[nodiscard]] const detail::HeldSample& held() const noexcept { return held_; }
 
  private:
-  void give_back() noexcept {
-    if (core_ != nullptr) detail::give_back(*core_, held_.hold);
-    core_ = nullptr;
-  }
-
-  std::shared_ptr<detail::InputCore> core_;
+  detail::HeldBy core_;
   detail::HeldSample held_;
 };
 
@@ -79,8 +63,8 @@ class Sample<void> : public SampleBase {
  private:
   template <class>
   friend class InputPort;
-  Sample(std::shared_ptr<detail::InputCore> core, const detail::HeldSample& held) noexcept
-      : SampleBase(std::move(core), held), bytes_(held.data, held.size) {}
+  Sample(detail::InputCore& core, const detail::HeldSample& held) noexcept
+      : SampleBase(core, held), bytes_(held.data, held.size) {}
 
   Bytes bytes_;
 };
@@ -137,7 +121,7 @@ class InputPort {
   [[nodiscard]] std::optional<Sample<T>> take() {
     const detail::HeldSample held = detail::take(*core_);
     if (held.data == nullptr) return std::nullopt;
-    return Sample<T>(core_, held);
+    return Sample<T>(*core_, held);
   }
 
   // As take(), but blocks, without spinning, until there is a sample, the port becomes idle, or the
@@ -147,7 +131,7 @@ class InputPort {
     detail::HeldSample held;
     switch (detail::wait(*core_, nanoseconds(timeout), held)) {
       case detail::Waited::kSample:
-        return WaitResult<T>(Sample<T>(core_, held));
+        return WaitResult<T>(Sample<T>(*core_, held));
       case detail::Waited::kIdle:
         return WaitResult<T>(WaitStatus::idle);
       case detail::Waited::kTimeout:

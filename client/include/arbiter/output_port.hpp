@@ -24,50 +24,23 @@ class OutputPort;
 template <class T>
 class Loan {
  public:
-  Loan(Loan&& other) noexcept = default;
-  Loan& operator=(Loan&& other) noexcept {
-    if (this != &other) {
-      end();
-      core_ = std::move(other.core_);
-      slot_ = other.slot_;
-    }
-    return *this;
-  }
-  ~Loan() { end(); }
-
   T& operator*() const noexcept { return *get(); }
   T* operator->() const noexcept { return get(); }
-  [[nodiscard]] T* get() const noexcept { return std::launder(reinterpret_cast<T*>(slot_.data)); }
+  [[nodiscard]] T* get() const noexcept { return std::launder(reinterpret_cast<T*>(data_)); }
 
  private:
   friend class OutputPort<T>;
-  Loan(std::shared_ptr<detail::OutputCore> core, detail::LoanedSlot slot) noexcept
-      : core_(std::move(core)), slot_(slot) {}
-  void end() noexcept {
-    if (core_ != nullptr) detail::end_loan(*core_, slot_.slot);
-    core_ = nullptr;
-  }
+  Loan(detail::OutputCore& core, detail::LoanedSlot slot) noexcept
+      : core_(&core, {slot.slot}), data_(slot.data) {}
 
-  std::shared_ptr<detail::OutputCore> core_;  // null once published
-  detail::LoanedSlot slot_;
+  detail::LoanedBy core_;  // null once published
+  std::byte* data_;
 };
 
 // The same for an untyped port: bytes.
 template <>
 class Loan<void> {
  public:
-  Loan(Loan&& other) noexcept = default;
-  Loan& operator=(Loan&& other) noexcept {
-    if (this != &other) {
-      end();
-      core_ = std::move(other.core_);
-      slot_ = other.slot_;
-      bytes_ = other.bytes_;
-    }
-    return *this;
-  }
-  ~Loan() { end(); }
-
   const WritableBytes& operator*() const noexcept { return bytes_; }
   const WritableBytes* operator->() const noexcept { return &bytes_; }
   [[nodiscard]] std::byte* data() const noexcept { return bytes_.data(); }
@@ -79,15 +52,10 @@ class Loan<void> {
 
  private:
   friend class OutputPort<void>;
-  Loan(std::shared_ptr<detail::OutputCore> core, detail::LoanedSlot slot, std::size_t size) noexcept
-      : core_(std::move(core)), slot_(slot), bytes_(slot.data, size) {}
-  void end() noexcept {
-    if (core_ != nullptr) detail::end_loan(*core_, slot_.slot);
-    core_ = nullptr;
-  }
+  Loan(detail::OutputCore& core, detail::LoanedSlot slot, std::size_t size) noexcept
+      : core_(&core, {slot.slot}), bytes_(slot.data, size) {}
 
-  std::shared_ptr<detail::OutputCore> core_;
-  detail::LoanedSlot slot_;
+  detail::LoanedBy core_;  // null once published
   WritableBytes bytes_;
 };
 
@@ -128,17 +96,17 @@ class OutputPort : public OutputPortBase {
     const detail::LoanedSlot slot = detail::loan(*core_, sizeof(T));
     if (slot.data == nullptr) return std::nullopt;
     if constexpr (std::is_default_constructible_v<T>) ::new (static_cast<void*>(slot.data)) T;
-    return Loan<T>(core_, slot);
+    return Loan<T>(*core_, slot);
   }
   // The arrival of a sample at all connected input ports: makes the source active, decides at each
   // port, and hands the sample to those where it wins. A loser wakes nobody. Wait-free; 50 ns and
   // up. Throws std::invalid_argument for a loan that is empty or another port's.
   Outcome publish(Loan<T> loan) {
-    if (loan.core_ == nullptr || loan.core_ != core_) {
+    if (loan.core_ == nullptr || loan.core_.get() != core_.get()) {
       throw std::invalid_argument("the loan is not one of this port");
     }
-    loan.core_ = nullptr;
-    return detail::publish(*core_, loan.slot_.slot, sizeof(T));
+    static_cast<void>(loan.core_.release());
+    return detail::publish(*core_, loan.core_.get_deleter().slot, sizeof(T));
   }
   // The same with a copy of `sample`.
   Outcome publish(const T& sample) noexcept {
@@ -157,14 +125,14 @@ class OutputPort<void> : public OutputPortBase {
   [[nodiscard]] std::optional<Loan<void>> loan(std::size_t size) noexcept {
     const detail::LoanedSlot slot = detail::loan(*core_, size);
     if (slot.data == nullptr) return std::nullopt;
-    return Loan<void>(core_, slot, size);
+    return Loan<void>(*core_, slot, size);
   }
   Outcome publish(Loan<void> loan) {
-    if (loan.core_ == nullptr || loan.core_ != core_) {
+    if (loan.core_ == nullptr || loan.core_.get() != core_.get()) {
       throw std::invalid_argument("the loan is not one of this port");
     }
-    loan.core_ = nullptr;
-    return detail::publish(*core_, loan.slot_.slot, loan.size());
+    static_cast<void>(loan.core_.release());
+    return detail::publish(*core_, loan.core_.get_deleter().slot, loan.size());
   }
   // With a copy. Throws std::invalid_argument for more than max_size bytes.
   Outcome publish(Bytes bytes) {

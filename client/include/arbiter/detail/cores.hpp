@@ -71,6 +71,21 @@ bool is_idle(InputCore& core) noexcept;
 std::string source_name(const InputCore& core, std::uint32_t source);
 const std::string& name(const InputCore& core) noexcept;
 
+// A sample, and a loan, keep the port's core in being without counting references to it: samples
+// and loans are counted anyway, by their port's thread, where an atomic count would hold up each
+// call until all that was stored before it has reached the cache.
+struct GiveBack {
+  void operator()(InputCore* core) const noexcept { give_back(*core, hold); }
+  std::uint32_t hold = 0;
+};
+using HeldBy = std::unique_ptr<InputCore, GiveBack>;
+
+struct EndLoan {
+  void operator()(OutputCore* core) const noexcept { end_loan(*core, slot); }
+  std::uint32_t slot = 0;
+};
+using LoanedBy = std::unique_ptr<OutputCore, EndLoan>;
+
 template <class T>
 PortType port_type() noexcept {
   static_assert(
