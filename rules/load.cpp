@@ -72,7 +72,8 @@ void hand_over_sorted(const Diagnostics& found, const DocumentOrder& order,
         diagnostics.warning(item->code, item->where, item->message);
         break;
       case Severity::kNote:
-        diagnostics.note(item->code, item->where, item->message, item->witness);
+        diagnostics.note(item->code, item->where, item->message, item->witness,
+                         item->more_witnesses);
         break;
     }
   }

@@ -129,6 +129,25 @@ TEST(Check, NotesWhereNobodyWinsAndWhoIsStarved) {
   EXPECT_THAT(result.err, EndsWith("2 notes\n"));
 }
 
+TEST(Check, TellsEachCauseOfNobody) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", R"(<behaviors>
+  <behavior name="Low"><config at="/B:i">/Low:o</config></behavior>
+  <behavior name="Mid"><config at="/B:i">/Mid:o</config>
+    <condition>/Enable:o</condition><inhibition>Low</inhibition></behavior>
+  <behavior name="Top"><config at="/B:i">/Top:o</config>
+    <condition>not /Fault:o</condition><inhibition>Mid, Low</inhibition></behavior>
+</behaviors>
+)");
+  EXPECT_THAT(arbiter({"check", model}).err,
+              HasSubstr("  so too with /Mid:o active and /Enable:o and /Top:o inactive\n"));
+  const auto found = nlohmann::json::parse(arbiter({"check", model, "--json"}).out);
+  EXPECT_EQ(found[0]["code"], "nobody-wins");
+  EXPECT_EQ(
+      found[0]["more_witnesses"],
+      nlohmann::json::parse(R"([{"active": ["/Mid:o"], "inactive": ["/Enable:o", "/Top:o"]}])"));
+}
+
 TEST(Check, NotesAndWarningsCanBeSilencedAndErrorsCannot) {
   TemporaryDirectory directory;
   const auto model = directory.write("m.xml", kTrackModel);
