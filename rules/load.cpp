@@ -99,7 +99,7 @@ LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
   check_sources(loaded.model, found);
   Hierarchy hierarchy(loaded.model, found);
   RuleSet& rules = loaded.rules = extract_rules(loaded.model, hierarchy, found);
-  if (application) check_application(*application, rules, found);
+  if (application) check_application(*application, loaded.model, rules, found);
   const Location whole{paths.empty() ? "" : paths.front(), 1, 1};
   check_limits(rules, application ? &*application : nullptr, whole, order, found);
   hand_over_sorted(found, order, diagnostics);
