@@ -117,7 +117,7 @@ int main(int argc, char** argv) {
   }
   if (!std::cout.flush()) {
     std::cerr << "arbiter: cannot write to standard output\n";
-    return exit_code == 0 ? kFailed : exit_code;
+    return kWrongUse;  // whatever it was: 1 would be an answer, such as diff's
   }
   return exit_code;
 }

@@ -27,6 +27,7 @@ struct CheckOptions {
 
 struct Statements {
   std::size_t proved = 0, refuted = 0, open = 0;
+  std::size_t not_judged = 0;  // malformed, or of names that the model does not have
 };
 
 // Of the warnings and notes that reading, compiling and proving a model can bring.
@@ -50,12 +51,13 @@ const std::vector<std::string_view> silenceable{"duplicate-config",
                                                 "unreachable-children"};
 
 std::string problem_of_code(std::string& code) {
-  if (code == "both-can-win" || code == "refuted") return "";  // known, but errors: they stay
   if (std::find(silenceable.begin(), silenceable.end(), code) != silenceable.end()) return "";
   std::string all;
   for (const auto& each : silenceable) all += (all.empty() ? "" : ", ") + std::string(each);
+  const auto similar = rules::find_similar(code, silenceable);
   return "no warning and no note has the code " + rules::quote(code) +
-         rules::advise(code, silenceable, "errors stay.") + " These are: " + all;
+         (similar ? "; did you mean " + rules::quote(*similar) + "?" : ".") +
+         " Errors cannot be silenced; what can be: " + all;
 }
 
 std::string counted(std::size_t count, const std::string& thing) {
@@ -76,9 +78,11 @@ Statements judge_statements(const CheckOptions& options, const rules::CompiledMo
   Statements result;
   for (const auto& path : options.statements) {
     const rules::TextFile file(path, rules::read_bytes(path));
-    const auto statements = rules::read_statements(file, diagnostics);
+    std::size_t malformed = 0;
+    const auto statements = rules::read_statements(file, diagnostics, &malformed);
     if (model == nullptr) continue;
     const auto verdicts = rules::judge(statements, *model, diagnostics);
+    result.not_judged += malformed + statements.size() - verdicts.size();
     rules::report(verdicts, diagnostics, options.json);
     for (const auto& verdict : verdicts) {
       using Kind = rules::Verdict::Kind;
@@ -88,6 +92,14 @@ Statements judge_statements(const CheckOptions& options, const rules::CompiledMo
     }
   }
   return result;
+}
+
+void write_summary(std::ostream& out, const Statements& statements) {
+  const std::size_t judged = statements.proved + statements.refuted + statements.open;
+  out << counted(judged + statements.not_judged, "statement") << ": " << statements.proved
+      << " proved, " << statements.refuted << " refuted, " << statements.open << " left open";
+  if (statements.not_judged > 0) out << ", " << statements.not_judged << " could not be read";
+  out << '\n';
 }
 
 int check(const CheckOptions& options) {
@@ -108,9 +120,7 @@ int check(const CheckOptions& options) {
   }
   rules::write_text(std::cerr, diagnostics);
   if (!options.statements.empty() && model) {
-    std::cout << counted(statements.proved + statements.refuted + statements.open, "statement")
-              << ": " << statements.proved << " proved, " << statements.refuted << " refuted, "
-              << statements.open << " left open\n";
+    write_summary(std::cout, statements);
   }
   if (failed) {
     std::cout << "failed: " << rules::counts(diagnostics) << '\n';
@@ -144,7 +154,8 @@ void add_check(CLI::App& app, int& exit_code) {
       "Statements speak of sources and winners:\n"
       "  /collision:o -> idle(/Arm/pos:i)\n"
       "  winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o\n"
-      "Exit code 0: no error; 1: an error, or a statement that is not proved; 2: wrong use.");
+      "Exit code 0: no error; 1: an error, or a statement that is not proved; 2: wrong use,\n"
+      "or a file cannot be opened, or the output not be written.");
   verb->callback([options, &exit_code] { exit_code = check(*options); });
 }
 

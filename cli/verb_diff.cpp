@@ -74,7 +74,8 @@ void add_diff(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   verb->add_flag("--json", options->json, "Write what is found as JSON");
   verb->footer(
-      "Exit code 0: they decide alike in every state; 1: they differ; 2: that cannot be told.\n"
+      "Exit code 0: they decide alike in every state; 1: they differ; 2: that cannot be told,\n"
+      "or not be written.\n"
       "Example:\n  arbiter diff search_and_track.xml new.xml");
   verb->callback([options, &exit_code] { exit_code = diff(*options); });
 }

@@ -9,6 +9,7 @@
 
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
+#include "cli/unmentioned.hpp"
 #include "cli/verbs.hpp"
 #include "shm/clock.hpp"
 
@@ -38,6 +39,7 @@ int pub(const PubOptions& options) {
   OutputPortOptions port_options;
   port_options.max_size = payload.size();
   auto out = node.output_port(options.port, port_options);
+  warn_if_unmentioned(options.instance, Direction::kOutput, options.port);
   const auto period = static_cast<shm::Nanoseconds>(1e9 / options.rate_hz);
   shm::Nanoseconds next = shm::monotonic_now();
   std::uint64_t published = 0;

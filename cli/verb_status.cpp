@@ -60,7 +60,13 @@ void print_model(const json& status) {
   }
 }
 
-void print_source(const json& source) {
+// Of a model in force; without one there is nothing to be misspelt.
+const char* unmentioned(const json& port, bool has_model) {
+  if (!has_model || port.at("mentioned").get<bool>()) return "";
+  return " (the model does not mention it)";
+}
+
+void print_source(const json& source, bool has_model) {
   std::cout << "  " << (source.at("active").get<bool>() ? "active   " : "inactive ")
             << source.at("name").get<std::string>() << "  [" << holder(source) << type_of(source)
             << ']';
@@ -68,7 +74,8 @@ void print_source(const json& source) {
     std::cout << counts(source, {"published"}, true)
               << counts(source, {"signals", "blind", "unsettled", "no_slot"}, false);
   }
-  std::cout << '\n';
+  const std::string mark = unmentioned(source, has_model);
+  std::cout << (mark.empty() ? "" : " " + mark) << '\n';
 }
 
 void print_connection(const json& connection) {
@@ -87,11 +94,11 @@ void print_connection(const json& connection) {
             << counts(connection, {"dropped", "overtaken", "refused", "waiting"}, false) << '\n';
 }
 
-void print_input(const json& input) {
+void print_input(const json& input, bool has_model) {
   std::cout << input.at("name").get<std::string>() << "  [" << holder(input) << type_of(input)
             << "]  ";
   if (!input.at("arbitrated").get<bool>()) {
-    std::cout << "not arbitrated";
+    std::cout << "not arbitrated" << unmentioned(input, has_model);
   } else if (input.at("winner").is_null()) {
     std::cout << "idle";
   } else {
@@ -113,10 +120,11 @@ int status(const StatusOptions& options) {
     return 0;
   }
   print_model(document);
+  const bool has_model = document.at("model").at("generation") != 0;
   std::cout << "\nsources\n";
-  for (const auto& source : document.at("sources")) print_source(source);
+  for (const auto& source : document.at("sources")) print_source(source, has_model);
   std::cout << "\ninput ports  (* winner, - active and overridden, ! active and sensed)\n";
-  for (const auto& input : document.at("inputs")) print_input(input);
+  for (const auto& input : document.at("inputs")) print_input(input, has_model);
   return 0;
 }
 

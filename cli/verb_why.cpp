@@ -65,7 +65,7 @@ void add_why(CLI::App& app, int& exit_code) {
       "  arbiter why /Gaze/pos:i /Face/pos:o\n"
       "  arbiter why /Gaze/pos:i --follow\n\n"
       "Exit code: 0 answered, whoever wins; 1 no daemon, no such port, no such source, or not\n"
-      "allowed to observe; 2 wrong use.");
+      "allowed to observe; 2 wrong use, or the answer cannot be written.");
   verb->callback([options, &exit_code] { exit_code = why(*options); });
 }
 

@@ -35,13 +35,13 @@ void Diagnostics::silence(const std::vector<std::string>& codes) {
 }
 
 void Diagnostics::add(Severity severity, std::string code, Location where, std::string message,
-                      std::optional<Witness> witness) {
+                      std::optional<Witness> witness, std::vector<Witness> more_witnesses) {
   if (items_.size() == kMaxItems) {
     ++dropped_;
     return;
   }
   items_.push_back({severity, std::move(code), std::move(where), in_one_line(std::move(message)),
-                    std::move(witness)});
+                    std::move(witness), std::move(more_witnesses)});
 }
 
 }  // namespace arbiter::rules

@@ -33,6 +33,7 @@ struct Diagnostic {
   Location where;
   std::string message;  // what is wrong, and behind the last "; " what to do
   std::optional<Witness> witness;
+  std::vector<Witness> more_witnesses;  // of the same, each for itself
 };
 
 class Diagnostics {
@@ -50,8 +51,9 @@ class Diagnostics {
     add(Severity::kWarning, std::move(code), std::move(where), std::move(message), {});
   }
   void note(std::string code, Location where, std::string message,
-            std::optional<Witness> witness = {}) {
-    add(Severity::kNote, std::move(code), std::move(where), std::move(message), std::move(witness));
+            std::optional<Witness> witness = {}, std::vector<Witness> more_witnesses = {}) {
+    add(Severity::kNote, std::move(code), std::move(where), std::move(message), std::move(witness),
+        std::move(more_witnesses));
   }
   // Without those of these codes; errors stay.
   void silence(const std::vector<std::string>& codes);
@@ -64,7 +66,7 @@ class Diagnostics {
  private:
   // Control characters in the message are made visible.
   void add(Severity severity, std::string code, Location where, std::string message,
-           std::optional<Witness> witness);
+           std::optional<Witness> witness, std::vector<Witness> more_witnesses = {});
 
   std::vector<Diagnostic> items_;
   std::size_t dropped_ = 0;

@@ -15,8 +15,9 @@
 namespace arbiter::rules {
 namespace {
 
-// More causes than these are not counted.
-constexpr std::size_t kMaxCauses = 5;
+// More causes than these are not counted, and more than those not told, at one port.
+constexpr std::size_t kMaxCauses = 16;
+constexpr std::size_t kMaxCausesTold = 8;
 // Chains reported for one port; there may be as many as cubes of sources.
 constexpr std::size_t kMaxChains = 4;
 
@@ -79,29 +80,49 @@ class PortFindings {
     return rules_.where;
   }
 
-  // A cause is a shortest conjunction that the causes before it leave uncovered.
+  // What is found before a bound is met is told.
   void note_states() {
-    const Witness witness = winners_->witness(nobody_);
-    std::size_t causes = 1;
-    Diagram rest = winners_->combine(Connective::kAndNot, nobody_, states_of(witness));
-    while (!rest.is_false() && causes < kMaxCauses) {
-      ++causes;
-      const Witness next = shortened(winners_->witness(rest));
-      rest = winners_->combine(Connective::kAndNot, rest, states_of(next));
+    std::vector<Witness> causes;
+    try {
+      note_causes(causes, find_causes(causes));
+    } catch (const DiagramLimit&) {
+      if (!causes.empty()) note_causes(causes, false);
+      throw;
     }
+  }
+
+  // A cause is a shortest conjunction that the causes before it leave uncovered. True: those are
+  // all.
+  bool find_causes(std::vector<Witness>& causes) {
+    Diagram rest = nobody_;
+    while (!rest.is_false() && causes.size() < kMaxCauses) {
+      Witness next = winners_->witness(rest);
+      if (!causes.empty()) next = shortened(std::move(next));
+      rest = winners_->combine(Connective::kAndNot, rest, states_of(next));
+      causes.push_back(std::move(next));
+    }
+    return rest.is_false();
+  }
+
+  void note_causes(const std::vector<Witness>& causes, bool are_all) {
+    const Witness& witness = causes.front();
     const auto losers = active_candidates(witness);
     std::string message = "with " + in_words(witness) + ", nobody wins at " + port_.port +
                           " although " + enumerate(losers) + (losers.size() == 1 ? " is" : " are") +
                           " connected there and active";
-    if (causes > 1) {
-      message += " (one of " + std::string(rest.is_false() ? "" : "more than ") +
-                 std::to_string(causes) + " such causes)";
+    const std::size_t told = std::min(causes.size(), kMaxCausesTold);
+    if (causes.size() > 1 || !are_all) {
+      message += " (one of " + std::string(are_all ? "" : "more than ") +
+                 std::to_string(causes.size()) + " such causes" +
+                 (told < causes.size() ? ", of which " + std::to_string(told) + " are told" : "") +
+                 ")";
     }
     diagnostics_.note("nobody-wins", where_of(losers.empty() ? "" : losers.front()),
                       message +
                           "; if somebody should win then, connect it in a behaviour that "
                           "nothing keeps from running in this state",
-                      witness);
+                      witness,
+                      {causes.begin() + 1, causes.begin() + static_cast<std::ptrdiff_t>(told)});
   }
 
   std::vector<std::string> active_candidates(const Witness& witness) const {

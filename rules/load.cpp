@@ -72,7 +72,8 @@ void hand_over_sorted(const Diagnostics& found, const DocumentOrder& order,
         diagnostics.warning(item->code, item->where, item->message);
         break;
       case Severity::kNote:
-        diagnostics.note(item->code, item->where, item->message, item->witness);
+        diagnostics.note(item->code, item->where, item->message, item->witness,
+                         item->more_witnesses);
         break;
     }
   }
@@ -98,7 +99,7 @@ LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
   check_sources(loaded.model, found);
   Hierarchy hierarchy(loaded.model, found);
   RuleSet& rules = loaded.rules = extract_rules(loaded.model, hierarchy, found);
-  if (application) check_application(*application, rules, found);
+  if (application) check_application(*application, loaded.model, rules, found);
   const Location whole{paths.empty() ? "" : paths.front(), 1, 1};
   check_limits(rules, application ? &*application : nullptr, whole, order, found);
   hand_over_sorted(found, order, diagnostics);

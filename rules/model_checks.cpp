@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -118,41 +119,125 @@ class LimitCheck {
   std::map<std::string_view, std::vector<Place>> of_source_;
 };
 
+// Where each source is first written that a condition reads.
+std::map<std::string_view, const Location*> places_of_reads(const Model& model) {
+  std::map<std::string_view, const Location*> places;
+  std::unordered_set<const Expression*> seen;
+  const auto add = [&](const ExpressionPtr& condition, const Location& where) {
+    std::unordered_set<std::string_view> reads;
+    collect_reads(condition, seen, reads);
+    for (const std::string_view source : reads) places.emplace(source, &where);
+  };
+  for (const Behaviour& behaviour : model.behaviours) {
+    for (const Condition& condition : behaviour.conditions) {
+      add(condition.expression, condition.where);
+    }
+  }
+  for (const Select& select : model.selects) add(select.condition, select.where);
+  // That only a quantifier stands for.
+  for (const SourceDeclaration& source : model.sources) places.emplace(source.name, &source.where);
+  return places;
+}
+
 // Sources that rules read and that nobody publishes, as far as the application tells: they have no
 // connection, and no module has ports that are called so. Without modules it tells nothing.
-void warn_of_unpublished(const Application& application, const RuleSet& rules,
-                         Diagnostics& diagnostics) {
-  if (application.prefixes.empty() || application.is_incomplete) return;
-  std::set<std::string_view> published;
-  for (const Application::Link& link : application.connections) published.insert(link.source);
-  const auto has_module = [&](std::string_view source) {
-    return std::any_of(application.prefixes.begin(), application.prefixes.end(),
-                       [&](const std::string& prefix) {
-                         if (!source.starts_with(prefix)) return false;
-                         const auto rest = source.substr(prefix.size());
-                         return rest.empty() || rest[0] == '/' || rest[0] == ':';
-                       });
-  };
-  std::set<std::string_view> known;  // that are fine, or reported
-  std::unordered_set<const Expression*> seen;
-  for (const PortRules& port : rules.ports) {
-    for (const ConnectionRule& rule : port.rules) {
-      std::unordered_set<std::string_view> reads;
-      collect_reads(rule.condition, seen, reads);
-      for (const std::string_view source : std::set(reads.begin(), reads.end())) {
-        if (!known.insert(source).second || published.contains(source) || has_module(source)) {
-          continue;
+class UnpublishedSources {
+ public:
+  UnpublishedSources(const Application& application, const Model& model, Diagnostics& diagnostics)
+      : diagnostics_(diagnostics), places_(places_of_reads(model)) {
+    for (const Application::Link& link : application.connections) published_.insert(link.source);
+    connected_.assign(published_.begin(), published_.end());
+    prefixes_.assign(application.prefixes.begin(), application.prefixes.end());
+  }
+
+  void warn(const RuleSet& rules) {
+    std::set<std::string_view> known;  // that are fine, or reported
+    std::unordered_set<const Expression*> seen;
+    for (const PortRules& port : rules.ports) {
+      for (const ConnectionRule& rule : port.rules) {
+        std::unordered_set<std::string_view> reads;
+        collect_reads(rule.condition, seen, reads);
+        for (const std::string_view source : std::set(reads.begin(), reads.end())) {
+          if (!known.insert(source).second || published_.contains(source) || has_module(source)) {
+            continue;
+          }
+          warn(source, rule, port.port);
         }
-        diagnostics.warning("never-published", rule.where,
-                            "the rule of " + rule.source + " at " + port.port + " reads " +
-                                std::string(source) +
-                                ", which no connection and no module of the application "
-                                "publishes: it will never be active; correct the name, or add "
-                                "the module whose <prefix> or <name> it begins with");
       }
     }
   }
-}
+
+ private:
+  [[nodiscard]] bool has_module(std::string_view source) const {
+    return std::any_of(prefixes_.begin(), prefixes_.end(), [&](std::string_view prefix) {
+      if (!source.starts_with(prefix)) return false;
+      const auto rest = source.substr(prefix.size());
+      return rest.empty() || rest[0] == '/' || rest[0] == ':';
+    });
+  }
+
+  // What one who has misspelt it may have meant: a source of a connection, or of a module.
+  std::optional<std::string> meant_by(std::string_view source) {
+    if (++reported_ > kMaxSuggestions) return std::nullopt;
+    if (auto similar = find_similar(source, connected_)) return similar;
+    for (std::size_t end = 1; end < source.size(); ++end) {
+      if (source[end] != '/' && source[end] != ':') continue;
+      const auto similar = find_similar(source.substr(0, end), prefixes_);
+      if (similar) return *similar + std::string(source.substr(end));
+    }
+    return std::nullopt;
+  }
+
+  void warn(std::string_view source, const ConnectionRule& rule, const std::string& port) {
+    const auto place = places_.find(source);
+    const auto meant = meant_by(source);
+    diagnostics_.warning(
+        "never-published", place == places_.end() ? rule.where : *place->second,
+        "the rule of " + rule.source + " at " + port + " reads " + std::string(source) +
+            ", which no connection and no module of the application publishes: it will never be "
+            "active" +
+            (meant ? "; did you mean " + quote(*meant) + "?"
+                   : std::string("; correct the name, or add the module whose <prefix> or <name> "
+                                 "it begins with")));
+  }
+
+  Diagnostics& diagnostics_;
+  const std::map<std::string_view, const Location*> places_;
+  std::set<std::string_view> published_;
+  std::vector<std::string_view> connected_;  // the same
+  std::vector<std::string_view> prefixes_;
+  std::size_t reported_ = 0;
+};
+
+// The end that is misspelt of a connection that the application does not have: of two ends, one
+// will be right.
+class MeantEnds {
+ public:
+  explicit MeantEnds(const Application& application) {
+    for (const Application::Link& link : application.connections) {
+      sources_at_[link.port].push_back(link.source);
+      ports_of_[link.source].push_back(link.port);
+    }
+  }
+
+  // ": did you mean …?", or nothing.
+  std::string ask(const std::string& source, const std::string& port) {
+    if (++asked_ > kMaxSuggestions) return "";
+    const auto look_in = [](const Ends& ends, const std::string& right, const std::string& wrong) {
+      const auto found = ends.find(right);
+      return found == ends.end() ? std::nullopt : find_similar(wrong, found->second);
+    };
+    auto meant = look_in(sources_at_, port, source);
+    if (!meant) meant = look_in(ports_of_, source, port);
+    return meant ? ": did you mean " + quote(*meant) + "?" : "";
+  }
+
+ private:
+  using Ends = std::map<std::string_view, std::vector<std::string_view>>;
+  Ends sources_at_;
+  Ends ports_of_;
+  std::size_t asked_ = 0;
+};
 
 }  // namespace
 
@@ -167,22 +252,27 @@ void check_sources(const Model& model, Diagnostics& diagnostics) {
   }
 }
 
-void check_application(const Application& application, RuleSet& rules, Diagnostics& diagnostics) {
+void check_application(const Application& application, const Model& model, RuleSet& rules,
+                       Diagnostics& diagnostics) {
   std::set<std::pair<std::string_view, std::string_view>> selected;
   std::set<std::pair<std::string_view, std::string_view>> connected;
   for (const Application::Link& link : application.connections) {
     connected.emplace(link.source, link.port);
   }
+  MeantEnds ends(application);
   for (const PortRules& port : rules.ports) {
     for (const ConnectionRule& rule : port.rules) {
       selected.emplace(rule.source, port.port);
       if (application.is_incomplete || connected.count({rule.source, port.port}) != 0) continue;
       diagnostics.error("not-in-application", rule.where,
                         "the application has no connection from " + rule.source + " to " +
-                            port.port + "; add it there, or correct the names here");
+                            port.port + "; add it there, or correct the names here" +
+                            ends.ask(rule.source, port.port));
     }
   }
-  warn_of_unpublished(application, rules, diagnostics);
+  if (!application.prefixes.empty() && !application.is_incomplete) {
+    UnpublishedSources(application, model, diagnostics).warn(rules);
+  }
   for (const Application::Link& link : application.connections) {
     if (selected.count({link.source, link.port}) == 0) {
       rules.other_connections.push_back({link.source, link.port, link.where});

@@ -12,8 +12,9 @@ namespace arbiter::rules {
 void check_sources(const Model& model, Diagnostics& diagnostics);
 
 // Each connection that a rule selects must be in the application; those that no rule selects are
-// added to the rules.
-void check_application(const Application& application, RuleSet& rules, Diagnostics& diagnostics);
+// added to the rules. What the rules read must be published, as far as the application tells.
+void check_application(const Application& application, const Model& model, RuleSet& rules,
+                       Diagnostics& diagnostics);
 
 // The limits of shm/limits.hpp that a model can exceed. `whole` is the place for what cannot be
 // pinned to a line. `application` may be null.

@@ -60,6 +60,14 @@ bool is_short(const Witness& witness) {
   return std::max(witness.active.size(), witness.inactive.size()) <= kMaxNamesInWords;
 }
 
+std::string in_lists(const Witness& witness) {
+  return "active: " + joined(witness.active) + "; inactive: " + joined(witness.inactive);
+}
+
+nlohmann::ordered_json json_of(const Witness& witness) {
+  return {{"active", witness.active}, {"inactive", witness.inactive}};
+}
+
 // What to do stands behind the last semicolon of a message.
 std::optional<std::string> help_of(const Diagnostic& item) {
   const std::size_t at = item.message.rfind("; ");
@@ -95,9 +103,9 @@ void write_text(std::ostream& out, const Diagnostics& diagnostics) {
     // A sentence that has all of it in words says it better.
     const bool is_told = item->witness && is_short(*item->witness) &&
                          item->message.find(in_words(*item->witness)) != std::string::npos;
-    if (item->witness && !is_told) {
-      out << "  active: " << joined(item->witness->active)
-          << "; inactive: " << joined(item->witness->inactive) << '\n';
+    if (item->witness && !is_told) out << "  " << in_lists(*item->witness) << '\n';
+    for (const Witness& other : item->more_witnesses) {
+      out << "  so too " << (is_short(other) ? "with " + in_words(other) : in_lists(other)) << '\n';
     }
   }
   for (const auto& [code, count] : notes) {
@@ -119,11 +127,12 @@ void write_json(std::ostream& out, const Diagnostics& diagnostics) {
                    {"column", item->where.column},
                    {"message", item->message},
                    {"help", nullptr},
-                   {"witness", nullptr}};
+                   {"witness", nullptr},
+                   {"more_witnesses", Json::array()}};
     if (const auto help = help_of(*item)) object["help"] = *help;
-    if (item->witness) {
-      object["witness"] = {{"active", item->witness->active},
-                           {"inactive", item->witness->inactive}};
+    if (item->witness) object["witness"] = json_of(*item->witness);
+    for (const Witness& other : item->more_witnesses) {
+      object["more_witnesses"].push_back(json_of(other));
     }
     array.push_back(std::move(object));
   }

@@ -33,8 +33,14 @@ class StatementReader {
       rest.remove_prefix(std::min(end + 1, rest.size()));
     }
     finish();
+    if (statements_.empty() && malformed_ == 0) {
+      diagnostics_.error("no-statements", file_.locate(0),
+                         "there is no statement in this file, so that nothing would be proved; "
+                         "write one on each line, or do not give the file");
+    }
     return std::move(statements_);
   }
+  [[nodiscard]] std::size_t malformed() const { return malformed_; }
 
  private:
   void take_line(std::string_view line) {
@@ -55,6 +61,7 @@ class StatementReader {
     if (!text_) return;
     const Text text = *std::exchange(text_, std::nullopt);
     if (statements_.size() == kMaxStatements) {
+      ++malformed_;
       if (!std::exchange(is_full_, true)) {
         diagnostics_.error("limit-exceeded", text.where(),
                            "from here on, there are more statements than the limit of " +
@@ -63,7 +70,10 @@ class StatementReader {
       return;
     }
     auto parsed = parse_statement(text, diagnostics_);
-    if (!parsed) return;
+    if (!parsed) {
+      ++malformed_;
+      return;
+    }
     statements_.push_back({collapse_blanks(text.bytes()), text.where(), std::move(*parsed)});
   }
 
@@ -71,13 +81,18 @@ class StatementReader {
   Diagnostics& diagnostics_;
   std::optional<Text> text_;
   bool is_full_ = false;
+  std::size_t malformed_ = 0;  // or beyond the limit
   std::vector<Statement> statements_;
 };
 
 }  // namespace
 
-std::vector<Statement> read_statements(const TextFile& file, Diagnostics& diagnostics) {
-  return StatementReader(file, diagnostics).read();
+std::vector<Statement> read_statements(const TextFile& file, Diagnostics& diagnostics,
+                                       std::size_t* malformed) {
+  StatementReader reader(file, diagnostics);
+  auto statements = reader.read();
+  if (malformed != nullptr) *malformed = reader.malformed();
+  return statements;
 }
 
 }  // namespace arbiter::rules

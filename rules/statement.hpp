@@ -10,6 +10,7 @@
 // idle(PORT), which means the same, are operands like a source's name.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -27,7 +28,9 @@ struct Statement {
   ParsedStatement parsed;
 };
 
-// Reports all that is malformed; the others are returned.
-std::vector<Statement> read_statements(const TextFile& file, Diagnostics& diagnostics);
+// Reports all that is malformed, and a file without any; the others are returned. `malformed`, if
+// given, is how many are not.
+std::vector<Statement> read_statements(const TextFile& file, Diagnostics& diagnostics,
+                                       std::size_t* malformed = nullptr);
 
 }  // namespace arbiter::rules

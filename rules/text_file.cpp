@@ -1,7 +1,9 @@
 #include "rules/text_file.hpp"
 
 #include <fcntl.h>
+#include <linux/magic.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -33,7 +35,18 @@ void require_regular(const std::string& path, const struct stat& status) {
                   kind_of(status.st_mode));
 }
 
+// Of a FIFO: that it has a name, and is no pipe that a shell has laid (`<(…)`, /dev/stdin).
+bool has_name(const std::string& path) {
+  struct statfs status {};
+  return ::statfs(path.c_str(), &status) == 0 && status.f_type != PIPEFS_MAGIC;
+}
+
+// To open a FIFO takes until somebody opens the other end: for ever, perhaps.
 int open_any(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) == 0 && S_ISFIFO(status.st_mode) && has_name(path)) {
+    require_regular(path, status);
+  }
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) fail(path, "open", errno);
   return fd;

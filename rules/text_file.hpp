@@ -36,8 +36,9 @@ class TextFile {
   std::vector<std::size_t> line_starts_;
 };
 
-// A pipe may stand for a file on a command line. Who must go on whatever the files are reads
-// regular ones only: to open or to read anything else may take for ever, or set a device off.
+// A pipe may stand for a file on a command line, but no FIFO that has a name: nobody may ever write
+// to it. Who must go on whatever the files are reads regular ones only: to open or to read anything
+// else may take for ever, or set a device off.
 enum class Accept { kAnyFile, kRegularFile };
 
 // The whole of a file, but not much more than `limit` bytes of it: a device or a pipe may have no

@@ -134,6 +134,7 @@ class Daemon {
   void prepare_switch(Swap& swap);
   void prepare_rollback(Swap& swap);
   void compare_with_files(Swap& swap);
+  [[nodiscard]] std::uint64_t content_of(const LoadedModel& next) const;
   void reserve_tables(const Library& library);
   void begin_swap(Swap& swap);
   void put_in_force();
@@ -191,7 +192,7 @@ class Daemon {
   const std::vector<NamedFiles> files_;
   std::vector<ModelPointer> read_at_start_;  // until they are put into the library
   Library library_;
-  ModelPointer in_force_;  // null: none, or a predecessor's
+  LoadedModel in_force_;  // null: none, or a predecessor's
   History history_;
   Continuity continuity_;
   ModelCopy model_copy_;

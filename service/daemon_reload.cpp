@@ -97,19 +97,25 @@ void Daemon::prepare_reload(Swap& swap) {
   Library library(std::move(reading.models), directory_);
   const LoadedModel* next = library.find(models_.name());
   if (next == nullptr) next = library.first();
-  const LoadedModel* const last = library_.find(next->model->name);
   swap.to = *next;
   swap.how = "reload";
   swap.is_compared = true;
-  // What was in force, and is now as it was, is no step for a rollback.
-  if (last != nullptr && last->model == in_force_ &&
-      last->layout->words() == next->layout->words() && history_.latest() != nullptr) {
-    swap.content = history_.latest()->content;
-  }
+  swap.content = content_of(*next);
   reserve_tables(library);
   swap.policy = std::move(reading.policy);
   swap.library = std::move(library);
   begin_swap(swap);
+}
+
+// What is in force, and comes into force once more as it is, is no step for a rollback. Tables say
+// so, and not which object it is: what a rollback has put in force is not the library's. While both
+// layouts live, a name has the same id in both.
+std::uint64_t Daemon::content_of(const LoadedModel& next) const {
+  const PastModel* const latest = history_.latest();
+  const bool is_same = latest != nullptr && in_force_.layout != nullptr &&
+                       in_force_.model->name == next.model->name &&
+                       in_force_.layout->words() == next.layout->words();
+  return is_same ? latest->content : 0;
 }
 
 // So that a switch does not fail for want of memory, either.
@@ -130,12 +136,13 @@ void Daemon::prepare_switch(Swap& swap) {
         "there is no model " + (is_model_name(name) ? '"' + name + '"' : "of that name") +
         (library_.models().empty() ? "; none is loaded" : "; there are: " + library_.names()));
   }
-  if (next->model == in_force_) {
+  if (next->model == in_force_.model) {
     answer_done(swap, {});
     return;
   }
   swap.to = *next;
   swap.how = "switch";
+  swap.content = content_of(*next);
   begin_swap(swap);
 }
 
@@ -184,11 +191,11 @@ void Daemon::put_in_force() {
   const auto last = models_.in_force();
   const shm::Nanoseconds last_since = models_.in_force_since();
   models_.put_in_force();
-  const ModelPointer before = std::exchange(in_force_, swap.to.model);
+  const ModelPointer before = std::exchange(in_force_, swap.to).model;
+  const Model& model = *in_force_.model;
   if (swap.library) library_ = *swap.library;
   const auto snapshot = models_.in_force();
-  continuity_.change(before == nullptr ? nullptr : &before->compiled, in_force_->compiled,
-                     last_since);
+  continuity_.change(before == nullptr ? nullptr : &before->compiled, model.compiled, last_since);
   if (last.generation != 0) {
     continuity_.change_timeouts(directory_, last.table, snapshot.table, models_.in_force_since());
   }
@@ -198,21 +205,21 @@ void Daemon::put_in_force() {
   for (const auto& [id, client] : clients_) {
     if (client->observes) switchboard_.show_everything(*client);
   }
-  log::info("model {} is in force: {} \"{}\"{}", snapshot.generation, swap.how, in_force_->name,
+  log::info("model {} is in force: {} \"{}\"{}", snapshot.generation, swap.how, model.name,
             swap.change.by.empty() ? "" : ", by " + swap.change.by);
   history_.add({snapshot.generation,
                 swap.content,
-                in_force_->name,
-                in_force_->files,
+                model.name,
+                model.files,
                 calendar_ms(),
                 swap.how,
                 swap.change.by,
                 {},
-                in_force_});
+                in_force_.model});
   welcome_waiting();
   std::string changes;
   if (swap.is_compared && before != nullptr) {
-    changes = summary_or_why_not(*before, *in_force_);
+    changes = summary_or_why_not(*before, model);
     log::info("model {} compared with the last: {}", snapshot.generation, changes);
     history_.set_changes(snapshot.generation, changes);
   }
@@ -229,7 +236,7 @@ void Daemon::compare_with_files(Swap& swap) {
     const bool is_in_force = read->name == models_.name();
     const LoadedModel* const loaded = library_.find(read->name);
     ModelPointer before = loaded == nullptr ? nullptr : loaded->model;
-    if (is_in_force) before = in_force_;
+    if (is_in_force) before = in_force_.model;
     nlohmann::json model{{"name", read->name}, {"in_force", is_in_force}, {"changes", nullptr}};
     if (before != nullptr) model["changes"] = changes_json(before->compiled, read->compiled);
     models.push_back(std::move(model));

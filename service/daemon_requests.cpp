@@ -308,8 +308,8 @@ void Daemon::close_port(Client& client, shm::PortInstance port) {
 
 void Daemon::send_status(Client& client, std::uint64_t request) {
   const std::string document =
-      status_document({instance_, models_, library_, in_force_, history_, directory_, switchboard_,
-                       clients_.size(), reloads_refused_},
+      status_document({instance_, models_, library_, in_force_.model, history_, directory_,
+                       switchboard_, clients_.size(), reloads_refused_},
                       shm::monotonic_now());
   send_document(client, request, shm::MessageKind::kStatusReply, document);
 }
@@ -326,7 +326,7 @@ void Daemon::send_document(Client& client, std::uint64_t request, shm::MessageKi
 
 void Daemon::send_model(Client& client, std::uint64_t request) {
   auto reply = reply_to(request, shm::MessageKind::kModelReply);
-  const ModelCopyOf of{models_, library_, in_force_, history_, continuity_};
+  const ModelCopyOf of{models_, library_, in_force_.model, history_, continuity_};
   client.send(reply, {model_copy_.of(of).get(), -1});
 }
 

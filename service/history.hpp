@@ -15,7 +15,7 @@ namespace arbiter::service {
 struct PastModel {
   std::uint64_t generation = 0;
   // The first generation in the history whose content this is; another for a rollback, and for a
-  // reload of files that had not changed.
+  // reload or a switch that changed nothing.
   std::uint64_t content = 0;
   std::string name;
   rules::ModelFiles files;

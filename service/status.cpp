@@ -131,6 +131,7 @@ class Document {
   [[nodiscard]] json source_json(const Source& source) const {
     const shm::Nanoseconds timeout = snapshot_.table.timeout(source.id);
     json result{{"name", source.name},
+                {"mentioned", snapshot_.table.knows_source(source.id)},
                 {"active", is_active(source)},
                 {"timeout_ns", timeout == shm::kForever ? json("forever") : json(timeout)}};
     const OutputPort* output = of_.switchboard.output(source.open);
@@ -156,6 +157,7 @@ class Document {
     const bool arbitrated = snapshot_.table.is_arbitrated(name.id);
     json result{
         {"name", name.name},
+        {"mentioned", snapshot_.table.knows_port(name.id)},
         {"arbitrated", arbitrated},
         {"idle", winner == shm::kNone},
         {"winner", arbitrated && winner != shm::kNone ? json(of_.directory.sources()[winner]->name)

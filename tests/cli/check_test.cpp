@@ -129,6 +129,25 @@ TEST(Check, NotesWhereNobodyWinsAndWhoIsStarved) {
   EXPECT_THAT(result.err, EndsWith("2 notes\n"));
 }
 
+TEST(Check, TellsEachCauseOfNobody) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", R"(<behaviors>
+  <behavior name="Low"><config at="/B:i">/Low:o</config></behavior>
+  <behavior name="Mid"><config at="/B:i">/Mid:o</config>
+    <condition>/Enable:o</condition><inhibition>Low</inhibition></behavior>
+  <behavior name="Top"><config at="/B:i">/Top:o</config>
+    <condition>not /Fault:o</condition><inhibition>Mid, Low</inhibition></behavior>
+</behaviors>
+)");
+  EXPECT_THAT(arbiter({"check", model}).err,
+              HasSubstr("  so too with /Mid:o active and /Enable:o and /Top:o inactive\n"));
+  const auto found = nlohmann::json::parse(arbiter({"check", model, "--json"}).out);
+  EXPECT_EQ(found[0]["code"], "nobody-wins");
+  EXPECT_EQ(
+      found[0]["more_witnesses"],
+      nlohmann::json::parse(R"([{"active": ["/Mid:o"], "inactive": ["/Enable:o", "/Top:o"]}])"));
+}
+
 TEST(Check, NotesAndWarningsCanBeSilencedAndErrorsCannot) {
   TemporaryDirectory directory;
   const auto model = directory.write("m.xml", kTrackModel);
@@ -137,10 +156,11 @@ TEST(Check, NotesAndWarningsCanBeSilencedAndErrorsCannot) {
   EXPECT_EQ(result.exit_code, 0);
   result = arbiter({"check", "--silence", "nobody-wins", "--silence", "starved", model});
   EXPECT_EQ(result.err, "");
-  result =
-      arbiter({"check", directory.write("c.xml", kConflictModel), "--silence", "both-can-win"});
-  EXPECT_THAT(result.err, HasSubstr("[both-can-win]"));
-  EXPECT_EQ(result.exit_code, 1);
+  for (const std::string code : {"both-can-win", "refuted", "cycle", "no-statements"}) {
+    result = arbiter({"check", model, "--silence", code});
+    EXPECT_EQ(result.exit_code, 2) << code;
+    EXPECT_THAT(result.err, HasSubstr('"' + code + "\". Errors cannot be silenced; "));
+  }
 }
 
 TEST(Check, ACodeThatThereIsNotCannotBeSilenced) {
@@ -224,6 +244,29 @@ TEST(Check, StatementsAreReadEvenIfTheModelHasErrors) {
   EXPECT_THAT(result.err, HasSubstr(statements + ":1:7: error: the statement ends where"));
   EXPECT_THAT(result.err, HasSubstr("was not looked at: the model has errors [left-open]"));
   EXPECT_EQ(result.out, "failed: 2 errors, 1 note\n");
+}
+
+TEST(Check, AFileWithoutStatementsIsAnErrorForItProvesNothing) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  for (const std::string text : {"", "\n", "# later\n  \n# more"}) {
+    const auto statements = directory.write("s.txt", text);
+    const auto result = arbiter({"check", model, "--assert", statements});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, HasSubstr(statements + ":1:1: error: there is no statement in this "));
+    EXPECT_THAT(result.out, EndsWith("failed: 1 error, 2 notes\n"));
+  }
+}
+
+TEST(Check, StatementsThatCannotBeReadAreCountedToo) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  const auto statements =
+      directory.write("s.txt", "/object or\nidle(/nowhere)\n/object or not /object\n)\n");
+  const auto result = arbiter({"check", model, "--assert", statements});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, StartsWith("4 statements: 1 proved, 0 refuted, 0 left open, 3 could not "
+                                     "be read\n"));
 }
 
 TEST(Check, StatementsThatCannotBeOpenedAreWrongUse) {

@@ -58,6 +58,17 @@ TEST(Models, AreWhatIsPromised) {
   }
 }
 
+// "Copy a folder": what leads out of it would be lost.
+TEST(Models, AreWholeWhereTheyAreCopied) {
+  const TemporaryDirectory directory;
+  for (const auto& folder : model_folders()) {
+    const fs::path copy = fs::path(directory.path()) / fs::path(folder.path).filename();
+    fs::copy(folder.path, copy, fs::copy_options::recursive | fs::copy_options::copy_symlinks);
+    const auto result = run_verb("check", ModelFolder{copy.string()}.model());
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+}
+
 TEST(Models, PassTheCheckWithoutErrorsAndWarnings) {
   for (const auto& folder : model_folders()) {
     SCOPED_TRACE(folder.path);

@@ -8,6 +8,7 @@
 namespace arbiter::test {
 namespace {
 
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::MatchesRegex;
 
@@ -105,11 +106,21 @@ TEST(Program, NoticesThatItsOutputCannotBeWritten) {
   const auto model = directory.write("m.xml", kOverrideModel);
   const auto trace = directory.write("t.csv", "t_ns,source\n0,/low\n");
   const std::vector<std::vector<std::string>> verbs = {
-      {"check", model}, {"rules", model}, {"simulate", model, "--trace", trace}};
+      {"check", model},
+      {"check", model, "--json"},
+      {"check", directory.write("bad.xml", "<behaviors>\n</behaviors><x/>"), "--json"},
+      {"diff", model, model},
+      {"diff", model, directory.write("other.xml", "<behaviors/>"), "--json"},
+      {"rules", model},
+      {"compile", model},
+      {"graph", model, "--format", "dot"},
+      {"simulate", model, "--trace", trace},
+      {"--help"},
+      {"--version"}};
   for (const auto& arguments : verbs) {
     const auto result = arbiter(arguments, "/dev/full");
-    EXPECT_EQ(result.exit_code, 1);
-    EXPECT_EQ(result.err, "arbiter: cannot write to standard output\n");
+    EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(arguments);
+    EXPECT_THAT(result.err, EndsWith("arbiter: cannot write to standard output\n"));
   }
 }
 

@@ -93,6 +93,21 @@ TEST(Application, ThatLacksAConfiguredConnectionIsAnErrorOfTheModel) {
   EXPECT_THAT(loaded.message(1), HasSubstr("from /t to /p"));
 }
 
+TEST(Application, ThatHasAConnectionOfNearlyThatNameIsAskedAbout) {
+  const auto message = [](const std::string& source, const std::string& port) {
+    return load_with_application(
+               "<behavior name='B'><config at='" + port + "'>" + source + "</config></behavior>",
+               "<application>" + connection("/Rest/pos:o", "/Arm/pos:i") + "</application>")
+        .message();
+  };
+  const std::string advice = "; add it there, or correct the names here";
+  EXPECT_THAT(message("/Rset/pos:o", "/Arm/pos:i"),
+              HasSubstr(advice + ": did you mean \"/Rest/pos:o\"?"));
+  EXPECT_THAT(message("/Rest/pos:o", "/Arm/po:i"),
+              HasSubstr(advice + ": did you mean \"/Arm/pos:i\"?"));
+  EXPECT_THAT(message("/Rest/pos:o", "/Gaze/pos:i"), testing::EndsWith(advice));
+}
+
 TEST(Application, MistakesAreReportedAtTheirPlace) {
   struct Case {
     std::string application, finding, message;

@@ -60,11 +60,41 @@ TEST(Findings, NameAShortestStateWithoutAWinnerAndItsPlace) {
             "active (one of 3 such causes); if somebody should win then, connect it in a behaviour "
             "that nothing keeps from running in this state");
   EXPECT_EQ(found.items[0].where.line, 3u);
+  const auto& others = found.items[0].more_witnesses;
+  ASSERT_EQ(others.size(), 2u);
+  EXPECT_THAT(others[0].active, ElementsAre("/high", "/off"));
+  EXPECT_THAT(others[1].active, ElementsAre("/low", "/off"));
   EXPECT_EQ(found.items[1].message,
             "at /p, /high silences /low even while /stop silences /high: with /high, /low and "
             "/stop active and /off inactive, nobody wins; if /low should win then, let no "
             "inhibition but its condition \"not /high or /stop\" keep it out");
   EXPECT_EQ(found.items[1].where.line, 3u);
+}
+
+TEST(Findings, EachCauseOfNobodyIsToldWhereverItLies) {
+  const auto found =
+      found_in(RulesByHand().port("/p", {{"/low", all_of({inactive("/mid"), inactive("/top")})},
+                                         {"/mid", all_of({active("/enable"), inactive("/top")})},
+                                         {"/top", inactive("/fault")}}));
+  ASSERT_THAT(found.codes(), ElementsAre("nobody-wins", "starved"));
+  EXPECT_THAT(found.items[0].message, HasSubstr("with /fault and /top active"));
+  ASSERT_EQ(found.items[0].more_witnesses.size(), 1u);
+  EXPECT_THAT(found.items[0].more_witnesses[0].active, ElementsAre("/mid"));
+  EXPECT_THAT(found.items[0].more_witnesses[0].inactive, ElementsAre("/enable", "/top"));
+}
+
+TEST(Findings, OfManyCausesSomeAreToldAndTheirNumberIsSaid) {
+  const auto causes = [](int count) {
+    std::vector<ExpressionPtr> fine;
+    for (int i = 0; i < count; ++i) fine.push_back(inactive("/stop" + std::to_string(i)));
+    return found_in(RulesByHand().port("/p", {{"/a", all_of(fine)}})).items.at(0);
+  };
+  EXPECT_THAT(causes(8).message, HasSubstr("(one of 8 such causes);"));
+  EXPECT_EQ(causes(8).more_witnesses.size(), 7u);
+  EXPECT_THAT(causes(11).message, HasSubstr("(one of 11 such causes, of which 8 are told);"));
+  EXPECT_EQ(causes(11).more_witnesses.size(), 7u);
+  EXPECT_THAT(causes(17).message,
+              HasSubstr("(one of more than 16 such causes, of which 8 are told);"));
 }
 
 TEST(Findings, ASourceThatWinsNowhereIsToldOnce) {

@@ -51,23 +51,26 @@ TEST(Limits, ADeviceWithoutAnEndIsTooLarge) {
 }
 
 TEST(Limits, APipeThatNeverEndsIsTooLarge) {
-  const Folder folder;
-  const std::string path = folder.file("pipe");
-  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
   const auto old_handler = std::signal(SIGPIPE, SIG_IGN);
   std::thread writer;
+  int ends[2] = {-1, -1};
+  const auto end = [&] {
+    if (!writer.joinable()) return;
+    ::close(ends[0]);
+    writer.join();
+  };
   expect_too_large([&] {
-    if (writer.joinable()) writer.join();
-    writer = std::thread([&path] {
-      const int pipe = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    end();
+    if (::pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error("pipe2");
+    writer = std::thread([pipe = ends[1]] {
       const std::string text(4096, '\n');
       while (::write(pipe, text.data(), text.size()) > 0) {
       }
       ::close(pipe);
     });
-    return path;
+    return "/proc/self/fd/" + std::to_string(ends[0]);
   });
-  writer.join();
+  end();
   std::signal(SIGPIPE, old_handler);
 }
 

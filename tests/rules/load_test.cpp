@@ -227,9 +227,26 @@ TEST(Load, ASourceThatIsSensedMustBelongToAModuleOrAConnection) {
     EXPECT_THAT(published_by(modules, fine), IsEmpty()) << fine;
   }
   for (const auto* lost : {"/fronts:o", "/rear/scan:o", "/rate", "/hul"}) {
-    EXPECT_THAT(published_by(modules, lost), ElementsAre("a.xml:1:20 warning never-published"))
+    EXPECT_THAT(published_by(modules, lost), ElementsAre("a.xml:1:47 warning never-published"))
         << lost;
   }
+}
+
+TEST(Load, ASourceThatNobodyPublishesIsShownWhereItIsReadWithTheNameThatWasMeant) {
+  const auto load = [](const std::string& condition) {
+    return load_with_application(
+        "<behavior name='A'>\n<config at='/p'>/a</config>\n<condition>not " + condition +
+            "</condition>\n</behavior>",
+        "<application><module><prefix>/collision</prefix></module>"
+        "<connection><from>/a</from><to>/p</to></connection>"
+        "<connection><from>/Front/scan:o</from><to>/unrelated</to></connection></application>");
+  };
+  const auto connected = load("/Font/scan:o");
+  EXPECT_THAT(connected.findings(true), ElementsAre("a.xml:3:1 warning never-published"));
+  EXPECT_THAT(connected.message(), HasSubstr("never be active; did you mean \"/Front/scan:o\"?"));
+  const auto of_module = load("/colision/state:o");
+  EXPECT_THAT(of_module.message(), HasSubstr("; did you mean \"/collision/state:o\"?"));
+  EXPECT_THAT(load("/bumper:o").message(), HasSubstr("; correct the name, or add the module"));
 }
 
 TEST(Load, WithoutModulesAnApplicationDoesNotTellWhoPublishes) {

@@ -110,9 +110,11 @@ TEST(Report, WritesJsonForPrograms) {
   diagnostics.error("both-can-win", {"m.xml", 5, 6}, "both; mend it", rules::Witness{{"/a"}, {}});
   EXPECT_EQ(json_of(diagnostics), nlohmann::json::parse(R"([
     {"severity": "warning", "code": "never-selected", "file": "m.xml", "line": 3, "column": 4,
-     "message": "a \"quoted\" message", "help": null, "witness": null},
+     "message": "a \"quoted\" message", "help": null, "witness": null,
+     "more_witnesses": []},
     {"severity": "error", "code": "both-can-win", "file": "m.xml", "line": 5, "column": 6,
-     "message": "both; mend it", "help": "mend it", "witness": {"active": ["/a"], "inactive": []}}])"));
+     "message": "both; mend it", "help": "mend it", "witness": {"active": ["/a"], "inactive": []},
+     "more_witnesses": []}])"));
 }
 
 TEST(Report, WritesJsonEvenIfAFilesNameIsNotUtf8) {

@@ -33,6 +33,13 @@ Read read(const std::string& text) {
   return {std::move(statements), diagnostics.items()};
 }
 
+TEST(Statement, OfAFileMustBeOneAtLeast) {
+  for (const std::string text : {"", " \n", "# none\n"}) {
+    EXPECT_THAT(read(text).findings(), ElementsAre("1:1 no-statements"));
+  }
+  EXPECT_THAT(read("/a or\n").findings(), ElementsAre(testing::Not(HasSubstr("no-statements"))));
+}
+
 TEST(Statement, StandsOnALineAndCommentsAreLeftOut) {
   const auto found = read(
       "# who has collided\n\n/a -> /b   # does not move\nnot /c\r\n\"/d#e\" or /f # a \"quote\n");

@@ -1,7 +1,9 @@
 #include "rules/text_file.hpp"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <string>
 #include <utility>
@@ -73,6 +75,19 @@ TEST(TextFile, ThatIsNotRegularIsRefusedWithoutOpeningIt) {
   EXPECT_THAT(why_not_regular(folder.file("")), HasSubstr("Is a directory"));
   EXPECT_THAT(why_not_regular(folder.file("none.xml")), HasSubstr("No such file or directory"));
   EXPECT_EQ(why_not_regular("/proc/self/status"), "");
+}
+
+TEST(TextFile, MayBeAPipeButNoFifo) {
+  const Folder folder;
+  const std::string fifo = folder.file("fifo");
+  ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
+  EXPECT_EQ(why_unreadable(fifo), "cannot read " + fifo + ": it is not a regular file but a FIFO");
+  int ends[2];
+  ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+  ASSERT_EQ(::write(ends[1], "<a/>", 4), 4);
+  ::close(ends[1]);
+  EXPECT_EQ(read_bytes("/proc/self/fd/" + std::to_string(ends[0])), "<a/>");
+  ::close(ends[0]);
 }
 
 TEST(TextFile, WithoutAnEndIsReadUpToTheLimit) {

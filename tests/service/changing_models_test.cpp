@@ -167,6 +167,24 @@ TEST_F(ChangingModels, RollbackGoesBackStepByStepOrToOneByItsNumber) {
   EXPECT_EQ(source_in_force(), "/c") << "what the file says";
 }
 
+// What is in force after a rollback is not the object that the library has.
+TEST_F(ChangingModels, AModelThatStaysAsItIsIsNoStepAfterARollbackEither) {
+  start();
+  ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
+  ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  expect_success(arbiter({"rollback"}),
+                 "model 4 is in force\n  1 of 1 port decides differently (/in)\n");
+  ASSERT_EQ(source_in_force(), "/a");
+  ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  expect_refusal(arbiter({"rollback"}),
+                 "model 1 is the oldest that is kept; arbiter history shows all");
+  ASSERT_EQ(arbiter({"rollback", "1"}).exit_code, 0);
+  ASSERT_EQ(arbiter({"switch", "default"}).exit_code, 0);
+  expect_refusal(arbiter({"rollback"}),
+                 "model 1 is the oldest that is kept; arbiter history shows all");
+}
+
 TEST_F(ChangingModels, HistoryTellsWhatWhenHowAndByWhom) {
   start();
   daemon_->load(only("c"));

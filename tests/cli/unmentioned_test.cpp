@@ -1,0 +1,69 @@
+// What is said of ports that the model in force does not mention.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string kModel =
+    "<behaviors><arbiter at='/Gaze/pos:i'><select from='/Face/pos:o'>not /stop</select></arbiter>"
+    "</behaviors>";
+
+TEST(Unmentioned, PubAndEchoSayThatNothingPasses) {
+  Daemon daemon(kModel);
+  auto result = arbiter({"pub", "/Fase/pos:o", "--count", "1"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err,
+            "arbiter: the model in force does not mention /Fase/pos:o, so that nothing of this is "
+            "delivered; did you mean \"/Face/pos:o\"?\n");
+  result = arbiter({"pub", "/other", "--count", "1"});
+  EXPECT_THAT(result.err, HasSubstr("; `arbiter status` shows the ports that it mentions\n"));
+  result = arbiter({"echo", "/Gaze/po:i", "--for", "1ms"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err,
+            "arbiter: the model in force does not mention /Gaze/po:i, so that nothing comes; did "
+            "you mean \"/Gaze/pos:i\"?\n");
+}
+
+TEST(Unmentioned, NothingIsSaidOfPortsThatTheModelConnectsOrReads) {
+  Daemon daemon(kModel);
+  EXPECT_EQ(arbiter({"pub", "/Face/pos:o", "--count", "1"}).err, "");
+  EXPECT_EQ(arbiter({"pub", "/stop", "--count", "1"}).err, "");
+  EXPECT_EQ(arbiter({"echo", "/Gaze/pos:i", "--for", "1ms"}).err, "");
+}
+
+TEST(Unmentioned, WithoutAModelThatIsSaid) {
+  Daemon daemon("", Daemon::Options{.without_model = true});
+  EXPECT_EQ(arbiter({"pub", "/a", "--count", "1"}).err,
+            "arbiter: no model is in force, so that nothing of this is delivered\n");
+  Node node("test");
+  auto out = node.output_port<int>("/a");
+  EXPECT_THAT(arbiter({"status"}).out, Not(HasSubstr("mention")));
+}
+
+TEST(Unmentioned, StatusMarksThem) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto out = node.output_port<int>("/Fase/pos:o");
+  auto in = node.input_port<int>("/Gaze/po:i");
+  EXPECT_EQ(daemon.source("/Fase/pos:o")["mentioned"], false);
+  EXPECT_EQ(daemon.source("/Face/pos:o")["mentioned"], true);
+  EXPECT_EQ(daemon.source("/stop")["mentioned"], true);
+  EXPECT_EQ(daemon.input("/Gaze/po:i")["mentioned"], false);
+  EXPECT_EQ(daemon.input("/Gaze/pos:i")["mentioned"], true);
+  EXPECT_THAT(arbiter({"status"}).out,
+              AllOf(HasSubstr("published 0  (the model does not mention it)\n"),
+                    HasSubstr("not arbitrated (the model does not mention it)\n")));
+}
+
+}  // namespace
+}  // namespace arbiter::test
