@@ -26,6 +26,12 @@ json client_json(const Client& client) {
   return {{"node", client.name}, {"pid", client.pid()}, {"user", client.user()}};
 }
 
+json stranger_json(const Stranger& stranger) {
+  return {{"node", stranger.node},       {"pid", stranger.process.pid}, {"user", stranger.user},
+          {"why", stranger.why},         {"since_ns", stranger.since},  {"seen_ns", stranger.seen},
+          {"outputs", stranger.outputs}, {"inputs", stranger.inputs}};
+}
+
 // What a full queue had no room for is lost already, though its receiver counts it when it takes.
 void count_lost(json& counters) {
   const auto waiting = counters["waiting"].get<std::uint64_t>();
@@ -82,6 +88,10 @@ class Document {
     }
     document["history"] = of_.history.json();
     document["clients"] = of_.clients;
+    document["strangers"] = json::array();
+    for (const Stranger* each : of_.strangers.living()) {
+      document["strangers"].push_back(stranger_json(*each));
+    }
     document["sources"] = json::array();
     for (const auto& source : of_.directory.sources()) {
       if (is_worth_showing(*source)) document["sources"].push_back(source_json(*source));

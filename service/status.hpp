@@ -6,6 +6,7 @@
 
 #include "service/history.hpp"
 #include "service/models.hpp"
+#include "service/strangers.hpp"
 #include "service/switchboard.hpp"
 
 namespace arbiter::service {
@@ -18,6 +19,7 @@ struct StatusOf {
   const History& history;
   const Directory& directory;
   const Switchboard& switchboard;
+  const Strangers& strangers;
   std::size_t clients = 0;
   std::uint64_t reloads_refused = 0;
 };
