@@ -334,8 +334,8 @@ void Daemon::close_port(Client& client, shm::PortInstance port) {
 
 void Daemon::send_status(Client& client, std::uint64_t request) {
   const std::string document =
-      status_document({instance_, models_, library_, in_force_, history_, directory_, switchboard_,
-                       strangers_, clients_.size(), reloads_refused_},
+      status_document({instance_, models_, library_, in_force_, history_, directory_, registry_,
+                       switchboard_, strangers_, clients_.size(), reloads_refused_},
                       shm::monotonic_now());
   send_document(client, request, shm::MessageKind::kStatusReply, document);
 }

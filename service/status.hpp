@@ -18,6 +18,7 @@ struct StatusOf {
   const ModelPointer& model;  // in force; null: none, or a predecessor's
   const History& history;
   const Directory& directory;
+  const Registry& registry;
   const Switchboard& switchboard;
   const Strangers& strangers;
   std::size_t clients = 0;

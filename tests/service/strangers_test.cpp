@@ -2,8 +2,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
-
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/support/daemon.hpp"
@@ -16,8 +14,7 @@ using nlohmann::json;
 // The next daemon knows nothing of what the last one did.
 void restart_without_state(Daemon& daemon) {
   daemon.kill();
-  const auto socket = daemon.socket_path();
-  std::filesystem::remove(socket.substr(0, socket.rfind(".sock")) + ".state");
+  daemon.lose_state();
   daemon.restart();
 }
 
