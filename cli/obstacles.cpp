@@ -166,12 +166,16 @@ std::vector<Obstacle> Obstacles::of_connection(const std::string& source) const 
   };
   const std::string component =
       input_->at("open").get<bool>() ? "component " + component_text(*input_) : "the component";
-  say("refused", "refused", " samples were refused, because the queue was full (refuse_new)");
+  // Counted from the opening of the ports on: it may be long ago.
+  say("refused", "refused",
+      " samples were refused since the ports were opened, because the queue was full then "
+      "(refuse_new)");
   say("overtaken", "overtaken",
-      " samples were lost to newer ones, because " + component + " takes too slowly");
+      " samples were lost to newer ones since the ports were opened, because " + component +
+          " took too slowly then");
   say("dropped", "dropped",
-      " samples that had been accepted were dropped at the take, because it was not "
-      "the winner any more then");
+      " samples that had been accepted were dropped at the take since the ports were opened, "
+      "because it was not the winner any more then");
   say("waiting", "waiting", " samples wait to be taken");
   if (count("accepted") != 0 && count("taken") + count("dropped") == 0) {
     result.push_back({"none-taken", component + " has not taken any of the " +

@@ -149,13 +149,14 @@ TEST(Why, TellsOfSamplesThatDidNotGetThrough) {
   auto in = node.input_port<int>("/gaze", {.depth = 2, .when_full = refuse_new});
   for (int i = 0; i < 5; ++i) random.publish(i);
   EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
-              ElementsAre(HasSubstr("3 samples were refused, because the queue was full"),
+              ElementsAre(HasSubstr("3 samples were refused since the ports were opened, because"),
                           HasSubstr("2 samples wait to be taken"),
                           HasSubstr("has not taken any of the 2 accepted samples")));
   face.signal();
   EXPECT_FALSE(in.take());
   EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
-              testing::Contains(HasSubstr("2 samples that had been accepted were dropped")));
+              testing::Contains(AllOf(HasSubstr("2 samples that had been accepted were dropped"),
+                                      HasSubstr("since the ports were opened"))));
 }
 
 TEST(Why, TellsOfComponentsThatAreStoppedAndThatHaveDied) {
