@@ -34,6 +34,25 @@ void write_obstacles(const std::vector<Obstacle>& obstacles, const std::string& 
   for (const auto& each : obstacles) std::cout << "  ! " << of << each.text << '\n';
 }
 
+// Of a file of the model in force; empty where it is as it was read.
+std::string file_advice(FileNow::State state, bool is_older) {
+  switch (state) {
+    case FileNow::State::kSame:
+      return {};
+    case FileNow::State::kGone:
+      return " is not there any more: arbiter reload would be refused";
+    case FileNow::State::kUnreadable:
+      return " cannot be read from here: whether it has changed since is not known";
+    case FileNow::State::kChanged:
+      break;
+  }
+  return is_older ? " says something else: in force is an older one, a rollback; arbiter reload "
+                    "would leave it for what the file says now (arbiter reload --dry-run tells "
+                    "what that changes)"
+                  : " has changed since; arbiter reload puts it in force, unless it has errors "
+                    "(arbiter reload --dry-run tells)";
+}
+
 // The winner first, then who would like to win.
 int rank(const ConnectionExplanation& connection) {
   return connection.wins ? 0 : connection.is_active ? 1 : 2;
@@ -157,8 +176,9 @@ void WhyAnswer::write_model() const {
   if (!model.is_none()) {
     std::cout << "  by " << model.text() << model.origin_text(look_.sources.now()) << '\n';
   }
-  for (const auto& file : model.changed_files()) {
-    std::cout << "  ! " << file << " has changed since; arbiter reload puts it in force\n";
+  for (const auto& file : model.files_now()) {
+    const std::string advice = file_advice(file.state, model.is_older());
+    if (!advice.empty()) std::cout << "  ! " << file.path << advice << '\n';
   }
   if (look_.is_mentioned) return;
   if (const auto other = model.other_that_mentions(port_.name())) {

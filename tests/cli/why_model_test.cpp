@@ -84,8 +84,30 @@ TEST_F(WhyOfTwoModels, TellsThatAFileSaysSomethingElseByNow) {
   files_.write("first.xml", model_of("/arm", "/b"));
   EXPECT_THAT(why({"/arm"}), HasSubstr("! " + first_ + " has changed since; arbiter reload"));
   EXPECT_EQ(why_json({"/arm"})["model"]["changed_files"], json::array({first_}));
+  EXPECT_THAT(why({"/arm"}), HasSubstr("unless it has errors (arbiter reload --dry-run tells)"));
   std::filesystem::remove(first_);
   EXPECT_EQ(why_json({"/arm"})["model"]["changed_files"], json::array({first_}));
+  EXPECT_EQ(why_json({"/arm"})["model"]["missing_files"], json::array({first_}));
+  EXPECT_THAT(why({"/arm"}), HasSubstr("! " + first_ + " is not there any more: arbiter reload "));
+  std::filesystem::create_directory(first_);
+  EXPECT_EQ(why_json({"/arm"})["model"]["unreadable_files"], json::array({first_}));
+  EXPECT_THAT(why({"/arm"}), HasSubstr("! " + first_ + " cannot be read from here"));
+}
+
+TEST_F(WhyOfTwoModels, AfterARollbackDoesNotAdviseToGoBackToWhatWasFledFrom) {
+  EXPECT_EQ(why_json({"/arm"})["model"]["is_older"], false);
+  files_.write("first.xml", model_of("/arm", "/b"));
+  ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  EXPECT_EQ(why_json({"/arm"})["model"]["is_older"], false);
+  ASSERT_EQ(arbiter({"rollback"}).exit_code, 0);
+  EXPECT_EQ(why_json({"/arm"})["model"]["is_older"], true);
+  EXPECT_THAT(why({"/arm"}),
+              AllOf(HasSubstr("! " + first_ +
+                              " says something else: in force is an older one, "
+                              "a rollback; arbiter reload would leave it"),
+                    HasSubstr("arbiter reload --dry-run"), Not(HasSubstr("has changed since"))));
+  ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  EXPECT_EQ(why_json({"/arm"})["model"]["is_older"], false);
 }
 
 TEST(WhyModel, TellsThatThereIsNone) {
