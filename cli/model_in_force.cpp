@@ -74,7 +74,7 @@ ModelInForce ModelInForce::fetch(detail::NodeCore& node) {
     const json& timeout = past.at("timeout_ns");
     model.timeouts_before_[source] = {
         timeout.is_string() ? shm::kForever : timeout.get<shm::Nanoseconds>(),
-        past.at("until_ns").get<shm::Nanoseconds>()};
+        past.at("until_ns").get<shm::Nanoseconds>(), past.at("word").get<shm::ActivityWord>()};
   }
   model.others_ = document.at("others");
   return model;

@@ -28,6 +28,7 @@ class ModelInForce {
   struct PastTimeout {
     shm::Nanoseconds timeout = 0;  // T until then
     shm::Nanoseconds until = 0;
+    shm::ActivityWord word = shm::kNeverActive;  // what the activity was then
   };
 
   ModelInForce() = default;

@@ -67,9 +67,13 @@ WhyAnswer::WhyAnswer(const WhyOptions& options, const LivePort& port, Look look,
       look_(std::move(look)),
       explanation_(std::move(explanation)),
       obstacles_(status, port.name(), look_.sources, port.known_sources(), port.known_ports()),
-      tenure_(rules::tenure_of(look_.snapshot.table, port.id(), look_.winner,
-                               {look_.sources.now(), port.model().since(port.name()),
-                                [this](shm::SourceId source) { return look_.words.at(source); }})),
+      tenure_(
+          rules::tenure_of(look_.snapshot.table, port.id(), look_.winner,
+                           {look_.sources.now(), port.model().since(port.name()),
+                            [this](shm::SourceId source) { return look_.words.at(source); },
+                            [this](shm::SourceId source) {
+                              return look_.sources.state(port_.source_name(source)).arrived_by();
+                            }})),
       shown_(explanation_.connections) {
   const auto is_other = [&](const auto& each) { return each.source != options_.source; };
   if (!options_.source.empty()) std::erase_if(shown_, is_other);

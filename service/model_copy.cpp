@@ -65,8 +65,8 @@ void add_past(const ModelCopyOf& of, json& document) {
   for (const auto& [port, since] : of.continuity.ports()) document["ports_since_ns"][port] = since;
   document["timeouts_before"] = json::object();
   for (const auto& [source, past] : of.continuity.timeouts()) {
-    document["timeouts_before"][source] = {{"timeout_ns", timeout_json(past.timeout)},
-                                           {"until_ns", past.until}};
+    document["timeouts_before"][source] = {
+        {"timeout_ns", timeout_json(past.timeout)}, {"until_ns", past.until}, {"word", past.word}};
   }
 }
 

@@ -156,6 +156,42 @@ TEST(WhyModel, ThatHasAnotherTDoesNotTellArrivalsByIt) {
   EXPECT_NE(connection(why_json({"/arm"}), "/a")["last_arrival_ns"], nullptr);
 }
 
+TEST(WhyModel, ThatHasAnotherTKnowsWhatIsActiveSinceBefore) {
+  Daemon daemon(model_of("/arm", "/a", "1000s"));
+  Node node("test");
+  auto a = node.output_port<int>("/a");
+  a.signal();
+  daemon.load(model_of("/arm", "/a", "500ms"));  // its end lies further ahead than that
+  EXPECT_THAT(why({"/arm"}), HasSubstr("/a wins, since model 2 came into force "));
+  const json answer = why_json({"/arm"});
+  EXPECT_EQ(answer["since"]["at_least_ns"], answer["model"]["in_force_since_ns"]);
+}
+
+TEST(WhyModel, ThatHasAnotherTTellsWhatArrivesUnderIt) {
+  Daemon daemon(model_of("/arm", "/a", "1000s"));
+  Node node("test");
+  auto a = node.output_port<int>("/a");
+  a.signal();
+  daemon.load(model_of("/arm", "/a", "500s"));
+  EXPECT_THAT(why({"/arm"}), HasSubstr("T was 1000s before the model changed it"));
+  a.signal();
+  EXPECT_THAT(why({"/arm"}), AllOf(HasSubstr("active (arrived "), HasSubstr(" ago, T 500s by ")));
+  EXPECT_NE(connection(why_json({"/arm"}), "/a")["last_arrival_ns"], nullptr);
+}
+
+TEST(WhyModel, TellsTheTThatTheLastArrivalCameUnder) {
+  Daemon daemon(model_of("/arm", "/a", "1000s"));
+  Node node("test");
+  auto a = node.output_port<int>("/a");
+  a.signal();
+  daemon.load(model_of("/arm", "/a", "2000s"));
+  daemon.load(model_of("/arm", "/a", "3000s"));
+  EXPECT_THAT(why({"/arm"}), AllOf(HasSubstr("T was 1000s before"), HasSubstr("now T 3000s by")));
+  daemon.load(model_of("/arm", "/a", "1000s"));
+  EXPECT_NE(connection(why_json({"/arm"}), "/a")["last_arrival_ns"], nullptr)
+      << "it is the T that it came under";
+}
+
 TEST(WhyModel, TellsWhereTComesFrom) {
   Daemon daemon(
       "<behaviors>\n<source port='/a' timeout='forever'/>\n"
