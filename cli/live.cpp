@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <fstream>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -75,6 +76,16 @@ bool sleep_until(shm::Nanoseconds time, const shm::FileDescriptor& interrupts) {
     if (ppoll(&interrupt, 1, &span, nullptr) == 1) return true;
     if (left <= 0) return false;
   }
+}
+
+// /proc/PID/stat: "pid (name) state …".
+bool is_stopped(int pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
+  std::string text;
+  std::getline(file, text);
+  const auto end = text.rfind(") ");
+  return end != std::string::npos && end + 2 < text.size() &&
+         (text[end + 2] == 'T' || text[end + 2] == 't');
 }
 
 std::string seconds_text(shm::Nanoseconds span) {

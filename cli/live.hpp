@@ -44,6 +44,9 @@ shm::FileDescriptor catch_interrupts();
 // Sleeps until `time` on CLOCK_MONOTONIC, or until `interrupts` is readable; true: it is.
 bool sleep_until(shm::Nanoseconds time, const shm::FileDescriptor& interrupts);
 
+// Whether a process lives, and does not run: it was sent SIGSTOP, or is being debugged.
+bool is_stopped(int pid);
+
 // 1 500 000 000 -> "1.500 s".
 std::string seconds_text(shm::Nanoseconds span);
 

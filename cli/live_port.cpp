@@ -127,6 +127,7 @@ void LivePort::add_timeouts(Look& look) const {
     if (const auto before = model_.timeout_before(name)) {
       state.timeout_before = before->timeout;
       state.timeout_changed = before->until;
+      state.word_at_change = before->word;
     }
     look.sources.set(name, state);
   }

@@ -46,6 +46,9 @@ class LivePort {
   // force since: look again.
   std::optional<rules::PortExplanation> explain(const Look& look);
 
+  // Else what it decided last goes on, and can be looked at.
+  [[nodiscard]] bool has_daemon() const { return node_->has_daemon(); }
+
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] shm::PortId id() const { return id_; }
   [[nodiscard]] std::string source_name(shm::SourceId source) const;

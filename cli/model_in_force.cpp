@@ -23,17 +23,17 @@ std::string text_or_nothing(const json& value) {
   return value.is_null() ? std::string() : value.get<std::string>();
 }
 
-bool has_changed(const rules::FileText& file) {
-  // What was not UTF-8 is not as it was read.
-  if (file.content.find(kReplacement) != std::string::npos) return false;
+FileNow::State state_of(const rules::FileText& file) {
   std::error_code error;
   const auto status = fs::status(file.path, error);
-  if (status.type() == fs::file_type::not_found) return true;
-  if (status.type() != fs::file_type::regular) return false;
+  if (status.type() == fs::file_type::not_found) return FileNow::State::kGone;
+  if (status.type() != fs::file_type::regular) return FileNow::State::kUnreadable;
   std::ifstream stream(file.path, std::ios::binary);
-  if (!stream) return false;  // not allowed to read it
   const std::string now{std::istreambuf_iterator<char>(stream), {}};
-  return !stream.bad() && now != file.content;
+  if (!stream.is_open() || stream.bad()) return FileNow::State::kUnreadable;
+  // What was not UTF-8 is not as it was read.
+  const bool is_whole = file.content.find(kReplacement) == std::string::npos;
+  return is_whole && now != file.content ? FileNow::State::kChanged : FileNow::State::kSame;
 }
 
 }  // namespace
@@ -55,6 +55,7 @@ ModelInForce ModelInForce::fetch(detail::NodeCore& node) {
   model.name_ = text_or_nothing(document.at("name"));
   model.how_ = text_or_nothing(document.at("how"));
   model.by_ = text_or_nothing(document.at("by"));
+  model.is_older_ = document.at("as_loaded") == false;
   model.has_texts_ = document.at("known").get<bool>();
   model.since_ = document.at("in_force_since_ns").get<shm::Nanoseconds>();
   const auto directory = document.at("directory").get<std::string>();
@@ -73,7 +74,7 @@ ModelInForce ModelInForce::fetch(detail::NodeCore& node) {
     const json& timeout = past.at("timeout_ns");
     model.timeouts_before_[source] = {
         timeout.is_string() ? shm::kForever : timeout.get<shm::Nanoseconds>(),
-        past.at("until_ns").get<shm::Nanoseconds>()};
+        past.at("until_ns").get<shm::Nanoseconds>(), past.at("word").get<shm::ActivityWord>()};
   }
   model.others_ = document.at("others");
   return model;
@@ -116,26 +117,36 @@ json ModelInForce::to_json() const {
   const auto or_null = [](const std::string& text) { return text.empty() ? json() : json(text); };
   json files = json::array();
   for (const auto& file : texts_.models) files.push_back(file.path);
+  json changed = json::array();
+  json missing = json::array();
+  json unreadable = json::array();
+  for (const auto& file : files_now()) {
+    const bool is_gone = file.state == FileNow::State::kGone;
+    if (is_gone) missing.push_back(file.path);
+    if (is_gone || file.state == FileNow::State::kChanged) changed.push_back(file.path);
+    if (file.state == FileNow::State::kUnreadable) unreadable.push_back(file.path);
+  }
   return {{"generation", generation_},
           {"name", or_null(name_)},
           {"files", std::move(files)},
           {"application", texts_.application ? json(texts_.application->path) : json()},
-          {"changed_files", changed_files()},
+          {"changed_files", std::move(changed)},
+          {"missing_files", std::move(missing)},
+          {"unreadable_files", std::move(unreadable)},
+          {"is_older", is_older_},
           {"in_force_since_ns", since_ == 0 ? json() : json(since_)},
           {"how", or_null(how_)},
           {"by", or_null(by_)},
           {"provenance_known", has_texts_}};
 }
 
-std::vector<std::string> ModelInForce::changed_files() const {
-  std::vector<std::string> changed;
-  for (const auto& file : texts_.models) {
-    if (has_changed(file)) changed.push_back(file.path);
+std::vector<FileNow> ModelInForce::files_now() const {
+  std::vector<FileNow> files;
+  for (const auto& file : texts_.models) files.push_back({file.path, state_of(file)});
+  if (texts_.application) {
+    files.push_back({texts_.application->path, state_of(*texts_.application)});
   }
-  if (texts_.application && has_changed(*texts_.application)) {
-    changed.push_back(texts_.application->path);
-  }
-  return changed;
+  return files;
 }
 
 std::optional<std::string> ModelInForce::other_that_mentions(

@@ -16,11 +16,19 @@
 
 namespace arbiter::cli {
 
+// A file of the model, as it is by now.
+struct FileNow {
+  enum class State : std::uint8_t { kSame, kChanged, kGone, kUnreadable };
+  std::string path;
+  State state = State::kSame;
+};
+
 class ModelInForce {
  public:
   struct PastTimeout {
     shm::Nanoseconds timeout = 0;  // T until then
     shm::Nanoseconds until = 0;
+    shm::ActivityWord word = shm::kNeverActive;  // what the activity was then
   };
 
   ModelInForce() = default;
@@ -49,8 +57,10 @@ class ModelInForce {
   [[nodiscard]] std::string origin_text(shm::Nanoseconds now) const;
   [[nodiscard]] nlohmann::json to_json() const;
 
-  // Files that say something else by now, or are gone.
-  [[nodiscard]] std::vector<std::string> changed_files() const;
+  // What has become of the files that were read. Looks at them.
+  [[nodiscard]] std::vector<FileNow> files_now() const;
+  // The files were read again after it: it has been rolled back to.
+  [[nodiscard]] bool is_older() const { return is_older_; }
 
   // Of the models that could be switched to, the first that connects something to the port, or that
   // source if one is given.
@@ -61,6 +71,7 @@ class ModelInForce {
   std::uint64_t generation_ = 0;
   std::string name_, how_, by_;
   bool has_texts_ = false;
+  bool is_older_ = false;
   rules::ModelTexts texts_;
   shm::Nanoseconds since_ = 0;
   std::map<std::string, shm::Nanoseconds> ports_since_;

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <fstream>
+#include <set>
 #include <string_view>
 #include <utility>
 
+#include "cli/live.hpp"
 #include "rules/names.hpp"
 
 namespace arbiter::cli {
@@ -13,20 +14,35 @@ namespace {
 
 using nlohmann::json;
 
-// "stopped": it lives, and does not run. /proc/PID/stat: "pid (name) state …".
-bool is_stopped(int pid) {
-  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
-  std::string text;
-  std::getline(file, text);
-  const auto end = text.rfind(") ");
-  return end != std::string::npos && end + 2 < text.size() &&
-         (text[end + 2] == 'T' || text[end + 2] == 't');
-}
-
-std::string component_text(const json& port) {
-  const json& component = port.at("component");
+// Of whatever the status tells the node and the pid.
+std::string process_text(const json& component) {
   return component.at("node").get<std::string>() + " (pid " +
          std::to_string(component.at("pid").get<int>()) + ")";
+}
+
+std::string component_text(const json& port) { return process_text(port.at("component")); }
+
+void add_stopped(int pid, const std::string& who, std::vector<Obstacle>& result) {
+  if (!is_stopped(pid)) return;
+  result.push_back({"component-stopped", who + " is stopped: its process does not run"});
+}
+
+void add_away(const json& port, std::vector<Obstacle>& result) {
+  const int pid = port.at("away_pid").get<int>();
+  const std::string who = "its component (pid " + std::to_string(pid) + ")";
+  result.push_back({"component-away", who +
+                                          " lives, but has not come back to this daemon yet: what "
+                                          "is connected goes on, what is new waits for it"});
+  add_stopped(pid, who, result);
+}
+
+void add_unknown(const json& stranger, std::vector<Obstacle>& result) {
+  const std::string who = "component " + process_text(stranger);
+  result.push_back({"component-unknown",
+                    who + " lives and has it open, but this daemon does not know it, for what the "
+                          "last one knew is lost: it goes on by itself, as was decided last; "
+                          "restart it"});
+  add_stopped(stranger.at("pid").get<int>(), who, result);
 }
 
 const json* find_named(const json& list, const char* key, const std::string& name) {
@@ -71,21 +87,48 @@ Obstacles::Obstacles(const json& status, const std::string& port, const Sources&
 
 std::vector<Obstacle> Obstacles::of_port() const {
   std::vector<Obstacle> result;
-  if (input_ == nullptr || !input_->at("open").get<bool>()) {
-    const bool is_away = input_ != nullptr && input_->at("away").get<bool>();
-    if (is_away) {
-      result.push_back({"component-away",
-                        "its component lives, but has not come back to this "
-                        "daemon yet"});
-    } else {
-      result.push_back({"port-not-open", "no component has the port open: nothing is taken"});
-    }
-  } else if (is_stopped(input_->at("component").at("pid"))) {
-    result.push_back({"component-stopped", "its component " + component_text(*input_) +
-                                               " is stopped: its process does not run"});
+  const json* stranger = stranger_with("inputs", port_);
+  if (input_ != nullptr && input_->at("open").get<bool>()) {
+    add_stopped(input_->at("component").at("pid").get<int>(),
+                "its component " + component_text(*input_), result);
+  } else if (is_away()) {
+    add_away(*input_, result);
+  } else if (stranger == nullptr) {
+    result.push_back({"port-not-open", "no component has the port open: nothing is taken"});
   }
+  if (stranger != nullptr) add_unknown(*stranger, result);
+  add_other_strangers(result);
   add_port_name(result);
   return result;
+}
+
+bool Obstacles::is_away() const { return input_ != nullptr && input_->at("away").get<bool>(); }
+
+const json* Obstacles::stranger_with(const char* ports, const std::string& name) const {
+  for (const auto& each : status_.at("strangers")) {
+    const json& list = each.at(ports);
+    if (std::find(list.begin(), list.end(), name) != list.end()) return &each;
+  }
+  return nullptr;
+}
+
+// Those that no port and no source which is told of here names: who is said not to be there may be
+// one of them.
+void Obstacles::add_other_strangers(std::vector<Obstacle>& result) const {
+  std::set<const json*> told{stranger_with("inputs", port_)};
+  for (const char* list : {"connections", "senses"}) {
+    if (input_ == nullptr) break;
+    for (const auto& each : input_->at(list)) {
+      told.insert(stranger_with("outputs", each.at("source").get<std::string>()));
+    }
+  }
+  const auto others = std::count_if(status_.at("strangers").begin(), status_.at("strangers").end(),
+                                    [&](const json& each) { return told.count(&each) == 0; });
+  if (others == 0) return;
+  result.push_back({"others-unknown", (others == 1 ? "a component runs"
+                                                   : std::to_string(others) + " components run") +
+                                          std::string(" that this daemon does not know: arbiter "
+                                                      "status tells which")});
 }
 
 // One of the two names is misspelt: the model's, or the component's.
@@ -123,12 +166,16 @@ std::vector<Obstacle> Obstacles::of_connection(const std::string& source) const 
   };
   const std::string component =
       input_->at("open").get<bool>() ? "component " + component_text(*input_) : "the component";
-  say("refused", "refused", " samples were refused, because the queue was full (refuse_new)");
+  // Counted from the opening of the ports on: it may be long ago.
+  say("refused", "refused",
+      " samples were refused since the ports were opened, because the queue was full then "
+      "(refuse_new)");
   say("overtaken", "overtaken",
-      " samples were lost to newer ones, because " + component + " takes too slowly");
+      " samples were lost to newer ones since the ports were opened, because " + component +
+          " took too slowly then");
   say("dropped", "dropped",
-      " samples that had been accepted were dropped at the take, because it was not "
-      "the winner any more then");
+      " samples that had been accepted were dropped at the take since the ports were opened, "
+      "because it was not the winner any more then");
   say("waiting", "waiting", " samples wait to be taken");
   if (count("accepted") != 0 && count("taken") + count("dropped") == 0) {
     result.push_back({"none-taken", component + " has not taken any of the " +
@@ -145,22 +192,21 @@ std::vector<Obstacle> Obstacles::of_source(const std::string& source) const {
 
 void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& result) const {
   const json* output = find_named(status_.at("sources"), "name", source);
+  const json* stranger = stranger_with("outputs", source);
+  if (stranger != nullptr) add_unknown(*stranger, result);
   if (output == nullptr) return;
   const bool is_latched =
       sources_.is_active(source) && sources_.state(source).timeout == shm::kForever;
   if (output->at("open").get<bool>()) {
-    if (is_stopped(output->at("component").at("pid"))) {
-      result.push_back({"component-stopped", "its component " + component_text(*output) +
-                                                 " is stopped: its process does not run"});
-    }
+    add_stopped(output->at("component").at("pid").get<int>(),
+                "its component " + component_text(*output), result);
     return;
   }
   if (output->at("away").get<bool>()) {
-    result.push_back({"component-away",
-                      "its component lives, but has not come back to this "
-                      "daemon yet"});
+    add_away(*output, result);
     return;
   }
+  if (stranger != nullptr) return;
   if (sources_.state(source).word == shm::kNeverActive) {
     result.push_back({"output-not-open",
                       "no component has the output port open: it was never "
@@ -184,7 +230,11 @@ std::optional<Obstacle> Obstacles::other_source(const std::string& name) const {
 }
 
 std::string Obstacles::why_nothing_comes_of(const std::string& source) const {
-  if (input_ == nullptr || !input_->at("open").get<bool>()) return "no component has it open";
+  if (!is_away() && (input_ == nullptr || !input_->at("open").get<bool>())) {
+    const json* stranger = stranger_with("inputs", port_);
+    if (stranger == nullptr) return "no component has it open";
+    return process_text(*stranger) + " has it open, which this daemon does not know";
+  }
   const json* connection = connection_of(source);
   if (connection != nullptr && connection->at("state") == "mismatch") {
     return "the two ports do not fit, " + connection->at("mismatch").get<std::string>();
@@ -200,6 +250,7 @@ std::string Obstacles::why_nothing_comes_of(const std::string& source) const {
 bool Obstacles::was_never_started(const std::string& source) const {
   const json* output = find_named(status_.at("sources"), "name", source);
   return output != nullptr && !output->at("open").get<bool>() && !output->at("away").get<bool>() &&
+         stranger_with("outputs", source) == nullptr &&
          sources_.state(source).word == shm::kNeverActive && !other_source(source);
 }
 

@@ -38,6 +38,11 @@ class Obstacles {
  private:
   using Json = nlohmann::json;
   [[nodiscard]] const Json* connection_of(const std::string& source) const;
+  [[nodiscard]] bool is_away() const;
+  // A component that this daemon does not know, and that has the port open. `ports`: "inputs" or
+  // "outputs".
+  [[nodiscard]] const Json* stranger_with(const char* ports, const std::string& name) const;
+  void add_other_strangers(std::vector<Obstacle>& result) const;
   void add_port_name(std::vector<Obstacle>& result) const;
   void add_publisher(const std::string& source, std::vector<Obstacle>& result) const;
   [[nodiscard]] std::optional<Obstacle> other_source(const std::string& name) const;

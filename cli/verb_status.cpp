@@ -10,6 +10,7 @@
 
 #include "cli/live.hpp"
 #include "cli/verbs.hpp"
+#include "shm/clock.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -22,10 +23,16 @@ struct StatusOptions {
 };
 
 std::string holder(const json& port) {
+  if (port.at("away").get<bool>()) {
+    const int pid = port.at("away_pid").get<int>();
+    return "pid " + std::to_string(pid) + (is_stopped(pid) ? ", stopped" : "") +
+           ", has not come back yet: what is connected goes on";
+  }
   if (!port.at("open").get<bool>()) return "not open";
   const json& component = port.at("component");
-  return component.at("node").get<std::string>() + " (pid " +
-         std::to_string(component.at("pid").get<int>()) + ")";
+  const int pid = component.at("pid").get<int>();
+  return component.at("node").get<std::string>() + " (pid " + std::to_string(pid) +
+         (is_stopped(pid) ? ", stopped)" : ")");
 }
 
 std::string type_of(const json& port) {
@@ -64,6 +71,24 @@ void print_model(const json& status) {
 const char* unmentioned(const json& port, bool has_model) {
   if (!has_model || port.at("mentioned").get<bool>()) return "";
   return " (the model does not mention it)";
+}
+
+// Who else runs, though nothing of it is seen below.
+void print_strangers(const json& strangers) {
+  if (strangers.empty()) return;
+  std::cout << "\nunknown to this daemon, for what the last one knew is lost; they go on by "
+               "themselves: restart them\n";
+  for (const auto& each : strangers) {
+    const int pid = each.at("pid").get<int>();
+    std::cout << "  " << each.at("node").get<std::string>() << " (pid " << pid
+              << (is_stopped(pid) ? ", stopped)" : ")");
+    for (const char* ports : {"outputs", "inputs"}) {
+      for (const auto& port : each.at(ports)) std::cout << ' ' << port.get<std::string>();
+    }
+    std::cout << "  asked "
+              << seconds_text(shm::monotonic_now() - each.at("seen_ns").get<shm::Nanoseconds>())
+              << " ago\n";
+  }
 }
 
 void print_source(const json& source, bool has_model) {
@@ -120,6 +145,7 @@ int status(const StatusOptions& options) {
     return 0;
   }
   print_model(document);
+  print_strangers(document.at("strangers"));
   const bool has_model = document.at("model").at("generation") != 0;
   std::cout << "\nsources\n";
   for (const auto& source : document.at("sources")) print_source(source, has_model);

@@ -34,6 +34,25 @@ void write_obstacles(const std::vector<Obstacle>& obstacles, const std::string& 
   for (const auto& each : obstacles) std::cout << "  ! " << of << each.text << '\n';
 }
 
+// Of a file of the model in force; empty where it is as it was read.
+std::string file_advice(FileNow::State state, bool is_older) {
+  switch (state) {
+    case FileNow::State::kSame:
+      return {};
+    case FileNow::State::kGone:
+      return " is not there any more: arbiter reload would be refused";
+    case FileNow::State::kUnreadable:
+      return " cannot be read from here: whether it has changed since is not known";
+    case FileNow::State::kChanged:
+      break;
+  }
+  return is_older ? " says something else: in force is an older one, a rollback; arbiter reload "
+                    "would leave it for what the file says now (arbiter reload --dry-run tells "
+                    "what that changes)"
+                  : " has changed since; arbiter reload puts it in force, unless it has errors "
+                    "(arbiter reload --dry-run tells)";
+}
+
 // The winner first, then who would like to win.
 int rank(const ConnectionExplanation& connection) {
   return connection.wins ? 0 : connection.is_active ? 1 : 2;
@@ -48,9 +67,13 @@ WhyAnswer::WhyAnswer(const WhyOptions& options, const LivePort& port, Look look,
       look_(std::move(look)),
       explanation_(std::move(explanation)),
       obstacles_(status, port.name(), look_.sources, port.known_sources(), port.known_ports()),
-      tenure_(rules::tenure_of(look_.snapshot.table, port.id(), look_.winner,
-                               {look_.sources.now(), port.model().since(port.name()),
-                                [this](shm::SourceId source) { return look_.words.at(source); }})),
+      tenure_(
+          rules::tenure_of(look_.snapshot.table, port.id(), look_.winner,
+                           {look_.sources.now(), port.model().since(port.name()),
+                            [this](shm::SourceId source) { return look_.words.at(source); },
+                            [this](shm::SourceId source) {
+                              return look_.sources.state(port_.source_name(source)).arrived_by();
+                            }})),
       shown_(explanation_.connections) {
   const auto is_other = [&](const auto& each) { return each.source != options_.source; };
   if (!options_.source.empty()) std::erase_if(shown_, is_other);
@@ -157,8 +180,9 @@ void WhyAnswer::write_model() const {
   if (!model.is_none()) {
     std::cout << "  by " << model.text() << model.origin_text(look_.sources.now()) << '\n';
   }
-  for (const auto& file : model.changed_files()) {
-    std::cout << "  ! " << file << " has changed since; arbiter reload puts it in force\n";
+  for (const auto& file : model.files_now()) {
+    const std::string advice = file_advice(file.state, model.is_older());
+    if (!advice.empty()) std::cout << "  ! " << file.path << advice << '\n';
   }
   if (look_.is_mentioned) return;
   if (const auto other = model.other_that_mentions(port_.name())) {

@@ -35,8 +35,9 @@ class Follower {
     while (std::cout) {
       const shm::Nanoseconds soon = shm::monotonic_now() + kLookEvery;
       if (sleep_until(std::min(soon, last_.next_end()), interrupts_)) return 0;
+      watch_daemon();
       Look look = port_.look();
-      if (look.winner != last_.winner || look.is_arbitrated != last_.is_arbitrated) {
+      if (look.winner != last_.winner || name_of(look) != name_of(last_)) {
         if (!write_change(look)) continue;
         if (++changes == options_.count) return 0;
       }
@@ -46,7 +47,18 @@ class Follower {
   }
 
  private:
+  // Not among the changes: decisions do not depend on it.
+  void watch_daemon() {
+    const bool is_alone = !port_.has_daemon();
+    if (is_alone == std::exchange(is_alone_, is_alone)) return;
+    std::cerr << (is_alone ? "arbiter: the daemon has gone; what it decided last goes on, and is "
+                             "followed on\n"
+                           : "arbiter: a daemon is there again\n");
+  }
+
   [[nodiscard]] std::string name_of(const Look& look) const {
+    if (look.snapshot.generation == 0) return "no model";
+    if (!look.is_mentioned) return "not mentioned";  // nothing comes; else all comes:
     if (!look.is_arbitrated) return "not arbitrated";
     return look.winner == shm::kNone ? "idle" : port_.source_name(look.winner);
   }
@@ -58,12 +70,20 @@ class Follower {
     if (options_.json) {
       write_line({{"at_ns", last_.sources.now()},
                   {"port", port_.name()},
+                  {"mentioned", last_.is_mentioned},
                   {"arbitrated", last_.is_arbitrated},
                   {"winner", winner_json(last_)}});
       return;
     }
-    std::cout << seconds_text(last_.sources.now() - started_) << "  " << port_.name() << ": "
-              << name_of(last_) << ", by " << port_.model().text() << std::endl;
+    std::cout << seconds_text(last_.sources.now() - started_) << "  " << port_.name() << ": ";
+    if (last_.snapshot.generation == 0) {
+      std::cout << "no model is in force";
+    } else if (!last_.is_mentioned) {
+      std::cout << port_.model().text() << " does not mention it: no connection leads to it";
+    } else {
+      std::cout << name_of(last_) << ", by " << port_.model().text();
+    }
+    std::cout << std::endl;
   }
 
   static void write_line(const json& line) {
@@ -102,6 +122,7 @@ class Follower {
       }
       write_line({{"at_ns", at},
                   {"port", port_.name()},
+                  {"mentioned", look.is_mentioned},
                   {"arbitrated", look.is_arbitrated},
                   {"old", winner_json(last_)},
                   {"winner", winner_json(look)},
@@ -121,6 +142,7 @@ class Follower {
   LivePort port_;
   const shm::Nanoseconds started_;
   Look last_;
+  bool is_alone_ = false;
 };
 
 }  // namespace

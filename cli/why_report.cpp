@@ -71,12 +71,17 @@ std::string inhibition_text(const rules::Cause& cause, const Sources& sources) {
 std::optional<shm::Nanoseconds> SourceState::last_arrival() const {
   if (word == shm::kNeverActive || shm::is_deactivation(word)) return std::nullopt;
   if (timeout_before && shm::is_finite(word)) {
-    const bool is_of_before = timeout == shm::kForever || word - timeout < timeout_changed;
-    const bool may_be_of_before =
-        *timeout_before != shm::kForever && word - *timeout_before < timeout_changed;
-    if (is_of_before || may_be_of_before) return std::nullopt;
+    const bool has_stood = word == word_at_change;
+    if (has_stood || timeout == shm::kForever || word - timeout < timeout_changed) {
+      return std::nullopt;
+    }
   }
   return shm::arrival_of(word, timeout);
+}
+
+std::optional<shm::Nanoseconds> SourceState::arrived_by() const {
+  if (!timeout_before || !shm::is_finite(word) || word == shm::kNeverActive) return std::nullopt;
+  return last_arrival() ? std::nullopt : std::optional(timeout_changed);
 }
 
 SourceState Sources::state(const std::string& name) const {

@@ -24,9 +24,12 @@ struct SourceState {
   // Of a source whose T is another than before: which it was, and until when.
   std::optional<shm::Nanoseconds> timeout_before{};
   shm::Nanoseconds timeout_changed = 0;
+  shm::ActivityWord word_at_change = shm::kNeverActive;
 
   // Nothing where it cannot be told, because T may have been another one then.
   [[nodiscard]] std::optional<shm::Nanoseconds> last_arrival() const;
+  // In that case: when it was at the latest.
+  [[nodiscard]] std::optional<shm::Nanoseconds> arrived_by() const;
 };
 
 // The activities that an explanation is about.

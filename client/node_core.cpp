@@ -170,6 +170,11 @@ std::shared_ptr<SharedMemory> NodeCore::memory() {
   return memory_;
 }
 
+bool NodeCore::has_daemon() {
+  const std::lock_guard lock(mutex_);
+  return standing_ == Standing::kMember;
+}
+
 void NodeCore::say(const shm::Message& message) noexcept {
   if (socket_ != nullptr) static_cast<void>(shm::send_message(socket_->get(), message));
 }

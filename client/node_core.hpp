@@ -56,6 +56,8 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
 
   [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
   [[nodiscard]] std::shared_ptr<SharedMemory> memory();
+  // Else the last one has gone, or stopped listening to us, and another is looked for.
+  [[nodiscard]] bool has_daemon();
   // Names of input ports, as far as the daemon has told them (kObserve).
   [[nodiscard]] std::map<shm::PortId, std::string> port_names();
 

@@ -60,14 +60,16 @@ struct Past {
   std::vector<Span> spans;
   Activation before = Activation::kUnknown;  // further back
 
-  static Past of(shm::ActivityWord word, shm::Nanoseconds timeout, shm::Nanoseconds now) {
+  // `arrived_by`: as in Moment.
+  static Past of(shm::ActivityWord word, shm::Nanoseconds timeout,
+                 std::optional<shm::Nanoseconds> arrived_by, shm::Nanoseconds now) {
     if (word == shm::kNeverActive) return {{}, Activation::kInactive};
     if (shm::is_deactivation(word)) {
       return {{{word & ~shm::kDeactivatedFlag, Activation::kInactive}}};
     }
     // T may have been another at the arrival. But it arrived before now, and was active after it.
-    const shm::Nanoseconds arrived =
-        std::min(shm::arrival_of(word, timeout), std::min<shm::Nanoseconds>(now, word - 1));
+    const shm::Nanoseconds arrived = std::min(arrived_by.value_or(shm::arrival_of(word, timeout)),
+                                              std::min<shm::Nanoseconds>(now, word - 1));
     if (shm::is_active(word, now)) return {{{arrived, Activation::kActive}}};
     return {{{word, Activation::kInactive}, {arrived, Activation::kActive}}};
   }
@@ -149,7 +151,8 @@ Tenure tenure_of(const shm::TableView& table, shm::PortId port, shm::SourceId wi
   std::map<shm::SourceId, Past> pasts;
   std::map<shm::Nanoseconds, std::vector<shm::SourceId>, std::greater<>> changes;
   for (const shm::SourceId source : sources_heeded(table, port)) {
-    const Past past = Past::of(moment.word(source), table.timeout(source), moment.now);
+    const auto arrived_by = moment.arrived_by ? moment.arrived_by(source) : std::nullopt;
+    const Past past = Past::of(moment.word(source), table.timeout(source), arrived_by, moment.now);
     for (const auto& span : past.spans) changes[span.since].push_back(source);
     pasts.emplace(source, past);
   }

@@ -54,6 +54,9 @@ struct Moment {
   // Further back another model may have been in force.
   shm::Nanoseconds model_since = 0;
   std::function<shm::ActivityWord(shm::SourceId)> word;  // one consistent picture
+  // Of a source whose last arrival came under another T than that of the table: when it was at the
+  // latest. Empty: there are none.
+  std::function<std::optional<shm::Nanoseconds>(shm::SourceId)> arrived_by{};
 };
 
 Tenure tenure_of(const shm::TableView& table, shm::PortId port, shm::SourceId winner,

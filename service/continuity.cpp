@@ -63,7 +63,16 @@ void Continuity::change_timeouts(const Directory& directory, const shm::TableVie
                                  const shm::TableView& after, shm::Nanoseconds now) {
   for (const auto& source : directory.sources()) {
     const shm::Nanoseconds timeout = before.timeout(source->id);
-    if (timeout != after.timeout(source->id)) timeouts_[source->name] = {timeout, now};
+    if (timeout == after.timeout(source->id)) continue;
+    const shm::ActivityWord word = source->has_page()
+                                       ? source->activity().word.load(std::memory_order_acquire)
+                                       : shm::kNeverActive;
+    const auto earlier = timeouts_.find(source->name);
+    if (earlier == timeouts_.end() || earlier->second.word != word) {
+      timeouts_[source->name] = {timeout, now, word};
+    } else if (earlier->second.timeout == after.timeout(source->id)) {
+      timeouts_.erase(earlier);  // as if it had always been so
+    }
   }
 }
 

@@ -17,13 +17,16 @@ class Continuity {
   struct PastTimeout {
     shm::Nanoseconds timeout = 0;  // T until then
     shm::Nanoseconds until = 0;
+    shm::ActivityWord word = shm::kNeverActive;  // what its activity was then
   };
 
   // The ports of `after` whose rules, and whose sources' T, are those of `before` (null: not known)
   // keep the time they have, `before_since` at the latest; all others begin anew.
   void change(const rules::CompiledModel* before, const rules::CompiledModel& after,
               shm::Nanoseconds before_since);
-  // Remembers of each source the T that it had, where that was another.
+  // Remembers of each source the T that it had, where that was another. Of a source to which
+  // nothing has happened since an earlier change it stays the T of then, which its last arrival
+  // came under.
   void change_timeouts(const Directory& directory, const shm::TableView& before,
                        const shm::TableView& after, shm::Nanoseconds now);
 

@@ -221,6 +221,9 @@ void Daemon::handle_or_refuse(Client& client, shm::Received& received, shm::Nano
       postponed_.push_back({client.id(), std::move(postponed), deadline});
       return;
     }
+  } catch (const RefusedAgain& again) {  // every second: one line for each component is enough
+    refuse(client, received.message.request, again.what());
+    return;
   } catch (const std::exception& error) {
     why = error.what();
   }
@@ -233,7 +236,7 @@ void Daemon::drop(ClientId id) {
   if (found == clients_.end()) return;
   const std::unique_ptr<Client> client = std::move(found->second);
   clients_.erase(found);
-  if (!client->name.empty()) {
+  if (!client->name.empty() && !client->is_turned_away) {
     log::info("{} left, {} ports with it", client->description(), client->ports.size());
   }
   if (client->comes_back && !client->has_died()) set_away(*client);

@@ -29,6 +29,7 @@
 #include "service/model_copy.hpp"
 #include "service/models.hpp"
 #include "service/registry.hpp"
+#include "service/strangers.hpp"
 #include "service/switchboard.hpp"
 #include "shm/rendezvous.hpp"
 
@@ -62,6 +63,12 @@ class NotYet : public std::runtime_error {
   NotYet(const std::string& why, shm::Nanoseconds until)
       : std::runtime_error(why), deadline(until) {}
   const shm::Nanoseconds deadline;
+};
+
+// A refusal that the log has already.
+class RefusedAgain : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
 };
 
 class Daemon {
@@ -166,6 +173,8 @@ class Daemon {
   void find_absentees();
   void add_absentee(const Owner& owner);
   void rejoin(Client& client, const shm::Received& hello);
+  // One that is not taken back says what it has, all the same.
+  void hear_stranger(const Client& client, const shm::Message& message) noexcept;
   void take_back_page(Client& client, const shm::Received& received);
   void take_back_output(Client& client, const shm::Received& received);
   void take_back_input(Client& client, const shm::Received& received);
@@ -205,6 +214,7 @@ class Daemon {
   std::optional<Predecessor> predecessor_;
   shm::Nanoseconds started_ = 0;
   std::map<NodeId, Absentee> absentees_;
+  Strangers strangers_;
   std::vector<ClientId> waiting_;  // have said hello, and are not welcomed yet
   std::vector<Postponed> postponed_;
   bool try_postponed_ = false;  // something has changed that they wait for

@@ -45,7 +45,10 @@ bool is_question(shm::MessageKind kind) {
 
 void Daemon::handle(Client& client, shm::Received& received) {
   const shm::Message& message = received.message;
-  if (client.is_turned_away) return;
+  if (client.is_turned_away) {
+    hear_stranger(client, message);
+    return;
+  }
   if (client.node == 0 && message.kind != shm::MessageKind::kHello) {
     throw std::runtime_error("a client must say hello first");
   }
@@ -180,8 +183,12 @@ void Daemon::hello(Client& client, const shm::Received& received) {
   if ((message.flags & shm::kRejoins) != 0) {
     try {
       rejoin(client, received);
-    } catch (...) {
+    } catch (const std::exception& error) {
       client.is_turned_away = true;
+      const std::string why = error.what();
+      if (!strangers_.refuse(client, message.link, why, shm::monotonic_now())) {
+        throw RefusedAgain(why);
+      }
       throw;
     }
   } else if (phase_ == Phase::kServing) {
@@ -191,10 +198,29 @@ void Daemon::hello(Client& client, const shm::Received& received) {
   }
 }
 
+// What cannot be a port of its is not listed; it has been refused already.
+void Daemon::hear_stranger(const Client& client, const shm::Message& message) noexcept {
+  try {
+    if (message.kind == shm::MessageKind::kHandBackOutput) {
+      const std::string port = port_name(message);
+      gate_.require(client, Action::kOutput, port);
+      strangers_.has_output(client, port);
+    } else if (message.kind == shm::MessageKind::kHandBackInput) {
+      const std::string port = port_name(message);
+      gate_.require(client, Action::kInput, port);
+      strangers_.has_input(client, port);
+    } else if (message.kind == shm::MessageKind::kHandedBack) {
+      strangers_.has_said_all(client);
+    }
+  } catch (const std::exception&) {
+  }
+}
+
 void Daemon::welcome(Client& client) {
   if (client.node == 0) client.node = registry_.next_node();
   auto welcome = reply_to(client.hello_request, shm::MessageKind::kWelcome);
   welcome.link = client.node;
+  strangers_.welcome(client);
   client.send(welcome, {models_.board().get(), registry_.readable().get()});
   log::debug("{} is here", client.description());
 }
@@ -309,7 +335,7 @@ void Daemon::close_port(Client& client, shm::PortInstance port) {
 void Daemon::send_status(Client& client, std::uint64_t request) {
   const std::string document =
       status_document({instance_, models_, library_, in_force_.model, history_, directory_,
-                       switchboard_, clients_.size(), reloads_refused_},
+                       registry_, switchboard_, strangers_, clients_.size(), reloads_refused_},
                       shm::monotonic_now());
   send_document(client, request, shm::MessageKind::kStatusReply, document);
 }

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
@@ -40,6 +41,10 @@ void add_origin(const ModelCopyOf& of, json& document) {
   const bool is_named = !name.empty() && name != kDefaultModel;
   document["name"] = is_named ? json(name) : json(nullptr);
   document["how"] = latest == nullptr ? json(nullptr) : json(latest->how);
+  const auto& loaded = of.library.models();
+  const auto is_it = [&](const LoadedModel& each) { return each.model == of.model; };
+  document["as_loaded"] =
+      of.model == nullptr ? json(nullptr) : json(std::any_of(loaded.begin(), loaded.end(), is_it));
   document["by"] = latest == nullptr || latest->by.empty() ? json(nullptr) : json(latest->by);
   document["in_force_since_ns"] = of.models.in_force_since();
 }
@@ -60,8 +65,8 @@ void add_past(const ModelCopyOf& of, json& document) {
   for (const auto& [port, since] : of.continuity.ports()) document["ports_since_ns"][port] = since;
   document["timeouts_before"] = json::object();
   for (const auto& [source, past] : of.continuity.timeouts()) {
-    document["timeouts_before"][source] = {{"timeout_ns", timeout_json(past.timeout)},
-                                           {"until_ns", past.until}};
+    document["timeouts_before"][source] = {
+        {"timeout_ns", timeout_json(past.timeout)}, {"until_ns", past.until}, {"word", past.word}};
   }
 }
 

@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <string_view>
+
 #include <nlohmann/json.hpp>
 
 #include "service/model_copy.hpp"
@@ -24,6 +26,12 @@ json type_json(const shm::TypeInfo& type) {
 
 json client_json(const Client& client) {
   return {{"node", client.name}, {"pid", client.pid()}, {"user", client.user()}};
+}
+
+json stranger_json(const Stranger& stranger) {
+  return {{"node", stranger.node},       {"pid", stranger.process.pid}, {"user", stranger.user},
+          {"why", stranger.why},         {"since_ns", stranger.since},  {"seen_ns", stranger.seen},
+          {"outputs", stranger.outputs}, {"inputs", stranger.inputs}};
 }
 
 // What a full queue had no room for is lost already, though its receiver counts it when it takes.
@@ -65,6 +73,18 @@ json connection_counters(const OutputPort* output, const InputPort* input, const
   return counters;
 }
 
+// An end that is away has not been closed: its connections go on.
+std::string connection_state(const Source& source, const OutputPort* output, const InputName& name,
+                             const InputPort* input) {
+  const char* const out = output != nullptr ? "" : source.away != 0 ? "away" : "closed";
+  const char* const in = input != nullptr ? "" : name.away != 0 ? "away" : "closed";
+  if (output != nullptr && input != nullptr) return "connected";
+  if (output != nullptr) return std::string("input port ") + in;
+  if (input != nullptr) return std::string("output port ") + out;
+  if (std::string_view(out) == in) return std::string("both ends ") + out;
+  return std::string("output port ") + out + ", input port " + in;
+}
+
 class Document {
  public:
   Document(const StatusOf& of, shm::Nanoseconds now)
@@ -82,6 +102,10 @@ class Document {
     }
     document["history"] = of_.history.json();
     document["clients"] = of_.clients;
+    document["strangers"] = json::array();
+    for (const Stranger* each : of_.strangers.living()) {
+      document["strangers"].push_back(stranger_json(*each));
+    }
     document["sources"] = json::array();
     for (const auto& source : of_.directory.sources()) {
       if (is_worth_showing(*source)) document["sources"].push_back(source_json(*source));
@@ -128,6 +152,12 @@ class Document {
     return shm::is_active(source.activity().word.load(std::memory_order_acquire), now_);
   }
 
+  // Of one that has not come back no more is known than its process.
+  static void add_away(shm::PortInstance away, const RegistryEntry& entry, json& result) {
+    result["away"] = away != 0;
+    result["away_pid"] = away != 0 ? json(entry.owner().process.pid) : json(nullptr);
+  }
+
   [[nodiscard]] json source_json(const Source& source) const {
     const shm::Nanoseconds timeout = snapshot_.table.timeout(source.id);
     json result{{"name", source.name},
@@ -136,7 +166,7 @@ class Document {
                 {"timeout_ns", timeout == shm::kForever ? json("forever") : json(timeout)}};
     const OutputPort* output = of_.switchboard.output(source.open);
     result["open"] = output != nullptr;
-    result["away"] = source.away != 0;
+    add_away(source.away, of_.registry.source(source.id), result);
     if (output == nullptr) return result;
     const auto& counters = output->header().counters;
     result["component"] = client_json(*output->client);
@@ -166,7 +196,7 @@ class Document {
         {"senses", json::array()}};
     const InputPort* input = of_.switchboard.input(name.open);
     result["open"] = input != nullptr;
-    result["away"] = name.away != 0;
+    add_away(name.away, of_.registry.input(name.id), result);
     if (input != nullptr) add_open(*input, result);
     add_connections(name, input, winner, result);
     return result;
@@ -207,10 +237,7 @@ class Document {
       connection["source"] = source->name;
       connection["active"] = is_active(*source);
       connection["winner"] = id == winner && snapshot_.table.is_arbitrated(name.id);
-      connection["state"] = output == nullptr && input == nullptr ? "both ends closed"
-                            : output == nullptr                   ? "output port closed"
-                            : input == nullptr                    ? "input port closed"
-                                                                  : "connected";
+      connection["state"] = connection_state(*source, output, name, input);
       connection["mismatch"] = nullptr;
       if (link != nullptr && !link->mismatch.empty()) {
         connection["state"] = "mismatch";

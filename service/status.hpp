@@ -6,6 +6,7 @@
 
 #include "service/history.hpp"
 #include "service/models.hpp"
+#include "service/strangers.hpp"
 #include "service/switchboard.hpp"
 
 namespace arbiter::service {
@@ -17,7 +18,9 @@ struct StatusOf {
   const ModelPointer& model;  // in force; null: none, or a predecessor's
   const History& history;
   const Directory& directory;
+  const Registry& registry;
   const Switchboard& switchboard;
+  const Strangers& strangers;
   std::size_t clients = 0;
   std::uint64_t reloads_refused = 0;
 };

@@ -84,8 +84,30 @@ TEST_F(WhyOfTwoModels, TellsThatAFileSaysSomethingElseByNow) {
   files_.write("first.xml", model_of("/arm", "/b"));
   EXPECT_THAT(why({"/arm"}), HasSubstr("! " + first_ + " has changed since; arbiter reload"));
   EXPECT_EQ(why_json({"/arm"})["model"]["changed_files"], json::array({first_}));
+  EXPECT_THAT(why({"/arm"}), HasSubstr("unless it has errors (arbiter reload --dry-run tells)"));
   std::filesystem::remove(first_);
   EXPECT_EQ(why_json({"/arm"})["model"]["changed_files"], json::array({first_}));
+  EXPECT_EQ(why_json({"/arm"})["model"]["missing_files"], json::array({first_}));
+  EXPECT_THAT(why({"/arm"}), HasSubstr("! " + first_ + " is not there any more: arbiter reload "));
+  std::filesystem::create_directory(first_);
+  EXPECT_EQ(why_json({"/arm"})["model"]["unreadable_files"], json::array({first_}));
+  EXPECT_THAT(why({"/arm"}), HasSubstr("! " + first_ + " cannot be read from here"));
+}
+
+TEST_F(WhyOfTwoModels, AfterARollbackDoesNotAdviseToGoBackToWhatWasFledFrom) {
+  EXPECT_EQ(why_json({"/arm"})["model"]["is_older"], false);
+  files_.write("first.xml", model_of("/arm", "/b"));
+  ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  EXPECT_EQ(why_json({"/arm"})["model"]["is_older"], false);
+  ASSERT_EQ(arbiter({"rollback"}).exit_code, 0);
+  EXPECT_EQ(why_json({"/arm"})["model"]["is_older"], true);
+  EXPECT_THAT(why({"/arm"}),
+              AllOf(HasSubstr("! " + first_ +
+                              " says something else: in force is an older one, "
+                              "a rollback; arbiter reload would leave it"),
+                    HasSubstr("arbiter reload --dry-run"), Not(HasSubstr("has changed since"))));
+  ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  EXPECT_EQ(why_json({"/arm"})["model"]["is_older"], false);
 }
 
 TEST(WhyModel, TellsThatThereIsNone) {
@@ -132,6 +154,42 @@ TEST(WhyModel, ThatHasAnotherTDoesNotTellArrivalsByIt) {
   daemon.load(model_of("/arm", "/a", "forever"));
   a.signal();
   EXPECT_NE(connection(why_json({"/arm"}), "/a")["last_arrival_ns"], nullptr);
+}
+
+TEST(WhyModel, ThatHasAnotherTKnowsWhatIsActiveSinceBefore) {
+  Daemon daemon(model_of("/arm", "/a", "1000s"));
+  Node node("test");
+  auto a = node.output_port<int>("/a");
+  a.signal();
+  daemon.load(model_of("/arm", "/a", "500ms"));  // its end lies further ahead than that
+  EXPECT_THAT(why({"/arm"}), HasSubstr("/a wins, since model 2 came into force "));
+  const json answer = why_json({"/arm"});
+  EXPECT_EQ(answer["since"]["at_least_ns"], answer["model"]["in_force_since_ns"]);
+}
+
+TEST(WhyModel, ThatHasAnotherTTellsWhatArrivesUnderIt) {
+  Daemon daemon(model_of("/arm", "/a", "1000s"));
+  Node node("test");
+  auto a = node.output_port<int>("/a");
+  a.signal();
+  daemon.load(model_of("/arm", "/a", "500s"));
+  EXPECT_THAT(why({"/arm"}), HasSubstr("T was 1000s before the model changed it"));
+  a.signal();
+  EXPECT_THAT(why({"/arm"}), AllOf(HasSubstr("active (arrived "), HasSubstr(" ago, T 500s by ")));
+  EXPECT_NE(connection(why_json({"/arm"}), "/a")["last_arrival_ns"], nullptr);
+}
+
+TEST(WhyModel, TellsTheTThatTheLastArrivalCameUnder) {
+  Daemon daemon(model_of("/arm", "/a", "1000s"));
+  Node node("test");
+  auto a = node.output_port<int>("/a");
+  a.signal();
+  daemon.load(model_of("/arm", "/a", "2000s"));
+  daemon.load(model_of("/arm", "/a", "3000s"));
+  EXPECT_THAT(why({"/arm"}), AllOf(HasSubstr("T was 1000s before"), HasSubstr("now T 3000s by")));
+  daemon.load(model_of("/arm", "/a", "1000s"));
+  EXPECT_NE(connection(why_json({"/arm"}), "/a")["last_arrival_ns"], nullptr)
+      << "it is the T that it came under";
 }
 
 TEST(WhyModel, TellsWhereTComesFrom) {

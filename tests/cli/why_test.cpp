@@ -1,8 +1,6 @@
 // arbiter why, against a running daemon with real components: each kind of cause.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <poll.h>
-#include <unistd.h>
 
 #include <arbiter/arbiter.hpp>
 #include <nlohmann/json.hpp>
@@ -151,13 +149,14 @@ TEST(Why, TellsOfSamplesThatDidNotGetThrough) {
   auto in = node.input_port<int>("/gaze", {.depth = 2, .when_full = refuse_new});
   for (int i = 0; i < 5; ++i) random.publish(i);
   EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
-              ElementsAre(HasSubstr("3 samples were refused, because the queue was full"),
+              ElementsAre(HasSubstr("3 samples were refused since the ports were opened, because"),
                           HasSubstr("2 samples wait to be taken"),
                           HasSubstr("has not taken any of the 2 accepted samples")));
   face.signal();
   EXPECT_FALSE(in.take());
   EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
-              testing::Contains(HasSubstr("2 samples that had been accepted were dropped")));
+              testing::Contains(AllOf(HasSubstr("2 samples that had been accepted were dropped"),
+                                      HasSubstr("since the ports were opened"))));
 }
 
 TEST(Why, TellsOfComponentsThatAreStoppedAndThatHaveDied) {
@@ -265,120 +264,6 @@ TEST(Why, TellsWhatItCanOfAModelThatThePredecessorHasRead) {
             json::parse(R"([{"source": "/object", "active": true}])"));
   EXPECT_THAT(why({"/gaze"}), AllOf(HasSubstr("not whose behaviours they come from"),
                                     HasSubstr("its rule does not hold: /object is active")));
-}
-
-// A program whose output is read as it comes.
-class Followed {
- public:
-  explicit Followed(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {std::string(ARBITER_PROGRAMS) + "/arbiter", "why"});
-    int ends[2];
-    if (::pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error("pipe2");
-    out_.reset(ends[0]);
-    const shm::FileDescriptor in(ends[1]);
-    process_ = ChildProcess(arguments, {}, {-1, in.get(), -1});
-  }
-
-  std::string line() {
-    std::string text;
-    char c = 0;
-    while (::read(out_.get(), &c, 1) == 1 && c != '\n') text += c;
-    return text;
-  }
-  json object() { return json::parse(line()); }
-  [[nodiscard]] bool has_said_something() const {
-    pollfd readable{out_.get(), POLLIN, 0};
-    return ::poll(&readable, 1, 5) == 1;
-  }
-  ChildProcess& process() { return process_; }
-
- private:
-  shm::FileDescriptor out_;
-  ChildProcess process_;
-};
-
-TEST(Why, FollowsTheWinnersOfThePapersScenario) {
-  Daemon daemon(kModel);
-  Node node("test");
-  auto random = node.output_port<int>("/random");
-  auto face = node.output_port<int>("/face");
-  auto object = node.output_port<int>("/object");
-  auto collision = node.output_port<int>("/collision");
-  Followed followed({"/gaze", "--follow", "--count", "6"});
-  EXPECT_THAT(followed.line(), HasSubstr("  /gaze: idle"));
-  random.signal();
-  EXPECT_THAT(followed.line(), HasSubstr("  idle -> /random  because /random became active"));
-  face.signal();
-  EXPECT_THAT(followed.line(),
-              HasSubstr("  /random -> /face  because /face became active; /random is inhibited by "
-                        "behaviour \"Follow\" (" +
-                        daemon.directory() + "/model.xml:4)"));
-  object.signal();
-  EXPECT_THAT(followed.line(), HasSubstr("  /face -> /object  because /object became active; /face "
-                                         "is inhibited by behaviour \"Track\" through"));
-  collision.signal();
-  EXPECT_THAT(followed.line(), HasSubstr("  /object -> idle  because /collision became active; "
-                                         "/object is out: the condition of"));
-  collision.deactivate();
-  EXPECT_THAT(followed.line(), HasSubstr("  idle -> /object  because /collision was deactivated"));
-  object.deactivate();
-  EXPECT_THAT(followed.line(), HasSubstr("  /object -> /face  because /object was deactivated"));
-  EXPECT_EQ(followed.process().wait(), 0);
-}
-
-TEST(Why, FollowsActivityThatRunsOutAndModelsThatComeIntoForce) {
-  const auto model = [](const std::string& condition) {
-    return "<behaviors timeout='forever'><source port='/high' timeout='30ms'/><arbiter at='/in'>"
-           "<select from='/low'>" +
-           condition + "</select><select from='/high'/></arbiter></behaviors>";
-  };
-  Daemon daemon(model("not /high"));
-  Node node("test");
-  auto low = node.output_port<int>("/low");
-  auto high = node.output_port<int>("/high");
-  low.signal();
-  Followed followed({"/in", "--follow", "--json"});
-  EXPECT_EQ(followed.object()["winner"], "/low");
-  do {
-    high.signal();  // until it has been seen
-  } while (!followed.has_said_something());
-  EXPECT_EQ(followed.object()["winner"], "/high");
-  json change = followed.object();
-  EXPECT_EQ(change["old"], "/high");
-  EXPECT_EQ(change["winner"], "/low");
-  EXPECT_EQ(change["because"][0]["source"], "/high");
-  EXPECT_EQ(change["because"][0]["became"], "expired");
-  EXPECT_EQ(change["because"][0]["at_ns"], change["at_ns"]) << "exactly when it ended";
-  daemon.load(model("not /high and /never"));
-  change = followed.object();
-  EXPECT_EQ(change["winner"], nullptr);
-  EXPECT_EQ(change["model"], 2);
-  EXPECT_EQ(change["because"], json::array());
-  EXPECT_THAT(change["old_loses"].get<std::string>(), HasSubstr("/never is inactive"));
-  followed.process().signal(SIGINT);
-  EXPECT_EQ(followed.process().wait(), 0);
-}
-
-TEST(Why, FollowsOnWhileNoDaemonRunsAndExplainsByTheModelThatDecides) {
-  Daemon daemon(kModel);
-  Node node("test");
-  auto random = node.output_port<int>("/random");
-  auto face = node.output_port<int>("/face");
-  Followed followed({"/gaze", "--follow"});
-  EXPECT_THAT(followed.line(), HasSubstr("  /gaze: idle, by model 1 ("));
-  daemon.kill();
-  random.signal();
-  EXPECT_THAT(followed.line(), HasSubstr("  idle -> /random  because"));
-  face.signal();
-  EXPECT_THAT(followed.line(), HasSubstr("/random is inhibited by behaviour \"Follow\" ("));
-  daemon.restart();  // takes over what is open, and puts its own model in force
-  face.deactivate();
-  EXPECT_THAT(followed.line(), HasSubstr("  /face -> /random  because"));
-  daemon.load(kNoRules);
-  EXPECT_THAT(followed.line(), AllOf(HasSubstr("  /random -> not arbitrated  because model "),
-                                     HasSubstr(" (" + daemon.directory() +
-                                               "/model.xml) came into "
-                                               "force (reload, by ")));
 }
 
 }  // namespace

@@ -86,6 +86,15 @@ TEST(WorkedExample, IsExplained) {
           "/Object/pos:o -> idle  because /Object/pos:o went inactive, "
           "500 ms after its last arrival\n" +
           "1.400 s" + at + "idle -> /RandomLook/pos:o  because /RandomLook/pos:o became active\n");
+  // The docs show it, run where the model is.
+  std::string shown = result.out;
+  const std::string folder = ARBITER_EXAMPLES "/search_and_track/";
+  for (auto at_path = shown.find(folder); at_path != std::string::npos;
+       at_path = shown.find(folder)) {
+    shown.erase(at_path, folder.size());
+  }
+  const std::string docs = content_of(ARBITER_EXAMPLES "/../docs/explaining.md");
+  EXPECT_NE(docs.find("--why=/Gaze/pos:i\n" + shown + "```\n"), std::string::npos);
 }
 
 }  // namespace

@@ -45,6 +45,13 @@ class Past {
                                return simulation_.activity(source);
                              }});
   }
+  // The same, of sources whose last arrivals came under another T, no later than `arrived_by`.
+  [[nodiscard]] rules::Tenure tenure_after_change(Nanoseconds arrived_by) const {
+    return rules::tenure_of(simulation_.table(), 0, winner(),
+                            {simulation_.now(), 0,
+                             [this](shm::SourceId source) { return simulation_.activity(source); },
+                             [arrived_by](shm::SourceId) { return std::optional(arrived_by); }});
+  }
   [[nodiscard]] shm::SourceId winner() const {
     return rules::winner_at(simulation_.table(), 0, [this](shm::SourceId source) {
       return shm::is_active(simulation_.activity(source), simulation_.now());
@@ -120,6 +127,14 @@ TEST(Tenure, GoesNoFurtherBackThanTheModel) {
   const auto tenure = past.tenure(35);
   EXPECT_EQ(tenure.at_least, 35);
   EXPECT_FALSE(tenure.not_before);
+}
+
+TEST(Tenure, OfASourceThatArrivedUnderAnotherTGoesBackToWhenItDidAtTheLatest) {
+  Past past(model());
+  past.arrives(38, "/low");  // by the T of now
+  past.live_until(40);
+  EXPECT_EQ(past.tenure_after_change(15).at_least, 15);
+  EXPECT_EQ(past.tenure_after_change(90).at_least, 40) << "it cannot have arrived later than now";
 }
 
 TEST(Tenure, NeverSaysOfThePastWhatWasNotSo) {

@@ -174,6 +174,11 @@ class Daemon {
     return process_.wait();
   }
   void kill() { process_.kill(); }
+  // What the next daemon would take over by. After it has ended.
+  void lose_state() const {
+    const std::string socket = socket_path();
+    ::unlink((socket.substr(0, socket.rfind(".sock")) + ".state").c_str());
+  }
   // After it has ended.
   void restart() {
     start();

@@ -1,0 +1,90 @@
+// arbiter why and arbiter status, of components that have not come back to a new daemon, and of
+// those that it does not know.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/cli/why_program.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using nlohmann::json;
+using testing::AllOf;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+const std::string kModel =
+    "<behaviors timeout='forever'><arbiter at='/arm'><select from='/rest'>not /track</select>"
+    "<select from='/track'/></arbiter><arbiter at='/leg'><select from='/walk'/></arbiter>"
+    "</behaviors>";
+
+std::string status_text() {
+  const auto result = arbiter({"status"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  return result.out;
+}
+
+TEST(WhyDaemon, OfAComponentThatHasNotComeBackSaysThatWhatIsConnectedGoesOn) {
+  Daemon daemon(kModel);
+  Node node("test");
+  auto rest = node.output_port<int>("/rest");
+  ChildProcess echo({ARBITER_PROGRAMS "/arbiter", "echo", "/arm"}, {}, {});
+  while (daemon.connection("/rest", "/arm")["state"] != "connected") {
+  }
+  rest.publish(1);
+  echo.stop();
+  daemon.kill();
+  daemon.restart();
+  ASSERT_EQ(daemon.input("/arm")["away"], true);
+  const std::string pid = std::to_string(echo.pid());
+  const std::string text = why({"/arm"});
+  EXPECT_THAT(text, AllOf(HasSubstr("/arm: /rest wins"), Not(HasSubstr("nothing of it reaches")),
+                          HasSubstr("! its component (pid " + pid + ") lives, but has not come "),
+                          HasSubstr("what is connected goes on"),
+                          HasSubstr("(pid " + pid + ") is stopped")));
+  const json answer = why_json({"/arm"});
+  EXPECT_EQ(answer["nothing_comes_of_it"], nullptr);
+  EXPECT_THAT(codes(answer["obstacles"]), ElementsAre("component-away", "component-stopped"));
+  EXPECT_THAT(status_text(), AllOf(HasSubstr("/arm  [pid " + pid + ", stopped, has not come back"),
+                                   HasSubstr("/rest  (input port away)")));
+  echo.signal(SIGCONT);
+  while (daemon.input("/arm")["away"] == true) {
+  }
+  EXPECT_THAT(texts(why_json({"/arm"})["obstacles"]), IsEmpty());
+}
+
+TEST(WhyDaemon, ThatHasLostItsStateSaysWhoRunsThatItDoesNotKnow) {
+  Daemon daemon(kModel);
+  Node node("robot");
+  auto rest = node.output_port<int>("/rest");
+  auto arm = node.input_port<int>("/arm");
+  daemon.kill();
+  daemon.lose_state();
+  daemon.restart();
+  for (json told; told.empty() || told[0]["inputs"].empty();) told = daemon.status()["strangers"];
+  const std::string who = "component robot (pid " + std::to_string(::getpid()) + ")";
+  const std::string unknown = "! " + who + " lives and has it open, but this daemon does not know";
+  const std::string text = why({"/arm"});
+  EXPECT_THAT(text, AllOf(HasSubstr("nobody wins"), HasSubstr("\n  " + unknown),
+                          Not(HasSubstr("no component has the port open")),
+                          HasSubstr("\n/rest is kept out"), HasSubstr("restart it"),
+                          HasSubstr("Never started, nobody has them open: /track\n")));
+  const json answer = why_json({"/arm"});
+  EXPECT_THAT(codes(answer["obstacles"]), ElementsAre("component-unknown"));
+  EXPECT_THAT(codes(connection(answer, "/rest")["obstacles"]), ElementsAre("component-unknown"));
+  EXPECT_THAT(texts(why_json({"/leg"})["obstacles"]),
+              Contains(HasSubstr("a component runs that this daemon does not know")));
+  EXPECT_THAT(status_text(),
+              AllOf(HasSubstr("unknown to this daemon"),
+                    HasSubstr("  robot (pid " + std::to_string(::getpid()) + ") /rest /arm  ")));
+}
+
+}  // namespace
+}  // namespace arbiter::test
