@@ -141,12 +141,29 @@ Case memory_case(const Robot& robot, const std::vector<Worker>& components) {
                      {"all together", mib(daemon.pss_kib + all.pss_kib)}});
 }
 
+void sleep_for(double seconds) {
+  timespec time{};
+  time.tv_sec = static_cast<time_t>(seconds);
+  time.tv_nsec = static_cast<long>((seconds - static_cast<double>(time.tv_sec)) * 1e9);
+  ::nanosleep(&time, nullptr);
+}
+
+// Whoever left last is seen off: no processor time is used for a moment. One that never rests is
+// measured as it is.
+void wait_until_idle(pid_t daemon) {
+  for (int tries = 0; tries < 20; ++tries) {
+    const std::int64_t used = processor_time_ns(daemon);
+    sleep_for(0.1);
+    if (processor_time_ns(daemon) == used) return;
+  }
+}
+
 // Nobody publishes meanwhile, and nobody comes or goes.
 Case idle_case(const Robot& robot, double seconds) {
+  wait_until_idle(robot.daemon());
   const std::int64_t used_before = processor_time_ns(robot.daemon());
   const std::int64_t before = now_ns();
-  const timespec time{static_cast<time_t>(seconds), 0};
-  ::nanosleep(&time, nullptr);
+  sleep_for(seconds);
   const auto used = static_cast<double>(processor_time_ns(robot.daemon()) - used_before);
   return value_case("daemon idle", "% of a processor",
                     {{"arbiterd", 100 * used / static_cast<double>(now_ns() - before)}});
