@@ -217,7 +217,8 @@ PortDiff compare_ports(const CompiledPort* before, const CompiledPort* after,
   result.first_wins_after = after != nullptr && after->first_wins;
   if (before != nullptr) result.connections_before = only_in(*before, after);
   if (after != nullptr) result.connections_after = only_in(*after, before);
-  if (result.arbitrated_before && result.arbitrated_after) {
+  if (before == nullptr || after == nullptr) return result;
+  if (before->arbitrated && after->arbitrated) {
     PortComparison(*before, *after, result).compare(work_left);
   }
   return result;
