@@ -17,16 +17,6 @@ using nlohmann::json;
 using testing::AllOf;
 using testing::HasSubstr;
 
-// Activity ends only by deactivate(), so that no test depends on time.
-const std::string kModel = R"(<behaviors timeout="forever">
-<meta_behavior name="Curious"><behavior>Look</behavior><behavior>Follow</behavior></meta_behavior>
-<behavior name="Look"><config at="/gaze">/random</config></behavior>
-<behavior name="Follow"><config at="/gaze">/face</config><inhibition>Look</inhibition></behavior>
-<behavior name="Track"><config at="/gaze">/object</config>
-  <condition>not /collision</condition>
-  <inhibition>Curious</inhibition></behavior>
-</behaviors>)";
-
 // A program whose output is read as it comes.
 class Followed {
  public:
@@ -66,7 +56,7 @@ class Followed {
 };
 
 TEST(WhyFollow, FollowsTheWinnersOfThePapersScenario) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   Node node("test");
   auto random = node.output_port<int>("/random");
   auto face = node.output_port<int>("/face");
@@ -128,7 +118,7 @@ TEST(WhyFollow, FollowsActivityThatRunsOutAndModelsThatComeIntoForce) {
 }
 
 TEST(WhyFollow, FollowsOnWhileNoDaemonRunsAndExplainsByTheModelThatDecides) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   Node node("test");
   auto random = node.output_port<int>("/random");
   auto face = node.output_port<int>("/face");
@@ -177,7 +167,7 @@ TEST(WhyFollow, TellsWhatIsDeliveredFromWhatTheModelDoesNotMention) {
 }
 
 TEST(WhyFollow, SaysThatTheDaemonHasGoneAndThatOneIsThereAgain) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   Node node("test");
   auto random = node.output_port<int>("/random");
   Followed followed({"/gaze", "--follow"});

@@ -12,6 +12,16 @@
 
 namespace arbiter::test {
 
+// Activity ends only by deactivate(), so that no test depends on time.
+inline const std::string kGazeModel = R"(<behaviors timeout="forever">
+<meta_behavior name="Curious"><behavior>Look</behavior><behavior>Follow</behavior></meta_behavior>
+<behavior name="Look"><config at="/gaze">/random</config></behavior>
+<behavior name="Follow"><config at="/gaze">/face</config><inhibition>Look</inhibition></behavior>
+<behavior name="Track"><config at="/gaze">/object</config>
+  <condition>not /collision</condition>
+  <inhibition>Curious</inhibition></behavior>
+</behaviors>)";
+
 inline nlohmann::json why_json(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), "why");
   arguments.emplace_back("--json");

@@ -18,18 +18,8 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-// Activity ends only by deactivate(), so that no test depends on time.
-const std::string kModel = R"(<behaviors timeout="forever">
-<meta_behavior name="Curious"><behavior>Look</behavior><behavior>Follow</behavior></meta_behavior>
-<behavior name="Look"><config at="/gaze">/random</config></behavior>
-<behavior name="Follow"><config at="/gaze">/face</config><inhibition>Look</inhibition></behavior>
-<behavior name="Track"><config at="/gaze">/object</config>
-  <condition>not /collision</condition>
-  <inhibition>Curious</inhibition></behavior>
-</behaviors>)";
-
 TEST(Why, TellsWhoInhibitsThroughWhomAndWhereItIsWritten) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   Node node("test");
   auto random = node.output_port<int>("/random");
   auto object = node.output_port<int>("/object");
@@ -56,7 +46,7 @@ TEST(Why, TellsWhoInhibitsThroughWhomAndWhereItIsWritten) {
 }
 
 TEST(Why, TellsWhichConditionIsFalseAndWhatMakesItSo) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   Node node("test");
   auto object = node.output_port<int>("/object");
   auto collision = node.output_port<int>("/collision");
@@ -91,7 +81,7 @@ TEST(Why, TellsHowSomethingCameToBeInactive) {
 }
 
 TEST(Why, TellsSinceWhenWhereItCanBeKnown) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   EXPECT_THAT(why({"/gaze"}), HasSubstr("idle, nobody wins, since model 1 came into force "));
   Node node("test");
   auto random = node.output_port<int>("/random");
@@ -127,7 +117,7 @@ TEST(Why, TellsThatSomethingWentInactiveAndMadeTheWinner) {
 }
 
 TEST(Why, TellsOfPortsThatAreNotOpenAndOfTypesThatDoNotFit) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   EXPECT_THAT(why({"/gaze"}), HasSubstr("! no component has the port open"));
   EXPECT_THAT(why({"/gaze", "/face"}), HasSubstr("! no component has the output port open"));
   Node node("test");
@@ -142,7 +132,7 @@ TEST(Why, TellsOfPortsThatAreNotOpenAndOfTypesThatDoNotFit) {
 }
 
 TEST(Why, TellsOfSamplesThatDidNotGetThrough) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   Node node("test");
   auto random = node.output_port<int>("/random");
   auto face = node.output_port<int>("/face");
@@ -160,7 +150,7 @@ TEST(Why, TellsOfSamplesThatDidNotGetThrough) {
 }
 
 TEST(Why, TellsOfComponentsThatAreStoppedAndThatHaveDied) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   const std::string program = std::string(ARBITER_PROGRAMS) + "/arbiter";
   ChildProcess component({program, "pub", "/random", "--rate", "1000", "--quiet"}, {}, {});
   while (daemon.source("/random")["active"] != true) {
@@ -179,7 +169,7 @@ TEST(Why, TellsOfComponentsThatAreStoppedAndThatHaveDied) {
 }
 
 TEST(Why, TellsOfConnectionsAndPortsWithoutRules) {
-  Daemon daemon(kModel, {.application = R"(<application>
+  Daemon daemon(kGazeModel, {.application = R"(<application>
 <connection><from>/random</from><to>/gaze</to></connection>
 <connection><from>/face</from><to>/gaze</to></connection>
 <connection><from>/object</from><to>/gaze</to></connection>
@@ -196,7 +186,7 @@ TEST(Why, TellsOfConnectionsAndPortsWithoutRules) {
 }
 
 TEST(Why, RefusesNamesThatThereAreNotWithAdvice) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   const auto refused = [](std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "why");
     const auto result = arbiter(arguments);
@@ -223,7 +213,7 @@ TEST(Why, TellsThatThereIsNoDaemonOrThatThePolicyForbidsIt) {
   }
   const TemporaryDirectory files;
   const auto policy = files.write("policy", "deny everyone observe\n");
-  Daemon daemon(kModel, {.arguments = {"--policy", policy}});
+  Daemon daemon(kGazeModel, {.arguments = {"--policy", policy}});
   const auto result = arbiter({"why", "/gaze"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("deny everyone observe"));
@@ -234,7 +224,7 @@ TEST(Why, TellsThatThereIsNoDaemonOrThatThePolicyForbidsIt) {
 }
 
 TEST(Why, SpeaksOfTheModelInForceNotOfTheFile) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   daemon.write_model(
       "<behaviors><arbiter at='/gaze'><select from='/random'>/never</select>"
       "</arbiter></behaviors>");
@@ -249,7 +239,7 @@ TEST(Why, SpeaksOfTheModelInForceNotOfTheFile) {
 }
 
 TEST(Why, TellsWhatItCanOfAModelThatThePredecessorHasRead) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   Node node("test");
   auto random = node.output_port<int>("/random");
   auto object = node.output_port<int>("/object");
