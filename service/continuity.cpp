@@ -64,8 +64,9 @@ void Continuity::change_timeouts(const Directory& directory, const shm::TableVie
   for (const auto& source : directory.sources()) {
     const shm::Nanoseconds timeout = before.timeout(source->id);
     if (timeout == after.timeout(source->id)) continue;
+    // Relaxed is enough: it is only compared with what the same word says later.
     const shm::ActivityWord word = source->has_page()
-                                       ? source->activity().word.load(std::memory_order_acquire)
+                                       ? source->activity().word.load(std::memory_order_relaxed)
                                        : shm::kNeverActive;
     const auto earlier = timeouts_.find(source->name);
     if (earlier == timeouts_.end() || earlier->second.word != word) {

@@ -39,6 +39,7 @@ struct Process {
   std::uint64_t started = 0;
 
   [[nodiscard]] bool lives() const;
+  friend bool operator==(const Process&, const Process&) = default;
 };
 // When a process began, in clock ticks since boot; 0 where that cannot be told.
 std::uint64_t start_of_process(pid_t pid);

@@ -6,10 +6,6 @@
 namespace arbiter::service {
 namespace {
 
-bool is_same(const Process& one, const Process& other) {
-  return one.pid == other.pid && one.started == other.started;
-}
-
 void add(std::set<std::string>& ports, const std::string& port) {
   if (ports.size() < Strangers::kMaxPorts) ports.insert(port);
 }
@@ -20,7 +16,7 @@ bool Strangers::refuse(const Client& client, NodeId former, const std::string& w
                        shm::Nanoseconds now) {
   auto found = std::find_if(known_.begin(), known_.end(), [&](const Known& each) {
     return each.former == former && each.stranger.node == client.name &&
-           is_same(each.stranger.process, client.identity());
+           each.stranger.process == client.identity();
   });
   const bool is_new = found == known_.end();
   if (is_new) {
@@ -65,7 +61,7 @@ void Strangers::has_said_all(const Client& client) {
 
 void Strangers::welcome(const Client& client) {
   std::erase_if(known_, [&](const Known& each) {
-    return each.stranger.node == client.name && is_same(each.stranger.process, client.identity());
+    return each.stranger.node == client.name && each.stranger.process == client.identity();
   });
 }
 
