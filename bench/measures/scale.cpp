@@ -4,9 +4,11 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <thread>
 
 #include "bench/harness/cpu.hpp"
 #include "bench/harness/robot.hpp"
@@ -141,19 +143,12 @@ Case memory_case(const Robot& robot, const std::vector<Worker>& components) {
                      {"all together", mib(daemon.pss_kib + all.pss_kib)}});
 }
 
-void sleep_for(double seconds) {
-  timespec time{};
-  time.tv_sec = static_cast<time_t>(seconds);
-  time.tv_nsec = static_cast<long>((seconds - static_cast<double>(time.tv_sec)) * 1e9);
-  ::nanosleep(&time, nullptr);
-}
-
 // Whoever left last is seen off: no processor time is used for a moment. One that never rests is
 // measured as it is.
 void wait_until_idle(pid_t daemon) {
   for (int tries = 0; tries < 20; ++tries) {
     const std::int64_t used = processor_time_ns(daemon);
-    sleep_for(0.1);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
     if (processor_time_ns(daemon) == used) return;
   }
 }
@@ -163,7 +158,7 @@ Case idle_case(const Robot& robot, double seconds) {
   wait_until_idle(robot.daemon());
   const std::int64_t used_before = processor_time_ns(robot.daemon());
   const std::int64_t before = now_ns();
-  sleep_for(seconds);
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
   const auto used = static_cast<double>(processor_time_ns(robot.daemon()) - used_before);
   return value_case("daemon idle", "% of a processor",
                     {{"arbiterd", 100 * used / static_cast<double>(now_ns() - before)}});

@@ -83,7 +83,7 @@ std::uint64_t picoseconds_each(std::int64_t ns, std::uint64_t times) {
 }
 
 Contender windowed(System& system, Exchange exchange) {
-  exchange.unique = "arbiter-bench-flood-" + std::to_string(::getpid()) + "-" + system.name();
+  exchange.unique = "arbiter-bench-" + std::to_string(::getpid()) + "-flood-" + system.name();
   for (char& c : exchange.unique) {
     if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '-';
   }
