@@ -254,7 +254,8 @@ class ChannelReader {
     prefetch(segment_.payload(slot_of(entry)));
   }
   // And the next one's, if it is there, while this one is taken: fence (c) would keep them waiting.
-  // Relaxed is enough for what is only a guess.
+  // Relaxed is enough for what is only a guess; and a guess harms nobody, whatever slot a publisher
+  // that lies has named: nothing is read.
   void prefetch_next() const noexcept {
     const std::uint32_t position = position_ + 1 == depth_ ? 0 : position_ + 1;
     const Entry entry = ring_[position].load(std::memory_order_relaxed);
