@@ -161,7 +161,7 @@ Witness Winners::witness(const Diagram& function) {
     }
   }
   Witness witness;
-  for (const Literal& literal : *literals) {
+  for (const VariableLiteral& literal : *literals) {
     (literal.active ? witness.active : witness.inactive)
         .push_back(names_[static_cast<std::size_t>(literal.variable)]);
   }

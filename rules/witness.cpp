@@ -40,20 +40,21 @@ std::optional<Literals> ShortestImplicant::find(const Diagram& function) {
   const auto literals = find_literals(function);
   if (!literals) return std::nullopt;
   Literals result;
-  for (const Literal& literal : *literals) {
+  for (const VariableLiteral& literal : *literals) {
     (literal.active ? result.active : result.inactive)
         .set(static_cast<std::size_t>(literal.variable));
   }
   return result;
 }
 
-std::optional<std::vector<Literal>> ShortestImplicant::find_literals(const Diagram& function) {
+std::optional<std::vector<VariableLiteral>> ShortestImplicant::find_literals(
+    const Diagram& function) {
   try {
     cost(function);
   } catch (const BoundMet&) {
     return std::nullopt;
   }
-  std::vector<Literal> result;
+  std::vector<VariableLiteral> result;
   for (Diagram rest = function; !rest.is_true();) {
     const Best& best = best_.at(rest.id());
     if (best.choice != Choice::kLeaveOut) {

@@ -11,15 +11,16 @@
 
 namespace arbiter::rules {
 
-// The shortest path through a diagram depends on the order of the variables and need not be it. The
-// search follows the definition instead: an implicant of f with top variable x either leaves x out,
-// and is then one of (f where x is false) and (f where x is true); or says which, and its rest is
-// one of that half. Functions seen are remembered; there may be many, so they are bounded.
-struct Literal {
+// What is said of a diagram's variable; rules::Literal says it of a source's name.
+struct VariableLiteral {
   int variable;
   bool active;
 };
 
+// The shortest path through a diagram depends on the order of the variables and need not be it. The
+// search follows the definition instead: an implicant of f with top variable x either leaves x out,
+// and is then one of (f where x is false) and (f where x is true); or says which, and its rest is
+// one of that half. Functions seen are remembered; there may be many, so they are bounded.
 class ShortestImplicant {
  public:
   // Functions that the searches of one object look at together.
@@ -31,7 +32,7 @@ class ShortestImplicant {
   // Throws DiagramLimit, after which it can't be used again. For a function that can be true.
   std::optional<Literals> find(const Diagram& function);
   // The same, whatever the number of variables.
-  std::optional<std::vector<Literal>> find_literals(const Diagram& function);
+  std::optional<std::vector<VariableLiteral>> find_literals(const Diagram& function);
 
   // How many functions the searches have looked at.
   [[nodiscard]] std::size_t functions() const { return best_.size(); }
