@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <exception>
+#include <utility>
 
 #include "client/node_names.hpp"
 #include "shm/instances.hpp"
@@ -73,6 +75,8 @@ NodeCore::NodeCore(std::string_view name, const NodeOptions& options)
     throw;
   } catch (const std::exception& error) {
     throw Error(error.what());
+  } catch (const ThrownByCallback& callback) {
+    std::rethrow_exception(callback.thrown);
   }
 }
 
@@ -149,14 +153,22 @@ std::string NodeCore::nobody_answers(const std::string& why_not) const {
          "; start one with: arbiterd --model FILE --instance " + instance_;
 }
 
+// Not under a lock: a callback may do what it likes, and throw.
 void NodeCore::say_that_we_wait() const {
+  static thread_local bool is_inside = false;
+  if (std::exchange(is_inside, true)) return;
+  const std::unique_ptr<bool, void (*)(bool*)> leave(&is_inside, [](bool* is) { *is = false; });
   const std::string text = "\"" + name_ + "\" waits for an arbiterd of instance \"" + instance_ +
                            "\", at most " + std::to_string(options_.connect_timeout.count()) +
                            " ms";
-  if (options_.on_waiting) {
-    options_.on_waiting(text);
-  } else {
+  if (!options_.on_waiting) {
     std::fprintf(stderr, "arbiter: %s\n", text.c_str());
+    return;
+  }
+  try {
+    options_.on_waiting(text);
+  } catch (...) {
+    throw ThrownByCallback{std::current_exception()};
   }
 }
 
@@ -193,7 +205,12 @@ void NodeCore::forget_port(shm::PortInstance port) {
 
 shm::Received NodeCore::ask(const shm::Message& question,
                             std::array<int, shm::kMaxDescriptors> descriptors) {
-  shm::Received answer = converse(question, descriptors);
+  shm::Received answer;
+  try {
+    answer = converse(question, descriptors);
+  } catch (const ThrownByCallback& callback) {
+    std::rethrow_exception(callback.thrown);
+  }
   if (question.kind == shm::MessageKind::kObserve) {
     const std::lock_guard lock(mutex_);
     observes_ = true;
@@ -214,6 +231,24 @@ bool NodeCore::wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_poi
   }
   lock.lock();
   return true;
+}
+
+// Nobody waits for the answer any more.
+void NodeCore::give_up_on(std::uint64_t request) {
+  const auto unanswered = replies_.extract(request);
+  if (unanswered.mapped().opened != 0) forget_port(unanswered.mapped().opened);
+}
+
+void NodeCore::say_that_we_wait(std::unique_lock<std::mutex>& lock, std::uint64_t request) {
+  lock.unlock();
+  try {
+    say_that_we_wait();
+  } catch (...) {
+    lock.lock();
+    give_up_on(request);
+    throw;
+  }
+  lock.lock();
 }
 
 shm::Received NodeCore::converse(const shm::Message& question,
@@ -248,14 +283,14 @@ shm::Received NodeCore::converse(const shm::Message& question,
       static_cast<void>(shm::send_message(socket_->get(), numbered, descriptors));
     }
     if (!said && standing_ != Standing::kMember && Clock::now() - begin >= kQuietWait) {
-      say_that_we_wait();
       said = true;
+      say_that_we_wait(lock, request);
+      continue;
     }
     const auto until = said ? give_up : std::min(give_up, Clock::now() + kQuietWait);
     if (wait_for_news(lock, until) || until < give_up) continue;
-    if (reply.opened != 0) forget_port(reply.opened);
     const bool is_there = standing_ == Standing::kMember;
-    replies_.erase(request);
+    give_up_on(request);
     throw Error(is_there ? "the daemon is there, but has not answered in time"
                          : nobody_answers(turned_away_));
   }
@@ -273,6 +308,8 @@ auto NodeCore::open(std::string_view name, Make make) {
     try {
       return make(memory());
     } catch (const MemoryIsNew&) {  // the next one is made for it
+    } catch (const ThrownByCallback& callback) {
+      std::rethrow_exception(callback.thrown);
     } catch (const std::system_error& error) {
       throw Error(std::string(name) + ": " + error.what());
     }

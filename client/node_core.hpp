@@ -12,6 +12,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <exception>
 #include <functional>
 #include <map>
 #include <memory>
@@ -75,12 +76,21 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   };
   // The daemon is one that has other memory: what was made for the old has to be made anew.
   struct MemoryIsNew {};
+  // What a user's callback has thrown, on its way through calls that would take it for an error of
+  // their own. The call that the user has made throws it on as it was.
+  struct ThrownByCallback {
+    std::exception_ptr thrown;
+  };
   // kRejoining: a daemon has been handed back everything, and has not answered yet.
   enum class Standing : std::uint8_t { kMember, kRejoining, kAlone };
 
   void connect();
   bool say_hello(Clock::time_point give_up);
+  // May throw what a callback throws, as ThrownByCallback.
   void say_that_we_wait() const;
+  // The same, without the lock meanwhile. If it throws, the request is given up.
+  void say_that_we_wait(std::unique_lock<std::mutex>& lock, std::uint64_t request);
+  void give_up_on(std::uint64_t request);
   [[nodiscard]] shm::Message hello() const;
   [[nodiscard]] std::string nobody_answers(const std::string& why_not) const;
 

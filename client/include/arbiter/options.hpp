@@ -15,7 +15,12 @@ struct NodeOptions {
   std::string instance{};
   // How long Node(), and the opening of a port, wait for a daemon before they throw.
   std::chrono::milliseconds connect_timeout{5000};
-  // Is told, once for each such wait, that no daemon answers yet. Empty: standard error is.
+  // Called once by each Node(), opening of a port or switch_model() that has waited half a second
+  // for a daemon, with a sentence that says so. Empty: the sentence goes to standard error. On the
+  // thread that waits, which holds no lock of the library meanwhile: the callback may use the node
+  // and its ports, and what it waits for itself it waits for in silence. The time that it takes
+  // counts as waiting. What it throws ends the wait: it leaves the call that waits, which then has
+  // opened nothing.
   std::function<void(const std::string&)> on_waiting{};
   // Whether a thread of low priority takes up what the daemon announces (ports that come and go,
   // new models). Without it call Node::service() often: until you do, this node's ports do not see
