@@ -68,9 +68,9 @@ void give_back(InputCore& core, std::uint32_t hold) noexcept {
   }
 }
 int wait_descriptor(InputCore& core) { return core.wait_descriptor(); }
-std::optional<std::string> winner(InputCore& core) { return core.winner(); }
+std::optional<std::string_view> winner(InputCore& core) noexcept { return core.winner(); }
 bool is_idle(InputCore& core) noexcept { return core.is_idle(); }
-std::string source_name(const InputCore& core, std::uint32_t source) {
+const std::string& source_name(const InputCore& core, std::uint32_t source) noexcept {
   return core.memory().source_name(source);
 }
 const std::string& name(const InputCore& core) noexcept { return core.name(); }

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <arbiter/detail/cores.hpp>
@@ -51,7 +52,7 @@ class InputCore {
   Waited wait(shm::Nanoseconds timeout, HeldSample& sample);
   void give_back(std::uint32_t hold) noexcept;
   int wait_descriptor();
-  [[nodiscard]] std::optional<std::string> winner();
+  [[nodiscard]] std::optional<std::string_view> winner() noexcept;
   [[nodiscard]] bool is_idle() noexcept;
   [[nodiscard]] std::uint32_t held() const noexcept { return held_; }
 

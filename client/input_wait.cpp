@@ -113,7 +113,7 @@ shm::Nanoseconds InputCore::next_change(const shm::Rule* winner) const noexcept 
   return next;
 }
 
-std::optional<std::string> InputCore::winner() {
+std::optional<std::string_view> InputCore::winner() noexcept {
   const shm::Rule* winner = winning_rule();
   if (winner == nullptr || !snapshot_.table.is_arbitrated(port_)) return std::nullopt;
   return memory_->source_name(winner->source);

@@ -33,10 +33,7 @@ void SharedMemory::add_page(shm::SourceId id, std::string name, shm::FileDescrip
   if (shm::checked_size(page, shm::Seals::kFixedSize) != sizeof(shm::ActivityPage)) {
     throw std::runtime_error("an activity page has another size");
   }
-  {
-    const std::lock_guard lock(names_mutex_);
-    names_[id] = std::move(name);
-  }
+  set_name(id, std::move(name));
   mappings_.emplace_back(page, sizeof(shm::ActivityPage), shm::Access::kReadOnly);
   pages_->attach(id, &mappings_.back().as<const shm::ActivityPage>()->of(id));
   if (page_descriptors_.size() < kMaxPageDescriptors || page_descriptors_.count(id) != 0) {
@@ -45,10 +42,17 @@ void SharedMemory::add_page(shm::SourceId id, std::string name, shm::FileDescrip
   shm::make_resident(mappings_.back(), 0, sizeof(shm::ActivityPage), residence_);
 }
 
-std::string SharedMemory::source_name(shm::SourceId id) const {
-  const std::lock_guard lock(names_mutex_);
-  const auto found = names_.find(id);
-  return found == names_.end() ? "source " + std::to_string(id) : found->second;
+// Relaxed is enough, here and below: see names_.
+void SharedMemory::set_name(shm::SourceId id, std::string name) {
+  shm::Atomic<const std::string*>& known = (*names_)[id];
+  const std::string* const before = known.load(std::memory_order_relaxed);
+  if (before != nullptr && *before == name) return;
+  known.store(&texts_.emplace_back(std::move(name)), std::memory_order_relaxed);
+}
+
+const std::string& SharedMemory::source_name(shm::SourceId id) const noexcept {
+  if (pages_->find(id) == nullptr) return unknown_;
+  return *(*names_)[id].load(std::memory_order_relaxed);
 }
 
 }  // namespace arbiter::detail

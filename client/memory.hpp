@@ -1,9 +1,10 @@
 // What all ports of a node see of the daemon: the tables, and the activity of sources.
 #pragma once
 
+#include <array>
+#include <deque>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,8 @@ class SharedMemory {
   void make_tables_resident() const;
   // A page that cannot be locked is used nevertheless: std::system_error is thrown once it is.
   void add_page(shm::SourceId id, std::string name, shm::FileDescriptor page);
-  [[nodiscard]] std::string source_name(shm::SourceId id) const;
+  // Wait-free. The string stays as it is for as long as this lives.
+  [[nodiscard]] const std::string& source_name(shm::SourceId id) const noexcept;
 
   // Service thread: what a daemon that takes over is handed back.
   [[nodiscard]] const shm::FileDescriptor& board() const noexcept { return board_descriptor_; }
@@ -49,6 +51,8 @@ class SharedMemory {
   // More need not be kept: others have them too, and a process has 1024 descriptors by default.
   static constexpr std::size_t kMaxPageDescriptors = 256;
 
+  void set_name(shm::SourceId id, std::string name);
+
   const std::shared_ptr<const ServiceBell> service_bell_;
   const shm::Residence residence_;
   shm::FileDescriptor board_descriptor_;
@@ -59,8 +63,13 @@ class SharedMemory {
   std::vector<shm::Mapping> mappings_;
   std::map<shm::SourceId, shm::FileDescriptor> page_descriptors_;
 
-  mutable std::mutex names_mutex_;
-  std::map<shm::SourceId, std::string> names_;
+  // A name is stored before its source's page is attached, and is looked for once the page has been
+  // found: page-attached orders the two. A source that gets another name keeps the old one in
+  // being.
+  using Names = std::array<shm::Atomic<const std::string*>, shm::kMaxSources>;
+  const std::string unknown_ = "a source that this node does not know";
+  std::deque<std::string> texts_;  // service thread; its strings never move
+  std::unique_ptr<Names> names_ = std::make_unique<Names>();
 };
 
 }  // namespace arbiter::detail

@@ -10,7 +10,9 @@
 #include <chrono>
 #include <climits>
 #include <fstream>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tests/client/models.hpp"
@@ -155,6 +157,32 @@ TEST_F(RealTimeTake, ActivityThatRunsOutCostsNothing) {
   }),
             kNone);
   EXPECT_GT(denied, 0u);
+}
+
+// The names are longer than any that a string would hold without an allocation.
+TEST_F(RealTimeTake, NamesOfSourcesCostNothing) {
+  const std::string name = "/a/source/whose/name/is/too/long/to/be/kept/in/a/string";
+  Daemon daemon(rules(arbiter_at("/in", select(name))));
+  Node sender("sender");
+  Node receiver("receiver");
+  auto in = receiver.input_port<Number>("/in");
+  auto out = sender.output_port<Number>(name);
+  thread.run([&] { EXPECT_FALSE(in.wait_for(1ms)); });
+  out.publish(Number{1});
+  const std::string* source = nullptr;
+  std::optional<std::string_view> winner;
+  EXPECT_EQ(thread.costs_of([&] {
+    const auto sample = in.take();
+    source = &sample->source();
+    winner = in.winner();
+  }),
+            kNone);
+  EXPECT_EQ(*source, name);
+  EXPECT_EQ(winner, name);
+  // They stay as they are, whatever is named since.
+  daemon.load(rules(arbiter_at("/in", select(name, "not /one and not /two"))));
+  EXPECT_EQ(*source, name);
+  EXPECT_EQ(winner, name);
 }
 
 TEST_F(RealTimeTake, WaitingForASampleThatIsThereCostsNothing) {

@@ -7,6 +7,7 @@
 #include <new>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <arbiter/bytes.hpp>
@@ -20,8 +21,10 @@ namespace arbiter {
 // held.
 class SampleBase {
  public:
-  // The output port it came from.
-  [[nodiscard]] std::string source() const { return detail::source_name(*core_, held_.source); }
+  // The name of the output port it came from. It stays as it is while the port is open. Wait-free.
+  [[nodiscard]] const std::string& source() const noexcept {
+    return detail::source_name(*core_, held_.source);
+  }
   // The source's own count of its samples, from 1.
   [[nodiscard]] std::uint64_t sequence() const noexcept { return held_.sequence; }
   // When it arrived: CLOCK_MONOTONIC, in nanoseconds.
@@ -146,8 +149,8 @@ class InputPort {
   [[nodiscard]] int fd() { return detail::wait_descriptor(*core_); }
 
   // The source of the connection that is selected now, if one is. At a port that is not arbitrated
-  // nothing is selected.
-  [[nodiscard]] std::optional<std::string> winner() { return detail::winner(*core_); }
+  // nothing is selected. The name stays as it is while the port is open. Wait-free, without a lock.
+  [[nodiscard]] std::optional<std::string_view> winner() noexcept { return detail::winner(*core_); }
   // True if no connection is selected now; at a port that is not arbitrated, if none is active.
   [[nodiscard]] bool idle() noexcept { return detail::is_idle(*core_); }
   [[nodiscard]] const std::string& name() const noexcept { return detail::name(*core_); }

@@ -66,9 +66,9 @@ HeldSample take(InputCore& core);
 Waited wait(InputCore& core, std::int64_t timeout_ns, HeldSample& sample);
 void give_back(InputCore& core, std::uint32_t hold) noexcept;
 int wait_descriptor(InputCore& core);
-std::optional<std::string> winner(InputCore& core);
+std::optional<std::string_view> winner(InputCore& core) noexcept;
 bool is_idle(InputCore& core) noexcept;
-std::string source_name(const InputCore& core, std::uint32_t source);
+const std::string& source_name(const InputCore& core, std::uint32_t source) noexcept;
 const std::string& name(const InputCore& core) noexcept;
 
 // A sample, and a loan, keep the port's core in being without counting references to it: samples
