@@ -28,20 +28,58 @@ std::string in_one_line(std::string text) {
 }  // namespace
 
 void Diagnostics::silence(const std::vector<std::string>& codes) {
-  std::erase_if(items_, [&](const Diagnostic& item) {
-    return item.severity != Severity::kError &&
-           std::find(codes.begin(), codes.end(), item.code) != codes.end();
+  const auto is_silenced = [&](Severity severity, const std::string& code) {
+    return severity != Severity::kError &&
+           std::find(codes.begin(), codes.end(), code) != codes.end();
+  };
+  std::erase_if(items_,
+                [&](const Diagnostic& item) { return is_silenced(item.severity, item.code); });
+  std::erase_if(tallies_, [&](const auto& tally) {
+    return is_silenced(tally.first.first, tally.first.second);
   });
+}
+
+void Diagnostics::add(Diagnostics other) {
+  for (Diagnostic& item : other.items_) add(std::move(item));
+  for (const Omission& omission : other.omissions()) {
+    tallies_[{omission.severity, omission.code}].found += omission.count;
+  }
+}
+
+std::vector<Omission> Diagnostics::omissions() const {
+  std::vector<Omission> result;
+  for (const auto& [kind, tally] : tallies_) {
+    if (tally.found <= kMaxOfCode) continue;
+    result.push_back({kind.first, kind.second, tally.last_kept, tally.found - kMaxOfCode});
+  }
+  return result;
+}
+
+std::size_t Diagnostics::count(Severity severity) const {
+  std::size_t count = 0;
+  for (const auto& [kind, tally] : tallies_) {
+    if (kind.first == severity) count += tally.found;
+  }
+  return count;
+}
+
+std::size_t Diagnostics::count(Severity severity, const std::string& code) const {
+  const auto found = tallies_.find({severity, code});
+  return found == tallies_.end() ? 0 : found->second.found;
 }
 
 void Diagnostics::add(Severity severity, std::string code, Location where, std::string message,
                       std::optional<Witness> witness, std::vector<Witness> more_witnesses) {
-  if (items_.size() == kMaxItems) {
-    ++dropped_;
-    return;
-  }
-  items_.push_back({severity, std::move(code), std::move(where), in_one_line(std::move(message)),
-                    std::move(witness), std::move(more_witnesses)});
+  add({severity, std::move(code), std::move(where), in_one_line(std::move(message)),
+       std::move(witness), std::move(more_witnesses)});
+}
+
+void Diagnostics::add(Diagnostic item) {
+  if (item.severity == Severity::kError) has_errors_ = true;
+  Tally& tally = tallies_[{item.severity, item.code}];
+  if (++tally.found > kMaxOfCode) return;
+  tally.last_kept = item.where;
+  items_.push_back(std::move(item));
 }
 
 }  // namespace arbiter::rules

@@ -1,8 +1,10 @@
 // What reading and checking a model finds, each with its place in a file.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -36,14 +38,23 @@ struct Diagnostic {
   std::vector<Witness> more_witnesses;  // of the same, each for itself
 };
 
+// What there is of one code beyond the bound.
+struct Omission {
+  Severity severity = Severity::kError;
+  std::string code;
+  Location where;  // of the last one that was kept
+  std::size_t count = 0;
+};
+
+// What was found, in the order in which it was. Each code has a bound of its own, so that nothing,
+// however often it is found, hides anything else; and only errors make an error.
 class Diagnostics {
  public:
   // Nobody reads more, and a large file of nothing but mistakes must not fill the memory.
-  static constexpr std::size_t kMaxItems = 10'000;
+  static constexpr std::size_t kMaxOfCode = 10'000;
 
   void error(std::string code, Location where, std::string message,
              std::optional<Witness> witness = {}) {
-    has_errors_ = true;
     add(Severity::kError, std::move(code), std::move(where), std::move(message),
         std::move(witness));
   }
@@ -55,21 +66,38 @@ class Diagnostics {
     add(Severity::kNote, std::move(code), std::move(where), std::move(message), std::move(witness),
         std::move(more_witnesses));
   }
+  // All that another one has, behind what is here.
+  void add(Diagnostics other);
   // Without those of these codes; errors stay.
   void silence(const std::vector<std::string>& codes);
+  template <typename Before>
+  void sort_by_place(const Before& is_before) {
+    std::stable_sort(items_.begin(), items_.end(), [&](const Diagnostic& a, const Diagnostic& b) {
+      return is_before(a.where, b.where);
+    });
+  }
 
   [[nodiscard]] bool has_errors() const { return has_errors_; }
   [[nodiscard]] const std::vector<Diagnostic>& items() const { return items_; }
-  // How many came after the first kMaxItems and were not kept.
-  [[nodiscard]] std::size_t dropped() const { return dropped_; }
+  // Errors first, then warnings, then notes.
+  [[nodiscard]] std::vector<Omission> omissions() const;
+  // How many were found, kept or not.
+  [[nodiscard]] std::size_t count(Severity severity) const;
+  [[nodiscard]] std::size_t count(Severity severity, const std::string& code) const;
 
  private:
+  struct Tally {
+    std::size_t found = 0;
+    Location last_kept;
+  };
+
   // Control characters in the message are made visible.
   void add(Severity severity, std::string code, Location where, std::string message,
            std::optional<Witness> witness, std::vector<Witness> more_witnesses = {});
+  void add(Diagnostic item);
 
   std::vector<Diagnostic> items_;
-  std::size_t dropped_ = 0;
+  std::map<std::pair<Severity, std::string>, Tally> tallies_;  // of each code, as found
   bool has_errors_ = false;
 };
 

@@ -1,6 +1,5 @@
 #include "rules/load.hpp"
 
-#include <algorithm>
 #include <memory>
 #include <optional>
 #include <set>
@@ -53,37 +52,6 @@ void read_all(const ModelTexts& texts, LoadedModel& loaded, Diagnostics& diagnos
   loaded.application = read_application(file, diagnostics);
 }
 
-// Checks go through a model in various orders; the reader of their findings goes through files.
-void hand_over_sorted(const Diagnostics& found, const DocumentOrder& order,
-                      Diagnostics& diagnostics) {
-  std::vector<const Diagnostic*> sorted;
-  for (const Diagnostic& item : found.items()) sorted.push_back(&item);
-  std::stable_sort(sorted.begin(), sorted.end(), [&](const Diagnostic* a, const Diagnostic* b) {
-    return order(a->where, b->where);
-  });
-  const bool is_cut = found.dropped() > 0;
-  if (is_cut) sorted.pop_back();  // makes room for the last word
-  for (const Diagnostic* item : sorted) {
-    switch (item->severity) {
-      case Severity::kError:
-        diagnostics.error(item->code, item->where, item->message, item->witness);
-        break;
-      case Severity::kWarning:
-        diagnostics.warning(item->code, item->where, item->message);
-        break;
-      case Severity::kNote:
-        diagnostics.note(item->code, item->where, item->message, item->witness,
-                         item->more_witnesses);
-        break;
-    }
-  }
-  if (is_cut) {
-    diagnostics.error("too-many-problems", sorted.back()->where,
-                      std::to_string(found.dropped() + 1) +
-                          " more problems are not shown; correct the ones above first");
-  }
-}
-
 // `relations`: where they are to be put; null: nowhere.
 LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
                      Hierarchy::Relations* relations) {
@@ -102,7 +70,9 @@ LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
   if (application) check_application(*application, loaded.model, rules, found);
   const Location whole{paths.empty() ? "" : paths.front(), 1, 1};
   check_limits(rules, application ? &*application : nullptr, whole, order, found);
-  hand_over_sorted(found, order, diagnostics);
+  // Checks go through a model in various orders; the reader of their findings goes through files.
+  found.sort_by_place(order);
+  diagnostics.add(std::move(found));
   if (relations != nullptr) *relations = std::move(hierarchy).release();
   return loaded;
 }

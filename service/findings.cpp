@@ -1,6 +1,8 @@
 #include "service/findings.hpp"
 
 #include <algorithm>
+#include <cstddef>
+#include <map>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
@@ -15,12 +17,27 @@ std::string place(const rules::Location& where) {
   return where.file + ":" + std::to_string(where.line) + ":" + std::to_string(where.column);
 }
 
+// Of one code, in one model. What is true of a thousand ports need not fill the log.
+constexpr std::size_t kMaxLogged = 20;
+
+log::level::level_enum level_of(rules::Severity severity) {
+  return severity == rules::Severity::kError     ? log::level::err
+         : severity == rules::Severity::kWarning ? log::level::warn
+                                                 : log::level::info;
+}
+
 void log_findings(const rules::Diagnostics& diagnostics) {
+  std::map<std::pair<rules::Severity, std::string>, std::size_t> logged;
   for (const rules::Diagnostic& finding : diagnostics.items()) {
-    const auto level = finding.severity == rules::Severity::kError     ? log::level::err
-                       : finding.severity == rules::Severity::kWarning ? log::level::warn
-                                                                       : log::level::info;
-    log::log(level, "{}: {} [{}]", place(finding.where), finding.message, finding.code);
+    if (++logged[{finding.severity, finding.code}] > kMaxLogged) continue;
+    log::log(level_of(finding.severity), "{}: {} [{}]", place(finding.where), finding.message,
+             finding.code);
+  }
+  for (const auto& [kind, kept] : logged) {
+    const std::size_t found = diagnostics.count(kind.first, kind.second);
+    if (found <= kMaxLogged) continue;
+    log::log(level_of(kind.first), "{} more [{}]; arbiter check shows them", found - kMaxLogged,
+             kind.second);
   }
 }
 
@@ -53,16 +70,11 @@ std::string Findings::first_error() const {
   for (const Part& part : parts_) {
     const auto& items = part.diagnostics.items();
     const auto found = std::find_if(items.begin(), items.end(), is_error);
-    if (found == items.end()) {
-      if (part.diagnostics.has_errors() && count++ == 0) {
-        first = part.of + " has errors: more than can be shown";
-      }
-      continue;
-    }
+    if (found == items.end()) continue;
     if (count == 0) {
       first = part.of + " has errors: " + place(found->where) + ": " + found->message;
     }
-    count += static_cast<std::size_t>(std::count_if(items.begin(), items.end(), is_error));
+    count += part.diagnostics.count(rules::Severity::kError);
   }
   if (count > 1) first += " (and " + std::to_string(count - 1) + " more; see the log)";
   return first;

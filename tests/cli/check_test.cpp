@@ -269,6 +269,23 @@ TEST(Check, StatementsThatCannotBeReadAreCountedToo) {
                                      "be read\n"));
 }
 
+TEST(Check, ARefutedStatementIsToldBehindAnyNumberOfTrueOnes) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  std::string text;
+  for (int i = 0; i < 9'999; ++i) text += "/object or not /object\n";
+  const auto statements = directory.write("s.txt", text + "/collision -> idle(/arm)\n");
+  const auto more = directory.write("t.txt", "/rest or not /rest\n/rest or not /rest\n");
+  const auto result =
+      arbiter({"check", model, "--assert", statements, "--assert", more, "--json"});
+  EXPECT_EQ(result.exit_code, 1);
+  const auto found = nlohmann::json::parse(result.out);
+  EXPECT_EQ(found.front()["code"], "refuted");
+  EXPECT_EQ(found.back()["code"], "not-listed");
+  EXPECT_EQ(found.back()["code_omitted"], "proved");
+  EXPECT_EQ(found.back()["count"], 1);
+}
+
 TEST(Check, StatementsThatCannotBeOpenedAreWrongUse) {
   TemporaryDirectory directory;
   const auto model = directory.write("m.xml", kTrackModel);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "rules/compile.hpp"
 #include "rules/text_file.hpp"
 #include "shm/limits.hpp"
 #include "tests/rules/model_text.hpp"
@@ -107,14 +108,51 @@ TEST(Load, AFileBeyondTheLimitIsRefused) {
               ElementsAre("app.xml:1:1 error limit-exceeded"));
 }
 
-TEST(Load, ReportsNoMoreThanCanBeRead) {
+TEST(Load, KeepsNoMoreOfACodeThanCanBeReadAndCountsTheRest) {
   std::string model;
   for (int i = 0; i < 20'000; ++i) model += "<x/>\n";
-  const Loaded loaded = load_text(model);
-  ASSERT_EQ(loaded.items.size(), Diagnostics::kMaxItems);
-  EXPECT_EQ(loaded.items[9'998].where.line, 9'999u);
-  EXPECT_EQ(loaded.items.back().code, "too-many-problems");
-  EXPECT_THAT(loaded.items.back().message, HasSubstr("10001 more problems are not shown"));
+  Diagnostics diagnostics;
+  load_all({{{"a.xml", model}}, {}}, diagnostics);
+  ASSERT_EQ(diagnostics.items().size(), Diagnostics::kMaxOfCode);
+  EXPECT_EQ(diagnostics.items().back().where.line, 10'000u);
+  EXPECT_EQ(diagnostics.count(Severity::kError), 20'000u);
+  ASSERT_EQ(diagnostics.omissions().size(), 1u);
+  EXPECT_EQ(diagnostics.omissions()[0].code, "unknown-element");
+  EXPECT_EQ(diagnostics.omissions()[0].count, 10'000u);
+  EXPECT_EQ(diagnostics.omissions()[0].where.line, 10'000u);
+}
+
+// `Stop i` at a port of its own inhibits a meta-behaviour of all `Bi`: a note for each pair.
+std::string inhibitions_across_ports(unsigned stops) {
+  std::string model = "<behaviors>\n<meta_behavior name='All'>";
+  for (unsigned i = 0; i < stops; ++i) model += "<behavior>B" + std::to_string(i) + "</behavior>";
+  model += "</meta_behavior>\n";
+  for (unsigned i = 0; i < stops; ++i) {
+    const std::string n = std::to_string(i);
+    model += "<behavior name='Stop " + n + "'><config at='/stop" + n + ":i'>/stop" + n +
+             ":o</config><inhibition>All</inhibition></behavior>\n<behavior name='B" + n +
+             "'><config at='/p" + n + ":i'>/s" + n + ":o</config></behavior>\n";
+  }
+  return model + "</behaviors>";
+}
+
+TEST(Load, IsNotRefusedForNotesHoweverMany) {
+  Diagnostics diagnostics;
+  load_all({{{"a.xml", inhibitions_across_ports(101)}}, {}}, diagnostics);
+  EXPECT_FALSE(diagnostics.has_errors());
+  EXPECT_EQ(diagnostics.count(Severity::kNote, "inhibition-across-ports"), 101u * 101u);
+  EXPECT_EQ(diagnostics.items().size(), Diagnostics::kMaxOfCode);
+}
+
+TEST(Load, ShowsAnErrorBehindAnyNumberOfNotes) {
+  std::string model = inhibitions_across_ports(101);
+  model.insert(model.rfind("</behaviors>"),
+               "<behavior name='A'><config at='/x:i'>/a:o</config></behavior>\n"
+               "<behavior name='B'><config at='/x:i'>/b:o</config></behavior>\n");
+  Diagnostics diagnostics;
+  compile(load_all({{{"a.xml", model}}, {}}, diagnostics).rules, diagnostics);
+  EXPECT_TRUE(diagnostics.has_errors());
+  EXPECT_EQ(diagnostics.items().back().code, "both-can-win");
 }
 
 // A model with so many connections, from so many sources, to so many ports.

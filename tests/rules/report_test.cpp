@@ -37,11 +37,11 @@ TEST(Report, WritesAsCompilersDoAndCounts) {
                     rules::Witness{{"/a", "/b"}, {"/c"}});
   diagnostics.error("both-can-win", {"m.xml", 10, 1}, "both win", rules::Witness{{"/a"}, {}});
   EXPECT_EQ(text_of(diagnostics),
-            "m.xml:3:4: note: by the way [some-note]\n"
             "m.xml:9:1: error: both win [both-can-win]\n"
             "  active: /a, /b; inactive: /c\n"
             "m.xml:10:1: error: both win [both-can-win]\n"
             "  active: /a; inactive: none\n"
+            "m.xml:3:4: note: by the way [some-note]\n"
             "2 errors, 1 note\n");
 }
 
@@ -72,6 +72,44 @@ TEST(Report, ShowsTheFirstNotesOfACodeAndCountsTheRest) {
       text.ends_with("\n15 more notes [n] are not shown; arbiter check --json has them\n"
                      "12 warnings, 25 notes\n"));
   EXPECT_EQ(json_of(diagnostics).size(), 37u);
+}
+
+TEST(Report, PutsErrorsBeforeWarningsBeforeNotes) {
+  Diagnostics diagnostics;
+  diagnostics.note("n", {"m.xml", 1, 1}, "third");
+  diagnostics.warning("w", {"m.xml", 2, 1}, "second");
+  diagnostics.error("e", {"m.xml", 3, 1}, "first");
+  std::vector<std::string> messages;
+  for (const auto& item : json_of(diagnostics)) messages.push_back(item["message"]);
+  EXPECT_EQ(messages, (std::vector<std::string>{"first", "second", "third"}));
+}
+
+TEST(Report, SaysHowManyMoreThereAreBeyondTheBoundOfACode) {
+  constexpr std::uint32_t kBound = Diagnostics::kMaxOfCode;
+  Diagnostics diagnostics;
+  for (std::uint32_t i = 0; i < kBound + 3; ++i) {
+    diagnostics.note("n", {"m.xml", i + 1, 1}, "a note");
+    diagnostics.error("e", {"m.xml", i + 1, 1}, "wrong");
+  }
+  diagnostics.error("other", {"m.xml", 1, 1}, "wrong, too");
+  EXPECT_EQ(counts(diagnostics), "10004 errors, 10003 notes");
+  EXPECT_TRUE(text_of(diagnostics)
+                  .ends_with("\n3 more errors [e] were found and are not listed\n"
+                             "9993 more notes [n] are not shown; arbiter check --json has the "
+                             "first 10000\n10004 errors, 10003 notes\n"));
+  const auto json = json_of(diagnostics);
+  ASSERT_EQ(json.size(), 2 * kBound + 3);
+  EXPECT_EQ(json[0]["code"], "other");
+  const auto& omission = json[2 * kBound + 1];
+  EXPECT_EQ(omission["severity"], "error");
+  EXPECT_EQ(omission["code"], "not-listed");
+  EXPECT_EQ(omission["code_omitted"], "e");
+  EXPECT_EQ(omission["count"], 3);
+  EXPECT_EQ(omission["line"], kBound);
+
+  diagnostics.silence({"n"});
+  EXPECT_EQ(counts(diagnostics), "10004 errors");
+  EXPECT_EQ(diagnostics.omissions().size(), 1u);
 }
 
 TEST(Report, SilencesWhatIsNoError) {
