@@ -276,8 +276,7 @@ TEST(Check, ARefutedStatementIsToldBehindAnyNumberOfTrueOnes) {
   for (int i = 0; i < 9'999; ++i) text += "/object or not /object\n";
   const auto statements = directory.write("s.txt", text + "/collision -> idle(/arm)\n");
   const auto more = directory.write("t.txt", "/rest or not /rest\n/rest or not /rest\n");
-  const auto result =
-      arbiter({"check", model, "--assert", statements, "--assert", more, "--json"});
+  const auto result = arbiter({"check", model, "--assert", statements, "--assert", more, "--json"});
   EXPECT_EQ(result.exit_code, 1);
   const auto found = nlohmann::json::parse(result.out);
   EXPECT_EQ(found.front()["code"], "refuted");

@@ -99,7 +99,7 @@ TEST(Report, SaysHowManyMoreThereAreBeyondTheBoundOfACode) {
                              "first 10000\n10004 errors, 10003 notes\n"));
   const auto json = json_of(diagnostics);
   ASSERT_EQ(json.size(), 2 * kBound + 3);
-  EXPECT_EQ(json[0]["code"], "other");
+  EXPECT_EQ(json[1]["code"], "other");
   const auto& omission = json[2 * kBound + 1];
   EXPECT_EQ(omission["severity"], "error");
   EXPECT_EQ(omission["code"], "not-listed");
@@ -147,11 +147,11 @@ TEST(Report, WritesJsonForPrograms) {
   diagnostics.warning("never-selected", {"m.xml", 3, 4}, "a \"quoted\" message");
   diagnostics.error("both-can-win", {"m.xml", 5, 6}, "both; mend it", rules::Witness{{"/a"}, {}});
   EXPECT_EQ(json_of(diagnostics), nlohmann::json::parse(R"([
-    {"severity": "warning", "code": "never-selected", "file": "m.xml", "line": 3, "column": 4,
-     "message": "a \"quoted\" message", "help": null, "witness": null,
-     "more_witnesses": []},
     {"severity": "error", "code": "both-can-win", "file": "m.xml", "line": 5, "column": 6,
      "message": "both; mend it", "help": "mend it", "witness": {"active": ["/a"], "inactive": []},
+     "more_witnesses": []},
+    {"severity": "warning", "code": "never-selected", "file": "m.xml", "line": 3, "column": 4,
+     "message": "a \"quoted\" message", "help": null, "witness": null,
      "more_witnesses": []}])"));
 }
 
