@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "rules/names.hpp"
-#include "rules/utf8.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -116,7 +116,7 @@ void ConditionLexer::advance() {
 }
 
 void ConditionLexer::skip_blanks() {
-  while (next_ < condition_.size() && is_blank(condition_[next_])) ++next_;
+  while (next_ < condition_.size() && shm::is_blank(condition_[next_])) ++next_;
 }
 
 Token ConditionLexer::read_operator() const {
@@ -144,7 +144,7 @@ Token ConditionLexer::read_quoted() const {
 Token ConditionLexer::read_word() const {
   const std::string_view word = bare_name("");
   if (word.empty()) {
-    const std::size_t length = decode_utf8(rest()).length;
+    const std::size_t length = shm::decode_utf8(rest()).length;
     const std::string where =
         language_ == Language::kStatement ? "in a statement" : "in a condition";
     throw ConditionError{next_, quote(rest().substr(0, length)) + " has no meaning " + where +

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "service/log.hpp"
+#include "service/log_sink.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
@@ -148,6 +149,7 @@ void Daemon::accept_client() {
       }
       return;
     }
+    const LogAccount stranger(LogAccount::kUnknown);
     try {
       const ClientId id = ++last_client_;
       auto client = std::make_unique<Client>(id, std::move(socket));
@@ -166,6 +168,7 @@ void Daemon::accept_client() {
 void Daemon::turn_away_client() {
   reserve_.reset();
   const shm::FileDescriptor socket(accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  const LogAccount stranger(LogAccount::kUnknown);
   log::warn("a client was turned away: no descriptors are left");
   reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
 }
@@ -182,6 +185,7 @@ void Daemon::drop_oldest_silent_client() {
 }
 
 void Daemon::serve(Client& client) {
+  const LogAccount account(client.user());
   const ClientId id = client.id();
   shm::Received received;
   for (int i = 0; i < kMaxMessagesAtOnce; ++i) {
@@ -205,6 +209,7 @@ void Daemon::serve(Client& client) {
 
 // `deadline`: of a request that was postponed.
 void Daemon::handle_or_refuse(Client& client, shm::Received& received, shm::Nanoseconds deadline) {
+  const LogAccount account(client.user());
   std::string why;
   try {
     handle(client, received);
@@ -236,6 +241,7 @@ void Daemon::drop(ClientId id) {
   if (found == clients_.end()) return;
   const std::unique_ptr<Client> client = std::move(found->second);
   clients_.erase(found);
+  const LogAccount account(client->user());
   if (!client->name.empty() && !client->is_turned_away) {
     log::info("{} left, {} ports with it", client->description(), client->ports.size());
   }

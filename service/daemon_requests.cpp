@@ -10,6 +10,7 @@
 #include "service/log.hpp"
 #include "service/status.hpp"
 #include "shm/clock.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -18,16 +19,19 @@ namespace {
 // dying.
 constexpr shm::Nanoseconds kMaxWaitForDeath = 100'000'000;
 
-// Logs and status are read by people and by programs: no name may break a line of theirs.
-bool is_printable(std::string_view name) {
-  return std::all_of(name.begin(), name.end(),
-                     [](char c) { return static_cast<unsigned char>(c) > ' ' && c != '\x7f'; });
+// Logs, status and terminals show what clients call themselves and their ports: no name may break a
+// line of theirs, or mislead those who read it.
+void require_fine(std::string_view name, const char* whose) {
+  if (const auto fault = shm::find_fault_in_name(name)) {
+    throw std::runtime_error(std::string(whose) + " name \"" + shm::printable(name) + "\" has " +
+                             fault->what + " in it");
+  }
 }
 
 std::string port_name(const shm::Message& message) {
   const std::string_view name = message.name_view();
   if (name.empty() || name[0] != '/') throw std::runtime_error("a port's name begins with '/'");
-  if (!is_printable(name)) throw std::runtime_error("a port's name has no white space");
+  require_fine(name, "the port's");
   return std::string(name);
 }
 
@@ -90,7 +94,7 @@ void Daemon::handle(Client& client, shm::Received& received) {
       break;
     case shm::MessageKind::kPeerRefused:
       if (client.ports.count(message.port) != 0) {
-        switchboard_.refuse(message.port, message.peer, std::string(message.text_view()));
+        switchboard_.refuse(message.port, message.peer, shm::printable(message.text_view()));
       }
       break;
     case shm::MessageKind::kHandBackPage:
@@ -172,9 +176,8 @@ void Daemon::hello(Client& client, const shm::Received& received) {
     throw std::runtime_error("the client speaks version " + std::to_string(message.value) +
                              ", this daemon version " + std::to_string(shm::kWireVersion));
   }
-  if (message.name_view().empty() || !is_printable(message.name_view())) {
-    throw std::runtime_error("a client must have a name, without white space");
-  }
+  if (message.name_view().empty()) throw std::runtime_error("a client must have a name");
+  require_fine(message.name_view(), "the client's");
   require_room_for(client, (message.flags & shm::kRejoins) != 0 ? message.link : 0);
   client.name = message.name_view();
   client.hello_request = message.request;

@@ -3,14 +3,18 @@
 #include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <systemd/sd-daemon.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <exception>
+#include <memory>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
 #include "service/daemon.hpp"
 #include "service/log.hpp"
+#include "service/log_sink.hpp"
 
 namespace {
 
@@ -48,9 +52,23 @@ arbiter::shm::FileDescriptor catch_signals() {
   return arbiter::shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
 }
 
-int serve(const arbiter::service::DaemonOptions& options, const std::string& instance) {
+// Says all that is left to be said, unless nobody reads it, and ends.
+class Log {
+ public:
+  explicit Log(const std::string& level) {
+    using namespace arbiter::service;
+    auto sink = std::make_shared<LogSink>(std::make_shared<LogWriter>(STDERR_FILENO));
+    log::set_default_logger(std::make_shared<log::logger>("arbiterd", std::move(sink)));
+    log::set_level(log::level::from_str(level));
+  }
+  Log(const Log&) = delete;
+  Log& operator=(const Log&) = delete;
+  ~Log() { log::shutdown(); }
+};
+
+int serve(const arbiter::service::DaemonOptions& options, const std::string& instance,
+          const arbiter::shm::FileDescriptor& signals) {
   raise_descriptor_limit();
-  const auto signals = catch_signals();
   Daemon daemon(options);
   log::info("instance \"{}\" is ready at {}", instance, daemon.path());
   sd_notifyf(0, "READY=1\nSTATUS=instance %s", instance.c_str());
@@ -91,14 +109,14 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
-  log::set_default_logger(log::stderr_logger_mt("arbiterd"));
-  log::set_level(log::level::from_str(level));
+  const auto signals = catch_signals();  // before there are threads: they inherit what is blocked
+  const Log logging(level);
   if (!policy.empty()) options.policy = policy;
   try {
     options.models = arbiter::service::named_files(models, applications);
     options.instance = arbiter::shm::instance_name(instance);
     options.directory = arbiter::shm::daemon_directory();
-    return serve(options, options.instance);
+    return serve(options, options.instance, signals);
   } catch (const std::invalid_argument& error) {
     log::error("{}", error.what());
     return 2;

@@ -9,6 +9,7 @@
 #include "service/model_copy.hpp"
 #include "shm/clock.hpp"
 #include "shm/decision.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -21,7 +22,7 @@ std::uint64_t read(const shm::Atomic<std::uint64_t>& counter) {
 
 json type_json(const shm::TypeInfo& type) {
   if (!type.is_typed()) return nullptr;
-  return {{"name", type.type_name()}, {"size", type.size}, {"alignment", type.alignment}};
+  return {{"name", shm::printable(type.type_name())}, {"size", type.size}, {"alignment", type.alignment}};
 }
 
 json client_json(const Client& client) {

@@ -114,7 +114,12 @@ struct Message {
 
  private:
   static void copy(std::string_view from, char* to, std::size_t capacity) noexcept {
-    const std::size_t length = from.size() < capacity - 1 ? from.size() : capacity - 1;
+    std::size_t length = from.size() < capacity - 1 ? from.size() : capacity - 1;
+    // What is cut off is cut off between two characters.
+    while (length != 0 && length < from.size() &&
+           (static_cast<unsigned char>(from[length]) & 0xc0) == 0x80) {
+      --length;
+    }
     if (length != 0) std::memcpy(to, from.data(), length);  // an empty view may point nowhere
     to[length] = '\0';
   }

@@ -83,7 +83,7 @@ Round::Round(const Options& options, const Plan& plan, Records& records, Totals&
 
 // After a failure too: nothing is left behind.
 Round::~Round() {
-  records_.phase.store(kEnd);
+  records_.begin(kEnd);
   for (auto& thread : threads_) thread.join();
   for (const pid_t process : processes_) {
     if (process <= 0) continue;
@@ -162,12 +162,12 @@ void Round::run(std::uint64_t kills, std::uint64_t stops, bool kill_the_daemon) 
     if (!options_.threads) accounts_.watch(i, processes_[i]);
   }
   port_ids_ = port_ids();
-  records_.phase.store(kRunning);
+  records_.begin(kRunning);
   work(kills, stops, kill_the_daemon);
   for (std::uint32_t i = 0; i < plan_.components.size(); ++i) wait_until_open(i);
   note_takeovers();
   for (const Phase phase : {kPublishersStop, kRelaysStop, kReceiversStop}) {
-    records_.phase.store(phase);
+    records_.begin(phase);
     wait_for_all_done(phase);
   }
   if (!records_.has_failed()) check();
