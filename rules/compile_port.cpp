@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "rules/in_order.hpp"
 #include "rules/names.hpp"
 
 namespace arbiter::rules {
@@ -34,13 +35,16 @@ class PortCompiler {
  private:
   bool mention_sources();
   void build_rules();
-  void subtract_earlier_rules();
+  void build_plain_rules();
+  void multiply_precedence_out();
+  bool subtract_earlier_rules();
   bool compile_rules(CompiledPort& result);
   std::vector<std::size_t> behaviours_that_run();
   void report_never_selected();
   void report_conflicts();
   Witness shortest_witness(const Proof::Pair& pair);
   void report_conflict(const Proof::Pair& pair);
+  void report_in_order(const InOrder& order);
   void report_outgrown(const ConnectionRule* rule);
 
   CompileContext& context_;
@@ -50,8 +54,10 @@ class PortCompiler {
   std::set<std::string> written_;             // in conditions
   const ConnectionRule* building_ = nullptr;  // to name it when it outgrows the node table
   std::vector<Diagram> plain_;                // the rules as they are, with the own source
-  std::vector<Diagram> functions_;            // the same, less what earlier ones win
-  std::vector<DiagramNodes> nodes_;           // of functions_
+  // The same, less what earlier ones win; but where the port is decided in order, as they are.
+  std::vector<Diagram> functions_;
+  bool in_order_ = false;
+  std::vector<DiagramNodes> nodes_;  // of functions_
   std::optional<ShortestImplicant> shortest_;
 };
 
@@ -100,12 +106,9 @@ bool PortCompiler::mention_sources() {
 }
 
 void PortCompiler::build_rules() {
-  for (const auto& rule : port_.rules) {
-    building_ = &rule;
-    plain_.push_back(rules_.rule(rule));
-  }
+  build_plain_rules();
   functions_ = plain_;
-  if (port_.first_wins) subtract_earlier_rules();
+  if (port_.first_wins) multiply_precedence_out();
   building_ = nullptr;
   const auto is_large = [&](const Diagram& function) {
     return context_.builder.node_count(function) > kNodesWorthSifting;
@@ -116,13 +119,41 @@ void PortCompiler::build_rules() {
   }
 }
 
-// conflict="first": a rule holds only where none before it does. What the earlier ones win together
-// is kept as one function while it is small; it may explode, and then each is taken away by itself.
-void PortCompiler::subtract_earlier_rules() {
+void PortCompiler::build_plain_rules() {
+  for (const auto& rule : port_.rules) {
+    building_ = &rule;
+    plain_.push_back(rules_.rule(rule));
+  }
+}
+
+// conflict="first": a rule holds only where none before it does. Where to say so in each rule would
+// make too much of them, they stay as they are, and are decided in order.
+void PortCompiler::multiply_precedence_out() {
+  const std::size_t steps = context_.builder.steps();
+  bool lost = false;
+  try {
+    in_order_ = !subtract_earlier_rules();
+  } catch (const DiagramLimit&) {
+    in_order_ = lost = true;
+  }
+  context_.precedence_steps -=
+      std::min(context_.precedence_steps, context_.builder.steps() - steps);
+  if (lost) {
+    plain_.clear();
+    rules_.forget_parts();
+    build_plain_rules();
+  }
+  if (in_order_) functions_ = plain_;
+}
+
+// What the earlier ones win together is kept as one function while it is small; it may explode, and
+// then each is taken away by itself. False: a bound was met.
+bool PortCompiler::subtract_earlier_rules() {
   auto& builder = context_.builder;
-  const auto is_small = [&](const Diagram& function) {
-    return function.is_false() || function.is_true() ||
-           builder.node_count(function) <= kMaxUnionNodes;
+  const std::size_t last_step =
+      builder.steps() + std::min(kMaxPortPrecedenceSteps, context_.precedence_steps);
+  const auto is_within = [&](const Diagram& function, std::size_t nodes) {
+    return function.is_false() || function.is_true() || builder.node_count(function) <= nodes;
   };
   Diagram won = builder.constant(false);
   bool has_union = true;
@@ -130,14 +161,19 @@ void PortCompiler::subtract_earlier_rules() {
     building_ = &port_.rules[i];
     if (has_union) {
       functions_[i] = builder.combine(Connective::kAndNot, functions_[i], won);
-      has_union = is_small(won) && is_small(plain_[i]);
+      has_union = is_within(won, kMaxUnionNodes) && is_within(plain_[i], kMaxUnionNodes);
       if (has_union) won = builder.combine(Connective::kOr, won, plain_[i]);
-      continue;
+    } else {
+      for (std::size_t j = 0; j < i && builder.steps() <= last_step; ++j) {
+        functions_[i] = builder.combine(Connective::kAndNot, functions_[i], plain_[j]);
+      }
     }
-    for (std::size_t j = 0; j < i; ++j) {
-      functions_[i] = builder.combine(Connective::kAndNot, functions_[i], plain_[j]);
-    }
+    // Of a rule that is large by itself, order would save nothing.
+    const std::size_t most =
+        std::max(context_.max_precedence_nodes, 2 * builder.node_count(plain_[i]));
+    if (builder.steps() > last_step || !is_within(functions_[i], most)) return false;
   }
+  return true;
 }
 
 bool PortCompiler::compile_rules(CompiledPort& result) {
@@ -157,6 +193,12 @@ bool PortCompiler::compile_rules(CompiledPort& result) {
     nodes_.push_back(context_.builder.nodes(functions_[i]));
   }
   building_ = nullptr;
+  result.in_order = in_order_;
+  if (in_order_) {
+    const InOrder order = put_in_order(result);
+    written_.insert(order.reads.begin(), order.reads.end());
+    report_in_order(order);
+  }
   result.reads.assign(written_.begin(), written_.end());
   return fits;
 }
@@ -240,6 +282,16 @@ void PortCompiler::report_conflict(const Proof::Pair& pair) {
                         "other, or let document order decide with <arbiter at=\"" +
                         port_.port + R"(" conflict="first"/>)";
   context_.diagnostics.error("both-can-win", second.where, std::move(message), std::move(witness));
+}
+
+void PortCompiler::report_in_order(const InOrder& order) {
+  context_.diagnostics.note(
+      "decided-in-order", port_.where,
+      "the rules at " + port_.port + " are tried one after the other, up to " +
+          std::to_string(port_.rules.size()) + " of them, for each decision, which reads up to " +
+          std::to_string(order.reads.size()) +
+          " sources: diagrams that say of each that none before it holds would be too large; the "
+          "winners are the same, and docs/performance.md says what it costs");
 }
 
 void PortCompiler::report_outgrown(const ConnectionRule* rule) {

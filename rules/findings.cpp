@@ -35,7 +35,7 @@ class PortFindings {
     winners_ = &winners;
     const Forget forget{*this};
     for (const auto& rule : port_.rules) {
-      Diagram wins = winners.winner(rule);
+      Diagram wins = winners.winner(port_, rule);
       if (wins.is_false()) continue;
       candidates_.push_back({&rule, std::move(wins)});
     }

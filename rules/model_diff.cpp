@@ -29,6 +29,15 @@ const CompiledRule* find_rule(const CompiledPort& port, const std::string& sourc
   return found == port.rules.end() ? nullptr : &*found;
 }
 
+// Whether a connection obviously wins in the same states of both. Where rules are decided in order,
+// those before it have a part in that.
+bool wins_alike(const CompiledPort& a, const CompiledRule& of_a, const CompiledPort& b,
+                const CompiledRule& of_b) {
+  if (!a.in_order && !b.in_order) return is_same(of_a, of_b);
+  return a.in_order && b.in_order &&
+         std::equal(a.rules.data(), &of_a + 1, b.rules.data(), &of_b + 1, is_same);
+}
+
 // The states of one port that both models arbitrate.
 //
 // Connections whose function is the same in both are left out: the others of either model exclude
@@ -67,6 +76,7 @@ class PortComparison {
 
  private:
   struct Side {
+    const CompiledPort* port = nullptr;
     const CompiledRule* rule = nullptr;
     Diagram wins;
     StateCount states = 0;
@@ -89,9 +99,10 @@ class PortComparison {
                          const CompiledPort& other) {
       for (const auto& rule : port.rules) {
         const CompiledRule* twin = find_rule(other, rule.source);
-        if (twin != nullptr && is_same(rule, *twin)) continue;
+        if (twin != nullptr && wins_alike(port, rule, other, *twin)) continue;
         const auto [found, is_new] = index.emplace(rule.source, candidates_.size());
         if (is_new) candidates_.push_back({rule.source, {}, {}});
+        (candidates_[found->second].*side).port = &port;
         (candidates_[found->second].*side).rule = &rule;
       }
     };
@@ -105,7 +116,7 @@ class PortComparison {
 
   void build(Side& side) {
     if (side.rule == nullptr) return;
-    side.wins = winners_->winner(*side.rule);
+    side.wins = winners_->winner(*side.port, *side.rule);
     if (result_.sources > VariableSet().size()) return;
     side.implied = implied_literals(winners_->nodes(side.wins));
   }

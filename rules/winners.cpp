@@ -110,7 +110,17 @@ Diagram Winners::combine(Connective connective, const Diagram& a, const Diagram&
   return result;
 }
 
-Diagram Winners::winner(const CompiledRule& rule) {
+Diagram Winners::winner(const CompiledPort& port, const CompiledRule& rule) {
+  Diagram result = holds(rule);
+  if (!port.in_order) return result;
+  for (const CompiledRule* earlier = port.rules.data(); earlier != &rule; ++earlier) {
+    if (result.is_false()) break;
+    result = combine(Connective::kAndNot, result, holds(*earlier));
+  }
+  return result;
+}
+
+Diagram Winners::holds(const CompiledRule& rule) {
   using shm::table::kTrue;
   Diagram own = active(rule.source);
   if (rule.kind == shm::table::kNever) return constant(false);
