@@ -52,7 +52,7 @@ struct CompiledModel {
   std::shared_ptr<const ModelTexts> texts;  // what it was made of, as RuleSet has it
 };
 
-// Proves every port and reports what fails: two connections that can both win, with a shortest
+// Proves every port and reports what fails: two connections that can both win, with a
 // witness; rules that nothing satisfies; limits exceeded. To be used only if there is no error.
 CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics,
                       std::size_t max_precedence_nodes = kMaxPrecedenceNodes);

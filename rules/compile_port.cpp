@@ -42,7 +42,7 @@ class PortCompiler {
   std::vector<std::size_t> behaviours_that_run();
   void report_never_selected();
   void report_conflicts();
-  Witness shortest_witness(const Proof::Pair& pair);
+  Witness witness_of(const Proof::Pair& pair);
   void report_conflict(const Proof::Pair& pair);
   void report_in_order(const InOrder& order);
   void report_outgrown(const ConnectionRule* rule);
@@ -250,7 +250,8 @@ void PortCompiler::report_conflicts() {
   }
 }
 
-Witness PortCompiler::shortest_witness(const Proof::Pair& pair) {
+// A shortest one, or where that takes too long, one of which no literal can be left out.
+Witness PortCompiler::witness_of(const Proof::Pair& pair) {
   std::optional<Literals> literals;
   if (shortest_) {
     try {
@@ -260,8 +261,9 @@ Witness PortCompiler::shortest_witness(const Proof::Pair& pair) {
       shortest_.reset();  // the diagrams are gone; their nodes serve for those that follow, too
     }
   }
-  if (!literals) literals = context_.proof.meeting_point(nodes_[pair.first], nodes_[pair.second]);
   Witness witness;
+  witness.is_shortest = literals.has_value();
+  if (!literals) literals = context_.proof.meeting_point(nodes_[pair.first], nodes_[pair.second]);
   for (std::size_t variable = 0; variable < rules_.names().size(); ++variable) {
     if (literals->active[variable]) witness.active.push_back(rules_.names()[variable]);
     if (literals->inactive[variable]) witness.inactive.push_back(rules_.names()[variable]);
@@ -274,7 +276,7 @@ Witness PortCompiler::shortest_witness(const Proof::Pair& pair) {
 void PortCompiler::report_conflict(const Proof::Pair& pair) {
   const auto& first = port_.rules[pair.first];
   const auto& second = port_.rules[pair.second];
-  Witness witness = shortest_witness(pair);
+  Witness witness = witness_of(pair);
   std::string message = second.source + " and " + first.source + " (" +
                         rules::describe(first.where) + ") can both win at " + port_.port +
                         " when " + describe(witness) +

@@ -1,5 +1,5 @@
 // In which states two models decide differently: proved over all states of the sources, counted
-// exactly, and shown by shortest examples.
+// exactly, and shown by examples.
 //
 // Two models decide alike iff their connections are the same, the same ports are arbitrated, the
 // same connection wins in every state, and each source stays active for as long. What behaviours
@@ -26,7 +26,7 @@ struct ModelDiff {
   struct Change {
     std::optional<std::string> before, after;  // winners; none: nobody wins
     std::string states;                        // how many, decimal and exact, of PortDiff::of
-    std::optional<Witness> example;            // a shortest; none if a bound was met
+    std::optional<Witness> example;            // none if a bound was met
   };
 
   struct PortDiff {

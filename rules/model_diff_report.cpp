@@ -142,7 +142,9 @@ void write_json(std::ostream& out, const ModelDiff& diff) {
     for (const auto& change : port.changes) {
       Json example = nullptr;
       if (change.example) {
-        example = {{"active", change.example->active}, {"inactive", change.example->inactive}};
+        example = {{"active", change.example->active},
+                   {"inactive", change.example->inactive},
+                   {"shortest", change.example->is_shortest}};
       }
       changes.push_back({{"before", or_null(change.before)},
                          {"after", or_null(change.after)},

@@ -63,9 +63,12 @@ class Winners {
   // The function in the states that differ from each one only in that the source is (not) active.
   Diagram given(const Diagram& function, const std::string& source, bool active);
 
-  // A shortest conjunction that implies the function, which can be true; or, where that takes too
-  // long, some conjunction.
-  Witness witness(const Diagram& function);
+  // A shortest conjunction that implies the function, which can be true; or, where the search for
+  // it takes too long, one of which no literal can be left out.
+  Witness witness(const Diagram& function) { return witness(function, constant(true)); }
+  // The same among the conjunctions that hold in some state of `reached`, in one of which the
+  // function is true.
+  Witness witness(const Diagram& function, const Diagram& reached);
 
   DiagramNodes nodes(const Diagram& function) { return builder_.nodes(function); }
 

@@ -145,10 +145,11 @@ TEST(Report, GoesThroughEachFileFromTheTop) {
 TEST(Report, WritesJsonForPrograms) {
   Diagnostics diagnostics;
   diagnostics.warning("never-selected", {"m.xml", 3, 4}, "a \"quoted\" message");
-  diagnostics.error("both-can-win", {"m.xml", 5, 6}, "both; mend it", rules::Witness{{"/a"}, {}});
+  diagnostics.error("both-can-win", {"m.xml", 5, 6}, "both; mend it",
+                    rules::Witness{{"/a"}, {}, true});
   EXPECT_EQ(json_of(diagnostics), nlohmann::json::parse(R"([
     {"severity": "error", "code": "both-can-win", "file": "m.xml", "line": 5, "column": 6,
-     "message": "both; mend it", "help": "mend it", "witness": {"active": ["/a"], "inactive": []},
+     "message": "both; mend it", "help": "mend it", "witness": {"active": ["/a"], "inactive": [], "shortest": true},
      "more_witnesses": []},
     {"severity": "warning", "code": "never-selected", "file": "m.xml", "line": 3, "column": 4,
      "message": "a \"quoted\" message", "help": null, "witness": null,
