@@ -5,6 +5,7 @@
 
 #include "rules/in_order.hpp"
 #include "rules/names.hpp"
+#include "rules/winners.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -39,6 +40,8 @@ class PortCompiler {
   void multiply_precedence_out();
   bool subtract_earlier_rules();
   bool compile_rules(CompiledPort& result);
+  void find_who_can_win(CompiledPort& result);
+  [[nodiscard]] bool can_win_as(std::size_t rule, const ConnectionRule& part);
   std::vector<std::size_t> behaviours_that_run();
   void report_never_selected();
   void report_conflicts();
@@ -57,6 +60,10 @@ class PortCompiler {
   // The same, less what earlier ones win; but where the port is decided in order, as they are.
   std::vector<Diagram> functions_;
   bool in_order_ = false;
+  std::vector<bool> can_win_;  // by rule; where that is not found out, it is taken as so
+  // Of a port that is decided in order: what its diagrams would be too large for.
+  std::optional<StateSearch> search_;
+  StateSearch::Port winners_;
   std::vector<DiagramNodes> nodes_;  // of functions_
   std::optional<ShortestImplicant> shortest_;
 };
@@ -194,6 +201,7 @@ bool PortCompiler::compile_rules(CompiledPort& result) {
   }
   building_ = nullptr;
   result.in_order = in_order_;
+  find_who_can_win(result);
   if (in_order_) {
     const InOrder order = put_in_order(result);
     written_.insert(order.reads.begin(), order.reads.end());
@@ -201,6 +209,44 @@ bool PortCompiler::compile_rules(CompiledPort& result) {
   }
   result.reads.assign(written_.begin(), written_.end());
   return fits;
+}
+
+void PortCompiler::find_who_can_win(CompiledPort& result) {
+  for (const auto& function : functions_) can_win_.push_back(!function.is_false());
+  if (!in_order_) return;
+  search_.emplace(context_.search_steps);
+  winners_ = search_->winners(result);
+  for (std::size_t i = 0; i < result.rules.size(); ++i) {
+    CompiledRule& rule = result.rules[i];
+    // Most rules hold where nothing is active but what they ask for.
+    std::set<std::string> asked{rule.source};
+    for (std::size_t read = 0; read < rule.expected.size(); ++read) {
+      if (rule.expected[read]) asked.insert(rule.reads[read]);
+    }
+    if (!can_win_[i] || find_winner(result, asked) == &rule) continue;
+    can_win_[i] = search_->find({winners_.wins[i]}) != StateSearch::Answer::kNo;
+    if (can_win_[i]) continue;
+    // Where it holds, an earlier one does too, so those behind it do not miss it.
+    rule.kind = shm::table::kNever;
+    rule.reads.clear();
+    rule.expected.clear();
+    rule.nodes.clear();
+  }
+  context_.search_steps = search_->steps_left();
+}
+
+// Whether the rule can win by what one behaviour contributes to it.
+bool PortCompiler::can_win_as(std::size_t rule, const ConnectionRule& part) {
+  if (!can_win_[rule] || part.condition == port_.rules[rule].condition) return can_win_[rule];
+  const Diagram condition = rules_.rule(part);
+  auto& builder = context_.builder;
+  if (!in_order_) return !builder.combine(Connective::kAnd, functions_[rule], condition).is_false();
+  const Diagram rest = builder.when(condition, rules_.variable(part.source));
+  const auto holds =
+      search_->holds(to_compiled_rule(part.source, builder.nodes(rest), rules_.names()));
+  const auto answer = search_->find({winners_.wins[rule], holds});
+  context_.search_steps = search_->steps_left();
+  return answer != StateSearch::Answer::kNo;
 }
 
 std::vector<std::size_t> PortCompiler::behaviours_that_run() {
@@ -211,11 +257,7 @@ std::vector<std::size_t> PortCompiler::behaviours_that_run() {
     const auto found = index.find(part.rule->source);
     if (found == index.end()) continue;
     building_ = part.rule;
-    Diagram function = functions_[found->second];
-    if (part.rule->condition != port_.rules[found->second].condition) {
-      function = context_.builder.combine(Connective::kAnd, function, rules_.rule(*part.rule));
-    }
-    if (!function.is_false()) running.push_back(part.behaviour);
+    if (can_win_as(found->second, *part.rule)) running.push_back(part.behaviour);
   }
   building_ = nullptr;
   return running;
@@ -223,7 +265,7 @@ std::vector<std::size_t> PortCompiler::behaviours_that_run() {
 
 void PortCompiler::report_never_selected() {
   for (std::size_t i = 0; i < functions_.size(); ++i) {
-    if (!functions_[i].is_false()) continue;
+    if (can_win_[i]) continue;
     const auto& rule = port_.rules[i];
     context_.diagnostics.warning(
         "never-selected", rule.where,

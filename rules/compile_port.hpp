@@ -10,6 +10,7 @@
 #include "rules/compile.hpp"
 #include "rules/diagram.hpp"
 #include "rules/proof.hpp"
+#include "rules/state_search.hpp"
 #include "rules/witness.hpp"
 
 namespace arbiter::rules {
@@ -27,6 +28,7 @@ struct CompileContext {
   std::size_t max_precedence_nodes;
   // What is left for all ports that have conflict="first".
   std::size_t precedence_steps = kMaxPrecedenceSteps;
+  int search_steps = StateSearch::kMaxStepsInAll;
 };
 
 // A behaviour's part in the rule of one connection of the port.

@@ -35,13 +35,15 @@ class PortFindings {
     winners_ = &winners;
     const Forget forget{*this};
     for (const auto& rule : port_.rules) {
-      Diagram wins = winners.winner(port_, rule);
+      // Whether somebody wins does not depend on who comes first.
+      Diagram wins = winners.holds(rule);
       if (wins.is_false()) continue;
       candidates_.push_back({&rule, std::move(wins)});
     }
     find_states();
     if (!nobody_.is_false()) {
       note_states();
+      if (port_.in_order) throw DiagramLimit("a diagram of each winner, and those are too large");
       note_chains();
     }
     return winners.work();

@@ -361,7 +361,7 @@ TEST(ModelDiff, WritesJsonForPrograms) {
     "ports": [{"port": "/p", "differs": true,
       "before": {"exists": true, "arbitrated": true, "conflict": "error", "only_here": []},
       "after": {"exists": true, "arbitrated": true, "conflict": "error", "only_here": []},
-      "sources": 2, "states": "1", "of": "4", "open": null,
+      "sources": 2, "states": "1", "of": "4", "all_changes": true, "open": null,
       "changes": [{"before": "/a", "after": null, "states": "1",
                    "example": {"active": ["/a", "/b"], "inactive": [], "shortest": true}}]}]})json";
   EXPECT_EQ(nlohmann::json::parse(out.str()), nlohmann::json::parse(kExpected));
