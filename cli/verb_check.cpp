@@ -31,7 +31,8 @@ struct Statements {
 };
 
 // Of the warnings and notes that reading, compiling and proving a model can bring.
-const std::vector<std::string_view> silenceable{"duplicate-config",
+const std::vector<std::string_view> silenceable{"decided-in-order",
+                                                "duplicate-config",
                                                 "duplicate-connection",
                                                 "inhibition-across-ports",
                                                 "left-open",

@@ -129,6 +129,7 @@ void print_input(const json& input, bool has_model) {
   } else {
     std::cout << "winner " << input.at("winner").get<std::string>();
   }
+  if (input.at("in_order").get<bool>()) std::cout << "  (rules tried in order)";
   std::cout << counts(input, {"blind", "unsettled", "misbehaved"}, false) << '\n';
   for (const auto& connection : input.at("connections")) print_connection(connection);
   for (const auto& sensed : input.at("senses")) {

@@ -18,8 +18,8 @@ constexpr int kMaxOutgrownPorts = 8;
 
 class ModelCompiler {
  public:
-  ModelCompiler(const RuleSet& rules, Diagnostics& diagnostics)
-      : rules_(rules), context_{{}, {}, diagnostics} {}
+  ModelCompiler(const RuleSet& rules, Diagnostics& diagnostics, std::size_t max_precedence_nodes)
+      : rules_(rules), context_{{}, {}, diagnostics, max_precedence_nodes} {}
 
   CompiledModel compile();
 
@@ -228,8 +228,9 @@ void ModelCompiler::check_limits() {
 
 }  // namespace
 
-CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics) {
-  return ModelCompiler(rules, diagnostics).compile();
+CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics,
+                      std::size_t max_precedence_nodes) {
+  return ModelCompiler(rules, diagnostics, max_precedence_nodes).compile();
 }
 
 }  // namespace arbiter::rules

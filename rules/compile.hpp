@@ -18,7 +18,7 @@ namespace arbiter::rules {
 // active.
 struct CompiledRule {
   std::string source;
-  shm::Word kind = 0;              // table::RuleKind
+  shm::Word kind = 0;              // table::RuleKind, but kInOrder
   std::vector<std::string> reads;  // the sources that decide, in the order of the diagram
   std::vector<bool> expected;      // kConjunction: the activity that each read must have
   struct Node {
@@ -32,8 +32,17 @@ struct CompiledPort {
   bool arbitrated = true;
   std::vector<std::string> reads;   // each source written in its rules, in byte order
   std::vector<CompiledRule> rules;  // in document order; those that no rule selects come last
-  bool first_wins = false;          // conflict="first"; the rules have it in them already
+  bool first_wins = false;          // conflict="first"
+  // Of a port with conflict="first", whether each rule is the connection's condition alone, and the
+  // first of them that holds wins. Otherwise at most one of the rules holds in any state: where
+  // first_wins is set, they have in them that none before them does.
+  bool in_order = false;
 };
+
+// How large diagrams with the precedence of conflict="first" in them may get, in nodes, before a
+// port's rules are decided in order instead. Larger ones would hardly decide faster, and to make
+// them takes seconds.
+inline constexpr std::size_t kMaxPrecedenceNodes = 4096;
 
 struct CompiledModel {
   shm::Nanoseconds timeout = shm::kDefaultTimeout;
@@ -43,9 +52,10 @@ struct CompiledModel {
   std::shared_ptr<const ModelTexts> texts;  // what it was made of, as RuleSet has it
 };
 
-// Proves every port and reports what fails: two connections that can both win, with a shortest
+// Proves every port and reports what fails: two connections that can both win, with a
 // witness; rules that nothing satisfies; limits exceeded. To be used only if there is no error.
-CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics);
+CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics,
+                      std::size_t max_precedence_nodes = kMaxPrecedenceNodes);
 
 // The ids under which a table names sources and ports; each must be below the limits of the table.
 struct TableIds {

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "rules/in_order.hpp"
 #include "rules/names.hpp"
+#include "rules/winners.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -34,13 +36,18 @@ class PortCompiler {
  private:
   bool mention_sources();
   void build_rules();
-  void subtract_earlier_rules();
+  void build_plain_rules();
+  void multiply_precedence_out();
+  bool subtract_earlier_rules();
   bool compile_rules(CompiledPort& result);
+  void find_who_can_win(CompiledPort& result);
+  [[nodiscard]] bool can_win_as(std::size_t rule, const ConnectionRule& part);
   std::vector<std::size_t> behaviours_that_run();
   void report_never_selected();
   void report_conflicts();
-  Witness shortest_witness(const Proof::Pair& pair);
+  Witness witness_of(const Proof::Pair& pair);
   void report_conflict(const Proof::Pair& pair);
+  void report_in_order(const InOrder& order);
   void report_outgrown(const ConnectionRule* rule);
 
   CompileContext& context_;
@@ -50,8 +57,14 @@ class PortCompiler {
   std::set<std::string> written_;             // in conditions
   const ConnectionRule* building_ = nullptr;  // to name it when it outgrows the node table
   std::vector<Diagram> plain_;                // the rules as they are, with the own source
-  std::vector<Diagram> functions_;            // the same, less what earlier ones win
-  std::vector<DiagramNodes> nodes_;           // of functions_
+  // The same, less what earlier ones win; but where the port is decided in order, as they are.
+  std::vector<Diagram> functions_;
+  bool in_order_ = false;
+  std::vector<bool> can_win_;  // by rule; where that is not found out, it is taken as so
+  // Of a port that is decided in order: what its diagrams would be too large for.
+  std::optional<StateSearch> search_;
+  StateSearch::Port winners_;
+  std::vector<DiagramNodes> nodes_;  // of functions_
   std::optional<ShortestImplicant> shortest_;
 };
 
@@ -100,12 +113,9 @@ bool PortCompiler::mention_sources() {
 }
 
 void PortCompiler::build_rules() {
-  for (const auto& rule : port_.rules) {
-    building_ = &rule;
-    plain_.push_back(rules_.rule(rule));
-  }
+  build_plain_rules();
   functions_ = plain_;
-  if (port_.first_wins) subtract_earlier_rules();
+  if (port_.first_wins) multiply_precedence_out();
   building_ = nullptr;
   const auto is_large = [&](const Diagram& function) {
     return context_.builder.node_count(function) > kNodesWorthSifting;
@@ -116,13 +126,41 @@ void PortCompiler::build_rules() {
   }
 }
 
-// conflict="first": a rule holds only where none before it does. What the earlier ones win together
-// is kept as one function while it is small; it may explode, and then each is taken away by itself.
-void PortCompiler::subtract_earlier_rules() {
+void PortCompiler::build_plain_rules() {
+  for (const auto& rule : port_.rules) {
+    building_ = &rule;
+    plain_.push_back(rules_.rule(rule));
+  }
+}
+
+// conflict="first": a rule holds only where none before it does. Where to say so in each rule would
+// make too much of them, they stay as they are, and are decided in order.
+void PortCompiler::multiply_precedence_out() {
+  const std::size_t steps = context_.builder.steps();
+  bool lost = false;
+  try {
+    in_order_ = !subtract_earlier_rules();
+  } catch (const DiagramLimit&) {
+    in_order_ = lost = true;
+  }
+  context_.precedence_steps -=
+      std::min(context_.precedence_steps, context_.builder.steps() - steps);
+  if (lost) {
+    plain_.clear();
+    rules_.forget_parts();
+    build_plain_rules();
+  }
+  if (in_order_) functions_ = plain_;
+}
+
+// What the earlier ones win together is kept as one function while it is small; it may explode, and
+// then each is taken away by itself. False: a bound was met.
+bool PortCompiler::subtract_earlier_rules() {
   auto& builder = context_.builder;
-  const auto is_small = [&](const Diagram& function) {
-    return function.is_false() || function.is_true() ||
-           builder.node_count(function) <= kMaxUnionNodes;
+  const std::size_t last_step =
+      builder.steps() + std::min(kMaxPortPrecedenceSteps, context_.precedence_steps);
+  const auto is_within = [&](const Diagram& function, std::size_t nodes) {
+    return function.is_false() || function.is_true() || builder.node_count(function) <= nodes;
   };
   Diagram won = builder.constant(false);
   bool has_union = true;
@@ -130,14 +168,19 @@ void PortCompiler::subtract_earlier_rules() {
     building_ = &port_.rules[i];
     if (has_union) {
       functions_[i] = builder.combine(Connective::kAndNot, functions_[i], won);
-      has_union = is_small(won) && is_small(plain_[i]);
+      has_union = is_within(won, kMaxUnionNodes) && is_within(plain_[i], kMaxUnionNodes);
       if (has_union) won = builder.combine(Connective::kOr, won, plain_[i]);
-      continue;
+    } else {
+      for (std::size_t j = 0; j < i && builder.steps() <= last_step; ++j) {
+        functions_[i] = builder.combine(Connective::kAndNot, functions_[i], plain_[j]);
+      }
     }
-    for (std::size_t j = 0; j < i; ++j) {
-      functions_[i] = builder.combine(Connective::kAndNot, functions_[i], plain_[j]);
-    }
+    // Of a rule that is large by itself, order would save nothing.
+    const std::size_t most =
+        std::max(context_.max_precedence_nodes, 2 * builder.node_count(plain_[i]));
+    if (builder.steps() > last_step || !is_within(functions_[i], most)) return false;
   }
+  return true;
 }
 
 bool PortCompiler::compile_rules(CompiledPort& result) {
@@ -157,8 +200,53 @@ bool PortCompiler::compile_rules(CompiledPort& result) {
     nodes_.push_back(context_.builder.nodes(functions_[i]));
   }
   building_ = nullptr;
+  result.in_order = in_order_;
+  find_who_can_win(result);
+  if (in_order_) {
+    const InOrder order = put_in_order(result);
+    written_.insert(order.reads.begin(), order.reads.end());
+    report_in_order(order);
+  }
   result.reads.assign(written_.begin(), written_.end());
   return fits;
+}
+
+void PortCompiler::find_who_can_win(CompiledPort& result) {
+  for (const auto& function : functions_) can_win_.push_back(!function.is_false());
+  if (!in_order_) return;
+  search_.emplace(context_.search_steps);
+  winners_ = search_->winners(result);
+  for (std::size_t i = 0; i < result.rules.size(); ++i) {
+    CompiledRule& rule = result.rules[i];
+    // Most rules hold where nothing is active but what they ask for.
+    std::set<std::string> asked{rule.source};
+    for (std::size_t read = 0; read < rule.expected.size(); ++read) {
+      if (rule.expected[read]) asked.insert(rule.reads[read]);
+    }
+    if (!can_win_[i] || find_winner(result, asked) == &rule) continue;
+    can_win_[i] = search_->find({winners_.wins[i]}) != StateSearch::Answer::kNo;
+    if (can_win_[i]) continue;
+    // Where it holds, an earlier one does too, so those behind it do not miss it.
+    rule.kind = shm::table::kNever;
+    rule.reads.clear();
+    rule.expected.clear();
+    rule.nodes.clear();
+  }
+  context_.search_steps = search_->steps_left();
+}
+
+// Whether the rule can win by what one behaviour contributes to it.
+bool PortCompiler::can_win_as(std::size_t rule, const ConnectionRule& part) {
+  if (!can_win_[rule] || part.condition == port_.rules[rule].condition) return can_win_[rule];
+  const Diagram condition = rules_.rule(part);
+  auto& builder = context_.builder;
+  if (!in_order_) return !builder.combine(Connective::kAnd, functions_[rule], condition).is_false();
+  const Diagram rest = builder.when(condition, rules_.variable(part.source));
+  const auto holds =
+      search_->holds(to_compiled_rule(part.source, builder.nodes(rest), rules_.names()));
+  const auto answer = search_->find({winners_.wins[rule], holds});
+  context_.search_steps = search_->steps_left();
+  return answer != StateSearch::Answer::kNo;
 }
 
 std::vector<std::size_t> PortCompiler::behaviours_that_run() {
@@ -169,11 +257,7 @@ std::vector<std::size_t> PortCompiler::behaviours_that_run() {
     const auto found = index.find(part.rule->source);
     if (found == index.end()) continue;
     building_ = part.rule;
-    Diagram function = functions_[found->second];
-    if (part.rule->condition != port_.rules[found->second].condition) {
-      function = context_.builder.combine(Connective::kAnd, function, rules_.rule(*part.rule));
-    }
-    if (!function.is_false()) running.push_back(part.behaviour);
+    if (can_win_as(found->second, *part.rule)) running.push_back(part.behaviour);
   }
   building_ = nullptr;
   return running;
@@ -181,7 +265,7 @@ std::vector<std::size_t> PortCompiler::behaviours_that_run() {
 
 void PortCompiler::report_never_selected() {
   for (std::size_t i = 0; i < functions_.size(); ++i) {
-    if (!functions_[i].is_false()) continue;
+    if (can_win_[i]) continue;
     const auto& rule = port_.rules[i];
     context_.diagnostics.warning(
         "never-selected", rule.where,
@@ -208,7 +292,8 @@ void PortCompiler::report_conflicts() {
   }
 }
 
-Witness PortCompiler::shortest_witness(const Proof::Pair& pair) {
+// A shortest one, or where that takes too long, one of which no literal can be left out.
+Witness PortCompiler::witness_of(const Proof::Pair& pair) {
   std::optional<Literals> literals;
   if (shortest_) {
     try {
@@ -218,8 +303,9 @@ Witness PortCompiler::shortest_witness(const Proof::Pair& pair) {
       shortest_.reset();  // the diagrams are gone; their nodes serve for those that follow, too
     }
   }
-  if (!literals) literals = context_.proof.meeting_point(nodes_[pair.first], nodes_[pair.second]);
   Witness witness;
+  witness.is_shortest = literals.has_value();
+  if (!literals) literals = context_.proof.meeting_point(nodes_[pair.first], nodes_[pair.second]);
   for (std::size_t variable = 0; variable < rules_.names().size(); ++variable) {
     if (literals->active[variable]) witness.active.push_back(rules_.names()[variable]);
     if (literals->inactive[variable]) witness.inactive.push_back(rules_.names()[variable]);
@@ -232,7 +318,7 @@ Witness PortCompiler::shortest_witness(const Proof::Pair& pair) {
 void PortCompiler::report_conflict(const Proof::Pair& pair) {
   const auto& first = port_.rules[pair.first];
   const auto& second = port_.rules[pair.second];
-  Witness witness = shortest_witness(pair);
+  Witness witness = witness_of(pair);
   std::string message = second.source + " and " + first.source + " (" +
                         rules::describe(first.where) + ") can both win at " + port_.port +
                         " when " + describe(witness) +
@@ -240,6 +326,16 @@ void PortCompiler::report_conflict(const Proof::Pair& pair) {
                         "other, or let document order decide with <arbiter at=\"" +
                         port_.port + R"(" conflict="first"/>)";
   context_.diagnostics.error("both-can-win", second.where, std::move(message), std::move(witness));
+}
+
+void PortCompiler::report_in_order(const InOrder& order) {
+  context_.diagnostics.note(
+      "decided-in-order", port_.where,
+      "the rules at " + port_.port + " are tried one after the other, up to " +
+          std::to_string(port_.rules.size()) + " of them, for each decision, which reads up to " +
+          std::to_string(order.reads.size()) +
+          " sources: diagrams that say of each that none before it holds would be too large; the "
+          "winners are the same, and docs/performance.md says what it costs");
 }
 
 void PortCompiler::report_outgrown(const ConnectionRule* rule) {

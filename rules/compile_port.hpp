@@ -10,15 +10,25 @@
 #include "rules/compile.hpp"
 #include "rules/diagram.hpp"
 #include "rules/proof.hpp"
+#include "rules/state_search.hpp"
 #include "rules/witness.hpp"
 
 namespace arbiter::rules {
+
+// Steps of diagrams that one port, and all ports of a model, may take to multiply precedence out. A
+// small part of what a builder has, so that there is enough for the rules themselves.
+inline constexpr std::size_t kMaxPortPrecedenceSteps = 500'000;
+inline constexpr std::size_t kMaxPrecedenceSteps = 4'000'000;
 
 // What the ports of one model share.
 struct CompileContext {
   DiagramBuilder builder;
   Proof proof;
   Diagnostics& diagnostics;
+  std::size_t max_precedence_nodes;
+  // What is left for all ports that have conflict="first".
+  std::size_t precedence_steps = kMaxPrecedenceSteps;
+  int search_steps = StateSearch::kMaxStepsInAll;
 };
 
 // A behaviour's part in the rule of one connection of the port.

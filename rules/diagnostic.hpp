@@ -27,6 +27,7 @@ enum class Severity { kError, kWarning, kNote };
 struct Witness {
   std::vector<std::string> active;
   std::vector<std::string> inactive;
+  bool is_shortest = false;  // known to be: no conjunction of fewer literals does the same
 };
 
 struct Diagnostic {

@@ -35,13 +35,15 @@ class PortFindings {
     winners_ = &winners;
     const Forget forget{*this};
     for (const auto& rule : port_.rules) {
-      Diagram wins = winners.winner(rule);
+      // Whether somebody wins does not depend on who comes first.
+      Diagram wins = winners.holds(rule);
       if (wins.is_false()) continue;
       candidates_.push_back({&rule, std::move(wins)});
     }
     find_states();
     if (!nobody_.is_false()) {
       note_states();
+      if (port_.in_order) throw DiagramLimit("a diagram of each winner, and those are too large");
       note_chains();
     }
     return winners.work();
@@ -91,13 +93,12 @@ class PortFindings {
     }
   }
 
-  // A cause is a shortest conjunction that the causes before it leave uncovered. True: those are
-  // all.
+  // A cause is a shortest of the conjunctions that cover a state which the causes before it do not.
+  // True: those are all.
   bool find_causes(std::vector<Witness>& causes) {
     Diagram rest = nobody_;
     while (!rest.is_false() && causes.size() < kMaxCauses) {
-      Witness next = winners_->witness(rest);
-      if (!causes.empty()) next = shortened(std::move(next));
+      Witness next = winners_->witness(nobody_, rest);
       rest = winners_->combine(Connective::kAndNot, rest, states_of(next));
       causes.push_back(std::move(next));
     }
@@ -143,20 +144,6 @@ class PortFindings {
       states = winners_->combine(Connective::kAndNot, states, winners_->active(name));
     }
     return states;
-  }
-
-  // What implies a part of nobody_ may imply all of it with fewer literals.
-  Witness shortened(Witness witness) {
-    for (auto* side : {&witness.active, &witness.inactive}) {
-      for (std::size_t i = side->size(); i-- > 0;) {
-        const std::string name = (*side)[i];
-        side->erase(side->begin() + static_cast<std::ptrdiff_t>(i));
-        if (winners_->combine(Connective::kAndNot, states_of(witness), nobody_).is_false())
-          continue;
-        side->insert(side->begin() + static_cast<std::ptrdiff_t>(i), name);
-      }
-    }
-    return witness;
   }
 
   // x is silenced by y, which is silenced by z: all three are active, nobody wins, x would win if
@@ -213,6 +200,7 @@ class PortFindings {
     blocked = winners_->combine(Connective::kAnd, blocked, winners_->given(y.wins, z, false));
     std::vector<std::string> names;
     std::optional<Witness> shortest;
+    bool is_known = true;  // to be a shortest of all
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
       if (blocked.is_false()) return false;
       if (!silenced[i]) continue;
@@ -221,10 +209,12 @@ class PortFindings {
           winners_->combine(Connective::kAnd, blocked, winners_->given(x->wins, by, false));
       if (states.is_false()) continue;
       const Witness witness = winners_->witness(states);
+      is_known = is_known && witness.is_shortest;
       if (!shortest || size(witness) < size(*shortest)) shortest = witness;
       names.push_back(x->rule->source);
     }
     if (!shortest) return false;
+    shortest->is_shortest = is_known;
     const std::string others = enumerate(names);
     diagnostics_.note("starved", where_of(by),
                       "at " + port_.port + ", " + by + " silences " + others + " even while " + z +

@@ -7,6 +7,7 @@
 
 #include "rules/proof.hpp"
 #include "rules/state_count.hpp"
+#include "rules/state_search.hpp"
 #include "rules/winners.hpp"
 
 namespace arbiter::rules {
@@ -27,6 +28,15 @@ const CompiledRule* find_rule(const CompiledPort& port, const std::string& sourc
   const auto found = std::find_if(port.rules.begin(), port.rules.end(),
                                   [&](const auto& rule) { return rule.source == source; });
   return found == port.rules.end() ? nullptr : &*found;
+}
+
+// Whether a connection obviously wins in the same states of both. Where rules are decided in order,
+// those before it have a part in that.
+bool wins_alike(const CompiledPort& a, const CompiledRule& of_a, const CompiledPort& b,
+                const CompiledRule& of_b) {
+  if (!a.in_order && !b.in_order) return is_same(of_a, of_b);
+  return a.in_order && b.in_order &&
+         std::equal(a.rules.data(), &of_a + 1, b.rules.data(), &of_b + 1, is_same);
 }
 
 // The states of one port that both models arbitrate.
@@ -50,23 +60,24 @@ class PortComparison {
     gather_candidates();
     if (candidates_.empty()) return;
     try {
-      Winners winners(order, std::min(work_left, Winners::kMaxWork));
+      Winners winners(order, std::min(work_left, max_work()));
       winners_ = &winners;
       count_pairs();
       add_examples();
       work_left -= std::min(work_left, winners.work());
       release();
     } catch (const DiagramLimit& limit) {
-      work_left -= std::min(work_left, Winners::kMaxWork);
+      work_left -= std::min(work_left, max_work());
       release();
       result_.changes.clear();
       result_.states = "0";
-      result_.open = limit.what();
+      search(work_left, limit.what());
     }
   }
 
  private:
   struct Side {
+    const CompiledPort* port = nullptr;
     const CompiledRule* rule = nullptr;
     Diagram wins;
     StateCount states = 0;
@@ -83,15 +94,66 @@ class PortComparison {
     StateCount states;
   };
 
+  // Rules are decided in order because their diagrams are too large: little hope for these here.
+  [[nodiscard]] std::uint64_t max_work() const {
+    constexpr std::uint64_t kMaxWorkInOrder = 500'000;
+    return before_.in_order || after_.in_order ? kMaxWorkInOrder : Winners::kMaxWork;
+  }
+
+  // State by state: one in which the winners differ, then one in which another pair of them does.
+  void search(std::uint64_t& work_left, const std::string& limit) {
+    constexpr std::uint64_t kWorkOfStep = 200;
+    const auto max_steps = static_cast<int>(
+        std::min<std::uint64_t>(work_left / kWorkOfStep, StateSearch::kMaxStepsInAll));
+    StateSearch search(max_steps);
+    const auto before = search.winners(before_), after = search.winners(after_);
+    search.require_any({-before.nobody, -after.nobody});
+    for (std::size_t i = 0; i < before_.rules.size(); ++i) {
+      const CompiledRule* twin = find_rule(after_, before_.rules[i].source);
+      if (twin == nullptr) continue;
+      const auto place = static_cast<std::size_t>(twin - after_.rules.data());
+      search.require_any({-before.wins[i], -after.wins[place]});
+    }
+    auto answer = StateSearch::Answer::kOpen;
+    while (result_.changes.size() < kMaxExamples) {
+      answer = search.find({});
+      if (answer != StateSearch::Answer::kYes) break;
+      ModelDiff::Change change;
+      const auto pair = search.all_of({winner_found(search, before, before_, change.before),
+                                       winner_found(search, after, after_, change.after)});
+      change.example = search.witness(pair);
+      result_.changes.push_back(std::move(change));
+      search.require_any({-pair});
+    }
+    work_left -= static_cast<std::uint64_t>(max_steps - search.steps_left()) * kWorkOfStep;
+    result_.is_complete = answer == StateSearch::Answer::kNo;
+    result_.is_counted = result_.is_complete && result_.changes.empty();
+    if (!result_.is_complete && result_.changes.empty()) result_.open = limit;
+  }
+
+  // That the one wins who does in the state that was found.
+  static StateSearch::Proposition winner_found(const StateSearch& search,
+                                               const StateSearch::Port& winners,
+                                               const CompiledPort& port,
+                                               std::optional<std::string>& name) {
+    for (std::size_t i = 0; i < winners.wins.size(); ++i) {
+      if (!search.is_so(winners.wins[i])) continue;
+      name = port.rules[i].source;
+      return winners.wins[i];
+    }
+    return winners.nobody;
+  }
+
   void gather_candidates() {
     std::map<std::string, std::size_t> index;
     const auto add = [&](const CompiledPort& port, Side Candidate::*side,
                          const CompiledPort& other) {
       for (const auto& rule : port.rules) {
         const CompiledRule* twin = find_rule(other, rule.source);
-        if (twin != nullptr && is_same(rule, *twin)) continue;
+        if (twin != nullptr && wins_alike(port, rule, other, *twin)) continue;
         const auto [found, is_new] = index.emplace(rule.source, candidates_.size());
         if (is_new) candidates_.push_back({rule.source, {}, {}});
+        (candidates_[found->second].*side).port = &port;
         (candidates_[found->second].*side).rule = &rule;
       }
     };
@@ -105,7 +167,7 @@ class PortComparison {
 
   void build(Side& side) {
     if (side.rule == nullptr) return;
-    side.wins = winners_->winner(*side.rule);
+    side.wins = winners_->winner(*side.port, *side.rule);
     if (result_.sources > VariableSet().size()) return;
     side.implied = implied_literals(winners_->nodes(side.wins));
   }

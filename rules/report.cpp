@@ -65,11 +65,14 @@ bool is_short(const Witness& witness) {
 }
 
 std::string in_lists(const Witness& witness) {
-  return "active: " + joined(witness.active) + "; inactive: " + joined(witness.inactive);
+  return "active: " + joined(witness.active) + "; inactive: " + joined(witness.inactive) +
+         (witness.is_shortest ? "" : " (nothing of it can be left out; others may be shorter)");
 }
 
 Json json_of(const Witness& witness) {
-  return {{"active", witness.active}, {"inactive", witness.inactive}};
+  return {{"active", witness.active},
+          {"inactive", witness.inactive},
+          {"shortest", witness.is_shortest}};
 }
 
 // The fields that each finding has.

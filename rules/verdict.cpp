@@ -85,7 +85,7 @@ class Question {
         if (winner != nullptr) continue;
         for (const auto& rule : port->rules) {
           if (bad.is_false()) return bad;
-          bad = winners_->combine(Connective::kAndNot, bad, winners_->winner(rule));
+          bad = winners_->combine(Connective::kAndNot, bad, winners_->holds(rule));
         }
       }
       return bad;
@@ -95,7 +95,8 @@ class Question {
     Diagram bad = refute_by_cases(next + 1, state);
     for (const auto& rule : port->rules) {
       if (!bad.is_false()) break;
-      const Diagram wins = winners_->combine(Connective::kAnd, state, winners_->winner(rule));
+      const Diagram wins =
+          winners_->combine(Connective::kAnd, state, winners_->winner(*port, rule));
       if (wins.is_false()) continue;
       decided_[port] = &rule;
       bad = refute_by_cases(next + 1, wins);
@@ -141,10 +142,10 @@ class Question {
     if (const auto known = decided_.find(term.port); known != decided_.end()) {
       return winners_->constant(known->second == term.rule);
     }
-    if (term.rule != nullptr) return winners_->winner(*term.rule);
+    if (term.rule != nullptr) return winners_->winner(*term.port, *term.rule);
     Diagram idle = winners_->constant(true);
     for (const auto& rule : term.port->rules) {
-      idle = winners_->combine(Connective::kAndNot, idle, winners_->winner(rule));
+      idle = winners_->combine(Connective::kAndNot, idle, winners_->holds(rule));
     }
     return idle;
   }

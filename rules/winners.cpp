@@ -110,7 +110,17 @@ Diagram Winners::combine(Connective connective, const Diagram& a, const Diagram&
   return result;
 }
 
-Diagram Winners::winner(const CompiledRule& rule) {
+Diagram Winners::winner(const CompiledPort& port, const CompiledRule& rule) {
+  Diagram result = holds(rule);
+  if (!port.in_order) return result;
+  for (const CompiledRule* earlier = port.rules.data(); earlier != &rule; ++earlier) {
+    if (result.is_false()) break;
+    result = combine(Connective::kAndNot, result, holds(*earlier));
+  }
+  return result;
+}
+
+Diagram Winners::holds(const CompiledRule& rule) {
   using shm::table::kTrue;
   Diagram own = active(rule.source);
   if (rule.kind == shm::table::kNever) return constant(false);
@@ -148,19 +158,16 @@ Diagram Winners::given(const Diagram& function, const std::string& source, bool 
   return result;
 }
 
-Witness Winners::witness(const Diagram& function) {
+Witness Winners::witness(const Diagram& function, const Diagram& reached) {
   ShortestImplicant shortest(builder_);
-  auto literals = shortest.find_literals(function);
-  take_account_of(shortest.functions());
-  if (!literals) {
-    literals.emplace();
-    for (Diagram rest = function; !rest.is_true();) {
-      const Diagram low = builder_.low(rest);
-      literals->push_back({builder_.top_variable(rest), low.is_false()});
-      rest = low.is_false() ? builder_.high(rest) : low;
-    }
-  }
+  auto literals = shortest.find_literals(function, reached);
+  take_account_of(shortest.splits());
   Witness witness;
+  witness.is_shortest = literals.has_value();
+  if (!literals) {
+    literals = lean_implicant(builder_, function, reached);
+    take_account_of(size_of(function) * (1 + literals->size()));
+  }
   for (const VariableLiteral& literal : *literals) {
     (literal.active ? witness.active : witness.inactive)
         .push_back(names_[static_cast<std::size_t>(literal.variable)]);

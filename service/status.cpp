@@ -190,6 +190,7 @@ class Document {
         {"name", name.name},
         {"mentioned", snapshot_.table.knows_port(name.id)},
         {"arbitrated", arbitrated},
+        {"in_order", is_decided_in_order(name.id)},
         {"idle", winner == shm::kNone},
         {"winner", arbitrated && winner != shm::kNone ? json(of_.directory.sources()[winner]->name)
                                                       : json(nullptr)},
@@ -259,6 +260,14 @@ class Document {
     if (output == nullptr || input == nullptr) return nullptr;
     const auto found = of_.switchboard.links().find({output->instance, input->instance});
     return found == of_.switchboard.links().end() ? nullptr : &found->second;
+  }
+
+  [[nodiscard]] bool is_decided_in_order(shm::PortId port) const {
+    const auto range = snapshot_.table.connections_to(port);
+    for (auto index = range.first; index != range.first + range.count; ++index) {
+      if (snapshot_.table.rule(index).kind == shm::table::kInOrder) return true;
+    }
+    return false;
   }
 
   [[nodiscard]] shm::SourceId winner_of(shm::PortId port) const {
