@@ -36,6 +36,8 @@ InputCore::InputCore(std::string name, const shm::TypeInfo& type, const InputPor
   header.refuse_new = options.when_full == WhenFull::refuse_new ? 1 : 0;
   header.type = type_;
   shm::seal(descriptor_, shm::Seals::kOneWriter);
+  bequest_.emplace(mapping_.data(), mapping_.size(), shm::Bequest::Kind::kPrivateZeros);
+  shm::close_in_children(descriptor_);
 }
 
 void InputCore::bind(shm::PortInstance instance, shm::PortId port) {
@@ -169,7 +171,7 @@ shm::Lane* InputCore::free_lane() noexcept {
 // has closed since.
 void InputCore::retire_queue(Queue& queue) {
   count(segment_->header.counters.dropped, queue.reader.backlog(queue.reader.backlog_end()));
-  if (std::find(held_from_.begin(), held_from_.end(), queue.peer.get()) != held_from_.end()) {
+  if (queue.peer->held != 0) {
     auto kept = std::make_unique<InputView>();
     kept->links.push_back({queue.peer, true});
     lingering_.push_back(std::move(kept));

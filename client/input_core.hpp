@@ -20,6 +20,7 @@
 #include "shm/bell.hpp"
 #include "shm/channel.hpp"
 #include "shm/clock.hpp"
+#include "shm/descendants.hpp"
 #include "shm/input_segment.hpp"
 
 namespace arbiter::detail {
@@ -68,6 +69,8 @@ class InputCore {
   [[nodiscard]] const shm::Bell& bell() const noexcept { return bell_; }
   [[nodiscard]] const SharedMemory& memory() const noexcept { return *memory_; }
 
+  shm::ProcessMark process;        // the node's
+  mutable pid_t warned_about = 0;  // the child that was told that the port is not its own
   std::shared_ptr<NodeCore>
       node;  // kept for as long as the port is, so that they may go in any order
   std::shared_ptr<InputCore> kept_by_samples;  // port's thread: the port is gone, they are not
@@ -132,6 +135,7 @@ class InputCore {
   const std::shared_ptr<SharedMemory> memory_;
   shm::FileDescriptor descriptor_;
   shm::Mapping mapping_;
+  std::optional<shm::Bequest> bequest_;
   shm::InputSegment* segment_ = nullptr;
   shm::Bell bell_;
   shm::PortInstance instance_ = 0;

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "shm/atomic.hpp"
 #include "shm/bell.hpp"
+#include "shm/descendants.hpp"
 #include "shm/ids.hpp"
 #include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
@@ -21,6 +23,7 @@ struct InputPeer {
   shm::PortInstance instance = 0;
   shm::PortId port = shm::kNone;
   shm::Mapping mapping;
+  std::optional<shm::Bequest> bequest;
   const shm::InputSegment* segment = nullptr;
   shm::Ringer ringer;
   std::uint32_t depth = 1;
@@ -51,6 +54,8 @@ struct OutputPeer {
   std::uint64_t link = 0;  // as InputLink::number: the queue that is ours bears it
   shm::SourceId source = shm::kNone;
   shm::Mapping mapping;
+  std::optional<shm::Bequest> bequest;  // a child keeps it if it was forked while samples were held
+  mutable std::uint32_t held = 0;       // port's thread: samples of it that the component holds
   shm::OutputSegment segment;
   // Set by the port's thread once a publisher that is gone has nothing left to be taken.
   mutable shm::Atomic<bool> drained{false};
