@@ -105,6 +105,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // Waits up to `timeout_ms` for something to do and does it.
   void pump(int timeout_ms);
   void tidy();
+  [[nodiscard]] bool has_predecessors();
   void handle(shm::Received& received);
   void handle_reply(shm::Received& received);
   void wake_inputs();

@@ -66,10 +66,15 @@ struct OutputLink {
   std::shared_ptr<const OutputPeer> peer;
   bool gone = false;      // closed or dead: drain it
   bool reported = false;  // that it misbehaves
+  bool offered = false;   // in the last view
+  bool known = false;     // to the port's thread: a view that had it was accepted
 };
 
 struct InputView {
   std::vector<OutputLink> links;
+  // Since the port was opened: samples of publishers that were let go of before the port's thread
+  // knew them. It counts them.
+  std::uint64_t let_go = 0;
   InputView* next_retired = nullptr;
 };
 

@@ -232,6 +232,13 @@ class ChannelReader {
     return count > kSequenceMask / 2 ? 0 : (count < depth_ ? count : depth_);
   }
 
+  // The same, with those that were overtaken before they were looked at. Of a publisher that is
+  // gone.
+  [[nodiscard]] std::uint64_t left_behind() const noexcept {
+    const std::uint64_t count = (backlog_end() + 1 - next_) & kSequenceMask;
+    return count > kSequenceMask / 2 ? 0 : count;
+  }
+
   // The arrival time of an entry that is not held, for ordering; sure only if the entry is still
   // there. SYNC POINT: stamp-peeked. The acquire fence keeps the second look at the entry behind
   // the load.

@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <mutex>
+#include <new>
 #include <system_error>
 
 #include "shm/limits.hpp"
@@ -35,7 +36,7 @@ struct Bequests {
     if (bequest.next_ != nullptr) bequest.next_->before_ = bequest.before_;
   }
 
-  // Nothing but list operations is done under the lock, so a fork waits for no more than these.
+  // Little is done under the lock, so a fork does not wait for long.
   static void prepare() { all().mutex.lock(); }
   static void in_parent() { all().mutex.unlock(); }
   // The addresses and descriptors may come to be the child's own: a child of the child must find
@@ -50,16 +51,15 @@ struct Bequests {
       bequest.settle();
     }
     MarkedDescriptors::close_all();
-    if (auto* const word = self.mark.load(std::memory_order_relaxed)) {
-      word->store(0, std::memory_order_relaxed);  // by a kernel that does not wipe it
-    }
+    // A kernel that is too old has not wiped it.
+    if (self.mark != nullptr) self.mark->store(0, std::memory_order_relaxed);
     self.mutex.unlock();
     errno = saved;
   }
 
   std::mutex mutex;
   Bequest* first = nullptr;
-  std::atomic<std::atomic<std::uint32_t>*> mark{nullptr};  // of this process, or of an ancestor
+  std::atomic<std::uint32_t>* mark = nullptr;  // of this process, or of an ancestor
 };
 
 Bequest::Bequest(void* address, std::size_t size, Kind kind, const std::uint32_t* users)
@@ -85,24 +85,18 @@ void close_in_children(const FileDescriptor& descriptor) {
 }
 
 ProcessMark ProcessMark::of_this_process() {
-  auto& mark = Bequests::all().mark;
-  // Acquire and release: who finds another thread's mark finds it written.
-  std::atomic<std::uint32_t>* word = mark.load(std::memory_order_acquire);
-  while (word == nullptr || word->load(std::memory_order_relaxed) == 0) {
+  Bequests& bequests = Bequests::all();
+  const std::lock_guard lock(bequests.mutex);
+  if (bequests.mark == nullptr || bequests.mark->load(std::memory_order_relaxed) == 0) {
     void* const page =
         mmap(nullptr, kPageSize, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (page == MAP_FAILED) {
       throw std::system_error(errno, std::generic_category(), "mapping the mark of a process");
     }
     static_cast<void>(madvise(page, kPageSize, MADV_WIPEONFORK));  // Linux 4.14
-    auto* const own = new (page) std::atomic<std::uint32_t>(1);
-    if (mark.compare_exchange_strong(word, own, std::memory_order_acq_rel)) {
-      word = own;
-    } else {
-      munmap(page, kPageSize);
-    }
+    bequests.mark = new (page) std::atomic<std::uint32_t>(1);
   }
-  return {word, getpid()};
+  return {bequests.mark, getpid()};
 }
 
 bool ProcessMark::is_surely_here() const noexcept { return is_here() && getpid() == process_; }
