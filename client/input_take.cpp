@@ -158,12 +158,12 @@ void InputCore::yield_to_successor(Queue& queue) noexcept {
     behind += other.reader.backlog(other.reader.backlog_end());
   }
   const std::uint64_t depth = segment_->header.depth;
-  for (std::uint64_t own = queue.reader.backlog(queue.reader.backlog_end());
-       own != 0 && own + behind > depth; --own) {
-    consume(queue);
-    count(queue.lane->overtaken);
-    count(segment_->header.counters.overtaken);
-  }
+  const std::uint64_t room = depth - std::min(behind, depth);
+  // Those that its own later ones have overtaken are among them.
+  const std::uint64_t own = queue.reader.left_behind();
+  if (own <= room) return;
+  queue.reader.skip(own - room);
+  count_overtaken(queue, own - room);
 }
 
 InputCore::Choice InputCore::choose(Queue*& oldest) noexcept {

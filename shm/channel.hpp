@@ -216,6 +216,11 @@ class ChannelReader {
     next_ = (next_ + 1) & kSequenceMask;
     advance(1);
   }
+  // Done with that many entries, seen or not.
+  void skip(std::uint64_t count) noexcept {
+    next_ = (next_ + count) & kSequenceMask;
+    advance(static_cast<std::uint32_t>(count % depth_));
+  }
   [[nodiscard]] std::uint64_t consumed() const noexcept { return next_ - 1; }
   [[nodiscard]] std::uint64_t next() const noexcept { return next_; }
 
