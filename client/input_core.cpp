@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "client/count.hpp"
+#include "client/predecessors.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -36,6 +37,8 @@ InputCore::InputCore(std::string name, const shm::TypeInfo& type, const InputPor
   header.refuse_new = options.when_full == WhenFull::refuse_new ? 1 : 0;
   header.type = type_;
   shm::seal(descriptor_, shm::Seals::kOneWriter);
+  bequest_.emplace(mapping_.data(), mapping_.size(), shm::Bequest::Kind::kPrivateZeros);
+  shm::close_in_children(descriptor_);
 }
 
 void InputCore::bind(shm::PortInstance instance, shm::PortId port) {
@@ -79,7 +82,12 @@ void InputCore::tidy() {
   const bool drained = std::any_of(links_.begin(), links_.end(), [](const auto& link) {
     return link.second.peer->drained.load(std::memory_order_relaxed);
   });
-  if (drained) offer_view();
+  if (drained || !spent_predecessors(links_, segment_->header.depth).empty()) offer_view();
+}
+
+bool InputCore::has_predecessors() const noexcept {
+  return std::any_of(links_.begin(), links_.end(),
+                     [](const auto& link) { return link.second.gone; });
 }
 
 std::vector<shm::PortInstance> InputCore::misbehaving() {
@@ -92,23 +100,44 @@ std::vector<shm::PortInstance> InputCore::misbehaving() {
   return found;
 }
 
-// A receiver that waits must look again: a publisher may have delivered to it already.
+// Leaves out those of whom nothing can be taken any more. Whoever knows of one counts what is lost
+// with it: the port's thread, if it has accepted a view that had it, or else we. Which of the two
+// is sure once the next view has been offered, for then it is seen whether the last one was
+// accepted.
 void InputCore::offer_view() {
-  auto view = std::make_unique<InputView>();
-  for (auto link = links_.begin(); link != links_.end();) {
-    if (link->second.peer->drained.load(std::memory_order_relaxed)) {
-      link = links_.erase(link);
-      continue;
-    }
-    view->links.push_back(link->second);
-    ++link;
+  std::erase_if(links_, [](const auto& link) {
+    return link.second.peer->drained.load(std::memory_order_relaxed);
+  });
+  std::vector<OutputLink> spent;
+  for (const shm::PortInstance peer : spent_predecessors(links_, segment_->header.depth)) {
+    spent.push_back(std::move(links_.extract(peer).mapped()));
   }
-  handover_.offer(std::move(view));
+  const bool was_accepted = offer_links();
+  const std::uint64_t before = let_go_;
+  for (const OutputLink& link : spent) {
+    const bool is_known = link.known || (link.offered && was_accepted);
+    if (!is_known) let_go_ += accepted_on(*link.peer);
+  }
+  if (let_go_ != before) offer_links();  // to say so
   // SYNC POINT: view-announced. Between our offer and our ring; pairs with fence (d) of the port's
   // thread: having heard the ring, it sees the offer at its next last look, whatever the pipe
   // orders.
   shm::full_fence();
+  // A receiver that waits must look again: a publisher may have delivered to it already.
   shm::ring_bell(bell_.write_end().get());
+}
+
+// True: the last view had been accepted.
+bool InputCore::offer_links() {
+  auto view = std::make_unique<InputView>();
+  for (const auto& [peer, link] : links_) view->links.push_back(link);
+  view->let_go = let_go_;
+  const bool was_accepted = handover_.offer(std::move(view));
+  for (auto& [peer, link] : links_) {
+    link.known = link.known || (link.offered && was_accepted);
+    link.offered = true;
+  }
+  return was_accepted;
 }
 
 // Port's thread.
@@ -125,10 +154,12 @@ void InputCore::accept_view() {
     if (link != view->links.end()) {
       queue.gone = link->gone;
     } else {
-      retire_queue(queue);
+      retire_queue(queue, *view);
     }
   }
   std::erase_if(queues_, [](const Queue& queue) { return queue.lane == nullptr; });
+  count(segment_->header.counters.overtaken,
+        view->let_go - std::exchange(counted_let_go_, view->let_go));
   for (const OutputLink& link : view->links) {
     const bool known = std::any_of(queues_.begin(), queues_.end(),
                                    [&](const Queue& queue) { return queue.peer == link.peer; });
@@ -165,11 +196,22 @@ shm::Lane* InputCore::free_lane() noexcept {
   return nullptr;
 }
 
-// What the queue still has is lost: its connection is gone, or a later publisher of the same source
-// has closed since.
-void InputCore::retire_queue(Queue& queue) {
-  count(segment_->header.counters.dropped, queue.reader.backlog(queue.reader.backlog_end()));
-  if (std::find(held_from_.begin(), held_from_.end(), queue.peer.get()) != held_from_.end()) {
+// What the queue still has is lost: its connection is gone; or its publisher is, and a later one of
+// the same source has pushed all of it out.
+void InputCore::retire_queue(Queue& queue, const InputView& next) {
+  const bool is_succeeded =
+      std::any_of(next.links.begin(), next.links.end(), [&](const OutputLink& link) {
+        return link.peer->source == queue.peer->source &&
+               link.peer->instance > queue.peer->instance;
+      });
+  shm::InputCounters& counters = segment_->header.counters;
+  if (is_succeeded) {
+    join(queue);
+    count(counters.overtaken, queue.reader.left_behind());
+  } else {
+    count(counters.dropped, queue.reader.backlog(queue.reader.backlog_end()));
+  }
+  if (queue.peer->held != 0) {
     auto kept = std::make_unique<InputView>();
     kept->links.push_back({queue.peer, true});
     lingering_.push_back(std::move(kept));

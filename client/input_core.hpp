@@ -20,6 +20,7 @@
 #include "shm/bell.hpp"
 #include "shm/channel.hpp"
 #include "shm/clock.hpp"
+#include "shm/descendants.hpp"
 #include "shm/input_segment.hpp"
 
 namespace arbiter::detail {
@@ -41,8 +42,10 @@ class InputCore {
   // The model has disconnected it.
   void disconnect_peer(shm::PortInstance peer);
   [[nodiscard]] std::vector<HeldLink> held_links() const;
-  // Unmaps what the port's thread has let go of.
+  // Unmaps what the port's thread has let go of, and what nobody will take any more.
   void tidy();
+  // Whether a publisher that is gone has left samples, which a later tidy() may let go of.
+  [[nodiscard]] bool has_predecessors() const noexcept;
   // Those that have begun to misbehave, once each. Nothing is taken from them any more.
   std::vector<shm::PortInstance> misbehaving();
 
@@ -68,6 +71,8 @@ class InputCore {
   [[nodiscard]] const shm::Bell& bell() const noexcept { return bell_; }
   [[nodiscard]] const SharedMemory& memory() const noexcept { return *memory_; }
 
+  shm::ProcessMark process;        // the node's
+  mutable pid_t warned_about = 0;  // the child that was told that the port is not its own
   std::shared_ptr<NodeCore>
       node;  // kept for as long as the port is, so that they may go in any order
   std::shared_ptr<InputCore> kept_by_samples;  // port's thread: the port is gone, they are not
@@ -88,9 +93,10 @@ class InputCore {
   };
 
   void offer_view();
+  bool offer_links();
   void accept_view();
   shm::Lane* free_lane() noexcept;
-  void retire_queue(Queue& queue);
+  void retire_queue(Queue& queue, const InputView& next);
   void bind_rules();
   void bind_queues();
   void refresh();
@@ -132,6 +138,7 @@ class InputCore {
   const std::shared_ptr<SharedMemory> memory_;
   shm::FileDescriptor descriptor_;
   shm::Mapping mapping_;
+  std::optional<shm::Bequest> bequest_;
   shm::InputSegment* segment_ = nullptr;
   shm::Bell bell_;
   shm::PortInstance instance_ = 0;
@@ -139,11 +146,13 @@ class InputCore {
 
   // Service thread.
   std::map<shm::PortInstance, OutputLink> links_;
+  std::uint64_t let_go_ = 0;  // as InputView::let_go
 
   Handover<InputView> handover_;
 
   // Port's thread.
   std::unique_ptr<InputView> view_;
+  std::uint64_t counted_let_go_ = 0;
   std::vector<Queue> queues_;
   std::vector<shm::ChannelReader::Watch> watches_;  // by queue: what says that nothing is new
   std::vector<Queue*> waiting_;  // those in which the take under way found a head

@@ -158,12 +158,12 @@ void InputCore::yield_to_successor(Queue& queue) noexcept {
     behind += other.reader.backlog(other.reader.backlog_end());
   }
   const std::uint64_t depth = segment_->header.depth;
-  for (std::uint64_t own = queue.reader.backlog(queue.reader.backlog_end());
-       own != 0 && own + behind > depth; --own) {
-    consume(queue);
-    count(queue.lane->overtaken);
-    count(segment_->header.counters.overtaken);
-  }
+  const std::uint64_t room = depth - std::min(behind, depth);
+  // Those that its own later ones have overtaken are among them.
+  const std::uint64_t own = queue.reader.left_behind();
+  if (own <= room) return;
+  queue.reader.skip(own - room);
+  count_overtaken(queue, own - room);
 }
 
 InputCore::Choice InputCore::choose(Queue*& oldest) noexcept {
@@ -302,6 +302,7 @@ bool InputCore::hold(Queue& queue, HeldSample& sample) noexcept {
   count(queue.lane->taken);
   count(segment_->header.counters.taken);
   held_from_[index] = queue.peer.get();
+  ++queue.peer->held;
   ++held_;
   return true;
 }
@@ -309,13 +310,14 @@ bool InputCore::hold(Queue& queue, HeldSample& sample) noexcept {
 void InputCore::give_back(std::uint32_t hold) noexcept {
   shm::ChannelReader::release(segment_->header.holds[hold]);
   const OutputPeer* const from = std::exchange(held_from_[hold], nullptr);
+  --from->held;
   --held_;
   if (!lingering_.empty()) let_go_of(from);
 }
 
 // Of a publisher that is gone, with its last sample. The service thread unmaps it.
 void InputCore::let_go_of(const OutputPeer* peer) noexcept {
-  if (std::find(held_from_.begin(), held_from_.end(), peer) != held_from_.end()) return;
+  if (peer->held != 0) return;
   const auto kept = std::find_if(
       lingering_.begin(), lingering_.end(),
       [&](const std::unique_ptr<InputView>& view) { return view->links[0].peer.get() == peer; });

@@ -135,6 +135,8 @@ int InputCore::wait_descriptor() {
   }
   epoll_ = std::move(epoll);
   timer_ = std::move(timer);
+  shm::close_in_children(epoll_);
+  shm::close_in_children(timer_);
   shm::ring_bell(bell_.write_end().get());  // what waits already is there to be taken
   return epoll_.get();
 }

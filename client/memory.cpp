@@ -15,6 +15,9 @@ SharedMemory::SharedMemory(shm::FileDescriptor board, shm::FileDescriptor regist
   const std::size_t size = shm::checked_size(board_descriptor_, shm::Seals::kFixedSize);
   if (size != sizeof(shm::Board)) throw std::runtime_error("the daemon's board has another size");
   board_ = shm::Mapping(board_descriptor_, size, shm::Access::kReadOnly);
+  leave_behind(board_);
+  shm::close_in_children(board_descriptor_);
+  shm::close_in_children(registry_);
   const auto* mapped = board_.as<const shm::Board>();
   if (mapped->magic != shm::Board::kMagic || mapped->version != shm::Board::kVersion) {
     throw std::runtime_error("the daemon is of another version");
@@ -35,11 +38,18 @@ void SharedMemory::add_page(shm::SourceId id, std::string name, shm::FileDescrip
   }
   set_name(id, std::move(name));
   mappings_.emplace_back(page, sizeof(shm::ActivityPage), shm::Access::kReadOnly);
+  leave_behind(mappings_.back());
   pages_->attach(id, &mappings_.back().as<const shm::ActivityPage>()->of(id));
   if (page_descriptors_.size() < kMaxPageDescriptors || page_descriptors_.count(id) != 0) {
     page_descriptors_[id] = std::move(page);
+    shm::close_in_children(page_descriptors_[id]);
   }
   shm::make_resident(mappings_.back(), 0, sizeof(shm::ActivityPage), residence_);
+}
+
+// The daemon may be replaced while a child lives on.
+void SharedMemory::leave_behind(const shm::Mapping& mapping) {
+  bequests_.emplace_back(mapping.data(), mapping.size(), shm::Bequest::Kind::kNothing);
 }
 
 // Relaxed is enough, here and below: see names_.

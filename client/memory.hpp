@@ -3,6 +3,7 @@
 
 #include <array>
 #include <deque>
+#include <list>
 #include <map>
 #include <memory>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include "client/service_bell.hpp"
 #include "shm/decision.hpp"
+#include "shm/descendants.hpp"
 #include "shm/file_descriptor.hpp"
 #include "shm/residence.hpp"
 #include "shm/segment.hpp"
@@ -52,6 +54,7 @@ class SharedMemory {
   static constexpr std::size_t kMaxPageDescriptors = 256;
 
   void set_name(shm::SourceId id, std::string name);
+  void leave_behind(const shm::Mapping& mapping);
 
   const std::shared_ptr<const ServiceBell> service_bell_;
   const shm::Residence residence_;
@@ -61,6 +64,7 @@ class SharedMemory {
   shm::TableReader tables_;
   std::unique_ptr<shm::ActivityPages> pages_ = std::make_unique<shm::ActivityPages>();
   std::vector<shm::Mapping> mappings_;
+  std::list<shm::Bequest> bequests_;  // of all of these mappings
   std::map<shm::SourceId, shm::FileDescriptor> page_descriptors_;
 
   // A name is stored before its source's page is attached, and is looked for once the page has been

@@ -3,6 +3,7 @@
 
 #include <poll.h>
 #include <sys/epoll.h>
+#include <sys/socket.h>
 #include <sys/timerfd.h>
 
 #include <algorithm>
@@ -80,7 +81,15 @@ NodeCore::NodeCore(std::string_view name, const NodeOptions& options)
   }
 }
 
-NodeCore::~NodeCore() { stop_service_thread(); }
+NodeCore::~NodeCore() {
+  stop_service_thread();
+  hang_up();
+}
+
+// A descendant may have the socket open too: what ends the conversation must not wait for it.
+void NodeCore::hang_up() const noexcept {
+  if (socket_ != nullptr) ::shutdown(socket_->get(), SHUT_RDWR);
+}
 
 void NodeCore::connect() {
   const auto begin = Clock::now();
@@ -91,6 +100,7 @@ void NodeCore::connect() {
     who_is_silent.clear();
     if (auto socket = shm::connect_to_daemon(instance_, why_not)) {
       socket_ = std::make_shared<const shm::FileDescriptor>(std::move(*socket));
+      shm::close_in_children(*socket_);
       const auto asked = Clock::now();
       if (say_hello(give_up)) break;
       if (is_open(*socket_)) who_is_silent = silence_of(*socket_, instance_, asked);
@@ -106,6 +116,8 @@ void NodeCore::connect() {
   }
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   timer_.reset(timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
+  shm::close_in_children(epoll_);
+  shm::close_in_children(timer_);
   epoll_event event{};
   event.events = EPOLLIN;
   if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, service_bell_->descriptor(), &event) != 0 ||
@@ -327,6 +339,7 @@ std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const P
   return open(name, [&](const std::shared_ptr<SharedMemory>& memory) {
     auto core = std::make_shared<OutputCore>(std::string(name), type_info(type), options, memory);
     core->node = shared_from_this();
+    core->process = process_;
     shm::Message question = message_of(shm::MessageKind::kOpenOutput, name);
     question.type = core->type();
     converse(question, {core->segment_descriptor().get(), -1}, memory.get(),
@@ -346,6 +359,7 @@ std::shared_ptr<InputCore> NodeCore::open_input(std::string_view name, const Por
   return open(name, [&](const std::shared_ptr<SharedMemory>& memory) {
     auto core = std::make_shared<InputCore>(std::string(name), type_info(type), options, memory);
     core->node = shared_from_this();
+    core->process = process_;
     shm::Message question = message_of(shm::MessageKind::kOpenInput, name);
     question.type = core->type();
     converse(question, {core->segment_descriptor().get(), core->bell().write_end().get()},

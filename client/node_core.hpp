@@ -25,6 +25,7 @@
 #include "client/input_core.hpp"
 #include "client/memory.hpp"
 #include "client/output_core.hpp"
+#include "shm/descendants.hpp"
 #include "shm/wire.hpp"
 
 namespace arbiter::detail {
@@ -49,6 +50,10 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void service();
   // Readable when there is something to take up.
   [[nodiscard]] int service_fd() const noexcept { return epoll_.get(); }
+
+  // The process that made it, and that alone may use it.
+  [[nodiscard]] const shm::ProcessMark& process() const noexcept { return process_; }
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
 
   // Asks the daemon and waits for the answer; a daemon that takes over is asked again. Throws Error
   // where it refuses, or none answers in time.
@@ -100,6 +105,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // Waits up to `timeout_ms` for something to do and does it.
   void pump(int timeout_ms);
   void tidy();
+  [[nodiscard]] bool has_predecessors();
   void handle(shm::Received& received);
   void handle_reply(shm::Received& received);
   void wake_inputs();
@@ -111,6 +117,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
 
   [[nodiscard]] bool watch_socket() const;
+  void hang_up() const noexcept;
   void lose_daemon();
   void be_alone(Clock::duration look_again_in);
   void ring_timer_every(Clock::duration time) const;
@@ -137,6 +144,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // Until something may have changed; false: it is time to give up.
   bool wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_point give_up);
 
+  const shm::ProcessMark process_ = shm::ProcessMark::of_this_process();
   const std::string name_;
   const NodeOptions options_;
   std::string instance_;

@@ -99,6 +99,7 @@ void NodeCore::lose_daemon() {
 
 void NodeCore::be_alone(Clock::duration look_again_in) {
   epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, socket_->get(), nullptr);
+  hang_up();
   socket_ = nullptr;
   standing_ = Standing::kAlone;
   ring_timer_every(look_again_in);
@@ -130,6 +131,7 @@ void NodeCore::rejoin() {
   is_anew_ = ports.empty();
   const bool is_said = is_anew_ ? is_sent(*socket, hello()) : hand_back(*socket, ports);
   if (!is_said) return;
+  shm::close_in_children(*socket);
   const std::lock_guard lock(mutex_);
   socket_ = socket;
   if (!watch_socket()) {

@@ -7,6 +7,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <system_error>
@@ -18,6 +19,9 @@ namespace {
 
 // How much less than a normal thread the service thread presses for the processor.
 constexpr int kServiceNiceness = 5;
+// While a publisher that is gone has samples waiting: how often it is looked whether those of its
+// successor have pushed them out. The successor rings nobody for that.
+constexpr int kTidyInterval = 1000;  // ms
 
 }  // namespace
 
@@ -67,8 +71,14 @@ void NodeCore::run_service_thread() {
       const std::lock_guard lock(mutex_);
       if (stopping_) return;
     }
-    pump(-1);
+    pump(has_predecessors() ? kTidyInterval : -1);
   }
+}
+
+bool NodeCore::has_predecessors() {
+  const std::lock_guard lock(mutex_);
+  return std::any_of(inputs_.begin(), inputs_.end(),
+                     [](const auto& input) { return input.second->has_predecessors(); });
 }
 
 // Where there is a service thread, it does this.

@@ -52,6 +52,8 @@ OutputCore::OutputCore(std::string name, const shm::TypeInfo& type,
   allocate_slots();
   pool_.grow(allocated_slots_);
   shm::seal(descriptor_, shm::Seals::kOneWriter);
+  bequest_.emplace(mapping_.data(), mapping_.size(), shm::Bequest::Kind::kPrivateZeros);
+  shm::close_in_children(descriptor_);
 }
 
 void OutputCore::bind(shm::PortInstance instance, shm::SourceId source, shm::FileDescriptor page) {
@@ -62,7 +64,9 @@ void OutputCore::bind(shm::PortInstance instance, shm::SourceId source, shm::Fil
   activity_ = &page_.as<shm::ActivityPage>()->of(source);
   own_word_ = activity_->word.load(std::memory_order_relaxed);  // a predecessor's: it carries on
   shm::make_resident(page_, 0, sizeof(shm::ActivityPage), memory_->residence());
+  page_bequest_.emplace(page_.data(), page_.size(), shm::Bequest::Kind::kPrivateZeros);
   page_descriptor_ = std::move(page);
+  shm::close_in_children(page_descriptor_);
   instance_ = instance;
   source_ = source;
 }

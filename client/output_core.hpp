@@ -6,6 +6,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "client/peers.hpp"
 #include "shm/channel.hpp"
 #include "shm/clock.hpp"
+#include "shm/descendants.hpp"
 #include "shm/output_segment.hpp"
 #include "shm/slot_pool.hpp"
 
@@ -69,6 +71,8 @@ class OutputCore {
   }
   [[nodiscard]] const SharedMemory& memory() const noexcept { return *memory_; }
 
+  shm::ProcessMark process;        // the node's
+  mutable pid_t warned_about = 0;  // the child that was told that the port is not its own
   std::shared_ptr<NodeCore>
       node;  // kept for as long as the port is, so that they may go in any order
   std::shared_ptr<OutputCore> kept_by_loans;  // port's thread: the port is gone, they are not
@@ -121,11 +125,13 @@ class OutputCore {
   const std::shared_ptr<SharedMemory> memory_;
   shm::FileDescriptor descriptor_;
   shm::Mapping mapping_;
+  std::optional<shm::Bequest> bequest_;
   shm::OutputSegment segment_;
   shm::PortInstance instance_ = 0;
   shm::SourceId source_ = shm::kNone;
   shm::FileDescriptor page_descriptor_;  // for a daemon that takes over
   shm::Mapping page_;
+  std::optional<shm::Bequest> page_bequest_;
   shm::Activity* activity_ = nullptr;
 
   // Service thread.

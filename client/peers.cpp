@@ -31,6 +31,7 @@ std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
   }
   peer->ringer = shm::Ringer(announced.descriptors[1]);
   shm::make_resident(peer->mapping, 0, sizeof(shm::InputSegment), residence);
+  peer->bequest.emplace(peer->mapping.data(), peer->mapping.size(), shm::Bequest::Kind::kNothing);
   return peer;
 }
 
@@ -56,6 +57,8 @@ std::shared_ptr<const OutputPeer> map_output_peer(const shm::Received& announced
   }
   peer->segment = shm::OutputSegment(peer->mapping.data(), layout);
   shm::make_written_resident(segment, peer->mapping, residence);
+  peer->bequest.emplace(peer->mapping.data(), peer->mapping.size(),
+                        shm::Bequest::Kind::kNothingUnlessUsed, &peer->held);
   return peer;
 }
 

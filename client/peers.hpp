@@ -2,10 +2,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "shm/atomic.hpp"
 #include "shm/bell.hpp"
+#include "shm/descendants.hpp"
 #include "shm/ids.hpp"
 #include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
@@ -21,6 +23,7 @@ struct InputPeer {
   shm::PortInstance instance = 0;
   shm::PortId port = shm::kNone;
   shm::Mapping mapping;
+  std::optional<shm::Bequest> bequest;
   const shm::InputSegment* segment = nullptr;
   shm::Ringer ringer;
   std::uint32_t depth = 1;
@@ -51,6 +54,8 @@ struct OutputPeer {
   std::uint64_t link = 0;  // as InputLink::number: the queue that is ours bears it
   shm::SourceId source = shm::kNone;
   shm::Mapping mapping;
+  std::optional<shm::Bequest> bequest;  // a child keeps it if it was forked while samples were held
+  mutable std::uint32_t held = 0;       // port's thread: samples of it that the component holds
   shm::OutputSegment segment;
   // Set by the port's thread once a publisher that is gone has nothing left to be taken.
   mutable shm::Atomic<bool> drained{false};
@@ -61,10 +66,15 @@ struct OutputLink {
   std::shared_ptr<const OutputPeer> peer;
   bool gone = false;      // closed or dead: drain it
   bool reported = false;  // that it misbehaves
+  bool offered = false;   // in the last view
+  bool known = false;     // to the port's thread: a view that had it was accepted
 };
 
 struct InputView {
   std::vector<OutputLink> links;
+  // Since the port was opened: samples of publishers that were let go of before the port's thread
+  // knew them. It counts them.
+  std::uint64_t let_go = 0;
   InputView* next_retired = nullptr;
 };
 

@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "shm/clock.hpp"
+#include "shm/descendants.hpp"
 #include "shm/segment.hpp"
 
 namespace arbiter::shm {
@@ -51,6 +52,8 @@ Bell::Bell() {
   }
   read_.reset(ends[0]);
   write_.reset(ends[1]);
+  close_in_children(read_);
+  close_in_children(write_);
   if (fchmod(write_.get(), 0222) != 0) {
     throw std::system_error(errno, std::generic_category(), "making a bell write-only");
   }
@@ -78,8 +81,9 @@ void Bell::silence() const noexcept {
   }
 }
 
-Ringer::Ringer(const FileDescriptor& write_end)
-    : write_(reopen(write_end, O_WRONLY | O_NONBLOCK)) {}
+Ringer::Ringer(const FileDescriptor& write_end) : write_(reopen(write_end, O_WRONLY | O_NONBLOCK)) {
+  close_in_children(write_);
+}
 
 void Ringer::ring() const noexcept { ring_bell(write_.get()); }
 

@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "shm/bell.hpp"
+#include "shm/descendants.hpp"
 #include "shm/residence.hpp"
 #include "shm/segment.hpp"
 #include "tests/explore/explorer.hpp"
@@ -109,6 +110,12 @@ Mapping::Mapping(const FileDescriptor& segment, std::size_t size, Access access)
                             size);
   region_.swap(region);
 }
+
+// Nothing is forked here.
+Bequest::Bequest(void* address, std::size_t size, Kind kind, const std::uint32_t* users)
+    : address_(address), size_(size), kind_(kind), users_(users) {}
+Bequest::~Bequest() = default;
+void close_in_children(const FileDescriptor&) {}
 
 // A real descriptor, which epoll takes, that is never readable; and a word in the image.
 Bell::Bell() : read_(eventfd(0, EFD_CLOEXEC)), write_(eventfd(0, EFD_CLOEXEC)) {

@@ -60,7 +60,8 @@ inline constexpr WhenFull drop_oldest = WhenFull::drop_oldest;
 inline constexpr WhenFull refuse_new = WhenFull::refuse_new;
 
 struct InputPortOptions {
-  // How many samples of each connection may wait, 1 to 1024.
+  // How many samples of each connection may wait, 1 to 1024: those of its publisher, and those that
+  // predecessors of it have left. Theirs give way, however the port is set.
   std::uint32_t depth = 8;
   WhenFull when_full = WhenFull::drop_oldest;
   // Receive all that was accepted, even if an override has come since. For loggers, not for motors.
