@@ -138,6 +138,18 @@ TEST(Predecessors, ASampleThatIsHeldOutlivesThem) {
   scene.expect_balance(taken.size() + 1);
 }
 
+// Of the five only the last two are in its ring still, and two later ones push these out.
+TEST(Predecessors, WhatWasOvertakenByItsOwnPublisherDoesNotGiveWayInsteadOfTheRest) {
+  Restarts scene({.depth = 2});
+  scene.restart(1, 5);
+  ASSERT_EQ(scene.sender.tell("output /out"), "open");
+  EXPECT_EQ(scene.sender.tell("publish /out 6 2"), "1 0 0");
+  scene.next += 2;
+  const auto taken = take_all(scene.in);
+  EXPECT_EQ(taken, (std::vector<std::int64_t>{6, 7}));
+  scene.expect_balance(taken.size());
+}
+
 // The successor rings nobody: the service thread looks by itself.
 TEST(Predecessors, WhatALivingSuccessorPushesOutIsLetGoOfToo) {
   Restarts scene({.depth = 3});
