@@ -22,6 +22,7 @@ struct CheckOptions {
   rules::ModelFiles files;
   std::vector<std::string> statements;  // files
   std::vector<std::string> silenced;    // codes
+  bool strict = false;
   bool json = false;
 };
 
@@ -31,23 +32,16 @@ struct Statements {
 };
 
 // Of the warnings and notes that reading, compiling and proving a model can bring.
-const std::vector<std::string_view> silenceable{"duplicate-config",
-                                                "duplicate-connection",
-                                                "inhibition-across-ports",
-                                                "left-open",
-                                                "matches-nothing",
-                                                "more-conflicts",
-                                                "never-published",
-                                                "never-runs",
-                                                "never-selected",
-                                                "never-wins",
-                                                "no-children",
-                                                "no-config",
-                                                "no-rule-at-port",
-                                                "nobody-wins",
-                                                "not-checked",
-                                                "proved",
-                                                "starved",
+const std::vector<std::string_view> silenceable{"duplicate-config",    "duplicate-connection",
+                                                "forever-commands",    "inhibition-across-ports",
+                                                "left-open",           "matches-nothing",
+                                                "more-conflicts",      "never-published",
+                                                "never-read",          "never-runs",
+                                                "never-selected",      "never-wins",
+                                                "no-children",         "no-config",
+                                                "no-rule-at-port",     "nobody-wins",
+                                                "not-checked",         "proved",
+                                                "similar-name",        "starved",
                                                 "unreachable-children"};
 
 std::string problem_of_code(std::string& code) {
@@ -113,6 +107,7 @@ int check(const CheckOptions& options) {
                      "whether the statements are true was not looked at: the model has errors");
   }
   diagnostics.silence(options.silenced);
+  if (options.strict) diagnostics.make_warnings_errors();
   const bool failed = diagnostics.has_errors();
   if (options.json) {
     rules::write_json(std::cout, diagnostics);
@@ -123,7 +118,8 @@ int check(const CheckOptions& options) {
     write_summary(std::cout, statements);
   }
   if (failed) {
-    std::cout << "failed: " << rules::counts(diagnostics) << '\n';
+    std::cout << "failed: " << rules::counts(diagnostics)
+              << (options.strict ? " (--strict takes warnings for errors)\n" : "\n");
   } else {
     std::cout << "ok: " << summary_of(model->compiled) << '\n';
   }
@@ -146,6 +142,7 @@ void add_check(CLI::App& app, int& exit_code) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(CLI::Validator(problem_of_code, ""));
+  verb->add_flag("--strict", options->strict, "Take warnings for errors, but for silenced ones");
   verb->add_flag("--json", options->json, "Write what is found as JSON, to standard output");
   verb->footer(
       "Example:\n"
@@ -154,7 +151,8 @@ void add_check(CLI::App& app, int& exit_code) {
       "Statements speak of sources and winners:\n"
       "  /collision:o -> idle(/Arm/pos:i)\n"
       "  winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o\n"
-      "Exit code 0: no error; 1: an error, or a statement that is not proved; 2: wrong use,\n"
+      "Exit code 0: no error; with --strict, no warning either; 1: an error, or a statement that "
+      "is not proved; 2: wrong use,\n"
       "or a file cannot be opened, or the output not be written.");
   verb->callback([options, &exit_code] { exit_code = check(*options); });
 }

@@ -25,7 +25,7 @@ TEST(Load, SeveralFilesFormOneModel) {
       "<behavior name='A'><config at='/p'>/a</config><inhibition>M</inhibition></behavior>"
       "</behaviors>",
       "<behavior name='B'><config at='/p'>/b</config></behavior>",
-      "<behaviors timeout='1000ms'><source port='/c' timeout='2s'/></behaviors>",
+      "<behaviors timeout='1000ms'><source port='/a' timeout='2s'/></behaviors>",
   });
   EXPECT_THAT(loaded.findings(), IsEmpty()) << loaded.message();
   EXPECT_THAT(show_rules(loaded, "/p"), ElementsAre("/a: true", "/b: not(/a)"));
