@@ -29,6 +29,7 @@ struct CheckOptions {
 struct Statements {
   std::size_t proved = 0, refuted = 0, open = 0;
   std::size_t not_judged = 0;  // malformed, or of names that the model does not have
+  rules::ProvedStatements facts;
 };
 
 // Of the warnings and notes that reading, compiling and proving a model can bring.
@@ -81,6 +82,7 @@ Statements judge_statements(const CheckOptions& options, const rules::CompiledMo
     for (const auto& verdict : verdicts) {
       using Kind = rules::Verdict::Kind;
       result.proved += verdict.kind == Kind::kProved ? 1 : 0;
+      if (verdict.proved) result.facts.push_back(verdict.proved);
       result.refuted += verdict.kind == Kind::kRefuted ? 1 : 0;
       result.open += verdict.kind == Kind::kOpen ? 1 : 0;
     }
@@ -99,9 +101,12 @@ void write_summary(std::ostream& out, const Statements& statements) {
 int check(const CheckOptions& options) {
   rules::Diagnostics diagnostics;
   const auto model = load_model(options.files, diagnostics);
-  if (model) rules::find_more(model->rules, model->compiled, diagnostics);
   const auto statements =
       judge_statements(options, model ? &model->compiled : nullptr, diagnostics);
+  if (model) {
+    rules::find_more(model->rules, model->compiled, diagnostics, rules::kMaxFindingsWork,
+                     statements.facts);
+  }
   if (!model && !options.statements.empty()) {
     diagnostics.note("left-open", {options.statements.front(), 1, 1},
                      "whether the statements are true was not looked at: the model has errors");

@@ -243,6 +243,15 @@ TEST(Check, StatementsThatAreTrueAreProved) {
   EXPECT_EQ(result.exit_code, 0);
 }
 
+TEST(Check, ProvedStatementsQuietWhatTheyCover) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  const auto statements = directory.write("s.txt", "/object and /collision -> idle(/arm)\n");
+  const auto result = arbiter({"check", model, "--assert", statements});
+  EXPECT_EQ(result.err, "");
+  EXPECT_EQ(result.exit_code, 0);
+}
+
 TEST(Check, AStatementThatIsNotTrueEndsWithOneAndSaysWhen) {
   TemporaryDirectory directory;
   const auto model = directory.write("m.xml", kTrackModel);
