@@ -280,7 +280,8 @@ TEST(Load, ASourceThatNobodyPublishesIsShownWhereItIsReadWithTheNameThatWasMeant
         "<connection><from>/Front/scan:o</from><to>/unrelated</to></connection></application>");
   };
   const auto connected = load("/Font/scan:o");
-  EXPECT_THAT(connected.findings(true), ElementsAre("a.xml:3:1 warning never-published"));
+  EXPECT_THAT(connected.findings(true),
+              ElementsAre("a.xml:3:1 warning never-published", "a.xml:3:16 warning similar-name"));
   EXPECT_THAT(connected.message(), HasSubstr("never be active; did you mean \"/Front/scan:o\"?"));
   const auto of_module = load("/colision/state:o");
   EXPECT_THAT(of_module.message(), HasSubstr("; did you mean \"/collision/state:o\"?"));
