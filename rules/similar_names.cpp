@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <map>
+#include <utility>
 
 namespace arbiter::rules {
 namespace {
@@ -53,11 +54,6 @@ std::vector<std::string> words_of(std::string_view name) {
   return words;
 }
 
-std::string without_digits(std::string text) {
-  std::erase_if(text, is_digit);
-  return text;
-}
-
 // Whether so many slips make one of the other: a letter too many, too few or another, or two
 // neighbours exchanged.
 bool are_within(std::string_view a, std::string_view b, std::size_t slips) {
@@ -89,10 +85,10 @@ bool are_exchanged(std::string_view a, std::string_view b) {
 
 // Two words of otherwise equal names. Short words are near each other by nature, first and last
 // letters are seldom wrong, and what differs there is often meant: get and set, hand and hands.
-Resemblance compare_words(const std::string& a, const std::string& b) {
-  const std::string letters_a = without_digits(a), letters_b = without_digits(b);
-  if (letters_a == letters_b) return Resemblance::kNone;  // siblings
-  const std::size_t length = std::max(letters_a.size(), letters_b.size());
+Resemblance compare_words(const NameWord& one, const NameWord& other) {
+  if (one.letters == other.letters) return Resemblance::kNone;  // siblings
+  const std::size_t length = std::max(one.letters.size(), other.letters.size());
+  const std::string &a = one.text, &b = other.text;
   const bool has_ends = a.front() == b.front() && a.back() == b.back();
   if (length < 3) return Resemblance::kNone;
   if (are_exchanged(a, b)) return has_ends ? Resemblance::kClose : Resemblance::kSlip;
@@ -118,23 +114,21 @@ std::string key_without(const std::vector<std::string>& words, std::size_t left_
   return key;
 }
 
-// Which characters a word has. A slip changes two of them at most, so that words which differ in
-// more than four need not be compared.
-std::uint64_t characters_of(const std::string& word) {
-  std::uint64_t result = 0;
-  for (const char byte : word)
-    result |= std::uint64_t{1} << (static_cast<unsigned char>(byte) & 63);
-  return result;
-}
-
 }  // namespace
+
+NameWord::NameWord(std::string word) : text(std::move(word)) {
+  for (const char byte : text) {
+    characters |= std::uint64_t{1} << (static_cast<unsigned char>(byte) & 63);
+    if (!is_digit(byte)) letters += byte;
+  }
+}
 
 NameIndex::NameIndex(const std::vector<std::string_view>& names) : names_(names) {
   for (std::size_t i = 0; i < names_.size(); ++i) {
     by_plain_[plain(names_[i])].push_back(i);
     const auto words = words_of(names_[i]);
     for (std::size_t at = 0; at < words.size(); ++at) {
-      by_key_[key_without(words, at)].push_back({words[at], characters_of(words[at]), i});
+      by_key_[key_without(words, at)].emplace_back(NameWord(words[at]), i);
     }
   }
 }
@@ -148,11 +142,11 @@ std::vector<SimilarName> NameIndex::similar_to(std::string_view name) const {
   for (std::size_t at = 0; at < words.size(); ++at) {
     const auto others = by_key_.find(key_without(words, at));
     if (others == by_key_.end()) continue;
-    const std::uint64_t characters = characters_of(words[at]);
-    for (const Entry& other : others->second) {
-      if (std::popcount(characters ^ other.characters) > 4) continue;
-      const Resemblance how = compare_words(words[at], other.word);
-      if (how != Resemblance::kNone) found.emplace(other.name, how);
+    const NameWord word(words[at]);
+    for (const auto& [other, i] : others->second) {
+      if (std::popcount(word.characters ^ other.characters) > 4) continue;
+      const Resemblance how = compare_words(word, other);
+      if (how != Resemblance::kNone) found.emplace(i, how);
     }
   }
   std::vector<SimilarName> result;

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 namespace arbiter::rules {
@@ -21,6 +22,14 @@ struct SimilarName {
   Resemblance how;
 };
 
+// A word of a name, with what is asked of it time and again.
+struct NameWord {
+  explicit NameWord(std::string word);
+  std::string text;
+  std::string letters;           // without its digits
+  std::uint64_t characters = 0;  // that it has, as bits; a slip changes two of them at most
+};
+
 // Names arranged so that each is compared with few others. Keeps views of them.
 class NameIndex {
  public:
@@ -30,14 +39,10 @@ class NameIndex {
   [[nodiscard]] std::vector<SimilarName> similar_to(std::string_view name) const;
 
  private:
-  struct Entry {
-    std::string word;  // that the key leaves open
-    std::uint64_t characters;
-    std::size_t name;
-  };
   std::vector<std::string_view> names_;
   std::unordered_map<std::string, std::vector<std::size_t>> by_plain_;
-  std::unordered_map<std::string, std::vector<Entry>> by_key_;
+  // By a name with one of its words left open: that word, and whose it is.
+  std::unordered_map<std::string, std::vector<std::pair<NameWord, std::size_t>>> by_key_;
 };
 
 }  // namespace arbiter::rules
