@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/name_warnings.hpp"
 #include "rules/load.hpp"
 #include "rules/names.hpp"
 #include "rules/table_rules.hpp"
@@ -106,12 +107,14 @@ void LivePort::fetch_model() {
   model_ = ModelInForce::fetch(*node_);
   generation_ = model_.generation();
   rules_ = {};
+  name_warnings_.clear();
   if (!model_.has_texts()) return;
   rules::Diagnostics diagnostics;
   rules_ = rules::load(model_.texts(), diagnostics, rules::Keep::kProvenance);
   if (diagnostics.has_errors()) {
     throw Error("the daemon's model is none to this program; are both of one version?");
   }
+  name_warnings_ = cli::name_warnings(diagnostics);
 }
 
 void LivePort::add_timeouts(Look& look) const {

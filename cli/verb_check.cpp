@@ -22,23 +22,27 @@ struct CheckOptions {
   rules::ModelFiles files;
   std::vector<std::string> statements;  // files
   std::vector<std::string> silenced;    // codes
+  bool strict = false;
   bool json = false;
 };
 
 struct Statements {
   std::size_t proved = 0, refuted = 0, open = 0;
   std::size_t not_judged = 0;  // malformed, or of names that the model does not have
+  rules::ProvedStatements facts;
 };
 
 // Of the warnings and notes that reading, compiling and proving a model can bring.
 const std::vector<std::string_view> silenceable{"decided-in-order",
                                                 "duplicate-config",
                                                 "duplicate-connection",
+                                                "forever-commands",
                                                 "inhibition-across-ports",
                                                 "left-open",
                                                 "matches-nothing",
                                                 "more-conflicts",
                                                 "never-published",
+                                                "never-read",
                                                 "never-runs",
                                                 "never-selected",
                                                 "never-wins",
@@ -48,6 +52,7 @@ const std::vector<std::string_view> silenceable{"decided-in-order",
                                                 "nobody-wins",
                                                 "not-checked",
                                                 "proved",
+                                                "similar-name",
                                                 "starved",
                                                 "unreachable-children"};
 
@@ -88,6 +93,7 @@ Statements judge_statements(const CheckOptions& options, const rules::CompiledMo
     for (const auto& verdict : verdicts) {
       using Kind = rules::Verdict::Kind;
       result.proved += verdict.kind == Kind::kProved ? 1 : 0;
+      if (verdict.proved) result.facts.push_back(verdict.proved);
       result.refuted += verdict.kind == Kind::kRefuted ? 1 : 0;
       result.open += verdict.kind == Kind::kOpen ? 1 : 0;
     }
@@ -106,14 +112,18 @@ void write_summary(std::ostream& out, const Statements& statements) {
 int check(const CheckOptions& options) {
   rules::Diagnostics diagnostics;
   const auto model = load_model(options.files, diagnostics);
-  if (model) rules::find_more(model->rules, model->compiled, diagnostics);
   const auto statements =
       judge_statements(options, model ? &model->compiled : nullptr, diagnostics);
+  if (model) {
+    rules::find_more(model->rules, model->compiled, diagnostics, rules::kMaxFindingsWork,
+                     statements.facts);
+  }
   if (!model && !options.statements.empty()) {
     diagnostics.note("left-open", {options.statements.front(), 1, 1},
                      "whether the statements are true was not looked at: the model has errors");
   }
   diagnostics.silence(options.silenced);
+  if (options.strict) diagnostics.make_warnings_errors();
   const bool failed = diagnostics.has_errors();
   if (options.json) {
     rules::write_json(std::cout, diagnostics);
@@ -124,7 +134,8 @@ int check(const CheckOptions& options) {
     write_summary(std::cout, statements);
   }
   if (failed) {
-    std::cout << "failed: " << rules::counts(diagnostics) << '\n';
+    std::cout << "failed: " << rules::counts(diagnostics)
+              << (options.strict ? " (--strict takes warnings for errors)\n" : "\n");
   } else {
     std::cout << "ok: " << summary_of(model->compiled) << '\n';
   }
@@ -147,6 +158,7 @@ void add_check(CLI::App& app, int& exit_code) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(CLI::Validator(problem_of_code, ""));
+  verb->add_flag("--strict", options->strict, "Take warnings for errors, but for silenced ones");
   verb->add_flag("--json", options->json, "Write what is found as JSON, to standard output");
   verb->footer(
       "Example:\n"
@@ -155,7 +167,8 @@ void add_check(CLI::App& app, int& exit_code) {
       "Statements speak of sources and winners:\n"
       "  /collision:o -> idle(/Arm/pos:i)\n"
       "  winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o\n"
-      "Exit code 0: no error; 1: an error, or a statement that is not proved; 2: wrong use,\n"
+      "Exit code 0: no error; with --strict, no warning either; 1: an error, or a statement that "
+      "is not proved; 2: wrong use,\n"
       "or a file cannot be opened, or the output not be written.");
   verb->callback([options, &exit_code] { exit_code = check(*options); });
 }

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "cli/name_warnings.hpp"
 #include "rules/names.hpp"
 
 namespace arbiter::cli {
@@ -314,7 +315,8 @@ void WhyAnswer::write_json() const {
                    {"since", nullptr},
                    {"obstacles", to_json(obstacles_.of_port())},
                    {"connections", json::array()},
-                   {"senses", json::array()}};
+                   {"senses", json::array()},
+                   {"warnings", to_json(port_.name_warnings())}};
   if (look_.is_arbitrated) document["since"] = since_json();
   if (explanation_.winner) {
     const std::string why = obstacles_.why_nothing_comes_of(*explanation_.winner);

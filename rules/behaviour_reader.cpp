@@ -69,6 +69,8 @@ class BehaviourReader {
     const auto text = reader_.text(element);
     const auto source = text ? reader_.port_name(*text, "the output port") : std::nullopt;
     if (!port || !source) return false;
+    model_.source_uses.add(*source, kConnected);
+    model_.port_uses.add(*port, kConnected);
     behaviour_.configs.push_back(
         {source->name, port->name, reader_.where(element), model_.next_order++});
     return true;
@@ -93,7 +95,7 @@ class BehaviourReader {
 
   bool read_own_condition(const XmlNode& element) {
     const bool fine = reader_.check_attributes(element, {});
-    const auto condition = read_condition(element, reader_, diagnostics_);
+    const auto condition = read_condition(element, reader_, model_, diagnostics_);
     if (!condition) return false;
     if (*condition != nullptr) {
       behaviour_.conditions.push_back({*condition, reader_.where(element)});
@@ -145,11 +147,14 @@ void read_behaviour(const XmlNode& element, ElementReader& reader, Model& model,
 }
 
 std::optional<ExpressionPtr> read_condition(const XmlNode& element, ElementReader& reader,
-                                            Diagnostics& diagnostics) {
+                                            Model& model, Diagnostics& diagnostics) {
   const auto text = reader.text(element);
   if (!text) return {};
   if (text->is_blank()) return ExpressionPtr();
-  return parse_condition(*text, diagnostics);
+  std::vector<Mention> sources;
+  auto condition = parse_condition(*text, diagnostics, &sources);
+  for (const Mention& source : sources) model.source_uses.add(source, kRead);
+  return condition;
 }
 
 void refuse(const XmlNode& element, Model& model) {

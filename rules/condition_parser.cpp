@@ -57,9 +57,13 @@ Operator operator_of(TokenKind kind) {
 
 class Parser {
  public:
-  explicit Parser(const Text& text) : text_(text), lexer_(text.bytes()) {}
+  Parser(const Text& text, std::vector<Mention>* sources)
+      : text_(text), sources_(sources), lexer_(text.bytes()) {}
   Parser(const Text& text, ParsedStatement& statement)
-      : text_(text), statement_(&statement), lexer_(text.bytes(), Language::kStatement) {}
+      : text_(text),
+        statement_(&statement),
+        sources_(&statement.sources),
+        lexer_(text.bytes(), Language::kStatement) {}
 
   ExpressionPtr parse_all() {
     Parsed parsed = parse_binary(0);
@@ -117,7 +121,7 @@ class Parser {
       case TokenKind::kPort:
         check_port(token);
         lexer_.take();
-        if (statement_ != nullptr) statement_->sources.push_back(mention(token));
+        if (sources_ != nullptr) sources_->push_back(mention(token));
         return {make_source(std::string(token.name))};
       case TokenKind::kOpen: {
         lexer_.take();
@@ -199,7 +203,8 @@ class Parser {
   }
 
   [[nodiscard]] Mention mention(const Token& token) const {
-    return {std::string(token.name), text_.where(token.at)};
+    return {std::string(token.name), text_.where(token.at),
+            text_.define_of(token.at, token.at + token.spelling.size())};
   }
 
   void expect_close(const Token& open) {
@@ -259,7 +264,8 @@ class Parser {
   }
 
   const Text& text_;
-  ParsedStatement* statement_ = nullptr;  // none while a condition is parsed
+  ParsedStatement* statement_ = nullptr;     // none while a condition is parsed
+  std::vector<Mention>* sources_ = nullptr;  // none where nobody asks
   ConditionLexer lexer_;
   int nesting_ = 0;
 };
@@ -271,9 +277,10 @@ void report(ConditionError& error, const Text& text, Diagnostics& diagnostics) {
 
 }  // namespace
 
-std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diagnostics) {
+std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diagnostics,
+                                             std::vector<Mention>* sources) {
   try {
-    return Parser(text).parse_all();
+    return Parser(text, sources).parse_all();
   } catch (ConditionError& error) {
     report(error, text, diagnostics);
     return {};

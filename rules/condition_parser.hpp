@@ -29,7 +29,9 @@ inline constexpr int kMaxConditionDepth = 500;
 
 // The text must not be blank: what an absent condition means is the caller's to know. Empty where
 // it is malformed, which was then reported.
-std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diagnostics);
+// `sources`, if given, gets each mention of a source.
+std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diagnostics,
+                                             std::vector<Mention>* sources = nullptr);
 
 // What a statement says of the winner at a port, with "winner(/p) = /s", "winner(/p) != /s",
 // "winner(/p) = none" or "idle(/p)", which mean an operand each.

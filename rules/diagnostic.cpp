@@ -18,6 +18,20 @@ void Diagnostics::silence(const std::vector<std::string>& codes) {
   });
 }
 
+void Diagnostics::make_warnings_errors() {
+  Diagnostics stricter;
+  for (Diagnostic& item : items_) {
+    if (item.severity == Severity::kWarning) item.severity = Severity::kError;
+    stricter.add(std::move(item));
+  }
+  for (const Omission& omission : omissions()) {
+    const bool is_warning = omission.severity == Severity::kWarning;
+    const Severity severity = is_warning ? Severity::kError : omission.severity;
+    stricter.tallies_[{severity, omission.code}].found += omission.count;
+  }
+  *this = std::move(stricter);
+}
+
 void Diagnostics::add(Diagnostics other) {
   for (Diagnostic& item : other.items_) add(std::move(item));
   for (const Omission& omission : other.omissions()) {

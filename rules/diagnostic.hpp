@@ -71,6 +71,7 @@ class Diagnostics {
   void add(Diagnostics other);
   // Without those of these codes; errors stay.
   void silence(const std::vector<std::string>& codes);
+  void make_warnings_errors();
   template <typename Before>
   void sort_by_place(const Before& is_before) {
     std::stable_sort(items_.begin(), items_.end(), [&](const Diagnostic& a, const Diagnostic& b) {

@@ -24,13 +24,15 @@ constexpr std::size_t kMaxChains = 4;
 // The states of one port in which somebody wants to win and nobody does.
 class PortFindings {
  public:
-  PortFindings(const PortRules& rules, const CompiledPort& port, Diagnostics& diagnostics)
-      : rules_(rules), port_(port), diagnostics_(diagnostics) {}
+  PortFindings(const PortRules& rules, const CompiledPort& port, const ProvedStatements& statements,
+               Diagnostics& diagnostics)
+      : rules_(rules), port_(port), statements_(statements), diagnostics_(diagnostics) {}
 
   // Returns the work that it took. Throws DiagramLimit.
   std::uint64_t find(std::uint64_t max_work) {
     SourceOrder order;
     order.add(port_);
+    add_sources(statements_, order);
     Winners winners(order, max_work, false);
     winners_ = &winners;
     const Forget forget{*this};
@@ -41,6 +43,7 @@ class PortFindings {
       candidates_.push_back({&rule, std::move(wins)});
     }
     find_states();
+    leave_out_stated();
     if (!nobody_.is_false()) {
       note_states();
       if (port_.in_order) throw DiagramLimit("a diagram of each winner, and those are too large");
@@ -73,6 +76,23 @@ class PortFindings {
     for (const auto& each : candidates_) {
       nobody_ = winners_->combine(Connective::kAndNot, nobody_, each.wins);
     }
+  }
+
+  // Of these states, those remain in which some active candidate could win and no statement would
+  // be false. In the others it is stated, in other words, that nobody wins.
+  void leave_out_stated() {
+    if (statements_.empty()) return;
+    Diagram unstated = winners_->constant(false);
+    for (const auto& each : candidates_) {
+      const Diagram active = winners_->active(each.rule->source);
+      Diagram states = winners_->combine(Connective::kAnd, nobody_, active);
+      for (const auto& statement : statements_) {
+        if (states.is_false()) break;
+        states = allowed_by(*statement, *winners_, port_, *each.rule, states);
+      }
+      unstated = winners_->combine(Connective::kOr, unstated, states);
+    }
+    nobody_ = unstated;
   }
 
   [[nodiscard]] Location where_of(const std::string& source) const {
@@ -232,6 +252,7 @@ class PortFindings {
 
   const PortRules& rules_;
   const CompiledPort& port_;
+  const ProvedStatements& statements_;  // that speak of the port
   Diagnostics& diagnostics_;
   Winners* winners_ = nullptr;
   std::vector<Candidate> candidates_;  // connections that can win
@@ -277,10 +298,33 @@ void warn_of_losers(const RuleSet& rules, const CompiledModel& model, Diagnostic
   }
 }
 
+// Returns the work that it took. Throws DiagramLimit. What the statements cover may be too hard to
+// find out; then they quiet nothing.
+std::uint64_t look_at(const PortRules& rules, const CompiledPort& port,
+                      const ProvedStatements& statements, Diagnostics& diagnostics,
+                      std::uint64_t max_work) {
+  ProvedStatements own;
+  for (const auto& statement : statements) {
+    if (speaks_of(*statement, port)) own.push_back(statement);
+  }
+  if (!own.empty()) {
+    try {
+      Diagnostics found;
+      const std::uint64_t work = PortFindings(rules, port, own, found).find(max_work);
+      diagnostics.add(std::move(found));
+      return work;
+    } catch (const DiagramLimit&) {
+      own.clear();
+    }
+  }
+  return PortFindings(rules, port, own, diagnostics).find(max_work);
+}
+
 }  // namespace
 
 FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
-                          Diagnostics& diagnostics, std::uint64_t max_work) {
+                          Diagnostics& diagnostics, std::uint64_t max_work,
+                          const ProvedStatements& statements) {
   warn_of_losers(rules, model, diagnostics);
   FindingsAccount account;
   std::pair<const PortRules*, std::string> first_open;
@@ -294,7 +338,7 @@ FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
     std::string limit = "the model's other ports have used up all steps";
     if (room > 0) {
       try {
-        account.work += PortFindings(port, *found->second, diagnostics).find(room);
+        account.work += look_at(port, *found->second, statements, diagnostics, room);
         continue;
       } catch (const DiagramLimit& reached) {
         account.work += room;

@@ -8,6 +8,7 @@
 #include "rules/compile.hpp"
 #include "rules/diagnostic.hpp"
 #include "rules/rule_set.hpp"
+#include "rules/verdict.hpp"
 
 namespace arbiter::rules {
 
@@ -23,8 +24,10 @@ inline constexpr std::uint64_t kMaxFindingsWork = 40'000'000;
 // And of those of one port, so that one cannot use up all.
 inline constexpr std::uint64_t kMaxPortWork = 4'000'000;
 
-// Warnings "never-wins"; notes "nobody-wins", "starved" and "left-open".
+// Warnings "never-wins"; notes "nobody-wins", "starved" and "left-open". States of which proved
+// statements say that nobody wins are known, and not noted: those in which they leave it to nobody.
 FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
-                          Diagnostics& diagnostics, std::uint64_t max_work = kMaxFindingsWork);
+                          Diagnostics& diagnostics, std::uint64_t max_work = kMaxFindingsWork,
+                          const ProvedStatements& statements = {});
 
 }  // namespace arbiter::rules

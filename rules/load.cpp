@@ -14,6 +14,7 @@
 #include "rules/model.hpp"
 #include "rules/model_checks.hpp"
 #include "rules/model_reader.hpp"
+#include "rules/name_checks.hpp"
 #include "rules/provenance.hpp"
 #include "rules/text_file.hpp"
 
@@ -70,6 +71,10 @@ LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
   if (application) check_application(*application, loaded.model, rules, found);
   const Location whole{paths.empty() ? "" : paths.front(), 1, 1};
   check_limits(rules, application ? &*application : nullptr, whole, order, found);
+  if (!found.has_errors()) {
+    check_names(loaded.model, application, rules, order, found);
+    note_commands_forever(loaded.model, rules, whole, found);
+  }
   // Checks go through a model in various orders; the reader of their findings goes through files.
   found.sort_by_place(order);
   diagnostics.add(std::move(found));

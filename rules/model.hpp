@@ -9,15 +9,10 @@
 
 #include "rules/diagnostic.hpp"
 #include "rules/expression.hpp"
+#include "rules/name_uses.hpp"
 #include "shm/activity.hpp"
 
 namespace arbiter::rules {
-
-// A name that is used somewhere.
-struct Mention {
-  std::string name;
-  Location where;
-};
 
 struct Condition {
   ExpressionPtr expression;
@@ -77,6 +72,9 @@ struct Model {
   std::vector<Behaviour> behaviours;  // in document order, as all lists here
   std::vector<Arbiter> arbiters;
   std::vector<Select> selects;
+
+  NameUses source_uses;
+  NameUses port_uses;  // of input ports
 
   // Names of elements that were refused as a whole. Mentions of them are no further mistakes.
   std::set<std::string> refused_names;

@@ -215,7 +215,9 @@ class ModelReader {
     const auto port = reader_.port_attribute(element, "port");
     const auto text = reader_.optional_attribute(element, "timeout");
     const auto timeout = text ? read_duration(*text) : std::nullopt;
-    if (port) model_.sources.push_back({port->name, reader_.where(element), timeout});
+    if (!port) return;
+    model_.source_uses.add(*port, kDeclared);
+    model_.sources.push_back({port->name, reader_.where(element), timeout});
   }
 
   std::optional<shm::Nanoseconds> read_duration(const Text& text) {
@@ -243,6 +245,8 @@ class ModelReader {
       }
     }
     if (!port) return;
+    const bool has_rules = Elements(element.first_child).begin() != Elements(nullptr).begin();
+    model_.port_uses.add(*port, has_rules ? kConnected : kDeclared);
     arbiter.port = port->name;
     model_.arbiters.push_back(std::move(arbiter));
   }
@@ -264,8 +268,9 @@ class ModelReader {
   bool read_select(const XmlNode& element, const std::optional<Mention>& port) {
     reader_.check_attributes(element, {"from"});
     const auto source = reader_.port_attribute(element, "from");
-    const auto condition = read_condition(element, reader_, diagnostics_);
+    const auto condition = read_condition(element, reader_, model_, diagnostics_);
     if (!port || !source || !condition) return false;
+    model_.source_uses.add(*source, kConnected);
     model_.selects.push_back({source->name, port->name,
                               *condition ? *condition : make_constant(true), reader_.where(element),
                               model_.next_order++});

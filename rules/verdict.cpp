@@ -20,21 +20,32 @@ struct Term {
   const CompiledRule* rule;  // null: nobody wins
 };
 
+}  // namespace
+
+struct ProvedStatement {
+  ExpressionPtr expression;
+  std::vector<Term> terms;
+};
+
+namespace {
+
 // One statement about one model.
 class Question {
  public:
   Question(const Expression& expression, std::vector<Term> terms, std::uint64_t max_work)
-      : expression_(expression), terms_(std::move(terms)), max_work_(max_work) {
-    for (const Term& term : terms_) order_.add(*term.port);
-    add_sources(expression_);
-    for (const Term& term : terms_) {
-      const bool is_new = std::find(idle_.begin(), idle_.end(), term.port) == idle_.end();
-      if (term.rule == nullptr && is_new) idle_.push_back(term.port);
-    }
+      : expression_(expression), terms_(std::move(terms)), max_work_(max_work) {}
+
+  // The states in which the statement is true if that rule's source wins at the port.
+  Diagram if_it_won(Winners& winners, const CompiledPort& port, const CompiledRule& rule) {
+    winners_ = &winners;
+    decided_ = {{&port, &rule}};
+    const Forget forget{*this};
+    return build(expression_);
   }
 
   // A witness against the statement, if there is one. Throws DiagramLimit.
   std::optional<Witness> refute() {
+    gather();
     // That nobody wins is the only function that needs all rules of a port in one diagram. Where
     // that is too large, each possible winner is looked at by itself.
     try {
@@ -46,6 +57,15 @@ class Question {
   }
 
  private:
+  void gather() {
+    for (const Term& term : terms_) order_.add(*term.port);
+    add_sources(expression_);
+    for (const Term& term : terms_) {
+      const bool is_new = std::find(idle_.begin(), idle_.end(), term.port) == idle_.end();
+      if (term.rule == nullptr && is_new) idle_.push_back(term.port);
+    }
+  }
+
   std::optional<Witness> ask(bool by_cases) {
     std::optional<Witness> witness;
     try {
@@ -61,6 +81,11 @@ class Question {
     forget();
     return witness;
   }
+
+  struct Forget {
+    Question& question;
+    ~Forget() { question.forget(); }
+  };
 
   void forget() {  // diagrams must not outlive their builder
     built_.clear();
@@ -199,7 +224,10 @@ class Judge {
       verdict.limit = limit.what();
       return verdict;
     }
-    if (!verdict.witness) return verdict;
+    if (!verdict.witness) {
+      verdict.proved = std::make_shared<const ProvedStatement>(ProvedStatement{expression, terms});
+      return verdict;
+    }
     verdict.kind = Verdict::Kind::kRefuted;
     const Active active(verdict.witness->active.begin(), verdict.witness->active.end());
     std::set<std::string> seen;
@@ -292,6 +320,32 @@ std::vector<Verdict> judge(const std::vector<Statement>& statements, const Compi
     if (auto verdict = judge.judge(statement)) verdicts.push_back(std::move(*verdict));
   }
   return verdicts;
+}
+
+bool speaks_of(const ProvedStatement& statement, const CompiledPort& port) {
+  return std::any_of(statement.terms.begin(), statement.terms.end(),
+                     [&](const Term& term) { return term.port == &port; });
+}
+
+void add_sources(const ProvedStatements& statements, SourceOrder& order) {
+  std::set<const CompiledPort*> ports;  // orders are costly: each once
+  std::set<std::string> sources;
+  std::set<const Expression*> seen;
+  for (const auto& statement : statements) {
+    for (const Term& term : statement->terms) {
+      if (ports.insert(term.port).second) order.add(*term.port);
+    }
+    add_sources_of(*statement->expression, sources, seen);
+  }
+  for (const std::string& source : sources) {
+    if (!source.starts_with('=')) order.add(source);
+  }
+}
+
+Diagram allowed_by(const ProvedStatement& statement, Winners& winners, const CompiledPort& port,
+                   const CompiledRule& rule, const Diagram& states) {
+  Question question(*statement.expression, statement.terms, Winners::kMaxWork);
+  return winners.combine(Connective::kAnd, states, question.if_it_won(winners, port, rule));
 }
 
 void report(const std::vector<Verdict>& verdicts, Diagnostics& diagnostics, bool with_proved) {

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -16,11 +17,17 @@
 #include "rules/compile.hpp"
 #include "rules/diagnostic.hpp"
 #include "rules/statement.hpp"
+#include "rules/winners.hpp"
 
 namespace arbiter::rules {
 
 // Nodes of the diagrams of one statement together: a second or two.
 inline constexpr std::uint64_t kMaxStatementWork = 20'000'000;
+
+// A statement that was proved, looked up in the model that it was proved of; to be used while that
+// lives.
+struct ProvedStatement;
+using ProvedStatements = std::vector<std::shared_ptr<const ProvedStatement>>;
 
 struct Verdict {
   enum class Kind { kProved, kRefuted, kOpen };
@@ -33,6 +40,7 @@ struct Verdict {
   std::optional<Witness> witness;
   std::vector<std::pair<std::string, std::optional<std::string>>> winners;
   std::string limit;  // where open: what was exceeded
+  std::shared_ptr<const ProvedStatement> proved;
 };
 
 // Verdicts on all statements that have a meaning in the model, in their order. Ports and sources
@@ -40,6 +48,15 @@ struct Verdict {
 // reported as errors; patterns that nothing matches as warnings.
 std::vector<Verdict> judge(const std::vector<Statement>& statements, const CompiledModel& model,
                            Diagnostics& diagnostics, std::uint64_t max_work = kMaxStatementWork);
+
+[[nodiscard]] bool speaks_of(const ProvedStatement& statement, const CompiledPort& port);
+// What it takes to ask the next question of each of them.
+void add_sources(const ProvedStatements& statements, SourceOrder& order);
+// Of the states, those in which the statement allows that this rule's source wins at the port, with
+// all other ports as they are. Throws DiagramLimit.
+[[nodiscard]] Diagram allowed_by(const ProvedStatement& statement, Winners& winners,
+                                 const CompiledPort& port, const CompiledRule& rule,
+                                 const Diagram& states);
 
 // An error for each statement that is refuted or left open; if asked for, a note "proved" for each
 // that is true.

@@ -34,11 +34,13 @@ Daemon::Daemon(const DaemonOptions& options)
       stores_(options.uses_descriptor_store),
       gate_(options.policy),
       files_(options.models),
+      is_strict_(options.is_strict),
       state_(options.directory, options.instance) {
   if (!files_.empty() || gate_.has_file()) {
     Reading reading = read_files();
     if (reading.findings.has_errors())
-      throw BadModel("not started: the files have errors, told above");
+      throw BadModel(std::string("not started: the files have errors, told above") +
+                     (is_strict_ ? "; --strict takes warnings for errors" : ""));
     if (reading.policy) gate_.put_in_force(*reading.policy);
     read_at_start_ = std::move(reading.models);
   }

@@ -46,6 +46,7 @@ struct DaemonOptions {
   std::string instance;               // checked
   std::string directory;              // where to listen
   std::optional<std::string> policy;  // a file; without one the default policy holds
+  bool is_strict = false;             // takes warnings for errors, in all that it reads
   // Whether the service manager keeps descriptors for the next daemon.
   bool uses_descriptor_store = false;
 };
@@ -199,6 +200,7 @@ class Daemon {
   Directory directory_{registry_, stores_};
   Models models_{directory_, registry_};
   const std::vector<NamedFiles> files_;
+  const bool is_strict_;
   std::vector<ModelPointer> read_at_start_;  // until they are put into the library
   Library library_;
   LoadedModel in_force_;  // null: none, or a predecessor's

@@ -78,7 +78,7 @@ Reading Daemon::read_files() const {
   if (files_.empty() && !gate_.has_file()) {
     throw std::runtime_error("there is no file to read again; start with --model");
   }
-  Reading reading;
+  Reading reading{Findings(is_strict_), {}, {}};
   reading.policy = gate_.read(reading.findings);
   reading.models = read_models(files_, reading.findings);
   return reading;

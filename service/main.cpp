@@ -27,7 +27,8 @@ Example:
   arbiterd --model search=search.xml --model dance=dance.xml     # and then: arbiter switch dance
 
 It runs in the foreground, needs no configuration and no privileges, and logs to standard error.
-Files must be regular ones. SIGHUP and `arbiter reload` read all again; a bad one changes nothing.
+Files must be regular ones. Warnings about them are logged; with --strict they refuse the files.
+SIGHUP and `arbiter reload` read all again; a bad one changes nothing.
 SIGTERM, SIGINT and `arbiter stop` stop it. Without --policy every user may open ports and observe,
 and only root and the daemon's own user may reload, switch and stop.
 Components go on without it. The next daemon of the instance takes them over, and puts its own model
@@ -97,6 +98,8 @@ int run(int argc, char** argv) {
   app.add_option("--policy", policy,
                  "Policy file: who may open which ports, reload, switch, stop, observe")
       ->type_name("FILE");
+  app.add_flag("--strict", options.is_strict,
+               "Take warnings for errors: refuse files with them, at the start and at a reload");
   app.add_option("--instance", instance,
                  "Name of this daemon; without it $ARBITER_INSTANCE, else \"default\"")
       ->type_name("NAME");

@@ -86,6 +86,34 @@ TEST_F(ChangingModels, SwitchWithoutAModelSaysSo) {
   expect_refusal(arbiter({"rollback"}), "there is no model to go back to: none has been in force");
 }
 
+// A source that is declared, and that no rule reads.
+std::string with_warning(const std::string& source) {
+  return rules("<source port='/unread'/>" + arbiter_at("/in", select("/" + source)));
+}
+
+TEST_F(ChangingModels, AReloadTellsWarningsAndGoesOn) {
+  start();
+  daemon_->write_model(with_warning("c"));
+  const auto result = arbiter({"reload"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("warning: no rule reads or selects /unread"));
+  EXPECT_THAT(daemon_->log(), HasSubstr("no rule reads or selects /unread"));
+  EXPECT_EQ(source_in_force(), "/c");
+}
+
+TEST_F(ChangingModels, AStrictDaemonRefusesWarningsAndKeepsWhatItHas) {
+  start({"--strict"});
+  daemon_->write_model(with_warning("c"));
+  const auto result = arbiter({"reload"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("error: no rule reads or selects /unread"));
+  EXPECT_EQ(source_in_force(), "/a");
+  EXPECT_EQ(arbiter({"reload", "--dry-run"}).exit_code, 1);
+  daemon_->write_model(only("c"));
+  EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
+  EXPECT_EQ(source_in_force(), "/c");
+}
+
 TEST_F(ChangingModels, ReloadReadsAllAndStaysWithTheOneInForce) {
   start();
   ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
