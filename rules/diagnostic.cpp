@@ -68,10 +68,9 @@ std::size_t Diagnostics::count(Severity severity, const std::string& code) const
   return found == tallies_.end() ? 0 : found->second.found;
 }
 
-void Diagnostics::add(Severity severity, std::string code, Location where, std::string message,
-                      std::optional<Witness> witness, std::vector<Witness> more_witnesses) {
-  add({severity, std::move(code), std::move(where), in_one_line(std::move(message)),
-       std::move(witness), std::move(more_witnesses)});
+void Diagnostics::find(Diagnostic item) {
+  item.message = in_one_line(std::move(item.message));
+  add(std::move(item));
 }
 
 void Diagnostics::add(Diagnostic item) {
