@@ -45,6 +45,8 @@ struct CompiledModel {
 
 // Proves every port and reports what fails: two connections that can both win, with a shortest
 // witness; rules that nothing satisfies; limits exceeded. To be used only if there is no error.
+// Where `diagnostics` has errors already, those of reading `rules`, ports that may depend on them
+// are passed over: all that can be judged is, so that all problems are told in one go.
 CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics);
 
 // The ids under which a table names sources and ports; each must be below the limits of the table.
