@@ -30,8 +30,12 @@ class DoubtFinder {
     for (const Arbiter& arbiter : model_.arbiters) {
       if (arbiter.is_incomplete) doubts_.ports.insert(arbiter.port);
     }
-    // A behaviour that was refused may inhibit any other.
-    if (!model_.refused_names.empty()) in_doubt_.assign(in_doubt_.size(), true);
+    // A behaviour that was refused may inhibit any other; a <config> that was may be one more that
+    // selects a connection of any other.
+    const bool lacks_configs =
+        std::any_of(model_.behaviours.begin(), model_.behaviours.end(),
+                    [](const Behaviour& each) { return !each.is_meta && each.lacks_parts; });
+    if (lacks_configs || !model_.refused_names.empty()) in_doubt_.assign(in_doubt_.size(), true);
     judge_behaviours();
     if (model_.lacks_sources) doubt_quantifiers();
     for (std::size_t b = 0; b < in_doubt_.size(); ++b) {

@@ -45,7 +45,9 @@ std::vector<std::string> errors_in(const std::string& text) {
 // What compiling says beside errors: code, port, source and behaviour of each.
 std::set<std::string> warnings_in(const std::string& text) {
   rules::Diagnostics reading, compiling;
-  const auto set = rules::load({{{"a.xml", text}}, {}}, reading);
+  rules::ModelTexts texts;
+  texts.models.push_back({"a.xml", text});
+  const auto set = rules::load(texts, reading);
   rules::compile(set, compiling);
   std::set<std::string> result;
   for (const auto& item : compiling.items()) {
