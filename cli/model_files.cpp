@@ -18,7 +18,6 @@ void add_model_options(CLI::App& verb, rules::ModelFiles& files) {
 std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
                                 rules::Keep keep) {
   rules::RuleSet rules = rules::load(files, diagnostics, keep);
-  if (diagnostics.has_errors()) return std::nullopt;
   rules::CompiledModel compiled = rules::compile(rules, diagnostics);
   if (diagnostics.has_errors()) return std::nullopt;
   return Model{std::move(rules), std::move(compiled)};

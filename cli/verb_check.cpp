@@ -167,6 +167,7 @@ void add_check(CLI::App& app, int& exit_code) {
       "Statements speak of sources and winners:\n"
       "  /collision:o -> idle(/Arm/pos:i)\n"
       "  winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o\n"
+      "  winner(/Base/vel:i) = any(/Nav/*) -> winner(/Arm/pos:i) != winner(/Hand/pos:i)\n"
       "Exit code 0: no error; with --strict, no warning either; 1: an error, or a statement that "
       "is not proved; 2: wrong use,\n"
       "or a file cannot be opened, or the output not be written.");

@@ -1,12 +1,15 @@
 #include "cli/why_answer.hpp"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <iostream>
 #include <set>
 #include <string_view>
 #include <utility>
 
 #include "cli/name_warnings.hpp"
+#include "cli/why_summary.hpp"
 #include "rules/names.hpp"
 
 namespace arbiter::cli {
@@ -15,8 +18,11 @@ namespace {
 using nlohmann::json;
 using rules::ConnectionExplanation;
 
-// Of ports with more connections than this, inactive ones are told of in a line each.
+// Of ports with more connections than this, inactive ones are told of in short.
 constexpr std::size_t kMaxTold = 8;
+// Where there is something to say of more than kMaxTold: of so many it is said one by one.
+constexpr std::size_t kMaxTakenApart = 3;
+constexpr std::size_t kMaxCauses = 3;  // of each of these
 
 // The sources that an explanation of a connection names as its reasons.
 std::vector<std::string> reasons_of(const ConnectionExplanation& connection) {
@@ -110,9 +116,12 @@ bool WhyAnswer::is_only_named(const std::string& source) const {
          std::find(reasons_.begin(), reasons_.end(), source) == reasons_.end();
 }
 
+bool WhyAnswer::is_large() const {
+  return options_.source.empty() && !options_.all && shown_.size() > kMaxTold;
+}
+
 bool WhyAnswer::is_short(const ConnectionExplanation& connection) const {
-  return options_.source.empty() && !options_.all && shown_.size() > kMaxTold &&
-         connection.has_rule && !connection.is_active;
+  return is_large() && connection.has_rule && !connection.is_active;
 }
 
 void WhyAnswer::write_text() const {
@@ -120,15 +129,55 @@ void WhyAnswer::write_text() const {
   auto sorted = shown_;
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const auto& a, const auto& b) { return rank(a) < rank(b); });
+  std::vector<const ConnectionExplanation*> told;
   for (const auto& each : sorted) {
-    if (!each.has_rule || !is_only_named(each.source)) write_connection(each);
+    if (!each.has_rule || !is_only_named(each.source)) told.push_back(&each);
   }
+  std::vector<const ConnectionExplanation*> rest;
+  if (is_large() && look_.is_arbitrated && told.size() > kMaxTold) {
+    rest.assign(told.begin() + kMaxTakenApart, told.end());
+    told.resize(kMaxTakenApart);
+  }
+  for (const auto* each : told) write_connection(*each);
+  if (!rest.empty()) write_rest(rest);
   if (is_sensed(options_.source)) write_sensed(options_.source);
   if (!options_.source.empty()) return;
-  for (const auto& source : explanation_.senses) {
-    if (!is_only_named(source)) write_sensed(source);
-  }
+  write_senses();
   write_only_named();
+}
+
+void WhyAnswer::write_rest(const std::vector<const ConnectionExplanation*>& rest) const {
+  write_summary(std::cout, rest);
+  std::vector<std::string> obstructed;
+  for (const auto* each : rest) {
+    if (!obstacles_.of_connection(each->source).empty()) obstructed.push_back(each->source);
+  }
+  if (!obstructed.empty()) {
+    std::cout << "  ! there is more to say of " << rules::enumerate(obstructed) << '\n';
+  }
+  std::cout << "\narbiter why " << port_.name() << " SOURCE tells of one of them, --all of all\n";
+}
+
+void WhyAnswer::write_senses() const {
+  std::vector<std::string> told;
+  for (const auto& source : explanation_.senses) {
+    if (!is_only_named(source)) told.push_back(source);
+  }
+  if (options_.all || told.size() <= kMaxTold) {
+    for (const auto& source : told) write_sensed(source);
+    return;
+  }
+  std::vector<std::string> active, inactive;
+  for (const auto& source : told) {
+    (look_.sources.is_active(source) ? active : inactive).push_back(source);
+  }
+  std::cout << "\nSensed, without a connection here:\n";
+  if (!active.empty()) {
+    std::cout << "  " << active.size() << " active: " << rules::enumerate(active) << '\n';
+  }
+  if (!inactive.empty()) {
+    std::cout << "  " << inactive.size() << " inactive: " << rules::enumerate(inactive) << '\n';
+  }
 }
 
 void WhyAnswer::write_only_named() const {
@@ -255,8 +304,13 @@ void WhyAnswer::write_connection(const ConnectionExplanation& connection) const 
 }
 
 void WhyAnswer::write_selected(const ConnectionExplanation& connection) const {
+  std::size_t told = 0;
   for (const auto& part : connection.parts) {
     if (!part.causes.empty()) continue;
+    if (told++ == kMaxCauses && is_large()) {
+      std::cout << "  and by other behaviours\n";
+      return;
+    }
     std::cout << "  selected by "
               << (part.behaviour ? describe(*part.behaviour) : std::string("its rule"));
     if (!part.where.file.empty()) {
@@ -272,12 +326,13 @@ void WhyAnswer::write_kept_out(const ConnectionExplanation& connection) const {
     std::cout << "  " << state_text(connection.source) << '\n';
   }
   if (!is_short(connection)) {
-    write_causes(std::cout, connection, look_.sources);
+    write_causes(std::cout, connection, look_.sources, is_large() ? kMaxCauses : SIZE_MAX);
     if (!connection.has_rule) std::cout << "  " << state_text(connection.source) << '\n';
     return;
   }
   const auto has_cause = [](const auto& part) { return !part.causes.empty(); };
-  if (std::all_of(connection.parts.begin(), connection.parts.end(), has_cause)) {
+  if (connection.earlier ||
+      std::all_of(connection.parts.begin(), connection.parts.end(), has_cause)) {
     std::cout << "  and by the rules: arbiter why " << port_.name() << ' ' << connection.source
               << '\n';
   }

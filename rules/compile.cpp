@@ -47,12 +47,13 @@ CompiledModel ModelCompiler::compile() {
   model_.timeouts = rules_.timeouts;
   model_.sources = all_sources();
   model_.texts = rules_.texts;
+  const bool is_whole = !context_.diagnostics.has_errors();
   gather_parts();
   compile_arbitrated_ports();
   add_unarbitrated_ports();
   report_never_running();
   report_unreachable_children();
-  check_limits();
+  if (is_whole) check_limits();  // reading has told what it found of them
   return std::move(model_);
 }
 
@@ -77,15 +78,20 @@ void ModelCompiler::gather_parts() {
 void ModelCompiler::compile_arbitrated_ports() {
   int outgrown = 0;
   for (const auto& port : rules_.ports) {
+    const auto& parts = parts_[port.port];
+    if (port.is_doubtful) {
+      for (const auto& part : parts) may_run_[part.behaviour] = true;  // as nobody knows
+      continue;
+    }
     if (outgrown == kMaxOutgrownPorts) {
       context_.diagnostics.note("not-checked", port.where,
                                 "the rules at " + port.port +
                                     ", and at the ports after it, were not looked at, since those "
-                                    "of too many ports exceed a limit");
+                                    "of too many ports exceed a limit",
+                                {.ports = {port.port}});
       may_run_.assign(may_run_.size(), true);
       return;
     }
-    const auto& parts = parts_[port.port];
     auto unselected = unselected_sources_[port.port];
     auto result = compile_port(context_, {port, unselected, parts});
     if (!result) {
@@ -138,7 +144,8 @@ void ModelCompiler::report_never_running() {
         "no activity of the sources lets the behaviour " + quote(behaviour.name) +
             " run: none of its connections can ever be selected for it" + reasons +
             "; look for a condition or an inhibition, its own or inherited, that contradicts "
-            "another one");
+            "another one",
+        {.behaviour = behaviour.name});
   }
 }
 
@@ -182,7 +189,8 @@ void ModelCompiler::report_unreachable_children() {
             (meta.children.size() == 1 ? " child" : " children") + " of " + quote(meta.name) +
             " can never run: " + enumerate(lost) +
             "; see what is said of each, or look at the conditions and inhibitions of " +
-            quote(meta.name));
+            quote(meta.name),
+        {.behaviour = meta.name});
   }
 }
 

@@ -54,6 +54,8 @@ struct CompiledModel {
 
 // Proves every port and reports what fails: two connections that can both win, with a
 // witness; rules that nothing satisfies; limits exceeded. To be used only if there is no error.
+// Where `diagnostics` has errors already, those of reading `rules`, ports that may depend on them
+// are passed over: all that can be judged is, so that all problems are told in one go.
 CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics,
                       std::size_t max_precedence_nodes = kMaxPrecedenceNodes);
 

@@ -88,7 +88,8 @@ std::optional<PortResult> PortCompiler::compile() {
         "limit-exceeded", port_.where,
         "the rules at " + port_.port + " are too entangled for the proof that only one can win: " +
             "it takes more than kMaxProofSteps (" + std::to_string(kMaxProofSteps) +
-            ") steps; write simpler conditions, or set conflict=\"first\" there");
+            ") steps; write simpler conditions, or set conflict=\"first\" there",
+        {.ports = {port_.port}});
     return std::nullopt;
   }
   return result;
@@ -100,7 +101,8 @@ bool PortCompiler::mention_sources() {
     context_.diagnostics.error(
         "limit-exceeded", where,
         "more than kMaxSourcesPerPort (" + std::to_string(shm::kMaxSourcesPerPort) +
-            ") sources are connected to " + port_.port + " or read by its rules; use fewer there");
+            ") sources are connected to " + port_.port + " or read by its rules; use fewer there",
+        {.ports = {port_.port}});
     return false;
   };
   for (const auto& rule : port_.rules) {
@@ -274,7 +276,8 @@ void PortCompiler::report_never_selected() {
                  ? ": no activity of the sources satisfies its rule; look for a condition or an "
                    "inhibition that contradicts another one"
                  : ": whenever its rule holds, that of an earlier connection does, too, which "
-                   "conflict=\"first\" prefers; move it up, or remove it"));
+                   "conflict=\"first\" prefers; move it up, or remove it"),
+        {.ports = {port_.port}, .source = rule.source, .behaviour = rule.behaviour});
   }
 }
 
@@ -288,7 +291,8 @@ void PortCompiler::report_conflicts() {
     context_.diagnostics.note("more-conflicts", port_.where,
                               std::to_string(pairs.size() - kMaxReportedPairs) +
                                   " more pairs of connections can both win at " + port_.port +
-                                  "; mend those reported first");
+                                  "; mend those reported first",
+                              {.ports = {port_.port}});
   }
 }
 
@@ -325,7 +329,10 @@ void PortCompiler::report_conflict(const Proof::Pair& pair) {
                         "; let one inhibit the other, give one a condition that excludes the "
                         "other, or let document order decide with <arbiter at=\"" +
                         port_.port + R"(" conflict="first"/>)";
-  context_.diagnostics.error("both-can-win", second.where, std::move(message), std::move(witness));
+  Subject about{.ports = {port_.port}, .source = second.source, .behaviour = second.behaviour};
+  for (const auto* rule : {&first, &second}) about.winners.emplace_back(port_.port, rule->source);
+  context_.diagnostics.error("both-can-win", second.where, std::move(message), std::move(about),
+                             std::move(witness));
 }
 
 void PortCompiler::report_in_order(const InOrder& order) {
@@ -346,7 +353,8 @@ void PortCompiler::report_outgrown(const ConnectionRule* rule) {
           std::to_string(shm::kMaxNodesPerConnection) +
           ") nodes, or the model too many steps to make its diagrams; write a simpler condition, "
           "or "
-          "one that reads fewer sources");
+          "one that reads fewer sources",
+      {.ports = {port_.port}, .source = rule != nullptr ? rule->source : std::string()});
 }
 
 }  // namespace

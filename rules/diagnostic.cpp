@@ -61,12 +61,11 @@ std::size_t Diagnostics::count(Severity severity, const std::string& code) const
   return found == tallies_.end() ? 0 : found->second.found;
 }
 
-void Diagnostics::add(Severity severity, std::string code, Location where, std::string message,
-                      std::optional<Witness> witness, std::vector<Witness> more_witnesses) {
+void Diagnostics::find(Diagnostic item) {
   // A message cites what stands in a file. Nothing of it may begin a line of its own, which would
   // look like another finding, or have a meaning to a terminal.
-  add({severity, std::move(code), std::move(where), shm::printable(message), std::move(witness),
-       std::move(more_witnesses)});
+  item.message = shm::printable(item.message);
+  add(std::move(item));
 }
 
 void Diagnostics::add(Diagnostic item) {

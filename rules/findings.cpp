@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -142,6 +143,7 @@ class PortFindings {
                       message +
                           "; if somebody should win then, connect it in a behaviour that "
                           "nothing keeps from running in this state",
+                      {.ports = {port_.port}, .source = losers.empty() ? "" : losers.front()},
                       witness,
                       {causes.begin() + 1, causes.begin() + static_cast<std::ptrdiff_t>(told)});
   }
@@ -242,7 +244,7 @@ class PortFindings {
                           ", nobody wins; if " + names.front() +
                           " should win then, let no inhibition but its condition \"not " + by +
                           " or " + z + "\" keep it out",
-                      *shortest);
+                      {.ports = {port_.port}, .source = by}, *shortest);
     return true;
   }
 
@@ -262,39 +264,77 @@ class PortFindings {
   std::unordered_map<std::string, Candidates> inhibited_by_;  // by source: that win only without it
 };
 
+// Where a connection is written: its rule or, where it has none, in the application.
+class Places {
+ public:
+  explicit Places(const RuleSet& rules) {
+    for (const auto& port : rules.ports) {
+      for (const auto& rule : port.rules)
+        of_rules_.emplace(Key(rule.source, port.port), &rule.where);
+    }
+    for (const auto& each : rules.other_connections) {
+      of_others_.emplace(Key(each.source, each.port), &each.where);
+    }
+  }
+  // Null where the connection has no rule, or is none of the application's.
+  [[nodiscard]] const Location* of_rule(const std::string& source, const std::string& port) const {
+    return find(of_rules_, source, port);
+  }
+  [[nodiscard]] const Location* in_application(const std::string& source,
+                                               const std::string& port) const {
+    return find(of_others_, source, port);
+  }
+
+ private:
+  using Key = std::pair<std::string_view, std::string_view>;
+  using Map = std::map<Key, const Location*>;
+
+  static const Location* find(const Map& places, const std::string& source,
+                              const std::string& port) {
+    const auto found = places.find(Key(source, port));
+    return found == places.end() ? nullptr : found->second;
+  }
+
+  Map of_rules_;
+  Map of_others_;
+};
+
 // Sources that are connected to arbitrated ports only, and win at none of them. Where it is one
-// connection with a rule, compile() has said so.
+// connection with a rule, compile() has said so. Told at the first rule of the source, for that can
+// be mended; if it has none, at its first connection in the application.
 void warn_of_losers(const RuleSet& rules, const CompiledModel& model, Diagnostics& diagnostics) {
   struct Losing {
     std::vector<std::string> ports;
     bool wins = false;
     bool lacks_rule = false;
-    Location where;
+    const Location* of_rule = nullptr;
+    const Location* in_application = nullptr;
   };
+  const Places places(rules);
   std::map<std::string, Losing> sources;
-  std::map<std::string, const PortRules*> by_name;
-  for (const auto& port : rules.ports) by_name.emplace(port.port, &port);
   for (const auto& port : model.ports) {
-    const auto found = by_name.find(port.port);
     for (const auto& rule : port.rules) {
       Losing& source = sources[rule.source];
       source.wins = source.wins || rule.kind != shm::table::kNever;
       source.ports.push_back(port.port);
-      if (found == by_name.end() || rule.kind != shm::table::kNever) continue;
-      const auto& written = found->second->rules;
-      const auto own = std::find_if(written.begin(), written.end(),
-                                    [&](const auto& each) { return each.source == rule.source; });
-      source.lacks_rule = source.lacks_rule || own == written.end();
-      source.where = own == written.end() ? found->second->where : own->where;
+      const Location* const own = places.of_rule(rule.source, port.port);
+      source.lacks_rule = source.lacks_rule || own == nullptr;
+      if (source.of_rule == nullptr) source.of_rule = own;
+      if (source.in_application == nullptr) {
+        source.in_application = places.in_application(rule.source, port.port);
+      }
     }
   }
   for (const auto& [source, losing] : sources) {
     if (losing.wins || (losing.ports.size() == 1 && !losing.lacks_rule)) continue;
-    diagnostics.warning("never-wins", losing.where,
+    const Location* const where =
+        losing.of_rule != nullptr ? losing.of_rule : losing.in_application;
+    diagnostics.warning("never-wins", where == nullptr ? Location() : *where,
                         source + " is connected to " + enumerate(losing.ports) +
                             ", and there is no state in which it wins anywhere" +
                             (losing.lacks_rule ? ", partly since no rule selects it" : "") +
-                            "; give it a behaviour that can run, or remove its connections");
+                            "; give it a behaviour that can run, or remove its connections",
+                        {.ports = losing.ports, .source = source});
   }
 }
 
@@ -327,7 +367,9 @@ FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
                           const ProvedStatements& statements) {
   warn_of_losers(rules, model, diagnostics);
   FindingsAccount account;
-  std::pair<const PortRules*, std::string> first_open;
+  std::vector<std::string> open;  // ports
+  Location first_open;
+  std::string why_open;  // of the first
   std::map<std::string, const CompiledPort*> compiled;
   for (const auto& port : model.ports) compiled.emplace(port.port, &port);
   for (const auto& port : rules.ports) {
@@ -345,16 +387,16 @@ FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
         limit = std::string("it takes ") + reached.what();
       }
     }
-    if (account.open++ == 0) first_open = {&port, limit};
+    if (open.empty()) first_open = port.where, why_open = limit;
+    open.push_back(port.port);
   }
-  if (account.open > 0) {
-    const std::string more = std::to_string(account.open - 1);
-    diagnostics.note("left-open", first_open.first->where,
-                     "not all states in which nobody wins at " + first_open.first->port +
-                         (account.open > 1 ? ", nor at " + more + " other ports," : "") +
-                         " were looked at: " + first_open.second +
-                         "; the model is in order, this is only not known");
-  }
+  account.open = open.size();
+  if (open.empty()) return account;
+  const std::string first = open.size() > 1 ? "at " + open.front() + ", " : "";
+  const std::string message = "not all states in which nobody wins at " + enumerate(open) +
+                              " were looked at: " + first + why_open +
+                              "; the model is in order, this is only not known";
+  diagnostics.note("left-open", first_open, message, {.ports = std::move(open)});
   return account;
 }
 

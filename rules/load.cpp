@@ -9,6 +9,7 @@
 #include "rules/application_reader.hpp"
 #include "rules/defines.hpp"
 #include "rules/document_order.hpp"
+#include "rules/doubt.hpp"
 #include "rules/extraction.hpp"
 #include "rules/hierarchy.hpp"
 #include "rules/model.hpp"
@@ -71,7 +72,10 @@ LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
   if (application) check_application(*application, loaded.model, rules, found);
   const Location whole{paths.empty() ? "" : paths.front(), 1, 1};
   check_limits(rules, application ? &*application : nullptr, whole, order, found);
-  if (!found.has_errors()) {
+  if (found.has_errors()) {
+    const Doubts doubts = find_doubts(loaded.model, hierarchy, found);
+    for (PortRules& port : rules.ports) port.is_doubtful = doubts.about(port.port);
+  } else {
     check_names(loaded.model, application, rules, order, found);
     note_commands_forever(loaded.model, rules, whole, found);
   }

@@ -38,6 +38,9 @@ struct Behaviour {
   std::vector<Mention> inhibitions;
   // Some part of it was refused, and is missing above: what seems to lack may not.
   bool is_incomplete = false;
+  // Of these parts: some inhibition, some <config> or child.
+  bool lacks_inhibitions = false;
+  bool lacks_parts = false;
 };
 
 // A rule written by hand.
@@ -53,7 +56,7 @@ struct Arbiter {
   std::string port;
   Location where;
   bool first_wins = false;
-  bool is_incomplete = false;
+  bool is_incomplete = false;  // some rule of it, or what conflict= says
 };
 
 struct SourceDeclaration {
@@ -80,6 +83,10 @@ struct Model {
   std::set<std::string> refused_names;
   // Something was refused whose name cannot even be told, so that any name may belong to it.
   bool has_unknown_gaps = false;
+  // Something was refused that may have named a source, so that quantifiers may range over more.
+  bool lacks_sources = false;
+  // An <arbiter> was refused whose port cannot be told.
+  bool lacks_arbiters = false;
 
   std::size_t next_order = 0;
 };

@@ -89,6 +89,22 @@ Json json_of(Severity severity, const std::string& code, const Location& where,
           {"more_witnesses", Json::array()}};
 }
 
+// One port by its name, so that most readers need no list.
+void add_subject(Json& object, const Subject& about) {
+  const auto or_null = [](const std::string& text) {
+    return text.empty() ? Json(nullptr) : Json(text);
+  };
+  object["port"] = or_null(about.ports.size() == 1 ? about.ports.front() : "");
+  object["ports"] = about.ports;
+  object["source"] = or_null(about.source);
+  object["behaviour"] = or_null(about.behaviour);
+  object["statement"] = or_null(about.statement);
+  object["winners"] = Json::array();
+  for (const auto& [port, winner] : about.winners) {
+    object["winners"].push_back({{"port", port}, {"winner", or_null(winner.value_or(""))}});
+  }
+}
+
 // What to do stands behind the last semicolon of a message.
 std::optional<std::string> help_of(const Diagnostic& item) {
   const std::size_t at = item.message.rfind("; ");
@@ -158,10 +174,12 @@ void write_json(std::ostream& out, const Diagnostics& diagnostics) {
     for (const Witness& other : item->more_witnesses) {
       object["more_witnesses"].push_back(json_of(other));
     }
+    add_subject(object, item->about);
     array.push_back(std::move(object));
   }
   for (const Omission& omission : diagnostics.omissions()) {
     Json object = json_of(omission.severity, "not-listed", omission.where, in_words(omission));
+    add_subject(object, {});
     object["code_omitted"] = omission.code;
     object["count"] = omission.count;
     array.push_back(std::move(object));

@@ -17,7 +17,9 @@ using Active = std::set<std::string>;
 
 struct Term {
   const CompiledPort* port;
-  const CompiledRule* rule;  // null: nobody wins
+  std::vector<const CompiledRule*> rules{};  // of which one wins
+  bool nobody = false;                       // in place of these: nobody wins
+  const CompiledPort* other = nullptr;       // in place of both: the winner is the same there
 };
 
 }  // namespace
@@ -46,23 +48,26 @@ class Question {
   // A witness against the statement, if there is one. Throws DiagramLimit.
   std::optional<Witness> refute() {
     gather();
-    // That nobody wins is the only function that needs all rules of a port in one diagram. Where
+    // That nobody wins, or the same as elsewhere, needs all rules of a port in one diagram. Where
     // that is too large, each possible winner is looked at by itself.
     try {
       return ask(false);
     } catch (const DiagramLimit&) {
-      if (idle_.empty()) throw;
+      if (whole_.empty()) throw;
     }
     return ask(true);
   }
 
  private:
   void gather() {
-    for (const Term& term : terms_) order_.add(*term.port);
+    for (const Term& term : terms_) {
+      order_.add(*term.port);
+      if (term.other != nullptr) order_.add(*term.other);
+    }
     add_sources(expression_);
     for (const Term& term : terms_) {
-      const bool is_new = std::find(idle_.begin(), idle_.end(), term.port) == idle_.end();
-      if (term.rule == nullptr && is_new) idle_.push_back(term.port);
+      if (term.nobody || term.other != nullptr) add_whole(*term.port);
+      if (term.other != nullptr) add_whole(*term.other);
     }
   }
 
@@ -93,6 +98,10 @@ class Question {
     winners_ = nullptr;
   }
 
+  void add_whole(const CompiledPort& port) {
+    if (std::find(whole_.begin(), whole_.end(), &port) == whole_.end()) whole_.push_back(&port);
+  }
+
   void add_sources(const Expression& expression) {
     if (expression.op == Operator::kSource && !expression.name.starts_with('=')) {
       order_.add(expression.name);
@@ -100,10 +109,10 @@ class Question {
     for (const auto& operand : expression.operands) add_sources(*operand);
   }
 
-  // The winner at each port of idle_ is chosen in turn; what is left of the statement then reads
+  // The winner at each port of whole_ is chosen in turn; what is left of the statement then reads
   // few rules, and most often contradicts `state` at once.
   Diagram refute_by_cases(std::size_t next, const Diagram& state) {
-    if (next == idle_.size()) {
+    if (next == whole_.size()) {
       Diagram bad = winners_->combine(Connective::kAndNot, state, build(expression_));
       built_.clear();
       for (const auto& [port, winner] : decided_) {
@@ -115,7 +124,7 @@ class Question {
       }
       return bad;
     }
-    const CompiledPort* port = idle_[next];
+    const CompiledPort* port = whole_[next];
     decided_[port] = nullptr;
     Diagram bad = refute_by_cases(next + 1, state);
     for (const auto& rule : port->rules) {
@@ -164,22 +173,57 @@ class Question {
   }
 
   Diagram build_term(const Term& term) {
+    if (term.other != nullptr) return build_same(*term.port, *term.other);
     if (const auto known = decided_.find(term.port); known != decided_.end()) {
-      return winners_->constant(known->second == term.rule);
+      const auto* const winner = known->second;
+      const auto& rules = term.rules;
+      return winners_->constant(term.nobody
+                                    ? winner == nullptr
+                                    : std::find(rules.begin(), rules.end(), winner) != rules.end());
     }
-    if (term.rule != nullptr) return winners_->winner(*term.port, *term.rule);
-    Diagram idle = winners_->constant(true);
-    for (const auto& rule : term.port->rules) {
-      idle = winners_->combine(Connective::kAndNot, idle, winners_->holds(rule));
+    Diagram result = winners_->constant(term.nobody);
+    if (term.nobody) {
+      for (const auto& rule : term.port->rules) {
+        result = winners_->combine(Connective::kAndNot, result, winners_->holds(rule));
+      }
     }
-    return idle;
+    for (const auto* rule : term.rules) {
+      result = winners_->combine(Connective::kOr, result, winners_->winner(*term.port, *rule));
+    }
+    return result;
+  }
+
+  // Each source wins at both or at neither: since only one can win at each, that is the same
+  // winner.
+  Diagram build_same(const CompiledPort& port, const CompiledPort& other) {
+    std::set<std::string> sources;
+    for (const auto* each : {&port, &other}) {
+      for (const auto& rule : each->rules) sources.insert(rule.source);
+    }
+    Diagram same = winners_->constant(true);
+    for (const auto& source : sources) {
+      const Diagram differ =
+          winners_->combine(Connective::kXor, wins_at(port, source), wins_at(other, source));
+      same = winners_->combine(Connective::kAndNot, same, differ);
+    }
+    return same;
+  }
+
+  Diagram wins_at(const CompiledPort& port, const std::string& source) {
+    if (const auto known = decided_.find(&port); known != decided_.end()) {
+      return winners_->constant(known->second != nullptr && known->second->source == source);
+    }
+    for (const auto& rule : port.rules) {
+      if (rule.source == source) return winners_->winner(port, rule);
+    }
+    return winners_->constant(false);
   }
 
   const Expression& expression_;
   const std::vector<Term> terms_;
   const std::uint64_t max_work_;
   SourceOrder order_;
-  std::vector<const CompiledPort*> idle_;  // of which the statement says that nobody wins
+  std::vector<const CompiledPort*> whole_;  // of which it takes all rules to tell
   Winners* winners_ = nullptr;
   std::unordered_map<const Expression*, Diagram> built_;
   std::map<const CompiledPort*, const CompiledRule*> decided_;  // null: nobody wins
@@ -196,6 +240,7 @@ class Judge {
   }
 
   std::optional<Verdict> judge(const Statement& statement) {
+    statement_ = &statement;
     bool has_meaning = true;
     std::vector<Term> terms;
     for (const auto& term : statement.parsed.terms) {
@@ -216,6 +261,8 @@ class Judge {
     Verdict verdict;
     verdict.statement = statement.text;
     verdict.where = statement.where;
+    const auto ports = ports_of(terms);
+    for (const auto* port : ports) verdict.ports.push_back(port->port);
     const ExpressionPtr expression = expansion_.expand(statement.parsed.expression);
     try {
       verdict.witness = Question(*expression, terms, max_work_).refute();
@@ -230,55 +277,108 @@ class Judge {
     }
     verdict.kind = Verdict::Kind::kRefuted;
     const Active active(verdict.witness->active.begin(), verdict.witness->active.end());
-    std::set<std::string> seen;
-    for (const Term& term : terms) {
-      if (!seen.insert(term.port->port).second) continue;
-      const CompiledRule* winner = find_winner(*term.port, active);
+    for (const auto* port : ports) {
+      const CompiledRule* winner = find_winner(*port, active);
       verdict.winners.emplace_back(
-          term.port->port, winner == nullptr ? std::nullopt : std::optional(winner->source));
+          port->port, winner == nullptr ? std::nullopt : std::optional(winner->source));
     }
     return verdict;
   }
 
+  // Each once.
+  static std::vector<const CompiledPort*> ports_of(const std::vector<Term>& terms) {
+    std::vector<const CompiledPort*> ports;
+    for (const Term& term : terms) {
+      for (const auto* port : {term.port, term.other}) {
+        const bool is_new = std::find(ports.begin(), ports.end(), port) == ports.end();
+        if (port != nullptr && is_new) ports.push_back(port);
+      }
+    }
+    return ports;
+  }
+
   std::optional<Term> find_term(const WinnerTerm& term) {
-    const auto port = ports_.find(term.port.name);
+    const CompiledPort* const port = find_port(term.port);
+    const CompiledPort* const other = term.other_port ? find_port(*term.other_port) : nullptr;
+    if (port == nullptr || (term.other_port && other == nullptr)) return std::nullopt;
+    Term result{port};
+    if (other != nullptr) {
+      result.other = other;
+    } else if (term.pattern) {
+      result.rules = find_rules(*port, *term.pattern);
+    } else if (term.source) {
+      const CompiledRule* const rule = find_rule(*port, *term.source);
+      if (rule == nullptr) return std::nullopt;
+      result.rules = {rule};
+    } else {
+      result.nobody = true;
+    }
+    return result;
+  }
+
+  // An arbitrated one; null, reported, if it is none.
+  const CompiledPort* find_port(const Mention& mention) {
+    const auto port = ports_.find(mention.name);
     if (port == ports_.end()) {
       std::vector<std::string_view> names;
       for (const auto& [name, known] : ports_) names.push_back(name);
-      diagnostics_.error("unknown-port", term.port.where,
-                         "the model has no input port " + term.port.name +
-                             advise(term.port.name, names, "name one that is arbitrated"));
-      return std::nullopt;
+      report("unknown-port", mention,
+             "the model has no input port " + mention.name +
+                 advise(mention.name, names, "name one that is arbitrated"),
+             {.ports = {mention.name}});
+      return nullptr;
     }
-    if (!port->second->arbitrated) {
-      diagnostics_.error("not-arbitrated", term.port.where,
-                         "no rule mentions " + term.port.name +
-                             ": it is not arbitrated, everything is delivered there and nobody "
-                             "wins or loses; name a port that is arbitrated");
-      return std::nullopt;
-    }
-    if (!term.source) return Term{port->second, nullptr};
+    if (port->second->arbitrated) return port->second;
+    report("not-arbitrated", mention,
+           "no rule mentions " + mention.name +
+               ": it is not arbitrated, everything is delivered there and nobody wins or loses; "
+               "name a port that is arbitrated",
+           {.ports = {mention.name}});
+    return nullptr;
+  }
+
+  // Of a connection; null, reported, if there is none.
+  const CompiledRule* find_rule(const CompiledPort& port, const Mention& source) {
     std::vector<std::string_view> names;
-    for (const auto& rule : port->second->rules) {
-      if (rule.source == term.source->name) return Term{port->second, &rule};
+    for (const auto& rule : port.rules) {
+      if (rule.source == source.name) return &rule;
       names.push_back(rule.source);
     }
-    diagnostics_.error("not-connected", term.source->where,
-                       term.source->name + " is not connected to " + term.port.name +
-                           ", so that it can never win there" +
-                           advise(term.source->name, names, "name one of its connections"));
-    return std::nullopt;
+    report("not-connected", source,
+           source.name + " is not connected to " + port.port + ", so that it can never win there" +
+               advise(source.name, names, "name one of its connections"),
+           {.ports = {port.port}, .source = source.name});
+    return nullptr;
+  }
+
+  std::vector<const CompiledRule*> find_rules(const CompiledPort& port, const Mention& pattern) {
+    std::vector<const CompiledRule*> rules;
+    for (const auto& rule : port.rules) {
+      if (matches(pattern.name, rule.source)) rules.push_back(&rule);
+    }
+    if (rules.empty()) {
+      diagnostics_.warning("matches-nothing", pattern.where,
+                           "no source that is connected to " + port.port + " matches " +
+                               quote(pattern.name) + ", so that none of these can win; correct it",
+                           {.ports = {port.port}, .statement = statement_->text});
+    }
+    return rules;
+  }
+
+  void report(std::string code, const Mention& mention, std::string message, Subject about) {
+    about.statement = statement_->text;
+    diagnostics_.error(std::move(code), mention.where, std::move(message), std::move(about));
   }
 
   bool is_known(const Mention& source) {
     if (sources_.contains(source.name)) return true;
     const std::vector<std::string_view> names(sources_.begin(), sources_.end());
     const bool may_suggest = ++unknown_ <= kMaxSuggestions;
-    diagnostics_.error(
-        "unknown-source", source.where,
-        "neither the model nor its application names a source " + source.name +
-            (may_suggest ? advise(source.name, names, "name one that it reads or connects")
-                         : std::string("; name one that it reads or connects")));
+    report("unknown-source", source,
+           "neither the model nor its application names a source " + source.name +
+               (may_suggest ? advise(source.name, names, "name one that it reads or connects")
+                            : std::string("; name one that it reads or connects")),
+           {.source = source.name});
     return false;
   }
 
@@ -287,7 +387,8 @@ class Judge {
     if (std::any_of(sources_.begin(), sources_.end(), fits)) return;
     diagnostics_.warning("matches-nothing", glob.where,
                          "no source matches " + quote(glob.name) +
-                             ": any() is false of it, all() and none() are true; correct it");
+                             ": any() is false of it, all() and none() are true; correct it",
+                         {.statement = statement_->text});
   }
 
   Diagnostics& diagnostics_;
@@ -295,8 +396,13 @@ class Judge {
   QuantifierExpansion expansion_;
   std::set<std::string, std::less<>> sources_;
   std::map<std::string, const CompiledPort*> ports_;
+  const Statement* statement_ = nullptr;  // the one that is judged
   std::size_t unknown_ = 0;
 };
+
+Subject about(const Verdict& verdict) {
+  return {.ports = verdict.ports, .statement = verdict.statement, .winners = verdict.winners};
+}
 
 std::string in_words(const Verdict& verdict) {
   std::string text = "this is false with " + in_words(*verdict.witness);
@@ -355,13 +461,15 @@ void report(const std::vector<Verdict>& verdicts, Diagnostics& diagnostics, bool
                         in_words(verdict) +
                             "; change the model so that this state is decided otherwise, or the "
                             "statement if it says too much",
-                        verdict.witness);
+                        about(verdict), verdict.witness);
     } else if (verdict.kind == Verdict::Kind::kOpen) {
       diagnostics.error("left-open", verdict.where,
                         "neither proved nor refuted: it takes " + verdict.limit +
-                            "; make several statements of it, about fewer ports each");
+                            "; make several statements of it, about fewer ports each",
+                        about(verdict));
     } else if (with_proved) {
-      diagnostics.note("proved", verdict.where, "true in every state: " + verdict.statement);
+      diagnostics.note("proved", verdict.where, "true in every state: " + verdict.statement,
+                       about(verdict));
     }
   }
 }

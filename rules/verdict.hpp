@@ -35,6 +35,7 @@ struct Verdict {
   Kind kind = Kind::kProved;
   std::string statement;
   Location where;
+  std::vector<std::string> ports;  // that it mentions
   // Where refuted: a conjunction under which the statement is false, whatever the other
   // sources do; and who wins at each port of the statement if they are inactive.
   std::optional<Witness> witness;

@@ -14,18 +14,15 @@ constexpr std::uint64_t kMaxWork = 500'000;
 
 }  // namespace
 
-std::string summary_of_changes(const rules::CompiledModel& before,
-                               const rules::CompiledModel& after) {
-  return rules::summary(rules::diff(before, after, kMaxWork));
-}
-
 nlohmann::json changes_json(const rules::CompiledModel& before, const rules::CompiledModel& after) {
   const rules::ModelDiff diff = rules::diff(before, after, kMaxWork);
   std::ostringstream text;
   rules::write_text(text, diff);
   std::ostringstream json;
   rules::write_json(json, diff);
-  return {{"text", text.str()}, {"diff", nlohmann::json::parse(json.str())}};
+  return {{"summary", rules::summary(diff)},
+          {"text", text.str()},
+          {"diff", nlohmann::json::parse(json.str())}};
 }
 
 }  // namespace arbiter::service

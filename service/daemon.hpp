@@ -93,6 +93,8 @@ class Daemon {
     std::string how;            // as in the history
     std::uint64_t content = 0;  // likewise
     bool is_compared = false;   // with what was in force before
+    // Of a rollback: to where.
+    std::optional<PastModel> back_to{};
     // Of a reload: what else changes with it.
     std::optional<Library> library{};
     std::optional<Policy> policy{};
@@ -146,7 +148,7 @@ class Daemon {
   void reserve_tables(const Library& library);
   void begin_swap(Swap& swap);
   void put_in_force();
-  void answer_done(const Swap& swap, const std::string& changes);
+  void answer_done(const Swap& swap, nlohmann::json changes);
   void answer_refused(const Swap& swap, const std::string& why);
   void answer(const Swap& swap, const std::string& report, const std::string& why_not = {});
   void send_document(Client& client, std::uint64_t request, shm::MessageKind kind,

@@ -24,11 +24,12 @@ std::string report(const Daemon::Swap& swap, nlohmann::json document) {
 }
 
 // The model is in force: nothing may come of this but words.
-std::string summary_or_why_not(const Model& before, const Model& after) {
+nlohmann::json changes_or_why_not(const Model& before, const Model& after) {
   try {
-    return summary_of_changes(before.compiled, after.compiled);
+    return changes_json(before.compiled, after.compiled);
   } catch (const std::exception& error) {
-    return std::string("not compared: ") + error.what();
+    const std::string why_not = std::string("not compared: ") + error.what();
+    return {{"summary", why_not}, {"text", why_not + '\n'}, {"diff", nullptr}};
   }
 }
 
@@ -91,7 +92,7 @@ void Daemon::prepare_reload(Swap& swap) {
   if (swap.findings.has_errors()) throw BadModel(swap.findings.first_error());
   if (files_.empty()) {
     gate_.put_in_force(*reading.policy);
-    answer_done(swap, {});
+    answer_done(swap, nullptr);
     return;
   }
   Library library(std::move(reading.models), directory_);
@@ -137,7 +138,7 @@ void Daemon::prepare_switch(Swap& swap) {
         (library_.models().empty() ? "; none is loaded" : "; there are: " + library_.names()));
   }
   if (next->model == in_force_.model) {
-    answer_done(swap, {});
+    answer_done(swap, nullptr);
     return;
   }
   swap.to = *next;
@@ -168,6 +169,7 @@ void Daemon::prepare_rollback(Swap& swap) {
   }
   swap.to = {past->model, std::make_shared<const Layout>(past->model->compiled, directory_)};
   swap.how = "rollback to " + std::to_string(past->generation);
+  swap.back_to = *past;
   swap.content = past->content;
   swap.is_compared = true;
   begin_swap(swap);
@@ -217,13 +219,14 @@ void Daemon::put_in_force() {
                 {},
                 in_force_.model});
   welcome_waiting();
-  std::string changes;
+  nlohmann::json changes;
   if (swap.is_compared && before != nullptr) {
-    changes = summary_or_why_not(*before, model);
-    log::info("model {} compared with the last: {}", snapshot.generation, changes);
-    history_.set_changes(snapshot.generation, changes);
+    changes = changes_or_why_not(*before, model);
+    const std::string summary = changes.at("summary").get<std::string>();
+    log::info("model {} compared with the last: {}", snapshot.generation, summary);
+    history_.set_changes(snapshot.generation, summary);
   }
-  answer_done(swap, changes);
+  answer_done(swap, std::move(changes));
 }
 
 // What `arbiter reload --dry-run` shows.
@@ -244,12 +247,12 @@ void Daemon::compare_with_files(Swap& swap) {
   answer(swap, report(swap, {{"ok", true}, {"models", std::move(models)}}));
 }
 
-void Daemon::answer_done(const Swap& swap, const std::string& changes) {
+void Daemon::answer_done(const Swap& swap, nlohmann::json changes) {
   answer(swap, report(swap, {{"ok", true},
                              {"generation", models_.in_force().generation},
                              {"name", models_.name()},
-                             {"changes", changes.empty() ? nlohmann::json(nullptr)
-                                                         : nlohmann::json(changes)}}));
+                             {"back_to", swap.back_to ? to_json(*swap.back_to) : nullptr},
+                             {"changes", std::move(changes)}}));
 }
 
 void Daemon::answer_refused(const Swap& swap, const std::string& why) {
