@@ -1,5 +1,7 @@
 #include "client/output_core.hpp"
 
+#include <fcntl.h>
+
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
@@ -52,6 +54,7 @@ OutputCore::OutputCore(std::string name, const shm::TypeInfo& type,
   allocate_slots();
   pool_.grow(allocated_slots_);
   shm::seal(descriptor_, shm::Seals::kOneWriter);
+  readable_ = shm::reopen(descriptor_, O_RDONLY);
 }
 
 void OutputCore::bind(shm::PortInstance instance, shm::SourceId source, shm::FileDescriptor page) {
