@@ -1,6 +1,8 @@
 // The service thread's side of an input port, and the taking up of what it offers.
 #include "client/input_core.hpp"
 
+#include <fcntl.h>
+
 #include <algorithm>
 #include <system_error>
 
@@ -37,6 +39,7 @@ InputCore::InputCore(std::string name, const shm::TypeInfo& type, const InputPor
   header.refuse_new = options.when_full == WhenFull::refuse_new ? 1 : 0;
   header.type = type_;
   shm::seal(descriptor_, shm::Seals::kOneWriter);
+  descriptor_ = shm::reopen(descriptor_, O_RDONLY);  // for others: the daemon passes it on as it is
   bequest_.emplace(mapping_.data(), mapping_.size(), shm::Bequest::Kind::kPrivateZeros);
   shm::close_in_children(descriptor_);
 }
@@ -52,10 +55,12 @@ void InputCore::add_peer(std::shared_ptr<const OutputPeer> peer) {
   offer_view();
 }
 
-void InputCore::map_growth(shm::PortInstance peer, const shm::FileDescriptor& segment) {
+void InputCore::map_growth(shm::PortInstance peer) {
   const auto found = links_.find(peer);
   if (found == links_.end()) return;
-  shm::make_written_resident(segment, found->second.peer->mapping, memory_->residence());
+  const OutputPeer& grown = *found->second.peer;
+  shm::make_written_resident(grown.file, grown.mapping, memory_->residence());
+  survey(grown);
 }
 
 void InputCore::lose_peer(shm::PortInstance peer) {
@@ -167,6 +172,7 @@ void InputCore::accept_view() {
     Queue queue;
     queue.peer = link.peer;
     queue.gone = link.gone;
+    queue.allocated_slots = link.peer->allocated_slots.load(std::memory_order_relaxed);
     queue.reader = shm::ChannelReader(link.peer->segment, link.peer->instance, link.peer->link);
     queue.lane = free_lane();
     if (queue.lane == nullptr) continue;

@@ -14,6 +14,7 @@
 
 #include <arbiter/detail/cores.hpp>
 
+#include "client/copies.hpp"
 #include "client/handover.hpp"
 #include "client/memory.hpp"
 #include "client/peers.hpp"
@@ -36,7 +37,7 @@ class InputCore {
   void bind(shm::PortInstance instance, shm::PortId port);
   void add_peer(std::shared_ptr<const OutputPeer> peer);
   // The peer uses more of its segment now. Throws std::system_error where that cannot be locked.
-  void map_growth(shm::PortInstance peer, const shm::FileDescriptor& segment);
+  void map_growth(shm::PortInstance peer);
   // The peer has closed or died; what it has delivered can still be taken.
   void lose_peer(shm::PortInstance peer);
   // The model has disconnected it.
@@ -84,7 +85,8 @@ class InputCore {
     bool gone = false;
     shm::ChannelReader reader;
     shm::Lane* lane = nullptr;
-    shm::BoundRule rule;  // of the connection, under snapshot_
+    shm::BoundRule rule;                // of the connection, under snapshot_
+    std::uint32_t allocated_slots = 0;  // of the peer's, when it was last looked at
     // Of the take under way.
     shm::Entry head = 0;
     shm::Nanoseconds head_stamp = 0;
@@ -117,6 +119,8 @@ class InputCore {
   void drop_losers(const Queue* winner) noexcept;
   bool hold(Queue& queue, HeldSample& sample) noexcept;
   [[nodiscard]] std::uint32_t free_hold() const;
+  [[nodiscard]] bool is_allocated(Queue& queue, std::uint32_t slot) const noexcept;
+  [[nodiscard]] bool copy(const Queue& queue, std::uint32_t slot, HeldSample& sample) noexcept;
   void consume(Queue& queue) noexcept;
   void count_overtaken(Queue& queue, std::uint64_t lost) noexcept;
   void let_go_of(const OutputPeer* peer) noexcept;
@@ -166,6 +170,7 @@ class InputCore {
   shm::Nanoseconds last_reading_ = 0;       // of the clock, by this port
   std::uint32_t held_ = 0;
   std::array<const OutputPeer*, shm::kMaxHeld> held_from_{};  // by hold
+  Copies copies_;                                             // likewise
   // Publishers that are gone and of whom samples are held: kept mapped, each in a view of its own.
   std::vector<std::unique_ptr<InputView>> lingering_;
   bool commanded_ = false;  // seen selected since idle was last told

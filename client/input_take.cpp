@@ -289,21 +289,45 @@ bool InputCore::hold(Queue& queue, HeldSample& sample) noexcept {
   shm::Atomic<shm::Hold>& word = segment_->header.holds[index];
   if (!queue.reader.hold(queue.head, word)) return false;
   const std::uint32_t slot = shm::slot_of(queue.head);
-  const shm::OutputSegment& from = queue.reader.segment();
-  const shm::SlotHeader& header = from.slot_header(slot);
-  sample.data = from.payload(slot);
-  sample.size =
-      std::min<std::uint64_t>(header.size.load(std::memory_order_relaxed), from.layout().stride);
-  sample.sequence = header.sequence.load(std::memory_order_relaxed);
-  sample.stamp_ns = header.stamp.load(std::memory_order_relaxed);
-  sample.source = queue.peer->source;
   sample.hold = index;
+  if (slot < queue.allocated_slots || is_allocated(queue, slot)) {
+    const shm::OutputSegment& from = queue.reader.segment();
+    const shm::SlotHeader& header = from.slot_header(slot);
+    sample.data = from.payload(slot);
+    sample.size =
+        std::min<std::uint64_t>(header.size.load(std::memory_order_relaxed), from.layout().stride);
+    sample.sequence = header.sequence.load(std::memory_order_relaxed);
+    sample.stamp_ns = header.stamp.load(std::memory_order_relaxed);
+  } else if (!copy(queue, slot, sample)) {
+    shm::ChannelReader::release(word);
+    return false;
+  }
+  sample.source = queue.peer->source;
   consume(queue);
   count(queue.lane->taken);
   count(segment_->header.counters.taken);
   held_from_[index] = queue.peer.get();
   ++queue.peer->held;
   ++held_;
+  return true;
+}
+
+bool InputCore::is_allocated(Queue& queue, std::uint32_t slot) const noexcept {
+  queue.allocated_slots = queue.peer->allocated_slots.load(std::memory_order_relaxed);
+  return slot < queue.allocated_slots;
+}
+
+// A slot that is not known to be allocated: copies.hpp.
+bool InputCore::copy(const Queue& queue, std::uint32_t slot, HeldSample& sample) noexcept {
+  for (std::uint32_t i = 0; i < max_held_; ++i) {
+    if (held_from_[i] == nullptr) copies_.forget(i);
+  }
+  CopiedSample copied;
+  if (!copies_.copy(*queue.peer, slot, type_.is_typed(), sample.hold, copied)) return false;
+  sample.data = copied.data;
+  sample.size = copied.size;
+  sample.sequence = copied.sequence;
+  sample.stamp_ns = copied.stamp;
   return true;
 }
 

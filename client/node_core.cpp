@@ -30,6 +30,8 @@ constexpr milliseconds kMaxConnectTimeout = std::chrono::hours(24 * 365);
 constexpr milliseconds kMinAnswerTime{1000};
 // The longest wait for an answer before looking for another daemon.
 constexpr milliseconds kMaxAnswerTime = std::chrono::seconds(60);
+// The most that max_memory may be: a segment has queues and headers beside the samples.
+constexpr std::size_t kMostMemory = shm::kMaxSegmentSize - (std::size_t{16} << 20);
 // Nobody is told of a shorter wait.
 constexpr milliseconds kQuietWait{500};
 
@@ -335,7 +337,7 @@ std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const P
   check_bounds<std::size_t>(name, "max_size", type.size, 0, std::size_t{1} << 40);
   check_bounds<std::size_t>(name, "max_memory", options.max_memory,
                             OutputCore::least_memory(type_info(type), options.max_loans),
-                            std::size_t{1} << 46);
+                            kMostMemory);
   return open(name, [&](const std::shared_ptr<SharedMemory>& memory) {
     auto core = std::make_shared<OutputCore>(std::string(name), type_info(type), options, memory);
     core->node = shared_from_this();
@@ -362,7 +364,7 @@ std::shared_ptr<InputCore> NodeCore::open_input(std::string_view name, const Por
     core->process = process_;
     shm::Message question = message_of(shm::MessageKind::kOpenInput, name);
     question.type = core->type();
-    converse(question, {core->segment_descriptor().get(), core->bell().write_end().get()},
+    converse(question, {core->segment_descriptor().get(), core->bell().for_publishers().get()},
              memory.get(), [&](shm::Received& opened) {
                core->bind(opened.message.port, opened.message.id);
                inputs_[opened.message.port] = core;

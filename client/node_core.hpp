@@ -107,6 +107,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void tidy();
   [[nodiscard]] bool has_predecessors();
   void handle(shm::Received& received);
+  void handle_without_descriptors(const shm::Message& message);
   void handle_reply(shm::Received& received);
   void wake_inputs();
   void handle_peer(shm::Received& received);

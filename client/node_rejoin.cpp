@@ -124,7 +124,7 @@ void NodeCore::rejoin() {
     }
     for (const auto& [instance, core] : inputs_) {
       ports.push_back(port_at_hand(shm::MessageKind::kHandBackInput, *core, core->port(),
-                                   core->bell().write_end()));
+                                   core->bell().for_publishers()));
     }
   }
   // With nothing to hand back there is nothing to keep of the old memory either.

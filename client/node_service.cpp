@@ -134,8 +134,36 @@ void NodeCore::tidy() {
   }
 }
 
+// This process has no descriptor left for what came with a message. Nothing is lost by that but
+// what the message was about.
+void NodeCore::handle_without_descriptors(const shm::Message& message) {
+  if (message.kind == shm::MessageKind::kWelcome) {
+    lose_daemon();  // and tries again
+    return;
+  }
+  const std::string why = "process " + std::to_string(getpid()) +
+                          " has no descriptor left for what the daemon sends: raise RLIMIT_NOFILE "
+                          "(ulimit -n, LimitNOFILE= in a systemd unit)";
+  const std::lock_guard lock(mutex_);
+  std::fprintf(stderr, "arbiter: \"%s\": %s\n", name_.c_str(), why.c_str());
+  if (message.peer != 0) say_refused(message.port, message.peer, why);
+  const auto found = replies_.find(message.request);
+  if (message.peer != 0 || found == replies_.end()) return;
+  found->second.refusal = why;
+  if (message.kind == shm::MessageKind::kOpened) {
+    say_closed(message.port);  // what it is answered ends the wait
+  } else {
+    found->second.finished = true;
+    news_.notify_all();
+  }
+}
+
 void NodeCore::handle(shm::Received& received) {
   const shm::Message& message = received.message;
+  if (received.lost_descriptors) {
+    handle_without_descriptors(message);
+    return;
+  }
   switch (message.kind) {
     case shm::MessageKind::kWelcome:
       be_welcomed(received);
@@ -230,7 +258,7 @@ void NodeCore::map_growth(const shm::Received& received) {
   const std::lock_guard lock(mutex_);
   const auto input = inputs_.find(received.message.port);
   if (input == inputs_.end()) return;
-  input->second->map_growth(received.message.peer, received.descriptors[0]);
+  input->second->map_growth(received.message.peer);
 }
 
 void NodeCore::handle_peer(shm::Received& received) {

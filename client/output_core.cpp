@@ -1,5 +1,7 @@
 #include "client/output_core.hpp"
 
+#include <fcntl.h>
+
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
@@ -54,6 +56,8 @@ OutputCore::OutputCore(std::string name, const shm::TypeInfo& type,
   shm::seal(descriptor_, shm::Seals::kOneWriter);
   bequest_.emplace(mapping_.data(), mapping_.size(), shm::Bequest::Kind::kPrivateZeros);
   shm::close_in_children(descriptor_);
+  readable_ = shm::reopen(descriptor_, O_RDONLY);
+  shm::close_in_children(readable_);
 }
 
 void OutputCore::bind(shm::PortInstance instance, shm::SourceId source, shm::FileDescriptor page) {

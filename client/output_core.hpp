@@ -63,9 +63,7 @@ class OutputCore {
   [[nodiscard]] shm::PortInstance instance() const noexcept { return instance_; }
   [[nodiscard]] shm::SourceId source() const noexcept { return source_; }
   [[nodiscard]] const shm::TypeInfo& type() const noexcept { return type_; }
-  [[nodiscard]] const shm::FileDescriptor& segment_descriptor() const noexcept {
-    return descriptor_;
-  }
+  [[nodiscard]] const shm::FileDescriptor& segment_descriptor() const noexcept { return readable_; }
   [[nodiscard]] const shm::FileDescriptor& page_descriptor() const noexcept {
     return page_descriptor_;
   }
@@ -124,6 +122,7 @@ class OutputCore {
   const std::uint32_t max_loans_;
   const std::shared_ptr<SharedMemory> memory_;
   shm::FileDescriptor descriptor_;
+  shm::FileDescriptor readable_;  // for others: the daemon passes it on as it is
   shm::Mapping mapping_;
   std::optional<shm::Bequest> bequest_;
   shm::OutputSegment segment_;

@@ -57,6 +57,11 @@ struct OutputPeer {
   std::optional<shm::Bequest> bequest;  // a child keeps it if it was forked while samples were held
   mutable std::uint32_t held = 0;       // port's thread: samples of it that the component holds
   shm::OutputSegment segment;
+  shm::FileDescriptor file;  // of the segment, opened by ourselves
+  // How many slots are known to be allocated, header and payload: only these are read where they
+  // lie. Written by the service thread. Relaxed is enough: what it says is true for ever, and the
+  // kernel had it allocated before it was said.
+  mutable shm::Atomic<std::uint32_t> allocated_slots{0};
   // Set by the port's thread once a publisher that is gone has nothing left to be taken.
   mutable shm::Atomic<bool> drained{false};
   mutable shm::Atomic<bool> misbehaved{false};  // as InputPeer::misbehaved
@@ -93,5 +98,8 @@ std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
 std::shared_ptr<const OutputPeer> map_output_peer(
     const shm::Received& announced, const shm::TypeInfo& own,
     shm::Residence residence = shm::Residence::kMapped);
+
+// Service thread: looks how much the publisher has allocated by now.
+void survey(const OutputPeer& peer);
 
 }  // namespace arbiter::detail

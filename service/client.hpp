@@ -27,13 +27,18 @@ class Client {
  public:
   // Takes over an accepted socket. Throws std::system_error.
   Client(ClientId id, shm::FileDescriptor socket);
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+  // What it sent and nobody read may take any time to close: that is left to its user's errands.
+  ~Client();
 
   // Sends, or queues where the client is slow to read. Descriptors are duplicated if need be.
   void send(const shm::Message& message,
             std::array<int, shm::kMaxDescriptors> descriptors = {-1, -1});
   // Sends what is queued, as far as it goes.
   void flush();
-  // The next message that it has sent; those that were read ahead come first.
+  // The next message that it has sent; those that were read ahead come first. Its descriptors are
+  // memfds and anonymous pipes, whoever made them; where others came with it, `is_strange` is set.
   [[nodiscard]] shm::ReceiveResult receive(shm::Received& received);
   // Reads what it has sent by now, at most kMaxReadAhead messages, and sets it aside.
   void read_ahead();
@@ -81,6 +86,7 @@ class Client {
   };
   static constexpr std::size_t kMaxReadAhead = 256;
   static constexpr std::size_t kMaxQueue = 16384;
+  [[nodiscard]] shm::ReceiveResult receive_from_socket(shm::Received& received);
   static constexpr std::size_t kMaxQueuedDescriptors = 4096;  // so that others find some left
 
   const ClientId id_;
@@ -95,6 +101,9 @@ class Client {
   std::deque<std::unique_ptr<shm::Received>> ahead_;
   std::optional<shm::ReceiveResult> ahead_ended_;  // how the conversation ends after `ahead_`
 };
+
+// Closes what a message has brought and nobody has taken, as errands of the user who sent it.
+void dispose_of(shm::Received& received, uid_t user);
 
 // An answer to a client's question.
 inline shm::Message reply_to(std::uint64_t request, shm::MessageKind kind) {

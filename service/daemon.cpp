@@ -1,6 +1,5 @@
 #include "service/daemon.hpp"
 
-#include <fcntl.h>
 #include <signal.h>
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
@@ -13,12 +12,17 @@
 #include <stdexcept>
 #include <utility>
 
+#include "service/errands.hpp"
+#include "service/headroom.hpp"
 #include "service/log.hpp"
 #include "service/log_sink.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
 namespace {
+
+// Without a descriptor to accept a client with.
+constexpr shm::Nanoseconds kListenAgainAfter = 100'000'000;
 
 // How many messages of one client are handled before it is the next one's turn.
 constexpr int kMaxMessagesAtOnce = 64;
@@ -48,7 +52,9 @@ Daemon::Daemon(const DaemonOptions& options)
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   if (!epoll_) throw std::system_error(errno, std::generic_category(), "epoll_create1");
   watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
-  reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
+  if (!Headroom::of_the_process().is_enough()) {
+    log::warn("few descriptors (RLIMIT_NOFILE): a client that sends many can hold up this daemon");
+  }
   look_for_predecessor();
 }
 
@@ -56,6 +62,8 @@ Daemon::Daemon(const DaemonOptions& options)
 // does.
 Daemon::~Daemon() {
   unlink(listener_.path.c_str());
+  // Who has connected and was not accepted may have sent something, too.
+  Errands::of_the_process().close(geteuid(), std::move(listener_.socket));
   if (!stores_ && phase_ == Phase::kServing && clients_.empty() && absentees_.empty())
     state_.remove();
 }
@@ -70,6 +78,8 @@ void Daemon::watch(int fd, Tag tag, ClientId client, std::uint32_t events) {
   }
 }
 
+void Daemon::unwatch(int fd) const noexcept { epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, fd, nullptr); }
+
 int Daemon::timeout_ms() const {
   const bool is_behind = std::any_of(clients_.begin(), clients_.end(), [](const auto& each) {
     return each.second->has_read_ahead();
@@ -77,7 +87,8 @@ int Daemon::timeout_ms() const {
   const bool may_change = !swap_ && phase_ == Phase::kServing && !changes_.empty();
   if (is_behind || may_change || (try_postponed_ && !postponed_.empty())) return 0;
   shm::Nanoseconds deadline =
-      std::min({barriers_.next_deadline(), takeover_deadline(), show_growth_at_});
+      std::min({barriers_.next_deadline(), takeover_deadline(), show_growth_at_, listen_again_at_,
+                watchdog_.deadline(), Errands::of_the_process().deadline()});
   for (const Postponed& request : postponed_) deadline = std::min(deadline, request.deadline);
   if (deadline == shm::kForever) return -1;
   const shm::Nanoseconds left = std::max<shm::Nanoseconds>(deadline - shm::monotonic_now(), 0);
@@ -117,6 +128,7 @@ void Daemon::run(int signal_descriptor) {
       switchboard_.show_growth();
       show_growth_at_ = switchboard_.has_growth_to_show() ? now + kShowGrowthAfter : shm::kForever;
     }
+    look_after_the_loop(now);
     advance_takeover(now);
     serve_postponed(now);
     advance_changes();
@@ -152,27 +164,54 @@ void Daemon::accept_client() {
       return;
     }
     const LogAccount stranger(LogAccount::kUnknown);
+    std::unique_ptr<Client> client;
     try {
       const ClientId id = ++last_client_;
-      auto client = std::make_unique<Client>(id, std::move(socket));
+      client = std::make_unique<Client>(id, std::move(socket));
       watch(client->socket(), Tag::kClient, id, EPOLLIN | EPOLLRDHUP);
       if (client->process() >= 0) watch(client->process(), Tag::kProcess, id, EPOLLIN);
       clients_.emplace(id, std::move(client));
       drop_oldest_silent_client();
     } catch (const std::exception& error) {
       log::warn("a client was turned away: {}", error.what());
+      if (client != nullptr) unwatch(client->socket());
     }
     return;
   }
 }
 
-// Else it would stay in the listener's queue, and the loop would never rest.
+void Daemon::look_after_the_loop(shm::Nanoseconds now) {
+  watchdog_.go_round(now);
+  if (now >= listen_again_at_) {
+    listen_again_at_ = shm::kForever;
+    watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
+  }
+  const std::string lost = Errands::of_the_process().look_after(now);
+  if (!lost.empty()) log::warn("{}", lost);
+}
+
+// It would stay in the listener's queue, and the loop would never rest. Where there is not even a
+// descriptor for that, the listener is left alone for a while.
 void Daemon::turn_away_client() {
-  reserve_.reset();
-  const shm::FileDescriptor socket(accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
-  const LogAccount stranger(LogAccount::kUnknown);
-  log::warn("a client was turned away: no descriptors are left");
-  reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
+  shm::FileDescriptor socket;
+  {
+    const Headroom::Use use;
+    socket.reset(accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  }
+  if (!socket) {
+    listen_again_at_ = shm::monotonic_now() + kListenAgainAfter;
+    watch(listener_.socket.get(), Tag::kListener, 0, 0);
+    return;
+  }
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  static_cast<void>(getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size));
+  const LogAccount account(peer.uid);
+  log::warn(
+      "a client of user {} was turned away: no descriptors are left (RLIMIT_NOFILE, "
+      "LimitNOFILE= in a systemd unit)",
+      peer.uid);
+  Errands::of_the_process().close(peer.uid, std::move(socket));
 }
 
 // Whoever connects and says nothing costs two descriptors, and gives way to those who come later.
@@ -189,6 +228,7 @@ void Daemon::drop_oldest_silent_client() {
 void Daemon::serve(Client& client) {
   const LogAccount account(client.user());
   const ClientId id = client.id();
+  const uid_t user = client.user();
   shm::Received received;
   for (int i = 0; i < kMaxMessagesAtOnce; ++i) {
     switch (client.receive(received)) {
@@ -198,13 +238,16 @@ void Daemon::serve(Client& client) {
         break;
       case shm::ReceiveResult::kMalformed:
         log::warn("{} sent what is no message; dropped", client.description());
+        dispose_of(received, user);
         drop(id);
         return;
       case shm::ReceiveResult::kClosed:
+        dispose_of(received, user);
         drop(id);
         return;
     }
     handle_or_refuse(client, received, shm::kForever);
+    dispose_of(received, user);
     if (clients_.count(id) == 0) return;
   }
 }
@@ -244,6 +287,7 @@ void Daemon::drop(ClientId id) {
   const std::unique_ptr<Client> client = std::move(found->second);
   clients_.erase(found);
   const LogAccount account(client->user());
+  unwatch(client->socket());  // it is closed later
   if (!client->name.empty() && !client->is_turned_away) {
     log::info("{} left, {} ports with it", client->description(), client->ports.size());
   }

@@ -31,6 +31,7 @@
 #include "service/registry.hpp"
 #include "service/strangers.hpp"
 #include "service/switchboard.hpp"
+#include "service/watchdog.hpp"
 #include "shm/rendezvous.hpp"
 
 namespace arbiter::service {
@@ -104,11 +105,15 @@ class Daemon {
   enum class Tag : std::uint32_t { kListener, kSignals, kClient, kProcess, kAbsentee };
 
   void watch(int fd, Tag tag, ClientId client, std::uint32_t events);
+  // One that is closed later, or by somebody else.
+  void unwatch(int fd) const noexcept;
   [[nodiscard]] int timeout_ms() const;
   // True: stop.
   bool handle_signal(int signal_descriptor);
   void accept_client();
   void turn_away_client();
+  // What is owed to strangers' descriptors and to the service manager, once in each round.
+  void look_after_the_loop(shm::Nanoseconds now);
   // Throws std::length_error where there is no room for another.
   void require_room_for(const Client& newcomer, NodeId returning) const;
   void drop_oldest_silent_client();
@@ -223,7 +228,9 @@ class Daemon {
   std::vector<Postponed> postponed_;
   bool try_postponed_ = false;  // something has changed that they wait for
   shm::FileDescriptor epoll_;
-  shm::FileDescriptor reserve_;  // given up for a moment to turn a client away when none is left
+  // Not before: there was no descriptor even to turn a client away.
+  shm::Nanoseconds listen_again_at_ = shm::kForever;
+  Watchdog watchdog_;
   std::map<ClientId, std::unique_ptr<Client>> clients_;  // the oldest first
   ClientId last_client_ = 0;
   Changes changes_;

@@ -35,6 +35,18 @@ std::string port_name(const shm::Message& message) {
   return std::string(name);
 }
 
+void require_usable(const shm::Received& received) {
+  if (received.is_strange) {
+    throw std::runtime_error(
+        "a descriptor of the message is neither a memfd nor an anonymous pipe: nothing else is "
+        "taken");
+  }
+  if (received.lost_descriptors) {
+    throw std::runtime_error(
+        "the daemon has no descriptor left (RLIMIT_NOFILE, LimitNOFILE= in its systemd unit)");
+  }
+}
+
 // What is not said while components come back to a new daemon.
 bool is_question(shm::MessageKind kind) {
   using shm::MessageKind;
@@ -53,6 +65,7 @@ void Daemon::handle(Client& client, shm::Received& received) {
     hear_stranger(client, message);
     return;
   }
+  require_usable(received);
   if (client.node == 0 && message.kind != shm::MessageKind::kHello) {
     throw std::runtime_error("a client must say hello first");
   }
@@ -271,7 +284,7 @@ void Daemon::require_not_kept(shm::PortInstance holder, const std::string& what)
 void Daemon::open_output(Client& client, shm::Received& received) {
   const std::string name = port_name(received.message);
   gate_.require(client, Action::kOutput, name);
-  auto port = adopt_output(received);
+  auto port = adopt_output(received, client.user());
   Source& source = directory_.source(name);
   require_free(client, source.open, "the output port " + name);
   require_not_kept(source.away, "the output port " + name);
@@ -288,7 +301,7 @@ void Daemon::open_output(Client& client, shm::Received& received) {
 void Daemon::open_input(Client& client, shm::Received& received) {
   const std::string name = port_name(received.message);
   gate_.require(client, Action::kInput, name);
-  auto port = adopt_input(received);
+  auto port = adopt_input(received, client.user());
   InputName& input = directory_.input(name);
   require_free(client, input.open, "the input port " + name);
   require_not_kept(input.away, "the input port " + name);

@@ -151,7 +151,7 @@ void Daemon::take_back_output(Client& client, const shm::Received& received) {
     throw std::runtime_error("an output port that it never had was handed back");
   }
   directory_.take_page(message.id, received.descriptors[1]);
-  switchboard_.readmit(adopt_output(received), client, *source);
+  switchboard_.readmit(adopt_output(received, client.user()), client, *source);
 }
 
 void Daemon::take_back_input(Client& client, const shm::Received& received) {
@@ -161,7 +161,7 @@ void Daemon::take_back_input(Client& client, const shm::Received& received) {
       client.to_hand_back.erase(message.port) == 0) {
     throw std::runtime_error("an input port that it never had was handed back");
   }
-  switchboard_.readmit(adopt_input(received), client, *input);
+  switchboard_.readmit(adopt_input(received, client.user()), client, *input);
 }
 
 void Daemon::take_back_link(const Client& client, const shm::Message& message) {

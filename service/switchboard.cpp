@@ -1,7 +1,6 @@
 #include "service/switchboard.hpp"
 
 #include "service/log.hpp"
-#include "shm/bell.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -68,7 +67,7 @@ void Switchboard::remove(shm::PortInstance port) {
       client_of(peer).send(message_to(shm::MessageKind::kPeerGone, peer, port));
     }
     // A publisher may have died between delivering and ringing.
-    if (output == port) shm::ring_bell(inputs_.at(peer)->bell.get());
+    if (output == port) inputs_.at(peer)->bell->ring();
     link = links_.erase(link);
   }
   end_claims_on(port);
@@ -192,7 +191,7 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
       message_to(shm::MessageKind::kInputPeer, output.instance, input.instance, input.name->id);
   to_output.flags = connects ? shm::kIsConnected : 0u;
   to_output.link = link.number = connects ? registry_.next_link() : 0;
-  output.client->send(to_output, {input.segment.get(), input.bell_for_peers.get()});
+  output.client->send(to_output, {input.segment.get(), input.bell->descriptor()});
   told.insert(output.client);
   if (!connects) return;
   auto to_input =
@@ -333,13 +332,13 @@ Client& Switchboard::client_of(shm::PortInstance port) const {
 }
 
 void Switchboard::ring_all() const {
-  for (const auto& [instance, input] : inputs_) shm::ring_bell(input->bell.get());
+  for (const auto& [instance, input] : inputs_) input->bell->ring();
 }
 
 void Switchboard::ring_concerned(const shm::TableView& table, shm::SourceId source) const {
   const auto ring = [&](shm::PortId id) {
     const InputName* name = directory_.input_by_id(id);
-    if (name != nullptr && name->open != 0) shm::ring_bell(inputs_.at(name->open)->bell.get());
+    if (name != nullptr && name->open != 0) inputs_.at(name->open)->bell->ring();
   };
   const auto concerned = table.ports_concerned(source);
   for (shm::Word i = 0; i < concerned.count; ++i) ring(concerned[i]);

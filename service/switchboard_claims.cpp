@@ -123,7 +123,7 @@ void Switchboard::end_claims_on(shm::PortInstance port) {
   for (const auto& [instance, input] : inputs_) {
     if (!take(input->claims, port)) continue;
     input->client->send(message_to(shm::MessageKind::kPeerGone, instance, port));
-    shm::ring_bell(input->bell.get());  // it may have died between delivering and ringing
+    input->bell->ring();  // it may have died between delivering and ringing
   }
 }
 

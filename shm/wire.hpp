@@ -127,16 +127,25 @@ struct Message {
 
 inline constexpr std::size_t kMaxDescriptors = 2;
 
+// What the kernel lets one message carry (SCM_MAX_FD).
+inline constexpr std::size_t kMostDescriptorsOfAMessage = 253;
+
 struct Received {
   Message message;
   std::array<FileDescriptor, kMaxDescriptors> descriptors;
   std::size_t descriptor_count = 0;
+  bool lost_descriptors = false;  // this process had no descriptor left for one that came
+  bool is_strange = false;        // the daemon's word: one of them is nothing that is taken
+  // Those beyond what a message may carry: it is malformed, and who received it disposes of them.
+  std::array<FileDescriptor, kMostDescriptorsOfAMessage - kMaxDescriptors> surplus{};
 };
 
 enum class SendResult { kSent, kFull, kClosed };
 enum class ReceiveResult { kReceived, kNothing, kClosed, kMalformed };
 
-// Non-blocking unless the socket blocks. Never raises SIGPIPE.
+// Non-blocking unless the socket blocks. Never raises SIGPIPE. What is received is all that came:
+// descriptors that the kernel finds no room for, it closes before recvmsg() returns, and to close a
+// stranger's may block. So there is room for as many as there can be.
 [[nodiscard]] SendResult send_message(int socket, const Message& message,
                                       std::array<int, kMaxDescriptors> descriptors = {-1,
                                                                                       -1}) noexcept;

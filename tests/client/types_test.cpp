@@ -119,6 +119,7 @@ void declare(Daemon& daemon, std::uint64_t size, std::uint64_t alignment,
   type.alignment = alignment;
   const auto layout = shm::OutputLayout::plan(type, 8);
   const auto segment = shm::make_segment("test", layout.total_size);
+  ASSERT_FALSE(shm::allocate(segment, 0, layout.total_size));
   shm::Mapping mapping(segment, layout.total_size, shm::Access::kReadWrite);
   auto& header = *mapping.as<shm::OutputHeader>();
   header.magic = shm::OutputHeader::kMagic;

@@ -89,6 +89,13 @@ FileDescriptor reopen(const FileDescriptor& segment, int) {
 std::size_t checked_size(const FileDescriptor& segment, Seals) {
   return explore::segments.at(segment.get()).size;
 }
+std::size_t allocated_size(const FileDescriptor& segment) noexcept {
+  return explore::segments.at(segment.get()).size;
+}
+std::size_t end_of_data(const FileDescriptor& segment, std::size_t) noexcept {
+  return explore::segments.at(segment.get()).size;
+}
+bool copy_out(const FileDescriptor&, std::size_t, void*, std::size_t) noexcept { return false; }
 
 namespace {
 

@@ -18,6 +18,7 @@ shm::FileDescriptor output_segment() {
   const shm::TypeInfo type;
   const auto layout = shm::OutputLayout::plan(type, 4);
   auto segment = shm::make_segment("test", layout.total_size);
+  EXPECT_FALSE(shm::allocate(segment, 0, layout.total_size));
   {
     const shm::Mapping mapping(segment, layout.total_size, shm::Access::kReadWrite);
     auto& header = *mapping.as<shm::OutputHeader>();
