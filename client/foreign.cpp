@@ -2,18 +2,32 @@
 
 #include <unistd.h>
 
+#include <atomic>
+#include <exception>
 #include <utility>
 
 namespace arbiter::detail {
 
+namespace {
+
+// "/Object/pos:o belongs to process 17, and this is process 18, …: make a Node of its own …".
 std::string is_foreign(const std::string& whose, const shm::ProcessMark& process) {
   return whose + " belongs to process " + std::to_string(process.process()) +
          ", and this is process " + std::to_string(::getpid()) +
          ", forked from it: make a Node of its own after fork()";
 }
 
+}  // namespace
+
+void refuse_foreign(const std::string& whose, const shm::ProcessMark& process) {
+  throw Error(is_foreign(whose, process));
+}
+
 // By one write: a lock of stdio may have been held by a thread that is not here.
-void warn_that_foreign(const std::string& whose, const shm::ProcessMark& process) noexcept {
+void warn_once_that_foreign(const std::string& whose, const shm::ProcessMark& process,
+                            pid_t& warned) noexcept {
+  const pid_t self = ::getpid();
+  if (std::exchange(warned, self) == self) return;
   try {
     const std::string line =
         "arbiter: " + is_foreign(whose, process) + "; what it does to the port is ignored\n";

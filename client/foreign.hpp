@@ -15,28 +15,28 @@
 
 namespace arbiter::detail {
 
-// "/Object/pos:o belongs to process 17, and this is process 18, …: make a Node of its own …".
-std::string is_foreign(const std::string& whose, const shm::ProcessMark& process);
-
-// Calls that may throw. `core`: a node's or a port's.
+// Calls that may throw. `whose`: the port's name, or the node's.
+[[noreturn, gnu::cold]] void refuse_foreign(const std::string& whose,
+                                            const shm::ProcessMark& process);
 template <class Core>
 void require_own(const Core& core) {
-  if (!core.process.is_here()) throw Error(is_foreign(core.name(), core.process));
+  if (!core.process.is_here()) [[unlikely]]
+    refuse_foreign(core.name(), core.process);
 }
 inline void require_own(const NodeCore& node) {
-  if (!node.process().is_surely_here()) {
-    throw Error(is_foreign("the node \"" + node.name() + "\"", node.process()));
-  }
+  if (node.process().is_surely_here()) return;
+  refuse_foreign("the node \"" + node.name() + "\"", node.process());
 }
 
-// Calls that may not: a line on standard error, once for each port and child.
-void warn_that_foreign(const std::string& whose, const shm::ProcessMark& process) noexcept;
+// Calls that may not: a line on standard error, once for each port and child. `warned`: the last
+// child that was told.
+[[gnu::cold]] void warn_once_that_foreign(const std::string& whose, const shm::ProcessMark& process,
+                                          pid_t& warned) noexcept;
 template <class Core>
 [[nodiscard]] bool is_own(const Core& core) noexcept {
-  if (core.process.is_here()) return true;
-  if (std::exchange(core.warned_about, ::getpid()) != ::getpid()) {
-    warn_that_foreign(core.name(), core.process);
-  }
+  if (core.process.is_here()) [[likely]]
+    return true;
+  warn_once_that_foreign(core.name(), core.process, core.warned_about);
   return false;
 }
 

@@ -52,14 +52,14 @@ struct Bequests {
     }
     MarkedDescriptors::close_all();
     // A kernel that is too old has not wiped it.
-    if (self.mark != nullptr) self.mark->store(0, std::memory_order_relaxed);
+    if (self.mark != nullptr) *self.mark = 0;
     self.mutex.unlock();
     errno = saved;
   }
 
   std::mutex mutex;
   Bequest* first = nullptr;
-  std::atomic<std::uint32_t>* mark = nullptr;  // of this process, or of an ancestor
+  std::uint8_t* mark = nullptr;  // of this process, or of an ancestor
 };
 
 Bequest::Bequest(void* address, std::size_t size, Kind kind, const std::uint32_t* users)
@@ -87,14 +87,14 @@ void close_in_children(const FileDescriptor& descriptor) {
 ProcessMark ProcessMark::of_this_process() {
   Bequests& bequests = Bequests::all();
   const std::lock_guard lock(bequests.mutex);
-  if (bequests.mark == nullptr || bequests.mark->load(std::memory_order_relaxed) == 0) {
+  if (bequests.mark == nullptr || *bequests.mark == 0) {
     void* const page =
         mmap(nullptr, kPageSize, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (page == MAP_FAILED) {
       throw std::system_error(errno, std::generic_category(), "mapping the mark of a process");
     }
     static_cast<void>(madvise(page, kPageSize, MADV_WIPEONFORK));  // Linux 4.14
-    bequests.mark = new (page) std::atomic<std::uint32_t>(1);
+    bequests.mark = new (page) std::uint8_t(1);
   }
   return {bequests.mark, getpid()};
 }

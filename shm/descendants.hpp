@@ -15,7 +15,6 @@
 
 #include <sys/types.h>
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 
@@ -31,20 +30,17 @@ class ProcessMark {
   static ProcessMark of_this_process();
 
   ProcessMark() = default;
-  [[nodiscard]] bool is_here() const noexcept {
-    // Relaxed is enough: nobody writes it. A child finds it wiped.
-    return word_->load(std::memory_order_relaxed) != 0;
-  }
+  // No atomic: no thread writes the word once it is set. A child finds it wiped.
+  [[nodiscard]] bool is_here() const noexcept { return *word_ != 0; }
   // The same, seeing also through a child that shares its parent's memory (vfork). A system call.
   [[nodiscard]] bool is_surely_here() const noexcept;
   // Of the process that made it.
   [[nodiscard]] pid_t process() const noexcept { return process_; }
 
  private:
-  ProcessMark(const std::atomic<std::uint32_t>* word, pid_t process) noexcept
-      : word_(word), process_(process) {}
+  ProcessMark(const std::uint8_t* word, pid_t process) noexcept : word_(word), process_(process) {}
 
-  const std::atomic<std::uint32_t>* word_ = nullptr;
+  const std::uint8_t* word_ = nullptr;
   pid_t process_ = 0;
 };
 
