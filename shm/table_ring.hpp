@@ -23,7 +23,7 @@ inline constexpr std::uint32_t kTableSlots = 8;
 
 struct Board {
   static constexpr std::uint64_t kMagic = 0x31647262'74696272;  // "rbitbrd1"
-  static constexpr std::uint32_t kVersion = 1;
+  static constexpr std::uint32_t kVersion = 2;
 
   std::uint64_t magic;
   std::uint32_t version;

@@ -33,7 +33,7 @@
 
 namespace arbiter::shm {
 
-inline constexpr std::uint32_t kWireVersion = 3;
+inline constexpr std::uint32_t kWireVersion = 4;
 
 enum class MessageKind : std::uint32_t {
   // From a client.
