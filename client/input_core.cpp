@@ -46,6 +46,7 @@ void InputCore::bind(shm::PortInstance instance, shm::PortId port) {
 void InputCore::add_peer(std::shared_ptr<const OutputPeer> peer) {
   const auto instance = peer->instance;
   links_[instance] = {std::move(peer), false};
+  refused_.erase(instance);
   offer_view();
 }
 
@@ -57,13 +58,18 @@ void InputCore::map_growth(shm::PortInstance peer, const shm::FileDescriptor& se
 
 void InputCore::lose_peer(shm::PortInstance peer) {
   const auto found = links_.find(peer);
-  if (found == links_.end()) return;
-  found->second.gone = true;
-  offer_view();
+  if (found != links_.end()) found->second.gone = true;
+  if (refused_.erase(peer) != 0 || found != links_.end()) offer_view();
 }
 
 void InputCore::disconnect_peer(shm::PortInstance peer) {
-  if (links_.erase(peer) != 0) offer_view();
+  if (links_.erase(peer) + refused_.erase(peer) != 0) offer_view();
+}
+
+void InputCore::refuse_peer(shm::PortInstance peer, shm::SourceId source) {
+  links_.erase(peer);
+  refused_[peer] = source;
+  offer_view();
 }
 
 std::vector<HeldLink> InputCore::held_links() const {
@@ -71,6 +77,7 @@ std::vector<HeldLink> InputCore::held_links() const {
   for (const auto& [peer, link] : links_) {
     if (!link.gone) held.push_back({peer, link.peer->link});
   }
+  for (const auto& [peer, source] : refused_) held.push_back({peer, 0});
   return held;
 }
 
@@ -103,6 +110,7 @@ void InputCore::offer_view() {
     view->links.push_back(link->second);
     ++link;
   }
+  for (const auto& [peer, source] : refused_) view->refused.push_back(source);
   handover_.offer(std::move(view));
   // SYNC POINT: view-announced. Between our offer and our ring; pairs with fence (d) of the port's
   // thread: having heard the ring, it sees the offer at its next last look, whatever the pipe

@@ -27,6 +27,8 @@ struct OutputPort {
   shm::Mapping mapping;
   shm::OutputLayout layout;
   Claims claims;
+  bool is_told_unmentioned = false;  // that the model in force does not mention it
+  bool is_known_blind = false;       // the log has it
 
   [[nodiscard]] const shm::OutputHeader& header() const {
     return *mapping.as<const shm::OutputHeader>();
@@ -44,6 +46,8 @@ struct InputPort {
   shm::FileDescriptor bell_for_peers;
   shm::Mapping mapping;
   Claims claims;
+  bool is_told_unmentioned = false;
+  bool is_known_blind = false;
 
   [[nodiscard]] const shm::InputSegment& shared() const {
     return *mapping.as<const shm::InputSegment>();
@@ -69,6 +73,10 @@ struct Link {
 
   // Both ends have been told of each other; else the publisher alone knows the input port.
   [[nodiscard]] bool is_mutual() const { return number != 0; }
+  // Both ends have been told that they are not.
+  [[nodiscard]] bool is_refused() const {
+    return kind == LinkKind::kConnected && !mismatch.empty();
+  }
 };
 
 }  // namespace arbiter::service
