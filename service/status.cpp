@@ -298,7 +298,7 @@ class Document {
     const Source& source = *of_.directory.sources()[id];
     const Link* link = link_between(of_.switchboard.output(source.open), input);
     if (link != nullptr && link->is_refused()) return link->mismatch;
-    const shm::ActivityWord word = source.activity().word.load(std::memory_order_acquire);
+    const shm::ActivityWord word = source.activity().word.load(std::memory_order_relaxed);
     if (source.open != 0 || source.away != 0 || shm::is_finite(word) || waits(id, input)) return {};
     return "no component has " + source.name + " open, and its activity lasts for ever (`arbiter " +
            "deactivate " + source.name + "` ends it)";
@@ -310,7 +310,7 @@ class Document {
     if (input == nullptr) return false;
     return std::any_of(std::begin(input->shared().lanes), std::end(input->shared().lanes),
                        [&](const shm::Lane& lane) {
-                         return lane.publisher.load(std::memory_order_acquire) != 0 &&
+                         return lane.publisher.load(std::memory_order_relaxed) != 0 &&
                                 lane.source.load(std::memory_order_relaxed) == source;
                        });
   }
