@@ -203,11 +203,16 @@ void WhyAnswer::write_port() const {
     std::cout << ": not arbitrated, for no rule mentions it; all that its connections bring is "
                  "delivered\n";
   } else {
+    const std::string useless =
+        explanation_.winner ? obstacles_.why_it_cannot_deliver(*explanation_.winner) : "";
     std::cout << ": "
-              << (explanation_.winner ? *explanation_.winner + " wins"
-                                      : std::string("idle, nobody wins"))
+              << (!useless.empty()      ? "idle, though " + *explanation_.winner + " is selected"
+                  : explanation_.winner ? *explanation_.winner + " wins"
+                                        : std::string("idle, nobody wins"))
               << since_text();
-    if (explanation_.winner) {
+    if (!useless.empty()) {
+      std::cout << "; it cannot deliver: " << useless;
+    } else if (explanation_.winner) {
       const std::string why = obstacles_.why_nothing_comes_of(*explanation_.winner);
       if (!why.empty()) std::cout << "; but nothing of it reaches the port: " << why;
     }
@@ -294,7 +299,9 @@ void WhyAnswer::write_connection(const ConnectionExplanation& connection) const 
   if (!look_.is_arbitrated) {
     std::cout << " is delivered\n  it is " << state_text(connection.source) << '\n';
   } else if (connection.wins) {
-    std::cout << " wins\n  " << state_text(connection.source) << '\n';
+    const bool can = obstacles_.why_it_cannot_deliver(connection.source).empty();
+    std::cout << (can ? " wins\n  " : " is selected, but cannot deliver\n  ")
+              << state_text(connection.source) << '\n';
     write_selected(connection);
   } else {
     write_kept_out(connection);
@@ -359,13 +366,17 @@ json WhyAnswer::component_json(const std::string& source) const {
 }
 
 void WhyAnswer::write_json() const {
+  const json selected = explanation_.winner ? json(*explanation_.winner) : json(nullptr);
+  const bool is_useless =
+      explanation_.winner && !obstacles_.why_it_cannot_deliver(*explanation_.winner).empty();
   json document = {{"port", port_.name()},
                    {"at_ns", look_.sources.now()},
                    {"settled", look_.is_settled},
                    {"model", port_.model().to_json()},
                    {"arbitrated", look_.is_arbitrated},
                    {"mentioned", look_.is_mentioned},
-                   {"winner", explanation_.winner ? json(*explanation_.winner) : json(nullptr)},
+                   {"selected", selected},
+                   {"winner", is_useless ? json(nullptr) : selected},
                    {"nothing_comes_of_it", nullptr},
                    {"since", nullptr},
                    {"obstacles", to_json(obstacles_.of_port())},
@@ -374,7 +385,8 @@ void WhyAnswer::write_json() const {
                    {"warnings", to_json(port_.name_warnings())}};
   if (look_.is_arbitrated) document["since"] = since_json();
   if (explanation_.winner) {
-    const std::string why = obstacles_.why_nothing_comes_of(*explanation_.winner);
+    const std::string why = is_useless ? obstacles_.why_it_cannot_deliver(*explanation_.winner)
+                                       : obstacles_.why_nothing_comes_of(*explanation_.winner);
     if (!why.empty()) document["nothing_comes_of_it"] = why;
   }
   for (const auto& each : shown_) {

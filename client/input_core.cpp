@@ -52,6 +52,7 @@ void InputCore::bind(shm::PortInstance instance, shm::PortId port) {
 void InputCore::add_peer(std::shared_ptr<const OutputPeer> peer) {
   const auto instance = peer->instance;
   links_[instance] = {std::move(peer), false};
+  refused_.erase(instance);
   offer_view();
 }
 
@@ -65,13 +66,18 @@ void InputCore::map_growth(shm::PortInstance peer) {
 
 void InputCore::lose_peer(shm::PortInstance peer) {
   const auto found = links_.find(peer);
-  if (found == links_.end()) return;
-  found->second.gone = true;
-  offer_view();
+  if (found != links_.end()) found->second.gone = true;
+  if (refused_.erase(peer) != 0 || found != links_.end()) offer_view();
 }
 
 void InputCore::disconnect_peer(shm::PortInstance peer) {
-  if (links_.erase(peer) != 0) offer_view();
+  if (links_.erase(peer) + refused_.erase(peer) != 0) offer_view();
+}
+
+void InputCore::refuse_peer(shm::PortInstance peer, shm::SourceId source) {
+  links_.erase(peer);
+  refused_[peer] = source;
+  offer_view();
 }
 
 std::vector<HeldLink> InputCore::held_links() const {
@@ -79,6 +85,7 @@ std::vector<HeldLink> InputCore::held_links() const {
   for (const auto& [peer, link] : links_) {
     if (!link.gone) held.push_back({peer, link.peer->link});
   }
+  for (const auto& [peer, source] : refused_) held.push_back({peer, 0});
   return held;
 }
 
@@ -136,6 +143,7 @@ void InputCore::offer_view() {
 bool InputCore::offer_links() {
   auto view = std::make_unique<InputView>();
   for (const auto& [peer, link] : links_) view->links.push_back(link);
+  for (const auto& [peer, source] : refused_) view->refused.push_back(source);
   view->let_go = let_go_;
   const bool was_accepted = handover_.offer(std::move(view));
   for (auto& [peer, link] : links_) {

@@ -42,6 +42,8 @@ class InputCore {
   void lose_peer(shm::PortInstance peer);
   // The model has disconnected it.
   void disconnect_peer(shm::PortInstance peer);
+  // Its connection is refused: nothing of the source comes while this peer has it open.
+  void refuse_peer(shm::PortInstance peer, shm::SourceId source);
   [[nodiscard]] std::vector<HeldLink> held_links() const;
   // Unmaps what the port's thread has let go of, and what nobody will take any more.
   void tidy();
@@ -49,6 +51,8 @@ class InputCore {
   [[nodiscard]] bool has_predecessors() const noexcept;
   // Those that have begun to misbehave, once each. Nothing is taken from them any more.
   std::vector<shm::PortInstance> misbehaving();
+  // Whether a take has missed a source that it could not see, for the first time.
+  [[nodiscard]] bool has_become_blind() noexcept { return blindness_.is_news(); }
 
   // Port's thread.
 
@@ -114,6 +118,7 @@ class InputCore {
   enum class Choice : std::uint8_t { kTake, kNothing, kAgain, kLoses };
   Choice choose(Queue*& oldest) noexcept;
   Choice decide_alone(Queue& queue) noexcept;
+  Choice be_blind() noexcept;
   Choice choose_among_all(Queue*& chosen) noexcept;
   bool decide_all() noexcept;
   void drop_losers(const Queue* winner) noexcept;
@@ -125,11 +130,21 @@ class InputCore {
   void count_overtaken(Queue& queue, std::uint64_t lost) noexcept;
   void let_go_of(const OutputPeer* peer) noexcept;
 
+  // Who commands. `selected`: the connection whose rule holds, or null; of several, where the port
+  // is not arbitrated, the first. `commander`: the same if anything of it can come, or null: then
+  // the port is idle.
+  struct Command {
+    const shm::Rule* selected = nullptr;
+    const shm::Rule* commander = nullptr;
+  };
+  [[nodiscard]] Command who_commands() noexcept;
+  [[nodiscard]] bool can_deliver(const shm::Rule& rule) noexcept;
+  [[nodiscard]] bool is_refused(shm::SourceId source) const noexcept;
+
   // wait() in parts.
-  [[nodiscard]] const shm::Rule* winning_rule() noexcept;
-  [[nodiscard]] shm::Nanoseconds next_change(const shm::Rule* winner) const noexcept;
+  [[nodiscard]] shm::Nanoseconds next_change(const shm::Rule* commander) const noexcept;
   Waited wait_once(shm::Nanoseconds timeout, HeldSample& sample);
-  bool arm(HeldSample& sample, const shm::Rule*& winner);
+  bool arm(HeldSample& sample, Command& command);
   void disarm() noexcept;
   void arm_descriptor(HeldSample& sample);
   HeldSample take_once();
@@ -151,8 +166,10 @@ class InputCore {
   // Service thread.
   std::map<shm::PortInstance, OutputLink> links_;
   std::uint64_t let_go_ = 0;  // as InputView::let_go
+  std::map<shm::PortInstance, shm::SourceId> refused_;  // peers that are not among links_
 
   Handover<InputView> handover_;
+  Blindness blindness_;
 
   // Port's thread.
   std::unique_ptr<InputView> view_;

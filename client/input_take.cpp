@@ -190,12 +190,17 @@ InputCore::Choice InputCore::decide_alone(Queue& queue) noexcept {
     case shm::Verdict::kLoses:
       return Choice::kLoses;
     case shm::Verdict::kBlind:
-      count(segment_->header.counters.blind);
-      return Choice::kNothing;
+      return be_blind();
     case shm::Verdict::kUnsettled:
       count(segment_->header.counters.unsettled);
       return Choice::kNothing;
   }
+  return Choice::kNothing;
+}
+
+InputCore::Choice InputCore::be_blind() noexcept {
+  count(segment_->header.counters.blind);
+  if (blindness_.begins()) memory_->service_bell().ring();
   return Choice::kNothing;
 }
 
@@ -206,10 +211,7 @@ InputCore::Choice InputCore::choose_among_all(Queue*& chosen) noexcept {
   if (!decide_all()) return Choice::kAgain;
   chosen = nullptr;
   for (Queue* const queue : waiting_) {
-    if (queue->verdict == shm::Verdict::kBlind) {
-      count(segment_->header.counters.blind);
-      return Choice::kNothing;
-    }
+    if (queue->verdict == shm::Verdict::kBlind) return be_blind();
     if (queue->verdict != shm::Verdict::kWins) continue;
     if (chosen == nullptr || queue->head_stamp < chosen->head_stamp) chosen = queue;
   }

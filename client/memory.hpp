@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/service_bell.hpp"
@@ -18,6 +19,26 @@
 #include "shm/table_ring.hpp"
 
 namespace arbiter::detail {
+
+// Whether a port's decisions have missed a source that the port cannot see, which its component
+// should know once. Begins at most once.
+class Blindness {
+ public:
+  // Port's thread. True once.
+  bool begins() noexcept {
+    if (begun_.load(std::memory_order_relaxed)) return false;
+    begun_.store(true, std::memory_order_relaxed);
+    return true;
+  }
+  // Service thread. True once, after it has begun. Relaxed is enough: nothing is read by it.
+  bool is_news() noexcept {
+    return begun_.load(std::memory_order_relaxed) && !std::exchange(told_, true);
+  }
+
+ private:
+  shm::Atomic<bool> begun_{false};
+  bool told_ = false;
+};
 
 // Thread safety: the service thread adds pages and names; every thread reads. Pages stay mapped for
 // as long as this lives.

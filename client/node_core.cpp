@@ -214,6 +214,7 @@ void NodeCore::say_closed(shm::PortInstance port) noexcept {
 void NodeCore::forget_port(shm::PortInstance port) {
   outputs_.erase(port);
   inputs_.erase(port);
+  given_.erase(port);
   say_closed(port);
 }
 
@@ -234,7 +235,10 @@ shm::Received NodeCore::ask(const shm::Message& question,
 
 bool NodeCore::wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_point give_up) {
   if (Clock::now() >= give_up) return false;
-  if (service_thread_.joinable()) {
+  // A callback on the service thread may open ports: then it serves itself.
+  const bool is_served =
+      service_thread_.joinable() && service_thread_.get_id() != std::this_thread::get_id();
+  if (is_served) {
     news_.wait_until(lock, give_up);
     return true;
   }
@@ -243,6 +247,7 @@ bool NodeCore::wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_poi
     const std::lock_guard pumping(pump_mutex_);
     pump(static_cast<int>(kConnectInterval.count()));
   }
+  give_notices();
   lock.lock();
   return true;
 }
@@ -385,6 +390,7 @@ void NodeCore::close(shm::PortInstance port) noexcept {
     input = std::move(found->second);
     inputs_.erase(found);
   }
+  given_.erase(port);
   say_closed(port);
 }
 

@@ -1,6 +1,7 @@
 // A node: the conversation with the daemon, and the registry of the ports that it concerns.
 //
 //   node_core.cpp     connecting; opening and closing ports; questions and answers
+//   node_notices.cpp  what the component should know
 //   node_service.cpp  what the daemon says, and the thread that hears it
 //   node_rejoin.cpp   losing the daemon, and coming back to another
 //
@@ -17,8 +18,10 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <arbiter/detail/cores.hpp>
 
@@ -112,10 +115,25 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void wake_inputs();
   void handle_peer(shm::Received& received);
   void refuse_peer(const shm::Message& announced, const std::string& why);
+  void handle_refusal(const shm::Message& refusal);
+  void handle_unmentioned(const shm::Message& message);
+  void add_page(shm::Received& received);
   void make_tables_resident();
   void map_growth(const shm::Received& received);
   void say_not_locked(shm::PortInstance port, const std::string& why);
   void say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
+
+  // Notices (node_notices.cpp). Under mutex_:
+  void note(NoticeKind kind, shm::PortInstance port, const std::string& peer,
+            const std::string& text);
+  void note_refusal(const shm::Message& about, const std::string& why);
+  void say_blind(shm::PortInstance port, const char* what_it_does);
+  // Empty where it is not open.
+  [[nodiscard]] const std::string& name_of_port(shm::PortInstance port) const;
+  // Under no lock. False: there was none.
+  bool give_notices();
+  void give(const Notice& notice) const noexcept;
+  [[nodiscard]] bool has_notices();
 
   [[nodiscard]] bool watch_socket() const;
   void hang_up() const noexcept;
@@ -171,6 +189,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::map<shm::PortInstance, std::shared_ptr<OutputCore>> outputs_;
   std::map<shm::PortInstance, std::shared_ptr<InputCore>> inputs_;
   std::map<shm::PortId, std::string> port_names_;
+  std::vector<Notice> notices_;  // to be given
+  bool is_giving_ = false;
+  std::map<shm::PortInstance, std::set<std::string>> given_;  // texts, by port
 
   std::thread service_thread_;  // last: it uses all of the above
 };

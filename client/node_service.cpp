@@ -72,6 +72,7 @@ void NodeCore::run_service_thread() {
       if (stopping_) return;
     }
     pump(has_predecessors() ? kTidyInterval : -1);
+    give_notices();
   }
 }
 
@@ -84,8 +85,13 @@ bool NodeCore::has_predecessors() {
 // Where there is a service thread, it does this.
 void NodeCore::service() {
   if (service_thread_.joinable()) return;
-  const std::lock_guard pumping(pump_mutex_);
-  pump(0);
+  const auto pump_once = [this] {
+    const std::lock_guard pumping(pump_mutex_);
+    pump(0);
+  };
+  do {
+    pump_once();
+  } while (give_notices());
 }
 
 void NodeCore::pump(int timeout_ms) {
@@ -111,7 +117,7 @@ void NodeCore::pump(int timeout_ms) {
         lose_daemon();
         return;
     }
-    if (this->socket() != socket) return;
+    if (this->socket() != socket || has_notices()) return;
   }
 }
 
@@ -124,6 +130,7 @@ void NodeCore::tidy() {
       say_refused(instance, peer,
                   "the input port misbehaves: it says that it has read what was never published");
     }
+    if (output->has_become_blind()) say_blind(instance, "discards its samples");
   }
   for (auto& [instance, input] : inputs_) {
     input->tidy();
@@ -131,6 +138,7 @@ void NodeCore::tidy() {
       say_refused(instance, peer,
                   "the output port misbehaves: its queue has what no honest publisher writes");
     }
+    if (input->has_become_blind()) say_blind(instance, "delivers nothing");
   }
 }
 
@@ -169,16 +177,7 @@ void NodeCore::handle(shm::Received& received) {
       be_welcomed(received);
       break;
     case shm::MessageKind::kSourcePage:
-      try {
-        memory_->add_page(message.id, std::string(message.name_view()),
-                          std::move(received.descriptors[0]));
-        wake_inputs();
-      } catch (const std::system_error& error) {
-        say_not_locked(0, error.what());
-        wake_inputs();
-      } catch (const std::exception& error) {
-        refuse_peer(message, error.what());
-      }
+      add_page(received);
       break;
     case shm::MessageKind::kOutputGrown:
       try {
@@ -205,6 +204,12 @@ void NodeCore::handle(shm::Received& received) {
         refuse_peer(message, error.what());
       }
       break;
+    case shm::MessageKind::kConnectionRefused:
+      handle_refusal(message);
+      break;
+    case shm::MessageKind::kUnmentioned:
+      handle_unmentioned(message);
+      break;
     case shm::MessageKind::kSync: {
       make_tables_resident();
       shm::Message synced;
@@ -222,6 +227,23 @@ void NodeCore::handle(shm::Received& received) {
       handle_reply(received);
       break;
   }
+}
+
+void NodeCore::add_page(shm::Received& received) {
+  const shm::Message& message = received.message;
+  const std::string source(message.name_view());
+  try {
+    memory_->add_page(message.id, source, std::move(received.descriptors[0]));
+  } catch (const std::exception& error) {
+    if (memory_->pages().find(message.id) != nullptr) {
+      say_not_locked(0, error.what());
+    } else {
+      const std::lock_guard lock(mutex_);
+      note(NoticeKind::blind, 0, source,
+           "the activity of " + source + " cannot be seen: " + error.what());
+    }
+  }
+  wake_inputs();
 }
 
 // A port that could not see a source may have held back a sample and gone to sleep.
@@ -251,7 +273,7 @@ void NodeCore::say_not_locked(shm::PortInstance port, const std::string& why) {
     reply.refusal = why;
     is_told = true;
   }
-  if (!is_told) std::fprintf(stderr, "arbiter: \"%s\": %s\n", name_.c_str(), why.c_str());
+  if (!is_told) note(NoticeKind::not_locked, port, {}, why);
 }
 
 void NodeCore::map_growth(const shm::Received& received) {
@@ -286,21 +308,6 @@ void NodeCore::handle_peer(shm::Received& received) {
       core.disconnect_peer(message.peer);
     }
   }
-}
-
-// Tells the daemon, so that it shows in its status.
-void NodeCore::refuse_peer(const shm::Message& announced, const std::string& why) {
-  const std::lock_guard lock(mutex_);
-  say_refused(announced.port, announced.peer, why);
-}
-
-void NodeCore::say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
-  shm::Message refusal;
-  refusal.kind = shm::MessageKind::kPeerRefused;
-  refusal.port = port;
-  refusal.peer = peer;
-  refusal.set_text(why);
-  say(refusal);
 }
 
 void NodeCore::handle_reply(shm::Received& received) {

@@ -82,12 +82,14 @@ void OutputCore::add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t n
   InputLink& link = links_[instance];
   if (link.peer == nullptr) link.peer = std::move(peer);
   link.connected = number != 0;
+  link.refused = false;
   link.number = number;
   try {
     if (link.connected) assign_channel(link);
     allocate_slots();
   } catch (...) {
     link.connected = false;
+    link.refused = true;
     link.channel = shm::kNone;
     offer_view();
     throw;
@@ -103,6 +105,16 @@ void OutputCore::disconnect_peer(shm::PortInstance peer) {
   const auto found = links_.find(peer);
   if (found == links_.end()) return;
   found->second.connected = false;
+  found->second.refused = false;
+  found->second.channel = shm::kNone;
+  offer_view();
+}
+
+void OutputCore::refuse_peer(shm::PortInstance peer) {
+  const auto found = links_.find(peer);
+  if (found == links_.end()) return;
+  found->second.connected = false;
+  found->second.refused = true;
   found->second.channel = shm::kNone;
   offer_view();
 }
@@ -122,7 +134,7 @@ std::vector<shm::PortInstance> OutputCore::misbehaving() {
       found.push_back(instance);
     }
   }
-  for (const shm::PortInstance peer : found) disconnect_peer(peer);
+  for (const shm::PortInstance peer : found) refuse_peer(peer);
   return found;
 }
 
@@ -184,6 +196,7 @@ void OutputCore::connect_waiting(InputLink& link) noexcept {
     allocate_slots();
   } catch (const std::exception&) {  // no memory: it stays unconnected
     link.connected = false;
+    link.refused = true;
     link.channel = shm::kNone;
   }
 }
@@ -215,6 +228,7 @@ void OutputCore::accept_view() noexcept {
       if (old.peer == link.peer.get()) destination = old;
     }
     destination.peer = link.peer.get();
+    destination.refused = link.refused;
     if (link.channel != shm::kNone && !destination.joined) {
       destination.joined = true;
       destination.link = link.number;
@@ -270,7 +284,7 @@ void OutputCore::bind_decisions() noexcept {
   decisions_.clear();
   std::size_t reads = 0;
   for (Destination& destination : destinations_) {
-    if (!destination.joined) continue;
+    if (!destination.joined && !destination.refused) continue;
     const shm::TableView& table = snapshot_.table;
     const shm::Rule rule = table.rule(table.find(source_, destination.peer->port));
     destination.has_rule = rule.source != shm::kNone;

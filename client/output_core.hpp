@@ -40,7 +40,11 @@ class OutputCore {
   void add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t link);
   void remove_peer(shm::PortInstance peer);
   void disconnect_peer(shm::PortInstance peer);
+  // The connection is refused: its arrivals are counted as that.
+  void refuse_peer(shm::PortInstance peer);
   [[nodiscard]] std::vector<HeldLink> held_links() const;
+  // Whether a decision has missed a source that it could not see, for the first time.
+  [[nodiscard]] bool has_become_blind() noexcept { return blindness_.is_news(); }
   // Unmaps what the port's thread has let go of.
   void tidy();
   // Those that have begun to misbehave; they are disconnected.
@@ -82,7 +86,8 @@ class OutputCore {
   // A link as the port's thread works with it.
   struct Destination {
     const InputPeer* peer = nullptr;  // kept alive by view_
-    bool joined = false;  // it has a queue of ours; else it senses, or holds old samples
+    bool joined = false;   // it has a queue of ours; else it senses, or holds old samples
+    bool refused = false;  // it would have, but for its type
     std::uint64_t link = 0;
     std::uint32_t channel = shm::kNone;
     shm::ChannelWriter writer;
@@ -109,6 +114,7 @@ class OutputCore {
   void stamp(shm::ActivityWord word) noexcept;
   void decide_all(shm::Nanoseconds now) noexcept;
   Outcome hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
+  [[nodiscard]] Outcome refuse(const Destination& destination, bool is_sample) const noexcept;
   [[nodiscard]] bool is_full(Destination& destination) const noexcept;
   static void ring_if_waiting(Destination& destination) noexcept;
   void ring_where_selection_changed(shm::Nanoseconds now) noexcept;
@@ -138,6 +144,7 @@ class OutputCore {
   std::uint32_t allocated_slots_ = 0;
 
   Handover<OutputView> handover_;
+  Blindness blindness_;
 
   // Port's thread.
   std::unique_ptr<OutputView> view_;

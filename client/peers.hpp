@@ -37,7 +37,8 @@ struct InputLink {
   std::shared_ptr<const InputPeer> peer;
   // Else the port only senses the source, or was disconnected and may still hold samples.
   bool connected = false;
-  std::uint64_t number = 0;            // the daemon's: each time that it is connected another
+  bool refused = false;      // it should be connected, but the types differ, or memory is short
+  std::uint64_t number = 0;  // the daemon's: each time that it is connected another
   std::uint32_t channel = shm::kNone;  // none: waits until another link's is free
   std::uint32_t depth = 1;             // of the queue: the peer's, or less where memory is short
 };
@@ -80,10 +81,11 @@ struct InputView {
   // Since the port was opened: samples of publishers that were let go of before the port's thread
   // knew them. It counts them.
   std::uint64_t let_go = 0;
+  std::vector<shm::SourceId> refused;  // those whose connection is refused
   InputView* next_retired = nullptr;
 };
 
-// A link as it is told to a daemon that takes over. Number 0: not connected.
+// A link as it is told to a daemon that takes over. Number 0: not connected, or refused.
 struct HeldLink {
   shm::PortInstance peer = 0;
   std::uint64_t number = 0;

@@ -430,7 +430,7 @@ std::vector<Verdict> judge(const std::vector<Statement>& statements, const Compi
 
 bool speaks_of(const ProvedStatement& statement, const CompiledPort& port) {
   return std::any_of(statement.terms.begin(), statement.terms.end(),
-                     [&](const Term& term) { return term.port == &port; });
+                     [&](const Term& term) { return term.port == &port || term.other == &port; });
 }
 
 void add_sources(const ProvedStatements& statements, SourceOrder& order) {
@@ -439,7 +439,9 @@ void add_sources(const ProvedStatements& statements, SourceOrder& order) {
   std::set<const Expression*> seen;
   for (const auto& statement : statements) {
     for (const Term& term : statement->terms) {
-      if (ports.insert(term.port).second) order.add(*term.port);
+      for (const CompiledPort* port : {term.port, term.other}) {
+        if (port != nullptr && ports.insert(port).second) order.add(*port);
+      }
     }
     add_sources_of(*statement->expression, sources, seen);
   }

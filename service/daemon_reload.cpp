@@ -203,6 +203,7 @@ void Daemon::put_in_force() {
   }
   introduce(switchboard_.link_all(snapshot.table), [] {});  // ports that were opened meanwhile
   switchboard_.unlink(snapshot.table);
+  switchboard_.tell_unmentioned(snapshot);
   switchboard_.ring_all();
   for (const auto& [id, client] : clients_) {
     if (client->observes) switchboard_.show_everything(*client);

@@ -110,6 +110,11 @@ void Daemon::handle(Client& client, shm::Received& received) {
         switchboard_.refuse(message.port, message.peer, shm::printable(message.text_view()));
       }
       break;
+    case shm::MessageKind::kBlind:
+      if (client.ports.count(message.port) != 0) {
+        switchboard_.note_blind(message.port, std::string(message.text_view()));
+      }
+      break;
     case shm::MessageKind::kHandBackPage:
       take_back_page(client, received);
       break;
@@ -317,7 +322,9 @@ void Daemon::open_input(Client& client, shm::Received& received) {
 
 // Introduces a new port to its peers, and tells its component once they know it.
 void Daemon::connect(Client& client, std::uint64_t request, shm::PortInstance port) {
-  auto told = switchboard_.link_one(models_.in_force().table, port);
+  const auto in_force = models_.in_force();
+  auto told = switchboard_.link_one(in_force.table, port);
+  switchboard_.tell_unmentioned(in_force, port);
   // Hears of it in order, before the kConnected. But its receivers have to wait for an output port.
   if (switchboard_.output(port) == nullptr) told.erase(&client);
   for (const auto& [id, other] : clients_) {

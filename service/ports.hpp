@@ -54,6 +54,8 @@ struct OutputPort {
   shm::Mapping mapping;  // of its beginning: the header and the channels
   shm::OutputLayout layout;
   Claims claims;
+  bool is_told_unmentioned = false;  // that the model in force does not mention it
+  bool is_known_blind = false;       // the log has it
 
   ~OutputPort();
   [[nodiscard]] const shm::OutputHeader& header() const {
@@ -71,6 +73,8 @@ struct InputPort {
   std::shared_ptr<const PortBell> bell;
   shm::Mapping mapping;
   Claims claims;
+  bool is_told_unmentioned = false;
+  bool is_known_blind = false;
 
   ~InputPort();
 
@@ -99,6 +103,10 @@ struct Link {
 
   // Both ends have been told of each other; else the publisher alone knows the input port.
   [[nodiscard]] bool is_mutual() const { return number != 0; }
+  // Both ends have been told that they are not.
+  [[nodiscard]] bool is_refused() const {
+    return kind == LinkKind::kConnected && !mismatch.empty();
+  }
 };
 
 }  // namespace arbiter::service

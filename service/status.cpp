@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <iterator>
 #include <string_view>
 
 #include <nlohmann/json.hpp>
@@ -184,7 +186,9 @@ class Document {
   }
 
   json input_json(const InputName& name) {
-    const auto winner = winner_of(name.id);
+    const InputPort* input = of_.switchboard.input(name.open);
+    const Command command = command_at(name.id, input);
+    const shm::SourceId winner = command.commander;
     const bool arbitrated = snapshot_.table.is_arbitrated(name.id);
     json result{
         {"name", name.name},
@@ -194,9 +198,13 @@ class Document {
         {"idle", winner == shm::kNone},
         {"winner", arbitrated && winner != shm::kNone ? json(of_.directory.sources()[winner]->name)
                                                       : json(nullptr)},
+        {"cannot_deliver", nullptr},
         {"connections", json::array()},
         {"senses", json::array()}};
-    const InputPort* input = of_.switchboard.input(name.open);
+    if (command.selected != shm::kNone && winner == shm::kNone) {
+      result["cannot_deliver"] = {{"source", of_.directory.sources()[command.selected]->name},
+                                  {"why", command.why}};
+    }
     result["open"] = input != nullptr;
     add_away(name.away, of_.registry.input(name.id), result);
     if (input != nullptr) add_open(*input, result);
@@ -270,15 +278,51 @@ class Document {
     return false;
   }
 
-  [[nodiscard]] shm::SourceId winner_of(shm::PortId port) const {
+  // As InputCore::who_commands().
+  struct Command {
+    shm::SourceId selected = shm::kNone;
+    shm::SourceId commander = shm::kNone;  // else the port is idle
+    std::string why;                       // the one that is selected cannot deliver
+  };
+  [[nodiscard]] Command command_at(shm::PortId port, const InputPort* input) const {
     shm::DecisionClock clock(now_, true);
     shm::Decider decider(snapshot_.table, of_.directory.pages(), clock);
+    Command command;
     const auto range = snapshot_.table.connections_to(port);
     for (auto index = range.first; index != range.first + range.count; ++index) {
       const shm::Rule rule = snapshot_.table.rule(index);
-      if (decider.decide_with_own(rule) == shm::Verdict::kWins) return rule.source;
+      if (decider.decide_with_own(rule) != shm::Verdict::kWins) continue;
+      const std::string why = why_nothing_can_come(rule.source, input);
+      if (why.empty()) command.commander = rule.source;
+      if (command.selected == shm::kNone) {
+        command.selected = rule.source;
+        command.why = why;
+      }
+      if (why.empty() || snapshot_.table.is_arbitrated(port)) break;
     }
-    return shm::kNone;
+    return command;
+  }
+
+  // Of an active source. Empty: something can.
+  [[nodiscard]] std::string why_nothing_can_come(shm::SourceId id, const InputPort* input) const {
+    const Source& source = *of_.directory.sources()[id];
+    const Link* link = link_between(of_.switchboard.output(source.open), input);
+    if (link != nullptr && link->is_refused()) return link->mismatch;
+    const shm::ActivityWord word = source.activity().word.load(std::memory_order_relaxed);
+    if (source.open != 0 || source.away != 0 || shm::is_finite(word) || waits(id, input)) return {};
+    return "no component has " + source.name + " open, and its activity lasts for ever (`arbiter " +
+           "deactivate " + source.name + "` ends it)";
+  }
+
+  // Whether a receiver still has a queue of a publisher that has gone: it gives it up once it is
+  // empty.
+  [[nodiscard]] static bool waits(shm::SourceId source, const InputPort* input) {
+    if (input == nullptr) return false;
+    return std::any_of(std::begin(input->shared().lanes), std::end(input->shared().lanes),
+                       [&](const shm::Lane& lane) {
+                         return lane.publisher.load(std::memory_order_relaxed) != 0 &&
+                                lane.source.load(std::memory_order_relaxed) == source;
+                       });
   }
 
   const StatusOf& of_;

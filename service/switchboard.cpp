@@ -63,7 +63,7 @@ void Switchboard::remove(shm::PortInstance port) {
       continue;
     }
     const shm::PortInstance peer = output == port ? input : output;
-    if (input == port || link->second.is_mutual()) {
+    if (input == port || link->second.is_mutual() || link->second.is_refused()) {
       client_of(peer).send(message_to(shm::MessageKind::kPeerGone, peer, port));
     }
     // A publisher may have died between delivering and ringing.
@@ -174,7 +174,7 @@ void Switchboard::send_pages(const OutputPort& output, const shm::TableView& tab
   }
 }
 
-// A mismatch leaves the two linked as if the input port only sensed the source.
+// A mismatch leaves the two linked as if the input port only sensed the source, and both are told.
 void Switchboard::make_link(const OutputPort& output, const InputPort& input, LinkKind kind,
                             Told& told) {
   Link& link = links_[{output.instance, input.instance}];
@@ -191,12 +191,19 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
       message_to(shm::MessageKind::kInputPeer, output.instance, input.instance, input.name->id);
   to_output.flags = connects ? shm::kIsConnected : 0u;
   to_output.link = link.number = connects ? registry_.next_link() : 0;
+  to_output.set_name(input.name->name);
   output.client->send(to_output, {input.segment.get(), input.bell->descriptor()});
   told.insert(output.client);
+  if (link.is_refused()) {
+    tell_refusal({output.instance, input.instance}, output.instance, link.mismatch);
+    tell_refusal({output.instance, input.instance}, input.instance, link.mismatch);
+    told.insert(input.client);
+  }
   if (!connects) return;
   auto to_input =
       message_to(shm::MessageKind::kOutputPeer, input.instance, output.instance, output.source->id);
   to_input.link = link.number;
+  to_input.set_name(output.source->name);
   input.client->send(to_input, {output.segment.get(), -1});
   told.insert(input.client);
   fresh_.emplace_back(output.instance, input.instance);
@@ -259,7 +266,7 @@ Switchboard::Told Switchboard::unlink(const shm::TableView& table) {
     const auto still = wanted.find(key);
     const LinkKind kind = still == wanted.end() ? LinkKind::kLapsed : still->second;
     if (kind == link.kind) continue;
-    if (link.is_mutual()) {
+    if (link.is_mutual() || link.is_refused()) {
       const OutputPort& output = *outputs_.at(key.first);
       const InputPort& input = *inputs_.at(key.second);
       output.client->send(message_to(shm::MessageKind::kDisconnected, key.first, key.second));
@@ -308,22 +315,6 @@ void Switchboard::show_everything(Client& client) {
     message.set_name(input->name);
     client.send(message);
   }
-}
-
-void Switchboard::refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
-  for (const LinkKey& key : {LinkKey{port, peer}, LinkKey{peer, port}}) {
-    const auto found = links_.find(key);
-    if (found == links_.end()) continue;
-    found->second.mismatch = why;
-    if (std::exchange(found->second.number, 0) != 0) disconnect(port, peer);
-    log::warn("{} is not connected to {}: {}", outputs_.at(key.first)->source->name,
-              inputs_.at(key.second)->name->name, why);
-  }
-}
-
-// The one that refused knows.
-void Switchboard::disconnect(shm::PortInstance refused_by, shm::PortInstance port) {
-  client_of(port).send(message_to(shm::MessageKind::kDisconnected, port, refused_by));
 }
 
 Client& Switchboard::client_of(shm::PortInstance port) const {

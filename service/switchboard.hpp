@@ -14,6 +14,7 @@
 
 #include "service/ports.hpp"
 #include "shm/decision_table.hpp"
+#include "shm/table_ring.hpp"
 
 namespace arbiter::service {
 
@@ -59,6 +60,12 @@ class Switchboard {
   void show_everything(Client& client);
   // A client could not take up a peer.
   void refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
+  // Tells the components, and the log, once, whose ports the model in force does not mention: of
+  // all ports, or of one. `table` of generation 0: there is no model.
+  void tell_unmentioned(const shm::TableSnapshot& in_force);
+  void tell_unmentioned(const shm::TableSnapshot& in_force, shm::PortInstance port);
+  // A component says that its port cannot see all that its rules read: for the log, once.
+  void note_blind(shm::PortInstance port, const std::string& text);
   // Wakes every component that waits, to look anew.
   void ring_all() const;
   // Wakes those that a source concerns.
@@ -86,7 +93,11 @@ class Switchboard {
   [[nodiscard]] bool is_connected(const LinkKey& key) const;
   // Whoever claims a link with that port is told that it has gone.
   void end_claims_on(shm::PortInstance port);
-  void disconnect(shm::PortInstance refused_by, shm::PortInstance port);
+  void tell_refusal(const LinkKey& key, shm::PortInstance to, const std::string& why) const;
+  template <class Port>
+  static void say_unmentioned(Port& port, const std::string& text);
+  [[nodiscard]] std::string unmentioned_text(const shm::TableSnapshot& in_force,
+                                             const std::string& name, bool is_output) const;
   bool send_page(Client& client, const Source& source);
   void insert(std::unique_ptr<OutputPort> port, Client& client, Source& source);
   void insert(std::unique_ptr<InputPort> port, Client& client, InputName& name);

@@ -36,7 +36,7 @@ std::optional<std::uint64_t> take(Claims& claims, shm::PortInstance peer) {
 void Switchboard::set_away(shm::PortInstance port) {
   for (auto link = links_.begin(); link != links_.end();) {
     const auto [output, input] = link->first;
-    if (output == port && link->second.is_mutual()) {
+    if (output == port && (link->second.is_mutual() || link->second.is_refused())) {
       inputs_.at(input)->claims[port] = link->second.number;
     }
     if (input == port) outputs_.at(output)->claims[port] = link->second.number;
@@ -107,7 +107,7 @@ void Switchboard::settle(OutputPort& output, InputPort& input) {
     output.client->send(
         message_to(shm::MessageKind::kDisconnected, output.instance, input.instance));
   }
-  if (by_input) {
+  if (by_input.value_or(0) != 0) {
     input.client->send(
         message_to(shm::MessageKind::kDisconnected, input.instance, output.instance));
   }

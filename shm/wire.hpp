@@ -60,6 +60,7 @@ enum class MessageKind : std::uint32_t {
   kConnect,  // port: opened by a daemon that has gone since; asks for the kConnected that is
              // missing
   kModel,    // ask for the texts of the model in force
+  kBlind,    // port, text: it cannot see a source that its rules read, for the log
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; descriptors: the board, the registry, read-only
@@ -79,6 +80,9 @@ enum class MessageKind : std::uint32_t {
   kOutputGrown,  // to input `port`: `peer` uses more of its segment now; descriptor: the segment
   kReport,       // in place of kDone and kRefused; descriptor: a memfd with JSON
   kModelReply,   // descriptor: a memfd with JSON
+  kConnectionRefused,  // `port` is not connected to `peer`, though the model says so, and is not to
+                       // be; id = source, or port id; name: the peer's; text: why
+  kUnmentioned,        // port, text: the model in force does not mention it
 };
 
 enum MessageFlag : std::uint32_t {

@@ -121,7 +121,12 @@ TEST(WhyNames, SaysOnTheFirstLineThatNothingOfTheWinnerArrives) {
   EXPECT_THAT(first_line(), HasSubstr(nothing + "no component has it open"));
   {
     auto in = node.input_port<double>("/base");
-    EXPECT_THAT(first_line(), HasSubstr(nothing + "the two ports do not fit"));
+    EXPECT_THAT(first_line(), AllOf(HasSubstr("idle, though /wander is selected"),
+                                    HasSubstr("; it cannot deliver: the output port sends int")));
+    const json answer = why_json({"/base"});
+    EXPECT_EQ(answer["winner"], nullptr);
+    EXPECT_EQ(answer["selected"], "/wander");
+    EXPECT_THAT(answer["nothing_comes_of_it"].get<std::string>(), HasSubstr("takes double"));
   }
   auto in = node.input_port<int>("/base");
   EXPECT_THAT(first_line(), HasSubstr(nothing + "test (pid " + pid() + ") only signals"));

@@ -30,6 +30,7 @@
 #include <arbiter/bytes.hpp>
 #include <arbiter/input_port.hpp>
 #include <arbiter/node.hpp>
+#include <arbiter/notice.hpp>
 #include <arbiter/options.hpp>
 #include <arbiter/output_port.hpp>
 #include <arbiter/result.hpp>
