@@ -132,7 +132,7 @@ void NodeCore::handle(shm::Received& received) {
       break;
     case shm::MessageKind::kSourcePage:
       try {
-        memory_->add_page(message.id, std::string(message.name_view()),
+        memory_->add_page(message.id, message.value, std::string(message.name_view()),
                           std::move(received.descriptors[0]));
         wake_inputs();
       } catch (const std::system_error& error) {

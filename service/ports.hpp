@@ -18,6 +18,10 @@ namespace arbiter::service {
 // link's number (0: not connected). They stand, in shared memory, until both ends are here again.
 using Claims = std::map<shm::PortInstance, std::uint64_t>;
 
+// Descriptors that the daemon keeps of a port.
+inline constexpr std::uint64_t kDescriptorsOfOutput = 1;
+inline constexpr std::uint64_t kDescriptorsOfInput = 3;
+
 struct OutputPort {
   shm::PortInstance instance = 0;
   Client* client = nullptr;
@@ -27,6 +31,7 @@ struct OutputPort {
   shm::Mapping mapping;
   shm::OutputLayout layout;
   Claims claims;
+  Charge charge;
 
   [[nodiscard]] const shm::OutputHeader& header() const {
     return *mapping.as<const shm::OutputHeader>();
@@ -44,6 +49,7 @@ struct InputPort {
   shm::FileDescriptor bell_for_peers;
   shm::Mapping mapping;
   Claims claims;
+  Charge charge;
 
   [[nodiscard]] const shm::InputSegment& shared() const {
     return *mapping.as<const shm::InputSegment>();

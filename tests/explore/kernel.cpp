@@ -110,6 +110,10 @@ Mapping::Mapping(const FileDescriptor& segment, std::size_t size, Access access)
   region_.swap(region);
 }
 
+void Mapping::replace(const FileDescriptor& segment) {
+  *this = Mapping(segment, size(), Access::kReadOnly);
+}
+
 // A real descriptor, which epoll takes, that is never readable; and a word in the image.
 Bell::Bell() : read_(eventfd(0, EFD_CLOEXEC)), write_(eventfd(0, EFD_CLOEXEC)) {
   auto* const rung = new Atomic<std::uint32_t>(0);
