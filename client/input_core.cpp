@@ -200,7 +200,7 @@ void InputCore::accept_view() {
   waiting_.reserve(queues_.size());
   handover_.retire(std::exchange(view_, std::move(view)));
   memory_->service_bell().ring();  // to dispose of the old one
-  bound_generation_ = UINT64_MAX;
+  bound_epoch_ = UINT64_MAX;
 }
 
 shm::Lane* InputCore::free_lane() noexcept {
@@ -238,7 +238,7 @@ void InputCore::retire_queue(Queue& queue, const InputView& next) {
 void InputCore::bind_rules() {
   bound_pages_ = memory_->pages().changes();
   snapshot_ = memory_->tables().snapshot();
-  bound_generation_ = snapshot_.generation;
+  bound_epoch_ = snapshot_.epoch;
   const shm::TableView& table = snapshot_.table;
   rules_.clear();
   sources_.clear();
@@ -255,6 +255,9 @@ void InputCore::bind_rules() {
   std::sort(sources_.begin(), sources_.end());
   sources_.erase(std::unique(sources_.begin(), sources_.end()), sources_.end());
   picture_.resize(sources_.size());
+  activities_.resize(sources_.size());
+  std::transform(sources_.begin(), sources_.end(), activities_.begin(),
+                 [&](shm::SourceId source) { return memory_->pages().find(source); });
 }
 
 void InputCore::bind_queues() {
@@ -277,8 +280,7 @@ void InputCore::bind_queues() {
 
 void InputCore::refresh() {
   if (handover_.has_offer()) accept_view();
-  if (memory_->tables().generation() != bound_generation_ ||
-      memory_->pages().changes() != bound_pages_) {
+  if (memory_->tables().epoch() != bound_epoch_ || memory_->pages().changes() != bound_pages_) {
     bind_rules();
   }
 }

@@ -178,13 +178,14 @@ class InputCore {
   std::vector<shm::ChannelReader::Watch> watches_;  // by queue: what says that nothing is new
   std::vector<Queue*> waiting_;  // those in which the take under way found a head
   shm::TableSnapshot snapshot_;
-  std::uint64_t bound_generation_ = UINT64_MAX;
+  shm::Epoch bound_epoch_ = UINT64_MAX;
   std::uint64_t bound_pages_ = 0;
-  std::vector<shm::Rule> rules_;            // of all connections to the port, in document order
-  std::vector<shm::Read> reads_;            // what the queues' rules have bound
-  std::vector<shm::SourceId> sources_;      // those that the rules and connections name
-  std::vector<shm::SeenActivity> picture_;  // scratch, parallel to sources_
-  shm::Nanoseconds last_reading_ = 0;       // of the clock, by this port
+  std::vector<shm::Rule> rules_;        // of all connections to the port, in document order
+  std::vector<shm::Read> reads_;        // what the queues' rules have bound
+  std::vector<shm::SourceId> sources_;  // those that the rules and connections name
+  std::vector<const shm::Activity*> activities_;  // theirs; null where there is no page in force
+  std::vector<shm::SeenActivity> picture_;        // scratch, parallel to sources_
+  shm::Nanoseconds last_reading_ = 0;             // of the clock, by this port
   std::uint32_t held_ = 0;
   std::array<const OutputPeer*, shm::kMaxHeld> held_from_{};  // by hold
   Copies copies_;                                             // likewise

@@ -220,11 +220,10 @@ InputCore::Choice InputCore::choose_among_all(Queue*& chosen) noexcept {
 }
 
 bool InputCore::decide_all() noexcept {
-  const auto look_at_source = [&](shm::SourceId source) {
-    const auto* activity = memory_->pages().find(source);
+  const auto look_at = [](const shm::Activity* activity) {
     return activity == nullptr ? shm::SeenActivity{} : shm::SeenActivity::of(*activity);
   };
-  std::transform(sources_.begin(), sources_.end(), picture_.begin(), look_at_source);
+  std::transform(activities_.begin(), activities_.end(), picture_.begin(), look_at);
   const shm::Nanoseconds now = shm::monotonic_now();
   // The time does not pass: the picture was begun before it, and is seen to stand after it.
   last_reading_ = now;
@@ -233,11 +232,10 @@ bool InputCore::decide_all() noexcept {
     queue->verdict = queue->rule.decide(snapshot_.table, clock);
     if (queue->verdict == shm::Verdict::kUnsettled) return false;
   }
-  const bool stands =
-      std::equal(sources_.begin(), sources_.end(), picture_.begin(),
-                 [&](shm::SourceId source, const shm::SeenActivity& seen) {
-                   return seen.stands(look_at_source(source), snapshot_.table.timeout(source), now);
-                 });
+  bool stands = true;
+  for (std::size_t i = 0; stands && i < sources_.size(); ++i) {
+    stands = picture_[i].stands(look_at(activities_[i]), snapshot_.table.timeout(sources_[i]), now);
+  }
   return stands && memory_->tables().is_in_force(snapshot_);
 }
 

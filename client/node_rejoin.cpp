@@ -152,11 +152,12 @@ bool NodeCore::hand_back(const shm::FileDescriptor& socket,
   message.flags |= shm::kRejoins;
   message.link = node_;
   if (!is_sent(socket, message, {memory_->board().get(), memory_->registry().get()})) return false;
-  for (const auto& [id, page] : memory_->page_descriptors()) {
+  for (const auto& page : memory_->pages_at_hand()) {
     message = {};
     message.kind = shm::MessageKind::kHandBackPage;
-    message.id = id;
-    if (!is_sent(socket, message, {page.get(), -1})) return false;
+    message.id = page.source;
+    message.value = page.number;
+    if (!is_sent(socket, message, {page.descriptor, -1})) return false;
   }
   for (const PortAtHand& port : ports) {
     if (!is_handed_back(socket, port)) return false;

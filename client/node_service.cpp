@@ -233,7 +233,7 @@ void NodeCore::add_page(shm::Received& received) {
   const shm::Message& message = received.message;
   const std::string source(message.name_view());
   try {
-    memory_->add_page(message.id, source, std::move(received.descriptors[0]));
+    memory_->add_page(message.id, message.value, source, std::move(received.descriptors[0]));
   } catch (const std::exception& error) {
     if (memory_->pages().find(message.id) != nullptr) {
       say_not_locked(0, error.what());

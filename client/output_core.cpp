@@ -243,7 +243,7 @@ void OutputCore::accept_view() noexcept {
   destinations_ = std::move(destinations);
   handover_.retire(std::exchange(view_, std::move(view)));
   memory_->service_bell().ring();  // to dispose of the old one
-  bound_generation_ = UINT64_MAX;
+  bound_epoch_ = UINT64_MAX;
   // (b) for the queues that we left: their slots may be reclaimed before the next publish.
   shm::full_fence();
 }
@@ -264,8 +264,7 @@ void OutputCore::leave_all_but(const OutputView& view) noexcept {
 }
 
 bool OutputCore::rules_are_bound() const noexcept {
-  return memory_->tables().generation() == bound_generation_ &&
-         memory_->pages().changes() == bound_pages_;
+  return memory_->tables().epoch() == bound_epoch_ && memory_->pages().changes() == bound_pages_;
 }
 
 // Again where seven models were loaded meanwhile, for T is used before a decision checks the table.
@@ -273,7 +272,7 @@ void OutputCore::bind_rules() noexcept {
   for (int tries = 0; tries <= kMaxTableRetries; ++tries) {
     bound_pages_ = memory_->pages().changes();
     snapshot_ = memory_->tables().snapshot();
-    bound_generation_ = snapshot_.generation;
+    bound_epoch_ = snapshot_.epoch;
     timeout_ = snapshot_.table.timeout(source_);
     bind_decisions();
     if (memory_->tables().is_whole(snapshot_)) return;

@@ -91,7 +91,7 @@ class OutputCore {
     std::uint64_t link = 0;
     std::uint32_t channel = shm::kNone;
     shm::ChannelWriter writer;
-    bool has_rule = false;  // the connection, under bound_generation_
+    bool has_rule = false;  // the connection, under bound_epoch_
     std::uint32_t decision = 0;
     shm::Verdict verdict = shm::Verdict::kLoses;
     std::uint64_t rung = 0;           // the wait that we rang for last
@@ -161,7 +161,7 @@ class OutputCore {
   std::uint32_t loans_ = 0;
   std::uint64_t sequence_ = 0;
   shm::ActivityWord own_word_ = shm::kNeverActive;
-  std::uint64_t bound_generation_ = UINT64_MAX;
+  shm::Epoch bound_epoch_ = UINT64_MAX;
   std::uint64_t bound_pages_ = 0;
   shm::TableSnapshot snapshot_;
   shm::Nanoseconds timeout_ = shm::kDefaultTimeout;

@@ -34,7 +34,8 @@ shm::FileDescriptor open_process(int socket, pid_t pid) {
 
 }  // namespace
 
-Client::Client(ClientId id, shm::FileDescriptor socket) : id_(id), socket_(std::move(socket)) {
+Client::Client(ClientId id, shm::FileDescriptor socket, Shares& shares)
+    : id_(id), shares_(shares), socket_(std::move(socket)) {
   const auto fail = [&](const char* what) {
     const int error = errno;
     Errands::of_the_process().close(user_, std::move(socket_));
@@ -47,6 +48,12 @@ Client::Client(ClientId id, shm::FileDescriptor socket) : id_(id), socket_(std::
   }
   pid_ = peer.pid;
   user_ = peer.uid;
+  try {
+    descriptors_ = shares_.take(user_, Share::kDescriptors, 2);  // the socket, and the process
+  } catch (const LimitExceeded&) {
+    Errands::of_the_process().close(user_, std::move(socket_));
+    throw;
+  }
   started_ = start_of_process(pid_);
   process_ = open_process(socket_.get(), pid_);
   if (!process_) fail("opening a client's process");
@@ -64,13 +71,17 @@ void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescript
       return;
     }
   }
-  if (queue_.size() == kMaxQueue || queued_descriptors_ >= kMaxQueuedDescriptors) {
+  const auto count = static_cast<std::uint64_t>(
+      std::count_if(descriptors.begin(), descriptors.end(), [](int fd) { return fd >= 0; }));
+  if (!has_room_for(count)) {
     log::warn("{} does not read its messages: {} wait; giving it up", description(), queue_.size());
     lost_ = true;
     return;
   }
   auto queued = std::make_unique<Queued>();
   queued->message = message;
+  queued->bytes = shares_.take(user_, Share::kQueue, sizeof(Queued));
+  queued->open = shares_.take(user_, Share::kDescriptors, count);
   for (std::size_t i = 0; i < descriptors.size() && descriptors[i] >= 0; ++i) {
     queued->descriptors[i].reset(fcntl(descriptors[i], F_DUPFD_CLOEXEC, 0));
     if (!queued->descriptors[i]) {
@@ -84,6 +95,12 @@ void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescript
     ++queued_descriptors_;
   }
   queue_.push_back(std::move(queued));
+}
+
+bool Client::has_room_for(std::uint64_t descriptors) const {
+  return queue_.size() < kMaxQueue && queued_descriptors_ < kMaxQueuedDescriptors &&
+         shares_.allows(user_, Share::kQueue, sizeof(Queued)) &&
+         shares_.allows(user_, Share::kDescriptors, descriptors);
 }
 
 void Client::flush() {

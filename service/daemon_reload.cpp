@@ -205,9 +205,6 @@ void Daemon::put_in_force() {
   switchboard_.unlink(snapshot.table);
   switchboard_.tell_unmentioned(snapshot);
   switchboard_.ring_all();
-  for (const auto& [id, client] : clients_) {
-    if (client->observes) switchboard_.show_everything(*client);
-  }
   log::info("model {} is in force: {} \"{}\"{}", snapshot.generation, swap.how, model.name,
             swap.change.by.empty() ? "" : ", by " + swap.change.by);
   history_.add({snapshot.generation,

@@ -103,6 +103,13 @@ int run(int argc, char** argv) {
   app.add_option("--instance", instance,
                  "Name of this daemon; without it $ARBITER_INSTANCE, else \"default\"")
       ->type_name("NAME");
+  app.add_option(
+         "--user-share", options.user_share,
+         "How much of names, clients, descriptors and unread messages one user may have, in "
+         "percent; what another has left counts")
+      ->type_name("PERCENT")
+      ->check(CLI::Range(1u, 99u))
+      ->capture_default_str();
   app.add_flag("--descriptor-store", options.uses_descriptor_store,
                "Leave descriptors with the service manager for the next daemon");
   app.add_option("--log-level", level, "trace, debug, info, warn or error")

@@ -44,6 +44,10 @@ class PortBell : public std::enable_shared_from_this<PortBell> {
   mutable std::atomic<bool> asked_{false};
 };
 
+// Descriptors that the daemon keeps of a port.
+inline constexpr std::uint64_t kDescriptorsOfOutput = 1;
+inline constexpr std::uint64_t kDescriptorsOfInput = 2;
+
 struct OutputPort {
   shm::PortInstance instance = 0;
   Client* client = nullptr;
@@ -56,6 +60,7 @@ struct OutputPort {
   Claims claims;
   bool is_told_unmentioned = false;  // that the model in force does not mention it
   bool is_known_blind = false;       // the log has it
+  Charge charge;
 
   ~OutputPort();
   [[nodiscard]] const shm::OutputHeader& header() const {
@@ -75,6 +80,7 @@ struct InputPort {
   Claims claims;
   bool is_told_unmentioned = false;
   bool is_known_blind = false;
+  Charge charge;
 
   ~InputPort();
 

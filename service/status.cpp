@@ -55,7 +55,7 @@ json connection_counters(const OutputPort* output, const InputPort* input, const
   const shm::OutputSegment segment(output->mapping.data(), output->layout);
   for (std::uint32_t i = 0; i < shm::kMaxDestinations; ++i) {
     const shm::Channel& channel = segment.channel(i);
-    if (channel.receiver.load(std::memory_order_acquire) != link->number) continue;
+    if (channel.receiver.load(std::memory_order_relaxed) != link->number) continue;
     const std::uint64_t before = read(channel.first) - 1;
     const std::uint64_t accepted = read(channel.accepted);
     counters["accepted"] = accepted - before;
@@ -64,7 +64,7 @@ json connection_counters(const OutputPort* output, const InputPort* input, const
     counters["depth"] = channel.depth.load(std::memory_order_relaxed);
     counters["waiting"] = accepted - before;  // a receiver that has never taken has no lane yet
     for (const shm::Lane& lane : input->shared().lanes) {
-      if (lane.publisher.load(std::memory_order_acquire) != output->instance) continue;
+      if (lane.publisher.load(std::memory_order_relaxed) != output->instance) continue;
       const std::uint64_t consumed = std::max(read(lane.consumed), before);
       counters["taken"] = read(lane.taken);
       counters["dropped"] = read(lane.dropped);
@@ -152,7 +152,7 @@ class Document {
 
   [[nodiscard]] bool is_active(const Source& source) const {
     if (!source.has_page()) return false;
-    return shm::is_active(source.activity().word.load(std::memory_order_acquire), now_);
+    return shm::is_active(source.activity().word.load(std::memory_order_relaxed), now_);
   }
 
   // Of one that has not come back no more is known than its process.

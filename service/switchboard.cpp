@@ -83,11 +83,13 @@ void Switchboard::remove(shm::PortInstance port) {
 void Switchboard::erase(shm::PortInstance port) {
   if (const auto found = outputs_.find(port); found != outputs_.end()) {
     found->second->source->open = 0;
+    directory_.let_go(*found->second->source);
     found->second->client->ports.erase(port);
     outputs_.erase(found);
   }
   if (const auto found = inputs_.find(port); found != inputs_.end()) {
     found->second->name->open = 0;
+    directory_.let_go(*found->second->name);
     found->second->client->ports.erase(port);
     inputs_.erase(found);
   }
@@ -293,28 +295,51 @@ void Switchboard::send_pages(Client& client, shm::PortId port, const shm::TableV
   }
 }
 
-// False: the client has it, or nobody has yet.
+// The page in force, and the next one where there is one. False: the client has them, or nobody has
+// yet.
 bool Switchboard::send_page(Client& client, const Source& source) {
   if (!source.has_page()) return false;
-  if (std::exchange(client.pages[source.id], source.page_number) == source.page_number) {
-    return false;
-  }
-  auto message = message_to(shm::MessageKind::kSourcePage, 0, 0, source.id);
-  message.set_name(source.name);
-  client.send(message, {source.readable.get(), -1});
-  return true;
+  shm::PageNumber& shown = client.pages[source.id];
+  const auto send = [&](const Page& page, shm::PageNumber number) {
+    if (!page || shown >= number) return false;
+    shown = number;
+    auto message = message_to(shm::MessageKind::kSourcePage, 0, 0, source.id);
+    message.value = number;
+    message.set_name(source.name);
+    client.send(message, {page.readable.get(), -1});
+    return true;
+  };
+  const bool is_new = send(source.page, source.page_number);
+  return send(source.next, source.page_number + 1) || is_new;
 }
 
-void Switchboard::show_everything(Client& client) {
-  for (const auto& source : directory_.sources()) send_page(client, *source);
-  for (const auto& input : directory_.inputs()) {
-    if (std::exchange(client.port_names[input->id], input->name_number) == input->name_number) {
+Switchboard::Told Switchboard::show_next_page(const Source& source) {
+  Told told;
+  const auto show = [&](Client& client) {
+    if (client.pages.count(source.id) != 0 && send_page(client, source)) told.insert(&client);
+  };
+  for (const auto& [instance, output] : outputs_) show(*output->client);
+  for (const auto& [instance, input] : inputs_) show(*input->client);
+  return told;
+}
+
+bool Switchboard::show_news(Client& client, std::uint64_t& told, int& left) {
+  const auto& news = directory_.news();
+  for (auto next = news.upper_bound(told); next != news.end(); ++next) {
+    if (client.has_queue() || client.is_lost()) return false;
+    if (left == 0) return true;
+    --left;
+    told = next->first;
+    if (next->second.is_source) {
+      send_page(client, *directory_.source_by_id(next->second.id));
       continue;
     }
-    auto message = message_to(shm::MessageKind::kPortName, 0, 0, input->id);
-    message.set_name(input->name);
+    auto message = message_to(shm::MessageKind::kPortName, 0, 0, next->second.id);
+    message.set_name(directory_.input_by_id(next->second.id)->name);
     client.send(message);
   }
+  told = directory_.last_news();
+  return false;
 }
 
 Client& Switchboard::client_of(shm::PortInstance port) const {

@@ -56,8 +56,11 @@ class Switchboard {
   Told show_segments();
   void show_growth();
   [[nodiscard]] bool has_growth_to_show() const { return !growth_.empty(); }
-  // Sends a client every page and port name that it does not have, for those who observe.
-  void show_everything(Client& client);
+  // Shows the source's next page to all components that have been sent the one in force.
+  Told show_next_page(const Source& source);
+  // Tells an observer what has come after `told`, which moves on: at most `left` pieces, and
+  // nothing more once it does not read. True: there is more that it would read.
+  bool show_news(Client& client, std::uint64_t& told, int& left);
   // A client could not take up a peer.
   void refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
   // Tells the components, and the log, once, whose ports the model in force does not mention: of
@@ -98,7 +101,7 @@ class Switchboard {
   static void say_unmentioned(Port& port, const std::string& text);
   [[nodiscard]] std::string unmentioned_text(const shm::TableSnapshot& in_force,
                                              const std::string& name, bool is_output) const;
-  bool send_page(Client& client, const Source& source);
+  static bool send_page(Client& client, const Source& source);
   void insert(std::unique_ptr<OutputPort> port, Client& client, Source& source);
   void insert(std::unique_ptr<InputPort> port, Client& client, InputName& name);
   void erase(shm::PortInstance port);

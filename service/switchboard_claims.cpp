@@ -131,10 +131,12 @@ void Switchboard::forget_away(shm::PortInstance port) {
   end_claims_on(port);
   if (Source* source = directory_.source_of(port)) {
     source->away = 0;
+    directory_.let_go(*source);
     registry_.source(source->id).clear_owner();
   }
   if (InputName* name = directory_.input_of(port)) {
     name->away = 0;
+    directory_.let_go(*name);
     registry_.input(name->id).clear_owner();
   }
 }

@@ -24,6 +24,7 @@
 #include <cstdint>
 
 #include "shm/activity.hpp"
+#include "shm/activity_pages.hpp"
 #include "shm/atomic.hpp"
 #include "shm/decision_table.hpp"
 #include "shm/limits.hpp"
@@ -35,30 +36,6 @@ enum class Verdict : std::uint8_t {
   kWins,
   kBlind,      // a source that the rule reads has no page here yet: deliver nothing
   kUnsettled,  // sources changed faster than a picture could be taken: deliver nothing
-};
-
-// Where a process finds the activity of each source.
-// Thread safety: one thread attaches, any thread reads. SYNC POINT: page-attached. The release in
-// attach() pairs with the acquire in find(): who finds a page finds it mapped.
-class ActivityPages {
- public:
-  void attach(SourceId id, const Activity* activity) noexcept {
-    activities_[id].store(activity, std::memory_order_release);
-    changes_.store(changes_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
-  }
-  // Another after each attach(): what was bound before must be bound again.
-  // SYNC POINT: page-attached. Acquire; pairs with the release in attach(): who sees the change
-  // finds the page.
-  [[nodiscard]] std::uint64_t changes() const noexcept {
-    return changes_.load(std::memory_order_acquire);
-  }
-  [[nodiscard]] const Activity* find(SourceId id) const noexcept {
-    return id < kMaxSources ? activities_[id].load(std::memory_order_acquire) : nullptr;
-  }
-
- private:
-  alignas(kCacheLine) Atomic<std::uint64_t> changes_{0};
-  alignas(kCacheLine) std::array<Atomic<const Activity*>, kMaxSources> activities_{};
 };
 
 // One look at a source.

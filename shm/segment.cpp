@@ -118,4 +118,17 @@ Mapping::Mapping(const FileDescriptor& segment, std::size_t size, Access access)
   if (access == Access::kReadWrite) madvise(data(), this->size(), MADV_DONTFORK);
 }
 
+// It is mapped elsewhere first, where it may fail, and then moved: the kernel puts it into the
+// place of the old one in one step.
+void Mapping::replace(const FileDescriptor& segment) {
+  void* const next = ::mmap(nullptr, size(), PROT_READ, MAP_SHARED, segment.get(), 0);
+  if (next == MAP_FAILED) fail("mapping a segment");
+  if (::mremap(next, size(), size(), MREMAP_MAYMOVE | MREMAP_FIXED, data()) == MAP_FAILED) {
+    const int error = errno;
+    ::munmap(next, size());
+    errno = error;
+    fail("mapping a segment in the place of another");
+  }
+}
+
 }  // namespace arbiter::shm

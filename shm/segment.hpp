@@ -70,6 +70,10 @@ class Mapping {
   // Throws std::system_error.
   Mapping(const FileDescriptor& segment, std::size_t size, Access access);
 
+  // Another segment of the same size takes its place, read-only, at the same address. Who reads
+  // there meanwhile reads the one or the other. Throws std::system_error; then it is as before.
+  void replace(const FileDescriptor& segment);
+
   [[nodiscard]] std::byte* data() const noexcept {
     return static_cast<std::byte*>(region_.get_address());
   }

@@ -52,7 +52,7 @@ enum class MessageKind : std::uint32_t {
   kStop,         // kDone, and then the daemon ends
   kSwitch,       // name: a model that is loaded; kDone (value: the generation) in force
   kRollback,     // link: a generation of the history, 0: the one before; as kReload
-  kHandBackPage = 40,  // id; descriptor: the activity page of a source
+  kHandBackPage = 40,  // id, value: its number; descriptor: an activity page of a source
   kHandBackOutput,     // port, id = source, type; descriptors: its segment, its page
   kHandBackInput,      // port, id = port id, type; descriptors: its segment, its bell
   kHandBackLink,       // port, peer; link: its number, 0 if not connected
@@ -67,7 +67,8 @@ enum class MessageKind : std::uint32_t {
   kOpened,         // port: its instance; id: its source or port id; descriptor: an output's page
   kConnected,
   kRefused,       // text: why
-  kSourcePage,    // id, name: a source; descriptor: its activity page, read-only
+  kSourcePage,    // id, name: a source; value: the number of its page, in force or to come;
+                  // descriptor: the page, read-only
   kPortName,      // id, name: an input port
   kOutputPeer,    // to input `port`: peer, id = source, link; descriptor: its segment
   kInputPeer,     // to output `port`: peer, id = port id, flags (kIsConnected), link; descriptors:

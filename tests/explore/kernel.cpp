@@ -118,6 +118,10 @@ Mapping::Mapping(const FileDescriptor& segment, std::size_t size, Access access)
   region_.swap(region);
 }
 
+void Mapping::replace(const FileDescriptor& segment) {
+  *this = Mapping(segment, size(), Access::kReadOnly);
+}
+
 // Nothing is forked here.
 Bequest::Bequest(void* address, std::size_t size, Kind kind, const std::uint32_t* users)
     : address_(address), size_(size), kind_(kind), users_(users) {}

@@ -297,7 +297,7 @@ TEST_F(HostileClient, TenThousandThatConnectAndSayNothingHarmNobody) {
 TEST_F(HostileClient, CannotBeMoreThanTheLimitOfItsUser) {
   std::deque<RawClient> many;
   std::string refusal;
-  while (refusal.empty() && many.size() < 2 * shm::kMaxClientsPerUser) {
+  while (refusal.empty() && many.size() < shm::kMaxClients) {
     many.emplace_back(daemon_.instance());
     auto hello = RawClient::message(MessageKind::kHello, "many");
     hello.value = shm::kWireVersion;
@@ -306,8 +306,8 @@ TEST_F(HostileClient, CannotBeMoreThanTheLimitOfItsUser) {
     ASSERT_TRUE(many.back().receive(answer));
     if (answer.message.kind == MessageKind::kRefused) refusal = answer.message.text_view();
   }
-  EXPECT_NE(refusal.find("kMaxClientsPerUser"), std::string::npos) << refusal;
-  EXPECT_EQ(many.size(), shm::kMaxClientsPerUser);  // with the good one, and without this
+  EXPECT_NE(refusal.find("kMaxClients"), std::string::npos) << refusal;
+  EXPECT_EQ(many.size(), shm::kMaxClients / 2);  // with the good one, and without this
   many.clear();
   while (daemon_.open_descriptors() > 100) {
   }

@@ -80,6 +80,7 @@ shm::FileDescriptor World::make_board(const Choices& choices) {
   shm::TableWriter writer(content);
   writer.write(table.words(kSources, kPorts));
   writer.put_in_force();
+  for (std::uint32_t source = 0; source < kSources; ++source) writer.give_page(source, 1);
   shm::seal(board, shm::Seals::kFixedSize);
   return board;
 }
@@ -96,7 +97,7 @@ std::shared_ptr<detail::SharedMemory> World::make_memory() {
                                                        std::make_shared<detail::ServiceBell>());
   const char* const names[]{"/p", "/h", "/s"};
   for (std::uint32_t source = 0; source < kSources; ++source) {
-    memory->add_page(source, names[source], copy_of(pages_[source].get()));
+    memory->add_page(source, 1, names[source], copy_of(pages_[source].get()));
   }
   return memory;
 }
