@@ -60,8 +60,8 @@ void InputCore::map_growth(shm::PortInstance peer) {
   const auto found = links_.find(peer);
   if (found == links_.end()) return;
   const OutputPeer& grown = *found->second.peer;
-  shm::make_written_resident(grown.file, grown.mapping, memory_->residence());
   survey(grown);
+  shm::make_written_resident(grown.file, grown.mapping, memory_->residence());
 }
 
 void InputCore::lose_peer(shm::PortInstance peer) {
