@@ -67,7 +67,7 @@ void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescript
     const shm::SendResult result = shm::send_message(socket_.get(), message, descriptors);
     if (result == shm::SendResult::kSent) return;
     if (result == shm::SendResult::kClosed) {
-      lost_ = true;
+      lost_ = hung_up_ = true;
       return;
     }
   }
@@ -110,7 +110,7 @@ void Client::flush() {
     for (std::size_t i = 0; i < descriptors.size(); ++i) descriptors[i] = next.descriptors[i].get();
     const shm::SendResult result = shm::send_message(socket_.get(), next.message, descriptors);
     if (result == shm::SendResult::kFull) return;
-    if (result == shm::SendResult::kClosed) lost_ = true;
+    if (result == shm::SendResult::kClosed) lost_ = hung_up_ = true;
     queued_descriptors_ -= static_cast<std::size_t>(
         std::count_if(descriptors.begin(), descriptors.end(), [](int fd) { return fd >= 0; }));
     queue_.pop_front();

@@ -50,7 +50,10 @@ class Client {
   [[nodiscard]] bool has_read_ahead() const { return !ahead_.empty() || ahead_ended_; }
   [[nodiscard]] bool has_queue() const { return !queue_.empty(); }
   // The client has gone, or does not read what it is sent.
+  // Nothing more can be sent to it.
   [[nodiscard]] bool is_lost() const { return lost_; }
+  // It has closed its end: what it sent before is all that there is, and still counts.
+  [[nodiscard]] bool has_hung_up() const { return hung_up_; }
   // Asks the kernel whether the process has ended, which may be known before its socket is closed.
   [[nodiscard]] bool has_died() const;
 
@@ -104,6 +107,7 @@ class Client {
   uid_t user_ = 0;
   std::uint64_t started_ = 0;
   bool lost_ = false;
+  bool hung_up_ = false;
   std::deque<std::unique_ptr<Queued>> queue_;
   std::size_t queued_descriptors_ = 0;
   std::deque<std::unique_ptr<shm::Received>> ahead_;

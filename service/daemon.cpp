@@ -175,6 +175,10 @@ void Daemon::give_turns() {
     Client& client = *found->second;
     const bool has_more = serve(client);
     if (clients_.count(*id) == 0) continue;
+    if (!has_more && client.is_lost()) {
+      drop(*id);
+      continue;
+    }
     client.has_turn = has_more;
     if (has_more) turns_.add(client.user(), *id);
     watch_client(client);
@@ -365,11 +369,12 @@ void Daemon::drop(ClientId id) {
 void Daemon::settle() {
   std::vector<ClientId> lost;
   for (const auto& [id, client] : clients_) {
-    if (client->is_lost()) {
+    // One that has hung up may have closed its ports before: it is read to its end, and then gone.
+    if (client->is_lost() && !client->has_hung_up()) {
       lost.push_back(id);
       continue;
     }
-    if (client->has_read_ahead() && !client->has_turn) {
+    if ((client->has_read_ahead() || client->is_lost()) && !client->has_turn) {
       client->has_turn = true;
       turns_.add(client->user(), id);
     }

@@ -257,7 +257,9 @@ TEST_F(ABellThatIsHandedIn, IsNoPipeThatWasNotOpenedToBeWritten) {
 TEST_F(ABellThatIsHandedIn, IsNotAnotherUsersNorIsTheSegment) {
   if (!may_be_another_user()) GTEST_SKIP() << "only root can become another user";
   ASSERT_EQ(::chmod(daemon_.directory().c_str(), 0711), 0);
-  const shm::Bell roots_bell;
+  const shm::Bell bell;
+  // A copy: a forked child has none of the library's own descriptors.
+  const FileDescriptor roots_bell(::fcntl(bell.write_end().get(), F_DUPFD_CLOEXEC, 0));
   const FileDescriptor roots_segment = input_segment();
   const auto said = as_user(kStranger, [&] {
     const shm::Bell own_bell;
@@ -266,7 +268,7 @@ TEST_F(ABellThatIsHandedIn, IsNotAnotherUsersNorIsTheSegment) {
     client.hello("attacker");
     std::string refusals;
     const auto open = RawClient::message(MessageKind::kOpenInput, "/attacker:i");
-    client.send(open, {own_segment.get(), roots_bell.write_end().get()});
+    client.send(open, {own_segment.get(), roots_bell.get()});
     refusals += client.expect_refusal() + "; ";
     client.send(open, {roots_segment.get(), own_bell.write_end().get()});
     refusals += client.expect_refusal() + "; ";

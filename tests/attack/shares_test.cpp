@@ -94,12 +94,12 @@ TEST_F(Greedy, UsersDoNotShutOutOthers) {
 
 // Opening and closing: what no model names and nobody has open any more is given back.
 TEST(NamesThatNobodyNeeds, AreGivenBack) {
-  Daemon daemon(kNoRules, {.max_descriptors = 128});
+  Daemon daemon(kNoRules, {.max_descriptors = 1024});
   RawClient client(daemon.instance());
   client.hello();
   const auto segment = raw_output_segment();
   const std::size_t before = daemon.open_descriptors();
-  for (int i = 0; i < 503; ++i) {
+  for (int i = 0; i < 2000; ++i) {
     const auto opened = open_raw_output(client, "/once/" + std::to_string(i), segment);
     close_raw(client, opened.message.port);
   }

@@ -18,7 +18,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kModel = R"(<behaviors timeout="forever">
+const std::string kModel = R"(<behaviors timeout="3600s">
   <behavior name="Low"><config at="/p">/low</config><condition>not /stop</condition></behavior>
   <behavior name="High"><config at="/p">/high</config><inhibition>Low</inhibition></behavior>
 </behaviors>
@@ -116,7 +116,7 @@ TEST(LiveGraph, FollowsEachChangeUntilItIsInterrupted) {
   daemon.load_bad("<behaviors>");
   low.deactivate();
   wait_for_picture(path, "○ Low");
-  daemon.load(R"(<behaviors timeout="forever">
+  daemon.load(R"(<behaviors timeout="3600s">
     <behavior name="Only"><config at="/p">/high</config></behavior></behaviors>)");
   wait_for_picture(path, "○ Only");
   high.signal();
@@ -145,7 +145,7 @@ TEST(LiveGraph, SaysThatTheDaemonHasGoneAndFollowsTheNext) {
     ASSERT_GT(count, 0) << said;
     said.append(part, static_cast<std::size_t>(count));
   }
-  daemon.write_model(R"(<behaviors timeout="forever">
+  daemon.write_model(R"(<behaviors timeout="3600s">
     <behavior name="Next"><config at="/p">/high</config></behavior></behaviors>)");
   daemon.restart();
   wait_for_picture(path, "○ Next");

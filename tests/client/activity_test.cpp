@@ -134,7 +134,7 @@ TEST(Activity, AReloadLeavesRunningActivityAsItIs) {
 }
 
 TEST(Activity, ClosingAPortDoesNotEndIt) {
-  Daemon daemon(override_model());
+  Daemon daemon(override_model("3600s"));
   Node node("test");
   auto low = node.output_port<Number>("/low");
   auto in = node.input_port<Number>("/in");

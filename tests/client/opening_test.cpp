@@ -149,11 +149,13 @@ TEST(Opening, ANameOfTheGreatestLengthIsFine) {
   EXPECT_EQ(in.winner(), longest);
 }
 
-TEST(Opening, ANameOfBytesThatAreNoTextShowsInTheStatus) {
+TEST(Opening, ANameOfBytesThatAreNoTextIsRefused) {
   Daemon daemon;
-  Node node("n\xff");
-  auto out = node.output_port<Number>("/o\xc3\x28");
-  EXPECT_EQ(daemon.status()["clients"], 2);
+  EXPECT_EQ(error_of([] { Node node("n\xff"); }),
+            R"("n\xff" is not a name for a node: it has a byte that is not UTF-8 in it)");
+  Node node("test");
+  EXPECT_EQ(error_of([&] { static_cast<void>(node.output_port<Number>("/o\xc3\x28")); }),
+            R"("/o\xc3(" is not a name for a port: it has a byte that is not UTF-8 in it)");
 }
 
 TEST(Opening, OptionsOutOfBoundsAreRefusedByName) {

@@ -90,24 +90,25 @@ TEST(LogWriter, ALogThatNobodyReadsHoldsNobodyUpAndSaysWhatItLost) {
 TEST(LogWriter, LinesThatWereLostAreCountedWhereTheyWouldHaveStood) {
   Pipe pipe;
   std::string text;
+  std::size_t put = 0;
+  std::thread reader;
   {
     LogWriter writer(pipe.write.get());
     const std::string line = std::string(99, 'x') + '\n';
-    std::size_t put = 0;
     for (; put < 4 * LogWriter::kMaxWaiting / line.size(); ++put) writer.put(line);
-    std::thread reader([&] {
+    reader = std::thread([&] {
       char buffer[4096];
       for (ssize_t size = 0; (size = ::read(pipe.read.get(), buffer, sizeof buffer)) > 0;) {
         text.append(buffer, static_cast<std::size_t>(size));
       }
     });
     EXPECT_TRUE(writer.finish(60s));
-    pipe.write.reset();
-    reader.join();
-    const auto written = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) - 1;
-    EXPECT_LT(written, put);
-    EXPECT_THAT(text, HasSubstr(std::to_string(put - written) + " lines were lost here"));
   }
+  pipe.write.reset();
+  reader.join();
+  const auto written = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) - 1;
+  EXPECT_LT(written, put);
+  EXPECT_THAT(text, HasSubstr(std::to_string(put - written) + " lines were lost here"));
 }
 
 TEST(LogWriter, WhatWasSaidIsWrittenBeforeItEnds) {

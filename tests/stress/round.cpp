@@ -281,8 +281,8 @@ void Round::kill_daemon() {
 // All flows go on without a daemon; then another takes over, whose status must list all ports, and
 // which puts the model that it is given in force: the same.
 void Round::replace_daemon() {
-  const shm::TableReader tables(*board_.as<const shm::Board>());
-  const std::uint64_t generation = tables.snapshot().generation;
+  const std::uint64_t generation =
+      shm::TableReader(*board_.as<const shm::Board>()).snapshot().generation;
   kill_daemon();
   const std::int64_t begin = read_clock();
   daemon_.restart();
@@ -292,6 +292,7 @@ void Round::replace_daemon() {
   while (!has_all_ports(daemon_.status())) deadline.wait();
   totals_.readoptions.add(static_cast<std::uint64_t>(read_clock() - begin));
   const Deadline swap("the new daemon's model should be in force");
+  const shm::TableReader tables(*board_.as<const shm::Board>());  // mapped again by meet_daemon()
   while (tables.snapshot().generation == generation) swap.wait();
   wait_for_steps(kAdvance, kNobody);
 }

@@ -1,11 +1,13 @@
 // What the daemon keeps for those who hang up and live is bounded as what it has for those who are
 // here. On the fuzz target's stage, where thousands of processes cost nothing.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include <string>
 
 #include "tests/fuzz/daemon/stage.hpp"
+#include "tests/support/raw_port.hpp"
 
 namespace arbiter::fuzz {
 namespace {
@@ -47,6 +49,7 @@ TEST(Absentees, CountAmongTheClientsOfTheirUser) {
   const Process process(1 << 23, 4'000'000);
   const Process another(1 << 23, 4'000'001);
   const auto segment = make_input_segment(1);
+  const auto samples = test::raw_output_segment();
   const shm::Bell bell;
   // A sixteenth is kept for root and the daemon's user; of the rest he may have half.
   constexpr std::uint32_t kMost = (shm::kMaxClients - shm::kMaxClients / 16) / 2;
@@ -54,15 +57,21 @@ TEST(Absentees, CountAmongTheClientsOfTheirUser) {
     const Connection connection(stage.path(), process);
     stage.run();
     connection.send(message(MessageKind::kHello, "away"));
-    connection.send(message(MessageKind::kOpenInput, "/away/" + std::to_string(i)),
-                    {segment.get(), bell.write_end().get()});
+    // Of both kinds, for his share of names is no larger than that of clients.
+    const std::string name = "/away/" + std::to_string(i);
+    if (i % 2 == 0) {
+      connection.send(message(MessageKind::kOpenInput, name),
+                      {segment.get(), bell.write_end().get()});
+    } else {
+      connection.send(message(MessageKind::kOpenOutput, name), {samples.get(), -1});
+    }
     stage.run();
     if (i + 2 == kMost) {
       EXPECT_EQ(refusal(stage, process), "");
     }
   }
   stage.run();
-  EXPECT_NE(refusal(stage, process).find("kMaxClients"), std::string::npos);
+  EXPECT_THAT(refusal(stage, process), testing::HasSubstr("kMaxClients"));
   EXPECT_EQ(refusal(stage, another), "");
 }
 

@@ -226,6 +226,13 @@ void Honest::hear(const shm::Received& received) {
       require(peers_.count(message.peer) == 1, "only a peer is disconnected");
       if (is_input_) peers_.erase(message.peer);
       break;
+    case MessageKind::kConnectionRefused:
+      require(message.port == port_, "what is refused is a connection of the client's own port");
+      peers_[message.peer] = message.id;  // of which it is told when it goes
+      break;
+    case MessageKind::kUnmentioned:
+      require(message.port == port_, "the port that is not mentioned is the client's own");
+      break;
     case MessageKind::kPortName:
     case MessageKind::kModelReply:
       break;
