@@ -34,12 +34,17 @@ bool waits_for_ever(pid_t process) {
   return timeout.size() >= 8 && timeout.substr(timeout.size() - 8) == "ffffffff";
 }
 
-// All of its threads come to sleep, its loop with no time set for waking, and none has been awake
-// since, though much has gone on elsewhere meanwhile.
-void expect_asleep(pid_t process) {
+// Until its loop sleeps with no time set for waking.
+void wait_until_it_rests(pid_t process) {
   do {
     wait_until_it_sleeps_in(SYS_epoll_wait, process, process);
   } while (!waits_for_ever(process));
+}
+
+// It comes to rest, and none of its threads has been awake since, though much has gone on elsewhere
+// meanwhile.
+void expect_asleep(pid_t process) {
+  wait_until_it_rests(process);
   const auto sleeps = [process] {
     std::map<pid_t, std::uint64_t> result;
     for (const pid_t task : tasks_of(process)) result[task] = sleeps_of(process, task);
@@ -61,7 +66,7 @@ TEST(Idle, ItSleepsWhileComponentsExchangeData) {
   auto out = node.output_port<int>("/out");
   auto in = node.input_port<int>("/in");
   const pid_t process = daemon.process().pid();
-  wait_until_it_sleeps_in(SYS_epoll_wait, process, process);
+  wait_until_it_rests(process);
   const auto before = sleeps_of(process, process);
   for (int i = 0; i < 10000; ++i) {
     EXPECT_EQ(out.publish(i).delivered, 1u);
@@ -87,7 +92,7 @@ TEST(Idle, ItSleepsAgainWhenEverybodyHasLeft) {
 std::size_t descriptors_at_rest(Daemon& daemon, RawClient& watcher) {
   while (watcher.status()["clients"] != 1) {
   }
-  wait_until_it_sleeps_in(SYS_epoll_wait, daemon.process().pid(), daemon.process().pid());
+  wait_until_it_rests(daemon.process().pid());
   return daemon.open_descriptors();
 }
 

@@ -63,7 +63,7 @@ TEST(Absentees, CountAmongTheClientsOfTheirUser) {
       connection.send(message(MessageKind::kOpenInput, name),
                       {segment.get(), bell.write_end().get()});
     } else {
-      connection.send(message(MessageKind::kOpenOutput, name), {samples.get(), -1});
+      connection.send(message(MessageKind::kOpenOutput, name), {samples.get()});
     }
     stage.run();
     if (i + 2 == kMost) {
