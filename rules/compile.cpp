@@ -13,13 +13,10 @@
 namespace arbiter::rules {
 namespace {
 
-// Rules that outgrow the node table cost a second each; after so many there is no more to learn.
-constexpr int kMaxOutgrownPorts = 8;
-
 class ModelCompiler {
  public:
-  ModelCompiler(const RuleSet& rules, Diagnostics& diagnostics)
-      : rules_(rules), context_{{}, {}, diagnostics} {}
+  ModelCompiler(const RuleSet& rules, Diagnostics& diagnostics, Budget& budget)
+      : rules_(rules), diagnostics_(diagnostics), context_(budget, attempt_) {}
 
   CompiledModel compile();
 
@@ -27,6 +24,9 @@ class ModelCompiler {
   [[nodiscard]] std::vector<std::string> all_sources() const;
   void gather_parts();
   void compile_arbitrated_ports();
+  void compile_port_at(std::size_t index);
+  void hand_over();
+  void report_out_of_steps(const PortRules& port);
   void add_unarbitrated_ports();
   void report_never_running();
   void report_unreachable_children();
@@ -35,6 +35,8 @@ class ModelCompiler {
                       std::size_t value);
 
   const RuleSet& rules_;
+  Diagnostics& diagnostics_;
+  Diagnostics attempt_;  // what is found at a port, until it is known whether that counts
   CompileContext context_;
   CompiledModel model_;
   std::map<std::string, std::vector<BehaviourPart>> parts_;             // by port
@@ -75,33 +77,46 @@ void ModelCompiler::gather_parts() {
 }
 
 void ModelCompiler::compile_arbitrated_ports() {
-  int outgrown = 0;
-  for (const auto& port : rules_.ports) {
-    if (outgrown == kMaxOutgrownPorts) {
-      context_.diagnostics.note("not-checked", port.where,
-                                "the rules at " + port.port +
-                                    ", and at the ports after it, were not looked at, since those "
-                                    "of too many ports exceed a limit");
-      may_run_.assign(may_run_.size(), true);
-      return;
-    }
-    const auto& parts = parts_[port.port];
-    auto unselected = unselected_sources_[port.port];
-    auto result = compile_port(context_, {port, unselected, parts});
-    if (!result) {
-      ++outgrown;
-      for (const auto& part : parts) may_run_[part.behaviour] = true;  // as nobody knows
-      continue;
-    }
-    for (const std::size_t behaviour : result->running) may_run_[behaviour] = true;
-    for (auto& source : unselected) {
-      CompiledRule rule;
-      rule.source = std::move(source);
-      rule.kind = shm::table::kNever;
-      result->port.rules.push_back(std::move(rule));
-    }
-    model_.ports.push_back(std::move(result->port));
+  const auto name = [&](std::size_t i) { return rules_.ports[i].port; };
+  const auto compile_it = [&](std::size_t i) { compile_port_at(i); };
+  for (const std::size_t open :
+       share_out(context_.budget, "proving", rules_.ports.size(), name, compile_it)) {
+    report_out_of_steps(rules_.ports[open]);
   }
+}
+
+void ModelCompiler::compile_port_at(std::size_t index) {
+  const auto& port = rules_.ports[index];
+  const auto& parts = parts_[port.port];
+  auto unselected = unselected_sources_[port.port];
+  attempt_ = {};
+  auto result = compile_port(context_, {port, unselected, parts});
+  hand_over();
+  if (!result) {
+    for (const auto& part : parts) may_run_[part.behaviour] = true;  // as nobody knows
+    return;
+  }
+  for (const std::size_t behaviour : result->running) may_run_[behaviour] = true;
+  for (auto& source : unselected) {
+    CompiledRule rule;
+    rule.source = std::move(source);
+    rule.kind = shm::table::kNever;
+    result->port.rules.push_back(std::move(rule));
+  }
+  model_.ports.push_back(std::move(result->port));
+}
+
+void ModelCompiler::hand_over() {
+  diagnostics_.add(std::move(attempt_));
+  attempt_ = {};
+}
+
+void ModelCompiler::report_out_of_steps(const PortRules& port) {
+  for (const auto& part : parts_[port.port]) may_run_[part.behaviour] = true;
+  diagnostics_.error("limit-exceeded", port.where,
+                     "whether only one can win at " + port.port +
+                         " was neither proved nor refuted: it takes more steps than there are for "
+                         "it; write simpler conditions there, or allow more steps with --effort");
 }
 
 void ModelCompiler::add_unarbitrated_ports() {
@@ -133,7 +148,7 @@ void ModelCompiler::report_never_running() {
       ++explained;
       reasons = why_it_never_runs(context_.builder, behaviour, rules_);
     }
-    context_.diagnostics.warning(
+    diagnostics_.warning(
         "never-runs", behaviour.where,
         "no activity of the sources lets the behaviour " + quote(behaviour.name) +
             " run: none of its connections can ever be selected for it" + reasons +
@@ -176,7 +191,7 @@ void ModelCompiler::report_unreachable_children() {
       if (!reached[child]) lost.push_back(quote(child));
     }
     if (lost.empty()) continue;
-    context_.diagnostics.warning(
+    diagnostics_.warning(
         "unreachable-children", meta.where,
         std::to_string(lost.size()) + " of the " + std::to_string(meta.children.size()) +
             (meta.children.size() == 1 ? " child" : " children") + " of " + quote(meta.name) +
@@ -188,9 +203,9 @@ void ModelCompiler::report_unreachable_children() {
 
 void ModelCompiler::limit_exceeded(const Location& where, std::string_view what,
                                    std::string_view limit, std::size_t value) {
-  context_.diagnostics.error("limit-exceeded", where,
-                             std::string(what) + " than " + std::string(limit) + " (" +
-                                 std::to_string(value) + ") allows; split the model");
+  diagnostics_.error("limit-exceeded", where,
+                     std::string(what) + " than " + std::string(limit) + " (" +
+                         std::to_string(value) + ") allows; split the model");
 }
 
 // What is true of every table that is made of the model, whatever ids its sources and ports get.
@@ -228,8 +243,14 @@ void ModelCompiler::check_limits() {
 
 }  // namespace
 
+CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics, Budget& budget) {
+  const Budget::Part part(budget, budget.left() / 2);
+  return ModelCompiler(rules, diagnostics, budget).compile();
+}
+
 CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics) {
-  return ModelCompiler(rules, diagnostics).compile();
+  Budget budget;
+  return compile(rules, diagnostics, budget);
 }
 
 }  // namespace arbiter::rules

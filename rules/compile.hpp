@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "rules/budget.hpp"
 #include "rules/diagnostic.hpp"
 #include "rules/rule_set.hpp"
 #include "shm/decision_table.hpp"
@@ -45,7 +46,12 @@ struct CompiledModel {
 
 // Proves every port and reports what fails: two connections that can both win, with a shortest
 // witness; rules that nothing satisfies; limits exceeded. To be used only if there is no error.
-CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics);
+//
+// Takes at most four fifths of the budget that is left, and shares them out among the ports. What
+// could not be proved within them is an error. The rest is for what is asked of the model
+// afterwards: whether it is accepted does not depend on that. Throws Stopped.
+CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics, Budget& budget);
+CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics);  // with a budget of its own
 
 // The ids under which a table names sources and ports; each must be below the limits of the table.
 struct TableIds {

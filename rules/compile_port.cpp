@@ -10,6 +10,8 @@ namespace {
 
 // Smaller diagrams are quick enough as they are; sifting takes a while, too.
 constexpr std::size_t kNodesWorthSifting = 1000;
+// That sifting takes about: without them, the diagrams stay as they are.
+constexpr std::size_t kStepsToSiftNode = 24;
 // The union of the rules so far is kept for as long as it is this small.
 constexpr std::size_t kMaxUnionNodes = 2000;
 // Pairs reported for one port; more would not help to mend it.
@@ -64,20 +66,13 @@ std::optional<PortResult> PortCompiler::compile() {
     if (!compile_rules(result.port)) return std::nullopt;
     result.running = behaviours_that_run();
     report_never_selected();
+  } catch (const StepLimit&) {
+    throw;
   } catch (const DiagramLimit&) {
     report_outgrown(building_);
     return std::nullopt;
   }
-  try {
-    if (!port_.first_wins) report_conflicts();
-  } catch (const ProofLimit&) {
-    context_.diagnostics.error(
-        "limit-exceeded", port_.where,
-        "the rules at " + port_.port + " are too entangled for the proof that only one can win: " +
-            "it takes more than kMaxProofSteps (" + std::to_string(kMaxProofSteps) +
-            ") steps; write simpler conditions, or set conflict=\"first\" there");
-    return std::nullopt;
-  }
+  if (!port_.first_wins) report_conflicts();
   return result;
 }
 
@@ -107,10 +102,12 @@ void PortCompiler::build_rules() {
   functions_ = plain_;
   if (port_.first_wins) subtract_earlier_rules();
   building_ = nullptr;
-  const auto is_large = [&](const Diagram& function) {
-    return context_.builder.node_count(function) > kNodesWorthSifting;
-  };
-  if (std::any_of(functions_.begin(), functions_.end(), is_large)) {
+  std::size_t nodes = 0, largest = 0;
+  for (const Diagram& function : functions_) {
+    nodes += context_.builder.node_count(function);
+    largest = std::max(largest, context_.builder.node_count(function));
+  }
+  if (largest > kNodesWorthSifting && context_.budget.left() > kStepsToSiftNode * nodes) {
     rules_.forget_parts();
     context_.builder.sift();
   }
@@ -197,6 +194,8 @@ void PortCompiler::report_never_selected() {
 void PortCompiler::report_conflicts() {
   const auto pairs = context_.proof.pairs_that_meet(nodes_);
   shortest_.emplace(context_.builder);
+  // A conflict is told even where no step is left to look for a shorter witness of it.
+  const Budget::Part search(context_.budget, context_.budget.left() / 2);
   for (std::size_t i = 0; i < std::min(pairs.size(), kMaxReportedPairs); ++i) {
     report_conflict(pairs[i]);
   }
@@ -248,9 +247,7 @@ void PortCompiler::report_outgrown(const ConnectionRule* rule) {
       (rule != nullptr ? "the rule of " + rule->source : std::string("a rule")) + " at " +
           port_.port + " needs a decision diagram of more than kMaxNodesPerConnection (" +
           std::to_string(shm::kMaxNodesPerConnection) +
-          ") nodes, or the model too many steps to make its diagrams; write a simpler condition, "
-          "or "
-          "one that reads fewer sources");
+          ") nodes; write a simpler condition, or one that reads fewer sources");
 }
 
 }  // namespace

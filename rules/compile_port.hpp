@@ -16,8 +16,11 @@ namespace arbiter::rules {
 
 // What the ports of one model share.
 struct CompileContext {
-  DiagramBuilder builder;
-  Proof proof;
+  CompileContext(Budget& of_all, Diagnostics& to) : budget(of_all), diagnostics(to) {}
+
+  Budget& budget;
+  DiagramBuilder builder{budget};
+  Proof proof{budget};
   Diagnostics& diagnostics;
 };
 
@@ -38,7 +41,8 @@ struct PortResult {
   std::vector<std::size_t> running;  // behaviours of which some activation satisfies the part
 };
 
-// Nothing if a limit was met, which is reported.
+// Nothing if a limit was met, which is reported. Throws StepLimit; what it has reported until then
+// is of no interest. Throws Stopped.
 std::optional<PortResult> compile_port(CompileContext& context, const PortTask& task);
 
 // Of an operator with two operands or more.

@@ -27,11 +27,11 @@ class PortFindings {
   PortFindings(const PortRules& rules, const CompiledPort& port, Diagnostics& diagnostics)
       : rules_(rules), port_(port), diagnostics_(diagnostics) {}
 
-  // Returns the work that it took. Throws DiagramLimit.
-  std::uint64_t find(std::uint64_t max_work) {
+  // Throws DiagramLimit; what has been found until then holds.
+  void find(Budget& budget) {
     SourceOrder order;
     order.add(port_);
-    Winners winners(order, max_work, false);
+    Winners winners(budget, order, false);
     winners_ = &winners;
     const Forget forget{*this};
     for (const auto& rule : port_.rules) {
@@ -44,7 +44,6 @@ class PortFindings {
       note_states();
       note_chains();
     }
-    return winners.work();
   }
 
  private:
@@ -287,40 +286,65 @@ void warn_of_losers(const RuleSet& rules, const CompiledModel& model, Diagnostic
   }
 }
 
+// With all their names: whoever wants to know of one looks for it here.
+void note_open(const std::vector<std::string>& ports, const std::string& limit,
+               const Location& where, Diagnostics& diagnostics) {
+  std::string names;
+  for (const auto& port : ports) names += (names.empty() ? "" : ", ") + port;
+  diagnostics.note("left-open", where,
+                   "not all states in which nobody wins were looked at, at " +
+                       std::to_string(ports.size()) + (ports.size() == 1 ? " port (" : " ports (") +
+                       names + "): it takes " + limit +
+                       "; the model is in order, this is only not known: --effort allows more");
+}
+
 }  // namespace
 
 FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
-                          Diagnostics& diagnostics, std::uint64_t max_work) {
+                          Diagnostics& diagnostics, Budget& budget) {
   warn_of_losers(rules, model, diagnostics);
-  FindingsAccount account;
-  std::pair<const PortRules*, std::string> first_open;
   std::map<std::string, const CompiledPort*> compiled;
   for (const auto& port : model.ports) compiled.emplace(port.port, &port);
+  struct Question {
+    const PortRules* rules;
+    const CompiledPort* port;
+    Diagnostics found;
+    std::string limit;  // why it is open
+  };
+  std::vector<Question> questions;
   for (const auto& port : rules.ports) {
     const auto found = compiled.find(port.port);
-    if (found == compiled.end()) continue;
-    ++account.ports;
-    const std::uint64_t room = std::min(kMaxPortWork, max_work - std::min(max_work, account.work));
-    std::string limit = "the model's other ports have used up all steps";
-    if (room > 0) {
-      try {
-        account.work += PortFindings(port, *found->second, diagnostics).find(room);
-        continue;
-      } catch (const DiagramLimit& reached) {
-        account.work += room;
-        limit = std::string("it takes ") + reached.what();
-      }
+    if (found != compiled.end()) questions.push_back({&port, found->second, {}, {}});
+  }
+  const auto ask = [&](std::size_t i) {
+    Question& question = questions[i];
+    question.found = {};
+    question.limit.clear();
+    try {
+      PortFindings(*question.rules, *question.port, question.found).find(budget);
+    } catch (const DiagramLimit& limit) {
+      question.limit = limit.what();
+      if (dynamic_cast<const StepLimit*>(&limit) != nullptr) throw;
     }
-    if (account.open++ == 0) first_open = {&port, limit};
+  };
+  share_out(
+      budget, "looking for states in which nobody wins", questions.size(),
+      [&](std::size_t i) { return questions[i].rules->port; }, ask);
+  FindingsAccount account{questions.size(), 0};
+  std::vector<std::string> open;
+  std::string limit;
+  Location where;
+  for (Question& question : questions) {
+    diagnostics.add(std::move(question.found));
+    if (question.limit.empty()) continue;
+    if (open.empty()) {
+      limit = question.limit;
+      where = question.rules->where;
+    }
+    open.push_back(question.rules->port);
   }
-  if (account.open > 0) {
-    const std::string more = std::to_string(account.open - 1);
-    diagnostics.note("left-open", first_open.first->where,
-                     "not all states in which nobody wins at " + first_open.first->port +
-                         (account.open > 1 ? ", nor at " + more + " other ports," : "") +
-                         " were looked at: " + first_open.second +
-                         "; the model is in order, this is only not known");
-  }
+  account.open = open.size();
+  if (!open.empty()) note_open(open, limit, where, diagnostics);
   return account;
 }
 

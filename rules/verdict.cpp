@@ -5,9 +5,9 @@
 #include <set>
 #include <unordered_map>
 
-#include "rules/compile_port.hpp"
 #include "rules/names.hpp"
 #include "rules/quantifiers.hpp"
+#include "rules/question.hpp"
 #include "rules/winners.hpp"
 
 namespace arbiter::rules {
@@ -15,207 +15,167 @@ namespace {
 
 using Active = std::set<std::string>;
 
-struct Term {
-  const CompiledPort* port;
-  const CompiledRule* rule;  // null: nobody wins
-};
-
-// One statement about one model.
-class Question {
- public:
-  Question(const Expression& expression, std::vector<Term> terms, std::uint64_t max_work)
-      : expression_(expression), terms_(std::move(terms)), max_work_(max_work) {
-    for (const Term& term : terms_) order_.add(*term.port);
-    add_sources(expression_);
-    for (const Term& term : terms_) {
-      const bool is_new = std::find(idle_.begin(), idle_.end(), term.port) == idle_.end();
-      if (term.rule == nullptr && is_new) idle_.push_back(term.port);
-    }
-  }
-
-  // A witness against the statement, if there is one. Throws DiagramLimit.
-  std::optional<Witness> refute() {
-    // That nobody wins is the only function that needs all rules of a port in one diagram. Where
-    // that is too large, each possible winner is looked at by itself.
-    try {
-      return ask(false);
-    } catch (const DiagramLimit&) {
-      if (idle_.empty()) throw;
-    }
-    return ask(true);
-  }
-
- private:
-  std::optional<Witness> ask(bool by_cases) {
-    std::optional<Witness> witness;
-    try {
-      Winners winners(order_, max_work_);
-      winners_ = &winners;
-      const Diagram bad = by_cases ? refute_by_cases(0, winners.constant(true))
-                                   : winners.negate(build(expression_));
-      if (!bad.is_false()) witness = winners.witness(bad);
-    } catch (...) {
-      forget();
-      throw;
-    }
-    forget();
-    return witness;
-  }
-
-  void forget() {  // diagrams must not outlive their builder
-    built_.clear();
-    decided_.clear();
-    winners_ = nullptr;
-  }
-
-  void add_sources(const Expression& expression) {
-    if (expression.op == Operator::kSource && !expression.name.starts_with('=')) {
-      order_.add(expression.name);
-    }
-    for (const auto& operand : expression.operands) add_sources(*operand);
-  }
-
-  // The winner at each port of idle_ is chosen in turn; what is left of the statement then reads
-  // few rules, and most often contradicts `state` at once.
-  Diagram refute_by_cases(std::size_t next, const Diagram& state) {
-    if (next == idle_.size()) {
-      Diagram bad = winners_->combine(Connective::kAndNot, state, build(expression_));
-      built_.clear();
-      for (const auto& [port, winner] : decided_) {
-        if (winner != nullptr) continue;
-        for (const auto& rule : port->rules) {
-          if (bad.is_false()) return bad;
-          bad = winners_->combine(Connective::kAndNot, bad, winners_->winner(rule));
-        }
-      }
-      return bad;
-    }
-    const CompiledPort* port = idle_[next];
-    decided_[port] = nullptr;
-    Diagram bad = refute_by_cases(next + 1, state);
-    for (const auto& rule : port->rules) {
-      if (!bad.is_false()) break;
-      const Diagram wins = winners_->combine(Connective::kAnd, state, winners_->winner(rule));
-      if (wins.is_false()) continue;
-      decided_[port] = &rule;
-      bad = refute_by_cases(next + 1, wins);
-    }
-    decided_.erase(port);
-    return bad;
-  }
-
-  Diagram build(const Expression& expression) {
-    if (const auto known = built_.find(&expression); known != built_.end()) return known->second;
-    Diagram result = build_new(expression);
-    built_.emplace(&expression, result);
-    return result;
-  }
-
-  Diagram build_new(const Expression& expression) {
-    const auto& operands = expression.operands;
-    switch (expression.op) {
-      case Operator::kFalse:
-      case Operator::kTrue:
-        return winners_->constant(expression.op == Operator::kTrue);
-      case Operator::kSource:
-        if (!expression.name.starts_with('=')) return winners_->active(expression.name);
-        return build_term(terms_.at(std::stoul(expression.name.substr(1))));
-      case Operator::kNot:
-        return winners_->negate(build(*operands[0]));
-      case Operator::kAnd:
-      case Operator::kOr: {
-        Diagram result = winners_->constant(expression.op == Operator::kAnd);
-        for (std::size_t i = operands.size(); i-- > 0;) {
-          result = winners_->combine(connective_of(expression.op), result, build(*operands[i]));
-        }
-        return result;
-      }
-      default: {
-        const Diagram left = build(*operands[0]);
-        return winners_->combine(connective_of(expression.op), left, build(*operands[1]));
-      }
-    }
-  }
-
-  Diagram build_term(const Term& term) {
-    if (const auto known = decided_.find(term.port); known != decided_.end()) {
-      return winners_->constant(known->second == term.rule);
-    }
-    if (term.rule != nullptr) return winners_->winner(*term.rule);
-    Diagram idle = winners_->constant(true);
-    for (const auto& rule : term.port->rules) {
-      idle = winners_->combine(Connective::kAndNot, idle, winners_->winner(rule));
-    }
-    return idle;
-  }
-
-  const Expression& expression_;
-  const std::vector<Term> terms_;
-  const std::uint64_t max_work_;
-  SourceOrder order_;
-  std::vector<const CompiledPort*> idle_;  // of which the statement says that nobody wins
-  Winners* winners_ = nullptr;
-  std::unordered_map<const Expression*, Diagram> built_;
-  std::map<const CompiledPort*, const CompiledRule*> decided_;  // null: nobody wins
+// A statement that has a meaning in the model.
+struct Case {
+  Verdict verdict;
+  ExpressionPtr expression;  // quantifiers expanded; null until then
+  std::vector<Term> terms;
+  std::set<std::string> ports;  // that it speaks of
 };
 
 class Judge {
  public:
-  Judge(const CompiledModel& model, Diagnostics& diagnostics, std::uint64_t max_work)
+  Judge(const CompiledModel& model, Diagnostics& diagnostics, Budget& budget)
       : diagnostics_(diagnostics),
-        max_work_(max_work),
+        budget_(budget),
         expansion_(model.sources),
         sources_(model.sources.begin(), model.sources.end()) {
     for (const auto& port : model.ports) ports_.emplace(port.port, &port);
   }
 
-  std::optional<Verdict> judge(const Statement& statement) {
+  std::vector<Verdict> judge(const std::vector<Statement>& statements) {
+    for (const Statement& statement : statements) admit(statement);
+    // Those about the same ports after each other, for they share a scene.
+    std::vector<std::size_t> order(cases_.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return cases_[a].ports < cases_[b].ports;
+    });
+    share_out(
+        budget_, "judging statements", order.size(),
+        [&](std::size_t i) { return cases_[order[i]].verdict.statement; },
+        [&](std::size_t i) { decide(cases_[order[i]]); });
+    std::vector<Verdict> verdicts;
+    for (Case& each : cases_) verdicts.push_back(std::move(each.verdict));
+    return verdicts;
+  }
+
+ private:
+  // Unless it speaks of what the model does not have, which is reported.
+  void admit(const Statement& statement) {
     bool has_meaning = true;
-    std::vector<Term> terms;
+    Case admitted;
     for (const auto& term : statement.parsed.terms) {
       const auto found = find_term(term);
       has_meaning = has_meaning && found.has_value();
-      if (found) terms.push_back(*found);
+      if (!found) continue;
+      admitted.terms.push_back(*found);
+      admitted.ports.insert(found->port->port);
     }
     for (const auto& source : statement.parsed.sources) {
       has_meaning = is_known(source) && has_meaning;
     }
     for (const auto& glob : statement.parsed.globs) warn_if_unmatched(glob);
-    if (!has_meaning) return std::nullopt;
-    return decide(statement, terms);
+    if (!has_meaning) return;
+    admitted.expression = expansion_.expand(statement.parsed.expression);
+    admitted.verdict.statement = statement.text;
+    admitted.verdict.where = statement.where;
+    cases_.push_back(std::move(admitted));
   }
 
- private:
-  Verdict decide(const Statement& statement, const std::vector<Term>& terms) {
-    Verdict verdict;
-    verdict.statement = statement.text;
-    verdict.where = statement.where;
-    const ExpressionPtr expression = expansion_.expand(statement.parsed.expression);
+  // Throws StepLimit, and then the verdict is that the question is open.
+  void decide(Case& of) {
+    Verdict& verdict = of.verdict;
+    verdict.kind = Verdict::Kind::kOpen;
     try {
-      verdict.witness = Question(*expression, terms, max_work_).refute();
-    } catch (const DiagramLimit& limit) {
-      verdict.kind = Verdict::Kind::kOpen;
+      verdict.witness = refute(of);
+    } catch (const StepLimit& limit) {
       verdict.limit = limit.what();
-      return verdict;
+      throw;
+    } catch (const DiagramLimit& limit) {
+      verdict.limit = limit.what();
+      return;
     }
-    if (!verdict.witness) return verdict;
-    verdict.kind = Verdict::Kind::kRefuted;
+    verdict.kind = verdict.witness ? Verdict::Kind::kRefuted : Verdict::Kind::kProved;
+    if (!verdict.witness) return;
     const Active active(verdict.witness->active.begin(), verdict.witness->active.end());
     std::set<std::string> seen;
-    for (const Term& term : terms) {
+    for (const Term& term : of.terms) {
       if (!seen.insert(term.port->port).second) continue;
       const CompiledRule* winner = find_winner(*term.port, active);
       verdict.winners.emplace_back(
           term.port->port, winner == nullptr ? std::nullopt : std::optional(winner->source));
     }
-    return verdict;
+  }
+
+  std::optional<Witness> refute(const Case& of) {
+    std::set<std::string> sources;
+    std::set<const Expression*> seen;
+    add_sources_of(*of.expression, sources, seen);
+    budget_.spend(sources.size());
+    set_scene(of.ports, sources);
+    try {
+      Question question(*of.expression, of.terms, *scene_);
+      if (!question.has_cases()) return question.refute(Question::Way::kAtOnce);
+      const Budget::Part half(budget_, budget_.left() / 2);
+      return question.refute(Question::Way::kAtOnce);
+    } catch (const StepLimit&) {
+      if (!has_cases(of)) throw;
+    } catch (const DiagramLimit&) {
+      scene_.reset();
+      if (!has_cases(of)) throw;
+    }
+    return refute_by_cases(of, sources);
+  }
+
+  std::optional<Witness> refute_by_cases(const Case& of, const std::set<std::string>& sources) {
+    set_scene(of.ports, sources);
+    try {
+      return Question(*of.expression, of.terms, *scene_).refute(Question::Way::kByCases);
+    } catch (const StepLimit&) {
+      throw;
+    } catch (const DiagramLimit&) {
+      scene_.reset();
+      throw;
+    }
+  }
+
+  static bool has_cases(const Case& of) {
+    return std::any_of(of.terms.begin(), of.terms.end(),
+                       [](const Term& term) { return term.rule == nullptr; });
+  }
+
+  // Goes on with the one that there is if it is of these ports, and knows these sources.
+  void set_scene(const std::set<std::string>& ports, const std::set<std::string>& sources) {
+    const auto is_known = [&](const std::string& source) {
+      return source.starts_with('=') || scene_sources_.contains(source);
+    };
+    if (scene_ && scene_ports_ == ports && std::all_of(sources.begin(), sources.end(), is_known)) {
+      return;
+    }
+    scene_.reset();
+    SourceOrder order;
+    for (const auto& port : ports) order.add(*ports_.at(port));
+    for (const auto& source : sources_with(ports, sources)) {
+      if (!source.starts_with('=')) order.add(source);
+    }
+    scene_.emplace(budget_, order);
+    scene_ports_ = ports;
+    const auto& names = scene_->winners().sources();
+    scene_sources_ = {names.begin(), names.end()};
+  }
+
+  // What all statements about these ports read or, where that is too much, these sources.
+  const std::set<std::string>& sources_with(const std::set<std::string>& ports,
+                                            const std::set<std::string>& sources) {
+    constexpr std::size_t kMost = DiagramBuilder::kMaxVariables;
+    const auto [found, is_new] = read_with_.try_emplace(ports);
+    auto& all = found->second;
+    std::set<const Expression*> seen;
+    for (std::size_t i = 0; is_new && i < cases_.size() && all.size() <= kMost; ++i) {
+      if (cases_[i].ports == ports) add_sources_of(*cases_[i].expression, all, seen);
+    }
+    const bool has_room = all.size() + ports.size() * shm::kMaxSourcesPerPort <= kMost;
+    return has_room ? all : sources;
   }
 
   std::optional<Term> find_term(const WinnerTerm& term) {
     const auto port = ports_.find(term.port.name);
     if (port == ports_.end()) {
       std::vector<std::string_view> names;
-      for (const auto& [name, known] : ports_) names.push_back(name);
+      if (may_suggest()) {
+        for (const auto& [name, known] : ports_) names.push_back(name);
+      }
       diagnostics_.error("unknown-port", term.port.where,
                          "the model has no input port " + term.port.name +
                              advise(term.port.name, names, "name one that is arbitrated"));
@@ -229,10 +189,12 @@ class Judge {
       return std::nullopt;
     }
     if (!term.source) return Term{port->second, nullptr};
-    std::vector<std::string_view> names;
     for (const auto& rule : port->second->rules) {
       if (rule.source == term.source->name) return Term{port->second, &rule};
-      names.push_back(rule.source);
+    }
+    std::vector<std::string_view> names;
+    if (may_suggest()) {
+      for (const auto& rule : port->second->rules) names.push_back(rule.source);
     }
     diagnostics_.error("not-connected", term.source->where,
                        term.source->name + " is not connected to " + term.port.name +
@@ -243,30 +205,39 @@ class Judge {
 
   bool is_known(const Mention& source) {
     if (sources_.contains(source.name)) return true;
-    const std::vector<std::string_view> names(sources_.begin(), sources_.end());
-    const bool may_suggest = ++unknown_ <= kMaxSuggestions;
-    diagnostics_.error(
-        "unknown-source", source.where,
-        "neither the model nor its application names a source " + source.name +
-            (may_suggest ? advise(source.name, names, "name one that it reads or connects")
-                         : std::string("; name one that it reads or connects")));
+    std::vector<std::string_view> names;
+    if (may_suggest()) names.assign(sources_.begin(), sources_.end());
+    diagnostics_.error("unknown-source", source.where,
+                       "neither the model nor its application names a source " + source.name +
+                           advise(source.name, names, "name one that it reads or connects"));
     return false;
   }
 
+  // To compare a name with all others takes long, and nobody reads so many.
+  bool may_suggest() { return ++unknown_ <= kMaxSuggestions; }
+
   void warn_if_unmatched(const Mention& glob) {
+    const auto [known, is_new] = matched_.try_emplace(glob.name);
     const auto fits = [&](const auto& source) { return matches(glob.name, source); };
-    if (std::any_of(sources_.begin(), sources_.end(), fits)) return;
+    if (is_new) known->second = std::any_of(sources_.begin(), sources_.end(), fits);
+    if (known->second) return;
     diagnostics_.warning("matches-nothing", glob.where,
                          "no source matches " + quote(glob.name) +
                              ": any() is false of it, all() and none() are true; correct it");
   }
 
   Diagnostics& diagnostics_;
-  const std::uint64_t max_work_;
+  Budget& budget_;
   QuantifierExpansion expansion_;
   std::set<std::string, std::less<>> sources_;
   std::map<std::string, const CompiledPort*> ports_;
+  std::unordered_map<std::string, bool> matched_;  // by pattern: whether any source does
   std::size_t unknown_ = 0;
+  std::vector<Case> cases_;
+  std::map<std::set<std::string>, std::set<std::string>> read_with_;  // by ports
+  std::optional<Scene> scene_;                                        // of these ports and sources
+  std::set<std::string> scene_ports_;
+  std::set<std::string> scene_sources_;
 };
 
 std::string in_words(const Verdict& verdict) {
@@ -284,13 +255,8 @@ std::string in_words(const Verdict& verdict) {
 }  // namespace
 
 std::vector<Verdict> judge(const std::vector<Statement>& statements, const CompiledModel& model,
-                           Diagnostics& diagnostics, std::uint64_t max_work) {
-  Judge judge(model, diagnostics, max_work);
-  std::vector<Verdict> verdicts;
-  for (const auto& statement : statements) {
-    if (auto verdict = judge.judge(statement)) verdicts.push_back(std::move(*verdict));
-  }
-  return verdicts;
+                           Diagnostics& diagnostics, Budget& budget) {
+  return Judge(model, diagnostics, budget).judge(statements);
 }
 
 void report(const std::vector<Verdict>& verdicts, Diagnostics& diagnostics, bool with_proved) {
@@ -304,7 +270,8 @@ void report(const std::vector<Verdict>& verdicts, Diagnostics& diagnostics, bool
     } else if (verdict.kind == Verdict::Kind::kOpen) {
       diagnostics.error("left-open", verdict.where,
                         "neither proved nor refuted: it takes " + verdict.limit +
-                            "; make several statements of it, about fewer ports each");
+                            "; make several statements of it, about fewer ports each, or allow "
+                            "more steps with --effort");
     } else if (with_proved) {
       diagnostics.note("proved", verdict.where, "true in every state: " + verdict.statement);
     }

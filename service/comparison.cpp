@@ -9,18 +9,23 @@
 namespace arbiter::service {
 namespace {
 
-// Nodes of decision diagrams: some hundredths of a second, in which the daemon serves nobody.
-constexpr std::uint64_t kMaxWork = 500'000;
+// A few tenths of a second, for which a change of the model waits.
+constexpr std::uint64_t kSteps = 3'000'000;
+// What has been asked for may take longer.
+constexpr std::uint64_t kStepsOfDryRun = 30'000'000;
 
 }  // namespace
 
 std::string summary_of_changes(const rules::CompiledModel& before,
-                               const rules::CompiledModel& after) {
-  return rules::summary(rules::diff(before, after, kMaxWork));
+                               const rules::CompiledModel& after, const std::stop_token& stop) {
+  rules::Budget budget(kSteps, stop);
+  return rules::summary(rules::diff(before, after, budget));
 }
 
-nlohmann::json changes_json(const rules::CompiledModel& before, const rules::CompiledModel& after) {
-  const rules::ModelDiff diff = rules::diff(before, after, kMaxWork);
+nlohmann::json changes_json(const rules::CompiledModel& before, const rules::CompiledModel& after,
+                            const std::stop_token& stop) {
+  rules::Budget budget(kStepsOfDryRun, stop);
+  const rules::ModelDiff diff = rules::diff(before, after, budget);
   std::ostringstream text;
   rules::write_text(text, diff);
   std::ostringstream json;
