@@ -33,18 +33,16 @@ Daemon::Daemon(const DaemonOptions& options)
       stores_(options.uses_descriptor_store),
       gate_(options.policy),
       files_(options.models),
-      state_(options.directory, options.instance) {
-  if (!files_.empty() || gate_.has_file()) {
-    Reading reading = read_files();
-    if (reading.findings.has_errors())
-      throw BadModel("not started: the files have errors, told above");
-    if (reading.policy) gate_.put_in_force(*reading.policy);
-    read_at_start_ = std::move(reading.models);
-  }
+      state_(options.directory, options.instance),
+      proving_{options.steps, tell_service_manager()},
+      before_reading_(options.before_reading),
+      compiler_(options.compiles_in) {
+  if (!files_.empty() || gate_.has_file()) read_first_models(options.stop_descriptor);
   listener_ = shm::listen_at(options.directory, instance_);
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   if (!epoll_) throw std::system_error(errno, std::generic_category(), "epoll_create1");
   watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
+  watch(compiler_.descriptor(), Tag::kCompiler, 0, EPOLLIN);
   reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
   look_for_predecessor();
 }
@@ -71,7 +69,7 @@ int Daemon::timeout_ms() const {
   const bool is_behind = std::any_of(clients_.begin(), clients_.end(), [](const auto& each) {
     return each.second->has_read_ahead();
   });
-  const bool may_change = !swap_ && phase_ == Phase::kServing && !changes_.empty();
+  const bool may_change = !swap_ && !preparing_ && phase_ == Phase::kServing && !changes_.empty();
   if (is_behind || may_change || (try_postponed_ && !postponed_.empty())) return 0;
   shm::Nanoseconds deadline =
       std::min({barriers_.next_deadline(), takeover_deadline(), show_growth_at_});
@@ -93,6 +91,7 @@ void Daemon::run(int signal_descriptor) {
       const auto tag = static_cast<Tag>(events[i].data.u64 >> 56);
       const ClientId id = events[i].data.u64 & ((std::uint64_t{1} << 56) - 1);
       if (tag == Tag::kListener) accept_client();
+      if (tag == Tag::kCompiler) finish_preparing();
       if (tag == Tag::kSignals && handle_signal(signal_descriptor)) return;
       if (tag == Tag::kAbsentee) {
         forget_absentee(id);

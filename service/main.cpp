@@ -5,6 +5,7 @@
 #include <systemd/sd-daemon.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 
 #include <CLI/CLI.hpp>
@@ -48,9 +49,10 @@ arbiter::shm::FileDescriptor catch_signals() {
   return arbiter::shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
 }
 
-int serve(const arbiter::service::DaemonOptions& options, const std::string& instance) {
+int serve(arbiter::service::DaemonOptions options, const std::string& instance) {
   raise_descriptor_limit();
   const auto signals = catch_signals();
+  options.stop_descriptor = signals.get();
   Daemon daemon(options);
   log::info("instance \"{}\" is ready at {}", instance, daemon.path());
   sd_notifyf(0, "READY=1\nSTATUS=instance %s", instance.c_str());
@@ -69,6 +71,7 @@ int run(int argc, char** argv) {
   std::string policy;
   std::string instance;
   std::string level = "info";
+  double effort = 1;
   app.add_option("--model", models,
                  "Model file; several of one NAME, or without one, form one model. The first model "
                  "is put in force, `arbiter switch` goes to the others")
@@ -84,6 +87,11 @@ int run(int argc, char** argv) {
       ->type_name("NAME");
   app.add_flag("--descriptor-store", options.uses_descriptor_store,
                "Leave descriptors with the service manager for the next daemon");
+  app.add_option("--effort", effort,
+                 "How many times as many steps as usual the proof of a model may take")
+      ->type_name("FACTOR")
+      ->check(
+          CLI::Range(arbiter::rules::Budget::kLeastEffort, arbiter::rules::Budget::kMostEffort));
   app.add_option("--log-level", level, "trace, debug, info, warn or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error"}));
   try {
@@ -94,11 +102,14 @@ int run(int argc, char** argv) {
   log::set_default_logger(log::stderr_logger_mt("arbiterd"));
   log::set_level(log::level::from_str(level));
   if (!policy.empty()) options.policy = policy;
+  options.steps = arbiter::rules::Budget::steps_of(effort);
   try {
     options.models = arbiter::service::named_files(models, applications);
     options.instance = arbiter::shm::instance_name(instance);
     options.directory = arbiter::shm::daemon_directory();
     return serve(options, options.instance);
+  } catch (const arbiter::rules::Stopped&) {  // by a signal, before it was ready
+    return 0;
   } catch (const std::invalid_argument& error) {
     log::error("{}", error.what());
     return 2;
@@ -112,7 +123,9 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    return run(argc, argv);
+    const int exit_code = run(argc, argv);
+    if (arbiter::service::Compiler::has_left_a_thread()) std::_Exit(exit_code);
+    return exit_code;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "arbiterd: %s\n", error.what());
     return 1;

@@ -1,0 +1,57 @@
+#include "service/preparation.hpp"
+
+#include <systemd/sd-daemon.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <stdexcept>
+
+#include "service/comparison.hpp"
+
+namespace arbiter::service {
+
+Reading read_files(const std::vector<NamedFiles>& files, const Gate& gate, const Proving& proving,
+                   const std::stop_token& stop) {
+  Reading reading;
+  reading.policy = gate.read(reading.findings);
+  reading.models = read_models(files, proving, stop, reading.findings);
+  return reading;
+}
+
+ModelPointer find_model(const std::vector<ModelPointer>& models, const std::string& name) {
+  const auto found = std::find_if(models.begin(), models.end(),
+                                  [&](const auto& model) { return model->name == name; });
+  if (found != models.end()) return *found;
+  return models.empty() ? nullptr : models.front();
+}
+
+std::string changes_between(const Model& before, const Model& after, const std::stop_token& stop) {
+  try {
+    return summary_of_changes(before.compiled, after.compiled, stop);
+  } catch (const rules::Stopped&) {
+    throw;
+  } catch (const std::exception& error) {
+    return std::string("not compared: ") + error.what();
+  }
+}
+
+rules::Budget::Watch tell_service_manager() {
+  using Clock = std::chrono::steady_clock;
+  constexpr auto kEvery = std::chrono::seconds(1);
+  // Longer than reading and extracting take, during which nothing is told.
+  constexpr int kAtMost = 30;
+  const auto next = std::make_shared<Clock::time_point>(Clock::now() + kEvery);
+  return [next](const rules::Progress& progress) {
+    if (Clock::now() < *next) return;
+    *next = Clock::now() + kEvery;
+    sd_notifyf(0, "STATUS=%s: %zu of %zu ports (%s)\nEXTEND_TIMEOUT_USEC=%d000000",
+               progress.stage.c_str(), progress.done, progress.of, progress.name.c_str(), kAtMost);
+  };
+}
+
+void tell_service_manager_ready(const std::string& instance) {
+  sd_notifyf(0, "STATUS=instance %s", instance.c_str());
+}
+
+}  // namespace arbiter::service

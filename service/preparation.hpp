@@ -1,0 +1,38 @@
+// The jobs of a compiler: what is read, proved and compared before the loop puts it in force.
+#pragma once
+
+#include <functional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "rules/budget.hpp"
+#include "service/compiler.hpp"
+
+namespace arbiter::service {
+
+// Of each model that is read.
+struct Proving {
+  std::uint64_t steps = rules::Budget::kSteps;
+  rules::Budget::Watch watch;  // is called in the compiler's thread
+};
+
+// Reads the policy and all models. In any thread; throws rules::Stopped, std::runtime_error.
+[[nodiscard]] Reading read_files(const std::vector<NamedFiles>& files, const Gate& gate,
+                                 const Proving& proving, const std::stop_token& stop);
+
+// The model of that name, or the first; null where there is none.
+[[nodiscard]] ModelPointer find_model(const std::vector<ModelPointer>& models,
+                                      const std::string& name);
+
+// What the one decides differently from the other, in one line. It may fail to find that out, and
+// then says so; it throws rules::Stopped only.
+[[nodiscard]] std::string changes_between(const Model& before, const Model& after,
+                                          const std::stop_token& stop);
+
+// Tells the service manager how far a model is, and that it is worth waiting for.
+[[nodiscard]] rules::Budget::Watch tell_service_manager();
+// That nothing is under way.
+void tell_service_manager_ready(const std::string& instance);
+
+}  // namespace arbiter::service
