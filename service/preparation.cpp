@@ -10,6 +10,14 @@
 #include "service/comparison.hpp"
 
 namespace arbiter::service {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr std::chrono::seconds kEvery{1};
+// Longer than reading and extracting take, during which nothing is told.
+constexpr int kAtMost = 30;
+
+}  // namespace
 
 Reading read_files(const std::vector<NamedFiles>& files, const Gate& gate, const Proving& proving,
                    const std::stop_token& stop) {
@@ -37,10 +45,6 @@ std::string changes_between(const Model& before, const Model& after, const std::
 }
 
 rules::Budget::Watch tell_service_manager() {
-  using Clock = std::chrono::steady_clock;
-  constexpr auto kEvery = std::chrono::seconds(1);
-  // Longer than reading and extracting take, during which nothing is told.
-  constexpr int kAtMost = 30;
   const auto next = std::make_shared<Clock::time_point>(Clock::now() + kEvery);
   return [next](const rules::Progress& progress) {
     if (Clock::now() < *next) return;

@@ -159,7 +159,7 @@ TEST(Budget, StatementsAboutAPortShareItsDiagrams) {
   }
   const rules::TextFile file("safety.txt", text);
   const auto statements = read_statements(file, diagnostics);
-  Budget budget(20'000'000);
+  Budget budget;
   const auto verdicts = judge(statements, model, diagnostics, budget);
   ASSERT_EQ(verdicts.size(), 10'000u);
   for (const auto& verdict : verdicts) {
