@@ -15,6 +15,9 @@ namespace {
 
 using Active = std::set<std::string>;
 
+// Before a statement about idle ports is looked at case by case: a second or two.
+constexpr std::uint64_t kMaxStepsAtOnce = 16'000'000;
+
 // A statement that has a meaning in the model.
 struct Case {
   Verdict verdict;
@@ -107,7 +110,7 @@ class Judge {
     try {
       Question question(*of.expression, of.terms, *scene_);
       if (!question.has_cases()) return question.refute(Question::Way::kAtOnce);
-      const Budget::Part half(budget_, budget_.left() / 2);
+      const Budget::Part part(budget_, std::min(budget_.left() / 2, kMaxStepsAtOnce));
       return question.refute(Question::Way::kAtOnce);
     } catch (const StepLimit&) {
       if (!has_cases(of)) throw;
