@@ -115,8 +115,14 @@ void Conversation::wait_until_gone(const shm::FileDescriptor& process) {
 
 void write_in_force(const nlohmann::json& report) {
   std::cout << "model " << report.at("generation") << " is in force\n";
+  if (const auto& past = report.at("back_to"); !past.is_null()) {
+    std::cout << "  it is model " << past.at("generation")
+              << " again: " << past.at("name").get<std::string>();
+    for (const auto& file : past.at("files")) std::cout << ' ' << file.get<std::string>();
+    std::cout << " (" << past.at("how").get<std::string>() << ")\n";
+  }
   if (!report.at("changes").is_null()) {
-    std::cout << "  " << report.at("changes").get<std::string>() << '\n';
+    std::cout << "  " << report.at("changes").at("summary").get<std::string>() << '\n';
   }
 }
 

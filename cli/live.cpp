@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
+#include <iostream>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -27,11 +29,17 @@ NodeOptions live_options(const std::string& instance) {
   NodeOptions options;
   options.instance = instance;
   options.connect_timeout = kConnectTimeout;
+  options.on_notice = [](const Notice& notice) { std::cerr << "arbiter: " << notice.text << '\n'; };
   return options;
 }
 
 std::shared_ptr<detail::NodeCore> connect(const std::string& verb, const std::string& instance) {
-  return detail::make_node("arbiter-" + verb, live_options(instance));
+  NodeOptions options = live_options(instance);
+  // Of names that the model does not mention the verbs speak themselves.
+  options.on_notice = [say = std::move(options.on_notice)](const Notice& notice) {
+    if (notice.kind != NoticeKind::unmentioned) say(notice);
+  };
+  return detail::make_node("arbiter-" + verb, options);
 }
 
 nlohmann::json fetch_document(detail::NodeCore& node, shm::MessageKind kind) {

@@ -24,6 +24,7 @@ void add_instance_option(CLI::App& verb, std::string& instance);
 // How long a verb looks for a daemon before it says that there is none.
 inline constexpr std::chrono::milliseconds kConnectTimeout{300};
 
+// Notices go to standard error.
 NodeOptions live_options(const std::string& instance);
 
 // Connects to the daemon. Throws arbiter::Error.

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/name_warnings.hpp"
 #include "rules/load.hpp"
 #include "rules/names.hpp"
 #include "rules/table_rules.hpp"
@@ -73,15 +74,18 @@ Look LivePort::look() const {
     const shm::TableView& table = look.snapshot.table;
     look.is_arbitrated = table.is_arbitrated(id_);
     look.is_mentioned = table.knows_port(id_);
+    std::map<shm::SourceId, const shm::Activity*> pages;
     std::map<shm::SourceId, shm::SeenActivity> seen;
     const auto sources = rules::sources_heeded(table, id_);
     for (const shm::SourceId source : sources) {
       const shm::Activity* activity = memory_->pages().find(source);
-      if (activity != nullptr) seen.emplace(source, shm::SeenActivity::of(*activity));
+      if (activity == nullptr) continue;
+      pages.emplace(source, activity);
+      seen.emplace(source, shm::SeenActivity::of(*activity));
     }
     const shm::Nanoseconds now = shm::monotonic_now();
     look.is_settled = std::all_of(seen.begin(), seen.end(), [&](const auto& each) {
-      const auto later = shm::SeenActivity::of(*memory_->pages().find(each.first));
+      const auto later = shm::SeenActivity::of(*pages.at(each.first));
       return each.second.stands(later, table.timeout(each.first), now);
     });
     look.sources.set_time(now);
@@ -106,12 +110,14 @@ void LivePort::fetch_model() {
   model_ = ModelInForce::fetch(*node_);
   generation_ = model_.generation();
   rules_ = {};
+  name_warnings_.clear();
   if (!model_.has_texts()) return;
   rules::Diagnostics diagnostics;
   rules_ = rules::load(model_.texts(), diagnostics, rules::Keep::kProvenance);
   if (diagnostics.has_errors()) {
     throw Error("the daemon's model is none to this program; are both of one version?");
   }
+  name_warnings_ = cli::name_warnings(diagnostics);
 }
 
 void LivePort::add_timeouts(Look& look) const {

@@ -59,6 +59,10 @@ class LivePort {
   [[nodiscard]] std::vector<std::string> known_ports() const {
     return rules::Explainer(rules_).ports();
   }
+  // What loading it has said of names that nobody has.
+  [[nodiscard]] const std::vector<rules::Diagnostic>& name_warnings() const {
+    return name_warnings_;
+  }
   // With where T comes from, and what it was. `look` must be of that model.
   void add_timeouts(Look& look) const;
 
@@ -72,6 +76,7 @@ class LivePort {
   std::optional<std::uint64_t> generation_;  // of what follows
   ModelInForce model_;
   rules::RuleSet rules_;
+  std::vector<rules::Diagnostic> name_warnings_;
 };
 
 }  // namespace arbiter::cli

@@ -13,7 +13,7 @@
 #include "cli/verbs.hpp"
 #include "rules/load.hpp"
 #include "rules/names.hpp"
-#include "rules/utf8.hpp"
+#include "shm/utf8.hpp"
 
 namespace {
 
@@ -21,29 +21,9 @@ constexpr int kFailed = 1;
 constexpr int kWrongUse = 2;
 
 // What was typed may hold anything; on a terminal, control characters would be obeyed.
-std::string printable(std::string_view text) {
-  static constexpr char kDigits[] = "0123456789abcdef";
-  std::string result;
-  while (!text.empty()) {
-    const auto character = arbiter::rules::decode_utf8(text);
-    const auto byte = static_cast<unsigned char>(text.front());
-    if (character.length == 0 ||
-        (arbiter::rules::is_control(character.code) && byte != '\n' && byte != '\t')) {
-      const std::size_t length = std::max<std::size_t>(character.length, 1);
-      for (const char each : text.substr(0, length)) {
-        const auto value = static_cast<unsigned char>(each);
-        result += {'\\', 'x', kDigits[value >> 4], kDigits[value & 15]};
-      }
-      text.remove_prefix(length);
-      continue;
-    }
-    result += text.substr(0, character.length);
-    text.remove_prefix(character.length);
-  }
-  return result;
+void say(const std::string& what) {
+  std::cerr << "arbiter: " << arbiter::shm::printable(what, "\n\t") << '\n';
 }
-
-void say(const std::string& what) { std::cerr << "arbiter: " << printable(what) << '\n'; }
 
 // CLI11 would say that a verb is missing.
 bool knows_verb(const CLI::App& app, const std::string& word) {
@@ -90,7 +70,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_history(app, exit_code);
   arbiter::cli::add_stop(app, exit_code);
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
-    return printable(CLI::FailureMessage::simple(failed, error));
+    return arbiter::shm::printable(CLI::FailureMessage::simple(failed, error), "\n\t");
   });
   if (argc > 1 && !knows_verb(app, argv[1])) return kWrongUse;
   try {

@@ -31,7 +31,6 @@ std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnosti
 std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
                                 rules::Budget& budget, rules::Keep keep) {
   rules::RuleSet rules = rules::load(files, diagnostics, keep);
-  if (diagnostics.has_errors()) return std::nullopt;
   rules::CompiledModel compiled = rules::compile(rules, diagnostics, budget);
   if (diagnostics.has_errors()) return std::nullopt;
   return Model{std::move(rules), std::move(compiled)};

@@ -229,6 +229,12 @@ std::optional<Obstacle> Obstacles::other_source(const std::string& name) const {
   return Obstacle{"near-name", unmentioned_text(*other)};
 }
 
+std::string Obstacles::why_it_cannot_deliver(const std::string& source) const {
+  if (input_ == nullptr || input_->at("cannot_deliver").is_null()) return {};
+  const json& selected = input_->at("cannot_deliver");
+  return selected.at("source") == source ? selected.at("why").get<std::string>() : std::string();
+}
+
 std::string Obstacles::why_nothing_comes_of(const std::string& source) const {
   if (!is_away() && (input_ == nullptr || !input_->at("open").get<bool>())) {
     const json* stranger = stranger_with("inputs", port_);

@@ -28,6 +28,8 @@ class Obstacles {
   // Of one that need not have a connection.
   [[nodiscard]] std::vector<Obstacle> of_source(const std::string& source) const;
 
+  // Why the port is idle though that source is selected; empty where it is not, or can deliver.
+  [[nodiscard]] std::string why_it_cannot_deliver(const std::string& source) const;
   // Why nothing of a winner reaches the port; empty where something does, as far as is known.
   [[nodiscard]] std::string why_nothing_comes_of(const std::string& source) const;
   // Nobody has it open, nothing has ever arrived, and nothing else could be meant by the name.

@@ -24,22 +24,38 @@ struct CheckOptions {
   std::vector<std::string> statements;  // files
   std::vector<std::string> silenced;    // codes
   double effort = 1;
+  bool strict = false;
   bool json = false;
 };
 
 struct Statements {
   std::size_t proved = 0, refuted = 0, open = 0;
   std::size_t not_judged = 0;  // malformed, or of names that the model does not have
+  rules::ProvedStatements facts;
 };
 
 // Of the warnings and notes that reading, compiling and proving a model can bring.
-const std::vector<std::string_view> silenceable{
-    "duplicate-config", "duplicate-connection", "inhibition-across-ports",
-    "left-open",        "matches-nothing",      "more-conflicts",
-    "never-published",  "never-runs",           "never-selected",
-    "never-wins",       "no-children",          "no-config",
-    "no-rule-at-port",  "nobody-wins",          "proved",
-    "starved",          "unreachable-children"};
+const std::vector<std::string_view> silenceable{"decided-in-order",
+                                                "duplicate-config",
+                                                "duplicate-connection",
+                                                "forever-commands",
+                                                "inhibition-across-ports",
+                                                "left-open",
+                                                "matches-nothing",
+                                                "more-conflicts",
+                                                "never-published",
+                                                "never-read",
+                                                "never-runs",
+                                                "never-selected",
+                                                "never-wins",
+                                                "no-children",
+                                                "no-config",
+                                                "no-rule-at-port",
+                                                "nobody-wins",
+                                                "proved",
+                                                "similar-name",
+                                                "starved",
+                                                "unreachable-children"};
 
 std::string problem_of_code(std::string& code) {
   if (std::find(silenceable.begin(), silenceable.end(), code) != silenceable.end()) return "";
@@ -67,20 +83,25 @@ std::string summary_of(const rules::CompiledModel& model) {
 Statements judge_statements(const CheckOptions& options, const rules::CompiledModel* model,
                             rules::Diagnostics& diagnostics, rules::Budget& budget) {
   Statements result;
+  std::vector<rules::Statement> statements;  // of all files: they share the budget
   for (const auto& path : options.statements) {
     const rules::TextFile file(path, rules::read_bytes(path));
     std::size_t malformed = 0;
-    const auto statements = rules::read_statements(file, diagnostics, &malformed);
-    if (model == nullptr) continue;
-    const auto verdicts = rules::judge(statements, *model, diagnostics, budget);
-    result.not_judged += malformed + statements.size() - verdicts.size();
-    rules::report(verdicts, diagnostics, options.json);
-    for (const auto& verdict : verdicts) {
-      using Kind = rules::Verdict::Kind;
-      result.proved += verdict.kind == Kind::kProved ? 1 : 0;
-      result.refuted += verdict.kind == Kind::kRefuted ? 1 : 0;
-      result.open += verdict.kind == Kind::kOpen ? 1 : 0;
+    for (auto& statement : rules::read_statements(file, diagnostics, &malformed)) {
+      statements.push_back(std::move(statement));
     }
+    result.not_judged += malformed;
+  }
+  if (model == nullptr) return result;
+  const auto verdicts = rules::judge(statements, *model, diagnostics, budget);
+  result.not_judged += statements.size() - verdicts.size();
+  rules::report(verdicts, diagnostics, options.json);
+  for (const auto& verdict : verdicts) {
+    using Kind = rules::Verdict::Kind;
+    result.proved += verdict.kind == Kind::kProved ? 1 : 0;
+    if (verdict.proved) result.facts.push_back(verdict.proved);
+    result.refuted += verdict.kind == Kind::kRefuted ? 1 : 0;
+    result.open += verdict.kind == Kind::kOpen ? 1 : 0;
   }
   return result;
 }
@@ -101,13 +122,16 @@ int check(const CheckOptions& options) {
   const auto model = load_model(options.files, diagnostics, budget);
   const auto statements =
       judge_statements(options, model ? &model->compiled : nullptr, diagnostics, budget);
-  if (model) rules::find_more(model->rules, model->compiled, diagnostics, budget);
+  if (model) {
+    rules::find_more(model->rules, model->compiled, diagnostics, budget, statements.facts);
+  }
   if (!model && !options.statements.empty()) {
     diagnostics.note("left-open", {options.statements.front(), 1, 1},
                      "whether the statements are true was not looked at: the model has errors");
   }
   progress.clear();
   diagnostics.silence(options.silenced);
+  if (options.strict) diagnostics.make_warnings_errors();
   const bool failed = diagnostics.has_errors();
   if (options.json) {
     rules::write_json(std::cout, diagnostics);
@@ -118,7 +142,8 @@ int check(const CheckOptions& options) {
     write_summary(std::cout, statements);
   }
   if (failed) {
-    std::cout << "failed: " << rules::counts(diagnostics) << '\n';
+    std::cout << "failed: " << rules::counts(diagnostics)
+              << (options.strict ? " (--strict takes warnings for errors)\n" : "\n");
   } else {
     std::cout << "ok: " << summary_of(model->compiled) << '\n';
   }
@@ -142,6 +167,7 @@ void add_check(CLI::App& app, int& exit_code) {
       ->allow_extra_args(false)
       ->check(CLI::Validator(problem_of_code, ""));
   add_effort_option(*verb, options->effort);
+  verb->add_flag("--strict", options->strict, "Take warnings for errors, but for silenced ones");
   verb->add_flag("--json", options->json, "Write what is found as JSON, to standard output");
   verb->footer(
       "Example:\n"
@@ -150,11 +176,13 @@ void add_check(CLI::App& app, int& exit_code) {
       "Statements speak of sources and winners:\n"
       "  /collision:o -> idle(/Arm/pos:i)\n"
       "  winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o\n"
+      "  winner(/Base/vel:i) = any(/Nav/*) -> winner(/Arm/pos:i) != winner(/Hand/pos:i)\n"
       "Proofs take a bounded number of steps, the same on every machine, shared out fairly. What\n"
       "they leave open is named: a port that is not proved and a statement are errors, the rest "
       "is\n"
       "the note left-open. A model that needs --effort here needs it at arbiterd, too.\n"
-      "Exit code 0: no error; 1: an error, or a statement that is not proved; 2: wrong use,\n"
+      "Exit code 0: no error; with --strict, no warning either; 1: an error, or a statement that "
+      "is not proved; 2: wrong use,\n"
       "or a file cannot be opened, or the output not be written.");
   verb->callback([options, &exit_code] { exit_code = check(*options); });
 }

@@ -12,7 +12,6 @@
 
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
-#include "cli/unmentioned.hpp"
 #include "cli/verbs.hpp"
 #include "rules/duration.hpp"
 #include "shm/clock.hpp"
@@ -53,7 +52,6 @@ class Echo {
         started_(shm::monotonic_now()) {}
 
   int run() {
-    warn_if_unmentioned(options_.instance, Direction::kInput, options_.port);
     const shm::Nanoseconds end =
         options_.duration == shm::kForever ? shm::kForever : started_ + options_.duration;
     pollfd ready[] = {{in_.fd(), POLLIN, 0}, {interrupts_.get(), POLLIN, 0}};

@@ -6,11 +6,12 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
-#include "cli/unmentioned.hpp"
 #include "cli/verbs.hpp"
+#include "rules/names.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {
@@ -32,6 +33,26 @@ std::vector<std::byte> payload_of(const PubOptions& options) {
   return {bytes, bytes + options.text.size()};
 }
 
+// Of ports that do not fit, or of which the model knows nothing, there was a notice. Says nothing
+// where the source is only sensed, or the daemon does not let us observe.
+void warn_if_nobody_is_there(const PubOptions& options) try {
+  const nlohmann::json status = fetch_status(*connect("pub-status", options.instance));
+  std::vector<std::string> missing;
+  for (const auto& input : status.at("inputs")) {
+    for (const auto& connection : input.at("connections")) {
+      if (connection.at("source") != options.port) continue;
+      if (connection.at("state") == "connected") return;
+      if (!input.at("open").get<bool>()) missing.push_back(input.at("name").get<std::string>());
+    }
+  }
+  if (missing.empty()) return;
+  std::cerr << "arbiter: no component has " << rules::enumerate(missing)
+            << " open, to which the model connects " << options.port
+            << ", so that nothing of this is delivered\n";
+} catch (const Error&) {
+  // It is not allowed, or the daemon has gone meanwhile.
+}
+
 int pub(const PubOptions& options) {
   const auto interrupts = catch_interrupts();
   const std::vector<std::byte> payload = payload_of(options);
@@ -39,7 +60,7 @@ int pub(const PubOptions& options) {
   OutputPortOptions port_options;
   port_options.max_size = payload.size();
   auto out = node.output_port(options.port, port_options);
-  warn_if_unmentioned(options.instance, Direction::kOutput, options.port);
+  warn_if_nobody_is_there(options);
   const auto period = static_cast<shm::Nanoseconds>(1e9 / options.rate_hz);
   shm::Nanoseconds next = shm::monotonic_now();
   std::uint64_t published = 0;

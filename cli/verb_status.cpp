@@ -103,9 +103,13 @@ void print_source(const json& source, bool has_model) {
   std::cout << (mark.empty() ? "" : " " + mark) << '\n';
 }
 
-void print_connection(const json& connection) {
+// `is_useless`: it is selected, and cannot deliver.
+void print_connection(const json& connection, bool is_useless) {
   const bool wins = connection.at("winner").get<bool>();
-  const char* mark = wins ? "  * " : connection.at("active").get<bool>() ? "  - " : "    ";
+  const char* mark = wins                                  ? "  * "
+                     : is_useless                          ? "  x "
+                     : connection.at("active").get<bool>() ? "  - "
+                                                           : "    ";
   std::cout << mark << connection.at("source").get<std::string>();
   if (connection.at("state") == "mismatch") {
     std::cout << "  MISMATCH: " << connection.at("mismatch").get<std::string>() << '\n';
@@ -124,13 +128,22 @@ void print_input(const json& input, bool has_model) {
             << "]  ";
   if (!input.at("arbitrated").get<bool>()) {
     std::cout << "not arbitrated" << unmentioned(input, has_model);
+  } else if (!input.at("cannot_deliver").is_null()) {
+    const json& selected = input.at("cannot_deliver");
+    std::cout << "idle: " << selected.at("source").get<std::string>()
+              << " is selected, but cannot deliver: " << selected.at("why").get<std::string>();
   } else if (input.at("winner").is_null()) {
     std::cout << "idle";
   } else {
     std::cout << "winner " << input.at("winner").get<std::string>();
   }
+  if (input.at("in_order").get<bool>()) std::cout << "  (rules tried in order)";
   std::cout << counts(input, {"blind", "unsettled", "misbehaved"}, false) << '\n';
-  for (const auto& connection : input.at("connections")) print_connection(connection);
+  const json& useless = input.at("cannot_deliver");
+  for (const auto& connection : input.at("connections")) {
+    print_connection(connection,
+                     !useless.is_null() && useless.at("source") == connection.at("source"));
+  }
   for (const auto& sensed : input.at("senses")) {
     std::cout << (sensed.at("active").get<bool>() ? "  ! " : "    ")
               << sensed.at("source").get<std::string>() << "  (sensed)\n";
@@ -149,7 +162,9 @@ int status(const StatusOptions& options) {
   const bool has_model = document.at("model").at("generation") != 0;
   std::cout << "\nsources\n";
   for (const auto& source : document.at("sources")) print_source(source, has_model);
-  std::cout << "\ninput ports  (* winner, - active and overridden, ! active and sensed)\n";
+  std::cout << "\ninput ports  (* winner, x selected but cannot deliver, - active and overridden, "
+               "! active and "
+               "sensed)\n";
   for (const auto& input : document.at("inputs")) print_input(input, has_model);
   return 0;
 }

@@ -2,6 +2,7 @@
 //
 // The daemon only hands out the texts of the model in force. What is active is read where the
 // decisions read it, in the activity pages, and explained here.
+#include <iostream>
 #include <memory>
 #include <string>
 #include <utility>
@@ -10,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/live_port.hpp"
+#include "cli/name_warnings.hpp"
 #include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
 #include "cli/why_answer.hpp"
@@ -29,7 +31,12 @@ int answer(const WhyOptions& options) {
     const nlohmann::json status = fetch_status(*node);
     const WhyAnswer answer(options, port, std::move(look), std::move(*explanation), status);
     answer.check_source();
-    options.json ? answer.write_json() : answer.write_text();
+    if (options.json) {
+      answer.write_json();
+    } else {
+      answer.write_text();
+      write_text(std::cout, port.name_warnings());
+    }
     return 0;
   }
 }
@@ -55,7 +62,7 @@ void add_why(CLI::App& app, int& exit_code) {
       ->type_name("N")
       ->needs(follow)
       ->check(at_least_one());
-  verb->add_flag("--all", options->all, "Tell all of every connection, of a port with many too")
+  verb->add_flag("--all", options->all, "Tell all of every connection; otherwise a port with many fits a screen")
       ->excludes(follow);
   verb->add_flag("--json", options->json, "As JSON; with --follow one object a line");
   add_instance_option(*verb, options->instance);

@@ -1,11 +1,15 @@
 #include "cli/why_answer.hpp"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <iostream>
 #include <set>
 #include <string_view>
 #include <utility>
 
+#include "cli/name_warnings.hpp"
+#include "cli/why_summary.hpp"
 #include "rules/names.hpp"
 
 namespace arbiter::cli {
@@ -14,8 +18,11 @@ namespace {
 using nlohmann::json;
 using rules::ConnectionExplanation;
 
-// Of ports with more connections than this, inactive ones are told of in a line each.
+// Of ports with more connections than this, inactive ones are told of in short.
 constexpr std::size_t kMaxTold = 8;
+// Where there is something to say of more than kMaxTold: of so many it is said one by one.
+constexpr std::size_t kMaxTakenApart = 3;
+constexpr std::size_t kMaxCauses = 3;  // of each of these
 
 // The sources that an explanation of a connection names as its reasons.
 std::vector<std::string> reasons_of(const ConnectionExplanation& connection) {
@@ -109,9 +116,12 @@ bool WhyAnswer::is_only_named(const std::string& source) const {
          std::find(reasons_.begin(), reasons_.end(), source) == reasons_.end();
 }
 
+bool WhyAnswer::is_large() const {
+  return options_.source.empty() && !options_.all && shown_.size() > kMaxTold;
+}
+
 bool WhyAnswer::is_short(const ConnectionExplanation& connection) const {
-  return options_.source.empty() && !options_.all && shown_.size() > kMaxTold &&
-         connection.has_rule && !connection.is_active;
+  return is_large() && connection.has_rule && !connection.is_active;
 }
 
 void WhyAnswer::write_text() const {
@@ -119,15 +129,55 @@ void WhyAnswer::write_text() const {
   auto sorted = shown_;
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const auto& a, const auto& b) { return rank(a) < rank(b); });
+  std::vector<const ConnectionExplanation*> told;
   for (const auto& each : sorted) {
-    if (!each.has_rule || !is_only_named(each.source)) write_connection(each);
+    if (!each.has_rule || !is_only_named(each.source)) told.push_back(&each);
   }
+  std::vector<const ConnectionExplanation*> rest;
+  if (is_large() && look_.is_arbitrated && told.size() > kMaxTold) {
+    rest.assign(told.begin() + kMaxTakenApart, told.end());
+    told.resize(kMaxTakenApart);
+  }
+  for (const auto* each : told) write_connection(*each);
+  if (!rest.empty()) write_rest(rest);
   if (is_sensed(options_.source)) write_sensed(options_.source);
   if (!options_.source.empty()) return;
-  for (const auto& source : explanation_.senses) {
-    if (!is_only_named(source)) write_sensed(source);
-  }
+  write_senses();
   write_only_named();
+}
+
+void WhyAnswer::write_rest(const std::vector<const ConnectionExplanation*>& rest) const {
+  write_summary(std::cout, rest);
+  std::vector<std::string> obstructed;
+  for (const auto* each : rest) {
+    if (!obstacles_.of_connection(each->source).empty()) obstructed.push_back(each->source);
+  }
+  if (!obstructed.empty()) {
+    std::cout << "  ! there is more to say of " << rules::enumerate(obstructed) << '\n';
+  }
+  std::cout << "\narbiter why " << port_.name() << " SOURCE tells of one of them, --all of all\n";
+}
+
+void WhyAnswer::write_senses() const {
+  std::vector<std::string> told;
+  for (const auto& source : explanation_.senses) {
+    if (!is_only_named(source)) told.push_back(source);
+  }
+  if (options_.all || told.size() <= kMaxTold) {
+    for (const auto& source : told) write_sensed(source);
+    return;
+  }
+  std::vector<std::string> active, inactive;
+  for (const auto& source : told) {
+    (look_.sources.is_active(source) ? active : inactive).push_back(source);
+  }
+  std::cout << "\nSensed, without a connection here:\n";
+  if (!active.empty()) {
+    std::cout << "  " << active.size() << " active: " << rules::enumerate(active) << '\n';
+  }
+  if (!inactive.empty()) {
+    std::cout << "  " << inactive.size() << " inactive: " << rules::enumerate(inactive) << '\n';
+  }
 }
 
 void WhyAnswer::write_only_named() const {
@@ -153,11 +203,16 @@ void WhyAnswer::write_port() const {
     std::cout << ": not arbitrated, for no rule mentions it; all that its connections bring is "
                  "delivered\n";
   } else {
+    const std::string useless =
+        explanation_.winner ? obstacles_.why_it_cannot_deliver(*explanation_.winner) : "";
     std::cout << ": "
-              << (explanation_.winner ? *explanation_.winner + " wins"
-                                      : std::string("idle, nobody wins"))
+              << (!useless.empty()      ? "idle, though " + *explanation_.winner + " is selected"
+                  : explanation_.winner ? *explanation_.winner + " wins"
+                                        : std::string("idle, nobody wins"))
               << since_text();
-    if (explanation_.winner) {
+    if (!useless.empty()) {
+      std::cout << "; it cannot deliver: " << useless;
+    } else if (explanation_.winner) {
       const std::string why = obstacles_.why_nothing_comes_of(*explanation_.winner);
       if (!why.empty()) std::cout << "; but nothing of it reaches the port: " << why;
     }
@@ -244,7 +299,9 @@ void WhyAnswer::write_connection(const ConnectionExplanation& connection) const 
   if (!look_.is_arbitrated) {
     std::cout << " is delivered\n  it is " << state_text(connection.source) << '\n';
   } else if (connection.wins) {
-    std::cout << " wins\n  " << state_text(connection.source) << '\n';
+    const bool can = obstacles_.why_it_cannot_deliver(connection.source).empty();
+    std::cout << (can ? " wins\n  " : " is selected, but cannot deliver\n  ")
+              << state_text(connection.source) << '\n';
     write_selected(connection);
   } else {
     write_kept_out(connection);
@@ -254,8 +311,13 @@ void WhyAnswer::write_connection(const ConnectionExplanation& connection) const 
 }
 
 void WhyAnswer::write_selected(const ConnectionExplanation& connection) const {
+  std::size_t told = 0;
   for (const auto& part : connection.parts) {
     if (!part.causes.empty()) continue;
+    if (told++ == kMaxCauses && is_large()) {
+      std::cout << "  and by other behaviours\n";
+      return;
+    }
     std::cout << "  selected by "
               << (part.behaviour ? describe(*part.behaviour) : std::string("its rule"));
     if (!part.where.file.empty()) {
@@ -271,12 +333,13 @@ void WhyAnswer::write_kept_out(const ConnectionExplanation& connection) const {
     std::cout << "  " << state_text(connection.source) << '\n';
   }
   if (!is_short(connection)) {
-    write_causes(std::cout, connection, look_.sources);
+    write_causes(std::cout, connection, look_.sources, is_large() ? kMaxCauses : SIZE_MAX);
     if (!connection.has_rule) std::cout << "  " << state_text(connection.source) << '\n';
     return;
   }
   const auto has_cause = [](const auto& part) { return !part.causes.empty(); };
-  if (std::all_of(connection.parts.begin(), connection.parts.end(), has_cause)) {
+  if (connection.earlier ||
+      std::all_of(connection.parts.begin(), connection.parts.end(), has_cause)) {
     std::cout << "  and by the rules: arbiter why " << port_.name() << ' ' << connection.source
               << '\n';
   }
@@ -303,21 +366,27 @@ json WhyAnswer::component_json(const std::string& source) const {
 }
 
 void WhyAnswer::write_json() const {
+  const json selected = explanation_.winner ? json(*explanation_.winner) : json(nullptr);
+  const bool is_useless =
+      explanation_.winner && !obstacles_.why_it_cannot_deliver(*explanation_.winner).empty();
   json document = {{"port", port_.name()},
                    {"at_ns", look_.sources.now()},
                    {"settled", look_.is_settled},
                    {"model", port_.model().to_json()},
                    {"arbitrated", look_.is_arbitrated},
                    {"mentioned", look_.is_mentioned},
-                   {"winner", explanation_.winner ? json(*explanation_.winner) : json(nullptr)},
+                   {"selected", selected},
+                   {"winner", is_useless ? json(nullptr) : selected},
                    {"nothing_comes_of_it", nullptr},
                    {"since", nullptr},
                    {"obstacles", to_json(obstacles_.of_port())},
                    {"connections", json::array()},
-                   {"senses", json::array()}};
+                   {"senses", json::array()},
+                   {"warnings", to_json(port_.name_warnings())}};
   if (look_.is_arbitrated) document["since"] = since_json();
   if (explanation_.winner) {
-    const std::string why = obstacles_.why_nothing_comes_of(*explanation_.winner);
+    const std::string why = is_useless ? obstacles_.why_it_cannot_deliver(*explanation_.winner)
+                                       : obstacles_.why_nothing_comes_of(*explanation_.winner);
     if (!why.empty()) document["nothing_comes_of_it"] = why;
   }
   for (const auto& each : shown_) {

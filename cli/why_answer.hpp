@@ -29,6 +29,8 @@ class WhyAnswer {
   [[nodiscard]] bool is_sensed(const std::string& source) const;
   // Of those that nobody has ever started, and that keep nobody out, the names are enough.
   [[nodiscard]] bool is_only_named(const std::string& source) const;
+  // Of a port with many connections a part is told, which fits a screen.
+  [[nodiscard]] bool is_large() const;
   [[nodiscard]] bool is_short(const rules::ConnectionExplanation& connection) const;
   void write_port() const;
   void write_model() const;
@@ -39,7 +41,10 @@ class WhyAnswer {
   void write_kept_out(const rules::ConnectionExplanation& connection) const;
   void write_reasons(const rules::ConnectionExplanation& connection) const;
   void write_sensed(const std::string& source) const;
+  void write_senses() const;
   void write_only_named() const;
+  // Of those that are not told of one by one.
+  void write_rest(const std::vector<const rules::ConnectionExplanation*>& rest) const;
   [[nodiscard]] nlohmann::json component_json(const std::string& source) const;
   // "active (arrived …)", and who has it open.
   [[nodiscard]] std::string state_text(const std::string& source) const;

@@ -49,11 +49,19 @@ std::string literals_text(const std::vector<rules::Literal>& literals, const Sou
   return text;
 }
 
+using OwnActivity = rules::Cause::OwnActivity;
+
 std::string inhibition_text(const rules::Cause& cause, const Sources& sources) {
-  std::string text = "inhibited by " + describe(*cause.inhibitor);
+  const bool will_be = cause.own_activity == OwnActivity::kWillMatter;
+  std::string text =
+      (will_be ? "would be inhibited by " : "inhibited by ") + describe(*cause.inhibitor);
   if (cause.speaker) text += " (its behaviour \"" + cause.speaker->name + "\")";
   if (cause.of && cause.of->is_meta) text += " through " + describe(*cause.of);
-  text += place(cause.where) + ": " + literals_text(cause.because, sources);
+  text += place(cause.where) + ": ";
+  text += cause.own_activity == OwnActivity::kNoMatter
+              ? literals_text(cause.because, sources)
+              : std::string(will_be ? "once it is active, it is itself" : "it is itself") +
+                    " a source of that one";
   if (!cause.also.empty()) {
     text += "; so " + std::string(cause.also.size() == 1 ? "is " : "are ");
     for (std::size_t i = 0; i < std::min(cause.also.size(), kMaxNamed); ++i) {
@@ -172,18 +180,29 @@ json Sources::to_json(const std::string& name) const {
 
 std::string cause_text(const rules::Cause& cause, const Sources& sources) {
   if (cause.kind == rules::Cause::Kind::kInhibited) return inhibition_text(cause, sources);
-  const std::string because = cause.because.empty() ? "no activity of the sources can make it true"
-                                                    : literals_text(cause.because, sources);
-  if (cause.kind == rules::Cause::Kind::kUnwritten) return "its rule does not hold: " + because;
+  const bool reads_itself = cause.own_activity != OwnActivity::kNoMatter;
+  const std::string because = !cause.because.empty() ? literals_text(cause.because, sources)
+                              : reads_itself ? "no activity of other sources can make it true"
+                                             : "no activity of the sources can make it true";
+  const bool will_be = cause.own_activity == OwnActivity::kWillMatter;
+  const std::string itself = will_be        ? " once it is active itself"
+                             : reads_itself ? " while it is active itself"
+                                            : "";
+  if (cause.kind == rules::Cause::Kind::kUnwritten) {
+    return (will_be ? "its rule would not hold" : "its rule does not hold") + itself + ": " +
+           because;
+  }
   const std::string whose = cause.of ? "the condition of " + describe(*cause.of) : "its condition";
-  return whose + ", " + cause.condition + ", is false" + place(cause.where) + ": " + because;
+  return whose + ", " + cause.condition + (will_be ? ", would be false" : ", is false") + itself +
+         place(cause.where) + ": " + because;
 }
 
 json cause_json(const rules::Cause& cause) {
   static constexpr const char* kKinds[] = {"inhibited", "condition-false", "rule-false"};
   json result = {{"kind", kKinds[static_cast<int>(cause.kind)]},
                  {"where", place_json(cause.where)},
-                 {"because", literals_json(cause.because)}};
+                 {"because", literals_json(cause.because)},
+                 {"by_own_activity", cause.own_activity != OwnActivity::kNoMatter}};
   if (cause.of) result["of"] = element_json(cause.of);
   if (cause.inhibitor) {
     result["inhibitor"] = element_json(cause.inhibitor);
@@ -193,6 +212,15 @@ json cause_json(const rules::Cause& cause) {
   }
   if (!cause.condition.empty()) result["condition"] = cause.condition;
   return result;
+}
+
+std::string headline(const rules::Cause& cause) {
+  if (cause.kind == rules::Cause::Kind::kInhibited) {
+    return "inhibited by " + describe(*cause.inhibitor) + place(cause.where);
+  }
+  if (cause.kind == rules::Cause::Kind::kUnwritten) return "kept out by their rules";
+  const std::string whose = cause.of ? "the condition of " + describe(*cause.of) : "a condition";
+  return "kept out by " + whose + ", " + cause.condition + place(cause.where);
 }
 
 std::string first_cause(const rules::ConnectionExplanation& connection, const Sources& sources) {
@@ -219,7 +247,7 @@ std::string loss_text(const rules::PortExplanation& port, const std::string& los
 }
 
 void write_causes(std::ostream& out, const rules::ConnectionExplanation& connection,
-                  const Sources& sources) {
+                  const Sources& sources, std::size_t max_lines) {
   if (!connection.has_rule) {
     out << "  no rule selects it, so that it never delivers here" << place(connection.where)
         << (connection.is_read ? "; its activity counts for the rules that read it"
@@ -229,19 +257,27 @@ void write_causes(std::ostream& out, const rules::ConnectionExplanation& connect
   }
   if (connection.earlier) {
     out << "  " << *connection.earlier
-        << " comes before it in the model, and where two rules hold the first wins "
-           "(conflict=\"first\")\n";
+        << (connection.is_active ? " comes before it in the model, and where two rules hold"
+                                 : " would win even if it were active, for it comes before it in "
+                                   "the model, and where two rules hold")
+        << " the first wins (conflict=\"first\")\n";
   }
   for (const auto& part : connection.parts) {
     const std::string who = part.behaviour ? describe(*part.behaviour) : std::string("its rule");
     if (part.causes.empty()) {
-      if (connection.is_active) continue;
+      if (connection.is_active || connection.earlier) continue;
       out << "  " << who << place(part.where) << " would select it, if it were active\n";
       continue;
     }
     const std::string indent = connection.parts.size() > 1 ? "    " : "  ";
     if (connection.parts.size() > 1) out << "  as " << who << place(part.where) << " has it:\n";
-    for (const auto& cause : part.causes) out << indent << cause_text(cause, sources) << '\n';
+    const std::size_t told = std::min(part.causes.size(), max_lines);
+    for (std::size_t i = 0; i < told; ++i) {
+      out << indent << cause_text(part.causes[i], sources) << '\n';
+    }
+    if (told < part.causes.size()) {
+      out << indent << "and for " << part.causes.size() - told << " more reasons like these\n";
+    }
   }
 }
 

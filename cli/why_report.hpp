@@ -61,6 +61,8 @@ std::string span_text(shm::Nanoseconds span);
 // In one line, without the name of the connection: "inhibited by …".
 std::string cause_text(const rules::Cause& cause, const Sources& sources);
 nlohmann::json cause_json(const rules::Cause& cause);
+// The same without activities, and without whose it is: "inhibited by behaviour "X" (m.xml:9)".
+std::string headline(const rules::Cause& cause);
 
 // The first of what keeps a connection out, in one line; of one that has several behaviours, that
 // of the first.
@@ -71,9 +73,10 @@ std::string first_cause(const rules::ConnectionExplanation& connection, const So
 std::string loss_text(const rules::PortExplanation& port, const std::string& loser,
                       const Sources& sources);
 
-// What of the rules keeps it out, a line each, indented.
+// What of the rules keeps it out, a line each, indented; of each behaviour at most so many lines,
+// and one that says how many more there are.
 void write_causes(std::ostream& out, const rules::ConnectionExplanation& connection,
-                  const Sources& sources);
+                  const Sources& sources, std::size_t max_lines);
 nlohmann::json connection_json(const rules::ConnectionExplanation& connection,
                                const Sources& sources);
 

@@ -30,9 +30,11 @@ class Handover {
   // By the service thread. A view that was never accepted is replaced.
   // SYNC POINT: view-offered. Release, with the acquire in accept(): who takes a view sees it
   // whole. What comes back was our own offer: nothing to acquire.
-  void offer(std::unique_ptr<View> view) {
-    delete offered_.exchange(view.release(), std::memory_order_release);
+  // True: the last view that was offered, if any, had been accepted.
+  bool offer(std::unique_ptr<View> view) {
+    const std::unique_ptr<View> last(offered_.exchange(view.release(), std::memory_order_release));
     collect();
+    return last == nullptr;
   }
 
   // By the port's thread. Relaxed is enough to look: a view seen late is as one offered late.

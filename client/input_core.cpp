@@ -1,10 +1,13 @@
 // The service thread's side of an input port, and the taking up of what it offers.
 #include "client/input_core.hpp"
 
+#include <fcntl.h>
+
 #include <algorithm>
 #include <system_error>
 
 #include "client/count.hpp"
+#include "client/predecessors.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -36,6 +39,9 @@ InputCore::InputCore(std::string name, const shm::TypeInfo& type, const InputPor
   header.refuse_new = options.when_full == WhenFull::refuse_new ? 1 : 0;
   header.type = type_;
   shm::seal(descriptor_, shm::Seals::kOneWriter);
+  descriptor_ = shm::reopen(descriptor_, O_RDONLY);  // for others: the daemon passes it on as it is
+  bequest_.emplace(mapping_.data(), mapping_.size(), shm::Bequest::Kind::kPrivateZeros);
+  shm::close_in_children(descriptor_);
 }
 
 void InputCore::bind(shm::PortInstance instance, shm::PortId port) {
@@ -46,24 +52,32 @@ void InputCore::bind(shm::PortInstance instance, shm::PortId port) {
 void InputCore::add_peer(std::shared_ptr<const OutputPeer> peer) {
   const auto instance = peer->instance;
   links_[instance] = {std::move(peer), false};
+  refused_.erase(instance);
   offer_view();
 }
 
-void InputCore::map_growth(shm::PortInstance peer, const shm::FileDescriptor& segment) {
+void InputCore::map_growth(shm::PortInstance peer) {
   const auto found = links_.find(peer);
   if (found == links_.end()) return;
-  shm::make_written_resident(segment, found->second.peer->mapping, memory_->residence());
+  const OutputPeer& grown = *found->second.peer;
+  survey(grown);
+  shm::make_written_resident(grown.file, grown.mapping, memory_->residence());
 }
 
 void InputCore::lose_peer(shm::PortInstance peer) {
   const auto found = links_.find(peer);
-  if (found == links_.end()) return;
-  found->second.gone = true;
-  offer_view();
+  if (found != links_.end()) found->second.gone = true;
+  if (refused_.erase(peer) != 0 || found != links_.end()) offer_view();
 }
 
 void InputCore::disconnect_peer(shm::PortInstance peer) {
-  if (links_.erase(peer) != 0) offer_view();
+  if (links_.erase(peer) + refused_.erase(peer) != 0) offer_view();
+}
+
+void InputCore::refuse_peer(shm::PortInstance peer, shm::SourceId source) {
+  links_.erase(peer);
+  refused_[peer] = source;
+  offer_view();
 }
 
 std::vector<HeldLink> InputCore::held_links() const {
@@ -71,6 +85,7 @@ std::vector<HeldLink> InputCore::held_links() const {
   for (const auto& [peer, link] : links_) {
     if (!link.gone) held.push_back({peer, link.peer->link});
   }
+  for (const auto& [peer, source] : refused_) held.push_back({peer, 0});
   return held;
 }
 
@@ -79,7 +94,12 @@ void InputCore::tidy() {
   const bool drained = std::any_of(links_.begin(), links_.end(), [](const auto& link) {
     return link.second.peer->drained.load(std::memory_order_relaxed);
   });
-  if (drained) offer_view();
+  if (drained || !spent_predecessors(links_, segment_->header.depth).empty()) offer_view();
+}
+
+bool InputCore::has_predecessors() const noexcept {
+  return std::any_of(links_.begin(), links_.end(),
+                     [](const auto& link) { return link.second.gone; });
 }
 
 std::vector<shm::PortInstance> InputCore::misbehaving() {
@@ -92,23 +112,45 @@ std::vector<shm::PortInstance> InputCore::misbehaving() {
   return found;
 }
 
-// A receiver that waits must look again: a publisher may have delivered to it already.
+// Leaves out those of whom nothing can be taken any more. Whoever knows of one counts what is lost
+// with it: the port's thread, if it has accepted a view that had it, or else we. Which of the two
+// is sure once the next view has been offered, for then it is seen whether the last one was
+// accepted.
 void InputCore::offer_view() {
-  auto view = std::make_unique<InputView>();
-  for (auto link = links_.begin(); link != links_.end();) {
-    if (link->second.peer->drained.load(std::memory_order_relaxed)) {
-      link = links_.erase(link);
-      continue;
-    }
-    view->links.push_back(link->second);
-    ++link;
+  std::erase_if(links_, [](const auto& link) {
+    return link.second.peer->drained.load(std::memory_order_relaxed);
+  });
+  std::vector<OutputLink> spent;
+  for (const shm::PortInstance peer : spent_predecessors(links_, segment_->header.depth)) {
+    spent.push_back(std::move(links_.extract(peer).mapped()));
   }
-  handover_.offer(std::move(view));
+  const bool was_accepted = offer_links();
+  const std::uint64_t before = let_go_;
+  for (const OutputLink& link : spent) {
+    const bool is_known = link.known || (link.offered && was_accepted);
+    if (!is_known) let_go_ += accepted_on(*link.peer);
+  }
+  if (let_go_ != before) offer_links();  // to say so
   // SYNC POINT: view-announced. Between our offer and our ring; pairs with fence (d) of the port's
   // thread: having heard the ring, it sees the offer at its next last look, whatever the pipe
   // orders.
   shm::full_fence();
+  // A receiver that waits must look again: a publisher may have delivered to it already.
   shm::ring_bell(bell_.write_end().get());
+}
+
+// True: the last view had been accepted.
+bool InputCore::offer_links() {
+  auto view = std::make_unique<InputView>();
+  for (const auto& [peer, link] : links_) view->links.push_back(link);
+  for (const auto& [peer, source] : refused_) view->refused.push_back(source);
+  view->let_go = let_go_;
+  const bool was_accepted = handover_.offer(std::move(view));
+  for (auto& [peer, link] : links_) {
+    link.known = link.known || (link.offered && was_accepted);
+    link.offered = true;
+  }
+  return was_accepted;
 }
 
 // Port's thread.
@@ -125,10 +167,12 @@ void InputCore::accept_view() {
     if (link != view->links.end()) {
       queue.gone = link->gone;
     } else {
-      retire_queue(queue);
+      retire_queue(queue, *view);
     }
   }
   std::erase_if(queues_, [](const Queue& queue) { return queue.lane == nullptr; });
+  count(segment_->header.counters.overtaken,
+        view->let_go - std::exchange(counted_let_go_, view->let_go));
   for (const OutputLink& link : view->links) {
     const bool known = std::any_of(queues_.begin(), queues_.end(),
                                    [&](const Queue& queue) { return queue.peer == link.peer; });
@@ -136,6 +180,7 @@ void InputCore::accept_view() {
     Queue queue;
     queue.peer = link.peer;
     queue.gone = link.gone;
+    queue.allocated_slots = link.peer->allocated_slots.load(std::memory_order_relaxed);
     queue.reader = shm::ChannelReader(link.peer->segment, link.peer->instance, link.peer->link);
     queue.lane = free_lane();
     if (queue.lane == nullptr) continue;
@@ -155,7 +200,7 @@ void InputCore::accept_view() {
   waiting_.reserve(queues_.size());
   handover_.retire(std::exchange(view_, std::move(view)));
   memory_->service_bell().ring();  // to dispose of the old one
-  bound_generation_ = UINT64_MAX;
+  bound_epoch_ = UINT64_MAX;
 }
 
 shm::Lane* InputCore::free_lane() noexcept {
@@ -165,11 +210,22 @@ shm::Lane* InputCore::free_lane() noexcept {
   return nullptr;
 }
 
-// What the queue still has is lost: its connection is gone, or a later publisher of the same source
-// has closed since.
-void InputCore::retire_queue(Queue& queue) {
-  count(segment_->header.counters.dropped, queue.reader.backlog(queue.reader.backlog_end()));
-  if (std::find(held_from_.begin(), held_from_.end(), queue.peer.get()) != held_from_.end()) {
+// What the queue still has is lost: its connection is gone; or its publisher is, and a later one of
+// the same source has pushed all of it out.
+void InputCore::retire_queue(Queue& queue, const InputView& next) {
+  const bool is_succeeded =
+      std::any_of(next.links.begin(), next.links.end(), [&](const OutputLink& link) {
+        return link.peer->source == queue.peer->source &&
+               link.peer->instance > queue.peer->instance;
+      });
+  shm::InputCounters& counters = segment_->header.counters;
+  if (is_succeeded) {
+    join(queue);
+    count(counters.overtaken, queue.reader.left_behind());
+  } else {
+    count(counters.dropped, queue.reader.backlog(queue.reader.backlog_end()));
+  }
+  if (queue.peer->held != 0) {
     auto kept = std::make_unique<InputView>();
     kept->links.push_back({queue.peer, true});
     lingering_.push_back(std::move(kept));
@@ -182,7 +238,7 @@ void InputCore::retire_queue(Queue& queue) {
 void InputCore::bind_rules() {
   bound_pages_ = memory_->pages().changes();
   snapshot_ = memory_->tables().snapshot();
-  bound_generation_ = snapshot_.generation;
+  bound_epoch_ = snapshot_.epoch;
   const shm::TableView& table = snapshot_.table;
   rules_.clear();
   sources_.clear();
@@ -199,6 +255,9 @@ void InputCore::bind_rules() {
   std::sort(sources_.begin(), sources_.end());
   sources_.erase(std::unique(sources_.begin(), sources_.end()), sources_.end());
   picture_.resize(sources_.size());
+  activities_.resize(sources_.size());
+  std::transform(sources_.begin(), sources_.end(), activities_.begin(),
+                 [&](shm::SourceId source) { return memory_->pages().find(source); });
 }
 
 void InputCore::bind_queues() {
@@ -221,8 +280,7 @@ void InputCore::bind_queues() {
 
 void InputCore::refresh() {
   if (handover_.has_offer()) accept_view();
-  if (memory_->tables().generation() != bound_generation_ ||
-      memory_->pages().changes() != bound_pages_) {
+  if (memory_->tables().epoch() != bound_epoch_ || memory_->pages().changes() != bound_pages_) {
     bind_rules();
   }
 }

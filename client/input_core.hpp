@@ -14,12 +14,14 @@
 
 #include <arbiter/detail/cores.hpp>
 
+#include "client/copies.hpp"
 #include "client/handover.hpp"
 #include "client/memory.hpp"
 #include "client/peers.hpp"
 #include "shm/bell.hpp"
 #include "shm/channel.hpp"
 #include "shm/clock.hpp"
+#include "shm/descendants.hpp"
 #include "shm/input_segment.hpp"
 
 namespace arbiter::detail {
@@ -35,16 +37,22 @@ class InputCore {
   void bind(shm::PortInstance instance, shm::PortId port);
   void add_peer(std::shared_ptr<const OutputPeer> peer);
   // The peer uses more of its segment now. Throws std::system_error where that cannot be locked.
-  void map_growth(shm::PortInstance peer, const shm::FileDescriptor& segment);
+  void map_growth(shm::PortInstance peer);
   // The peer has closed or died; what it has delivered can still be taken.
   void lose_peer(shm::PortInstance peer);
   // The model has disconnected it.
   void disconnect_peer(shm::PortInstance peer);
+  // Its connection is refused: nothing of the source comes while this peer has it open.
+  void refuse_peer(shm::PortInstance peer, shm::SourceId source);
   [[nodiscard]] std::vector<HeldLink> held_links() const;
-  // Unmaps what the port's thread has let go of.
+  // Unmaps what the port's thread has let go of, and what nobody will take any more.
   void tidy();
+  // Whether a publisher that is gone has left samples, which a later tidy() may let go of.
+  [[nodiscard]] bool has_predecessors() const noexcept;
   // Those that have begun to misbehave, once each. Nothing is taken from them any more.
   std::vector<shm::PortInstance> misbehaving();
+  // Whether a take has missed a source that it could not see, for the first time.
+  [[nodiscard]] bool has_become_blind() noexcept { return blindness_.is_news(); }
 
   // Port's thread.
 
@@ -68,6 +76,8 @@ class InputCore {
   [[nodiscard]] const shm::Bell& bell() const noexcept { return bell_; }
   [[nodiscard]] const SharedMemory& memory() const noexcept { return *memory_; }
 
+  shm::ProcessMark process;        // the node's
+  mutable pid_t warned_about = 0;  // the child that was told that the port is not its own
   std::shared_ptr<NodeCore>
       node;  // kept for as long as the port is, so that they may go in any order
   std::shared_ptr<InputCore> kept_by_samples;  // port's thread: the port is gone, they are not
@@ -79,7 +89,8 @@ class InputCore {
     bool gone = false;
     shm::ChannelReader reader;
     shm::Lane* lane = nullptr;
-    shm::BoundRule rule;  // of the connection, under snapshot_
+    shm::BoundRule rule;                // of the connection, under snapshot_
+    std::uint32_t allocated_slots = 0;  // of the peer's, when it was last looked at
     // Of the take under way.
     shm::Entry head = 0;
     shm::Nanoseconds head_stamp = 0;
@@ -88,9 +99,10 @@ class InputCore {
   };
 
   void offer_view();
+  bool offer_links();
   void accept_view();
   shm::Lane* free_lane() noexcept;
-  void retire_queue(Queue& queue);
+  void retire_queue(Queue& queue, const InputView& next);
   void bind_rules();
   void bind_queues();
   void refresh();
@@ -106,20 +118,33 @@ class InputCore {
   enum class Choice : std::uint8_t { kTake, kNothing, kAgain, kLoses };
   Choice choose(Queue*& oldest) noexcept;
   Choice decide_alone(Queue& queue) noexcept;
+  Choice be_blind() noexcept;
   Choice choose_among_all(Queue*& chosen) noexcept;
   bool decide_all() noexcept;
   void drop_losers(const Queue* winner) noexcept;
   bool hold(Queue& queue, HeldSample& sample) noexcept;
   [[nodiscard]] std::uint32_t free_hold() const;
+  [[nodiscard]] bool is_allocated(Queue& queue, std::uint32_t slot) const noexcept;
+  [[nodiscard]] bool copy(const Queue& queue, std::uint32_t slot, HeldSample& sample) noexcept;
   void consume(Queue& queue) noexcept;
   void count_overtaken(Queue& queue, std::uint64_t lost) noexcept;
   void let_go_of(const OutputPeer* peer) noexcept;
 
+  // Who commands. `selected`: the connection whose rule holds, or null; of several, where the port
+  // is not arbitrated, the first. `commander`: the same if anything of it can come, or null: then
+  // the port is idle.
+  struct Command {
+    const shm::Rule* selected = nullptr;
+    const shm::Rule* commander = nullptr;
+  };
+  [[nodiscard]] Command who_commands() noexcept;
+  [[nodiscard]] bool can_deliver(const shm::Rule& rule) noexcept;
+  [[nodiscard]] bool is_refused(shm::SourceId source) const noexcept;
+
   // wait() in parts.
-  [[nodiscard]] const shm::Rule* winning_rule() noexcept;
-  [[nodiscard]] shm::Nanoseconds next_change(const shm::Rule* winner) const noexcept;
+  [[nodiscard]] shm::Nanoseconds next_change(const shm::Rule* commander) const noexcept;
   Waited wait_once(shm::Nanoseconds timeout, HeldSample& sample);
-  bool arm(HeldSample& sample, const shm::Rule*& winner);
+  bool arm(HeldSample& sample, Command& command);
   void disarm() noexcept;
   void arm_descriptor(HeldSample& sample);
   HeldSample take_once();
@@ -132,6 +157,7 @@ class InputCore {
   const std::shared_ptr<SharedMemory> memory_;
   shm::FileDescriptor descriptor_;
   shm::Mapping mapping_;
+  std::optional<shm::Bequest> bequest_;
   shm::InputSegment* segment_ = nullptr;
   shm::Bell bell_;
   shm::PortInstance instance_ = 0;
@@ -139,24 +165,30 @@ class InputCore {
 
   // Service thread.
   std::map<shm::PortInstance, OutputLink> links_;
+  std::uint64_t let_go_ = 0;  // as InputView::let_go
+  std::map<shm::PortInstance, shm::SourceId> refused_;  // peers that are not among links_
 
   Handover<InputView> handover_;
+  Blindness blindness_;
 
   // Port's thread.
   std::unique_ptr<InputView> view_;
+  std::uint64_t counted_let_go_ = 0;
   std::vector<Queue> queues_;
   std::vector<shm::ChannelReader::Watch> watches_;  // by queue: what says that nothing is new
   std::vector<Queue*> waiting_;  // those in which the take under way found a head
   shm::TableSnapshot snapshot_;
-  std::uint64_t bound_generation_ = UINT64_MAX;
+  shm::Epoch bound_epoch_ = UINT64_MAX;
   std::uint64_t bound_pages_ = 0;
-  std::vector<shm::Rule> rules_;            // of all connections to the port, in document order
-  std::vector<shm::Read> reads_;            // what the queues' rules have bound
-  std::vector<shm::SourceId> sources_;      // those that the rules and connections name
-  std::vector<shm::SeenActivity> picture_;  // scratch, parallel to sources_
-  shm::Nanoseconds last_reading_ = 0;       // of the clock, by this port
+  std::vector<shm::Rule> rules_;        // of all connections to the port, in document order
+  std::vector<shm::Read> reads_;        // what the queues' rules have bound
+  std::vector<shm::SourceId> sources_;  // those that the rules and connections name
+  std::vector<const shm::Activity*> activities_;  // theirs; null where there is no page in force
+  std::vector<shm::SeenActivity> picture_;        // scratch, parallel to sources_
+  shm::Nanoseconds last_reading_ = 0;             // of the clock, by this port
   std::uint32_t held_ = 0;
   std::array<const OutputPeer*, shm::kMaxHeld> held_from_{};  // by hold
+  Copies copies_;                                             // likewise
   // Publishers that are gone and of whom samples are held: kept mapped, each in a view of its own.
   std::vector<std::unique_ptr<InputView>> lingering_;
   bool commanded_ = false;  // seen selected since idle was last told

@@ -158,12 +158,12 @@ void InputCore::yield_to_successor(Queue& queue) noexcept {
     behind += other.reader.backlog(other.reader.backlog_end());
   }
   const std::uint64_t depth = segment_->header.depth;
-  for (std::uint64_t own = queue.reader.backlog(queue.reader.backlog_end());
-       own != 0 && own + behind > depth; --own) {
-    consume(queue);
-    count(queue.lane->overtaken);
-    count(segment_->header.counters.overtaken);
-  }
+  const std::uint64_t room = depth - std::min(behind, depth);
+  // Those that its own later ones have overtaken are among them.
+  const std::uint64_t own = queue.reader.left_behind();
+  if (own <= room) return;
+  queue.reader.skip(own - room);
+  count_overtaken(queue, own - room);
 }
 
 InputCore::Choice InputCore::choose(Queue*& oldest) noexcept {
@@ -190,12 +190,17 @@ InputCore::Choice InputCore::decide_alone(Queue& queue) noexcept {
     case shm::Verdict::kLoses:
       return Choice::kLoses;
     case shm::Verdict::kBlind:
-      count(segment_->header.counters.blind);
-      return Choice::kNothing;
+      return be_blind();
     case shm::Verdict::kUnsettled:
       count(segment_->header.counters.unsettled);
       return Choice::kNothing;
   }
+  return Choice::kNothing;
+}
+
+InputCore::Choice InputCore::be_blind() noexcept {
+  count(segment_->header.counters.blind);
+  if (blindness_.begins()) memory_->service_bell().ring();
   return Choice::kNothing;
 }
 
@@ -206,10 +211,7 @@ InputCore::Choice InputCore::choose_among_all(Queue*& chosen) noexcept {
   if (!decide_all()) return Choice::kAgain;
   chosen = nullptr;
   for (Queue* const queue : waiting_) {
-    if (queue->verdict == shm::Verdict::kBlind) {
-      count(segment_->header.counters.blind);
-      return Choice::kNothing;
-    }
+    if (queue->verdict == shm::Verdict::kBlind) return be_blind();
     if (queue->verdict != shm::Verdict::kWins) continue;
     if (chosen == nullptr || queue->head_stamp < chosen->head_stamp) chosen = queue;
   }
@@ -218,11 +220,10 @@ InputCore::Choice InputCore::choose_among_all(Queue*& chosen) noexcept {
 }
 
 bool InputCore::decide_all() noexcept {
-  const auto look_at_source = [&](shm::SourceId source) {
-    const auto* activity = memory_->pages().find(source);
+  const auto look_at = [](const shm::Activity* activity) {
     return activity == nullptr ? shm::SeenActivity{} : shm::SeenActivity::of(*activity);
   };
-  std::transform(sources_.begin(), sources_.end(), picture_.begin(), look_at_source);
+  std::transform(activities_.begin(), activities_.end(), picture_.begin(), look_at);
   const shm::Nanoseconds now = shm::monotonic_now();
   // The time does not pass: the picture was begun before it, and is seen to stand after it.
   last_reading_ = now;
@@ -231,11 +232,10 @@ bool InputCore::decide_all() noexcept {
     queue->verdict = queue->rule.decide(snapshot_.table, clock);
     if (queue->verdict == shm::Verdict::kUnsettled) return false;
   }
-  const bool stands =
-      std::equal(sources_.begin(), sources_.end(), picture_.begin(),
-                 [&](shm::SourceId source, const shm::SeenActivity& seen) {
-                   return seen.stands(look_at_source(source), snapshot_.table.timeout(source), now);
-                 });
+  bool stands = true;
+  for (std::size_t i = 0; stands && i < sources_.size(); ++i) {
+    stands = picture_[i].stands(look_at(activities_[i]), snapshot_.table.timeout(sources_[i]), now);
+  }
   return stands && memory_->tables().is_in_force(snapshot_);
 }
 
@@ -289,33 +289,59 @@ bool InputCore::hold(Queue& queue, HeldSample& sample) noexcept {
   shm::Atomic<shm::Hold>& word = segment_->header.holds[index];
   if (!queue.reader.hold(queue.head, word)) return false;
   const std::uint32_t slot = shm::slot_of(queue.head);
-  const shm::OutputSegment& from = queue.reader.segment();
-  const shm::SlotHeader& header = from.slot_header(slot);
-  sample.data = from.payload(slot);
-  sample.size =
-      std::min<std::uint64_t>(header.size.load(std::memory_order_relaxed), from.layout().stride);
-  sample.sequence = header.sequence.load(std::memory_order_relaxed);
-  sample.stamp_ns = header.stamp.load(std::memory_order_relaxed);
-  sample.source = queue.peer->source;
   sample.hold = index;
+  if (slot < queue.allocated_slots || is_allocated(queue, slot)) {
+    const shm::OutputSegment& from = queue.reader.segment();
+    const shm::SlotHeader& header = from.slot_header(slot);
+    sample.data = from.payload(slot);
+    sample.size =
+        std::min<std::uint64_t>(header.size.load(std::memory_order_relaxed), from.layout().stride);
+    sample.sequence = header.sequence.load(std::memory_order_relaxed);
+    sample.stamp_ns = header.stamp.load(std::memory_order_relaxed);
+  } else if (!copy(queue, slot, sample)) {
+    shm::ChannelReader::release(word);
+    return false;
+  }
+  sample.source = queue.peer->source;
   consume(queue);
   count(queue.lane->taken);
   count(segment_->header.counters.taken);
   held_from_[index] = queue.peer.get();
+  ++queue.peer->held;
   ++held_;
+  return true;
+}
+
+bool InputCore::is_allocated(Queue& queue, std::uint32_t slot) const noexcept {
+  queue.allocated_slots = queue.peer->allocated_slots.load(std::memory_order_relaxed);
+  return slot < queue.allocated_slots;
+}
+
+// A slot that is not known to be allocated: copies.hpp.
+bool InputCore::copy(const Queue& queue, std::uint32_t slot, HeldSample& sample) noexcept {
+  for (std::uint32_t i = 0; i < max_held_; ++i) {
+    if (held_from_[i] == nullptr) copies_.forget(i);
+  }
+  CopiedSample copied;
+  if (!copies_.copy(*queue.peer, slot, type_.is_typed(), sample.hold, copied)) return false;
+  sample.data = copied.data;
+  sample.size = copied.size;
+  sample.sequence = copied.sequence;
+  sample.stamp_ns = copied.stamp;
   return true;
 }
 
 void InputCore::give_back(std::uint32_t hold) noexcept {
   shm::ChannelReader::release(segment_->header.holds[hold]);
   const OutputPeer* const from = std::exchange(held_from_[hold], nullptr);
+  --from->held;
   --held_;
   if (!lingering_.empty()) let_go_of(from);
 }
 
 // Of a publisher that is gone, with its last sample. The service thread unmaps it.
 void InputCore::let_go_of(const OutputPeer* peer) noexcept {
-  if (std::find(held_from_.begin(), held_from_.end(), peer) != held_from_.end()) return;
+  if (peer->held != 0) return;
   const auto kept = std::find_if(
       lingering_.begin(), lingering_.end(),
       [&](const std::unique_ptr<InputView>& view) { return view->links[0].peer.get() == peer; });

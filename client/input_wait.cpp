@@ -1,9 +1,10 @@
 // wait_for(), fd(), idle() and winner(): who commands now, and sleeping until that matters.
 //
-// A port is idle when no connection to it is selected. The component learns it once for each time
-// that it had been commanded before. Nothing runs while it sleeps: a sample rings the bell; so does
-// a source whose activity begins or ends and thereby makes what the port believes of itself untrue;
-// and where activity is going to run out by itself, the sleep ends at that time.
+// A port is idle when no connection to it is selected, or the one that is cannot deliver. The
+// component learns it once for each time that it had been commanded before. Nothing runs while it
+// sleeps: a sample rings the bell; so does a source whose activity begins or ends and thereby makes
+// what the port believes of itself untrue, and a view of other peers; and where activity is going
+// to run out by itself, the sleep ends at that time.
 #include <sys/epoll.h>
 #include <sys/timerfd.h>
 
@@ -16,6 +17,10 @@
 
 namespace arbiter::detail {
 namespace {
+
+shm::SourceId source_of(const shm::Rule* rule) noexcept {
+  return rule == nullptr ? shm::kNone : rule->source;
+}
 
 shm::Nanoseconds after(shm::Nanoseconds now, shm::Nanoseconds timeout) {
   return timeout > shm::kMaxTime - now ? shm::kForever : now + timeout;
@@ -36,18 +41,18 @@ Waited InputCore::wait_once(shm::Nanoseconds timeout, HeldSample& sample) {
   for (;;) {
     sample = take_once();
     if (sample.data != nullptr) return Waited::kSample;
-    const shm::Rule* winner = winning_rule();
-    if (commanded_ && winner == nullptr) {
+    Command command = who_commands();
+    if (commanded_ && command.commander == nullptr) {
       commanded_ = false;
       count(segment_->header.counters.idles);
       return Waited::kIdle;
     }
-    commanded_ = winner != nullptr;
+    commanded_ = command.commander != nullptr;
     const shm::Nanoseconds now = shm::monotonic_now();
     if (deadline < 0) deadline = after(now, timeout);
     if (now >= deadline) return Waited::kTimeout;
-    if (arm(sample, winner)) {
-      bell_.wait(std::min(deadline, next_change(winner)));
+    if (arm(sample, command)) {
+      bell_.wait(std::min(deadline, next_change(command.commander)));
       count(segment_->header.counters.wakes);
     }
     disarm();
@@ -58,9 +63,11 @@ Waited InputCore::wait_once(shm::Nanoseconds timeout, HeldSample& sample) {
 // Says that we wait and what we believe, then looks once more; true if it is still so.
 // SYNC POINT: waiting. Fence (d), between our wait word and our last look. Pairs with fences (a)
 // and (b) of publishers: either we see what they did, or they see us wait.
-bool InputCore::arm(HeldSample& sample, const shm::Rule*& winner) {
+// What we believe is the selection, which publishers can judge, and not whether it can deliver.
+bool InputCore::arm(HeldSample& sample, Command& command) {
   shm::InputHeader& header = segment_->header;
-  const shm::SourceId believed = winner == nullptr ? shm::kNone : winner->source;
+  const shm::SourceId believed = source_of(command.selected);
+  const shm::SourceId commander = source_of(command.commander);
   header.believed.store(believed, std::memory_order_relaxed);
   // Relaxed is enough: a publisher that sees us wait and does not see what we believe has passed
   // its fence before ours; then our last look sees what it has done, and we do not sleep.
@@ -70,8 +77,8 @@ bool InputCore::arm(HeldSample& sample, const shm::Rule*& winner) {
   shm::full_fence();
   sample = take_once();
   if (sample.data != nullptr) return false;
-  winner = winning_rule();
-  return (winner == nullptr ? shm::kNone : winner->source) == believed;
+  command = who_commands();
+  return source_of(command.selected) == believed && source_of(command.commander) == commander;
 }
 
 // The next wait has another number. What rang for this one is forgotten before the next begins.
@@ -82,44 +89,84 @@ void InputCore::disarm() noexcept {
   bell_.silence();
 }
 
-// The rule of the connection that is selected now, or null.
-const shm::Rule* InputCore::winning_rule() noexcept {
+InputCore::Command InputCore::who_commands() noexcept {
   refresh();
   shm::DecisionClock clock(shm::monotonic_now(), true);
   shm::Decider decider(snapshot_.table, memory_->pages(), clock);
-  const auto winner = std::find_if(rules_.begin(), rules_.end(), [&](const shm::Rule& rule) {
+  const auto wins = [&](const shm::Rule& rule) {
     return decider.decide_with_own(rule) == shm::Verdict::kWins;
-  });
+  };
+  Command command;
+  const auto selected = std::find_if(rules_.begin(), rules_.end(), wins);
+  if (selected != rules_.end()) {
+    command.selected = &*selected;
+    // Where an arbiter has selected, nobody takes the place of one that cannot deliver.
+    const auto end = snapshot_.table.is_arbitrated(port_) ? selected + 1 : rules_.end();
+    const auto commander = std::find_if(selected, end, [&](const shm::Rule& rule) {
+      return (&rule == command.selected || wins(rule)) && can_deliver(rule);
+    });
+    if (commander != end) command.commander = &*commander;
+  }
   last_reading_ = clock.reading();
-  return winner == rules_.end() ? nullptr : &*winner;
+  return command;
 }
 
-// When the selection will change of itself: at the first end among the activities that the winning
-// rule reads. Whatever else happens rings: a sample, or a begin or an end that makes another the
-// winner. Then, or there, it is looked at anew.
-shm::Nanoseconds InputCore::next_change(const shm::Rule* winner) const noexcept {
+// Whether anything of a selected connection can come: a component has the source open and is
+// connected, or something of it waits, or it is but silent for a while. What a view does not tell
+// yet is as if it came later: its offer rings.
+bool InputCore::can_deliver(const shm::Rule& rule) noexcept {
+  bool waits = false;
+  bool refused = is_refused(rule.source);
+  for (Queue& queue : queues_) {
+    if (queue.peer->source != rule.source) continue;
+    if (queue.reader.state() == shm::ChannelReader::State::kMisbehaved) {
+      refused = true;
+      continue;
+    }
+    if (!queue.gone) return true;
+    // The entry counts, and not the publisher's count of them: it may have died between the two.
+    waits = look_closely(queue) || waits;
+    queue.head = 0;  // for a take to find
+  }
+  if (refused) return false;
+  const shm::Activity* const activity = memory_->pages().find(rule.source);
+  const bool ends_by_itself =
+      activity == nullptr || shm::is_finite(activity->word.load(std::memory_order_relaxed));
+  return waits || ends_by_itself;
+}
+
+bool InputCore::is_refused(shm::SourceId source) const noexcept {
+  if (view_ == nullptr) return false;
+  const auto& refused = view_->refused;
+  return std::find(refused.begin(), refused.end(), source) != refused.end();
+}
+
+// When the command will change of itself: at the first end among the activities that the
+// commander's rule reads. Whatever else happens rings: a sample, or a begin or an end that makes
+// another the winner. Then, or there, it is looked at anew.
+shm::Nanoseconds InputCore::next_change(const shm::Rule* commander) const noexcept {
   shm::Nanoseconds next = shm::kForever;
-  if (winner == nullptr) return next;
+  if (commander == nullptr) return next;
   const auto heed = [&](shm::SourceId source) {
     const auto* activity = memory_->pages().find(source);
     if (activity == nullptr) return;
     const shm::ActivityWord word = activity->word.load(std::memory_order_relaxed);
     if (shm::is_finite(word) && word > last_reading_) next = std::min(next, word);
   };
-  heed(winner->source);
-  for (shm::Word i = 0; i < winner->reads.count; ++i) {
-    heed(winner->reads[i] & ~shm::table::kExpectActive);
+  heed(commander->source);
+  for (shm::Word i = 0; i < commander->reads.count; ++i) {
+    heed(commander->reads[i] & ~shm::table::kExpectActive);
   }
   return next;
 }
 
 std::optional<std::string_view> InputCore::winner() noexcept {
-  const shm::Rule* winner = winning_rule();
-  if (winner == nullptr || !snapshot_.table.is_arbitrated(port_)) return std::nullopt;
-  return memory_->source_name(winner->source);
+  const shm::Rule* const commander = who_commands().commander;
+  if (commander == nullptr || !snapshot_.table.is_arbitrated(port_)) return std::nullopt;
+  return memory_->source_name(commander->source);
 }
 
-bool InputCore::is_idle() noexcept { return winning_rule() == nullptr; }
+bool InputCore::is_idle() noexcept { return who_commands().commander == nullptr; }
 
 // A descriptor for the user's own loop: the bell, and a timer for the time at which activity runs
 // out.
@@ -135,6 +182,8 @@ int InputCore::wait_descriptor() {
   }
   epoll_ = std::move(epoll);
   timer_ = std::move(timer);
+  shm::close_in_children(epoll_);
+  shm::close_in_children(timer_);
   shm::ring_bell(bell_.write_end().get());  // what waits already is there to be taken
   return epoll_.get();
 }
@@ -143,11 +192,11 @@ int InputCore::wait_descriptor() {
 void InputCore::arm_descriptor(HeldSample& sample) {
   for (;;) {
     disarm();
-    const shm::Rule* winner = winning_rule();
-    const bool armed = arm(sample, winner);
+    Command command = who_commands();
+    const bool armed = arm(sample, command);
     if (sample.data != nullptr) return;
     if (!armed) continue;
-    const shm::Nanoseconds change_at = next_change(winner);
+    const shm::Nanoseconds change_at = next_change(command.commander);
     itimerspec at{};  // zero: no alarm
     if (change_at != shm::kForever) {
       at.it_value = {change_at / 1'000'000'000, change_at % 1'000'000'000};

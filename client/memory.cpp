@@ -15,11 +15,15 @@ SharedMemory::SharedMemory(shm::FileDescriptor board, shm::FileDescriptor regist
   const std::size_t size = shm::checked_size(board_descriptor_, shm::Seals::kFixedSize);
   if (size != sizeof(shm::Board)) throw std::runtime_error("the daemon's board has another size");
   board_ = shm::Mapping(board_descriptor_, size, shm::Access::kReadOnly);
+  leave_behind(board_);
+  shm::close_in_children(board_descriptor_);
+  shm::close_in_children(registry_);
   const auto* mapped = board_.as<const shm::Board>();
   if (mapped->magic != shm::Board::kMagic || mapped->version != shm::Board::kVersion) {
     throw std::runtime_error("the daemon is of another version");
   }
   tables_ = shm::TableReader(*mapped);
+  pages_ = std::make_unique<shm::ActivityPages>(&tables_.pages());
   make_tables_resident();
 }
 
@@ -27,19 +31,54 @@ void SharedMemory::make_tables_resident() const {
   shm::make_written_resident(board_descriptor_, board_, residence_);
 }
 
-void SharedMemory::add_page(shm::SourceId id, std::string name, shm::FileDescriptor page) {
+void SharedMemory::add_page(shm::SourceId id, shm::PageNumber number, std::string name,
+                            shm::FileDescriptor page) {
   if (id >= shm::kMaxSources)
     throw std::runtime_error("the daemon names a source beyond its limit");
   if (shm::checked_size(page, shm::Seals::kFixedSize) != sizeof(shm::ActivityPage)) {
     throw std::runtime_error("an activity page has another size");
   }
   set_name(id, std::move(name));
-  mappings_.emplace_back(page, sizeof(shm::ActivityPage), shm::Access::kReadOnly);
-  pages_->attach(id, &mappings_.back().as<const shm::ActivityPage>()->of(id));
-  if (page_descriptors_.size() < kMaxPageDescriptors || page_descriptors_.count(id) != 0) {
-    page_descriptors_[id] = std::move(page);
+  Page& place = mapped_[id][number % 2];
+  if (place.number == 0) {
+    place.mapping = shm::Mapping(page, sizeof(shm::ActivityPage), shm::Access::kReadOnly);
+    leave_behind(place.mapping);
+  } else {
+    pages_->vacate(id, number);
+    place.mapping.replace(page);
   }
-  shm::make_resident(mappings_.back(), 0, sizeof(shm::ActivityPage), residence_);
+  place.number = number;
+  const bool is_kept = place.descriptor || descriptors_kept_ < kMaxPageDescriptors;
+  if (is_kept && !place.descriptor) ++descriptors_kept_;
+  if (is_kept) {
+    place.descriptor = std::move(page);
+    shm::close_in_children(place.descriptor);
+  }
+  const auto attach = [&] {
+    pages_->attach(id, number, &place.mapping.as<const shm::ActivityPage>()->of(id));
+  };
+  try {
+    shm::make_resident(place.mapping, 0, sizeof(shm::ActivityPage), residence_);
+  } catch (const std::system_error&) {
+    attach();
+    throw;
+  }
+  attach();
+}
+
+std::vector<SharedMemory::PageAtHand> SharedMemory::pages_at_hand() const {
+  std::vector<PageAtHand> pages;
+  for (const auto& [id, places] : mapped_) {
+    for (const Page& page : places) {
+      if (page.descriptor) pages.push_back({id, page.number, page.descriptor.get()});
+    }
+  }
+  return pages;
+}
+
+// The daemon may be replaced while a child lives on.
+void SharedMemory::leave_behind(const shm::Mapping& mapping) {
+  bequests_.emplace_back(mapping.data(), mapping.size(), shm::Bequest::Kind::kNothing);
 }
 
 // Relaxed is enough, here and below: see names_.
@@ -51,7 +90,7 @@ void SharedMemory::set_name(shm::SourceId id, std::string name) {
 }
 
 const std::string& SharedMemory::source_name(shm::SourceId id) const noexcept {
-  if (pages_->find(id) == nullptr) return unknown_;
+  if (!pages_->knows(id)) return unknown_;
   return *(*names_)[id].load(std::memory_order_relaxed);
 }
 

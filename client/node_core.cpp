@@ -3,6 +3,7 @@
 
 #include <poll.h>
 #include <sys/epoll.h>
+#include <sys/socket.h>
 #include <sys/timerfd.h>
 
 #include <algorithm>
@@ -29,6 +30,8 @@ constexpr milliseconds kMaxConnectTimeout = std::chrono::hours(24 * 365);
 constexpr milliseconds kMinAnswerTime{1000};
 // The longest wait for an answer before looking for another daemon.
 constexpr milliseconds kMaxAnswerTime = std::chrono::seconds(60);
+// The most that max_memory may be: a segment has queues and headers beside the samples.
+constexpr std::size_t kMostMemory = shm::kMaxSegmentSize - (std::size_t{16} << 20);
 // Nobody is told of a shorter wait.
 constexpr milliseconds kQuietWait{500};
 
@@ -80,7 +83,15 @@ NodeCore::NodeCore(std::string_view name, const NodeOptions& options)
   }
 }
 
-NodeCore::~NodeCore() { stop_service_thread(); }
+NodeCore::~NodeCore() {
+  stop_service_thread();
+  hang_up();
+}
+
+// A descendant may have the socket open too: what ends the conversation must not wait for it.
+void NodeCore::hang_up() const noexcept {
+  if (socket_ != nullptr) ::shutdown(socket_->get(), SHUT_RDWR);
+}
 
 void NodeCore::connect() {
   const auto begin = Clock::now();
@@ -91,6 +102,7 @@ void NodeCore::connect() {
     who_is_silent.clear();
     if (auto socket = shm::connect_to_daemon(instance_, why_not)) {
       socket_ = std::make_shared<const shm::FileDescriptor>(std::move(*socket));
+      shm::close_in_children(*socket_);
       const auto asked = Clock::now();
       if (say_hello(give_up)) break;
       if (is_open(*socket_)) who_is_silent = silence_of(*socket_, instance_, asked);
@@ -106,6 +118,8 @@ void NodeCore::connect() {
   }
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   timer_.reset(timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
+  shm::close_in_children(epoll_);
+  shm::close_in_children(timer_);
   epoll_event event{};
   event.events = EPOLLIN;
   if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, service_bell_->descriptor(), &event) != 0 ||
@@ -200,6 +214,7 @@ void NodeCore::say_closed(shm::PortInstance port) noexcept {
 void NodeCore::forget_port(shm::PortInstance port) {
   outputs_.erase(port);
   inputs_.erase(port);
+  given_.erase(port);
   say_closed(port);
 }
 
@@ -220,7 +235,10 @@ shm::Received NodeCore::ask(const shm::Message& question,
 
 bool NodeCore::wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_point give_up) {
   if (Clock::now() >= give_up) return false;
-  if (service_thread_.joinable()) {
+  // A callback on the service thread may open ports: then it serves itself.
+  const bool is_served =
+      service_thread_.joinable() && service_thread_.get_id() != std::this_thread::get_id();
+  if (is_served) {
     news_.wait_until(lock, give_up);
     return true;
   }
@@ -229,6 +247,7 @@ bool NodeCore::wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_poi
     const std::lock_guard pumping(pump_mutex_);
     pump(static_cast<int>(kConnectInterval.count()));
   }
+  give_notices();
   lock.lock();
   return true;
 }
@@ -323,10 +342,11 @@ std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const P
   check_bounds<std::size_t>(name, "max_size", type.size, 0, std::size_t{1} << 40);
   check_bounds<std::size_t>(name, "max_memory", options.max_memory,
                             OutputCore::least_memory(type_info(type), options.max_loans),
-                            std::size_t{1} << 46);
+                            kMostMemory);
   return open(name, [&](const std::shared_ptr<SharedMemory>& memory) {
     auto core = std::make_shared<OutputCore>(std::string(name), type_info(type), options, memory);
     core->node = shared_from_this();
+    core->process = process_;
     shm::Message question = message_of(shm::MessageKind::kOpenOutput, name);
     question.type = core->type();
     converse(question, {core->segment_descriptor().get(), -1}, memory.get(),
@@ -346,9 +366,10 @@ std::shared_ptr<InputCore> NodeCore::open_input(std::string_view name, const Por
   return open(name, [&](const std::shared_ptr<SharedMemory>& memory) {
     auto core = std::make_shared<InputCore>(std::string(name), type_info(type), options, memory);
     core->node = shared_from_this();
+    core->process = process_;
     shm::Message question = message_of(shm::MessageKind::kOpenInput, name);
     question.type = core->type();
-    converse(question, {core->segment_descriptor().get(), core->bell().write_end().get()},
+    converse(question, {core->segment_descriptor().get(), core->bell().for_publishers().get()},
              memory.get(), [&](shm::Received& opened) {
                core->bind(opened.message.port, opened.message.id);
                inputs_[opened.message.port] = core;
@@ -369,6 +390,7 @@ void NodeCore::close(shm::PortInstance port) noexcept {
     input = std::move(found->second);
     inputs_.erase(found);
   }
+  given_.erase(port);
   say_closed(port);
 }
 

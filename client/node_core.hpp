@@ -1,6 +1,7 @@
 // A node: the conversation with the daemon, and the registry of the ports that it concerns.
 //
 //   node_core.cpp     connecting; opening and closing ports; questions and answers
+//   node_notices.cpp  what the component should know
 //   node_service.cpp  what the daemon says, and the thread that hears it
 //   node_rejoin.cpp   losing the daemon, and coming back to another
 //
@@ -17,14 +18,17 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <arbiter/detail/cores.hpp>
 
 #include "client/input_core.hpp"
 #include "client/memory.hpp"
 #include "client/output_core.hpp"
+#include "shm/descendants.hpp"
 #include "shm/wire.hpp"
 
 namespace arbiter::detail {
@@ -49,6 +53,10 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void service();
   // Readable when there is something to take up.
   [[nodiscard]] int service_fd() const noexcept { return epoll_.get(); }
+
+  // The process that made it, and that alone may use it.
+  [[nodiscard]] const shm::ProcessMark& process() const noexcept { return process_; }
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
 
   // Asks the daemon and waits for the answer; a daemon that takes over is asked again. Throws Error
   // where it refuses, or none answers in time.
@@ -100,17 +108,35 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // Waits up to `timeout_ms` for something to do and does it.
   void pump(int timeout_ms);
   void tidy();
+  [[nodiscard]] bool has_predecessors();
   void handle(shm::Received& received);
+  void handle_without_descriptors(const shm::Message& message);
   void handle_reply(shm::Received& received);
   void wake_inputs();
   void handle_peer(shm::Received& received);
   void refuse_peer(const shm::Message& announced, const std::string& why);
+  void handle_refusal(const shm::Message& refusal);
+  void handle_unmentioned(const shm::Message& message);
+  void add_page(shm::Received& received);
   void make_tables_resident();
   void map_growth(const shm::Received& received);
   void say_not_locked(shm::PortInstance port, const std::string& why);
   void say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
 
+  // Notices (node_notices.cpp). Under mutex_:
+  void note(NoticeKind kind, shm::PortInstance port, const std::string& peer,
+            const std::string& text);
+  void note_refusal(const shm::Message& about, const std::string& why);
+  void say_blind(shm::PortInstance port, const char* what_it_does);
+  // Empty where it is not open.
+  [[nodiscard]] const std::string& name_of_port(shm::PortInstance port) const;
+  // Under no lock. False: there was none.
+  bool give_notices();
+  void give(const Notice& notice) const noexcept;
+  [[nodiscard]] bool has_notices();
+
   [[nodiscard]] bool watch_socket() const;
+  void hang_up() const noexcept;
   void lose_daemon();
   void be_alone(Clock::duration look_again_in);
   void ring_timer_every(Clock::duration time) const;
@@ -137,6 +163,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // Until something may have changed; false: it is time to give up.
   bool wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_point give_up);
 
+  const shm::ProcessMark process_ = shm::ProcessMark::of_this_process();
   const std::string name_;
   const NodeOptions options_;
   std::string instance_;
@@ -162,6 +189,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::map<shm::PortInstance, std::shared_ptr<OutputCore>> outputs_;
   std::map<shm::PortInstance, std::shared_ptr<InputCore>> inputs_;
   std::map<shm::PortId, std::string> port_names_;
+  std::vector<Notice> notices_;  // to be given
+  bool is_giving_ = false;
+  std::map<shm::PortInstance, std::set<std::string>> given_;  // texts, by port
 
   std::thread service_thread_;  // last: it uses all of the above
 };

@@ -2,11 +2,11 @@
 
 #include <cxxabi.h>
 
-#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 
 #include "shm/limits.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -32,12 +32,14 @@ std::string fitting(std::string name) {
 }  // namespace
 
 void check_name(std::string_view name, const char* what) {
-  const bool printable = std::all_of(name.begin(), name.end(), [](char c) {
-    return static_cast<unsigned char>(c) > ' ' && c != '\x7f';
-  });
-  if (name.empty() || name.size() > shm::kMaxNameLength || !printable) {
-    throw Error("\"" + std::string(name) + "\" is not a name for " + what + ": use 1 to " +
-                std::to_string(shm::kMaxNameLength) + " bytes without white space");
+  const auto refuse = [&](const std::string& why) {
+    throw Error("\"" + shm::printable(name) + "\" is not a name for " + what + ": " + why);
+  };
+  if (name.empty() || name.size() > shm::kMaxNameLength) {
+    refuse("use 1 to " + std::to_string(shm::kMaxNameLength) + " bytes");
+  }
+  if (const auto fault = shm::find_fault_in_name(name)) {
+    refuse("it has " + std::string(fault->what) + " in it");
   }
 }
 

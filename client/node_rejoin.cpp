@@ -99,6 +99,7 @@ void NodeCore::lose_daemon() {
 
 void NodeCore::be_alone(Clock::duration look_again_in) {
   epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, socket_->get(), nullptr);
+  hang_up();
   socket_ = nullptr;
   standing_ = Standing::kAlone;
   ring_timer_every(look_again_in);
@@ -123,13 +124,14 @@ void NodeCore::rejoin() {
     }
     for (const auto& [instance, core] : inputs_) {
       ports.push_back(port_at_hand(shm::MessageKind::kHandBackInput, *core, core->port(),
-                                   core->bell().write_end()));
+                                   core->bell().for_publishers()));
     }
   }
   // With nothing to hand back there is nothing to keep of the old memory either.
   is_anew_ = ports.empty();
   const bool is_said = is_anew_ ? is_sent(*socket, hello()) : hand_back(*socket, ports);
   if (!is_said) return;
+  shm::close_in_children(*socket);
   const std::lock_guard lock(mutex_);
   socket_ = socket;
   if (!watch_socket()) {
@@ -150,11 +152,12 @@ bool NodeCore::hand_back(const shm::FileDescriptor& socket,
   message.flags |= shm::kRejoins;
   message.link = node_;
   if (!is_sent(socket, message, {memory_->board().get(), memory_->registry().get()})) return false;
-  for (const auto& [id, page] : memory_->page_descriptors()) {
+  for (const auto& page : memory_->pages_at_hand()) {
     message = {};
     message.kind = shm::MessageKind::kHandBackPage;
-    message.id = id;
-    if (!is_sent(socket, message, {page.get(), -1})) return false;
+    message.id = page.source;
+    message.value = page.number;
+    if (!is_sent(socket, message, {page.descriptor, -1})) return false;
   }
   for (const PortAtHand& port : ports) {
     if (!is_handed_back(socket, port)) return false;

@@ -7,6 +7,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <system_error>
@@ -18,6 +19,9 @@ namespace {
 
 // How much less than a normal thread the service thread presses for the processor.
 constexpr int kServiceNiceness = 5;
+// While a publisher that is gone has samples waiting: how often it is looked whether those of its
+// successor have pushed them out. The successor rings nobody for that.
+constexpr int kTidyInterval = 1000;  // ms
 
 }  // namespace
 
@@ -67,15 +71,27 @@ void NodeCore::run_service_thread() {
       const std::lock_guard lock(mutex_);
       if (stopping_) return;
     }
-    pump(-1);
+    pump(has_predecessors() ? kTidyInterval : -1);
+    give_notices();
   }
+}
+
+bool NodeCore::has_predecessors() {
+  const std::lock_guard lock(mutex_);
+  return std::any_of(inputs_.begin(), inputs_.end(),
+                     [](const auto& input) { return input.second->has_predecessors(); });
 }
 
 // Where there is a service thread, it does this.
 void NodeCore::service() {
   if (service_thread_.joinable()) return;
-  const std::lock_guard pumping(pump_mutex_);
-  pump(0);
+  const auto pump_once = [this] {
+    const std::lock_guard pumping(pump_mutex_);
+    pump(0);
+  };
+  do {
+    pump_once();
+  } while (give_notices());
 }
 
 void NodeCore::pump(int timeout_ms) {
@@ -101,7 +117,7 @@ void NodeCore::pump(int timeout_ms) {
         lose_daemon();
         return;
     }
-    if (this->socket() != socket) return;
+    if (this->socket() != socket || has_notices()) return;
   }
 }
 
@@ -114,6 +130,7 @@ void NodeCore::tidy() {
       say_refused(instance, peer,
                   "the input port misbehaves: it says that it has read what was never published");
     }
+    if (output->has_become_blind()) say_blind(instance, "discards its samples");
   }
   for (auto& [instance, input] : inputs_) {
     input->tidy();
@@ -121,26 +138,46 @@ void NodeCore::tidy() {
       say_refused(instance, peer,
                   "the output port misbehaves: its queue has what no honest publisher writes");
     }
+    if (input->has_become_blind()) say_blind(instance, "delivers nothing");
+  }
+}
+
+// This process has no descriptor left for what came with a message. Nothing is lost by that but
+// what the message was about.
+void NodeCore::handle_without_descriptors(const shm::Message& message) {
+  if (message.kind == shm::MessageKind::kWelcome) {
+    lose_daemon();  // and tries again
+    return;
+  }
+  const std::string why = "process " + std::to_string(getpid()) +
+                          " has no descriptor left for what the daemon sends: raise RLIMIT_NOFILE "
+                          "(ulimit -n, LimitNOFILE= in a systemd unit)";
+  const std::lock_guard lock(mutex_);
+  std::fprintf(stderr, "arbiter: \"%s\": %s\n", name_.c_str(), why.c_str());
+  if (message.peer != 0) say_refused(message.port, message.peer, why);
+  const auto found = replies_.find(message.request);
+  if (message.peer != 0 || found == replies_.end()) return;
+  found->second.refusal = why;
+  if (message.kind == shm::MessageKind::kOpened) {
+    say_closed(message.port);  // what it is answered ends the wait
+  } else {
+    found->second.finished = true;
+    news_.notify_all();
   }
 }
 
 void NodeCore::handle(shm::Received& received) {
   const shm::Message& message = received.message;
+  if (received.lost_descriptors) {
+    handle_without_descriptors(message);
+    return;
+  }
   switch (message.kind) {
     case shm::MessageKind::kWelcome:
       be_welcomed(received);
       break;
     case shm::MessageKind::kSourcePage:
-      try {
-        memory_->add_page(message.id, std::string(message.name_view()),
-                          std::move(received.descriptors[0]));
-        wake_inputs();
-      } catch (const std::system_error& error) {
-        say_not_locked(0, error.what());
-        wake_inputs();
-      } catch (const std::exception& error) {
-        refuse_peer(message, error.what());
-      }
+      add_page(received);
       break;
     case shm::MessageKind::kOutputGrown:
       try {
@@ -167,6 +204,12 @@ void NodeCore::handle(shm::Received& received) {
         refuse_peer(message, error.what());
       }
       break;
+    case shm::MessageKind::kConnectionRefused:
+      handle_refusal(message);
+      break;
+    case shm::MessageKind::kUnmentioned:
+      handle_unmentioned(message);
+      break;
     case shm::MessageKind::kSync: {
       make_tables_resident();
       shm::Message synced;
@@ -184,6 +227,23 @@ void NodeCore::handle(shm::Received& received) {
       handle_reply(received);
       break;
   }
+}
+
+void NodeCore::add_page(shm::Received& received) {
+  const shm::Message& message = received.message;
+  const std::string source(message.name_view());
+  try {
+    memory_->add_page(message.id, message.value, source, std::move(received.descriptors[0]));
+  } catch (const std::exception& error) {
+    if (memory_->pages().find(message.id) != nullptr) {
+      say_not_locked(0, error.what());
+    } else {
+      const std::lock_guard lock(mutex_);
+      note(NoticeKind::blind, 0, source,
+           "the activity of " + source + " cannot be seen: " + error.what());
+    }
+  }
+  wake_inputs();
 }
 
 // A port that could not see a source may have held back a sample and gone to sleep.
@@ -213,14 +273,14 @@ void NodeCore::say_not_locked(shm::PortInstance port, const std::string& why) {
     reply.refusal = why;
     is_told = true;
   }
-  if (!is_told) std::fprintf(stderr, "arbiter: \"%s\": %s\n", name_.c_str(), why.c_str());
+  if (!is_told) note(NoticeKind::not_locked, port, {}, why);
 }
 
 void NodeCore::map_growth(const shm::Received& received) {
   const std::lock_guard lock(mutex_);
   const auto input = inputs_.find(received.message.port);
   if (input == inputs_.end()) return;
-  input->second->map_growth(received.message.peer, received.descriptors[0]);
+  input->second->map_growth(received.message.peer);
 }
 
 void NodeCore::handle_peer(shm::Received& received) {
@@ -248,21 +308,6 @@ void NodeCore::handle_peer(shm::Received& received) {
       core.disconnect_peer(message.peer);
     }
   }
-}
-
-// Tells the daemon, so that it shows in its status.
-void NodeCore::refuse_peer(const shm::Message& announced, const std::string& why) {
-  const std::lock_guard lock(mutex_);
-  say_refused(announced.port, announced.peer, why);
-}
-
-void NodeCore::say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
-  shm::Message refusal;
-  refusal.kind = shm::MessageKind::kPeerRefused;
-  refusal.port = port;
-  refusal.peer = peer;
-  refusal.set_text(why);
-  say(refusal);
 }
 
 void NodeCore::handle_reply(shm::Received& received) {

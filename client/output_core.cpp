@@ -1,5 +1,7 @@
 #include "client/output_core.hpp"
 
+#include <fcntl.h>
+
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
@@ -52,6 +54,10 @@ OutputCore::OutputCore(std::string name, const shm::TypeInfo& type,
   allocate_slots();
   pool_.grow(allocated_slots_);
   shm::seal(descriptor_, shm::Seals::kOneWriter);
+  bequest_.emplace(mapping_.data(), mapping_.size(), shm::Bequest::Kind::kPrivateZeros);
+  shm::close_in_children(descriptor_);
+  readable_ = shm::reopen(descriptor_, O_RDONLY);
+  shm::close_in_children(readable_);
 }
 
 void OutputCore::bind(shm::PortInstance instance, shm::SourceId source, shm::FileDescriptor page) {
@@ -62,7 +68,9 @@ void OutputCore::bind(shm::PortInstance instance, shm::SourceId source, shm::Fil
   activity_ = &page_.as<shm::ActivityPage>()->of(source);
   own_word_ = activity_->word.load(std::memory_order_relaxed);  // a predecessor's: it carries on
   shm::make_resident(page_, 0, sizeof(shm::ActivityPage), memory_->residence());
+  page_bequest_.emplace(page_.data(), page_.size(), shm::Bequest::Kind::kPrivateZeros);
   page_descriptor_ = std::move(page);
+  shm::close_in_children(page_descriptor_);
   instance_ = instance;
   source_ = source;
 }
@@ -74,12 +82,14 @@ void OutputCore::add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t n
   InputLink& link = links_[instance];
   if (link.peer == nullptr) link.peer = std::move(peer);
   link.connected = number != 0;
+  link.refused = false;
   link.number = number;
   try {
     if (link.connected) assign_channel(link);
     allocate_slots();
   } catch (...) {
     link.connected = false;
+    link.refused = true;
     link.channel = shm::kNone;
     offer_view();
     throw;
@@ -95,6 +105,16 @@ void OutputCore::disconnect_peer(shm::PortInstance peer) {
   const auto found = links_.find(peer);
   if (found == links_.end()) return;
   found->second.connected = false;
+  found->second.refused = false;
+  found->second.channel = shm::kNone;
+  offer_view();
+}
+
+void OutputCore::refuse_peer(shm::PortInstance peer) {
+  const auto found = links_.find(peer);
+  if (found == links_.end()) return;
+  found->second.connected = false;
+  found->second.refused = true;
   found->second.channel = shm::kNone;
   offer_view();
 }
@@ -114,7 +134,7 @@ std::vector<shm::PortInstance> OutputCore::misbehaving() {
       found.push_back(instance);
     }
   }
-  for (const shm::PortInstance peer : found) disconnect_peer(peer);
+  for (const shm::PortInstance peer : found) refuse_peer(peer);
   return found;
 }
 
@@ -176,6 +196,7 @@ void OutputCore::connect_waiting(InputLink& link) noexcept {
     allocate_slots();
   } catch (const std::exception&) {  // no memory: it stays unconnected
     link.connected = false;
+    link.refused = true;
     link.channel = shm::kNone;
   }
 }
@@ -207,6 +228,7 @@ void OutputCore::accept_view() noexcept {
       if (old.peer == link.peer.get()) destination = old;
     }
     destination.peer = link.peer.get();
+    destination.refused = link.refused;
     if (link.channel != shm::kNone && !destination.joined) {
       destination.joined = true;
       destination.link = link.number;
@@ -221,7 +243,7 @@ void OutputCore::accept_view() noexcept {
   destinations_ = std::move(destinations);
   handover_.retire(std::exchange(view_, std::move(view)));
   memory_->service_bell().ring();  // to dispose of the old one
-  bound_generation_ = UINT64_MAX;
+  bound_epoch_ = UINT64_MAX;
   // (b) for the queues that we left: their slots may be reclaimed before the next publish.
   shm::full_fence();
 }
@@ -242,8 +264,7 @@ void OutputCore::leave_all_but(const OutputView& view) noexcept {
 }
 
 bool OutputCore::rules_are_bound() const noexcept {
-  return memory_->tables().generation() == bound_generation_ &&
-         memory_->pages().changes() == bound_pages_;
+  return memory_->tables().epoch() == bound_epoch_ && memory_->pages().changes() == bound_pages_;
 }
 
 // Again where seven models were loaded meanwhile, for T is used before a decision checks the table.
@@ -251,7 +272,7 @@ void OutputCore::bind_rules() noexcept {
   for (int tries = 0; tries <= kMaxTableRetries; ++tries) {
     bound_pages_ = memory_->pages().changes();
     snapshot_ = memory_->tables().snapshot();
-    bound_generation_ = snapshot_.generation;
+    bound_epoch_ = snapshot_.epoch;
     timeout_ = snapshot_.table.timeout(source_);
     bind_decisions();
     if (memory_->tables().is_whole(snapshot_)) return;
@@ -262,7 +283,7 @@ void OutputCore::bind_decisions() noexcept {
   decisions_.clear();
   std::size_t reads = 0;
   for (Destination& destination : destinations_) {
-    if (!destination.joined) continue;
+    if (!destination.joined && !destination.refused) continue;
     const shm::TableView& table = snapshot_.table;
     const shm::Rule rule = table.rule(table.find(source_, destination.peer->port));
     destination.has_rule = rule.source != shm::kNone;

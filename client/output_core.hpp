@@ -6,6 +6,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "client/peers.hpp"
 #include "shm/channel.hpp"
 #include "shm/clock.hpp"
+#include "shm/descendants.hpp"
 #include "shm/output_segment.hpp"
 #include "shm/slot_pool.hpp"
 
@@ -38,7 +40,11 @@ class OutputCore {
   void add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t link);
   void remove_peer(shm::PortInstance peer);
   void disconnect_peer(shm::PortInstance peer);
+  // The connection is refused: its arrivals are counted as that.
+  void refuse_peer(shm::PortInstance peer);
   [[nodiscard]] std::vector<HeldLink> held_links() const;
+  // Whether a decision has missed a source that it could not see, for the first time.
+  [[nodiscard]] bool has_become_blind() noexcept { return blindness_.is_news(); }
   // Unmaps what the port's thread has let go of.
   void tidy();
   // Those that have begun to misbehave; they are disconnected.
@@ -61,14 +67,14 @@ class OutputCore {
   [[nodiscard]] shm::PortInstance instance() const noexcept { return instance_; }
   [[nodiscard]] shm::SourceId source() const noexcept { return source_; }
   [[nodiscard]] const shm::TypeInfo& type() const noexcept { return type_; }
-  [[nodiscard]] const shm::FileDescriptor& segment_descriptor() const noexcept {
-    return descriptor_;
-  }
+  [[nodiscard]] const shm::FileDescriptor& segment_descriptor() const noexcept { return readable_; }
   [[nodiscard]] const shm::FileDescriptor& page_descriptor() const noexcept {
     return page_descriptor_;
   }
   [[nodiscard]] const SharedMemory& memory() const noexcept { return *memory_; }
 
+  shm::ProcessMark process;        // the node's
+  mutable pid_t warned_about = 0;  // the child that was told that the port is not its own
   std::shared_ptr<NodeCore>
       node;  // kept for as long as the port is, so that they may go in any order
   std::shared_ptr<OutputCore> kept_by_loans;  // port's thread: the port is gone, they are not
@@ -80,11 +86,12 @@ class OutputCore {
   // A link as the port's thread works with it.
   struct Destination {
     const InputPeer* peer = nullptr;  // kept alive by view_
-    bool joined = false;  // it has a queue of ours; else it senses, or holds old samples
+    bool joined = false;   // it has a queue of ours; else it senses, or holds old samples
+    bool refused = false;  // it would have, but for its type
     std::uint64_t link = 0;
     std::uint32_t channel = shm::kNone;
     shm::ChannelWriter writer;
-    bool has_rule = false;  // the connection, under bound_generation_
+    bool has_rule = false;  // the connection, under bound_epoch_
     std::uint32_t decision = 0;
     shm::Verdict verdict = shm::Verdict::kLoses;
     std::uint64_t rung = 0;           // the wait that we rang for last
@@ -107,6 +114,7 @@ class OutputCore {
   void stamp(shm::ActivityWord word) noexcept;
   void decide_all(shm::Nanoseconds now) noexcept;
   Outcome hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
+  [[nodiscard]] Outcome refuse(const Destination& destination, bool is_sample) const noexcept;
   [[nodiscard]] bool is_full(Destination& destination) const noexcept;
   static void ring_if_waiting(Destination& destination) noexcept;
   void ring_where_selection_changed(shm::Nanoseconds now) noexcept;
@@ -120,12 +128,15 @@ class OutputCore {
   const std::uint32_t max_loans_;
   const std::shared_ptr<SharedMemory> memory_;
   shm::FileDescriptor descriptor_;
+  shm::FileDescriptor readable_;  // for others: the daemon passes it on as it is
   shm::Mapping mapping_;
+  std::optional<shm::Bequest> bequest_;
   shm::OutputSegment segment_;
   shm::PortInstance instance_ = 0;
   shm::SourceId source_ = shm::kNone;
   shm::FileDescriptor page_descriptor_;  // for a daemon that takes over
   shm::Mapping page_;
+  std::optional<shm::Bequest> page_bequest_;
   shm::Activity* activity_ = nullptr;
 
   // Service thread.
@@ -133,6 +144,7 @@ class OutputCore {
   std::uint32_t allocated_slots_ = 0;
 
   Handover<OutputView> handover_;
+  Blindness blindness_;
 
   // Port's thread.
   std::unique_ptr<OutputView> view_;
@@ -149,7 +161,7 @@ class OutputCore {
   std::uint32_t loans_ = 0;
   std::uint64_t sequence_ = 0;
   shm::ActivityWord own_word_ = shm::kNeverActive;
-  std::uint64_t bound_generation_ = UINT64_MAX;
+  shm::Epoch bound_epoch_ = UINT64_MAX;
   std::uint64_t bound_pages_ = 0;
   shm::TableSnapshot snapshot_;
   shm::Nanoseconds timeout_ = shm::kDefaultTimeout;

@@ -103,7 +103,13 @@ Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanosec
   std::uint64_t blind = 0;
   std::uint64_t unsettled = 0;
   for (Destination& destination : destinations_) {
-    if (!destination.joined) continue;
+    if (!destination.joined) {
+      if (!destination.refused) continue;
+      const Outcome refusal = refuse(destination, is_sample);
+      outcome.discarded += refusal.discarded;
+      outcome.refused += refusal.refused;
+      continue;
+    }
     if (!destination.has_rule) {
       destination.verdict = shm::Verdict::kLoses;
       continue;
@@ -144,8 +150,22 @@ Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanosec
     count(counters.discarded, outcome.discarded);
     count(counters.refused, outcome.refused);
   }
-  count(counters.blind, blind);
+  if (blind != 0) {
+    count(counters.blind, blind);
+    if (blindness_.begins()) memory_->service_bell().ring();
+  }
   count(counters.unsettled, unsettled);
+  return outcome;
+}
+
+// What becomes of an arrival at a port whose connection is refused: it may be the winner there, but
+// is never handed over.
+Outcome OutputCore::refuse(const Destination& destination, bool is_sample) const noexcept {
+  Outcome outcome;
+  if (!destination.has_rule) return outcome;
+  const bool wins = decisions_[destination.decision].verdict == shm::Verdict::kWins;
+  outcome.discarded = wins ? 0 : 1;
+  outcome.refused = wins && is_sample ? 1 : 0;
   return outcome;
 }
 

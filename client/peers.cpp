@@ -1,5 +1,8 @@
 #include "client/peers.hpp"
 
+#include <fcntl.h>
+
+#include <algorithm>
 #include <stdexcept>
 
 namespace arbiter::detail {
@@ -13,6 +16,9 @@ std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
   const shm::FileDescriptor& segment = announced.descriptors[0];
   if (shm::checked_size(segment, shm::Seals::kOneWriter) != sizeof(shm::InputSegment)) {
     throw std::runtime_error("the input port's segment has another size");
+  }
+  if (shm::allocated_size(segment) < sizeof(shm::InputSegment)) {
+    throw std::runtime_error("the input port's memory is not allocated");
   }
   peer->mapping = shm::Mapping(segment, sizeof(shm::InputSegment), shm::Access::kReadOnly);
   peer->segment = peer->mapping.as<const shm::InputSegment>();
@@ -31,6 +37,7 @@ std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
   }
   peer->ringer = shm::Ringer(announced.descriptors[1]);
   shm::make_resident(peer->mapping, 0, sizeof(shm::InputSegment), residence);
+  peer->bequest.emplace(peer->mapping.data(), peer->mapping.size(), shm::Bequest::Kind::kNothing);
   return peer;
 }
 
@@ -43,7 +50,12 @@ std::shared_ptr<const OutputPeer> map_output_peer(const shm::Received& announced
   peer->source = announced.message.id;
   const shm::FileDescriptor& segment = announced.descriptors[0];
   const std::size_t size = shm::checked_size(segment, shm::Seals::kOneWriter);
-  if (size < sizeof(shm::OutputHeader)) throw std::runtime_error("the segment is too small");
+  if (size < shm::kOutputHeadBytes) throw std::runtime_error("the segment is too small");
+  if (size > shm::kMaxSegmentSize) throw std::runtime_error("the segment is too large");
+  peer->file = shm::reopen(segment, O_RDONLY);
+  if (shm::end_of_data(peer->file, 0) < sizeof(shm::OutputHeader)) {
+    throw std::runtime_error("the output port's memory is not allocated");
+  }
   peer->mapping = shm::Mapping(segment, size, shm::Access::kReadOnly);
   const auto* header = peer->mapping.as<const shm::OutputHeader>();
   const shm::OutputLayout layout = shm::OutputLayout::checked(*header, size);
@@ -55,8 +67,28 @@ std::shared_ptr<const OutputPeer> map_output_peer(const shm::Received& announced
     throw std::runtime_error(mismatch);
   }
   peer->segment = shm::OutputSegment(peer->mapping.data(), layout);
-  shm::make_written_resident(segment, peer->mapping, residence);
+  shm::make_written_resident(peer->file, peer->mapping, residence);
+  survey(*peer);
+  shm::close_in_children(peer->file);
+  peer->bequest.emplace(peer->mapping.data(), peer->mapping.size(),
+                        shm::Bequest::Kind::kNothingUnlessUsed, &peer->held);
   return peer;
+}
+
+void survey(const OutputPeer& peer) {
+  const shm::OutputLayout& layout = peer.segment.layout();
+  if (shm::allocated_size(peer.file) >= layout.total_size) {
+    peer.allocated_slots.store(layout.slot_count, std::memory_order_relaxed);
+    return;
+  }
+  const auto slots = [&](std::uint64_t offset, std::uint64_t stride) {
+    return (shm::end_of_data(peer.file, offset) - offset) / stride;
+  };
+  const std::uint64_t both = std::min(slots(layout.headers_offset, sizeof(shm::SlotHeader)),
+                                      slots(layout.payload_offset, layout.stride));
+  peer.allocated_slots.store(
+      static_cast<std::uint32_t>(std::min<std::uint64_t>(both, layout.slot_count)),
+      std::memory_order_relaxed);
 }
 
 }  // namespace arbiter::detail

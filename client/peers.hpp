@@ -2,10 +2,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "shm/atomic.hpp"
 #include "shm/bell.hpp"
+#include "shm/descendants.hpp"
 #include "shm/ids.hpp"
 #include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
@@ -21,6 +23,7 @@ struct InputPeer {
   shm::PortInstance instance = 0;
   shm::PortId port = shm::kNone;
   shm::Mapping mapping;
+  std::optional<shm::Bequest> bequest;
   const shm::InputSegment* segment = nullptr;
   shm::Ringer ringer;
   std::uint32_t depth = 1;
@@ -34,7 +37,8 @@ struct InputLink {
   std::shared_ptr<const InputPeer> peer;
   // Else the port only senses the source, or was disconnected and may still hold samples.
   bool connected = false;
-  std::uint64_t number = 0;            // the daemon's: each time that it is connected another
+  bool refused = false;      // it should be connected, but the types differ, or memory is short
+  std::uint64_t number = 0;  // the daemon's: each time that it is connected another
   std::uint32_t channel = shm::kNone;  // none: waits until another link's is free
   std::uint32_t depth = 1;             // of the queue: the peer's, or less where memory is short
 };
@@ -51,7 +55,14 @@ struct OutputPeer {
   std::uint64_t link = 0;  // as InputLink::number: the queue that is ours bears it
   shm::SourceId source = shm::kNone;
   shm::Mapping mapping;
+  std::optional<shm::Bequest> bequest;  // a child keeps it if it was forked while samples were held
+  mutable std::uint32_t held = 0;       // port's thread: samples of it that the component holds
   shm::OutputSegment segment;
+  shm::FileDescriptor file;  // of the segment, opened by ourselves
+  // How many slots are known to be allocated, header and payload: only these are read where they
+  // lie. Written by the service thread. Relaxed is enough: what it says is true for ever, and the
+  // kernel had it allocated before it was said.
+  mutable shm::Atomic<std::uint32_t> allocated_slots{0};
   // Set by the port's thread once a publisher that is gone has nothing left to be taken.
   mutable shm::Atomic<bool> drained{false};
   mutable shm::Atomic<bool> misbehaved{false};  // as InputPeer::misbehaved
@@ -61,14 +72,20 @@ struct OutputLink {
   std::shared_ptr<const OutputPeer> peer;
   bool gone = false;      // closed or dead: drain it
   bool reported = false;  // that it misbehaves
+  bool offered = false;   // in the last view
+  bool known = false;     // to the port's thread: a view that had it was accepted
 };
 
 struct InputView {
   std::vector<OutputLink> links;
+  // Since the port was opened: samples of publishers that were let go of before the port's thread
+  // knew them. It counts them.
+  std::uint64_t let_go = 0;
+  std::vector<shm::SourceId> refused;  // those whose connection is refused
   InputView* next_retired = nullptr;
 };
 
-// A link as it is told to a daemon that takes over. Number 0: not connected.
+// A link as it is told to a daemon that takes over. Number 0: not connected, or refused.
 struct HeldLink {
   shm::PortInstance peer = 0;
   std::uint64_t number = 0;
@@ -83,5 +100,8 @@ std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
 std::shared_ptr<const OutputPeer> map_output_peer(
     const shm::Received& announced, const shm::TypeInfo& own,
     shm::Residence residence = shm::Residence::kMapped);
+
+// Service thread: looks how much the publisher has allocated by now.
+void survey(const OutputPeer& peer);
 
 }  // namespace arbiter::detail

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <system_error>
 
+#include "shm/descendants.hpp"
 #include "shm/file_descriptor.hpp"
 
 namespace arbiter::detail {
@@ -17,6 +18,7 @@ class ServiceBell {
   // Throws std::system_error.
   ServiceBell() : event_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
     if (!event_) throw std::system_error(errno, std::generic_category(), "eventfd");
+    shm::close_in_children(event_);
   }
 
   void ring() const noexcept {

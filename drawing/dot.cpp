@@ -1,7 +1,7 @@
 #include "drawing/dot.hpp"
 
-#include "rules/utf8.hpp"
 #include "rules/xml.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::drawing {
 namespace {
@@ -10,11 +10,11 @@ namespace {
 template <typename Use>
 void for_each_character(std::string_view text, const Use& use) {
   for (std::size_t i = 0; i < text.size();) {
-    const rules::Utf8Character character = rules::decode_utf8(text.substr(i));
+    const shm::Utf8Character character = shm::decode_utf8(text.substr(i));
     const std::size_t length = character.length == 0 ? 1 : character.length;
     const bool is_line_end = text[i] == '\n';
     const bool can_be_drawn =
-        character.length != 0 && (is_line_end || !rules::is_control(character.code));
+        character.length != 0 && (is_line_end || !shm::is_control(character.code));
     use(can_be_drawn ? text.substr(i, length) : std::string_view("\xef\xbf\xbd"));
     i += length;
   }

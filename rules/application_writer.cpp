@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "rules/print_rules.hpp"
-#include "rules/utf8.hpp"
 #include "rules/xml.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -37,7 +37,7 @@ bool is_utf8(std::string_view content) {
     if (declared.find("utf-8") == std::string::npos) return false;
   }
   for (std::size_t i = 0; i < content.size();) {
-    const std::size_t length = decode_utf8(content.substr(i)).length;
+    const std::size_t length = shm::decode_utf8(content.substr(i)).length;
     if (length == 0) return false;
     i += length;
   }
@@ -87,7 +87,7 @@ class ArbitrationWriter {
   [[nodiscard]] std::string escape(std::string_view written, std::string_view dollar) const {
     std::string result;
     for (std::size_t i = 0; i < written.size();) {
-      const Utf8Character character = decode_utf8(written.substr(i));
+      const shm::Utf8Character character = shm::decode_utf8(written.substr(i));
       const std::size_t length = std::max<std::size_t>(character.length, 1);
       const std::string_view bytes = written.substr(i, length);
       i += length;
@@ -150,7 +150,7 @@ class ArbitrationWriter {
       if (!text.empty()) text += ", ";
       for (std::size_t i = 0; i < name.size();) {
         const std::size_t length =
-            std::max<std::size_t>(decode_utf8(std::string_view(name).substr(i)).length, 1);
+            std::max<std::size_t>(shm::decode_utf8(std::string_view(name).substr(i)).length, 1);
         if (name[i] == '-' && text.ends_with('-')) text += ' ';
         text += length > 1 && !style_.is_utf8 ? "?" : name.substr(i, length);
         i += length;

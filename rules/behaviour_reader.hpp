@@ -20,9 +20,9 @@ void read_behaviour(const XmlNode& element, ElementReader& reader, Model& model,
                     Diagnostics& diagnostics);
 
 // The condition that is the text of an element: a null pointer where it is blank, nothing where it
-// is malformed.
+// is malformed. The model gets to know the names in it.
 std::optional<ExpressionPtr> read_condition(const XmlNode& element, ElementReader& reader,
-                                            Diagnostics& diagnostics);
+                                            Model& model, Diagnostics& diagnostics);
 
 // Of an element that is not read: remembers what it would have named, so that its mentions are no
 // further mistakes.

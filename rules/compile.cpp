@@ -15,8 +15,11 @@ namespace {
 
 class ModelCompiler {
  public:
-  ModelCompiler(const RuleSet& rules, Diagnostics& diagnostics, Budget& budget)
-      : rules_(rules), diagnostics_(diagnostics), context_(budget, attempt_) {}
+  ModelCompiler(const RuleSet& rules, Diagnostics& diagnostics, Budget& budget,
+                std::size_t max_precedence_nodes)
+      : rules_(rules),
+        diagnostics_(diagnostics),
+        context_(budget, attempt_, max_precedence_nodes) {}
 
   CompiledModel compile();
 
@@ -26,6 +29,7 @@ class ModelCompiler {
   void compile_arbitrated_ports();
   void compile_port_at(std::size_t index);
   void hand_over();
+  void assume_running(const PortRules& port);
   void report_out_of_steps(const PortRules& port);
   void add_unarbitrated_ports();
   void report_never_running();
@@ -49,12 +53,13 @@ CompiledModel ModelCompiler::compile() {
   model_.timeouts = rules_.timeouts;
   model_.sources = all_sources();
   model_.texts = rules_.texts;
+  const bool is_whole = !diagnostics_.has_errors();
   gather_parts();
   compile_arbitrated_ports();
   add_unarbitrated_ports();
   report_never_running();
   report_unreachable_children();
-  check_limits();
+  if (is_whole) check_limits();  // reading has told what it found of them
   return std::move(model_);
 }
 
@@ -77,11 +82,19 @@ void ModelCompiler::gather_parts() {
 }
 
 void ModelCompiler::compile_arbitrated_ports() {
-  const auto name = [&](std::size_t i) { return rules_.ports[i].port; };
-  const auto compile_it = [&](std::size_t i) { compile_port_at(i); };
+  std::vector<std::size_t> judged;  // ports
+  for (std::size_t i = 0; i < rules_.ports.size(); ++i) {
+    if (rules_.ports[i].is_doubtful) {
+      assume_running(rules_.ports[i]);
+    } else {
+      judged.push_back(i);
+    }
+  }
+  const auto name = [&](std::size_t i) { return rules_.ports[judged[i]].port; };
+  const auto compile_it = [&](std::size_t i) { compile_port_at(judged[i]); };
   for (const std::size_t open :
-       share_out(context_.budget, "proving", rules_.ports.size(), name, compile_it)) {
-    report_out_of_steps(rules_.ports[open]);
+       share_out(context_.budget, "proving", judged.size(), name, compile_it)) {
+    report_out_of_steps(rules_.ports[judged[open]]);
   }
 }
 
@@ -92,10 +105,7 @@ void ModelCompiler::compile_port_at(std::size_t index) {
   attempt_ = {};
   auto result = compile_port(context_, {port, unselected, parts});
   hand_over();
-  if (!result) {
-    for (const auto& part : parts) may_run_[part.behaviour] = true;  // as nobody knows
-    return;
-  }
+  if (!result) return assume_running(port);
   for (const std::size_t behaviour : result->running) may_run_[behaviour] = true;
   for (auto& source : unselected) {
     CompiledRule rule;
@@ -111,12 +121,18 @@ void ModelCompiler::hand_over() {
   attempt_ = {};
 }
 
-void ModelCompiler::report_out_of_steps(const PortRules& port) {
+// Nobody knows.
+void ModelCompiler::assume_running(const PortRules& port) {
   for (const auto& part : parts_[port.port]) may_run_[part.behaviour] = true;
+}
+
+void ModelCompiler::report_out_of_steps(const PortRules& port) {
+  assume_running(port);
   diagnostics_.error("limit-exceeded", port.where,
                      "whether only one can win at " + port.port +
                          " was neither proved nor refuted: it takes more steps than there are for "
-                         "it; write simpler conditions there, or allow more steps with --effort");
+                         "it; write simpler conditions there, or allow more steps with --effort",
+                     {.ports = {port.port}});
 }
 
 void ModelCompiler::add_unarbitrated_ports() {
@@ -153,7 +169,8 @@ void ModelCompiler::report_never_running() {
         "no activity of the sources lets the behaviour " + quote(behaviour.name) +
             " run: none of its connections can ever be selected for it" + reasons +
             "; look for a condition or an inhibition, its own or inherited, that contradicts "
-            "another one");
+            "another one",
+        {.behaviour = behaviour.name});
   }
 }
 
@@ -197,7 +214,8 @@ void ModelCompiler::report_unreachable_children() {
             (meta.children.size() == 1 ? " child" : " children") + " of " + quote(meta.name) +
             " can never run: " + enumerate(lost) +
             "; see what is said of each, or look at the conditions and inhibitions of " +
-            quote(meta.name));
+            quote(meta.name),
+        {.behaviour = meta.name});
   }
 }
 
@@ -243,14 +261,16 @@ void ModelCompiler::check_limits() {
 
 }  // namespace
 
-CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics, Budget& budget) {
-  const Budget::Part part(budget, budget.left() / 2);
-  return ModelCompiler(rules, diagnostics, budget).compile();
+CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics, Budget& budget,
+                      std::size_t max_precedence_nodes) {
+  const Budget::Part part(budget, budget.left() / 5 * 4);
+  return ModelCompiler(rules, diagnostics, budget, max_precedence_nodes).compile();
 }
 
-CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics) {
+CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics,
+                      std::size_t max_precedence_nodes) {
   Budget budget;
-  return compile(rules, diagnostics, budget);
+  return compile(rules, diagnostics, budget, max_precedence_nodes);
 }
 
 }  // namespace arbiter::rules

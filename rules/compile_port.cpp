@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "rules/in_order.hpp"
 #include "rules/names.hpp"
+#include "rules/winners.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -36,13 +38,19 @@ class PortCompiler {
  private:
   bool mention_sources();
   void build_rules();
-  void subtract_earlier_rules();
+  void build_plain_rules();
+  void multiply_precedence_out();
+  bool subtract_earlier_rules();
   bool compile_rules(CompiledPort& result);
+  void find_who_can_win(CompiledPort& result);
+  StateSearch::Answer search(const std::vector<StateSearch::Proposition>& wanted);
+  [[nodiscard]] bool can_win_as(std::size_t rule, const ConnectionRule& part);
   std::vector<std::size_t> behaviours_that_run();
   void report_never_selected();
   void report_conflicts();
-  Witness shortest_witness(const Proof::Pair& pair);
+  Witness witness_of(const Proof::Pair& pair);
   void report_conflict(const Proof::Pair& pair);
+  void report_in_order(const InOrder& order);
   void report_outgrown(const ConnectionRule* rule);
 
   CompileContext& context_;
@@ -52,8 +60,14 @@ class PortCompiler {
   std::set<std::string> written_;             // in conditions
   const ConnectionRule* building_ = nullptr;  // to name it when it outgrows the node table
   std::vector<Diagram> plain_;                // the rules as they are, with the own source
-  std::vector<Diagram> functions_;            // the same, less what earlier ones win
-  std::vector<DiagramNodes> nodes_;           // of functions_
+  // The same, less what earlier ones win; but where the port is decided in order, as they are.
+  std::vector<Diagram> functions_;
+  bool in_order_ = false;
+  std::vector<bool> can_win_;  // by rule; where that is not found out, it is taken as so
+  // Of a port that is decided in order: what its diagrams would be too large for.
+  std::optional<StateSearch> search_;
+  StateSearch::Port winners_;
+  std::vector<DiagramNodes> nodes_;  // of functions_
   std::optional<ShortestImplicant> shortest_;
 };
 
@@ -82,7 +96,8 @@ bool PortCompiler::mention_sources() {
     context_.diagnostics.error(
         "limit-exceeded", where,
         "more than kMaxSourcesPerPort (" + std::to_string(shm::kMaxSourcesPerPort) +
-            ") sources are connected to " + port_.port + " or read by its rules; use fewer there");
+            ") sources are connected to " + port_.port + " or read by its rules; use fewer there",
+        {.ports = {port_.port}});
     return false;
   };
   for (const auto& rule : port_.rules) {
@@ -95,12 +110,9 @@ bool PortCompiler::mention_sources() {
 }
 
 void PortCompiler::build_rules() {
-  for (const auto& rule : port_.rules) {
-    building_ = &rule;
-    plain_.push_back(rules_.rule(rule));
-  }
+  build_plain_rules();
   functions_ = plain_;
-  if (port_.first_wins) subtract_earlier_rules();
+  if (port_.first_wins) multiply_precedence_out();
   building_ = nullptr;
   std::size_t nodes = 0, largest = 0;
   for (const Diagram& function : functions_) {
@@ -113,13 +125,40 @@ void PortCompiler::build_rules() {
   }
 }
 
-// conflict="first": a rule holds only where none before it does. What the earlier ones win together
-// is kept as one function while it is small; it may explode, and then each is taken away by itself.
-void PortCompiler::subtract_earlier_rules() {
+void PortCompiler::build_plain_rules() {
+  for (const auto& rule : port_.rules) {
+    building_ = &rule;
+    plain_.push_back(rules_.rule(rule));
+  }
+}
+
+// conflict="first": a rule holds only where none before it does. Where to say so in each rule would
+// make too much of them, they stay as they are, and are decided in order.
+void PortCompiler::multiply_precedence_out() {
+  bool lost = false;
+  try {
+    const Budget::Part part(context_.budget,
+                            std::min(kMaxPrecedenceSteps, context_.budget.left() / 2));
+    in_order_ = !subtract_earlier_rules();
+  } catch (const StepLimit&) {
+    in_order_ = true;
+  } catch (const DiagramLimit&) {
+    in_order_ = lost = true;
+  }
+  if (lost) {
+    plain_.clear();
+    rules_.forget_parts();
+    build_plain_rules();
+  }
+  if (in_order_) functions_ = plain_;
+}
+
+// What the earlier ones win together is kept as one function while it is small; it may explode, and
+// then each is taken away by itself. False: a bound was met.
+bool PortCompiler::subtract_earlier_rules() {
   auto& builder = context_.builder;
-  const auto is_small = [&](const Diagram& function) {
-    return function.is_false() || function.is_true() ||
-           builder.node_count(function) <= kMaxUnionNodes;
+  const auto is_within = [&](const Diagram& function, std::size_t nodes) {
+    return function.is_false() || function.is_true() || builder.node_count(function) <= nodes;
   };
   Diagram won = builder.constant(false);
   bool has_union = true;
@@ -127,14 +166,19 @@ void PortCompiler::subtract_earlier_rules() {
     building_ = &port_.rules[i];
     if (has_union) {
       functions_[i] = builder.combine(Connective::kAndNot, functions_[i], won);
-      has_union = is_small(won) && is_small(plain_[i]);
+      has_union = is_within(won, kMaxUnionNodes) && is_within(plain_[i], kMaxUnionNodes);
       if (has_union) won = builder.combine(Connective::kOr, won, plain_[i]);
-      continue;
+    } else {
+      for (std::size_t j = 0; j < i; ++j) {
+        functions_[i] = builder.combine(Connective::kAndNot, functions_[i], plain_[j]);
+      }
     }
-    for (std::size_t j = 0; j < i; ++j) {
-      functions_[i] = builder.combine(Connective::kAndNot, functions_[i], plain_[j]);
-    }
+    // Of a rule that is large by itself, order would save nothing.
+    const std::size_t most =
+        std::max(context_.max_precedence_nodes, 2 * builder.node_count(plain_[i]));
+    if (!is_within(functions_[i], most)) return false;
   }
+  return true;
 }
 
 bool PortCompiler::compile_rules(CompiledPort& result) {
@@ -154,8 +198,57 @@ bool PortCompiler::compile_rules(CompiledPort& result) {
     nodes_.push_back(context_.builder.nodes(functions_[i]));
   }
   building_ = nullptr;
+  result.in_order = in_order_;
+  find_who_can_win(result);
+  if (in_order_) {
+    const InOrder order = put_in_order(result);
+    written_.insert(order.reads.begin(), order.reads.end());
+    report_in_order(order);
+  }
   result.reads.assign(written_.begin(), written_.end());
   return fits;
+}
+
+void PortCompiler::find_who_can_win(CompiledPort& result) {
+  for (const auto& function : functions_) can_win_.push_back(!function.is_false());
+  if (!in_order_) return;
+  search_.emplace(StateSearch::steps_within(context_.budget.left() / 2));
+  winners_ = search_->winners(result);
+  for (std::size_t i = 0; i < result.rules.size(); ++i) {
+    CompiledRule& rule = result.rules[i];
+    // Most rules hold where nothing is active but what they ask for.
+    std::set<std::string> asked{rule.source};
+    for (std::size_t read = 0; read < rule.expected.size(); ++read) {
+      if (rule.expected[read]) asked.insert(rule.reads[read]);
+    }
+    if (!can_win_[i] || find_winner(result, asked) == &rule) continue;
+    can_win_[i] = search({winners_.wins[i]}) != StateSearch::Answer::kNo;
+    if (can_win_[i]) continue;
+    // Where it holds, an earlier one does too, so those behind it do not miss it.
+    rule.kind = shm::table::kNever;
+    rule.reads.clear();
+    rule.expected.clear();
+    rule.nodes.clear();
+  }
+}
+
+StateSearch::Answer PortCompiler::search(const std::vector<StateSearch::Proposition>& wanted) {
+  const int steps = search_->steps_left();
+  const auto answer = search_->find(wanted);
+  context_.budget.note(StateSearch::budget_of(steps - search_->steps_left()));
+  return answer;
+}
+
+// Whether the rule can win by what one behaviour contributes to it.
+bool PortCompiler::can_win_as(std::size_t rule, const ConnectionRule& part) {
+  if (!can_win_[rule] || part.condition == port_.rules[rule].condition) return can_win_[rule];
+  const Diagram condition = rules_.rule(part);
+  auto& builder = context_.builder;
+  if (!in_order_) return !builder.combine(Connective::kAnd, functions_[rule], condition).is_false();
+  const Diagram rest = builder.when(condition, rules_.variable(part.source));
+  const auto holds =
+      search_->holds(to_compiled_rule(part.source, builder.nodes(rest), rules_.names()));
+  return search({winners_.wins[rule], holds}) != StateSearch::Answer::kNo;
 }
 
 std::vector<std::size_t> PortCompiler::behaviours_that_run() {
@@ -166,11 +259,7 @@ std::vector<std::size_t> PortCompiler::behaviours_that_run() {
     const auto found = index.find(part.rule->source);
     if (found == index.end()) continue;
     building_ = part.rule;
-    Diagram function = functions_[found->second];
-    if (part.rule->condition != port_.rules[found->second].condition) {
-      function = context_.builder.combine(Connective::kAnd, function, rules_.rule(*part.rule));
-    }
-    if (!function.is_false()) running.push_back(part.behaviour);
+    if (can_win_as(found->second, *part.rule)) running.push_back(part.behaviour);
   }
   building_ = nullptr;
   return running;
@@ -178,7 +267,7 @@ std::vector<std::size_t> PortCompiler::behaviours_that_run() {
 
 void PortCompiler::report_never_selected() {
   for (std::size_t i = 0; i < functions_.size(); ++i) {
-    if (!functions_[i].is_false()) continue;
+    if (can_win_[i]) continue;
     const auto& rule = port_.rules[i];
     context_.diagnostics.warning(
         "never-selected", rule.where,
@@ -187,7 +276,8 @@ void PortCompiler::report_never_selected() {
                  ? ": no activity of the sources satisfies its rule; look for a condition or an "
                    "inhibition that contradicts another one"
                  : ": whenever its rule holds, that of an earlier connection does, too, which "
-                   "conflict=\"first\" prefers; move it up, or remove it"));
+                   "conflict=\"first\" prefers; move it up, or remove it"),
+        {.ports = {port_.port}, .source = rule.source, .behaviour = rule.behaviour});
   }
 }
 
@@ -203,11 +293,13 @@ void PortCompiler::report_conflicts() {
     context_.diagnostics.note("more-conflicts", port_.where,
                               std::to_string(pairs.size() - kMaxReportedPairs) +
                                   " more pairs of connections can both win at " + port_.port +
-                                  "; mend those reported first");
+                                  "; mend those reported first",
+                              {.ports = {port_.port}});
   }
 }
 
-Witness PortCompiler::shortest_witness(const Proof::Pair& pair) {
+// A shortest one, or where that takes too long, one of which no literal can be left out.
+Witness PortCompiler::witness_of(const Proof::Pair& pair) {
   std::optional<Literals> literals;
   if (shortest_) {
     try {
@@ -217,8 +309,9 @@ Witness PortCompiler::shortest_witness(const Proof::Pair& pair) {
       shortest_.reset();  // the diagrams are gone; their nodes serve for those that follow, too
     }
   }
-  if (!literals) literals = context_.proof.meeting_point(nodes_[pair.first], nodes_[pair.second]);
   Witness witness;
+  witness.is_shortest = literals.has_value();
+  if (!literals) literals = context_.proof.meeting_point(nodes_[pair.first], nodes_[pair.second]);
   for (std::size_t variable = 0; variable < rules_.names().size(); ++variable) {
     if (literals->active[variable]) witness.active.push_back(rules_.names()[variable]);
     if (literals->inactive[variable]) witness.inactive.push_back(rules_.names()[variable]);
@@ -231,14 +324,27 @@ Witness PortCompiler::shortest_witness(const Proof::Pair& pair) {
 void PortCompiler::report_conflict(const Proof::Pair& pair) {
   const auto& first = port_.rules[pair.first];
   const auto& second = port_.rules[pair.second];
-  Witness witness = shortest_witness(pair);
+  Witness witness = witness_of(pair);
   std::string message = second.source + " and " + first.source + " (" +
                         rules::describe(first.where) + ") can both win at " + port_.port +
                         " when " + describe(witness) +
                         "; let one inhibit the other, give one a condition that excludes the "
                         "other, or let document order decide with <arbiter at=\"" +
                         port_.port + R"(" conflict="first"/>)";
-  context_.diagnostics.error("both-can-win", second.where, std::move(message), std::move(witness));
+  Subject about{.ports = {port_.port}, .source = second.source, .behaviour = second.behaviour};
+  for (const auto* rule : {&first, &second}) about.winners.emplace_back(port_.port, rule->source);
+  context_.diagnostics.error("both-can-win", second.where, std::move(message), std::move(about),
+                             std::move(witness));
+}
+
+void PortCompiler::report_in_order(const InOrder& order) {
+  context_.diagnostics.note(
+      "decided-in-order", port_.where,
+      "the rules at " + port_.port + " are tried one after the other, up to " +
+          std::to_string(port_.rules.size()) + " of them, for each decision, which reads up to " +
+          std::to_string(order.reads.size()) +
+          " sources: diagrams that say of each that none before it holds would be too large; the "
+          "winners are the same, and docs/performance.md says what it costs");
 }
 
 void PortCompiler::report_outgrown(const ConnectionRule* rule) {
@@ -247,7 +353,8 @@ void PortCompiler::report_outgrown(const ConnectionRule* rule) {
       (rule != nullptr ? "the rule of " + rule->source : std::string("a rule")) + " at " +
           port_.port + " needs a decision diagram of more than kMaxNodesPerConnection (" +
           std::to_string(shm::kMaxNodesPerConnection) +
-          ") nodes; write a simpler condition, or one that reads fewer sources");
+          ") nodes; write a simpler condition, or one that reads fewer sources",
+      {.ports = {port_.port}, .source = rule != nullptr ? rule->source : std::string()});
 }
 
 }  // namespace

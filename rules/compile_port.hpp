@@ -10,18 +10,25 @@
 #include "rules/compile.hpp"
 #include "rules/diagram.hpp"
 #include "rules/proof.hpp"
+#include "rules/state_search.hpp"
 #include "rules/witness.hpp"
 
 namespace arbiter::rules {
 
+// Steps that a port may take to multiply precedence out, and no more than half of what it has, so
+// that there is enough for the rules themselves.
+inline constexpr std::uint64_t kMaxPrecedenceSteps = 500'000;
+
 // What the ports of one model share.
 struct CompileContext {
-  CompileContext(Budget& of_all, Diagnostics& to) : budget(of_all), diagnostics(to) {}
+  CompileContext(Budget& of_all, Diagnostics& to, std::size_t most)
+      : budget(of_all), diagnostics(to), max_precedence_nodes(most) {}
 
   Budget& budget;
   DiagramBuilder builder{budget};
   Proof proof{budget};
   Diagnostics& diagnostics;
+  const std::size_t max_precedence_nodes;
 };
 
 // A behaviour's part in the rule of one connection of the port.

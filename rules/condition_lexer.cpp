@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "rules/names.hpp"
-#include "rules/utf8.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -56,6 +56,54 @@ constexpr std::array<Spelling, 2> kStatementWords{{
     {"idle", TokenKind::kIdle},
 }};
 
+// What other languages write, and what to write here. Those that others begin with come later.
+struct Foreign {
+  std::string_view spelling;
+  std::string_view advice;
+};
+
+constexpr auto kForeignOperators = std::to_array<Foreign>({
+    {"<=>", "write iff or <->"},
+    {"=>", "write implies or ->"},
+    {"<=", "write implies or ->, what follows behind it"},
+    {"<-", "write implies or ->, what follows behind it"},
+    {"⇒", "write implies or ->"},
+    {"⇔", "write iff or <->"},
+    {"⊕", "write xor"},
+    {"^", "write xor"},
+    {"∀", "write all(/Nav/*)"},
+    {"∃", "write any(/Nav/*)"},
+    {"≠", "write xor between conditions, and != behind winner(…)"},
+    {"<>", "write xor between conditions, and != behind winner(…)"},
+});
+
+// In a statement, the comparisons of winners mean something; "==" nowhere does.
+constexpr std::string_view kDoubleEquals = "==";
+constexpr auto kNoComparisons = std::to_array<Foreign>({
+    {"!=", "write xor"},
+    {"=", "write iff or <->"},
+});
+
+constexpr auto kForeignWords = std::to_array<Foreign>({
+    {"active", "a source's name by itself says that it is active: write the name alone"},
+    {"isactive", "a source's name by itself says that it is active: write the name alone"},
+    {"is_active", "a source's name by itself says that it is active: write the name alone"},
+    {"is", "a source's name by itself says that it is active: write the name alone"},
+    {"inactive", "write not and the source's name"},
+    {"exists", "write any(/Nav/*)"},
+    {"some", "write any(/Nav/*)"},
+    {"forall", "write all(/Nav/*)"},
+    {"every", "write all(/Nav/*)"},
+    {"no", "write none(/Nav/*) of several sources, and not of one"},
+    {"if", "write implies or ->, as in /Object/pos:o -> /Face/pos:o"},
+    {"then", "write implies or ->, as in /Object/pos:o -> /Face/pos:o"},
+    {"nor", "write and not"},
+    {"nand", "write not (… and …)"},
+    {"unless", "write or"},
+    {"equals", "write iff or <->"},
+    {"but", "write and"},
+});
+
 bool is_letter_or_digit(char byte) {
   return (byte >= 'a' && byte <= 'z') || (byte >= 'A' && byte <= 'Z') ||
          (byte >= '0' && byte <= '9');
@@ -70,6 +118,19 @@ bool is_letter_or_digit(char byte) {
   std::vector<Spelling> words(kWords.begin(), kWords.end());
   if (language == Language::kStatement) {
     words.insert(words.end(), kStatementWords.begin(), kStatementWords.end());
+  }
+  for (const auto& [spelling, advice] : kForeignWords) {
+    if (spelling == lower) {
+      throw ConditionError{at, quote(word) + " is no keyword here; " + std::string(advice)};
+    }
+  }
+  for (const auto& [spelling, kind] : kStatementWords) {
+    if (spelling == lower && language == Language::kCondition) {
+      throw ConditionError{at,
+                           "a condition reads which sources are active, and not who wins; write "
+                           "the sources' names, or put this into a statement for arbiter check "
+                           "--assert"};
+    }
   }
   for (const auto& [spelling, kind] : words) {
     if (spelling == lower) {
@@ -110,13 +171,29 @@ void ConditionLexer::advance() {
   skip_blanks();
   token_ = Token{TokenKind::kEnd, next_, {}, {}};
   if (rest().empty()) return;
+  reject_foreign_operator();
   token_ = read_operator();
   if (token_.spelling.empty()) token_ = rest().starts_with('"') ? read_quoted() : read_word();
   next_ += token_.spelling.size();
 }
 
 void ConditionLexer::skip_blanks() {
-  while (next_ < condition_.size() && is_blank(condition_[next_])) ++next_;
+  while (next_ < condition_.size() && shm::is_blank(condition_[next_])) ++next_;
+}
+
+void ConditionLexer::reject_foreign_operator() const {
+  const auto reject = [this](std::string_view spelling, std::string_view advice) {
+    if (!rest().starts_with(spelling)) return;
+    throw ConditionError{next_, quote(spelling) + " is no operator here; " + std::string(advice)};
+  };
+  if (rest().starts_with("<->")) return;
+  for (const auto& [spelling, advice] : kForeignOperators) reject(spelling, advice);
+  if (language_ == Language::kStatement) {
+    reject(kDoubleEquals, "write = behind winner(…), and iff or <-> between conditions");
+    return;
+  }
+  reject(kDoubleEquals, "write iff or <->");
+  for (const auto& [spelling, advice] : kNoComparisons) reject(spelling, advice);
 }
 
 Token ConditionLexer::read_operator() const {
@@ -144,7 +221,7 @@ Token ConditionLexer::read_quoted() const {
 Token ConditionLexer::read_word() const {
   const std::string_view word = bare_name("");
   if (word.empty()) {
-    const std::size_t length = decode_utf8(rest()).length;
+    const std::size_t length = shm::decode_utf8(rest()).length;
     const std::string where =
         language_ == Language::kStatement ? "in a statement" : "in a condition";
     throw ConditionError{next_, quote(rest().substr(0, length)) + " has no meaning " + where +

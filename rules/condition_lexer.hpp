@@ -62,6 +62,8 @@ class ConditionLexer {
  private:
   void advance();
   void skip_blanks();
+  // Says of operators of other languages what to write for them.
+  void reject_foreign_operator() const;
   [[nodiscard]] Token read_operator() const;
   [[nodiscard]] Token read_quoted() const;
   [[nodiscard]] Token read_word() const;

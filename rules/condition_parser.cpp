@@ -57,14 +57,24 @@ Operator operator_of(TokenKind kind) {
 
 class Parser {
  public:
-  explicit Parser(const Text& text) : text_(text), lexer_(text.bytes()) {}
+  Parser(const Text& text, std::vector<Mention>* sources)
+      : text_(text), sources_(sources), lexer_(text.bytes()) {}
   Parser(const Text& text, ParsedStatement& statement)
-      : text_(text), statement_(&statement), lexer_(text.bytes(), Language::kStatement) {}
+      : text_(text),
+        statement_(&statement),
+        sources_(&statement.sources),
+        lexer_(text.bytes(), Language::kStatement) {}
 
   ExpressionPtr parse_all() {
     Parsed parsed = parse_binary(0);
     const Token& next = lexer_.peek();
     if (next.kind == TokenKind::kClose) fail(next.at, "this ')' closes nothing; remove it");
+    if (next.kind == TokenKind::kEquals || next.kind == TokenKind::kDiffers) {
+      fail(next.at, quote(next.spelling) +
+                        " compares a winner, as in winner(/Arm/pos:i) = /Teleop/pos:o; between "
+                        "conditions write " +
+                        (next.kind == TokenKind::kEquals ? "iff" : "xor"));
+    }
     if (next.kind != TokenKind::kEnd) {
       fail(next.at, "an operator is missing before " + quote(next.spelling) +
                         "; write and, or, xor, implies or iff");
@@ -117,7 +127,7 @@ class Parser {
       case TokenKind::kPort:
         check_port(token);
         lexer_.take();
-        if (statement_ != nullptr) statement_->sources.push_back(mention(token));
+        if (sources_ != nullptr) sources_->push_back(mention(token));
         return {make_source(std::string(token.name))};
       case TokenKind::kOpen: {
         lexer_.take();
@@ -147,15 +157,10 @@ class Parser {
 
   Parsed parse_quantifier() {
     const Token quantifier = lexer_.take();
-    const Token open = lexer_.peek();
-    const std::string word(quantifier.spelling);
-    if (open.kind != TokenKind::kOpen) {
-      fail(open.at, word + " takes a pattern in parentheses; write " + word + "(/Face/*)");
-    }
-    const Token glob = lexer_.take_glob();
-    if (statement_ != nullptr) statement_->globs.push_back(mention(glob));
-    expect_close(open);
-    return {make_quantifier(operator_of(quantifier.kind), std::string(glob.name))};
+    Mention glob = take_pattern(quantifier);
+    ExpressionPtr expression = make_quantifier(operator_of(quantifier.kind), glob.name);
+    if (statement_ != nullptr) statement_->globs.push_back(std::move(glob));
+    return {std::move(expression)};
   }
 
   Parsed parse_winner() {
@@ -178,16 +183,57 @@ class Parser {
              "'=' or '!=' is missing behind winner(" + term.port.name + "); write " + example);
       }
       lexer_.take();
-      if (lexer_.peek().kind == TokenKind::kNone) {
-        lexer_.take();
-      } else {
-        term.source = take_port("a source or none, as in " + example);
-      }
+      parse_who(term, example);
     }
     ExpressionPtr expression = make_source(term_name(statement_->terms.size()));
     statement_->terms.push_back(std::move(term));
     if (!differs) return {expression};
     return {make_operation(Operator::kNot, {std::move(expression)}), 2};
+  }
+
+  // What stands behind "winner(/p) =".
+  void parse_who(WinnerTerm& term, const std::string& example) {
+    const Token who = lexer_.peek();
+    switch (who.kind) {
+      case TokenKind::kNone:
+        lexer_.take();
+        if (lexer_.peek().kind != TokenKind::kOpen) return;
+        fail(who.at,
+             "none means that nobody wins; for the winner to be none of several sources, "
+             "write winner(" +
+                 term.port.name + ") != any(/Nav/*)");
+      case TokenKind::kAll:
+        fail(who.at, "only one source wins at a port; write any(/Nav/*) for one of several");
+      case TokenKind::kAny:
+        lexer_.take();
+        term.pattern = take_pattern(who);
+        return;
+      case TokenKind::kWinner: {
+        lexer_.take();
+        const Token open = lexer_.peek();
+        if (open.kind != TokenKind::kOpen) {
+          fail(open.at, "winner takes a port in parentheses; write winner(/Arm/pos:i)");
+        }
+        lexer_.take();
+        term.other_port = take_port("an input port's name, as in winner(/Arm/pos:i)");
+        expect_close(open);
+        return;
+      }
+      default:
+        term.source = take_port("a source, any(…), winner(…) or none here, as in " + example);
+    }
+  }
+
+  // "(GLOB)".
+  Mention take_pattern(const Token& quantifier) {
+    const Token open = lexer_.peek();
+    const std::string word(quantifier.spelling);
+    if (open.kind != TokenKind::kOpen) {
+      fail(open.at, word + " takes a pattern in parentheses; write " + word + "(/Face/*)");
+    }
+    const Token glob = lexer_.take_glob();
+    expect_close(open);
+    return mention(glob);
   }
 
   Mention take_port(const std::string& expected) {
@@ -199,7 +245,8 @@ class Parser {
   }
 
   [[nodiscard]] Mention mention(const Token& token) const {
-    return {std::string(token.name), text_.where(token.at)};
+    return {std::string(token.name), text_.where(token.at),
+            text_.define_of(token.at, token.at + token.spelling.size())};
   }
 
   void expect_close(const Token& open) {
@@ -259,7 +306,8 @@ class Parser {
   }
 
   const Text& text_;
-  ParsedStatement* statement_ = nullptr;  // none while a condition is parsed
+  ParsedStatement* statement_ = nullptr;     // none while a condition is parsed
+  std::vector<Mention>* sources_ = nullptr;  // none where nobody asks
   ConditionLexer lexer_;
   int nesting_ = 0;
 };
@@ -271,9 +319,10 @@ void report(ConditionError& error, const Text& text, Diagnostics& diagnostics) {
 
 }  // namespace
 
-std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diagnostics) {
+std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diagnostics,
+                                             std::vector<Mention>* sources) {
   try {
-    return Parser(text).parse_all();
+    return Parser(text, sources).parse_all();
   } catch (ConditionError& error) {
     report(error, text, diagnostics);
     return {};

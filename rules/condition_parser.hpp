@@ -29,13 +29,19 @@ inline constexpr int kMaxConditionDepth = 500;
 
 // The text must not be blank: what an absent condition means is the caller's to know. Empty where
 // it is malformed, which was then reported.
-std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diagnostics);
+// `sources`, if given, gets each mention of a source.
+std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diagnostics,
+                                             std::vector<Mention>* sources = nullptr);
 
-// What a statement says of the winner at a port, with "winner(/p) = /s", "winner(/p) != /s",
-// "winner(/p) = none" or "idle(/p)", which mean an operand each.
+// What a statement says of the winner at a port, with "winner(/p) = /s", "winner(/p) = any(/s/*)",
+// "winner(/p) = winner(/q)", "winner(/p) = none", each with "!=" as well, or "idle(/p)". Each is an
+// operand.
 struct WinnerTerm {
   Mention port;
-  std::optional<Mention> source;  // none: nobody wins
+  // One of them; with neither of them, nobody wins.
+  std::optional<Mention> source{};
+  std::optional<Mention> pattern{};     // of the sources of which one wins
+  std::optional<Mention> other_port{};  // the same source wins there, or nobody at either
 };
 
 struct ParsedStatement {

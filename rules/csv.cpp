@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "rules/utf8.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::rules {
 
@@ -17,7 +17,7 @@ void CsvReader::skip_line_end() {
 
 bool CsvReader::skip_blank_line() {
   std::size_t end = at_;
-  while (end < text_.size() && text_[end] != '\n' && is_blank(text_[end])) ++end;
+  while (end < text_.size() && text_[end] != '\n' && shm::is_blank(text_[end])) ++end;
   if (end < text_.size() && text_[end] != '\n') return false;
   at_ = end == text_.size() ? end : end + 1;
   return true;

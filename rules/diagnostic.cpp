@@ -2,30 +2,9 @@
 
 #include <algorithm>
 
+#include "shm/utf8.hpp"
+
 namespace arbiter::rules {
-namespace {
-
-bool is_control(char byte) { return static_cast<unsigned char>(byte) < 0x20 || byte == '\x7f'; }
-
-// A message cites what stands in a file. Nothing of it may begin a line of its own, which would
-// look like another finding, or have a meaning to a terminal.
-std::string in_one_line(std::string text) {
-  if (std::none_of(text.begin(), text.end(), is_control)) return text;
-  static constexpr char kDigits[] = "0123456789abcdef";
-  std::string result;
-  for (const char byte : text) {
-    if (!is_control(byte)) {
-      result += byte;
-    } else if (byte == '\n') {
-      result += "\\n";
-    } else {
-      result += {'\\', 'x', kDigits[byte >> 4 & 15], kDigits[byte & 15]};
-    }
-  }
-  return result;
-}
-
-}  // namespace
 
 void Diagnostics::silence(const std::vector<std::string>& codes) {
   const auto is_silenced = [&](Severity severity, const std::string& code) {
@@ -37,6 +16,20 @@ void Diagnostics::silence(const std::vector<std::string>& codes) {
   std::erase_if(tallies_, [&](const auto& tally) {
     return is_silenced(tally.first.first, tally.first.second);
   });
+}
+
+void Diagnostics::make_warnings_errors() {
+  Diagnostics stricter;
+  for (Diagnostic& item : items_) {
+    if (item.severity == Severity::kWarning) item.severity = Severity::kError;
+    stricter.add(std::move(item));
+  }
+  for (const Omission& omission : omissions()) {
+    const bool is_warning = omission.severity == Severity::kWarning;
+    const Severity severity = is_warning ? Severity::kError : omission.severity;
+    stricter.tallies_[{severity, omission.code}].found += omission.count;
+  }
+  *this = std::move(stricter);
 }
 
 void Diagnostics::add(Diagnostics other) {
@@ -68,10 +61,11 @@ std::size_t Diagnostics::count(Severity severity, const std::string& code) const
   return found == tallies_.end() ? 0 : found->second.found;
 }
 
-void Diagnostics::add(Severity severity, std::string code, Location where, std::string message,
-                      std::optional<Witness> witness, std::vector<Witness> more_witnesses) {
-  add({severity, std::move(code), std::move(where), in_one_line(std::move(message)),
-       std::move(witness), std::move(more_witnesses)});
+void Diagnostics::find(Diagnostic item) {
+  // A message cites what stands in a file. Nothing of it may begin a line of its own, which would
+  // look like another finding, or have a meaning to a terminal.
+  item.message = shm::printable(item.message);
+  add(std::move(item));
 }
 
 void Diagnostics::add(Diagnostic item) {

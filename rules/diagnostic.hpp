@@ -27,6 +27,18 @@ enum class Severity { kError, kWarning, kNote };
 struct Witness {
   std::vector<std::string> active;
   std::vector<std::string> inactive;
+  bool is_shortest = false;  // known to be: no conjunction of fewer literals does the same
+};
+
+// What a finding is about, for programs, which should not have to take its message apart. Empty is
+// what it does not speak of.
+struct Subject {
+  std::vector<std::string> ports{};
+  std::string source{};
+  std::string behaviour{};  // or meta-behaviour
+  std::string statement{};
+  // Who wins, or could: port and source, which is none where nobody does.
+  std::vector<std::pair<std::string, std::optional<std::string>>> winners{};
 };
 
 struct Diagnostic {
@@ -36,6 +48,7 @@ struct Diagnostic {
   std::string message;  // what is wrong, and behind the last "; " what to do
   std::optional<Witness> witness;
   std::vector<Witness> more_witnesses;  // of the same, each for itself
+  Subject about;
 };
 
 // What there is of one code beyond the bound.
@@ -53,23 +66,35 @@ class Diagnostics {
   // Nobody reads more, and a large file of nothing but mistakes must not fill the memory.
   static constexpr std::size_t kMaxOfCode = 10'000;
 
-  void error(std::string code, Location where, std::string message,
+  void error(std::string code, Location where, std::string message, Subject about = {},
              std::optional<Witness> witness = {}) {
-    add(Severity::kError, std::move(code), std::move(where), std::move(message),
-        std::move(witness));
+    find({Severity::kError,
+          std::move(code),
+          std::move(where),
+          std::move(message),
+          std::move(witness),
+          {},
+          std::move(about)});
   }
-  void warning(std::string code, Location where, std::string message) {
-    add(Severity::kWarning, std::move(code), std::move(where), std::move(message), {});
+  void warning(std::string code, Location where, std::string message, Subject about = {}) {
+    find({Severity::kWarning,
+          std::move(code),
+          std::move(where),
+          std::move(message),
+          {},
+          {},
+          std::move(about)});
   }
-  void note(std::string code, Location where, std::string message,
+  void note(std::string code, Location where, std::string message, Subject about = {},
             std::optional<Witness> witness = {}, std::vector<Witness> more_witnesses = {}) {
-    add(Severity::kNote, std::move(code), std::move(where), std::move(message), std::move(witness),
-        std::move(more_witnesses));
+    find({Severity::kNote, std::move(code), std::move(where), std::move(message),
+          std::move(witness), std::move(more_witnesses), std::move(about)});
   }
   // All that another one has, behind what is here.
   void add(Diagnostics other);
   // Without those of these codes; errors stay.
   void silence(const std::vector<std::string>& codes);
+  void make_warnings_errors();
   template <typename Before>
   void sort_by_place(const Before& is_before) {
     std::stable_sort(items_.begin(), items_.end(), [&](const Diagnostic& a, const Diagnostic& b) {
@@ -92,8 +117,7 @@ class Diagnostics {
   };
 
   // Control characters in the message are made visible.
-  void add(Severity severity, std::string code, Location where, std::string message,
-           std::optional<Witness> witness, std::vector<Witness> more_witnesses = {});
+  void find(Diagnostic item);
   void add(Diagnostic item);
 
   std::vector<Diagnostic> items_;

@@ -98,6 +98,9 @@ class DiagramBuilder {
   [[nodiscard]] Diagram low(const Diagram& a);
   [[nodiscard]] Diagram high(const Diagram& a);
 
+  // Of all operations so far.
+  [[nodiscard]] std::size_t steps() const { return budget_.spent(); }
+
   [[nodiscard]] int level_of(int variable) const;
   [[nodiscard]] std::size_t node_count(const Diagram& a) const;
   [[nodiscard]] DiagramNodes nodes(const Diagram& a);

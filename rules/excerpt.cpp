@@ -4,7 +4,7 @@
 
 #include "rules/load.hpp"
 #include "rules/text_file.hpp"
-#include "rules/utf8.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -40,13 +40,13 @@ std::vector<Character> take_apart(std::string_view line, std::size_t place,
     if (i >= place && character_at_place == std::string_view::npos) {
       character_at_place = characters.size();
     }
-    const Utf8Character character = decode_utf8(line.substr(i));
+    const shm::Utf8Character character = shm::decode_utf8(line.substr(i));
     const std::size_t length = character.length == 0 ? 1 : character.length;
     if (line[i] == '\t') {
       const std::size_t blanks = kTab - column % kTab;
       characters.push_back({std::string(blanks, ' '), blanks});
-    } else if (character.length == 0 || is_control(character.code) ||
-               is_invisible(character.code)) {
+    } else if (character.length == 0 || shm::is_control(character.code) ||
+               shm::is_invisible(character.code)) {
       characters.push_back({"\xef\xbf\xbd", 1});
     } else {
       const std::size_t columns = is_combining(character.code) ? 0

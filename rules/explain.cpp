@@ -4,9 +4,12 @@
 #include <iterator>
 #include <map>
 #include <set>
+#include <string_view>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
+#include "rules/assume.hpp"
 #include "rules/print_rules.hpp"
 #include "rules/provenance.hpp"
 #include "rules/quantifiers.hpp"
@@ -33,7 +36,7 @@ class PortInquiry {
       result.is_known = result.is_arbitrated = true;
       result.first_wins = at->first_wins;
       gather_parts();
-      for (const ConnectionRule& rule : at->rules) add(rule, result);
+      for (const ConnectionRule& rule : at->rules) add(rule, *at, result);
       add_senses(*at, result);
     }
     for (const Connection& connection : rules_.other_connections) {
@@ -56,6 +59,7 @@ class PortInquiry {
   };
   struct Voices {
     std::vector<Voice> active;
+    std::unordered_set<std::string_view> inactive;
     bool across_ports = false;
   };
   struct ConfigPlace {
@@ -77,33 +81,45 @@ class PortInquiry {
     }
   }
 
-  void add(const ConnectionRule& rule, PortExplanation& port) {
+  void add(const ConnectionRule& rule, const PortRules& rules, PortExplanation& port) {
     ConnectionExplanation result;
     result.source = rule.source;
     result.has_rule = true;
     result.is_active = is_active_(rule.source);
     result.parts = parts_of(rule);
-    result.holds =
-        result.is_active && std::any_of(result.parts.begin(), result.parts.end(),
-                                        [](const Part& part) { return part.causes.empty(); });
+    const bool may_hold = std::any_of(result.parts.begin(), result.parts.end(),
+                                      [](const Part& part) { return part.causes.empty(); });
+    result.holds = result.is_active && may_hold;
     if (result.holds && !port.winner) {
       result.wins = true;
       port.winner = rule.source;
-      winner_ = &rule;
-    } else if (result.holds) {
-      result.earlier = port.winner;
-      result.earlier_because = reason_to_hold(*winner_);
+    } else if (may_hold) {
+      add_earlier(rule, rules, result);
     }
     port.connections.push_back(std::move(result));
   }
 
-  [[nodiscard]] std::vector<Literal> reason_to_hold(const ConnectionRule& rule) const {
-    const ExpressionPtr whole =
-        make_operation(Operator::kAnd, {make_source(rule.source), rule.condition});
-    return sufficient_reason(*whole, is_active_);
+  // Where the rule's own source is active, it may end what keeps an earlier rule from holding, or
+  // what lets it: all of them are asked once more.
+  void add_earlier(const ConnectionRule& rule, const PortRules& rules,
+                   ConnectionExplanation& result) const {
+    const IsActive with_own = [&](const std::string& source) {
+      return source == rule.source || is_active_(source);
+    };
+    for (const ConnectionRule& earlier : rules.rules) {
+      if (&earlier == &rule) return;
+      if (!is_active_(earlier.source) || !evaluate(*earlier.condition, with_own)) continue;
+      result.earlier = earlier.source;
+      const ExpressionPtr whole =
+          make_operation(Operator::kAnd, {make_source(earlier.source), earlier.condition});
+      result.earlier_because = sufficient_reason(*assume_active(whole, rule.source), with_own);
+      return;
+    }
   }
 
   std::vector<Part> parts_of(const ConnectionRule& rule) {
+    own_ = &rule.source;
+    is_own_active_ = is_active_(rule.source);
     std::vector<Part> parts;
     if (rules_.provenance == nullptr) {
       parts.push_back({{}, rule.where, {}});
@@ -145,19 +161,33 @@ class PortInquiry {
   void add_condition(const ExpressionPtr& written, const std::optional<Element>& of,
                      const Location& where, Cause::Kind kind, Part& part) {
     const ExpressionPtr expanded = expansion_.expand(written);
-    if (evaluate(*expanded, is_active_)) return;
+    const ExpressionPtr left = assume_active(expanded, *own_);
+    if (evaluate(*left, is_active_)) return;
     Cause cause;
     cause.kind = kind;
     cause.where = where;
     cause.of = of;
     if (kind == Cause::Kind::kConditionFalse) cause.condition = to_string(*written);
-    cause.because = sufficient_reason(*expanded, is_active_);
+    cause.because = sufficient_reason(*left, is_active_);
+    const IsActive without_own = [this](const std::string& source) {
+      return source != *own_ && is_active_(source);
+    };
+    if (left != expanded && evaluate(*expanded, without_own)) note_own_activity(cause);
     part.causes.push_back(std::move(cause));
+  }
+
+  void note_own_activity(Cause& cause) const {
+    using OwnActivity = Cause::OwnActivity;
+    cause.own_activity = is_own_active_ ? OwnActivity::kMatters : OwnActivity::kWillMatter;
   }
 
   void add_inhibition(const Hierarchy::Inhibitor& inhibitor, std::size_t inhibited, Part& part) {
     const Voices& voices = voices_of(inhibitor.behaviour);
-    if (voices.active.empty()) return;
+    const bool is_own_a_voice =
+        voices.inactive.count(*own_) != 0 ||
+        std::any_of(voices.active.begin(), voices.active.end(),
+                    [this](const Voice& voice) { return *voice.source == *own_; });
+    if (voices.active.empty() && !is_own_a_voice) return;
     const auto& behaviours = rules_.provenance->model.behaviours;
     const Behaviour& by = behaviours[inhibitor.behaviour];
     Cause cause;
@@ -165,28 +195,39 @@ class PortInquiry {
     cause.where = by.inhibitions[inhibitor.mention].where;
     cause.of = element(behaviours[inhibited]);
     cause.inhibitor = element(by);
-    const Voice& first = voices.active.front();
-    if (first.behaviour != inhibitor.behaviour)
-      cause.speaker = element(behaviours[first.behaviour]);
     cause.across_ports = voices.across_ports;
-    cause.because = {{*first.source, true}};
-    for (const Voice& voice : voices.active) {
-      if (*voice.source != *first.source) cause.also.push_back(*voice.source);
-    }
-    std::sort(cause.also.begin(), cause.also.end());
-    cause.also.erase(std::unique(cause.also.begin(), cause.also.end()), cause.also.end());
+    add_voices(voices, inhibitor.behaviour, is_own_a_voice, cause);
     part.causes.push_back(std::move(cause));
   }
 
-  // The active ones among the sources that speak for a behaviour here: those of its behaviours at
-  // the port or, where there are none, all of them.
+  // Which sources inhibit. The connection's own is enough, where it is one of them.
+  void add_voices(const Voices& voices, std::size_t inhibitor, bool is_own_a_voice, Cause& cause) {
+    for (const Voice& voice : voices.active) {
+      if (*voice.source == *own_) continue;
+      cause.also.push_back(*voice.source);
+    }
+    if (is_own_a_voice) {
+      note_own_activity(cause);
+    } else {
+      const Voice& first = voices.active.front();
+      if (first.behaviour != inhibitor) {
+        cause.speaker = element(rules_.provenance->model.behaviours[first.behaviour]);
+      }
+      cause.because = {{*first.source, true}};
+      std::erase(cause.also, *first.source);
+    }
+    std::sort(cause.also.begin(), cause.also.end());
+    cause.also.erase(std::unique(cause.also.begin(), cause.also.end()), cause.also.end());
+  }
+
+  // The sources that speak for a behaviour here: those of its behaviours at the port or, where
+  // there are none, all of them.
   const Voices& voices_of(std::size_t behaviour) {
     const auto [found, is_new] = voices_.try_emplace(behaviour);
     Voices& result = found->second;
     if (!is_new) return result;
     const Provenance& provenance = *rules_.provenance;
-    std::vector<Voice> anywhere;
-    result.across_ports = true;
+    std::vector<Voice> here, anywhere;
     std::vector<std::size_t> pending{behaviour};
     while (!pending.empty()) {
       const std::size_t at = pending.back();
@@ -194,13 +235,17 @@ class PortInquiry {
       const auto& children = provenance.relations.children[at];
       pending.insert(pending.end(), children.rbegin(), children.rend());
       for (const Config& config : provenance.model.behaviours[at].configs) {
-        const bool is_here = config.port == port_;
-        if (is_here) result.across_ports = false;
-        if (!is_active_(config.source)) continue;
-        (is_here ? result.active : anywhere).push_back({&config.source, at});
+        (config.port == port_ ? here : anywhere).push_back({&config.source, at});
       }
     }
-    if (result.across_ports) result.active = std::move(anywhere);
+    result.across_ports = here.empty();
+    for (const Voice& voice : result.across_ports ? anywhere : here) {
+      if (is_active_(*voice.source)) {
+        result.active.push_back(voice);
+      } else {
+        result.inactive.insert(*voice.source);
+      }
+    }
     return result;
   }
 
@@ -242,7 +287,8 @@ class PortInquiry {
   std::unordered_map<std::string, const Select*> selects_;             // by source
   std::unordered_map<std::size_t, Voices> voices_;                     // by behaviour
   std::optional<std::set<std::string>> read_;                          // by any rule
-  const ConnectionRule* winner_ = nullptr;
+  const std::string* own_ = nullptr;  // source of the connection whose parts are looked at
+  bool is_own_active_ = false;
 };
 
 }  // namespace

@@ -21,14 +21,20 @@ struct Element {
 };
 
 // Something that by itself keeps a rule, or one behaviour's part of it, from holding, whatever
-// sources other than those of `because` do.
+// sources other than those of `because` do. The connection's own source counts as active in it, as
+// in each decision on an arrival, whether it is active or not: `because` does not name it.
 struct Cause {
   enum class Kind {
     kInhibited,       // `inhibitor` inhibits `of`
     kConditionFalse,  // a condition of `of`, or of a <select>
     kUnwritten,       // the rule's own text is not known; `because` is what of it does not hold
   };
+  // Whether the connection's own activity makes it so: were its source alone inactive, it would not
+  // be.
+  enum class OwnActivity { kNoMatter, kMatters, kWillMatter };  // the last: it is not active yet
+
   Kind kind = Kind::kConditionFalse;
+  OwnActivity own_activity = OwnActivity::kNoMatter;
   Location where;  // of the name in the <inhibition>, of the condition, of the <select>
 
   // Whom the inhibition names, or whose condition it is: the behaviour itself or one above it.
@@ -40,7 +46,7 @@ struct Cause {
 
   std::string condition;  // as it is written, quantifiers and all
 
-  // Enough to make it so. Empty: no activity can make the condition true.
+  // Enough to make it so. Empty: no activity of other sources can make it otherwise.
   std::vector<Literal> because;
   // Further sources that inhibit as well, each by itself.
   std::vector<std::string> also;
@@ -50,7 +56,7 @@ struct Cause {
 struct Part {
   std::optional<Element> behaviour;  // none: written by hand
   Location where;                    // of the <config> or <select>
-  std::vector<Cause> causes;         // none: it holds, if the source is active
+  std::vector<Cause> causes;         // none: it holds, or would if the source were active
 };
 
 struct ConnectionExplanation {
@@ -66,7 +72,8 @@ struct ConnectionExplanation {
   // Activities that are enough for it to lose: while these stay, it cannot win. Nothing where it
   // wins.
   [[nodiscard]] std::optional<std::vector<Literal>> reason() const;
-  // Of a connection that holds and does not win: the one before it that holds.
+  // Of a connection that holds and does not win, or would hold if it were active: the one before it
+  // that holds then.
   std::optional<std::string> earlier;
   std::vector<Literal> earlier_because;  // why that one holds
 };

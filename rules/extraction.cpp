@@ -107,10 +107,11 @@ class Extraction {
     for (const Config& config : behaviour.configs) {
       if (!seen.emplace(config.source, config.port).second) {
         if (gives_advice_) {
-          diagnostics_.warning("duplicate-config", config.where,
-                               quote(behaviour.name) + " configures the connection from " +
-                                   config.source + " to " + config.port +
-                                   " already; remove one of the two");
+          diagnostics_.warning(
+              "duplicate-config", config.where,
+              quote(behaviour.name) + " configures the connection from " + config.source + " to " +
+                  config.port + " already; remove one of the two",
+              {.ports = {config.port}, .source = config.source, .behaviour = behaviour.name});
         }
         continue;
       }
@@ -152,7 +153,8 @@ class Extraction {
     if (std::exchange(is_exhausted_, true)) return false;
     diagnostics_.error("limit-exceeded", model_.behaviours[behaviour].where,
                        "from here on, the rules of the model have more terms than the limit of " +
-                           std::to_string(kMaxRuleTerms) + " in all; use fewer inhibitions");
+                           std::to_string(kMaxRuleTerms) + " in all; use fewer inhibitions",
+                       {.behaviour = model_.behaviours[behaviour].name});
     return false;
   }
 
@@ -170,7 +172,8 @@ class Extraction {
                         quote(behaviour.name) + " inhibits " +
                             quote(model_.behaviours[inhibited].name) + " at " + *port_names_[port] +
                             " without a connection there; it does so while " + describe(voice) +
-                            " active, which is fine if it is meant so");
+                            " active, which is fine if it is meant so",
+                        {.ports = {*port_names_[port]}, .behaviour = behaviour.name});
     }
     return voice.anywhere;
   }
@@ -231,12 +234,15 @@ class Extraction {
     if (first.behaviour.empty()) {
       diagnostics_.error("duplicate-select", select.where,
                          connection + " has a rule already, at " + rules::describe(first.where) +
-                             "; join the two with 'or', or remove one");
+                             "; join the two with 'or', or remove one",
+                         {.ports = {select.port}, .source = select.source});
     } else {
-      diagnostics_.error("rule-from-both", select.where,
-                         connection + " has a rule from the behaviour " + quote(first.behaviour) +
-                             " already, at " + rules::describe(first.where) +
-                             "; keep either this <select> or that <config>");
+      diagnostics_.error(
+          "rule-from-both", select.where,
+          connection + " has a rule from the behaviour " + quote(first.behaviour) +
+              " already, at " + rules::describe(first.where) +
+              "; keep either this <select> or that <config>",
+          {.ports = {select.port}, .source = select.source, .behaviour = first.behaviour});
     }
   }
 
@@ -278,7 +284,8 @@ class Extraction {
         diagnostics_.warning("no-rule-at-port", arbiter.where,
                              "no rule selects a connection at " + arbiter.port +
                                  ", so that it is not arbitrated; write a <select> or a <config> "
-                                 "for it, or remove this");
+                                 "for it, or remove this",
+                             {.ports = {arbiter.port}});
       }
     }
     for (auto& [name, port] : ports) {

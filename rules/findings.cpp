@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -24,24 +25,29 @@ constexpr std::size_t kMaxChains = 4;
 // The states of one port in which somebody wants to win and nobody does.
 class PortFindings {
  public:
-  PortFindings(const PortRules& rules, const CompiledPort& port, Diagnostics& diagnostics)
-      : rules_(rules), port_(port), diagnostics_(diagnostics) {}
+  PortFindings(const PortRules& rules, const CompiledPort& port, const ProvedStatements& statements,
+               Diagnostics& diagnostics)
+      : rules_(rules), port_(port), statements_(statements), diagnostics_(diagnostics) {}
 
   // Throws DiagramLimit; what has been found until then holds.
   void find(Budget& budget) {
     SourceOrder order;
     order.add(port_);
+    add_sources(statements_, order);
     Winners winners(budget, order, false);
     winners_ = &winners;
     const Forget forget{*this};
     for (const auto& rule : port_.rules) {
-      Diagram wins = winners.winner(rule);
+      // Whether somebody wins does not depend on who comes first.
+      Diagram wins = winners.holds(rule);
       if (wins.is_false()) continue;
       candidates_.push_back({&rule, std::move(wins)});
     }
     find_states();
+    leave_out_stated();
     if (!nobody_.is_false()) {
       note_states();
+      if (port_.in_order) throw DiagramLimit("a diagram of each winner, and those are too large");
       note_chains();
     }
   }
@@ -72,6 +78,23 @@ class PortFindings {
     }
   }
 
+  // Of these states, those remain in which some active candidate could win and no statement would
+  // be false. In the others it is stated, in other words, that nobody wins.
+  void leave_out_stated() {
+    if (statements_.empty()) return;
+    Diagram unstated = winners_->constant(false);
+    for (const auto& each : candidates_) {
+      const Diagram active = winners_->active(each.rule->source);
+      Diagram states = winners_->combine(Connective::kAnd, nobody_, active);
+      for (const auto& statement : statements_) {
+        if (states.is_false()) break;
+        states = allowed_by(*statement, *winners_, port_, *each.rule, states);
+      }
+      unstated = winners_->combine(Connective::kOr, unstated, states);
+    }
+    nobody_ = unstated;
+  }
+
   [[nodiscard]] Location where_of(const std::string& source) const {
     for (const auto& rule : rules_.rules) {
       if (rule.source == source) return rule.where;
@@ -90,13 +113,12 @@ class PortFindings {
     }
   }
 
-  // A cause is a shortest conjunction that the causes before it leave uncovered. True: those are
-  // all.
+  // A cause is a shortest of the conjunctions that cover a state which the causes before it do not.
+  // True: those are all.
   bool find_causes(std::vector<Witness>& causes) {
     Diagram rest = nobody_;
     while (!rest.is_false() && causes.size() < kMaxCauses) {
-      Witness next = winners_->witness(rest);
-      if (!causes.empty()) next = shortened(std::move(next));
+      Witness next = winners_->witness(nobody_, rest);
       rest = winners_->combine(Connective::kAndNot, rest, states_of(next));
       causes.push_back(std::move(next));
     }
@@ -120,6 +142,7 @@ class PortFindings {
                       message +
                           "; if somebody should win then, connect it in a behaviour that "
                           "nothing keeps from running in this state",
+                      {.ports = {port_.port}, .source = losers.empty() ? "" : losers.front()},
                       witness,
                       {causes.begin() + 1, causes.begin() + static_cast<std::ptrdiff_t>(told)});
   }
@@ -142,20 +165,6 @@ class PortFindings {
       states = winners_->combine(Connective::kAndNot, states, winners_->active(name));
     }
     return states;
-  }
-
-  // What implies a part of nobody_ may imply all of it with fewer literals.
-  Witness shortened(Witness witness) {
-    for (auto* side : {&witness.active, &witness.inactive}) {
-      for (std::size_t i = side->size(); i-- > 0;) {
-        const std::string name = (*side)[i];
-        side->erase(side->begin() + static_cast<std::ptrdiff_t>(i));
-        if (winners_->combine(Connective::kAndNot, states_of(witness), nobody_).is_false())
-          continue;
-        side->insert(side->begin() + static_cast<std::ptrdiff_t>(i), name);
-      }
-    }
-    return witness;
   }
 
   // x is silenced by y, which is silenced by z: all three are active, nobody wins, x would win if
@@ -212,6 +221,7 @@ class PortFindings {
     blocked = winners_->combine(Connective::kAnd, blocked, winners_->given(y.wins, z, false));
     std::vector<std::string> names;
     std::optional<Witness> shortest;
+    bool is_known = true;  // to be a shortest of all
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
       if (blocked.is_false()) return false;
       if (!silenced[i]) continue;
@@ -220,10 +230,12 @@ class PortFindings {
           winners_->combine(Connective::kAnd, blocked, winners_->given(x->wins, by, false));
       if (states.is_false()) continue;
       const Witness witness = winners_->witness(states);
+      is_known = is_known && witness.is_shortest;
       if (!shortest || size(witness) < size(*shortest)) shortest = witness;
       names.push_back(x->rule->source);
     }
     if (!shortest) return false;
+    shortest->is_shortest = is_known;
     const std::string others = enumerate(names);
     diagnostics_.note("starved", where_of(by),
                       "at " + port_.port + ", " + by + " silences " + others + " even while " + z +
@@ -231,7 +243,7 @@ class PortFindings {
                           ", nobody wins; if " + names.front() +
                           " should win then, let no inhibition but its condition \"not " + by +
                           " or " + z + "\" keep it out",
-                      *shortest);
+                      {.ports = {port_.port}, .source = by}, *shortest);
     return true;
   }
 
@@ -241,6 +253,7 @@ class PortFindings {
 
   const PortRules& rules_;
   const CompiledPort& port_;
+  const ProvedStatements& statements_;  // that speak of the port
   Diagnostics& diagnostics_;
   Winners* winners_ = nullptr;
   std::vector<Candidate> candidates_;  // connections that can win
@@ -250,58 +263,107 @@ class PortFindings {
   std::unordered_map<std::string, Candidates> inhibited_by_;  // by source: that win only without it
 };
 
+// Where a connection is written: its rule or, where it has none, in the application.
+class Places {
+ public:
+  explicit Places(const RuleSet& rules) {
+    for (const auto& port : rules.ports) {
+      for (const auto& rule : port.rules)
+        of_rules_.emplace(Key(rule.source, port.port), &rule.where);
+    }
+    for (const auto& each : rules.other_connections) {
+      of_others_.emplace(Key(each.source, each.port), &each.where);
+    }
+  }
+  // Null where the connection has no rule, or is none of the application's.
+  [[nodiscard]] const Location* of_rule(const std::string& source, const std::string& port) const {
+    return find(of_rules_, source, port);
+  }
+  [[nodiscard]] const Location* in_application(const std::string& source,
+                                               const std::string& port) const {
+    return find(of_others_, source, port);
+  }
+
+ private:
+  using Key = std::pair<std::string_view, std::string_view>;
+  using Map = std::map<Key, const Location*>;
+
+  static const Location* find(const Map& places, const std::string& source,
+                              const std::string& port) {
+    const auto found = places.find(Key(source, port));
+    return found == places.end() ? nullptr : found->second;
+  }
+
+  Map of_rules_;
+  Map of_others_;
+};
+
 // Sources that are connected to arbitrated ports only, and win at none of them. Where it is one
-// connection with a rule, compile() has said so.
+// connection with a rule, compile() has said so. Told at the first rule of the source, for that can
+// be mended; if it has none, at its first connection in the application.
 void warn_of_losers(const RuleSet& rules, const CompiledModel& model, Diagnostics& diagnostics) {
   struct Losing {
     std::vector<std::string> ports;
     bool wins = false;
     bool lacks_rule = false;
-    Location where;
+    const Location* of_rule = nullptr;
+    const Location* in_application = nullptr;
   };
+  const Places places(rules);
   std::map<std::string, Losing> sources;
-  std::map<std::string, const PortRules*> by_name;
-  for (const auto& port : rules.ports) by_name.emplace(port.port, &port);
   for (const auto& port : model.ports) {
-    const auto found = by_name.find(port.port);
     for (const auto& rule : port.rules) {
       Losing& source = sources[rule.source];
       source.wins = source.wins || rule.kind != shm::table::kNever;
       source.ports.push_back(port.port);
-      if (found == by_name.end() || rule.kind != shm::table::kNever) continue;
-      const auto& written = found->second->rules;
-      const auto own = std::find_if(written.begin(), written.end(),
-                                    [&](const auto& each) { return each.source == rule.source; });
-      source.lacks_rule = source.lacks_rule || own == written.end();
-      source.where = own == written.end() ? found->second->where : own->where;
+      const Location* const own = places.of_rule(rule.source, port.port);
+      source.lacks_rule = source.lacks_rule || own == nullptr;
+      if (source.of_rule == nullptr) source.of_rule = own;
+      if (source.in_application == nullptr) {
+        source.in_application = places.in_application(rule.source, port.port);
+      }
     }
   }
   for (const auto& [source, losing] : sources) {
     if (losing.wins || (losing.ports.size() == 1 && !losing.lacks_rule)) continue;
-    diagnostics.warning("never-wins", losing.where,
+    const Location* const where =
+        losing.of_rule != nullptr ? losing.of_rule : losing.in_application;
+    diagnostics.warning("never-wins", where == nullptr ? Location() : *where,
                         source + " is connected to " + enumerate(losing.ports) +
                             ", and there is no state in which it wins anywhere" +
                             (losing.lacks_rule ? ", partly since no rule selects it" : "") +
-                            "; give it a behaviour that can run, or remove its connections");
+                            "; give it a behaviour that can run, or remove its connections",
+                        {.ports = losing.ports, .source = source});
   }
 }
 
-// With all their names: whoever wants to know of one looks for it here.
-void note_open(const std::vector<std::string>& ports, const std::string& limit,
-               const Location& where, Diagnostics& diagnostics) {
-  std::string names;
-  for (const auto& port : ports) names += (names.empty() ? "" : ", ") + port;
-  diagnostics.note("left-open", where,
-                   "not all states in which nobody wins were looked at, at " +
-                       std::to_string(ports.size()) + (ports.size() == 1 ? " port (" : " ports (") +
-                       names + "): it takes " + limit +
-                       "; the model is in order, this is only not known: --effort allows more");
+// Throws DiagramLimit. What the statements cover may be too hard to find out; then they quiet
+// nothing.
+void look_at(const PortRules& rules, const CompiledPort& port, const ProvedStatements& statements,
+             Diagnostics& diagnostics, Budget& budget) {
+  ProvedStatements own;
+  for (const auto& statement : statements) {
+    if (speaks_of(*statement, port)) own.push_back(statement);
+  }
+  if (!own.empty()) {
+    try {
+      Diagnostics found;
+      const Budget::Part part(budget, budget.left() / 2);
+      PortFindings(rules, port, own, found).find(budget);
+      diagnostics.add(std::move(found));
+      return;
+    } catch (const DiagramLimit&) {
+      own.clear();
+    }
+  }
+  PortFindings(rules, port, own, diagnostics).find(budget);
 }
 
 }  // namespace
 
 FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
-                          Diagnostics& diagnostics, Budget& budget) {
+                          Diagnostics& diagnostics, Budget& budget,
+                          const ProvedStatements& statements) {
   warn_of_losers(rules, model, diagnostics);
   std::map<std::string, const CompiledPort*> compiled;
   for (const auto& port : model.ports) compiled.emplace(port.port, &port);
@@ -321,30 +383,35 @@ FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
     question.found = {};
     question.limit.clear();
     try {
-      PortFindings(*question.rules, *question.port, question.found).find(budget);
+      look_at(*question.rules, *question.port, statements, question.found, budget);
+    } catch (const StepLimit& limit) {
+      question.limit = limit.what();
+      throw;
     } catch (const DiagramLimit& limit) {
       question.limit = limit.what();
-      if (dynamic_cast<const StepLimit*>(&limit) != nullptr) throw;
     }
   };
   share_out(
       budget, "looking for states in which nobody wins", questions.size(),
       [&](std::size_t i) { return questions[i].rules->port; }, ask);
   FindingsAccount account{questions.size(), 0};
-  std::vector<std::string> open;
-  std::string limit;
-  Location where;
+  std::vector<std::string> open;  // ports
+  std::string why_open;           // of the first
+  Location first_open;
   for (Question& question : questions) {
     diagnostics.add(std::move(question.found));
     if (question.limit.empty()) continue;
-    if (open.empty()) {
-      limit = question.limit;
-      where = question.rules->where;
-    }
+    if (open.empty()) first_open = question.rules->where, why_open = question.limit;
     open.push_back(question.rules->port);
   }
   account.open = open.size();
-  if (!open.empty()) note_open(open, limit, where, diagnostics);
+  if (open.empty()) return account;
+  const std::string first = open.size() > 1 ? "at " + open.front() + ", " : "";
+  const std::string message = "not all states in which nobody wins at " + enumerate(open) +
+                              " were looked at: " + first + "it takes " + why_open +
+                              "; the model is in order, this is only not known: --effort allows "
+                              "more";
+  diagnostics.note("left-open", first_open, message, {.ports = std::move(open)});
   return account;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "rules/compile.hpp"
+#include "rules/in_order.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -38,6 +39,9 @@ std::size_t words_in_lists(const CompiledModel& model) {
       words +=
           table::kConnectionWords + 1 + rule.reads.size() + rule.nodes.size() * table::kNodeWords;
     }
+    if (port.in_order) {
+      words += shm::kMaxSourcesPerPort + nodes_in_order(port) * table::kNodeWords;
+    }
   }
   for (const auto& [source, ports] : ports_concerned(model)) words += ports.size();
   return words;
@@ -56,13 +60,16 @@ class Flattener {
   void write_header();
   void write_sources();
   void write_ports();
-  void write_rule(Word record, const CompiledRule& rule, shm::PortId port);
+  void write_rules(const CompiledPort& port, shm::PortId id, Word first_connection);
+  void write_rule(Word record, const CompiledRule& rule);
   void write_span(Word at, shm::Nanoseconds span);
 
   // Opens a list at the table's end: writes {first, count} into the record's field.
   void begin_list(Word field, std::size_t count);
   // Writes a list, or leads to an equal one: rules that are the same are seen to be.
-  void share_list(Word field, std::size_t count, const std::vector<Word>& list);
+  Word share(const std::vector<Word>& list);
+  Word share(const std::vector<CompiledRule::Node>& nodes);
+  void refer(Word field, Word first, std::size_t count);
   void append(Word word) { words_.push_back(word); }
 
   const CompiledModel& model_;
@@ -139,11 +146,21 @@ void Flattener::begin_list(Word field, std::size_t count) {
   words_[field + 1] = to_word(count);
 }
 
-void Flattener::share_list(Word field, std::size_t count, const std::vector<Word>& list) {
+Word Flattener::share(const std::vector<Word>& list) {
   const auto [known, is_new] = shared_.try_emplace(list, to_word(words_.size()));
-  words_[field] = known->second;
-  words_[field + 1] = to_word(count);
   if (is_new) words_.insert(words_.end(), list.begin(), list.end());
+  return known->second;
+}
+
+Word Flattener::share(const std::vector<CompiledRule::Node>& nodes) {
+  std::vector<Word> list;
+  for (const auto& node : nodes) list.insert(list.end(), {node.position, node.low, node.high});
+  return share(list);
+}
+
+void Flattener::refer(Word field, Word first, std::size_t count) {
+  words_[field] = first;
+  words_[field + 1] = to_word(count);
 }
 
 void Flattener::write_ports() {
@@ -157,28 +174,51 @@ void Flattener::write_ports() {
     words_[record + table::kPortConnectionCount] = to_word(port.rules.size());
     begin_list(record + table::kFirstPortRead, port.reads.size());
     for (const auto& source : port.reads) append(source_id(source));
-    for (const auto& rule : port.rules) {
-      links_[rule.source].push_back(connection);
-      write_rule(connections_ + connection * table::kConnectionWords, rule, id);
-      ++connection;
-    }
+    write_rules(port, id, connection);
+    for (const auto& rule : port.rules) links_[rule.source].push_back(connection++);
   }
 }
 
-void Flattener::write_rule(Word record, const CompiledRule& rule, shm::PortId port) {
-  words_[record + table::kConnectionSource] = source_id(rule.source);
-  words_[record + table::kConnectionPort] = port;
+void Flattener::write_rules(const CompiledPort& port, shm::PortId id, Word first_connection) {
+  InOrder in_order;
+  Word first_read = 0, first_node = 0;
+  if (port.in_order) {
+    in_order = put_in_order(port);
+    std::vector<Word> reads;
+    for (const auto& read : in_order.reads) reads.push_back(source_id(read));
+    first_read = share(reads);
+    first_node = share(in_order.nodes);
+  }
+  for (std::size_t i = 0; i < port.rules.size(); ++i) {
+    const CompiledRule& rule = port.rules[i];
+    const Word record =
+        connections_ + (first_connection + to_word(i)) * Word{table::kConnectionWords};
+    words_[record + table::kConnectionSource] = source_id(rule.source);
+    words_[record + table::kConnectionPort] = id;
+    words_[record + table::kBefore] = table::kTrue;
+    if (!port.in_order || rule.kind == table::kNever ||
+        in_order.entries[i].before == table::kTrue) {
+      write_rule(record, rule);
+      continue;
+    }
+    const InOrder::Entry& entry = in_order.entries[i];
+    words_[record + table::kRuleKind] = table::kInOrder;
+    words_[record + table::kRoot] = entry.root;
+    words_[record + table::kBefore] = entry.before;
+    refer(record + table::kFirstRead, first_read, entry.reads);
+    refer(record + table::kFirstNode, first_node, in_order.nodes.size());
+  }
+}
+
+void Flattener::write_rule(Word record, const CompiledRule& rule) {
   words_[record + table::kRuleKind] = rule.kind;
   std::vector<Word> reads;
   for (std::size_t i = 0; i < rule.reads.size(); ++i) {
     const bool expect_active = rule.kind == table::kConjunction && rule.expected[i];
     reads.push_back(source_id(rule.reads[i]) | (expect_active ? table::kExpectActive : Word{0}));
   }
-  share_list(record + table::kFirstRead, rule.reads.size(), reads);
-  std::vector<Word> nodes;
-  for (const auto& node : rule.nodes)
-    nodes.insert(nodes.end(), {node.position, node.low, node.high});
-  share_list(record + table::kFirstNode, rule.nodes.size(), nodes);
+  refer(record + table::kFirstRead, share(reads), rule.reads.size());
+  refer(record + table::kFirstNode, share(rule.nodes), rule.nodes.size());
 }
 
 void Flattener::write_sources() {

@@ -16,7 +16,8 @@ Hierarchy::Hierarchy(const Model& model, Diagnostics& diagnostics)
       adoptions_(model.behaviours.size(), nullptr),
       misplaced_(model.behaviours.size(), false),
       children_(model.behaviours.size()),
-      inhibitors_(model.behaviours.size()) {
+      inhibitors_(model.behaviours.size()),
+      doubts_(model.behaviours.size()) {
   index_names();
   adopt_children();
   cut_cycles();
@@ -36,11 +37,19 @@ void Hierarchy::index_names() {
     const auto [first, is_new] = by_name_.try_emplace(behaviour.name, b);
     if (is_new) continue;
     misplaced_[b] = true;
+    doubt_place(b);
+    doubt_place(first->second);
     diagnostics_.error("duplicate-name", behaviour.where,
                        "the name " + quote(behaviour.name) + " is taken already, at " +
                            describe(model_.behaviours[first->second].where) +
-                           "; rename or remove one");
+                           "; rename or remove one",
+                       {.behaviour = behaviour.name});
   }
+}
+
+// What is above it is in doubt, and what those that contain it have.
+void Hierarchy::doubt_place(std::size_t behaviour) {
+  doubts_[behaviour].of_rule = doubts_[behaviour].of_parts = true;
 }
 
 std::size_t Hierarchy::look_up(const Mention& mention) const {
@@ -53,22 +62,35 @@ std::size_t Hierarchy::look_up(const Mention& mention) const {
   }
   diagnostics_.error("unknown-name", mention.where,
                      "no behaviour has the name " + quote(mention.name) +
-                         advise(mention.name, known, "define it, or correct the name"));
+                         advise(mention.name, known, "define it, or correct the name"),
+                     {.behaviour = mention.name});
   return kNobody;
 }
 
 void Hierarchy::adopt_children() {
   for (std::size_t meta = 0; meta < model_.behaviours.size(); ++meta) {
-    if (misplaced_[meta]) continue;  // the second one of its name
-    for (const Mention& mention : model_.behaviours[meta].children) {
+    const auto& mentions = model_.behaviours[meta].children;
+    if (misplaced_[meta]) {  // the second one of its name
+      for (const Mention& mention : mentions) {
+        const auto child = by_name_.find(mention.name);
+        if (child != by_name_.end()) doubt_place(child->second);
+      }
+      continue;
+    }
+    for (const Mention& mention : mentions) {
       const std::size_t child = look_up(mention);
-      if (child == kNobody) continue;
+      if (child == kNobody) {
+        doubts_[meta].of_parts = true;
+        continue;
+      }
       if (parents_[child] == kNobody) {
         parents_[child] = meta;
         adoptions_[child] = &mention;
         continue;
       }
       misplaced_[child] = true;
+      doubt_place(child);
+      doubts_[meta].of_parts = true;
       const bool is_same = parents_[child] == meta;
       diagnostics_.error(
           "two-parents", mention.where,
@@ -76,7 +98,8 @@ void Hierarchy::adopt_children() {
               (is_same ? "this meta-behaviour" : quote(model_.behaviours[parents_[child]].name)) +
               " already, at " + describe(adoptions_[child]->where) +
               (is_same ? "; remove one of the two"
-                       : "; a behaviour is in one meta-behaviour at most, remove it from one"));
+                       : "; a behaviour is in one meta-behaviour at most, remove it from one"),
+          {.behaviour = mention.name});
     }
   }
 }
@@ -114,10 +137,12 @@ void Hierarchy::cut_cycle(std::size_t start) {
   }
   const std::size_t first_child = members.back();
   diagnostics_.error("cycle", adoptions_[first_child]->where,
-                     "no meta-behaviour can contain itself: " + path + "; remove one of these");
+                     "no meta-behaviour can contain itself: " + path + "; remove one of these",
+                     {.behaviour = model_.behaviours[members.front()].name});
   for (const std::size_t member : members) {
     parents_[member] = kNobody;
     misplaced_[member] = true;
+    doubt_place(member);
   }
 }
 
@@ -139,9 +164,11 @@ void Hierarchy::check_depth() {
       diagnostics_.error("limit-exceeded", adoptions_[child]->where,
                          quote(model_.behaviours[child].name) +
                              " is inside more meta-behaviours than the limit of " +
-                             std::to_string(kMaxMetaDepth) + "; nest them less deeply");
+                             std::to_string(kMaxMetaDepth) + "; nest them less deeply",
+                         {.behaviour = model_.behaviours[child].name});
       parents_[child] = kNobody;  // and the rest below it is not looked at
       misplaced_[child] = true;
+      doubt_place(child);
     }
   }
 }
@@ -152,8 +179,13 @@ void Hierarchy::link_inhibitions() {
     std::unordered_set<std::size_t> named;
     for (std::size_t m = 0; m < mentions.size(); ++m) {
       const std::size_t inhibited = look_up(mentions[m]);
+      if (inhibited == kNobody) doubts_[b].of_inhibitions = true;
       if (inhibited == kNobody || !named.insert(inhibited).second) continue;
-      if (may_inhibit(b, inhibited, mentions[m])) inhibitors_[inhibited].push_back({b, m});
+      if (may_inhibit(b, inhibited, mentions[m])) {
+        inhibitors_[inhibited].push_back({b, m});
+      } else {
+        doubts_[inhibited].of_rule = true;
+      }
     }
   }
 }
@@ -163,12 +195,12 @@ std::string Hierarchy::describe_place(std::size_t behaviour) const {
   return "is in " + quote(model_.behaviours[parents_[behaviour]].name);
 }
 
-bool Hierarchy::may_inhibit(std::size_t inhibitor, std::size_t inhibited,
-                            const Mention& mention) const {
+bool Hierarchy::may_inhibit(std::size_t inhibitor, std::size_t inhibited, const Mention& mention) {
   const std::string& name = model_.behaviours[inhibitor].name;
   if (inhibitor == inhibited || name == mention.name) {
     diagnostics_.error("self-inhibition", mention.where,
-                       quote(name) + " inhibits itself; remove this name");
+                       quote(name) + " inhibits itself; remove this name", {.behaviour = name});
+    doubts_[inhibitor].of_inhibitions = true;  // another one may be meant
     return false;
   }
   if (misplaced_[inhibitor] || misplaced_[inhibited]) return false;
@@ -179,7 +211,8 @@ bool Hierarchy::may_inhibit(std::size_t inhibitor, std::size_t inhibited,
                      quote(name) + " cannot inhibit " + quote(mention.name) +
                          ", for only behaviours in the same meta-behaviour can: the one " +
                          describe_place(inhibitor) + ", the other " + describe_place(inhibited) +
-                         "; let siblings inhibit each other, or move one of the two");
+                         "; let siblings inhibit each other, or move one of the two",
+                     {.behaviour = name});
   return false;
 }
 
@@ -189,12 +222,14 @@ void Hierarchy::check_emptiness() const {
     if (behaviour.is_meta && behaviour.children.empty()) {
       diagnostics_.warning("no-children", behaviour.where,
                            "the meta-behaviour " + quote(behaviour.name) +
-                               " contains nothing; name its behaviours with <behavior>");
+                               " contains nothing; name its behaviours with <behavior>",
+                           {.behaviour = behaviour.name});
     }
     if (!behaviour.is_meta && behaviour.configs.empty()) {
       diagnostics_.warning("no-config", behaviour.where,
                            "the behaviour " + quote(behaviour.name) +
-                               " selects no connection; write a <config> for each one");
+                               " selects no connection; write a <config> for each one",
+                           {.behaviour = behaviour.name});
     }
   }
 }

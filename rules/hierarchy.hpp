@@ -25,6 +25,13 @@ class Hierarchy {
     std::size_t mention;    // in its list of inhibitions
   };
 
+  // What of a behaviour may be meant otherwise, for something wrong was found about it.
+  struct Doubt {
+    bool of_rule = false;         // what is above it, or inhibits it
+    bool of_inhibitions = false;  // which of its siblings it inhibits
+    bool of_parts = false;        // what it contains
+  };
+
   // What is found out, by behaviour.
   struct Relations {
     std::vector<std::size_t> parents;  // or kNobody
@@ -42,6 +49,7 @@ class Hierarchy {
   [[nodiscard]] const std::vector<Inhibitor>& inhibitors(std::size_t behaviour) const {
     return inhibitors_[behaviour];
   }
+  [[nodiscard]] const Doubt& doubt(std::size_t behaviour) const { return doubts_[behaviour]; }
   // All of it, for those who keep it beyond the life of this.
   [[nodiscard]] Relations release() && {
     return {std::move(parents_), std::move(children_), std::move(inhibitors_)};
@@ -56,7 +64,8 @@ class Hierarchy {
   void link_inhibitions();
   void check_emptiness() const;
   [[nodiscard]] bool may_inhibit(std::size_t inhibitor, std::size_t inhibited,
-                                 const Mention& mention) const;
+                                 const Mention& mention);
+  void doubt_place(std::size_t behaviour);
   // The behaviour of that name; kNobody, reported, if there is none.
   [[nodiscard]] std::size_t look_up(const Mention& mention) const;
   [[nodiscard]] std::string describe_place(std::size_t behaviour) const;
@@ -70,6 +79,7 @@ class Hierarchy {
   bool lacks_parents_ = false;             // what was refused may have been the parent of anything
   std::vector<std::vector<std::size_t>> children_;
   std::vector<std::vector<Inhibitor>> inhibitors_;
+  std::vector<Doubt> doubts_;
 };
 
 }  // namespace arbiter::rules

@@ -9,11 +9,13 @@
 #include "rules/application_reader.hpp"
 #include "rules/defines.hpp"
 #include "rules/document_order.hpp"
+#include "rules/doubt.hpp"
 #include "rules/extraction.hpp"
 #include "rules/hierarchy.hpp"
 #include "rules/model.hpp"
 #include "rules/model_checks.hpp"
 #include "rules/model_reader.hpp"
+#include "rules/name_checks.hpp"
 #include "rules/provenance.hpp"
 #include "rules/text_file.hpp"
 
@@ -70,6 +72,13 @@ LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
   if (application) check_application(*application, loaded.model, rules, found);
   const Location whole{paths.empty() ? "" : paths.front(), 1, 1};
   check_limits(rules, application ? &*application : nullptr, whole, order, found);
+  if (found.has_errors()) {
+    const Doubts doubts = find_doubts(loaded.model, hierarchy, found);
+    for (PortRules& port : rules.ports) port.is_doubtful = doubts.about(port.port);
+  } else {
+    check_names(loaded.model, application, rules, order, found);
+    note_commands_forever(loaded.model, rules, whole, found);
+  }
   // Checks go through a model in various orders; the reader of their findings goes through files.
   found.sort_by_place(order);
   diagnostics.add(std::move(found));

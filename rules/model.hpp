@@ -9,15 +9,10 @@
 
 #include "rules/diagnostic.hpp"
 #include "rules/expression.hpp"
+#include "rules/name_uses.hpp"
 #include "shm/activity.hpp"
 
 namespace arbiter::rules {
-
-// A name that is used somewhere.
-struct Mention {
-  std::string name;
-  Location where;
-};
 
 struct Condition {
   ExpressionPtr expression;
@@ -43,6 +38,9 @@ struct Behaviour {
   std::vector<Mention> inhibitions;
   // Some part of it was refused, and is missing above: what seems to lack may not.
   bool is_incomplete = false;
+  // Of these parts: some inhibition, some <config> or child.
+  bool lacks_inhibitions = false;
+  bool lacks_parts = false;
 };
 
 // A rule written by hand.
@@ -58,7 +56,7 @@ struct Arbiter {
   std::string port;
   Location where;
   bool first_wins = false;
-  bool is_incomplete = false;
+  bool is_incomplete = false;  // some rule of it, or what conflict= says
 };
 
 struct SourceDeclaration {
@@ -78,10 +76,17 @@ struct Model {
   std::vector<Arbiter> arbiters;
   std::vector<Select> selects;
 
+  NameUses source_uses;
+  NameUses port_uses;  // of input ports
+
   // Names of elements that were refused as a whole. Mentions of them are no further mistakes.
   std::set<std::string> refused_names;
   // Something was refused whose name cannot even be told, so that any name may belong to it.
   bool has_unknown_gaps = false;
+  // Something was refused that may have named a source, so that quantifiers may range over more.
+  bool lacks_sources = false;
+  // An <arbiter> was refused whose port cannot be told.
+  bool lacks_arbiters = false;
 
   std::size_t next_order = 0;
 };

@@ -94,7 +94,7 @@ class LimitCheck {
     }
     report(sources.size(), shm::kMaxSourcesPerPort,
            "sources at " + std::string(name) + ", connected or read by its rules", *where,
-           "connect and mention fewer there");
+           "connect and mention fewer there", {.ports = {std::string(name)}});
   }
 
   // At the first connection that is one too many.
@@ -105,11 +105,12 @@ class LimitCheck {
   }
 
   void report(std::size_t count, std::size_t limit, const std::string& what, const Location& where,
-              const std::string& advice) {
+              const std::string& advice, Subject about = {}) {
     if (count <= limit) return;
     diagnostics_.error("limit-exceeded", where,
                        "there are " + std::to_string(count) + ' ' + what +
-                           ", more than the limit of " + std::to_string(limit) + "; " + advice);
+                           ", more than the limit of " + std::to_string(limit) + "; " + advice,
+                       std::move(about));
   }
 
   const RuleSet& rules_;
@@ -198,7 +199,8 @@ class UnpublishedSources {
             "active" +
             (meant ? "; did you mean " + quote(*meant) + "?"
                    : std::string("; correct the name, or add the module whose <prefix> or <name> "
-                                 "it begins with")));
+                                 "it begins with")),
+        {.ports = {port}, .source = std::string(source)});
   }
 
   Diagnostics& diagnostics_;
@@ -248,7 +250,8 @@ void check_sources(const Model& model, Diagnostics& diagnostics) {
     if (is_new) continue;
     diagnostics.error("duplicate-source", source.where,
                       "the source " + source.name + " is declared already, at " +
-                          describe(first->second->where) + "; remove one of the two");
+                          describe(first->second->where) + "; remove one of the two",
+                      {.source = source.name});
   }
 }
 
@@ -267,7 +270,8 @@ void check_application(const Application& application, const Model& model, RuleS
       diagnostics.error("not-in-application", rule.where,
                         "the application has no connection from " + rule.source + " to " +
                             port.port + "; add it there, or correct the names here" +
-                            ends.ask(rule.source, port.port));
+                            ends.ask(rule.source, port.port),
+                        {.ports = {port.port}, .source = rule.source, .behaviour = rule.behaviour});
     }
   }
   if (!application.prefixes.empty() && !application.is_incomplete) {

@@ -7,6 +7,7 @@
 
 #include "rules/proof.hpp"
 #include "rules/state_count.hpp"
+#include "rules/state_search.hpp"
 #include "rules/winners.hpp"
 
 namespace arbiter::rules {
@@ -29,6 +30,15 @@ const CompiledRule* find_rule(const CompiledPort& port, const std::string& sourc
   return found == port.rules.end() ? nullptr : &*found;
 }
 
+// Whether a connection obviously wins in the same states of both. Where rules are decided in order,
+// those before it have a part in that.
+bool wins_alike(const CompiledPort& a, const CompiledRule& of_a, const CompiledPort& b,
+                const CompiledRule& of_b) {
+  if (!a.in_order && !b.in_order) return is_same(of_a, of_b);
+  return a.in_order && b.in_order &&
+         std::equal(a.rules.data(), &of_a + 1, b.rules.data(), &of_b + 1, is_same);
+}
+
 // The states of one port that both models arbitrate.
 //
 // Connections whose function is the same in both are left out: the others of either model exclude
@@ -49,22 +59,24 @@ class PortComparison {
     gather_candidates();
     if (candidates_.empty()) return;
     try {
+      const Budget::Part part(budget, steps_at_once(budget));
       Winners winners(budget, order);
       const Release release{*this};
       winners_ = &winners;
       budget_ = &budget;
       count_pairs();
       add_examples();
+    } catch (const StepLimit& limit) {
+      search(budget, limit.what());
+      throw;
     } catch (const DiagramLimit& limit) {
-      result_.changes.clear();
-      result_.states = "0";
-      result_.open = limit.what();
-      if (dynamic_cast<const StepLimit*>(&limit) != nullptr) throw;
+      search(budget, limit.what());
     }
   }
 
  private:
   struct Side {
+    const CompiledPort* port = nullptr;
     const CompiledRule* rule = nullptr;
     Diagram wins;
     StateCount states = 0;
@@ -81,15 +93,68 @@ class PortComparison {
     StateCount states;
   };
 
+  // Rules are decided in order because their diagrams are too large: little hope for these here.
+  // A part is left for the search.
+  [[nodiscard]] std::uint64_t steps_at_once(const Budget& budget) const {
+    constexpr std::uint64_t kMostInOrder = 500'000;
+    const std::uint64_t most = budget.left() / 4 * 3;
+    return before_.in_order || after_.in_order ? std::min(most, kMostInOrder) : most;
+  }
+
+  // State by state: one in which the winners differ, then one in which another pair of them does.
+  void search(Budget& budget, const std::string& limit) {
+    result_.changes.clear();
+    result_.states = "0";
+    const int max_steps = StateSearch::steps_within(budget.left());
+    StateSearch search(max_steps);
+    const auto before = search.winners(before_), after = search.winners(after_);
+    search.require_any({-before.nobody, -after.nobody});
+    for (std::size_t i = 0; i < before_.rules.size(); ++i) {
+      const CompiledRule* twin = find_rule(after_, before_.rules[i].source);
+      if (twin == nullptr) continue;
+      const auto place = static_cast<std::size_t>(twin - after_.rules.data());
+      search.require_any({-before.wins[i], -after.wins[place]});
+    }
+    auto answer = StateSearch::Answer::kOpen;
+    while (result_.changes.size() < kMaxExamples) {
+      answer = search.find({});
+      if (answer != StateSearch::Answer::kYes) break;
+      ModelDiff::Change change;
+      const auto pair = search.all_of({winner_found(search, before, before_, change.before),
+                                       winner_found(search, after, after_, change.after)});
+      change.example = search.witness(pair);
+      result_.changes.push_back(std::move(change));
+      search.require_any({-pair});
+    }
+    budget.note(StateSearch::budget_of(max_steps - search.steps_left()));
+    result_.is_complete = answer == StateSearch::Answer::kNo;
+    result_.is_counted = result_.is_complete && result_.changes.empty();
+    if (!result_.is_complete && result_.changes.empty()) result_.open = limit;
+  }
+
+  // That the one wins who does in the state that was found.
+  static StateSearch::Proposition winner_found(const StateSearch& search,
+                                               const StateSearch::Port& winners,
+                                               const CompiledPort& port,
+                                               std::optional<std::string>& name) {
+    for (std::size_t i = 0; i < winners.wins.size(); ++i) {
+      if (!search.is_so(winners.wins[i])) continue;
+      name = port.rules[i].source;
+      return winners.wins[i];
+    }
+    return winners.nobody;
+  }
+
   void gather_candidates() {
     std::map<std::string, std::size_t> index;
     const auto add = [&](const CompiledPort& port, Side Candidate::*side,
                          const CompiledPort& other) {
       for (const auto& rule : port.rules) {
         const CompiledRule* twin = find_rule(other, rule.source);
-        if (twin != nullptr && is_same(rule, *twin)) continue;
+        if (twin != nullptr && wins_alike(port, rule, other, *twin)) continue;
         const auto [found, is_new] = index.emplace(rule.source, candidates_.size());
         if (is_new) candidates_.push_back({rule.source, {}, {}});
+        (candidates_[found->second].*side).port = &port;
         (candidates_[found->second].*side).rule = &rule;
       }
     };
@@ -105,7 +170,7 @@ class PortComparison {
 
   void build(Side& side) {
     if (side.rule == nullptr) return;
-    side.wins = winners_->winner(*side.rule);
+    side.wins = winners_->winner(*side.port, *side.rule);
     if (result_.sources > VariableSet().size()) return;
     side.implied = implied_literals(winners_->nodes(side.wins));
   }
@@ -289,7 +354,7 @@ ModelDiff diff(const CompiledModel& before, const CompiledModel& after, Budget& 
       [&](std::size_t i) { return compared[questions[i].first].port; },
       [&](std::size_t i) {
         const auto& [port, sides] = questions[i];
-        compared[port].open.clear();
+        compared[port] = outline(compared[port].port, sides.first, sides.second);
         PortComparison(*sides.first, *sides.second, compared[port]).compare(budget);
       });
   ModelDiff result;

@@ -1,5 +1,5 @@
 // In which states two models decide differently: proved over all states of the sources, counted
-// exactly, and shown by shortest examples.
+// exactly, and shown by examples.
 //
 // Two models decide alike iff their connections are the same, the same ports are arbitrated, the
 // same connection wins in every state, and each source stays active for as long. What behaviours
@@ -25,8 +25,8 @@ struct ModelDiff {
   // All states in which `before` wins in the one model, and `after` in the other.
   struct Change {
     std::optional<std::string> before, after;  // winners; none: nobody wins
-    std::string states;                        // how many, decimal and exact, of PortDiff::of
-    std::optional<Witness> example;            // a shortest; none if a bound was met
+    std::string states;              // how many, decimal and exact, of PortDiff::of; if counted
+    std::optional<Witness> example;  // none if a bound was met
   };
 
   struct PortDiff {
@@ -42,6 +42,10 @@ struct ModelDiff {
     std::string states = "0";     // in which different connections win, decimal and exact
     std::string of = "0";         // 2^sources
     std::vector<Change> changes;  // most states first
+    // Where the diagrams are too large, states of change are searched one by one. Then they are not
+    // counted, and there may be more changes than those found.
+    bool is_counted = true;
+    bool is_complete = true;
     std::string open;  // why no proof was found, and `states` is not known; empty if one was
 
     // In what is decided; conflict="first" by itself is none.

@@ -32,9 +32,9 @@ std::string states_text(const std::string& states) {
 }
 
 void write_change(std::ostream& out, const ModelDiff::Change& change) {
-  out << "  " << winner_name(change.before) << " -> " << winner_name(change.after) << ": "
-      << states_text(change.states);
-  if (change.example) out << ", such as with " << in_words(*change.example);
+  out << "  " << winner_name(change.before) << " -> " << winner_name(change.after) << ": ";
+  if (!change.states.empty()) out << states_text(change.states) << (change.example ? ", " : "");
+  if (change.example) out << "such as with " << in_words(*change.example);
   out << '\n';
 }
 
@@ -44,8 +44,13 @@ void write_states(std::ostream& out, const PortDiff& port) {
     return;
   }
   if (port.changes.empty()) return;
-  out << "  decides differently in " << port.states << " of 2^" << port.sources << " = " << port.of
-      << " states\n";
+  if (port.is_counted) {
+    out << "  decides differently in " << port.states << " of 2^" << port.sources << " = "
+        << port.of << " states\n";
+  } else {
+    out << "  decides differently in some of 2^" << port.sources
+        << " states, which are too entangled to be counted\n";
+  }
   for (std::size_t i = 0; i < std::min(port.changes.size(), kMaxChangesShown); ++i) {
     write_change(out, port.changes[i]);
   }
@@ -53,6 +58,8 @@ void write_states(std::ostream& out, const PortDiff& port) {
     out << "  and " << port.changes.size() - kMaxChangesShown
         << " more pairs of winners; --json has them all\n";
   }
+  if (!port.is_complete)
+    out << "  other pairs of winners may differ, too: not all were looked at\n";
 }
 
 void write_port(std::ostream& out, const PortDiff& port) {
@@ -142,11 +149,13 @@ void write_json(std::ostream& out, const ModelDiff& diff) {
     for (const auto& change : port.changes) {
       Json example = nullptr;
       if (change.example) {
-        example = {{"active", change.example->active}, {"inactive", change.example->inactive}};
+        example = {{"active", change.example->active},
+                   {"inactive", change.example->inactive},
+                   {"shortest", change.example->is_shortest}};
       }
       changes.push_back({{"before", or_null(change.before)},
                          {"after", or_null(change.after)},
-                         {"states", change.states},
+                         {"states", change.states.empty() ? Json(nullptr) : Json(change.states)},
                          {"example", std::move(example)}});
     }
     const auto side = [](bool exists, bool arbitrated, bool first_wins,
@@ -156,17 +165,19 @@ void write_json(std::ostream& out, const ModelDiff& diff) {
                   {"conflict", first_wins ? "first" : "error"},
                   {"only_here", connections}};
     };
-    ports.push_back({{"port", port.port},
-                     {"differs", port.differs()},
-                     {"before", side(port.exists_before, port.arbitrated_before,
-                                     port.first_wins_before, port.connections_before)},
-                     {"after", side(port.exists_after, port.arbitrated_after, port.first_wins_after,
-                                    port.connections_after)},
-                     {"sources", port.sources},
-                     {"states", port.open.empty() ? Json(port.states) : Json(nullptr)},
-                     {"of", port.of},
-                     {"changes", std::move(changes)},
-                     {"open", port.open.empty() ? Json(nullptr) : Json(port.open)}});
+    ports.push_back(
+        {{"port", port.port},
+         {"differs", port.differs()},
+         {"before", side(port.exists_before, port.arbitrated_before, port.first_wins_before,
+                         port.connections_before)},
+         {"after", side(port.exists_after, port.arbitrated_after, port.first_wins_after,
+                        port.connections_after)},
+         {"sources", port.sources},
+         {"states", port.open.empty() && port.is_counted ? Json(port.states) : Json(nullptr)},
+         {"of", port.of},
+         {"changes", std::move(changes)},
+         {"all_changes", port.open.empty() && port.is_complete},
+         {"open", port.open.empty() ? Json(nullptr) : Json(port.open)}});
   }
   Json timeouts = Json::array();
   for (const auto& timeout : diff.timeouts) {

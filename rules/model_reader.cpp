@@ -91,7 +91,7 @@ class ModelReader {
         reader_.error("duplicate-arbitration", reader_.where(element),
                       "the application has its model already, at " +
                           describe(reader_.where(*first)) + "; remove one of the two");
-        model_.has_unknown_gaps = true;
+        model_.has_unknown_gaps = model_.lacks_sources = true;
         return;
       }
       first = &element;
@@ -100,7 +100,7 @@ class ModelReader {
   }
 
   bool give_up() {
-    model_.has_unknown_gaps = true;
+    model_.has_unknown_gaps = model_.lacks_sources = true;
     defines_.expect_gaps();
     return false;
   }
@@ -215,7 +215,12 @@ class ModelReader {
     const auto port = reader_.port_attribute(element, "port");
     const auto text = reader_.optional_attribute(element, "timeout");
     const auto timeout = text ? read_duration(*text) : std::nullopt;
-    if (port) model_.sources.push_back({port->name, reader_.where(element), timeout});
+    if (!port) {
+      model_.lacks_sources = true;
+      return;
+    }
+    model_.source_uses.add(*port, kDeclared);
+    model_.sources.push_back({port->name, reader_.where(element), timeout});
   }
 
   std::optional<shm::Nanoseconds> read_duration(const Text& text) {
@@ -226,13 +231,14 @@ class ModelReader {
   }
 
   void read_arbiter(const XmlNode& element) {
-    reader_.check_attributes(element, {"at", "conflict"});
-    reader_.check_no_text(element.first_child);
-    const auto port = reader_.port_attribute(element, "at");
     Arbiter arbiter;
+    const bool has_known_attributes = reader_.check_attributes(element, {"at", "conflict"});
+    const bool has_no_text = reader_.check_no_text(element.first_child);
+    arbiter.is_incomplete = !has_known_attributes || !has_no_text;
+    const auto port = reader_.port_attribute(element, "at");
     arbiter.where = reader_.where(element);
-    if (ElementReader::has_attribute(element, "conflict")) {
-      read_conflict(element, arbiter);
+    if (ElementReader::has_attribute(element, "conflict") && !read_conflict(element, arbiter)) {
+      arbiter.is_incomplete = true;
     }
     for (const XmlNode& child : Elements(element.first_child)) {
       if (child.text == "select") {
@@ -242,30 +248,37 @@ class ModelReader {
         reader_.report_unknown_element(child, {"select"});
       }
     }
-    if (!port) return;
+    if (arbiter.is_incomplete || !port) model_.lacks_sources = true;
+    if (!port) {
+      model_.lacks_arbiters = true;
+      return;
+    }
+    const bool has_rules = Elements(element.first_child).begin() != Elements(nullptr).begin();
+    model_.port_uses.add(*port, has_rules ? kConnected : kDeclared);
     arbiter.port = port->name;
     model_.arbiters.push_back(std::move(arbiter));
   }
 
-  void read_conflict(const XmlNode& element, Arbiter& arbiter) {
+  bool read_conflict(const XmlNode& element, Arbiter& arbiter) {
     const auto text = reader_.optional_attribute(element, "conflict");
-    if (!text) return;
+    if (!text) return false;
     const std::string_view value = trim(text->bytes());
-    if (value == "first") {
-      arbiter.first_wins = true;
-    } else {
+    arbiter.first_wins = value == "first";
+    if (!arbiter.first_wins) {
       reader_.error("invalid-conflict", text->where(),
                     "conflict=" + quote(value) +
                         " is not known; write conflict=\"first\", or "
                         "leave it away so that conflicts are errors");
     }
+    return arbiter.first_wins;
   }
 
   bool read_select(const XmlNode& element, const std::optional<Mention>& port) {
     reader_.check_attributes(element, {"from"});
     const auto source = reader_.port_attribute(element, "from");
-    const auto condition = read_condition(element, reader_, diagnostics_);
+    const auto condition = read_condition(element, reader_, model_, diagnostics_);
     if (!port || !source || !condition) return false;
+    model_.source_uses.add(*source, kConnected);
     model_.selects.push_back({source->name, port->name,
                               *condition ? *condition : make_constant(true), reader_.where(element),
                               model_.next_order++});

@@ -4,8 +4,8 @@
 #include <array>
 #include <numeric>
 
-#include "rules/utf8.hpp"
 #include "shm/limits.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -41,8 +41,8 @@ std::size_t count_edits(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string_view trim(std::string_view text) {
-  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  while (!text.empty() && shm::is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && shm::is_blank(text.back())) text.remove_suffix(1);
   return text;
 }
 
@@ -50,7 +50,7 @@ std::string collapse_blanks(std::string_view text) {
   std::string result;
   bool gap = false;
   for (const char byte : trim(text)) {
-    if (is_blank(byte)) {
+    if (shm::is_blank(byte)) {
       gap = true;
       continue;
     }
@@ -91,20 +91,10 @@ std::optional<NameProblem> find_problem_in_port(std::string_view name) {
                            " for " + quote(name),
                        0};
   }
-  for (std::size_t i = 0; i < name.size();) {
-    const Utf8Character character = decode_utf8(name.substr(i));
-    const char* what = is_blank(name[i])       ? "white space"
-                       : name[i] == '"'        ? "a double quote"
-                       : character.length == 0 ? "a byte that is not UTF-8"
-                       : is_control(character.code) || is_invisible(character.code)
-                           ? "an invisible character"
-                           : nullptr;
-    if (what != nullptr) {
-      return NameProblem{"invalid-port-name",
-                         "the port's name " + quote(name) + " has " + what + " in it; remove it",
-                         i};
-    }
-    i += character.length;
+  if (const auto fault = shm::find_fault_in_name(name)) {
+    return NameProblem{
+        "invalid-port-name",
+        "the port's name " + quote(name) + " has " + fault->what + " in it; remove it", fault->at};
   }
   return {};
 }
@@ -112,7 +102,8 @@ std::optional<NameProblem> find_problem_in_port(std::string_view name) {
 std::optional<NameProblem> find_problem_in_foreign_port(std::string_view name) {
   if (auto problem = find_length_problem(name)) return problem;
   const auto is_control_byte = [](char byte) {
-    return is_control(static_cast<unsigned char>(byte)) && static_cast<unsigned char>(byte) < 0x80;
+    return shm::is_control(static_cast<unsigned char>(byte)) &&
+           static_cast<unsigned char>(byte) < 0x80;
   };
   const auto* found = std::find_if(name.begin(), name.end(), is_control_byte);
   if (found == name.end()) return {};

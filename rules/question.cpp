@@ -6,11 +6,19 @@
 
 namespace arbiter::rules {
 
-Diagram Scene::winner(const CompiledRule& rule) {
+Diagram Scene::winner(const CompiledPort& port, const CompiledRule& rule) {
+  if (!port.in_order) return holds(rule);
   if (const auto known = winner_.find(&rule); known != winner_.end()) return known->second;
-  Diagram wins = winners_.winner(rule);
+  Diagram wins = winners_.winner(port, rule);
   winner_.emplace(&rule, wins);
   return wins;
+}
+
+Diagram Scene::holds(const CompiledRule& rule) {
+  if (const auto known = holds_.find(&rule); known != holds_.end()) return known->second;
+  Diagram states = winners_.holds(rule);
+  holds_.emplace(&rule, states);
+  return states;
 }
 
 Diagram Scene::idle(const CompiledPort& port) {
@@ -18,8 +26,7 @@ Diagram Scene::idle(const CompiledPort& port) {
   Idle& idle = found->second;
   if (is_new) idle.states = winners_.constant(true);
   for (; idle.rules < port.rules.size(); ++idle.rules) {
-    idle.states =
-        winners_.combine(Connective::kAndNot, idle.states, winner(port.rules[idle.rules]));
+    idle.states = winners_.combine(Connective::kAndNot, idle.states, holds(port.rules[idle.rules]));
   }
   return idle.states;
 }
@@ -27,9 +34,19 @@ Diagram Scene::idle(const CompiledPort& port) {
 Question::Question(const Expression& expression, const std::vector<Term>& terms, Scene& scene)
     : expression_(expression), terms_(terms), scene_(scene), winners_(scene.winners()) {
   for (const Term& term : terms_) {
-    const bool is_new = std::find(idle_.begin(), idle_.end(), term.port) == idle_.end();
-    if (term.rule == nullptr && is_new) idle_.push_back(term.port);
+    if (term.is_of_all()) add_whole(*term.port);
+    if (term.other != nullptr) add_whole(*term.other);
   }
+}
+
+void Question::add_whole(const CompiledPort& port) {
+  if (std::find(whole_.begin(), whole_.end(), &port) == whole_.end()) whole_.push_back(&port);
+}
+
+Diagram Question::if_it_won(const CompiledPort& port, const CompiledRule& rule) {
+  built_.clear();
+  decided_ = {{&port, &rule}};
+  return build(expression_);
 }
 
 std::optional<Witness> Question::refute(Way way) {
@@ -41,27 +58,27 @@ std::optional<Witness> Question::refute(Way way) {
   return winners_.witness(bad);
 }
 
-// The winner at each port of idle_ is chosen in turn; what is left of the statement then reads few
+// The winner at each port of whole_ is chosen in turn; what is left of the statement then reads few
 // rules, and most often contradicts `state` at once.
 Diagram Question::refute_by_cases(std::size_t next, const Diagram& state) {
-  if (next == idle_.size()) {
+  if (next == whole_.size()) {
     Diagram bad = winners_.combine(Connective::kAndNot, state, build(expression_));
     built_.clear();
     for (const auto& [port, winner] : decided_) {
       if (winner != nullptr) continue;
       for (const auto& rule : port->rules) {
         if (bad.is_false()) return bad;
-        bad = winners_.combine(Connective::kAndNot, bad, scene_.winner(rule));
+        bad = winners_.combine(Connective::kAndNot, bad, scene_.holds(rule));
       }
     }
     return bad;
   }
-  const CompiledPort* port = idle_[next];
+  const CompiledPort* port = whole_[next];
   decided_[port] = nullptr;
   Diagram bad = refute_by_cases(next + 1, state);
   for (const auto& rule : port->rules) {
     if (!bad.is_false()) break;
-    const Diagram wins = winners_.combine(Connective::kAnd, state, scene_.winner(rule));
+    const Diagram wins = winners_.combine(Connective::kAnd, state, scene_.winner(*port, rule));
     if (wins.is_false()) continue;
     decided_[port] = &rule;
     bad = refute_by_cases(next + 1, wins);
@@ -104,10 +121,45 @@ Diagram Question::build_new(const Expression& expression) {
 }
 
 Diagram Question::build_term(const Term& term) {
+  if (term.other != nullptr) return build_same(*term.port, *term.other);
   if (const auto known = decided_.find(term.port); known != decided_.end()) {
-    return winners_.constant(known->second == term.rule);
+    const auto* const winner = known->second;
+    const auto& rules = term.rules;
+    return winners_.constant(term.nobody
+                                 ? winner == nullptr
+                                 : std::find(rules.begin(), rules.end(), winner) != rules.end());
   }
-  return term.rule != nullptr ? scene_.winner(*term.rule) : scene_.idle(*term.port);
+  if (term.nobody) return scene_.idle(*term.port);
+  Diagram result = winners_.constant(false);
+  for (const auto* rule : term.rules) {
+    result = winners_.combine(Connective::kOr, result, scene_.winner(*term.port, *rule));
+  }
+  return result;
+}
+
+// Each source wins at both or at neither: since only one can win at each, that is the same winner.
+Diagram Question::build_same(const CompiledPort& port, const CompiledPort& other) {
+  std::set<std::string> sources;
+  for (const auto* each : {&port, &other}) {
+    for (const auto& rule : each->rules) sources.insert(rule.source);
+  }
+  Diagram same = winners_.constant(true);
+  for (const auto& source : sources) {
+    const Diagram differ =
+        winners_.combine(Connective::kXor, wins_at(port, source), wins_at(other, source));
+    same = winners_.combine(Connective::kAndNot, same, differ);
+  }
+  return same;
+}
+
+Diagram Question::wins_at(const CompiledPort& port, const std::string& source) {
+  if (const auto known = decided_.find(&port); known != decided_.end()) {
+    return winners_.constant(known->second != nullptr && known->second->source == source);
+  }
+  for (const auto& rule : port.rules) {
+    if (rule.source == source) return scene_.winner(port, rule);
+  }
+  return winners_.constant(false);
 }
 
 }  // namespace arbiter::rules

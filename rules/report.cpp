@@ -65,11 +65,14 @@ bool is_short(const Witness& witness) {
 }
 
 std::string in_lists(const Witness& witness) {
-  return "active: " + joined(witness.active) + "; inactive: " + joined(witness.inactive);
+  return "active: " + joined(witness.active) + "; inactive: " + joined(witness.inactive) +
+         (witness.is_shortest ? "" : " (nothing of it can be left out; others may be shorter)");
 }
 
 Json json_of(const Witness& witness) {
-  return {{"active", witness.active}, {"inactive", witness.inactive}};
+  return {{"active", witness.active},
+          {"inactive", witness.inactive},
+          {"shortest", witness.is_shortest}};
 }
 
 // The fields that each finding has.
@@ -84,6 +87,22 @@ Json json_of(Severity severity, const std::string& code, const Location& where,
           {"help", nullptr},
           {"witness", nullptr},
           {"more_witnesses", Json::array()}};
+}
+
+// One port by its name, so that most readers need no list.
+void add_subject(Json& object, const Subject& about) {
+  const auto or_null = [](const std::string& text) {
+    return text.empty() ? Json(nullptr) : Json(text);
+  };
+  object["port"] = or_null(about.ports.size() == 1 ? about.ports.front() : "");
+  object["ports"] = about.ports;
+  object["source"] = or_null(about.source);
+  object["behaviour"] = or_null(about.behaviour);
+  object["statement"] = or_null(about.statement);
+  object["winners"] = Json::array();
+  for (const auto& [port, winner] : about.winners) {
+    object["winners"].push_back({{"port", port}, {"winner", or_null(winner.value_or(""))}});
+  }
 }
 
 // What to do stands behind the last semicolon of a message.
@@ -155,10 +174,12 @@ void write_json(std::ostream& out, const Diagnostics& diagnostics) {
     for (const Witness& other : item->more_witnesses) {
       object["more_witnesses"].push_back(json_of(other));
     }
+    add_subject(object, item->about);
     array.push_back(std::move(object));
   }
   for (const Omission& omission : diagnostics.omissions()) {
     Json object = json_of(omission.severity, "not-listed", omission.where, in_words(omission));
+    add_subject(object, {});
     object["code_omitted"] = omission.code;
     object["count"] = omission.count;
     array.push_back(std::move(object));

@@ -13,9 +13,9 @@ namespace arbiter::rules {
 // warnings; of the notes of each code the first ones only. Nothing if nothing was found.
 void write_text(std::ostream& out, const Diagnostics& diagnostics);
 
-// One array of {severity, code, file, line, column, message, help, witness}; the witness is
-// {"active": […], "inactive": […]} or null, and so may be the help. What was found beyond the bound
-// of a code is one object, "not-listed", with "code_omitted" and "count".
+// One array of {severity, code, file, line, column, message, help, witness, more_witnesses, port,
+// ports, source, behaviour, statement, winners}, as docs/checking.md has it. What was found beyond
+// the bound of a code is one object, "not-listed", with "code_omitted" and "count".
 void write_json(std::ostream& out, const Diagnostics& diagnostics);
 // "2 errors, 1 note"; "" if nothing was found.
 std::string counts(const Diagnostics& diagnostics);

@@ -31,6 +31,7 @@ struct PortRules {
   bool first_wins = false;            // conflict="first"
   Location where;                     // of the <arbiter> element, else of the first rule
   std::vector<ConnectionRule> rules;  // in document order
+  bool is_doubtful = false;           // something is wrong that these rules may depend on
 };
 
 struct Connection {

@@ -6,8 +6,9 @@
 //   winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o
 //
 // One on each line; a line that begins with a blank goes on with the one above. '#' begins a
-// comment, except in quotes. winner(PORT) = SOURCE, winner(PORT) != SOURCE, winner(PORT) = none and
-// idle(PORT), which means the same, are operands like a source's name.
+// comment, except in quotes. winner(PORT) = SOURCE, winner(PORT) = any(GLOB), of whose sources one
+// wins, winner(PORT) = winner(PORT), the same or nobody at either, winner(PORT) = none and
+// idle(PORT), which means the same, are operands like a source's name; so are those with "!=".
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,6 @@
 #include "rules/table_rules.hpp"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -10,19 +11,33 @@ ExpressionPtr negate(ExpressionPtr operand) {
   return make_operation(Operator::kNot, {std::move(operand)});
 }
 
+// The connection's own condition: of rules in order, as far as to where those before it begin.
 // Successors lie behind their node, so that they are made before it.
 ExpressionPtr diagram(const shm::Rule& rule, const std::vector<ExpressionPtr>& reads) {
   namespace table = shm::table;
   const shm::Word count = rule.nodes.count / table::kNodeWords;
   ExpressionPtr never = make_constant(false);
   ExpressionPtr always = make_constant(true);
-  std::vector<ExpressionPtr> nodes(count);
-  for (shm::Word node = count; node-- > 0;) {
+  const shm::Word end = rule.kind == table::kInOrder ? std::min(count, rule.before) : count;
+  if (rule.root == rule.before) return always;
+  if (rule.root >= end) return never;
+  // The nodes between are those of others.
+  std::vector<bool> is_own(end);
+  is_own[rule.root] = true;
+  for (shm::Word node = rule.root; node < end; ++node) {
+    for (const shm::Word at : {table::kNodeLow, table::kNodeHigh}) {
+      const shm::Word to = rule.nodes[node * table::kNodeWords + at];
+      if (is_own[node] && to > node && to < end) is_own[to] = true;
+    }
+  }
+  std::vector<ExpressionPtr> nodes(end);
+  for (shm::Word node = end; node-- > rule.root;) {
+    if (!is_own[node]) continue;
     const shm::Word base = node * table::kNodeWords;
     const auto successor = [&](shm::Word at) {
       const shm::Word to = rule.nodes[base + at];
-      if (to == table::kTrue) return always;
-      return to > node && to < count ? nodes[to] : never;
+      if (to == rule.before) return always;
+      return to > node && to < end ? nodes[to] : never;
     };
     const shm::Word position = rule.nodes[base + table::kNodePosition];
     if (position >= reads.size()) {
@@ -35,7 +50,7 @@ ExpressionPtr diagram(const shm::Rule& rule, const std::vector<ExpressionPtr>& r
         {make_operation(Operator::kAnd, {read, successor(table::kNodeHigh)}),
          make_operation(Operator::kAnd, {negate(read), successor(table::kNodeLow)})});
   }
-  return count == 0 ? never : nodes[0];
+  return nodes[rule.root];
 }
 
 ExpressionPtr condition_of(const shm::Rule& rule,
@@ -45,7 +60,9 @@ ExpressionPtr condition_of(const shm::Rule& rule,
   for (shm::Word i = 0; i < rule.reads.count; ++i) {
     reads.push_back(make_source(source_name(rule.reads[i] & ~shm::table::kExpectActive)));
   }
-  if (rule.kind == shm::table::kDiagram) return diagram(rule, reads);
+  if (rule.kind == shm::table::kDiagram || rule.kind == shm::table::kInOrder) {
+    return diagram(rule, reads);
+  }
   for (shm::Word i = 0; i < rule.reads.count; ++i) {
     if ((rule.reads[i] & shm::table::kExpectActive) == 0) reads[i] = negate(reads[i]);
   }
@@ -63,6 +80,7 @@ RuleSet rules_of_table(const shm::TableView& table, shm::PortId port, const std:
   for (auto index = range.first; index != range.first + range.count; ++index) {
     const shm::Rule rule = table.rule(index);
     const std::string source = source_name(rule.source);
+    result.first_wins = result.first_wins || rule.kind == shm::table::kInOrder;
     if (rule.kind == shm::table::kNever || !table.is_arbitrated(port)) {
       rules.other_connections.push_back({source, port_name});
     } else {

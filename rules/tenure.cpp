@@ -18,15 +18,16 @@ Activation both(Activation left, Activation right) {
                                                                      : Activation::kUnknown;
 }
 
-// Which ends of a diagram can be reached, if both ways are gone where a source is unknown. Exact,
-// for no way meets a source twice.
+// Which ends of a diagram can be reached, if both ways are gone where a source is unknown. Exact
+// where no way meets a source twice; of rules in order some may, which leaves more unknown than is.
 Activation walk(const shm::Rule& rule, const std::vector<Activation>& reads) {
   namespace table = shm::table;
   const shm::Word count = rule.nodes.count / table::kNodeWords;
   std::vector<bool> reached(count, false);
-  if (count != 0) reached[0] = true;
+  const bool begins = rule.root < count;
+  if (begins) reached[rule.root] = true;
   bool can_hold = false;
-  bool can_fail = count == 0;
+  bool can_fail = !begins;
   const auto go = [&](shm::Word from, shm::Word to) {
     if (to == table::kTrue) {
       can_hold = true;
@@ -106,9 +107,12 @@ Activation evaluate(const shm::Rule& rule,
   if (rule.kind == shm::table::kNever) return Activation::kInactive;
   const Activation own = activation_of(rule.source);
   if (rule.kind == shm::table::kAlways || own == Activation::kInactive) return own;
-  if (rule.kind == shm::table::kDiagram) {
+  if (rule.kind == shm::table::kDiagram || rule.kind == shm::table::kInOrder) {
     std::vector<Activation> reads;
-    for (shm::Word i = 0; i < rule.reads.count; ++i) reads.push_back(activation_of(rule.reads[i]));
+    for (shm::Word i = 0; i < rule.reads.count; ++i) {
+      const bool is_own = rule.reads[i] == rule.source;
+      reads.push_back(is_own ? Activation::kActive : activation_of(rule.reads[i]));
+    }
     return both(own, walk(rule, reads));
   }
   Activation result = own;

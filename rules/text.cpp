@@ -50,4 +50,11 @@ std::string Text::origin(std::size_t i) const {
   return {};
 }
 
+std::string Text::define_of(std::size_t first, std::size_t last) const {
+  for (const Expansion& expansion : expansions_) {
+    if (first >= expansion.first && last <= expansion.last) return expansion.define;
+  }
+  return {};
+}
+
 }  // namespace arbiter::rules

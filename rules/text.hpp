@@ -38,6 +38,8 @@ class Text {
   [[nodiscard]] Location where() const;
   // " (in the text of ${name})" for a byte that came out of a define, else nothing.
   [[nodiscard]] std::string origin(std::size_t i) const;
+  // The define that all of these bytes came out of, in one use; else nothing.
+  [[nodiscard]] std::string define_of(std::size_t first, std::size_t last) const;
 
  private:
   struct Expansion {

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "rules/load.hpp"
-#include "rules/utf8.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -136,14 +136,14 @@ bool check_characters(const TextFile& file, Diagnostics& diagnostics, std::size_
   if (!check_size(file, kMaxFileBytes, diagnostics)) return false;
   const std::string_view content = file.content().substr(0, end);
   for (std::size_t i = begin; i < content.size();) {
-    const Utf8Character character = decode_utf8(content.substr(i));
+    const shm::Utf8Character character = shm::decode_utf8(content.substr(i));
     if (character.length == 0) {
       diagnostics.error("invalid-character", file.locate(i),
                         "the byte " + in_hex(static_cast<unsigned char>(content[i])) +
                             " is not UTF-8 here; save the file in UTF-8");
       return false;
     }
-    if (is_control(character.code) && !is_blank(content[i])) {
+    if (shm::is_control(character.code) && !shm::is_blank(content[i])) {
       diagnostics.error("invalid-character", file.locate(i),
                         "the control character " + in_hex(character.code) +
                             " must not occur in this file; remove it");

@@ -15,15 +15,38 @@ namespace {
 
 using Active = std::set<std::string>;
 
-// Before a statement about idle ports is looked at case by case: a second or two.
+// Before a statement about whole ports is looked at case by case: a second or two.
 constexpr std::uint64_t kMaxStepsAtOnce = 16'000'000;
+
+}  // namespace
+
+struct ProvedStatement {
+  ExpressionPtr expression;
+  std::vector<Term> terms;
+};
+
+namespace {
 
 // A statement that has a meaning in the model.
 struct Case {
   Verdict verdict;
-  ExpressionPtr expression;  // quantifiers expanded; null until then
+  ExpressionPtr expression;  // quantifiers expanded
   std::vector<Term> terms;
   std::set<std::string> ports;  // that it speaks of
+
+  // Some part of it takes all rules of a port.
+  [[nodiscard]] bool has_cases() const {
+    return std::any_of(terms.begin(), terms.end(),
+                       [](const Term& term) { return term.is_of_all(); });
+  }
+};
+
+// What statements about the same ports share.
+struct SharedScene {
+  SharedScene(Budget& budget, const SourceOrder& order) : winners(budget, order) {}
+
+  Winners winners;
+  Scene scene{winners};
 };
 
 class Judge {
@@ -56,6 +79,7 @@ class Judge {
  private:
   // Unless it speaks of what the model does not have, which is reported.
   void admit(const Statement& statement) {
+    statement_ = &statement;
     bool has_meaning = true;
     Case admitted;
     for (const auto& term : statement.parsed.terms) {
@@ -63,7 +87,6 @@ class Judge {
       has_meaning = has_meaning && found.has_value();
       if (!found) continue;
       admitted.terms.push_back(*found);
-      admitted.ports.insert(found->port->port);
     }
     for (const auto& source : statement.parsed.sources) {
       has_meaning = is_known(source) && has_meaning;
@@ -73,6 +96,10 @@ class Judge {
     admitted.expression = expansion_.expand(statement.parsed.expression);
     admitted.verdict.statement = statement.text;
     admitted.verdict.where = statement.where;
+    for (const auto* port : ports_of(admitted.terms)) {
+      admitted.verdict.ports.push_back(port->port);
+      admitted.ports.insert(port->port);
+    }
     cases_.push_back(std::move(admitted));
   }
 
@@ -89,15 +116,18 @@ class Judge {
       verdict.limit = limit.what();
       return;
     }
+    verdict.limit.clear();
     verdict.kind = verdict.witness ? Verdict::Kind::kRefuted : Verdict::Kind::kProved;
-    if (!verdict.witness) return;
+    if (!verdict.witness) {
+      verdict.proved =
+          std::make_shared<const ProvedStatement>(ProvedStatement{of.expression, of.terms});
+      return;
+    }
     const Active active(verdict.witness->active.begin(), verdict.witness->active.end());
-    std::set<std::string> seen;
-    for (const Term& term : of.terms) {
-      if (!seen.insert(term.port->port).second) continue;
-      const CompiledRule* winner = find_winner(*term.port, active);
+    for (const auto* port : ports_of(of.terms)) {
+      const CompiledRule* winner = find_winner(*port, active);
       verdict.winners.emplace_back(
-          term.port->port, winner == nullptr ? std::nullopt : std::optional(winner->source));
+          port->port, winner == nullptr ? std::nullopt : std::optional(winner->source));
     }
   }
 
@@ -108,15 +138,15 @@ class Judge {
     budget_.spend(sources.size());
     set_scene(of.ports, sources);
     try {
-      Question question(*of.expression, of.terms, *scene_);
+      Question question(*of.expression, of.terms, shared_->scene);
       if (!question.has_cases()) return question.refute(Question::Way::kAtOnce);
       const Budget::Part part(budget_, std::min(budget_.left() / 2, kMaxStepsAtOnce));
       return question.refute(Question::Way::kAtOnce);
     } catch (const StepLimit&) {
-      if (!has_cases(of)) throw;
+      if (!of.has_cases()) throw;
     } catch (const DiagramLimit&) {
-      scene_.reset();
-      if (!has_cases(of)) throw;
+      shared_.reset();
+      if (!of.has_cases()) throw;
     }
     return refute_by_cases(of, sources);
   }
@@ -124,18 +154,13 @@ class Judge {
   std::optional<Witness> refute_by_cases(const Case& of, const std::set<std::string>& sources) {
     set_scene(of.ports, sources);
     try {
-      return Question(*of.expression, of.terms, *scene_).refute(Question::Way::kByCases);
+      return Question(*of.expression, of.terms, shared_->scene).refute(Question::Way::kByCases);
     } catch (const StepLimit&) {
       throw;
     } catch (const DiagramLimit&) {
-      scene_.reset();
+      shared_.reset();
       throw;
     }
-  }
-
-  static bool has_cases(const Case& of) {
-    return std::any_of(of.terms.begin(), of.terms.end(),
-                       [](const Term& term) { return term.rule == nullptr; });
   }
 
   // Goes on with the one that there is if it is of these ports, and knows these sources.
@@ -143,18 +168,18 @@ class Judge {
     const auto is_known = [&](const std::string& source) {
       return source.starts_with('=') || scene_sources_.contains(source);
     };
-    if (scene_ && scene_ports_ == ports && std::all_of(sources.begin(), sources.end(), is_known)) {
+    if (shared_ && scene_ports_ == ports && std::all_of(sources.begin(), sources.end(), is_known)) {
       return;
     }
-    scene_.reset();
+    shared_.reset();
     SourceOrder order;
     for (const auto& port : ports) order.add(*ports_.at(port));
     for (const auto& source : sources_with(ports, sources)) {
       if (!source.starts_with('=')) order.add(source);
     }
-    scene_.emplace(budget_, order);
+    shared_.emplace(budget_, order);
     scene_ports_ = ports;
-    const auto& names = scene_->winners().sources();
+    const auto& names = shared_->winners.sources();
     scene_sources_ = {names.begin(), names.end()};
   }
 
@@ -172,47 +197,103 @@ class Judge {
     return has_room ? all : sources;
   }
 
+  // Each once.
+  static std::vector<const CompiledPort*> ports_of(const std::vector<Term>& terms) {
+    std::vector<const CompiledPort*> ports;
+    for (const Term& term : terms) {
+      for (const auto* port : {term.port, term.other}) {
+        const bool is_new = std::find(ports.begin(), ports.end(), port) == ports.end();
+        if (port != nullptr && is_new) ports.push_back(port);
+      }
+    }
+    return ports;
+  }
+
   std::optional<Term> find_term(const WinnerTerm& term) {
-    const auto port = ports_.find(term.port.name);
+    const CompiledPort* const port = find_port(term.port);
+    const CompiledPort* const other = term.other_port ? find_port(*term.other_port) : nullptr;
+    if (port == nullptr || (term.other_port && other == nullptr)) return std::nullopt;
+    Term result{port};
+    if (other != nullptr) {
+      result.other = other;
+    } else if (term.pattern) {
+      result.rules = find_rules(*port, *term.pattern);
+    } else if (term.source) {
+      const CompiledRule* const rule = find_rule(*port, *term.source);
+      if (rule == nullptr) return std::nullopt;
+      result.rules = {rule};
+    } else {
+      result.nobody = true;
+    }
+    return result;
+  }
+
+  // An arbitrated one; null, reported, if it is none.
+  const CompiledPort* find_port(const Mention& mention) {
+    const auto port = ports_.find(mention.name);
     if (port == ports_.end()) {
       std::vector<std::string_view> names;
       if (may_suggest()) {
         for (const auto& [name, known] : ports_) names.push_back(name);
       }
-      diagnostics_.error("unknown-port", term.port.where,
-                         "the model has no input port " + term.port.name +
-                             advise(term.port.name, names, "name one that is arbitrated"));
-      return std::nullopt;
+      report("unknown-port", mention,
+             "the model has no input port " + mention.name +
+                 advise(mention.name, names, "name one that is arbitrated"),
+             {.ports = {mention.name}});
+      return nullptr;
     }
-    if (!port->second->arbitrated) {
-      diagnostics_.error("not-arbitrated", term.port.where,
-                         "no rule mentions " + term.port.name +
-                             ": it is not arbitrated, everything is delivered there and nobody "
-                             "wins or loses; name a port that is arbitrated");
-      return std::nullopt;
-    }
-    if (!term.source) return Term{port->second, nullptr};
-    for (const auto& rule : port->second->rules) {
-      if (rule.source == term.source->name) return Term{port->second, &rule};
+    if (port->second->arbitrated) return port->second;
+    report("not-arbitrated", mention,
+           "no rule mentions " + mention.name +
+               ": it is not arbitrated, everything is delivered there and nobody wins or loses; "
+               "name a port that is arbitrated",
+           {.ports = {mention.name}});
+    return nullptr;
+  }
+
+  // Of a connection; null, reported, if there is none.
+  const CompiledRule* find_rule(const CompiledPort& port, const Mention& source) {
+    for (const auto& rule : port.rules) {
+      if (rule.source == source.name) return &rule;
     }
     std::vector<std::string_view> names;
     if (may_suggest()) {
-      for (const auto& rule : port->second->rules) names.push_back(rule.source);
+      for (const auto& rule : port.rules) names.push_back(rule.source);
     }
-    diagnostics_.error("not-connected", term.source->where,
-                       term.source->name + " is not connected to " + term.port.name +
-                           ", so that it can never win there" +
-                           advise(term.source->name, names, "name one of its connections"));
-    return std::nullopt;
+    report("not-connected", source,
+           source.name + " is not connected to " + port.port + ", so that it can never win there" +
+               advise(source.name, names, "name one of its connections"),
+           {.ports = {port.port}, .source = source.name});
+    return nullptr;
+  }
+
+  std::vector<const CompiledRule*> find_rules(const CompiledPort& port, const Mention& pattern) {
+    std::vector<const CompiledRule*> rules;
+    for (const auto& rule : port.rules) {
+      if (matches(pattern.name, rule.source)) rules.push_back(&rule);
+    }
+    if (rules.empty()) {
+      diagnostics_.warning("matches-nothing", pattern.where,
+                           "no source that is connected to " + port.port + " matches " +
+                               quote(pattern.name) + ", so that none of these can win; correct it",
+                           {.ports = {port.port}, .statement = statement_->text});
+    }
+    return rules;
+  }
+
+  void report(std::string code, const Mention& mention, std::string message, Subject about) {
+    about.statement = statement_->text;
+    diagnostics_.error(std::move(code), mention.where, std::move(message), std::move(about));
   }
 
   bool is_known(const Mention& source) {
     if (sources_.contains(source.name)) return true;
     std::vector<std::string_view> names;
     if (may_suggest()) names.assign(sources_.begin(), sources_.end());
-    diagnostics_.error("unknown-source", source.where,
-                       "neither the model nor its application names a source " + source.name +
-                           advise(source.name, names, "name one that it reads or connects"));
+    report("unknown-source", source,
+           "neither the model nor its application names a source " + source.name +
+               advise(source.name, names, "name one that it reads or connects"),
+           {.source = source.name});
     return false;
   }
 
@@ -226,7 +307,8 @@ class Judge {
     if (known->second) return;
     diagnostics_.warning("matches-nothing", glob.where,
                          "no source matches " + quote(glob.name) +
-                             ": any() is false of it, all() and none() are true; correct it");
+                             ": any() is false of it, all() and none() are true; correct it",
+                         {.statement = statement_->text});
   }
 
   Diagnostics& diagnostics_;
@@ -235,13 +317,18 @@ class Judge {
   std::set<std::string, std::less<>> sources_;
   std::map<std::string, const CompiledPort*> ports_;
   std::unordered_map<std::string, bool> matched_;  // by pattern: whether any source does
+  const Statement* statement_ = nullptr;           // the one that is admitted
   std::size_t unknown_ = 0;
   std::vector<Case> cases_;
   std::map<std::set<std::string>, std::set<std::string>> read_with_;  // by ports
-  std::optional<Scene> scene_;                                        // of these ports and sources
+  std::optional<SharedScene> shared_;                                 // of these ports and sources
   std::set<std::string> scene_ports_;
   std::set<std::string> scene_sources_;
 };
+
+Subject about(const Verdict& verdict) {
+  return {.ports = verdict.ports, .statement = verdict.statement, .winners = verdict.winners};
+}
 
 std::string in_words(const Verdict& verdict) {
   std::string text = "this is false with " + in_words(*verdict.witness);
@@ -262,6 +349,35 @@ std::vector<Verdict> judge(const std::vector<Statement>& statements, const Compi
   return Judge(model, diagnostics, budget).judge(statements);
 }
 
+bool speaks_of(const ProvedStatement& statement, const CompiledPort& port) {
+  return std::any_of(statement.terms.begin(), statement.terms.end(),
+                     [&](const Term& term) { return term.port == &port || term.other == &port; });
+}
+
+void add_sources(const ProvedStatements& statements, SourceOrder& order) {
+  std::set<const CompiledPort*> ports;  // orders are costly: each once
+  std::set<std::string> sources;
+  std::set<const Expression*> seen;
+  for (const auto& statement : statements) {
+    for (const Term& term : statement->terms) {
+      for (const CompiledPort* port : {term.port, term.other}) {
+        if (port != nullptr && ports.insert(port).second) order.add(*port);
+      }
+    }
+    add_sources_of(*statement->expression, sources, seen);
+  }
+  for (const std::string& source : sources) {
+    if (!source.starts_with('=')) order.add(source);
+  }
+}
+
+Diagram allowed_by(const ProvedStatement& statement, Winners& winners, const CompiledPort& port,
+                   const CompiledRule& rule, const Diagram& states) {
+  Scene scene(winners);
+  Question question(*statement.expression, statement.terms, scene);
+  return winners.combine(Connective::kAnd, states, question.if_it_won(port, rule));
+}
+
 void report(const std::vector<Verdict>& verdicts, Diagnostics& diagnostics, bool with_proved) {
   for (const auto& verdict : verdicts) {
     if (verdict.kind == Verdict::Kind::kRefuted) {
@@ -269,14 +385,16 @@ void report(const std::vector<Verdict>& verdicts, Diagnostics& diagnostics, bool
                         in_words(verdict) +
                             "; change the model so that this state is decided otherwise, or the "
                             "statement if it says too much",
-                        verdict.witness);
+                        about(verdict), verdict.witness);
     } else if (verdict.kind == Verdict::Kind::kOpen) {
       diagnostics.error("left-open", verdict.where,
                         "neither proved nor refuted: it takes " + verdict.limit +
                             "; make several statements of it, about fewer ports each, or allow "
-                            "more steps with --effort");
+                            "more steps with --effort",
+                        about(verdict));
     } else if (with_proved) {
-      diagnostics.note("proved", verdict.where, "true in every state: " + verdict.statement);
+      diagnostics.note("proved", verdict.where, "true in every state: " + verdict.statement,
+                       about(verdict));
     }
   }
 }

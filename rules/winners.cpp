@@ -82,6 +82,7 @@ void SourceOrder::add(const std::string& source) {
 
 Winners::Winners(Budget& budget, const SourceOrder& order, bool sifts)
     : names_(order.names()),
+      budget_(budget),
       builder_(budget,
                std::clamp(static_cast<int>(names_.size()), 1, DiagramBuilder::kMaxVariables),
                sifts) {
@@ -93,7 +94,17 @@ Winners::Winners(Budget& budget, const SourceOrder& order, bool sifts)
   }
 }
 
-Diagram Winners::winner(const CompiledRule& rule) {
+Diagram Winners::winner(const CompiledPort& port, const CompiledRule& rule) {
+  Diagram result = holds(rule);
+  if (!port.in_order) return result;
+  for (const CompiledRule* earlier = port.rules.data(); earlier != &rule; ++earlier) {
+    if (result.is_false()) break;
+    result = combine(Connective::kAndNot, result, holds(*earlier));
+  }
+  return result;
+}
+
+Diagram Winners::holds(const CompiledRule& rule) {
   using shm::table::kTrue;
   Diagram own = active(rule.source);
   if (rule.kind == shm::table::kNever) return constant(false);
@@ -127,18 +138,20 @@ Diagram Winners::given(const Diagram& function, const std::string& source, bool 
   return active ? builder_.when(function, variable) : builder_.when_not(function, variable);
 }
 
-Witness Winners::witness(const Diagram& function) {
+Witness Winners::witness(const Diagram& function, const Diagram& reached) {
   ShortestImplicant shortest(builder_);
-  auto literals = shortest.find_literals(function);
-  if (!literals) {
-    literals.emplace();
-    for (Diagram rest = function; !rest.is_true();) {
-      const Diagram low = builder_.low(rest);
-      literals->push_back({builder_.top_variable(rest), low.is_false()});
-      rest = low.is_false() ? builder_.high(rest) : low;
-    }
+  std::optional<std::vector<VariableLiteral>> literals;
+  try {
+    const Budget::Part search(budget_, budget_.left() / 2);
+    literals = shortest.find_literals(function, reached);
+  } catch (const StepLimit&) {  // another one is told, even where no step is left
   }
   Witness witness;
+  witness.is_shortest = literals.has_value();
+  if (!literals) {
+    const Budget::Overdraft overdraft(budget_);
+    literals = lean_implicant(builder_, function, reached);
+  }
   for (const VariableLiteral& literal : *literals) {
     (literal.active ? witness.active : witness.inactive)
         .push_back(names_[static_cast<std::size_t>(literal.variable)]);

@@ -2,8 +2,8 @@
 // of compiled models are answered with.
 //
 // A state says of each source whether it is active. With the rules of a port compiled and proved,
-// at most one of winner(rule) holds in any state. There is no diagram of a whole port, which would
-// explode where connections are inhibited by a few others each (rules/proof.hpp).
+// at most one of winner(port, rule) holds in any state. There is no diagram of a whole port, which
+// would explode where connections are inhibited by a few others each (rules/proof.hpp).
 #pragma once
 
 #include <cstddef>
@@ -46,20 +46,28 @@ class Winners {
   Diagram negate(const Diagram& a) { return combine(Connective::kXor, a, constant(true)); }
   Diagram constant(bool value) { return builder_.constant(value); }
   Diagram active(const std::string& source) { return builder_.variable(variables_.at(source)); }
-  // The states in which the rule's source is active, and wins.
-  Diagram winner(const CompiledRule& rule);
+  // The states in which the rule's source is active, and wins at the port.
+  Diagram winner(const CompiledPort& port, const CompiledRule& rule);
+  // The same, but for the rules before it where those of a port are decided in order. So some
+  // connection of a port wins iff holds() of one of them does.
+  Diagram holds(const CompiledRule& rule);
   // The function in the states that differ from each one only in that the source is (not) active.
   Diagram given(const Diagram& function, const std::string& source, bool active);
 
-  // A shortest conjunction that implies the function, which can be true; or, where that takes too
-  // long, some conjunction.
-  Witness witness(const Diagram& function);
+  // A shortest conjunction that implies the function, which can be true; or, where the search for
+  // it takes too long, one of which no literal can be left out. That one may be found beyond the
+  // budget.
+  Witness witness(const Diagram& function) { return witness(function, constant(true)); }
+  // The same among the conjunctions that hold in some state of `reached`, in one of which the
+  // function is true.
+  Witness witness(const Diagram& function, const Diagram& reached);
 
   DiagramNodes nodes(const Diagram& function) { return builder_.nodes(function); }
 
  private:
   std::vector<std::string> names_;
   std::unordered_map<std::string, int> variables_;
+  Budget& budget_;
   DiagramBuilder builder_;
 };
 

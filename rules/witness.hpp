@@ -20,37 +20,64 @@ struct VariableLiteral {
 // The shortest path through a diagram depends on the order of the variables and need not be it. The
 // search follows the definition instead: an implicant of f with top variable x either leaves x out,
 // and is then one of (f where x is false) and (f where x is true); or says which, and its rest is
-// one of that half. Functions seen are remembered; there may be many, so they are bounded.
+// one of that half. It looks for one literal, then for two, and so on, so that what many literals
+// would lead to is not looked at. Functions seen are remembered; there may be many, so they are
+// bounded.
+//
+// Asked for an implicant of f that reaches g, it follows both: the implicant must be true in some
+// state in which g is, too.
 class ShortestImplicant {
  public:
-  // Functions that the searches of one object look at together.
-  static constexpr std::size_t kMaxFunctions = 20'000;
+  // How often the searches of one object take a function apart, and the steps of diagrams that they
+  // take for it: a fraction of a second.
+  static constexpr std::size_t kMaxSplits = 20'000;
+  static constexpr std::size_t kMaxSteps = 2'000'000;
 
-  explicit ShortestImplicant(DiagramBuilder& builder) : builder_(builder) {}
+  explicit ShortestImplicant(DiagramBuilder& builder, std::size_t max_splits = kMaxSplits)
+      : builder_(builder), max_splits_(max_splits), first_step_(builder.steps()) {}
 
   // Fewest literals, then fewest that are active; always the same one. Nothing if the bound is met.
   // Throws DiagramLimit, after which it can't be used again. For a function that can be true.
   std::optional<Literals> find(const Diagram& function);
-  // The same, whatever the number of variables.
-  std::optional<std::vector<VariableLiteral>> find_literals(const Diagram& function);
+  // The same, whatever the number of variables, of the implicants that reach `reached`. It and the
+  // function can be true together.
+  std::optional<std::vector<VariableLiteral>> find_literals(const Diagram& function,
+                                                            const Diagram& reached);
 
-  // How many functions the searches have looked at.
-  [[nodiscard]] std::size_t functions() const { return best_.size(); }
+  [[nodiscard]] std::size_t splits() const { return splits_; }
 
  private:
   enum class Choice : std::uint8_t { kNone, kLeaveOut, kInactive, kActive };
+  struct Goal {
+    Diagram function, reached;
+    [[nodiscard]] bool is_impossible() const { return function.is_false() || reached.is_false(); }
+    [[nodiscard]] std::uint64_t key() const;
+  };
   struct Best {
-    std::uint32_t cost;  // literals, and a little more for each active one
+    std::uint32_t cost;  // literals, and a little more for each active one; or more than that
+    bool is_exact;
     Choice choice;
-    int variable;      // that the choice is about; sifting may put another one on top meanwhile
-    Diagram rest;      // what remains to be implied
-    Diagram function;  // keeps the node from being reused, so that it can be the key
+    int variable;  // that the choice is about; sifting may put another one on top meanwhile
+    Goal rest;     // what remains to be implied
+    Goal goal;     // keeps the nodes from being reused, so that they can be the key
   };
 
-  std::uint32_t cost(const Diagram& function);
+  // If it is less than `limit`; otherwise something that is not more than it, nor less than
+  // `limit`.
+  std::uint32_t cost(const Goal& goal, std::uint32_t limit);
+  Best split(const Goal& goal, std::uint32_t limit);
+  Goal without_what_is_above(Goal goal);
 
   DiagramBuilder& builder_;
-  std::unordered_map<int, Best> best_;
+  const std::size_t max_splits_;
+  const std::size_t first_step_;
+  std::size_t splits_ = 0;
+  std::unordered_map<std::uint64_t, Best> best_;
 };
+
+// Literals that imply the function, of which none can be left out: those of a path to true, less
+// what is not needed, of the active ones first. They reach `reached`.
+std::vector<VariableLiteral> lean_implicant(DiagramBuilder& builder, const Diagram& function,
+                                            const Diagram& reached);
 
 }  // namespace arbiter::rules

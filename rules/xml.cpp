@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "rules/names.hpp"
-#include "rules/utf8.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -187,9 +187,9 @@ std::string resolve_reference(std::string_view name) {
       std::from_chars(name.data(), name.data() + name.size(), code, hex ? 16 : 10);
   const bool complete = error == std::errc{} && end == name.data() + name.size();
   if (!complete || code > 0x10ffff) return {};
-  std::string bytes = encode_utf8(code);
-  const bool allowed =
-      decode_utf8(bytes).length != 0 && (!is_control(code) || (code < 0x80 && is_blank(bytes[0])));
+  std::string bytes = shm::encode_utf8(code);
+  const bool allowed = shm::decode_utf8(bytes).length != 0 &&
+                       (!shm::is_control(code) || (code < 0x80 && shm::is_blank(bytes[0])));
   return allowed ? bytes : std::string();
 }
 

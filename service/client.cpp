@@ -11,7 +11,10 @@
 #include <cstring>
 #include <system_error>
 
+#include "service/errands.hpp"
+#include "service/headroom.hpp"
 #include "service/log.hpp"
+#include "shm/foreign.hpp"
 
 #ifndef SO_PEERPIDFD
 #define SO_PEERPIDFD 77  // Linux 6.5; older headers lack it
@@ -31,19 +34,32 @@ shm::FileDescriptor open_process(int socket, pid_t pid) {
 
 }  // namespace
 
-Client::Client(ClientId id, shm::FileDescriptor socket) : id_(id), socket_(std::move(socket)) {
+Client::Client(ClientId id, shm::FileDescriptor socket, Shares& shares)
+    : id_(id), shares_(shares), socket_(std::move(socket)) {
+  const auto fail = [&](const char* what) {
+    const int error = errno;
+    Errands::of_the_process().close(user_, std::move(socket_));
+    throw std::system_error(error, std::generic_category(), what);
+  };
   ucred peer{};
   socklen_t size = sizeof peer;
   if (getsockopt(socket_.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
-    throw std::system_error(errno, std::generic_category(), "asking who connects");
+    fail("asking who connects");
   }
   pid_ = peer.pid;
   user_ = peer.uid;
+  try {
+    descriptors_ = shares_.take(user_, Share::kDescriptors, 2);  // the socket, and the process
+  } catch (const LimitExceeded&) {
+    Errands::of_the_process().close(user_, std::move(socket_));
+    throw;
+  }
   started_ = start_of_process(pid_);
   process_ = open_process(socket_.get(), pid_);
-  if (!process_)
-    throw std::system_error(errno, std::generic_category(), "opening a client's process");
+  if (!process_) fail("opening a client's process");
 }
+
+Client::~Client() { Errands::of_the_process().close(user_, std::move(socket_)); }
 
 void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescriptors> descriptors) {
   if (lost_) return;
@@ -55,23 +71,36 @@ void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescript
       return;
     }
   }
-  if (queue_.size() == kMaxQueue || queued_descriptors_ >= kMaxQueuedDescriptors) {
+  const auto count = static_cast<std::uint64_t>(
+      std::count_if(descriptors.begin(), descriptors.end(), [](int fd) { return fd >= 0; }));
+  if (!has_room_for(count)) {
     log::warn("{} does not read its messages: {} wait; giving it up", description(), queue_.size());
     lost_ = true;
     return;
   }
   auto queued = std::make_unique<Queued>();
   queued->message = message;
+  queued->bytes = shares_.take(user_, Share::kQueue, sizeof(Queued));
+  queued->open = shares_.take(user_, Share::kDescriptors, count);
   for (std::size_t i = 0; i < descriptors.size() && descriptors[i] >= 0; ++i) {
     queued->descriptors[i].reset(fcntl(descriptors[i], F_DUPFD_CLOEXEC, 0));
     if (!queued->descriptors[i]) {
-      log::warn("{} cannot be told: {}", description(), std::strerror(errno));
+      log::warn(
+          "{} cannot be told, and is given up: {} (the limit is RLIMIT_NOFILE, LimitNOFILE= in "
+          "a systemd unit)",
+          description(), std::strerror(errno));
       lost_ = true;
       return;
     }
     ++queued_descriptors_;
   }
   queue_.push_back(std::move(queued));
+}
+
+bool Client::has_room_for(std::uint64_t descriptors) const {
+  return queue_.size() < kMaxQueue && queued_descriptors_ < kMaxQueuedDescriptors &&
+         shares_.allows(user_, Share::kQueue, sizeof(Queued)) &&
+         shares_.allows(user_, Share::kDescriptors, descriptors);
 }
 
 void Client::flush() {
@@ -95,13 +124,42 @@ shm::ReceiveResult Client::receive(shm::Received& received) {
     return shm::ReceiveResult::kReceived;
   }
   if (ahead_ended_) return *ahead_ended_;
-  return shm::receive_message(socket_.get(), received, false);
+  return receive_from_socket(received);
+}
+
+// What is neither a memfd nor an anonymous pipe is not looked at. What has come by the last
+// descriptors that there are is given up, lest the next message find none.
+shm::ReceiveResult Client::receive_from_socket(shm::Received& received) {
+  dispose_of(received, user_);
+  shm::ReceiveResult result{};
+  {
+    const Headroom::Use use;
+    result = shm::receive_message(socket_.get(), received, false);
+  }
+  const rlim_t limit = Headroom::of_the_process().limit();
+  for (auto& descriptor : received.descriptors) {
+    if (!descriptor) break;
+    const bool is_tame = shm::foreign_kind(descriptor.get()) != shm::ForeignKind::kOther;
+    const bool is_last = static_cast<rlim_t>(descriptor.get()) >= limit;
+    received.is_strange |= !is_tame;
+    received.lost_descriptors |= is_last;
+  }
+  if (received.is_strange || received.lost_descriptors) dispose_of(received, user_);
+  return result;
+}
+
+void dispose_of(shm::Received& received, uid_t user) {
+  const auto dispose = [&](shm::FileDescriptor& descriptor) {
+    Errands::of_the_process().close(user, std::move(descriptor));
+  };
+  std::for_each(received.descriptors.begin(), received.descriptors.end(), dispose);
+  std::for_each(received.surplus.begin(), received.surplus.end(), dispose);
 }
 
 void Client::read_ahead() {
   while (!ahead_ended_ && ahead_.size() < kMaxReadAhead) {
     auto received = std::make_unique<shm::Received>();
-    const shm::ReceiveResult result = shm::receive_message(socket_.get(), *received, false);
+    const shm::ReceiveResult result = receive_from_socket(*received);
     if (result == shm::ReceiveResult::kNothing) return;
     if (result == shm::ReceiveResult::kReceived) {
       ahead_.push_back(std::move(received));

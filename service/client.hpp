@@ -12,6 +12,7 @@
 #include <string>
 
 #include "service/registry.hpp"
+#include "service/shares.hpp"
 #include "shm/file_descriptor.hpp"
 #include "shm/ids.hpp"
 #include "shm/wire.hpp"
@@ -25,15 +26,21 @@ using ClientId = std::uint64_t;
 
 class Client {
  public:
-  // Takes over an accepted socket. Throws std::system_error.
-  Client(ClientId id, shm::FileDescriptor socket);
+  // Takes over an accepted socket. Throws std::system_error; LimitExceeded where its user has
+  // enough.
+  Client(ClientId id, shm::FileDescriptor socket, Shares& shares);
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+  // What it sent and nobody read may take any time to close: that is left to its user's errands.
+  ~Client();
 
   // Sends, or queues where the client is slow to read. Descriptors are duplicated if need be.
   void send(const shm::Message& message,
             std::array<int, shm::kMaxDescriptors> descriptors = {-1, -1});
   // Sends what is queued, as far as it goes.
   void flush();
-  // The next message that it has sent; those that were read ahead come first.
+  // The next message that it has sent; those that were read ahead come first. Its descriptors are
+  // memfds and anonymous pipes, whoever made them; where others came with it, `is_strange` is set.
   [[nodiscard]] shm::ReceiveResult receive(shm::Received& received);
   // Reads what it has sent by now, at most kMaxReadAhead messages, and sets it aside.
   void read_ahead();
@@ -66,24 +73,31 @@ class Client {
   bool is_component = false;  // has opened a port once
   bool comes_back = false;    // if the conversation is lost: then its ports are kept for it
   bool is_returning = false;  // and has not handed back all yet:
-  std::set<shm::PortInstance> to_hand_back;  // these are missing
-  bool observes = false;
-  std::uint32_t postponed = 0;                      // requests that cannot be served yet
-  bool watches_queue = false;                       // the loop waits until it can be written
-  std::map<shm::SourceId, std::uint64_t> pages;     // those that it has been sent, by their number
-  std::map<shm::PortId, std::uint64_t> port_names;  // the same of names of input ports
-  std::set<shm::PortInstance> ports;                // that it has open
+  std::set<shm::PortInstance> to_hand_back;        // these are missing
+  bool has_turn = false;                           // waits for its turn to be served
+  Charge charge;                                   // as one of so many clients
+  std::uint32_t postponed = 0;                     // requests that cannot be served yet
+  std::uint32_t waits_for_status = 0;              // how often it has asked for a document
+  bool watches_queue = false;                      // the loop waits until it can be written
+  std::map<shm::SourceId, shm::PageNumber> pages;  // the last that it has been sent, by number
+  std::set<shm::PortInstance> ports;               // that it has open
 
  private:
   struct Queued {
     shm::Message message;
     std::array<shm::FileDescriptor, shm::kMaxDescriptors> descriptors;
+    Charge bytes;
+    Charge open;  // the descriptors
   };
+  [[nodiscard]] bool has_room_for(std::uint64_t descriptors) const;
   static constexpr std::size_t kMaxReadAhead = 256;
   static constexpr std::size_t kMaxQueue = 16384;
+  [[nodiscard]] shm::ReceiveResult receive_from_socket(shm::Received& received);
   static constexpr std::size_t kMaxQueuedDescriptors = 4096;  // so that others find some left
 
   const ClientId id_;
+  Shares& shares_;
+  Charge descriptors_;
   shm::FileDescriptor socket_;
   shm::FileDescriptor process_;  // a pidfd
   pid_t pid_ = 0;
@@ -95,6 +109,9 @@ class Client {
   std::deque<std::unique_ptr<shm::Received>> ahead_;
   std::optional<shm::ReceiveResult> ahead_ended_;  // how the conversation ends after `ahead_`
 };
+
+// Closes what a message has brought and nobody has taken, as errands of the user who sent it.
+void dispose_of(shm::Received& received, uid_t user);
 
 // An answer to a client's question.
 inline shm::Message reply_to(std::uint64_t request, shm::MessageKind kind) {

@@ -31,8 +31,9 @@ struct Reading {
   Findings findings;  // the rest is to be used only if there is no error
   std::optional<Policy> policy;
   std::vector<ModelPointer> models;
-  std::string changes;             // of the model in force, in one line; empty: was not asked for
-  std::vector<std::string> diffs;  // JSON, of each model where that was asked for
+  // What it changes, as changes_json() has it, in bytes; "null": not known, or not asked for.
+  std::string changes = "null";    // of the model in force
+  std::vector<std::string> diffs;  // of each model, where that was asked for
 };
 
 class Compiler {

@@ -20,7 +20,7 @@ bool is_same_rule(const CompiledRule& a, const CompiledRule& b) {
 }
 
 bool is_same_port(const CompiledPort& a, const CompiledPort& b) {
-  return a.arbitrated == b.arbitrated && a.reads == b.reads &&
+  return a.arbitrated == b.arbitrated && a.in_order == b.in_order && a.reads == b.reads &&
          std::equal(a.rules.begin(), a.rules.end(), b.rules.begin(), b.rules.end(), is_same_rule);
 }
 

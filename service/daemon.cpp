@@ -1,6 +1,5 @@
 #include "service/daemon.hpp"
 
-#include <fcntl.h>
 #include <signal.h>
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
@@ -13,14 +12,24 @@
 #include <stdexcept>
 #include <utility>
 
+#include "service/errands.hpp"
+#include "service/headroom.hpp"
 #include "service/log.hpp"
+#include "service/log_sink.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
 namespace {
 
+// Without a descriptor to accept a client with.
+constexpr shm::Nanoseconds kListenAgainAfter = 100'000'000;
+
 // How many messages of one client are handled before it is the next one's turn.
 constexpr int kMaxMessagesAtOnce = 64;
+// And for how long at most, but for the last of them.
+constexpr shm::Nanoseconds kMaxTurn = 1'000'000;
+// How often the loop looks who has something to say before it serves those of whom it knows.
+constexpr int kMaxRounds = 64;
 
 std::uint64_t event_key(std::uint32_t tag, ClientId client) {
   return std::uint64_t{tag} << 56 | client;
@@ -32,9 +41,11 @@ Daemon::Daemon(const DaemonOptions& options)
     : instance_(options.instance),
       stores_(options.uses_descriptor_store),
       gate_(options.policy),
+      shares_(totals_of_this_process(), options.user_share, geteuid()),
       files_(options.models),
+      is_strict_(options.is_strict),
       state_(options.directory, options.instance),
-      proving_{options.steps, tell_service_manager()},
+      proving_{options.steps, tell_service_manager(), options.is_strict},
       before_reading_(options.before_reading),
       compiler_(options.compiles_in) {
   if (!files_.empty() || gate_.has_file()) read_first_models(options.stop_descriptor);
@@ -43,7 +54,9 @@ Daemon::Daemon(const DaemonOptions& options)
   if (!epoll_) throw std::system_error(errno, std::generic_category(), "epoll_create1");
   watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
   watch(compiler_.descriptor(), Tag::kCompiler, 0, EPOLLIN);
-  reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
+  if (!Headroom::of_the_process().is_enough()) {
+    log::warn("few descriptors (RLIMIT_NOFILE): a client that sends many can hold up this daemon");
+  }
   look_for_predecessor();
 }
 
@@ -51,6 +64,8 @@ Daemon::Daemon(const DaemonOptions& options)
 // does.
 Daemon::~Daemon() {
   unlink(listener_.path.c_str());
+  // Who has connected and was not accepted may have sent something, too.
+  Errands::of_the_process().close(geteuid(), std::move(listener_.socket));
   if (!stores_ && phase_ == Phase::kServing && clients_.empty() && absentees_.empty())
     state_.remove();
 }
@@ -65,14 +80,16 @@ void Daemon::watch(int fd, Tag tag, ClientId client, std::uint32_t events) {
   }
 }
 
+void Daemon::unwatch(int fd) const noexcept { epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, fd, nullptr); }
+
 int Daemon::timeout_ms() const {
-  const bool is_behind = std::any_of(clients_.begin(), clients_.end(), [](const auto& each) {
-    return each.second->has_read_ahead();
-  });
   const bool may_change = !swap_ && !preparing_ && phase_ == Phase::kServing && !changes_.empty();
-  if (is_behind || may_change || (try_postponed_ && !postponed_.empty())) return 0;
+  if (!turns_.empty() || is_more_to_tell_ || may_change || (try_postponed_ && !postponed_.empty()))
+    return 0;
   shm::Nanoseconds deadline =
-      std::min({barriers_.next_deadline(), takeover_deadline(), show_growth_at_});
+      std::min({barriers_.next_deadline(), takeover_deadline(), show_growth_at_, give_back_at_,
+                status_requests_.next(), listen_again_at_, watchdog_.deadline(),
+                Errands::of_the_process().deadline()});
   for (const Postponed& request : postponed_) deadline = std::min(deadline, request.deadline);
   if (deadline == shm::kForever) return -1;
   const shm::Nanoseconds left = std::max<shm::Nanoseconds>(deadline - shm::monotonic_now(), 0);
@@ -82,8 +99,33 @@ int Daemon::timeout_ms() const {
 void Daemon::run(int signal_descriptor) {
   watch(signal_descriptor, Tag::kSignals, 0, EPOLLIN);
   for (;;) {
-    epoll_event events[64];
-    const int count = epoll_wait(epoll_.get(), events, 64, timeout_ms());
+    if (!hear(signal_descriptor)) return;
+    give_turns();
+    const shm::Nanoseconds now = shm::monotonic_now();
+    barriers_.expire(now);
+    if (now >= show_growth_at_) {
+      switchboard_.show_growth();
+      show_growth_at_ = switchboard_.has_growth_to_show() ? now + kShowGrowthAfter : shm::kForever;
+    }
+    look_after_the_loop(now);
+    advance_takeover(now);
+    serve_postponed(now);
+    advance_changes();
+    if (phase_ == Phase::kServing) give_back_at_ = directory_.give_back(now);
+    is_more_to_tell_ = observers_.tell(clients_, switchboard_);
+    answer_status(now);
+    settle();
+    if (stop_wanted_) return;
+  }
+}
+
+// Notes who has something to say, waiting for it if nothing is to be done. False: stop.
+bool Daemon::hear(int signal_descriptor) {
+  constexpr int kAtOnce = 64;
+  epoll_event events[kAtOnce];
+  int timeout = timeout_ms();
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const int count = epoll_wait(epoll_.get(), events, kAtOnce, timeout);
     if (count < 0 && errno != EINTR) {
       throw std::system_error(errno, std::generic_category(), "epoll_wait");
     }
@@ -92,33 +134,57 @@ void Daemon::run(int signal_descriptor) {
       const ClientId id = events[i].data.u64 & ((std::uint64_t{1} << 56) - 1);
       if (tag == Tag::kListener) accept_client();
       if (tag == Tag::kCompiler) finish_preparing();
-      if (tag == Tag::kSignals && handle_signal(signal_descriptor)) return;
-      if (tag == Tag::kAbsentee) {
-        forget_absentee(id);
-        continue;
-      }
-      const auto client = clients_.find(id);
-      if (client == clients_.end()) continue;
-      if (tag == Tag::kClient && (events[i].events & EPOLLOUT) != 0) client->second->flush();
-      if (tag == Tag::kClient && (events[i].events & ~EPOLLOUT) != 0) serve(*client->second);
-      // What it sent before it died is served first.
-      if (tag == Tag::kProcess) {
-        serve(*client->second);
-        drop(id);
-      }
+      if (tag == Tag::kSignals && handle_signal(signal_descriptor)) return false;
+      if (tag == Tag::kAbsentee) forget_absentee(id);
+      if (tag == Tag::kClient) hear_client(id, events[i].events);
+      if (tag == Tag::kProcess) hear_death(id);
     }
-    const shm::Nanoseconds now = shm::monotonic_now();
-    barriers_.expire(now);
-    if (now >= show_growth_at_) {
-      switchboard_.show_growth();
-      show_growth_at_ = switchboard_.has_growth_to_show() ? now + kShowGrowthAfter : shm::kForever;
-    }
-    advance_takeover(now);
-    serve_postponed(now);
-    advance_changes();
-    settle();
-    if (stop_wanted_) return;
+    if (count < kAtOnce) break;
+    timeout = 0;  // the others that have something to say, before anyone is served
   }
+  return true;
+}
+
+void Daemon::hear_client(ClientId id, std::uint32_t events) {
+  const auto found = clients_.find(id);
+  if (found == clients_.end()) return;
+  Client& client = *found->second;
+  if ((events & EPOLLOUT) != 0) client.flush();
+  if ((events & ~EPOLLOUT) != 0) client.has_turn = true;
+  if (client.has_turn) turns_.add(client.user(), id);
+  watch_client(client);
+}
+
+// What it sent before it died is served first.
+void Daemon::hear_death(ClientId id) {
+  const auto found = clients_.find(id);
+  if (found == clients_.end()) return;
+  serve(*found->second);
+  drop(id);
+}
+
+// One turn for each user who waits for one.
+void Daemon::give_turns() {
+  for (std::size_t left = turns_.users(); left > 0; --left) {
+    const auto id = turns_.next();
+    if (!id) return;
+    const auto found = clients_.find(*id);
+    if (found == clients_.end()) continue;
+    Client& client = *found->second;
+    const bool has_more = serve(client);
+    if (clients_.count(*id) == 0) continue;
+    client.has_turn = has_more;
+    if (has_more) turns_.add(client.user(), *id);
+    watch_client(client);
+  }
+}
+
+// One that waits for its turn is not heard again before it, and whoever is heard is not until this.
+void Daemon::watch_client(Client& client) {
+  const std::uint32_t in = client.has_turn ? 0u : static_cast<std::uint32_t>(EPOLLIN | EPOLLRDHUP);
+  const std::uint32_t out = client.has_queue() ? static_cast<std::uint32_t>(EPOLLOUT) : 0u;
+  watch(client.socket(), Tag::kClient, client.id(), in | out | EPOLLONESHOT);
+  client.watches_queue = out != 0;
 }
 
 bool Daemon::handle_signal(int signal_descriptor) {
@@ -147,63 +213,109 @@ void Daemon::accept_client() {
       }
       return;
     }
+    const LogAccount stranger(LogAccount::kUnknown);
+    std::unique_ptr<Client> client;
     try {
       const ClientId id = ++last_client_;
-      auto client = std::make_unique<Client>(id, std::move(socket));
-      watch(client->socket(), Tag::kClient, id, EPOLLIN | EPOLLRDHUP);
+      client = std::make_unique<Client>(id, std::move(socket), shares_);
+      watch_client(*client);
       if (client->process() >= 0) watch(client->process(), Tag::kProcess, id, EPOLLIN);
       clients_.emplace(id, std::move(client));
       drop_oldest_silent_client();
+    } catch (const LimitExceeded& limit) {  // anybody may come again and again: not worth a warning
+      log::debug("a client was turned away: {}", limit.what());
     } catch (const std::exception& error) {
       log::warn("a client was turned away: {}", error.what());
+      if (client != nullptr) unwatch(client->socket());
     }
     return;
   }
 }
 
-// Else it would stay in the listener's queue, and the loop would never rest.
-void Daemon::turn_away_client() {
-  reserve_.reset();
-  const shm::FileDescriptor socket(accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
-  log::warn("a client was turned away: no descriptors are left");
-  reserve_.reset(open("/dev/null", O_RDONLY | O_CLOEXEC));
+void Daemon::look_after_the_loop(shm::Nanoseconds now) {
+  watchdog_.go_round(now);
+  if (now >= listen_again_at_) {
+    listen_again_at_ = shm::kForever;
+    watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
+  }
+  const std::string lost = Errands::of_the_process().look_after(now);
+  if (!lost.empty()) log::warn("{}", lost);
 }
 
-// Whoever connects and says nothing costs two descriptors, and gives way to those who come later.
+// It would stay in the listener's queue, and the loop would never rest. Where there is not even a
+// descriptor for that, the listener is left alone for a while.
+void Daemon::turn_away_client() {
+  shm::FileDescriptor socket;
+  {
+    const Headroom::Use use;
+    socket.reset(accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  }
+  if (!socket) {
+    listen_again_at_ = shm::monotonic_now() + kListenAgainAfter;
+    watch(listener_.socket.get(), Tag::kListener, 0, 0);
+    return;
+  }
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  static_cast<void>(getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size));
+  const LogAccount account(peer.uid);
+  log::warn(
+      "a client of user {} was turned away: no descriptors are left (RLIMIT_NOFILE, "
+      "LimitNOFILE= in a systemd unit)",
+      peer.uid);
+  Errands::of_the_process().close(peer.uid, std::move(socket));
+}
+
+// Whoever connects and says nothing costs two descriptors, and gives way to those who come later:
+// of the user who has the most of them.
 void Daemon::drop_oldest_silent_client() {
-  ClientId oldest = 0;
+  std::map<uid_t, std::pair<std::size_t, ClientId>> silent;  // how many, and the oldest
   std::size_t count = 0;
   for (const auto& [id, client] : clients_) {
     if (!client->name.empty()) continue;
-    if (count++ == 0) oldest = id;
+    ++count;
+    ++silent.try_emplace(client->user(), std::size_t{0}, id).first->second.first;
   }
-  if (count > shm::kMaxSilentClients) drop(oldest);
+  if (count <= shm::kMaxSilentClients) return;
+  const auto most = std::max_element(
+      silent.begin(), silent.end(),
+      [](const auto& one, const auto& other) { return one.second.first < other.second.first; });
+  drop(most->second.second);
 }
 
-void Daemon::serve(Client& client) {
+bool Daemon::serve(Client& client) {
+  const LogAccount account(client.user());
   const ClientId id = client.id();
+  const uid_t user = client.user();
+  const shm::Nanoseconds until = shm::monotonic_now() + kMaxTurn;
   shm::Received received;
   for (int i = 0; i < kMaxMessagesAtOnce; ++i) {
     switch (client.receive(received)) {
       case shm::ReceiveResult::kNothing:
-        return;
+        return false;
       case shm::ReceiveResult::kReceived:
         break;
       case shm::ReceiveResult::kMalformed:
         log::warn("{} sent what is no message; dropped", client.description());
+        dispose_of(received, user);
         drop(id);
-        return;
+        return false;
       case shm::ReceiveResult::kClosed:
+        dispose_of(received, user);
         drop(id);
-        return;
+        return false;
     }
     handle_or_refuse(client, received, shm::kForever);
-    if (clients_.count(id) == 0) return;
+    dispose_of(received, user);
+    if (clients_.count(id) == 0) return false;
+    if (shm::monotonic_now() >= until) break;
   }
+  return true;
 }
 
 // `deadline`: of a request that was postponed.
 void Daemon::handle_or_refuse(Client& client, shm::Received& received, shm::Nanoseconds deadline) {
+  const LogAccount account(client.user());
   std::string why;
   try {
     handle(client, received);
@@ -235,36 +347,31 @@ void Daemon::drop(ClientId id) {
   if (found == clients_.end()) return;
   const std::unique_ptr<Client> client = std::move(found->second);
   clients_.erase(found);
+  const LogAccount account(client->user());
+  unwatch(client->socket());  // it is closed later
   if (!client->name.empty() && !client->is_turned_away) {
     log::info("{} left, {} ports with it", client->description(), client->ports.size());
   }
   if (client->comes_back && !client->has_died()) set_away(*client);
   while (!client->ports.empty()) switchboard_.remove(*client->ports.begin());
   for (const shm::PortInstance port : client->to_hand_back) switchboard_.forget_away(port);
+  observers_.forget(id);
   barriers_.forget(id);
 }
 
 // After each round: sends what is queued, and drops who is lost.
 void Daemon::settle() {
-  std::vector<ClientId> read_ahead;
-  for (const auto& [id, client] : clients_) {
-    if (client->has_read_ahead()) read_ahead.push_back(id);
-  }
-  for (const ClientId id : read_ahead) {
-    const auto client = clients_.find(id);
-    if (client != clients_.end()) serve(*client->second);
-  }
   std::vector<ClientId> lost;
   for (const auto& [id, client] : clients_) {
     if (client->is_lost()) {
       lost.push_back(id);
-    } else {
-      const std::uint32_t out = client->has_queue() ? static_cast<std::uint32_t>(EPOLLOUT) : 0u;
-      if (out != 0 || client->watches_queue) {
-        watch(client->socket(), Tag::kClient, id, EPOLLIN | EPOLLRDHUP | out);
-        client->watches_queue = out != 0;
-      }
+      continue;
     }
+    if (client->has_read_ahead() && !client->has_turn) {
+      client->has_turn = true;
+      turns_.add(client->user(), id);
+    }
+    if (client->has_queue() && !client->watches_queue) watch_client(*client);
   }
   for (const ClientId id : lost) drop(id);
 }

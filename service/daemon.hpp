@@ -5,6 +5,7 @@
 //
 //   daemon.cpp           the loop, and clients that come and go
 //   daemon_requests.cpp  what they ask
+//   daemon_pages.cpp     sources that pass from one user to another
 //   daemon_reload.cpp    another model, or policy: reload, switch, rollback
 //   daemon_takeover.cpp  what a predecessor has left
 #pragma once
@@ -31,10 +32,15 @@
 #include "service/library.hpp"
 #include "service/model_copy.hpp"
 #include "service/models.hpp"
+#include "service/observers.hpp"
 #include "service/preparation.hpp"
 #include "service/registry.hpp"
+#include "service/shares.hpp"
+#include "service/status_requests.hpp"
 #include "service/strangers.hpp"
 #include "service/switchboard.hpp"
+#include "service/turns.hpp"
+#include "service/watchdog.hpp"
 #include "shm/rendezvous.hpp"
 
 namespace arbiter::service {
@@ -50,6 +56,9 @@ struct DaemonOptions {
   std::string instance;               // checked
   std::string directory;              // where to listen
   std::optional<std::string> policy;  // a file; without one the default policy holds
+  bool is_strict = false;             // takes warnings for errors, in all that it reads
+  // How much of what all share one user may have, in percent of what is left (service/shares.hpp).
+  unsigned user_share = Shares::kDefaultPercent;
   // Whether the service manager keeps descriptors for the next daemon.
   bool uses_descriptor_store = false;
   std::uint64_t steps = rules::Budget::kSteps;  // that the proof of a model may take
@@ -92,9 +101,11 @@ class Daemon {
     Change change;
     Findings findings;
     LoadedModel to;
-    std::string how;            // as in the history
-    std::uint64_t content = 0;  // likewise
-    std::string changes{};      // of what was in force before
+    std::string how;               // as in the history
+    std::uint64_t content = 0;     // likewise
+    std::string changes = "null";  // of what was in force before: as Reading::changes
+    // Of a rollback: to where.
+    std::optional<PastModel> back_to{};
     // Of a reload: what else changes with it.
     std::optional<Library> library{};
     std::optional<Policy> policy{};
@@ -104,16 +115,25 @@ class Daemon {
   enum class Tag : std::uint32_t { kListener, kSignals, kClient, kProcess, kAbsentee, kCompiler };
 
   void watch(int fd, Tag tag, ClientId client, std::uint32_t events);
+  // One that is closed later, or by somebody else.
+  void unwatch(int fd) const noexcept;
   [[nodiscard]] int timeout_ms() const;
   // True: stop.
   bool handle_signal(int signal_descriptor);
+  [[nodiscard]] bool hear(int signal_descriptor);
+  void hear_client(ClientId id, std::uint32_t events);
+  void hear_death(ClientId id);
+  void give_turns();
+  void watch_client(Client& client);
   void accept_client();
   void turn_away_client();
+  // What is owed to strangers' descriptors and to the service manager, once in each round.
+  void look_after_the_loop(shm::Nanoseconds now);
   // Throws std::length_error where there is no room for another.
-  void require_room_for(const Client& newcomer, NodeId returning) const;
+  Charge make_room_for(const Client& newcomer, NodeId returning);
   void drop_oldest_silent_client();
-  // Handles what it has sent, a bounded part of it: others wait too.
-  void serve(Client& client);
+  // Handles what it has sent, a bounded part of it: others wait too. True: there may be more.
+  bool serve(Client& client);
   void drop(ClientId id);
   void settle();
 
@@ -121,11 +141,14 @@ class Daemon {
   void handle(Client& client, shm::Received& received);
   void hello(Client& client, const shm::Received& received);
   void open_output(Client& client, shm::Received& received);
+  void finish_opening(Client& client, std::uint64_t request, std::unique_ptr<OutputPort> port,
+                      Source& source);
   void open_input(Client& client, shm::Received& received);
   void connect(Client& client, std::uint64_t request, shm::PortInstance port);
   void introduce(const Switchboard::Told& told, std::function<void()> passed);
   void close_port(Client& client, shm::PortInstance port);
-  void send_status(Client& client, std::uint64_t request);
+  void answer_status(shm::Nanoseconds now);
+  static shm::FileDescriptor make_document(const std::string& document);
   void send_model(Client& client, std::uint64_t request);
   void deactivate(Client& client, const shm::Message& message);
   void refuse(Client& client, std::uint64_t request, const std::string& why);
@@ -134,6 +157,18 @@ class Daemon {
   void require_free(const Client& asking, shm::PortInstance holder, const std::string& what);
   // The same of one that is away. Throws NotYet.
   void require_not_kept(shm::PortInstance holder, const std::string& what);
+
+  // Pages that are replaced (daemon_pages.cpp).
+
+  // Throws NotYet.
+  void require_not_changing(const Source& source) const;
+  // Calls `changed` once another page is in force, which `user` may be given, or nobody; not if the
+  // client has gone by then.
+  void change_page(Source& source, const Client& client, PageUser user,
+                   std::function<void(Source&, Client&)> changed);
+  // Whether somebody else can write the page, whom an operator may have to hold it against.
+  [[nodiscard]] bool may_undo(const Source& source) const;
+  bool end_activity(const Source& source);
 
   // Changes of the model (daemon_reload.cpp): each is answered when it is over.
   void ask_for(Change change, const Client& client, const shm::Message& message);
@@ -159,7 +194,7 @@ class Daemon {
   void reserve_tables(const Library& library);
   void begin_swap(Swap& swap);
   void put_in_force();
-  void answer_done(const Swap& swap, const std::string& changes);
+  void answer_done(const Swap& swap, nlohmann::json changes);
   void answer_refused(const Swap& swap, const std::string& why);
   void answer(const Swap& swap, const std::string& report, const std::string& why_not = {});
   void send_document(Client& client, std::uint64_t request, shm::MessageKind kind,
@@ -175,6 +210,7 @@ class Daemon {
     uid_t user = 0;
     shm::FileDescriptor process;
     std::set<shm::PortInstance> ports;
+    Charge charge;
   };
   struct Postponed {
     ClientId client = 0;
@@ -209,10 +245,12 @@ class Daemon {
   const std::string instance_;
   const bool stores_;
   Gate gate_;
+  Shares shares_;
   Registry registry_;
-  Directory directory_{registry_, stores_};
+  Directory directory_{registry_, shares_, stores_};
   Models models_{directory_, registry_};
   const std::vector<NamedFiles> files_;
+  const bool is_strict_;
   std::vector<ModelPointer> read_at_start_;  // until they are put into the library
   Library library_;
   LoadedModel in_force_;  // null: none, or a predecessor's
@@ -233,9 +271,16 @@ class Daemon {
   std::vector<Postponed> postponed_;
   bool try_postponed_ = false;  // something has changed that they wait for
   shm::FileDescriptor epoll_;
-  shm::FileDescriptor reserve_;  // given up for a moment to turn a client away when none is left
+  // Not before: there was no descriptor even to turn a client away.
+  shm::Nanoseconds listen_again_at_ = shm::kForever;
+  Watchdog watchdog_;
   std::map<ClientId, std::unique_ptr<Client>> clients_;  // the oldest first
   ClientId last_client_ = 0;
+  Turns turns_;
+  Observers observers_;
+  bool is_more_to_tell_ = false;  // to observers
+  StatusRequests status_requests_;
+  shm::Nanoseconds give_back_at_ = shm::kForever;
   Changes changes_;
   std::optional<Swap> swap_;       // the one that waits for its barrier
   std::optional<Swap> preparing_;  // the one that waits for the compiler

@@ -145,7 +145,8 @@ void Daemon::read_first_models(int stop_descriptor) {
   }
   Reading reading = compiler_.take();
   if (reading.findings.has_errors()) {
-    throw BadModel("not started: the files have errors, told above");
+    throw BadModel(std::string("not started: the files have errors, told above") +
+                   (is_strict_ ? "; --strict takes warnings for errors" : ""));
   }
   if (reading.policy) gate_.put_in_force(*reading.policy);
   read_at_start_ = std::move(reading.models);
@@ -156,7 +157,7 @@ void Daemon::prepare_reload(Swap& swap) {
                                 Reading& reading, const std::stop_token& stop) {
             const ModelPointer after = find_model(reading.models, name);
             if (before == nullptr || after == nullptr) return;
-            reading.changes = changes_between(*before, *after, stop);
+            reading.changes = changes_between(*before, *after, kStepsOfChange, stop);
           }));
 }
 
@@ -164,7 +165,7 @@ void Daemon::prepare_reload(Swap& swap) {
 void Daemon::finish_reload(Swap& swap, Reading reading) {
   if (files_.empty()) {
     gate_.put_in_force(*reading.policy);
-    answer_done(swap, {});
+    answer_done(swap, nullptr);
     return;
   }
   Library library(std::move(reading.models), directory_);
@@ -210,7 +211,7 @@ void Daemon::prepare_switch(Swap& swap) {
         (library_.models().empty() ? "; none is loaded" : "; there are: " + library_.names()));
   }
   if (next->model == in_force_.model) {
-    answer_done(swap, {});
+    answer_done(swap, nullptr);
     return;
   }
   swap.to = *next;
@@ -241,11 +242,12 @@ void Daemon::prepare_rollback(Swap& swap) {
   }
   swap.to = {past->model, std::make_shared<const Layout>(past->model->compiled, directory_)};
   swap.how = "rollback to " + std::to_string(past->generation);
+  swap.back_to = *past;
   swap.content = past->content;
   if (in_force_.model == nullptr) return begin_swap(swap);
   prepare(swap, [before = in_force_.model, after = past->model](const std::stop_token& stop) {
     Reading reading;
-    reading.changes = changes_between(*before, *after, stop);
+    reading.changes = changes_between(*before, *after, kStepsOfChange, stop);
     return reading;
   });
 }
@@ -278,10 +280,8 @@ void Daemon::put_in_force() {
   }
   introduce(switchboard_.link_all(snapshot.table), [] {});  // ports that were opened meanwhile
   switchboard_.unlink(snapshot.table);
+  switchboard_.tell_unmentioned(snapshot);
   switchboard_.ring_all();
-  for (const auto& [id, client] : clients_) {
-    if (client->observes) switchboard_.show_everything(*client);
-  }
   log::info("model {} is in force: {} \"{}\"{}", snapshot.generation, swap.how, model.name,
             swap.change.by.empty() ? "" : ", by " + swap.change.by);
   history_.add({snapshot.generation,
@@ -294,11 +294,13 @@ void Daemon::put_in_force() {
                 {},
                 in_force_.model});
   welcome_waiting();
-  if (!swap.changes.empty()) {
-    log::info("model {} compared with the last: {}", snapshot.generation, swap.changes);
-    history_.set_changes(snapshot.generation, swap.changes);
+  nlohmann::json changes = nlohmann::json::parse(swap.changes);
+  if (!changes.is_null()) {
+    const std::string summary = changes.at("summary").get<std::string>();
+    log::info("model {} compared with the last: {}", snapshot.generation, summary);
+    history_.set_changes(snapshot.generation, summary);
   }
-  answer_done(swap, swap.changes);
+  answer_done(swap, std::move(changes));
 }
 
 // What `arbiter reload --dry-run` shows.
@@ -313,10 +315,9 @@ void Daemon::prepare_comparison(Swap& swap) {
               });
               ModelPointer before = found == loaded.end() ? nullptr : *found;
               if (read->name == name) before = in_force;
-              reading.diffs.push_back(
-                  before == nullptr
-                      ? "null"
-                      : in_bytes(changes_json(before->compiled, read->compiled, stop)));
+              reading.diffs.push_back(before == nullptr
+                                          ? "null"
+                                          : changes_between(*before, *read, kStepsOfDryRun, stop));
             }
           }));
 }
@@ -332,12 +333,12 @@ void Daemon::finish_comparison(const Swap& swap, const Reading& reading) {
   answer(swap, report(swap, {{"ok", true}, {"models", std::move(models)}}));
 }
 
-void Daemon::answer_done(const Swap& swap, const std::string& changes) {
+void Daemon::answer_done(const Swap& swap, nlohmann::json changes) {
   answer(swap, report(swap, {{"ok", true},
                              {"generation", models_.in_force().generation},
                              {"name", models_.name()},
-                             {"changes", changes.empty() ? nlohmann::json(nullptr)
-                                                         : nlohmann::json(changes)}}));
+                             {"back_to", swap.back_to ? to_json(*swap.back_to) : nullptr},
+                             {"changes", std::move(changes)}}));
 }
 
 void Daemon::answer_refused(const Swap& swap, const std::string& why) {

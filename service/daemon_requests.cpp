@@ -10,6 +10,7 @@
 #include "service/log.hpp"
 #include "service/status.hpp"
 #include "shm/clock.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -18,17 +19,32 @@ namespace {
 // dying.
 constexpr shm::Nanoseconds kMaxWaitForDeath = 100'000'000;
 
-// Logs and status are read by people and by programs: no name may break a line of theirs.
-bool is_printable(std::string_view name) {
-  return std::all_of(name.begin(), name.end(),
-                     [](char c) { return static_cast<unsigned char>(c) > ' ' && c != '\x7f'; });
+// Logs, status and terminals show what clients call themselves and their ports: no name may break a
+// line of theirs, or mislead those who read it.
+void require_fine(std::string_view name, const char* whose) {
+  if (const auto fault = shm::find_fault_in_name(name)) {
+    throw std::runtime_error(std::string(whose) + " name \"" + shm::printable(name) + "\" has " +
+                             fault->what + " in it");
+  }
 }
 
 std::string port_name(const shm::Message& message) {
   const std::string_view name = message.name_view();
   if (name.empty() || name[0] != '/') throw std::runtime_error("a port's name begins with '/'");
-  if (!is_printable(name)) throw std::runtime_error("a port's name has no white space");
+  require_fine(name, "the port's");
   return std::string(name);
+}
+
+void require_usable(const shm::Received& received) {
+  if (received.is_strange) {
+    throw std::runtime_error(
+        "a descriptor of the message is neither a memfd nor an anonymous pipe: nothing else is "
+        "taken");
+  }
+  if (received.lost_descriptors) {
+    throw std::runtime_error(
+        "the daemon has no descriptor left (RLIMIT_NOFILE, LimitNOFILE= in its systemd unit)");
+  }
 }
 
 // What is not said while components come back to a new daemon.
@@ -49,6 +65,7 @@ void Daemon::handle(Client& client, shm::Received& received) {
     hear_stranger(client, message);
     return;
   }
+  require_usable(received);
   if (client.node == 0 && message.kind != shm::MessageKind::kHello) {
     throw std::runtime_error("a client must say hello first");
   }
@@ -73,7 +90,7 @@ void Daemon::handle(Client& client, shm::Received& received) {
       break;
     case shm::MessageKind::kStatus:
       gate_.require(client, Action::kObserve);
-      send_status(client, message.request);
+      status_requests_.add(client, message.request);
       break;
     case shm::MessageKind::kModel:
       gate_.require(client, Action::kObserve);
@@ -84,13 +101,16 @@ void Daemon::handle(Client& client, shm::Received& received) {
       break;
     case shm::MessageKind::kObserve:
       gate_.require(client, Action::kObserve);
-      client.observes = true;
-      switchboard_.show_everything(client);
-      client.send(reply_to(message.request, shm::MessageKind::kDone));
+      observers_.add(client, message.request, directory_.last_news());
       break;
     case shm::MessageKind::kPeerRefused:
       if (client.ports.count(message.port) != 0) {
-        switchboard_.refuse(message.port, message.peer, std::string(message.text_view()));
+        switchboard_.refuse(message.port, message.peer, shm::printable(message.text_view()));
+      }
+      break;
+    case shm::MessageKind::kBlind:
+      if (client.ports.count(message.port) != 0) {
+        switchboard_.note_blind(message.port, std::string(message.text_view()));
       }
       break;
     case shm::MessageKind::kHandBackPage:
@@ -142,27 +162,12 @@ void Daemon::handle(Client& client, shm::Received& received) {
 }
 
 // `returning`: the node that the newcomer says it was, if it was here before.
-void Daemon::require_room_for(const Client& newcomer, NodeId returning) const {
-  std::size_t count = 0;
-  std::size_t of_the_user = 0;
-  for (const auto& [id, client] : clients_) {
-    if (client->node == 0) continue;
-    ++count;
-    if (client->user() == newcomer.user()) ++of_the_user;
+Charge Daemon::make_room_for(const Client& newcomer, NodeId returning) {
+  const auto absentee = absentees_.find(returning);
+  if (absentee != absentees_.end() && absentee->second.pid == newcomer.pid()) {
+    return std::move(absentee->second.charge);
   }
-  for (const auto& [node, absentee] : absentees_) {
-    if (node == returning) continue;
-    ++count;
-    if (absentee.user == newcomer.user()) ++of_the_user;
-  }
-  const auto refuse = [](const char* what, std::uint32_t limit) {
-    throw std::length_error("limit-exceeded: there are " + std::to_string(limit) + " clients " +
-                            what + " already, the most there can be");
-  };
-  if (count >= shm::kMaxClients) refuse("(kMaxClients)", shm::kMaxClients);
-  if (of_the_user >= shm::kMaxClientsPerUser) {
-    refuse("of this user (kMaxClientsPerUser)", shm::kMaxClientsPerUser);
-  }
+  return shares_.take(newcomer.user(), Share::kClients);
 }
 
 void Daemon::hello(Client& client, const shm::Received& received) {
@@ -172,10 +177,9 @@ void Daemon::hello(Client& client, const shm::Received& received) {
     throw std::runtime_error("the client speaks version " + std::to_string(message.value) +
                              ", this daemon version " + std::to_string(shm::kWireVersion));
   }
-  if (message.name_view().empty() || !is_printable(message.name_view())) {
-    throw std::runtime_error("a client must have a name, without white space");
-  }
-  require_room_for(client, (message.flags & shm::kRejoins) != 0 ? message.link : 0);
+  if (message.name_view().empty()) throw std::runtime_error("a client must have a name");
+  require_fine(message.name_view(), "the client's");
+  client.charge = make_room_for(client, (message.flags & shm::kRejoins) != 0 ? message.link : 0);
   client.name = message.name_view();
   client.hello_request = message.request;
   client.has_service_thread = (message.flags & shm::kHasServiceThread) != 0;
@@ -268,25 +272,46 @@ void Daemon::require_not_kept(shm::PortInstance holder, const std::string& what)
 void Daemon::open_output(Client& client, shm::Received& received) {
   const std::string name = port_name(received.message);
   gate_.require(client, Action::kOutput, name);
-  auto port = adopt_output(received);
-  Source& source = directory_.source(name);
+  auto port = adopt_output(received, client.user());
+  directory_.give_back(shm::monotonic_now());  // what this client may have closed just before
+  port->charge = shares_.take(client.user(), Share::kDescriptors, kDescriptorsOfOutput);
+  Source& source = directory_.source(name, client.user());
+  directory_.let_go(source);  // if it is not opened after all
   require_free(client, source.open, "the output port " + name);
   require_not_kept(source.away, "the output port " + name);
+  require_not_changing(source);
+  const std::uint64_t request = received.message.request;
+  if (Directory::may_be_given(source, client.user())) {
+    finish_opening(client, request, std::move(port), source);
+    return;
+  }
+  const auto kept = std::make_shared<std::unique_ptr<OutputPort>>(std::move(port));
+  change_page(source, client, client.user(), [this, kept, request](Source& own, Client& opener) {
+    finish_opening(opener, request, std::move(*kept), own);
+  });
+}
+
+void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_ptr<OutputPort> port,
+                            Source& source) {
   remember_component(client);
+  directory_.give_page(source, client.user());
   const OutputPort& opened = switchboard_.add(std::move(port), client, source);
-  auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
+  auto reply = reply_to(request, shm::MessageKind::kOpened);
   reply.port = opened.instance;
   reply.id = source.id;
-  client.send(reply, {source.writable.get(), -1});
-  log::info("{} opened output port {}", client.description(), name);
-  connect(client, received.message.request, opened.instance);
+  client.send(reply, {source.page.writable.get(), -1});
+  log::info("{} opened output port {}", client.description(), source.name);
+  connect(client, request, opened.instance);
 }
 
 void Daemon::open_input(Client& client, shm::Received& received) {
   const std::string name = port_name(received.message);
   gate_.require(client, Action::kInput, name);
-  auto port = adopt_input(received);
-  InputName& input = directory_.input(name);
+  auto port = adopt_input(received, client.user());
+  directory_.give_back(shm::monotonic_now());
+  port->charge = shares_.take(client.user(), Share::kDescriptors, kDescriptorsOfInput);
+  InputName& input = directory_.input(name, client.user());
+  directory_.let_go(input);
   require_free(client, input.open, "the input port " + name);
   require_not_kept(input.away, "the input port " + name);
   remember_component(client);
@@ -301,12 +326,11 @@ void Daemon::open_input(Client& client, shm::Received& received) {
 
 // Introduces a new port to its peers, and tells its component once they know it.
 void Daemon::connect(Client& client, std::uint64_t request, shm::PortInstance port) {
-  auto told = switchboard_.link_one(models_.in_force().table, port);
+  const auto in_force = models_.in_force();
+  auto told = switchboard_.link_one(in_force.table, port);
+  switchboard_.tell_unmentioned(in_force, port);
   // Hears of it in order, before the kConnected. But its receivers have to wait for an output port.
   if (switchboard_.output(port) == nullptr) told.erase(&client);
-  for (const auto& [id, other] : clients_) {
-    if (other->observes) switchboard_.show_everything(*other);
-  }
   introduce(told, [this, id = client.id(), request] {
     const auto found = clients_.find(id);
     if (found == clients_.end()) return;
@@ -332,22 +356,45 @@ void Daemon::close_port(Client& client, shm::PortInstance port) {
   switchboard_.remove(port);
 }
 
-void Daemon::send_status(Client& client, std::uint64_t request) {
-  const std::string document =
-      status_document({instance_, models_, library_, in_force_.model, history_, directory_,
-                       registry_, switchboard_, strangers_, clients_.size(), reloads_refused_},
-                      shm::monotonic_now());
-  send_document(client, request, shm::MessageKind::kStatusReply, document);
+// One document for all who have asked by now.
+void Daemon::answer_status(shm::Nanoseconds now) {
+  if (!status_requests_.are_due(now)) return;
+  shm::FileDescriptor document;
+  std::string why_not;
+  try {
+    document = make_document(
+        status_document({instance_, models_, library_, in_force_.model, history_, directory_,
+                         registry_, switchboard_, strangers_, clients_.size(), reloads_refused_},
+                        now));
+  } catch (const std::exception& error) {  // no descriptors are left
+    why_not = error.what();
+  }
+  for (const StatusRequests::Asking& each : status_requests_.take()) {
+    const auto found = clients_.find(each.client);
+    if (found == clients_.end()) continue;
+    Client& client = *found->second;
+    --client.waits_for_status;
+    if (document) {
+      client.send(reply_to(each.request, shm::MessageKind::kStatusReply), {document.get(), -1});
+    } else {
+      refuse(client, each.request, why_not);
+    }
+  }
+  status_requests_.made(now, shm::monotonic_now());
 }
 
-void Daemon::send_document(Client& client, std::uint64_t request, shm::MessageKind kind,
-                           const std::string& document) {
+shm::FileDescriptor Daemon::make_document(const std::string& document) {
   const auto file = shm::make_segment("arbiter-document", document.size());
   if (pwrite(file.get(), document.data(), document.size(), 0) !=
       static_cast<ssize_t>(document.size())) {
     throw std::runtime_error("the document could not be written");
   }
-  client.send(reply_to(request, kind), {shm::reopen(file, O_RDONLY).get(), -1});
+  return shm::reopen(file, O_RDONLY);
+}
+
+void Daemon::send_document(Client& client, std::uint64_t request, shm::MessageKind kind,
+                           const std::string& document) {
+  client.send(reply_to(request, kind), {make_document(document).get(), -1});
 }
 
 void Daemon::send_model(Client& client, std::uint64_t request) {
@@ -365,22 +412,23 @@ void Daemon::deactivate(Client& client, const shm::Message& message) {
   }
   require_free(client, source->open, "the output port " + name);
   require_not_kept(source->away, "the output port " + name);
+  require_not_changing(*source);
   if (!source->has_page()) throw std::runtime_error("nobody has the activity of " + name);
-  const shm::Nanoseconds now = shm::monotonic_now();
-  shm::Activity& activity = source->activity();
-  const shm::ActivityWord before = activity.word.load(std::memory_order_relaxed);
-  const bool was_active = shm::is_active(before, now);
-  // What is not active stays as it is: that it ran out, and when, or that it has never arrived.
-  if (was_active) {
-    activity.write(before, shm::deactivation(now));
-    shm::full_fence();  // (a): as a publisher's own deactivate()
-    switchboard_.ring_concerned(models_.in_force().table, source->id);
+  const bool was_active = end_activity(*source);
+  const auto answer = [this, was_active, request = message.request](Source& ended, Client& asking) {
+    end_activity(ended);  // who had it may have written there until it was replaced
+    directory_.let_go(ended);
+    auto reply = reply_to(request, shm::MessageKind::kDone);
+    reply.value = was_active ? 1 : 0;
+    asking.send(reply);
+    log::info("{} deactivated {}{}", asking.description(), ended.name,
+              was_active ? "" : ", which was not active");
+  };
+  if (was_active && may_undo(*source)) {
+    change_page(*source, client, {}, answer);
+  } else {
+    answer(*source, client);
   }
-  auto reply = reply_to(message.request, shm::MessageKind::kDone);
-  reply.value = was_active ? 1 : 0;
-  client.send(reply);
-  log::info("{} deactivated {}{}", client.description(), name,
-            was_active ? "" : ", which was not active");
 }
 
 void Daemon::refuse(Client& client, std::uint64_t request, const std::string& why) {

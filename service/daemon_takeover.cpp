@@ -55,7 +55,8 @@ void Daemon::look_for_predecessor() {
     try {
       inherit(board->descriptor, registry->descriptor);
       for (const StoredDescriptor& each : stored) {
-        if (&each != &*board && &each != &*registry) directory_.take_page(each.descriptor);
+        if (&each == &*board || &each == &*registry) continue;
+        if (!directory_.take_page(each.descriptor)) discard_stored(each.name);
       }
       return;
     } catch (const std::exception& error) {
@@ -136,6 +137,9 @@ void Daemon::rejoin(Client& client, const shm::Received& hello) {
 
 void Daemon::take_back_page(Client& client, const shm::Received& received) {
   const shm::SourceId id = received.message.id;
+  const Source* source = directory_.source_by_id(id);
+  // One that was to come into force next when the last daemon ended.
+  if (source != nullptr && received.message.value == source->page_number + 1) return;
   if (!directory_.take_page(id, received.descriptors[0])) {
     throw std::runtime_error("what was handed back is not the page of source " +
                              std::to_string(id));
@@ -151,7 +155,7 @@ void Daemon::take_back_output(Client& client, const shm::Received& received) {
     throw std::runtime_error("an output port that it never had was handed back");
   }
   directory_.take_page(message.id, received.descriptors[1]);
-  switchboard_.readmit(adopt_output(received), client, *source);
+  switchboard_.readmit(adopt_output(received, client.user()), client, *source);
 }
 
 void Daemon::take_back_input(Client& client, const shm::Received& received) {
@@ -161,7 +165,7 @@ void Daemon::take_back_input(Client& client, const shm::Received& received) {
       client.to_hand_back.erase(message.port) == 0) {
     throw std::runtime_error("an input port that it never had was handed back");
   }
-  switchboard_.readmit(adopt_input(received), client, *input);
+  switchboard_.readmit(adopt_input(received, client.user()), client, *input);
 }
 
 void Daemon::take_back_link(const Client& client, const shm::Message& message) {
@@ -196,6 +200,7 @@ void Daemon::set_away(Client& client) {
   absentee.ports.insert(client.ports.begin(), client.ports.end());
   while (!client.ports.empty()) switchboard_.set_away(*client.ports.begin());
   absentee.process = client.release_process();
+  absentee.charge = std::move(client.charge);
   watch(absentee.process.get(), Tag::kAbsentee, client.node, EPOLLIN);
 }
 

@@ -48,6 +48,7 @@ bool is_error(const rules::Diagnostic& finding) {
 }  // namespace
 
 void Findings::add(std::string of, rules::Diagnostics diagnostics) {
+  if (takes_warnings_for_errors_) diagnostics.make_warnings_errors();
   log_findings(diagnostics);
   parts_.push_back({std::move(of), std::move(diagnostics)});
 }

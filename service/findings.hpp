@@ -14,6 +14,9 @@ namespace arbiter::service {
 // Of several files that are read together: a policy and models.
 class Findings {
  public:
+  explicit Findings(bool takes_warnings_for_errors = false)
+      : takes_warnings_for_errors_(takes_warnings_for_errors) {}
+
   // Logs them too. `of` is what was read, as in a sentence: "the policy", "the model work".
   void add(std::string of, rules::Diagnostics diagnostics);
   // It could not be read at all; the sentence says why.
@@ -33,6 +36,7 @@ class Findings {
     std::string of;
     rules::Diagnostics diagnostics;
   };
+  bool takes_warnings_for_errors_;
   std::vector<std::string> failures_;
   std::vector<Part> parts_;
 };

@@ -57,22 +57,24 @@ const PastModel* History::previous() const {
   return before == models_.rend() ? nullptr : &*before;
 }
 
-nlohmann::json History::json() const {
+nlohmann::json to_json(const PastModel& entry) {
   using Json = nlohmann::json;
-  Json result = Json::array();
-  for (const PastModel& entry : models_) {
-    const auto& application = entry.files.application;
-    result.push_back({{"generation", entry.generation},
-                      {"content", entry.content},
-                      {"name", entry.name},
-                      {"files", entry.files.models},
-                      {"application", application ? Json(*application) : Json(nullptr)},
-                      {"since_ms", entry.since_ms},
-                      {"how", entry.how},
-                      {"by", entry.by.empty() ? Json(nullptr) : Json(entry.by)},
-                      {"changes", entry.changes.empty() ? Json(nullptr) : Json(entry.changes)},
-                      {"is_kept", entry.model != nullptr}});
-  }
+  const auto& application = entry.files.application;
+  return {{"generation", entry.generation},
+          {"content", entry.content},
+          {"name", entry.name},
+          {"files", entry.files.models},
+          {"application", application ? Json(*application) : Json(nullptr)},
+          {"since_ms", entry.since_ms},
+          {"how", entry.how},
+          {"by", entry.by.empty() ? Json(nullptr) : Json(entry.by)},
+          {"changes", entry.changes.empty() ? Json(nullptr) : Json(entry.changes)},
+          {"is_kept", entry.model != nullptr}};
+}
+
+nlohmann::json History::json() const {
+  nlohmann::json result = nlohmann::json::array();
+  for (const PastModel& entry : models_) result.push_back(to_json(entry));
   std::reverse(result.begin(), result.end());
   return result;
 }

@@ -26,6 +26,9 @@ struct PastModel {
   ModelPointer model;         // null: not kept any longer, or a predecessor's
 };
 
+// As it stands in the history's JSON.
+[[nodiscard]] nlohmann::json to_json(const PastModel& entry);
+
 // The calendar's time, in milliseconds since 1970.
 [[nodiscard]] std::int64_t calendar_ms();
 

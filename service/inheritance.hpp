@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "service/process.hpp"
 #include "shm/file_descriptor.hpp"
 
 namespace arbiter::service {
@@ -32,17 +33,6 @@ struct Realm {
   FileIdentity registry;
   friend bool operator==(const Realm&, const Realm&) = default;
 };
-
-// A process, told from later ones with the same pid by when it began.
-struct Process {
-  pid_t pid = 0;
-  std::uint64_t started = 0;
-
-  [[nodiscard]] bool lives() const;
-  friend bool operator==(const Process&, const Process&) = default;
-};
-// When a process began, in clock ticks since boot; 0 where that cannot be told.
-std::uint64_t start_of_process(pid_t pid);
 
 // What a daemon that is gone has left behind.
 struct Predecessor {

@@ -51,7 +51,7 @@ std::vector<ModelPointer> read_models(const std::vector<NamedFiles>& named, cons
     try {
       const rules::RuleSet rules =
           rules::load(rules::read_texts(each.files, rules::Accept::kRegularFile), diagnostics);
-      if (!diagnostics.has_errors()) model->compiled = rules::compile(rules, diagnostics, budget);
+      model->compiled = rules::compile(rules, diagnostics, budget);
     } catch (const rules::FileError& error) {
       findings.add_failure(error.what());
     }

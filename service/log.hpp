@@ -1,7 +1,7 @@
-// The one place that includes spdlog. Logs go to standard error: under systemd that is the journal.
+// How the daemon logs. The lines go to standard error, by way of log_sink.hpp: under systemd that
+// is the journal.
 #pragma once
 
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
 namespace arbiter::service {

@@ -3,15 +3,19 @@
 #include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <systemd/sd-daemon.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <memory>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
 #include "service/daemon.hpp"
 #include "service/log.hpp"
+#include "service/log_sink.hpp"
 
 namespace {
 
@@ -24,7 +28,8 @@ Example:
   arbiterd --model search=search.xml --model dance=dance.xml     # and then: arbiter switch dance
 
 It runs in the foreground, needs no configuration and no privileges, and logs to standard error.
-Files must be regular ones. SIGHUP and `arbiter reload` read all again; a bad one changes nothing.
+Files must be regular ones. Warnings about them are logged; with --strict they refuse the files.
+SIGHUP and `arbiter reload` read all again; a bad one changes nothing.
 SIGTERM, SIGINT and `arbiter stop` stop it. Without --policy every user may open ports and observe,
 and only root and the daemon's own user may reload, switch and stop.
 Components go on without it. The next daemon of the instance takes them over, and puts its own model
@@ -49,10 +54,23 @@ arbiter::shm::FileDescriptor catch_signals() {
   return arbiter::shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
 }
 
-int serve(arbiter::service::DaemonOptions options, const std::string& instance) {
+// Says all that is left to be said, unless nobody reads it, and ends.
+class Log {
+ public:
+  explicit Log(const std::string& level) {
+    using namespace arbiter::service;
+    auto sink = std::make_shared<LogSink>(std::make_shared<LogWriter>(STDERR_FILENO));
+    log::set_default_logger(std::make_shared<log::logger>("arbiterd", std::move(sink)));
+    log::set_level(log::level::from_str(level));
+  }
+  Log(const Log&) = delete;
+  Log& operator=(const Log&) = delete;
+  ~Log() { log::shutdown(); }
+};
+
+int serve(const arbiter::service::DaemonOptions& options, const std::string& instance,
+          const arbiter::shm::FileDescriptor& signals) {
   raise_descriptor_limit();
-  const auto signals = catch_signals();
-  options.stop_descriptor = signals.get();
   Daemon daemon(options);
   log::info("instance \"{}\" is ready at {}", instance, daemon.path());
   sd_notifyf(0, "READY=1\nSTATUS=instance %s", instance.c_str());
@@ -82,9 +100,18 @@ int run(int argc, char** argv) {
   app.add_option("--policy", policy,
                  "Policy file: who may open which ports, reload, switch, stop, observe")
       ->type_name("FILE");
+  app.add_flag("--strict", options.is_strict,
+               "Take warnings for errors: refuse files with them, at the start and at a reload");
   app.add_option("--instance", instance,
                  "Name of this daemon; without it $ARBITER_INSTANCE, else \"default\"")
       ->type_name("NAME");
+  app.add_option(
+         "--user-share", options.user_share,
+         "How much of names, clients, descriptors and unread messages one user may have, in "
+         "percent; what another has left counts")
+      ->type_name("PERCENT")
+      ->check(CLI::Range(1u, 99u))
+      ->capture_default_str();
   app.add_flag("--descriptor-store", options.uses_descriptor_store,
                "Leave descriptors with the service manager for the next daemon");
   app.add_option("--effort", effort,
@@ -99,15 +126,16 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
-  log::set_default_logger(log::stderr_logger_mt("arbiterd"));
-  log::set_level(log::level::from_str(level));
+  const auto signals = catch_signals();  // before there are threads: they inherit what is blocked
+  const Log logging(level);
   if (!policy.empty()) options.policy = policy;
   options.steps = arbiter::rules::Budget::steps_of(effort);
   try {
     options.models = arbiter::service::named_files(models, applications);
     options.instance = arbiter::shm::instance_name(instance);
     options.directory = arbiter::shm::daemon_directory();
-    return serve(options, options.instance);
+    options.stop_descriptor = signals.get();
+    return serve(options, options.instance, signals);
   } catch (const arbiter::rules::Stopped&) {  // by a signal, before it was ready
     return 0;
   } catch (const std::invalid_argument& error) {

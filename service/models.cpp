@@ -31,6 +31,7 @@ Models::Models(Directory& directory, Registry& registry)
       writer_(*mapping_.as<shm::Board>()),
       reader_(*mapping_.as<shm::Board>()) {
   shm::TableWriter::initialize(*mapping_.as<shm::Board>());
+  directory_.use_board(writer_);
 }
 
 void Models::inherit(const shm::FileDescriptor& board) {
@@ -45,6 +46,8 @@ void Models::inherit(const shm::FileDescriptor& board) {
   mapping_ = std::move(mapping);
   writer_ = shm::TableWriter(*mapping_.as<shm::Board>());
   reader_ = shm::TableReader(*mapping_.as<shm::Board>());
+  writer_.renew_pages();  // the last daemon may have died while it changed one
+  directory_.use_board(writer_);
 }
 
 void Models::reserve(std::size_t words) {

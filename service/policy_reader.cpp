@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "rules/names.hpp"
-#include "rules/utf8.hpp"
 #include "service/policy.hpp"
 #include "shm/limits.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -104,10 +104,10 @@ class PolicyReader {
 
   // The next word of line_, nothing at its end. A word that begins with '#' ends the line.
   std::string_view next_word() {
-    while (!line_.empty() && rules::is_blank(line_.front())) line_.remove_prefix(1);
+    while (!line_.empty() && shm::is_blank(line_.front())) line_.remove_prefix(1);
     if (line_.starts_with('#')) line_ = line_.substr(line_.size());
     std::size_t length = 0;
-    while (length < line_.size() && !rules::is_blank(line_[length])) ++length;
+    while (length < line_.size() && !shm::is_blank(line_[length])) ++length;
     const std::string_view word = line_.substr(0, length);
     line_.remove_prefix(length);
     return word;

@@ -7,6 +7,8 @@
 #include <memory>
 #include <stdexcept>
 
+#include <nlohmann/json.hpp>
+
 #include "service/comparison.hpp"
 
 namespace arbiter::service {
@@ -22,6 +24,7 @@ constexpr int kAtMost = 30;
 Reading read_files(const std::vector<NamedFiles>& files, const Gate& gate, const Proving& proving,
                    const std::stop_token& stop) {
   Reading reading;
+  reading.findings = Findings(proving.is_strict);
   reading.policy = gate.read(reading.findings);
   reading.models = read_models(files, proving, stop, reading.findings);
   return reading;
@@ -34,14 +37,19 @@ ModelPointer find_model(const std::vector<ModelPointer>& models, const std::stri
   return models.empty() ? nullptr : models.front();
 }
 
-std::string changes_between(const Model& before, const Model& after, const std::stop_token& stop) {
+std::string changes_between(const Model& before, const Model& after, std::uint64_t steps,
+                            const std::stop_token& stop) {
+  nlohmann::json changes;
   try {
-    return summary_of_changes(before.compiled, after.compiled, stop);
+    changes = changes_json(before.compiled, after.compiled, steps, stop);
   } catch (const rules::Stopped&) {
     throw;
   } catch (const std::exception& error) {
-    return std::string("not compared: ") + error.what();
+    const std::string why_not = std::string("not compared: ") + error.what();
+    changes = {{"summary", why_not}, {"text", why_not + '\n'}, {"diff", nullptr}};
   }
+  // Names may be any bytes; JSON may not.
+  return changes.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 rules::Budget::Watch tell_service_manager() {

@@ -15,6 +15,7 @@ namespace arbiter::service {
 struct Proving {
   std::uint64_t steps = rules::Budget::kSteps;
   rules::Budget::Watch watch;  // is called in the compiler's thread
+  bool is_strict = false;      // takes warnings for errors
 };
 
 // Reads the policy and all models. In any thread; throws rules::Stopped, std::runtime_error.
@@ -25,10 +26,10 @@ struct Proving {
 [[nodiscard]] ModelPointer find_model(const std::vector<ModelPointer>& models,
                                       const std::string& name);
 
-// What the one decides differently from the other, in one line. It may fail to find that out, and
-// then says so; it throws rules::Stopped only.
+// What the one decides differently from the other: as Reading::changes. It may fail to find that
+// out, and then says so; it throws rules::Stopped only.
 [[nodiscard]] std::string changes_between(const Model& before, const Model& after,
-                                          const std::stop_token& stop);
+                                          std::uint64_t steps, const std::stop_token& stop);
 
 // Tells the service manager how far a model is, and that it is worth waiting for.
 [[nodiscard]] rules::Budget::Watch tell_service_manager();

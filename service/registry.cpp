@@ -13,7 +13,7 @@ namespace arbiter::service {
 
 struct Registry::Segment {
   static constexpr std::uint64_t kMagic = 0x31676572'74696272;
-  static constexpr std::uint32_t kVersion = 2;
+  static constexpr std::uint32_t kVersion = 3;
 
   std::uint64_t magic;
   std::uint32_t version;
@@ -26,23 +26,6 @@ struct Registry::Segment {
   RegistryEntry sources[shm::kMaxSources];
   RegistryEntry inputs[shm::kMaxInputPorts];
 };
-
-Owner RegistryEntry::owner() const noexcept {
-  Owner result;
-  result.port = port.load(std::memory_order_acquire);
-  result.node = node.load(std::memory_order_relaxed);
-  result.process.pid = static_cast<pid_t>(pid.load(std::memory_order_relaxed));
-  result.process.started = started.load(std::memory_order_relaxed);
-  return result.port == 0 ? Owner{} : result;
-}
-
-void RegistryEntry::set_owner(const Owner& owner) noexcept {
-  clear_owner();
-  node.store(owner.node, std::memory_order_release);
-  pid.store(static_cast<std::uint64_t>(owner.process.pid), std::memory_order_release);
-  started.store(owner.process.started, std::memory_order_release);
-  port.store(owner.port, std::memory_order_release);
-}
 
 Registry::Registry() : writable_(shm::make_segment("arbiter-registry", sizeof(Segment))) {
   if (const auto error = shm::allocate(writable_, 0, offsetof(Segment, sources))) {
@@ -70,8 +53,12 @@ namespace {
 
 std::uint64_t next(shm::Atomic<std::uint64_t>& last) noexcept {
   const std::uint64_t given = last.load(std::memory_order_relaxed) + 1;
-  last.store(given, std::memory_order_release);
+  last.store(given, std::memory_order_relaxed);
   return given;
+}
+
+void count_up_to(shm::Atomic<std::uint32_t>& count, std::uint32_t id) noexcept {
+  count.store(std::max(count.load(std::memory_order_relaxed), id + 1), std::memory_order_relaxed);
 }
 
 }  // namespace
@@ -80,37 +67,29 @@ std::uint64_t Registry::next_instance() noexcept { return next(segment().last_in
 std::uint64_t Registry::next_link() noexcept { return next(segment().last_link); }
 NodeId Registry::next_node() noexcept { return next(segment().last_node); }
 
-void Registry::name(RegistryEntry& entry, const std::string& name, std::uint64_t page) {
+void Registry::reserve(RegistryEntry& entry) {
   const auto offset =
       static_cast<std::size_t>(reinterpret_cast<std::byte*>(&entry) - mapping_.data());
   if (const auto error = shm::allocate(writable_, offset, sizeof entry)) {
     throw std::system_error(error, "allocating the registry");
   }
-  entry.clear_owner();
-  entry.named.store(0, std::memory_order_release);
-  entry.page.store(page, std::memory_order_release);
-  const std::size_t length = std::min(name.size(), sizeof entry.name - 1);
-  std::memcpy(entry.name, name.data(), length);
-  entry.name[length] = '\0';
-  entry.named.store(1, std::memory_order_release);
 }
 
-void Registry::name_source(shm::SourceId id, const std::string& name, std::uint64_t page) {
-  this->name(source(id), name, page);
-  auto& count = segment().sources_named;
-  count.store(std::max(count.load(std::memory_order_relaxed), id + 1), std::memory_order_release);
+void Registry::reserve_source(shm::SourceId id) { reserve(source(id)); }
+void Registry::reserve_input(shm::PortId id) { reserve(input(id)); }
+
+void Registry::name_source(shm::SourceId id, const std::string& name) noexcept {
+  source(id).name(name);
+  count_up_to(segment().sources_named, id);
 }
 
-void Registry::name_input(shm::PortId id, const std::string& name) {
-  this->name(input(id), name, 0);
-  auto& count = segment().inputs_named;
-  count.store(std::max(count.load(std::memory_order_relaxed), id + 1), std::memory_order_release);
+void Registry::name_input(shm::PortId id, const std::string& name) noexcept {
+  input(id).name(name);
+  count_up_to(segment().inputs_named, id);
 }
 
-void Registry::forget_source(shm::SourceId id) noexcept {
-  source(id).clear_owner();
-  source(id).named.store(0, std::memory_order_release);
-}
+void Registry::forget_source(shm::SourceId id) noexcept { source(id).forget(); }
+void Registry::forget_input(shm::PortId id) noexcept { input(id).forget(); }
 
 // A name that cannot be one is of nobody: the segment may have been made by anyone of our user.
 std::string Registry::model(std::uint64_t generation) const {
@@ -130,10 +109,10 @@ RegistryEntry& Registry::source(shm::SourceId id) const noexcept { return segmen
 RegistryEntry& Registry::input(shm::PortId id) const noexcept { return segment().inputs[id]; }
 
 std::uint32_t Registry::source_count() const noexcept {
-  return std::min(segment().sources_named.load(std::memory_order_acquire), shm::kMaxSources);
+  return std::min(segment().sources_named.load(std::memory_order_relaxed), shm::kMaxSources);
 }
 std::uint32_t Registry::input_count() const noexcept {
-  return std::min(segment().inputs_named.load(std::memory_order_acquire), shm::kMaxInputPorts);
+  return std::min(segment().inputs_named.load(std::memory_order_relaxed), shm::kMaxInputPorts);
 }
 
 }  // namespace arbiter::service

@@ -4,48 +4,23 @@
 // descriptor of it, and hand it to a successor, so that names keep their ids, live ports their
 // numbers, and a port that a live component has open is given to nobody else.
 //
-// A daemon may be killed between any two stores. Each entry has one word that makes it count, which
-// is stored last, and cleared first.
+// A daemon may be killed between any two stores (registry_entry.hpp). The numbers given so far are
+// stored before what they are given to is: relaxed is enough, for a successor reads them when their
+// writer is gone.
 #pragma once
-
-#include <sys/types.h>
 
 #include <cstdint>
 #include <functional>
 #include <string>
 
 #include "service/inheritance.hpp"
+#include "service/registry_entry.hpp"
 #include "shm/atomic.hpp"
 #include "shm/ids.hpp"
 #include "shm/limits.hpp"
 #include "shm/segment.hpp"
 
 namespace arbiter::service {
-
-// A component's conversation with the daemon, and those that carry it on after a loss. Never given
-// twice.
-using NodeId = std::uint64_t;
-
-// Who has a port open.
-struct Owner {
-  shm::PortInstance port = 0;  // 0: nobody
-  NodeId node = 0;
-  Process process;
-};
-
-struct RegistryEntry {
-  shm::Atomic<std::uint64_t> page;  // of a source: the inode of its activity page
-  shm::Atomic<std::uint64_t> port;  // not 0: the owner counts
-  shm::Atomic<std::uint64_t> node;
-  shm::Atomic<std::uint64_t> pid;
-  shm::Atomic<std::uint64_t> started;
-  shm::Atomic<std::uint32_t> named;  // 1: the name counts
-  char name[shm::kMaxNameLength + 1];
-
-  [[nodiscard]] Owner owner() const noexcept;
-  void set_owner(const Owner& owner) noexcept;
-  void clear_owner() noexcept { port.store(0, std::memory_order_release); }
-};
 
 class Registry {
  public:
@@ -59,9 +34,12 @@ class Registry {
   [[nodiscard]] NodeId next_node() noexcept;
 
   // Throw std::system_error where there is no memory.
-  void name_source(shm::SourceId id, const std::string& name, std::uint64_t page);
-  void name_input(shm::PortId id, const std::string& name);
+  void reserve_source(shm::SourceId id);  // before anything is said of it
+  void reserve_input(shm::PortId id);
+  void name_source(shm::SourceId id, const std::string& name) noexcept;
+  void name_input(shm::PortId id, const std::string& name) noexcept;
   void forget_source(shm::SourceId id) noexcept;
+  void forget_input(shm::PortId id) noexcept;
   // That a name has been given.
   [[nodiscard]] RegistryEntry& source(shm::SourceId id) const noexcept;
   [[nodiscard]] RegistryEntry& input(shm::PortId id) const noexcept;
@@ -79,7 +57,7 @@ class Registry {
 
  private:
   struct Segment;
-  void name(RegistryEntry& entry, const std::string& name, std::uint64_t page);
+  void reserve(RegistryEntry& entry);
   [[nodiscard]] Segment& segment() const noexcept;
 
   shm::FileDescriptor writable_;

@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <iterator>
 #include <string_view>
 
 #include <nlohmann/json.hpp>
@@ -9,6 +11,7 @@
 #include "service/model_copy.hpp"
 #include "shm/clock.hpp"
 #include "shm/decision.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -21,7 +24,7 @@ std::uint64_t read(const shm::Atomic<std::uint64_t>& counter) {
 
 json type_json(const shm::TypeInfo& type) {
   if (!type.is_typed()) return nullptr;
-  return {{"name", type.type_name()}, {"size", type.size}, {"alignment", type.alignment}};
+  return {{"name", shm::printable(type.type_name())}, {"size", type.size}, {"alignment", type.alignment}};
 }
 
 json client_json(const Client& client) {
@@ -52,7 +55,7 @@ json connection_counters(const OutputPort* output, const InputPort* input, const
   const shm::OutputSegment segment(output->mapping.data(), output->layout);
   for (std::uint32_t i = 0; i < shm::kMaxDestinations; ++i) {
     const shm::Channel& channel = segment.channel(i);
-    if (channel.receiver.load(std::memory_order_acquire) != link->number) continue;
+    if (channel.receiver.load(std::memory_order_relaxed) != link->number) continue;
     const std::uint64_t before = read(channel.first) - 1;
     const std::uint64_t accepted = read(channel.accepted);
     counters["accepted"] = accepted - before;
@@ -61,7 +64,7 @@ json connection_counters(const OutputPort* output, const InputPort* input, const
     counters["depth"] = channel.depth.load(std::memory_order_relaxed);
     counters["waiting"] = accepted - before;  // a receiver that has never taken has no lane yet
     for (const shm::Lane& lane : input->shared().lanes) {
-      if (lane.publisher.load(std::memory_order_acquire) != output->instance) continue;
+      if (lane.publisher.load(std::memory_order_relaxed) != output->instance) continue;
       const std::uint64_t consumed = std::max(read(lane.consumed), before);
       counters["taken"] = read(lane.taken);
       counters["dropped"] = read(lane.dropped);
@@ -149,7 +152,7 @@ class Document {
 
   [[nodiscard]] bool is_active(const Source& source) const {
     if (!source.has_page()) return false;
-    return shm::is_active(source.activity().word.load(std::memory_order_acquire), now_);
+    return shm::is_active(source.activity().word.load(std::memory_order_relaxed), now_);
   }
 
   // Of one that has not come back no more is known than its process.
@@ -183,18 +186,25 @@ class Document {
   }
 
   json input_json(const InputName& name) {
-    const auto winner = winner_of(name.id);
+    const InputPort* input = of_.switchboard.input(name.open);
+    const Command command = command_at(name.id, input);
+    const shm::SourceId winner = command.commander;
     const bool arbitrated = snapshot_.table.is_arbitrated(name.id);
     json result{
         {"name", name.name},
         {"mentioned", snapshot_.table.knows_port(name.id)},
         {"arbitrated", arbitrated},
+        {"in_order", is_decided_in_order(name.id)},
         {"idle", winner == shm::kNone},
         {"winner", arbitrated && winner != shm::kNone ? json(of_.directory.sources()[winner]->name)
                                                       : json(nullptr)},
+        {"cannot_deliver", nullptr},
         {"connections", json::array()},
         {"senses", json::array()}};
-    const InputPort* input = of_.switchboard.input(name.open);
+    if (command.selected != shm::kNone && winner == shm::kNone) {
+      result["cannot_deliver"] = {{"source", of_.directory.sources()[command.selected]->name},
+                                  {"why", command.why}};
+    }
     result["open"] = input != nullptr;
     add_away(name.away, of_.registry.input(name.id), result);
     if (input != nullptr) add_open(*input, result);
@@ -260,15 +270,59 @@ class Document {
     return found == of_.switchboard.links().end() ? nullptr : &found->second;
   }
 
-  [[nodiscard]] shm::SourceId winner_of(shm::PortId port) const {
+  [[nodiscard]] bool is_decided_in_order(shm::PortId port) const {
+    const auto range = snapshot_.table.connections_to(port);
+    for (auto index = range.first; index != range.first + range.count; ++index) {
+      if (snapshot_.table.rule(index).kind == shm::table::kInOrder) return true;
+    }
+    return false;
+  }
+
+  // As InputCore::who_commands().
+  struct Command {
+    shm::SourceId selected = shm::kNone;
+    shm::SourceId commander = shm::kNone;  // else the port is idle
+    std::string why;                       // the one that is selected cannot deliver
+  };
+  [[nodiscard]] Command command_at(shm::PortId port, const InputPort* input) const {
     shm::DecisionClock clock(now_, true);
     shm::Decider decider(snapshot_.table, of_.directory.pages(), clock);
+    Command command;
     const auto range = snapshot_.table.connections_to(port);
     for (auto index = range.first; index != range.first + range.count; ++index) {
       const shm::Rule rule = snapshot_.table.rule(index);
-      if (decider.decide_with_own(rule) == shm::Verdict::kWins) return rule.source;
+      if (decider.decide_with_own(rule) != shm::Verdict::kWins) continue;
+      const std::string why = why_nothing_can_come(rule.source, input);
+      if (why.empty()) command.commander = rule.source;
+      if (command.selected == shm::kNone) {
+        command.selected = rule.source;
+        command.why = why;
+      }
+      if (why.empty() || snapshot_.table.is_arbitrated(port)) break;
     }
-    return shm::kNone;
+    return command;
+  }
+
+  // Of an active source. Empty: something can.
+  [[nodiscard]] std::string why_nothing_can_come(shm::SourceId id, const InputPort* input) const {
+    const Source& source = *of_.directory.sources()[id];
+    const Link* link = link_between(of_.switchboard.output(source.open), input);
+    if (link != nullptr && link->is_refused()) return link->mismatch;
+    const shm::ActivityWord word = source.activity().word.load(std::memory_order_relaxed);
+    if (source.open != 0 || source.away != 0 || shm::is_finite(word) || waits(id, input)) return {};
+    return "no component has " + source.name + " open, and its activity lasts for ever (`arbiter " +
+           "deactivate " + source.name + "` ends it)";
+  }
+
+  // Whether a receiver still has a queue of a publisher that has gone: it gives it up once it is
+  // empty.
+  [[nodiscard]] static bool waits(shm::SourceId source, const InputPort* input) {
+    if (input == nullptr) return false;
+    return std::any_of(std::begin(input->shared().lanes), std::end(input->shared().lanes),
+                       [&](const shm::Lane& lane) {
+                         return lane.publisher.load(std::memory_order_relaxed) != 0 &&
+                                lane.source.load(std::memory_order_relaxed) == source;
+                       });
   }
 
   const StatusOf& of_;

@@ -1,7 +1,6 @@
 #include "service/switchboard.hpp"
 
 #include "service/log.hpp"
-#include "shm/bell.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -64,11 +63,11 @@ void Switchboard::remove(shm::PortInstance port) {
       continue;
     }
     const shm::PortInstance peer = output == port ? input : output;
-    if (input == port || link->second.is_mutual()) {
+    if (input == port || link->second.is_mutual() || link->second.is_refused()) {
       client_of(peer).send(message_to(shm::MessageKind::kPeerGone, peer, port));
     }
     // A publisher may have died between delivering and ringing.
-    if (output == port) shm::ring_bell(inputs_.at(peer)->bell.get());
+    if (output == port) inputs_.at(peer)->bell->ring();
     link = links_.erase(link);
   }
   end_claims_on(port);
@@ -84,11 +83,13 @@ void Switchboard::remove(shm::PortInstance port) {
 void Switchboard::erase(shm::PortInstance port) {
   if (const auto found = outputs_.find(port); found != outputs_.end()) {
     found->second->source->open = 0;
+    directory_.let_go(*found->second->source);
     found->second->client->ports.erase(port);
     outputs_.erase(found);
   }
   if (const auto found = inputs_.find(port); found != inputs_.end()) {
     found->second->name->open = 0;
+    directory_.let_go(*found->second->name);
     found->second->client->ports.erase(port);
     inputs_.erase(found);
   }
@@ -175,7 +176,7 @@ void Switchboard::send_pages(const OutputPort& output, const shm::TableView& tab
   }
 }
 
-// A mismatch leaves the two linked as if the input port only sensed the source.
+// A mismatch leaves the two linked as if the input port only sensed the source, and both are told.
 void Switchboard::make_link(const OutputPort& output, const InputPort& input, LinkKind kind,
                             Told& told) {
   Link& link = links_[{output.instance, input.instance}];
@@ -192,12 +193,19 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
       message_to(shm::MessageKind::kInputPeer, output.instance, input.instance, input.name->id);
   to_output.flags = connects ? shm::kIsConnected : 0u;
   to_output.link = link.number = connects ? registry_.next_link() : 0;
-  output.client->send(to_output, {input.segment.get(), input.bell_for_peers.get()});
+  to_output.set_name(input.name->name);
+  output.client->send(to_output, {input.segment.get(), input.bell->descriptor()});
   told.insert(output.client);
+  if (link.is_refused()) {
+    tell_refusal({output.instance, input.instance}, output.instance, link.mismatch);
+    tell_refusal({output.instance, input.instance}, input.instance, link.mismatch);
+    told.insert(input.client);
+  }
   if (!connects) return;
   auto to_input =
       message_to(shm::MessageKind::kOutputPeer, input.instance, output.instance, output.source->id);
   to_input.link = link.number;
+  to_input.set_name(output.source->name);
   input.client->send(to_input, {output.segment.get(), -1});
   told.insert(input.client);
   fresh_.emplace_back(output.instance, input.instance);
@@ -260,7 +268,7 @@ Switchboard::Told Switchboard::unlink(const shm::TableView& table) {
     const auto still = wanted.find(key);
     const LinkKind kind = still == wanted.end() ? LinkKind::kLapsed : still->second;
     if (kind == link.kind) continue;
-    if (link.is_mutual()) {
+    if (link.is_mutual() || link.is_refused()) {
       const OutputPort& output = *outputs_.at(key.first);
       const InputPort& input = *inputs_.at(key.second);
       output.client->send(message_to(shm::MessageKind::kDisconnected, key.first, key.second));
@@ -287,44 +295,51 @@ void Switchboard::send_pages(Client& client, shm::PortId port, const shm::TableV
   }
 }
 
-// False: the client has it, or nobody has yet.
+// The page in force, and the next one where there is one. False: the client has them, or nobody has
+// yet.
 bool Switchboard::send_page(Client& client, const Source& source) {
   if (!source.has_page()) return false;
-  if (std::exchange(client.pages[source.id], source.page_number) == source.page_number) {
-    return false;
-  }
-  auto message = message_to(shm::MessageKind::kSourcePage, 0, 0, source.id);
-  message.set_name(source.name);
-  client.send(message, {source.readable.get(), -1});
-  return true;
+  shm::PageNumber& shown = client.pages[source.id];
+  const auto send = [&](const Page& page, shm::PageNumber number) {
+    if (!page || shown >= number) return false;
+    shown = number;
+    auto message = message_to(shm::MessageKind::kSourcePage, 0, 0, source.id);
+    message.value = number;
+    message.set_name(source.name);
+    client.send(message, {page.readable.get(), -1});
+    return true;
+  };
+  const bool is_new = send(source.page, source.page_number);
+  return send(source.next, source.page_number + 1) || is_new;
 }
 
-void Switchboard::show_everything(Client& client) {
-  for (const auto& source : directory_.sources()) send_page(client, *source);
-  for (const auto& input : directory_.inputs()) {
-    if (std::exchange(client.port_names[input->id], input->name_number) == input->name_number) {
+Switchboard::Told Switchboard::show_next_page(const Source& source) {
+  Told told;
+  const auto show = [&](Client& client) {
+    if (client.pages.count(source.id) != 0 && send_page(client, source)) told.insert(&client);
+  };
+  for (const auto& [instance, output] : outputs_) show(*output->client);
+  for (const auto& [instance, input] : inputs_) show(*input->client);
+  return told;
+}
+
+bool Switchboard::show_news(Client& client, std::uint64_t& told, int& left) {
+  const auto& news = directory_.news();
+  for (auto next = news.upper_bound(told); next != news.end(); ++next) {
+    if (client.has_queue() || client.is_lost()) return false;
+    if (left == 0) return true;
+    --left;
+    told = next->first;
+    if (next->second.is_source) {
+      send_page(client, *directory_.source_by_id(next->second.id));
       continue;
     }
-    auto message = message_to(shm::MessageKind::kPortName, 0, 0, input->id);
-    message.set_name(input->name);
+    auto message = message_to(shm::MessageKind::kPortName, 0, 0, next->second.id);
+    message.set_name(directory_.input_by_id(next->second.id)->name);
     client.send(message);
   }
-}
-
-void Switchboard::refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
-  for (const LinkKey& key : {LinkKey{port, peer}, LinkKey{peer, port}}) {
-    const auto found = links_.find(key);
-    if (found == links_.end()) continue;
-    found->second.mismatch = why;
-    if (std::exchange(found->second.number, 0) != 0) disconnect(port, peer);
-    log::warn("{} is not connected to {}: {}", outputs_.at(key.first)->source->name,
-              inputs_.at(key.second)->name->name, why);
-  }
-}
-
-// The one that refused knows.
-void Switchboard::disconnect(shm::PortInstance refused_by, shm::PortInstance port) {
-  client_of(port).send(message_to(shm::MessageKind::kDisconnected, port, refused_by));
+  told = directory_.last_news();
+  return false;
 }
 
 Client& Switchboard::client_of(shm::PortInstance port) const {
@@ -333,13 +348,13 @@ Client& Switchboard::client_of(shm::PortInstance port) const {
 }
 
 void Switchboard::ring_all() const {
-  for (const auto& [instance, input] : inputs_) shm::ring_bell(input->bell.get());
+  for (const auto& [instance, input] : inputs_) input->bell->ring();
 }
 
 void Switchboard::ring_concerned(const shm::TableView& table, shm::SourceId source) const {
   const auto ring = [&](shm::PortId id) {
     const InputName* name = directory_.input_by_id(id);
-    if (name != nullptr && name->open != 0) shm::ring_bell(inputs_.at(name->open)->bell.get());
+    if (name != nullptr && name->open != 0) inputs_.at(name->open)->bell->ring();
   };
   const auto concerned = table.ports_concerned(source);
   for (shm::Word i = 0; i < concerned.count; ++i) ring(concerned[i]);

@@ -14,6 +14,7 @@
 
 #include "service/ports.hpp"
 #include "shm/decision_table.hpp"
+#include "shm/table_ring.hpp"
 
 namespace arbiter::service {
 
@@ -55,10 +56,19 @@ class Switchboard {
   Told show_segments();
   void show_growth();
   [[nodiscard]] bool has_growth_to_show() const { return !growth_.empty(); }
-  // Sends a client every page and port name that it does not have, for those who observe.
-  void show_everything(Client& client);
+  // Shows the source's next page to all components that have been sent the one in force.
+  Told show_next_page(const Source& source);
+  // Tells an observer what has come after `told`, which moves on: at most `left` pieces, and
+  // nothing more once it does not read. True: there is more that it would read.
+  bool show_news(Client& client, std::uint64_t& told, int& left);
   // A client could not take up a peer.
   void refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
+  // Tells the components, and the log, once, whose ports the model in force does not mention: of
+  // all ports, or of one. `table` of generation 0: there is no model.
+  void tell_unmentioned(const shm::TableSnapshot& in_force);
+  void tell_unmentioned(const shm::TableSnapshot& in_force, shm::PortInstance port);
+  // A component says that its port cannot see all that its rules read: for the log, once.
+  void note_blind(shm::PortInstance port, const std::string& text);
   // Wakes every component that waits, to look anew.
   void ring_all() const;
   // Wakes those that a source concerns.
@@ -86,8 +96,12 @@ class Switchboard {
   [[nodiscard]] bool is_connected(const LinkKey& key) const;
   // Whoever claims a link with that port is told that it has gone.
   void end_claims_on(shm::PortInstance port);
-  void disconnect(shm::PortInstance refused_by, shm::PortInstance port);
-  bool send_page(Client& client, const Source& source);
+  void tell_refusal(const LinkKey& key, shm::PortInstance to, const std::string& why) const;
+  template <class Port>
+  static void say_unmentioned(Port& port, const std::string& text);
+  [[nodiscard]] std::string unmentioned_text(const shm::TableSnapshot& in_force,
+                                             const std::string& name, bool is_output) const;
+  static bool send_page(Client& client, const Source& source);
   void insert(std::unique_ptr<OutputPort> port, Client& client, Source& source);
   void insert(std::unique_ptr<InputPort> port, Client& client, InputName& name);
   void erase(shm::PortInstance port);

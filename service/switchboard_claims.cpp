@@ -36,7 +36,7 @@ std::optional<std::uint64_t> take(Claims& claims, shm::PortInstance peer) {
 void Switchboard::set_away(shm::PortInstance port) {
   for (auto link = links_.begin(); link != links_.end();) {
     const auto [output, input] = link->first;
-    if (output == port && link->second.is_mutual()) {
+    if (output == port && (link->second.is_mutual() || link->second.is_refused())) {
       inputs_.at(input)->claims[port] = link->second.number;
     }
     if (input == port) outputs_.at(output)->claims[port] = link->second.number;
@@ -107,7 +107,7 @@ void Switchboard::settle(OutputPort& output, InputPort& input) {
     output.client->send(
         message_to(shm::MessageKind::kDisconnected, output.instance, input.instance));
   }
-  if (by_input) {
+  if (by_input.value_or(0) != 0) {
     input.client->send(
         message_to(shm::MessageKind::kDisconnected, input.instance, output.instance));
   }
@@ -123,7 +123,7 @@ void Switchboard::end_claims_on(shm::PortInstance port) {
   for (const auto& [instance, input] : inputs_) {
     if (!take(input->claims, port)) continue;
     input->client->send(message_to(shm::MessageKind::kPeerGone, instance, port));
-    shm::ring_bell(input->bell.get());  // it may have died between delivering and ringing
+    input->bell->ring();  // it may have died between delivering and ringing
   }
 }
 
@@ -131,10 +131,12 @@ void Switchboard::forget_away(shm::PortInstance port) {
   end_claims_on(port);
   if (Source* source = directory_.source_of(port)) {
     source->away = 0;
+    directory_.let_go(*source);
     registry_.source(source->id).clear_owner();
   }
   if (InputName* name = directory_.input_of(port)) {
     name->away = 0;
+    directory_.let_go(*name);
     registry_.input(name->id).clear_owner();
   }
 }

@@ -75,6 +75,13 @@ struct Activity {
     }
     word.store(next, std::memory_order_release);
   }
+
+  // By the daemon, into a page that nobody reads yet, from one whose owner is gone, or should be:
+  // what he writes after this counts no more.
+  void carry_on(const Activity& before) noexcept {
+    breaks.store(before.breaks.load(std::memory_order_relaxed), std::memory_order_relaxed);
+    word.store(before.word.load(std::memory_order_relaxed), std::memory_order_relaxed);
+  }
 };
 
 // The page that the daemon makes for each source; a page, because that is what the kernel protects.

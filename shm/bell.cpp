@@ -7,9 +7,12 @@
 #include <sys/stat.h>
 
 #include <cerrno>
+#include <stdexcept>
 #include <system_error>
 
 #include "shm/clock.hpp"
+#include "shm/descendants.hpp"
+#include "shm/foreign.hpp"
 #include "shm/segment.hpp"
 
 namespace arbiter::shm {
@@ -51,9 +54,12 @@ Bell::Bell() {
   }
   read_.reset(ends[0]);
   write_.reset(ends[1]);
+  close_in_children(read_);
+  close_in_children(write_);
   if (fchmod(write_.get(), 0222) != 0) {
     throw std::system_error(errno, std::generic_category(), "making a bell write-only");
   }
+  for_publishers_ = reopen(write_, O_WRONLY | O_NONBLOCK);
 }
 
 void Bell::wait(Nanoseconds deadline) const noexcept {
@@ -78,8 +84,13 @@ void Bell::silence() const noexcept {
   }
 }
 
-Ringer::Ringer(const FileDescriptor& write_end)
-    : write_(reopen(write_end, O_WRONLY | O_NONBLOCK)) {}
+Ringer::Ringer(const FileDescriptor& write_end) {
+  if (foreign_kind(write_end.get()) != ForeignKind::kPipe) {
+    throw std::runtime_error("the bell is not a pipe");
+  }
+  write_ = reopen(write_end, O_WRONLY | O_NONBLOCK);
+  close_in_children(write_);
+}
 
 void Ringer::ring() const noexcept { ring_bell(write_.get()); }
 

@@ -23,19 +23,22 @@ class Bell {
   void silence() const noexcept;
 
   [[nodiscard]] int read_end() const noexcept { return read_.get(); }
-  // For publishers, who reopen it, and for the port's own service thread.
+  // For the port's own threads.
   [[nodiscard]] const FileDescriptor& write_end() const noexcept { return write_; }
+  // For publishers, who reopen it. Whoever has it may make its writes block, not those of ours.
+  [[nodiscard]] const FileDescriptor& for_publishers() const noexcept { return for_publishers_; }
 
  private:
   FileDescriptor read_;
   FileDescriptor write_;
+  FileDescriptor for_publishers_;
 };
 
 // The publishers' side.
 class Ringer {
  public:
   Ringer() = default;
-  // Opens the pipe anew. Throws std::system_error.
+  // Opens the pipe anew. Throws std::system_error; std::runtime_error where it is none.
   explicit Ringer(const FileDescriptor& write_end);
 
   // Never blocks; a full pipe is rung already, and one without a reader raises no SIGPIPE.

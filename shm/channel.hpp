@@ -216,6 +216,11 @@ class ChannelReader {
     next_ = (next_ + 1) & kSequenceMask;
     advance(1);
   }
+  // Done with that many entries, seen or not.
+  void skip(std::uint64_t count) noexcept {
+    next_ = (next_ + count) & kSequenceMask;
+    advance(static_cast<std::uint32_t>(count % depth_));
+  }
   [[nodiscard]] std::uint64_t consumed() const noexcept { return next_ - 1; }
   [[nodiscard]] std::uint64_t next() const noexcept { return next_; }
 
@@ -230,6 +235,13 @@ class ChannelReader {
   [[nodiscard]] std::uint64_t backlog(std::uint64_t end) const noexcept {
     const std::uint64_t count = (end + 1 - next_) & kSequenceMask;
     return count > kSequenceMask / 2 ? 0 : (count < depth_ ? count : depth_);
+  }
+
+  // The same, with those that were overtaken before they were looked at. Of a publisher that is
+  // gone.
+  [[nodiscard]] std::uint64_t left_behind() const noexcept {
+    const std::uint64_t count = (backlog_end() + 1 - next_) & kSequenceMask;
+    return count > kSequenceMask / 2 ? 0 : count;
   }
 
   // The arrival time of an entry that is not held, for ordering; sure only if the entry is still

@@ -24,6 +24,7 @@
 #include <cstdint>
 
 #include "shm/activity.hpp"
+#include "shm/activity_pages.hpp"
 #include "shm/atomic.hpp"
 #include "shm/decision_table.hpp"
 #include "shm/limits.hpp"
@@ -35,30 +36,6 @@ enum class Verdict : std::uint8_t {
   kWins,
   kBlind,      // a source that the rule reads has no page here yet: deliver nothing
   kUnsettled,  // sources changed faster than a picture could be taken: deliver nothing
-};
-
-// Where a process finds the activity of each source.
-// Thread safety: one thread attaches, any thread reads. SYNC POINT: page-attached. The release in
-// attach() pairs with the acquire in find(): who finds a page finds it mapped.
-class ActivityPages {
- public:
-  void attach(SourceId id, const Activity* activity) noexcept {
-    activities_[id].store(activity, std::memory_order_release);
-    changes_.store(changes_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
-  }
-  // Another after each attach(): what was bound before must be bound again.
-  // SYNC POINT: page-attached. Acquire; pairs with the release in attach(): who sees the change
-  // finds the page.
-  [[nodiscard]] std::uint64_t changes() const noexcept {
-    return changes_.load(std::memory_order_acquire);
-  }
-  [[nodiscard]] const Activity* find(SourceId id) const noexcept {
-    return id < kMaxSources ? activities_[id].load(std::memory_order_acquire) : nullptr;
-  }
-
- private:
-  alignas(kCacheLine) Atomic<std::uint64_t> changes_{0};
-  alignas(kCacheLine) std::array<Atomic<const Activity*>, kMaxSources> activities_{};
 };
 
 // One look at a source.
@@ -90,6 +67,12 @@ struct SeenActivity {
 // can hold up a receiver.
 inline constexpr int kMaxPictures = 64;
 
+// The most nodes of one walk. A diagram tests each source once; rules in order each do.
+inline constexpr Word kMaxWalk = (kMaxSourcesPerPort + 1) * (kMaxSourcesPerPort + 1);
+
+// In place of a connection's own source, where its rule is to take that as active.
+inline const Activity kAlwaysActive{{kForeverFlag}, {0}};
+
 // A source that a rule reads, and how it was last seen.
 struct Read {
   const Activity* activity;  // null: it has no page here
@@ -117,7 +100,8 @@ class BoundRule {
 
   // How much memory bind() is to be given. At most kMaxSourcesPerPort.
   static Word reads_of(const Rule& rule) noexcept {
-    const bool reads_others = rule.kind == table::kConjunction || rule.kind == table::kDiagram;
+    const bool reads_others =
+        rule.kind == table::kConjunction || rule.kind == table::kDiagram || is_in_order(rule);
     return reads_others ? rule.reads.count : 0;
   }
 
@@ -136,6 +120,10 @@ class BoundRule {
       const Word read = rule.reads[i];
       add(read & ~table::kExpectActive, (read & table::kExpectActive) != 0, pages);
     }
+    if (is_in_order(rule)) take_own_as_active(rule.source);
+    walks_ = kind_ == table::kDiagram || is_in_order(rule);
+    root_ = rule.root;
+    max_walk_ = is_in_order(rule) ? kMaxWalk : count_;
     // Those that deny a rule each by itself.
     literals_ = kind_ == table::kConjunction ? count_ : own_;
     if (count_ == 0) {
@@ -159,6 +147,17 @@ class BoundRule {
 
  private:
   static constexpr Word kNobody = UINT32_MAX;
+
+  static bool is_in_order(const Rule& rule) noexcept { return rule.kind == table::kInOrder; }
+
+  // The rules before it may read the connection's own source, for which it has no page then.
+  void take_own_as_active(SourceId own) noexcept {
+    is_blind_ = false;
+    for (Word i = 0; i < count_; ++i) {
+      if (i >= own_ && reads_[i].source == own) reads_[i].activity = &kAlwaysActive;
+      is_blind_ = is_blind_ || reads_[i].activity == nullptr;
+    }
+  }
 
   void add(SourceId source, bool expect_active, const ActivityPages& pages) noexcept {
     Read& read = reads_[count_++];
@@ -248,7 +247,7 @@ class BoundRule {
       if (is && is_finite(read.word) && read.word < until_) until_ = read.word;
       if (i < literals_ && is != read.expect_active && denied_by_ == kNobody) denied_by_ = i;
     }
-    const bool holds = denied_by_ == kNobody && (kind_ != table::kDiagram || walk_holds(active));
+    const bool holds = denied_by_ == kNobody && (!walks_ || walk_holds(active));
     verdict_ = holds ? Verdict::kWins : Verdict::kLoses;
   }
 
@@ -256,8 +255,8 @@ class BoundRule {
   static constexpr std::size_t kActiveWords = kMaxSourcesPerPort / 64 + 1;
   [[nodiscard]] bool walk_holds(
       const std::array<std::uint64_t, kActiveWords>& active) const noexcept {
-    Word node = 0;
-    for (Word steps = 0; steps <= count_; ++steps) {
+    Word node = root_;
+    for (Word steps = 0; steps <= max_walk_; ++steps) {
       if (node >= nodes_.count / table::kNodeWords) return false;
       const Word base = node * table::kNodeWords;
       const std::uint64_t position = std::uint64_t{nodes_[base + table::kNodePosition]} + own_;
@@ -278,7 +277,10 @@ class BoundRule {
   Verdict verdict_ = Verdict::kLoses;
   bool is_blind_ = false;
   bool was_collected_ = false;
+  bool walks_ = false;  // through nodes_
   Word kind_ = table::kNever;
+  Word root_ = 0;
+  Word max_walk_ = 0;
   Word own_ = 0;  // whether the first of reads_ is the connection's own
   Word literals_ = 0;
   WordList nodes_;

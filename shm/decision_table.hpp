@@ -19,8 +19,14 @@
 //   kAlways       no other source matters
 //   kConjunction  reads: each source with the activity it must have
 //   kDiagram      reads: the sources that the nodes test, by position;
-//                 nodes: {position, low, high}, node 0 is the root,
+//                 nodes: {position, low, high}, the walk begins at kRoot,
 //                 successors lie behind their node, or are kFalse / kTrue
+//   kInOrder      as a diagram; but the walk first goes through the connection's own condition,
+//                 and where that holds, from kBefore on, through the rules of the connections
+//                 before it, of which none may hold. So it may test a source more than once. The
+//                 connections of a port share the nodes, and the reads: each reads the first
+//                 kReadCount of them. Where the connection's own source is among these, it counts
+//                 as active.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +43,7 @@ using Word = std::uint32_t;
 namespace table {
 
 inline constexpr Word kMagic = 0x54425241;  // "ARBT"
-inline constexpr Word kVersion = 1;
+inline constexpr Word kVersion = 2;
 
 // Header, by word.
 enum : Word {
@@ -87,9 +93,11 @@ enum : Word {
   kReadCount,
   kFirstNode,
   kNodeCount,
-  kConnectionWords = 8
+  kRoot,
+  kBefore,  // of kInOrder; kTrue where no rule stands before it
+  kConnectionWords = 10
 };
-enum RuleKind : Word { kNever, kAlways, kConjunction, kDiagram };
+enum RuleKind : Word { kNever, kAlways, kConjunction, kDiagram, kInOrder };
 
 // A read: a source id, and in a conjunction the activity it must have.
 inline constexpr Word kExpectActive = 0x80000000;
@@ -121,10 +129,13 @@ struct Rule {
   Word kind = table::kNever;
   WordList reads;
   WordList nodes;  // count in words
+  Word root = 0;
+  Word before = table::kTrue;
 
   // Whether it is the same condition. A table has equal lists once.
   [[nodiscard]] bool decides_as(const Rule& other) const noexcept {
-    return kind == other.kind && reads.is(other.reads) && nodes.is(other.nodes);
+    return kind == other.kind && reads.is(other.reads) && nodes.is(other.nodes) &&
+           root == other.root;
   }
 };
 
@@ -208,6 +219,8 @@ class TableView {
     rule.port = at(record + table::kConnectionPort);
     rule.reads = list_of(record, table::kFirstRead);
     rule.nodes = list_of(record, table::kFirstNode, table::kNodeWords);
+    rule.root = at(record + table::kRoot);
+    rule.before = at(record + table::kBefore);
     rule.kind = at(record + table::kRuleKind);
     if (rule.reads.count > kMaxSourcesPerPort) rule.kind = table::kNever;
     return rule;

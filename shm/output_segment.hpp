@@ -96,10 +96,13 @@ struct OutputHeader {
 };
 static_assert(sizeof(OutputHeader) <= kPageSize);
 
+// The header and the channels: what whoever only watches a port needs of its segment.
+inline constexpr std::size_t kOutputHeadBytes = kPageSize + sizeof(Channel) * kMaxDestinations;
+
 // Where everything lies in a segment; a reader checks a foreign one with is_consistent().
 struct OutputLayout {
   std::uint64_t channels_offset = kPageSize;
-  std::uint64_t rings_offset = kPageSize + sizeof(Channel) * kMaxDestinations;
+  std::uint64_t rings_offset = kOutputHeadBytes;
   std::uint64_t headers_offset = rings_offset + kRingBytes * kMaxDestinations;
   std::uint64_t payload_offset = 0;
   std::uint64_t stride = 0;

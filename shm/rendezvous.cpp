@@ -98,6 +98,35 @@ FileDescriptor make_socket() {
   return made;
 }
 
+// Whether root has given the system's directory to `user`: nobody else can make it in /run. So a
+// daemon of a dynamic user is known as the system's where no name service knows that user.
+bool has_system_directory(uid_t user) {
+  struct stat parent {};
+  struct stat status {};
+  return lstat("/run", &parent) == 0 && parent.st_uid == 0 &&
+         (parent.st_mode & (S_IWGRP | S_IWOTH)) == 0 && lstat(kSystemDirectory, &status) == 0 &&
+         S_ISDIR(status.st_mode) && status.st_uid == user &&
+         (status.st_mode & (S_IWGRP | S_IWOTH)) == 0;
+}
+
+bool is_trusted(uid_t user, const std::string& directory) {
+  return user == 0 || user == geteuid() || user == arbiter_user() ||
+         (directory == kSystemDirectory && has_system_directory(user));
+}
+
+std::string why_not_connected(int error) {
+  switch (error) {
+    case ENOENT:
+      return "there is none";
+    case ECONNREFUSED:
+      return "nobody listens there";
+    case EAGAIN:
+      return "somebody listens there, but lets nobody in: is it stopped?";
+    default:
+      return std::generic_category().message(error);
+  }
+}
+
 }  // namespace
 
 std::string instance_name(const std::string& given) {
@@ -167,22 +196,28 @@ Listener listen_at(const std::string& directory, const std::string& instance) {
 }
 
 std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not) {
+  why_not.clear();
   for (const std::string& directory : client_directories()) {
+    const auto passed_over = [&](const std::string& why) {
+      why_not += (why_not.empty() ? "tried " : ", ") + directory + "/" + instance + ".sock: " + why;
+    };
     FileDescriptor socket = make_socket();
     const Address at = address_of(directory, instance + ".sock");
     const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
     if (connect(socket.get(), address, sizeof at.address) != 0) {
-      if (errno == EAGAIN) {
-        why_not = "one listens in " + directory + ", but lets nobody in: is it stopped?";
-      }
+      passed_over(why_not_connected(errno));
       continue;
     }
     ucred peer{};
     socklen_t size = sizeof peer;
-    if (getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) continue;
-    if (peer.uid == 0 || peer.uid == geteuid() || peer.uid == arbiter_user()) return socket;
-    why_not = "the daemon in " + directory + " runs as user " + std::to_string(peer.uid) +
-              ", who is neither root, nor \"arbiter\", nor you";
+    if (getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
+      passed_over("it is not known whose daemon that is");
+    } else if (is_trusted(peer.uid, directory)) {
+      return socket;
+    } else {
+      passed_over("that daemon runs as user " + std::to_string(peer.uid) +
+                  ", who is neither root, nor \"arbiter\", nor you");
+    }
   }
   return {};
 }

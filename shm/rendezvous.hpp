@@ -33,8 +33,10 @@ struct Listener {
 };
 Listener listen_at(const std::string& directory, const std::string& instance);
 
-// Connects to the instance's daemon, if one listens in any of the directories. One that runs as
-// neither root, nor the user `arbiter`, nor this user is not trusted; `why_not` then says so.
+// Connects to the instance's daemon, if one listens in any of the directories. One is trusted that
+// runs as root, as the user `arbiter`, as this user, or, in /run/arbiter, as the user to whom root
+// has given that directory. Where there is none, `why_not` lists the sockets that were tried, each
+// with what was wrong.
 std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not);
 
 }  // namespace arbiter::shm

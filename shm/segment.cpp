@@ -3,12 +3,15 @@
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <stdexcept>
 #include <string>
 
 #include <boost/interprocess/exceptions.hpp>
+
+#include "shm/foreign.hpp"
 
 namespace arbiter::shm {
 namespace {
@@ -64,14 +67,42 @@ FileDescriptor reopen(const FileDescriptor& segment, int flags) {
 }
 
 std::size_t checked_size(const FileDescriptor& segment, Seals wanted) {
+  if (foreign_kind(segment.get()) != ForeignKind::kMemfd) {
+    throw std::runtime_error("the descriptor is not a memfd");
+  }
   const int seals = fcntl(segment.get(), F_GET_SEALS);
-  if (seals < 0) throw std::runtime_error("the descriptor is not a memfd");
   if ((seals & seal_bits(wanted)) != seal_bits(wanted)) {
     throw std::runtime_error("the segment is not sealed as it must be");
   }
   struct stat status {};
   if (fstat(segment.get(), &status) != 0) fail("fstat of a segment");
   return static_cast<std::size_t>(status.st_size);
+}
+
+std::size_t allocated_size(const FileDescriptor& segment) noexcept {
+  struct stat status {};
+  if (fstat(segment.get(), &status) != 0) return 0;
+  constexpr std::size_t kBlock = 512;
+  return static_cast<std::size_t>(status.st_blocks) * kBlock;
+}
+
+std::size_t end_of_data(const FileDescriptor& segment, std::size_t offset) noexcept {
+  const off_t end = lseek(segment.get(), static_cast<off_t>(offset), SEEK_HOLE);
+  return end < 0 ? offset : static_cast<std::size_t>(end);
+}
+
+bool copy_out(const FileDescriptor& segment, std::size_t offset, void* to,
+              std::size_t bytes) noexcept {
+  auto* at = static_cast<char*>(to);
+  while (bytes != 0) {
+    const ssize_t count = pread(segment.get(), at, bytes, static_cast<off_t>(offset));
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return false;
+    at += count;
+    offset += static_cast<std::size_t>(count);
+    bytes -= static_cast<std::size_t>(count);
+  }
+  return true;
 }
 
 Mapping::Mapping(const FileDescriptor& segment, std::size_t size, Access access) {
@@ -85,6 +116,19 @@ Mapping::Mapping(const FileDescriptor& segment, std::size_t size, Access access)
     throw std::system_error(error.get_native_error(), std::generic_category(), "mapping a segment");
   }
   if (access == Access::kReadWrite) madvise(data(), this->size(), MADV_DONTFORK);
+}
+
+// It is mapped elsewhere first, where it may fail, and then moved: the kernel puts it into the
+// place of the old one in one step.
+void Mapping::replace(const FileDescriptor& segment) {
+  void* const next = ::mmap(nullptr, size(), PROT_READ, MAP_SHARED, segment.get(), 0);
+  if (next == MAP_FAILED) fail("mapping a segment");
+  if (::mremap(next, size(), size(), MREMAP_MAYMOVE | MREMAP_FIXED, data()) == MAP_FAILED) {
+    const int error = errno;
+    ::munmap(next, size());
+    errno = error;
+    fail("mapping a segment in the place of another");
+  }
 }
 
 }  // namespace arbiter::shm

@@ -17,6 +17,9 @@
 
 namespace arbiter::shm {
 
+// Of one port: a process of 128 TiB of addresses can map those of 8192 peers.
+inline constexpr std::size_t kMaxSegmentSize = std::size_t{16} << 30;
+
 enum class Seals {
   kFixedSize,  // cannot shrink or grow
   kOneWriter,  // and cannot be mapped writable again
@@ -42,6 +45,21 @@ FileDescriptor reopen(const FileDescriptor& segment, int flags);
 // std::runtime_error with what is wrong with it.
 std::size_t checked_size(const FileDescriptor& segment, Seals wanted);
 
+// How much of a foreign segment is allocated, once checked_size() has passed. It never falls where
+// a segment is sealed to its size and its one writer: it can be truncated no more, nor holes be
+// punched into it, not even through its owner's own mapping. What was paged out counts. Takes no
+// lock that its owner could hold.
+[[nodiscard]] std::size_t allocated_size(const FileDescriptor& segment) noexcept;
+
+// Where the data that stands at `offset` ends: the next hole, or the end. `offset` itself where it
+// is a hole. Through a descriptor of our own; waits while the owner changes what is allocated.
+[[nodiscard]] std::size_t end_of_data(const FileDescriptor& segment, std::size_t offset) noexcept;
+
+// Copies a range of a segment out of it, holes as zeros: unlike a load, that allocates nothing.
+// False: not all of it is there.
+[[nodiscard]] bool copy_out(const FileDescriptor& segment, std::size_t offset, void* to,
+                            std::size_t bytes) noexcept;
+
 enum class Access { kReadOnly, kReadWrite };
 
 // A mapping of a whole segment. Writable ones are not inherited by a fork: a child that ran on with
@@ -51,6 +69,10 @@ class Mapping {
   Mapping() = default;
   // Throws std::system_error.
   Mapping(const FileDescriptor& segment, std::size_t size, Access access);
+
+  // Another segment of the same size takes its place, read-only, at the same address. Who reads
+  // there meanwhile reads the one or the other. Throws std::system_error; then it is as before.
+  void replace(const FileDescriptor& segment);
 
   [[nodiscard]] std::byte* data() const noexcept {
     return static_cast<std::byte*>(region_.get_address());

@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "shm/utf8.hpp"
+
 namespace arbiter::shm {
 
 inline constexpr std::uint32_t kMaxTypeName = 239;
@@ -27,13 +29,14 @@ struct TypeInfo {
   }
 };
 
-// Empty if samples of `output` may go to `input`; else what is wrong, as a sentence's end.
+// Empty if samples of `output` may go to `input`; else what is wrong, as a sentence's end. Types
+// are what components say they are: their names are made printable.
 inline std::string type_mismatch(const TypeInfo& output, const TypeInfo& input) {
   if (!input.is_typed()) return {};
-  const std::string wanted(input.type_name());
+  const std::string wanted = printable(input.type_name());
   if (!output.is_typed()) return "the output port is untyped, the input port takes " + wanted;
   if (output.type_name() != input.type_name()) {
-    return "the output port sends " + std::string(output.type_name()) + ", the input port takes " +
+    return "the output port sends " + printable(output.type_name()) + ", the input port takes " +
            wanted;
   }
   if (output.size != input.size) {

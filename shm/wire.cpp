@@ -14,7 +14,7 @@ constexpr std::size_t kShortest = offsetof(Message, type);
 
 union Control {
   cmsghdr header;
-  char bytes[CMSG_SPACE(sizeof(int) * kMaxDescriptors)];
+  char bytes[CMSG_SPACE(sizeof(int) * kMostDescriptorsOfAMessage)];
 };
 
 // Most messages bear no text, and many no name: what is zero at the end need not travel.
@@ -24,7 +24,9 @@ std::size_t used_size(const Message& message) noexcept {
   return offsetof(Message, name);
 }
 
-void take_descriptors(msghdr& header, Received& received) noexcept {
+// Returns how many have come.
+std::size_t take_descriptors(msghdr& header, Received& received) noexcept {
+  std::size_t taken = 0;
   for (cmsghdr* part = CMSG_FIRSTHDR(&header); part != nullptr; part = CMSG_NXTHDR(&header, part)) {
     if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != SCM_RIGHTS) continue;
     const std::size_t count = (part->cmsg_len - CMSG_LEN(0)) / sizeof(int);
@@ -32,11 +34,15 @@ void take_descriptors(msghdr& header, Received& received) noexcept {
       int fd = -1;
       std::memcpy(&fd, CMSG_DATA(part) + i * sizeof(int), sizeof fd);
       FileDescriptor owned(fd);
-      if (received.descriptor_count < kMaxDescriptors) {
-        received.descriptors[received.descriptor_count++] = std::move(owned);
+      if (taken < kMaxDescriptors) {
+        received.descriptors[taken] = std::move(owned);
+      } else if (taken < kMostDescriptorsOfAMessage) {
+        received.surplus[taken - kMaxDescriptors] = std::move(owned);
       }
+      ++taken;
     }
   }
+  return taken;
 }
 
 }  // namespace
@@ -71,7 +77,9 @@ SendResult send_message(int socket, const Message& message,
 ReceiveResult receive_message(int socket, Received& received, bool wait) noexcept {
   received.message = {};
   for (auto& descriptor : received.descriptors) descriptor.reset();
+  for (auto& descriptor : received.surplus) descriptor.reset();
   received.descriptor_count = 0;
+  received.lost_descriptors = received.is_strange = false;
   iovec data{&received.message, sizeof received.message};
   Control control{};
   msghdr header{};
@@ -84,9 +92,12 @@ ReceiveResult receive_message(int socket, Received& received, bool wait) noexcep
     if (errno == EINTR) continue;
     return errno == EAGAIN ? ReceiveResult::kNothing : ReceiveResult::kClosed;
   }
-  take_descriptors(header, received);  // of an empty message too
+  const std::size_t taken = take_descriptors(header, received);  // of an empty message too
+  received.descriptor_count = taken < kMaxDescriptors ? taken : kMaxDescriptors;
   if (size == 0) return ReceiveResult::kClosed;
-  const bool cut = (header.msg_flags & (MSG_TRUNC | MSG_CTRUNC)) != 0;
+  // There was room for all in the control buffer.
+  received.lost_descriptors = (header.msg_flags & MSG_CTRUNC) != 0;
+  const bool cut = (header.msg_flags & MSG_TRUNC) != 0 || taken > kMaxDescriptors;
   if (cut || static_cast<std::size_t>(size) < kShortest) return ReceiveResult::kMalformed;
   Message& message = received.message;
   message.name[sizeof message.name - 1] = '\0';

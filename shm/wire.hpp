@@ -33,7 +33,7 @@
 
 namespace arbiter::shm {
 
-inline constexpr std::uint32_t kWireVersion = 3;
+inline constexpr std::uint32_t kWireVersion = 4;
 
 enum class MessageKind : std::uint32_t {
   // From a client.
@@ -52,7 +52,7 @@ enum class MessageKind : std::uint32_t {
   kStop,         // kDone, and then the daemon ends
   kSwitch,       // name: a model that is loaded; kDone (value: the generation) in force
   kRollback,     // link: a generation of the history, 0: the one before; as kReload
-  kHandBackPage = 40,  // id; descriptor: the activity page of a source
+  kHandBackPage = 40,  // id, value: its number; descriptor: an activity page of a source
   kHandBackOutput,     // port, id = source, type; descriptors: its segment, its page
   kHandBackInput,      // port, id = port id, type; descriptors: its segment, its bell
   kHandBackLink,       // port, peer; link: its number, 0 if not connected
@@ -60,13 +60,15 @@ enum class MessageKind : std::uint32_t {
   kConnect,  // port: opened by a daemon that has gone since; asks for the kConnected that is
              // missing
   kModel,    // ask for the texts of the model in force
+  kBlind,    // port, text: it cannot see a source that its rules read, for the log
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; descriptors: the board, the registry, read-only
   kOpened,         // port: its instance; id: its source or port id; descriptor: an output's page
   kConnected,
   kRefused,       // text: why
-  kSourcePage,    // id, name: a source; descriptor: its activity page, read-only
+  kSourcePage,    // id, name: a source; value: the number of its page, in force or to come;
+                  // descriptor: the page, read-only
   kPortName,      // id, name: an input port
   kOutputPeer,    // to input `port`: peer, id = source, link; descriptor: its segment
   kInputPeer,     // to output `port`: peer, id = port id, flags (kIsConnected), link; descriptors:
@@ -79,6 +81,9 @@ enum class MessageKind : std::uint32_t {
   kOutputGrown,  // to input `port`: `peer` uses more of its segment now; descriptor: the segment
   kReport,       // in place of kDone and kRefused; descriptor: a memfd with JSON
   kModelReply,   // descriptor: a memfd with JSON
+  kConnectionRefused,  // `port` is not connected to `peer`, though the model says so, and is not to
+                       // be; id = source, or port id; name: the peer's; text: why
+  kUnmentioned,        // port, text: the model in force does not mention it
 };
 
 enum MessageFlag : std::uint32_t {
@@ -114,7 +119,12 @@ struct Message {
 
  private:
   static void copy(std::string_view from, char* to, std::size_t capacity) noexcept {
-    const std::size_t length = from.size() < capacity - 1 ? from.size() : capacity - 1;
+    std::size_t length = from.size() < capacity - 1 ? from.size() : capacity - 1;
+    // What is cut off is cut off between two characters.
+    while (length != 0 && length < from.size() &&
+           (static_cast<unsigned char>(from[length]) & 0xc0) == 0x80) {
+      --length;
+    }
     if (length != 0) std::memcpy(to, from.data(), length);  // an empty view may point nowhere
     to[length] = '\0';
   }
@@ -122,16 +132,25 @@ struct Message {
 
 inline constexpr std::size_t kMaxDescriptors = 2;
 
+// What the kernel lets one message carry (SCM_MAX_FD).
+inline constexpr std::size_t kMostDescriptorsOfAMessage = 253;
+
 struct Received {
   Message message;
   std::array<FileDescriptor, kMaxDescriptors> descriptors;
   std::size_t descriptor_count = 0;
+  bool lost_descriptors = false;  // this process had no descriptor left for one that came
+  bool is_strange = false;        // the daemon's word: one of them is nothing that is taken
+  // Those beyond what a message may carry: it is malformed, and who received it disposes of them.
+  std::array<FileDescriptor, kMostDescriptorsOfAMessage - kMaxDescriptors> surplus{};
 };
 
 enum class SendResult { kSent, kFull, kClosed };
 enum class ReceiveResult { kReceived, kNothing, kClosed, kMalformed };
 
-// Non-blocking unless the socket blocks. Never raises SIGPIPE.
+// Non-blocking unless the socket blocks. Never raises SIGPIPE. What is received is all that came:
+// descriptors that the kernel finds no room for, it closes before recvmsg() returns, and to close a
+// stranger's may block. So there is room for as many as there can be.
 [[nodiscard]] SendResult send_message(int socket, const Message& message,
                                       std::array<int, kMaxDescriptors> descriptors = {-1,
                                                                                       -1}) noexcept;

@@ -19,16 +19,19 @@ constexpr shm::Nanoseconds kHour = 3'600'000'000'000;
 
 std::string source(std::size_t i) { return "/s" + std::to_string(1000 + i); }
 
-// One connection, "/from" at "/to", whose rule reads `reads` sources. Every second one is active.
+// The connection of "/from", the last at "/to"; the rules read `reads`. Every second source is
+// active.
 class Table {
  public:
-  explicit Table(rules::CompiledRule rule) : activities_(rule.reads.size() + 1) {
+  Table(std::vector<rules::CompiledRule> rules, const std::vector<std::string>& reads)
+      : activities_(reads.size() + 1) {
     rules::CompiledModel model;
     model.timeout = kHour;
-    model.sources = rule.reads;
+    model.sources = reads;
     model.sources.push_back("/from");
-    rule.source = "/from";
-    model.ports.push_back({"/to", true, rule.reads, {rule}});
+    rules.back().source = "/from";
+    const auto last = static_cast<shm::ConnectionIndex>(rules.size() - 1);
+    model.ports.push_back({"/to", true, reads, std::move(rules), last > 0, last > 0});
     const auto words = rules::flatten(model, {id_of, [](const std::string&) { return 0u; }});
     words_ = std::vector<shm::Atomic<shm::Word>>(words.size());
     for (std::size_t i = 0; i < words.size(); ++i) words_[i] = words[i];
@@ -38,8 +41,8 @@ class Table {
       pages_->attach(id, &activity);
       activity.word = id % 2 != 0 ? shm::arrival(kNow - 1, kHour) : shm::deactivation(kNow - 1);
     }
-    reads_.resize(shm::BoundRule::reads_of(view_.rule(0)));
-    rule_.bind(view_.rule(0), *pages_, reads_.data(), false);
+    reads_.resize(shm::BoundRule::reads_of(view_.rule(last)));
+    rule_.bind(view_.rule(last), *pages_, reads_.data(), false);
   }
 
   // Nothing has changed since the last decision: all are looked at once.
@@ -55,6 +58,16 @@ class Table {
     return decide();
   }
 
+  // One has become active or inactive: the rule is looked through again.
+  shm::Verdict decide_after_a_change() {
+    shm::Activity& changed = activities_[1].of(1);
+    const bool was_active = !shm::is_deactivation(changed.word);
+    ++changes_;
+    changed.write(changed.word, was_active ? shm::deactivation(kNow - 1 - changes_)
+                                           : shm::arrival(kNow - 1 - changes_, kHour));
+    return decide();
+  }
+
  private:
   static shm::SourceId id_of(const std::string& name) {
     return name == "/from" ? 0 : static_cast<shm::SourceId>(std::stoi(name.substr(2)) - 999);
@@ -66,6 +79,7 @@ class Table {
   shm::TableView view_;
   std::vector<shm::Read> reads_;
   shm::BoundRule rule_;
+  shm::Nanoseconds changes_ = 0;
 };
 
 // All must be as they are: nothing denies it early.
@@ -95,12 +109,38 @@ rules::CompiledRule parity(shm::Word size) {
   return rule;
 }
 
-void count_decision(const std::string& measure, const rules::CompiledRule& rule) {
-  Table table(rule);
+// As with conflict="first": of each of `size` sources a connection, whose rule says that three
+// others are inactive, and does not hold. The last one, without a condition, wins.
+std::vector<rules::CompiledRule> in_order(std::size_t size) {
+  std::vector<rules::CompiledRule> rules;
+  for (std::size_t i = 0; i < size; ++i) {
+    auto& rule = rules.emplace_back();
+    rule.source = source(i);
+    rule.kind = shm::table::kConjunction;
+    for (const std::size_t other : {1, 2, 4}) rule.reads.push_back(source((i + other) % size));
+    rule.expected.assign(rule.reads.size(), false);
+  }
+  rules.emplace_back().kind = shm::table::kAlways;
+  return rules;
+}
+
+std::vector<std::string> sources(std::size_t size) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < size; ++i) names.push_back(source(i));
+  return names;
+}
+
+void count_decision(const std::string& measure, const std::vector<rules::CompiledRule>& rules,
+                    std::size_t reads) {
+  Table table(rules, sources(reads));
   shm::Verdict verdict = shm::Verdict::kBlind;
   count_after(10, measure, kTimes, [&] { verdict = table.decide(); });
   count_after(10, measure + ", one renewed", kTimes,
               [&] { verdict = table.decide_after_a_renewal(); });
+  if (rules.size() > 1) {
+    count_after(10, measure + ", one changed", kTimes,
+                [&] { verdict = table.decide_after_a_change(); });
+  }
   if (verdict != shm::Verdict::kWins) throw std::runtime_error("must win: " + measure);
 }
 
@@ -108,10 +148,13 @@ void count_decision(const std::string& measure, const rules::CompiledRule& rule)
 
 void count_decisions() {
   for (const std::size_t size : {1, 8, 64, 256}) {
-    count_decision("decide, conjunction of " + std::to_string(size), conjunction(size));
+    count_decision("decide, conjunction of " + std::to_string(size), {conjunction(size)}, size);
   }
   for (const shm::Word size : {8, 64}) {
-    count_decision("decide, diagram of " + std::to_string(size), parity(size));
+    count_decision("decide, diagram of " + std::to_string(size), {parity(size)}, size);
+  }
+  for (const std::size_t size : {8, 64, 254}) {
+    count_decision("decide, " + std::to_string(size) + " rules in order", in_order(size), size);
   }
 }
 

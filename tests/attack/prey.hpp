@@ -68,6 +68,7 @@ class Prey {
     const auto type = in_type();
     const auto layout = shm::OutputLayout::plan(type, 8);
     own_output_ = shm::make_segment("attacker-output", layout.total_size);
+    allocate(own_output_, layout.total_size);
     own_output_mapping_ = shm::Mapping(own_output_, layout.total_size, shm::Access::kReadWrite);
     attackers_output = shm::OutputSegment(own_output_mapping_.data(), layout);
     auto& header = attackers_output.header();
@@ -82,6 +83,7 @@ class Prey {
     collect();
 
     own_input_ = shm::make_segment("attacker-input", sizeof(shm::InputSegment));
+    allocate(own_input_, sizeof(shm::InputSegment));
     own_input_mapping_ =
         shm::Mapping(own_input_, sizeof(shm::InputSegment), shm::Access::kReadWrite);
     attackers_input = own_input_mapping_.as<shm::InputSegment>();
@@ -98,6 +100,10 @@ class Prey {
     attacker_.send(open_input, {own_input_.get(), own_bell_.write_end().get()});
     collect();
     if (!page || !output || !input || !bell) throw std::runtime_error("not all has come");
+  }
+
+  static void allocate(const shm::FileDescriptor& segment, std::size_t size) {
+    if (shm::allocate(segment, 0, size)) throw std::runtime_error("no memory");
   }
 
   static shm::TypeInfo in_type() {

@@ -97,6 +97,42 @@ TEST(Check, AWarningIsNoError) {
   EXPECT_EQ(result.out, "ok: 1 port, 1 connection, 1 source\n");
 }
 
+// The stop is declared under one name, and read under another.
+const std::string kMisspeltModel = R"(<behaviors>
+  <source port="/safety/estop:o"/>
+  <behavior name="Drive"><config at="/Base/vel:i">/Nav/vel:o</config>
+    <condition>not /safety/estopp:o</condition></behavior>
+</behaviors>
+)";
+
+TEST(Check, WarnsOfAnEmergencyStopThatNobodyHas) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kMisspeltModel);
+  const auto result = arbiter({"check", model, "--silence", "nobody-wins"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr(model + ":2:3: warning: no rule reads or selects "
+                                            "/safety/estop:o, which is declared here: "));
+  EXPECT_THAT(result.err, HasSubstr(model +
+                                    ":4:20: warning: the name /safety/estopp:o stands only "
+                                    "here, and nothing declares it; did you mean "
+                                    "/safety/estop:o, as at " +
+                                    model + ":2:17?"));
+}
+
+TEST(Check, StrictTakesWarningsForErrorsButForSilencedOnes) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kMisspeltModel);
+  auto result = arbiter({"check", model, "--strict"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.out, "failed: 2 errors, 1 note (--strict takes warnings for errors)\n");
+  EXPECT_THAT(result.err, HasSubstr(model + ":4:20: error: the name /safety/estopp:o "));
+  result = arbiter({"check", model, "--strict", "--json"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(nlohmann::json::parse(result.out)[0]["severity"], "error");
+  result = arbiter({"check", model, "--strict", "--silence", "never-read,similar-name"});
+  EXPECT_EQ(result.exit_code, 0) << result.out;
+}
+
 TEST(Check, ReportsMalformedFiles) {
   TemporaryDirectory directory;
   const auto model = directory.write("m.xml", "<behaviors>");
@@ -169,7 +205,7 @@ TEST(Check, ACodeThatThereIsNotCannotBeSilenced) {
   const auto result = arbiter({"check", model, "--silence", "nobody-wins,starving"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("\"starving\""));
-  EXPECT_THAT(result.err, HasSubstr("nobody-wins, proved, starved"));
+  EXPECT_THAT(result.err, HasSubstr("nobody-wins, proved, similar-name, starved"));
   EXPECT_THAT(arbiter({"check", model, "--silence", "straved"}).err,
               HasSubstr("did you mean \"starved\"?"));
 }
@@ -204,6 +240,15 @@ TEST(Check, StatementsThatAreTrueAreProved) {
   EXPECT_EQ(result.out,
             "1 statement: 1 proved, 0 refuted, 0 left open\n"
             "ok: 1 port, 2 connections, 3 sources\n");
+  EXPECT_EQ(result.exit_code, 0);
+}
+
+TEST(Check, ProvedStatementsQuietWhatTheyCover) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  const auto statements = directory.write("s.txt", "/object and /collision -> idle(/arm)\n");
+  const auto result = arbiter({"check", model, "--assert", statements});
+  EXPECT_EQ(result.err, "");
   EXPECT_EQ(result.exit_code, 0);
 }
 

@@ -36,9 +36,57 @@ TEST(Unmentioned, PubAndEchoSayThatNothingPasses) {
 
 TEST(Unmentioned, NothingIsSaidOfPortsThatTheModelConnectsOrReads) {
   Daemon daemon(kModel);
+  Node node("test");
+  auto in = node.input_port("/Gaze/pos:i");
   EXPECT_EQ(arbiter({"pub", "/Face/pos:o", "--count", "1"}).err, "");
   EXPECT_EQ(arbiter({"pub", "/stop", "--count", "1"}).err, "");
+  in = node.input_port("/free");
   EXPECT_EQ(arbiter({"echo", "/Gaze/pos:i", "--for", "1ms"}).err, "");
+}
+
+TEST(Unmentioned, PubSaysWhereNobodyHasTheInputPortOpen) {
+  Daemon daemon(kModel);
+  const auto result = arbiter({"pub", "/Face/pos:o", "--count", "1"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err,
+            "arbiter: no component has /Gaze/pos:i open, to which the model connects /Face/pos:o, "
+            "so that nothing of this is delivered\n");
+}
+
+TEST(Unmentioned, PubSaysThatTheTypesDiffer) {
+  Daemon daemon(kModel);
+  NodeOptions quiet;
+  quiet.on_notice = [](const Notice&) {};
+  Node node("test", quiet);
+  auto in = node.input_port<int>("/Gaze/pos:i");
+  const auto result = arbiter({"pub", "/Face/pos:o", "--count", "1"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err,
+            "arbiter: /Face/pos:o is not connected to /Gaze/pos:i: the output port is untyped, the "
+            "input port takes int\n");
+  EXPECT_THAT(result.out, HasSubstr("refused 1"));
+}
+
+// Once, however often it is asked of; again for another that has the name.
+TEST(Unmentioned, TheLogWarnsOnceOfEachPort) {
+  Daemon daemon(kModel);
+  const auto count = [&](const std::string& text) {
+    const std::string log = daemon.log();
+    int found = 0;
+    for (auto at = log.find(text); at != std::string::npos; at = log.find(text, at + 1)) ++found;
+    return found;
+  };
+  NodeOptions quiet;
+  quiet.on_notice = [](const Notice&) {};
+  Node node("test", quiet);
+  auto out = node.output_port<int>("/Fase/pos:o");
+  auto in = node.input_port<int>("/Gaze/po:i");
+  daemon.load(kModel);
+  daemon.load(kModel);
+  EXPECT_EQ(count("the model in force does not mention /Fase/pos:o, so that nothing of this is "
+                  "delivered; did you mean \"/Face/pos:o\"?"),
+            1);
+  EXPECT_EQ(count("the model in force does not mention /Gaze/po:i, so that nothing comes"), 1);
 }
 
 TEST(Unmentioned, WithoutAModelThatIsSaid) {

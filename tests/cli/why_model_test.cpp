@@ -43,6 +43,19 @@ class WhyOfTwoModels : public testing::Test {
   }
 };
 
+TEST(Why, WarnsOfNamesThatNobodyHas) {
+  const Daemon daemon(
+      "<behaviors>\n<source port='/safety/estop:o'/>\n"
+      "<arbiter at='/base'><select from='/nav'>not /safety/estopp:o</select></arbiter>\n"
+      "</behaviors>");
+  EXPECT_THAT(why({"/base"}), AllOf(HasSubstr("\nwarning: "), HasSubstr("model.xml:2:1: no rule "),
+                                    HasSubstr("the name /safety/estopp:o stands only here")));
+  const json warnings = why_json({"/base"})["warnings"];
+  ASSERT_EQ(warnings.size(), 2u);
+  EXPECT_EQ(warnings[1]["code"], "similar-name");
+  EXPECT_EQ(warnings[1]["line"], 3);
+}
+
 TEST_F(WhyOfTwoModels, TellsWhichIsInForceSinceWhenAndWhoseDoingItIs) {
   EXPECT_THAT(why({"/arm"}),
               AllOf(HasSubstr("since model 1 came into force "),

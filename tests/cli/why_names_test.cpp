@@ -121,7 +121,12 @@ TEST(WhyNames, SaysOnTheFirstLineThatNothingOfTheWinnerArrives) {
   EXPECT_THAT(first_line(), HasSubstr(nothing + "no component has it open"));
   {
     auto in = node.input_port<double>("/base");
-    EXPECT_THAT(first_line(), HasSubstr(nothing + "the two ports do not fit"));
+    EXPECT_THAT(first_line(), AllOf(HasSubstr("idle, though /wander is selected"),
+                                    HasSubstr("; it cannot deliver: the output port sends int")));
+    const json answer = why_json({"/base"});
+    EXPECT_EQ(answer["winner"], nullptr);
+    EXPECT_EQ(answer["selected"], "/wander");
+    EXPECT_THAT(answer["nothing_comes_of_it"].get<std::string>(), HasSubstr("takes double"));
   }
   auto in = node.input_port<int>("/base");
   EXPECT_THAT(first_line(), HasSubstr(nothing + "test (pid " + pid() + ") only signals"));
@@ -169,6 +174,56 @@ TEST(WhyNames, TellsWhoWouldLikeToWinFirstAndOnlyNamesWhoWasNeverStarted) {
               AllOf(HasSubstr("\n/s101 is kept out"), Not(HasSubstr("Never started"))));
   EXPECT_THAT(why({"/base", "/s101"}), HasSubstr("\n/s101 is kept out"));
   EXPECT_EQ(why_json({"/base"})["connections"].size(), 12u);
+}
+
+// As many as a port can have, all active: the last inhibits all others, each all before it.
+TEST(WhyNames, OfAPortWithAsManyConnectionsAsCanBeTellsWhatFitsAScreen) {
+  constexpr int kCount = 255;
+  const auto name = [](int i) { return "/s" + std::to_string(1000 + i); };
+  std::string rules;
+  for (int i = 0; i < kCount; ++i) {
+    rules += "<behavior name='B" + std::to_string(i) + "'><config at='/base'>" + name(i) +
+             "</config><inhibition>";
+    for (int j = 0; j < i; ++j) rules += (j == 0 ? "B" : ", B") + std::to_string(j);
+    rules += "</inhibition></behavior>\n";
+  }
+  Daemon daemon("<behaviors timeout='forever'>\n" + rules + "</behaviors>");
+  Node node("test");
+  std::vector<OutputPort<int>> ports;
+  for (int i = 0; i < kCount; ++i) ports.push_back(node.output_port<int>(name(i)));
+  for (auto& port : ports) port.signal();
+  const std::string text = why({"/base"});
+  EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 30) << text;
+  EXPECT_THAT(text,
+              AllOf(HasSubstr("/base: /s1254 wins"), HasSubstr("\n/s1000 is kept out\n"),
+                    HasSubstr("and for 251 more reasons like these"),
+                    HasSubstr("\n252 more are kept out by the rules:\n"
+                              "  252 inhibited by behaviour \"B254\" ("),
+                    HasSubstr(": /s1002, /s1003, /s1004, /s1005, /s1006, /s1007 and 246 more"),
+                    HasSubstr("arbiter why /base SOURCE tells of one of them, --all of all")));
+  const std::string all = why({"/base", "--all"});
+  EXPECT_THAT(all, AllOf(HasSubstr("\n/s1253 is kept out\n"), Not(HasSubstr("more are kept out"))));
+  for (int i = 0; i + 1 < kCount; ++i) ports[static_cast<std::size_t>(i)].deactivate();
+  EXPECT_THAT(why({"/base"}), HasSubstr("\n252 more are inactive: /s1002"));
+}
+
+// Its own activity counts in its decision, and is no reason to wait for.
+TEST(WhyNames, ASourceIsNotToldThatItWouldWinWhereItsOwnActivityForbidsIt) {
+  Daemon daemon(R"(<behaviors timeout="forever"><source port="/Nav/other:o"/>
+<behavior name="Drive"><config at="/base">/Nav/vel:o</config>
+  <condition>none(/Nav/*) or /Operator/ok:o</condition></behavior></behaviors>)");
+  const std::string text = why({"/base", "/Nav/vel:o"});
+  EXPECT_THAT(text, Not(HasSubstr("would select it")));
+  EXPECT_THAT(text, HasSubstr("the condition of behaviour \"Drive\", none(/Nav/*) ∨ "
+                              "/Operator/ok:o, would be false once it is active itself"));
+  EXPECT_THAT(text, HasSubstr("/Operator/ok:o is inactive"));
+  const auto cause = connection(why_json({"/base"}), "/Nav/vel:o")["behaviours"][0]["causes"][0];
+  EXPECT_EQ(cause["by_own_activity"], true);
+  EXPECT_EQ(cause["because"].size(), 1u);
+  Node node("test");
+  auto ok = node.output_port<int>("/Operator/ok:o");
+  ok.signal();
+  EXPECT_THAT(why({"/base", "/Nav/vel:o"}), HasSubstr("would select it, if it were active"));
 }
 
 TEST(WhyNames, CountsAsWaitingNoMoreThanThereIsRoomFor) {

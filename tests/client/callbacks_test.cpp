@@ -2,9 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <memory>
+#include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include <arbiter/arbiter.hpp>
 
@@ -121,6 +126,195 @@ TEST(OnWaiting, APortWhoseOpeningWasCancelledHasItsNameFree) {
   Node other("other");
   auto out = other.output_port<Number>("/out");
   EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
+}
+
+// Notices, as they were given.
+class Notices {
+ public:
+  [[nodiscard]] NodeOptions options() {
+    NodeOptions options;
+    options.on_notice = [this](const Notice& notice) {
+      const std::lock_guard lock(mutex_);
+      all_.push_back(notice);
+    };
+    return options;
+  }
+  std::vector<Notice> take() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(all_, {});
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<Notice> all_;
+};
+
+struct Wrong {
+  float x = 0;
+};
+
+const std::string kTypesDiffer =
+    "/out is not connected to /in: the output port sends arbiter::test::(anonymous "
+    "namespace)::Wrong, the input port takes arbiter::test::Number";
+
+TEST(OnNotice, ARefusalIsKnownToWhoeverOpensThePortWhenItIsOpen) {
+  Daemon daemon(single_model());
+  Notices of_sender, of_receiver;
+  Node sender("sender", of_sender.options());
+  Node receiver("receiver", of_receiver.options());
+  auto in = receiver.input_port<Number>("/in");
+  EXPECT_TRUE(of_receiver.take().empty());
+  auto out = sender.output_port<Wrong>("/out");
+  const auto by_sender = of_sender.take();
+  ASSERT_EQ(by_sender.size(), 1u);
+  EXPECT_EQ(by_sender[0].kind, NoticeKind::refused);
+  EXPECT_EQ(by_sender[0].port, "/out");
+  EXPECT_EQ(by_sender[0].peer, "/in");
+  EXPECT_EQ(by_sender[0].text, kTypesDiffer);
+  const auto by_receiver = of_receiver.take();
+  ASSERT_EQ(by_receiver.size(), 1u);
+  EXPECT_EQ(by_receiver[0].port, "/in");
+  EXPECT_EQ(by_receiver[0].peer, "/out");
+  EXPECT_EQ(by_receiver[0].text, kTypesDiffer);
+}
+
+// Another daemon finds out the same, and it is no news.
+TEST(OnNotice, IsCalledOnceForEachPortAndSentence) {
+  Daemon daemon(single_model());
+  Notices notices;
+  Node node("test", notices.options());
+  auto in = node.input_port<Number>("/in");
+  auto out = node.output_port<Wrong>("/out");
+  EXPECT_EQ(notices.take().size(), 2u);
+  daemon.load(single_model("1s"));
+  daemon.kill();
+  daemon.restart();
+  EXPECT_TRUE(daemon.source("/out")["open"]);
+  auto other = node.output_port<Number>("/other");
+  const auto since = notices.take();
+  ASSERT_EQ(since.size(), 1u);
+  EXPECT_EQ(since[0].port, "/other");
+}
+
+TEST(OnNotice, TellsOfPortsThatTheModelDoesNotMention) {
+  Daemon daemon(single_model());
+  Notices notices;
+  Node node("test", notices.options());
+  auto out = node.output_port<Number>("/ouut");
+  auto known = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/elsewhere");
+  const auto given = notices.take();
+  ASSERT_EQ(given.size(), 2u);
+  EXPECT_EQ(given[0].kind, NoticeKind::unmentioned);
+  EXPECT_EQ(given[0].port, "/ouut");
+  EXPECT_EQ(given[0].text,
+            "the model in force does not mention /ouut, so that nothing of this is delivered; did "
+            "you mean \"/out\"?");
+  EXPECT_EQ(given[1].port, "/elsewhere");
+  // A model that has them, and one that has not.
+  daemon.load(rules(arbiter_at("/elsewhere", select("/ouut"))));
+  EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
+  auto another = node.output_port<Number>("/out2");
+  bool told_of_known = false;
+  for (const Notice& each : notices.take()) told_of_known |= each.port == "/out";
+  EXPECT_TRUE(told_of_known) << "/out is not mentioned any more";
+}
+
+TEST(OnNotice, TellsWhatLimitOfMemoryRefusesAConnection) {
+  Daemon daemon(fan_out_model(2));
+  Notices notices;
+  Node node("test", notices.options());
+  OutputPortOptions options;
+  options.max_memory = sizeof(Image) * 5;  // the loans, a copy, and one queue of one
+  auto out = node.output_port<Image>("/out", options);
+  auto first = node.input_port<Image>("/in0", {.depth = 1});
+  auto second = node.input_port<Image>("/in1", {.depth = 1});
+  const auto given = notices.take();
+  ASSERT_EQ(given.size(), 2u) << "both ends";
+  EXPECT_NE(given[0].text.find("/out is not connected to /in1: max_memory"), std::string::npos)
+      << given[0].text;
+  EXPECT_EQ(out.publish(std::move(*out.loan())).refused, 1u);
+  EXPECT_TRUE(second.idle());
+  EXPECT_FALSE(first.idle());
+}
+
+// On the service thread, which opens them itself.
+TEST(OnNotice, MayOpenAndClosePortsOfTheSameNode) {
+  for (const bool service_thread : {true, false}) {
+    Daemon daemon(single_model());
+    Node* self = nullptr;
+    std::optional<OutputPort<Number>> opened;
+    std::thread::id called_on;
+    std::atomic<bool> is_back{false};
+    NodeOptions options;
+    options.service_thread = service_thread;
+    options.on_notice = [&](const Notice& notice) {
+      if (notice.port != "/ouut") return;
+      called_on = std::this_thread::get_id();
+      { auto closed = self->output_port<Number>("/another"); }
+      opened.emplace(self->output_port<Number>("/out"));
+      is_back = true;
+    };
+    Node node("test", options);
+    self = &node;
+    auto out = node.output_port<Number>("/ouut");
+    while (!is_back) node.service();
+    EXPECT_EQ(called_on == std::this_thread::get_id(), !service_thread);
+    EXPECT_TRUE(daemon.source("/out")["open"]);
+  }
+}
+
+TEST(OnNotice, WhatItThrowsIsWrittenDownAndHasNoOtherEffect) {
+  Daemon daemon(single_model());
+  NodeOptions options;
+  options.on_notice = [](const Notice&) { throw Cancelled("no more"); };
+  options.on_waiting = [](const std::string&) {};  // where the machine is slow
+  testing::internal::CaptureStderr();
+  Node node("test", options);
+  auto lost = node.output_port<Number>("/lost");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "arbiter: \"test\": on_notice has thrown: no more\n");
+}
+
+TEST(OnNotice, WithoutOneStandardErrorSaysIt) {
+  Daemon daemon(single_model());
+  NodeOptions options;
+  options.on_waiting = [](const std::string&) {};  // where the machine is slow
+  testing::internal::CaptureStderr();
+  Node node("test", options);
+  auto in = node.input_port<Number>("/in");
+  auto out = node.output_port<Wrong>("/out");
+  const std::string line = "arbiter: \"test\": " + kTypesDiffer + "\n";
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), line + line) << "the node has both ends";
+}
+
+TEST(OnNotice, TellsOfAPortThatCannotSee) {
+  Daemon daemon(override_model());
+  Notices notices;
+  NodeOptions options = notices.options();
+  options.service_thread = false;
+  Node blind("blind", options);
+  auto in = blind.input_port<Number>("/in");
+  Node sender("sender");
+  auto low = sender.output_port<Number>("/low");
+  // This node is not serviced: it does not see what a new model reads.
+  blind.service();
+  daemon.load(rules(arbiter_at("/in", select("/low", "not /new"))));
+  EXPECT_EQ(low.publish(Number{1}).delivered, 1u);
+  EXPECT_FALSE(in.take());
+  blind.service();
+  const auto given = notices.take();
+  ASSERT_EQ(given.size(), 1u);
+  EXPECT_EQ(given[0].kind, NoticeKind::blind);
+  EXPECT_EQ(given[0].port, "/in");
+  EXPECT_EQ(given[0].text,
+            "/in delivers nothing while it cannot see all sources that its rules read");
+  EXPECT_EQ(daemon.status()["clients"].is_number(), true);  // the daemon has read on
+  EXPECT_NE(daemon.log().find(given[0].text), std::string::npos);
+  EXPECT_EQ(take_from(in), 1) << "now it sees";
 }
 
 }  // namespace

@@ -1,7 +1,12 @@
 // A component in a process of its own, told what to do line by line on standard input. It answers
 // each line with one line. component.hpp speaks to it.
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <cstdint>
+#include <cstdlib>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -14,7 +19,9 @@
 #include "tests/client/samples.hpp"
 
 namespace arbiter::test {
-namespace {
+
+// main() is to return.
+struct Returns {};
 
 class Component {
  public:
@@ -27,6 +34,7 @@ class Component {
     if (verb == "input") return input(words);
     if (verb == "images-out") return images_out(words);
     if (verb == "images-in") return images_in(words);
+    if (verb == "fork") return fork_child(words);
     std::string port;
     words >> port;
     if (verb == "publish") return publish(port, words);
@@ -61,6 +69,30 @@ class Component {
     words >> name >> options.depth >> options.max_held >> options.keep;
     inputs_[name] = std::make_unique<InputPort<Number>>(node_->input_port<Number>(name, options));
     return "open";
+  }
+  // A child that ends as if this component did; or one that stays, whose number it answers.
+  std::string fork_child(std::istringstream& words) {
+    std::string how;
+    words >> how;
+    int is_here[2];
+    if (::pipe2(is_here, O_CLOEXEC) != 0) return "no pipe";
+    const pid_t child = ::fork();
+    if (child == 0) {
+      ::alarm(60);
+      ::close(is_here[0]);
+      ::close(is_here[1]);
+      if (how == "pause") ::pause();
+      if (how == "exit") std::exit(0);
+      throw Returns();
+    }
+    char nothing = 0;
+    ::close(is_here[1]);
+    static_cast<void>(!::read(is_here[0], &nothing, 1));  // until the child has closed it
+    ::close(is_here[0]);
+    if (how == "pause") return std::to_string(child);
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    return WIFEXITED(status) ? "ended " + std::to_string(WEXITSTATUS(status)) : "killed";
   }
   std::string publish(const std::string& port, std::istringstream& words) {
     std::int64_t value = 0;
@@ -126,15 +158,16 @@ class Component {
   std::optional<Sample<Image>> image_;
 };
 
-}  // namespace
 }  // namespace arbiter::test
 
 int main() {
-  arbiter::test::Component component;
+  static arbiter::test::Component component;  // for exit() to destroy
   for (std::string line; std::getline(std::cin, line);) {
     std::string answer;
     try {
       answer = component.obey(line);
+    } catch (const arbiter::test::Returns&) {
+      return 0;
     } catch (const std::exception& error) {
       answer = std::string("error: ") + error.what();
     }

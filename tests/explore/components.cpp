@@ -94,6 +94,7 @@ Instance::Instance(const test::TableBuilder& model)
   for (SourceId id = 0; id < kSources; ++id) {
     pages_.push_back(shm::make_segment("page", sizeof(shm::ActivityPage)));
     page_mappings_.emplace_back(pages_.back(), sizeof(shm::ActivityPage), shm::Access::kReadWrite);
+    shm::TableWriter(*board_mapping_.as<shm::Board>()).give_page(id, 1);
   }
   prepare(model);
   put_in_force();
@@ -103,7 +104,7 @@ std::shared_ptr<detail::SharedMemory> Instance::make_memory() {
   auto memory = std::make_shared<detail::SharedMemory>(
       alias(board_), shm::FileDescriptor(), std::make_shared<const detail::ServiceBell>());
   for (SourceId id = 0; id < kSources; ++id) {
-    memory->add_page(id, std::string(1, static_cast<char>('A' + id)), alias(pages_[id]));
+    memory->add_page(id, 1, std::string(1, static_cast<char>('A' + id)), alias(pages_[id]));
   }
   return memory;
 }
@@ -169,6 +170,24 @@ void Instance::prepare(const test::TableBuilder& model) {
   shm::TableWriter(*board_mapping_.as<shm::Board>()).write(model.words(kSources, kPorts));
 }
 void Instance::put_in_force() { shm::TableWriter(*board_mapping_.as<shm::Board>()).put_in_force(); }
+
+void Instance::make_next_page(SourceId) {
+  const auto page = shm::make_segment("page", sizeof(shm::ActivityPage));
+  next_page_ = page.get();
+  next_mapping_ = shm::Mapping(page, sizeof(shm::ActivityPage), shm::Access::kReadWrite);
+}
+void Instance::show_next_page(SourceId source, detail::SharedMemory& memory) const {
+  memory.add_page(source, 2, std::string(1, static_cast<char>('A' + source)),
+                  shm::FileDescriptor(next_page_));
+}
+// The former owner keeps his mapping of the old page.
+void Instance::change_page(SourceId source) {
+  shm::Activity& next = next_mapping_.as<shm::ActivityPage>()->of(source);
+  shm::TableWriter(*board_mapping_.as<shm::Board>()).change_page(source, activity(source), next);
+  std::swap(page_mappings_[source], next_mapping_);
+  pages_[source].reset();
+  pages_[source] = shm::FileDescriptor(next_page_);
+}
 
 test::TableBuilder forever() {
   test::TableBuilder builder;

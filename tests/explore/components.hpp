@@ -86,6 +86,11 @@ class Instance {
   // As the daemon does it: writes a model's table behind the one in force, and puts it in force.
   void prepare(const test::TableBuilder& model);
   void put_in_force();
+  // The same when a source passes to another user: its next page is made, shown to those who read
+  // the source, and put in force; from then on it is the one that bind() gives.
+  void make_next_page(SourceId source);
+  void show_next_page(SourceId source, detail::SharedMemory& memory) const;
+  void change_page(SourceId source);
   [[nodiscard]] shm::Activity& activity(SourceId source) const {
     return page_mappings_[source].as<shm::ActivityPage>()->of(source);
   }
@@ -97,6 +102,8 @@ class Instance {
   shm::Mapping board_mapping_;
   std::vector<shm::FileDescriptor> pages_;
   std::vector<shm::Mapping> page_mappings_;
+  int next_page_ = -1;  // the descriptor that it is known by, whether it is in force or not
+  shm::Mapping next_mapping_;
   shm::PortInstance next_instance_ = 1;
   std::uint64_t next_link_ = 1;
 };

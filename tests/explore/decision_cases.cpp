@@ -54,8 +54,8 @@ struct World {
 };
 
 // A and not B and not C. B is active; C arrives, then B is deactivated: never are both inactive.
-void move_activity(const Explore& explore) {
-  World world(forever().conjunction(kA, 0, {}, {kC, kB}));
+void move_activity_of(const Explore& explore, const test::TableBuilder& builder) {
+  World world(builder);
   explore([&](Execution& execution) {
     world.reset();
     world.arrive(kB);
@@ -67,7 +67,19 @@ void move_activity(const Explore& explore) {
   });
 }
 const Register kMoved("MomentsAreNotMixedWhereActivityMovesFromOneToAnother", {8, 8},
-                      move_activity);
+                      [](const Explore& explore) {
+                        move_activity_of(explore, forever().conjunction(kA, 0, {}, {kC, kB}));
+                      });
+
+// The same where B and C have the two rules before A's, which are tried one after the other.
+const Register kMovedInOrder(
+    "MomentsAreNotMixedInRulesThatAreTriedInOrder", {8, 8}, [](const Explore& explore) {
+      constexpr shm::Word kTrue = shm::table::kTrue, kFalse = shm::table::kFalse;
+      move_activity_of(
+          explore,
+          forever().connect(
+              {kA, 0, shm::table::kInOrder, {kC, kB}, {0, 1, kFalse, 1, kTrue, kFalse}, 0, 0}));
+    });
 
 // The same by a rule that is kept bound: what it saw last counts too, and was before all this.
 void move_activity_under_a_bound_rule(const Explore& explore) {

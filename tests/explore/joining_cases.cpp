@@ -137,6 +137,53 @@ void reuse_lane(const Explore& explore) {
 const Register kLane("AReceiversWordToOnePublisherIsNotTakenForItsWordToTheNext", {5, 3},
                      reuse_lane);
 
+// Two publishers of one source come and go, each leaving a sample that its successor's pushes out.
+// They are let go of by the service thread, while the component takes; before or after it has known
+// of them. Each of their samples is taken, or counted, once.
+struct Restarts : Scene {
+  Restarts() : Scene(everything(), depth(1), {kA}), second(successor(1)), third(successor(2)) {
+    a().publish();
+  }
+  // Its sequence goes on where its predecessor's ends.
+  std::unique_ptr<Output> successor(int published_before) {
+    auto output = instance.make_output();
+    instance.bind(*output, kA);
+    Instance::tell_output(*output, *input, 0);
+    for (int i = 0; i < published_before; ++i) output->publish();
+    return output;
+  }
+  void succeed(const Output& before, Output& after) {
+    input->core->lose_peer(before.core->instance());
+    instance.connect(after, *input);
+    after.publish();
+  }
+  std::unique_ptr<Output> second;
+  std::unique_ptr<Output> third;
+};
+
+void restart(const Explore& explore) {
+  explore_anew<Restarts>(explore, [](Restarts& scene, Execution& execution) {
+    execution.thread([&scene] {
+      scene.succeed(scene.a(), *scene.second);
+      scene.succeed(*scene.second, *scene.third);
+      scene.input->core->tidy();
+    });
+    execution.thread([&scene] {
+      for (int i = 0; i < 2; ++i) scene.input->take();
+    });
+    execution.finally([&scene] {
+      while (scene.input->take()) {
+      }
+      const shm::InputCounters& counters = scene.input->counters();
+      require(scene.input->last[kA] == 3, "the last sample was lost");
+      require(counters.dropped.load(std::memory_order_relaxed) == 0, "a winner's was dropped");
+      require(scene.input->taken[kA] + counters.overtaken.load(std::memory_order_relaxed) == 3,
+              "a sample was counted twice, or not at all");
+    });
+  });
+}
+const Register kRestarts("APublisherThatIsLetGoOfTakesNoSampleWithItUncounted", {3, 1}, restart);
+
 // client/handover.hpp by itself: a view is taken up whole, and disposed of after its last use.
 struct Offered {
   explicit Offered(int which) : number(which) {}

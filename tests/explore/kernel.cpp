@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "shm/bell.hpp"
+#include "shm/descendants.hpp"
 #include "shm/residence.hpp"
 #include "shm/segment.hpp"
 #include "tests/explore/explorer.hpp"
@@ -88,6 +89,13 @@ FileDescriptor reopen(const FileDescriptor& segment, int) {
 std::size_t checked_size(const FileDescriptor& segment, Seals) {
   return explore::segments.at(segment.get()).size;
 }
+std::size_t allocated_size(const FileDescriptor& segment) noexcept {
+  return explore::segments.at(segment.get()).size;
+}
+std::size_t end_of_data(const FileDescriptor& segment, std::size_t) noexcept {
+  return explore::segments.at(segment.get()).size;
+}
+bool copy_out(const FileDescriptor&, std::size_t, void*, std::size_t) noexcept { return false; }
 
 namespace {
 
@@ -109,6 +117,16 @@ Mapping::Mapping(const FileDescriptor& segment, std::size_t size, Access access)
                             size);
   region_.swap(region);
 }
+
+void Mapping::replace(const FileDescriptor& segment) {
+  *this = Mapping(segment, size(), Access::kReadOnly);
+}
+
+// Nothing is forked here.
+Bequest::Bequest(void* address, std::size_t size, Kind kind, const std::uint32_t* users)
+    : address_(address), size_(size), kind_(kind), users_(users) {}
+Bequest::~Bequest() = default;
+void close_in_children(const FileDescriptor&) {}
 
 // A real descriptor, which epoll takes, that is never readable; and a word in the image.
 Bell::Bell() : read_(eventfd(0, EFD_CLOEXEC)), write_(eventfd(0, EFD_CLOEXEC)) {

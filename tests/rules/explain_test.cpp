@@ -96,6 +96,45 @@ TEST_F(Explained, WhatIsInactiveLosesByThat) {
   EXPECT_FALSE(port_.winner);
 }
 
+const std::string kReadsItself = R"(<behaviors><source port="/Nav/other"/>
+<behavior name="Drive"><config at="/p">/Nav/vel</config>
+  <condition>none(/Nav/*) or /ok</condition></behavior></behaviors>)";
+
+TEST_F(Explained, AConditionThatReadsItsOwnSourceIsJudgedAsIfThatWereActive) {
+  using OwnActivity = Cause::OwnActivity;
+  const auto waiting = connection(kReadsItself, "/Nav/vel", {});
+  EXPECT_EQ(only_cause(waiting).own_activity, OwnActivity::kWillMatter);
+  EXPECT_THAT(said(only_cause(waiting).because), ElementsAre("not /ok"));
+  const auto out = connection(kReadsItself, "/Nav/vel", {"/Nav/vel"});
+  EXPECT_EQ(only_cause(out).own_activity, OwnActivity::kMatters);
+  EXPECT_THAT(said(*out.reason()), ElementsAre("not /ok"));
+  const auto other = connection(kReadsItself, "/Nav/vel", {"/Nav/vel", "/Nav/other"});
+  EXPECT_EQ(only_cause(other).own_activity, OwnActivity::kNoMatter) << "/Nav/other is enough";
+  EXPECT_THAT(connection(kReadsItself, "/Nav/vel", {"/ok"}).parts.at(0).causes, IsEmpty());
+  const std::string wants_itself =
+      R"(<arbiter at="/p"><select from="/a">/a and /ok</select></arbiter>)";
+  EXPECT_THAT(connection(wants_itself, "/a", {"/ok"}).parts.at(0).causes, IsEmpty());
+}
+
+TEST_F(Explained, AnInhibitionByItsOwnSourceIsToldBeforeItIsActive) {
+  const auto shared = connection(R"(<behaviors>
+<behavior name="A"><config at="/p">/s</config></behavior>
+<behavior name="B"><config at="/q">/s</config><inhibition>A</inhibition></behavior>
+</behaviors>)",
+                                 "/s", {});
+  EXPECT_EQ(only_cause(shared).own_activity, Cause::OwnActivity::kWillMatter);
+  EXPECT_THAT(only_cause(shared).because, IsEmpty());
+}
+
+TEST_F(Explained, WhatIsInactiveIsToldOfTheEarlierOneThatWouldWinAllTheSame) {
+  const std::string model = R"(<behaviors><arbiter at="/p" conflict="first">
+<select from="/high">/go</select><select from="/yields">not /low</select>
+<select from="/low"/></arbiter></behaviors>)";
+  EXPECT_EQ(connection(model, "/low", {"/high", "/go"}).earlier, "/high");
+  EXPECT_FALSE(connection(model, "/low", {"/high"}).earlier);
+  EXPECT_FALSE(connection(model, "/low", {"/yields"}).earlier) << "it yields to it then";
+}
+
 TEST_F(Explained, AWinnerNeedsNoReason) {
   const auto low = connection(kThrough, "/low", {"/low", "/ready"});
   EXPECT_TRUE(low.wins);

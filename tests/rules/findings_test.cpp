@@ -114,6 +114,20 @@ TEST(Findings, ASourceThatWinsNowhereIsToldOnce) {
   EXPECT_THAT(found.items[0].message, HasSubstr("/a is connected to /p and /q, and there is no"));
   EXPECT_THAT(found.items[1].message, HasSubstr("/x is connected to /p, and there is no state in "
                                                 "which it wins anywhere, partly since no rule"));
+  EXPECT_EQ(found.items[0].about.source, "/a");
+  EXPECT_THAT(found.items[0].about.ports, ElementsAre("/p", "/q"));
+}
+
+// /x has no rule, /a has; neither is told of at /b's.
+TEST(Findings, ASourceThatWinsNowhereIsToldWhereItIsConnected) {
+  const auto found = found_in(RulesByHand()
+                                  .port("/p", {{"/b", always()}, {"/a", inactive("/a")}}, true)
+                                  .port("/q", {{"/b", always()}})
+                                  .other("/x", "/p")
+                                  .other("/a", "/q"));
+  ASSERT_THAT(found.codes(), ElementsAre("never-wins", "never-wins"));
+  EXPECT_EQ(found.items[0].where, (rules::Location{"model.xml", 3, 5})) << "/a has a rule";
+  EXPECT_EQ(found.items[1].where, (rules::Location{"application.xml", 6, 3}));
 }
 
 TEST(Findings, AQuestionThatOutgrowsItsBoundIsLeftOpenAndSaysSo) {
@@ -123,8 +137,9 @@ TEST(Findings, AQuestionThatOutgrowsItsBoundIsLeftOpenAndSaysSo) {
   EXPECT_EQ(found.account.ports, 2u);
   EXPECT_EQ(found.account.open, 2u);
   ASSERT_THAT(found.codes(), ElementsAre("left-open"));
-  EXPECT_THAT(found.items[0].message,
-              HasSubstr("at 2 ports (/p, /q): it takes more steps than there are for it"));
+  EXPECT_THAT(found.items[0].message, HasSubstr("nobody wins at /p and /q were looked at: at /p, "
+                                                "it takes more steps than there are for it"));
+  EXPECT_THAT(found.items[0].about.ports, ElementsAre("/p", "/q"));
   EXPECT_EQ(found_in(set).account.open, 0u);
 }
 

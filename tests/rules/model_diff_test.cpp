@@ -91,7 +91,8 @@ void expect_is_example(const CompiledModel& before, const CompiledModel& after,
     }
     return true;
   };
-  const auto& [active, inactive] = *change.example;
+  const auto& active = change.example->active;
+  const auto& inactive = change.example->inactive;
   EXPECT_TRUE(implies(active, inactive));
   for (std::size_t i = 0; i < active.size(); ++i) {
     auto less = active;
@@ -366,9 +367,9 @@ TEST(ModelDiff, WritesJsonForPrograms) {
     "ports": [{"port": "/p", "differs": true,
       "before": {"exists": true, "arbitrated": true, "conflict": "error", "only_here": []},
       "after": {"exists": true, "arbitrated": true, "conflict": "error", "only_here": []},
-      "sources": 2, "states": "1", "of": "4", "open": null,
+      "sources": 2, "states": "1", "of": "4", "all_changes": true, "open": null,
       "changes": [{"before": "/a", "after": null, "states": "1",
-                   "example": {"active": ["/a", "/b"], "inactive": []}}]}]})json";
+                   "example": {"active": ["/a", "/b"], "inactive": [], "shortest": true}}]}]})json";
   EXPECT_EQ(nlohmann::json::parse(out.str()), nlohmann::json::parse(kExpected));
 }
 

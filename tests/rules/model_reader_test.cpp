@@ -104,7 +104,7 @@ TEST(ModelReader, AnInhibitionIsRepeatableAndTakesSeveralNames) {
 TEST(ModelReader, TimeoutsAreOfTheModelAndOfSources) {
   const Loaded loaded = load_text(R"(<behaviors timeout=" 250us ">
     <source port="/a" timeout="forever"/><source port=" /b " timeout="10ns"/><source port="/c"/>
-    <arbiter at="/p"><select from="/d"/></arbiter></behaviors>)");
+    <arbiter at="/p"><select from="/d">/a or /b or /c</select></arbiter></behaviors>)");
   EXPECT_THAT(loaded.findings(), IsEmpty()) << loaded.message();
   EXPECT_EQ(loaded.rules.timeout, 250'000);
   EXPECT_THAT(loaded.rules.timeouts,

@@ -108,7 +108,12 @@ class Explanations {
         sources.push_back(connection.source);
         EXPECT_EQ(connection.wins, explained.winner == connection.source);
         check_reason(port, connection, active);
-        for (const auto& part : connection.parts) check_part(port, part, active);
+        check_hypothesis(port, connection, active);
+        auto with_own = active;  // as in each decision on its arrivals
+        with_own.insert(connection.source);
+        for (const auto& part : connection.parts) {
+          check_part(port, connection.source, part, with_own);
+        }
       }
       EXPECT_EQ(sources, naive_.sources_at(port));
     }
@@ -138,7 +143,30 @@ class Explanations {
     }
   }
 
-  void check_part(const std::string& port, const rules::Part& part, const Active& active) {
+  // What is not active is told to wait for that only where it would win then.
+  void check_hypothesis(const std::string& port, const rules::ConnectionExplanation& connection,
+                        const Active& active) {
+    auto with_own = active;
+    with_own.insert(connection.source);
+    const auto selected = naive_.selected(port, with_own);
+    const bool may_hold = std::any_of(connection.parts.begin(), connection.parts.end(),
+                                      [](const auto& part) { return part.causes.empty(); });
+    const bool holds =
+        std::find(selected.begin(), selected.end(), connection.source) != selected.end();
+    EXPECT_EQ(may_hold, holds) << connection.source;
+    EXPECT_EQ(may_hold && !connection.earlier, holds && selected.front() == connection.source);
+    if (!connection.earlier) return;
+    EXPECT_EQ(*connection.earlier, selected.front());
+    for (const auto& other : activations_) {
+      if (!other.contains(connection.source) || !agrees(connection.earlier_because, other))
+        continue;
+      const auto then = naive_.selected(port, other);
+      EXPECT_TRUE(!then.empty() && then.front() != connection.source);
+    }
+  }
+
+  void check_part(const std::string& port, const std::string& own, const rules::Part& part,
+                  const Active& active) {
     ASSERT_TRUE(part.behaviour);
     const int behaviour = std::stoi(part.behaviour->name.substr(std::strlen("Element ")));
     std::multiset<std::string> told;
@@ -150,10 +178,16 @@ class Explanations {
       told.insert(obstacle);
       EXPECT_TRUE(agrees(cause.because, active));
       for (const auto& other : activations_) {
-        if (!agrees(cause.because, other)) continue;
+        if (!other.contains(own) || !agrees(cause.because, other)) continue;
         EXPECT_EQ(naive_.obstacles(behaviour, port, other).count(obstacle) > 0, true) << obstacle;
       }
-      if (!inhibits) continue;
+      const auto by_own = cause.own_activity != rules::Cause::OwnActivity::kNoMatter;
+      auto without_own = active;
+      without_own.erase(own);
+      if (!inhibits) {
+        EXPECT_EQ(by_own, naive_.obstacles(behaviour, port, without_own).count(obstacle) == 0);
+      }
+      if (!inhibits || by_own) continue;
       // Once all that it names are inactive, the inhibition is over.
       auto after = active;
       for (const auto& literal : cause.because) after.erase(literal.source);

@@ -66,7 +66,11 @@ class StatementGenerator {
     const auto& port = ports[pick(ports.size())];
     const auto connected = naive_.sources_at(port);
     const auto& source = connected[pick(connected.size())];
-    switch (pick(6)) {
+    switch (pick(8)) {
+      case 6:
+        return one_of(port);
+      case 7:
+        return same(port, ports[pick(ports.size())]);
       case 0:
         return {"idle(" + port + ")", [=](const auto& naive, const auto& now) {
                   return !naive.winner(port, now).has_value();
@@ -88,6 +92,26 @@ class StatementGenerator {
       default:
         return {source, [=](const auto&, const auto& now) { return now.contains(source); }};
     }
+  }
+
+  // Sources are called /x:o, so that "/x*" is one and "*" is all.
+  RandomStatement one_of(const std::string& port) {
+    const bool is_all = pick(4) == 0, differs = pick(2) == 0;
+    const std::string first = words_.sources[pick(words_.sources.size())].substr(0, 2);
+    const std::string pattern = is_all ? "*" : first + "*";
+    return {"winner(" + port + ") " + (differs ? "!=" : "=") + " any(" + pattern + ")",
+            [=](const auto& naive, const auto& now) {
+              const auto winner = naive.winner(port, now);
+              return differs != (winner && (is_all || winner->starts_with(first)));
+            }};
+  }
+
+  RandomStatement same(const std::string& port, const std::string& other) {
+    const bool differs = pick(2) == 0;
+    return {"winner(" + port + ") " + (differs ? "!=" : "=") + " winner(" + other + ")",
+            [=](const auto& naive, const auto& now) {
+              return differs != (naive.winner(port, now) == naive.winner(other, now));
+            }};
   }
 
   std::mt19937 random_;

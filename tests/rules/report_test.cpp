@@ -1,5 +1,6 @@
 #include "rules/report.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <sstream>
@@ -33,9 +34,10 @@ TEST(Report, SaysNothingIfNothingWasFound) {
 TEST(Report, WritesAsCompilersDoAndCounts) {
   Diagnostics diagnostics;
   diagnostics.note("some-note", {"m.xml", 3, 4}, "by the way");
-  diagnostics.error("both-can-win", {"m.xml", 9, 1}, "both win",
-                    rules::Witness{{"/a", "/b"}, {"/c"}});
-  diagnostics.error("both-can-win", {"m.xml", 10, 1}, "both win", rules::Witness{{"/a"}, {}});
+  diagnostics.error("both-can-win", {"m.xml", 9, 1}, "both win", {},
+                    rules::Witness{{"/a", "/b"}, {"/c"}, true});
+  diagnostics.error("both-can-win", {"m.xml", 10, 1}, "both win", {},
+                    rules::Witness{{"/a"}, {}, true});
   EXPECT_EQ(text_of(diagnostics),
             "m.xml:9:1: error: both win [both-can-win]\n"
             "  active: /a, /b; inactive: /c\n"
@@ -45,14 +47,24 @@ TEST(Report, WritesAsCompilersDoAndCounts) {
             "2 errors, 1 note\n");
 }
 
+TEST(Report, CallsNoWitnessAShortestThatIsNotKnownToBe) {
+  Diagnostics diagnostics;
+  diagnostics.error("both-can-win", {"m.xml", 1, 1}, "both win", {},
+                    rules::Witness{{"/a"}, {"/b"}});
+  EXPECT_THAT(
+      text_of(diagnostics),
+      testing::HasSubstr("inactive: /b (nothing of it can be left out; others may be shorter)\n"));
+  EXPECT_EQ(json_of(diagnostics)[0]["witness"]["shortest"], false);
+}
+
 TEST(Report, DoesNotRepeatAWitnessThatTheMessageHasInWords) {
   Diagnostics diagnostics;
-  diagnostics.note("n", {"m.xml", 1, 1}, "with /a active and /b inactive, nobody wins",
-                   rules::Witness{{"/a"}, {"/b"}});
+  diagnostics.note("n", {"m.xml", 1, 1}, "with /a active and /b inactive, nobody wins", {},
+                   rules::Witness{{"/a"}, {"/b"}, true});
   std::vector<std::string> many;
   for (int i = 0; i < 8; ++i) many.push_back("/s" + std::to_string(i));
-  const rules::Witness large{many, {}};
-  diagnostics.note("n", {"m.xml", 2, 1}, "with " + in_words(large), large);
+  const rules::Witness large{many, {}, true};
+  diagnostics.note("n", {"m.xml", 2, 1}, "with " + in_words(large), {}, large);
   EXPECT_EQ(text_of(diagnostics),
             "m.xml:1:1: note: with /a active and /b inactive, nobody wins [n]\n"
             "m.xml:2:1: note: with /s0, /s1, /s2, /s3, /s4, /s5 and 2 more active [n]\n"
@@ -145,14 +157,39 @@ TEST(Report, GoesThroughEachFileFromTheTop) {
 TEST(Report, WritesJsonForPrograms) {
   Diagnostics diagnostics;
   diagnostics.warning("never-selected", {"m.xml", 3, 4}, "a \"quoted\" message");
-  diagnostics.error("both-can-win", {"m.xml", 5, 6}, "both; mend it", rules::Witness{{"/a"}, {}});
+  diagnostics.error("both-can-win", {"m.xml", 5, 6}, "both; mend it", {},
+                    rules::Witness{{"/a"}, {}, true});
   EXPECT_EQ(json_of(diagnostics), nlohmann::json::parse(R"([
     {"severity": "error", "code": "both-can-win", "file": "m.xml", "line": 5, "column": 6,
-     "message": "both; mend it", "help": "mend it", "witness": {"active": ["/a"], "inactive": []},
-     "more_witnesses": []},
+     "message": "both; mend it", "help": "mend it", "witness": {"active": ["/a"], "inactive": [], "shortest": true},
+     "more_witnesses": [],
+     "port": null, "ports": [], "source": null, "behaviour": null, "statement": null,
+     "winners": []},
     {"severity": "warning", "code": "never-selected", "file": "m.xml", "line": 3, "column": 4,
      "message": "a \"quoted\" message", "help": null, "witness": null,
-     "more_witnesses": []}])"));
+     "more_witnesses": [],
+     "port": null, "ports": [], "source": null, "behaviour": null, "statement": null,
+     "winners": []}])"));
+}
+
+TEST(Report, NamesWhatAFindingIsAboutInFieldsOfTheirOwn) {
+  Diagnostics diagnostics;
+  diagnostics.error("refuted", {"s.txt", 1, 1}, "false",
+                    {.ports = {"/p"},
+                     .source = "/a",
+                     .behaviour = "Go",
+                     .statement = "idle(/p)",
+                     .winners = {{"/p", "/a"}, {"/q", std::nullopt}}});
+  diagnostics.note("left-open", {"s.txt", 2, 1}, "open", {.ports = {"/p", "/q"}});
+  const auto found = json_of(diagnostics);
+  EXPECT_EQ(found[0]["port"], "/p");
+  EXPECT_EQ(found[0]["source"], "/a");
+  EXPECT_EQ(found[0]["behaviour"], "Go");
+  EXPECT_EQ(found[0]["statement"], "idle(/p)");
+  EXPECT_EQ(found[0]["winners"], nlohmann::json::parse(R"([
+    {"port": "/p", "winner": "/a"}, {"port": "/q", "winner": null}])"));
+  EXPECT_EQ(found[1]["port"], nullptr) << "not one";
+  EXPECT_EQ(found[1]["ports"], (nlohmann::json{"/p", "/q"}));
 }
 
 TEST(Report, WritesJsonEvenIfAFilesNameIsNotUtf8) {

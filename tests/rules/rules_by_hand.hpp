@@ -58,7 +58,7 @@ class RulesByHand {
     return *this;
   }
   RulesByHand& other(const std::string& source, const std::string& port) {
-    set_.other_connections.push_back({source, port});
+    set_.other_connections.push_back({source, port, {"application.xml", ++line_, 3}});
     return *this;
   }
   RulesByHand& behaviour(const std::string& name, const std::string& port,

@@ -78,6 +78,46 @@ TEST(Statement, SpeaksOfWinnersWithEachSpelling) {
   EXPECT_FALSE(found.statements[4].parsed.terms[0].source.has_value());
 }
 
+TEST(Statement, MaySpeakOfOneOfSeveralWinnersAndOfTheSame) {
+  const auto found = read(
+      "winner(/p) = any(/Nav/*)\nwinner(/p) != any( \"/odd *\" )\nwinner(/p) = winner(/q)\n"
+      "winner(/p) != winner (/q) and /s\n");
+  EXPECT_THAT(found.items, IsEmpty());
+  ASSERT_EQ(found.statements.size(), 4u);
+  const auto& any = found.statements[0].parsed;
+  EXPECT_EQ(any.terms[0].pattern->name, "/Nav/*");
+  EXPECT_EQ(any.terms[0].pattern->where, (Location{"safety.txt", 1, 18}));
+  EXPECT_THAT(any.globs, IsEmpty()) << "it ranges over the port's connections";
+  EXPECT_EQ(show(found.statements[1].parsed.expression), "not(=0)");
+  EXPECT_EQ(found.statements[1].parsed.terms[0].pattern->name, "/odd *");
+  EXPECT_EQ(found.statements[2].parsed.terms[0].other_port->name, "/q");
+  EXPECT_EQ(found.statements[2].parsed.terms[0].other_port->where, (Location{"safety.txt", 3, 21}));
+  EXPECT_EQ(show(found.statements[3].parsed.expression), "(not(=0) and /s)");
+}
+
+TEST(Statement, WhatOtherLanguagesWriteIsToldWhatToWriteHere) {
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"/a => idle(/p)", "\"=>\" is no operator here; write implies or ->"},
+      {"winner(/p) == /s", "\"==\" is no operator here; write = behind winner(…)"},
+      {"/a = /b",
+       "\"=\" compares a winner, as in winner(/Arm/pos:i) = /Teleop/pos:o; between "
+       "conditions write iff"},
+      {"/a != /b", "between conditions write xor"},
+      {"active(/a) -> idle(/p)", "write the name alone"},
+      {"winner(/p) = none(/Nav/*)", "write winner(/p) != any(/Nav/*)"},
+      {"winner(/p) = all(/Nav/*)", "only one source wins at a port; write any(/Nav/*)"},
+      {"winner(/p) = any", "any takes a pattern in parentheses"},
+      {"winner(/p) = winner", "winner takes a port in parentheses"},
+      {"winner(/p) = idle(/q)", "a source, any(…), winner(…) or none here"},
+  };
+  for (const auto& [text, advice] : cases) {
+    const auto found = read(text + "\n");
+    ASSERT_EQ(found.items.size(), 1u) << text;
+    EXPECT_EQ(found.items[0].code, "malformed-statement") << text;
+    EXPECT_THAT(found.items[0].message, HasSubstr(advice)) << text;
+  }
+}
+
 TEST(Statement, AWinnerIsAnOperandThatBindsTighterThanNot) {
   const auto found = read("winner(/p) = /a -> not winner(/q) = /b xor idle(/r)");
   ASSERT_EQ(found.statements.size(), 1u);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "rules/load.hpp"
-#include "rules/utf8.hpp"
+#include "shm/utf8.hpp"
 #include "tests/rules/model_text.hpp"
 
 namespace arbiter::rules {
@@ -99,14 +99,14 @@ TEST(Utf8, IsDecodedStrictly) {
   const std::vector<std::pair<std::string, std::uint32_t>> good{
       {"a", 'a'}, {"ä", 0xe4}, {"→", 0x2192}, {"😀", 0x1f600}, {"\xf4\x8f\xbf\xbf", 0x10ffff}};
   for (const auto& [bytes, code] : good) {
-    EXPECT_EQ(decode_utf8(bytes + "x").code, code);
-    EXPECT_EQ(decode_utf8(bytes).length, bytes.size());
-    EXPECT_EQ(encode_utf8(code), bytes);
+    EXPECT_EQ(shm::decode_utf8(bytes + "x").code, code);
+    EXPECT_EQ(shm::decode_utf8(bytes).length, bytes.size());
+    EXPECT_EQ(shm::encode_utf8(code), bytes);
   }
   for (const std::string bad :
        {"\x80", "\xc3", "\xc3x", "\xc0\x80", "\xc1\xbf", "\xe0\x80\x80", "\xed\xa0\x80", "\xe2\x86",
         "\xf4\x90\x80\x80", "\xf8\x88\x80\x80\x80", "\xff", ""}) {
-    EXPECT_EQ(decode_utf8(bad).length, 0u);
+    EXPECT_EQ(shm::decode_utf8(bad).length, 0u);
   }
 }
 

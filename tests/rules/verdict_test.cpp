@@ -78,11 +78,53 @@ TEST(Verdict, WhatIsNotIsRefutedWithAShortestWitnessAndItsWinners) {
   report(result.verdicts, diagnostics);
   ASSERT_EQ(diagnostics.items().size(), 1u);
   EXPECT_EQ(diagnostics.items()[0].code, "refuted");
+  const auto& about = diagnostics.items()[0].about;
+  EXPECT_THAT(about.ports, ElementsAre("/Arm"));
+  EXPECT_EQ(about.statement, "/collision -> idle(/Arm)");
+  EXPECT_EQ(about.winners, verdict.winners);
   EXPECT_TRUE(diagnostics.has_errors());
   EXPECT_EQ(diagnostics.items()[0].message,
             "this is false with /Rest and /collision active and /Object inactive, whatever else "
             "is; /Rest wins at /Arm if nothing else is active; change the model so that this "
             "state is decided otherwise, or the statement if it says too much");
+}
+
+TEST(Verdict, OneOfSeveralAndTheSameAtTwoPortsAreProvedAndRefuted) {
+  const auto model =
+      compiled(RulesByHand()
+                   .port("/Arm", {{"/Nav/a", inactive("/Nav/b")},
+                                  {"/Nav/b", always()},
+                                  {"/Rest", all_of({inactive("/Nav/a"), inactive("/Nav/b")})}})
+                   .port("/Base", {{"/Nav/a", inactive("/Nav/b")}, {"/Nav/b", inactive("/stop")}}));
+  for (const auto* text :
+       {"any(/Nav/*) -> winner(/Arm) = any(/Nav/*)", "winner(/Base) != any(/Rest*) or /Rest",
+        "winner(/Arm) = winner(/Arm)", "winner(/Arm) != winner(/Base) -> /Rest or /stop",
+        "none(*) -> winner(/Arm) = winner(/Base)"}) {
+    const auto result = judged(model, text);
+    ASSERT_EQ(result.verdicts.size(), 1u) << text;
+    EXPECT_EQ(result.verdicts[0].kind, Verdict::Kind::kProved) << text;
+  }
+  const auto refuted =
+      judged(model, "winner(/Arm) = winner(/Base)\n/Rest -> winner(/Arm) != any(/Nav/*)");
+  ASSERT_EQ(refuted.verdicts.size(), 2u);
+  EXPECT_THAT(refuted.verdicts[0].witness->active, ElementsAre("/Nav/b", "/stop"));
+  EXPECT_THAT(refuted.verdicts[0].witness->inactive, IsEmpty());
+  EXPECT_THAT(
+      refuted.verdicts[0].winners,
+      ElementsAre(Pair("/Arm", std::optional<std::string>("/Nav/b")), Pair("/Base", std::nullopt)));
+  EXPECT_EQ(refuted.verdicts[1].witness->active.size(), 2u);
+}
+
+TEST(Verdict, NamesOfOneOfSeveralAndOfTheSameAreJudged) {
+  const auto result = judged(robot(),
+                             "winner(/Arm) = winner(/Leg)\n"
+                             "winner(/View) = winner(/Arm)\n"
+                             "winner(/Base) = any(/Object*)\n");
+  std::vector<std::string> codes;
+  for (const auto& item : result.diagnostics.items()) codes.push_back(item.code);
+  EXPECT_THAT(codes, ElementsAre("unknown-port", "not-arbitrated", "matches-nothing"));
+  EXPECT_EQ(result.diagnostics.items()[0].about.statement, "winner(/Arm) = winner(/Leg)");
+  EXPECT_EQ(result.diagnostics.items()[0].about.ports, (std::vector<std::string>{"/Leg"}));
 }
 
 TEST(Verdict, WithConflictFirstTheOrderDecidesWhoWins) {

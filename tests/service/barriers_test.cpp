@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <array>
 
@@ -19,7 +20,7 @@ class BarriersTest : public testing::Test {
     EXPECT_EQ(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends.data()),
               0);
     others_.emplace_back(ends[1]);
-    auto client = std::make_unique<Client>(id, shm::FileDescriptor(ends[0]));
+    auto client = std::make_unique<Client>(id, shm::FileDescriptor(ends[0]), shares_);
     client->has_service_thread = true;
     return client;
   }
@@ -35,6 +36,7 @@ class BarriersTest : public testing::Test {
     barriers_.raise(clients, deadline, [this] { ++passed_; });
   }
 
+  Shares shares_{totals_of_this_process(), Shares::kDefaultPercent, geteuid()};
   std::vector<shm::FileDescriptor> others_;
   std::unique_ptr<Client> one_;
   std::unique_ptr<Client> two_;

@@ -86,6 +86,34 @@ TEST_F(ChangingModels, SwitchWithoutAModelSaysSo) {
   expect_refusal(arbiter({"rollback"}), "there is no model to go back to: none has been in force");
 }
 
+// A source that is declared, and that no rule reads.
+std::string with_warning(const std::string& source) {
+  return rules("<source port='/unread'/>" + arbiter_at("/in", select("/" + source)));
+}
+
+TEST_F(ChangingModels, AReloadTellsWarningsAndGoesOn) {
+  start();
+  daemon_->write_model(with_warning("c"));
+  const auto result = arbiter({"reload"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("warning: no rule reads or selects /unread"));
+  EXPECT_THAT(daemon_->log(), HasSubstr("no rule reads or selects /unread"));
+  EXPECT_EQ(source_in_force(), "/c");
+}
+
+TEST_F(ChangingModels, AStrictDaemonRefusesWarningsAndKeepsWhatItHas) {
+  start({"--strict"});
+  daemon_->write_model(with_warning("c"));
+  const auto result = arbiter({"reload"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("error: no rule reads or selects /unread"));
+  EXPECT_EQ(source_in_force(), "/a");
+  EXPECT_EQ(arbiter({"reload", "--dry-run"}).exit_code, 1);
+  daemon_->write_model(only("c"));
+  EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
+  EXPECT_EQ(source_in_force(), "/c");
+}
+
 TEST_F(ChangingModels, ReloadReadsAllAndStaysWithTheOneInForce) {
   start();
   ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
@@ -143,12 +171,51 @@ TEST_F(ChangingModels, ADryRunShowsWhatAReloadWouldDo) {
   EXPECT_EQ(source_in_force(), "/b");
 }
 
+TEST_F(ChangingModels, WhatChangesHasOneTypeInEachReport) {
+  start();
+  daemon_->write_model(only("c"));
+  const auto dry = nlohmann::json::parse(arbiter({"reload", "--dry-run", "--json"}).out);
+  const auto reload = nlohmann::json::parse(arbiter({"reload", "--json"}).out);
+  EXPECT_EQ(reload["changes"], dry["models"][0]["changes"]);
+  EXPECT_EQ(reload["changes"]["summary"], "1 of 1 port decides differently (/in)");
+  EXPECT_EQ(reload["changes"]["diff"]["ports"][0]["port"], "/in");
+  EXPECT_EQ(reload["back_to"], nullptr);
+  const auto rollback = nlohmann::json::parse(arbiter({"rollback", "--json"}).out);
+  EXPECT_EQ(rollback["back_to"]["generation"], 1);
+  EXPECT_EQ(rollback["back_to"]["name"], "default");
+  EXPECT_EQ(rollback["back_to"]["files"][0], daemon_->directory() + "/model.xml");
+  EXPECT_TRUE(rollback["changes"].is_object());
+  const auto to_other = nlohmann::json::parse(arbiter({"switch", "other", "--json"}).out);
+  EXPECT_EQ(to_other["changes"], nullptr) << "not compared";
+}
+
+// What cannot be judged for an error in it is not; the rest is, as by arbiter check.
+TEST_F(ChangingModels, ARefusedReloadTellsOfAllProblemsInFields) {
+  start();
+  daemon_->write_model(
+      "<behaviors><source port='/a' timeout='5 parsecs'/><arbiter at='/in'><select from='/a'/>"
+      "<select from='/b'/></arbiter></behaviors>");
+  const auto result = arbiter({"reload", "--json"});
+  EXPECT_EQ(result.exit_code, 1);
+  const auto report = nlohmann::json::parse(result.out);
+  const auto& found = report["findings"][0]["findings"];
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0]["code"], "invalid-timeout");
+  EXPECT_EQ(found[1]["code"], "both-can-win");
+  EXPECT_EQ(found[1]["port"], "/in");
+  EXPECT_EQ(found[1]["source"], "/b");
+  EXPECT_EQ(found[1]["winners"][0]["winner"], "/a");
+}
+
 TEST_F(ChangingModels, RollbackGoesBackStepByStepOrToOneByItsNumber) {
   Daemon& daemon = start();
   daemon.load(only("b"));
   daemon.load(only("c"));
   auto result = arbiter({"rollback"});
-  EXPECT_EQ(result.out, "model 4 is in force\n  1 of 1 port decides differently (/in)\n");
+  EXPECT_EQ(result.out, "model 4 is in force\n  it is model 2 again: default " +
+                            daemon.directory() +
+                            "/model.xml (reload)\n"
+                            "  1 of 1 port decides differently (/in)\n");
   EXPECT_EQ(source_in_force(), "/b");
   EXPECT_THAT(arbiter({"switch"}).out, HasSubstr("(in force is an older one: a rollback)"));
   ASSERT_EQ(arbiter({"rollback"}).exit_code, 0);
@@ -172,8 +239,10 @@ TEST_F(ChangingModels, AModelThatStaysAsItIsIsNoStepAfterARollbackEither) {
   start();
   ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
   ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
-  expect_success(arbiter({"rollback"}),
-                 "model 4 is in force\n  1 of 1 port decides differently (/in)\n");
+  expect_success(arbiter({"rollback"}), "model 4 is in force\n  it is model 1 again: default " +
+                                            daemon_->directory() +
+                                            "/model.xml (start)\n"
+                                            "  1 of 1 port decides differently (/in)\n");
   ASSERT_EQ(source_in_force(), "/a");
   ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
   ASSERT_EQ(arbiter({"reload"}).exit_code, 0);

@@ -5,30 +5,14 @@
 
 #include <arbiter/arbiter.hpp>
 
-#include "shm/output_segment.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/raw_port.hpp"
 #include "tests/support/threads.hpp"
 
 namespace arbiter::test {
 namespace {
 
 using shm::MessageKind;
-
-shm::FileDescriptor output_segment() {
-  const shm::TypeInfo type;
-  const auto layout = shm::OutputLayout::plan(type, 4);
-  auto segment = shm::make_segment("test", layout.total_size);
-  {
-    const shm::Mapping mapping(segment, layout.total_size, shm::Access::kReadWrite);
-    auto& header = *mapping.as<shm::OutputHeader>();
-    header.magic = shm::OutputHeader::kMagic;
-    header.version = shm::OutputHeader::kVersion;
-    header.slot_count = 4;
-    header.type = type;
-  }
-  shm::seal(segment, shm::Seals::kOneWriter);
-  return segment;
-}
 
 shm::Message open_output(const std::string& name) {
   return RawClient::message(MessageKind::kOpenOutput, name);
@@ -43,7 +27,7 @@ TEST(Names, AskedForTwiceByAComponentThatIsDeadByThenAreFree) {
     RawClient client(daemon.instance());
     client.hello("doomed");
     ::kill(daemon.process().pid(), SIGSTOP);
-    const auto segment = output_segment();
+    const auto segment = raw_output_segment();
     for (int i = 0; i < 2; ++i) client.send(open_output("/twice"), {segment.get(), -1});
     ::_exit(0);
   }
@@ -64,7 +48,7 @@ TEST(Names, AreFreeInTheOrderInWhichComponentsSpoke) {
     RawClient second(daemon.instance());
     first.hello("first");
     second.hello("second");
-    const auto segment = output_segment();
+    const auto segment = raw_output_segment();
     first.send(open_output("/x"), {segment.get(), -1});
     auto close = RawClient::message(MessageKind::kClosePort);
     close.port = first.expect(MessageKind::kOpened).message.port;

@@ -42,6 +42,19 @@ TEST(Start, TellsTheServiceManagerThatItIsReadyAndThatItStops) {
   EXPECT_EQ(daemon.process().wait(), 0);
 }
 
+TEST(Start, IsRefusedForWarningsIfItIsStrict) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write(
+      "model.xml",
+      "<behaviors><source port='/unread'/><arbiter at='/in'><select from='/out'/></arbiter>"
+      "</behaviors>");
+  const Environment environment{{"RUNTIME_DIRECTORY", directory.path()}};
+  const auto [code, log] = start_in_vain({"--strict", "--model", model}, environment);
+  EXPECT_EQ(code, 1);
+  EXPECT_NE(log.find(model + ":1:12: no rule reads or selects /unread"), std::string::npos) << log;
+  EXPECT_NE(log.find("--strict takes warnings for errors"), std::string::npos) << log;
+}
+
 TEST(Start, StopsOnAnInterruptToo) {
   Daemon daemon;
   daemon.process().signal(SIGINT);

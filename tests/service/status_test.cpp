@@ -1,6 +1,8 @@
 // The status document: what it says of ports and connections.
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include <arbiter/arbiter.hpp>
 
 #include "tests/support/daemon.hpp"
@@ -29,6 +31,40 @@ TEST(Status, TellsWhatAModelNamesThoughNobodyIsThere) {
   EXPECT_EQ(in["connections"][0]["state"], "both ends closed");
   ASSERT_EQ(in["senses"].size(), 1u);
   EXPECT_EQ(in["senses"][0]["source"], "/stop");
+}
+
+// `s and not a and not b and not c` for each of 60 connections, with conflict="first"; but /s20 and
+// /s40 do without.
+std::string entangled_model() {
+  constexpr unsigned kConnections = 60;
+  std::mt19937 random(1);
+  const auto other = [&] { return "not /s" + std::to_string(random() % kConnections); };
+  std::string model = "<behaviors timeout='forever'><arbiter at='/in' conflict='first'>";
+  for (unsigned i = 0; i < kConnections; ++i) {
+    const std::string own = "/s" + std::to_string(i);
+    const std::string condition = other() + " and " + other() + " and " + other();
+    model += "<select from='" + own + "'>" + (i == 20 || i == 40 ? "" : condition) + "</select>";
+  }
+  return model + "</arbiter><arbiter at='/other'><select from='/s1'/></arbiter></behaviors>";
+}
+
+TEST(Status, TellsWhereRulesAreTriedInOrderAndTheFirstOfThemWins) {
+  Daemon daemon(entangled_model());
+  EXPECT_EQ(daemon.input("/in")["in_order"], true);
+  EXPECT_EQ(daemon.input("/other")["in_order"], false);
+  Node node("test");
+  auto in = node.input_port<int>("/in");
+  auto earlier = node.output_port<int>("/s20");
+  auto later = node.output_port<int>("/s40");
+  EXPECT_EQ(later.publish(1).delivered, 1u);
+  EXPECT_EQ(daemon.input("/in")["winner"], "/s40");
+  EXPECT_EQ(earlier.publish(2).delivered, 1u);
+  EXPECT_EQ(later.publish(3).discarded, 1u);
+  EXPECT_EQ(daemon.input("/in")["winner"], "/s20");
+  const auto sample = in.take();
+  ASSERT_TRUE(sample);
+  EXPECT_EQ(**sample, 2);
+  EXPECT_FALSE(in.take());
 }
 
 TEST(Status, TellsWhichEndIsMissing) {

@@ -28,6 +28,13 @@ std::vector<Word> sample_table() {
                    table::kDiagram,
                    {0, 1},
                    {0, 1, table::kTrue, 1, table::kFalse, table::kTrue}});  // 0 or 1
+  builder.connect({5,
+                   2,
+                   table::kInOrder,
+                   {4, 5},
+                   {0, 1, table::kFalse, 1, table::kTrue, 2, 0, table::kTrue, table::kFalse},
+                   0,
+                   1});
   builder.timeout(5, kForever).timeout(4, 7);
   return builder.words(kSources, kPorts);
 }
@@ -92,7 +99,7 @@ TEST(DecisionTable, AViewReadsBackWhatWasWritten) {
   const TableWords words(sample_table());
   const TableView view = words.view();
   ASSERT_TRUE(view.is_table());
-  EXPECT_EQ(view.connection_count(), 5u);
+  EXPECT_EQ(view.connection_count(), 6u);
   EXPECT_EQ(view.timeout(4), 7);
   EXPECT_EQ(view.timeout(5), kForever);
   EXPECT_EQ(view.timeout(0), kDefaultTimeout);
@@ -142,8 +149,18 @@ TEST(DecisionTable, AllWordsMayBeGarbage) {
   }
 }
 
+TEST(DecisionTable, WhereAWalkThroughRulesInOrderBeginsIsReadBack) {
+  const TableWords words(sample_table());
+  const Rule rule = words.view().rule(5);
+  EXPECT_EQ(rule.kind, Word{table::kInOrder});
+  EXPECT_EQ(rule.root, 0u);
+  EXPECT_EQ(rule.before, 1u);
+  EXPECT_EQ(words.view().rule(4).before, table::kTrue);
+}
+
 TEST(DecisionTable, ADiagramThatRunsInACircleIsCutShort) {
   TableBuilder builder;
+  builder.connect({1, 0, table::kInOrder, {2, 1}, {0, 1, 1, 1, 0, 0}, 1, 0});
   builder.connect({0, 0, table::kDiagram, {1, 2}, {0, 1, 1, 1, 0, 0}});
   Reader().read_all(TableWords(builder.words(kSources, 1)).view());
 }

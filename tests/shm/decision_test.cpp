@@ -72,6 +72,42 @@ TEST_F(Decision, AConnectionWithoutARuleLosesAndOneWithoutAConditionWins) {
   EXPECT_EQ(decide_at(1, 1), Verdict::kWins);
 }
 
+// A where B is not, then B, then C where D is not.
+TableBuilder& rules_in_order(TableBuilder& builder) {
+  constexpr Word t = table::kTrue, f = table::kFalse;
+  const std::vector<Word> nodes = {2, 1, f, 0, 2, f, 1, t, 3, 0, f, t};
+  builder.conjunction(kA, 0, {}, {kB});
+  builder.connect({kB, 0, table::kInOrder, {kB, kA}, nodes, 2, 2});
+  return builder.connect({kC, 0, table::kInOrder, {kB, kA, kD}, nodes, 0, 1});
+}
+
+TEST_F(Decision, OfRulesInOrderTheFirstThatHoldsWins) {
+  rules_in_order(builder_);
+  for (unsigned mask = 0; mask < 16; ++mask) {
+    const auto is = [&](SourceId id) { return (mask >> id & 1) != 0; };
+    for (SourceId id = 0; id < kSources; ++id) {
+      word(id) = is(id) ? arrival(1, kForever) : deactivation(1);
+    }
+    const bool first = !is(kB), third = !is(kD) && !is(kB) && !is(kA);
+    const auto verdict = [](bool wins) { return wins ? Verdict::kWins : Verdict::kLoses; };
+    EXPECT_EQ(decide_at(0, 2), verdict(first)) << mask;
+    EXPECT_EQ(decide_at(1, 2), Verdict::kWins) << mask;
+    EXPECT_EQ(decide_at(2, 2), verdict(third)) << mask;
+    EXPECT_EQ(decide_at(0, 2, true), verdict(is(kA) && first)) << mask;
+    EXPECT_EQ(decide_at(1, 2, true), verdict(is(kB))) << mask;
+    EXPECT_EQ(decide_at(2, 2, true), verdict(is(kC) && third)) << mask;
+  }
+}
+
+TEST_F(Decision, OfRulesInOrderAConnectionTakesItsOwnActivityAsGivenInThoseBeforeIt) {
+  rules_in_order(builder_);
+  pages_->attach(kB, nullptr);
+  word(kA) = arrival(1, kT);
+  EXPECT_EQ(decide_at(1, 2), Verdict::kWins);
+  EXPECT_EQ(decide_at(1, 2, true), Verdict::kBlind);
+  EXPECT_EQ(decide_at(2, 2), Verdict::kBlind);
+}
+
 TEST_F(Decision, ItsOwnActivityIsTakenAsGivenUnlessItIsAskedFor) {
   builder_.connect({kA, 0, table::kAlways, {}, {}});
   EXPECT_EQ(decide_at(0, 1), Verdict::kWins);

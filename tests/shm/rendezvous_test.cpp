@@ -140,8 +140,18 @@ TEST_F(Rendezvous, AClientFindsTheDaemonOfItsInstanceAndNoOther) {
   const Listener listener = listen_at(directory_, "mine");
   std::string why_not;
   EXPECT_TRUE(connect_to_daemon("mine", why_not).has_value());
-  EXPECT_FALSE(connect_to_daemon("another-" + std::to_string(getpid()), why_not).has_value());
   EXPECT_EQ(why_not, "");
+  EXPECT_FALSE(connect_to_daemon("another-" + std::to_string(getpid()), why_not).has_value());
+}
+
+TEST_F(Rendezvous, WhereNobodyAnswersEachSocketThatWasTriedIsNamedWithTheReason) {
+  setenv("RUNTIME_DIRECTORY", directory_.c_str(), 1);
+  const std::string name = "nobody-" + std::to_string(getpid());
+  { const Listener gone = listen_at(directory_, name); }
+  std::string why_not;
+  EXPECT_FALSE(connect_to_daemon(name, why_not));
+  EXPECT_THAT(why_not, HasSubstr("tried " + directory_ + "/" + name + ".sock: nobody listens"));
+  EXPECT_THAT(why_not, HasSubstr("/run/arbiter/" + name + ".sock: there is none"));
 }
 
 TEST_F(Rendezvous, PathsLongerThanAnAddressWork) {

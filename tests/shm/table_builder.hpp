@@ -17,6 +17,8 @@ class TableBuilder {
     shm::Word kind = shm::table::kAlways;
     std::vector<shm::Word> reads;
     std::vector<shm::Word> nodes;  // three words each
+    shm::Word root = 0;
+    shm::Word before = shm::table::kTrue;
   };
 
   TableBuilder& timeout(shm::SourceId source, shm::Nanoseconds timeout) {
@@ -32,7 +34,7 @@ class TableBuilder {
   TableBuilder& conjunction(shm::SourceId source, shm::PortId port,
                             const std::vector<shm::SourceId>& active,
                             const std::vector<shm::SourceId>& inactive) {
-    Connection connection{source, port, shm::table::kConjunction, {}, {}};
+    Connection connection{source, port, shm::table::kConjunction, {}, {}, 0, shm::table::kTrue};
     for (const auto id : active) connection.reads.push_back(id | shm::table::kExpectActive);
     for (const auto id : inactive) connection.reads.push_back(id);
     return connect(std::move(connection));
@@ -106,6 +108,8 @@ class TableBuilder {
     words[record + kConnectionSource] = connection.source;
     words[record + kConnectionPort] = connection.port;
     words[record + kRuleKind] = connection.kind;
+    words[record + kRoot] = connection.root;
+    words[record + kBefore] = connection.before;
     add_list(words, record + kFirstRead, connection.reads);
     add_list(words, record + kFirstNode, connection.nodes, kNodeWords);
   }

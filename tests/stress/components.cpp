@@ -68,7 +68,7 @@ class Worker {
     state_.last_step.store(now, std::memory_order_relaxed);
     state_.opened_at.store(now, std::memory_order_relaxed);
     state_.incarnation.store(incarnation_, std::memory_order_release);
-    while (phase() == kOpening) usleep(200);
+    records_.await_phase_after(kOpening);
   }
   void step(std::int64_t now) {
     add(state_.steps);
@@ -80,7 +80,7 @@ class Worker {
   }
   void finish(Phase of) {
     state_.done.store(of, std::memory_order_release);
-    while (phase() < kEnd) usleep(500);
+    records_.await_phase_after(kReceiversStop);
   }
 
   const Plan& plan_;

@@ -4,10 +4,14 @@
 // who is started when the predecessor is dead for certain. Others read what is committed.
 #pragma once
 
+#include <linux/futex.h>
 #include <sys/mman.h>
+#include <sys/syscall.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <atomic>
+#include <climits>
 #include <cstdint>
 #include <cstdio>
 #include <new>
@@ -136,6 +140,20 @@ struct Records {
         mmap(nullptr, sizeof(Records), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (memory == MAP_FAILED) throw std::runtime_error("no memory for the records");
     return *static_cast<Records*>(memory);  // zero is what they begin as
+  }
+  // Wakes who waits for it. The store comes before the wake-up, which the kernel orders against the
+  // look that await_phase_after() has it take.
+  void begin(Phase next) noexcept {
+    phase.store(next, std::memory_order_release);
+    syscall(SYS_futex, &phase, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0);
+  }
+  // In any process. Acquire: pairs with the release in begin().
+  void await_phase_after(Phase last) noexcept {
+    std::uint32_t now = phase.load(std::memory_order_acquire);
+    while (now <= last) {
+      syscall(SYS_futex, &phase, FUTEX_WAIT, now, nullptr, nullptr, 0);
+      now = phase.load(std::memory_order_acquire);
+    }
   }
   void reset() noexcept {
     phase.store(kOpening);

@@ -83,7 +83,7 @@ Round::Round(const Options& options, const Plan& plan, Records& records, Totals&
 
 // After a failure too: nothing is left behind.
 Round::~Round() {
-  records_.phase.store(kEnd);
+  records_.begin(kEnd);
   for (auto& thread : threads_) thread.join();
   for (const pid_t process : processes_) {
     if (process <= 0) continue;
@@ -162,12 +162,12 @@ void Round::run(std::uint64_t kills, std::uint64_t stops, bool kill_the_daemon) 
     if (!options_.threads) accounts_.watch(i, processes_[i]);
   }
   port_ids_ = port_ids();
-  records_.phase.store(kRunning);
+  records_.begin(kRunning);
   work(kills, stops, kill_the_daemon);
   for (std::uint32_t i = 0; i < plan_.components.size(); ++i) wait_until_open(i);
   note_takeovers();
   for (const Phase phase : {kPublishersStop, kRelaysStop, kReceiversStop}) {
-    records_.phase.store(phase);
+    records_.begin(phase);
     wait_for_all_done(phase);
   }
   if (!records_.has_failed()) check();
@@ -197,14 +197,14 @@ void Round::work(std::uint64_t kills, std::uint64_t stops, bool kill_the_daemon)
 }
 
 void Round::swap_model() {
-  const auto& generation = board_.as<const shm::Board>()->generation;
-  const std::uint64_t before = generation.load();
+  const shm::TableReader tables(*board_.as<const shm::Board>());
+  const std::uint64_t before = tables.snapshot().generation;
   const std::uint32_t model = 1 - swaps_.back().model;
   daemon_.write_model(plan_.model_text(model));
   const std::int64_t begin = read_clock();
   daemon_.hang_up();
   const Deadline deadline("a model should be in force");
-  while (generation.load(std::memory_order_acquire) == before) deadline.wait();
+  while (tables.snapshot().generation == before) deadline.wait();
   swaps_.push_back({begin, read_clock(), model});
   ++totals_.swaps;
 }
@@ -281,7 +281,8 @@ void Round::kill_daemon() {
 // All flows go on without a daemon; then another takes over, whose status must list all ports, and
 // which puts the model that it is given in force: the same.
 void Round::replace_daemon() {
-  const std::uint64_t generation = board_.as<const shm::Board>()->generation.load();
+  const shm::TableReader tables(*board_.as<const shm::Board>());
+  const std::uint64_t generation = tables.snapshot().generation;
   kill_daemon();
   const std::int64_t begin = read_clock();
   daemon_.restart();
@@ -291,7 +292,7 @@ void Round::replace_daemon() {
   while (!has_all_ports(daemon_.status())) deadline.wait();
   totals_.readoptions.add(static_cast<std::uint64_t>(read_clock() - begin));
   const Deadline swap("the new daemon's model should be in force");
-  while (board_.as<const shm::Board>()->generation.load() == generation) swap.wait();
+  while (tables.snapshot().generation == generation) swap.wait();
   wait_for_steps(kAdvance, kNobody);
 }
 

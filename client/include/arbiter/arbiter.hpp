@@ -15,11 +15,22 @@
 // threads as you like. Node is safe to use from several threads. Calls that may block say so; no
 // other does. Errors are thrown as arbiter::Error when ports are opened; nothing on the data path
 // throws, except for misuse that is named where it applies.
+//
+// Processes: a node and its ports belong to the process that made them. A child that this process
+// forks may do with its copies what it likes, and end as it likes: nothing of it reaches the ports.
+// take(), wait_for(), fd() and all that opens ports throw arbiter::Error there, which says so;
+// publish(), signal(), deactivate() and loan() do nothing, and say so on standard error, once for
+// each port; idle() is true, and there is no winner(). A child may read samples that were held at
+// the fork for as long as its parent holds them, and may make a Node of its own. So a program that
+// calls daemon(3) makes its node after it. If the process ends, its ports are closed, whatever its
+// children do. A child of vfork() runs in its parent's memory: it may call exec or _exit, and
+// nothing else.
 #pragma once
 
 #include <arbiter/bytes.hpp>
 #include <arbiter/input_port.hpp>
 #include <arbiter/node.hpp>
+#include <arbiter/notice.hpp>
 #include <arbiter/options.hpp>
 #include <arbiter/output_port.hpp>
 #include <arbiter/result.hpp>

@@ -74,7 +74,7 @@ class Sample<void> : public SampleBase {
 
 enum class WaitStatus : std::uint8_t {
   sample,   // here it is
-  idle,     // the port has become idle: no connection is selected any more; told once for each time
+  idle,     // the port has become idle, see InputPort::idle(); told once for each time
   timeout,  // nothing of the kind happened in time
 };
 
@@ -148,10 +148,14 @@ class InputPort {
   // Throws arbiter::Error if the system has no descriptor left.
   [[nodiscard]] int fd() { return detail::wait_descriptor(*core_); }
 
-  // The source of the connection that is selected now, if one is. At a port that is not arbitrated
-  // nothing is selected. The name stays as it is while the port is open. Wait-free, without a lock.
+  // The source of the connection that is selected now, if one is and the port is not idle. At a
+  // port that is not arbitrated nothing is selected. The name stays as it is while the port is
+  // open. Wait-free, without a lock.
   [[nodiscard]] std::optional<std::string_view> winner() noexcept { return detail::winner(*core_); }
-  // True if no connection is selected now; at a port that is not arbitrated, if none is active.
+  // True if no connection is selected now; at a port that is not arbitrated, if none is active. And
+  // true while the one that is selected cannot deliver: it is refused (NoticeKind::refused); or it
+  // stays active for ever, no component has its source open, and nothing of it waits. Then what it
+  // inhibits stays inhibited. Wait-free.
   [[nodiscard]] bool idle() noexcept { return detail::is_idle(*core_); }
   [[nodiscard]] const std::string& name() const noexcept { return detail::name(*core_); }
 

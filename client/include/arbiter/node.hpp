@@ -3,12 +3,15 @@
 // If the daemon dies, data flows on between the ports that are open. The node looks for a new
 // daemon of the instance, about twenty times a second, and hands back what it has; it need not be
 // told to. The service thread does this, or service() where there is none.
+//
+// In a child that was forked all calls throw arbiter::Error, but service_fd(), which answers -1.
 #pragma once
 
 #include <cstddef>
 #include <memory>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include <arbiter/detail/cores.hpp>
 #include <arbiter/input_port.hpp>
@@ -23,6 +26,14 @@ class Node {
   // arbiter::Error. `name` is for people to read; several nodes may share one.
   explicit Node(std::string_view name, const NodeOptions& options = {})
       : core_(detail::make_node(name, options)) {}
+  // Copies are of one component: it stays connected until the last of them, and of its ports, goes.
+  Node(const Node&) = default;
+  Node(Node&&) noexcept = default;
+  Node& operator=(Node other) noexcept {
+    core_.swap(other.core_);
+    return *this;
+  }
+  ~Node() { detail::drop_node(std::move(core_)); }
 
   // Opens an output port. Its name is the source of its connections. Blocks while the daemon
   // connects it with the input ports that are open, which takes below a millisecond, or up to 0.2 s

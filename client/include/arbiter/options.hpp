@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <arbiter/notice.hpp>
+
 namespace arbiter {
 
 struct NodeOptions {
@@ -22,6 +24,16 @@ struct NodeOptions {
   // counts as waiting. What it throws ends the wait: it leaves the call that waits, which then has
   // opened nothing.
   std::function<void(const std::string&)> on_waiting{};
+  // Called for what a component should know of its ports (notice.hpp), once for each port and
+  // sentence. Empty: the sentence goes to standard error.
+  // On the service thread; where there is none, on a thread that calls service() or opens a port.
+  // One call at a time, and no lock of the library is held meanwhile: the callback may open and
+  // close ports of this node. But it must not destroy the node, nor the last of its ports after it;
+  // and be quick: until it returns, this node takes up nothing that is new. What it throws is
+  // written to standard error, and has no other effect. It may be called until the node and all of
+  // its ports have gone. Of what is known when a port is opened, the call begins before the
+  // opening returns.
+  std::function<void(const Notice&)> on_notice{};
   // Whether a thread of low priority takes up what the daemon announces (ports that come and go,
   // new models). Without it call Node::service() often: until you do, this node's ports do not see
   // changes.
@@ -60,7 +72,8 @@ inline constexpr WhenFull drop_oldest = WhenFull::drop_oldest;
 inline constexpr WhenFull refuse_new = WhenFull::refuse_new;
 
 struct InputPortOptions {
-  // How many samples of each connection may wait, 1 to 1024.
+  // How many samples of each connection may wait, 1 to 1024: those of its publisher, and those that
+  // predecessors of it have left. Theirs give way, however the port is set.
   std::uint32_t depth = 8;
   WhenFull when_full = WhenFull::drop_oldest;
   // Receive all that was accepted, even if an override has come since. For loggers, not for motors.

@@ -16,7 +16,9 @@ class Error : public std::runtime_error {
 struct Outcome {
   std::uint32_t delivered = 0;  // accepted: the connection is the winner there
   std::uint32_t discarded = 0;  // another connection is, or none
-  std::uint32_t refused = 0;    // it is the winner, but the queue is full (refuse_new)
+  // It is the winner, but the queue is full (refuse_new); or the connection is refused, because the
+  // ports' types differ or memory is short (NoticeKind::refused), and the input port is idle.
+  std::uint32_t refused = 0;
 };
 
 }  // namespace arbiter

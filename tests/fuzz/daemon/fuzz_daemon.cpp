@@ -10,8 +10,10 @@
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <utility>
@@ -66,7 +68,7 @@ struct Hostile {
 
 class Run {
  public:
-  explicit Run(Script& script) : script_(script) {}
+  explicit Run(Script& script) : script_(script) { Loop::senders_are_makers = false; }
 
   void go() {
     for (int step = 0; step < kMostSteps && !script_.is_at_end(); ++step) act();
@@ -134,8 +136,20 @@ class Run {
   }
 
   void say(Hostile& who, const shm::Message& message, std::vector<int> descriptors) {
+    declare_makers(who, descriptors);
     if (who.said.size() < kMostRemembered) who.said.emplace_back(message, descriptors);
     who.connection->send(message, std::move(descriptors));
+  }
+
+  // What they have made themselves is of the user who sends it first.
+  void declare_makers(const Hostile& who, const std::vector<int>& descriptors) {
+    for (const int fd : descriptors) {
+      const bool is_made = std::any_of(made_.begin(), made_.end(),
+                                       [fd](const auto& made) { return made.get() == fd; });
+      if (is_made || fd == bell_.write_end().get()) {
+        Loop::declare_maker(fd, who.process.identity().user);
+      }
+    }
   }
 
   void say_hello() {
@@ -219,7 +233,9 @@ class Run {
       bytes[script_.word() % bytes.size()] = script_.byte();
     }
     const std::size_t size = script_.word() % bytes.size();
-    hostile->connection->send_bytes(bytes.data(), size, descriptors(*hostile));
+    const std::vector<int> with = descriptors(*hostile);
+    declare_makers(*hostile, with);
+    hostile->connection->send_bytes(bytes.data(), size, with);
   }
 
   void say_again() {
@@ -314,7 +330,8 @@ class Run {
   }
   int descriptor(const Hostile& hostile) {
     const std::uint8_t kind = script_.byte();
-    switch (kind % 18) {
+    // Those that came later have bytes of their own, so that the corpus still means what it did.
+    switch (kind >= 252 ? 14 + kind % 3 : kind % 18 > 13 ? 17 : kind % 18) {
       case 0:
         return make(make_output_segment({}, 1 + script_.byte() % 8u));
       case 1:
@@ -347,12 +364,40 @@ class Run {
                   script_.byte() % 2 == 0 ? shm::Seals::kFixedSize : shm::Seals::kOneWriter);
         return make(std::move(segment));
       }
+      case 14:
+        return make(fifo(kind));
+      case 15: {
+        int ends[2];
+        if (::pipe2(ends, O_CLOEXEC) != 0) return -1;
+        make(shm::FileDescriptor(ends[0]));
+        return make(shm::FileDescriptor(ends[1]));
+      }
+      case 16:
+        return make(queued(hostile));
       default:
         return given_.empty() ? -1 : given_[script_.byte() % given_.size()].get();
     }
   }
 
+  // A pipe with a name, by which a daemon of root might open it for others.
+  shm::FileDescriptor fifo(std::uint8_t kind) {
+    const std::string path = names_.path() + "/pipe:[1]";
+    static_cast<void>(::mkfifo(path.c_str(), 0600));
+    const int flags = kind % 2 == 0 ? O_PATH : O_RDWR;
+    return shm::FileDescriptor(::open(path.c_str(), flags | O_CLOEXEC));
+  }
+  // A socket with another in a message that nobody reads.
+  shm::FileDescriptor queued(const Hostile& hostile) {
+    int ends[2];
+    if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) return {};
+    shm::FileDescriptor inner(ends[0]);
+    const shm::FileDescriptor outer(ends[1]);
+    static_cast<void>(shm::send_message(outer.get(), {}, {hostile.process.identity().process, -1}));
+    return inner;
+  }
+
   Script& script_;
+  const test::TemporaryDirectory names_;
   const shm::Bell bell_;
   Stage stage_;
   std::vector<Hostile> hostile_;

@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <sys/signalfd.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -31,9 +32,30 @@ constexpr int kMostRounds = 100'000;
 // stands here until it accepts another of that number.
 std::map<int, Identity> peers;
 
+// By inode.
+std::map<ino_t, uid_t> makers;
+
 }  // namespace
 
+void Loop::declare_maker(int fd, uid_t user) {
+  struct stat status {};
+  if (::fstat(fd, &status) == 0) makers.emplace(status.st_ino, user);
+}
+
+void Loop::forget_maker(int fd) {
+  struct stat status {};
+  if (::fstat(fd, &status) == 0) makers.erase(status.st_ino);
+}
+
+uid_t maker_of(int fd) {
+  struct stat status {};
+  require(::fstat(fd, &status) == 0, "the daemon looks at memory and pipes alone");
+  const auto declared = makers.find(status.st_ino);
+  return declared == makers.end() ? status.st_uid : declared->second;
+}
+
 Loop::Loop() {
+  makers.clear();
   int ends[2];
   require(::pipe2(ends, O_CLOEXEC | O_NONBLOCK) == 0, "a pipe can be made");
   read_end_.reset(ends[0]);
@@ -65,6 +87,8 @@ int wait_for_events(int epoll, epoll_event* events, int most, int timeout_ms) {
 }  // namespace arbiter::fuzz
 
 using arbiter::fuzz::Loop;
+
+extern "C" uid_t __wrap__ZN7arbiter3shm8maker_ofEi(int fd) { return arbiter::fuzz::maker_of(fd); }
 
 extern "C" int __wrap_accept4(int socket, sockaddr* address, socklen_t* size, int flags) {
   const int accepted = __real_accept4(socket, address, size, flags);

@@ -28,6 +28,11 @@ class Loop {
   [[nodiscard]] int signals() const { return read_end_.get(); }
 
   static inline Identity connecting;
+  // What a descriptor leads to was made by that user, where nobody has said so before.
+  static void declare_maker(int fd, uid_t user);
+  // Whoever sends a descriptor has made it, whatever was said before. Unless that is left out.
+  static inline bool senders_are_makers = true;
+  static void forget_maker(int fd);
   static inline shm::Nanoseconds now = 0;
   static inline shm::Nanoseconds may_pass = 0;  // how much time, in this run
   static inline int rounds = 0;                 // in this run
@@ -43,5 +48,6 @@ class Loop {
 };
 
 int wait_for_events(int epoll, epoll_event* events, int most, int timeout_ms);
+uid_t maker_of(int fd);
 
 }  // namespace arbiter::fuzz

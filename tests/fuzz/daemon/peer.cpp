@@ -32,6 +32,7 @@ constexpr std::uint32_t kDepth = 4;
 template <class Header, class Set>
 shm::FileDescriptor make_segment(const char* name, std::size_t size, Set set) {
   auto segment = shm::make_segment(name, size);
+  require(!shm::allocate(segment, 0, size), "memory can be allocated");
   const shm::Mapping mapping(segment, size, shm::Access::kReadWrite);
   set(*mapping.as<Header>());
   shm::seal(segment, shm::Seals::kOneWriter);
@@ -93,7 +94,8 @@ shm::FileDescriptor make_input_segment(std::size_t word, std::uint64_t value) {
 }
 
 Connection::Connection(const std::string& path, const Process& process)
-    : socket_(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {
+    : user_(process.identity().user),
+      socket_(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
@@ -105,6 +107,10 @@ Connection::Connection(const std::string& path, const Process& process)
 
 shm::SendResult Connection::send_bytes(const void* data, std::size_t size,
                                        const std::vector<int>& descriptors) const {
+  for (const int fd : Loop::senders_are_makers ? descriptors : std::vector<int>()) {
+    Loop::forget_maker(fd);
+    Loop::declare_maker(fd, user_);
+  }
   iovec part{const_cast<void*>(data), size};
   msghdr header{};
   header.msg_iov = &part;

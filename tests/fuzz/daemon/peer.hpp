@@ -49,6 +49,7 @@ class Connection {
   void half_close(int how) const;
 
  private:
+  const uid_t user_;
   shm::FileDescriptor socket_;
 };
 

@@ -38,7 +38,7 @@ class Stage {
   void write_model(int number);
   void run_daemon();
   void require_status();
-  // All sources that the daemon has ever had to name: each costs two descriptors for ever.
+  // All sources that the daemon has to name: each costs two descriptors.
   std::size_t count_sources();
 
   test::TemporaryDirectory directory_;

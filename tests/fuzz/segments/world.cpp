@@ -80,6 +80,7 @@ shm::FileDescriptor World::make_board(const Choices& choices) {
   shm::TableWriter writer(content);
   writer.write(table.words(kSources, kPorts));
   writer.put_in_force();
+  for (std::uint32_t source = 0; source < kSources; ++source) writer.give_page(source, 1);
   shm::seal(board, shm::Seals::kFixedSize);
   return board;
 }
@@ -96,7 +97,7 @@ std::shared_ptr<detail::SharedMemory> World::make_memory() {
                                                        std::make_shared<detail::ServiceBell>());
   const char* const names[]{"/p", "/h", "/s"};
   for (std::uint32_t source = 0; source < kSources; ++source) {
-    memory->add_page(source, names[source], copy_of(pages_[source].get()));
+    memory->add_page(source, 1, names[source], copy_of(pages_[source].get()));
   }
   return memory;
 }
@@ -146,6 +147,7 @@ void World::connect(detail::OutputCore& from, detail::InputCore& to) {
   to_input.message.link = link;
   to_input.descriptors[0] = copy_of(from.segment_descriptor().get());
   to.add_peer(detail::map_output_peer(to_input, type()));
+  for (detail::InputCore* const each : {&r, &r2, &x}) each->map_growth(from.instance());
 }
 
 void World::disconnect(detail::OutputCore& from, detail::InputCore& to) {
@@ -276,9 +278,13 @@ void World::require_accounts() {
 }
 
 std::uint64_t World::require_whole(const detail::HeldSample& held) const {
-  if (!is_mapped(held.data, held.size)) die("a sample lies outside of any segment");
   if (held.source != kP && held.source != kH) die("a sample of nobody");
-  if (held.source == kH) return 0;  // says what it likes
+  // One of a hostile publisher may be a copy (client/copies.hpp): all of it can be read.
+  if (held.source == kH) {
+    read_ += static_cast<std::size_t>(std::count(held.data, held.data + held.size, std::byte{1}));
+    return 0;  // says what it likes
+  }
+  if (!is_mapped(held.data, held.size)) die("a sample lies outside of any segment");
   Sample sample{};
   if (held.size > sizeof sample) die("a sample of /p is too long");
   std::memcpy(&sample, held.data, held.size);

@@ -86,6 +86,7 @@ class World {
  private:
   std::uint64_t published_ = 0;
   std::uint64_t last_link_ = 0;
+  mutable std::size_t read_ = 0;  // of hostile samples: so that they are read
   std::uint64_t last_instance_ = 100;
 };
 

@@ -43,6 +43,7 @@ struct HeldSample {
 enum class Waited : std::uint8_t { kSample, kIdle, kTimeout };
 
 std::shared_ptr<NodeCore> make_node(std::string_view name, const NodeOptions& options);
+void drop_node(std::shared_ptr<NodeCore> node) noexcept;
 void service(NodeCore& node);
 int service_fd(const NodeCore& node) noexcept;
 void switch_model(NodeCore& node, std::string_view name);

@@ -1,0 +1,44 @@
+#include "client/copies.hpp"
+
+#include <algorithm>
+
+namespace arbiter::detail {
+namespace {
+
+// As a slot's header lies in the file.
+struct HeaderInFile {
+  std::uint64_t sequence;
+  shm::Nanoseconds stamp;
+  std::uint64_t size;
+};
+static_assert(offsetof(shm::SlotHeader, sequence) == offsetof(HeaderInFile, sequence));
+static_assert(offsetof(shm::SlotHeader, stamp) == offsetof(HeaderInFile, stamp));
+static_assert(offsetof(shm::SlotHeader, size) == offsetof(HeaderInFile, size));
+
+}  // namespace
+
+bool Copies::copy(const OutputPeer& from, std::uint32_t slot, bool is_typed, std::uint32_t number,
+                  CopiedSample& sample) noexcept {
+  const shm::OutputLayout& layout = from.segment.layout();
+  HeaderInFile header{};
+  if (!shm::copy_out(from.file, layout.headers_offset + sizeof(shm::SlotHeader) * slot, &header,
+                     sizeof header)) {
+    return false;
+  }
+  const std::uint64_t size = std::min(header.size, layout.stride);
+  if (!is_typed && size > kMostCopied) return false;
+  // As aligned as it is where it lies; a typed one is read whole, whatever its size is said to be.
+  const std::uint64_t bytes = is_typed ? layout.stride : size;
+  const std::size_t room = std::max<std::size_t>(1, (bytes + shm::kPageSize - 1) / shm::kPageSize);
+  data_[number].reset(
+      static_cast<std::byte*>(std::aligned_alloc(shm::kPageSize, room * shm::kPageSize)));
+  std::byte* const data = data_[number].get();
+  if (data == nullptr ||
+      !shm::copy_out(from.file, layout.payload_offset + layout.stride * slot, data, bytes)) {
+    return false;
+  }
+  sample = {header.sequence, header.stamp, size, data};
+  return true;
+}
+
+}  // namespace arbiter::detail

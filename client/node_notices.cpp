@@ -1,0 +1,130 @@
+// Notices: what a component should know of its ports, and does not see by its own calls.
+//
+// They are collected while messages are handled, under the lock, and given afterwards, under none,
+// before the next message is handled: so a port's opening returns after what was known of it.
+#include <cstdio>
+
+#include "client/node_core.hpp"
+
+namespace arbiter::detail {
+namespace {
+
+// Texts that are kept of one port, lest they be given twice.
+constexpr std::size_t kMaxTexts = 64;
+// Notices that wait because a callback is slow; what comes then is lost.
+constexpr std::size_t kMaxNotices = 1024;
+
+}  // namespace
+
+const std::string& NodeCore::name_of_port(shm::PortInstance port) const {
+  static const std::string none;
+  if (const auto output = outputs_.find(port); output != outputs_.end()) {
+    return output->second->name();
+  }
+  const auto input = inputs_.find(port);
+  return input != inputs_.end() ? input->second->name() : none;
+}
+
+void NodeCore::note(NoticeKind kind, shm::PortInstance port, const std::string& peer,
+                    const std::string& text) {
+  std::set<std::string>& texts = given_[port];
+  if (texts.size() >= kMaxTexts || notices_.size() >= kMaxNotices) return;
+  if (texts.insert(text).second) notices_.push_back({kind, name_of_port(port), peer, text});
+}
+
+bool NodeCore::has_notices() {
+  const std::lock_guard lock(mutex_);
+  return !notices_.empty() && !is_giving_;
+}
+
+bool NodeCore::give_notices() {
+  std::unique_lock lock(mutex_);
+  if (notices_.empty() || is_giving_) return false;
+  is_giving_ = true;
+  while (!notices_.empty()) {
+    const std::vector<Notice> notices = std::exchange(notices_, {});
+    lock.unlock();
+    for (const Notice& notice : notices) give(notice);
+    lock.lock();
+  }
+  is_giving_ = false;
+  return true;
+}
+
+void NodeCore::give(const Notice& notice) const noexcept {
+  if (!options_.on_notice) {
+    std::fprintf(stderr, "arbiter: \"%s\": %s\n", name_.c_str(), notice.text.c_str());
+    return;
+  }
+  try {
+    options_.on_notice(notice);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "arbiter: \"%s\": on_notice has thrown: %s\n", name_.c_str(),
+                 error.what());
+  } catch (...) {
+    std::fprintf(stderr, "arbiter: \"%s\": on_notice has thrown\n", name_.c_str());
+  }
+}
+
+// Of a peer that the daemon has announced and that we cannot take up. Tells the daemon, so that it
+// shows in its status, and the other end.
+void NodeCore::refuse_peer(const shm::Message& announced, const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  say_refused(announced.port, announced.peer, why);
+  const auto input = inputs_.find(announced.port);
+  const bool is_output_peer = announced.kind == shm::MessageKind::kOutputPeer;
+  if (is_output_peer && input != inputs_.end()) {
+    input->second->refuse_peer(announced.peer, announced.id);
+  }
+  if (is_output_peer || (announced.flags & shm::kIsConnected) != 0) note_refusal(announced, why);
+}
+
+void NodeCore::say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
+  shm::Message refusal;
+  refusal.kind = shm::MessageKind::kPeerRefused;
+  refusal.port = port;
+  refusal.peer = peer;
+  refusal.set_text(why);
+  say(refusal);
+}
+
+void NodeCore::note_refusal(const shm::Message& about, const std::string& why) {
+  const std::string& own = name_of_port(about.port);
+  if (own.empty()) return;  // closed meanwhile
+  const std::string peer(about.name_view());
+  const bool is_output = outputs_.count(about.port) != 0;
+  const std::string& from = is_output ? own : peer;
+  const std::string& to = is_output ? peer : own;
+  note(NoticeKind::refused, about.port, peer, from + " is not connected to " + to + ": " + why);
+}
+
+void NodeCore::say_blind(shm::PortInstance port, const char* what_it_does) {
+  const std::string text = name_of_port(port) + " " + what_it_does +
+                           " while it cannot see all sources that its rules read";
+  note(NoticeKind::blind, port, {}, text);
+  shm::Message message;
+  message.kind = shm::MessageKind::kBlind;
+  message.port = port;
+  message.set_text(text);
+  say(message);
+}
+
+// A refusal that the daemon or the peer has found.
+void NodeCore::handle_refusal(const shm::Message& refusal) {
+  const std::lock_guard lock(mutex_);
+  if (const auto output = outputs_.find(refusal.port); output != outputs_.end()) {
+    output->second->refuse_peer(refusal.peer);
+  }
+  if (const auto input = inputs_.find(refusal.port); input != inputs_.end()) {
+    input->second->refuse_peer(refusal.peer, refusal.id);
+  }
+  note_refusal(refusal, std::string(refusal.text_view()));
+}
+
+void NodeCore::handle_unmentioned(const shm::Message& message) {
+  const std::lock_guard lock(mutex_);
+  if (name_of_port(message.port).empty()) return;  // closed meanwhile
+  note(NoticeKind::unmentioned, message.port, {}, std::string(message.text_view()));
+}
+
+}  // namespace arbiter::detail

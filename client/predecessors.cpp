@@ -1,0 +1,45 @@
+#include "client/predecessors.hpp"
+
+#include <algorithm>
+
+namespace arbiter::detail {
+
+// Relaxed is enough: of one that is gone these are the last values, for the kernel has passed on
+// the news of its end; of one that lives an older value only keeps a predecessor for longer.
+std::uint64_t accepted_on(const OutputPeer& peer) noexcept {
+  for (std::uint32_t index = 0; index < shm::kMaxDestinations; ++index) {
+    const shm::Channel& channel = peer.segment.channel(index);
+    if (channel.receiver.load(std::memory_order_relaxed) != peer.link) continue;
+    const std::uint64_t first = channel.first.load(std::memory_order_relaxed);
+    const std::uint64_t accepted = channel.accepted.load(std::memory_order_relaxed);
+    return accepted + 1 > first ? accepted + 1 - first : 0;
+  }
+  return 0;
+}
+
+std::vector<shm::PortInstance> spent_predecessors(
+    const std::map<shm::PortInstance, OutputLink>& links, std::uint32_t depth) {
+  std::map<shm::SourceId, std::uint64_t> later;  // samples, of sources that have a predecessor
+  for (const auto& [instance, link] : links) {
+    if (link.gone) later[link.peer->source] = 0;
+  }
+  std::vector<shm::PortInstance> spent;
+  if (later.empty()) return spent;
+  std::size_t kept = 0;
+  for (auto each = links.rbegin(); each != links.rend(); ++each) {  // the latest first
+    const OutputLink& link = each->second;
+    const auto behind = later.find(link.peer->source);
+    if (behind == later.end()) continue;
+    // A publisher that lies harms its own connection: the sum is bounded.
+    const std::uint64_t own = std::min<std::uint64_t>(accepted_on(*link.peer), depth);
+    if (link.gone && (own == 0 || behind->second >= depth || kept == kMaxPredecessors)) {
+      spent.push_back(each->first);
+    } else if (link.gone) {
+      ++kept;
+    }
+    behind->second += own;
+  }
+  return spent;
+}
+
+}  // namespace arbiter::detail

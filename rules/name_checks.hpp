@@ -1,0 +1,24 @@
+// Names that nobody has: what a model says of sources and ports that there are probably not.
+#pragma once
+
+#include <optional>
+
+#include "rules/diagnostic.hpp"
+#include "rules/document_order.hpp"
+#include "rules/model.hpp"
+#include "rules/rule_set.hpp"
+
+namespace arbiter::rules {
+
+// Warnings "never-read", of sources that are declared and that no rule reads or selects, and
+// "similar-name", of names that stand in one place and are a slip away from another one. To be
+// asked of a model without errors: what was refused may have named them.
+void check_names(const Model& model, const std::optional<Application>& application,
+                 const RuleSet& rules, const DocumentOrder& order, Diagnostics& diagnostics);
+
+// Notes "forever-commands", of sources with T = forever that a rule selects somewhere. `whole` is
+// the place for what cannot be pinned to a line.
+void note_commands_forever(const Model& model, const RuleSet& rules, const Location& whole,
+                           Diagnostics& diagnostics);
+
+}  // namespace arbiter::rules

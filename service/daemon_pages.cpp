@@ -1,0 +1,60 @@
+// How a source gets another page: when it passes to another user, and when an operator ends the
+// activity that another user has left.
+//
+//   show    the next page to all whose ports read the source, and wait for them as for a swap
+//   change  in one step: activity is carried on, and the next page is in force
+// Who has not mapped it by then finds no page, and delivers nothing that depends on it. What the
+// former owner writes after the change is read by nobody.
+#include <unistd.h>
+
+#include "service/daemon.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::service {
+
+void Daemon::require_not_changing(const Source& source) const {
+  if (source.changing_for == 0) return;
+  throw NotYet("the output port " + source.name + " is just passing to another user",
+               shm::monotonic_now() + 2 * kMaxWaitForClients);
+}
+
+void Daemon::change_page(Source& source, const Client& client, PageUser user,
+                         std::function<void(Source&, Client&)> changed) {
+  directory_.prepare_page(source, user);
+  source.changing_for = client.id();
+  const auto pass = [this, id = source.id, user, for_client = client.id(),
+                     changed = std::move(changed)] {
+    Source& changing = *directory_.source_by_id(id);
+    if (changing.changing_for != for_client) return;
+    changing.changing_for = 0;
+    try_postponed_ = true;
+    directory_.let_go(changing);  // if nobody opens it after all
+    const auto found = clients_.find(for_client);
+    if (found == clients_.end()) return;
+    directory_.change_page(changing, user);
+    switchboard_.ring_concerned(models_.in_force().table, id);
+    changed(changing, *found->second);
+  };
+  barriers_.raise(switchboard_.show_next_page(source), shm::monotonic_now() + kMaxWaitForClients,
+                  pass);
+}
+
+bool Daemon::may_undo(const Source& source) const {
+  return source.page_user && *source.page_user != 0 && *source.page_user != geteuid();
+}
+
+// True: the source was active.
+bool Daemon::end_activity(const Source& source) {
+  const shm::Nanoseconds now = shm::monotonic_now();
+  shm::Activity& activity = source.activity();
+  const shm::ActivityWord before = activity.word.load(std::memory_order_relaxed);
+  // What is not active stays as it is: that it ran out, and when, or that it has never arrived.
+  if (!shm::is_active(before, now)) return false;
+  activity.write(before, shm::deactivation(now));
+  // SYNC POINT: stamped. Fence (a), as of a publisher's own deactivate().
+  shm::full_fence();
+  switchboard_.ring_concerned(models_.in_force().table, source.id);
+  return true;
+}
+
+}  // namespace arbiter::service

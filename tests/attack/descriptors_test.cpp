@@ -1,0 +1,343 @@
+// What a client can do to the daemon by the descriptors that it sends along: by those that take for
+// ever to close, and by those that it may name but not open.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+
+#include <string>
+#include <vector>
+
+#include <arbiter/arbiter.hpp>
+
+#include "shm/bell.hpp"
+#include "shm/foreign.hpp"
+#include "shm/input_segment.hpp"
+#include "shm/output_segment.hpp"
+#include "tests/attack/attacker.hpp"
+#include "tests/support/daemon.hpp"
+#include "tests/support/other_user.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using shm::FileDescriptor;
+using shm::MessageKind;
+
+// A TCP connection whose peer does not read: closing it waits for an hour. The last who closes it
+// waits; so whoever sends it stops the daemon, closes its own, and lets the daemon go on.
+class Lingering {
+ public:
+  Lingering() {
+    const FileDescriptor listener(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    auto* const name = reinterpret_cast<sockaddr*>(&address);
+    socklen_t size = sizeof address;
+    require(::bind(listener.get(), name, size) == 0 && ::listen(listener.get(), 1) == 0 &&
+            ::getsockname(listener.get(), name, &size) == 0);
+    end_.reset(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    require(::connect(end_.get(), name, size) == 0);
+    peer_.reset(::accept4(listener.get(), nullptr, nullptr, SOCK_CLOEXEC));
+    const linger an_hour{1, 3600};
+    require(peer_ &&
+            ::setsockopt(end_.get(), SOL_SOCKET, SO_LINGER, &an_hour, sizeof an_hour) == 0);
+    const std::vector<char> unread(1 << 16);
+    while (::send(end_.get(), unread.data(), unread.size(), MSG_DONTWAIT) > 0) {
+    }
+  }
+
+  [[nodiscard]] int get() const { return end_.get(); }
+  void close() { end_.reset(); }
+  // Closing it waits no more.
+  void release() { peer_.reset(); }
+
+ private:
+  static void require(bool succeeded) {
+    if (!succeeded) throw std::runtime_error("a connection to linger at cannot be made");
+  }
+  FileDescriptor end_;
+  FileDescriptor peer_;
+};
+
+shm::TypeInfo some_type(std::uint64_t size) {
+  shm::TypeInfo type;
+  type.size = size;
+  return type;
+}
+
+FileDescriptor output_segment(std::uint64_t sample_size, std::uint32_t slots) {
+  const auto layout = shm::OutputLayout::plan(some_type(sample_size), slots);
+  auto segment = shm::make_segment("attack", layout.total_size);
+  EXPECT_FALSE(shm::allocate(segment, 0, shm::kOutputHeadBytes));
+  const shm::Mapping mapping(segment, shm::kOutputHeadBytes, shm::Access::kReadWrite);
+  auto& header = *mapping.as<shm::OutputHeader>();
+  header.magic = shm::OutputHeader::kMagic;
+  header.version = shm::OutputHeader::kVersion;
+  header.slot_count = slots;
+  header.type = some_type(sample_size);
+  shm::seal(segment, shm::Seals::kOneWriter);
+  return segment;
+}
+
+FileDescriptor input_segment() {
+  auto segment = shm::make_segment("attack", sizeof(shm::InputSegment));
+  EXPECT_FALSE(shm::allocate(segment, 0, sizeof(shm::InputSegment)));
+  const shm::Mapping mapping(segment, sizeof(shm::InputSegment), shm::Access::kReadWrite);
+  auto& header = mapping.as<shm::InputSegment>()->header;
+  header.magic = shm::InputHeader::kMagic;
+  header.version = shm::InputHeader::kVersion;
+  header.depth = 1;
+  header.max_held = 1;
+  shm::seal(segment, shm::Seals::kOneWriter);
+  return segment;
+}
+
+// Any number of descriptors, more than a client library would send.
+void send_with(int socket, const shm::Message& message, const std::vector<int>& descriptors) {
+  iovec data{const_cast<shm::Message*>(&message), sizeof message};
+  std::vector<char> control(CMSG_SPACE(sizeof(int) * descriptors.size()));
+  msghdr header{};
+  header.msg_iov = &data;
+  header.msg_iovlen = 1;
+  header.msg_control = control.data();
+  header.msg_controllen = control.size();
+  cmsghdr* const part = CMSG_FIRSTHDR(&header);
+  part->cmsg_level = SOL_SOCKET;
+  part->cmsg_type = SCM_RIGHTS;
+  part->cmsg_len = CMSG_LEN(sizeof(int) * descriptors.size());
+  std::memcpy(CMSG_DATA(part), descriptors.data(), sizeof(int) * descriptors.size());
+  ASSERT_GT(::sendmsg(socket, &header, MSG_NOSIGNAL), 0);
+}
+
+void expect_that_others_are_served(Daemon& daemon) {
+  Node node("honest");
+  auto out = node.output_port<int>("/honest:o");
+  auto in = node.input_port<int>("/honest:i");
+  EXPECT_FALSE(daemon.source("/honest:o").is_null());
+}
+
+void wait_until_a_thread_is_lost(Daemon& daemon) {
+  while (daemon.log().find("keeps a thread waiting") == std::string::npos) {
+    daemon.status();  // and it answers
+  }
+}
+
+class ALingeringSocket : public testing::Test {
+ protected:
+  RawClient client() {
+    RawClient result(daemon_.instance());
+    result.hello("attacker");
+    return result;
+  }
+  // Sends it in such a way that the daemon is the last to close it.
+  template <class Send>
+  void give(Lingering& lingering, Send send) {
+    daemon_.process().stop();
+    send(lingering.get());
+    lingering.close();
+    daemon_.process().signal(SIGCONT);
+  }
+  void expect_no_harm() {
+    expect_that_others_are_served(daemon_);
+    wait_until_a_thread_is_lost(daemon_);
+    expect_that_others_are_served(daemon_);
+    EXPECT_EQ(daemon_.terminate(), 0) << "it does not wait for what is lost";
+  }
+
+  Daemon daemon_;
+};
+
+TEST_F(ALingeringSocket, AsAWantedDescriptorHoldsUpNobody) {
+  Lingering lingering;
+  RawClient attacker = client();
+  give(lingering, [&](int fd) {
+    attacker.send(RawClient::message(MessageKind::kOpenOutput, "/attacker:o"), {fd, -1});
+  });
+  EXPECT_NE(attacker.expect_refusal().find("neither a memfd nor an anonymous pipe"),
+            std::string::npos);
+  expect_no_harm();
+}
+
+TEST_F(ALingeringSocket, AsOneTooManyHoldsUpNobody) {
+  Lingering lingering;
+  RawClient attacker = client();
+  const FileDescriptor zero(::open("/dev/zero", O_RDONLY | O_CLOEXEC));
+  give(lingering, [&](int fd) {
+    std::vector<int> many(shm::kMostDescriptorsOfAMessage, zero.get());
+    many.back() = fd;
+    send_with(attacker.socket(), RawClient::message(MessageKind::kStatus), many);
+  });
+  expect_no_harm();
+}
+
+TEST_F(ALingeringSocket, InAMessageThatIsNeverReadHoldsUpNobody) {
+  Lingering lingering;
+  {
+    RawClient attacker = client();
+    give(lingering, [&](int fd) {
+      attacker.send_bytes("?", 1);  // the daemon hangs up on that
+      send_with(attacker.socket(), RawClient::message(MessageKind::kStatus), {fd});
+    });
+    EXPECT_TRUE(attacker.is_hung_up_on());
+  }
+  expect_no_harm();
+}
+
+TEST_F(ALingeringSocket, InsideASocketHoldsUpNobody) {
+  Lingering lingering;
+  RawClient attacker = client();
+  int ends[2];
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends), 0);
+  FileDescriptor inner(ends[0]);
+  const FileDescriptor outer(ends[1]);
+  give(lingering, [&](int fd) {
+    send_with(outer.get(), RawClient::message(MessageKind::kStatus), {fd});
+    send_with(attacker.socket(), RawClient::message(MessageKind::kStatus), {inner.get()});
+    inner.reset();
+  });
+  expect_no_harm();
+}
+
+// More than there are threads for one user: the rest waits, and another user's is done.
+TEST_F(ALingeringSocket, SentManyTimesHoldsUpNobody) {
+  std::vector<Lingering> many(6);
+  RawClient attacker = client();
+  daemon_.process().stop();
+  for (Lingering& each : many) {
+    send_with(attacker.socket(), RawClient::message(MessageKind::kStatus), {each.get()});
+    each.close();
+  }
+  daemon_.process().signal(SIGCONT);
+  expect_that_others_are_served(daemon_);
+  while (daemon_.log().find("4 of 4") == std::string::npos) daemon_.status();
+  expect_that_others_are_served(daemon_);
+}
+
+// A daemon of root must not open for others what they could not open themselves.
+class ABellThatIsHandedIn : public testing::Test {
+ protected:
+  std::string refusal(int bell) {
+    RawClient client(daemon_.instance());
+    client.hello("attacker");
+    const FileDescriptor segment = input_segment();
+    client.send(RawClient::message(MessageKind::kOpenInput, "/attacker:i"), {segment.get(), bell});
+    return client.expect_refusal();
+  }
+  Daemon daemon_;
+};
+
+TEST_F(ABellThatIsHandedIn, IsNoFifoOfADirectory) {
+  const std::string path = daemon_.directory() + "/pipe:[1]";
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  for (const int flags : {O_PATH, O_RDWR}) {
+    const FileDescriptor fifo(::open(path.c_str(), flags | O_CLOEXEC));
+    EXPECT_NE(refusal(fifo.get()).find("neither a memfd nor an anonymous pipe"), std::string::npos);
+  }
+  const FileDescriptor reader(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  const FileDescriptor writer(::open(path.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC));
+  EXPECT_NE(refusal(writer.get()).find("neither"), std::string::npos);
+}
+
+TEST_F(ABellThatIsHandedIn, IsNoPipeThatWasNotOpenedToBeWritten) {
+  int ends[2];
+  ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+  const FileDescriptor read_end(ends[0]);
+  const FileDescriptor write_end(ends[1]);
+  EXPECT_NE(refusal(read_end.get()).find("write end"), std::string::npos);
+  const FileDescriptor named(
+      ::open(("/proc/self/fd/" + std::to_string(ends[1])).c_str(), O_PATH | O_CLOEXEC));
+  EXPECT_NE(refusal(named.get()).find("neither"), std::string::npos);
+}
+
+TEST_F(ABellThatIsHandedIn, IsNotAnotherUsersNorIsTheSegment) {
+  if (!may_be_another_user()) GTEST_SKIP() << "only root can become another user";
+  ASSERT_EQ(::chmod(daemon_.directory().c_str(), 0711), 0);
+  const shm::Bell roots_bell;
+  const FileDescriptor roots_segment = input_segment();
+  const auto said = as_user(kStranger, [&] {
+    const shm::Bell own_bell;
+    const FileDescriptor own_segment = input_segment();
+    RawClient client(daemon_.instance());
+    client.hello("attacker");
+    std::string refusals;
+    const auto open = RawClient::message(MessageKind::kOpenInput, "/attacker:i");
+    client.send(open, {own_segment.get(), roots_bell.write_end().get()});
+    refusals += client.expect_refusal() + "; ";
+    client.send(open, {roots_segment.get(), own_bell.write_end().get()});
+    refusals += client.expect_refusal() + "; ";
+    client.send(open, {own_segment.get(), own_bell.write_end().get()});
+    client.expect(MessageKind::kConnected);
+    return refusals;
+  });
+  EXPECT_EQ(said,
+            "the bell was made by user 0, and handed in by user 54321; "
+            "the segment was made by user 0, and handed in by user 54321; ");
+}
+
+// Memory that a stranger makes others map, read and pay for.
+TEST(ASparseSegment, TakesNoAddressesOfTheDaemon) {
+  Daemon daemon;
+  RawClient attacker(daemon.instance());
+  attacker.hello("attacker");
+  const auto addresses = [&] {
+    std::ifstream file("/proc/" + std::to_string(daemon.process().pid()) + "/statm");
+    std::size_t pages = 0;
+    file >> pages;
+    return pages * shm::kPageSize;
+  };
+  const std::size_t before = addresses();
+  constexpr std::uint64_t kGigabyte = std::uint64_t{1} << 30;
+  std::vector<FileDescriptor> segments;
+  for (int i = 0; i < 60; ++i) {
+    segments.push_back(output_segment(kGigabyte, 15));
+    auto open = RawClient::message(MessageKind::kOpenOutput, "/attacker:o" + std::to_string(i));
+    open.type = some_type(kGigabyte);
+    attacker.send(open, {segments.back().get(), -1});
+    attacker.expect(MessageKind::kConnected);
+  }
+  EXPECT_LT(addresses() - before, kGigabyte) << "60 segments of 15 GiB";
+  const FileDescriptor larger = output_segment(kGigabyte, 17);
+  auto open = RawClient::message(MessageKind::kOpenOutput, "/attacker:larger");
+  open.type = some_type(kGigabyte);
+  attacker.send(open, {larger.get(), -1});
+  EXPECT_NE(attacker.expect_refusal().find("kMaxSegmentSize"), std::string::npos);
+}
+
+// What holds what is allocated in place: the seals, on this kernel.
+TEST(ASealedSegment, LosesNoPageThroughItsOwnersMapping) {
+  const auto segment = shm::make_segment("attack", 4 * shm::kPageSize);
+  const shm::Mapping mapping(segment, 4 * shm::kPageSize, shm::Access::kReadWrite);
+  ASSERT_FALSE(shm::allocate(segment, 0, 2 * shm::kPageSize));
+  mapping.data()[0] = std::byte{1};
+  shm::seal(segment, shm::Seals::kOneWriter);
+  const std::size_t before = shm::allocated_size(segment);
+  EXPECT_EQ(before, 2 * shm::kPageSize);
+  for (const int advice : {MADV_REMOVE, MADV_DONTNEED, MADV_FREE, MADV_PAGEOUT, MADV_COLD}) {
+    static_cast<void>(::madvise(mapping.data(), 2 * shm::kPageSize, advice));
+    EXPECT_EQ(shm::allocated_size(segment), before) << advice;
+  }
+  for (const int mode : {FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, FALLOC_FL_ZERO_RANGE,
+                         FALLOC_FL_COLLAPSE_RANGE}) {
+    EXPECT_NE(::fallocate(segment.get(), mode, 0, shm::kPageSize), 0) << mode;
+  }
+  // Nor can it be allocated where nobody would look for it.
+  EXPECT_NE(::fallocate(segment.get(), FALLOC_FL_KEEP_SIZE, 4 * shm::kPageSize, shm::kPageSize), 0);
+  EXPECT_NE(::ftruncate(segment.get(), 0), 0);
+  EXPECT_EQ(shm::allocated_size(segment), before);
+  EXPECT_EQ(mapping.data()[0], std::byte{1});
+}
+
+TEST(ASegmentOfHugePages, IsNotTaken) {
+  const FileDescriptor huge(
+      ::memfd_create("attack", MFD_HUGETLB | MFD_ALLOW_SEALING | MFD_CLOEXEC));
+  if (!huge) GTEST_SKIP() << "this kernel has no huge pages";
+  EXPECT_EQ(shm::foreign_kind(huge.get()), shm::ForeignKind::kOther);
+}
+
+}  // namespace
+}  // namespace arbiter::test

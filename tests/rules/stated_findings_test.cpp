@@ -1,0 +1,88 @@
+// States without a winner of which a proved statement says that nobody shall win.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "rules/compile.hpp"
+#include "rules/findings.hpp"
+#include "tests/rules/rules_by_hand.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using rules::Diagnostics;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+// The paper's arm: with object and collision both active nobody wins, on purpose. Nothing drives
+// the base while an object is there.
+rules::RuleSet robot() {
+  return RulesByHand()
+      .port("/Arm", {{"/Rest", inactive("/Object")}, {"/Object", inactive("/collision")}})
+      .port("/Base", {{"/Nav", inactive("/Object")}});
+}
+
+// "nobody-wins /Arm", each, where all of these statements are proved, or not.
+std::vector<std::string> found_beside(const std::string& text,
+                                      std::uint64_t steps = rules::Budget::kSteps) {
+  const rules::RuleSet set = robot();
+  Diagnostics diagnostics;
+  const auto model = compile(set, diagnostics);
+  rules::ProvedStatements proved;
+  const rules::TextFile file("safety.txt", text);
+  rules::Budget to_judge;
+  for (const auto& verdict :
+       judge(read_statements(file, diagnostics), model, diagnostics, to_judge)) {
+    if (verdict.proved) proved.push_back(verdict.proved);
+  }
+  Diagnostics found;
+  rules::Budget budget(steps);
+  find_more(set, model, found, budget, proved);
+  std::vector<std::string> result;
+  for (const auto& item : found.items()) {
+    const bool is_arm = item.message.find("/Arm") != std::string::npos;
+    result.push_back(item.code + (is_arm ? " /Arm" : " /Base"));
+  }
+  return result;
+}
+
+TEST(StatedFindings, WithoutStatementsAllIsNoted) {
+  EXPECT_THAT(found_beside("/Rest or not /Rest"),
+              ElementsAre("nobody-wins /Arm", "starved /Arm", "nobody-wins /Base"));
+}
+
+TEST(StatedFindings, AStateThatIsToBeIdleIsNotNoted) {
+  EXPECT_THAT(found_beside("/Object and /collision -> idle(/Arm)"),
+              ElementsAre("nobody-wins /Base"));
+  EXPECT_THAT(found_beside("/Object and /collision -> idle(/Arm)\n/Object -> idle(/Base)"),
+              IsEmpty());
+}
+
+TEST(StatedFindings, StatementsTogetherMayLeaveItToNobody) {
+  const std::string not_object = "/collision -> winner(/Arm) != /Object\n";
+  const std::string not_rest = "/Object -> winner(/Arm) != /Rest\n";
+  EXPECT_THAT(found_beside(not_object + not_rest), ElementsAre("nobody-wins /Base"));
+  // Rest may still win, as far as this says.
+  EXPECT_THAT(found_beside(not_object),
+              ElementsAre("nobody-wins /Arm", "starved /Arm", "nobody-wins /Base"));
+}
+
+TEST(StatedFindings, OnlyTheStatesThatAreCoveredAreQuiet) {
+  EXPECT_THAT(found_beside("/Object and /collision and /Nav -> idle(/Arm)"),
+              ElementsAre("nobody-wins /Arm", "starved /Arm", "nobody-wins /Base"));
+}
+
+TEST(StatedFindings, AStatementMayTieOnePortToAnother) {
+  EXPECT_THAT(
+      found_beside("idle(/Arm) and /Object -> idle(/Base)\n/Object -> winner(/Arm) != /Rest"),
+      ElementsAre("nobody-wins /Arm", "starved /Arm", "nobody-wins /Base"));
+  EXPECT_THAT(found_beside("/collision and idle(/Base) and /Object -> idle(/Arm)"),
+              ElementsAre("nobody-wins /Base"));
+}
+
+TEST(StatedFindings, WhatIsRefutedQuietsNothing) {
+  EXPECT_THAT(found_beside("/collision -> idle(/Arm)"),
+              ElementsAre("nobody-wins /Arm", "starved /Arm", "nobody-wins /Base"));
+}
+
+}  // namespace
+}  // namespace arbiter::test

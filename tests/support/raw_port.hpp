@@ -1,0 +1,43 @@
+// Ports that are opened below the client library.
+#pragma once
+
+#include <string>
+
+#include "shm/output_segment.hpp"
+#include "tests/support/raw_client.hpp"
+
+namespace arbiter::test {
+
+inline shm::FileDescriptor raw_output_segment() {
+  const shm::TypeInfo type;
+  const auto layout = shm::OutputLayout::plan(type, 4);
+  auto segment = shm::make_segment("test", layout.total_size);
+  if (shm::allocate(segment, 0, layout.total_size)) throw std::runtime_error("no memory");
+  {
+    const shm::Mapping mapping(segment, layout.total_size, shm::Access::kReadWrite);
+    auto& header = *mapping.as<shm::OutputHeader>();
+    header.magic = shm::OutputHeader::kMagic;
+    header.version = shm::OutputHeader::kVersion;
+    header.slot_count = 4;
+    header.type = type;
+  }
+  shm::seal(segment, shm::Seals::kOneWriter);
+  return segment;
+}
+
+// kOpened, with the source's page. Throws what the daemon refuses with.
+inline shm::Received open_raw_output(RawClient& client, const std::string& name,
+                                     const shm::FileDescriptor& segment) {
+  client.send(RawClient::message(shm::MessageKind::kOpenOutput, name), {segment.get(), -1});
+  shm::Received opened = client.expect(shm::MessageKind::kOpened);
+  client.expect(shm::MessageKind::kConnected);
+  return opened;
+}
+
+inline void close_raw(RawClient& client, shm::PortInstance port) {
+  auto close = RawClient::message(shm::MessageKind::kClosePort);
+  close.port = port;
+  client.send(close);
+}
+
+}  // namespace arbiter::test
