@@ -45,7 +45,7 @@ Daemon::Daemon(const DaemonOptions& options)
       files_(options.models),
       is_strict_(options.is_strict),
       state_(options.directory, options.instance),
-      proving_{options.steps, tell_service_manager(), options.is_strict},
+      steps_(options.steps),
       before_reading_(options.before_reading),
       compiler_(options.compiles_in) {
   if (!files_.empty() || gate_.has_file()) read_first_models(options.stop_descriptor);

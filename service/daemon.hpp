@@ -286,7 +286,7 @@ class Daemon {
   std::optional<Swap> preparing_;  // the one that waits for the compiler
   std::uint64_t reloads_refused_ = 0;
   bool stop_wanted_ = false;
-  const Proving proving_;
+  const std::uint64_t steps_;  // that the proof of a model may take
   const std::function<void(std::stop_token)> before_reading_;
   Compiler compiler_;  // last: its job ends before anything else does
 };

@@ -104,7 +104,6 @@ void Daemon::finish_preparing() {
         return begin_swap(swap);
     }
   });
-  tell_service_manager_ready(instance_);
 }
 
 // A comparison is made for those who asked. A reload or a rollback happens all the same.
@@ -123,13 +122,15 @@ Compiler::Job Daemon::reading_job(
   if (files_.empty() && !gate_.has_file()) {
     throw std::runtime_error("there is no file to read again; start with --model");
   }
-  return [files = files_, gate = gate_, proving = proving_, before = before_reading_,
-          after = std::move(after_reading)](const std::stop_token& stop) {
-    if (before) before(stop);
-    Reading reading = read_files(files, gate, proving, stop);
-    if (!reading.findings.has_errors()) after(reading, stop);
-    return reading;
-  };
+  return
+      [files = files_, gate = gate_, steps = steps_, is_strict = is_strict_, instance = instance_,
+       before = before_reading_, after = std::move(after_reading)](const std::stop_token& stop) {
+        if (before) before(stop);
+        StatusLine line(instance);
+        Reading reading = read_files(files, gate, {steps, line.watch(), is_strict}, stop);
+        if (!reading.findings.has_errors()) after(reading, stop);
+        return reading;
+      };
 }
 
 // Before anybody is served, who could be kept waiting; but signals are heard.

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <memory>
 #include <stdexcept>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -14,7 +14,6 @@
 namespace arbiter::service {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr std::chrono::seconds kEvery{1};
 // Longer than reading and extracting take, during which nothing is told.
 constexpr int kAtMost = 30;
@@ -52,18 +51,21 @@ std::string changes_between(const Model& before, const Model& after, std::uint64
   return changes.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-rules::Budget::Watch tell_service_manager() {
-  const auto next = std::make_shared<Clock::time_point>(Clock::now() + kEvery);
-  return [next](const rules::Progress& progress) {
-    if (Clock::now() < *next) return;
-    *next = Clock::now() + kEvery;
+StatusLine::StatusLine(std::string instance)
+    : instance_(std::move(instance)), next_(Clock::now() + kEvery) {}
+
+StatusLine::~StatusLine() {
+  if (has_told_) sd_notifyf(0, "STATUS=instance %s", instance_.c_str());
+}
+
+rules::Budget::Watch StatusLine::watch() {
+  return [this](const rules::Progress& progress) {
+    if (Clock::now() < next_) return;
+    next_ = Clock::now() + kEvery;
+    has_told_ = true;
     sd_notifyf(0, "STATUS=%s: %zu of %zu ports (%s)\nEXTEND_TIMEOUT_USEC=%d000000",
                progress.stage.c_str(), progress.done, progress.of, progress.name.c_str(), kAtMost);
   };
-}
-
-void tell_service_manager_ready(const std::string& instance) {
-  sd_notifyf(0, "STATUS=instance %s", instance.c_str());
 }
 
 }  // namespace arbiter::service

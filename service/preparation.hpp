@@ -1,6 +1,7 @@
 // The jobs of a compiler: what is read, proved and compared before the loop puts it in force.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <stop_token>
 #include <string>
@@ -31,9 +32,25 @@ struct Proving {
 [[nodiscard]] std::string changes_between(const Model& before, const Model& after,
                                           std::uint64_t steps, const std::stop_token& stop);
 
-// Tells the service manager how far a model is, and that it is worth waiting for.
-[[nodiscard]] rules::Budget::Watch tell_service_manager();
-// That nothing is under way.
-void tell_service_manager_ready(const std::string& instance);
+// Tells the service manager how far a model is, and that it is worth waiting for; once a second,
+// and nothing of what takes less. At the end it shows the instance again. To be used in the
+// compiler's thread: a manager that does not listen holds up who tells it.
+class StatusLine {
+ public:
+  explicit StatusLine(std::string instance);
+  StatusLine(const StatusLine&) = delete;
+  StatusLine& operator=(const StatusLine&) = delete;
+  ~StatusLine();
+
+  // Must not outlive this.
+  [[nodiscard]] rules::Budget::Watch watch();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  const std::string instance_;
+  Clock::time_point next_;
+  bool has_told_ = false;
+};
 
 }  // namespace arbiter::service

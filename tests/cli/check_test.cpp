@@ -75,7 +75,7 @@ TEST(Check, WritesTheSameAsJson) {
             "let one inhibit the other, give one a condition that excludes the other, or let "
             "document order decide with <arbiter at=\"/p\" conflict=\"first\"/>");
   EXPECT_EQ(found[0]["witness"], nlohmann::json::parse(R"({"active": ["/a", "/b"],
-                                                           "inactive": ["/c"]})"));
+                                                           "inactive": ["/c"], "shortest": true})"));
 }
 
 TEST(Check, WritesAnEmptyArrayOfJsonIfNothingWasFound) {
@@ -181,7 +181,8 @@ TEST(Check, TellsEachCauseOfNobody) {
   EXPECT_EQ(found[0]["code"], "nobody-wins");
   EXPECT_EQ(
       found[0]["more_witnesses"],
-      nlohmann::json::parse(R"([{"active": ["/Mid:o"], "inactive": ["/Enable:o", "/Top:o"]}])"));
+      nlohmann::json::parse(
+          R"([{"active": ["/Mid:o"], "inactive": ["/Enable:o", "/Top:o"], "shortest": true}])"));
 }
 
 TEST(Check, NotesAndWarningsCanBeSilencedAndErrorsCannot) {
