@@ -142,6 +142,7 @@ bool InputCore::look_closely(Queue& queue) noexcept {
   }
   if (queue.head == 0 && queue.gone && !queue.peer->drained.load(std::memory_order_relaxed)) {
     queue.peer->drained.store(true, std::memory_order_relaxed);
+    queue.lane->source.store(shm::kNone, std::memory_order_relaxed);  // for status: nothing waits
     memory_->service_bell().ring();
   }
   return queue.head != 0;

@@ -314,8 +314,8 @@ class Document {
            "deactivate " + source.name + "` ends it)";
   }
 
-  // Whether a receiver still has a queue of a publisher that has gone: it gives it up once it is
-  // empty.
+  // Whether a receiver still has a queue of a publisher that has gone: once it has found it empty,
+  // it says that it is nobody's.
   [[nodiscard]] static bool waits(shm::SourceId source, const InputPort* input) {
     if (input == nullptr) return false;
     return std::any_of(std::begin(input->shared().lanes), std::end(input->shared().lanes),

@@ -109,6 +109,12 @@ class FormerOwner {
   pid_t child_ = -1;
 };
 
+struct Robot {
+  Node node{"robot"};
+  OutputPort<int> drive = node.output_port<int>("/drive:o");
+  InputPort<int> motor = node.input_port<int>("/motor:i");
+};
+
 class AFormerOwner : public testing::Test {
  protected:
   void SetUp() override {
@@ -135,9 +141,8 @@ class AFormerOwner : public testing::Test {
 
 TEST_F(AFormerOwner, CannotEndHisSuccessorsEmergencyStop) {
   take_it_away();
-  Node node("robot");
-  auto drive = node.output_port<int>("/drive:o");
-  auto motor = node.input_port<int>("/motor:i");
+  Robot robot;
+  auto& [node, drive, motor] = robot;
   auto estop = node.output_port<int>("/estop:o");
   estop.signal();
   EXPECT_EQ(drive.publish(1).delivered, 0u);
@@ -154,9 +159,8 @@ TEST_F(AFormerOwner, CannotEndHisSuccessorsEmergencyStop) {
 TEST_F(AFormerOwner, LeavesHisActivityToHisSuccessor) {
   stranger_->tell('s');
   take_it_away();
-  Node node("robot");
-  auto drive = node.output_port<int>("/drive:o");
-  auto motor = node.input_port<int>("/motor:i");
+  Robot robot;
+  auto& [node, drive, motor] = robot;
   EXPECT_EQ(drive.publish(1).delivered, 0u);
   auto estop = node.output_port<int>("/estop:o");
   stranger_->tell('d');
@@ -168,9 +172,8 @@ TEST_F(AFormerOwner, LeavesHisActivityToHisSuccessor) {
 TEST_F(AFormerOwner, CannotBringBackWhatAnOperatorHasEnded) {
   stranger_->tell('s');
   take_it_away();
-  Node node("robot");
-  auto drive = node.output_port<int>("/drive:o");
-  auto motor = node.input_port<int>("/motor:i");
+  Robot robot;
+  auto& [node, drive, motor] = robot;
   EXPECT_EQ(drive.publish(1).delivered, 0u);
   RawClient arbiter(daemon_->instance());
   arbiter.hello("operator");
@@ -183,9 +186,8 @@ TEST_F(AFormerOwner, CannotBringBackWhatAnOperatorHasEnded) {
 
 TEST_F(AFormerOwner, CannotHandBackHisPageToTheNextDaemon) {
   take_it_away();
-  Node node("robot");
-  auto drive = node.output_port<int>("/drive:o");
-  auto motor = node.input_port<int>("/motor:i");
+  Robot robot;
+  auto& [node, drive, motor] = robot;
   auto estop = node.output_port<int>("/estop:o");
   estop.signal();
   daemon_->kill();
