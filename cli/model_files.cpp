@@ -15,10 +15,23 @@ void add_model_options(CLI::App& verb, rules::ModelFiles& files) {
       ->type_name("FILE");
 }
 
+void add_effort_option(CLI::App& verb, double& effort) {
+  verb.add_option("--effort", effort,
+                  "How many times as many steps as usual proofs may take, such as 10 or 0.1")
+      ->type_name("FACTOR")
+      ->check(CLI::Range(rules::Budget::kLeastEffort, rules::Budget::kMostEffort));
+}
+
 std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
                                 rules::Keep keep) {
+  rules::Budget budget;
+  return load_model(files, diagnostics, budget, keep);
+}
+
+std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
+                                rules::Budget& budget, rules::Keep keep) {
   rules::RuleSet rules = rules::load(files, diagnostics, keep);
-  rules::CompiledModel compiled = rules::compile(rules, diagnostics);
+  rules::CompiledModel compiled = rules::compile(rules, diagnostics, budget);
   if (diagnostics.has_errors()) return std::nullopt;
   return Model{std::move(rules), std::move(compiled)};
 }

@@ -16,6 +16,9 @@ namespace arbiter::cli {
 // MODEL... and --application.
 void add_model_options(CLI::App& verb, rules::ModelFiles& files);
 
+// --effort
+void add_effort_option(CLI::App& verb, double& effort);
+
 struct Model {
   rules::RuleSet rules;
   rules::CompiledModel compiled;
@@ -24,5 +27,7 @@ struct Model {
 // Reads, compiles and proves a model; nothing if that finds an error.
 std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
                                 rules::Keep keep = rules::Keep::kRules);
+std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
+                                rules::Budget& budget, rules::Keep keep = rules::Keep::kRules);
 
 }  // namespace arbiter::cli

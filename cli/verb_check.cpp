@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/model_files.hpp"
+#include "cli/progress.hpp"
 #include "cli/verbs.hpp"
 #include "rules/findings.hpp"
 #include "rules/names.hpp"
@@ -22,6 +23,7 @@ struct CheckOptions {
   rules::ModelFiles files;
   std::vector<std::string> statements;  // files
   std::vector<std::string> silenced;    // codes
+  double effort = 1;
   bool strict = false;
   bool json = false;
 };
@@ -50,7 +52,6 @@ const std::vector<std::string_view> silenceable{"decided-in-order",
                                                 "no-config",
                                                 "no-rule-at-port",
                                                 "nobody-wins",
-                                                "not-checked",
                                                 "proved",
                                                 "similar-name",
                                                 "starved",
@@ -80,23 +81,27 @@ std::string summary_of(const rules::CompiledModel& model) {
 // Statements are read even where there is no model that they could be true of: all problems are
 // reported in one go.
 Statements judge_statements(const CheckOptions& options, const rules::CompiledModel* model,
-                            rules::Diagnostics& diagnostics) {
+                            rules::Diagnostics& diagnostics, rules::Budget& budget) {
   Statements result;
+  std::vector<rules::Statement> statements;  // of all files: they share the budget
   for (const auto& path : options.statements) {
     const rules::TextFile file(path, rules::read_bytes(path));
     std::size_t malformed = 0;
-    const auto statements = rules::read_statements(file, diagnostics, &malformed);
-    if (model == nullptr) continue;
-    const auto verdicts = rules::judge(statements, *model, diagnostics);
-    result.not_judged += malformed + statements.size() - verdicts.size();
-    rules::report(verdicts, diagnostics, options.json);
-    for (const auto& verdict : verdicts) {
-      using Kind = rules::Verdict::Kind;
-      result.proved += verdict.kind == Kind::kProved ? 1 : 0;
-      if (verdict.proved) result.facts.push_back(verdict.proved);
-      result.refuted += verdict.kind == Kind::kRefuted ? 1 : 0;
-      result.open += verdict.kind == Kind::kOpen ? 1 : 0;
+    for (auto& statement : rules::read_statements(file, diagnostics, &malformed)) {
+      statements.push_back(std::move(statement));
     }
+    result.not_judged += malformed;
+  }
+  if (model == nullptr) return result;
+  const auto verdicts = rules::judge(statements, *model, diagnostics, budget);
+  result.not_judged += statements.size() - verdicts.size();
+  rules::report(verdicts, diagnostics, options.json);
+  for (const auto& verdict : verdicts) {
+    using Kind = rules::Verdict::Kind;
+    result.proved += verdict.kind == Kind::kProved ? 1 : 0;
+    if (verdict.proved) result.facts.push_back(verdict.proved);
+    result.refuted += verdict.kind == Kind::kRefuted ? 1 : 0;
+    result.open += verdict.kind == Kind::kOpen ? 1 : 0;
   }
   return result;
 }
@@ -111,17 +116,20 @@ void write_summary(std::ostream& out, const Statements& statements) {
 
 int check(const CheckOptions& options) {
   rules::Diagnostics diagnostics;
-  const auto model = load_model(options.files, diagnostics);
+  rules::Budget budget(rules::Budget::steps_of(options.effort));
+  ProgressLine progress;
+  budget.watch(progress.watch());
+  const auto model = load_model(options.files, diagnostics, budget);
   const auto statements =
-      judge_statements(options, model ? &model->compiled : nullptr, diagnostics);
+      judge_statements(options, model ? &model->compiled : nullptr, diagnostics, budget);
   if (model) {
-    rules::find_more(model->rules, model->compiled, diagnostics, rules::kMaxFindingsWork,
-                     statements.facts);
+    rules::find_more(model->rules, model->compiled, diagnostics, budget, statements.facts);
   }
   if (!model && !options.statements.empty()) {
     diagnostics.note("left-open", {options.statements.front(), 1, 1},
                      "whether the statements are true was not looked at: the model has errors");
   }
+  progress.clear();
   diagnostics.silence(options.silenced);
   if (options.strict) diagnostics.make_warnings_errors();
   const bool failed = diagnostics.has_errors();
@@ -158,6 +166,7 @@ void add_check(CLI::App& app, int& exit_code) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(CLI::Validator(problem_of_code, ""));
+  add_effort_option(*verb, options->effort);
   verb->add_flag("--strict", options->strict, "Take warnings for errors, but for silenced ones");
   verb->add_flag("--json", options->json, "Write what is found as JSON, to standard output");
   verb->footer(
@@ -168,6 +177,10 @@ void add_check(CLI::App& app, int& exit_code) {
       "  /collision:o -> idle(/Arm/pos:i)\n"
       "  winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o\n"
       "  winner(/Base/vel:i) = any(/Nav/*) -> winner(/Arm/pos:i) != winner(/Hand/pos:i)\n"
+      "Proofs take a bounded number of steps, the same on every machine, shared out fairly. What\n"
+      "they leave open is named: a port that is not proved and a statement are errors, the rest "
+      "is\n"
+      "the note left-open. A model that needs --effort here needs it at arbiterd, too.\n"
       "Exit code 0: no error; with --strict, no warning either; 1: an error, or a statement that "
       "is not proved; 2: wrong use,\n"
       "or a file cannot be opened, or the output not be written.");

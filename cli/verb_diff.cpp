@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/model_files.hpp"
+#include "cli/progress.hpp"
 #include "cli/verbs.hpp"
 #include "rules/model_diff.hpp"
 #include "rules/report.hpp"
@@ -17,6 +18,7 @@ namespace {
 struct DiffOptions {
   std::string before, after;
   std::string application, application_before, application_after;
+  double effort = 1;
   bool json = false;
 };
 
@@ -29,12 +31,16 @@ std::vector<std::string> files_of(const std::string& argument) {
 }
 
 std::optional<Model> load_side(const DiffOptions& options, const std::string& files,
-                               const std::string& application) {
+                               const std::string& application, ProgressLine& progress) {
   rules::ModelFiles model{files_of(files), {}};
   const std::string& given = application.empty() ? options.application : application;
   if (!given.empty()) model.application = given;
   rules::Diagnostics diagnostics;
-  auto loaded = load_model(model, diagnostics);
+  // Of each model as check has it, so that what is accepted there is accepted here.
+  rules::Budget budget(rules::Budget::steps_of(options.effort));
+  budget.watch(progress.watch());
+  auto loaded = load_model(model, diagnostics, budget);
+  progress.clear();
   // What a check finds beside errors is not what was asked for here.
   if (!loaded) rules::write_text(std::cerr, diagnostics);
   return loaded;
@@ -42,10 +48,14 @@ std::optional<Model> load_side(const DiffOptions& options, const std::string& fi
 
 int diff(const DiffOptions& options) {
   constexpr int kEqual = 0, kDiffers = 1, kCannot = 2;
-  const auto before = load_side(options, options.before, options.application_before);
-  const auto after = load_side(options, options.after, options.application_after);
+  ProgressLine progress;
+  const auto before = load_side(options, options.before, options.application_before, progress);
+  const auto after = load_side(options, options.after, options.application_after, progress);
   if (!before || !after) return kCannot;
-  const auto found = rules::diff(before->compiled, after->compiled);
+  rules::Budget budget(rules::Budget::steps_of(options.effort) / 5);
+  budget.watch(progress.watch());
+  const auto found = rules::diff(before->compiled, after->compiled, budget);
+  progress.clear();
   if (options.json) {
     rules::write_json(std::cout, found);
   } else {
@@ -72,6 +82,7 @@ void add_diff(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   verb->add_option("--application-after", options->application_after, "Connections of AFTER")
       ->type_name("FILE");
+  add_effort_option(*verb, options->effort);
   verb->add_flag("--json", options->json, "Write what is found as JSON");
   verb->footer(
       "Exit code 0: they decide alike in every state; 1: they differ; 2: that cannot be told,\n"

@@ -62,7 +62,8 @@ void add_why(CLI::App& app, int& exit_code) {
       ->type_name("N")
       ->needs(follow)
       ->check(at_least_one());
-  verb->add_flag("--all", options->all, "Tell all of every connection; otherwise a port with many fits a screen")
+  verb->add_flag("--all", options->all,
+                 "Tell all of every connection; otherwise a port with many fits a screen")
       ->excludes(follow);
   verb->add_flag("--json", options->json, "As JSON; with --follow one object a line");
   add_instance_option(*verb, options->instance);

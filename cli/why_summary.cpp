@@ -42,9 +42,9 @@ void write_active(std::ostream& out, const std::vector<const ConnectionExplanati
     for (const auto& [connection, reasons] : left) {
       for (const auto& reason : reasons) ++counts[reason];
     }
-    const auto most = std::max_element(
-        counts.begin(), counts.end(),
-        [](const auto& a, const auto& b) { return a.second < b.second; });
+    const auto most =
+        std::max_element(counts.begin(), counts.end(),
+                         [](const auto& a, const auto& b) { return a.second < b.second; });
     if (most == counts.end()) break;
     std::vector<std::string> sources;
     for (const auto* each : active) {

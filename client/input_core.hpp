@@ -165,7 +165,7 @@ class InputCore {
 
   // Service thread.
   std::map<shm::PortInstance, OutputLink> links_;
-  std::uint64_t let_go_ = 0;  // as InputView::let_go
+  std::uint64_t let_go_ = 0;                            // as InputView::let_go
   std::map<shm::PortInstance, shm::SourceId> refused_;  // peers that are not among links_
 
   Handover<InputView> handover_;

@@ -13,13 +13,13 @@
 namespace arbiter::rules {
 namespace {
 
-// Rules that outgrow the node table cost a second each; after so many there is no more to learn.
-constexpr int kMaxOutgrownPorts = 8;
-
 class ModelCompiler {
  public:
-  ModelCompiler(const RuleSet& rules, Diagnostics& diagnostics, std::size_t max_precedence_nodes)
-      : rules_(rules), context_{{}, {}, diagnostics, max_precedence_nodes} {}
+  ModelCompiler(const RuleSet& rules, Diagnostics& diagnostics, Budget& budget,
+                std::size_t max_precedence_nodes)
+      : rules_(rules),
+        diagnostics_(diagnostics),
+        context_(budget, attempt_, max_precedence_nodes) {}
 
   CompiledModel compile();
 
@@ -27,6 +27,10 @@ class ModelCompiler {
   [[nodiscard]] std::vector<std::string> all_sources() const;
   void gather_parts();
   void compile_arbitrated_ports();
+  void compile_port_at(std::size_t index);
+  void hand_over();
+  void assume_running(const PortRules& port);
+  void report_out_of_steps(const PortRules& port);
   void add_unarbitrated_ports();
   void report_never_running();
   void report_unreachable_children();
@@ -35,6 +39,8 @@ class ModelCompiler {
                       std::size_t value);
 
   const RuleSet& rules_;
+  Diagnostics& diagnostics_;
+  Diagnostics attempt_;  // what is found at a port, until it is known whether that counts
   CompileContext context_;
   CompiledModel model_;
   std::map<std::string, std::vector<BehaviourPart>> parts_;             // by port
@@ -47,7 +53,7 @@ CompiledModel ModelCompiler::compile() {
   model_.timeouts = rules_.timeouts;
   model_.sources = all_sources();
   model_.texts = rules_.texts;
-  const bool is_whole = !context_.diagnostics.has_errors();
+  const bool is_whole = !diagnostics_.has_errors();
   gather_parts();
   compile_arbitrated_ports();
   add_unarbitrated_ports();
@@ -76,38 +82,57 @@ void ModelCompiler::gather_parts() {
 }
 
 void ModelCompiler::compile_arbitrated_ports() {
-  int outgrown = 0;
-  for (const auto& port : rules_.ports) {
-    const auto& parts = parts_[port.port];
-    if (port.is_doubtful) {
-      for (const auto& part : parts) may_run_[part.behaviour] = true;  // as nobody knows
-      continue;
+  std::vector<std::size_t> judged;  // ports
+  for (std::size_t i = 0; i < rules_.ports.size(); ++i) {
+    if (rules_.ports[i].is_doubtful) {
+      assume_running(rules_.ports[i]);
+    } else {
+      judged.push_back(i);
     }
-    if (outgrown == kMaxOutgrownPorts) {
-      context_.diagnostics.note("not-checked", port.where,
-                                "the rules at " + port.port +
-                                    ", and at the ports after it, were not looked at, since those "
-                                    "of too many ports exceed a limit",
-                                {.ports = {port.port}});
-      may_run_.assign(may_run_.size(), true);
-      return;
-    }
-    auto unselected = unselected_sources_[port.port];
-    auto result = compile_port(context_, {port, unselected, parts});
-    if (!result) {
-      ++outgrown;
-      for (const auto& part : parts) may_run_[part.behaviour] = true;  // as nobody knows
-      continue;
-    }
-    for (const std::size_t behaviour : result->running) may_run_[behaviour] = true;
-    for (auto& source : unselected) {
-      CompiledRule rule;
-      rule.source = std::move(source);
-      rule.kind = shm::table::kNever;
-      result->port.rules.push_back(std::move(rule));
-    }
-    model_.ports.push_back(std::move(result->port));
   }
+  const auto name = [&](std::size_t i) { return rules_.ports[judged[i]].port; };
+  const auto compile_it = [&](std::size_t i) { compile_port_at(judged[i]); };
+  for (const std::size_t open :
+       share_out(context_.budget, "proving", judged.size(), name, compile_it)) {
+    report_out_of_steps(rules_.ports[judged[open]]);
+  }
+}
+
+void ModelCompiler::compile_port_at(std::size_t index) {
+  const auto& port = rules_.ports[index];
+  const auto& parts = parts_[port.port];
+  auto unselected = unselected_sources_[port.port];
+  attempt_ = {};
+  auto result = compile_port(context_, {port, unselected, parts});
+  hand_over();
+  if (!result) return assume_running(port);
+  for (const std::size_t behaviour : result->running) may_run_[behaviour] = true;
+  for (auto& source : unselected) {
+    CompiledRule rule;
+    rule.source = std::move(source);
+    rule.kind = shm::table::kNever;
+    result->port.rules.push_back(std::move(rule));
+  }
+  model_.ports.push_back(std::move(result->port));
+}
+
+void ModelCompiler::hand_over() {
+  diagnostics_.add(std::move(attempt_));
+  attempt_ = {};
+}
+
+// Nobody knows.
+void ModelCompiler::assume_running(const PortRules& port) {
+  for (const auto& part : parts_[port.port]) may_run_[part.behaviour] = true;
+}
+
+void ModelCompiler::report_out_of_steps(const PortRules& port) {
+  assume_running(port);
+  diagnostics_.error("limit-exceeded", port.where,
+                     "whether only one can win at " + port.port +
+                         " was neither proved nor refuted: it takes more steps than there are for "
+                         "it; write simpler conditions there, or allow more steps with --effort",
+                     {.ports = {port.port}});
 }
 
 void ModelCompiler::add_unarbitrated_ports() {
@@ -139,7 +164,7 @@ void ModelCompiler::report_never_running() {
       ++explained;
       reasons = why_it_never_runs(context_.builder, behaviour, rules_);
     }
-    context_.diagnostics.warning(
+    diagnostics_.warning(
         "never-runs", behaviour.where,
         "no activity of the sources lets the behaviour " + quote(behaviour.name) +
             " run: none of its connections can ever be selected for it" + reasons +
@@ -183,7 +208,7 @@ void ModelCompiler::report_unreachable_children() {
       if (!reached[child]) lost.push_back(quote(child));
     }
     if (lost.empty()) continue;
-    context_.diagnostics.warning(
+    diagnostics_.warning(
         "unreachable-children", meta.where,
         std::to_string(lost.size()) + " of the " + std::to_string(meta.children.size()) +
             (meta.children.size() == 1 ? " child" : " children") + " of " + quote(meta.name) +
@@ -196,9 +221,9 @@ void ModelCompiler::report_unreachable_children() {
 
 void ModelCompiler::limit_exceeded(const Location& where, std::string_view what,
                                    std::string_view limit, std::size_t value) {
-  context_.diagnostics.error("limit-exceeded", where,
-                             std::string(what) + " than " + std::string(limit) + " (" +
-                                 std::to_string(value) + ") allows; split the model");
+  diagnostics_.error("limit-exceeded", where,
+                     std::string(what) + " than " + std::string(limit) + " (" +
+                         std::to_string(value) + ") allows; split the model");
 }
 
 // What is true of every table that is made of the model, whatever ids its sources and ports get.
@@ -236,9 +261,16 @@ void ModelCompiler::check_limits() {
 
 }  // namespace
 
+CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics, Budget& budget,
+                      std::size_t max_precedence_nodes) {
+  const Budget::Part part(budget, budget.left() / 5 * 4);
+  return ModelCompiler(rules, diagnostics, budget, max_precedence_nodes).compile();
+}
+
 CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics,
                       std::size_t max_precedence_nodes) {
-  return ModelCompiler(rules, diagnostics, max_precedence_nodes).compile();
+  Budget budget;
+  return compile(rules, diagnostics, budget, max_precedence_nodes);
 }
 
 }  // namespace arbiter::rules

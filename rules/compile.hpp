@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "rules/budget.hpp"
 #include "rules/diagnostic.hpp"
 #include "rules/rule_set.hpp"
 #include "shm/decision_table.hpp"
@@ -56,6 +57,13 @@ struct CompiledModel {
 // witness; rules that nothing satisfies; limits exceeded. To be used only if there is no error.
 // Where `diagnostics` has errors already, those of reading `rules`, ports that may depend on them
 // are passed over: all that can be judged is, so that all problems are told in one go.
+//
+// Takes at most four fifths of the budget that is left, and shares them out among the ports. What
+// could not be proved within them is an error. The rest is for what is asked of the model
+// afterwards: whether it is accepted does not depend on that. Throws Stopped.
+CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics, Budget& budget,
+                      std::size_t max_precedence_nodes = kMaxPrecedenceNodes);
+// With a budget of its own.
 CompiledModel compile(const RuleSet& rules, Diagnostics& diagnostics,
                       std::size_t max_precedence_nodes = kMaxPrecedenceNodes);
 

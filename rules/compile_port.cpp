@@ -12,6 +12,8 @@ namespace {
 
 // Smaller diagrams are quick enough as they are; sifting takes a while, too.
 constexpr std::size_t kNodesWorthSifting = 1000;
+// That sifting takes about: without them, the diagrams stay as they are.
+constexpr std::size_t kStepsToSiftNode = 24;
 // The union of the rules so far is kept for as long as it is this small.
 constexpr std::size_t kMaxUnionNodes = 2000;
 // Pairs reported for one port; more would not help to mend it.
@@ -41,6 +43,7 @@ class PortCompiler {
   bool subtract_earlier_rules();
   bool compile_rules(CompiledPort& result);
   void find_who_can_win(CompiledPort& result);
+  StateSearch::Answer search(const std::vector<StateSearch::Proposition>& wanted);
   [[nodiscard]] bool can_win_as(std::size_t rule, const ConnectionRule& part);
   std::vector<std::size_t> behaviours_that_run();
   void report_never_selected();
@@ -77,21 +80,13 @@ std::optional<PortResult> PortCompiler::compile() {
     if (!compile_rules(result.port)) return std::nullopt;
     result.running = behaviours_that_run();
     report_never_selected();
+  } catch (const StepLimit&) {
+    throw;
   } catch (const DiagramLimit&) {
     report_outgrown(building_);
     return std::nullopt;
   }
-  try {
-    if (!port_.first_wins) report_conflicts();
-  } catch (const ProofLimit&) {
-    context_.diagnostics.error(
-        "limit-exceeded", port_.where,
-        "the rules at " + port_.port + " are too entangled for the proof that only one can win: " +
-            "it takes more than kMaxProofSteps (" + std::to_string(kMaxProofSteps) +
-            ") steps; write simpler conditions, or set conflict=\"first\" there",
-        {.ports = {port_.port}});
-    return std::nullopt;
-  }
+  if (!port_.first_wins) report_conflicts();
   return result;
 }
 
@@ -119,10 +114,12 @@ void PortCompiler::build_rules() {
   functions_ = plain_;
   if (port_.first_wins) multiply_precedence_out();
   building_ = nullptr;
-  const auto is_large = [&](const Diagram& function) {
-    return context_.builder.node_count(function) > kNodesWorthSifting;
-  };
-  if (std::any_of(functions_.begin(), functions_.end(), is_large)) {
+  std::size_t nodes = 0, largest = 0;
+  for (const Diagram& function : functions_) {
+    nodes += context_.builder.node_count(function);
+    largest = std::max(largest, context_.builder.node_count(function));
+  }
+  if (largest > kNodesWorthSifting && context_.budget.left() > kStepsToSiftNode * nodes) {
     rules_.forget_parts();
     context_.builder.sift();
   }
@@ -138,15 +135,16 @@ void PortCompiler::build_plain_rules() {
 // conflict="first": a rule holds only where none before it does. Where to say so in each rule would
 // make too much of them, they stay as they are, and are decided in order.
 void PortCompiler::multiply_precedence_out() {
-  const std::size_t steps = context_.builder.steps();
   bool lost = false;
   try {
+    const Budget::Part part(context_.budget,
+                            std::min(kMaxPrecedenceSteps, context_.budget.left() / 2));
     in_order_ = !subtract_earlier_rules();
+  } catch (const StepLimit&) {
+    in_order_ = true;
   } catch (const DiagramLimit&) {
     in_order_ = lost = true;
   }
-  context_.precedence_steps -=
-      std::min(context_.precedence_steps, context_.builder.steps() - steps);
   if (lost) {
     plain_.clear();
     rules_.forget_parts();
@@ -159,8 +157,6 @@ void PortCompiler::multiply_precedence_out() {
 // then each is taken away by itself. False: a bound was met.
 bool PortCompiler::subtract_earlier_rules() {
   auto& builder = context_.builder;
-  const std::size_t last_step =
-      builder.steps() + std::min(kMaxPortPrecedenceSteps, context_.precedence_steps);
   const auto is_within = [&](const Diagram& function, std::size_t nodes) {
     return function.is_false() || function.is_true() || builder.node_count(function) <= nodes;
   };
@@ -173,14 +169,14 @@ bool PortCompiler::subtract_earlier_rules() {
       has_union = is_within(won, kMaxUnionNodes) && is_within(plain_[i], kMaxUnionNodes);
       if (has_union) won = builder.combine(Connective::kOr, won, plain_[i]);
     } else {
-      for (std::size_t j = 0; j < i && builder.steps() <= last_step; ++j) {
+      for (std::size_t j = 0; j < i; ++j) {
         functions_[i] = builder.combine(Connective::kAndNot, functions_[i], plain_[j]);
       }
     }
     // Of a rule that is large by itself, order would save nothing.
     const std::size_t most =
         std::max(context_.max_precedence_nodes, 2 * builder.node_count(plain_[i]));
-    if (builder.steps() > last_step || !is_within(functions_[i], most)) return false;
+    if (!is_within(functions_[i], most)) return false;
   }
   return true;
 }
@@ -216,7 +212,7 @@ bool PortCompiler::compile_rules(CompiledPort& result) {
 void PortCompiler::find_who_can_win(CompiledPort& result) {
   for (const auto& function : functions_) can_win_.push_back(!function.is_false());
   if (!in_order_) return;
-  search_.emplace(context_.search_steps);
+  search_.emplace(StateSearch::steps_within(context_.budget.left() / 2));
   winners_ = search_->winners(result);
   for (std::size_t i = 0; i < result.rules.size(); ++i) {
     CompiledRule& rule = result.rules[i];
@@ -226,7 +222,7 @@ void PortCompiler::find_who_can_win(CompiledPort& result) {
       if (rule.expected[read]) asked.insert(rule.reads[read]);
     }
     if (!can_win_[i] || find_winner(result, asked) == &rule) continue;
-    can_win_[i] = search_->find({winners_.wins[i]}) != StateSearch::Answer::kNo;
+    can_win_[i] = search({winners_.wins[i]}) != StateSearch::Answer::kNo;
     if (can_win_[i]) continue;
     // Where it holds, an earlier one does too, so those behind it do not miss it.
     rule.kind = shm::table::kNever;
@@ -234,7 +230,13 @@ void PortCompiler::find_who_can_win(CompiledPort& result) {
     rule.expected.clear();
     rule.nodes.clear();
   }
-  context_.search_steps = search_->steps_left();
+}
+
+StateSearch::Answer PortCompiler::search(const std::vector<StateSearch::Proposition>& wanted) {
+  const int steps = search_->steps_left();
+  const auto answer = search_->find(wanted);
+  context_.budget.note(StateSearch::budget_of(steps - search_->steps_left()));
+  return answer;
 }
 
 // Whether the rule can win by what one behaviour contributes to it.
@@ -246,9 +248,7 @@ bool PortCompiler::can_win_as(std::size_t rule, const ConnectionRule& part) {
   const Diagram rest = builder.when(condition, rules_.variable(part.source));
   const auto holds =
       search_->holds(to_compiled_rule(part.source, builder.nodes(rest), rules_.names()));
-  const auto answer = search_->find({winners_.wins[rule], holds});
-  context_.search_steps = search_->steps_left();
-  return answer != StateSearch::Answer::kNo;
+  return search({winners_.wins[rule], holds}) != StateSearch::Answer::kNo;
 }
 
 std::vector<std::size_t> PortCompiler::behaviours_that_run() {
@@ -284,6 +284,8 @@ void PortCompiler::report_never_selected() {
 void PortCompiler::report_conflicts() {
   const auto pairs = context_.proof.pairs_that_meet(nodes_);
   shortest_.emplace(context_.builder);
+  // A conflict is told even where no step is left to look for a shorter witness of it.
+  const Budget::Part search(context_.budget, context_.budget.left() / 2);
   for (std::size_t i = 0; i < std::min(pairs.size(), kMaxReportedPairs); ++i) {
     report_conflict(pairs[i]);
   }
@@ -351,9 +353,7 @@ void PortCompiler::report_outgrown(const ConnectionRule* rule) {
       (rule != nullptr ? "the rule of " + rule->source : std::string("a rule")) + " at " +
           port_.port + " needs a decision diagram of more than kMaxNodesPerConnection (" +
           std::to_string(shm::kMaxNodesPerConnection) +
-          ") nodes, or the model too many steps to make its diagrams; write a simpler condition, "
-          "or "
-          "one that reads fewer sources",
+          ") nodes; write a simpler condition, or one that reads fewer sources",
       {.ports = {port_.port}, .source = rule != nullptr ? rule->source : std::string()});
 }
 

@@ -15,20 +15,20 @@
 
 namespace arbiter::rules {
 
-// Steps of diagrams that one port, and all ports of a model, may take to multiply precedence out. A
-// small part of what a builder has, so that there is enough for the rules themselves.
-inline constexpr std::size_t kMaxPortPrecedenceSteps = 500'000;
-inline constexpr std::size_t kMaxPrecedenceSteps = 4'000'000;
+// Steps that a port may take to multiply precedence out, and no more than half of what it has, so
+// that there is enough for the rules themselves.
+inline constexpr std::uint64_t kMaxPrecedenceSteps = 500'000;
 
 // What the ports of one model share.
 struct CompileContext {
-  DiagramBuilder builder;
-  Proof proof;
+  CompileContext(Budget& of_all, Diagnostics& to, std::size_t most)
+      : budget(of_all), diagnostics(to), max_precedence_nodes(most) {}
+
+  Budget& budget;
+  DiagramBuilder builder{budget};
+  Proof proof{budget};
   Diagnostics& diagnostics;
-  std::size_t max_precedence_nodes;
-  // What is left for all ports that have conflict="first".
-  std::size_t precedence_steps = kMaxPrecedenceSteps;
-  int search_steps = StateSearch::kMaxStepsInAll;
+  const std::size_t max_precedence_nodes;
 };
 
 // A behaviour's part in the rule of one connection of the port.
@@ -48,7 +48,8 @@ struct PortResult {
   std::vector<std::size_t> running;  // behaviours of which some activation satisfies the part
 };
 
-// Nothing if a limit was met, which is reported.
+// Nothing if a limit was met, which is reported. Throws StepLimit; what it has reported until then
+// is of no interest. Throws Stopped.
 std::optional<PortResult> compile_port(CompileContext& context, const PortTask& task);
 
 // Of an operator with two operands or more.

@@ -29,6 +29,9 @@ constexpr int kNodesPerCacheEntry = 4;
 // each time takes as long as a few hundred thousand nodes may.
 constexpr int kNodesToSift = 80000;
 constexpr int kAutomaticSifts = 2;
+// What BuDDy does by itself takes about as long as these would.
+constexpr std::uint64_t kStepsOfStart = 2000;
+constexpr std::uint64_t kStepsOfCollection = kMaxWorkingNodes / 16;
 
 std::mutex one_instance;
 std::uint32_t current_instance = 0;
@@ -61,6 +64,13 @@ int operator_of(Connective connective) {
   return bddop_and;
 }
 
+// Since BuDDy was started; sifting makes most of those that it moves.
+std::uint64_t nodes_made() {
+  bddStat statistics{};
+  bdd_stats(&statistics);
+  return static_cast<std::uint64_t>(statistics.produced);
+}
+
 // The result of `operation`, or the error that BuDDy called back with. Neither this frame nor
 // `operation` may hold an object with a destructor: leave_buddy() jumps over them.
 template <class Operation>
@@ -73,7 +83,7 @@ int attempt(Operation operation) {
   if (code == BDD_NODENUM || code == DiagramOperation::kTooManyNodes) {
     throw DiagramLimit("more than " + std::to_string(kMaxWorkingNodes) + " nodes");
   }
-  if (code == DiagramOperation::kTooManySteps) throw DiagramLimit("too many steps");
+  if (code == DiagramOperation::kTooManySteps) throw DiagramLimit("too many steps at once");
   if (code == BDD_MEMORY) throw std::bad_alloc();
   throw std::logic_error(std::string("decision diagrams: ") + bdd_errstring(code));
 }
@@ -99,14 +109,24 @@ Diagram::~Diagram() {
   if (instance_ == current_instance) bdd_delref(node_);
 }
 
+DiagramBuilder::DiagramBuilder(Budget& budget, int variables, bool sifts)
+    : only_one_(one_instance), budget_(budget), variables_(variables), sifts_(sifts) {
+  start();
+}
+
 DiagramBuilder::DiagramBuilder(int variables, bool sifts)
-    : only_one_(one_instance), variables_(variables), sifts_(sifts) {
+    : only_one_(one_instance),
+      own_budget_(std::in_place),
+      budget_(*own_budget_),
+      variables_(variables),
+      sifts_(sifts) {
   start();
 }
 
 DiagramBuilder::~DiagramBuilder() { stop(); }
 
 void DiagramBuilder::start() {
+  budget_.note(kStepsOfStart);  // first, since it throws where the run is to stop
   ++current_instance;
   order_changed_ = false;
   sifts_left_ = sifts_ ? kAutomaticSifts : 0;
@@ -133,7 +153,7 @@ void DiagramBuilder::start() {
 
 void DiagramBuilder::stop() {
   ++current_instance;
-  steps_ += operation_.end(true);
+  operation_.end(true);
   if (bdd_isrunning() != 0) bdd_done();
 }
 
@@ -153,15 +173,20 @@ void DiagramBuilder::start_anew(int error) {
 template <class Operation>
 Diagram DiagramBuilder::operate(Operation operation) {
   for (;;) {
+    budget_.spend(1);
     DiagramOperation* const steps = &operation_;
+    const std::uint64_t left = budget_.left();
     const DiagramOperation::Bounds bounds{
-        std::min(kMaxSteps, kMaxStepsInAll - std::min(steps_, kMaxStepsInAll)),
+        static_cast<std::size_t>(std::min<std::uint64_t>(kMaxSteps, left)),
         sifts_left_ == 0 ? kMaxWorkingNodes : max_nodes_};
     const int result = attempt([=] { return operation(*steps, bounds); });
     if (result >= 0) {
       Diagram kept = keep(result);
-      steps_ += operation_.end(false);
+      budget_.note(operation_.end(false));
       return kept;
+    }
+    if (result == DiagramOperation::kTooManySteps && left < kMaxSteps) {
+      budget_.spend(operation_.end(false) + 1);  // throws: it would take more
     }
     if (result != DiagramOperation::kTooManyNodes || sifts_left_ == 0) start_anew(result);
     begin_again();
@@ -172,7 +197,7 @@ Diagram DiagramBuilder::operate(Operation operation) {
 void DiagramBuilder::begin_again() {
   bdd_gbc();
   const bool is_in_use = bdd_getnodenum() >= max_nodes_ / 5 * 4;
-  steps_ += operation_.end(false);
+  budget_.note(operation_.end(false) + kStepsOfCollection);
   if (!is_in_use) return;
   --sifts_left_;
   sift();
@@ -220,11 +245,14 @@ Diagram DiagramBuilder::choose(int variable, const Diagram& high, const Diagram&
 
 void DiagramBuilder::sift() {
   order_changed_ = true;
+  const std::uint64_t before = nodes_made();
   const int result = attempt([] {
     bdd_reorder(BDD_REORDER_SIFT);
     return 0;
   });
+  const std::uint64_t made = nodes_made() - before;
   if (result < 0) start_anew(result);
+  budget_.note(made);
 }
 
 Diagram DiagramBuilder::constant(bool value) { return keep(value ? 1 : 0); }
@@ -274,6 +302,7 @@ DiagramNodes DiagramBuilder::nodes(const Diagram& a) {
         {level(node), bdd_var(node), successor(bdd_low(node)), successor(bdd_high(node))});
   }
   for (const int node : found) index_of_node_[static_cast<std::size_t>(node)] = shm::kNone;
+  budget_.note(found.size());
   return result;
 }
 

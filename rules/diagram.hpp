@@ -12,9 +12,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <mutex>
-#include <stdexcept>
+#include <optional>
 #include <vector>
 
+#include "rules/budget.hpp"
 #include "rules/diagram_operation.hpp"
 #include "shm/decision_table.hpp"
 #include "shm/limits.hpp"
@@ -26,13 +27,6 @@ namespace arbiter::rules {
 // of such sizes, and if sifting fills one that cannot grow to its limit for that reason alone, it
 // writes behind the table's end.
 inline constexpr int kMaxWorkingNodes = 262139;
-
-// A function outgrew the node table, or took too many steps. The builder is as new afterwards: all
-// its diagrams are lost. Once the steps of all its operations are used up, each of them fails.
-class DiagramLimit : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 // A Boolean function of the builder's variables. Two are the same function iff they are equal.
 class Diagram {
@@ -76,15 +70,18 @@ class DiagramBuilder {
   static constexpr int kVariables = static_cast<int>(shm::kMaxSourcesPerPort);
   static constexpr int kMaxVariables = 4 * kVariables;  // for what is asked of several ports
 
-  DiagramBuilder() : DiagramBuilder(kVariables) {}
   // Without sifting, diagrams that outgrow the table are given up at once: where the question is
   // not worth the second that each attempt to find a better order may take.
-  explicit DiagramBuilder(int variables, bool sifts = true);
+  explicit DiagramBuilder(Budget& budget, int variables = kVariables, bool sifts = true);
+  // With a budget of its own.
+  explicit DiagramBuilder(int variables = kVariables, bool sifts = true);
   ~DiagramBuilder();
   DiagramBuilder(const DiagramBuilder&) = delete;
   DiagramBuilder& operator=(const DiagramBuilder&) = delete;
 
-  // All of these throw DiagramLimit.
+  // All of these throw StepLimit and Stopped, after which all diagrams are as they were; and
+  // DiagramLimit where a function outgrows the node table, or one operation kMaxSteps: then the
+  // builder is as new, and all its diagrams are lost.
   [[nodiscard]] Diagram combine(Connective connective, const Diagram& a, const Diagram& b);
   [[nodiscard]] Diagram negate(const Diagram& a);
   [[nodiscard]] Diagram when(const Diagram& a, int variable);  // `variable` taken as true
@@ -102,7 +99,7 @@ class DiagramBuilder {
   [[nodiscard]] Diagram high(const Diagram& a);
 
   // Of all operations so far.
-  [[nodiscard]] std::size_t steps() const { return steps_; }
+  [[nodiscard]] std::size_t steps() const { return budget_.spent(); }
 
   [[nodiscard]] int level_of(int variable) const;
   [[nodiscard]] std::size_t node_count(const Diagram& a) const;
@@ -112,9 +109,8 @@ class DiagramBuilder {
   void restore_order();
 
  private:
-  // Of one operation, and of all of a builder, which takes some seconds.
+  // Of one operation, for the sake of the memory that its results take up until it ends.
   static constexpr std::size_t kMaxSteps = std::size_t{4} * kMaxWorkingNodes;
-  static constexpr std::size_t kMaxStepsInAll = 16 * kMaxSteps;
 
   template <class Operation>
   Diagram operate(Operation operation);
@@ -127,11 +123,12 @@ class DiagramBuilder {
   static Diagram keep(int node);
 
   std::unique_lock<std::mutex> only_one_;
+  std::optional<Budget> own_budget_;
+  Budget& budget_;
   const int variables_;
   const bool sifts_;
   bool order_changed_ = false;
   DiagramOperation operation_;
-  std::size_t steps_ = 0;
   int sifts_left_ = 0;                    // by itself
   int max_nodes_ = 0;                     // before it sifts
   std::vector<shm::Word> index_of_node_;  // scratch of nodes(), by BuDDy's node

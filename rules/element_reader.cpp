@@ -141,8 +141,7 @@ std::optional<Mention> ElementReader::port_name(const Text& text, std::string_vi
     error(std::move(problem->code), text.where(at), problem->message + text.origin(at));
     return {};
   }
-  return Mention{std::string(name), text.where(start),
-                 text.define_of(start, start + name.size())};
+  return Mention{std::string(name), text.where(start), text.define_of(start, start + name.size())};
 }
 
 std::optional<Mention> ElementReader::port_attribute(const XmlNode& element,

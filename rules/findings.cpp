@@ -29,12 +29,12 @@ class PortFindings {
                Diagnostics& diagnostics)
       : rules_(rules), port_(port), statements_(statements), diagnostics_(diagnostics) {}
 
-  // Returns the work that it took. Throws DiagramLimit.
-  std::uint64_t find(std::uint64_t max_work) {
+  // Throws DiagramLimit; what has been found until then holds.
+  void find(Budget& budget) {
     SourceOrder order;
     order.add(port_);
     add_sources(statements_, order);
-    Winners winners(order, max_work, false);
+    Winners winners(budget, order, false);
     winners_ = &winners;
     const Forget forget{*this};
     for (const auto& rule : port_.rules) {
@@ -50,7 +50,6 @@ class PortFindings {
       if (port_.in_order) throw DiagramLimit("a diagram of each winner, and those are too large");
       note_chains();
     }
-    return winners.work();
   }
 
  private:
@@ -338,11 +337,10 @@ void warn_of_losers(const RuleSet& rules, const CompiledModel& model, Diagnostic
   }
 }
 
-// Returns the work that it took. Throws DiagramLimit. What the statements cover may be too hard to
-// find out; then they quiet nothing.
-std::uint64_t look_at(const PortRules& rules, const CompiledPort& port,
-                      const ProvedStatements& statements, Diagnostics& diagnostics,
-                      std::uint64_t max_work) {
+// Throws DiagramLimit. What the statements cover may be too hard to find out; then they quiet
+// nothing.
+void look_at(const PortRules& rules, const CompiledPort& port, const ProvedStatements& statements,
+             Diagnostics& diagnostics, Budget& budget) {
   ProvedStatements own;
   for (const auto& statement : statements) {
     if (speaks_of(*statement, port)) own.push_back(statement);
@@ -350,52 +348,69 @@ std::uint64_t look_at(const PortRules& rules, const CompiledPort& port,
   if (!own.empty()) {
     try {
       Diagnostics found;
-      const std::uint64_t work = PortFindings(rules, port, own, found).find(max_work);
+      const Budget::Part part(budget, budget.left() / 2);
+      PortFindings(rules, port, own, found).find(budget);
       diagnostics.add(std::move(found));
-      return work;
+      return;
     } catch (const DiagramLimit&) {
       own.clear();
     }
   }
-  return PortFindings(rules, port, own, diagnostics).find(max_work);
+  PortFindings(rules, port, own, diagnostics).find(budget);
 }
 
 }  // namespace
 
 FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
-                          Diagnostics& diagnostics, std::uint64_t max_work,
+                          Diagnostics& diagnostics, Budget& budget,
                           const ProvedStatements& statements) {
   warn_of_losers(rules, model, diagnostics);
-  FindingsAccount account;
-  std::vector<std::string> open;  // ports
-  Location first_open;
-  std::string why_open;  // of the first
   std::map<std::string, const CompiledPort*> compiled;
   for (const auto& port : model.ports) compiled.emplace(port.port, &port);
+  struct Question {
+    const PortRules* rules;
+    const CompiledPort* port;
+    Diagnostics found;
+    std::string limit;  // why it is open
+  };
+  std::vector<Question> questions;
   for (const auto& port : rules.ports) {
     const auto found = compiled.find(port.port);
-    if (found == compiled.end()) continue;
-    ++account.ports;
-    const std::uint64_t room = std::min(kMaxPortWork, max_work - std::min(max_work, account.work));
-    std::string limit = "the model's other ports have used up all steps";
-    if (room > 0) {
-      try {
-        account.work += look_at(port, *found->second, statements, diagnostics, room);
-        continue;
-      } catch (const DiagramLimit& reached) {
-        account.work += room;
-        limit = std::string("it takes ") + reached.what();
-      }
+    if (found != compiled.end()) questions.push_back({&port, found->second, {}, {}});
+  }
+  const auto ask = [&](std::size_t i) {
+    Question& question = questions[i];
+    question.found = {};
+    question.limit.clear();
+    try {
+      look_at(*question.rules, *question.port, statements, question.found, budget);
+    } catch (const StepLimit& limit) {
+      question.limit = limit.what();
+      throw;
+    } catch (const DiagramLimit& limit) {
+      question.limit = limit.what();
     }
-    if (open.empty()) first_open = port.where, why_open = limit;
-    open.push_back(port.port);
+  };
+  share_out(
+      budget, "looking for states in which nobody wins", questions.size(),
+      [&](std::size_t i) { return questions[i].rules->port; }, ask);
+  FindingsAccount account{questions.size(), 0};
+  std::vector<std::string> open;  // ports
+  std::string why_open;           // of the first
+  Location first_open;
+  for (Question& question : questions) {
+    diagnostics.add(std::move(question.found));
+    if (question.limit.empty()) continue;
+    if (open.empty()) first_open = question.rules->where, why_open = question.limit;
+    open.push_back(question.rules->port);
   }
   account.open = open.size();
   if (open.empty()) return account;
   const std::string first = open.size() > 1 ? "at " + open.front() + ", " : "";
   const std::string message = "not all states in which nobody wins at " + enumerate(open) +
-                              " were looked at: " + first + why_open +
-                              "; the model is in order, this is only not known";
+                              " were looked at: " + first + "it takes " + why_open +
+                              "; the model is in order, this is only not known: --effort allows "
+                              "more";
   diagnostics.note("left-open", first_open, message, {.ports = std::move(open)});
   return account;
 }

@@ -49,9 +49,8 @@ class PortComparison {
   PortComparison(const CompiledPort& before, const CompiledPort& after, PortDiff& result)
       : before_(before), after_(after), result_(result) {}
 
-  // Takes what it needs from the work that is left; what outgrows the diagrams counts as all that a
-  // port may take.
-  void compare(std::uint64_t& work_left) {
+  // Throws StepLimit, and then the result is that the port is open.
+  void compare(Budget& budget) {
     SourceOrder order;
     order.add(before_);
     order.add(after_);
@@ -60,18 +59,18 @@ class PortComparison {
     gather_candidates();
     if (candidates_.empty()) return;
     try {
-      Winners winners(order, std::min(work_left, max_work()));
+      const Budget::Part part(budget, steps_at_once(budget));
+      Winners winners(budget, order);
+      const Release release{*this};
       winners_ = &winners;
+      budget_ = &budget;
       count_pairs();
       add_examples();
-      work_left -= std::min(work_left, winners.work());
-      release();
+    } catch (const StepLimit& limit) {
+      search(budget, limit.what());
+      throw;
     } catch (const DiagramLimit& limit) {
-      work_left -= std::min(work_left, max_work());
-      release();
-      result_.changes.clear();
-      result_.states = "0";
-      search(work_left, limit.what());
+      search(budget, limit.what());
     }
   }
 
@@ -95,16 +94,18 @@ class PortComparison {
   };
 
   // Rules are decided in order because their diagrams are too large: little hope for these here.
-  [[nodiscard]] std::uint64_t max_work() const {
-    constexpr std::uint64_t kMaxWorkInOrder = 500'000;
-    return before_.in_order || after_.in_order ? kMaxWorkInOrder : Winners::kMaxWork;
+  // A part is left for the search.
+  [[nodiscard]] std::uint64_t steps_at_once(const Budget& budget) const {
+    constexpr std::uint64_t kMostInOrder = 500'000;
+    const std::uint64_t most = budget.left() / 4 * 3;
+    return before_.in_order || after_.in_order ? std::min(most, kMostInOrder) : most;
   }
 
   // State by state: one in which the winners differ, then one in which another pair of them does.
-  void search(std::uint64_t& work_left, const std::string& limit) {
-    constexpr std::uint64_t kWorkOfStep = 200;
-    const auto max_steps = static_cast<int>(
-        std::min<std::uint64_t>(work_left / kWorkOfStep, StateSearch::kMaxStepsInAll));
+  void search(Budget& budget, const std::string& limit) {
+    result_.changes.clear();
+    result_.states = "0";
+    const int max_steps = StateSearch::steps_within(budget.left());
     StateSearch search(max_steps);
     const auto before = search.winners(before_), after = search.winners(after_);
     search.require_any({-before.nobody, -after.nobody});
@@ -125,7 +126,7 @@ class PortComparison {
       result_.changes.push_back(std::move(change));
       search.require_any({-pair});
     }
-    work_left -= static_cast<std::uint64_t>(max_steps - search.steps_left()) * kWorkOfStep;
+    budget.note(StateSearch::budget_of(max_steps - search.steps_left()));
     result_.is_complete = answer == StateSearch::Answer::kNo;
     result_.is_counted = result_.is_complete && result_.changes.empty();
     if (!result_.is_complete && result_.changes.empty()) result_.open = limit;
@@ -162,7 +163,9 @@ class PortComparison {
   }
 
   StateCount count(const Diagram& function) {
-    return count_states(winners_->nodes(function), result_.sources);
+    const DiagramNodes nodes = winners_->nodes(function);
+    budget_->spend(nodes.nodes.size());
+    return count_states(nodes, result_.sources);
   }
 
   void build(Side& side) {
@@ -241,12 +244,14 @@ class PortComparison {
     return states;
   }
 
-  // Diagrams must not outlive their builder.
-  void release() {
-    candidates_.clear();
-    found_.clear();
-    winners_ = nullptr;
-  }
+  struct Release {  // diagrams must not outlive their builder
+    PortComparison& comparison;
+    ~Release() {
+      comparison.candidates_.clear();
+      comparison.found_.clear();
+      comparison.winners_ = nullptr;
+    }
+  };
 
   static constexpr std::size_t kMaxExamples = 64;
 
@@ -254,6 +259,7 @@ class PortComparison {
   const CompiledPort& after_;
   PortDiff& result_;
   Winners* winners_ = nullptr;
+  Budget* budget_ = nullptr;
   std::vector<Candidate> candidates_;
   std::vector<Found> found_;
 };
@@ -267,10 +273,10 @@ std::vector<std::string> only_in(const CompiledPort& port, const CompiledPort* o
   return {sources.begin(), sources.end()};
 }
 
-PortDiff compare_ports(const CompiledPort* before, const CompiledPort* after,
-                       std::uint64_t& work_left) {
+// All but who wins.
+PortDiff outline(const std::string& port, const CompiledPort* before, const CompiledPort* after) {
   PortDiff result;
-  result.port = before != nullptr ? before->port : after->port;
+  result.port = port;
   result.exists_before = before != nullptr;
   result.exists_after = after != nullptr;
   result.arbitrated_before = before != nullptr && before->arbitrated;
@@ -279,10 +285,6 @@ PortDiff compare_ports(const CompiledPort* before, const CompiledPort* after,
   result.first_wins_after = after != nullptr && after->first_wins;
   if (before != nullptr) result.connections_before = only_in(*before, after);
   if (after != nullptr) result.connections_after = only_in(*after, before);
-  if (before == nullptr || after == nullptr) return result;
-  if (before->arbitrated && after->arbitrated) {
-    PortComparison(*before, *after, result).compare(work_left);
-  }
   return result;
 }
 
@@ -334,15 +336,30 @@ bool ModelDiff::is_open() const {
                                    [](const PortDiff& port) { return !port.open.empty(); });
 }
 
-ModelDiff diff(const CompiledModel& before, const CompiledModel& after, std::uint64_t max_work) {
-  std::map<std::string, std::pair<const CompiledPort*, const CompiledPort*>> ports;
+ModelDiff diff(const CompiledModel& before, const CompiledModel& after, Budget& budget) {
+  using Sides = std::pair<const CompiledPort*, const CompiledPort*>;
+  std::map<std::string, Sides> ports;
   for (const auto& port : before.ports) ports[port.port].first = &port;
   for (const auto& port : after.ports) ports[port.port].second = &port;
-  ModelDiff result;
-  result.compared_ports = ports.size();
-  std::uint64_t work_left = max_work;
+  std::vector<PortDiff> compared;
+  std::vector<std::pair<std::size_t, Sides>>
+      questions;  // of which ports who wins is to be compared
   for (const auto& [name, sides] : ports) {
-    PortDiff port = compare_ports(sides.first, sides.second, work_left);
+    compared.push_back(outline(name, sides.first, sides.second));
+    if (!compared.back().arbitrated_before || !compared.back().arbitrated_after) continue;
+    questions.emplace_back(compared.size() - 1, sides);
+  }
+  share_out(
+      budget, "comparing", questions.size(),
+      [&](std::size_t i) { return compared[questions[i].first].port; },
+      [&](std::size_t i) {
+        const auto& [port, sides] = questions[i];
+        compared[port] = outline(compared[port].port, sides.first, sides.second);
+        PortComparison(*sides.first, *sides.second, compared[port]).compare(budget);
+      });
+  ModelDiff result;
+  result.compared_ports = compared.size();
+  for (PortDiff& port : compared) {
     const bool handles_conflicts_alike = port.first_wins_before == port.first_wins_after;
     if (port.differs() || !port.open.empty() || !handles_conflicts_alike) {
       result.ports.push_back(std::move(port));

@@ -10,12 +10,12 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
 
+#include "rules/budget.hpp"
 #include "rules/compile.hpp"
 #include "rules/diagnostic.hpp"
 
@@ -66,11 +66,8 @@ struct ModelDiff {
   [[nodiscard]] bool is_open() const;
 };
 
-// Nodes of the diagrams of one comparison together: some seconds.
-inline constexpr std::uint64_t kMaxDiffWork = 80'000'000;
-
-ModelDiff diff(const CompiledModel& before, const CompiledModel& after,
-               std::uint64_t max_work = kMaxDiffWork);
+// Shares out what is left of the budget among the ports. Throws Stopped.
+ModelDiff diff(const CompiledModel& before, const CompiledModel& after, Budget& budget);
 
 // For people. Says "no difference" where there is none.
 void write_text(std::ostream& out, const ModelDiff& diff);

@@ -1,7 +1,5 @@
 #include "rules/proof.hpp"
 
-#include <string>
-
 namespace arbiter::rules {
 namespace {
 
@@ -74,6 +72,7 @@ std::vector<Proof::Pair> Proof::pairs_that_meet(const std::vector<DiagramNodes>&
 }
 
 Literals Proof::meeting_point(const DiagramNodes& a, const DiagramNodes& b) {
+  const Budget::Overdraft overdraft(budget_);
   if (!meet(a, b)) return {};
   Literals point = path_;
   const auto leave_out = [&](VariableSet& side) {
@@ -97,9 +96,7 @@ bool Proof::meet(const DiagramNodes& a, const DiagramNodes& b) {
 bool Proof::walk(const DiagramNodes& a, shm::Word at_a, const DiagramNodes& b, shm::Word at_b) {
   if (at_a == kFalse || at_b == kFalse) return false;
   if (at_a == kTrue && at_b == kTrue) return true;
-  if (++steps_ > kMaxProofSteps) {
-    throw ProofLimit("more than " + std::to_string(kMaxProofSteps) + " steps");
-  }
+  budget_.spend(1);
   const std::uint64_t both = std::uint64_t{at_a} << 32 | at_b;
   if (apart_.contains(both)) return false;
 

@@ -9,7 +9,6 @@
 
 #include <bitset>
 #include <cstdint>
-#include <stdexcept>
 #include <unordered_set>
 #include <utility>
 #include <vector>
@@ -37,30 +36,26 @@ bool exclude_each_other(const Literals& a, const Literals& b);
 // Whether the function holds under each activation in which `given` holds.
 bool holds_given(const DiagramNodes& function, const Literals& given);
 
-// Walking took more than kMaxProofSteps.
-class ProofLimit : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
-// Steps of all walks of one compilation together: a second or two.
-inline constexpr std::uint64_t kMaxProofSteps = 20'000'000;
-
 class Proof {
  public:
+  explicit Proof(Budget& budget) : budget_(budget) {}
+
   using Pair = std::pair<std::size_t, std::size_t>;  // indices, the lower one first
 
   // Every pair of functions that can hold together, in order of the second, then of the first.
+  // Throws StepLimit, Stopped.
   std::vector<Pair> pairs_that_meet(const std::vector<DiagramNodes>& functions);
 
-  // Some activation under which both hold; no literal of it can be left out. For two that meet.
+  // Some activation under which both hold; no literal of it can be left out. For two that are known
+  // to meet: whatever is left of the budget, since it takes no more than to find that out. Throws
+  // Stopped.
   Literals meeting_point(const DiagramNodes& a, const DiagramNodes& b);
 
  private:
   bool meet(const DiagramNodes& a, const DiagramNodes& b);
   bool walk(const DiagramNodes& a, shm::Word at_a, const DiagramNodes& b, shm::Word at_b);
 
-  std::uint64_t steps_ = 0;
+  Budget& budget_;
   std::unordered_set<std::uint64_t> apart_;  // pairs of nodes known to exclude each other
   Literals path_;                            // to where the last walk found that both hold
 };

@@ -5,6 +5,8 @@
 // Thread safety: none; a search is for one thread, and any number of them may live.
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <initializer_list>
 #include <memory>
 #include <string>
@@ -26,6 +28,15 @@ class StateSearch {
   // solver.
   static constexpr int kMaxSteps = 5'000;
   static constexpr int kMaxStepsInAll = 50'000;
+
+  // Steps of a budget that one of a search takes about as long as.
+  static constexpr std::uint64_t kBudgetPerStep = 200;
+  static int steps_within(std::uint64_t budget) {
+    return static_cast<int>(std::min<std::uint64_t>(budget / kBudgetPerStep, kMaxStepsInAll));
+  }
+  static std::uint64_t budget_of(int steps) {
+    return static_cast<std::uint64_t>(std::max(steps, 0)) * kBudgetPerStep;
+  }
 
   explicit StateSearch(int max_steps = kMaxStepsInAll);
   ~StateSearch();

@@ -5,9 +5,9 @@
 #include <set>
 #include <unordered_map>
 
-#include "rules/compile_port.hpp"
 #include "rules/names.hpp"
 #include "rules/quantifiers.hpp"
+#include "rules/question.hpp"
 #include "rules/winners.hpp"
 
 namespace arbiter::rules {
@@ -15,12 +15,8 @@ namespace {
 
 using Active = std::set<std::string>;
 
-struct Term {
-  const CompiledPort* port;
-  std::vector<const CompiledRule*> rules{};  // of which one wins
-  bool nobody = false;                       // in place of these: nobody wins
-  const CompiledPort* other = nullptr;       // in place of both: the winner is the same there
-};
+// Before a statement about whole ports is looked at case by case: a second or two.
+constexpr std::uint64_t kMaxStepsAtOnce = 16'000'000;
 
 }  // namespace
 
@@ -31,258 +27,174 @@ struct ProvedStatement {
 
 namespace {
 
-// One statement about one model.
-class Question {
- public:
-  Question(const Expression& expression, std::vector<Term> terms, std::uint64_t max_work)
-      : expression_(expression), terms_(std::move(terms)), max_work_(max_work) {}
+// A statement that has a meaning in the model.
+struct Case {
+  Verdict verdict;
+  ExpressionPtr expression;  // quantifiers expanded
+  std::vector<Term> terms;
+  std::set<std::string> ports;  // that it speaks of
 
-  // The states in which the statement is true if that rule's source wins at the port.
-  Diagram if_it_won(Winners& winners, const CompiledPort& port, const CompiledRule& rule) {
-    winners_ = &winners;
-    decided_ = {{&port, &rule}};
-    const Forget forget{*this};
-    return build(expression_);
+  // Some part of it takes all rules of a port.
+  [[nodiscard]] bool has_cases() const {
+    return std::any_of(terms.begin(), terms.end(),
+                       [](const Term& term) { return term.is_of_all(); });
   }
+};
 
-  // A witness against the statement, if there is one. Throws DiagramLimit.
-  std::optional<Witness> refute() {
-    gather();
-    // That nobody wins, or the same as elsewhere, needs all rules of a port in one diagram. Where
-    // that is too large, each possible winner is looked at by itself.
-    try {
-      return ask(false);
-    } catch (const DiagramLimit&) {
-      if (whole_.empty()) throw;
-    }
-    return ask(true);
-  }
+// What statements about the same ports share.
+struct SharedScene {
+  SharedScene(Budget& budget, const SourceOrder& order) : winners(budget, order) {}
 
- private:
-  void gather() {
-    for (const Term& term : terms_) {
-      order_.add(*term.port);
-      if (term.other != nullptr) order_.add(*term.other);
-    }
-    add_sources(expression_);
-    for (const Term& term : terms_) {
-      if (term.nobody || term.other != nullptr) add_whole(*term.port);
-      if (term.other != nullptr) add_whole(*term.other);
-    }
-  }
-
-  std::optional<Witness> ask(bool by_cases) {
-    std::optional<Witness> witness;
-    try {
-      Winners winners(order_, max_work_);
-      winners_ = &winners;
-      const Diagram bad = by_cases ? refute_by_cases(0, winners.constant(true))
-                                   : winners.negate(build(expression_));
-      if (!bad.is_false()) witness = winners.witness(bad);
-    } catch (...) {
-      forget();
-      throw;
-    }
-    forget();
-    return witness;
-  }
-
-  struct Forget {
-    Question& question;
-    ~Forget() { question.forget(); }
-  };
-
-  void forget() {  // diagrams must not outlive their builder
-    built_.clear();
-    decided_.clear();
-    winners_ = nullptr;
-  }
-
-  void add_whole(const CompiledPort& port) {
-    if (std::find(whole_.begin(), whole_.end(), &port) == whole_.end()) whole_.push_back(&port);
-  }
-
-  void add_sources(const Expression& expression) {
-    if (expression.op == Operator::kSource && !expression.name.starts_with('=')) {
-      order_.add(expression.name);
-    }
-    for (const auto& operand : expression.operands) add_sources(*operand);
-  }
-
-  // The winner at each port of whole_ is chosen in turn; what is left of the statement then reads
-  // few rules, and most often contradicts `state` at once.
-  Diagram refute_by_cases(std::size_t next, const Diagram& state) {
-    if (next == whole_.size()) {
-      Diagram bad = winners_->combine(Connective::kAndNot, state, build(expression_));
-      built_.clear();
-      for (const auto& [port, winner] : decided_) {
-        if (winner != nullptr) continue;
-        for (const auto& rule : port->rules) {
-          if (bad.is_false()) return bad;
-          bad = winners_->combine(Connective::kAndNot, bad, winners_->holds(rule));
-        }
-      }
-      return bad;
-    }
-    const CompiledPort* port = whole_[next];
-    decided_[port] = nullptr;
-    Diagram bad = refute_by_cases(next + 1, state);
-    for (const auto& rule : port->rules) {
-      if (!bad.is_false()) break;
-      const Diagram wins =
-          winners_->combine(Connective::kAnd, state, winners_->winner(*port, rule));
-      if (wins.is_false()) continue;
-      decided_[port] = &rule;
-      bad = refute_by_cases(next + 1, wins);
-    }
-    decided_.erase(port);
-    return bad;
-  }
-
-  Diagram build(const Expression& expression) {
-    if (const auto known = built_.find(&expression); known != built_.end()) return known->second;
-    Diagram result = build_new(expression);
-    built_.emplace(&expression, result);
-    return result;
-  }
-
-  Diagram build_new(const Expression& expression) {
-    const auto& operands = expression.operands;
-    switch (expression.op) {
-      case Operator::kFalse:
-      case Operator::kTrue:
-        return winners_->constant(expression.op == Operator::kTrue);
-      case Operator::kSource:
-        if (!expression.name.starts_with('=')) return winners_->active(expression.name);
-        return build_term(terms_.at(std::stoul(expression.name.substr(1))));
-      case Operator::kNot:
-        return winners_->negate(build(*operands[0]));
-      case Operator::kAnd:
-      case Operator::kOr: {
-        Diagram result = winners_->constant(expression.op == Operator::kAnd);
-        for (std::size_t i = operands.size(); i-- > 0;) {
-          result = winners_->combine(connective_of(expression.op), result, build(*operands[i]));
-        }
-        return result;
-      }
-      default: {
-        const Diagram left = build(*operands[0]);
-        return winners_->combine(connective_of(expression.op), left, build(*operands[1]));
-      }
-    }
-  }
-
-  Diagram build_term(const Term& term) {
-    if (term.other != nullptr) return build_same(*term.port, *term.other);
-    if (const auto known = decided_.find(term.port); known != decided_.end()) {
-      const auto* const winner = known->second;
-      const auto& rules = term.rules;
-      return winners_->constant(term.nobody
-                                    ? winner == nullptr
-                                    : std::find(rules.begin(), rules.end(), winner) != rules.end());
-    }
-    Diagram result = winners_->constant(term.nobody);
-    if (term.nobody) {
-      for (const auto& rule : term.port->rules) {
-        result = winners_->combine(Connective::kAndNot, result, winners_->holds(rule));
-      }
-    }
-    for (const auto* rule : term.rules) {
-      result = winners_->combine(Connective::kOr, result, winners_->winner(*term.port, *rule));
-    }
-    return result;
-  }
-
-  // Each source wins at both or at neither: since only one can win at each, that is the same
-  // winner.
-  Diagram build_same(const CompiledPort& port, const CompiledPort& other) {
-    std::set<std::string> sources;
-    for (const auto* each : {&port, &other}) {
-      for (const auto& rule : each->rules) sources.insert(rule.source);
-    }
-    Diagram same = winners_->constant(true);
-    for (const auto& source : sources) {
-      const Diagram differ =
-          winners_->combine(Connective::kXor, wins_at(port, source), wins_at(other, source));
-      same = winners_->combine(Connective::kAndNot, same, differ);
-    }
-    return same;
-  }
-
-  Diagram wins_at(const CompiledPort& port, const std::string& source) {
-    if (const auto known = decided_.find(&port); known != decided_.end()) {
-      return winners_->constant(known->second != nullptr && known->second->source == source);
-    }
-    for (const auto& rule : port.rules) {
-      if (rule.source == source) return winners_->winner(port, rule);
-    }
-    return winners_->constant(false);
-  }
-
-  const Expression& expression_;
-  const std::vector<Term> terms_;
-  const std::uint64_t max_work_;
-  SourceOrder order_;
-  std::vector<const CompiledPort*> whole_;  // of which it takes all rules to tell
-  Winners* winners_ = nullptr;
-  std::unordered_map<const Expression*, Diagram> built_;
-  std::map<const CompiledPort*, const CompiledRule*> decided_;  // null: nobody wins
+  Winners winners;
+  Scene scene{winners};
 };
 
 class Judge {
  public:
-  Judge(const CompiledModel& model, Diagnostics& diagnostics, std::uint64_t max_work)
+  Judge(const CompiledModel& model, Diagnostics& diagnostics, Budget& budget)
       : diagnostics_(diagnostics),
-        max_work_(max_work),
+        budget_(budget),
         expansion_(model.sources),
         sources_(model.sources.begin(), model.sources.end()) {
     for (const auto& port : model.ports) ports_.emplace(port.port, &port);
   }
 
-  std::optional<Verdict> judge(const Statement& statement) {
+  std::vector<Verdict> judge(const std::vector<Statement>& statements) {
+    for (const Statement& statement : statements) admit(statement);
+    // Those about the same ports after each other, for they share a scene.
+    std::vector<std::size_t> order(cases_.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return cases_[a].ports < cases_[b].ports;
+    });
+    share_out(
+        budget_, "judging statements", order.size(),
+        [&](std::size_t i) { return cases_[order[i]].verdict.statement; },
+        [&](std::size_t i) { decide(cases_[order[i]]); });
+    std::vector<Verdict> verdicts;
+    for (Case& each : cases_) verdicts.push_back(std::move(each.verdict));
+    return verdicts;
+  }
+
+ private:
+  // Unless it speaks of what the model does not have, which is reported.
+  void admit(const Statement& statement) {
     statement_ = &statement;
     bool has_meaning = true;
-    std::vector<Term> terms;
+    Case admitted;
     for (const auto& term : statement.parsed.terms) {
       const auto found = find_term(term);
       has_meaning = has_meaning && found.has_value();
-      if (found) terms.push_back(*found);
+      if (!found) continue;
+      admitted.terms.push_back(*found);
     }
     for (const auto& source : statement.parsed.sources) {
       has_meaning = is_known(source) && has_meaning;
     }
     for (const auto& glob : statement.parsed.globs) warn_if_unmatched(glob);
-    if (!has_meaning) return std::nullopt;
-    return decide(statement, terms);
+    if (!has_meaning) return;
+    admitted.expression = expansion_.expand(statement.parsed.expression);
+    admitted.verdict.statement = statement.text;
+    admitted.verdict.where = statement.where;
+    for (const auto* port : ports_of(admitted.terms)) {
+      admitted.verdict.ports.push_back(port->port);
+      admitted.ports.insert(port->port);
+    }
+    cases_.push_back(std::move(admitted));
   }
 
- private:
-  Verdict decide(const Statement& statement, const std::vector<Term>& terms) {
-    Verdict verdict;
-    verdict.statement = statement.text;
-    verdict.where = statement.where;
-    const auto ports = ports_of(terms);
-    for (const auto* port : ports) verdict.ports.push_back(port->port);
-    const ExpressionPtr expression = expansion_.expand(statement.parsed.expression);
+  // Throws StepLimit, and then the verdict is that the question is open.
+  void decide(Case& of) {
+    Verdict& verdict = of.verdict;
+    verdict.kind = Verdict::Kind::kOpen;
     try {
-      verdict.witness = Question(*expression, terms, max_work_).refute();
-    } catch (const DiagramLimit& limit) {
-      verdict.kind = Verdict::Kind::kOpen;
+      verdict.witness = refute(of);
+    } catch (const StepLimit& limit) {
       verdict.limit = limit.what();
-      return verdict;
+      throw;
+    } catch (const DiagramLimit& limit) {
+      verdict.limit = limit.what();
+      return;
     }
+    verdict.limit.clear();
+    verdict.kind = verdict.witness ? Verdict::Kind::kRefuted : Verdict::Kind::kProved;
     if (!verdict.witness) {
-      verdict.proved = std::make_shared<const ProvedStatement>(ProvedStatement{expression, terms});
-      return verdict;
+      verdict.proved =
+          std::make_shared<const ProvedStatement>(ProvedStatement{of.expression, of.terms});
+      return;
     }
-    verdict.kind = Verdict::Kind::kRefuted;
     const Active active(verdict.witness->active.begin(), verdict.witness->active.end());
-    for (const auto* port : ports) {
+    for (const auto* port : ports_of(of.terms)) {
       const CompiledRule* winner = find_winner(*port, active);
       verdict.winners.emplace_back(
           port->port, winner == nullptr ? std::nullopt : std::optional(winner->source));
     }
-    return verdict;
+  }
+
+  std::optional<Witness> refute(const Case& of) {
+    std::set<std::string> sources;
+    std::set<const Expression*> seen;
+    add_sources_of(*of.expression, sources, seen);
+    budget_.spend(sources.size());
+    set_scene(of.ports, sources);
+    try {
+      Question question(*of.expression, of.terms, shared_->scene);
+      if (!question.has_cases()) return question.refute(Question::Way::kAtOnce);
+      const Budget::Part part(budget_, std::min(budget_.left() / 2, kMaxStepsAtOnce));
+      return question.refute(Question::Way::kAtOnce);
+    } catch (const StepLimit&) {
+      if (!of.has_cases()) throw;
+    } catch (const DiagramLimit&) {
+      shared_.reset();
+      if (!of.has_cases()) throw;
+    }
+    return refute_by_cases(of, sources);
+  }
+
+  std::optional<Witness> refute_by_cases(const Case& of, const std::set<std::string>& sources) {
+    set_scene(of.ports, sources);
+    try {
+      return Question(*of.expression, of.terms, shared_->scene).refute(Question::Way::kByCases);
+    } catch (const StepLimit&) {
+      throw;
+    } catch (const DiagramLimit&) {
+      shared_.reset();
+      throw;
+    }
+  }
+
+  // Goes on with the one that there is if it is of these ports, and knows these sources.
+  void set_scene(const std::set<std::string>& ports, const std::set<std::string>& sources) {
+    const auto is_known = [&](const std::string& source) {
+      return source.starts_with('=') || scene_sources_.contains(source);
+    };
+    if (shared_ && scene_ports_ == ports && std::all_of(sources.begin(), sources.end(), is_known)) {
+      return;
+    }
+    shared_.reset();
+    SourceOrder order;
+    for (const auto& port : ports) order.add(*ports_.at(port));
+    for (const auto& source : sources_with(ports, sources)) {
+      if (!source.starts_with('=')) order.add(source);
+    }
+    shared_.emplace(budget_, order);
+    scene_ports_ = ports;
+    const auto& names = shared_->winners.sources();
+    scene_sources_ = {names.begin(), names.end()};
+  }
+
+  // What all statements about these ports read or, where that is too much, these sources.
+  const std::set<std::string>& sources_with(const std::set<std::string>& ports,
+                                            const std::set<std::string>& sources) {
+    constexpr std::size_t kMost = DiagramBuilder::kMaxVariables;
+    const auto [found, is_new] = read_with_.try_emplace(ports);
+    auto& all = found->second;
+    std::set<const Expression*> seen;
+    for (std::size_t i = 0; is_new && i < cases_.size() && all.size() <= kMost; ++i) {
+      if (cases_[i].ports == ports) add_sources_of(*cases_[i].expression, all, seen);
+    }
+    const bool has_room = all.size() + ports.size() * shm::kMaxSourcesPerPort <= kMost;
+    return has_room ? all : sources;
   }
 
   // Each once.
@@ -321,7 +233,9 @@ class Judge {
     const auto port = ports_.find(mention.name);
     if (port == ports_.end()) {
       std::vector<std::string_view> names;
-      for (const auto& [name, known] : ports_) names.push_back(name);
+      if (may_suggest()) {
+        for (const auto& [name, known] : ports_) names.push_back(name);
+      }
       report("unknown-port", mention,
              "the model has no input port " + mention.name +
                  advise(mention.name, names, "name one that is arbitrated"),
@@ -339,10 +253,12 @@ class Judge {
 
   // Of a connection; null, reported, if there is none.
   const CompiledRule* find_rule(const CompiledPort& port, const Mention& source) {
-    std::vector<std::string_view> names;
     for (const auto& rule : port.rules) {
       if (rule.source == source.name) return &rule;
-      names.push_back(rule.source);
+    }
+    std::vector<std::string_view> names;
+    if (may_suggest()) {
+      for (const auto& rule : port.rules) names.push_back(rule.source);
     }
     report("not-connected", source,
            source.name + " is not connected to " + port.port + ", so that it can never win there" +
@@ -372,19 +288,23 @@ class Judge {
 
   bool is_known(const Mention& source) {
     if (sources_.contains(source.name)) return true;
-    const std::vector<std::string_view> names(sources_.begin(), sources_.end());
-    const bool may_suggest = ++unknown_ <= kMaxSuggestions;
+    std::vector<std::string_view> names;
+    if (may_suggest()) names.assign(sources_.begin(), sources_.end());
     report("unknown-source", source,
            "neither the model nor its application names a source " + source.name +
-               (may_suggest ? advise(source.name, names, "name one that it reads or connects")
-                            : std::string("; name one that it reads or connects")),
+               advise(source.name, names, "name one that it reads or connects"),
            {.source = source.name});
     return false;
   }
 
+  // To compare a name with all others takes long, and nobody reads so many.
+  bool may_suggest() { return ++unknown_ <= kMaxSuggestions; }
+
   void warn_if_unmatched(const Mention& glob) {
+    const auto [known, is_new] = matched_.try_emplace(glob.name);
     const auto fits = [&](const auto& source) { return matches(glob.name, source); };
-    if (std::any_of(sources_.begin(), sources_.end(), fits)) return;
+    if (is_new) known->second = std::any_of(sources_.begin(), sources_.end(), fits);
+    if (known->second) return;
     diagnostics_.warning("matches-nothing", glob.where,
                          "no source matches " + quote(glob.name) +
                              ": any() is false of it, all() and none() are true; correct it",
@@ -392,12 +312,18 @@ class Judge {
   }
 
   Diagnostics& diagnostics_;
-  const std::uint64_t max_work_;
+  Budget& budget_;
   QuantifierExpansion expansion_;
   std::set<std::string, std::less<>> sources_;
   std::map<std::string, const CompiledPort*> ports_;
-  const Statement* statement_ = nullptr;  // the one that is judged
+  std::unordered_map<std::string, bool> matched_;  // by pattern: whether any source does
+  const Statement* statement_ = nullptr;           // the one that is admitted
   std::size_t unknown_ = 0;
+  std::vector<Case> cases_;
+  std::map<std::set<std::string>, std::set<std::string>> read_with_;  // by ports
+  std::optional<SharedScene> shared_;                                 // of these ports and sources
+  std::set<std::string> scene_ports_;
+  std::set<std::string> scene_sources_;
 };
 
 Subject about(const Verdict& verdict) {
@@ -419,13 +345,8 @@ std::string in_words(const Verdict& verdict) {
 }  // namespace
 
 std::vector<Verdict> judge(const std::vector<Statement>& statements, const CompiledModel& model,
-                           Diagnostics& diagnostics, std::uint64_t max_work) {
-  Judge judge(model, diagnostics, max_work);
-  std::vector<Verdict> verdicts;
-  for (const auto& statement : statements) {
-    if (auto verdict = judge.judge(statement)) verdicts.push_back(std::move(*verdict));
-  }
-  return verdicts;
+                           Diagnostics& diagnostics, Budget& budget) {
+  return Judge(model, diagnostics, budget).judge(statements);
 }
 
 bool speaks_of(const ProvedStatement& statement, const CompiledPort& port) {
@@ -452,8 +373,9 @@ void add_sources(const ProvedStatements& statements, SourceOrder& order) {
 
 Diagram allowed_by(const ProvedStatement& statement, Winners& winners, const CompiledPort& port,
                    const CompiledRule& rule, const Diagram& states) {
-  Question question(*statement.expression, statement.terms, Winners::kMaxWork);
-  return winners.combine(Connective::kAnd, states, question.if_it_won(winners, port, rule));
+  Scene scene(winners);
+  Question question(*statement.expression, statement.terms, scene);
+  return winners.combine(Connective::kAnd, states, question.if_it_won(port, rule));
 }
 
 void report(const std::vector<Verdict>& verdicts, Diagnostics& diagnostics, bool with_proved) {
@@ -467,7 +389,8 @@ void report(const std::vector<Verdict>& verdicts, Diagnostics& diagnostics, bool
     } else if (verdict.kind == Verdict::Kind::kOpen) {
       diagnostics.error("left-open", verdict.where,
                         "neither proved nor refuted: it takes " + verdict.limit +
-                            "; make several statements of it, about fewer ports each",
+                            "; make several statements of it, about fewer ports each, or allow "
+                            "more steps with --effort",
                         about(verdict));
     } else if (with_proved) {
       diagnostics.note("proved", verdict.where, "true in every state: " + verdict.statement,

@@ -7,22 +7,19 @@
 // Thread safety: as rules/model_diff.hpp.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "rules/budget.hpp"
 #include "rules/compile.hpp"
 #include "rules/diagnostic.hpp"
 #include "rules/statement.hpp"
 #include "rules/winners.hpp"
 
 namespace arbiter::rules {
-
-// Nodes of the diagrams of one statement together: a second or two.
-inline constexpr std::uint64_t kMaxStatementWork = 20'000'000;
 
 // A statement that was proved, looked up in the model that it was proved of; to be used while that
 // lives.
@@ -46,9 +43,10 @@ struct Verdict {
 
 // Verdicts on all statements that have a meaning in the model, in their order. Ports and sources
 // that it does not know, ports that are not arbitrated, and winners that are not connected are
-// reported as errors; patterns that nothing matches as warnings.
+// reported as errors; patterns that nothing matches as warnings. Shares out what is left of the
+// budget among the statements. Throws Stopped.
 std::vector<Verdict> judge(const std::vector<Statement>& statements, const CompiledModel& model,
-                           Diagnostics& diagnostics, std::uint64_t max_work = kMaxStatementWork);
+                           Diagnostics& diagnostics, Budget& budget);
 
 [[nodiscard]] bool speaks_of(const ProvedStatement& statement, const CompiledPort& port);
 // What it takes to ask the next question of each of them.

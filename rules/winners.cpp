@@ -80,34 +80,18 @@ void SourceOrder::add(const std::string& source) {
   if (std::find(names_.begin(), names_.end(), source) == names_.end()) names_.push_back(source);
 }
 
-Winners::Winners(const SourceOrder& order, std::uint64_t max_work, bool sifts)
+Winners::Winners(Budget& budget, const SourceOrder& order, bool sifts)
     : names_(order.names()),
-      builder_(std::clamp(static_cast<int>(names_.size()), 1, DiagramBuilder::kMaxVariables),
-               sifts),
-      max_work_(max_work) {
+      budget_(budget),
+      builder_(budget,
+               std::clamp(static_cast<int>(names_.size()), 1, DiagramBuilder::kMaxVariables),
+               sifts) {
   if (names_.size() > static_cast<std::size_t>(DiagramBuilder::kMaxVariables)) {
-    throw WorkLimit("more than " + std::to_string(DiagramBuilder::kMaxVariables) + " sources");
+    throw DiagramLimit("more than " + std::to_string(DiagramBuilder::kMaxVariables) + " sources");
   }
   for (std::size_t i = 0; i < names_.size(); ++i) {
     variables_.emplace(names_[i], static_cast<int>(i));
   }
-}
-
-void Winners::take_account_of(std::uint64_t work) {
-  work_ += work;
-  if (work_ > max_work_) throw WorkLimit("more than " + std::to_string(max_work_) + " steps");
-}
-
-std::uint64_t Winners::size_of(const Diagram& function) const {
-  return function.is_false() || function.is_true() ? 0 : builder_.node_count(function);
-}
-
-Diagram Winners::combine(Connective connective, const Diagram& a, const Diagram& b) {
-  Diagram result = builder_.combine(connective, a, b);
-  // That the result is constant is found out by walking through what it is made of.
-  const std::uint64_t size = size_of(result);
-  take_account_of(1 + (size > 0 ? size : std::min(size_of(a), size_of(b))));
-  return result;
 }
 
 Diagram Winners::winner(const CompiledPort& port, const CompiledRule& rule) {
@@ -126,7 +110,6 @@ Diagram Winners::holds(const CompiledRule& rule) {
   if (rule.kind == shm::table::kNever) return constant(false);
   if (rule.kind == shm::table::kAlways) return own;
   Diagram condition;
-  take_account_of(rule.reads.size() + rule.nodes.size());
   if (rule.kind == shm::table::kConjunction) {
     condition = constant(true);
     for (std::size_t i = rule.reads.size(); i-- > 0;) {
@@ -152,21 +135,22 @@ Diagram Winners::holds(const CompiledRule& rule) {
 
 Diagram Winners::given(const Diagram& function, const std::string& source, bool active) {
   const int variable = variables_.at(source);
-  Diagram result =
-      active ? builder_.when(function, variable) : builder_.when_not(function, variable);
-  take_account_of(1 + size_of(result));
-  return result;
+  return active ? builder_.when(function, variable) : builder_.when_not(function, variable);
 }
 
 Witness Winners::witness(const Diagram& function, const Diagram& reached) {
   ShortestImplicant shortest(builder_);
-  auto literals = shortest.find_literals(function, reached);
-  take_account_of(shortest.splits());
+  std::optional<std::vector<VariableLiteral>> literals;
+  try {
+    const Budget::Part search(budget_, budget_.left() / 2);
+    literals = shortest.find_literals(function, reached);
+  } catch (const StepLimit&) {  // another one is told, even where no step is left
+  }
   Witness witness;
   witness.is_shortest = literals.has_value();
   if (!literals) {
+    const Budget::Overdraft overdraft(budget_);
     literals = lean_implicant(builder_, function, reached);
-    take_account_of(size_of(function) * (1 + literals->size()));
   }
   for (const VariableLiteral& literal : *literals) {
     (literal.active ? witness.active : witness.inactive)

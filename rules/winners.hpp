@@ -19,13 +19,6 @@
 
 namespace arbiter::rules {
 
-// A question took more than its bound of work. Unlike after DiagramLimit, diagrams stay valid; but
-// whoever asks drops them in both cases.
-class WorkLimit : public DiagramLimit {
- public:
-  using DiagramLimit::DiagramLimit;
-};
-
 // The sources that ports read or are connected to, as variables, in an order that keeps the
 // diagrams of all of them as small as it can: that of the first port, with what others add.
 class SourceOrder {
@@ -41,17 +34,15 @@ class SourceOrder {
 
 class Winners {
  public:
-  // Nodes of all results of one question together: a second or two.
-  static constexpr std::uint64_t kMaxWork = 20'000'000;
-
   // Throws DiagramLimit if there are more sources than DiagramBuilder::kMaxVariables.
-  explicit Winners(const SourceOrder& order, std::uint64_t max_work = kMaxWork, bool sifts = true);
+  Winners(Budget& budget, const SourceOrder& order, bool sifts = true);
 
   [[nodiscard]] const std::vector<std::string>& sources() const { return names_; }
-  [[nodiscard]] std::uint64_t work() const { return work_; }
 
-  // All of these throw DiagramLimit.
-  Diagram combine(Connective connective, const Diagram& a, const Diagram& b);
+  // All of these throw as DiagramBuilder's.
+  Diagram combine(Connective connective, const Diagram& a, const Diagram& b) {
+    return builder_.combine(connective, a, b);
+  }
   Diagram negate(const Diagram& a) { return combine(Connective::kXor, a, constant(true)); }
   Diagram constant(bool value) { return builder_.constant(value); }
   Diagram active(const std::string& source) { return builder_.variable(variables_.at(source)); }
@@ -64,7 +55,8 @@ class Winners {
   Diagram given(const Diagram& function, const std::string& source, bool active);
 
   // A shortest conjunction that implies the function, which can be true; or, where the search for
-  // it takes too long, one of which no literal can be left out.
+  // it takes too long, one of which no literal can be left out. That one may be found beyond the
+  // budget.
   Witness witness(const Diagram& function) { return witness(function, constant(true)); }
   // The same among the conjunctions that hold in some state of `reached`, in one of which the
   // function is true.
@@ -73,14 +65,10 @@ class Winners {
   DiagramNodes nodes(const Diagram& function) { return builder_.nodes(function); }
 
  private:
-  [[nodiscard]] std::uint64_t size_of(const Diagram& function) const;
-  void take_account_of(std::uint64_t work);
-
   std::vector<std::string> names_;
   std::unordered_map<std::string, int> variables_;
+  Budget& budget_;
   DiagramBuilder builder_;
-  const std::uint64_t max_work_;
-  std::uint64_t work_ = 0;
 };
 
 // The rule that selects its connection in that state; null if nobody wins.

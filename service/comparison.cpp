@@ -7,15 +7,11 @@
 #include "rules/model_diff.hpp"
 
 namespace arbiter::service {
-namespace {
 
-// Nodes of decision diagrams: some hundredths of a second, in which the daemon serves nobody.
-constexpr std::uint64_t kMaxWork = 500'000;
-
-}  // namespace
-
-nlohmann::json changes_json(const rules::CompiledModel& before, const rules::CompiledModel& after) {
-  const rules::ModelDiff diff = rules::diff(before, after, kMaxWork);
+nlohmann::json changes_json(const rules::CompiledModel& before, const rules::CompiledModel& after,
+                            std::uint64_t steps, const std::stop_token& stop) {
+  rules::Budget budget(steps, stop);
+  const rules::ModelDiff diff = rules::diff(before, after, budget);
   std::ostringstream text;
   rules::write_text(text, diff);
   std::ostringstream json;

@@ -44,19 +44,16 @@ Daemon::Daemon(const DaemonOptions& options)
       shares_(totals_of_this_process(), options.user_share, geteuid()),
       files_(options.models),
       is_strict_(options.is_strict),
-      state_(options.directory, options.instance) {
-  if (!files_.empty() || gate_.has_file()) {
-    Reading reading = read_files();
-    if (reading.findings.has_errors())
-      throw BadModel(std::string("not started: the files have errors, told above") +
-                     (is_strict_ ? "; --strict takes warnings for errors" : ""));
-    if (reading.policy) gate_.put_in_force(*reading.policy);
-    read_at_start_ = std::move(reading.models);
-  }
+      state_(options.directory, options.instance),
+      steps_(options.steps),
+      before_reading_(options.before_reading),
+      compiler_(options.compiles_in) {
+  if (!files_.empty() || gate_.has_file()) read_first_models(options.stop_descriptor);
   listener_ = shm::listen_at(options.directory, instance_);
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   if (!epoll_) throw std::system_error(errno, std::generic_category(), "epoll_create1");
   watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
+  watch(compiler_.descriptor(), Tag::kCompiler, 0, EPOLLIN);
   if (!Headroom::of_the_process().is_enough()) {
     log::warn("few descriptors (RLIMIT_NOFILE): a client that sends many can hold up this daemon");
   }
@@ -86,7 +83,7 @@ void Daemon::watch(int fd, Tag tag, ClientId client, std::uint32_t events) {
 void Daemon::unwatch(int fd) const noexcept { epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, fd, nullptr); }
 
 int Daemon::timeout_ms() const {
-  const bool may_change = !swap_ && phase_ == Phase::kServing && !changes_.empty();
+  const bool may_change = !swap_ && !preparing_ && phase_ == Phase::kServing && !changes_.empty();
   if (!turns_.empty() || is_more_to_tell_ || may_change || (try_postponed_ && !postponed_.empty()))
     return 0;
   shm::Nanoseconds deadline =
@@ -136,6 +133,7 @@ bool Daemon::hear(int signal_descriptor) {
       const auto tag = static_cast<Tag>(events[i].data.u64 >> 56);
       const ClientId id = events[i].data.u64 & ((std::uint64_t{1} << 56) - 1);
       if (tag == Tag::kListener) accept_client();
+      if (tag == Tag::kCompiler) finish_preparing();
       if (tag == Tag::kSignals && handle_signal(signal_descriptor)) return false;
       if (tag == Tag::kAbsentee) forget_absentee(id);
       if (tag == Tag::kClient) hear_client(id, events[i].events);

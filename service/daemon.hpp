@@ -10,17 +10,20 @@
 //   daemon_takeover.cpp  what a predecessor has left
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <stdexcept>
+#include <stop_token>
 #include <string>
 #include <vector>
 
 #include "service/barriers.hpp"
 #include "service/changes.hpp"
 #include "service/client.hpp"
+#include "service/compiler.hpp"
 #include "service/continuity.hpp"
 #include "service/directory.hpp"
 #include "service/gate.hpp"
@@ -30,6 +33,7 @@
 #include "service/model_copy.hpp"
 #include "service/models.hpp"
 #include "service/observers.hpp"
+#include "service/preparation.hpp"
 #include "service/registry.hpp"
 #include "service/shares.hpp"
 #include "service/status_requests.hpp"
@@ -57,13 +61,12 @@ struct DaemonOptions {
   unsigned user_share = Shares::kDefaultPercent;
   // Whether the service manager keeps descriptors for the next daemon.
   bool uses_descriptor_store = false;
-};
-
-// What the files say now.
-struct Reading {
-  Findings findings;  // the rest is to be used only if there is no error
-  std::optional<Policy> policy;
-  std::vector<ModelPointer> models;
+  std::uint64_t steps = rules::Budget::kSteps;  // that the proof of a model may take
+  // Where it becomes readable while the first models are proved, this stops; -1: nowhere.
+  int stop_descriptor = -1;
+  Compiler::Thread compiles_in = Compiler::Thread::kOfItsOwn;
+  // For tests: is called in the compiler's thread before files are read.
+  std::function<void(std::stop_token)> before_reading{};
 };
 
 // A request that cannot be served yet, and why; it is tried again, at `deadline` for the last time.
@@ -82,7 +85,7 @@ class RefusedAgain : public std::runtime_error {
 
 class Daemon {
  public:
-  // Loads the model and listens. Throws BadModel, std::runtime_error.
+  // Loads the model and listens. Throws BadModel, std::runtime_error, rules::Stopped.
   explicit Daemon(const DaemonOptions& options);
   Daemon(const Daemon&) = delete;
   Daemon& operator=(const Daemon&) = delete;
@@ -98,9 +101,9 @@ class Daemon {
     Change change;
     Findings findings;
     LoadedModel to;
-    std::string how;            // as in the history
-    std::uint64_t content = 0;  // likewise
-    bool is_compared = false;   // with what was in force before
+    std::string how;               // as in the history
+    std::uint64_t content = 0;     // likewise
+    std::string changes = "null";  // of what was in force before: as Reading::changes
     // Of a rollback: to where.
     std::optional<PastModel> back_to{};
     // Of a reload: what else changes with it.
@@ -109,7 +112,7 @@ class Daemon {
   };
 
  private:
-  enum class Tag : std::uint32_t { kListener, kSignals, kClient, kProcess, kAbsentee };
+  enum class Tag : std::uint32_t { kListener, kSignals, kClient, kProcess, kAbsentee, kCompiler };
 
   void watch(int fd, Tag tag, ClientId client, std::uint32_t events);
   // One that is closed later, or by somebody else.
@@ -171,11 +174,22 @@ class Daemon {
   void ask_for(Change change, const Client& client, const shm::Message& message);
   void reload_for_signal(const std::string& by);
   void advance_changes();
-  [[nodiscard]] Reading read_files() const;
+  // Calls `step`; where it throws, the change is refused.
+  void attempt(Swap& swap, const std::function<void()>& step);
+  // In the compiler's thread; `after_reading` may add to what was read.
+  [[nodiscard]] Compiler::Job reading_job(
+      std::function<void(Reading&, const std::stop_token&)> after_reading) const;
+  void read_first_models(int stop_descriptor);
+  // What comes of a change is prepared by the compiler, and then finished here.
+  void prepare(Swap& swap, Compiler::Job job);
+  void finish_preparing();
+  void stop_preparing_for_nobody();
   void prepare_reload(Swap& swap);
+  void finish_reload(Swap& swap, Reading reading);
   void prepare_switch(Swap& swap);
   void prepare_rollback(Swap& swap);
-  void compare_with_files(Swap& swap);
+  void prepare_comparison(Swap& swap);
+  void finish_comparison(const Swap& swap, const Reading& reading);
   [[nodiscard]] std::uint64_t content_of(const LoadedModel& next) const;
   void reserve_tables(const Library& library);
   void begin_swap(Swap& swap);
@@ -268,9 +282,13 @@ class Daemon {
   StatusRequests status_requests_;
   shm::Nanoseconds give_back_at_ = shm::kForever;
   Changes changes_;
-  std::optional<Swap> swap_;  // the one that waits for its barrier
+  std::optional<Swap> swap_;       // the one that waits for its barrier
+  std::optional<Swap> preparing_;  // the one that waits for the compiler
   std::uint64_t reloads_refused_ = 0;
   bool stop_wanted_ = false;
+  const std::uint64_t steps_;  // that the proof of a model may take
+  const std::function<void(std::stop_token)> before_reading_;
+  Compiler compiler_;  // last: its job ends before anything else does
 };
 
 }  // namespace arbiter::service

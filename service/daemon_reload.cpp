@@ -1,7 +1,10 @@
 // How another model, and another policy, come into force: read again, switched to, or gone back to.
 //
-// Whatever it is, it ends in one swap: the new table is written and its clients are told before it
-// counts; they switch all at once. Changes wait for each other.
+// What takes long (reading, proving, comparing) the compiler does in its thread, while the loop
+// serves others. Whatever it is, it ends in one swap: the new table is written and its clients are
+// told before it counts; they switch all at once. Changes wait for each other.
+#include <poll.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -15,22 +18,17 @@
 namespace arbiter::service {
 namespace {
 
-// What came of it, for those who want all of it. File names may be any bytes; JSON may not.
+// File names may be any bytes; JSON may not.
+std::string in_bytes(const nlohmann::json& document) {
+  return document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+// What came of it, for those who want all of it.
 std::string report(const Daemon::Swap& swap, nlohmann::json document) {
   document["text"] = swap.findings.text();
   document["has_errors"] = swap.findings.has_errors();  // told in the text, in full
   document["findings"] = swap.findings.json();
-  return document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
-// The model is in force: nothing may come of this but words.
-nlohmann::json changes_or_why_not(const Model& before, const Model& after) {
-  try {
-    return changes_json(before.compiled, after.compiled);
-  } catch (const std::exception& error) {
-    const std::string why_not = std::string("not compared: ") + error.what();
-    return {{"summary", why_not}, {"text", why_not + '\n'}, {"diff", nullptr}};
-  }
+  return in_bytes(document);
 }
 
 }  // namespace
@@ -47,20 +45,27 @@ void Daemon::reload_for_signal(const std::string& by) {
 
 // One at a time, so that others are served in between.
 void Daemon::advance_changes() {
-  if (swap_ || phase_ != Phase::kServing || changes_.empty()) return;
+  if (preparing_) stop_preparing_for_nobody();
+  if (swap_ || preparing_ || phase_ != Phase::kServing || changes_.empty()) return;
   Swap swap;
   swap.change = changes_.take_next();
-  try {
+  attempt(swap, [&] {
     switch (swap.change.kind) {
       case Change::Kind::kReload:
         return prepare_reload(swap);
       case Change::Kind::kCompare:
-        return compare_with_files(swap);
+        return prepare_comparison(swap);
       case Change::Kind::kSwitch:
         return prepare_switch(swap);
       case Change::Kind::kRollback:
         return prepare_rollback(swap);
     }
+  });
+}
+
+void Daemon::attempt(Swap& swap, const std::function<void()>& step) {
+  try {
+    step();
   } catch (const std::exception& error) {
     if (swap.change.kind == Change::Kind::kReload) ++reloads_refused_;
     // What is found in files is in the log when they have been read.
@@ -75,21 +80,90 @@ void Daemon::advance_changes() {
   }
 }
 
-Reading Daemon::read_files() const {
+// Throws, and then `swap` is as it was.
+void Daemon::prepare(Swap& swap, Compiler::Job job) {
+  compiler_.start(std::move(job));
+  preparing_ = std::move(swap);
+}
+
+void Daemon::finish_preparing() {
+  Swap swap = std::move(*std::exchange(preparing_, std::nullopt));
+  attempt(swap, [&] {
+    Reading reading = compiler_.take();
+    swap.findings = std::move(reading.findings);
+    if (swap.findings.has_errors()) throw BadModel(swap.findings.first_error());
+    switch (swap.change.kind) {
+      case Change::Kind::kReload:
+        return finish_reload(swap, std::move(reading));
+      case Change::Kind::kCompare:
+        return finish_comparison(swap, reading);
+      case Change::Kind::kSwitch:  // needs no compiler
+        return;
+      case Change::Kind::kRollback:
+        swap.changes = std::move(reading.changes);
+        return begin_swap(swap);
+    }
+  });
+}
+
+// A comparison is made for those who asked. A reload or a rollback happens all the same.
+void Daemon::stop_preparing_for_nobody() {
+  if (preparing_->change.kind != Change::Kind::kCompare) return;
+  const auto& asking = preparing_->change.asking;
+  const bool is_awaited = std::any_of(asking.begin(), asking.end(), [&](const auto& each) {
+    return clients_.contains(each.client);
+  });
+  if (!is_awaited) compiler_.stop();
+}
+
+// The job has copies of all that it needs: it may outlive this, if a file holds it up.
+Compiler::Job Daemon::reading_job(
+    std::function<void(Reading&, const std::stop_token&)> after_reading) const {
   if (files_.empty() && !gate_.has_file()) {
     throw std::runtime_error("there is no file to read again; start with --model");
   }
-  Reading reading{Findings(is_strict_), {}, {}};
-  reading.policy = gate_.read(reading.findings);
-  reading.models = read_models(files_, reading.findings);
-  return reading;
+  return
+      [files = files_, gate = gate_, steps = steps_, is_strict = is_strict_, instance = instance_,
+       before = before_reading_, after = std::move(after_reading)](const std::stop_token& stop) {
+        if (before) before(stop);
+        StatusLine line(instance);
+        Reading reading = read_files(files, gate, {steps, line.watch(), is_strict}, stop);
+        if (!reading.findings.has_errors()) after(reading, stop);
+        return reading;
+      };
+}
+
+// Before anybody is served, who could be kept waiting; but signals are heard.
+void Daemon::read_first_models(int stop_descriptor) {
+  compiler_.start(reading_job([](Reading&, const std::stop_token&) {}));
+  for (bool is_over = false; !is_over;) {
+    pollfd watched[2] = {{compiler_.descriptor(), POLLIN, 0}, {stop_descriptor, POLLIN, 0}};
+    if (poll(watched, 2, -1) < 0 && errno != EINTR) {
+      throw std::system_error(errno, std::generic_category(), "poll");
+    }
+    if (watched[1].revents != 0 && handle_signal(stop_descriptor)) throw rules::Stopped();
+    is_over = watched[0].revents != 0;
+  }
+  Reading reading = compiler_.take();
+  if (reading.findings.has_errors()) {
+    throw BadModel(std::string("not started: the files have errors, told above") +
+                   (is_strict_ ? "; --strict takes warnings for errors" : ""));
+  }
+  if (reading.policy) gate_.put_in_force(*reading.policy);
+  read_at_start_ = std::move(reading.models);
+}
+
+void Daemon::prepare_reload(Swap& swap) {
+  prepare(swap, reading_job([before = in_force_.model, name = models_.name()](
+                                Reading& reading, const std::stop_token& stop) {
+            const ModelPointer after = find_model(reading.models, name);
+            if (before == nullptr || after == nullptr) return;
+            reading.changes = changes_between(*before, *after, kStepsOfChange, stop);
+          }));
 }
 
 // Throws; then nothing has changed, and `swap` knows the findings.
-void Daemon::prepare_reload(Swap& swap) {
-  Reading reading = read_files();
-  swap.findings = std::move(reading.findings);
-  if (swap.findings.has_errors()) throw BadModel(swap.findings.first_error());
+void Daemon::finish_reload(Swap& swap, Reading reading) {
   if (files_.empty()) {
     gate_.put_in_force(*reading.policy);
     answer_done(swap, nullptr);
@@ -100,7 +174,7 @@ void Daemon::prepare_reload(Swap& swap) {
   if (next == nullptr) next = library.first();
   swap.to = *next;
   swap.how = "reload";
-  swap.is_compared = true;
+  swap.changes = std::move(reading.changes);
   swap.content = content_of(*next);
   reserve_tables(library);
   swap.policy = std::move(reading.policy);
@@ -171,8 +245,12 @@ void Daemon::prepare_rollback(Swap& swap) {
   swap.how = "rollback to " + std::to_string(past->generation);
   swap.back_to = *past;
   swap.content = past->content;
-  swap.is_compared = true;
-  begin_swap(swap);
+  if (in_force_.model == nullptr) return begin_swap(swap);
+  prepare(swap, [before = in_force_.model, after = past->model](const std::stop_token& stop) {
+    Reading reading;
+    reading.changes = changes_between(*before, *after, kStepsOfChange, stop);
+    return reading;
+  });
 }
 
 // Throws, and then nothing has changed, `swap` neither.
@@ -217,9 +295,8 @@ void Daemon::put_in_force() {
                 {},
                 in_force_.model});
   welcome_waiting();
-  nlohmann::json changes;
-  if (swap.is_compared && before != nullptr) {
-    changes = changes_or_why_not(*before, model);
+  nlohmann::json changes = nlohmann::json::parse(swap.changes);
+  if (!changes.is_null()) {
     const std::string summary = changes.at("summary").get<std::string>();
     log::info("model {} compared with the last: {}", snapshot.generation, summary);
     history_.set_changes(snapshot.generation, summary);
@@ -228,19 +305,31 @@ void Daemon::put_in_force() {
 }
 
 // What `arbiter reload --dry-run` shows.
-void Daemon::compare_with_files(Swap& swap) {
-  Reading reading = read_files();
-  swap.findings = std::move(reading.findings);
-  if (swap.findings.has_errors()) throw BadModel(swap.findings.first_error());
+void Daemon::prepare_comparison(Swap& swap) {
+  std::vector<ModelPointer> loaded;
+  for (const LoadedModel& each : library_.models()) loaded.push_back(each.model);
+  prepare(swap, reading_job([loaded = std::move(loaded), in_force = in_force_.model,
+                             name = models_.name()](Reading& reading, const std::stop_token& stop) {
+            for (const ModelPointer& read : reading.models) {
+              const auto found = std::find_if(loaded.begin(), loaded.end(), [&](const auto& each) {
+                return each->name == read->name;
+              });
+              ModelPointer before = found == loaded.end() ? nullptr : *found;
+              if (read->name == name) before = in_force;
+              reading.diffs.push_back(before == nullptr
+                                          ? "null"
+                                          : changes_between(*before, *read, kStepsOfDryRun, stop));
+            }
+          }));
+}
+
+void Daemon::finish_comparison(const Swap& swap, const Reading& reading) {
   nlohmann::json models = nlohmann::json::array();
-  for (const ModelPointer& read : reading.models) {
-    const bool is_in_force = read->name == models_.name();
-    const LoadedModel* const loaded = library_.find(read->name);
-    ModelPointer before = loaded == nullptr ? nullptr : loaded->model;
-    if (is_in_force) before = in_force_.model;
-    nlohmann::json model{{"name", read->name}, {"in_force", is_in_force}, {"changes", nullptr}};
-    if (before != nullptr) model["changes"] = changes_json(before->compiled, read->compiled);
-    models.push_back(std::move(model));
+  for (std::size_t i = 0; i < reading.models.size(); ++i) {
+    const std::string& name = reading.models[i]->name;
+    models.push_back({{"name", name},
+                      {"in_force", name == models_.name()},
+                      {"changes", nlohmann::json::parse(reading.diffs[i])}});
   }
   answer(swap, report(swap, {{"ok", true}, {"models", std::move(models)}}));
 }

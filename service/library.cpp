@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "rules/load.hpp"
+#include "service/preparation.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -36,17 +37,21 @@ std::size_t size_of(const Model& model) {
   return size;
 }
 
-std::vector<ModelPointer> read_models(const std::vector<NamedFiles>& named, Findings& findings) {
+std::vector<ModelPointer> read_models(const std::vector<NamedFiles>& named, const Proving& proving,
+                                      const std::stop_token& stop, Findings& findings) {
   std::vector<ModelPointer> models;
   for (const NamedFiles& each : named) {
+    if (stop.stop_requested()) throw rules::Stopped();
     rules::Diagnostics diagnostics;
+    rules::Budget budget(proving.steps, stop);
+    budget.watch(proving.watch);
     auto model = std::make_shared<Model>();
     model->name = each.name;
     model->files = each.files;
     try {
       const rules::RuleSet rules =
           rules::load(rules::read_texts(each.files, rules::Accept::kRegularFile), diagnostics);
-      model->compiled = rules::compile(rules, diagnostics);
+      model->compiled = rules::compile(rules, diagnostics, budget);
     } catch (const rules::FileError& error) {
       findings.add_failure(error.what());
     }

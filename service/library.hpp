@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <stdexcept>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -33,8 +34,11 @@ using ModelPointer = std::shared_ptr<const Model>;
 [[nodiscard]] std::size_t size_of(const Model& model);
 
 // Reads, proves and compiles each; all problems of all files are added in one go. The result is to
-// be used only if there is no error.
+// be used only if there is no error. In any thread; throws rules::Stopped.
+struct Proving;
 [[nodiscard]] std::vector<ModelPointer> read_models(const std::vector<NamedFiles>& named,
+                                                    const Proving& proving,
+                                                    const std::stop_token& stop,
                                                     Findings& findings);
 
 // A model as the words of its table. The names in it keep their ids for as long as this lives.

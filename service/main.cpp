@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <memory>
 #include <utility>
@@ -88,6 +89,7 @@ int run(int argc, char** argv) {
   std::string policy;
   std::string instance;
   std::string level = "info";
+  double effort = 1;
   app.add_option("--model", models,
                  "Model file; several of one NAME, or without one, form one model. The first model "
                  "is put in force, `arbiter switch` goes to the others")
@@ -112,6 +114,11 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--descriptor-store", options.uses_descriptor_store,
                "Leave descriptors with the service manager for the next daemon");
+  app.add_option("--effort", effort,
+                 "How many times as many steps as usual the proof of a model may take")
+      ->type_name("FACTOR")
+      ->check(
+          CLI::Range(arbiter::rules::Budget::kLeastEffort, arbiter::rules::Budget::kMostEffort));
   app.add_option("--log-level", level, "trace, debug, info, warn or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error"}));
   try {
@@ -122,11 +129,15 @@ int run(int argc, char** argv) {
   const auto signals = catch_signals();  // before there are threads: they inherit what is blocked
   const Log logging(level);
   if (!policy.empty()) options.policy = policy;
+  options.steps = arbiter::rules::Budget::steps_of(effort);
   try {
     options.models = arbiter::service::named_files(models, applications);
     options.instance = arbiter::shm::instance_name(instance);
     options.directory = arbiter::shm::daemon_directory();
+    options.stop_descriptor = signals.get();
     return serve(options, options.instance, signals);
+  } catch (const arbiter::rules::Stopped&) {  // by a signal, before it was ready
+    return 0;
   } catch (const std::invalid_argument& error) {
     log::error("{}", error.what());
     return 2;
@@ -140,7 +151,9 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    return run(argc, argv);
+    const int exit_code = run(argc, argv);
+    if (arbiter::service::Compiler::has_left_a_thread()) std::_Exit(exit_code);
+    return exit_code;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "arbiterd: %s\n", error.what());
     return 1;

@@ -24,7 +24,9 @@ std::uint64_t read(const shm::Atomic<std::uint64_t>& counter) {
 
 json type_json(const shm::TypeInfo& type) {
   if (!type.is_typed()) return nullptr;
-  return {{"name", shm::printable(type.type_name())}, {"size", type.size}, {"alignment", type.alignment}};
+  return {{"name", shm::printable(type.type_name())},
+          {"size", type.size},
+          {"alignment", type.alignment}};
 }
 
 json client_json(const Client& client) {

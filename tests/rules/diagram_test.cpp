@@ -159,7 +159,8 @@ TEST(Diagram, NoPairOfNodesIsCombinedTwice) {
 }
 
 TEST(Diagram, AllOperationsTogetherHaveABoundOfSteps) {
-  DiagramBuilder builder(64, false);
+  rules::Budget budget(1'000'000);
+  DiagramBuilder builder(budget, 64, false);
   const auto use_up = [&] {
     for (int i = 0; i < 100'000; ++i) static_cast<void>(parities(builder, 6));
   };

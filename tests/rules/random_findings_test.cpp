@@ -164,7 +164,8 @@ void compare(const RandomModel& random, const Vocabulary& words,
   const auto set = rules::load({{path}, {}}, diagnostics);
   const auto model = compile(set, diagnostics);
   if (diagnostics.has_errors()) return;
-  const auto account = find_more(set, model, diagnostics);
+  rules::Budget budget;
+  const auto account = find_more(set, model, diagnostics, budget);
   EXPECT_EQ(account.open, 0u);
   ++seen.compared;
   const auto& items = diagnostics.items();

@@ -180,7 +180,8 @@ TEST(RandomStatements, AreProvedOrRefutedAsAllStatesSay) {
       text += statements.back().text + "  # " + std::to_string(i) + "\n";
     }
     const rules::TextFile file("s.txt", text);
-    const auto verdicts = judge(read_statements(file, diagnostics), model, diagnostics);
+    rules::Budget budget;
+    const auto verdicts = judge(read_statements(file, diagnostics), model, diagnostics, budget);
     ASSERT_FALSE(diagnostics.has_errors()) << diagnostics.items().back().message;
     ASSERT_EQ(verdicts.size(), statements.size());
     for (std::size_t i = 0; i < verdicts.size(); ++i) {

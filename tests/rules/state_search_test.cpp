@@ -185,16 +185,21 @@ CompiledModel compiled(const Rules& rules) {
   return model;
 }
 
+rules::ModelDiff compared_with(const CompiledModel& before, const CompiledModel& after) {
+  rules::Budget budget;
+  return diff(before, after, budget);
+}
+
 TEST(InOrder, ModelsOfManyConnectionsThatDecideAlikeAreProvedTo) {
   const Rules rules = random_inhibitions(256, 1);
   Rules doubled = rules;  // the same conditions in other words
   for (auto& rule : doubled) rule.second = all_of({rule.second, rule.second});
   Rules without = rules;  // one that never holds
   without[9].second = negation(always());
-  const auto compared = diff(compiled(rules), compiled(doubled));
+  const auto compared = compared_with(compiled(rules), compiled(doubled));
   EXPECT_FALSE(compared.differs());
   EXPECT_FALSE(compared.is_open());
-  EXPECT_TRUE(diff(compiled(rules), compiled(without)).differs());
+  EXPECT_TRUE(compared_with(compiled(rules), compiled(without)).differs());
 }
 
 TEST(InOrder, WhereModelsOfManyConnectionsDecideDifferentlyIsFound) {
@@ -203,7 +208,7 @@ TEST(InOrder, WhereModelsOfManyConnectionsDecideDifferentlyIsFound) {
     const Rules before = random_inhibitions(count, 1);
     Rules after = before;
     after[count / 2].second = all_of({after[count / 2].second, inactive(source_name(count / 3))});
-    const auto compared = diff(compiled(before), compiled(after));
+    const auto compared = compared_with(compiled(before), compiled(after));
     ASSERT_EQ(compared.ports.size(), 1u);
     const auto& port = compared.ports[0];
     EXPECT_TRUE(port.differs());
@@ -229,7 +234,8 @@ TEST(InOrder, WhetherNobodyWinsIsAskedOfTheRulesAsTheyStand) {
   Diagnostics diagnostics, more;
   const auto model = compile(set, diagnostics, 0);
   ASSERT_TRUE(model.ports.at(0).in_order);
-  find_more(set, model, more);
+  rules::Budget budget;
+  find_more(set, model, more, budget);
   std::vector<std::string> codes;
   for (const auto& item : more.items()) codes.push_back(item.code);
   EXPECT_THAT(codes, Contains("nobody-wins"));

@@ -23,17 +23,20 @@ rules::RuleSet robot() {
 
 // "nobody-wins /Arm", each, where all of these statements are proved, or not.
 std::vector<std::string> found_beside(const std::string& text,
-                                      std::uint64_t max_work = rules::kMaxFindingsWork) {
+                                      std::uint64_t steps = rules::Budget::kSteps) {
   const rules::RuleSet set = robot();
   Diagnostics diagnostics;
   const auto model = compile(set, diagnostics);
   rules::ProvedStatements proved;
   const rules::TextFile file("safety.txt", text);
-  for (const auto& verdict : judge(read_statements(file, diagnostics), model, diagnostics)) {
+  rules::Budget to_judge;
+  for (const auto& verdict :
+       judge(read_statements(file, diagnostics), model, diagnostics, to_judge)) {
     if (verdict.proved) proved.push_back(verdict.proved);
   }
   Diagnostics found;
-  find_more(set, model, found, max_work, proved);
+  rules::Budget budget(steps);
+  find_more(set, model, found, budget, proved);
   std::vector<std::string> result;
   for (const auto& item : found.items()) {
     const bool is_arm = item.message.find("/Arm") != std::string::npos;

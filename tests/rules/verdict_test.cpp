@@ -40,11 +40,12 @@ struct Judged {
 };
 
 Judged judged(const rules::CompiledModel& model, const std::string& text,
-              std::uint64_t max_work = rules::kMaxStatementWork) {
+              std::uint64_t steps = rules::Budget::kSteps) {
   Judged result;
   const rules::TextFile file("safety.txt", text);
   const auto statements = read_statements(file, result.diagnostics);
-  result.verdicts = judge(statements, model, result.diagnostics, max_work);
+  rules::Budget budget(steps);
+  result.verdicts = judge(statements, model, result.diagnostics, budget);
   return result;
 }
 
@@ -194,9 +195,9 @@ TEST(Verdict, IdlenessThatExplodesAsOneDiagramIsProvedByCases) {
   EXPECT_EQ(kind_of(model, statement), Verdict::Kind::kProved);
   // Whichever of the two ways a bound leaves room for, none tells anything but the truth.
   int proved = 0;
-  for (std::uint64_t max_work = 1'000; max_work < 2'000'000; max_work *= 2) {
-    const auto kind = judged(model, statement, max_work).verdicts.at(0).kind;
-    EXPECT_NE(kind, Verdict::Kind::kRefuted) << max_work;
+  for (std::uint64_t steps = 1'000; steps < 300'000'000; steps *= 8) {
+    const auto kind = judged(model, statement, steps).verdicts.at(0).kind;
+    EXPECT_NE(kind, Verdict::Kind::kRefuted) << steps;
     proved += kind == Verdict::Kind::kProved ? 1 : 0;
   }
   EXPECT_GT(proved, 0);

@@ -128,7 +128,8 @@ std::vector<rules::Diagnostic> findings_of(const rules::RuleSet& set) {
   Diagnostics diagnostics, more;
   const auto model = compile(set, diagnostics);
   EXPECT_FALSE(diagnostics.has_errors());
-  find_more(set, model, more);
+  rules::Budget budget;
+  find_more(set, model, more, budget);
   return more.items();
 }
 

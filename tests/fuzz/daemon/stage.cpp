@@ -59,6 +59,7 @@ Stage::Stage() : owner_(::getpid(), ::geteuid()) {
                     {"other", {{directory_.write("other.xml", kModels[1])}, {}}}};
   options.instance = "fuzz";
   options.directory = directory_.path();
+  options.compiles_in = service::Compiler::Thread::kOfCaller;
   daemon_ = std::make_unique<service::Daemon>(options);
   sender_ = std::make_unique<Honest>(path(), owner_, "sender");
   run();

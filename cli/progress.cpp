@@ -1,0 +1,55 @@
+#include "cli/progress.hpp"
+
+#include <unistd.h>
+
+#include <iostream>
+#include <string>
+#include <utility>
+
+namespace arbiter::cli {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kFirstOnTerminal{300}, kFirstInLog{2000};
+constexpr milliseconds kEveryOnTerminal{100}, kEveryInLog{10'000};
+constexpr std::size_t kMaxBytesOfName = 48;
+
+// Of a statement, as much as a line has room for; no character is cut in two.
+std::string shortened(const std::string& name) {
+  if (name.size() <= kMaxBytesOfName) return name;
+  std::size_t end = kMaxBytesOfName;
+  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80) --end;
+  return name.substr(0, end) + "…";
+}
+
+}  // namespace
+
+ProgressLine::ProgressLine() : ProgressLine(std::cerr, isatty(STDERR_FILENO) != 0, Clock::now) {}
+
+ProgressLine::ProgressLine(std::ostream& out, bool is_terminal,
+                           std::function<Clock::time_point()> now)
+    : out_(out),
+      is_terminal_(is_terminal),
+      now_(std::move(now)),
+      next_(now_() + (is_terminal ? kFirstOnTerminal : kFirstInLog)) {}
+
+rules::Budget::Watch ProgressLine::watch() {
+  return [this](const rules::Progress& progress) { show(progress); };
+}
+
+void ProgressLine::show(const rules::Progress& progress) {
+  const Clock::time_point now = now_();
+  if (progress.of == 0 || now < next_) return;
+  next_ = now + (is_terminal_ ? kEveryOnTerminal : kEveryInLog);
+  out_ << (is_terminal_ ? "\r\033[K" : "") << progress.stage << ": " << progress.done << " of "
+       << progress.of << " (" << shortened(progress.name) << ')' << (is_terminal_ ? "" : "\n")
+       << std::flush;
+  is_shown_ = is_terminal_;
+}
+
+void ProgressLine::clear() {
+  if (std::exchange(is_shown_, false)) out_ << "\r\033[K" << std::flush;
+}
+
+}  // namespace arbiter::cli

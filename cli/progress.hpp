@@ -1,0 +1,42 @@
+// Says on standard error how far a long run is, for who waits before it.
+//
+// On a terminal one line, which comes when a run takes a moment, changes with it, and is gone at
+// the end. Elsewhere a line after two seconds, and then one every ten, so that a log shows what
+// took so long. Standard output stays as it is.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <ostream>
+
+#include "rules/budget.hpp"
+
+namespace arbiter::cli {
+
+class ProgressLine {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // On standard error.
+  ProgressLine();
+  ProgressLine(std::ostream& out, bool is_terminal, std::function<Clock::time_point()> now);
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+  ~ProgressLine() { clear(); }
+
+  // Must not outlive this.
+  rules::Budget::Watch watch();
+  // Before anything else is written there.
+  void clear();
+
+ private:
+  void show(const rules::Progress& progress);
+
+  std::ostream& out_;
+  const bool is_terminal_;
+  const std::function<Clock::time_point()> now_;
+  Clock::time_point next_;
+  bool is_shown_ = false;
+};
+
+}  // namespace arbiter::cli
