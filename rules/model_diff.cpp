@@ -104,7 +104,7 @@ class PortComparison {
   // State by state: one in which the winners differ, then one in which another pair of them does.
   void search(Budget& budget, const std::string& limit) {
     result_.changes.clear();
-    result_.states = "0";
+    result_.states = std::string(1, '0');
     const int max_steps = StateSearch::steps_within(budget.left());
     StateSearch search(max_steps);
     const auto before = search.winners(before_), after = search.winners(after_);

@@ -71,7 +71,7 @@ inline constexpr int kMaxPictures = 64;
 inline constexpr Word kMaxWalk = (kMaxSourcesPerPort + 1) * (kMaxSourcesPerPort + 1);
 
 // In place of a connection's own source, where its rule is to take that as active.
-inline const Activity kAlwaysActive{{kForeverFlag}, {0}};
+inline const Activity always_active{{kForeverFlag}, {0}};
 
 // A source that a rule reads, and how it was last seen.
 struct Read {
@@ -154,7 +154,7 @@ class BoundRule {
   void take_own_as_active(SourceId own) noexcept {
     is_blind_ = false;
     for (Word i = 0; i < count_; ++i) {
-      if (i >= own_ && reads_[i].source == own) reads_[i].activity = &kAlwaysActive;
+      if (i >= own_ && reads_[i].source == own) reads_[i].activity = &always_active;
       is_blind_ = is_blind_ || reads_[i].activity == nullptr;
     }
   }
