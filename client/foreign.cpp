@@ -3,7 +3,9 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cstdlib>
 #include <exception>
+#include <new>
 #include <utility>
 
 namespace arbiter::detail {
@@ -47,8 +49,9 @@ std::atomic<Kept*> all_kept{nullptr};  // reachable, so that nobody takes them f
 }  // namespace
 
 void keep_for_ever(std::shared_ptr<const void> core) noexcept {
-  // Where there is no memory for it, std::bad_alloc ends the child: it must not destroy the core.
-  auto* const kept = new Kept{std::move(core), all_kept.load(std::memory_order_relaxed)};
+  auto* const kept =
+      new (std::nothrow) Kept{std::move(core), all_kept.load(std::memory_order_relaxed)};
+  if (kept == nullptr) std::abort();  // the child ends: it must not destroy the core
   while (!all_kept.compare_exchange_weak(kept->next, kept, std::memory_order_relaxed)) {
   }
 }

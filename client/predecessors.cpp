@@ -26,19 +26,20 @@ std::vector<shm::PortInstance> spent_predecessors(
   std::vector<shm::PortInstance> spent;
   if (later.empty()) return spent;
   std::size_t kept = 0;
-  for (auto each = links.rbegin(); each != links.rend(); ++each) {  // the latest first
-    const OutputLink& link = each->second;
+  const auto look_at = [&](const auto& each) {
+    const auto& [instance, link] = each;
     const auto behind = later.find(link.peer->source);
-    if (behind == later.end()) continue;
+    if (behind == later.end()) return;
     // A publisher that lies harms its own connection: the sum is bounded.
     const std::uint64_t own = std::min<std::uint64_t>(accepted_on(*link.peer), depth);
     if (link.gone && (own == 0 || behind->second >= depth || kept == kMaxPredecessors)) {
-      spent.push_back(each->first);
+      spent.push_back(instance);
     } else if (link.gone) {
       ++kept;
     }
     behind->second += own;
-  }
+  };
+  std::for_each(links.rbegin(), links.rend(), look_at);  // the latest first
   return spent;
 }
 

@@ -123,7 +123,7 @@ NameWord::NameWord(std::string word) : text(std::move(word)) {
   }
 }
 
-NameIndex::NameIndex(const std::vector<std::string_view>& names) : names_(names) {
+NameIndex::NameIndex(std::vector<std::string_view> names) : names_(std::move(names)) {
   for (std::size_t i = 0; i < names_.size(); ++i) {
     by_plain_[plain(names_[i])].push_back(i);
     const auto words = words_of(names_[i]);

@@ -33,7 +33,7 @@ struct NameWord {
 // Names arranged so that each is compared with few others. Keeps views of them.
 class NameIndex {
  public:
-  explicit NameIndex(const std::vector<std::string_view>& names);
+  explicit NameIndex(std::vector<std::string_view> names);
 
   // Those that resemble it, without itself, in the order in which they were given.
   [[nodiscard]] std::vector<SimilarName> similar_to(std::string_view name) const;

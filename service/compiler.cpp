@@ -64,7 +64,7 @@ Compiler::~Compiler() {
     return;
   }
   log::warn("a file that is read does not let itself be read, nor left: it is left all the same");
-  has_left_a_thread_ = true;
+  left_behind = true;
   thread_.detach();
 }
 

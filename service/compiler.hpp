@@ -63,7 +63,7 @@ class Compiler {
 
   // Some job did not let itself be stopped, since a file held it up. Its thread still runs, and the
   // process must end without the destructors of what is static.
-  [[nodiscard]] static bool has_left_a_thread() { return has_left_a_thread_; }
+  [[nodiscard]] static bool has_left_a_thread() { return left_behind; }
 
  private:
   struct Ended;
@@ -73,7 +73,7 @@ class Compiler {
   std::shared_ptr<Ended> ended_;                      // of the job at hand
   std::stop_source stop_;
   std::thread thread_;
-  static inline bool has_left_a_thread_ = false;  // of the loop's thread only
+  static inline bool left_behind = false;  // a thread; of the loop's thread only
 };
 
 }  // namespace arbiter::service

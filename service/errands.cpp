@@ -113,7 +113,7 @@ void Errands::State::start(uid_t user, Lane& lane) {
 }
 
 Errands& Errands::of_the_process() {
-  static Errands* const errands = new Errands();  // threads may outlive main()
+  static auto* const errands = new Errands();  // threads may outlive main()
   return *errands;
 }
 

@@ -53,7 +53,7 @@ class Errands {
   [[nodiscard]] std::size_t lost() const;
 
   // Waits until all is done, or `limit` has passed. True: all is done.
-  bool wait_until_done(shm::Nanoseconds limit) const;
+  [[nodiscard]] bool wait_until_done(shm::Nanoseconds limit) const;
 
  private:
   struct State;

@@ -144,7 +144,7 @@ TEST(Activity, ClosingAPortDoesNotEndIt) {
 }
 
 TEST(Activity, TheDeathOfItsProcessDoesNotEndIt) {
-  Daemon daemon(override_model());
+  Daemon daemon(override_model("3600s"));
   Node node("test");
   auto low = node.output_port<Number>("/low");
   auto in = node.input_port<Number>("/in");
