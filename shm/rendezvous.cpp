@@ -199,7 +199,8 @@ std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std
   why_not.clear();
   for (const std::string& directory : client_directories()) {
     const auto passed_over = [&](const std::string& why) {
-      why_not += (why_not.empty() ? "tried " : ", ") + directory + "/" + instance + ".sock: " + why;
+      why_not += why_not.empty() ? "tried " : ", ";
+      why_not.append(directory).append("/").append(instance).append(".sock: ").append(why);
     };
     FileDescriptor socket = make_socket();
     const Address at = address_of(directory, instance + ".sock");
