@@ -111,7 +111,7 @@ void news(const Explore& explore) {
       },
       b_overrides_a(), depth(1), std::initializer_list<SourceId>{});
 }
-const Register kNews("AReceiverThatWaitsIsWokenForAPublisherThatItDidNotKnow", {3, 3}, news);
+const Register kNews("AReceiverThatWaitsIsWokenForAPublisherThatItDidNotKnow", {3, 6}, news);
 
 // The descriptor for a loop of one's own.
 struct Polling : Scene {
