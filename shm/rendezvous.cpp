@@ -216,8 +216,10 @@ std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std
     } else if (is_trusted(peer.uid, directory)) {
       return socket;
     } else {
-      passed_over("that daemon runs as user " + std::to_string(peer.uid) +
-                  ", who is neither root, nor \"arbiter\", nor you");
+      std::string why = "that daemon runs as user ";
+      why += std::to_string(peer.uid);
+      why += ", who is neither root, nor \"arbiter\", nor you";
+      passed_over(why);
     }
   }
   return {};

@@ -66,7 +66,9 @@ std::string printable(std::string_view text, std::string_view kept) {
       result += "\\n";
     } else {
       for (const char byte : bytes) {
-        result += {'\\', 'x', kDigits[byte >> 4 & 15], kDigits[byte & 15]};
+        result += "\\x";
+        result += kDigits[byte >> 4 & 15];
+        result += kDigits[byte & 15];
       }
     }
     text.remove_prefix(bytes.size());
