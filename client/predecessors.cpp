@@ -12,7 +12,14 @@ std::uint64_t accepted_on(const OutputPeer& peer) noexcept {
     if (channel.receiver.load(std::memory_order_relaxed) != peer.link) continue;
     const std::uint64_t first = channel.first.load(std::memory_order_relaxed);
     const std::uint64_t accepted = channel.accepted.load(std::memory_order_relaxed);
-    return accepted + 1 > first ? accepted + 1 - first : 0;
+    const std::uint64_t counted = accepted + 1 > first ? accepted + 1 - first : 0;
+    const std::uint32_t depth = channel.depth.load(std::memory_order_relaxed);
+    if (depth == 0 || depth > shm::kMaxDepth) return counted;
+    // It may have died between storing an entry and counting it.
+    const shm::Entry entry =
+        peer.segment.ring(index, peer.link)[counted % depth].load(std::memory_order_relaxed);
+    const bool is_stored = shm::sequence_of(entry) == ((first + counted) & shm::kSequenceMask);
+    return counted + (is_stored ? 1 : 0);
   }
   return 0;
 }

@@ -237,11 +237,15 @@ class ChannelReader {
     return count > kSequenceMask / 2 ? 0 : (count < depth_ ? count : depth_);
   }
 
-  // The same, with those that were overtaken before they were looked at. Of a publisher that is
-  // gone.
+  // The same, with those that were overtaken before they were looked at, and with one that its
+  // publisher has stored and not lived to count. Of a publisher that is gone.
   [[nodiscard]] std::uint64_t left_behind() const noexcept {
-    const std::uint64_t count = (backlog_end() + 1 - next_) & kSequenceMask;
-    return count > kSequenceMask / 2 ? 0 : count;
+    const std::uint64_t next_stored = (backlog_end() + 1) & kSequenceMask;
+    const std::uint64_t count = (next_stored - next_) & kSequenceMask;
+    if (count > kSequenceMask / 2) return 0;
+    if (state_ != State::kJoined) return count;
+    const Entry entry = ring_[(position_ + count) % depth_].load(std::memory_order_relaxed);
+    return count + (sequence_of(entry) == next_stored ? 1 : 0);
   }
 
   // The arrival time of an entry that is not held, for ordering; sure only if the entry is still

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <stdexcept>
@@ -114,7 +115,7 @@ bool is_trusted(uid_t user, const std::string& directory) {
          (directory == kSystemDirectory && has_system_directory(user));
 }
 
-std::string why_not_connected(int error) {
+const char* why_not_connected(int error) {
   switch (error) {
     case ENOENT:
       return "there is none";
@@ -123,8 +124,16 @@ std::string why_not_connected(int error) {
     case EAGAIN:
       return "somebody listens there, but lets nobody in: is it stopped?";
     default:
-      return std::generic_category().message(error);
+      break;
   }
+  const char* const described = strerrordesc_np(error);
+  return described == nullptr ? "it cannot be connected to" : described;
+}
+
+void pass_over(const std::string& directory, const std::string& instance, const char* why,
+               std::string& why_not) {
+  why_not.append(why_not.empty() ? "tried " : ", ");
+  why_not.append(directory).append("/").append(instance).append(".sock: ").append(why);
 }
 
 }  // namespace
@@ -198,28 +207,25 @@ Listener listen_at(const std::string& directory, const std::string& instance) {
 std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not) {
   why_not.clear();
   for (const std::string& directory : client_directories()) {
-    const auto passed_over = [&](const std::string& why) {
-      why_not += why_not.empty() ? "tried " : ", ";
-      why_not.append(directory).append("/").append(instance).append(".sock: ").append(why);
-    };
     FileDescriptor socket = make_socket();
     const Address at = address_of(directory, instance + ".sock");
     const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
     if (connect(socket.get(), address, sizeof at.address) != 0) {
-      passed_over(why_not_connected(errno));
+      pass_over(directory, instance, why_not_connected(errno), why_not);
       continue;
     }
     ucred peer{};
     socklen_t size = sizeof peer;
     if (getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
-      passed_over("it is not known whose daemon that is");
+      pass_over(directory, instance, "it is not known whose daemon that is", why_not);
     } else if (is_trusted(peer.uid, directory)) {
       return socket;
     } else {
-      std::string why = "that daemon runs as user ";
-      why += std::to_string(peer.uid);
-      why += ", who is neither root, nor \"arbiter\", nor you";
-      passed_over(why);
+      char why[96];
+      std::snprintf(why, sizeof why,
+                    "that daemon runs as user %u, who is neither root, nor \"arbiter\", nor you",
+                    peer.uid);
+      pass_over(directory, instance, why, why_not);
     }
   }
   return {};

@@ -54,7 +54,6 @@ std::optional<NameFault> find_fault_in_name(std::string_view name) {
 std::string printable(std::string_view text, std::string_view kept) {
   static constexpr char kDigits[] = "0123456789abcdef";
   std::string result;
-  result.reserve(text.size());
   while (!text.empty()) {
     const Utf8Character character = decode_utf8(text);
     const std::string_view bytes = text.substr(0, character.length == 0 ? 1 : character.length);
