@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
+#include <utility>
 
 namespace arbiter::shm {
 namespace {
@@ -88,8 +89,11 @@ ReceiveResult receive_message(int socket, Received& received, bool wait) noexcep
   header.msg_control = &control;
   header.msg_controllen = sizeof control;
   ssize_t size = 0;
+  bool was_reset = false;
   while ((size = recvmsg(socket, &header, MSG_CMSG_CLOEXEC | (wait ? 0 : MSG_DONTWAIT))) < 0) {
     if (errno == EINTR) continue;
+    // Said once where the other end has closed with messages unread, before what it sent itself.
+    if (errno == ECONNRESET && !std::exchange(was_reset, true)) continue;
     return errno == EAGAIN ? ReceiveResult::kNothing : ReceiveResult::kClosed;
   }
   const std::size_t taken = take_descriptors(header, received);  // of an empty message too

@@ -181,5 +181,18 @@ TEST_F(Wire, APeerThatIsGoneIsToldApartAndRaisesNoSignal) {
   EXPECT_EQ(receive_message(sender_.get(), received_, true), ReceiveResult::kClosed);
 }
 
+// The kernel says first that the other end left messages unread, and only then what it sent.
+TEST_F(Wire, WhatWasSentBeforeHangingUpIsReadThoughTheSenderLeftMessagesUnread) {
+  Message message;
+  message.kind = MessageKind::kClosePort;
+  ASSERT_EQ(send_message(sender_.get(), message), SendResult::kSent);
+  ASSERT_EQ(send_message(receiver_.get(), message), SendResult::kSent);
+  sender_.reset();
+  Received received;
+  EXPECT_EQ(receive_message(receiver_.get(), received, false), ReceiveResult::kReceived);
+  EXPECT_EQ(received.message.kind, MessageKind::kClosePort);
+  EXPECT_EQ(receive_message(receiver_.get(), received, false), ReceiveResult::kClosed);
+}
+
 }  // namespace
 }  // namespace arbiter::shm
