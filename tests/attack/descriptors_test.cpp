@@ -20,6 +20,7 @@
 #include "tests/attack/attacker.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/other_user.hpp"
+#include "tests/support/raw_port.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -80,19 +81,6 @@ FileDescriptor output_segment(std::uint64_t sample_size, std::uint32_t slots) {
   header.version = shm::OutputHeader::kVersion;
   header.slot_count = slots;
   header.type = some_type(sample_size);
-  shm::seal(segment, shm::Seals::kOneWriter);
-  return segment;
-}
-
-FileDescriptor input_segment() {
-  auto segment = shm::make_segment("attack", sizeof(shm::InputSegment));
-  EXPECT_FALSE(shm::allocate(segment, 0, sizeof(shm::InputSegment)));
-  const shm::Mapping mapping(segment, sizeof(shm::InputSegment), shm::Access::kReadWrite);
-  auto& header = mapping.as<shm::InputSegment>()->header;
-  header.magic = shm::InputHeader::kMagic;
-  header.version = shm::InputHeader::kVersion;
-  header.depth = 1;
-  header.max_held = 1;
   shm::seal(segment, shm::Seals::kOneWriter);
   return segment;
 }
@@ -224,7 +212,7 @@ class ABellThatIsHandedIn : public testing::Test {
   std::string refusal(int bell) {
     RawClient client(daemon_.instance());
     client.hello("attacker");
-    const FileDescriptor segment = input_segment();
+    const FileDescriptor segment = raw_input_segment();
     client.send(RawClient::message(MessageKind::kOpenInput, "/attacker:i"), {segment.get(), bell});
     return client.expect_refusal();
   }
@@ -260,10 +248,10 @@ TEST_F(ABellThatIsHandedIn, IsNotAnotherUsersNorIsTheSegment) {
   const shm::Bell bell;
   // A copy: a forked child has none of the library's own descriptors.
   const FileDescriptor roots_bell(::fcntl(bell.write_end().get(), F_DUPFD_CLOEXEC, 0));
-  const FileDescriptor roots_segment = input_segment();
+  const FileDescriptor roots_segment = raw_input_segment();
   const auto said = as_user(kStranger, [&] {
     const shm::Bell own_bell;
-    const FileDescriptor own_segment = input_segment();
+    const FileDescriptor own_segment = raw_input_segment();
     RawClient client(daemon_.instance());
     client.hello("attacker");
     std::string refusals;

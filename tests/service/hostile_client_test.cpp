@@ -15,6 +15,7 @@
 #include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/raw_port.hpp"
 #include "tests/support/threads.hpp"
 
 namespace arbiter::test {
@@ -182,17 +183,7 @@ TEST_F(HostileClient, CannotPassOtherKindsOfDescriptorsForASegment) {
 }
 
 TEST_F(HostileClient, CannotPassAnotherThingForABell) {
-  const auto segment = shm::make_segment("input", sizeof(shm::InputSegment));
-  EXPECT_FALSE(shm::allocate(segment, 0, sizeof(shm::InputSegment)));
-  {
-    const shm::Mapping mapping(segment, sizeof(shm::InputSegment), shm::Access::kReadWrite);
-    auto& header = mapping.as<shm::InputSegment>()->header;
-    header.magic = shm::InputHeader::kMagic;
-    header.version = shm::InputHeader::kVersion;
-    header.depth = 1;
-    header.max_held = 1;
-  }
-  shm::seal(segment, shm::Seals::kOneWriter);
+  const auto segment = raw_input_segment();
   const shm::FileDescriptor event(::eventfd(0, EFD_CLOEXEC));
   const std::string why =
       refusal(RawClient::message(MessageKind::kOpenInput, "/x"), {segment.get(), event.get()});

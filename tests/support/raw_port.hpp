@@ -1,8 +1,10 @@
 // Ports that are opened below the client library.
 #pragma once
 
+#include <stdexcept>
 #include <string>
 
+#include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
 #include "tests/support/raw_client.hpp"
 
@@ -20,6 +22,21 @@ inline shm::FileDescriptor raw_output_segment() {
     header.version = shm::OutputHeader::kVersion;
     header.slot_count = 4;
     header.type = type;
+  }
+  shm::seal(segment, shm::Seals::kOneWriter);
+  return segment;
+}
+
+inline shm::FileDescriptor raw_input_segment() {
+  auto segment = shm::make_segment("test", sizeof(shm::InputSegment));
+  if (shm::allocate(segment, 0, sizeof(shm::InputSegment))) throw std::runtime_error("no memory");
+  {
+    const shm::Mapping mapping(segment, sizeof(shm::InputSegment), shm::Access::kReadWrite);
+    auto& header = mapping.as<shm::InputSegment>()->header;
+    header.magic = shm::InputHeader::kMagic;
+    header.version = shm::InputHeader::kVersion;
+    header.depth = 1;
+    header.max_held = 1;
   }
   shm::seal(segment, shm::Seals::kOneWriter);
   return segment;
