@@ -24,7 +24,6 @@ inline constexpr std::uint32_t kMaxHeld = 64;                   // samples a com
 inline constexpr std::uint32_t kMaxLoans = 64;                  // samples being written at once
 inline constexpr std::uint32_t kMaxSlots = 65535;               // payload slots of one output port
 inline constexpr std::uint32_t kMaxClients = 4096;              // of one daemon
-inline constexpr std::uint32_t kMaxClientsPerUser = 2048;       // so that none can shut others out
 inline constexpr std::uint32_t kMaxPostponed = 64;              // requests of one client
 inline constexpr std::uint32_t kMaxSilentClients = 256;         // that have not said who they are
 
