@@ -154,14 +154,14 @@ LiveSituation look(detail::NodeCore& node, const rules::RuleSet& rules) {
 }
 
 // What the daemon has in force.
-struct ModelInForce {
+struct FetchedModel {
   json generation;
   std::optional<rules::ModelTexts> texts;  // none: it has them from a former daemon, as a table
 };
 
-ModelInForce fetch_model(detail::NodeCore& node) {
+FetchedModel fetch_model(detail::NodeCore& node) {
   const json document = fetch_document(node, shm::MessageKind::kModel);
-  ModelInForce model{document.at("generation"), {}};
+  FetchedModel model{document.at("generation"), {}};
   if (!document.at("known").get<bool>()) return model;
   const auto text_of = [](const json& file) {
     return rules::FileText{file.at("path").get<std::string>(), file.at("text").get<std::string>()};
@@ -233,7 +233,7 @@ class LivePicture {
 
  private:
   bool load(const json& model) {
-    const ModelInForce in_force = fetch_model(*node_);
+    const FetchedModel in_force = fetch_model(*node_);
     if (!options_.files.models.empty()) {
       const rules::ModelTexts given = rules::read_texts(options_.files);
       if (!picture_.load(given)) return false;

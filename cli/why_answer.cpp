@@ -25,7 +25,7 @@ constexpr std::size_t kMaxTakenApart = 3;
 constexpr std::size_t kMaxCauses = 3;  // of each of these
 
 // The sources that an explanation of a connection names as its reasons.
-std::vector<std::string> reasons_of(const ConnectionExplanation& connection) {
+std::vector<std::string> sources_that_matter(const ConnectionExplanation& connection) {
   std::set<std::string> names;
   for (const auto& part : connection.parts) {
     for (const auto& cause : part.causes) {
@@ -86,7 +86,7 @@ WhyAnswer::WhyAnswer(const WhyOptions& options, const LivePort& port, Look look,
   if (!options_.source.empty()) std::erase_if(shown_, is_other);
   for (const auto& each : shown_) {
     if (!each.is_active || each.wins) continue;
-    for (auto& name : reasons_of(each)) reasons_.push_back(std::move(name));
+    for (auto& name : sources_that_matter(each)) reasons_.push_back(std::move(name));
   }
 }
 
@@ -348,7 +348,7 @@ void WhyAnswer::write_kept_out(const ConnectionExplanation& connection) const {
 // Where only one connection is told of, what there is to say of the sources that keep it out.
 void WhyAnswer::write_reasons(const ConnectionExplanation& connection) const {
   if (connection.wins) return;
-  for (const auto& source : reasons_of(connection)) {
+  for (const auto& source : sources_that_matter(connection)) {
     write_obstacles(obstacles_.of_source(source), source + ": ");
   }
 }

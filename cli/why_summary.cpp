@@ -17,7 +17,7 @@ using rules::ConnectionExplanation;
 constexpr std::size_t kMaxReasons = 5;  // lines
 
 // All that by themselves keep it out, without what differs from one connection to the next.
-std::set<std::string> reasons_of(const ConnectionExplanation& connection) {
+std::set<std::string> causes_by_themselves(const ConnectionExplanation& connection) {
   if (!connection.has_rule) return {"selected by no rule"};
   if (connection.earlier) {
     return {"behind " + *connection.earlier + " in the model, which wins by conflict=\"first\""};
@@ -36,7 +36,7 @@ void write_group(std::ostream& out, const std::string& reason,
 // Each is told of once, by the reason that it shares with most of those that are left.
 void write_active(std::ostream& out, const std::vector<const ConnectionExplanation*>& active) {
   std::map<const ConnectionExplanation*, std::set<std::string>> left;
-  for (const auto* each : active) left.emplace(each, reasons_of(*each));
+  for (const auto* each : active) left.emplace(each, causes_by_themselves(*each));
   for (std::size_t line = 0; line < kMaxReasons && !left.empty(); ++line) {
     std::map<std::string, std::size_t> counts;
     for (const auto& [connection, reasons] : left) {

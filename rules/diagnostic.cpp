@@ -1,10 +1,46 @@
 #include "rules/diagnostic.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "shm/utf8.hpp"
 
 namespace arbiter::rules {
+
+void Diagnostics::error(std::string code, Location where, std::string message) {
+  error(std::move(code), std::move(where), std::move(message), {});
+}
+
+void Diagnostics::error(std::string code, Location where, std::string message, Subject about,
+                        std::optional<Witness> witness) {
+  find({Severity::kError,
+        std::move(code),
+        std::move(where),
+        std::move(message),
+        std::move(witness),
+        {},
+        std::move(about)});
+}
+
+void Diagnostics::warning(std::string code, Location where, std::string message, Subject about) {
+  find({Severity::kWarning,
+        std::move(code),
+        std::move(where),
+        std::move(message),
+        {},
+        {},
+        std::move(about)});
+}
+
+void Diagnostics::note(std::string code, Location where, std::string message) {
+  note(std::move(code), std::move(where), std::move(message), {});
+}
+
+void Diagnostics::note(std::string code, Location where, std::string message, Subject about,
+                       std::optional<Witness> witness, std::vector<Witness> more_witnesses) {
+  find({Severity::kNote, std::move(code), std::move(where), std::move(message), std::move(witness),
+        std::move(more_witnesses), std::move(about)});
+}
 
 void Diagnostics::silence(const std::vector<std::string>& codes) {
   const auto is_silenced = [&](Severity severity, const std::string& code) {

@@ -66,30 +66,13 @@ class Diagnostics {
   // Nobody reads more, and a large file of nothing but mistakes must not fill the memory.
   static constexpr std::size_t kMaxOfCode = 10'000;
 
-  void error(std::string code, Location where, std::string message, Subject about = {},
-             std::optional<Witness> witness = {}) {
-    find({Severity::kError,
-          std::move(code),
-          std::move(where),
-          std::move(message),
-          std::move(witness),
-          {},
-          std::move(about)});
-  }
-  void warning(std::string code, Location where, std::string message, Subject about = {}) {
-    find({Severity::kWarning,
-          std::move(code),
-          std::move(where),
-          std::move(message),
-          {},
-          {},
-          std::move(about)});
-  }
-  void note(std::string code, Location where, std::string message, Subject about = {},
-            std::optional<Witness> witness = {}, std::vector<Witness> more_witnesses = {}) {
-    find({Severity::kNote, std::move(code), std::move(where), std::move(message),
-          std::move(witness), std::move(more_witnesses), std::move(about)});
-  }
+  void error(std::string code, Location where, std::string message);
+  void error(std::string code, Location where, std::string message, Subject about,
+             std::optional<Witness> witness = {});
+  void warning(std::string code, Location where, std::string message, Subject about = {});
+  void note(std::string code, Location where, std::string message);
+  void note(std::string code, Location where, std::string message, Subject about,
+            std::optional<Witness> witness = {}, std::vector<Witness> more_witnesses = {});
   // All that another one has, behind what is here.
   void add(Diagnostics other);
   // Without those of these codes; errors stay.

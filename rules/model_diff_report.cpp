@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "rules/model_diff.hpp"
+#include "rules/names.hpp"
 #include "rules/print_rules.hpp"
 #include "rules/winners.hpp"
 
@@ -15,12 +16,6 @@ constexpr std::size_t kMaxChangesShown = 8;  // of a port, in the text; JSON has
 
 std::string counted(std::size_t count, const std::string& thing) {
   return std::to_string(count) + ' ' + thing + (count == 1 ? "" : "s");
-}
-
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 std::string winner_name(const std::optional<std::string>& winner) {
@@ -74,10 +69,10 @@ void write_port(std::ostream& out, const PortDiff& port) {
         << ": without rules everything is delivered\n";
   }
   if (!port.connections_before.empty()) {
-    out << "  connected only before: " << joined(port.connections_before) << '\n';
+    out << "  connected only before: " << comma_list(port.connections_before) << '\n';
   }
   if (!port.connections_after.empty()) {
-    out << "  connected only after: " << joined(port.connections_after) << '\n';
+    out << "  connected only after: " << comma_list(port.connections_after) << '\n';
   }
   if (port.first_wins_before != port.first_wins_after) {
     out << "  conflict=\"first\" only " << (port.first_wins_before ? "before" : "after") << '\n';
@@ -108,7 +103,7 @@ std::string summary(const ModelDiff& diff) {
   const auto named = [&](std::vector<std::string> names) {
     const std::size_t count = names.size();
     if (count > kMaxNames) names.resize(kMaxNames);
-    return " (" + joined(names) + (count > kMaxNames ? ", …)" : ")");
+    return " (" + comma_list(names) + (count > kMaxNames ? ", …)" : ")");
   };
   const auto changed = list([](const PortDiff& port) { return port.differs(); });
   const auto open = list([](const PortDiff& port) { return !port.open.empty(); });

@@ -79,6 +79,12 @@ std::string enumerate(const std::vector<std::string>& names) {
   return text;
 }
 
+std::string comma_list(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
 std::string describe(const Location& where) {
   return where.file + ':' + std::to_string(where.line) + ':' + std::to_string(where.column);
 }

@@ -25,6 +25,9 @@ inline constexpr std::size_t kMaxNamesInWords = 6;
 // "/a, /b and /c".
 std::string enumerate(const std::vector<std::string>& names);
 
+// "/a, /b, /c".
+std::string comma_list(const std::vector<std::string>& names);
+
 // file:line:column, to point at a second place from within a message.
 std::string describe(const Location& where);
 

@@ -53,11 +53,8 @@ std::vector<const Diagnostic*> in_reading_order(const Diagnostics& diagnostics) 
   return items;
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  if (names.empty()) return "none";
-  std::string text;
-  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
+std::string list_or_none(const std::vector<std::string>& names) {
+  return names.empty() ? "none" : comma_list(names);
 }
 
 bool is_short(const Witness& witness) {
@@ -65,7 +62,7 @@ bool is_short(const Witness& witness) {
 }
 
 std::string in_lists(const Witness& witness) {
-  return "active: " + joined(witness.active) + "; inactive: " + joined(witness.inactive) +
+  return "active: " + list_or_none(witness.active) + "; inactive: " + list_or_none(witness.inactive) +
          (witness.is_shortest ? "" : " (nothing of it can be left out; others may be shorter)");
 }
 

@@ -20,25 +20,6 @@ namespace {
 
 using Errand = std::function<void()>;
 
-// One thread's turn. Whoever it works for looks at `since` to see whether it is lost.
-struct Turn {
-  shm::Nanoseconds since = 0;  // when its errand began
-  bool lost = false;
-};
-
-struct Lane {
-  std::deque<Errand> waiting;
-  std::vector<std::shared_ptr<Turn>> turns;  // of threads that work for this user, lost ones too
-
-  [[nodiscard]] std::size_t lost() const {
-    return static_cast<std::size_t>(
-        std::count_if(turns.begin(), turns.end(), [](const auto& turn) { return turn->lost; }));
-  }
-  [[nodiscard]] bool needs_a_thread() const {
-    return !waiting.empty() && turns.size() == lost() && lost() < Errands::kMaxLostOfAUser;
-  }
-};
-
 // Signals are for the loop: a thread that is made now inherits that it has them blocked.
 class SignalsBlocked {
  public:
@@ -58,6 +39,25 @@ class SignalsBlocked {
 }  // namespace
 
 struct Errands::State : std::enable_shared_from_this<State> {
+  // One thread's turn. Whoever it works for looks at `since` to see whether it is lost.
+  struct Turn {
+    shm::Nanoseconds since = 0;  // when its errand began
+    bool lost = false;
+  };
+
+  struct Lane {
+    std::deque<Errand> waiting;
+    std::vector<std::shared_ptr<Turn>> turns;  // of threads that work for this user, lost ones too
+
+    [[nodiscard]] std::size_t lost() const {
+      return static_cast<std::size_t>(
+          std::count_if(turns.begin(), turns.end(), [](const auto& turn) { return turn->lost; }));
+    }
+    [[nodiscard]] bool needs_a_thread() const {
+      return !waiting.empty() && turns.size() == lost() && lost() < Errands::kMaxLostOfAUser;
+    }
+  };
+
   mutable std::mutex mutex;
   mutable std::condition_variable news;
   std::map<uid_t, Lane> lanes;  // those that have something to do
@@ -122,7 +122,7 @@ Errands::~Errands() = default;
 
 void Errands::run(uid_t user, std::function<void()> errand) {
   const std::lock_guard lock(state_->mutex);
-  Lane& lane = state_->lanes[user];
+  State::Lane& lane = state_->lanes[user];
   lane.waiting.push_back(std::move(errand));
   if (lane.needs_a_thread() && state_->threads < kMaxThreads) state_->start(user, lane);
 }

@@ -5,8 +5,14 @@
 namespace arbiter::service {
 namespace {
 
+Owner owner(const Client& client, shm::PortInstance port) {
+  return {port, client.node, client.identity()};
+}
+
+}  // namespace
+
 shm::Message message_to(shm::MessageKind kind, shm::PortInstance port, shm::PortInstance peer,
-                        std::uint32_t id = 0) {
+                        std::uint32_t id) {
   shm::Message message;
   message.kind = kind;
   message.port = port;
@@ -14,12 +20,6 @@ shm::Message message_to(shm::MessageKind kind, shm::PortInstance port, shm::Port
   message.id = id;
   return message;
 }
-
-Owner owner(const Client& client, shm::PortInstance port) {
-  return {port, client.node, client.identity()};
-}
-
-}  // namespace
 
 OutputPort& Switchboard::add(std::unique_ptr<OutputPort> port, Client& client, Source& source) {
   port->instance = registry_.next_instance();

@@ -13,14 +13,6 @@
 namespace arbiter::service {
 namespace {
 
-shm::Message message_to(shm::MessageKind kind, shm::PortInstance port, shm::PortInstance peer) {
-  shm::Message message;
-  message.kind = kind;
-  message.port = port;
-  message.peer = peer;
-  return message;
-}
-
 // Takes a claim out: its number, 0 where it is not one of a connection, nothing where there is
 // none.
 std::optional<std::uint64_t> take(Claims& claims, shm::PortInstance peer) {

@@ -203,7 +203,7 @@ TEST(InOrder, ModelsOfManyConnectionsThatDecideAlikeAreProvedTo) {
 }
 
 TEST(InOrder, WhereModelsOfManyConnectionsDecideDifferentlyIsFound) {
-  for (const std::size_t count : {50, 100, 256}) {
+  for (const std::size_t count : {50u, 100u, 256u}) {
     SCOPED_TRACE(std::to_string(count));
     const Rules before = random_inhibitions(count, 1);
     Rules after = before;
