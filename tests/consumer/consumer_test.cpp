@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <regex>
 
 #include "tests/support/daemon.hpp"
 #include "tests/support/run_program.hpp"
@@ -21,11 +24,52 @@ void run(const std::vector<std::string>& command) {
   ASSERT_EQ(result.exit_code, 0) << command[1] << "\n" << result.out << result.err;
 }
 
+void install(const std::string& prefix) {
+  run({CONSUMER_CMAKE, "--install", CONSUMER_BUILD, "--prefix", prefix});
+}
+
+// The files that a page links to, as it names them.
+std::vector<std::string> links_of(const fs::path& page) {
+  std::ifstream in(page);
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  const std::regex link(R"(\]\(([^)#]+)[^)]*\))");
+  std::vector<std::string> links;
+  for (std::sregex_iterator it(text.begin(), text.end(), link), end; it != end; ++it) {
+    if (const std::string to = (*it)[1]; to.find("://") == std::string::npos) links.push_back(to);
+  }
+  return links;
+}
+
+TEST(Consumer, FindsWhatTheInstalledPagesLinkTo) {
+  const TemporaryDirectory directory;
+  ASSERT_NO_FATAL_FAILURE(install(directory.path()));
+  std::size_t links = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(directory.path() + "/share/doc")) {
+    if (entry.path().extension() != ".md") continue;
+    for (const auto& to : links_of(entry.path())) {
+      ++links;
+      EXPECT_TRUE(fs::exists(entry.path().parent_path() / to)) << entry.path() << ": " << to;
+    }
+  }
+  EXPECT_GT(links, 40u);
+}
+
+TEST(Consumer, NeedsAtMost15Megabytes) {
+  if (std::string(CONSUMER_BUILD_TYPE) != "RelWithDebInfo") return;  // of what ships
+  const TemporaryDirectory directory;
+  ASSERT_NO_FATAL_FAILURE(install(directory.path()));
+  std::uintmax_t bytes = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(directory.path())) {
+    if (entry.is_regular_file() && !entry.is_symlink()) bytes += entry.file_size();
+  }
+  EXPECT_LE(bytes, 15'000'000u);
+}
+
 TEST(Consumer, BuildsAndRunsAgainstTheInstalledPackage) {
   const TemporaryDirectory directory;
   const std::string prefix = directory.path() + "/prefix";
   const std::string build = directory.path() + "/build";
-  ASSERT_NO_FATAL_FAILURE(run({CONSUMER_CMAKE, "--install", CONSUMER_BUILD, "--prefix", prefix}));
+  ASSERT_NO_FATAL_FAILURE(install(prefix));
   EXPECT_TRUE(fs::exists(prefix + "/include/arbiter/arbiter.hpp"));
   EXPECT_TRUE(fs::exists(prefix + "/bin/arbiterd"));
   // The sources are copied, so that nothing of ours is found by the way.
