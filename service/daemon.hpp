@@ -214,7 +214,7 @@ class Daemon {
   };
   struct Postponed {
     ClientId client = 0;
-    std::unique_ptr<shm::Received> request;
+    std::unique_ptr<KeptMessage> request;
     shm::Nanoseconds deadline = 0;
   };
 

@@ -163,6 +163,13 @@ shm::Nanoseconds Errands::deadline() const {
   return first;
 }
 
+bool Errands::is_stuck(uid_t user) const {
+  const std::lock_guard lock(state_->mutex);
+  const auto lane = state_->lanes.find(user);
+  return lane != state_->lanes.end() && lane->second.waiting.size() >= kMaxWaiting &&
+         lane->second.lost() == kMaxLostOfAUser;
+}
+
 std::size_t Errands::lost() const {
   const std::lock_guard lock(state_->mutex);
   std::size_t count = 0;
