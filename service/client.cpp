@@ -33,9 +33,11 @@ shm::FileDescriptor open_process(int socket, pid_t pid) {
 }
 
 std::string too_much_waits(uid_t user) {
-  return "limit-exceeded: " + std::to_string(Errands::kMaxWaiting) + " descriptors of user " +
-         std::to_string(user) + " wait to be closed behind others that never are: end the " +
-         "processes that have sent them, and those at their other ends";
+  return "limit-exceeded: more than " + std::to_string(Errands::kMaxWaiting) +
+         " descriptors of user " + std::to_string(user) +
+         " wait behind others that take long to close: end the processes that have sent them, "
+         "and " +
+         "those at their other ends";
 }
 
 // The most messages that are looked at before a socket is closed.

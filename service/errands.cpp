@@ -166,8 +166,10 @@ shm::Nanoseconds Errands::deadline() const {
 bool Errands::is_stuck(uid_t user) const {
   const std::lock_guard lock(state_->mutex);
   const auto lane = state_->lanes.find(user);
-  return lane != state_->lanes.end() && lane->second.waiting.size() >= kMaxWaiting &&
-         lane->second.lost() == kMaxLostOfAUser;
+  if (lane == state_->lanes.end()) return false;
+  const std::size_t waiting = lane->second.waiting.size();
+  return waiting >= kMostWaiting ||
+         (waiting >= kMaxWaiting && lane->second.lost() == kMaxLostOfAUser);
 }
 
 std::size_t Errands::lost() const {
