@@ -2,8 +2,8 @@
 // it is not known yet that this memory is allocated: a load from a hole would allocate it, and the
 // receiver would pay, sample after sample.
 //
-// An honest publisher's samples are copied for as long as it takes the service thread to hear that
-// more of its segment is in use: another input port has just been connected to it.
+// An honest publisher's samples are copied for as long as it takes the service thread to look how
+// much of the segment is in use by now: another input port has just been connected to it.
 #pragma once
 
 #include <array>

@@ -56,12 +56,18 @@ void InputCore::add_peer(std::shared_ptr<const OutputPeer> peer) {
   offer_view();
 }
 
-void InputCore::map_growth(shm::PortInstance peer) {
-  const auto found = links_.find(peer);
-  if (found == links_.end()) return;
-  const OutputPeer& grown = *found->second.peer;
-  survey(grown);
-  shm::make_written_resident(grown.file, grown.mapping, memory_->residence());
+std::shared_ptr<const OutputPeer> InputCore::peer(shm::PortInstance instance) const {
+  const auto found = links_.find(instance);
+  return found == links_.end() ? nullptr : found->second.peer;
+}
+
+std::vector<std::shared_ptr<const OutputPeer>> InputCore::copied_from() {
+  std::vector<std::shared_ptr<const OutputPeer>> found;
+  for (auto& [instance, link] : links_) {
+    const std::uint32_t copied = link.peer->copied.load(std::memory_order_relaxed);
+    if (std::exchange(link.copied, copied) != copied) found.push_back(link.peer);
+  }
+  return found;
 }
 
 void InputCore::lose_peer(shm::PortInstance peer) {

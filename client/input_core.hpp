@@ -36,8 +36,10 @@ class InputCore {
 
   void bind(shm::PortInstance instance, shm::PortId port);
   void add_peer(std::shared_ptr<const OutputPeer> peer);
-  // The peer uses more of its segment now. Throws std::system_error where that cannot be locked.
-  void map_growth(shm::PortInstance peer);
+  // Null: it is not known.
+  [[nodiscard]] std::shared_ptr<const OutputPeer> peer(shm::PortInstance instance) const;
+  // Those of whom samples had to be copied since this was asked last: they may have grown.
+  [[nodiscard]] std::vector<std::shared_ptr<const OutputPeer>> copied_from();
   // The peer has closed or died; what it has delivered can still be taken.
   void lose_peer(shm::PortInstance peer);
   // The model has disconnected it.

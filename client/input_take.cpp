@@ -318,8 +318,12 @@ bool InputCore::is_allocated(Queue& queue, std::uint32_t slot) const noexcept {
   return slot < queue.allocated_slots;
 }
 
-// A slot that is not known to be allocated: copies.hpp.
+// A slot that is not known to be allocated: copies.hpp. The service thread is asked to look again,
+// for the publisher may have grown later than we were told to look.
 bool InputCore::copy(const Queue& queue, std::uint32_t slot, HeldSample& sample) noexcept {
+  queue.peer->copied.store(queue.peer->copied.load(std::memory_order_relaxed) + 1,
+                           std::memory_order_relaxed);
+  memory_->service_bell().ring();
   for (std::uint32_t i = 0; i < max_held_; ++i) {
     if (held_from_[i] == nullptr) copies_.forget(i);
   }

@@ -18,9 +18,11 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <arbiter/detail/cores.hpp>
@@ -108,18 +110,25 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // Waits up to `timeout_ms` for something to do and does it.
   void pump(int timeout_ms);
   void tidy();
+  void tidy_ports(
+      std::vector<std::pair<shm::PortInstance, std::shared_ptr<const OutputPeer>>>& copied_from);
   [[nodiscard]] bool has_predecessors();
   void handle(shm::Received& received);
   void handle_without_descriptors(const shm::Message& message);
   void handle_reply(shm::Received& received);
   void wake_inputs();
-  void handle_peer(shm::Received& received);
+  void add_receiver(const shm::Received& received);
+  void add_publisher(const shm::Received& received);
+  void end_peer(const shm::Message& message);
+  [[nodiscard]] std::optional<shm::TypeInfo> type_of_port(shm::PortInstance port);
   void refuse_peer(const shm::Message& announced, const std::string& why);
   void handle_refusal(const shm::Message& refusal);
   void handle_unmentioned(const shm::Message& message);
   void add_page(shm::Received& received);
+  void note_unseen(const std::string& source, const std::string& why);
   void make_tables_resident();
-  void map_growth(const shm::Received& received);
+  void hear_of_growth(const shm::Message& message);
+  void look_at_growth(shm::PortInstance port, const OutputPeer& peer);
   void say_not_locked(shm::PortInstance port, const std::string& why);
   void say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
 

@@ -76,7 +76,12 @@ void NodeCore::refuse_peer(const shm::Message& announced, const std::string& why
   if (is_output_peer && input != inputs_.end()) {
     input->second->refuse_peer(announced.peer, announced.id);
   }
-  if (is_output_peer || (announced.flags & shm::kIsConnected) != 0) note_refusal(announced, why);
+  const auto output = outputs_.find(announced.port);
+  const bool is_to_connect = is_output_peer || (announced.flags & shm::kIsConnected) != 0;
+  if (is_to_connect && output != outputs_.end()) {
+    output->second->refuse_peer(announced.peer, announced.id);
+  }
+  if (is_to_connect) note_refusal(announced, why);
 }
 
 void NodeCore::say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
@@ -109,11 +114,17 @@ void NodeCore::say_blind(shm::PortInstance port, const char* what_it_does) {
   say(message);
 }
 
+// Of no port in particular: whose rules read the source says so when it is missed.
+void NodeCore::note_unseen(const std::string& source, const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  note(NoticeKind::blind, 0, source, "the activity of " + source + " cannot be seen: " + why);
+}
+
 // A refusal that the daemon or the peer has found.
 void NodeCore::handle_refusal(const shm::Message& refusal) {
   const std::lock_guard lock(mutex_);
   if (const auto output = outputs_.find(refusal.port); output != outputs_.end()) {
-    output->second->refuse_peer(refusal.peer);
+    output->second->refuse_peer(refusal.peer, refusal.id);
   }
   if (const auto input = inputs_.find(refusal.port); input != inputs_.end()) {
     input->second->refuse_peer(refusal.peer, refusal.id);

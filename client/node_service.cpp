@@ -8,9 +8,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <cstring>
 #include <system_error>
+#include <utility>
 
 #include "client/node_core.hpp"
 
@@ -122,6 +122,13 @@ void NodeCore::pump(int timeout_ms) {
 }
 
 void NodeCore::tidy() {
+  std::vector<std::pair<shm::PortInstance, std::shared_ptr<const OutputPeer>>> to_look_at;
+  tidy_ports(to_look_at);
+  for (const auto& [port, peer] : to_look_at) look_at_growth(port, *peer);
+}
+
+void NodeCore::tidy_ports(
+    std::vector<std::pair<shm::PortInstance, std::shared_ptr<const OutputPeer>>>& copied_from) {
   const std::lock_guard lock(mutex_);
   service_bell_->silence();
   for (auto& [instance, output] : outputs_) {
@@ -139,31 +146,38 @@ void NodeCore::tidy() {
                   "the output port misbehaves: its queue has what no honest publisher writes");
     }
     if (input->has_become_blind()) say_blind(instance, "delivers nothing");
+    for (auto& peer : input->copied_from()) copied_from.emplace_back(instance, std::move(peer));
   }
 }
 
 // This process has no descriptor left for what came with a message. Nothing is lost by that but
 // what the message was about.
 void NodeCore::handle_without_descriptors(const shm::Message& message) {
-  if (message.kind == shm::MessageKind::kWelcome) {
-    lose_daemon();  // and tries again
-    return;
-  }
   const std::string why = "process " + std::to_string(getpid()) +
                           " has no descriptor left for what the daemon sends: raise RLIMIT_NOFILE "
                           "(ulimit -n, LimitNOFILE= in a systemd unit)";
-  const std::lock_guard lock(mutex_);
-  std::fprintf(stderr, "arbiter: \"%s\": %s\n", name_.c_str(), why.c_str());
-  if (message.peer != 0) say_refused(message.port, message.peer, why);
-  const auto found = replies_.find(message.request);
-  if (message.peer != 0 || found == replies_.end()) return;
-  found->second.refusal = why;
-  if (message.kind == shm::MessageKind::kOpened) {
-    say_closed(message.port);  // what it is answered ends the wait
-  } else {
-    found->second.finished = true;
-    news_.notify_all();
+  switch (message.kind) {
+    case shm::MessageKind::kWelcome:
+      lose_daemon();  // and tries again
+      return;
+    case shm::MessageKind::kOutputPeer:
+    case shm::MessageKind::kInputPeer:
+      refuse_peer(message, why);
+      return;
+    case shm::MessageKind::kSourcePage:
+      note_unseen(std::string(message.name_view()), why);
+      return;
+    default:
+      break;
   }
+  const std::lock_guard lock(mutex_);
+  const bool is_opened = message.kind == shm::MessageKind::kOpened;
+  if (is_opened) say_closed(message.port);  // what it is answered ends the wait
+  const auto found = replies_.find(message.request);
+  if (found == replies_.end()) return;
+  found->second.refusal = why;
+  found->second.finished = !is_opened;
+  news_.notify_all();
 }
 
 void NodeCore::handle(shm::Received& received) {
@@ -180,23 +194,22 @@ void NodeCore::handle(shm::Received& received) {
       add_page(received);
       break;
     case shm::MessageKind::kOutputGrown:
-      try {
-        map_growth(received);
-      } catch (const std::system_error& error) {
-        say_not_locked(message.port, error.what());
-      }
+      hear_of_growth(message);
       break;
     case shm::MessageKind::kPortName: {
       const std::lock_guard lock(mutex_);
       port_names_[message.id] = message.name_view();
       break;
     }
-    case shm::MessageKind::kInputPeer:
-    case shm::MessageKind::kOutputPeer:
     case shm::MessageKind::kPeerGone:
     case shm::MessageKind::kDisconnected:
+      end_peer(message);
+      break;
+    case shm::MessageKind::kInputPeer:
+    case shm::MessageKind::kOutputPeer:
       try {
-        handle_peer(received);
+        message.kind == shm::MessageKind::kInputPeer ? add_receiver(received)
+                                                     : add_publisher(received);
       } catch (const std::system_error& error) {
         refuse_peer(message, error.what());
         if (options_.lock_memory) say_not_locked(message.port, error.what());
@@ -238,15 +251,14 @@ void NodeCore::add_page(shm::Received& received) {
     if (memory_->pages().find(message.id) != nullptr) {
       say_not_locked(0, error.what());
     } else {
-      const std::lock_guard lock(mutex_);
-      note(NoticeKind::blind, 0, source,
-           "the activity of " + source + " cannot be seen: " + error.what());
+      note_unseen(source, error.what());
     }
   }
   wake_inputs();
 }
 
-// A port that could not see a source may have held back a sample and gone to sleep.
+// A port that could not see a source, or could not copy a large sample out of memory that it did
+// not know to be allocated, may have held back a sample and gone to sleep.
 void NodeCore::wake_inputs() {
   const std::lock_guard lock(mutex_);
   for (const auto& [instance, input] : inputs_) {
@@ -276,37 +288,71 @@ void NodeCore::say_not_locked(shm::PortInstance port, const std::string& why) {
   if (!is_told) note(NoticeKind::not_locked, port, {}, why);
 }
 
-void NodeCore::map_growth(const shm::Received& received) {
-  const std::lock_guard lock(mutex_);
-  const auto input = inputs_.find(received.message.port);
-  if (input == inputs_.end()) return;
-  input->second->map_growth(received.message.peer);
+// Whoever made a segment or a bell may hold its lock in the kernel: so it is looked at, and mapped,
+// under no lock of ours.
+void NodeCore::look_at_growth(shm::PortInstance port, const OutputPeer& peer) {
+  const bool is_more = survey(peer);
+  try {
+    shm::make_written_resident(peer.file, peer.mapping, residence());
+  } catch (const std::system_error& error) {
+    say_not_locked(port, error.what());
+  }
+  if (is_more) wake_inputs();
 }
 
-void NodeCore::handle_peer(shm::Received& received) {
+void NodeCore::hear_of_growth(const shm::Message& message) {
+  std::shared_ptr<const OutputPeer> grown;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto input = inputs_.find(message.port);
+    if (input != inputs_.end()) grown = input->second->peer(message.peer);
+  }
+  if (grown != nullptr) look_at_growth(message.port, *grown);
+}
+
+void NodeCore::add_receiver(const shm::Received& received) {
   const shm::Message& message = received.message;
+  const auto type = type_of_port(message.port);
+  if (!type) return;  // closed meanwhile, as it may be below
+  auto receiver = map_input_peer(received, *type, residence());
   const std::lock_guard lock(mutex_);
   const auto output = outputs_.find(message.port);
+  if (output == outputs_.end()) return;
+  output->second->add_peer(std::move(receiver),
+                           (message.flags & shm::kIsConnected) != 0 ? message.link : 0);
+}
+
+void NodeCore::add_publisher(const shm::Received& received) {
+  const shm::Message& message = received.message;
+  const auto type = type_of_port(message.port);
+  if (!type) return;
+  auto publisher = map_output_peer(received, *type, residence());
+  const std::lock_guard lock(mutex_);
   const auto input = inputs_.find(message.port);
-  if (output != outputs_.end()) {
+  if (input != inputs_.end()) input->second->add_peer(std::move(publisher));
+}
+
+// Not the port itself: whoever keeps it keeps this node.
+std::optional<shm::TypeInfo> NodeCore::type_of_port(shm::PortInstance port) {
+  const std::lock_guard lock(mutex_);
+  if (const auto output = outputs_.find(port); output != outputs_.end()) {
+    return output->second->type();
+  }
+  const auto input = inputs_.find(port);
+  if (input == inputs_.end()) return {};
+  return input->second->type();
+}
+
+void NodeCore::end_peer(const shm::Message& message) {
+  const bool is_gone = message.kind == shm::MessageKind::kPeerGone;
+  const std::lock_guard lock(mutex_);
+  if (const auto output = outputs_.find(message.port); output != outputs_.end()) {
     OutputCore& core = *output->second;
-    if (message.kind == shm::MessageKind::kInputPeer) {
-      core.add_peer(map_input_peer(received, core.type(), residence()),
-                    (message.flags & shm::kIsConnected) != 0 ? message.link : 0);
-    } else if (message.kind == shm::MessageKind::kPeerGone) {
-      core.remove_peer(message.peer);
-    } else if (message.kind == shm::MessageKind::kDisconnected) {
-      core.disconnect_peer(message.peer);
-    }
-  } else if (input != inputs_.end()) {
+    is_gone ? core.remove_peer(message.peer) : core.disconnect_peer(message.peer);
+  }
+  if (const auto input = inputs_.find(message.port); input != inputs_.end()) {
     InputCore& core = *input->second;
-    if (message.kind == shm::MessageKind::kOutputPeer) {
-      core.add_peer(map_output_peer(received, core.type(), residence()));
-    } else if (message.kind == shm::MessageKind::kPeerGone) {
-      core.lose_peer(message.peer);
-    } else if (message.kind == shm::MessageKind::kDisconnected) {
-      core.disconnect_peer(message.peer);
-    }
+    is_gone ? core.lose_peer(message.peer) : core.disconnect_peer(message.peer);
   }
 }
 

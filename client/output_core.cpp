@@ -80,7 +80,7 @@ void OutputCore::bind(shm::PortInstance instance, shm::SourceId source, shm::Fil
 void OutputCore::add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t number) {
   const auto instance = peer->instance;
   InputLink& link = links_[instance];
-  if (link.peer == nullptr) link.peer = std::move(peer);
+  if (link.peer == nullptr || !link.peer->is_mapped) link.peer = std::move(peer);
   link.connected = number != 0;
   link.refused = false;
   link.number = number;
@@ -110,12 +110,12 @@ void OutputCore::disconnect_peer(shm::PortInstance peer) {
   offer_view();
 }
 
-void OutputCore::refuse_peer(shm::PortInstance peer) {
-  const auto found = links_.find(peer);
-  if (found == links_.end()) return;
-  found->second.connected = false;
-  found->second.refused = true;
-  found->second.channel = shm::kNone;
+void OutputCore::refuse_peer(shm::PortInstance peer, shm::PortId port) {
+  InputLink& link = links_[peer];
+  if (link.peer == nullptr) link.peer = unmapped_input_peer(peer, port);
+  link.connected = false;
+  link.refused = true;
+  link.channel = shm::kNone;
   offer_view();
 }
 
@@ -134,7 +134,7 @@ std::vector<shm::PortInstance> OutputCore::misbehaving() {
       found.push_back(instance);
     }
   }
-  for (const shm::PortInstance peer : found) refuse_peer(peer);
+  for (const shm::PortInstance peer : found) refuse_peer(peer, links_.at(peer).peer->port);
   return found;
 }
 

@@ -40,8 +40,8 @@ class OutputCore {
   void add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t link);
   void remove_peer(shm::PortInstance peer);
   void disconnect_peer(shm::PortInstance peer);
-  // The connection is refused: its arrivals are counted as that.
-  void refuse_peer(shm::PortInstance peer);
+  // The connection is refused: its arrivals are counted as that, be the peer mapped or not.
+  void refuse_peer(shm::PortInstance peer, shm::PortId port);
   [[nodiscard]] std::vector<HeldLink> held_links() const;
   // Whether a decision has missed a source that it could not see, for the first time.
   [[nodiscard]] bool has_become_blind() noexcept { return blindness_.is_news(); }

@@ -7,6 +7,21 @@
 
 namespace arbiter::detail {
 
+namespace {
+
+std::uint32_t allocated_slots(const OutputPeer& peer) {
+  const shm::OutputLayout& layout = peer.segment.layout();
+  if (shm::allocated_size(peer.file) >= layout.total_size) return layout.slot_count;
+  const auto slots = [&](std::uint64_t offset, std::uint64_t stride) {
+    return (shm::end_of_data(peer.file, offset) - offset) / stride;
+  };
+  const std::uint64_t both = std::min(slots(layout.headers_offset, sizeof(shm::SlotHeader)),
+                                      slots(layout.payload_offset, layout.stride));
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(both, layout.slot_count));
+}
+
+}  // namespace
+
 std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
                                                 const shm::TypeInfo& own,
                                                 shm::Residence residence) {
@@ -75,20 +90,22 @@ std::shared_ptr<const OutputPeer> map_output_peer(const shm::Received& announced
   return peer;
 }
 
-void survey(const OutputPeer& peer) {
-  const shm::OutputLayout& layout = peer.segment.layout();
-  if (shm::allocated_size(peer.file) >= layout.total_size) {
-    peer.allocated_slots.store(layout.slot_count, std::memory_order_relaxed);
-    return;
-  }
-  const auto slots = [&](std::uint64_t offset, std::uint64_t stride) {
-    return (shm::end_of_data(peer.file, offset) - offset) / stride;
-  };
-  const std::uint64_t both = std::min(slots(layout.headers_offset, sizeof(shm::SlotHeader)),
-                                      slots(layout.payload_offset, layout.stride));
-  peer.allocated_slots.store(
-      static_cast<std::uint32_t>(std::min<std::uint64_t>(both, layout.slot_count)),
-      std::memory_order_relaxed);
+bool survey(const OutputPeer& peer) {
+  const std::uint32_t known = peer.allocated_slots.load(std::memory_order_relaxed);
+  const std::uint32_t allocated = allocated_slots(peer);
+  peer.allocated_slots.store(allocated, std::memory_order_relaxed);
+  return allocated > known;
+}
+
+std::shared_ptr<const InputPeer> unmapped_input_peer(shm::PortInstance instance, shm::PortId port) {
+  static const shm::InputSegment nobody{};
+  auto peer = std::make_shared<InputPeer>();
+  peer->instance = instance;
+  peer->port = port;
+  peer->segment = &nobody;
+  peer->is_mapped = false;
+  peer->max_held = 0;
+  return peer;
 }
 
 }  // namespace arbiter::detail

@@ -25,6 +25,7 @@ struct InputPeer {
   shm::Mapping mapping;
   std::optional<shm::Bequest> bequest;
   const shm::InputSegment* segment = nullptr;
+  bool is_mapped = true;  // else the segment is an empty one of our own
   shm::Ringer ringer;
   std::uint32_t depth = 1;
   std::uint32_t max_held = 1;
@@ -63,6 +64,10 @@ struct OutputPeer {
   // lie. Written by the service thread. Relaxed is enough: what it says is true for ever, and the
   // kernel had it allocated before it was said.
   mutable shm::Atomic<std::uint32_t> allocated_slots{0};
+  // By the port's thread: samples that it has copied, or would have, because their place was not
+  // known to be allocated. Another number asks the service thread to look again. Relaxed is enough:
+  // nothing is read by it, and the next copy asks again.
+  mutable shm::Atomic<std::uint32_t> copied{0};
   // Set by the port's thread once a publisher that is gone has nothing left to be taken.
   mutable shm::Atomic<bool> drained{false};
   mutable shm::Atomic<bool> misbehaved{false};  // as InputPeer::misbehaved
@@ -70,10 +75,11 @@ struct OutputPeer {
 
 struct OutputLink {
   std::shared_ptr<const OutputPeer> peer;
-  bool gone = false;      // closed or dead: drain it
-  bool reported = false;  // that it misbehaves
-  bool offered = false;   // in the last view
-  bool known = false;     // to the port's thread: a view that had it was accepted
+  bool gone = false;         // closed or dead: drain it
+  bool reported = false;     // that it misbehaves
+  bool offered = false;      // in the last view
+  bool known = false;        // to the port's thread: a view that had it was accepted
+  std::uint32_t copied = 0;  // of the peer's, when it was surveyed last
 };
 
 struct InputView {
@@ -101,7 +107,12 @@ std::shared_ptr<const OutputPeer> map_output_peer(
     const shm::Received& announced, const shm::TypeInfo& own,
     shm::Residence residence = shm::Residence::kMapped);
 
-// Service thread: looks how much the publisher has allocated by now.
-void survey(const OutputPeer& peer);
+// In the place of an input port that should be connected and cannot be mapped: it holds nothing and
+// waits for nothing.
+std::shared_ptr<const InputPeer> unmapped_input_peer(shm::PortInstance instance, shm::PortId port);
+
+// Service thread: looks how much the publisher has allocated by now. True: it is more than was
+// known. Waits while the publisher allocates.
+bool survey(const OutputPeer& peer);
 
 }  // namespace arbiter::detail

@@ -32,13 +32,56 @@ shm::FileDescriptor open_process(int socket, pid_t pid) {
   return shm::FileDescriptor(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
 }
 
+std::string too_much_waits(uid_t user) {
+  return "limit-exceeded: more than " + std::to_string(Errands::kMaxWaiting) +
+         " descriptors of user " + std::to_string(user) +
+         " wait behind others that take long to close: end the processes that have sent them, "
+         "and " +
+         "those at their other ends";
+}
+
+// The most messages that are looked at before a socket is closed.
+constexpr int kMaxUnread = 1024;
+
+// Whether messages that nobody has read bring descriptors, once nobody can send more of them. Each
+// look has room for the sender's credentials alone: the end of the conversation brings none, a
+// message does, and the kernel says whether more was left out. A look lets go of nothing, so it
+// takes no time; and a message without descriptors can be taken.
+bool brings_descriptors(int socket) noexcept {
+  const int on = 1;
+  if (setsockopt(socket, SOL_SOCKET, SO_PASSCRED, &on, sizeof on) != 0) return true;
+  for (int i = 0; i < kMaxUnread; ++i) {
+    alignas(cmsghdr) char credentials[CMSG_SPACE(sizeof(ucred))];
+    msghdr header{};
+    header.msg_control = credentials;
+    header.msg_controllen = sizeof credentials;
+    if (recvmsg(socket, &header, MSG_PEEK | MSG_DONTWAIT | MSG_CMSG_CLOEXEC) < 0) {
+      if (errno == ECONNRESET) continue;  // said once, before what was sent
+      return true;
+    }
+    if (header.msg_controllen == 0) return false;
+    if ((header.msg_flags & MSG_CTRUNC) != 0) return true;
+    static_cast<void>(!recv(socket, nullptr, 0, MSG_DONTWAIT));
+  }
+  return true;
+}
+
 }  // namespace
+
+// Most conversations end with nothing unread, or nothing that takes time.
+void hang_up(shm::FileDescriptor socket, uid_t user) {
+  if (!socket) return;
+  ::shutdown(socket.get(), SHUT_RDWR);
+  if (brings_descriptors(socket.get())) {
+    Errands::of_the_process().close(user, std::move(socket));
+  }
+}
 
 Client::Client(ClientId id, shm::FileDescriptor socket, Shares& shares)
     : id_(id), shares_(shares), socket_(std::move(socket)) {
   const auto fail = [&](const char* what) {
     const int error = errno;
-    Errands::of_the_process().close(user_, std::move(socket_));
+    hang_up(std::move(socket_), user_);
     throw std::system_error(error, std::generic_category(), what);
   };
   ucred peer{};
@@ -49,9 +92,10 @@ Client::Client(ClientId id, shm::FileDescriptor socket, Shares& shares)
   pid_ = peer.pid;
   user_ = peer.uid;
   try {
+    if (Errands::of_the_process().is_stuck(user_)) throw LimitExceeded(too_much_waits(user_));
     descriptors_ = shares_.take(user_, Share::kDescriptors, 2);  // the socket, and the process
   } catch (const LimitExceeded&) {
-    Errands::of_the_process().close(user_, std::move(socket_));
+    hang_up(std::move(socket_), user_);
     throw;
   }
   started_ = start_of_process(pid_);
@@ -59,7 +103,11 @@ Client::Client(ClientId id, shm::FileDescriptor socket, Shares& shares)
   if (!process_) fail("opening a client's process");
 }
 
-Client::~Client() { Errands::of_the_process().close(user_, std::move(socket_)); }
+Client::Queued::~Queued() {
+  for (auto& descriptor : descriptors) Errands::of_the_process().close(user, std::move(descriptor));
+}
+
+Client::~Client() { hang_up(std::move(socket_), user_); }
 
 void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescriptors> descriptors) {
   if (lost_) return;
@@ -78,7 +126,7 @@ void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescript
     lost_ = true;
     return;
   }
-  auto queued = std::make_unique<Queued>();
+  auto queued = std::make_unique<Queued>(user_);
   queued->message = message;
   queued->bytes = shares_.take(user_, Share::kQueue, sizeof(Queued));
   queued->open = shares_.take(user_, Share::kDescriptors, count);
@@ -119,7 +167,7 @@ void Client::flush() {
 
 shm::ReceiveResult Client::receive(shm::Received& received) {
   if (!ahead_.empty()) {
-    received = std::move(*ahead_.front());
+    received = std::move(ahead_.front()->received);
     ahead_.pop_front();
     return shm::ReceiveResult::kReceived;
   }
@@ -128,9 +176,14 @@ shm::ReceiveResult Client::receive(shm::Received& received) {
 }
 
 // What is neither a memfd nor an anonymous pipe is not looked at. What has come by the last
-// descriptors that there are is given up, lest the next message find none.
+// descriptors that there are is given up, lest the next message find none. Of a user who is stuck
+// nothing more is received: what is unread counts against the limit of who has sent it.
 shm::ReceiveResult Client::receive_from_socket(shm::Received& received) {
   dispose_of(received, user_);
+  if (Errands::of_the_process().is_stuck(user_)) {
+    log::warn("{} is given up: {}", description(), too_much_waits(user_));
+    return shm::ReceiveResult::kClosed;
+  }
   shm::ReceiveResult result{};
   {
     const Headroom::Use use;
@@ -158,11 +211,11 @@ void dispose_of(shm::Received& received, uid_t user) {
 
 void Client::read_ahead() {
   while (!ahead_ended_ && ahead_.size() < kMaxReadAhead) {
-    auto received = std::make_unique<shm::Received>();
-    const shm::ReceiveResult result = receive_from_socket(*received);
+    auto kept = std::make_unique<KeptMessage>(user_);
+    const shm::ReceiveResult result = receive_from_socket(kept->received);
     if (result == shm::ReceiveResult::kNothing) return;
     if (result == shm::ReceiveResult::kReceived) {
-      ahead_.push_back(std::move(received));
+      ahead_.push_back(std::move(kept));
     } else {
       ahead_ended_ = result;
     }
@@ -170,8 +223,9 @@ void Client::read_ahead() {
 }
 
 bool Client::take_closing_of(shm::PortInstance port) {
-  const auto closing = std::find_if(ahead_.begin(), ahead_.end(), [&](const auto& received) {
-    return received->message.kind == shm::MessageKind::kClosePort && received->message.port == port;
+  const auto closing = std::find_if(ahead_.begin(), ahead_.end(), [&](const auto& kept) {
+    const shm::Message& message = kept->received.message;
+    return message.kind == shm::MessageKind::kClosePort && message.port == port;
   });
   if (closing == ahead_.end()) return ahead_ended_.has_value();
   ahead_.erase(closing);

@@ -24,6 +24,24 @@ using ClientId = std::uint64_t;
 // Whether the process of a pidfd has ended.
 [[nodiscard]] bool has_ended(const shm::FileDescriptor& process);
 
+// Closes a client's socket: at once, or, where unread messages in it bring descriptors, which may
+// take any time to close, as an errand of that user.
+void hang_up(shm::FileDescriptor socket, uid_t user);
+
+// Closes what a message has brought and nobody has taken, as errands of the user who sent it.
+void dispose_of(shm::Received& received, uid_t user);
+
+// A message that is handled later, if at all: its end disposes of what it has brought.
+struct KeptMessage {
+  explicit KeptMessage(uid_t sender) : user(sender) {}
+  KeptMessage(const KeptMessage&) = delete;
+  KeptMessage& operator=(const KeptMessage&) = delete;
+  ~KeptMessage() { dispose_of(received, user); }
+
+  const uid_t user;
+  shm::Received received;
+};
+
 class Client {
  public:
   // Takes over an accepted socket. Throws std::system_error; LimitExceeded where its user has
@@ -31,7 +49,6 @@ class Client {
   Client(ClientId id, shm::FileDescriptor socket, Shares& shares);
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
-  // What it sent and nobody read may take any time to close: that is left to its user's errands.
   ~Client();
 
   // Sends, or queues where the client is slow to read. Descriptors are duplicated if need be.
@@ -49,8 +66,7 @@ class Client {
   // Whether anything was read ahead, be it that the client has hung up.
   [[nodiscard]] bool has_read_ahead() const { return !ahead_.empty() || ahead_ended_; }
   [[nodiscard]] bool has_queue() const { return !queue_.empty(); }
-  // The client has gone, or does not read what it is sent.
-  // Nothing more can be sent to it.
+  // Nothing more can be sent to it: it has gone, or does not read what it is sent.
   [[nodiscard]] bool is_lost() const { return lost_; }
   // It has closed its end: what it sent before is all that there is, and still counts.
   [[nodiscard]] bool has_hung_up() const { return hung_up_; }
@@ -87,16 +103,23 @@ class Client {
 
  private:
   struct Queued {
+    explicit Queued(uid_t reader) : user(reader) {}
+    Queued(const Queued&) = delete;
+    Queued& operator=(const Queued&) = delete;
+    ~Queued();  // a bell among them may take any time to close
+
+    const uid_t user;
     shm::Message message;
     std::array<shm::FileDescriptor, shm::kMaxDescriptors> descriptors;
     Charge bytes;
     Charge open;  // the descriptors
   };
-  [[nodiscard]] bool has_room_for(std::uint64_t descriptors) const;
   static constexpr std::size_t kMaxReadAhead = 256;
   static constexpr std::size_t kMaxQueue = 16384;
-  [[nodiscard]] shm::ReceiveResult receive_from_socket(shm::Received& received);
   static constexpr std::size_t kMaxQueuedDescriptors = 4096;  // so that others find some left
+
+  [[nodiscard]] bool has_room_for(std::uint64_t descriptors) const;
+  [[nodiscard]] shm::ReceiveResult receive_from_socket(shm::Received& received);
 
   const ClientId id_;
   Shares& shares_;
@@ -110,12 +133,9 @@ class Client {
   bool hung_up_ = false;
   std::deque<std::unique_ptr<Queued>> queue_;
   std::size_t queued_descriptors_ = 0;
-  std::deque<std::unique_ptr<shm::Received>> ahead_;
+  std::deque<std::unique_ptr<KeptMessage>> ahead_;
   std::optional<shm::ReceiveResult> ahead_ended_;  // how the conversation ends after `ahead_`
 };
-
-// Closes what a message has brought and nobody has taken, as errands of the user who sent it.
-void dispose_of(shm::Received& received, uid_t user);
 
 // An answer to a client's question.
 inline shm::Message reply_to(std::uint64_t request, shm::MessageKind kind) {

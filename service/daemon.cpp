@@ -267,7 +267,7 @@ void Daemon::turn_away_client() {
       "a client of user {} was turned away: no descriptors are left (RLIMIT_NOFILE, "
       "LimitNOFILE= in a systemd unit)",
       peer.uid);
-  Errands::of_the_process().close(peer.uid, std::move(socket));
+  hang_up(std::move(socket), peer.uid);
 }
 
 // Whoever connects and says nothing costs two descriptors, and gives way to those who come later:
@@ -332,7 +332,8 @@ void Daemon::handle_or_refuse(Client& client, shm::Received& received, shm::Nano
             " requests of this client wait already (kMaxPostponed): " + why;
     } else if (shm::monotonic_now() < deadline) {
       ++client.postponed;
-      auto postponed = std::make_unique<shm::Received>(std::move(received));
+      auto postponed = std::make_unique<KeptMessage>(client.user());
+      postponed->received = std::move(received);
       postponed_.push_back({client.id(), std::move(postponed), deadline});
       return;
     }

@@ -163,8 +163,8 @@ class Daemon {
   // Throws NotYet.
   void require_not_changing(const Source& source) const;
   // Calls `changed` once another page is in force, which `user` may be given, or nobody; not if the
-  // client has gone by then.
-  void change_page(Source& source, const Client& client, PageUser user,
+  // client has gone by then. Where it throws, the request is refused.
+  void change_page(Source& source, const Client& client, std::uint64_t request, PageUser user,
                    std::function<void(Source&, Client&)> changed);
   // Whether somebody else can write the page, whom an operator may have to hold it against.
   [[nodiscard]] bool may_undo(const Source& source) const;
@@ -214,7 +214,7 @@ class Daemon {
   };
   struct Postponed {
     ClientId client = 0;
-    std::unique_ptr<shm::Received> request;
+    std::unique_ptr<KeptMessage> request;
     shm::Nanoseconds deadline = 0;
   };
 

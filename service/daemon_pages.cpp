@@ -7,7 +7,10 @@
 // former owner writes after the change is read by nobody.
 #include <unistd.h>
 
+#include <exception>
+
 #include "service/daemon.hpp"
+#include "service/log.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
@@ -18,11 +21,11 @@ void Daemon::require_not_changing(const Source& source) const {
                shm::monotonic_now() + 2 * kMaxWaitForClients);
 }
 
-void Daemon::change_page(Source& source, const Client& client, PageUser user,
+void Daemon::change_page(Source& source, const Client& client, std::uint64_t request, PageUser user,
                          std::function<void(Source&, Client&)> changed) {
   directory_.prepare_page(source, user);
   source.changing_for = client.id();
-  const auto pass = [this, id = source.id, user, for_client = client.id(),
+  const auto pass = [this, id = source.id, user, for_client = client.id(), request,
                      changed = std::move(changed)] {
     Source& changing = *directory_.source_by_id(id);
     if (changing.changing_for != for_client) return;
@@ -33,7 +36,12 @@ void Daemon::change_page(Source& source, const Client& client, PageUser user,
     if (found == clients_.end()) return;
     directory_.change_page(changing, user);
     switchboard_.ring_concerned(models_.in_force().table, id);
-    changed(changing, *found->second);
+    try {
+      changed(changing, *found->second);
+    } catch (const std::exception& error) {
+      log::warn("{}: {}", found->second->description(), error.what());
+      refuse(*found->second, request, error.what());
+    }
   };
   barriers_.raise(switchboard_.show_next_page(source), shm::monotonic_now() + kMaxWaitForClients,
                   pass);

@@ -286,9 +286,10 @@ void Daemon::open_output(Client& client, shm::Received& received) {
     return;
   }
   const auto kept = std::make_shared<std::unique_ptr<OutputPort>>(std::move(port));
-  change_page(source, client, client.user(), [this, kept, request](Source& own, Client& opener) {
-    finish_opening(opener, request, std::move(*kept), own);
-  });
+  change_page(source, client, request, client.user(),
+              [this, kept, request](Source& own, Client& opener) {
+                finish_opening(opener, request, std::move(*kept), own);
+              });
 }
 
 void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_ptr<OutputPort> port,
@@ -425,7 +426,7 @@ void Daemon::deactivate(Client& client, const shm::Message& message) {
               was_active ? "" : ", which was not active");
   };
   if (was_active && may_undo(*source)) {
-    change_page(*source, client, {}, answer);
+    change_page(*source, client, message.request, {}, answer);
   } else {
     answer(*source, client);
   }

@@ -321,7 +321,7 @@ void Daemon::serve_postponed(shm::Nanoseconds now) {
     if (client == clients_.end()) continue;
     if (all || now >= request.deadline) {
       --client->second->postponed;
-      handle_or_refuse(*client->second, *request.request, request.deadline);
+      handle_or_refuse(*client->second, request.request->received, request.deadline);
     } else {
       postponed_.push_back(std::move(request));
     }

@@ -163,6 +163,15 @@ shm::Nanoseconds Errands::deadline() const {
   return first;
 }
 
+bool Errands::is_stuck(uid_t user) const {
+  const std::lock_guard lock(state_->mutex);
+  const auto lane = state_->lanes.find(user);
+  if (lane == state_->lanes.end()) return false;
+  const std::size_t waiting = lane->second.waiting.size();
+  return waiting >= kMostWaiting ||
+         (waiting >= kMaxWaiting && lane->second.lost() == kMaxLostOfAUser);
+}
+
 std::size_t Errands::lost() const {
   const std::lock_guard lock(state_->mutex);
   std::size_t count = 0;

@@ -9,9 +9,11 @@
 //
 // A user has one thread while there is something to do. Once an errand has taken kOverdue its
 // thread is taken for lost, and another goes on with the rest, up to kMaxLostOfAUser: then the rest
-// waits until one comes back. A process that exits does not wait for them: the kernel makes no
-// socket linger there; only a server of FUSE that does not answer keeps the process from ending,
-// until it is killed itself.
+// waits until one comes back. From kMaxWaiting on, or kMostWaiting where errands are slow and none
+// is lost, the user is stuck, and whoever collects errands takes nothing more from that user: what
+// waits keeps descriptors that all share. A process that
+// exits does not wait for them: the kernel makes no socket linger there; only a server of FUSE that
+// does not answer keeps the process from ending, until it is killed itself.
 #pragma once
 
 #include <sys/types.h>
@@ -31,6 +33,8 @@ class Errands {
   static constexpr shm::Nanoseconds kOverdue = 1'000'000'000;
   static constexpr std::size_t kMaxLostOfAUser = 4;
   static constexpr std::size_t kMaxThreads = 64;
+  static constexpr std::size_t kMaxWaiting = 512;  // while all threads of their user are lost
+  static constexpr std::size_t kMostWaiting = 4096;
 
   // The process's. What it is given is done even when nobody is left who gave it.
   static Errands& of_the_process();
@@ -49,6 +53,8 @@ class Errands {
   // lost, empty if there is none. To be called again by deadline().
   [[nodiscard]] std::string look_after(shm::Nanoseconds now);
   [[nodiscard]] shm::Nanoseconds deadline() const;
+  // Whether as many errands of the user wait as may.
+  [[nodiscard]] bool is_stuck(uid_t user) const;
   // How many threads are lost now.
   [[nodiscard]] std::size_t lost() const;
 

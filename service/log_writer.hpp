@@ -1,12 +1,13 @@
-// Writes lines to a descriptor, from a thread of its own.
+// Writes lines to a descriptor, from a thread of its own; to a regular file at once, for nobody has
+// to read that.
 //
 // Standard error may be a pipe that nobody reads, a terminal that somebody has stopped, or a
 // journal that hangs: write() then blocks for as long as they like. The daemon's loop must not, so
 // it puts lines into a bounded queue, and this thread alone waits for the reader. What does not fit
 // is lost, and counted; the count is written where the lines would have stood.
 //
-// Thread safety: put() may be called by any thread. One mutex guards the queue; nobody holds it
-// while writing.
+// Thread safety: put() may be called by any thread. One mutex guards the queue; the thread does not
+// hold it while it writes.
 #pragma once
 
 #include <chrono>

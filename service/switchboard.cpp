@@ -211,17 +211,12 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
   fresh_.emplace_back(output.instance, input.instance);
 }
 
-void Switchboard::show_segment(const LinkKey& key, Client& receiver) const {
-  receiver.send(message_to(shm::MessageKind::kOutputGrown, key.second, key.first),
-                {outputs_.at(key.first)->segment.get(), -1});
-}
-
 Switchboard::Told Switchboard::show_segments() {
   Told told;
   for (const LinkKey& key : std::exchange(fresh_, {})) {
     if (!is_connected(key)) continue;
     Client& receiver = client_of(key.second);
-    show_segment(key, receiver);
+    receiver.send(message_to(shm::MessageKind::kOutputGrown, key.second, key.first));
     told.insert(&receiver);
     for (auto link = links_.lower_bound({key.first, 0});
          link != links_.end() && link->first.first == key.first; ++link) {
@@ -248,7 +243,7 @@ void Switchboard::show_growth() {
       continue;
     }
     if (left > 0) {
-      show_segment(*each, receiver);
+      receiver.send(message_to(shm::MessageKind::kOutputGrown, each->second, each->first));
       --left;
     }
     each = growth_.erase(each);

@@ -96,7 +96,6 @@ class Switchboard {
   void send_pages(const OutputPort& output, const shm::TableView& table, Told& told);
   void make_link(const OutputPort& output, const InputPort& input, LinkKind kind, Told& told);
   void send_pages(Client& client, shm::PortId port, const shm::TableView& table, Told& told);
-  void show_segment(const LinkKey& key, Client& receiver) const;
   [[nodiscard]] bool is_connected(const LinkKey& key) const;
   // Whoever claims a link with that port is told that it has gone.
   void end_claims_on(shm::PortInstance port);

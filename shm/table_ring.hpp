@@ -4,8 +4,7 @@
 // Thread safety: one writer, the daemon; any number of readers, that may stop or die anywhere.
 // Invariants
 //  1. An epoch is a generation and a number of pages. The generation counts the models; the table
-//  of
-//     generation g lies in slot g % kTableSlots. The number is another each time that a source's
+//     of generation g lies in slot g % kTableSlots. The number is another each time that a source's
 //     page is replaced (activity_pages.hpp), so that one comparison tells a decision that it was
 //     taken under one model and on one page of each source.
 //  2. While generation g is in force only slot (g + 1) % kTableSlots is written. So a table read
@@ -13,9 +12,8 @@
 //     s + kTableSlots - 1.
 //  3. Generation 0 has no table: no model has been loaded yet.
 //  4. The number of pages comes round after 2^24. A port that has slept so long binds its rules
-//  again
-//     all the same, since its node has been sent pages meanwhile; or it was sent none, and has
-//     nothing to bind again.
+//     again all the same, since its node has been sent pages meanwhile; or it was sent none, and
+//     has nothing to bind again.
 #pragma once
 
 #include <cstddef>
@@ -138,9 +136,8 @@ class TableWriter {
     board_->epoch.store(epoch() + 1, std::memory_order_release);  // SYNC POINT: table-in-force
   }
 
-  [[nodiscard]] PageNumber page_number(SourceId id) const noexcept {
-    return board_->pages.numbers[id].load(std::memory_order_relaxed);
-  }
+  // A daemon that takes over finds in the registry what was written down before it.
+  [[nodiscard]] PageNumber page_number(SourceId id) const noexcept { return board_->pages.of(id); }
   // A source's first page, or its next, for which nothing is carried on: no table in force reads
   // it. SYNC POINT: page-in-force. Release, as in change_page().
   void give_page(SourceId id, PageNumber number) noexcept {

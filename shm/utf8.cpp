@@ -57,8 +57,8 @@ std::string printable(std::string_view text, std::string_view kept) {
   while (!text.empty()) {
     const Utf8Character character = decode_utf8(text);
     const std::string_view bytes = text.substr(0, character.length == 0 ? 1 : character.length);
-    const bool stays = character.length != 0 &&
-                       (!is_control(character.code) || kept.find(text.front()) != kept.npos);
+    const bool misleads = is_control(character.code) || is_invisible(character.code);
+    const bool stays = character.length != 0 && (!misleads || kept.find(text.front()) != kept.npos);
     if (stays) {
       result += bytes;
     } else if (text.front() == '\n') {

@@ -78,9 +78,9 @@ enum class MessageKind : std::uint32_t {
   kSync,
   kStatusReply,  // descriptor: a memfd with JSON
   kDone,
-  kOutputGrown,  // to input `port`: `peer` uses more of its segment now; descriptor: the segment
-  kReport,       // in place of kDone and kRefused; descriptor: a memfd with JSON
-  kModelReply,   // descriptor: a memfd with JSON
+  kOutputGrown,        // to input `port`: `peer` uses more of its segment now
+  kReport,             // in place of kDone and kRefused; descriptor: a memfd with JSON
+  kModelReply,         // descriptor: a memfd with JSON
   kConnectionRefused,  // `port` is not connected to `peer`, though the model says so, and is not to
                        // be; id = source, or port id; name: the peer's; text: why
   kUnmentioned,        // port, text: the model in force does not mention it

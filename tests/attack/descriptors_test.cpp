@@ -13,6 +13,7 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "service/errands.hpp"
 #include "shm/bell.hpp"
 #include "shm/foreign.hpp"
 #include "shm/input_segment.hpp"
@@ -85,8 +86,9 @@ FileDescriptor output_segment(std::uint64_t sample_size, std::uint32_t slots) {
   return segment;
 }
 
-// Any number of descriptors, more than a client library would send.
-void send_with(int socket, const shm::Message& message, const std::vector<int>& descriptors) {
+// Any number of descriptors, more than a client library would send. False: nobody listens.
+bool try_to_send_with(int socket, const shm::Message& message,
+                      const std::vector<int>& descriptors) {
   iovec data{const_cast<shm::Message*>(&message), sizeof message};
   std::vector<char> control(CMSG_SPACE(sizeof(int) * descriptors.size()));
   msghdr header{};
@@ -99,7 +101,11 @@ void send_with(int socket, const shm::Message& message, const std::vector<int>& 
   part->cmsg_type = SCM_RIGHTS;
   part->cmsg_len = CMSG_LEN(sizeof(int) * descriptors.size());
   std::memcpy(CMSG_DATA(part), descriptors.data(), sizeof(int) * descriptors.size());
-  ASSERT_GT(::sendmsg(socket, &header, MSG_NOSIGNAL), 0);
+  return ::sendmsg(socket, &header, MSG_NOSIGNAL) > 0;
+}
+
+void send_with(int socket, const shm::Message& message, const std::vector<int>& descriptors) {
+  ASSERT_TRUE(try_to_send_with(socket, message, descriptors));
 }
 
 void expect_that_others_are_served(Daemon& daemon) {
@@ -163,6 +169,24 @@ TEST_F(ALingeringSocket, AsOneTooManyHoldsUpNobody) {
   expect_no_harm();
 }
 
+// Who opens a name that somebody has open makes the daemon read ahead what that client has sent: it
+// may have closed the port. What comes so in a message that is none is not closed by the loop
+// either.
+TEST_F(ALingeringSocket, AsOneTooManyInAMessageThatIsReadAheadHoldsUpNobody) {
+  Lingering lingering;
+  const FileDescriptor segment = raw_output_segment();
+  RawClient holder = client();
+  open_raw_output(holder, "/attacker:o", segment);
+  RawClient other = client();
+  give(lingering, [&](int fd) {
+    // Heard first, so served first.
+    other.send(RawClient::message(MessageKind::kOpenOutput, "/attacker:o"), {segment.get(), -1});
+    send_with(holder.socket(), RawClient::message(MessageKind::kStatus),
+              {segment.get(), segment.get(), fd});
+  });
+  expect_no_harm();
+}
+
 TEST_F(ALingeringSocket, InAMessageThatIsNeverReadHoldsUpNobody) {
   Lingering lingering;
   {
@@ -203,6 +227,55 @@ TEST_F(ALingeringSocket, SentManyTimesHoldsUpNobody) {
   daemon_.process().signal(SIGCONT);
   expect_that_others_are_served(daemon_);
   while (daemon_.log().find("4 of 4") == std::string::npos) daemon_.status();
+  expect_that_others_are_served(daemon_);
+}
+
+// Once all threads of a user are lost, what comes after waits, and keeps its descriptors: it must
+// not use up those of others.
+class AUserWhoseThreadsAreLost : public ALingeringSocket {
+ protected:
+  // A thread, and all that may wait for one, and a message that is read before that is seen.
+  static constexpr std::size_t kMostKept = service::Errands::kMaxLostOfAUser +
+                                           service::Errands::kMaxWaiting +
+                                           2 * shm::kMostDescriptorsOfAMessage;
+
+  AUserWhoseThreadsAreLost() {
+    RawClient attacker = client();
+    daemon_.process().stop();
+    for (Lingering& each : lingering_) {
+      send_with(attacker.socket(), RawClient::message(MessageKind::kStatus), {each.get()});
+      each.close();
+    }
+    daemon_.process().signal(SIGCONT);
+    while (daemon_.log().find("4 of 4") == std::string::npos) daemon_.status();
+  }
+
+  std::vector<Lingering> lingering_{service::Errands::kMaxLostOfAUser};
+};
+
+TEST_F(AUserWhoseThreadsAreLost, CostsNothingByConnectingAgainAndAgain) {
+  const std::size_t before = daemon_.open_descriptors();
+  for (int i = 0; i < 2000; ++i) {
+    RawClient again(daemon_.instance());
+    again.send(RawClient::message(MessageKind::kStatus));
+  }
+  expect_that_others_are_served(daemon_);
+  EXPECT_LT(daemon_.open_descriptors(), before + 100);
+}
+
+TEST_F(AUserWhoseThreadsAreLost, IsGivenUpBeforeItKeepsThoseOfOthers) {
+  const std::size_t before = daemon_.open_descriptors();
+  const FileDescriptor zero(::open("/dev/zero", O_RDONLY | O_CLOEXEC));
+  const std::vector<int> many(shm::kMostDescriptorsOfAMessage, zero.get());
+  for (int i = 0; i < 20; ++i) {
+    RawClient again(daemon_.instance());
+    try_to_send_with(again.socket(), RawClient::message(MessageKind::kStatus), many);
+    again.is_hung_up_on();
+  }
+  EXPECT_LT(daemon_.open_descriptors(), before + kMostKept);
+  for (Lingering& each : lingering_) each.release();
+  while (daemon_.open_descriptors() > before) {
+  }
   expect_that_others_are_served(daemon_);
 }
 

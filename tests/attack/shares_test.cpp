@@ -123,6 +123,7 @@ TEST(NamesThatNobodyNeeds, AreKeptWhileTheirActivityRuns) {
   auto ask = RawClient::message(MessageKind::kDeactivate, "/unmentioned:o");
   operator_of.send(ask);
   EXPECT_EQ(operator_of.expect(MessageKind::kDone).message.value, 1u);
+  operator_of.status();  // made at the end of a round, after names have been given back
   operator_of.send(ask);
   EXPECT_THAT(operator_of.expect_refusal(), HasSubstr("no model and no component has named"));
 }

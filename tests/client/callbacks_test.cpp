@@ -1,5 +1,9 @@
 // What a node calls back: on which thread, under no lock, and what becomes of what is thrown.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <memory>
@@ -13,6 +17,8 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "shm/file_descriptor.hpp"
+#include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
@@ -291,12 +297,105 @@ TEST(OnNotice, WithoutOneStandardErrorSaysIt) {
   EXPECT_EQ(testing::internal::GetCapturedStderr(), line + line) << "the node has both ends";
 }
 
+// While it lives, this process gets no further descriptor.
+class NoDescriptors {
+ public:
+  NoDescriptors() {
+    const shm::FileDescriptor next(::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 0));
+    ::getrlimit(RLIMIT_NOFILE, &before_);
+    const rlimit none{static_cast<rlim_t>(next.get()), before_.rlim_max};
+    ::setrlimit(RLIMIT_NOFILE, &none);
+  }
+  NoDescriptors(const NoDescriptors&) = delete;
+  NoDescriptors& operator=(const NoDescriptors&) = delete;
+  ~NoDescriptors() { ::setrlimit(RLIMIT_NOFILE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+NodeOptions serviced_by_hand(Notices& notices) {
+  NodeOptions options = notices.options();
+  options.service_thread = false;
+  return options;
+}
+
+TEST(OnNotice, TellsAReceiverThatNoDescriptorIsLeftForItsPublisher) {
+  Daemon daemon(single_model());
+  Notices notices;
+  Node node("test", serviced_by_hand(notices));
+  auto in = node.input_port<Number>("/in");
+  Component sender("sender");
+  ASSERT_EQ(sender.tell("output /out"), "open");
+  testing::internal::CaptureStderr();
+  {
+    const NoDescriptors none;
+    node.service();
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << "who has a callback is told by it";
+  const auto given = notices.take();
+  ASSERT_EQ(given.size(), 1u);
+  EXPECT_EQ(given[0].kind, NoticeKind::refused);
+  EXPECT_EQ(given[0].port, "/in");
+  EXPECT_EQ(given[0].peer, "/out");
+  EXPECT_NE(given[0].text.find("has no descriptor left"), std::string::npos) << given[0].text;
+  while (sender.tell("publish /out 1") != "0 0 1") {  // once it knows
+  }
+  EXPECT_TRUE(in.idle());
+}
+
+// It is the winner there, so it must hear that nobody gets what it sends.
+TEST(OnNotice, TellsAPublisherThatNoDescriptorIsLeftForItsReceiver) {
+  Daemon daemon(single_model());
+  Notices notices;
+  Node node("test", serviced_by_hand(notices));
+  auto out = node.output_port<Number>("/out");
+  Component receiver("receiver");
+  ASSERT_EQ(receiver.tell("input /in 4 1 0"), "open");
+  {
+    const NoDescriptors none;
+    node.service();
+  }
+  const auto given = notices.take();
+  ASSERT_EQ(given.size(), 1u);
+  EXPECT_EQ(given[0].kind, NoticeKind::refused);
+  EXPECT_EQ(given[0].port, "/out");
+  EXPECT_EQ(given[0].peer, "/in");
+  const Outcome outcome = out.publish(Number{1});
+  EXPECT_EQ(outcome.refused, 1u);
+  EXPECT_EQ(outcome.delivered + outcome.discarded, 0u);
+  // The next one can be mapped.
+  receiver.kill();
+  Component successor("successor");
+  ASSERT_EQ(successor.tell("input /in 4 1 0"), "open");
+  node.service();
+  EXPECT_EQ(out.publish(Number{2}).delivered, 1u);
+  EXPECT_EQ(successor.tell("take /in"), "2");
+}
+
+TEST(OnNotice, APublisherThatGrowsNeedsNoFurtherDescriptor) {
+  Daemon daemon(fan_out_model(2));
+  Notices notices;
+  Node node("test", serviced_by_hand(notices));
+  auto in = node.input_port<Number>("/in0");
+  Component sender("sender");
+  ASSERT_EQ(sender.tell("output /out"), "open");
+  node.service();
+  Component receiver("receiver");
+  const NoDescriptors none;
+  ASSERT_EQ(receiver.tell("input /in1 64 1 0"), "open");
+  pollfd grown{node.service_fd(), POLLIN, 0};
+  ASSERT_EQ(::poll(&grown, 1, -1), 1);
+  node.service();
+  EXPECT_TRUE(notices.take().empty());
+  EXPECT_EQ(sender.tell("publish /out 1"), "2 0 0");
+  EXPECT_EQ(take_from(in), 1);
+}
+
 TEST(OnNotice, TellsOfAPortThatCannotSee) {
   Daemon daemon(override_model());
   Notices notices;
-  NodeOptions options = notices.options();
-  options.service_thread = false;
-  Node blind("blind", options);
+  Node blind("blind", serviced_by_hand(notices));
   auto in = blind.input_port<Number>("/in");
   Node sender("sender");
   auto low = sender.output_port<Number>("/low");

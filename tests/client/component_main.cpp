@@ -47,6 +47,7 @@ class Component {
     if (verb == "wait") return wait(port);
     if (verb == "close") return close(port);
     if (verb == "look") return look(port);
+    if (verb == "look-at-next") return image_.reset(), look(port);
     return "what?";
   }
 

@@ -32,11 +32,14 @@ TEST(Deaths, APublisherKilledFlatOutLeavesAPortThatWorks) {
 
 TEST(Deaths, AReceiverKilledFlatOutLeavesAPublisherThatWorks) {
   Daemon daemon(single_model());
-  Node node("test");
+  // It takes up its receivers when it is told to: on a machine that is busy a service thread may be
+  // later than their opening, which waits for it no longer than 0.2 s.
+  Node node("test", {.service_thread = false});
   auto out = node.output_port<Number>("/out");
   for (int i = 0; i < 20; ++i) {
     Component receiver("receiver");
     ASSERT_EQ(receiver.tell("input /in 4 2 0"), "open");
+    node.service();
     receiver.begin("wait /in");
     receiver.begin("hold /in");
     receiver.begin("wait /in");

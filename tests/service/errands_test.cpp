@@ -109,6 +109,39 @@ TEST(Errands, OfOneUserLoseABoundedNumberOfThreads) {
   EXPECT_TRUE(errands.wait_until_done(kLong));
 }
 
+TEST(Errands, OfWhichTooManyWaitMakeTheirUserStuck) {
+  Errands errands;
+  Held held(errands);
+  const auto wait = [&](std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) errands.run(kOne, [] {});
+  };
+  held.keep_a_thread(kOne);
+  wait(Errands::kMostWaiting - 1);
+  EXPECT_FALSE(errands.is_stuck(kOne)) << "its thread may come back";
+  wait(1);
+  EXPECT_TRUE(errands.is_stuck(kOne)) << "though it is not lost";
+  EXPECT_FALSE(errands.is_stuck(kOther));
+  held.let_go();
+  EXPECT_TRUE(errands.wait_until_done(kLong));
+  EXPECT_FALSE(errands.is_stuck(kOne));
+}
+
+TEST(Errands, OfAUserWithoutAThreadMakeItStuckSooner) {
+  Errands errands;
+  Held held(errands);
+  for (std::size_t i = 0; i < Errands::kMaxLostOfAUser; ++i) {
+    held.keep_a_thread(kOne);
+    EXPECT_NE(errands.look_after(shm::monotonic_now() + Errands::kOverdue), "");
+  }
+  for (std::size_t i = 1; i < Errands::kMaxWaiting; ++i) errands.run(kOne, [] {});
+  EXPECT_FALSE(errands.is_stuck(kOne));
+  errands.run(kOne, [] {});
+  EXPECT_TRUE(errands.is_stuck(kOne));
+  held.let_go();
+  EXPECT_TRUE(errands.wait_until_done(kLong));
+  EXPECT_FALSE(errands.is_stuck(kOne));
+}
+
 TEST(Errands, OutliveWhoGaveThem) {
   auto errands = std::make_unique<Errands>();
   Held held(*errands);

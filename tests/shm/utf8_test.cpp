@@ -39,6 +39,7 @@ TEST(Utf8, WhatIsPrintedCannotForgeALineNorSteerATerminal) {
   EXPECT_EQ(printable("a\nb\tc"), "a\\nb\\x09c");
   EXPECT_EQ(printable("a\nb\tc", "\n\t"), "a\nb\tc");
   EXPECT_EQ(printable("\x1b[31m\u009b"), "\\x1b[31m\\xc2\\x9b");
+  EXPECT_EQ(printable("a\u202eb\u2028c"), "a\\xe2\\x80\\xaeb\\xe2\\x80\\xa8c");
   EXPECT_EQ(printable("\xff\xc3"), "\\xff\\xc3");
   EXPECT_EQ(printable(std::string_view("\0x", 2)), "\\x00x");
 }

@@ -195,7 +195,7 @@ void Honest::hear(const shm::Received& received) {
       peers_[message.peer] = message.id;
       break;
     case MessageKind::kOutputGrown:
-      has(1);
+      has(0);
       require(peers_.count(message.peer) == 1, "only a peer grows");
       break;
     case MessageKind::kPeerGone:

@@ -147,7 +147,11 @@ void World::connect(detail::OutputCore& from, detail::InputCore& to) {
   to_input.message.link = link;
   to_input.descriptors[0] = copy_of(from.segment_descriptor().get());
   to.add_peer(detail::map_output_peer(to_input, type()));
-  for (detail::InputCore* const each : {&r, &r2, &x}) each->map_growth(from.instance());
+  for (const detail::InputCore* const each : {&r, &r2, &x}) {
+    if (const auto grown = each->peer(from.instance())) {
+      detail::survey(*grown);
+    }
+  }
 }
 
 void World::disconnect(detail::OutputCore& from, detail::InputCore& to) {
