@@ -20,7 +20,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-const std::string kModel =
+const std::string kOneDefault =
     "<behaviors timeout='forever'><arbiter at='/arm'><select from='/rest'>not /track</select>"
     "<select from='/track'/></arbiter><arbiter at='/leg'><select from='/walk'/></arbiter>"
     "</behaviors>";
@@ -32,7 +32,7 @@ std::string status_text() {
 }
 
 TEST(WhyDaemon, OfAComponentThatHasNotComeBackSaysThatWhatIsConnectedGoesOn) {
-  Daemon daemon(kModel);
+  Daemon daemon(kOneDefault);
   Node node("test");
   auto rest = node.output_port<int>("/rest");
   ChildProcess echo({ARBITER_PROGRAMS "/arbiter", "echo", "/arm"}, {}, {});
@@ -61,7 +61,7 @@ TEST(WhyDaemon, OfAComponentThatHasNotComeBackSaysThatWhatIsConnectedGoesOn) {
 }
 
 TEST(WhyDaemon, ThatHasLostItsStateSaysWhoRunsThatItDoesNotKnow) {
-  Daemon daemon(kModel);
+  Daemon daemon(kOneDefault);
   Node node("robot");
   auto rest = node.output_port<int>("/rest");
   auto arm = node.input_port<int>("/arm");

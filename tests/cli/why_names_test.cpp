@@ -17,7 +17,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kModel = R"(<behaviors timeout="forever">
+const std::string kMisnamed = R"(<behaviors timeout="forever">
 <behavior name="Wander"><config at="/base">/wander</config></behavior>
 <behavior name="Follow"><config at="/base">/follow</config>
   <condition>/deadmann</condition><inhibition>Wander</inhibition></behavior>
@@ -35,7 +35,7 @@ json sensed(const json& answer, const std::string& source) {
 }
 
 TEST(WhyNames, TellsOfASourceThatIsOnlySensedWhatItWouldOfAConnection) {
-  Daemon daemon(kModel);
+  Daemon daemon(kMisnamed);
   EXPECT_THAT(codes(sensed(why_json({"/base"}), "/deadmann")["obstacles"]),
               ElementsAre("output-not-open"));
   Node node("test");
@@ -56,7 +56,7 @@ TEST(WhyNames, TellsOfASourceThatIsOnlySensedWhatItWouldOfAConnection) {
 }
 
 TEST(WhyNames, TellsOfPortsUnderANearName) {
-  Daemon daemon(kModel);
+  Daemon daemon(kMisnamed);
   Node node("test");
   auto in = node.input_port<int>("/bas");
   auto out = node.output_port<int>("/wandr");
@@ -109,7 +109,7 @@ TEST(WhyNames, DeactivationOfWhatIsNotActiveLeavesItsRecord) {
 }
 
 TEST(WhyNames, SaysOnTheFirstLineThatNothingOfTheWinnerArrives) {
-  Daemon daemon(kModel);
+  Daemon daemon(kMisnamed);
   Node node("test");
   auto wander = node.output_port<int>("/wander");
   wander.signal();
@@ -136,7 +136,7 @@ TEST(WhyNames, SaysOnTheFirstLineThatNothingOfTheWinnerArrives) {
 }
 
 TEST(WhyNames, TellsWhereTheApplicationHasAConnectionWithoutARuleAndWhoReadsIt) {
-  Daemon daemon(kModel, {.application = R"(<application>
+  Daemon daemon(kMisnamed, {.application = R"(<application>
 <connection><from>/wander</from><to>/base</to></connection>
 <connection><from>/follow</from><to>/base</to></connection>
 <connection><from>/deadmann</from><to>/base</to></connection>
@@ -227,7 +227,7 @@ TEST(WhyNames, ASourceIsNotToldThatItWouldWinWhereItsOwnActivityForbidsIt) {
 }
 
 TEST(WhyNames, CountsAsWaitingNoMoreThanThereIsRoomFor) {
-  Daemon daemon(kModel);
+  Daemon daemon(kMisnamed);
   Node node("test");
   auto wander = node.output_port<int>("/wander");
   auto in = node.input_port<int>("/base", {.depth = 2});

@@ -28,6 +28,11 @@ inline std::string single_model(const std::string& timeout = "forever") {
   return rules(arbiter_at("/in", select("/out")), timeout);
 }
 
+// /in takes this one alone: only("a") takes /a.
+inline std::string only(const std::string& source, const std::string& port = "/in") {
+  return rules(arbiter_at(port, select("/" + source)));
+}
+
 // A source that delivers at several arbitrated ports.
 inline std::string fan_out_model(int ports) {
   std::string body;

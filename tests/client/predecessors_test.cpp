@@ -30,12 +30,6 @@ std::size_t mapped_outputs() {
   return count;
 }
 
-std::vector<std::int64_t> take_all(InputPort<Number>& in) {
-  std::vector<std::int64_t> values;
-  while (auto sample = in.take()) values.push_back((**sample).value);
-  return values;
-}
-
 // The publishers are in another process, or their own mappings would count.
 struct Restarts {
   explicit Restarts(const InputPortOptions& options)

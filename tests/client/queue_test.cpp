@@ -11,12 +11,6 @@
 namespace arbiter::test {
 namespace {
 
-std::vector<std::int64_t> take_all(InputPort<Number>& in) {
-  std::vector<std::int64_t> values;
-  while (auto sample = in.take()) values.push_back((**sample).value);
-  return values;
-}
-
 TEST(Queue, TheOldestSampleGivesWayWhenItIsFull) {
   Daemon daemon(single_model());
   Node node("test");

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include <arbiter/arbiter.hpp>
 
@@ -21,6 +22,13 @@ inline constexpr std::int64_t kNothing = INT64_MIN;
 inline std::int64_t take_from(InputPort<Number>& in) {
   const auto sample = in.take();
   return sample ? (*sample)->value : kNothing;
+}
+
+// All that waits.
+inline std::vector<std::int64_t> take_all(InputPort<Number>& in) {
+  std::vector<std::int64_t> values;
+  while (auto sample = in.take()) values.push_back((**sample).value);
+  return values;
 }
 
 // 4 MiB.

@@ -14,11 +14,6 @@
 namespace arbiter::test {
 namespace {
 
-// /in takes /a alone, or /b alone.
-std::string only(const std::string& source) {
-  return rules(arbiter_at("/in", select("/" + source)));
-}
-
 TEST(Swap, DeliveriesFollowTheNewModelOnceItIsInForce) {
   Daemon daemon(only("a"));
   Node node("test");

@@ -18,10 +18,6 @@ namespace {
 
 using testing::HasSubstr;
 
-std::string only(const std::string& source, const std::string& port = "/in") {
-  return rules(arbiter_at(port, select("/" + source)));
-}
-
 // The models "default" and "other".
 class Switch : public testing::Test {
  protected:

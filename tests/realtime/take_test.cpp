@@ -26,7 +26,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::int64_t kManySamples = 200;  // more than any pool here has slots
+constexpr std::int64_t kMoreThanSlots = 200;  // more than any pool here has slots
 
 // How much of our mappings of output ports is resident, in KiB: the largest one, or the smallest.
 struct Resident {
@@ -89,7 +89,7 @@ class RealTimeTake : public testing::Test {
 TEST_F(RealTimeTake, SamplesCostNothingFromTheFirstOn) {
   Scene scene(1);
   set_up(scene);
-  for (std::int64_t i = 0; i < kManySamples; ++i) {
+  for (std::int64_t i = 0; i < kMoreThanSlots; ++i) {
     scene.out[0].publish(Number{i});
     std::int64_t value = kNothing;
     EXPECT_EQ(thread.costs_of([&] { value = take_from(scene.in); }), kNone) << i;
@@ -122,10 +122,10 @@ TEST_F(RealTimeTake, SeveralSourcesCostNothing) {
 TEST_F(RealTimeTake, ReceiversThatWereOvertakenPayNothing) {
   Scene scene(1, {.depth = 2});
   set_up(scene);
-  for (std::int64_t i = 0; i < kManySamples; ++i) scene.out[0].publish(Number{i});
+  for (std::int64_t i = 0; i < kMoreThanSlots; ++i) scene.out[0].publish(Number{i});
   std::int64_t value = kNothing;
   EXPECT_EQ(thread.costs_of([&] { value = take_from(scene.in); }), kNone);
-  EXPECT_EQ(value, kManySamples - 2);
+  EXPECT_EQ(value, kMoreThanSlots - 2);
 }
 
 TEST_F(RealTimeTake, HeldSamplesCostNothing) {

@@ -13,7 +13,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kModel = "<arbiter at='/p'><select from='/a'>not /b</select></arbiter>";
+const std::string kWritten = "<arbiter at='/p'><select from='/a'>not /b</select></arbiter>";
 const std::string kMerged =
     "<arbitration timeout=\"500ms\">\n"
     "  <!-- Written by arbiter compile: the rules of each input port. -->\n"
@@ -38,9 +38,9 @@ std::string round_trip(const std::string& model) {
 }
 
 TEST(ApplicationWriter, PutsTheRulesLastIntoTheRootInTheStyleOfTheFile) {
-  EXPECT_EQ(merge(kModel, "<application>\n <name>x</name>\n</application>\n<!-- end -->\n"),
+  EXPECT_EQ(merge(kWritten, "<application>\n <name>x</name>\n</application>\n<!-- end -->\n"),
             "<application>\n <name>x</name>\n\n " + kMerged + "\n</application>\n<!-- end -->\n");
-  const std::string crlf = merge(kModel, "<application>\r\n\t<name/>\r\n</application>\r\n");
+  const std::string crlf = merge(kWritten, "<application>\r\n\t<name/>\r\n</application>\r\n");
   EXPECT_THAT(crlf, HasSubstr("\r\n\t\t<arbiter at=\"/p\">\r\n"));
   for (std::size_t at = crlf.find('\n'); at != std::string::npos; at = crlf.find('\n', at + 1)) {
     EXPECT_EQ(crlf[at - 1], '\r');
@@ -52,21 +52,21 @@ TEST(ApplicationWriter, TakesWhateverTheRootLooksLike) {
        {"<application/>", "<application />", "<application></application>",
         "<?xml version='1.0'?><!-- <application> --><application a='/>'/><!-- -->",
         "<application><name>x</name></application>"}) {
-    const std::string merged = merge(kModel, application);
+    const std::string merged = merge(kWritten, application);
     const Loaded read = load_text(merged.substr(0, merged.find("</application>")) +
                                   "<connection><from>/a</from><to>/p</to></connection>" +
                                   merged.substr(merged.find("</application>")));
     EXPECT_FALSE(read.has_errors) << merged;
-    EXPECT_TRUE(same_rules(read.rules, load_text(kModel).rules)) << merged;
+    EXPECT_TRUE(same_rules(read.rules, load_text(kWritten).rules)) << merged;
   }
 }
 
 TEST(ApplicationWriter, ReplacesTheRulesThatWereThere) {
   const std::string before = "<application>\n <name>x</name>\n\n ";
   const std::string after = "\n <connection/>\n</application>\n";
-  EXPECT_EQ(merge(kModel, before + "<arbitration><old/></arbitration>" + after),
+  EXPECT_EQ(merge(kWritten, before + "<arbitration><old/></arbitration>" + after),
             before + kMerged + after);
-  EXPECT_EQ(merge(kModel, before + "<arbitration/>\n <arbitration>\n </arbitration>" + after),
+  EXPECT_EQ(merge(kWritten, before + "<arbitration/>\n <arbitration>\n </arbitration>" + after),
             before + kMerged + after);
 }
 
@@ -98,9 +98,9 @@ TEST(ApplicationWriter, WhatItWroteIntoALatinFileCanBeRead) {
   const std::string latin =
       "<application><author>J\xf6rg</author><connection><from>/a</from><to>/p</to>"
       "</connection></application>";
-  const Loaded read = load_text(merge(kModel, latin));
+  const Loaded read = load_text(merge(kWritten, latin));
   EXPECT_FALSE(read.has_errors) << read.message();
-  EXPECT_TRUE(same_rules(read.rules, load_text(kModel).rules));
+  EXPECT_TRUE(same_rules(read.rules, load_text(kWritten).rules));
 }
 
 TEST(ApplicationWriter, NamesAreReadBackAsTheyAre) {

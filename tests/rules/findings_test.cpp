@@ -168,15 +168,15 @@ void expect_within_bounds(const Found& found, std::size_t ports) {
   EXPECT_EQ(std::count(codes.begin(), codes.end(), "left-open"), found.account.open > 0 ? 1 : 0);
 }
 
-constexpr int kSources = 256;  // kMaxSourcesPerPort
-constexpr int kPorts = 16;     // 4096 connections
+constexpr int kMostSources = 256;  // kMaxSourcesPerPort
+constexpr int kPorts = 16;         // 4096 connections
 
 TEST(FindingsScale, AllInhibitAll) {
   const auto found = found_in(inhibited(
-      4, kSources,
+      4, kMostSources,
       [](int i) {
         std::vector<int> others;
-        for (int j = 0; j < kSources; ++j) {
+        for (int j = 0; j < kMostSources; ++j) {
           if (j != i) others.push_back(j);
         }
         return others;
@@ -188,10 +188,10 @@ TEST(FindingsScale, AllInhibitAll) {
 
 TEST(FindingsScale, ChainsOfPriorities) {
   const auto found = found_in(inhibited(
-      kPorts, kSources,
+      kPorts, kMostSources,
       [](int i) {
         std::vector<int> others;
-        for (int j = i + 1; j < kSources; ++j) others.push_back(j);
+        for (int j = i + 1; j < kMostSources; ++j) others.push_back(j);
         return others;
       },
       false));

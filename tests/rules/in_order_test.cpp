@@ -23,7 +23,7 @@ using testing::Contains;
 
 using Rules = std::vector<std::pair<std::string, ExpressionPtr>>;
 
-const std::vector<std::string> kSources = {"/a", "/b", "/c", "/d", "/e", "/f"};
+const std::vector<std::string> kSixSources = {"/a", "/b", "/c", "/d", "/e", "/f"};
 
 std::string source_name(std::size_t i) { return "/s" + std::to_string(1000 + i); }
 
@@ -46,7 +46,7 @@ ExpressionPtr random_condition(std::mt19937& random, int depth) {
   const auto pick = [&](std::size_t n) { return static_cast<std::size_t>(random()) % n; };
   if (depth == 0 || pick(4) == 0) {
     if (pick(12) == 0) return pick(2) == 0 ? always() : negation(always());
-    const auto& source = kSources[pick(kSources.size())];
+    const auto& source = kSixSources[pick(kSixSources.size())];
     return pick(2) == 0 ? active(source) : inactive(source);
   }
   static constexpr Operator kOperators[] = {Operator::kAnd, Operator::kOr, Operator::kXor,
@@ -57,9 +57,9 @@ ExpressionPtr random_condition(std::mt19937& random, int depth) {
 
 Rules random_rules(std::mt19937& random) {
   Rules rules;
-  const std::size_t count = 1 + random() % kSources.size();
+  const std::size_t count = 1 + random() % kSixSources.size();
   for (std::size_t i = 0; i < count; ++i) {
-    rules.emplace_back(kSources[i], random() % 6 == 0 ? always() : random_condition(random, 2));
+    rules.emplace_back(kSixSources[i], random() % 6 == 0 ? always() : random_condition(random, 2));
   }
   return rules;
 }
@@ -84,7 +84,7 @@ class Readers {
       : rules_(rules), model_(model), live_(model) {}
 
   void check_all_states() {
-    for (const auto& now : subsets(kSources)) {
+    for (const auto& now : subsets(kSixSources)) {
       SCOPED_TRACE(testing::PrintToString(now));
       live_.activate_only(now);
       const auto expected = first_that_holds(rules_, now);

@@ -105,7 +105,7 @@ TEST(Limits, DefinesThatGrowTenfoldEachAreStopped) {
   EXPECT_THAT(loaded.message(), HasSubstr("more than the limit of 64 KiB"));
 }
 
-std::string nested(int metas) {
+std::string nested_metas(int metas) {
   std::string model = "<behaviors>";
   for (int i = 0; i < metas; ++i) {
     model += "<meta_behavior name='M" + std::to_string(i) + "'><behavior>M" +
@@ -116,11 +116,11 @@ std::string nested(int metas) {
 }
 
 TEST(Limits, AThousandNestedMetaBehavioursAreReadAndMoreAreAnError) {
-  EXPECT_FALSE(load_text(nested(1000)).has_errors);
-  const Loaded deeper = load_text(nested(1001));
+  EXPECT_FALSE(load_text(nested_metas(1000)).has_errors);
+  const Loaded deeper = load_text(nested_metas(1001));
   EXPECT_TRUE(deeper.has_errors);
   EXPECT_THAT(deeper.message(), HasSubstr("than the limit of 1000"));
-  EXPECT_TRUE(load_text(nested(50'000)).has_errors);
+  EXPECT_TRUE(load_text(nested_metas(50'000)).has_errors);
 }
 
 TEST(Limits, AFindingIsOneLineWhateverItCites) {

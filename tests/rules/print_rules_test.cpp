@@ -11,7 +11,7 @@
 namespace arbiter::test {
 namespace {
 
-const auto a = active("/a"), b = active("/b"), c = active("/c");
+const auto is_a = active("/a"), is_b = active("/b"), is_c = active("/c");
 
 std::string text_of(const rules::RuleSet& set) {
   std::ostringstream out;
@@ -29,12 +29,12 @@ TEST(PrintRules, WritesAPortsRulesAsThePaperDoes) {
 
 TEST(PrintRules, SaysTheOwnSourceOnceAndFirst) {
   const rules::ConnectionRule rule{
-      "/a", all_of({inactive("/b"), a, always(), inactive("/b")}), {}, {}};
+      "/a", all_of({inactive("/b"), is_a, always(), inactive("/b")}), {}, {}};
   EXPECT_EQ(to_string(rule), "/a ∧ ¬/b");
 }
 
 TEST(PrintRules, KeepsParenthesesWhereADisjunctionIsOneOfSeveralConditions) {
-  const rules::ConnectionRule rule{"/a", any_of({b, inactive("/c")}), {}, {}};
+  const rules::ConnectionRule rule{"/a", any_of({is_b, inactive("/c")}), {}, {}};
   EXPECT_EQ(to_string(rule), "/a ∧ (/b ∨ ¬/c)");
 }
 
@@ -42,22 +42,23 @@ TEST(PrintRules, PutsParenthesesOnlyWhereThePrecedencesAskForThem) {
   const auto iff = [](auto x, auto y) { return binary(Operator::kIff, x, y); };
   const auto implies = [](auto x, auto y) { return binary(Operator::kImplies, x, y); };
   const auto exclusive = [](auto x, auto y) { return binary(Operator::kXor, x, y); };
-  EXPECT_EQ(to_string(*any_of({all_of({a, b}), c})), "/a ∧ /b ∨ /c");
-  EXPECT_EQ(to_string(*all_of({any_of({a, b}), c})), "(/a ∨ /b) ∧ /c");
-  EXPECT_EQ(to_string(*negation(all_of({a, b}))), "¬(/a ∧ /b)");
-  EXPECT_EQ(to_string(*negation(negation(a))), "¬¬/a");
-  EXPECT_EQ(to_string(*implies(a, implies(b, c))), "/a → /b → /c");
-  EXPECT_EQ(to_string(*implies(implies(a, b), c)), "(/a → /b) → /c");
-  EXPECT_EQ(to_string(*iff(iff(a, b), c)), "/a ↔ /b ↔ /c");
-  EXPECT_EQ(to_string(*iff(a, iff(b, c))), "/a ↔ (/b ↔ /c)");
-  EXPECT_EQ(to_string(*iff(implies(a, b), any_of({b, c}))), "/a → /b ↔ /b ∨ /c");
-  EXPECT_EQ(to_string(*any_of({exclusive(a, b), c})), "/a xor /b ∨ /c");
-  EXPECT_EQ(to_string(*exclusive(any_of({a, b}), all_of({b, c}))), "(/a ∨ /b) xor /b ∧ /c");
-  EXPECT_EQ(to_string(*exclusive(a, exclusive(b, c))), "/a xor (/b xor /c)");
-  EXPECT_EQ(to_string(*exclusive(exclusive(a, b), c)), "/a xor /b xor /c");
+  EXPECT_EQ(to_string(*any_of({all_of({is_a, is_b}), is_c})), "/a ∧ /b ∨ /c");
+  EXPECT_EQ(to_string(*all_of({any_of({is_a, is_b}), is_c})), "(/a ∨ /b) ∧ /c");
+  EXPECT_EQ(to_string(*negation(all_of({is_a, is_b}))), "¬(/a ∧ /b)");
+  EXPECT_EQ(to_string(*negation(negation(is_a))), "¬¬/a");
+  EXPECT_EQ(to_string(*implies(is_a, implies(is_b, is_c))), "/a → /b → /c");
+  EXPECT_EQ(to_string(*implies(implies(is_a, is_b), is_c)), "(/a → /b) → /c");
+  EXPECT_EQ(to_string(*iff(iff(is_a, is_b), is_c)), "/a ↔ /b ↔ /c");
+  EXPECT_EQ(to_string(*iff(is_a, iff(is_b, is_c))), "/a ↔ (/b ↔ /c)");
+  EXPECT_EQ(to_string(*iff(implies(is_a, is_b), any_of({is_b, is_c}))), "/a → /b ↔ /b ∨ /c");
+  EXPECT_EQ(to_string(*any_of({exclusive(is_a, is_b), is_c})), "/a xor /b ∨ /c");
+  EXPECT_EQ(to_string(*exclusive(any_of({is_a, is_b}), all_of({is_b, is_c}))),
+            "(/a ∨ /b) xor /b ∧ /c");
+  EXPECT_EQ(to_string(*exclusive(is_a, exclusive(is_b, is_c))), "/a xor (/b xor /c)");
+  EXPECT_EQ(to_string(*exclusive(exclusive(is_a, is_b), is_c)), "/a xor /b xor /c");
   EXPECT_EQ(to_string(*all_of({})), "true");
   EXPECT_EQ(to_string(*any_of({})), "false");
-  EXPECT_EQ(to_string(*negation(any_of({all_of({a})}))), "¬/a");
+  EXPECT_EQ(to_string(*negation(any_of({all_of({is_a})}))), "¬/a");
 }
 
 TEST(PrintRules, QuotesNamesThatAConditionCouldNotTakeOtherwise) {
@@ -97,10 +98,10 @@ TEST(PrintRules, WritesJson) {
                                    .other("/x", "/q")
                                    .timeout("/b", shm::kForever));
   const auto expected = nlohmann::json::parse(R"({
-    "timeout": "500ms", "timeouts": {"/b": "forever"},
+    "timeout": "500ms", "timeouts": {"/is_b": "forever"},
     "ports": [
       {"port": "/p", "arbitrated": true, "conflict": "error", "connections": [
-        {"source": "/a", "rule": "/a ∧ ¬/b", "behaviours": ["First", "Second"]},
+        {"source": "/is_a", "rule": "/is_a ∧ ¬/is_b", "behaviours": ["First", "Second"]},
         {"source": "/x", "rule": null, "behaviours": []}]},
       {"port": "/q", "arbitrated": false, "conflict": "error", "connections": [
         {"source": "/x", "rule": null, "behaviours": []}]}]})");

@@ -132,12 +132,6 @@ class ExhaustiveFindings {
   mutable std::map<std::string, std::optional<std::size_t>> candidates_;
 };
 
-bool agrees(const Active& now, const rules::Witness& witness) {
-  const auto is_active = [&](const auto& source) { return now.contains(source); };
-  return std::all_of(witness.active.begin(), witness.active.end(), is_active) &&
-         std::none_of(witness.inactive.begin(), witness.inactive.end(), is_active);
-}
-
 std::set<std::string> first_matches(const std::vector<Diagnostic>& items, const std::string& code,
                                     const std::string& pattern) {
   std::set<std::string> result;

@@ -241,4 +241,11 @@ class NaiveEvaluator {
   const RandomModel& model_;
 };
 
+// Whether the witness speaks of this activation.
+inline bool agrees(const Active& now, const rules::Witness& witness) {
+  const auto is_active = [&](const auto& source) { return now.contains(source); };
+  return std::all_of(witness.active.begin(), witness.active.end(), is_active) &&
+         std::none_of(witness.inactive.begin(), witness.inactive.end(), is_active);
+}
+
 }  // namespace arbiter::test

@@ -16,14 +16,14 @@ namespace arbiter::test {
 namespace {
 
 const Vocabulary kVocabulary;
-const auto& kSources = kVocabulary.sources;
+const auto& kDrawnFrom = kVocabulary.sources;
 const auto& kPorts = kVocabulary.ports;
 
 // How many pairs of connections can win together, by trying all activations.
 std::size_t count_conflicts(const NaiveEvaluator& naive) {
   std::set<std::vector<std::string>> pairs;
   for (const auto& port : kPorts) {
-    for (const auto& active : subsets(kSources)) {
+    for (const auto& active : subsets(kDrawnFrom)) {
       const auto selected = naive.selected(port, active);
       for (std::size_t j = 1; j < selected.size(); ++j) {
         for (std::size_t i = 0; i < j; ++i) pairs.insert({port, selected[i], selected[j]});
@@ -72,7 +72,7 @@ void RandomModels::check(unsigned seed) {
 
 void RandomModels::check_decisions(const rules::CompiledModel& model, const NaiveEvaluator& naive) {
   LiveTable live(model);
-  for (const auto& active : subsets(kSources)) {
+  for (const auto& active : subsets(kDrawnFrom)) {
     live.activate_only(active);
     for (const auto& port : kPorts) {
       if (naive.sources_at(port).empty()) continue;
@@ -199,7 +199,7 @@ class Explanations {
 
   const NaiveEvaluator naive_;
   const rules::Explainer explainer_;
-  const std::vector<Active> activations_ = subsets(kSources);
+  const std::vector<Active> activations_ = subsets(kDrawnFrom);
   int reasons_ = 0;
 };
 

@@ -123,12 +123,6 @@ struct Counts {
   int proved = 0, refuted = 0;
 };
 
-bool agrees(const Active& now, const rules::Witness& witness) {
-  const auto is_active = [&](const auto& source) { return now.contains(source); };
-  return std::all_of(witness.active.begin(), witness.active.end(), is_active) &&
-         std::none_of(witness.inactive.begin(), witness.inactive.end(), is_active);
-}
-
 void expect_verdict(const Verdict& verdict, const RandomStatement& statement,
                     const NaiveEvaluator& naive, const std::vector<Active>& states,
                     Counts& counts) {

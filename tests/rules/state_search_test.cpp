@@ -24,14 +24,14 @@ using testing::Contains;
 
 using Rules = std::vector<std::pair<std::string, ExpressionPtr>>;
 
-const std::vector<std::string> kSources = {"/a", "/b", "/c", "/d", "/e"};
+const std::vector<std::string> kFiveSources = {"/a", "/b", "/c", "/d", "/e"};
 
 std::string source_name(std::size_t i) { return "/s" + std::to_string(1000 + i); }
 
 ExpressionPtr random_condition(std::mt19937& random, int depth) {
   const auto pick = [&](std::size_t n) { return static_cast<std::size_t>(random()) % n; };
   if (depth == 0 || pick(4) == 0) {
-    const auto& source = kSources[pick(kSources.size())];
+    const auto& source = kFiveSources[pick(kFiveSources.size())];
     return pick(2) == 0 ? active(source) : inactive(source);
   }
   static constexpr Operator kOperators[] = {Operator::kAnd, Operator::kOr, Operator::kXor,
@@ -42,7 +42,7 @@ ExpressionPtr random_condition(std::mt19937& random, int depth) {
 
 Rules random_rules(std::mt19937& random) {
   Rules rules;
-  for (const auto& source : kSources) rules.emplace_back(source, random_condition(random, 2));
+  for (const auto& source : kFiveSources) rules.emplace_back(source, random_condition(random, 2));
   return rules;
 }
 
@@ -66,7 +66,7 @@ bool agrees(const rules::Witness& witness, const Active& now) {
 // Whether that one wins in every state of which the witness is true.
 bool implies(const rules::Witness& witness, const Rules& rules,
              const std::optional<std::string>& winner) {
-  const auto states = subsets(kSources);
+  const auto states = subsets(kFiveSources);
   return std::all_of(states.begin(), states.end(), [&](const Active& now) {
     return !agrees(witness, now) || first_that_holds(rules, now) == winner;
   });
@@ -94,7 +94,7 @@ TEST(StateSearch, FindsWhoCanWinAndStatesOfWhichNothingCanBeLeftOut) {
     StateSearch search;
     const auto winners = search.winners(port);
     std::set<std::string> can_win;
-    for (const auto& now : subsets(kSources)) {
+    for (const auto& now : subsets(kFiveSources)) {
       if (const auto winner = first_that_holds(rules, now)) can_win.insert(*winner);
     }
     for (std::size_t i = 0; i < port.rules.size(); ++i) {
@@ -145,8 +145,8 @@ TEST(InOrder, WarnsOfTheSameRulesThatCanNeverWin) {
   for (int round = 0; round < 200; ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
     const Rules rules = random_rules(random);
-    std::set<std::string> expected(kSources.begin(), kSources.end());
-    for (const auto& now : subsets(kSources)) {
+    std::set<std::string> expected(kFiveSources.begin(), kFiveSources.end());
+    for (const auto& now : subsets(kFiveSources)) {
       if (const auto winner = first_that_holds(rules, now)) expected.erase(*winner);
     }
     Diagnostics diagnostics;
@@ -154,7 +154,7 @@ TEST(InOrder, WarnsOfTheSameRulesThatCanNeverWin) {
     EXPECT_EQ(never_selected(diagnostics), expected);
     warned += expected.size();
     LiveTable live(model);
-    for (const auto& now : subsets(kSources)) {
+    for (const auto& now : subsets(kFiveSources)) {
       live.activate_only(now);
       ASSERT_EQ(live.winner("/p"), first_that_holds(rules, now));
     }
@@ -229,7 +229,7 @@ TEST(InOrder, WhereModelsOfManyConnectionsDecideDifferentlyIsFound) {
 
 TEST(InOrder, WhetherNobodyWinsIsAskedOfTheRulesAsTheyStand) {
   Rules rules;
-  for (const auto& source : kSources) rules.emplace_back(source, inactive("/x"));
+  for (const auto& source : kFiveSources) rules.emplace_back(source, inactive("/x"));
   const rules::RuleSet set = RulesByHand().port("/p", rules, true);
   Diagnostics diagnostics, more;
   const auto model = compile(set, diagnostics, 0);

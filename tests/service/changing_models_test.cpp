@@ -19,10 +19,6 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-std::string only(const std::string& source) {
-  return rules(arbiter_at("/in", select("/" + source)));
-}
-
 // The models "default", which takes /a, and "other", which takes /b.
 class ChangingModels : public testing::Test {
  protected:

@@ -13,7 +13,7 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr uid_t kOwner = 100, kOne = 1001, kTwo = 1002, kThree = 1003;
+constexpr uid_t kDaemonsUser = 100, kOne = 1001, kTwo = 1002, kThree = 1003;
 
 Totals of_each(std::uint64_t total) {
   Totals totals{};
@@ -31,25 +31,25 @@ std::uint64_t take_all(Shares& shares, uid_t user, std::vector<Charge>& charges)
 }
 
 TEST(Shares, NobodyHasMoreThanIsLeftForTheOthers) {
-  Shares shares(of_each(1600), 50, kOwner);
+  Shares shares(of_each(1600), 50, kDaemonsUser);
   std::vector<Charge> charges;
   EXPECT_EQ(take_all(shares, kOne, charges), 750u);  // a sixteenth is kept
   EXPECT_EQ(take_all(shares, kTwo, charges), 375u);
   EXPECT_EQ(take_all(shares, kThree, charges), 187u);
-  EXPECT_EQ(take_all(shares, kOwner, charges), 144u);
+  EXPECT_EQ(take_all(shares, kDaemonsUser, charges), 144u);
   for (uid_t user = 2000; user < 2006; ++user) EXPECT_GT(take_all(shares, user, charges), 0u);
 }
 
 TEST(Shares, SomethingIsKeptForRootAndTheDaemonsUser) {
-  Shares shares(of_each(1600), 50, kOwner);
+  Shares shares(of_each(1600), 50, kDaemonsUser);
   std::vector<Charge> charges;
   for (uid_t user = 2000; user < 2100; ++user) take_all(shares, user, charges);
   EXPECT_FALSE(shares.allows(kOne, Share::kClients, 1));
-  EXPECT_GE(take_all(shares, 0, charges) + take_all(shares, kOwner, charges), 100u);
+  EXPECT_GE(take_all(shares, 0, charges) + take_all(shares, kDaemonsUser, charges), 100u);
 }
 
 TEST(Shares, AreGivenBackWithTheCharge) {
-  Shares shares(of_each(1600), 50, kOwner);
+  Shares shares(of_each(1600), 50, kDaemonsUser);
   {
     Charge charge = shares.take(kOne, Share::kInputs, 700);
     EXPECT_EQ(shares.taken(kOne, Share::kInputs), 700u);
@@ -63,21 +63,21 @@ TEST(Shares, AreGivenBackWithTheCharge) {
 }
 
 TEST(Shares, OfARobotWithOneUserMayBeGreater) {
-  Shares shares(of_each(1600), 90, kOwner);
+  Shares shares(of_each(1600), 90, kDaemonsUser);
   std::vector<Charge> charges;
   EXPECT_EQ(take_all(shares, kOne, charges), 1350u);
   EXPECT_GT(take_all(shares, kTwo, charges), 100u);
 }
 
 TEST(Shares, CountWhatTheDaemonTakesAndDoNotRefuseIt) {
-  Shares shares(of_each(1600), 50, kOwner);
+  Shares shares(of_each(1600), 50, kDaemonsUser);
   const Charge own = shares.take_own(Share::kSources, 1700);
   EXPECT_FALSE(shares.allows(kOne, Share::kSources, 1));
   EXPECT_TRUE(shares.allows(kOne, Share::kInputs, 1));
 }
 
 TEST(Shares, ARefusalSaysWhatIsTheLimitAndWhatToDo) {
-  Shares shares(of_each(16), 50, kOwner);
+  Shares shares(of_each(16), 50, kDaemonsUser);
   const Charge some = shares.take(kOne, Share::kSources, 7);
   try {
     shares.take(kOne, Share::kSources);

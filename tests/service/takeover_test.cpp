@@ -18,10 +18,6 @@ namespace {
 
 constexpr auto kForEver = std::chrono::hours::max();
 
-std::string only(const std::string& source) {
-  return rules(arbiter_at("/in", select("/" + source)));
-}
-
 // Waits for no daemon for long.
 NodeOptions impatient() {
   NodeOptions options;

@@ -17,7 +17,7 @@ using shm::MessageKind;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-constexpr const char* kModel =
+constexpr const char* kOneArm =
     "<behaviors><arbiter at='/Arm/in'><select from='/Arm/out'/></arbiter></behaviors>";
 
 class Users : public testing::Test {
@@ -28,13 +28,13 @@ class Users : public testing::Test {
 
   // A daemon that processes of other users can reach.
   Daemon& start(const std::string& policy) {
-    daemon_.emplace(kModel,
+    daemon_.emplace(kOneArm,
                     Daemon::Options{.arguments = {"--policy", files_.write("policy", policy)}});
     open_up();
     return *daemon_;
   }
   Daemon& start_without_policy() {
-    daemon_.emplace(kModel);
+    daemon_.emplace(kOneArm);
     open_up();
     return *daemon_;
   }
@@ -251,7 +251,7 @@ TEST_F(Users, KeepTheirPortsWhenThePolicyChanges) {
   char byte = 0;
   ASSERT_EQ(::read(opened.ends[0], &byte, 1), 1);
   write_policy("allow user root all\n");
-  daemon.load(kModel);
+  daemon.load(kOneArm);
   EXPECT_TRUE(daemon.source("/Arm/out")["open"]);
   ASSERT_EQ(::write(go.ends[1], "x", 1), 1);
   int status = 0;
@@ -271,7 +271,7 @@ TEST_F(Users, AnswerToTheOldPolicyWhereTheNewOneIsBad) {
   write_policy("allow everyone all\n");
   daemon.load_bad("<behaviors>");
   EXPECT_THAT(open_output(kStranger, "/Arm/out"), HasSubstr("may not"));
-  daemon.load(kModel);
+  daemon.load(kOneArm);
   EXPECT_EQ(open_output(kStranger, "/Arm/out"), "opened");
 }
 

@@ -17,8 +17,8 @@ using test::TableBuilder;
 using test::TableWords;
 
 constexpr SourceId kA = 0, kB = 1, kC = 2, kD = 3;
-constexpr SourceId kSources = 4;
-constexpr Nanoseconds kT = 100;
+constexpr SourceId kFour = 4;
+constexpr Nanoseconds kShortT = 100;
 
 // A clock whose readings the test writes, and that counts how often it was read.
 struct ScriptedClock {
@@ -41,16 +41,16 @@ struct ScriptedClock {
 class Decision : public testing::Test {
  protected:
   Decision() {
-    for (SourceId id = 0; id < kSources; ++id) {
+    for (SourceId id = 0; id < kFour; ++id) {
       pages_->attach(id, &activities_[id]);
-      builder_.timeout(id, kT);
+      builder_.timeout(id, kShortT);
     }
   }
 
   Atomic<ActivityWord>& word(SourceId id) { return activities_[id].word; }
 
   Verdict decide(ConnectionIndex connection, ScriptedClock& clock, bool with_own = false) {
-    const TableWords words(builder_.words(kSources, 1));
+    const TableWords words(builder_.words(kFour, 1));
     const TableView view = words.view();
     Decider decider(view, *pages_, clock);
     const Rule rule = view.rule(connection);
@@ -62,7 +62,7 @@ class Decision : public testing::Test {
   }
 
   TableBuilder builder_;
-  Activity activities_[kSources];
+  Activity activities_[kFour];
   std::unique_ptr<ActivityPages> pages_ = std::make_unique<ActivityPages>();
 };
 
@@ -85,7 +85,7 @@ TEST_F(Decision, OfRulesInOrderTheFirstThatHoldsWins) {
   rules_in_order(builder_);
   for (unsigned mask = 0; mask < 16; ++mask) {
     const auto is = [&](SourceId id) { return (mask >> id & 1) != 0; };
-    for (SourceId id = 0; id < kSources; ++id) {
+    for (SourceId id = 0; id < kFour; ++id) {
       word(id) = is(id) ? arrival(1, kForever) : deactivation(1);
     }
     const bool first = !is(kB), third = !is(kD) && !is(kB) && !is(kA);
@@ -102,7 +102,7 @@ TEST_F(Decision, OfRulesInOrderTheFirstThatHoldsWins) {
 TEST_F(Decision, OfRulesInOrderAConnectionTakesItsOwnActivityAsGivenInThoseBeforeIt) {
   rules_in_order(builder_);
   pages_->attach(kB, nullptr);
-  word(kA) = arrival(1, kT);
+  word(kA) = arrival(1, kShortT);
   EXPECT_EQ(decide_at(1, 2), Verdict::kWins);
   EXPECT_EQ(decide_at(1, 2, true), Verdict::kBlind);
   EXPECT_EQ(decide_at(2, 2), Verdict::kBlind);
@@ -112,9 +112,9 @@ TEST_F(Decision, ItsOwnActivityIsTakenAsGivenUnlessItIsAskedFor) {
   builder_.connect({kA, 0, table::kAlways, {}, {}});
   EXPECT_EQ(decide_at(0, 1), Verdict::kWins);
   EXPECT_EQ(decide_at(0, 1, true), Verdict::kLoses);
-  word(kA) = arrival(1, kT);
-  EXPECT_EQ(decide_at(0, kT, true), Verdict::kWins);
-  EXPECT_EQ(decide_at(0, 1 + kT, true), Verdict::kLoses) << "at exactly t + T it is inactive";
+  word(kA) = arrival(1, kShortT);
+  EXPECT_EQ(decide_at(0, kShortT, true), Verdict::kWins);
+  EXPECT_EQ(decide_at(0, 1 + kShortT, true), Verdict::kLoses) << "at exactly t + T it is inactive";
 }
 
 TEST_F(Decision, AConjunctionHoldsForExactlyTheActivitiesItAsksFor) {
@@ -152,8 +152,8 @@ TEST_F(Decision, ASourceWithoutAPageMakesBlindWhatReadsItAndNothingElse) {
 TEST_F(Decision, AnOldReadingDecidesAsAFreshOneDoesForAllCombinations) {
   builder_.conjunction(kA, 0, {kB}, {kC});
   const ActivityWord choices[] = {kNeverActive,     arrival(100, kForever), deactivation(100),
-                                  arrival(0, kT),   arrival(50, kT),        arrival(100, kT),
-                                  arrival(101, kT), arrival(120, kForever), deactivation(130)};
+                                  arrival(0, kShortT),   arrival(50, kShortT),        arrival(100, kShortT),
+                                  arrival(101, kShortT), arrival(120, kForever), deactivation(130)};
   for (const ActivityWord b : choices) {
     for (const ActivityWord c : choices) {
       word(kB) = b;
@@ -172,12 +172,12 @@ TEST_F(Decision, AnOldReadingDecidesAsAFreshOneDoesForAllCombinations) {
 
 TEST_F(Decision, AnOldReadingCostsAClockOnlyWhereActivityMayHaveEndedSince) {
   builder_.conjunction(kA, 0, {}, {kB, kC});
-  word(kB) = arrival(0, kT);  // ended at 100
+  word(kB) = arrival(0, kShortT);  // ended at 100
   word(kC) = deactivation(100);
   ScriptedClock clock{100, false, 500, 0, [] {}};
   EXPECT_EQ(decide(0, clock), Verdict::kWins);
   EXPECT_EQ(clock.readings, 0);
-  word(kC) = arrival(90, kT);  // ends at 190
+  word(kC) = arrival(90, kShortT);  // ends at 190
   EXPECT_EQ(decide(0, clock), Verdict::kWins);
   EXPECT_EQ(clock.readings, 1);
 }
@@ -186,7 +186,7 @@ TEST_F(Decision, AnOldReadingCostsAClockOnlyWhereActivityMayHaveEndedSince) {
 // we were held up. No moment has seen B and C as a naive reader would put them together.
 TEST_F(Decision, AnEndBeforeAndADeactivationAfterAReadingAreNotCombined) {
   builder_.conjunction(kA, 0, {kB}, {kC});
-  word(kB) = arrival(100, kT);
+  word(kB) = arrival(100, kShortT);
   word(kC) = deactivation(300);
   ScriptedClock clock{150, true, 310, 0, [] {}};
   EXPECT_EQ(decide(0, clock), Verdict::kLoses);
@@ -194,7 +194,7 @@ TEST_F(Decision, AnEndBeforeAndADeactivationAfterAReadingAreNotCombined) {
 
 TEST_F(Decision, AnEndBeforeAndAnEndlessActivityAfterAReadingAreNotCombined) {
   builder_.conjunction(kA, 0, {kB, kC}, {});
-  word(kB) = arrival(100, kT);
+  word(kB) = arrival(100, kShortT);
   word(kC) = arrival(300, kForever);
   ScriptedClock clock{150, true, 310, 0, [] {}};
   EXPECT_EQ(decide(0, clock), Verdict::kLoses);
@@ -202,8 +202,8 @@ TEST_F(Decision, AnEndBeforeAndAnEndlessActivityAfterAReadingAreNotCombined) {
 
 TEST_F(Decision, AnEndBeforeAndAnArrivalAfterAReadingAreNotCombined) {
   builder_.conjunction(kA, 0, {kB, kC}, {});
-  word(kB) = arrival(100, kT);
-  word(kC) = arrival(300, kT);
+  word(kB) = arrival(100, kShortT);
+  word(kC) = arrival(300, kShortT);
   ScriptedClock clock{150, true, 310, 0, [] {}};
   EXPECT_EQ(decide(0, clock), Verdict::kLoses);
 }
@@ -249,7 +249,7 @@ TEST_F(Decision, ASourceThatChangesAtEveryLookLeavesItUnsettledAfterABoundedTime
   ScriptedClock clock{0, true, 0, 0, [] {}};
   clock.on_read = [&] {  // always one step behind an activity that is deactivated in between
     time += 1000;
-    activities_[kC].write(deactivation(time), arrival(time + 10, kT));
+    activities_[kC].write(deactivation(time), arrival(time + 10, kShortT));
     clock.next = time;
   };
   clock.on_read();
@@ -291,14 +291,14 @@ TEST_F(KeptBound, ItDecidesAsOneThatIsBoundAnewWhateverHappensInBetween) {
     for (const bool with_own : {false, true}) {
       TableBuilder builder = builder_;
       make_rule(builder);
-      const TableWords words(builder.words(kSources, 1));
+      const TableWords words(builder.words(kFour, 1));
       const TableView view = words.view();
       bind(view, with_own);
       Nanoseconds now = 1;
       for (int step = 0; step < 20'000; ++step) {
         for (unsigned changes = draw(3); changes != 0; --changes) {
-          Activity& activity = activities_[draw(kSources)];
-          const Nanoseconds timeout = draw(5) == 0 ? kForever : kT;
+          Activity& activity = activities_[draw(kFour)];
+          const Nanoseconds timeout = draw(5) == 0 ? kForever : kShortT;
           activity.write(activity.word, draw(3) == 0 ? deactivation(now) : arrival(now, timeout));
           now += 1 + draw(5);
         }
@@ -317,14 +317,14 @@ TEST_F(KeptBound, ItDecidesAsOneThatIsBoundAnewWhateverHappensInBetween) {
 TEST_F(KeptBound, AnOldReadingServesAsLongAsNothingMayHaveEnded) {
   TableBuilder builder = builder_;
   builder.conjunction(kA, 0, {}, {kB, kC});
-  const TableWords words(builder.words(kSources, 1));
+  const TableWords words(builder.words(kFour, 1));
   const TableView view = words.view();
   bind(view);
-  word(kB) = arrival(0, kT);  // ended at 100
+  word(kB) = arrival(0, kShortT);  // ended at 100
   ScriptedClock clock{100, false, 500, 0, [] {}};
   for (int i = 0; i < 3; ++i) EXPECT_EQ(rule_.decide(view, clock), Verdict::kWins);
   EXPECT_EQ(clock.readings, 0);
-  word(kC) = arrival(450, kT);  // it denies the rule until 550
+  word(kC) = arrival(450, kShortT);  // it denies the rule until 550
   EXPECT_EQ(rule_.decide(view, clock), Verdict::kLoses);
   EXPECT_EQ(clock.readings, 1);
   clock = {500, false, 550, 0, [] {}};
@@ -335,22 +335,22 @@ TEST_F(KeptBound, AnOldReadingServesAsLongAsNothingMayHaveEnded) {
 TEST_F(KeptBound, TheOneThatDeniesItMayChangeItsReason) {
   TableBuilder builder = builder_;
   builder.conjunction(kA, 0, {kB}, {kC});
-  const TableWords words(builder.words(kSources, 1));
+  const TableWords words(builder.words(kFour, 1));
   const TableView view = words.view();
   bind(view);
   EXPECT_EQ(decide_bound(view, 1), Verdict::kLoses) << "B is not active";
-  word(kC) = arrival(10, kT);
-  word(kB) = arrival(10, kT);
+  word(kC) = arrival(10, kShortT);
+  word(kB) = arrival(10, kShortT);
   EXPECT_EQ(decide_bound(view, 20), Verdict::kLoses) << "C is";
   word(kC) = deactivation(30);
   EXPECT_EQ(decide_bound(view, 40), Verdict::kWins);
-  EXPECT_EQ(decide_bound(view, 10 + kT), Verdict::kLoses) << "B has run out";
+  EXPECT_EQ(decide_bound(view, 10 + kShortT), Verdict::kLoses) << "B has run out";
 }
 
 TEST_F(KeptBound, APageThatIsAttachedLaterIsSeenOnceItIsBoundAgain) {
   TableBuilder builder = builder_;
   builder.conjunction(kA, 0, {}, {kB});
-  const TableWords words(builder.words(kSources, 1));
+  const TableWords words(builder.words(kFour, 1));
   const TableView view = words.view();
   pages_->attach(kB, nullptr);
   bind(view);
