@@ -40,6 +40,10 @@ class ObservedFields {
   [[nodiscard]] const std::map<std::string, Field>& fields() const { return fields_; }
   // How many objects there were that could have had it.
   [[nodiscard]] std::size_t parents(const std::string& path) const {
+    if (path.ends_with(".*")) {  // a map may be empty
+      const auto field = fields_.find(path);
+      return field == fields_.end() ? 0 : field->second.count;
+    }
     const auto dot = path.rfind('.');
     const auto found = objects_.find(dot == std::string::npos ? "" : path.substr(0, dot));
     return found == objects_.end() ? 0 : found->second;
