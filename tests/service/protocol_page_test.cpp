@@ -4,16 +4,14 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <regex>
 
 #include <arbiter/arbiter.hpp>
 
-#include "shm/bell.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/documented_fields.hpp"
-#include "tests/support/raw_port.hpp"
+#include "tests/support/listener.hpp"
 #include "tests/support/text_files.hpp"
 
 namespace arbiter::test {
@@ -22,36 +20,13 @@ namespace {
 using nlohmann::json;
 using shm::MessageKind;
 using testing::IsEmpty;
-using Words = std::set<std::string>;
-using Numbers = std::map<std::string, std::uint32_t>;
 
-std::string source_of(const std::string& path) {
-  return content_of(std::string(ARBITER_SOURCE) + "/" + path);
-}
 std::string page() { return source_of("docs/protocol.md"); }
 
 const std::vector<std::string> kFromClient{"kind",        "number", "what it says", "fields",
                                            "descriptors", "needs",  "answered by"};
 const std::vector<std::string> kFromDaemon{"kind", "number", "what it says", "fields",
                                            "descriptors"};
-
-// The enumerators of an enumeration in the text of a header, comments left out.
-Numbers enumerators(const std::string& header, const std::string& name) {
-  const auto begin = header.find("enum " + name);
-  if (begin == std::string::npos) throw std::runtime_error("no enum " + name);
-  std::string body = header.substr(begin, header.find("};", begin) - begin);
-  body = std::regex_replace(body.substr(body.find('{')), std::regex("//[^\n]*"), "");
-  const std::regex enumerator("(k[A-Za-z]+)( = ([0-9]+))?,");
-  Numbers numbers;
-  std::uint32_t next = 0;
-  for (std::sregex_iterator found(body.begin(), body.end(), enumerator), end; found != end;
-       ++found) {
-    if ((*found)[3].matched) next = static_cast<std::uint32_t>(std::stoul((*found)[3]));
-    numbers[(*found)[1]] = next++;
-  }
-  return numbers;
-}
-Numbers kinds_of_header() { return enumerators(source_of("shm/wire.hpp"), "class MessageKind"); }
 
 Numbers numbers_of(const std::vector<PageRow>& rows) {
   Numbers numbers;
@@ -60,13 +35,6 @@ Numbers numbers_of(const std::vector<PageRow>& rows) {
     EXPECT_TRUE(numbers.emplace(quoted(row.cells.at(0)).at(0), number).second) << row.line;
   }
   return numbers;
-}
-
-std::string name_of(MessageKind kind) {
-  for (const auto& [name, number] : kinds_of_header()) {
-    if (number == static_cast<std::uint32_t>(kind)) return name;
-  }
-  return "unknown";
 }
 
 TEST(ProtocolPage, HasEachKindOfMessageUnderWhoSendsIt) {
@@ -152,117 +120,6 @@ TEST(ProtocolPage, HasTheBoundsAndVersionsOfTheCode) {
   EXPECT_FALSE(has_words("int kMax = 256;", "kMax = 25"));
   EXPECT_FALSE(has_words("int kMax = 256;", "Max = 256"));
 }
-
-// What a client hears, kind by kind: the fields that were not 0, and how many descriptors came.
-struct Heard {
-  Words fields;
-  std::set<std::size_t> descriptors;
-};
-
-Words used_fields(const shm::Message& message) {
-  Words fields;
-  const auto add = [&](const char* name, bool is_used) {
-    if (is_used) fields.insert(name);
-  };
-  add("flags", message.flags != 0);
-  add("request", message.request != 0);
-  add("port", message.port != 0);
-  add("peer", message.peer != 0);
-  add("link", message.link != 0);
-  add("id", message.id != 0);
-  add("value", message.value != 0);
-  add("type", message.type.is_typed() || message.type.size != 0);
-  add("name", message.name[0] != '\0');
-  add("text", message.text[0] != '\0');
-  return fields;
-}
-
-// A client that notes all that it hears, and says kSynced as a component would.
-class Listener {
- public:
-  explicit Listener(const Daemon& daemon) : client_(daemon.instance()) {}
-
-  // Sends it with a number of its own, and returns the kinds that answer it.
-  Words ask(shm::Message message, RawClient::Descriptors descriptors = {-1, -1}) {
-    message.request = ++last_request_;
-    client_.send(message, descriptors);
-    Words kinds;
-    do {
-      const shm::Message answer = hear_next();
-      if (answer.kind == MessageKind::kSync || answer.request != message.request) continue;
-      kinds.insert(name_of(answer.kind));
-      last_answer_ = answer;
-    } while (kinds.empty() || kinds == Words{"kOpened"});
-    return kinds;
-  }
-  Words ask(MessageKind kind, const std::string& name = {}, std::uint32_t flags = 0) {
-    auto message = RawClient::message(kind, name);
-    message.flags = flags;
-    return ask(message);
-  }
-  Words hello() {
-    auto message = RawClient::message(MessageKind::kHello, "listener");
-    message.value = shm::kWireVersion;
-    message.flags = shm::kHasServiceThread;
-    return ask(message);
-  }
-  // The kinds that answer a message of which there may be no answer: it comes before that to a
-  // question that is asked after it.
-  Words say(MessageKind kind) {
-    auto message = RawClient::message(kind);
-    const std::uint64_t request = message.request = ++last_request_;
-    client_.send(message);
-    auto question = RawClient::message(MessageKind::kStatus);
-    question.request = ++last_request_;
-    client_.send(question);
-    Words kinds;
-    for (;;) {
-      const shm::Message answer = hear_next();
-      if (answer.request == question.request) return kinds;
-      if (answer.request == request) kinds.insert(name_of(answer.kind));
-    }
-  }
-  Words open_output(const std::string& name) {
-    const auto segment = raw_output_segment();
-    return ask(RawClient::message(MessageKind::kOpenOutput, name), {segment.get(), -1});
-  }
-  Words open_input(const std::string& name) {
-    const auto segment = raw_input_segment();
-    const shm::Bell bell;
-    return ask(RawClient::message(MessageKind::kOpenInput, name),
-               {segment.get(), bell.for_publishers().get()});
-  }
-  void hear(MessageKind kind) {
-    while (hear_next().kind != kind) {
-    }
-  }
-  [[nodiscard]] const std::map<std::string, Heard>& heard() const { return heard_; }
-  [[nodiscard]] const shm::Message& last_answer() const { return last_answer_; }
-  [[nodiscard]] shm::PortInstance last_opened() const { return last_opened_; }
-
- private:
-  shm::Message hear_next() {
-    shm::Received received;
-    if (!client_.receive(received)) throw std::runtime_error("the daemon has hung up");
-    const shm::Message& message = received.message;
-    Heard& heard = heard_[name_of(message.kind)];
-    heard.fields.merge(used_fields(message));
-    heard.descriptors.insert(received.descriptor_count);
-    if (message.kind == MessageKind::kOpened) last_opened_ = message.port;
-    if (message.kind == MessageKind::kSync) {
-      auto synced = RawClient::message(MessageKind::kSynced);
-      synced.request = message.request;
-      client_.send(synced);
-    }
-    return message;
-  }
-
-  RawClient client_;
-  std::uint64_t last_request_ = 1'000'000;  // beyond the numbers of barriers
-  std::map<std::string, Heard> heard_;
-  shm::Message last_answer_;
-  shm::PortInstance last_opened_ = 0;
-};
 
 std::map<std::string, Words> documented_answers() {
   std::map<std::string, Words> answers;
