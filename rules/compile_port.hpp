@@ -72,6 +72,7 @@ class RuleBuilder {
   void forget_parts() { built_.clear(); }
 
  private:
+  [[nodiscard]] int first_level(const Expression& expression) const;
   Diagram build(const ExpressionPtr& expression);
   Diagram build_new(const Expression& expression);
   Diagram join(Operator op, const std::vector<const ExpressionPtr*>& operands);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <random>
 
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
@@ -348,6 +349,29 @@ TEST(Compile, GivesTheSameTableEachTime) {
     return lines;
   };
   EXPECT_EQ(all(first), all(second));
+}
+
+// Conjunctions of clauses that lie anywhere. In the order in which they are written they took three
+// times these steps.
+TEST(Compile, JoinsClausesFromTheLastVariableToTheFirst) {
+  std::mt19937 random(7);
+  RulesByHand set;
+  for (int port = 0; port < 10; ++port) {
+    std::vector<ExpressionPtr> clauses;
+    for (int clause = 0; clause < 120; ++clause) {
+      std::vector<ExpressionPtr> literals;
+      while (literals.size() < 3) {
+        const auto source = source_name(random() % 40);
+        literals.push_back(random() % 2 == 0 ? active(source) : inactive(source));
+      }
+      clauses.push_back(any_of(std::move(literals)));
+    }
+    set.port("/p" + std::to_string(port), {{"/own", all_of(std::move(clauses))}});
+  }
+  Diagnostics diagnostics;
+  rules::Budget budget(60'000'000);
+  compile(set, diagnostics, budget);
+  EXPECT_THAT(codes(diagnostics), testing::Each("never-selected"));
 }
 
 }  // namespace
