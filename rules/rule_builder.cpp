@@ -131,7 +131,9 @@ Diagram RuleBuilder::join(Operator op, const std::vector<const ExpressionPtr*>& 
   std::stable_sort(literals.begin(), literals.end(),
                    [&](const auto* left, const auto* right) { return level(left) > level(right); });
   std::vector<std::pair<int, const ExpressionPtr*>> by_first;
-  for (const ExpressionPtr* other : others) by_first.emplace_back(first_level(**other), other);
+  for (const ExpressionPtr* other : others) {
+    by_first.emplace_back(joins_as_written_ ? 0 : first_level(**other), other);
+  }
   std::stable_sort(by_first.begin(), by_first.end(),
                    [](const auto& left, const auto& right) { return left.first > right.first; });
   Diagram result = builder_.constant(op == Operator::kAnd);
