@@ -93,7 +93,12 @@ class Picture {
   void write(const Situation* situation) {
     std::string text = drawing::draw(model_, view_, situation);
     if (text == last_) return;
-    write_output(options_.output, format_ == "dot" ? text : drawing::lay_out(text, format_));
+    const drawing::Waiting waiting{[] {
+      std::cerr << "arbiter: Graphviz is at work, which takes it long for hundreds of behaviours; "
+                   "--format dot does without it, --view connections is smaller\n";
+    }};
+    write_output(options_.output,
+                 format_ == "dot" ? text : drawing::lay_out(text, format_, waiting));
     last_ = std::move(text);
   }
 
