@@ -131,6 +131,7 @@ Diagram RuleBuilder::join(Operator op, const std::vector<const ExpressionPtr*>& 
   std::stable_sort(literals.begin(), literals.end(),
                    [&](const auto* left, const auto* right) { return level(left) > level(right); });
   std::vector<std::pair<int, const ExpressionPtr*>> by_first;
+  by_first.reserve(others.size());
   for (const ExpressionPtr* other : others) {
     by_first.emplace_back(joins_as_written_ ? 0 : first_level(**other), other);
   }
