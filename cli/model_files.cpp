@@ -4,6 +4,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/progress.hpp"
+
 namespace arbiter::cli {
 
 void add_model_options(CLI::App& verb, rules::ModelFiles& files) {
@@ -22,18 +24,37 @@ void add_effort_option(CLI::App& verb, double& effort) {
       ->check(CLI::Range(rules::Budget::kLeastEffort, rules::Budget::kMostEffort));
 }
 
+namespace {
+
+std::optional<Model> checked(rules::RuleSet rules, rules::CompiledModel compiled,
+                             const rules::Diagnostics& diagnostics) {
+  if (diagnostics.has_errors()) return std::nullopt;
+  return Model{std::move(rules), std::move(compiled)};
+}
+
+}  // namespace
+
 std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
-                                rules::Keep keep) {
-  rules::Budget budget;
-  return load_model(files, diagnostics, budget, keep);
+                                rules::Budget& budget) {
+  rules::RuleSet rules = rules::load(files, diagnostics);
+  rules::CompiledModel compiled = rules::compile(rules, diagnostics, budget);
+  return checked(std::move(rules), std::move(compiled), diagnostics);
 }
 
 std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
-                                rules::Budget& budget, rules::Keep keep) {
+                                double effort, rules::Keep keep) {
   rules::RuleSet rules = rules::load(files, diagnostics, keep);
-  rules::CompiledModel compiled = rules::compile(rules, diagnostics, budget);
-  if (diagnostics.has_errors()) return std::nullopt;
-  return Model{std::move(rules), std::move(compiled)};
+  rules::CompiledModel compiled = compile_model(rules, diagnostics, effort);
+  diagnostics.drop_notes();
+  return checked(std::move(rules), std::move(compiled), diagnostics);
+}
+
+rules::CompiledModel compile_model(const rules::RuleSet& rules, rules::Diagnostics& diagnostics,
+                                   double effort) {
+  rules::Budget budget(rules::Budget::steps_of(effort));
+  ProgressLine progress;
+  budget.watch(progress.watch());
+  return rules::compile(rules, diagnostics, budget);
 }
 
 }  // namespace arbiter::cli

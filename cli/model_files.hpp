@@ -26,8 +26,13 @@ struct Model {
 
 // Reads, compiles and proves a model; nothing if that finds an error.
 std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
-                                rules::Keep keep = rules::Keep::kRules);
+                                rules::Budget& budget);
+// With a budget of its own, as check has it, so that what is accepted there is accepted everywhere;
+// and with its progress on standard error. Drops notes: see Diagnostics::drop_notes.
 std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
-                                rules::Budget& budget, rules::Keep keep = rules::Keep::kRules);
+                                double effort, rules::Keep keep = rules::Keep::kRules);
+// The same of rules that are read already.
+rules::CompiledModel compile_model(const rules::RuleSet& rules, rules::Diagnostics& diagnostics,
+                                   double effort);
 
 }  // namespace arbiter::cli

@@ -11,8 +11,8 @@ namespace arbiter::cli {
 namespace {
 
 constexpr std::size_t kMaxShown = 4;
-constexpr std::array<std::string_view, 4> kCodes{"matches-nothing", "never-published", "never-read",
-                                                 "similar-name"};
+constexpr std::array<std::string_view, 5> kCodes{"matches-nothing", "never-published", "never-read",
+                                                 "similar-name", "wrong-end"};
 
 }  // namespace
 

@@ -11,7 +11,8 @@
 
 namespace arbiter::cli {
 
-// Those of `found`: never-published, never-read, similar-name and matches-nothing.
+// Those of `found`: never-published, never-read, similar-name, wrong-end and
+// matches-nothing.
 std::vector<rules::Diagnostic> name_warnings(const rules::Diagnostics& found);
 
 // A line each, of the first few; nothing if there is none.

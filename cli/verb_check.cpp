@@ -55,7 +55,8 @@ const std::vector<std::string_view> silenceable{"decided-in-order",
                                                 "proved",
                                                 "similar-name",
                                                 "starved",
-                                                "unreachable-children"};
+                                                "unreachable-children",
+                                                "wrong-end"};
 
 std::string problem_of_code(std::string& code) {
   if (std::find(silenceable.begin(), silenceable.end(), code) != silenceable.end()) return "";

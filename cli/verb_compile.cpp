@@ -24,6 +24,7 @@ namespace {
 struct CompileOptions {
   rules::ModelFiles files;
   std::string output;
+  double effort = 1;
 };
 
 // The application given; else the one that the model is in already; else one made of the model. All
@@ -69,7 +70,7 @@ void check_by_reading_back(const std::string& content, const rules::RuleSet& rul
 
 int compile(const CompileOptions& options) {
   rules::Diagnostics diagnostics;
-  const auto model = load_model(options.files, diagnostics);
+  const auto model = load_model(options.files, diagnostics, options.effort);
   rules::write_text(std::cerr, diagnostics);
   if (!model) return 1;
   require_no_input(options.output, *model->rules.texts);
@@ -86,6 +87,7 @@ void add_compile(CLI::App& app, int& exit_code) {
   CLI::App* verb =
       app.add_subcommand("compile", "Write the application with the rules merged into it");
   add_model_options(*verb, options->files);
+  add_effort_option(*verb, options->effort);
   verb->add_option("-o,--output", options->output, kOutputHelp)->type_name("FILE");
   verb->footer(
       "The application file stays as it is and gets one element more, <arbitration>, with the "

@@ -31,16 +31,12 @@ std::vector<std::string> files_of(const std::string& argument) {
 }
 
 std::optional<Model> load_side(const DiffOptions& options, const std::string& files,
-                               const std::string& application, ProgressLine& progress) {
+                               const std::string& application) {
   rules::ModelFiles model{files_of(files), {}};
   const std::string& given = application.empty() ? options.application : application;
   if (!given.empty()) model.application = given;
   rules::Diagnostics diagnostics;
-  // Of each model as check has it, so that what is accepted there is accepted here.
-  rules::Budget budget(rules::Budget::steps_of(options.effort));
-  budget.watch(progress.watch());
-  auto loaded = load_model(model, diagnostics, budget);
-  progress.clear();
+  auto loaded = load_model(model, diagnostics, options.effort);
   // What a check finds beside errors is not what was asked for here.
   if (!loaded) rules::write_text(std::cerr, diagnostics);
   return loaded;
@@ -48,10 +44,10 @@ std::optional<Model> load_side(const DiffOptions& options, const std::string& fi
 
 int diff(const DiffOptions& options) {
   constexpr int kEqual = 0, kDiffers = 1, kCannot = 2;
-  ProgressLine progress;
-  const auto before = load_side(options, options.before, options.application_before, progress);
-  const auto after = load_side(options, options.after, options.application_after, progress);
+  const auto before = load_side(options, options.before, options.application_before);
+  const auto after = load_side(options, options.after, options.application_after);
   if (!before || !after) return kCannot;
+  ProgressLine progress;
   rules::Budget budget(rules::Budget::steps_of(options.effort) / 5);
   budget.watch(progress.watch());
   const auto found = rules::diff(before->compiled, after->compiled, budget);

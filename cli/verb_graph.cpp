@@ -13,12 +13,12 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/live.hpp"
+#include "cli/model_files.hpp"
 #include "cli/model_in_force.hpp"
 #include "cli/output_file.hpp"
 #include "cli/verbs.hpp"
 #include "drawing/drawing.hpp"
 #include "drawing/graphviz.hpp"
-#include "rules/compile.hpp"
 #include "rules/report.hpp"
 #include "shm/clock.hpp"
 
@@ -37,6 +37,7 @@ struct GraphOptions {
   std::string format;
   std::string output;
   std::string instance;
+  double effort = 1;
   bool live = false;
   bool follow = false;
 };
@@ -68,6 +69,7 @@ class Picture {
     require_no_input(options_.output, texts);
     rules::Diagnostics diagnostics;
     model_ = rules::load_all(texts, diagnostics);
+    diagnostics.drop_notes();
     rules::write_text(std::cerr, diagnostics);
     view_ = options_.view == "behaviours"    ? View::kBehaviours
             : options_.view == "connections" ? View::kConnections
@@ -91,15 +93,21 @@ class Picture {
   void write(const Situation* situation) {
     std::string text = drawing::draw(model_, view_, situation);
     if (text == last_) return;
-    write_output(options_.output, format_ == "dot" ? text : drawing::lay_out(text, format_));
+    const drawing::Waiting waiting{[] {
+      std::cerr << "arbiter: Graphviz is at work, which takes it long for hundreds of behaviours; "
+                   "--format dot does without it, --view connections is smaller\n";
+    }};
+    write_output(options_.output,
+                 format_ == "dot" ? text : drawing::lay_out(text, format_, waiting));
     last_ = std::move(text);
   }
 
  private:
   void check() {
     rules::Diagnostics proof;
-    rules::compile(model_.rules, proof);
+    compile_model(model_.rules, proof, options_.effort);
     is_good_ = !proof.has_errors();
+    proof.drop_notes();
     if (!is_good_) rules::write_text(std::cerr, proof);
   }
 
@@ -336,6 +344,7 @@ void add_graph(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember(formats))
       ->type_name("FORMAT");
   verb->add_option("-o,--output", options->output, kOutputHelp)->type_name("FILE");
+  add_effort_option(*verb, options->effort);
   verb->add_flag("--live", options->live, "Colour it by who is active and who wins now");
   verb->add_flag("--follow", options->follow, "As --live, and write it anew on each change");
   add_instance_option(*verb, options->instance);

@@ -21,6 +21,7 @@ struct RulesOptions {
 int show_rules(const RulesOptions& options) {
   rules::Diagnostics diagnostics;
   const rules::RuleSet rules = rules::load(options.files, diagnostics);
+  diagnostics.drop_notes();
   rules::write_text(std::cerr, diagnostics);
   if (diagnostics.has_errors()) return 1;
   if (options.json) {

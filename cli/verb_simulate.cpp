@@ -25,6 +25,7 @@ struct SimulateOptions {
   rules::ModelFiles files;
   std::string trace;
   std::string why;  // all_ports, or the port; empty: no
+  double effort = 1;
   bool json = false;
 };
 
@@ -73,7 +74,7 @@ int simulate(const SimulateOptions& options) {
   const bool is_why = !options.why.empty();
   rules::Diagnostics diagnostics;
   const auto keep = is_why ? rules::Keep::kProvenance : rules::Keep::kRules;
-  const auto model = load_model(options.files, diagnostics, keep);
+  const auto model = load_model(options.files, diagnostics, options.effort, keep);
   const auto events = rules::read_trace(options.trace, diagnostics);
   if (!model || diagnostics.has_errors()) {
     rules::write_text(std::cerr, diagnostics);
@@ -108,6 +109,7 @@ void add_simulate(CLI::App& app, int& exit_code) {
   auto* why = verb->add_flag("--why", options->why,
                              "Instead of the CSV: each change of a winner and each arrival that "
                              "was discarded, with its cause; --why=PORT: of this port only");
+  add_effort_option(*verb, options->effort);
   verb->add_flag("--json", options->json, "With --why: one object a line")->needs(why);
   verb->footer(
       "Example:\n"

@@ -67,11 +67,18 @@ bool drain(shm::FileDescriptor& from, std::string& text) {
 // All three at once: dot may write before it has read everything. SIGPIPE is ignored by the
 // program.
 void exchange(std::string_view input, Pipe& in, std::string& output, Pipe& out, std::string& errors,
-              Pipe& err) {
+              Pipe& err, const Waiting& waiting) {
+  auto patience = waiting.first;
   while (out.read || err.read) {
     std::array<pollfd, 3> polled{
         {{in.write.get(), POLLOUT, 0}, {out.read.get(), POLLIN, 0}, {err.read.get(), POLLIN, 0}}};
-    if (poll(polled.data(), polled.size(), -1) < 0 && errno != EINTR) break;
+    const int ready = poll(polled.data(), polled.size(), static_cast<int>(patience.count()));
+    if (ready < 0 && errno != EINTR) break;
+    if (ready == 0) {
+      waiting.tell();
+      patience = waiting.then;
+    }
+    if (ready <= 0) continue;
     if (polled[0].revents != 0) {
       // A piece that fits into an empty pipe, so that a write does not block for long.
       const ssize_t count =
@@ -86,14 +93,14 @@ void exchange(std::string_view input, Pipe& in, std::string& output, Pipe& out, 
 
 }  // namespace
 
-std::string lay_out(const std::string& dot, const std::string& format) {
+std::string lay_out(const std::string& dot, const std::string& format, const Waiting& waiting) {
   Pipe in, out, err;
   const pid_t child = start(format, in, out, err);
   in.read.reset();
   out.write.reset();
   err.write.reset();
   std::string picture, errors;
-  exchange(dot, in, picture, out, errors, err);
+  exchange(dot, in, picture, out, errors, err, waiting);
   in.write.reset();
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {

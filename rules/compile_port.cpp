@@ -126,9 +126,21 @@ void PortCompiler::build_rules() {
 }
 
 void PortCompiler::build_plain_rules() {
-  for (const auto& rule : port_.rules) {
-    building_ = &rule;
-    plain_.push_back(rules_.rule(rule));
+  const auto build = [&] {
+    plain_.clear();
+    rules_.forget_parts();
+    for (const auto& rule : port_.rules) {
+      building_ = &rule;
+      plain_.push_back(rules_.rule(rule));
+    }
+  };
+  try {
+    build();
+  } catch (const StepLimit&) {
+    throw;
+  } catch (const DiagramLimit&) {
+    rules_.join_as_written();
+    build();
   }
 }
 
@@ -145,11 +157,7 @@ void PortCompiler::multiply_precedence_out() {
   } catch (const DiagramLimit&) {
     in_order_ = lost = true;
   }
-  if (lost) {
-    plain_.clear();
-    rules_.forget_parts();
-    build_plain_rules();
-  }
+  if (lost) build_plain_rules();
   if (in_order_) functions_ = plain_;
 }
 

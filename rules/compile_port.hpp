@@ -67,16 +67,22 @@ class RuleBuilder {
   [[nodiscard]] int variable(const std::string& source) const { return variables_.at(source); }
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }  // by variable
 
+  // Operands are joined from the last variable to the first, which is nearly always best; or, from
+  // now on, as they are written: what follows may be what keeps the rest small.
+  void join_as_written() { joins_as_written_ = true; }
+
   // The own source active, and the condition.
   Diagram rule(const ConnectionRule& rule);
   void forget_parts() { built_.clear(); }
 
  private:
+  [[nodiscard]] int first_level(const Expression& expression) const;
   Diagram build(const ExpressionPtr& expression);
   Diagram build_new(const Expression& expression);
   Diagram join(Operator op, const std::vector<const ExpressionPtr*>& operands);
 
   DiagramBuilder& builder_;
+  bool joins_as_written_ = false;
   std::vector<std::string> names_;
   std::unordered_map<std::string, int> variables_;
   std::unordered_map<const Expression*, Diagram> built_;  // shared ones are built once

@@ -54,6 +54,11 @@ void Diagnostics::silence(const std::vector<std::string>& codes) {
   });
 }
 
+void Diagnostics::drop_notes() {
+  std::erase_if(items_, [](const Diagnostic& item) { return item.severity == Severity::kNote; });
+  std::erase_if(tallies_, [](const auto& each) { return each.first.first == Severity::kNote; });
+}
+
 void Diagnostics::make_warnings_errors() {
   Diagnostics stricter;
   for (Diagnostic& item : items_) {

@@ -77,6 +77,9 @@ class Diagnostics {
   void add(Diagnostics other);
   // Without those of these codes; errors stay.
   void silence(const std::vector<std::string>& codes);
+  // Notes are true of many good models. Who asks what there is to say of a model gets them, and
+  // nobody who wants it drawn, replayed or compiled.
+  void drop_notes();
   void make_warnings_errors();
   template <typename Before>
   void sort_by_place(const Before& is_before) {

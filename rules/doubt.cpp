@@ -120,4 +120,9 @@ Doubts find_doubts(const Model& model, const Hierarchy& hierarchy, const Diagnos
   return DoubtFinder(model, hierarchy).find(found);
 }
 
+bool may_lack_names(const Model& model, const std::optional<Application>& application) {
+  return model.has_unknown_gaps || model.lacks_sources || model.lacks_arbiters ||
+         (application && application->is_incomplete);
+}
+
 }  // namespace arbiter::rules

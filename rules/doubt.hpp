@@ -5,6 +5,7 @@
 // whatever is said of it may only follow from the error. Where in doubt, it does.
 #pragma once
 
+#include <optional>
 #include <set>
 #include <string>
 
@@ -26,5 +27,8 @@ struct Doubts {
 // Of all that was found wrong with the model until now: by its reader and in its hierarchy, which
 // both leave marks, and by checks that name the ports that they are about.
 Doubts find_doubts(const Model& model, const Hierarchy& hierarchy, const Diagnostics& found);
+
+// Whether something was refused that may have named sources or ports.
+bool may_lack_names(const Model& model, const std::optional<Application>& application);
 
 }  // namespace arbiter::rules

@@ -72,13 +72,16 @@ LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
   if (application) check_application(*application, loaded.model, rules, found);
   const Location whole{paths.empty() ? "" : paths.front(), 1, 1};
   check_limits(rules, application ? &*application : nullptr, whole, order, found);
+  bool has_all_names = true;
   if (found.has_errors()) {
     const Doubts doubts = find_doubts(loaded.model, hierarchy, found);
     for (PortRules& port : rules.ports) port.is_doubtful = doubts.about(port.port);
+    has_all_names = !doubts.everything && !may_lack_names(loaded.model, application);
   } else {
-    check_names(loaded.model, application, rules, order, found);
     note_commands_forever(loaded.model, rules, whole, found);
   }
+  const RuleSet* sound = found.has_errors() ? nullptr : &rules;
+  if (has_all_names) check_names(loaded.model, application, sound, whole, order, found);
   // Checks go through a model in various orders; the reader of their findings goes through files.
   found.sort_by_place(order);
   diagnostics.add(std::move(found));

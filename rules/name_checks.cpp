@@ -40,8 +40,10 @@ class NameCheck {
     }
   }
 
+  [[nodiscard]] bool is_exhausted() const { return index_.is_exhausted(); }
+
   // Among names that nothing declares, the one that was probably to be this one.
-  [[nodiscard]] std::optional<std::string> written_for(const std::string& name) const {
+  [[nodiscard]] std::optional<std::string> written_for(const std::string& name) {
     for (const SimilarName& similar : index_.similar_to(name)) {
       std::string other(similar.name);
       if ((all_.find(other)->roles & kDeclared) == 0) return other;
@@ -64,20 +66,43 @@ class NameCheck {
     return (use.roles & (kDeclared | kConnected)) != 0;
   }
 
+  // What is declared was spelt with care, and what is connected at least by somebody who meant it.
+  static int trust_in(const NameUse& use) {
+    if ((use.roles & kDeclared) != 0) return 3;
+    if ((use.roles & kConnected) != 0) return 2;
+    return use.is_repeated ? 1 : 0;
+  }
+
   // Of two that stand in one place each, one is reported: the one that nothing vouches for, else
-  // the one that comes later.
+  // the one that comes later. Of several that it may have meant, the one with most behind it, and
+  // of those the last before it: what belongs together stands together.
   [[nodiscard]] std::optional<std::string_view> meant_by(const std::string& name,
-                                                         const NameUse& use) const {
+                                                         const NameUse& use) {
+    std::optional<std::string_view> meant;
+    const NameUse* best = nullptr;
     for (const SimilarName& similar : index_.similar_to(name)) {
-      const std::string other_name(similar.name);
-      const NameUse& other = *all_.find(other_name);
-      const bool is_alone = is_vouched_for(other) && !is_vouched_for(use);
-      if (similar.how != Resemblance::kClose && !is_alone) continue;
-      if (is_alone || !is_suspect(other_name, other)) return similar.name;
-      if (is_vouched_for(use) && !is_vouched_for(other)) continue;
-      if (order_(other.where, use.where)) return similar.name;
+      const NameUse& other = *all_.find(std::string(similar.name));
+      if (!is_meant_rather(similar, other, use)) continue;
+      if (best != nullptr && !is_better(other, *best, use)) continue;
+      meant = similar.name;
+      best = &other;
     }
-    return std::nullopt;
+    return meant;
+  }
+
+  [[nodiscard]] bool is_better(const NameUse& other, const NameUse& best,
+                               const NameUse& use) const {
+    if (trust_in(other) != trust_in(best)) return trust_in(other) > trust_in(best);
+    return order_(best.where, other.where) && order_(other.where, use.where);
+  }
+
+  [[nodiscard]] bool is_meant_rather(const SimilarName& similar, const NameUse& other,
+                                     const NameUse& use) const {
+    const bool is_alone = is_vouched_for(other) && !is_vouched_for(use);
+    if (similar.how != Resemblance::kClose && !is_alone) return false;
+    if (is_alone || !is_suspect(std::string(similar.name), other)) return true;
+    if (is_vouched_for(use) && !is_vouched_for(other)) return false;
+    return order_(other.where, use.where);
   }
 
   void warn(const std::string& name, const NameUse& use, std::string_view meant) {
@@ -96,7 +121,7 @@ class NameCheck {
   const DocumentOrder& order_;
   Diagnostics& diagnostics_;
   const std::vector<std::string_view> names_;
-  const NameIndex index_;
+  NameIndex index_;
 };
 
 // Sources that some rule selects or reads.
@@ -112,8 +137,8 @@ std::set<std::string> sources_of_rules(const RuleSet& rules) {
   return sources;
 }
 
-void warn_of_unread(const Model& model, const RuleSet& rules, const NameCheck& names,
-                    const NameUses& all, Diagnostics& diagnostics) {
+void warn_of_unread(const Model& model, const RuleSet& rules, NameCheck& names, const NameUses& all,
+                    Diagnostics& diagnostics) {
   const std::set<std::string> used = sources_of_rules(rules);
   for (const SourceDeclaration& source : model.sources) {
     if (used.contains(source.name)) continue;
@@ -128,10 +153,59 @@ void warn_of_unread(const Model& model, const RuleSet& rules, const NameCheck& n
   }
 }
 
+// ":i" or ":o", in whatever case; nothing where the name does not end so.
+std::string_view end_of(std::string_view name) {
+  if (name.size() < 2 || name[name.size() - 2] != ':') return {};
+  const char end = name.back();
+  if (end == 'o' || end == 'O') return ":o";
+  return end == 'i' || end == 'I' ? ":i" : std::string_view();
+}
+
+// Names that stand where the other end of a connection belongs. A name that is used for both counts
+// as what its ending says, and as an input port if that says nothing.
+class WrongEnds {
+ public:
+  WrongEnds(const Model& model, Diagnostics& diagnostics)
+      : model_(model), diagnostics_(diagnostics) {}
+
+  void warn() {
+    for (const auto& [name, use] : model_.source_uses) {
+      const NameUse* port = model_.port_uses.find(name);
+      if (end_of(name) != ":i" && (port == nullptr || end_of(name) == ":o")) continue;
+      warn(use,
+           name + " stands here as a source" + origin_of(use) +
+               (port != nullptr ? ", and as an input port at " + describe(port->where)
+                                : std::string(", and is called as input ports are")) +
+               ": nobody publishes at an input port, so that it is never active; write the output "
+               "port that was meant",
+           {.source = name});
+    }
+    for (const auto& [name, use] : model_.port_uses) {
+      if (end_of(name) != ":o") continue;
+      warn(use,
+           name + " stands here as an input port" + origin_of(use) +
+               ", and is called as output ports are: nobody takes samples there, so that nothing "
+               "is commanded; write the input port that was meant",
+           {.ports = {name}});
+    }
+  }
+
+ private:
+  void warn(const NameUse& use, const std::string& message, Subject about) {
+    diagnostics_.warning("wrong-end", use.where,
+                         message + ", or exchange the names if each stands in the other's place",
+                         std::move(about));
+  }
+
+  const Model& model_;
+  Diagnostics& diagnostics_;
+};
+
 }  // namespace
 
 void check_names(const Model& model, const std::optional<Application>& application,
-                 const RuleSet& rules, const DocumentOrder& order, Diagnostics& diagnostics) {
+                 const RuleSet* rules, const Location& whole, const DocumentOrder& order,
+                 Diagnostics& diagnostics) {
   NameUses sources = model.source_uses;
   NameUses ports = model.port_uses;
   if (application) {
@@ -141,9 +215,15 @@ void check_names(const Model& model, const std::optional<Application>& applicati
     }
   }
   NameCheck source_check(model.source_uses, sources, "source port", order, diagnostics);
-  warn_of_unread(model, rules, source_check, sources, diagnostics);
+  if (rules != nullptr) warn_of_unread(model, *rules, source_check, sources, diagnostics);
   source_check.warn();
-  NameCheck(model.port_uses, ports, "arbiter at", order, diagnostics).warn();
+  NameCheck port_check(model.port_uses, ports, "arbiter at", order, diagnostics);
+  port_check.warn();
+  WrongEnds(model, diagnostics).warn();
+  if (!source_check.is_exhausted() && !port_check.is_exhausted()) return;
+  diagnostics.note("left-open", whole,
+                   "whether names are a slip away from each other was not found out of all: too "
+                   "many long ones are nearly the same; misspelt ones may be among them");
 }
 
 void note_commands_forever(const Model& model, const RuleSet& rules, const Location& whole,

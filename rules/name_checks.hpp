@@ -10,11 +10,14 @@
 
 namespace arbiter::rules {
 
-// Warnings "never-read", of sources that are declared and that no rule reads or selects, and
-// "similar-name", of names that stand in one place and are a slip away from another one. To be
-// asked of a model without errors: what was refused may have named them.
+// Warnings "similar-name", of names that stand in one place and are a slip away from another one,
+// and "wrong-end", of sources that are input ports, and the other way round. To be asked only where
+// no name is missing: what was refused may have had it (may_lack_names). Where the model has no
+// error, `rules` are its rules, and not null: then also "never-read", of sources that are declared
+// and that no rule reads or selects. `whole` is the place for what cannot be pinned to a line.
 void check_names(const Model& model, const std::optional<Application>& application,
-                 const RuleSet& rules, const DocumentOrder& order, Diagnostics& diagnostics);
+                 const RuleSet* rules, const Location& whole, const DocumentOrder& order,
+                 Diagnostics& diagnostics);
 
 // Notes "forever-commands", of sources with T = forever that a rule selects somewhere. `whole` is
 // the place for what cannot be pinned to a line.

@@ -91,6 +91,12 @@ std::string describe(const Location& where) {
 
 std::optional<NameProblem> find_problem_in_port(std::string_view name) {
   if (auto problem = find_length_problem(name)) return problem;
+  if (name.size() > 2 && name.starts_with("\"/") && name.ends_with('"')) {
+    return NameProblem{"invalid-port-name",
+                       "only in a condition does a port's name have quotes; write " +
+                           std::string(name.substr(1, name.size() - 2)) + " without them",
+                       0};
+  }
   if (!name.starts_with('/')) {
     return NameProblem{"invalid-port-name",
                        "a port's name begins with '/'; write " + quote("/" + std::string(name)) +

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 #include <unordered_set>
 
@@ -70,6 +71,16 @@ Diagram RuleBuilder::rule(const ConnectionRule& rule) {
   return join(Operator::kAnd, operands);
 }
 
+// Of the sources that the expression names; behind all levels if it names none.
+int RuleBuilder::first_level(const Expression& expression) const {
+  int first = std::numeric_limits<int>::max();
+  std::unordered_set<const Expression*> seen;
+  visit_sources(expression, seen, [&](const std::string& source) {
+    first = std::min(first, builder_.level_of(variable(source)));
+  });
+  return first;
+}
+
 Diagram RuleBuilder::build(const ExpressionPtr& expression) {
   if (expression->op == Operator::kSource) return builder_.variable(variable(expression->name));
   if (expression.use_count() == 1) return build_new(*expression);
@@ -100,8 +111,10 @@ Diagram RuleBuilder::build_new(const Expression& expression) {
   }
 }
 
-// Literals first, from the last variable to the first: each then only adds a node on top, where the
-// order in which they are written would build the whole list anew each time.
+// From the operands that begin at the last variable to those that begin at the first. Each of a
+// list of literals then only adds a node on top, where the order in which they are written would
+// build the whole list anew each time; and of clauses that lie anywhere, what is built so far does
+// not reach up to those variables that would multiply it.
 Diagram RuleBuilder::join(Operator op, const std::vector<const ExpressionPtr*>& operands) {
   std::vector<const Expression*> literals;
   std::vector<const ExpressionPtr*> others;
@@ -117,13 +130,20 @@ Diagram RuleBuilder::join(Operator op, const std::vector<const ExpressionPtr*>& 
   };
   std::stable_sort(literals.begin(), literals.end(),
                    [&](const auto* left, const auto* right) { return level(left) > level(right); });
+  std::vector<std::pair<int, const ExpressionPtr*>> by_first;
+  by_first.reserve(others.size());
+  for (const ExpressionPtr* other : others) {
+    by_first.emplace_back(joins_as_written_ ? 0 : first_level(**other), other);
+  }
+  std::stable_sort(by_first.begin(), by_first.end(),
+                   [](const auto& left, const auto& right) { return left.first > right.first; });
   Diagram result = builder_.constant(op == Operator::kAnd);
   for (const Expression* literal : literals) {
     Diagram source = builder_.variable(variable(source_of(*literal)));
     if (literal->op == Operator::kNot) source = builder_.negate(source);
     result = builder_.combine(connective_of(op), source, result);
   }
-  for (const ExpressionPtr* other : others) {
+  for (const auto& [first, other] : by_first) {
     result = builder_.combine(connective_of(op), result, build(*other));
   }
   return result;

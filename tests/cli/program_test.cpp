@@ -124,5 +124,67 @@ TEST(Program, NoticesThatItsOutputCannotBeWritten) {
   }
 }
 
+// Ten pigeons in nine holes: nothing satisfies the rule, and to find that out takes some steps.
+std::string pigeons() {
+  const auto sits = [](int pigeon, int hole) {
+    return "/x" + std::to_string(pigeon) + '_' + std::to_string(hole);
+  };
+  std::string rule = "true";
+  for (int pigeon = 0; pigeon < 10; ++pigeon) {
+    rule += " and (false";
+    for (int hole = 0; hole < 9; ++hole) rule += " or " + sits(pigeon, hole);
+    rule += ")";
+    for (int hole = 0; hole < 9; ++hole) {
+      for (int other = 0; other < pigeon; ++other) {
+        rule += " and not (" + sits(pigeon, hole) + " and " + sits(other, hole) + ")";
+      }
+    }
+  }
+  return "<behaviors><arbiter at='/p'><select from='/a'>" + rule +
+         "</select></arbiter></behaviors>";
+}
+
+TEST(Program, ProvesAModelWithTheSameEffortWhateverTheVerb) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", pigeons());
+  const auto trace = directory.write("t.csv", "t_ns,source\n0,/a\n");
+  const std::vector<std::vector<std::string>> verbs = {{"check", model},
+                                                       {"diff", model, model},
+                                                       {"simulate", model, "--trace", trace},
+                                                       {"compile", model},
+                                                       {"graph", model, "--format", "dot"}};
+  for (auto arguments : verbs) {
+    EXPECT_EQ(arbiter(arguments).exit_code, 0) << arguments[0];
+    arguments.insert(arguments.end(), {"--effort", "0.001"});
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, arguments[0] == "diff" ? 2 : 1) << arguments[0];
+    EXPECT_THAT(result.err, HasSubstr("allow more steps with --effort [limit-exceeded]"))
+        << arguments[0];
+  }
+}
+
+// They are true of many good models: whoever draws or replays one did not ask for them.
+TEST(Program, NotesAreToldByCheckAndNoOtherVerb) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml",
+                                     "<behaviors><source port='/a' timeout='forever'/>"
+                                     "<behavior name='A'><config at='/p'>/a</config>"
+                                     "<inhibition>B</inhibition></behavior>"
+                                     "<behavior name='B'><config at='/q'>/b</config>"
+                                     "</behavior></behaviors>");
+  const auto trace = directory.write("t.csv", "t_ns,source\n0,/a\n");
+  EXPECT_THAT(arbiter({"check", model}).err, HasSubstr("[forever-commands]"));
+  for (const auto& arguments :
+       std::vector<std::vector<std::string>>{{"diff", model, model},
+                                             {"rules", model},
+                                             {"simulate", model, "--trace", trace},
+                                             {"compile", model},
+                                             {"graph", model, "--format", "dot"}}) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 0) << arguments[0];
+    EXPECT_EQ(result.err, "") << arguments[0];
+  }
+}
+
 }  // namespace
 }  // namespace arbiter::test

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <random>
 
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
@@ -348,6 +349,50 @@ TEST(Compile, GivesTheSameTableEachTime) {
     return lines;
   };
   EXPECT_EQ(all(first), all(second));
+}
+
+// Of three literals each, that lie anywhere.
+std::vector<ExpressionPtr> random_clauses(std::mt19937& random, std::size_t count,
+                                          std::size_t sources) {
+  std::vector<ExpressionPtr> clauses;
+  while (clauses.size() < count) {
+    std::vector<ExpressionPtr> literals;
+    while (literals.size() < 3) {
+      const auto source = source_name(random() % sources);
+      literals.push_back(random() % 2 == 0 ? active(source) : inactive(source));
+    }
+    clauses.push_back(any_of(std::move(literals)));
+  }
+  return clauses;
+}
+
+// In the order in which they are written they took three times these steps.
+TEST(Compile, JoinsClausesFromTheLastVariableToTheFirst) {
+  std::mt19937 random(7);
+  RulesByHand set;
+  for (int port = 0; port < 10; ++port) {
+    set.port("/p" + std::to_string(port), {{"/own", all_of(random_clauses(random, 120, 40))}});
+  }
+  Diagnostics diagnostics;
+  rules::Budget budget(60'000'000);
+  compile(set, diagnostics, budget);
+  EXPECT_THAT(codes(diagnostics), testing::Each("never-selected"));
+}
+
+// All sources alike, says the first operand, and leaves two states of the rest; without it that is
+// too large for a diagram.
+TEST(Compile, JoinsClausesAsTheyAreWrittenWhereTheyAreTooLargeOtherwise) {
+  std::mt19937 random(1);
+  std::vector<ExpressionPtr> all, none;
+  for (std::size_t i = 0; i < 80; ++i) {
+    all.push_back(active(source_name(i)));
+    none.push_back(inactive(source_name(i)));
+  }
+  std::vector<ExpressionPtr> operands{any_of({all_of(std::move(all)), all_of(std::move(none))})};
+  for (auto& clause : random_clauses(random, 80, 80)) operands.push_back(std::move(clause));
+  Diagnostics diagnostics;
+  compile(RulesByHand().port("/p", {{"/own", all_of(std::move(operands))}}), diagnostics);
+  EXPECT_FALSE(diagnostics.has_errors());
 }
 
 }  // namespace

@@ -233,6 +233,7 @@ TEST(ModelReader, NamesThatAreNoneAreErrors) {
       {"<behavior name='B'>\n<config at='/p'>s</config></behavior>", "2:17 error invalid-port-name",
        "write \"/s\" for \"s\""},
       {"<source port='/a&quot;b'/>", "1:17 error invalid-port-name", "a double quote"},
+      {"<source port='&quot;/a&quot;'/>", "1:15 error invalid-port-name", "write /a without"},
       {"<source port='a'/>", "1:15 error invalid-port-name", "begins with '/'"},
       {"<arbiter at='/p'>\n<select from='s'/></arbiter>", "2:15 error invalid-port-name",
        "begins with '/'"},

@@ -22,16 +22,18 @@ Resemblance resemblance(const std::string& a, const std::string& b) {
 
 TEST(SimilarNames, ASlipInOneWordMakesThemClose) {
   const std::vector<std::pair<const char*, const char*>> close{
-      {"/safety/estop:o", "/safety/estopp:o"},  // doubled
-      {"/safety/estop:o", "/safety/etop:o"},    // left out
-      {"/safety/estop:o", "/safety/esxop:o"},   // replaced
-      {"/Gaze/pos:i", "/Gzae/pos:i"},           // exchanged
-      {"/safety/estop:o", "/safety/est0p:o"},   // a digit for a letter
-      {"/collision:o", "/colisson:o"},          // two slips in a long word
-      {"/safety/estop:o", "/safety/e_stop:o"},  // punctuation
-      {"/safety/estop:o", "/Safety/EStop:o"},   // case
-      {"/safety/estop:o", "/safety/estop"},     // the end left out
-      {"/safety/estop:o", "/safety/estop:i"}};  // the other end
+      {"/safety/estop:o", "/safety/estopp:o"},   // doubled
+      {"/safety/estop:o", "/safety/etop:o"},     // left out
+      {"/safety/estop:o", "/safety/esxop:o"},    // replaced
+      {"/Gaze/pos:i", "/Gzae/pos:i"},            // exchanged
+      {"/safety/estop:o", "/safety/est0p:o"},    // a digit for a letter
+      {"/collision:o", "/colisson:o"},           // two slips in a long word
+      {"/safety/estop:o", "/safety/e_stop:o"},   // punctuation
+      {"/safety/estop:o", "/Safety/EStop:o"},    // case
+      {"/safety/estop:o", "/safety/estop"},      // the end left out
+      {"/safety/estop:o", "/safety/estop:i"},    // the other end
+      {"/safety/estop:o", "/safety/estop:O"},    // the end, in the other case
+      {"/safety/estop:o", "/safety/estop:o/"}};  // more behind the end
   for (const auto& [a, b] : close) {
     EXPECT_EQ(resemblance(a, b), Resemblance::kClose) << a << " " << b;
     EXPECT_EQ(resemblance(b, a), Resemblance::kClose) << a << " " << b;
@@ -66,6 +68,37 @@ TEST(SimilarNames, SiblingsAreTwoNames) {
                                                         {"/up:o", "/on:o"}}) {
     EXPECT_EQ(resemblance(a, b), Resemblance::kNone) << a << " " << b;
   }
+}
+
+TEST(SimilarNames, ANamespaceMoreOrLessMayMakeAnotherName) {
+  for (const auto& [a, b] : std::vector<std::pair<const char*, const char*>>{
+           {"/estop:o", "/robot1/estop:o"},
+           {"/estop:o", "/site/robot1/estop:o"},
+           {"/robot1/estop:o", "/robot1/safety/estop:o"},
+           {"/robot1/safety/estop:o", "/robot1/base/safety/estop:O"}}) {
+    EXPECT_EQ(resemblance(a, b), Resemblance::kSlip) << a << " " << b;
+    EXPECT_EQ(resemblance(b, a), Resemblance::kSlip) << a << " " << b;
+  }
+  for (const auto& [a, b] : std::vector<std::pair<const char*, const char*>>{
+           {"/robot1/estop:o", "/robot2/safety/estop:o"},
+           {"/robot1/base:o", "/robot1/base/cmd:o"},
+           {"/estop:o", "/robot1/stop:o"},
+           {"/a/b/c:o", "/a/x/y/b/c:o"},
+           {"/left/estop:o", "/right/estop:o"}}) {
+    EXPECT_EQ(resemblance(a, b), Resemblance::kNone) << a << " " << b;
+    EXPECT_EQ(resemblance(b, a), Resemblance::kNone) << a << " " << b;
+  }
+}
+
+TEST(SimilarNames, ComparingLongNamesOfOnePatternHasABound) {
+  const std::string one = "/" + std::string(100, 'a') + ":o";
+  const std::string other = "/" + std::string(99, 'a') + "b:o";
+  NameIndex enough({one, other}, 1000);
+  EXPECT_EQ(enough.similar_to(one).size(), 1U);
+  EXPECT_FALSE(enough.is_exhausted());
+  NameIndex less({one, other}, 100);
+  EXPECT_THAT(less.similar_to(one), IsEmpty());
+  EXPECT_TRUE(less.is_exhausted());
 }
 
 TEST(NameChecks, AnEmergencyStopUnderTwoNamesIsToldAtBoth) {
@@ -184,9 +217,56 @@ TEST(NameChecks, TheApplicationKnowsNamesAndItsOwnAreNotJudged) {
               ElementsAre("2:16 warning similar-name"));
 }
 
-TEST(NameChecks, AreNotAskedOfAModelWithErrors) {
+// It may have been the very name that is missing.
+TEST(NameChecks, AreNotAskedWhereANameMayHaveBeenRefused) {
   EXPECT_THAT(load_condition("not /estopp:o and", "<source port='/estop:o'/>").findings(),
               ElementsAre("2:29 error malformed-condition"));
+}
+
+TEST(NameChecks, AreAskedBesideErrorsThatTakeNoNameAway) {
+  EXPECT_THAT(
+      load_condition("not /estopp:o", "<source port='/estop:o' timeout='5 parsecs'/>").findings(),
+      ElementsAre("1:45 error invalid-timeout", "2:16 warning similar-name"));
+}
+
+TEST(NameChecks, WhatIsOnlyReadAndLacksTheNamespaceIsTold) {
+  const Loaded loaded = load_text(
+      "<behaviors><source port='/r1/estop:o'/><source port='/r2/estop:o'/>\n"
+      "<behavior name='A'><config at='/r1/p:i'>/r1/nav:o</config>"
+      "<condition>not /r1/estop:o</condition></behavior>\n"
+      "<behavior name='B'><config at='/r2/p:i'>/r2/nav:o</config>"
+      "<condition>not /estop:o</condition></behavior></behaviors>");
+  EXPECT_THAT(loaded.findings(),
+              ElementsAre("1:40 warning never-read", "3:74 warning similar-name"));
+  EXPECT_THAT(loaded.message(1), HasSubstr("did you mean /r2/estop:o, as at "));
+}
+
+TEST(NameChecks, OfSeveralTheOneThatIsDeclaredIsMeant) {
+  const Loaded loaded = load_condition("/Estop:o and not /e/stop:o", "<source port='/estop:o'/>");
+  EXPECT_THAT(loaded.findings(), ElementsAre("1:12 warning never-read", "2:12 warning similar-name",
+                                             "2:29 warning similar-name"));
+  EXPECT_THAT(loaded.message(1), HasSubstr("did you mean /estop:o, as at "));
+  EXPECT_THAT(loaded.message(2), HasSubstr("did you mean /estop:o, as at "));
+}
+
+TEST(NameChecks, ASourceThatIsAnInputPortIsToldAndTheOtherWayRound) {
+  const Loaded read = load_condition("not /Base/vel:i");
+  EXPECT_THAT(read.findings(), ElementsAre("2:16 warning wrong-end"));
+  EXPECT_THAT(read.message(), HasSubstr("/Base/vel:i stands here as a source, and as an input "
+                                        "port at "));
+  EXPECT_THAT(load_condition("not /Far:i").findings(), ElementsAre("2:16 warning wrong-end"));
+  const Loaded exchanged = load_text(
+      "<behaviors><behavior name='B'><config at='/Nav/vel:o'>/Base/vel:i</config></behavior>\n"
+      "<behavior name='C'><config at='/Base/vel:i'>/Rest/vel:o</config></behavior></behaviors>");
+  EXPECT_THAT(exchanged.findings(),
+              ElementsAre("1:43 warning wrong-end", "1:55 warning wrong-end"));
+  EXPECT_THAT(exchanged.message(0), HasSubstr("/Nav/vel:o stands here as an input port, and is "));
+  // Who has no such endings is judged by what he does with the names.
+  EXPECT_THAT(load_text("<behaviors><behavior name='B'><config at='/base'>/nav</config></behavior>"
+                        "<behavior name='C'><config at='/arm'>/base</config></behavior>"
+                        "</behaviors>")
+                  .findings(),
+              ElementsAre("1:111 warning wrong-end"));
 }
 
 TEST(NameChecks, LargeModelsOfSiblingsAreQuiet) {
