@@ -8,6 +8,7 @@
 #include <array>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -17,9 +18,25 @@
 
 namespace arbiter::test {
 
+// What a reply has brought, of kStatusReply or the like.
+inline nlohmann::json read_document(const shm::Received& reply) {
+  std::string text;
+  std::array<char, 65536> buffer;
+  ssize_t count = 0;
+  off_t at = 0;
+  while ((count = ::pread(reply.descriptors[0].get(), buffer.data(), buffer.size(), at)) > 0) {
+    text.append(buffer.data(), static_cast<std::size_t>(count));
+    at += count;
+  }
+  return nlohmann::json::parse(text);
+}
+
 class RawClient {
  public:
   using Descriptors = std::array<int, shm::kMaxDescriptors>;
+
+  // Connected by other means.
+  explicit RawClient(shm::FileDescriptor socket) : socket_(std::move(socket)) {}
 
   explicit RawClient(const std::string& instance) {
     std::string why_not;
@@ -85,16 +102,7 @@ class RawClient {
 
   nlohmann::json status() {
     send(message(shm::MessageKind::kStatus));
-    const shm::Received reply = expect(shm::MessageKind::kStatusReply);
-    std::string text;
-    std::array<char, 65536> buffer;
-    ssize_t count = 0;
-    off_t at = 0;
-    while ((count = ::pread(reply.descriptors[0].get(), buffer.data(), buffer.size(), at)) > 0) {
-      text.append(buffer.data(), static_cast<std::size_t>(count));
-      at += count;
-    }
-    return nlohmann::json::parse(text);
+    return read_document(expect(shm::MessageKind::kStatusReply));
   }
 
   [[nodiscard]] int socket() const { return socket_.get(); }
