@@ -3,7 +3,9 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/syscall.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,6 +24,8 @@
 
 namespace arbiter::service {
 namespace {
+
+constexpr long kPidFsMagic = 0x50494446;  // PID_FS_MAGIC, Linux 6.9; older headers lack it
 
 // The process at the other end. The kernel may know it by descriptor; where it is too old for that,
 // its number is opened, which is sure for as long as the socket is not closed at that end.
@@ -66,6 +70,16 @@ bool brings_descriptors(int socket) noexcept {
   return true;
 }
 
+// On a file system of their own, pidfds of one process have one inode, which is no other's.
+bool is_one_process(int one, int other) {
+  struct statfs system {};
+  struct stat first {};
+  struct stat second {};
+  return fstatfs(one, &system) == 0 && system.f_type == kPidFsMagic && fstat(one, &first) == 0 &&
+         fstat(other, &second) == 0 && first.st_dev == second.st_dev &&
+         first.st_ino == second.st_ino;
+}
+
 }  // namespace
 
 // Most conversations end with nothing unread, or nothing that takes time.
@@ -98,7 +112,6 @@ Client::Client(ClientId id, shm::FileDescriptor socket, Shares& shares)
     hang_up(std::move(socket_), user_);
     throw;
   }
-  started_ = start_of_process(pid_);
   process_ = open_process(socket_.get(), pid_);
   if (!process_) fail("opening a client's process");
 }
@@ -109,18 +122,33 @@ Client::Queued::~Queued() {
 
 Client::~Client() { hang_up(std::move(socket_), user_); }
 
+LeftUnread::Client Client::release_unread() {
+  return {user_, std::move(socket_), std::move(in_flight_), std::move(descriptors_)};
+}
+
+shm::SendResult Client::try_to_send(const shm::Message& message, const Descriptors& descriptors,
+                                    std::uint64_t count) {
+  if (count != 0) in_flight_.look(socket_.get());
+  held_back_ = !in_flight_.allows(shares_, user_, count);
+  if (held_back_) return shm::SendResult::kTooMany;
+  const shm::SendResult result = shm::send_message(socket_.get(), message, descriptors);
+  if (result == shm::SendResult::kSent) in_flight_.add(shares_, user_, count);
+  held_back_ = result == shm::SendResult::kTooMany;
+  return result;
+}
+
 void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescriptors> descriptors) {
   if (lost_) return;
+  const auto count = static_cast<std::uint64_t>(
+      std::count_if(descriptors.begin(), descriptors.end(), [](int fd) { return fd >= 0; }));
   if (queue_.empty()) {
-    const shm::SendResult result = shm::send_message(socket_.get(), message, descriptors);
+    const shm::SendResult result = try_to_send(message, descriptors, count);
     if (result == shm::SendResult::kSent) return;
     if (result == shm::SendResult::kClosed) {
       lost_ = hung_up_ = true;
       return;
     }
   }
-  const auto count = static_cast<std::uint64_t>(
-      std::count_if(descriptors.begin(), descriptors.end(), [](int fd) { return fd >= 0; }));
   if (!has_room_for(count)) {
     log::warn("{} does not read its messages: {} wait; giving it up", description(), queue_.size());
     lost_ = true;
@@ -156,18 +184,19 @@ void Client::flush() {
     const Queued& next = *queue_.front();
     std::array<int, shm::kMaxDescriptors> descriptors{};
     for (std::size_t i = 0; i < descriptors.size(); ++i) descriptors[i] = next.descriptors[i].get();
-    const shm::SendResult result = shm::send_message(socket_.get(), next.message, descriptors);
-    if (result == shm::SendResult::kFull) return;
-    if (result == shm::SendResult::kClosed) lost_ = hung_up_ = true;
-    queued_descriptors_ -= static_cast<std::size_t>(
+    const auto count = static_cast<std::size_t>(
         std::count_if(descriptors.begin(), descriptors.end(), [](int fd) { return fd >= 0; }));
+    const shm::SendResult result = try_to_send(next.message, descriptors, count);
+    if (result == shm::SendResult::kFull || result == shm::SendResult::kTooMany) return;
+    if (result == shm::SendResult::kClosed) lost_ = hung_up_ = true;
+    queued_descriptors_ -= count;
     queue_.pop_front();
   }
 }
 
 shm::ReceiveResult Client::receive(shm::Received& received) {
   if (!ahead_.empty()) {
-    received = std::move(ahead_.front()->received);
+    received = std::move(ahead_.front().received());
     ahead_.pop_front();
     return shm::ReceiveResult::kReceived;
   }
@@ -210,21 +239,24 @@ void dispose_of(shm::Received& received, uid_t user) {
 }
 
 void Client::read_ahead() {
-  while (!ahead_ended_ && ahead_.size() < kMaxReadAhead) {
-    auto kept = std::make_unique<KeptMessage>(user_);
-    const shm::ReceiveResult result = receive_from_socket(kept->received);
+  shm::Received received;
+  while (!ahead_ended_ && ahead_.size() < kMaxReadAhead &&
+         shares_.allows(user_, Share::kQueue, sizeof received) &&
+         shares_.allows(user_, Share::kDescriptors, shm::kMaxDescriptors)) {
+    const shm::ReceiveResult result = receive_from_socket(received);
     if (result == shm::ReceiveResult::kNothing) return;
     if (result == shm::ReceiveResult::kReceived) {
-      ahead_.push_back(std::move(kept));
+      ahead_.push_back(put_aside(received));
     } else {
       ahead_ended_ = result;
     }
   }
+  dispose_of(received, user_);
 }
 
 bool Client::take_closing_of(shm::PortInstance port) {
-  const auto closing = std::find_if(ahead_.begin(), ahead_.end(), [&](const auto& kept) {
-    const shm::Message& message = kept->received.message;
+  const auto closing = std::find_if(ahead_.begin(), ahead_.end(), [&](const PutAside& each) {
+    const shm::Message& message = each.received().message;
     return message.kind == shm::MessageKind::kClosePort && message.port == port;
   });
   if (closing == ahead_.end()) return ahead_ended_.has_value();
@@ -232,9 +264,41 @@ bool Client::take_closing_of(shm::PortInstance port) {
   return true;
 }
 
+PutAside::PutAside(shm::Received& received, uid_t user, Shares& shares) : user_(user) {
+  bytes_ = shares.take(user, Share::kQueue, sizeof received);
+  const std::size_t count = received.descriptor_count;
+  if (count != 0) descriptors_ = shares.take(user, Share::kDescriptors, count);
+  received_ = std::make_unique<shm::Received>(std::move(received));
+}
+
+PutAside& PutAside::operator=(PutAside&& other) noexcept {
+  std::swap(received_, other.received_);
+  std::swap(user_, other.user_);
+  std::swap(bytes_, other.bytes_);
+  std::swap(descriptors_, other.descriptors_);
+  return *this;
+}
+
+PutAside::~PutAside() {
+  if (received_ != nullptr) dispose_of(*received_, user_);
+}
+
 bool has_ended(const shm::FileDescriptor& process) {
   pollfd polled{process.get(), POLLIN, 0};
   return process && ::poll(&polled, 1, 0) == 1;
+}
+
+// Where it has not ended after that, its number has not been another's meanwhile.
+Process Client::identity() const {
+  if (!started_) {
+    const std::uint64_t started = start_of_process(pid_);
+    started_ = has_died() ? 0 : started;
+  }
+  return {pid_, *started_};
+}
+
+bool Client::is_process(pid_t pid, int process) const {
+  return pid_ == pid && (pid != 0 || is_one_process(process_.get(), process));
 }
 
 bool Client::has_died() const { return has_ended(process_); }

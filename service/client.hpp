@@ -11,8 +11,10 @@
 #include <set>
 #include <string>
 
+#include "service/in_flight.hpp"
 #include "service/registry.hpp"
 #include "service/shares.hpp"
+#include "shm/activity.hpp"
 #include "shm/file_descriptor.hpp"
 #include "shm/ids.hpp"
 #include "shm/wire.hpp"
@@ -31,15 +33,33 @@ void hang_up(shm::FileDescriptor socket, uid_t user);
 // Closes what a message has brought and nobody has taken, as errands of the user who sent it.
 void dispose_of(shm::Received& received, uid_t user);
 
-// A message that is handled later, if at all: its end disposes of what it has brought.
-struct KeptMessage {
-  explicit KeptMessage(uid_t sender) : user(sender) {}
-  KeptMessage(const KeptMessage&) = delete;
-  KeptMessage& operator=(const KeptMessage&) = delete;
-  ~KeptMessage() { dispose_of(received, user); }
+// A message that cannot be handled yet, and what keeping it costs its user. What it has brought and
+// nobody takes is closed as an errand of his.
+class PutAside {
+ public:
+  PutAside() = default;
+  // Throws LimitExceeded, and then `received` is as it was.
+  PutAside(shm::Received& received, uid_t user, Shares& shares);
+  PutAside(PutAside&& other) noexcept = default;
+  PutAside& operator=(PutAside&& other) noexcept;
+  PutAside(const PutAside&) = delete;
+  PutAside& operator=(const PutAside&) = delete;
+  ~PutAside();
 
-  const uid_t user;
-  shm::Received received;
+  [[nodiscard]] shm::Received& received() const { return *received_; }
+
+ private:
+  std::unique_ptr<shm::Received> received_;
+  uid_t user_ = 0;
+  Charge bytes_;
+  Charge descriptors_;
+};
+
+// A request that is tried again, at `deadline` for the last time.
+struct Postponed {
+  ClientId client = 0;
+  PutAside request;
+  shm::Nanoseconds deadline = 0;
 };
 
 class Client {
@@ -59,13 +79,22 @@ class Client {
   // The next message that it has sent; those that were read ahead come first. Its descriptors are
   // memfds and anonymous pipes, whoever made them; where others came with it, `is_strange` is set.
   [[nodiscard]] shm::ReceiveResult receive(shm::Received& received);
-  // Reads what it has sent by now, at most kMaxReadAhead messages, and sets it aside.
+  // Reads what it has sent by now, at most kMaxReadAhead messages, and sets it aside; less where
+  // its user has no share left.
   void read_ahead();
+  // Throws LimitExceeded, and then `received` is as it was.
+  [[nodiscard]] PutAside put_aside(shm::Received& received) { return {received, user_, shares_}; }
   // Of what was read ahead: takes out the closing of a port, if it is there.
   [[nodiscard]] bool take_closing_of(shm::PortInstance port);
   // Whether anything was read ahead, be it that the client has hung up.
   [[nodiscard]] bool has_read_ahead() const { return !ahead_.empty() || ahead_ended_; }
   [[nodiscard]] bool has_queue() const { return !queue_.empty(); }
+  // What is queued waits for others of this user to read, not for its own socket.
+  [[nodiscard]] bool is_held_back() const { return held_back_ && !queue_.empty(); }
+  // Looks whether it has read what it was sent.
+  void look_in_flight() { in_flight_.look(socket_.get()); }
+  // The end: what is to be kept for as long as it has not read all.
+  [[nodiscard]] LeftUnread::Client release_unread();
   // Nothing more can be sent to it: it has gone, or does not read what it is sent.
   [[nodiscard]] bool is_lost() const { return lost_; }
   // It has closed its end: what it sent before is all that there is, and still counts.
@@ -80,7 +109,12 @@ class Client {
   [[nodiscard]] shm::FileDescriptor release_process() { return std::move(process_); }
   [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] uid_t user() const { return user_; }
-  [[nodiscard]] Process identity() const { return {pid_, started_}; }
+  // Whether that is the process at the other end, by its number and its pidfd. Processes outside of
+  // this one's PID namespace all have the number 0: such a one is known by its pidfd alone, and
+  // where the kernel does not tell those apart (before Linux 6.9), by nothing.
+  [[nodiscard]] bool is_process(pid_t pid, int process) const;
+  // Asked of the kernel once, and not before somebody wants to know.
+  [[nodiscard]] Process identity() const;
   // For messages to people: node "object-detector" (pid 4711).
   [[nodiscard]] std::string description() const;
 
@@ -94,8 +128,10 @@ class Client {
   bool is_returning = false;  // and has not handed back all yet:
   std::set<shm::PortInstance> to_hand_back;        // these are missing
   bool has_turn = false;                           // waits for its turn to be served
+  bool is_last_turn = false;                       // for its process has ended
   Charge charge;                                   // as one of so many clients
   std::uint32_t postponed = 0;                     // requests that cannot be served yet
+  std::deque<Postponed> to_retry;                  // of these: in its next turns
   std::uint32_t waits_for_status = 0;              // how often it has asked for a document
   bool watches_queue = false;                      // the loop waits until it can be written
   std::map<shm::SourceId, shm::PageNumber> pages;  // the last that it has been sent, by number
@@ -114,11 +150,15 @@ class Client {
     Charge bytes;
     Charge open;  // the descriptors
   };
+  using Descriptors = std::array<int, shm::kMaxDescriptors>;
+
+  [[nodiscard]] bool has_room_for(std::uint64_t descriptors) const;
+  [[nodiscard]] shm::SendResult try_to_send(const shm::Message& message,
+                                            const Descriptors& descriptors, std::uint64_t count);
   static constexpr std::size_t kMaxReadAhead = 256;
   static constexpr std::size_t kMaxQueue = 16384;
   static constexpr std::size_t kMaxQueuedDescriptors = 4096;  // so that others find some left
 
-  [[nodiscard]] bool has_room_for(std::uint64_t descriptors) const;
   [[nodiscard]] shm::ReceiveResult receive_from_socket(shm::Received& received);
 
   const ClientId id_;
@@ -128,12 +168,14 @@ class Client {
   shm::FileDescriptor process_;  // a pidfd
   pid_t pid_ = 0;
   uid_t user_ = 0;
-  std::uint64_t started_ = 0;
+  mutable std::optional<std::uint64_t> started_;
+  InFlight in_flight_;
+  bool held_back_ = false;
   bool lost_ = false;
   bool hung_up_ = false;
   std::deque<std::unique_ptr<Queued>> queue_;
   std::size_t queued_descriptors_ = 0;
-  std::deque<std::unique_ptr<KeptMessage>> ahead_;
+  std::deque<PutAside> ahead_;
   std::optional<shm::ReceiveResult> ahead_ended_;  // how the conversation ends after `ahead_`
 };
 

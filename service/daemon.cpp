@@ -1,5 +1,6 @@
 #include "service/daemon.hpp"
 
+#include <fcntl.h>
 #include <signal.h>
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
@@ -24,12 +25,29 @@ namespace {
 // Without a descriptor to accept a client with.
 constexpr shm::Nanoseconds kListenAgainAfter = 100'000'000;
 
+// How often it is looked who has read what he was sent, where somebody waits for that.
+constexpr shm::Nanoseconds kLookInFlightAfter = 5'000'000;
+// The same where nobody does, but what was left unread still counts.
+constexpr shm::Nanoseconds kLookLeftUnreadAfter = 1'000'000'000;
+
+// How many connections are taken out of the kernel's queue in one round.
+constexpr int kMaxAcceptedAtOnce = 64;
+
 // How many messages of one client are handled before it is the next one's turn.
 constexpr int kMaxMessagesAtOnce = 64;
 // And for how long at most, but for the last of them.
 constexpr shm::Nanoseconds kMaxTurn = 1'000'000;
 // How often the loop looks who has something to say before it serves those of whom it knows.
 constexpr int kMaxRounds = 64;
+
+// Of who has connected; nobody in particular where that cannot be told.
+uid_t user_of(const shm::FileDescriptor& socket) {
+  ucred peer{};
+  peer.uid = LogAccount::kUnknown;
+  socklen_t size = sizeof peer;
+  static_cast<void>(getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size));
+  return peer.uid;
+}
 
 std::uint64_t event_key(std::uint32_t tag, ClientId client) {
   return std::uint64_t{tag} << 56 | client;
@@ -50,6 +68,9 @@ Daemon::Daemon(const DaemonOptions& options)
       compiler_(options.compiles_in) {
   if (!files_.empty() || gate_.has_file()) read_first_models(options.stop_descriptor);
   listener_ = shm::listen_at(options.directory, instance_);
+  if (fcntl(listener_.socket.get(), F_SETFL, O_NONBLOCK) != 0) {
+    throw std::system_error(errno, std::generic_category(), "listening");
+  }
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   if (!epoll_) throw std::system_error(errno, std::generic_category(), "epoll_create1");
   watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
@@ -66,6 +87,11 @@ Daemon::~Daemon() {
   unlink(listener_.path.c_str());
   // Who has connected and was not accepted may have sent something, too.
   Errands::of_the_process().close(geteuid(), std::move(listener_.socket));
+  while (!lobby_.empty()) {
+    for (Lobby::Waiting& each : lobby_.next()) {
+      Errands::of_the_process().close(each.user, std::move(each.socket));
+    }
+  }
   if (!stores_ && phase_ == Phase::kServing && clients_.empty() && absentees_.empty())
     state_.remove();
 }
@@ -84,11 +110,12 @@ void Daemon::unwatch(int fd) const noexcept { epoll_ctl(epoll_.get(), EPOLL_CTL_
 
 int Daemon::timeout_ms() const {
   const bool may_change = !swap_ && !preparing_ && phase_ == Phase::kServing && !changes_.empty();
-  if (!turns_.empty() || is_more_to_tell_ || may_change || (try_postponed_ && !postponed_.empty()))
+  if (!turns_.empty() || !lobby_.empty() || is_more_to_tell_ || may_change ||
+      (try_postponed_ && !postponed_.empty()))
     return 0;
   shm::Nanoseconds deadline =
       std::min({barriers_.next_deadline(), takeover_deadline(), show_growth_at_, give_back_at_,
-                status_requests_.next(), listen_again_at_, watchdog_.deadline(),
+                status_requests_.next(), listen_again_at_, look_in_flight_at_, watchdog_.deadline(),
                 Errands::of_the_process().deadline()});
   for (const Postponed& request : postponed_) deadline = std::min(deadline, request.deadline);
   if (deadline == shm::kForever) return -1;
@@ -100,6 +127,7 @@ void Daemon::run(int signal_descriptor) {
   watch(signal_descriptor, Tag::kSignals, 0, EPOLLIN);
   for (;;) {
     if (!hear(signal_descriptor)) return;
+    admit_clients();
     give_turns();
     const shm::Nanoseconds now = shm::monotonic_now();
     barriers_.expire(now);
@@ -109,7 +137,7 @@ void Daemon::run(int signal_descriptor) {
     }
     look_after_the_loop(now);
     advance_takeover(now);
-    serve_postponed(now);
+    retry_postponed(now);
     advance_changes();
     if (phase_ == Phase::kServing) give_back_at_ = directory_.give_back(now);
     is_more_to_tell_ = observers_.tell(clients_, switchboard_);
@@ -132,7 +160,7 @@ bool Daemon::hear(int signal_descriptor) {
     for (int i = 0; i < count; ++i) {
       const auto tag = static_cast<Tag>(events[i].data.u64 >> 56);
       const ClientId id = events[i].data.u64 & ((std::uint64_t{1} << 56) - 1);
-      if (tag == Tag::kListener) accept_client();
+      if (tag == Tag::kListener) accept_clients();
       if (tag == Tag::kCompiler) finish_preparing();
       if (tag == Tag::kSignals && handle_signal(signal_descriptor)) return false;
       if (tag == Tag::kAbsentee) forget_absentee(id);
@@ -155,12 +183,16 @@ void Daemon::hear_client(ClientId id, std::uint32_t events) {
   watch_client(client);
 }
 
-// What it sent before it died is served first.
+// It is given up in a turn of its user's, lest the end of a process that had a thousand nodes keep
+// the others waiting. What it sent before it died is served first.
 void Daemon::hear_death(ClientId id) {
   const auto found = clients_.find(id);
   if (found == clients_.end()) return;
-  serve(*found->second);
-  drop(id);
+  Client& client = *found->second;
+  unwatch(client.process());
+  client.has_turn = client.is_last_turn = true;
+  turns_.add(client.user(), id);
+  watch_client(client);
 }
 
 // One turn for each user who waits for one.
@@ -173,7 +205,7 @@ void Daemon::give_turns() {
     Client& client = *found->second;
     const bool has_more = serve(client);
     if (clients_.count(*id) == 0) continue;
-    if (!has_more && client.is_lost()) {
+    if (client.is_last_turn || (!has_more && client.is_lost())) {
       drop(*id);
       continue;
     }
@@ -186,7 +218,8 @@ void Daemon::give_turns() {
 // One that waits for its turn is not heard again before it, and whoever is heard is not until this.
 void Daemon::watch_client(Client& client) {
   const std::uint32_t in = client.has_turn ? 0u : static_cast<std::uint32_t>(EPOLLIN | EPOLLRDHUP);
-  const std::uint32_t out = client.has_queue() ? static_cast<std::uint32_t>(EPOLLOUT) : 0u;
+  const bool may_write = client.has_queue() && !client.is_held_back();
+  const std::uint32_t out = may_write ? static_cast<std::uint32_t>(EPOLLOUT) : 0u;
   watch(client.socket(), Tag::kClient, client.id(), in | out | EPOLLONESHOT);
   client.watches_queue = out != 0;
 }
@@ -205,8 +238,9 @@ bool Daemon::handle_signal(int signal_descriptor) {
   return false;
 }
 
-void Daemon::accept_client() {
-  for (;;) {
+// What waits at the listener's, as far as it goes in one round.
+void Daemon::accept_clients() {
+  for (int i = 0; i < kMaxAcceptedAtOnce; ++i) {
     shm::FileDescriptor socket(
         accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (!socket) {
@@ -217,22 +251,37 @@ void Daemon::accept_client() {
       }
       return;
     }
-    const LogAccount stranger(LogAccount::kUnknown);
+    const uid_t user = user_of(socket);
+    const LogAccount account(user);
+    try {
+      Charge descriptor = shares_.take(user, Share::kDescriptors);
+      lobby_.add({user, std::move(socket), std::move(descriptor)});
+    } catch (const LimitExceeded& limit) {  // anybody may come again and again: not worth a warning
+      log::debug("a client was turned away: {}", limit.what());
+      Errands::of_the_process().close(user, std::move(socket));
+    }
+  }
+}
+
+// One of each user's.
+void Daemon::admit_clients() {
+  for (Lobby::Waiting& waiting : lobby_.next()) {
+    const LogAccount account(waiting.user);
     std::unique_ptr<Client> client;
     try {
       const ClientId id = ++last_client_;
-      client = std::make_unique<Client>(id, std::move(socket), shares_);
+      waiting.descriptor = {};
+      client = std::make_unique<Client>(id, std::move(waiting.socket), shares_);
       watch_client(*client);
       if (client->process() >= 0) watch(client->process(), Tag::kProcess, id, EPOLLIN);
       clients_.emplace(id, std::move(client));
       drop_oldest_silent_client();
-    } catch (const LimitExceeded& limit) {  // anybody may come again and again: not worth a warning
+    } catch (const LimitExceeded& limit) {
       log::debug("a client was turned away: {}", limit.what());
     } catch (const std::exception& error) {
       log::warn("a client was turned away: {}", error.what());
       if (client != nullptr) unwatch(client->socket());
     }
-    return;
   }
 }
 
@@ -242,8 +291,28 @@ void Daemon::look_after_the_loop(shm::Nanoseconds now) {
     listen_again_at_ = shm::kForever;
     watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
   }
+  look_in_flight(now);
   const std::string lost = Errands::of_the_process().look_after(now);
   if (!lost.empty()) log::warn("{}", lost);
+}
+
+void Daemon::look_in_flight(shm::Nanoseconds now) {
+  if (now < look_in_flight_at_) return;
+  look_in_flight_at_ = shm::kForever;
+  left_unread_.look();
+  for (const auto& [id, client] : clients_) client->look_in_flight();
+  for (const auto& [id, client] : clients_) {
+    if (client->is_held_back()) client->flush();
+  }
+}
+
+// At the end of a round: whoever is held back by now waits for that.
+void Daemon::plan_to_look_in_flight() {
+  const bool is_awaited = std::any_of(clients_.begin(), clients_.end(),
+                                      [](const auto& each) { return each.second->is_held_back(); });
+  if (!is_awaited && left_unread_.empty()) return;
+  const shm::Nanoseconds after = is_awaited ? kLookInFlightAfter : kLookLeftUnreadAfter;
+  look_in_flight_at_ = std::min(look_in_flight_at_, shm::monotonic_now() + after);
 }
 
 // It would stay in the listener's queue, and the loop would never rest. Where there is not even a
@@ -259,15 +328,13 @@ void Daemon::turn_away_client() {
     watch(listener_.socket.get(), Tag::kListener, 0, 0);
     return;
   }
-  ucred peer{};
-  socklen_t size = sizeof peer;
-  static_cast<void>(getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size));
-  const LogAccount account(peer.uid);
+  const uid_t user = user_of(socket);
+  const LogAccount account(user);
   log::warn(
       "a client of user {} was turned away: no descriptors are left (RLIMIT_NOFILE, "
       "LimitNOFILE= in a systemd unit)",
-      peer.uid);
-  hang_up(std::move(socket), peer.uid);
+      user);
+  hang_up(std::move(socket), user);
 }
 
 // Whoever connects and says nothing costs two descriptors, and gives way to those who come later:
@@ -294,6 +361,12 @@ bool Daemon::serve(Client& client) {
   const shm::Nanoseconds until = shm::monotonic_now() + kMaxTurn;
   shm::Received received;
   for (int i = 0; i < kMaxMessagesAtOnce; ++i) {
+    if (!client.to_retry.empty()) {
+      retry(client);
+      if (clients_.count(id) == 0) return false;
+      if (shm::monotonic_now() >= until) break;
+      continue;
+    }
     switch (client.receive(received)) {
       case shm::ReceiveResult::kNothing:
         return false;
@@ -317,6 +390,13 @@ bool Daemon::serve(Client& client) {
   return true;
 }
 
+void Daemon::retry(Client& client) {
+  Postponed request = std::move(client.to_retry.front());
+  client.to_retry.pop_front();
+  --client.postponed;
+  handle_or_refuse(client, request.request.received(), request.deadline);
+}
+
 // `deadline`: of a request that was postponed.
 void Daemon::handle_or_refuse(Client& client, shm::Received& received, shm::Nanoseconds deadline) {
   const LogAccount account(client.user());
@@ -331,11 +411,13 @@ void Daemon::handle_or_refuse(Client& client, shm::Received& received, shm::Nano
       why = "limit-exceeded: " + std::to_string(shm::kMaxPostponed) +
             " requests of this client wait already (kMaxPostponed): " + why;
     } else if (shm::monotonic_now() < deadline) {
-      ++client.postponed;
-      auto postponed = std::make_unique<KeptMessage>(client.user());
-      postponed->received = std::move(received);
-      postponed_.push_back({client.id(), std::move(postponed), deadline});
-      return;
+      try {
+        postponed_.push_back({client.id(), client.put_aside(received), deadline});
+        ++client.postponed;
+        return;
+      } catch (const LimitExceeded& limit) {
+        why = std::string(limit.what()) + "; it would have to wait: " + why;
+      }
     }
   } catch (const RefusedAgain& again) {  // every second: one line for each component is enough
     refuse(client, received.message.request, again.what());
@@ -357,11 +439,14 @@ void Daemon::drop(ClientId id) {
   if (!client->name.empty() && !client->is_turned_away) {
     log::info("{} left, {} ports with it", client->description(), client->ports.size());
   }
-  if (client->comes_back && !client->has_died()) set_away(*client);
+  // One that could not be known again does not come back as what it was.
+  const bool can_be_known = client->is_process(client->pid(), client->process());
+  if (client->comes_back && can_be_known && !client->has_died()) set_away(*client);
   while (!client->ports.empty()) switchboard_.remove(*client->ports.begin());
   for (const shm::PortInstance port : client->to_hand_back) switchboard_.forget_away(port);
   observers_.forget(id);
   barriers_.forget(id);
+  left_unread_.add(client->release_unread());
 }
 
 // After each round: sends what is queued, and drops who is lost.
@@ -377,9 +462,12 @@ void Daemon::settle() {
       client->has_turn = true;
       turns_.add(client->user(), id);
     }
-    if (client->has_queue() && !client->watches_queue) watch_client(*client);
+    if (client->has_queue() && !client->is_held_back() && !client->watches_queue) {
+      watch_client(*client);
+    }
   }
   for (const ClientId id : lost) drop(id);
+  plan_to_look_in_flight();
 }
 
 }  // namespace arbiter::service

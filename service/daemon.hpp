@@ -28,8 +28,10 @@
 #include "service/directory.hpp"
 #include "service/gate.hpp"
 #include "service/history.hpp"
+#include "service/in_flight.hpp"
 #include "service/inheritance.hpp"
 #include "service/library.hpp"
+#include "service/lobby.hpp"
 #include "service/model_copy.hpp"
 #include "service/models.hpp"
 #include "service/observers.hpp"
@@ -125,10 +127,13 @@ class Daemon {
   void hear_death(ClientId id);
   void give_turns();
   void watch_client(Client& client);
-  void accept_client();
+  void accept_clients();
+  void admit_clients();
   void turn_away_client();
   // What is owed to strangers' descriptors and to the service manager, once in each round.
   void look_after_the_loop(shm::Nanoseconds now);
+  void look_in_flight(shm::Nanoseconds now);
+  void plan_to_look_in_flight();
   // Throws std::length_error where there is no room for another.
   Charge make_room_for(const Client& newcomer, NodeId returning);
   void drop_oldest_silent_client();
@@ -137,6 +142,7 @@ class Daemon {
   void drop(ClientId id);
   void settle();
 
+  void retry(Client& client);
   void handle_or_refuse(Client& client, shm::Received& received, shm::Nanoseconds deadline);
   void handle(Client& client, shm::Received& received);
   void hello(Client& client, const shm::Received& received);
@@ -212,11 +218,6 @@ class Daemon {
     std::set<shm::PortInstance> ports;
     Charge charge;
   };
-  struct Postponed {
-    ClientId client = 0;
-    std::unique_ptr<KeptMessage> request;
-    shm::Nanoseconds deadline = 0;
-  };
 
   void look_for_predecessor();
   void inherit(const shm::FileDescriptor& board, const shm::FileDescriptor& registry);
@@ -240,7 +241,8 @@ class Daemon {
   void welcome_waiting();
   [[nodiscard]] shm::Nanoseconds takeover_deadline() const;
   void advance_takeover(shm::Nanoseconds now);
-  void serve_postponed(shm::Nanoseconds now);
+  // Those that are to be tried again are in the next turns of who asked.
+  void retry_postponed(shm::Nanoseconds now);
 
   const std::string instance_;
   const bool stores_;
@@ -273,6 +275,11 @@ class Daemon {
   shm::FileDescriptor epoll_;
   // Not before: there was no descriptor even to turn a client away.
   shm::Nanoseconds listen_again_at_ = shm::kForever;
+  Lobby lobby_;
+  LeftUnread left_unread_;
+  // When to look again who has read: somebody is to be sent something, or has left something
+  // unread.
+  shm::Nanoseconds look_in_flight_at_ = shm::kForever;
   Watchdog watchdog_;
   std::map<ClientId, std::unique_ptr<Client>> clients_;  // the oldest first
   ClientId last_client_ = 0;

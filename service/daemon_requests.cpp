@@ -164,7 +164,8 @@ void Daemon::handle(Client& client, shm::Received& received) {
 // `returning`: the node that the newcomer says it was, if it was here before.
 Charge Daemon::make_room_for(const Client& newcomer, NodeId returning) {
   const auto absentee = absentees_.find(returning);
-  if (absentee != absentees_.end() && absentee->second.pid == newcomer.pid()) {
+  if (absentee != absentees_.end() &&
+      newcomer.is_process(absentee->second.pid, absentee->second.process.get())) {
     return std::move(absentee->second.charge);
   }
   return shares_.take(newcomer.user(), Share::kClients);

@@ -27,6 +27,8 @@ constexpr shm::Nanoseconds kMaxWaitForReturn = 500'000'000;
 constexpr shm::Nanoseconds kMaxWaitForRealm = 2'000'000'000;
 // How many components that have ended the state file may name.
 constexpr std::size_t kMaxForgotten = 64;
+// About what it takes to remember one link that a component says it has.
+constexpr std::uint64_t kBytesOfAClaim = 128;
 
 shm::FileDescriptor open_process(pid_t pid) {
   return shm::FileDescriptor(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
@@ -120,12 +122,13 @@ void Daemon::rejoin(Client& client, const shm::Received& hello) {
   const NodeId node = hello.message.link;
   // The conversation that it gave up may not have been seen to end.
   const auto former = std::find_if(clients_.begin(), clients_.end(), [&](const auto& each) {
-    return each.second->node == node && each.second->pid() == client.pid() &&
-           each.second.get() != &client;
+    return each.second->node == node && each.second.get() != &client &&
+           client.is_process(each.second->pid(), each.second->process());
   });
   if (former != clients_.end()) drop(former->first);
   const auto absentee = absentees_.find(node);
-  if (absentee != absentees_.end() && absentee->second.pid == client.pid()) {
+  if (absentee != absentees_.end() &&
+      client.is_process(absentee->second.pid, absentee->second.process.get())) {
     client.node = node;
     client.to_hand_back = std::move(absentee->second.ports);
     absentees_.erase(absentee);
@@ -169,20 +172,23 @@ void Daemon::take_back_input(Client& client, const shm::Received& received) {
 }
 
 void Daemon::take_back_link(const Client& client, const shm::Message& message) {
-  if (client.is_returning && client.ports.count(message.port) != 0) {
-    switchboard_.claim(message.port, message.peer, message.link);
-  }
+  if (!client.is_returning || client.ports.count(message.port) == 0) return;
+  // It may claim links with ports that have never been, one after the other.
+  Charge charge = shares_.take(client.user(), Share::kQueue, kBytesOfAClaim);
+  switchboard_.claim(message.port, message.peer, {message.link, std::move(charge)});
 }
 
 void Daemon::finish_return(Client& client) {
   if (!client.is_returning) return;
   client.is_returning = false;
-  const auto is_away = [&](shm::PortInstance port) {
-    return directory_.source_of(port) != nullptr || directory_.input_of(port) != nullptr;
-  };
   for (const shm::PortInstance port : std::exchange(client.to_hand_back, {})) {
     switchboard_.forget_away(port);  // closed meanwhile
   }
+  std::set<shm::PortInstance> away;
+  for (const auto& source : directory_.sources()) away.insert(source->away);
+  for (const auto& input : directory_.inputs()) away.insert(input->away);
+  away.erase(0);
+  const auto is_away = [&](shm::PortInstance port) { return away.contains(port); };
   for (const shm::PortInstance port : client.ports) switchboard_.settle_claims(port, is_away);
   const auto table = models_.in_force().table;
   switchboard_.link_all(table);
@@ -314,14 +320,17 @@ void Daemon::advance_takeover(shm::Nanoseconds now) {
   if (all_are_back || now >= takeover_deadline()) finish_takeover();
 }
 
-void Daemon::serve_postponed(shm::Nanoseconds now) {
+void Daemon::retry_postponed(shm::Nanoseconds now) {
   const bool all = std::exchange(try_postponed_, false);
   for (Postponed& request : std::exchange(postponed_, {})) {
-    const auto client = clients_.find(request.client);
-    if (client == clients_.end()) continue;
+    const auto found = clients_.find(request.client);
+    if (found == clients_.end()) continue;
     if (all || now >= request.deadline) {
-      --client->second->postponed;
-      handle_or_refuse(*client->second, request.request->received, request.deadline);
+      Client& client = *found->second;
+      client.to_retry.push_back(std::move(request));
+      client.has_turn = true;
+      turns_.add(client.user(), client.id());
+      watch_client(client);
     } else {
       postponed_.push_back(std::move(request));
     }

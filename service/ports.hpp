@@ -20,7 +20,11 @@ namespace arbiter::service {
 
 // Links that a component had when it was lost to a daemon, or its peer was: the peer, and the
 // link's number (0: not connected). They stand, in shared memory, until both ends are here again.
-using Claims = std::map<shm::PortInstance, std::uint64_t>;
+struct Claim {
+  std::uint64_t number = 0;
+  Charge charge{};  // of the user whose component says so
+};
+using Claims = std::map<shm::PortInstance, Claim>;
 
 // The write end of an input port's bell, as its component has handed it in and as it is passed on.
 // The pipe's lock may be held by any process that has it, so ringing and closing are errands of the

@@ -37,7 +37,10 @@ Naming naming(Share what) {
       return {"descriptors", "the daemon's RLIMIT_NOFILE, less 64",
               "close ports or nodes, or raise LimitNOFILE= of the service"};
     case Share::kQueue:
-      return {"bytes of unread messages", "64 MiB", "let its nodes read what they are sent"};
+      return {"bytes of waiting messages", "64 MiB", "let its nodes read what they are sent"};
+    case Share::kInFlight:
+      return {"descriptors under way", "a quarter of the daemon's RLIMIT_NOFILE",
+              "let its nodes read what they are sent"};
   }
   return {"", "", ""};
 }
@@ -57,6 +60,9 @@ Totals totals_of_this_process() {
   totals[index(Share::kInputs)] = shm::kMaxInputPorts;
   totals[index(Share::kDescriptors)] = descriptors - std::min(kOwnDescriptors, descriptors / 2);
   totals[index(Share::kQueue)] = kMaxQueuedBytes;
+  // The rest is for what each client may have beside it (InFlight), and for components of the
+  // daemon's own user, whose messages the kernel counts too.
+  totals[index(Share::kInFlight)] = descriptors / 4;
   return totals;
 }
 

@@ -28,9 +28,10 @@ enum class Share : std::uint8_t {
   kSources,      // names of output ports that no model names
   kInputs,       // the same of input ports
   kDescriptors,  // open files
-  kQueue,        // bytes of messages that wait to be read
+  kQueue,        // bytes of messages that wait, to be read or to be served, and of claims
+  kInFlight,     // descriptors that have been sent and not been received
 };
-inline constexpr std::size_t kShareCount = 5;
+inline constexpr std::size_t kShareCount = 6;
 
 class LimitExceeded : public std::length_error {
  public:

@@ -42,7 +42,7 @@ class Switchboard {
   // It comes back, with the instance that it had.
   OutputPort& readmit(std::unique_ptr<OutputPort> port, Client& client, Source& source);
   InputPort& readmit(std::unique_ptr<InputPort> port, Client& client, InputName& name);
-  void claim(shm::PortInstance port, shm::PortInstance peer, std::uint64_t number);
+  void claim(shm::PortInstance port, shm::PortInstance peer, Claim claim);
   // Makes links of the port's claims and its peers' where they agree. `is_away`: whether a port may
   // still come back.
   void settle_claims(shm::PortInstance port, const std::function<bool(shm::PortInstance)>& is_away);

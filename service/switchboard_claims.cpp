@@ -6,6 +6,7 @@
 // is here once it has said all (kHandedBack): nothing is concluded before from what it has not
 // claimed.
 #include <optional>
+#include <utility>
 
 #include "service/switchboard.hpp"
 #include "shm/bell.hpp"
@@ -18,7 +19,7 @@ namespace {
 std::optional<std::uint64_t> take(Claims& claims, shm::PortInstance peer) {
   const auto found = claims.find(peer);
   if (found == claims.end()) return {};
-  const std::uint64_t number = found->second;
+  const std::uint64_t number = found->second.number;
   claims.erase(found);
   return number;
 }
@@ -29,9 +30,9 @@ void Switchboard::set_away(shm::PortInstance port) {
   for (auto link = links_.begin(); link != links_.end();) {
     const auto [output, input] = link->first;
     if (output == port && (link->second.is_mutual() || link->second.is_refused())) {
-      inputs_.at(input)->claims[port] = link->second.number;
+      inputs_.at(input)->claims[port] = {link->second.number};
     }
-    if (input == port) outputs_.at(output)->claims[port] = link->second.number;
+    if (input == port) outputs_.at(output)->claims[port] = {link->second.number};
     link = output == port || input == port ? links_.erase(link) : std::next(link);
   }
   Source* source = directory_.source_of(port);
@@ -60,8 +61,8 @@ Claims& Switchboard::claims_of(shm::PortInstance port) const {
   return output != outputs_.end() ? output->second->claims : inputs_.at(port)->claims;
 }
 
-void Switchboard::claim(shm::PortInstance port, shm::PortInstance peer, std::uint64_t number) {
-  claims_of(port)[peer] = number;
+void Switchboard::claim(shm::PortInstance port, shm::PortInstance peer, Claim claim) {
+  claims_of(port)[peer] = std::move(claim);
 }
 
 void Switchboard::settle_claims(shm::PortInstance port,
@@ -69,7 +70,7 @@ void Switchboard::settle_claims(shm::PortInstance port,
   const bool is_output = outputs_.count(port) != 0;
   // Those of peers that are here count too: this end may not have heard of the link.
   std::set<shm::PortInstance> peers;
-  for (const auto& [peer, number] : claims_of(port)) peers.insert(peer);
+  for (const auto& [peer, claim] : claims_of(port)) peers.insert(peer);
   for (const auto& [instance, input] : inputs_) {
     if (is_output && input->claims.count(port) != 0) peers.insert(instance);
   }

@@ -115,6 +115,14 @@ bool is_trusted(uid_t user, const std::string& directory) {
          (directory == kSystemDirectory && has_system_directory(user));
 }
 
+// Whose it is, if it is a stranger's: a daemon listens in a directory of its own, so that nobody
+// else can put a socket there, and in that of a stranger there is none of ours.
+std::optional<uid_t> stranger_who_owns(const std::string& directory) {
+  struct stat status {};
+  if (lstat(directory.c_str(), &status) != 0 || is_trusted(status.st_uid, directory)) return {};
+  return status.st_uid;
+}
+
 const char* why_not_connected(int error) {
   switch (error) {
     case ENOENT:
@@ -164,6 +172,10 @@ std::string daemon_directory() {
   return make_safe(temporary_directory(geteuid()));
 }
 
+bool is_a_strangers(const std::string& directory) {
+  return stranger_who_owns(directory).has_value();
+}
+
 std::vector<std::string> client_directories() {
   std::vector<std::string> directories;
   const auto add = [&](std::string directory) {
@@ -207,6 +219,16 @@ Listener listen_at(const std::string& directory, const std::string& instance) {
 std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not) {
   why_not.clear();
   for (const std::string& directory : client_directories()) {
+    // Not even connected to: who listens there could let nobody in, for a second each time.
+    if (const auto stranger = stranger_who_owns(directory)) {
+      char why[112];
+      std::snprintf(
+          why, sizeof why,
+          "that directory belongs to user %u, who is neither root, nor \"arbiter\", nor you",
+          *stranger);
+      pass_over(directory, instance, why, why_not);
+      continue;
+    }
     FileDescriptor socket = make_socket();
     const Address at = address_of(directory, instance + ".sock");
     const auto* address = reinterpret_cast<const sockaddr*>(&at.address);

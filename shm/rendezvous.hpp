@@ -24,6 +24,10 @@ std::string daemon_directory();
 // The directories in which a client looks, in this order.
 std::vector<std::string> client_directories();
 
+// Whether the directory is there and belongs to somebody whose daemon is not trusted: what lies in
+// it is not even looked at.
+bool is_a_strangers(const std::string& directory);
+
 // A listening socket at DIRECTORY/INSTANCE.sock that every user may connect to. Holds a lock beside
 // it for as long as the result lives; throws std::runtime_error if another daemon has it.
 struct Listener {

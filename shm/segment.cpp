@@ -61,7 +61,10 @@ std::error_code allocate(const FileDescriptor& segment, std::size_t offset,
 
 FileDescriptor reopen(const FileDescriptor& segment, int flags) {
   const std::string path = "/proc/self/fd/" + std::to_string(segment.get());
-  FileDescriptor opened(::open(path.c_str(), flags | O_CLOEXEC));
+  FileDescriptor opened(::open(path.c_str(), flags | O_CLOEXEC | O_NONBLOCK));
+  if (!opened && errno == EWOULDBLOCK) {
+    throw std::runtime_error("its maker holds a lease on the memory, which keeps others waiting");
+  }
   if (!opened) fail("reopening a descriptor");
   return opened;
 }

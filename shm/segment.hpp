@@ -36,8 +36,9 @@ void seal(const FileDescriptor& segment, Seals seals);
 [[nodiscard]] std::error_code allocate(const FileDescriptor& segment, std::size_t offset,
                                        std::size_t bytes) noexcept;
 
-// Opens the same segment anew, read-only or read-write, as far as its mode lets this user.
-// Throws std::system_error.
+// Opens the same segment once more, read-only or read-write, as far as its mode lets this user.
+// Never waits: its maker may hold a lease on it (F_SETLEASE), and would keep an ordinary open()
+// waiting for 45 seconds. Throws std::system_error, std::runtime_error.
 FileDescriptor reopen(const FileDescriptor& segment, int flags);
 
 // The size of a segment that somebody else made, once it is sure that it is a memfd that can

@@ -68,8 +68,8 @@ SendResult send_message(int socket, const Message& message,
   }
   while (sendmsg(socket, &header, MSG_NOSIGNAL) < 0) {
     if (errno == EINTR) continue;
-    // ETOOMANYREFS: too many descriptors are on their way; some will arrive soon.
-    if (errno == EAGAIN || errno == ENOBUFS || errno == ETOOMANYREFS) return SendResult::kFull;
+    if (errno == EAGAIN || errno == ENOBUFS) return SendResult::kFull;
+    if (errno == ETOOMANYREFS) return SendResult::kTooMany;
     return SendResult::kClosed;
   }
   return SendResult::kSent;

@@ -145,7 +145,8 @@ struct Received {
   std::array<FileDescriptor, kMostDescriptorsOfAMessage - kMaxDescriptors> surplus{};
 };
 
-enum class SendResult { kSent, kFull, kClosed };
+// kTooMany: this user has as many descriptors under way, to whomever, as it may.
+enum class SendResult { kSent, kFull, kTooMany, kClosed };
 enum class ReceiveResult { kReceived, kNothing, kClosed, kMalformed };
 
 // Non-blocking unless the socket blocks. Never raises SIGPIPE. What is received is all that came:

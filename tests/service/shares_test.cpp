@@ -1,12 +1,16 @@
 // What each user may have, and whose turn it is.
 #include "service/shares.hpp"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <vector>
 
+#include "service/client.hpp"
+#include "service/errands.hpp"
 #include "service/turns.hpp"
+#include "shm/segment.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -100,6 +104,33 @@ TEST(Turns, AreByUserHoweverManyOfHisClientsWait) {
   for (int i = 0; i < 4; ++i) order.push_back(*turns.next());
   EXPECT_EQ(order, (std::vector<std::uint64_t>{1, 200, 2, 3}));
   EXPECT_EQ(turns.users(), 1u);
+}
+
+TEST(WhatIsPutAside, CountsAsItsSendersAndIsClosedAsHisErrand) {
+  Shares shares(of_each(1 << 20), 50, kOwner);
+  shm::Received received;
+  received.descriptors[0] = shm::make_segment("test", 1);
+  received.descriptor_count = 1;
+  const int number = received.descriptors[0].get();
+  {
+    const PutAside aside(received, kOne, shares);
+    EXPECT_EQ(aside.received().descriptors[0].get(), number);
+    EXPECT_EQ(shares.taken(kOne, Share::kDescriptors), 1u);
+    EXPECT_GE(shares.taken(kOne, Share::kQueue), sizeof(shm::Message));
+  }
+  EXPECT_EQ(shares.taken(kOne, Share::kDescriptors), 0u);
+  EXPECT_EQ(shares.taken(kOne, Share::kQueue), 0u);
+  ASSERT_TRUE(Errands::of_the_process().wait_until_done(shm::kForever / 2));
+  EXPECT_EQ(::fcntl(number, F_GETFD), -1) << "it is still open";
+}
+
+TEST(WhatIsPutAside, IsRefusedBeyondTheShareAndStaysWhatItWas) {
+  Shares shares(of_each(1), 50, kOwner);
+  shm::Received received;
+  received.descriptors[0] = shm::make_segment("test", 1);
+  received.descriptor_count = 1;
+  EXPECT_THROW(PutAside(received, kOne, shares), LimitExceeded);
+  EXPECT_TRUE(received.descriptors[0]);
 }
 
 TEST(Turns, ComeToAnEnd) {

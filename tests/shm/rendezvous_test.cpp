@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -142,6 +143,20 @@ TEST_F(Rendezvous, AClientFindsTheDaemonOfItsInstanceAndNoOther) {
   EXPECT_TRUE(connect_to_daemon("mine", why_not).has_value());
   EXPECT_EQ(why_not, "");
   EXPECT_FALSE(connect_to_daemon("another-" + std::to_string(getpid()), why_not).has_value());
+}
+
+// Whoever listens there could let a client wait, and have any number of sockets there.
+TEST_F(Rendezvous, NobodyIsConnectedToInADirectoryOfAnotherUser) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root can give a directory away";
+  const std::string theirs = make("theirs");
+  setenv("RUNTIME_DIRECTORY", theirs.c_str(), 1);
+  const Listener listener = listen_at(theirs, "planted");
+  ASSERT_EQ(chown(theirs.c_str(), 65534, 65534), 0);
+  std::string why_not;
+  EXPECT_FALSE(connect_to_daemon("planted", why_not));
+  EXPECT_THAT(why_not, HasSubstr(theirs + "/planted.sock: that directory belongs to user 65534"));
+  pollfd waiting{listener.socket.get(), POLLIN, 0};
+  EXPECT_EQ(poll(&waiting, 1, 0), 0) << "it was connected to";
 }
 
 TEST_F(Rendezvous, WhereNobodyAnswersEachSocketThatWasTriedIsNamedWithTheReason) {

@@ -47,7 +47,8 @@ class ChildProcess {
     if (pid_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
     if (pid_ == 0) {
       ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-      if (::getppid() != parent) ::_exit(126);
+      const pid_t starter = ::getppid();  // 0 from within a PID namespace of its own
+      if (starter != 0 && starter != parent) ::_exit(126);
       ::dup2(streams.in < 0 ? null.get() : streams.in, STDIN_FILENO);
       ::dup2(streams.out < 0 ? null.get() : streams.out, STDOUT_FILENO);
       if (streams.err >= 0) ::dup2(streams.err, STDERR_FILENO);
@@ -89,6 +90,7 @@ class ChildProcess {
     while (::waitpid(pid_, &status, WUNTRACED) < 0 && errno == EINTR) {
     }
   }
+  void resume() const { signal(SIGCONT); }
   void kill() {
     if (!runs()) return;
     signal(SIGKILL);

@@ -126,6 +126,7 @@ class Daemon {
     bool without_model = false;
     std::optional<std::string> runtime_directory{};  // else one of its own
     std::optional<int> max_descriptors{};
+    std::vector<std::string> by{};  // a program that is given the daemon's command line to execute
   };
 
   explicit Daemon(const std::string& model = kNoRules) : Daemon(model, Options()) {}
@@ -268,6 +269,7 @@ class Daemon {
       argv.insert(argv.begin(), {"/bin/sh", "-c", limit + R"( && exec "$0" "$@")"});
     }
     argv.insert(argv.begin(), by.begin(), by.end());
+    argv.insert(argv.begin(), options_.by.begin(), options_.by.end());
     const shm::FileDescriptor log(::open((directory_.path() + "/log").c_str(),
                                          O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600));
     process_ = ChildProcess(argv, {{"NOTIFY_SOCKET", notify_.path()}}, {-1, -1, log.get()});

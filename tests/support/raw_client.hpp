@@ -8,6 +8,7 @@
 #include <array>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -33,6 +34,9 @@ inline nlohmann::json read_document(const shm::Received& reply) {
 class RawClient {
  public:
   using Descriptors = std::array<int, shm::kMaxDescriptors>;
+
+  // Connected by other means.
+  explicit RawClient(shm::FileDescriptor socket) : socket_(std::move(socket)) {}
 
   explicit RawClient(const std::string& instance) {
     std::string why_not;
