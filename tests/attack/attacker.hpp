@@ -18,7 +18,7 @@ namespace arbiter::test {
 
 inline constexpr uid_t kStrangersId = 65534;
 
-enum class As { kSameUser, kStranger };
+enum class As { kSameUser, kAnotherUser };
 
 struct Attacked {
   int signal = 0;    // that ended it
@@ -32,7 +32,7 @@ inline Attacked run_attack(As who, const std::function<std::string()>& attack) {
   shm::FileDescriptor out(ends[1]);
   const pid_t child = ::fork();
   if (child == 0) {
-    if (who == As::kStranger) {
+    if (who == As::kAnotherUser) {
       const bool changed = ::setgroups(0, nullptr) == 0 &&
                            ::setresgid(kStrangersId, kStrangersId, kStrangersId) == 0 &&
                            ::setresuid(kStrangersId, kStrangersId, kStrangersId) == 0;

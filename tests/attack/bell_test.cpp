@@ -42,7 +42,7 @@ TEST_F(ABell, CannotBeReadByAStranger) {
   Prey prey;
   const int bell = prey.bell.get();
   EXPECT_EQ(
-      run_attack(As::kStranger,
+      run_attack(As::kAnotherUser,
                  [&] {
                    std::string succeeded;
                    char byte = 0;
@@ -63,14 +63,14 @@ TEST_F(ABell, WhichAStrangerFillsHoldsUpNoPublisherAndStillWakes) {
   const int bell = prey.bell.get();
   arbiter::Node node("honest");
   auto out = node.output_port<int>("/honest:o");  // before the flood
-  EXPECT_EQ(run_attack(As::kStranger, [&] { return fill(bell); }).said, "done full");
+  EXPECT_EQ(run_attack(As::kAnotherUser, [&] { return fill(bell); }).said, "done full");
   EXPECT_EQ(prey.in().wait_for(0ms).status(), arbiter::WaitStatus::timeout);
   arbiter::test::Watched waiting([&] {
     // The flood may wake it; it finds nothing, empties the bell, and sleeps again.
     while (!prey.in().wait_for(1h).idle()) {
     }
   });
-  EXPECT_EQ(run_attack(As::kStranger, [&] { return fill(bell); }).said, "done full");
+  EXPECT_EQ(run_attack(As::kAnotherUser, [&] { return fill(bell); }).said, "done full");
   // The honest publishers' calls return, whatever the bell is like.
   for (int i = 0; i < 1000; ++i) {
     static_cast<void>(prey.out().publish(i));
@@ -92,7 +92,7 @@ TEST_F(ABell, WhichAStrangerFillsHoldsUpNoPublisherAndStillWakes) {
 TEST_F(ABell, WhoseDescriptorAStrangerMakesBlockDoesNotHoldUpTheDaemon) {
   Prey prey;
   const int bell = prey.bell.get();
-  EXPECT_EQ(run_attack(As::kStranger,
+  EXPECT_EQ(run_attack(As::kAnotherUser,
                        [&] {
                          if (::fcntl(bell, F_SETFL, 0) != 0) return std::string("cannot");
                          return fill(bell);

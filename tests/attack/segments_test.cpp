@@ -165,7 +165,7 @@ TEST_F(AStranger, CanChangeNoForeignMemory) {
   Prey prey;
   for (const Named& each : kAll) {
     const int fd = (prey.*each.descriptor).get();
-    EXPECT_EQ(run_attack(As::kStranger, [&] { return attack_and_reopen(fd); }).said, "done ")
+    EXPECT_EQ(run_attack(As::kAnotherUser, [&] { return attack_and_reopen(fd); }).said, "done ")
         << each.name;
   }
 }
@@ -174,7 +174,7 @@ TEST_F(AStranger, HasNoOtherWayIntoAProcess) {
   Prey prey;
   for (const pid_t process : {::getpid(), prey.daemon().process().pid()}) {
     EXPECT_EQ(
-        run_attack(As::kStranger,
+        run_attack(As::kAnotherUser,
                    [&] {
                      std::string succeeded;
                      const std::string directory = "/proc/" + std::to_string(process);

@@ -21,7 +21,7 @@ using nlohmann::json;
 using shm::MessageKind;
 using testing::IsEmpty;
 
-std::string page() { return source_of("docs/protocol.md"); }
+std::string protocol_page() { return source_of("docs/protocol.md"); }
 
 const std::vector<std::string> kFromClient{"kind",        "number", "what it says", "fields",
                                            "descriptors", "needs",  "answered by"};
@@ -46,18 +46,19 @@ TEST(ProtocolPage, HasEachKindOfMessageUnderWhoSendsIt) {
   EXPECT_EQ(of_client["kHello"], static_cast<std::uint32_t>(MessageKind::kHello));
   EXPECT_EQ(of_client["kBlind"], static_cast<std::uint32_t>(MessageKind::kBlind));
   EXPECT_EQ(of_daemon["kUnmentioned"], static_cast<std::uint32_t>(MessageKind::kUnmentioned));
-  EXPECT_EQ(numbers_of(rows_of(page(), kFromClient)), of_client);
-  EXPECT_EQ(numbers_of(rows_of(page(), kFromDaemon)), of_daemon);
+  EXPECT_EQ(numbers_of(rows_of(protocol_page(), kFromClient)), of_client);
+  EXPECT_EQ(numbers_of(rows_of(protocol_page(), kFromDaemon)), of_daemon);
 }
 
 TEST(ProtocolPage, HasEachFlagAndTheVersion) {
   Numbers flags;
-  for (const PageRow& row : rows_of(page(), {"flag", "value", "of", "meaning"})) {
+  for (const PageRow& row : rows_of(protocol_page(), {"flag", "value", "of", "meaning"})) {
     flags[quoted(row.cells[0]).at(0)] = static_cast<std::uint32_t>(std::stoul(row.cells[1]));
   }
   EXPECT_EQ(flags, enumerators(source_of("shm/wire.hpp"), "MessageFlag"));
-  EXPECT_THAT(page(), testing::HasSubstr("It describes version " +
-                                         std::to_string(shm::kWireVersion) + " (`kWireVersion`)"));
+  EXPECT_THAT(protocol_page(),
+              testing::HasSubstr("It describes version " + std::to_string(shm::kWireVersion) +
+                                 " (`kWireVersion`)"));
 }
 
 TEST(ProtocolPage, SaysWhereEachFieldOfAMessageLies) {
@@ -76,7 +77,7 @@ TEST(ProtocolPage, SaysWhereEachFieldOfAMessageLies) {
       {"name", {offsetof(Message, name), sizeof Message::name}},
       {"text", {offsetof(Message, text), sizeof Message::text}}};
   std::map<std::string, Place> on_page;
-  for (const PageRow& row : rows_of(page(), {"field", "offset", "bytes", "what it is"})) {
+  for (const PageRow& row : rows_of(protocol_page(), {"field", "offset", "bytes", "what it is"})) {
     on_page[quoted(row.cells[0]).at(0)] = {std::stoul(row.cells[1]), std::stoul(row.cells[2])};
   }
   EXPECT_EQ(on_page, places);
@@ -109,11 +110,12 @@ TEST(ProtocolPage, HasTheBoundsAndVersionsOfTheCode) {
       ++count;
     }
   };
-  for (const PageRow& row : rows_of(page(), {"bound", "of what", "in the code", "where"})) {
+  for (const PageRow& row :
+       rows_of(protocol_page(), {"bound", "of what", "in the code", "where"})) {
     check(row.cells[2], row.cells[3]);
   }
-  for (const PageRow& row : rows_of(page(), {"segment", "made by", "written by", "read by", "holds",
-                                             "declared in", "version"})) {
+  for (const PageRow& row : rows_of(protocol_page(), {"segment", "made by", "written by", "read by",
+                                                      "holds", "declared in", "version"})) {
     check(row.cells[6], row.cells[5]);
   }
   EXPECT_GT(count, 25u);
@@ -123,7 +125,7 @@ TEST(ProtocolPage, HasTheBoundsAndVersionsOfTheCode) {
 
 std::map<std::string, Words> documented_answers() {
   std::map<std::string, Words> answers;
-  for (const PageRow& row : rows_of(page(), kFromClient)) {
+  for (const PageRow& row : rows_of(protocol_page(), kFromClient)) {
     const auto kinds = quoted(row.cells.at(6));
     answers[quoted(row.cells[0]).at(0)] = Words(kinds.begin(), kinds.end());
   }
@@ -171,7 +173,7 @@ TEST(ProtocolPage, SaysWhatAnswersWhat) {
 // Each message is sent to daemons of which each forbids one action, and allows all others.
 TEST(ProtocolPage, SaysWhatThePolicyMustAllow) {
   const auto numbers = kinds_of_header();
-  const auto rows = rows_of(page(), kFromClient);
+  const auto rows = rows_of(protocol_page(), kFromClient);
   for (const std::string action :
        {"output", "input", "deactivate", "observe", "reload", "switch", "stop"}) {
     const bool has_ports = action == "output" || action == "input" || action == "deactivate";
@@ -232,7 +234,7 @@ std::map<std::string, Heard> hear_all() {
 
 TEST(ProtocolPage, SaysWhichFieldsAndDescriptorsTheDaemonSends) {
   const auto all = hear_all();
-  for (const PageRow& row : rows_of(page(), kFromDaemon)) {
+  for (const PageRow& row : rows_of(protocol_page(), kFromDaemon)) {
     const std::string kind = quoted(row.cells[0]).at(0);
     const auto heard = all.find(kind);
     ASSERT_NE(heard, all.end()) << kind << " was never heard";
@@ -287,7 +289,7 @@ TEST(ProtocolPage, NamesEachFieldOfTheModelDocumentAndNoOther) {
   }
   Daemon without("", {.without_model = true});
   observed.see(model_document(without));
-  EXPECT_THAT(disagreements(page(), observed), IsEmpty());
+  EXPECT_THAT(disagreements(protocol_page(), observed), IsEmpty());
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ using nlohmann::json;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-std::string page() { return content_of(std::string(ARBITER_SOURCE) + "/docs/status.md"); }
+std::string status_page() { return content_of(std::string(ARBITER_SOURCE) + "/docs/status.md"); }
 
 // A change that a client asks for, until it is in force.
 void change(const Daemon& daemon, shm::MessageKind kind, const std::string& name = {}) {
@@ -106,13 +106,13 @@ TEST(StatusPage, NamesEachFieldOfTheDocumentAndNoOther) {
   see_no_model(observed);
   see_ports(observed);
   see_strangers(observed);
-  EXPECT_THAT(disagreements(page(), observed), IsEmpty());
+  EXPECT_THAT(disagreements(status_page(), observed), IsEmpty());
 }
 
 TEST(StatusPage, HasAnExampleThatCouldBeOne) {
-  const auto example = listing_of(page(), "json");
+  const auto example = listing_of(status_page(), "json");
   ASSERT_TRUE(example);
-  EXPECT_THAT(faults_of_example(page(), json::parse(*example)), IsEmpty());
+  EXPECT_THAT(faults_of_example(status_page(), json::parse(*example)), IsEmpty());
 }
 
 // The comparison itself: a page of two objects, and documents that differ from it.
