@@ -98,10 +98,10 @@ TEST(PrintRules, WritesJson) {
                                    .other("/x", "/q")
                                    .timeout("/b", shm::kForever));
   const auto expected = nlohmann::json::parse(R"({
-    "timeout": "500ms", "timeouts": {"/is_b": "forever"},
+    "timeout": "500ms", "timeouts": {"/b": "forever"},
     "ports": [
       {"port": "/p", "arbitrated": true, "conflict": "error", "connections": [
-        {"source": "/is_a", "rule": "/is_a ∧ ¬/is_b", "behaviours": ["First", "Second"]},
+        {"source": "/a", "rule": "/a ∧ ¬/b", "behaviours": ["First", "Second"]},
         {"source": "/x", "rule": null, "behaviours": []}]},
       {"port": "/q", "arbitrated": false, "conflict": "error", "connections": [
         {"source": "/x", "rule": null, "behaviours": []}]}]})");
