@@ -62,7 +62,8 @@ bool is_short(const Witness& witness) {
 }
 
 std::string in_lists(const Witness& witness) {
-  return "active: " + list_or_none(witness.active) + "; inactive: " + list_or_none(witness.inactive) +
+  return "active: " + list_or_none(witness.active) +
+         "; inactive: " + list_or_none(witness.inactive) +
          (witness.is_shortest ? "" : " (nothing of it can be left out; others may be shorter)");
 }
 

@@ -151,9 +151,10 @@ TEST_F(Decision, ASourceWithoutAPageMakesBlindWhatReadsItAndNothingElse) {
 
 TEST_F(Decision, AnOldReadingDecidesAsAFreshOneDoesForAllCombinations) {
   builder_.conjunction(kA, 0, {kB}, {kC});
-  const ActivityWord choices[] = {kNeverActive,     arrival(100, kForever), deactivation(100),
-                                  arrival(0, kShortT),   arrival(50, kShortT),        arrival(100, kShortT),
-                                  arrival(101, kShortT), arrival(120, kForever), deactivation(130)};
+  const ActivityWord choices[] = {
+      kNeverActive,          arrival(100, kForever), deactivation(100),
+      arrival(0, kShortT),   arrival(50, kShortT),   arrival(100, kShortT),
+      arrival(101, kShortT), arrival(120, kForever), deactivation(130)};
   for (const ActivityWord b : choices) {
     for (const ActivityWord c : choices) {
       word(kB) = b;
