@@ -8,6 +8,8 @@
 
 namespace arbiter::bench {
 
+inline constexpr int kTimes = 5000;  // of what takes few instructions
+
 inline std::string part_name(const std::string& measure, int times) {
   return measure + " * " + std::to_string(times);
 }

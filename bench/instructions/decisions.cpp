@@ -13,7 +13,6 @@
 namespace arbiter::bench {
 namespace {
 
-constexpr int kTimes = 5000;
 constexpr shm::Nanoseconds kNow = 1'000'000'000;
 constexpr shm::Nanoseconds kHour = 3'600'000'000'000;
 
@@ -117,7 +116,7 @@ std::vector<rules::CompiledRule> in_order(std::size_t size) {
     auto& rule = rules.emplace_back();
     rule.source = source(i);
     rule.kind = shm::table::kConjunction;
-    for (const std::size_t other : {1, 2, 4}) rule.reads.push_back(source((i + other) % size));
+    for (const std::size_t other : {1u, 2u, 4u}) rule.reads.push_back(source((i + other) % size));
     rule.expected.assign(rule.reads.size(), false);
   }
   rules.emplace_back().kind = shm::table::kAlways;
@@ -147,13 +146,13 @@ void count_decision(const std::string& measure, const std::vector<rules::Compile
 }  // namespace
 
 void count_decisions() {
-  for (const std::size_t size : {1, 8, 64, 256}) {
+  for (const std::size_t size : {1u, 8u, 64u, 256u}) {
     count_decision("decide, conjunction of " + std::to_string(size), {conjunction(size)}, size);
   }
-  for (const shm::Word size : {8, 64}) {
+  for (const shm::Word size : {8u, 64u}) {
     count_decision("decide, diagram of " + std::to_string(size), {parity(size)}, size);
   }
-  for (const std::size_t size : {8, 64, 254}) {
+  for (const std::size_t size : {8u, 64u, 254u}) {
     count_decision("decide, " + std::to_string(size) + " rules in order", in_order(size), size);
   }
 }
