@@ -3,9 +3,20 @@
 #include <algorithm>
 #include <utility>
 
+#include "rules/names.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::rules {
+
+std::string in_words(const Witness& witness) {
+  if (witness.active.empty() && witness.inactive.empty()) return "nothing active";
+  std::string text;
+  if (!witness.active.empty()) text = enumerate(witness.active) + " active";
+  if (!witness.inactive.empty()) {
+    text += (text.empty() ? "" : " and ") + enumerate(witness.inactive) + " inactive";
+  }
+  return text;
+}
 
 void Diagnostics::error(std::string code, Location where, std::string message) {
   error(std::move(code), std::move(where), std::move(message), {});

@@ -30,6 +30,9 @@ struct Witness {
   bool is_shortest = false;  // known to be: no conjunction of fewer literals does the same
 };
 
+// "/a and /b active and /c inactive"; "nothing active" if there are no literals.
+std::string in_words(const Witness& witness);
+
 // What a finding is about, for programs, which should not have to take its message apart. Empty is
 // what it does not speak of.
 struct Subject {

@@ -2,7 +2,6 @@
 
 #include <string_view>
 
-#include "rules/load.hpp"
 #include "rules/text_file.hpp"
 #include "shm/utf8.hpp"
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -17,12 +16,6 @@ namespace arbiter::rules {
 struct ModelFiles {
   std::vector<std::string> models;  // together they form one model
   std::optional<std::string> application;
-};
-
-// A file that cannot be opened or read; the message names it and says why.
-class FileError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
 };
 
 // Throws FileError.

@@ -12,7 +12,6 @@
 #include <cstring>
 #include <utility>
 
-#include "rules/load.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::rules {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,6 +12,12 @@
 namespace arbiter::rules {
 
 inline constexpr std::size_t kMaxFileBytes = 16u << 20;
+
+// A file that cannot be opened or read; the message names it and says why.
+class FileError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 // What is read out of a file refers to its bytes by std::string_view, hence it stays where it is.
 class TextFile {

@@ -178,14 +178,4 @@ const CompiledRule* find_winner(const CompiledPort& port, const std::set<std::st
   return found == port.rules.end() ? nullptr : &*found;
 }
 
-std::string in_words(const Witness& witness) {
-  if (witness.active.empty() && witness.inactive.empty()) return "nothing active";
-  std::string text;
-  if (!witness.active.empty()) text = enumerate(witness.active) + " active";
-  if (!witness.inactive.empty()) {
-    text += (text.empty() ? "" : " and ") + enumerate(witness.inactive) + " inactive";
-  }
-  return text;
-}
-
 }  // namespace arbiter::rules

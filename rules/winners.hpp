@@ -74,7 +74,4 @@ class Winners {
 // The rule that selects its connection in that state; null if nobody wins.
 const CompiledRule* find_winner(const CompiledPort& port, const std::set<std::string>& active);
 
-// "/a and /b active and /c inactive"; "nothing active" if there are no literals.
-std::string in_words(const Witness& witness);
-
 }  // namespace arbiter::rules
