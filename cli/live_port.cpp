@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "cli/name_warnings.hpp"
-#include "rules/load.hpp"
-#include "rules/names.hpp"
-#include "rules/table_rules.hpp"
-#include "rules/tenure.hpp"
+#include "rules/explain/tenure.hpp"
+#include "rules/model/load.hpp"
+#include "rules/prove/table_rules.hpp"
+#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "shm/decision.hpp"
 

@@ -11,7 +11,7 @@
 #include "cli/live.hpp"
 #include "cli/model_in_force.hpp"
 #include "cli/why_report.hpp"
-#include "rules/explain.hpp"
+#include "rules/explain/explain.hpp"
 #include "shm/ids.hpp"
 #include "shm/table_ring.hpp"
 

@@ -11,8 +11,8 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/verbs.hpp"
-#include "rules/load.hpp"
-#include "rules/names.hpp"
+#include "rules/model/load.hpp"
+#include "rules/text/names.hpp"
 #include "shm/utf8.hpp"
 
 namespace {

@@ -3,9 +3,9 @@
 
 #include <optional>
 
-#include "rules/compile.hpp"
-#include "rules/diagnostic.hpp"
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
+#include "rules/prove/compile.hpp"
+#include "rules/text/diagnostic.hpp"
 
 namespace CLI {
 class App;

@@ -9,7 +9,7 @@
 
 #include "cli/live.hpp"
 #include "cli/why_report.hpp"
-#include "rules/names.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {

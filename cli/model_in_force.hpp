@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/node_core.hpp"
-#include "rules/model_texts.hpp"
+#include "rules/model/model_texts.hpp"
 #include "shm/activity.hpp"
 
 namespace arbiter::cli {

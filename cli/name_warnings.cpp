@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <string_view>
 
-#include "rules/names.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "rules/diagnostic.hpp"
+#include "rules/text/diagnostic.hpp"
 
 namespace arbiter::cli {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "cli/live.hpp"
-#include "rules/names.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <iostream>
 
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
 
 namespace arbiter::cli {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "rules/model_texts.hpp"
+#include "rules/model/model_texts.hpp"
 
 namespace arbiter::cli {
 

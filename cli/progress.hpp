@@ -9,7 +9,7 @@
 #include <functional>
 #include <ostream>
 
-#include "rules/budget.hpp"
+#include "rules/prove/budget.hpp"
 
 namespace arbiter::cli {
 

@@ -11,10 +11,10 @@
 #include "cli/model_files.hpp"
 #include "cli/progress.hpp"
 #include "cli/verbs.hpp"
-#include "rules/findings.hpp"
-#include "rules/names.hpp"
-#include "rules/report.hpp"
-#include "rules/verdict.hpp"
+#include "rules/ask/findings.hpp"
+#include "rules/ask/report.hpp"
+#include "rules/ask/verdict.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {

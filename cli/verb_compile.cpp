@@ -13,9 +13,9 @@
 #include "cli/model_files.hpp"
 #include "cli/output_file.hpp"
 #include "cli/verbs.hpp"
-#include "rules/application_writer.hpp"
-#include "rules/report.hpp"
-#include "rules/xml.hpp"
+#include "rules/ask/report.hpp"
+#include "rules/model/application_writer.hpp"
+#include "rules/text/xml.hpp"
 #include "shm/file_descriptor.hpp"
 
 namespace arbiter::cli {

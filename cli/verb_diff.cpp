@@ -9,8 +9,8 @@
 #include "cli/model_files.hpp"
 #include "cli/progress.hpp"
 #include "cli/verbs.hpp"
-#include "rules/model_diff.hpp"
-#include "rules/report.hpp"
+#include "rules/ask/model_diff.hpp"
+#include "rules/ask/report.hpp"
 
 namespace arbiter::cli {
 namespace {

@@ -13,7 +13,7 @@
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
-#include "rules/duration.hpp"
+#include "rules/text/duration.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {

@@ -19,7 +19,7 @@
 #include "cli/verbs.hpp"
 #include "drawing/drawing.hpp"
 #include "drawing/graphviz.hpp"
-#include "rules/report.hpp"
+#include "rules/ask/report.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {

@@ -17,9 +17,9 @@
 
 #include "cli/live.hpp"
 #include "cli/verbs.hpp"
-#include "rules/report.hpp"
-#include "rules/simulation.hpp"
-#include "rules/trace.hpp"
+#include "rules/ask/report.hpp"
+#include "rules/explain/simulation.hpp"
+#include "rules/explain/trace.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {

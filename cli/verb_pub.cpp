@@ -11,7 +11,7 @@
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
-#include "rules/names.hpp"
+#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {

@@ -6,8 +6,8 @@
 
 #include "cli/model_files.hpp"
 #include "cli/verbs.hpp"
-#include "rules/print_rules.hpp"
-#include "rules/report.hpp"
+#include "rules/ask/report.hpp"
+#include "rules/model/print_rules.hpp"
 
 namespace arbiter::cli {
 namespace {

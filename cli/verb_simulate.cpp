@@ -13,10 +13,10 @@
 #include "cli/model_files.hpp"
 #include "cli/verbs.hpp"
 #include "cli/why_simulated.hpp"
-#include "rules/names.hpp"
-#include "rules/report.hpp"
-#include "rules/simulation.hpp"
-#include "rules/trace.hpp"
+#include "rules/ask/report.hpp"
+#include "rules/explain/simulation.hpp"
+#include "rules/explain/trace.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "cli/name_warnings.hpp"
 #include "cli/why_summary.hpp"
-#include "rules/names.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {

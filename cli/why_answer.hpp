@@ -9,8 +9,8 @@
 #include "cli/live_port.hpp"
 #include "cli/obstacles.hpp"
 #include "cli/why_follow.hpp"
-#include "rules/explain.hpp"
-#include "rules/tenure.hpp"
+#include "rules/explain/explain.hpp"
+#include "rules/explain/tenure.hpp"
 
 namespace arbiter::cli {
 

@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "rules/change.hpp"
+#include "rules/explain/change.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {

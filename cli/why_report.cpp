@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "rules/names.hpp"
-#include "rules/print_rules.hpp"
+#include "rules/model/print_rules.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {

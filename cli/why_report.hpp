@@ -10,7 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "rules/explain.hpp"
+#include "rules/explain/explain.hpp"
 #include "shm/activity.hpp"
 
 namespace arbiter::cli {

@@ -5,9 +5,9 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "rules/change.hpp"
-#include "rules/names.hpp"
-#include "rules/tenure.hpp"
+#include "rules/explain/change.hpp"
+#include "rules/explain/tenure.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "cli/why_report.hpp"
-#include "rules/explain.hpp"
-#include "rules/simulation.hpp"
+#include "rules/explain/explain.hpp"
+#include "rules/explain/simulation.hpp"
 
 namespace arbiter::cli {
 

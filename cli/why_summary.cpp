@@ -7,7 +7,7 @@
 #include <string>
 
 #include "cli/why_report.hpp"
-#include "rules/names.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {

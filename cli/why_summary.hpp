@@ -4,7 +4,7 @@
 #include <ostream>
 #include <vector>
 
-#include "rules/explain.hpp"
+#include "rules/explain/explain.hpp"
 
 namespace arbiter::cli {
 

@@ -8,8 +8,8 @@
 
 #include "drawing/siblings.hpp"
 #include "drawing/views.hpp"
-#include "rules/hierarchy.hpp"
-#include "rules/print_rules.hpp"
+#include "rules/model/hierarchy.hpp"
+#include "rules/model/print_rules.hpp"
 
 namespace arbiter::drawing {
 namespace {

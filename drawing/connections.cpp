@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "drawing/views.hpp"
-#include "rules/print_rules.hpp"
+#include "rules/model/print_rules.hpp"
 
 namespace arbiter::drawing {
 namespace {

@@ -1,6 +1,6 @@
 #include "drawing/dot.hpp"
 
-#include "rules/xml.hpp"
+#include "rules/text/xml.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::drawing {

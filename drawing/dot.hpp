@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "rules/diagnostic.hpp"
+#include "rules/text/diagnostic.hpp"
 
 namespace arbiter::drawing {
 

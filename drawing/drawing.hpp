@@ -6,7 +6,7 @@
 #include <string>
 
 #include "drawing/situation.hpp"
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
 
 namespace arbiter::drawing {
 

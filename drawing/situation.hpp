@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "rules/rule_set.hpp"
+#include "rules/model/rule_set.hpp"
 
 namespace arbiter::drawing {
 

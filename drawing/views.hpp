@@ -3,7 +3,7 @@
 
 #include "drawing/dot.hpp"
 #include "drawing/situation.hpp"
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
 
 namespace arbiter::drawing {
 

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "rules/model_diff.hpp"
+#include "rules/ask/model_diff.hpp"
 
 namespace arbiter::service {
 

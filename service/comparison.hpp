@@ -7,7 +7,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "rules/compile.hpp"
+#include "rules/prove/compile.hpp"
 
 namespace arbiter::service {
 

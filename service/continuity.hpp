@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "rules/compile.hpp"
+#include "rules/prove/compile.hpp"
 #include "service/directory.hpp"
 #include "shm/activity.hpp"
 #include "shm/decision_table.hpp"

@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "rules/report.hpp"
+#include "rules/ask/report.hpp"
 #include "service/log.hpp"
 
 namespace arbiter::service {

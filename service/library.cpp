@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
 #include "service/preparation.hpp"
 
 namespace arbiter::service {

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "rules/compile.hpp"
+#include "rules/prove/compile.hpp"
 #include "service/directory.hpp"
 #include "service/findings.hpp"
 #include "service/model_files.hpp"

@@ -21,7 +21,7 @@
 #include <optional>
 #include <string>
 
-#include "rules/model_texts.hpp"
+#include "rules/model/model_texts.hpp"
 #include "service/continuity.hpp"
 #include "service/history.hpp"
 #include "service/library.hpp"

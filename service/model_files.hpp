@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
 
 namespace arbiter::service {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "rules/quantifiers.hpp"
+#include "rules/model/quantifiers.hpp"
 
 namespace arbiter::service {
 namespace {

@@ -20,8 +20,8 @@
 #include <string_view>
 #include <vector>
 
-#include "rules/diagnostic.hpp"
-#include "rules/text_file.hpp"
+#include "rules/text/diagnostic.hpp"
+#include "rules/text/text_file.hpp"
 
 namespace arbiter::service {
 

@@ -7,7 +7,7 @@
 #include <charconv>
 #include <utility>
 
-#include "rules/names.hpp"
+#include "rules/text/names.hpp"
 #include "service/policy.hpp"
 #include "shm/limits.hpp"
 #include "shm/utf8.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "rules/budget.hpp"
+#include "rules/prove/budget.hpp"
 #include "service/compiler.hpp"
 
 namespace arbiter::service {

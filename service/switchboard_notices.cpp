@@ -3,7 +3,7 @@
 #include <string_view>
 #include <vector>
 
-#include "rules/names.hpp"
+#include "rules/text/names.hpp"
 #include "service/log.hpp"
 #include "service/switchboard.hpp"
 

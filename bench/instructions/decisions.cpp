@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bench/instructions/counting.hpp"
-#include "rules/compile.hpp"
+#include "rules/prove/compile.hpp"
 #include "shm/clock.hpp"
 #include "shm/decision.hpp"
 

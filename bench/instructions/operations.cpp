@@ -21,7 +21,7 @@
 namespace arbiter::bench {
 namespace {
 
-constexpr int kWarmUp = 3000;  // more than the largest pool has slots
+constexpr int kWarmUp = 3000;           // more than the largest pool has slots
 constexpr std::uint32_t kDepth = 1024;  // of queues that are filled to be emptied
 constexpr int kTakes = 1000;
 

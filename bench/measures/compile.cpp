@@ -1,6 +1,6 @@
 // Reading, proving and compiling models of 10 to 10 000 behaviours, as arbiterd and `arbiter check`
 // do.
-#include "rules/compile.hpp"
+#include "rules/prove/compile.hpp"
 
 #include <algorithm>
 #include <fstream>
@@ -10,7 +10,7 @@
 #include "bench/harness/program.hpp"
 #include "bench/harness/worker.hpp"
 #include "bench/measures/measures.hpp"
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
 
 namespace arbiter::bench {
 namespace {

@@ -10,9 +10,9 @@
 #include <string>
 #include <string_view>
 
-#include "rules/diagnostic.hpp"
-#include "rules/report.hpp"
-#include "rules/text_file.hpp"
+#include "rules/ask/report.hpp"
+#include "rules/text/diagnostic.hpp"
+#include "rules/text/text_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 

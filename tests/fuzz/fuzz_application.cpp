@@ -1,6 +1,6 @@
 // An application file, beside a model of which it has all connections, or not.
-#include "rules/compile.hpp"
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
+#include "rules/prove/compile.hpp"
 #include "tests/fuzz/file_in_memory.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/support/live_table.hpp"

@@ -1,10 +1,10 @@
 // A condition: parsed, its quantifiers expanded, written again, parsed again: it means the same.
 #include <random>
 
-#include "rules/condition_parser.hpp"
-#include "rules/print_rules.hpp"
-#include "rules/quantifiers.hpp"
-#include "rules/text.hpp"
+#include "rules/model/condition_parser.hpp"
+#include "rules/model/print_rules.hpp"
+#include "rules/model/quantifiers.hpp"
+#include "rules/text/text.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/support/meaning.hpp"
 

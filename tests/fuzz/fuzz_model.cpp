@@ -3,11 +3,11 @@
 #include <random>
 #include <stdexcept>
 
-#include "rules/application_writer.hpp"
-#include "rules/compile.hpp"
-#include "rules/load.hpp"
-#include "rules/print_rules.hpp"
-#include "rules/xml.hpp"
+#include "rules/model/application_writer.hpp"
+#include "rules/model/load.hpp"
+#include "rules/model/print_rules.hpp"
+#include "rules/prove/compile.hpp"
+#include "rules/text/xml.hpp"
 #include "tests/fuzz/file_in_memory.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/support/live_table.hpp"

@@ -1,9 +1,9 @@
 // A trace: read, written, read again, and replayed against a small model.
-#include "rules/compile.hpp"
-#include "rules/csv.hpp"
-#include "rules/load.hpp"
-#include "rules/simulation.hpp"
-#include "rules/trace.hpp"
+#include "rules/explain/simulation.hpp"
+#include "rules/explain/trace.hpp"
+#include "rules/model/load.hpp"
+#include "rules/prove/compile.hpp"
+#include "rules/text/csv.hpp"
 #include "tests/fuzz/file_in_memory.hpp"
 #include "tests/fuzz/fuzz.hpp"
 

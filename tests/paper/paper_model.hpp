@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "rules/compile.hpp"
-#include "rules/load.hpp"
-#include "rules/print_rules.hpp"
-#include "rules/report.hpp"
+#include "rules/ask/report.hpp"
+#include "rules/model/load.hpp"
+#include "rules/model/print_rules.hpp"
+#include "rules/prove/compile.hpp"
 #include "tests/support/live_table.hpp"
 #include "tests/support/temporary_directory.hpp"
 

@@ -2,7 +2,7 @@
 // them.
 #include <gmock/gmock.h>
 
-#include "rules/simulation.hpp"
+#include "rules/explain/simulation.hpp"
 #include "tests/paper/paper_model.hpp"
 
 namespace arbiter::test {

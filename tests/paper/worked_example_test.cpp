@@ -4,7 +4,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "rules/simulation.hpp"
+#include "rules/explain/simulation.hpp"
 #include "tests/paper/paper_model.hpp"
 #include "tests/support/run_program.hpp"
 

@@ -1,4 +1,4 @@
-#include "rules/application_reader.hpp"
+#include "rules/model/application_reader.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "rules/application_writer.hpp"
+#include "rules/model/application_writer.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "rules/compile.hpp"
+#include "rules/prove/compile.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
 

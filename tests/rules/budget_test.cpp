@@ -1,15 +1,15 @@
 // One budget for a whole run, spent fairly, whatever the machine.
-#include "rules/budget.hpp"
+#include "rules/prove/budget.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <memory>
 
-#include "rules/compile.hpp"
-#include "rules/findings.hpp"
-#include "rules/model_diff.hpp"
-#include "rules/verdict.hpp"
+#include "rules/ask/findings.hpp"
+#include "rules/ask/model_diff.hpp"
+#include "rules/ask/verdict.hpp"
+#include "rules/prove/compile.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 
 namespace arbiter::test {

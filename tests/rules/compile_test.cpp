@@ -1,4 +1,4 @@
-#include "rules/compile.hpp"
+#include "rules/prove/compile.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "rules/condition_parser.hpp"
+#include "rules/model/condition_parser.hpp"
 
 #include <gmock/gmock.h>
 

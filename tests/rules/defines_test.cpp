@@ -1,4 +1,4 @@
-#include "rules/defines.hpp"
+#include "rules/text/defines.hpp"
 
 #include <gmock/gmock.h>
 

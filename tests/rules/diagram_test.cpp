@@ -1,4 +1,4 @@
-#include "rules/diagram.hpp"
+#include "rules/prove/diagram.hpp"
 
 #include <gtest/gtest.h>
 

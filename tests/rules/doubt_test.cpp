@@ -1,5 +1,5 @@
 // An error in one element hides no problem of others, and brings none that only follows from it.
-#include "rules/doubt.hpp"
+#include "rules/model/doubt.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,8 +7,8 @@
 #include <random>
 #include <set>
 
-#include "rules/compile.hpp"
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
+#include "rules/prove/compile.hpp"
 #include "tests/rules/random_model.hpp"
 #include "tests/support/temporary_directory.hpp"
 

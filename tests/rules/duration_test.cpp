@@ -1,4 +1,4 @@
-#include "rules/duration.hpp"
+#include "rules/text/duration.hpp"
 
 #include <gmock/gmock.h>
 

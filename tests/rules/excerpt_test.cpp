@@ -1,4 +1,4 @@
-#include "rules/excerpt.hpp"
+#include "rules/text/excerpt.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

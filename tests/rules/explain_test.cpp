@@ -1,5 +1,5 @@
 // What is told of a connection that loses: in the terms of the model, and where it is written.
-#include "rules/explain.hpp"
+#include "rules/explain/explain.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "rules/extraction.hpp"
+#include "rules/model/extraction.hpp"
 
 #include <gmock/gmock.h>
 

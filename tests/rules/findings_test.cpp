@@ -1,5 +1,5 @@
 // What check finds beside errors, and that it keeps to its bounds whatever the rules.
-#include "rules/findings.hpp"
+#include "rules/ask/findings.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <functional>
 #include <random>
 
-#include "rules/compile.hpp"
+#include "rules/prove/compile.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 
 namespace arbiter::test {

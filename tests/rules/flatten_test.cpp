@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <random>
 
-#include "rules/compile.hpp"
+#include "rules/prove/compile.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
 

@@ -1,4 +1,4 @@
-#include "rules/hierarchy.hpp"
+#include "rules/model/hierarchy.hpp"
 
 #include <gmock/gmock.h>
 

@@ -4,7 +4,7 @@
 #include <random>
 #include <string>
 
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
 #include "tests/rules/model_text.hpp"
 
 namespace arbiter::rules {

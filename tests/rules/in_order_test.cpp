@@ -1,6 +1,6 @@
 // conflict="first" where the rules are decided one after the other, since precedence multiplied out
 // would be too large: the same winners, with tables that stay small.
-#include "rules/in_order.hpp"
+#include "rules/prove/in_order.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <random>
 
-#include "rules/explain.hpp"
-#include "rules/simulation.hpp"
-#include "rules/table_rules.hpp"
-#include "rules/tenure.hpp"
+#include "rules/explain/explain.hpp"
+#include "rules/explain/simulation.hpp"
+#include "rules/explain/tenure.hpp"
+#include "rules/prove/table_rules.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
 

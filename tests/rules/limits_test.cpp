@@ -9,8 +9,8 @@
 #include <string>
 #include <thread>
 
-#include "rules/load.hpp"
-#include "rules/trace.hpp"
+#include "rules/explain/trace.hpp"
+#include "rules/model/load.hpp"
 #include "tests/rules/model_text.hpp"
 
 namespace arbiter::rules {

@@ -1,12 +1,12 @@
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
 
 #include <gmock/gmock.h>
 
 #include <string>
 #include <vector>
 
-#include "rules/compile.hpp"
-#include "rules/text_file.hpp"
+#include "rules/prove/compile.hpp"
+#include "rules/text/text_file.hpp"
 #include "shm/limits.hpp"
 #include "tests/rules/model_text.hpp"
 

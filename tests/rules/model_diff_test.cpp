@@ -1,5 +1,5 @@
 // What differs between two models, against brute force over all states.
-#include "rules/model_diff.hpp"
+#include "rules/ask/model_diff.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
 #include "tests/rules/random_model.hpp"
 #include "tests/support/live_table.hpp"
 #include "tests/support/temporary_directory.hpp"

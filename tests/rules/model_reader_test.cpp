@@ -1,4 +1,4 @@
-#include "rules/model_reader.hpp"
+#include "rules/model/model_reader.hpp"
 
 #include <gmock/gmock.h>
 

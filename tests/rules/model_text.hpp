@@ -11,9 +11,9 @@
 #include <string_view>
 #include <vector>
 
-#include "rules/diagnostic.hpp"
-#include "rules/load.hpp"
-#include "rules/rule_set.hpp"
+#include "rules/model/load.hpp"
+#include "rules/model/rule_set.hpp"
+#include "rules/text/diagnostic.hpp"
 
 namespace arbiter::rules {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "rules/similar_names.hpp"
+#include "rules/text/similar_names.hpp"
 #include "tests/rules/model_text.hpp"
 
 namespace arbiter::rules {

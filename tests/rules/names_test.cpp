@@ -1,4 +1,4 @@
-#include "rules/names.hpp"
+#include "rules/text/names.hpp"
 
 #include <gmock/gmock.h>
 

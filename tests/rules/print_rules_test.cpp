@@ -1,4 +1,4 @@
-#include "rules/print_rules.hpp"
+#include "rules/model/print_rules.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The proof that one connection wins at most, against brute force over all activations.
-#include "rules/proof.hpp"
+#include "rules/prove/proof.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <optional>
 #include <random>
 
-#include "rules/compile.hpp"
-#include "rules/witness.hpp"
+#include "rules/prove/compile.hpp"
+#include "rules/prove/witness.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
 

@@ -1,4 +1,4 @@
-#include "rules/quantifiers.hpp"
+#include "rules/model/quantifiers.hpp"
 
 #include <gmock/gmock.h>
 

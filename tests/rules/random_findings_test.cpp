@@ -6,8 +6,8 @@
 #include <map>
 #include <regex>
 
-#include "rules/findings.hpp"
-#include "rules/load.hpp"
+#include "rules/ask/findings.hpp"
+#include "rules/model/load.hpp"
 #include "tests/rules/random_model.hpp"
 #include "tests/support/live_table.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cstring>
 
-#include "rules/application_writer.hpp"
-#include "rules/compile.hpp"
-#include "rules/explain.hpp"
-#include "rules/load.hpp"
+#include "rules/explain/explain.hpp"
+#include "rules/model/application_writer.hpp"
+#include "rules/model/load.hpp"
+#include "rules/prove/compile.hpp"
 #include "tests/rules/random_model.hpp"
 #include "tests/support/live_table.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -3,9 +3,9 @@
 
 #include <functional>
 
-#include "rules/load.hpp"
-#include "rules/statement.hpp"
-#include "rules/verdict.hpp"
+#include "rules/ask/verdict.hpp"
+#include "rules/model/load.hpp"
+#include "rules/model/statement.hpp"
 #include "tests/rules/random_model.hpp"
 #include "tests/support/live_table.hpp"
 #include "tests/support/temporary_directory.hpp"

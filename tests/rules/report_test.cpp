@@ -1,4 +1,4 @@
-#include "rules/report.hpp"
+#include "rules/ask/report.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "rules/winners.hpp"
+#include "rules/prove/winners.hpp"
 
 namespace arbiter::test {
 namespace {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "rules/rule_set.hpp"
+#include "rules/model/rule_set.hpp"
 #include "tests/support/meaning.hpp"
 
 namespace arbiter::test {

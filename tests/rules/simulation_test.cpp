@@ -1,4 +1,4 @@
-#include "rules/simulation.hpp"
+#include "rules/explain/simulation.hpp"
 
 #include <gtest/gtest.h>
 

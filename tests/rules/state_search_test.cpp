@@ -1,6 +1,6 @@
 // States found one by one, against brute force: where rules are decided in order, or diagrams are
 // too large, the findings and `diff` rest on them.
-#include "rules/state_search.hpp"
+#include "rules/prove/state_search.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,9 +8,9 @@
 #include <algorithm>
 #include <random>
 
-#include "rules/findings.hpp"
-#include "rules/model_diff.hpp"
-#include "rules/winners.hpp"
+#include "rules/ask/findings.hpp"
+#include "rules/ask/model_diff.hpp"
+#include "rules/prove/winners.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
 

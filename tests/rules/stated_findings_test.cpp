@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "rules/compile.hpp"
-#include "rules/findings.hpp"
+#include "rules/ask/findings.hpp"
+#include "rules/prove/compile.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 
 namespace arbiter::test {

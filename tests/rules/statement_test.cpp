@@ -1,4 +1,4 @@
-#include "rules/statement.hpp"
+#include "rules/model/statement.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Smallest reasons, against trying all activations.
-#include "rules/sufficient_reason.hpp"
+#include "rules/explain/sufficient_reason.hpp"
 
 #include <gtest/gtest.h>
 

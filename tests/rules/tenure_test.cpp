@@ -1,13 +1,13 @@
 // Since when a winner wins: what is said of the past, against the past.
-#include "rules/tenure.hpp"
+#include "rules/explain/tenure.hpp"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "rules/change.hpp"
-#include "rules/compile.hpp"
-#include "rules/simulation.hpp"
+#include "rules/explain/change.hpp"
+#include "rules/explain/simulation.hpp"
+#include "rules/prove/compile.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
 

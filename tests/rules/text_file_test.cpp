@@ -1,4 +1,4 @@
-#include "rules/text_file.hpp"
+#include "rules/text/text_file.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
 #include "shm/utf8.hpp"
 #include "tests/rules/model_text.hpp"
 

@@ -1,12 +1,12 @@
-#include "rules/trace.hpp"
+#include "rules/explain/trace.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <tuple>
 
-#include "rules/csv.hpp"
-#include "rules/load.hpp"
+#include "rules/model/load.hpp"
+#include "rules/text/csv.hpp"
 
 namespace arbiter::test {
 namespace {

@@ -1,11 +1,11 @@
-#include "rules/verdict.hpp"
+#include "rules/ask/verdict.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "rules/compile.hpp"
+#include "rules/prove/compile.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 
 namespace arbiter::test {

@@ -1,6 +1,6 @@
 // Witnesses against brute force: none shorter where one is called a shortest, and never a literal
 // that can be left out.
-#include "rules/witness.hpp"
+#include "rules/prove/witness.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,8 +9,8 @@
 #include <bit>
 #include <random>
 
-#include "rules/compile.hpp"
-#include "rules/findings.hpp"
+#include "rules/ask/findings.hpp"
+#include "rules/prove/compile.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 
 namespace arbiter::test {

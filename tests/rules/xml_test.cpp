@@ -1,4 +1,4 @@
-#include "rules/xml.hpp"
+#include "rules/text/xml.hpp"
 
 #include <gmock/gmock.h>
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "rules/compile.hpp"
+#include "rules/prove/compile.hpp"
 #include "shm/decision.hpp"
 
 namespace arbiter::test {

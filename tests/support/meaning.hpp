@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "rules/expression.hpp"
+#include "rules/model/expression.hpp"
 
 namespace arbiter::test {
 

@@ -1,0 +1,23 @@
+#include "rules/explain/change.hpp"
+
+#include "rules/explain/tenure.hpp"
+
+namespace arbiter::rules {
+
+std::vector<shm::SourceId> causes_of_change(const shm::TableView& table, shm::PortId port,
+                                            const Picture& before, const Picture& after) {
+  std::vector<shm::SourceId> changed;
+  for (const shm::SourceId source : sources_heeded(table, port)) {
+    if (before(source) != after(source)) changed.push_back(source);
+  }
+  const shm::SourceId now = winner_at(table, port, after);
+  for (const shm::SourceId source : changed) {
+    const shm::SourceId alone = winner_at(table, port, [&](shm::SourceId each) {
+      return each == source ? after(each) : before(each);
+    });
+    if (alone == now) return {source};
+  }
+  return changed;
+}
+
+}  // namespace arbiter::rules

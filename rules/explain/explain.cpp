@@ -1,0 +1,339 @@
+#include "rules/explain/explain.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <map>
+#include <set>
+#include <string_view>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+
+#include "rules/explain/assume.hpp"
+#include "rules/model/print_rules.hpp"
+#include "rules/model/provenance.hpp"
+#include "rules/model/quantifiers.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+Element element(const Behaviour& behaviour) {
+  return {behaviour.name, behaviour.is_meta, behaviour.where};
+}
+
+// Explains the connections of one port, under one activation.
+class PortInquiry {
+ public:
+  PortInquiry(const RuleSet& rules, const std::string& port, const IsActive& is_active)
+      : rules_(rules), port_(port), is_active_(is_active), expansion_(rules.sources) {}
+
+  PortExplanation explain() {
+    PortExplanation result;
+    result.port = port_;
+    const auto at = std::find_if(rules_.ports.begin(), rules_.ports.end(),
+                                 [&](const PortRules& each) { return each.port == port_; });
+    if (at != rules_.ports.end()) {
+      result.is_known = result.is_arbitrated = true;
+      result.first_wins = at->first_wins;
+      gather_parts();
+      for (const ConnectionRule& rule : at->rules) add(rule, *at, result);
+      add_senses(*at, result);
+    }
+    for (const Connection& connection : rules_.other_connections) {
+      if (connection.port != port_) continue;
+      result.is_known = true;
+      auto& added = result.connections.emplace_back();
+      added.source = connection.source;
+      added.is_active = is_active_(connection.source);
+      added.where = connection.where;
+      added.is_read = is_read(connection.source);
+    }
+    return result;
+  }
+
+ private:
+  // A source of a behaviour, as one that it may inhibit by.
+  struct Voice {
+    const std::string* source;
+    std::size_t behaviour;
+  };
+  struct Voices {
+    std::vector<Voice> active;
+    std::unordered_set<std::string_view> inactive;
+    bool across_ports = false;
+  };
+  struct ConfigPlace {
+    std::size_t behaviour;
+    const Config* config;
+  };
+
+  // Which behaviours configure a connection to the port, and which rules are written by hand.
+  void gather_parts() {
+    if (rules_.provenance == nullptr) return;
+    const Model& model = rules_.provenance->model;
+    for (std::size_t b = 0; b < model.behaviours.size(); ++b) {
+      for (const Config& config : model.behaviours[b].configs) {
+        if (config.port == port_) configs_[config.source].push_back({b, &config});
+      }
+    }
+    for (const Select& select : model.selects) {
+      if (select.port == port_) selects_[select.source] = &select;
+    }
+  }
+
+  void add(const ConnectionRule& rule, const PortRules& rules, PortExplanation& port) {
+    ConnectionExplanation result;
+    result.source = rule.source;
+    result.has_rule = true;
+    result.is_active = is_active_(rule.source);
+    result.parts = parts_of(rule);
+    const bool may_hold = std::any_of(result.parts.begin(), result.parts.end(),
+                                      [](const Part& part) { return part.causes.empty(); });
+    result.holds = result.is_active && may_hold;
+    if (result.holds && !port.winner) {
+      result.wins = true;
+      port.winner = rule.source;
+    } else if (may_hold) {
+      add_earlier(rule, rules, result);
+    }
+    port.connections.push_back(std::move(result));
+  }
+
+  // Where the rule's own source is active, it may end what keeps an earlier rule from holding, or
+  // what lets it: all of them are asked once more.
+  void add_earlier(const ConnectionRule& rule, const PortRules& rules,
+                   ConnectionExplanation& result) const {
+    const IsActive with_own = [&](const std::string& source) {
+      return source == rule.source || is_active_(source);
+    };
+    for (const ConnectionRule& earlier : rules.rules) {
+      if (&earlier == &rule) return;
+      if (!is_active_(earlier.source) || !evaluate(*earlier.condition, with_own)) continue;
+      result.earlier = earlier.source;
+      const ExpressionPtr whole =
+          make_operation(Operator::kAnd, {make_source(earlier.source), earlier.condition});
+      result.earlier_because = sufficient_reason(*assume_active(whole, rule.source), with_own);
+      return;
+    }
+  }
+
+  std::vector<Part> parts_of(const ConnectionRule& rule) {
+    own_ = &rule.source;
+    is_own_active_ = is_active_(rule.source);
+    std::vector<Part> parts;
+    if (rules_.provenance == nullptr) {
+      parts.push_back({{}, rule.where, {}});
+      add_condition(rule.condition, {}, {}, Cause::Kind::kUnwritten, parts.back());
+      return parts;
+    }
+    if (const auto select = selects_.find(rule.source); select != selects_.end()) {
+      parts.push_back({{}, select->second->where, {}});
+      add_condition(select->second->condition, {}, select->second->where,
+                    Cause::Kind::kConditionFalse, parts.back());
+      return parts;
+    }
+    std::size_t last = Hierarchy::kNobody;
+    for (const ConfigPlace& place : configs_[rule.source]) {
+      if (std::exchange(last, place.behaviour) == place.behaviour) continue;  // configured twice
+      parts.push_back(part_of(place));
+    }
+    return parts;
+  }
+
+  // The terms of docs/semantics.md: conditions of the behaviour and of all above it, then
+  // inhibitions.
+  Part part_of(const ConfigPlace& place) {
+    const Model& model = rules_.provenance->model;
+    const Hierarchy::Relations& relations = rules_.provenance->relations;
+    Part part{element(model.behaviours[place.behaviour]), place.config->where, {}};
+    for (std::size_t b = place.behaviour; b != Hierarchy::kNobody; b = relations.parents[b]) {
+      for (const Condition& condition : model.behaviours[b].conditions) {
+        add_condition(condition.expression, element(model.behaviours[b]), condition.where,
+                      Cause::Kind::kConditionFalse, part);
+      }
+    }
+    for (std::size_t b = place.behaviour; b != Hierarchy::kNobody; b = relations.parents[b]) {
+      for (const auto& inhibitor : relations.inhibitors[b]) add_inhibition(inhibitor, b, part);
+    }
+    return part;
+  }
+
+  void add_condition(const ExpressionPtr& written, const std::optional<Element>& of,
+                     const Location& where, Cause::Kind kind, Part& part) {
+    const ExpressionPtr expanded = expansion_.expand(written);
+    const ExpressionPtr left = assume_active(expanded, *own_);
+    if (evaluate(*left, is_active_)) return;
+    Cause cause;
+    cause.kind = kind;
+    cause.where = where;
+    cause.of = of;
+    if (kind == Cause::Kind::kConditionFalse) cause.condition = to_string(*written);
+    cause.because = sufficient_reason(*left, is_active_);
+    const IsActive without_own = [this](const std::string& source) {
+      return source != *own_ && is_active_(source);
+    };
+    if (left != expanded && evaluate(*expanded, without_own)) note_own_activity(cause);
+    part.causes.push_back(std::move(cause));
+  }
+
+  void note_own_activity(Cause& cause) const {
+    using OwnActivity = Cause::OwnActivity;
+    cause.own_activity = is_own_active_ ? OwnActivity::kMatters : OwnActivity::kWillMatter;
+  }
+
+  void add_inhibition(const Hierarchy::Inhibitor& inhibitor, std::size_t inhibited, Part& part) {
+    const Voices& voices = voices_of(inhibitor.behaviour);
+    const bool is_own_a_voice =
+        voices.inactive.count(*own_) != 0 ||
+        std::any_of(voices.active.begin(), voices.active.end(),
+                    [this](const Voice& voice) { return *voice.source == *own_; });
+    if (voices.active.empty() && !is_own_a_voice) return;
+    const auto& behaviours = rules_.provenance->model.behaviours;
+    const Behaviour& by = behaviours[inhibitor.behaviour];
+    Cause cause;
+    cause.kind = Cause::Kind::kInhibited;
+    cause.where = by.inhibitions[inhibitor.mention].where;
+    cause.of = element(behaviours[inhibited]);
+    cause.inhibitor = element(by);
+    cause.across_ports = voices.across_ports;
+    add_voices(voices, inhibitor.behaviour, is_own_a_voice, cause);
+    part.causes.push_back(std::move(cause));
+  }
+
+  // Which sources inhibit. The connection's own is enough, where it is one of them.
+  void add_voices(const Voices& voices, std::size_t inhibitor, bool is_own_a_voice, Cause& cause) {
+    for (const Voice& voice : voices.active) {
+      if (*voice.source == *own_) continue;
+      cause.also.push_back(*voice.source);
+    }
+    if (is_own_a_voice) {
+      note_own_activity(cause);
+    } else {
+      const Voice& first = voices.active.front();
+      if (first.behaviour != inhibitor) {
+        cause.speaker = element(rules_.provenance->model.behaviours[first.behaviour]);
+      }
+      cause.because = {{*first.source, true}};
+      std::erase(cause.also, *first.source);
+    }
+    std::sort(cause.also.begin(), cause.also.end());
+    cause.also.erase(std::unique(cause.also.begin(), cause.also.end()), cause.also.end());
+  }
+
+  // The sources that speak for a behaviour here: those of its behaviours at the port or, where
+  // there are none, all of them.
+  const Voices& voices_of(std::size_t behaviour) {
+    const auto [found, is_new] = voices_.try_emplace(behaviour);
+    Voices& result = found->second;
+    if (!is_new) return result;
+    const Provenance& provenance = *rules_.provenance;
+    std::vector<Voice> here, anywhere;
+    std::vector<std::size_t> pending{behaviour};
+    while (!pending.empty()) {
+      const std::size_t at = pending.back();
+      pending.pop_back();
+      const auto& children = provenance.relations.children[at];
+      pending.insert(pending.end(), children.rbegin(), children.rend());
+      for (const Config& config : provenance.model.behaviours[at].configs) {
+        (config.port == port_ ? here : anywhere).push_back({&config.source, at});
+      }
+    }
+    result.across_ports = here.empty();
+    for (const Voice& voice : result.across_ports ? anywhere : here) {
+      if (is_active_(*voice.source)) {
+        result.active.push_back(voice);
+      } else {
+        result.inactive.insert(*voice.source);
+      }
+    }
+    return result;
+  }
+
+  // By a rule of any port.
+  bool is_read(const std::string& source) {
+    if (!read_) {
+      read_.emplace();
+      std::set<const Expression*> seen;
+      for (const PortRules& port : rules_.ports) {
+        for (const ConnectionRule& rule : port.rules) collect(*rule.condition, seen, *read_);
+      }
+    }
+    return read_->count(source) != 0;
+  }
+
+  void add_senses(const PortRules& port, PortExplanation& result) {
+    std::set<std::string> sources;
+    std::set<const Expression*> seen;
+    for (const ConnectionRule& rule : port.rules) collect(*rule.condition, seen, sources);
+    for (const ConnectionRule& rule : port.rules) sources.erase(rule.source);
+    for (const Connection& other : rules_.other_connections) {
+      if (other.port == port_) sources.erase(other.source);
+    }
+    result.senses.assign(sources.begin(), sources.end());
+  }
+
+  static void collect(const Expression& expression, std::set<const Expression*>& seen,
+                      std::set<std::string>& sources) {
+    if (!seen.insert(&expression).second) return;
+    if (expression.op == Operator::kSource) sources.insert(expression.name);
+    for (const auto& operand : expression.operands) collect(*operand, seen, sources);
+  }
+
+  const RuleSet& rules_;
+  const std::string& port_;
+  const IsActive& is_active_;
+  QuantifierExpansion expansion_;
+  std::unordered_map<std::string, std::vector<ConfigPlace>> configs_;  // by source
+  std::unordered_map<std::string, const Select*> selects_;             // by source
+  std::unordered_map<std::size_t, Voices> voices_;                     // by behaviour
+  std::optional<std::set<std::string>> read_;                          // by any rule
+  const std::string* own_ = nullptr;  // source of the connection whose parts are looked at
+  bool is_own_active_ = false;
+};
+
+}  // namespace
+
+std::optional<std::vector<Literal>> ConnectionExplanation::reason() const {
+  if (wins) return std::nullopt;
+  if (!has_rule) return std::vector<Literal>{};
+  if (!is_active) return std::vector<Literal>{{source, false}};
+  if (holds) return earlier_because;
+  std::map<std::string, bool> joined;
+  for (const Part& part : parts) {
+    const auto least = std::min_element(part.causes.begin(), part.causes.end(),
+                                        [](const Cause& left, const Cause& right) {
+                                          return left.because.size() < right.because.size();
+                                        });
+    for (const Literal& literal : least->because) joined[literal.source] = literal.active;
+  }
+  std::vector<Literal> result;
+  result.reserve(joined.size());
+  for (const auto& [name, active] : joined) result.push_back({name, active});
+  return result;
+}
+
+PortExplanation Explainer::explain(const std::string& port, const IsActive& is_active) const {
+  return PortInquiry(rules_, port, is_active).explain();
+}
+
+std::vector<std::string> Explainer::ports() const {
+  std::set<std::string> names;
+  for (const PortRules& port : rules_.ports) names.insert(port.port);
+  for (const Connection& connection : rules_.other_connections) names.insert(connection.port);
+  return {names.begin(), names.end()};
+}
+
+Location Explainer::place_of_timeout(const std::string& source) const {
+  if (rules_.provenance == nullptr) return {};
+  const Model& model = rules_.provenance->model;
+  for (const SourceDeclaration& each : model.sources) {
+    if (each.name == source && each.timeout) return each.where;
+  }
+  return model.timeout ? model.timeout->where : Location();
+}
+
+std::string describe(const Element& element) {
+  return (element.is_meta ? "meta-behaviour \"" : "behaviour \"") + element.name + '"';
+}
+
+}  // namespace arbiter::rules

@@ -1,0 +1,85 @@
+// Replays a trace against the very tables and decision code that run live, with an injected clock.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "rules/explain/trace.hpp"
+#include "rules/prove/compile.hpp"
+#include "shm/decision.hpp"
+
+namespace arbiter::rules {
+
+// What came of an event at one port.
+struct PortOutcome {
+  bool delivered = false;  // of an arrival
+  std::string winner;      // the source selected afterwards; empty if none is
+};
+
+// A line of the result: t_ns,source,destination,decision,winner.
+struct OutcomeRow {
+  const TraceEvent& event;
+  const std::string& port;
+  PortOutcome outcome;
+};
+
+void write_outcome_header(std::ostream& out);
+void write_outcome(std::ostream& out, const OutcomeRow& row);
+
+class Simulation {
+ public:
+  explicit Simulation(const CompiledModel& model);
+
+  [[nodiscard]] bool knows(const std::string& source) const { return ids_.contains(source); }
+
+  [[nodiscard]] shm::SourceId source_id(const std::string& source) const { return ids_.at(source); }
+
+  // The ports that an event has a row for, in byte order: those that an arrival's source is
+  // connected to or that read it, for anything else each arbitrated port.
+  [[nodiscard]] std::vector<shm::PortId> ports_of(const TraceEvent& event) const;
+  [[nodiscard]] const std::string& port_name(shm::PortId port) const { return ports_[port]; }
+
+  // Takes an event, the time of which must not fall, and says what came of it at each of its ports.
+  std::vector<OutcomeRow> step(const TraceEvent& event);
+
+  // Lets time pass without an event; it must not fall.
+  void advance_to(shm::Nanoseconds time) { clock_.now = time; }
+
+  // The state, for those who explain it.
+  [[nodiscard]] shm::Nanoseconds now() const { return clock_.now; }
+  [[nodiscard]] const shm::TableView& table() const { return table_; }
+  [[nodiscard]] std::size_t source_count() const { return sources_.size(); }
+  [[nodiscard]] const std::string& source_name(shm::SourceId source) const {
+    return sources_[source];
+  }
+  [[nodiscard]] shm::ActivityWord activity(shm::SourceId source) const {
+    return activity_[source].word.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] const std::vector<std::string>& port_names() const { return ports_; }  // by id
+
+ private:
+  struct Clock {
+    shm::Nanoseconds now = 0;
+    [[nodiscard]] shm::Nanoseconds reading() const { return now; }
+    [[nodiscard]] bool is_fresh() const { return true; }
+    void read() {}
+  };
+
+  void apply(const TraceEvent& event);
+  PortOutcome outcome_at(shm::PortId port, const TraceEvent& event);
+
+  std::vector<std::string> sources_;  // by id
+  std::vector<std::string> ports_;    // by id; ids follow byte order
+  std::unordered_map<std::string, shm::SourceId> ids_;
+  std::vector<shm::Atomic<shm::Word>> words_;
+  shm::TableView table_;
+  std::vector<shm::Activity> activity_;  // by source id
+  std::unique_ptr<shm::ActivityPages> pages_;
+  Clock clock_;
+};
+
+}  // namespace arbiter::rules

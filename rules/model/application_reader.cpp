@@ -1,0 +1,144 @@
+#include "rules/model/application_reader.hpp"
+
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "rules/model/element_reader.hpp"
+#include "rules/text/names.hpp"
+#include "rules/text/xml.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+class ApplicationReader {
+ public:
+  ApplicationReader(const TextFile& file, Diagnostics& diagnostics)
+      : file_(file), diagnostics_(diagnostics) {}
+
+  Application read() {
+    if (!read_document()) application_.is_incomplete = true;
+    return std::move(application_);
+  }
+
+ private:
+  bool read_document() {
+    if (!check_readable(file_, diagnostics_)) return false;
+    const auto document = parse_xml(file_, diagnostics_);
+    if (!document) return false;
+    const Elements top(document->first());
+    if (top.begin() == top.end()) {
+      diagnostics_.error("empty-file", file_.locate(0),
+                         "the file is empty; an application without connections is "
+                         "<application/>");
+      return false;
+    }
+    const XmlNode& root = *top.begin();
+    if (root.text != "application") {
+      diagnostics_.error("not-an-application", locate(file_, root),
+                         "the root of an application file is <application>, not <" +
+                             std::string(root.text.substr(0, 80)) +
+                             ">; give a model as a model, not as the application");
+      return false;
+    }
+    bool fine = true;
+    for (const XmlNode& element : Elements(root.first_child)) {
+      if (element.text == "connection") fine = read_connection(element) && fine;
+      if (element.text == "module") read_module(element);
+    }
+    return fine;
+  }
+
+  // Of what is not ours nothing is an error: a text that cannot be read tells nothing.
+  void read_module(const XmlNode& module) {
+    for (const XmlNode& element : Elements(module.first_child)) {
+      if (element.text == "prefix" || element.text == "name") {
+        add_prefix(read_text(element));
+      } else if (element.text == "parameters") {
+        const std::string parameters = collapse_blanks(read_text(element)) + " ";
+        const std::size_t at = (" " + parameters).find(" --name ");
+        if (at == std::string::npos) continue;
+        const std::size_t first = at + std::string_view("--name ").size();
+        add_prefix(parameters.substr(first, parameters.find(' ', first) - first));
+      }
+    }
+  }
+
+  void add_prefix(std::string_view text) {
+    const std::string_view prefix = trim(text);
+    if (prefix.empty()) return;
+    application_.prefixes.push_back((prefix[0] == '/' ? "" : "/") + std::string(prefix));
+  }
+
+  std::string read_text(const XmlNode& element) {
+    Text text(file_, file_.offset_of(element.text.data()) - 1);
+    Diagnostics ignored;
+    for (const XmlNode* child = element.first_child; child != nullptr; child = child->next) {
+      if (child->kind == XmlKind::kText && !decode(file_, child->text, text, ignored)) return {};
+    }
+    return text.bytes();
+  }
+
+  bool read_connection(const XmlNode& element) {
+    const auto source = read_end(element, "from");
+    const auto port = read_end(element, "to");
+    if (!source || !port) return false;
+    const Location where = locate(file_, element);
+    const auto [known, is_new] = known_.try_emplace({*source, *port}, where);
+    if (is_new) {
+      application_.connections.push_back({*source, *port, where});
+    } else {
+      diagnostics_.note("duplicate-connection", where,
+                        "the connection from " + *source + " to " + *port + " exists already, at " +
+                            describe(known->second) + "; it counts once, remove one");
+    }
+    return true;
+  }
+
+  std::optional<std::string> read_end(const XmlNode& connection, std::string_view tag) {
+    for (const XmlNode& element : Elements(connection.first_child)) {
+      if (element.text == tag) return read_name(element);
+    }
+    diagnostics_.error(
+        "incomplete-connection", locate(file_, connection),
+        "this connection lacks <" + std::string(tag) + ">; write the name of a port in it");
+    return {};
+  }
+
+  std::optional<std::string> read_name(const XmlNode& element) {
+    Text text(file_, file_.offset_of(element.text.data()) - 1);
+    for (const XmlNode* child = element.first_child; child != nullptr; child = child->next) {
+      if (child->kind == XmlKind::kCData) {
+        text.append(child->text, file_.offset_of(child->text.data()));
+      } else if (child->kind == XmlKind::kText && !decode(file_, child->text, text, diagnostics_)) {
+        return {};
+      }
+    }
+    const std::string name(trim(text.bytes()));
+    if (name.empty()) {
+      diagnostics_.error("incomplete-connection", text.where(),
+                         "<" + std::string(element.text) + "> is empty; write the name of a port");
+      return {};
+    }
+    if (auto problem = find_problem_in_foreign_port(name)) {
+      diagnostics_.error(std::move(problem->code), text.where(), problem->message);
+      return {};
+    }
+    return name;
+  }
+
+  const TextFile& file_;
+  Diagnostics& diagnostics_;
+  Application application_;
+  std::map<std::pair<std::string, std::string>, Location> known_;
+};
+
+}  // namespace
+
+Application read_application(const TextFile& file, Diagnostics& diagnostics) {
+  return ApplicationReader(file, diagnostics).read();
+}
+
+}  // namespace arbiter::rules

@@ -1,0 +1,13 @@
+// YARP's description of an application, of which the connections alone concern us.
+#pragma once
+
+#include "rules/model/model.hpp"
+#include "rules/text/diagnostic.hpp"
+#include "rules/text/text_file.hpp"
+
+namespace arbiter::rules {
+
+// Everything that is no connection is passed over, for these files are written for other readers.
+Application read_application(const TextFile& file, Diagnostics& diagnostics);
+
+}  // namespace arbiter::rules

@@ -1,0 +1,163 @@
+#include "rules/model/element_reader.hpp"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "rules/text/names.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+std::string in_brackets(const XmlNode& element) {
+  return '<' + std::string(element.text.substr(0, 80)) + '>';
+}
+
+std::string list(KnownNames names, std::string_view before, std::string_view after) {
+  std::string result;
+  for (const auto* name = names.begin(); name != names.end(); ++name) {
+    if (name != names.begin()) result += name + 1 == names.end() ? " or " : ", ";
+    result += std::string(before) + std::string(*name) + std::string(after);
+  }
+  return result;
+}
+
+// "; did you mean …?", else what there is to choose from.
+std::string propose(std::string_view name, KnownNames known, std::string_view before,
+                    std::string_view after) {
+  if (known.size() == 0) return "; remove it";
+  const auto similar = find_similar(name, std::vector<std::string_view>(known));
+  if (similar) {
+    return "; did you mean " + std::string(before) + *similar + std::string(after) + "?";
+  }
+  return "; it takes " + list(known, before, after);
+}
+
+}  // namespace
+
+bool ElementReader::check_attributes(const XmlNode& element, KnownNames known) {
+  bool fine = true;
+  for (std::size_t i = 0; i < element.attributes.size(); ++i) {
+    const XmlAttribute& attribute = element.attributes[i];
+    const Location where = file_.locate(file_.offset_of(attribute.name.data()));
+    if (std::find(known.begin(), known.end(), attribute.name) == known.end()) {
+      error("unknown-attribute", where,
+            in_brackets(element) + " has no attribute " + quote(attribute.name) +
+                propose(attribute.name, known, "", ""));
+      fine = false;
+      continue;
+    }
+    const auto* first = element.attributes.data();
+    while (first->name != attribute.name) ++first;
+    if (first != &attribute) {
+      error("duplicate-attribute", where,
+            "the attribute " + quote(attribute.name) + " occurs twice; remove one");
+      fine = false;
+    }
+  }
+  return fine;
+}
+
+bool ElementReader::has_attribute(const XmlNode& element, std::string_view name) {
+  return std::any_of(element.attributes.begin(), element.attributes.end(),
+                     [&](const XmlAttribute& attribute) { return attribute.name == name; });
+}
+
+std::optional<Text> ElementReader::optional_attribute(const XmlNode& element,
+                                                      std::string_view name) {
+  for (const XmlAttribute& attribute : element.attributes) {
+    if (attribute.name != name) continue;
+    const std::size_t start = file_.offset_of(attribute.value.data());
+    const std::size_t tag = attribute.value.find('<');
+    if (tag != std::string_view::npos) {
+      error("malformed-xml", file_.locate(start + tag),
+            "'<' must not stand in an attribute; write &lt;, or close the attribute before it");
+      return {};
+    }
+    Text text(file_, start);
+    if (!decode(file_, attribute.value, text, diagnostics_)) return {};
+    return defines_.expand(text, diagnostics_);
+  }
+  return {};
+}
+
+std::optional<Text> ElementReader::attribute(const XmlNode& element, std::string_view name) {
+  if (!has_attribute(element, name)) {
+    error("missing-attribute", where(element),
+          in_brackets(element) + " lacks the attribute " + std::string(name) + "; write " +
+              std::string(name) + "=\"…\"");
+    return {};
+  }
+  return optional_attribute(element, name);
+}
+
+std::optional<Text> ElementReader::text(const XmlNode& element) {
+  Text text(file_, file_.offset_of(element.text.data()) - 1);
+  bool fine = true;
+  for (const XmlNode* child = element.first_child; child != nullptr; child = child->next) {
+    if (child->kind == XmlKind::kElement) {
+      error("unknown-element", where(*child),
+            in_brackets(element) + " takes text only, no " + in_brackets(*child) +
+                "; remove it, or close " + in_brackets(element) + " before it");
+      return {};
+    }
+    if (child->kind == XmlKind::kCData) {
+      text.append(child->text, file_.offset_of(child->text.data()));
+    } else {
+      fine = decode(file_, child->text, text, diagnostics_) && fine;
+    }
+  }
+  if (!fine) return {};
+  return defines_.expand(text, diagnostics_);
+}
+
+bool ElementReader::check_no_text(const XmlNode* first_child) {
+  bool fine = true;
+  for (const XmlNode* child = first_child; child != nullptr; child = child->next) {
+    if (child->kind == XmlKind::kElement || trim(child->text).empty()) continue;
+    const std::string_view text = trim(child->text);
+    error("stray-text", file_.locate(file_.offset_of(text.data())),
+          "the text " + quote(text.substr(0, text.find_first_of("\r\n"))) +
+              " belongs to no element; remove it, or put it into one");
+    fine = false;
+  }
+  return fine;
+}
+
+void ElementReader::report_unknown_element(const XmlNode& element, KnownNames known) {
+  error("unknown-element", where(element),
+        in_brackets(element) + " is not known here" + propose(element.text, known, "<", ">"));
+}
+
+std::optional<Mention> ElementReader::port_name(const Text& text, std::string_view what) {
+  const std::string_view name = trim(text.bytes());
+  if (name.empty()) {
+    error("empty-name", text.where(), std::string(what) + " is empty; write a port's name");
+    return {};
+  }
+  const auto start = static_cast<std::size_t>(name.data() - text.bytes().data());
+  if (auto problem = find_problem_in_port(name)) {
+    const std::size_t at = start + problem->at;
+    error(std::move(problem->code), text.where(at), problem->message + text.origin(at));
+    return {};
+  }
+  return Mention{std::string(name), text.where(start), text.define_of(start, start + name.size())};
+}
+
+std::optional<Mention> ElementReader::port_attribute(const XmlNode& element,
+                                                     std::string_view name) {
+  const auto text = attribute(element, name);
+  if (!text) return {};
+  return port_name(*text, "the attribute " + quote(name));
+}
+
+std::optional<Mention> ElementReader::name(const Text& text, std::string_view what) {
+  std::string name = collapse_blanks(text.bytes());
+  if (name.empty()) {
+    error("empty-name", text.where(), std::string(what) + " is empty; write a name");
+    return {};
+  }
+  return Mention{std::move(name), text.where()};
+}
+
+}  // namespace arbiter::rules

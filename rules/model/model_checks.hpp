@@ -1,0 +1,24 @@
+// What is checked of a model as a whole, beside what finding its way through it takes.
+#pragma once
+
+#include "rules/model/document_order.hpp"
+#include "rules/model/model.hpp"
+#include "rules/model/rule_set.hpp"
+#include "rules/text/diagnostic.hpp"
+
+namespace arbiter::rules {
+
+// Sources that are declared twice.
+void check_sources(const Model& model, Diagnostics& diagnostics);
+
+// Each connection that a rule selects must be in the application; those that no rule selects are
+// added to the rules. What the rules read must be published, as far as the application tells.
+void check_application(const Application& application, const Model& model, RuleSet& rules,
+                       Diagnostics& diagnostics);
+
+// The limits of shm/limits.hpp that a model can exceed. `whole` is the place for what cannot be
+// pinned to a line. `application` may be null.
+void check_limits(const RuleSet& rules, const Application* application, const Location& whole,
+                  const DocumentOrder& order, Diagnostics& diagnostics);
+
+}  // namespace arbiter::rules

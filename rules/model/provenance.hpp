@@ -1,0 +1,21 @@
+// Where the rules of a model come from: its behaviours, who contains whom, who inhibits whom.
+//
+// Extraction joins all that into rules, and a rule alone does not tell which inhibition put a
+// source into it. To keep that of each term would take many times the room of the model (there may
+// be millions of them), while hardly anyone asks. So the model is kept, and whoever explains a rule
+// (explain.hpp) derives its terms again, for the one port that is asked for.
+#pragma once
+
+#include <cstddef>
+
+#include "rules/model/hierarchy.hpp"
+#include "rules/model/model.hpp"
+
+namespace arbiter::rules {
+
+struct Provenance {
+  Model model;
+  Hierarchy::Relations relations;  // between Model::behaviours, by index
+};
+
+}  // namespace arbiter::rules

@@ -1,0 +1,90 @@
+#include "rules/model/quantifiers.hpp"
+
+#include <set>
+
+namespace arbiter::rules {
+namespace {
+
+// Conditions are no deeper than kMaxConditionDepth, hence recursion is fine here and below.
+void collect(const ExpressionPtr& expression, std::set<std::string>& names) {
+  if (expression->op == Operator::kSource) names.insert(expression->name);
+  for (const ExpressionPtr& operand : expression->operands) collect(operand, names);
+}
+
+}  // namespace
+
+bool matches(std::string_view pattern, std::string_view name) {
+  // Only the last '*' ever needs to take more: what fits before it cannot fit better further on.
+  std::size_t p = 0, n = 0;
+  std::size_t star = std::string_view::npos, star_end = 0;
+  while (n < name.size()) {
+    if (p < pattern.size() && pattern[p] == '*') {
+      star = p++;
+      star_end = n;
+    } else if (p < pattern.size() && pattern[p] == name[n]) {
+      ++p, ++n;
+    } else if (star != std::string_view::npos) {
+      p = star + 1;
+      n = ++star_end;
+    } else {
+      return false;
+    }
+  }
+  return pattern.find_first_not_of('*', p) == std::string_view::npos;
+}
+
+std::vector<std::string> collect_sources(const Model& model) {
+  std::set<std::string> names;
+  for (const SourceDeclaration& source : model.sources) names.insert(source.name);
+  for (const Behaviour& behaviour : model.behaviours) {
+    for (const Config& config : behaviour.configs) names.insert(config.source);
+    for (const Condition& condition : behaviour.conditions) collect(condition.expression, names);
+  }
+  for (const Select& select : model.selects) {
+    names.insert(select.source);
+    collect(select.condition, names);
+  }
+  return {names.begin(), names.end()};
+}
+
+ExpressionPtr QuantifierExpansion::expand(const ExpressionPtr& expression) {
+  switch (expression->op) {
+    case Operator::kAny:
+    case Operator::kAll:
+    case Operator::kNone:
+      return expand_quantifier(*expression);
+    default:
+      break;
+  }
+  std::vector<ExpressionPtr> operands;
+  bool differs = false;
+  for (const ExpressionPtr& operand : expression->operands) {
+    operands.push_back(expand(operand));
+    differs = differs || operands.back() != operand;
+  }
+  return differs ? make_operation(expression->op, std::move(operands)) : expression;
+}
+
+ExpressionPtr QuantifierExpansion::expand_quantifier(const Expression& quantifier) {
+  ExpressionPtr& expanded = expanded_[{quantifier.op, quantifier.name}];
+  if (expanded != nullptr) return expanded;
+  std::vector<ExpressionPtr> operands;
+  for (const std::string& source : sources_) {
+    if (!matches(quantifier.name, source)) continue;
+    const ExpressionPtr active = make_source(source);
+    operands.push_back(quantifier.op == Operator::kNone ? make_operation(Operator::kNot, {active})
+                                                        : active);
+  }
+  const bool is_any = quantifier.op == Operator::kAny;
+  if (operands.empty()) {
+    unmatched_.push_back(quantifier.name);
+    expanded = make_constant(!is_any);
+  } else if (operands.size() == 1) {
+    expanded = operands.front();
+  } else {
+    expanded = make_operation(is_any ? Operator::kOr : Operator::kAnd, std::move(operands));
+  }
+  return expanded;
+}
+
+}  // namespace arbiter::rules

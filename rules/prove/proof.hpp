@@ -1,0 +1,63 @@
+// The proof that at most one connection of a port can win: for no two of them is there an
+// activation of the sources under which both rules hold.
+//
+// One diagram for a whole port would show this at once, but it explodes where connections are
+// inhibited by a few others each. So pairs are looked at, and nearly all of them cost a few machine
+// words: two functions exclude each other if one of them implies a literal whose opposite the other
+// implies, as inhibition makes them do. For the rest both diagrams are walked side by side.
+#pragma once
+
+#include <bitset>
+#include <cstdint>
+#include <unordered_set>
+#include <utility>
+#include <vector>
+
+#include "rules/prove/diagram.hpp"
+
+namespace arbiter::rules {
+
+using VariableSet = std::bitset<shm::kMaxSourcesPerPort>;
+
+// A conjunction of literals, by variable.
+struct Literals {
+  VariableSet active;
+  VariableSet inactive;
+
+  [[nodiscard]] std::size_t count() const { return active.count() + inactive.count(); }
+};
+
+// All literals that the function implies; none if it is false, since it then implies everything.
+Literals implied_literals(const DiagramNodes& function);
+
+// Whether one says of some variable the opposite of the other.
+bool exclude_each_other(const Literals& a, const Literals& b);
+
+// Whether the function holds under each activation in which `given` holds.
+bool holds_given(const DiagramNodes& function, const Literals& given);
+
+class Proof {
+ public:
+  explicit Proof(Budget& budget) : budget_(budget) {}
+
+  using Pair = std::pair<std::size_t, std::size_t>;  // indices, the lower one first
+
+  // Every pair of functions that can hold together, in order of the second, then of the first.
+  // Throws StepLimit, Stopped.
+  std::vector<Pair> pairs_that_meet(const std::vector<DiagramNodes>& functions);
+
+  // Some activation under which both hold; no literal of it can be left out. For two that are known
+  // to meet: whatever is left of the budget, since it takes no more than to find that out. Throws
+  // Stopped.
+  Literals meeting_point(const DiagramNodes& a, const DiagramNodes& b);
+
+ private:
+  bool meet(const DiagramNodes& a, const DiagramNodes& b);
+  bool walk(const DiagramNodes& a, shm::Word at_a, const DiagramNodes& b, shm::Word at_b);
+
+  Budget& budget_;
+  std::unordered_set<std::uint64_t> apart_;  // pairs of nodes known to exclude each other
+  Literals path_;                            // to where the last walk found that both hold
+};
+
+}  // namespace arbiter::rules

@@ -1,0 +1,163 @@
+#include "rules/text/names.hpp"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+#include "shm/limits.hpp"
+#include "shm/utf8.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+constexpr std::size_t kMaxEdits = 2;
+constexpr std::size_t kMaxComparedLength = 64;
+
+std::optional<NameProblem> find_length_problem(std::string_view name) {
+  if (name.size() <= shm::kMaxNameLength) return {};
+  return NameProblem{"name-too-long",
+                     "the name " + quote(name) + " has " + std::to_string(name.size()) +
+                         " bytes, more than the limit of " + std::to_string(shm::kMaxNameLength) +
+                         "; shorten it",
+                     0};
+}
+
+// How many single characters must be put in, taken out or replaced.
+std::size_t count_edits(std::string_view a, std::string_view b) {
+  std::array<std::size_t, kMaxComparedLength + 1> row;
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row[b.size()];
+}
+
+}  // namespace
+
+std::string_view trim(std::string_view text) {
+  while (!text.empty() && shm::is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && shm::is_blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+std::string collapse_blanks(std::string_view text) {
+  std::string result;
+  bool gap = false;
+  for (const char byte : trim(text)) {
+    if (shm::is_blank(byte)) {
+      gap = true;
+      continue;
+    }
+    if (gap) result += ' ';
+    gap = false;
+    result += byte;
+  }
+  return result;
+}
+
+std::string quote(std::string_view name) {
+  constexpr std::size_t kMaxQuoted = 80;
+  if (name.size() <= kMaxQuoted) return '"' + std::string(name) + '"';
+  std::size_t end = kMaxQuoted;
+  while (end > 0 && (static_cast<unsigned char>(name[end]) >> 6) == 0b10) --end;
+  return '"' + std::string(name.substr(0, end)) + "…\"";
+}
+
+std::string enumerate(const std::vector<std::string>& names) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i == kMaxNamesInWords) return text + " and " + std::to_string(names.size() - i) + " more";
+    if (i > 0) text += i + 1 == names.size() ? " and " : ", ";
+    text += names[i];
+  }
+  return text;
+}
+
+std::string comma_list(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+std::string describe(const Location& where) {
+  return where.file + ':' + std::to_string(where.line) + ':' + std::to_string(where.column);
+}
+
+std::optional<NameProblem> find_problem_in_port(std::string_view name) {
+  if (auto problem = find_length_problem(name)) return problem;
+  if (name.size() > 2 && name.starts_with("\"/") && name.ends_with('"')) {
+    return NameProblem{"invalid-port-name",
+                       "only in a condition does a port's name have quotes; write " +
+                           std::string(name.substr(1, name.size() - 2)) + " without them",
+                       0};
+  }
+  if (!name.starts_with('/')) {
+    return NameProblem{"invalid-port-name",
+                       "a port's name begins with '/'; write " + quote("/" + std::string(name)) +
+                           " for " + quote(name),
+                       0};
+  }
+  if (const auto fault = shm::find_fault_in_name(name)) {
+    return NameProblem{
+        "invalid-port-name",
+        "the port's name " + quote(name) + " has " + fault->what + " in it; remove it", fault->at};
+  }
+  return {};
+}
+
+std::optional<NameProblem> find_problem_in_foreign_port(std::string_view name) {
+  if (auto problem = find_length_problem(name)) return problem;
+  const auto is_control_byte = [](char byte) {
+    return shm::is_control(static_cast<unsigned char>(byte)) &&
+           static_cast<unsigned char>(byte) < 0x80;
+  };
+  const auto* found = std::find_if(name.begin(), name.end(), is_control_byte);
+  if (found == name.end()) return {};
+  return NameProblem{"invalid-port-name",
+                     "a port's name has no line ends or other control characters in it; "
+                     "remove them",
+                     static_cast<std::size_t>(found - name.begin())};
+}
+
+std::optional<NameProblem> find_problem_in_behaviour(std::string_view name) {
+  if (auto problem = find_length_problem(name)) return problem;
+  const std::size_t comma = name.find(',');
+  if (comma == std::string_view::npos) return {};
+  return NameProblem{"invalid-name",
+                     "the name " + quote(name) +
+                         " has a comma, which separates the names of an inhibition; remove it",
+                     comma};
+}
+
+std::optional<std::string> find_similar(std::string_view name,
+                                        const std::vector<std::string_view>& candidates) {
+  if (name.empty() || name.size() > kMaxComparedLength) return {};
+  std::optional<std::string> best;
+  // A short name is within two edits of anything; at least half of it must be right.
+  std::size_t fewest = std::min(kMaxEdits, name.size() / 2) + 1;
+  for (const std::string_view candidate : candidates) {
+    const std::size_t shorter = std::min(name.size(), candidate.size());
+    const std::size_t longer = std::max(name.size(), candidate.size());
+    if (longer > kMaxComparedLength || longer - shorter >= fewest) continue;
+    const std::size_t edits = count_edits(name, candidate);
+    if (edits < fewest) {
+      fewest = edits;
+      best = std::string(candidate);
+    }
+  }
+  return best;
+}
+
+std::string advise(std::string_view name, const std::vector<std::string_view>& candidates,
+                   std::string_view otherwise) {
+  const auto similar = find_similar(name, candidates);
+  return similar ? "; did you mean " + quote(*similar) + "?" : "; " + std::string(otherwise);
+}
+
+}  // namespace arbiter::rules
