@@ -107,7 +107,7 @@ TEST(Turns, AreByUserHoweverManyOfHisClientsWait) {
 }
 
 TEST(WhatIsPutAside, CountsAsItsSendersAndIsClosedAsHisErrand) {
-  Shares shares(of_each(1 << 20), 50, kOwner);
+  Shares shares(of_each(1 << 20), 50, kDaemonsUser);
   shm::Received received;
   received.descriptors[0] = shm::make_segment("test", 1);
   received.descriptor_count = 1;
@@ -125,7 +125,7 @@ TEST(WhatIsPutAside, CountsAsItsSendersAndIsClosedAsHisErrand) {
 }
 
 TEST(WhatIsPutAside, IsRefusedBeyondTheShareAndStaysWhatItWas) {
-  Shares shares(of_each(1), 50, kOwner);
+  Shares shares(of_each(1), 50, kDaemonsUser);
   shm::Received received;
   received.descriptors[0] = shm::make_segment("test", 1);
   received.descriptor_count = 1;
