@@ -28,13 +28,12 @@ std::string environment(const char* name) {
 }
 
 std::string temporary_directory(uid_t user) {
-  std::string base = environment("TMPDIR");
-  if (base.empty()) base = "/tmp";
-  return base.append("/arbiter-").append(std::to_string(user));
+  const std::string base = environment("TMPDIR");
+  return (base.empty() ? "/tmp" : base) + "/arbiter-" + std::to_string(user);
 }
 
 [[noreturn]] void fail(const std::string& what) {
-  throw std::system_error(errno, std::generic_category(), what);
+  throw std::runtime_error(what + ": " + std::generic_category().message(errno));
 }
 
 // Whoever may write in the directory could put a socket of his own there.
@@ -43,9 +42,8 @@ void require_safe(const std::string& directory) {
   if (lstat(directory.c_str(), &status) != 0) fail("cannot look at " + directory);
   if (!S_ISDIR(status.st_mode)) throw std::runtime_error(directory + " is not a directory");
   if (status.st_uid != geteuid()) {
-    std::string why = directory + " belongs to user ";
-    why.append(std::to_string(status.st_uid));
-    throw std::runtime_error(why.append("; set RUNTIME_DIRECTORY to a directory of your own"));
+    throw std::runtime_error(directory + " belongs to user " + std::to_string(status.st_uid) +
+                             "; set RUNTIME_DIRECTORY to a directory of your own");
   }
   if ((status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
     throw std::runtime_error("others may write in " + directory + "; run: chmod go-w " + directory);
