@@ -1,4 +1,4 @@
-#include "rules/csv.hpp"
+#include "rules/text/csv.hpp"
 
 #include <utility>
 
