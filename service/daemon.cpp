@@ -49,6 +49,17 @@ uid_t user_of(const shm::FileDescriptor& socket) {
   return peer.uid;
 }
 
+// An errand costs the loop least. But errands of a user who is stuck are not done: each socket
+// would keep a descriptor that is charged to nobody.
+void turn_away(shm::FileDescriptor socket, uid_t user) {
+  Errands& errands = Errands::of_the_process();
+  if (errands.is_stuck(user)) {
+    hang_up(std::move(socket), user);
+  } else {
+    errands.close(user, std::move(socket));
+  }
+}
+
 std::uint64_t event_key(std::uint32_t tag, ClientId client) {
   return std::uint64_t{tag} << 56 | client;
 }
@@ -258,7 +269,7 @@ void Daemon::accept_clients() {
       lobby_.add({user, std::move(socket), std::move(descriptor)});
     } catch (const LimitExceeded& limit) {  // anybody may come again and again: not worth a warning
       log::debug("a client was turned away: {}", limit.what());
-      Errands::of_the_process().close(user, std::move(socket));
+      turn_away(std::move(socket), user);
     }
   }
 }
