@@ -80,6 +80,15 @@ TEST(Shares, CountWhatTheDaemonTakesAndDoNotRefuseIt) {
   EXPECT_TRUE(shares.allows(kOne, Share::kInputs, 1));
 }
 
+TEST(Shares, NothingMoreIsAllowedEvenToAUserWhoHasTooMuchByNow) {
+  Shares shares(of_each(1600), 50, kDaemonsUser);
+  std::vector<Charge> charges;
+  take_all(shares, kOne, charges);
+  take_all(shares, kTwo, charges);
+  EXPECT_FALSE(shares.allows(kOne, Share::kClients, 1));
+  EXPECT_TRUE(shares.allows(kOne, Share::kClients, 0));
+}
+
 TEST(Shares, ARefusalSaysWhatIsTheLimitAndWhatToDo) {
   Shares shares(of_each(16), 50, kDaemonsUser);
   const Charge some = shares.take(kOne, Share::kSources, 7);
@@ -107,7 +116,7 @@ TEST(Turns, AreByUserHoweverManyOfHisClientsWait) {
 }
 
 TEST(WhatIsPutAside, CountsAsItsSendersAndIsClosedAsHisErrand) {
-  Shares shares(of_each(1 << 20), 50, kOwner);
+  Shares shares(of_each(1 << 20), 50, kDaemonsUser);
   shm::Received received;
   received.descriptors[0] = shm::make_segment("test", 1);
   received.descriptor_count = 1;
@@ -125,7 +134,7 @@ TEST(WhatIsPutAside, CountsAsItsSendersAndIsClosedAsHisErrand) {
 }
 
 TEST(WhatIsPutAside, IsRefusedBeyondTheShareAndStaysWhatItWas) {
-  Shares shares(of_each(1), 50, kOwner);
+  Shares shares(of_each(1), 50, kDaemonsUser);
   shm::Received received;
   received.descriptors[0] = shm::make_segment("test", 1);
   received.descriptor_count = 1;
