@@ -47,6 +47,11 @@ class PutAside {
   ~PutAside();
 
   [[nodiscard]] shm::Received& received() const { return *received_; }
+  // What it costs is given back: whoever puts the message aside again is charged again.
+  void give_back() {
+    bytes_ = {};
+    descriptors_ = {};
+  }
 
  private:
   std::unique_ptr<shm::Received> received_;

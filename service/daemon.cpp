@@ -405,6 +405,7 @@ void Daemon::retry(Client& client) {
   Postponed request = std::move(client.to_retry.front());
   client.to_retry.pop_front();
   --client.postponed;
+  request.request.give_back();  // or a user who has room for one could not have it wait on
   handle_or_refuse(client, request.request.received(), request.deadline);
 }
 

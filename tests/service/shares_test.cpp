@@ -133,6 +133,15 @@ TEST(WhatIsPutAside, CountsAsItsSendersAndIsClosedAsHisErrand) {
   EXPECT_EQ(::fcntl(number, F_GETFD), -1) << "it is still open";
 }
 
+TEST(WhatIsPutAside, CanWaitOnWhereThereIsRoomForItOnce) {
+  Shares shares(of_each(3 * sizeof(shm::Received)), 50, kDaemonsUser);
+  shm::Received received;
+  PutAside aside(received, kOne, shares);
+  EXPECT_THROW(PutAside(aside.received(), kOne, shares), LimitExceeded);
+  aside.give_back();
+  EXPECT_NO_THROW(PutAside(aside.received(), kOne, shares));
+}
+
 TEST(WhatIsPutAside, IsRefusedBeyondTheShareAndStaysWhatItWas) {
   Shares shares(of_each(1), 50, kDaemonsUser);
   shm::Received received;
