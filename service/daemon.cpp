@@ -27,6 +27,8 @@ constexpr shm::Nanoseconds kListenAgainAfter = 100'000'000;
 
 // How often it is looked who has read what he was sent, where somebody waits for that.
 constexpr shm::Nanoseconds kLookInFlightAfter = 5'000'000;
+// Each look in vain doubles that, so often: who never reads costs next to nothing.
+constexpr unsigned kMostDoublings = 5;
 // The same where nobody does, but what was left unread still counts.
 constexpr shm::Nanoseconds kLookLeftUnreadAfter = 1'000'000'000;
 
@@ -319,10 +321,13 @@ void Daemon::look_in_flight(shm::Nanoseconds now) {
 
 // At the end of a round: whoever is held back by now waits for that.
 void Daemon::plan_to_look_in_flight() {
-  const bool is_awaited = std::any_of(clients_.begin(), clients_.end(),
-                                      [](const auto& each) { return each.second->is_held_back(); });
-  if (!is_awaited && left_unread_.empty()) return;
-  const shm::Nanoseconds after = is_awaited ? kLookInFlightAfter : kLookLeftUnreadAfter;
+  shm::Nanoseconds after = left_unread_.empty() ? shm::kForever : kLookLeftUnreadAfter;
+  for (const auto& [id, client] : clients_) {
+    if (!client->is_held_back()) continue;
+    after =
+        std::min(after, kLookInFlightAfter << std::min(client->flushed_in_vain(), kMostDoublings));
+  }
+  if (after == shm::kForever) return;
   look_in_flight_at_ = std::min(look_in_flight_at_, shm::monotonic_now() + after);
 }
 
