@@ -484,6 +484,8 @@ void Daemon::settle() {
     }
   }
   for (const ClientId id : lost) drop(id);
+  // Another round: others are told of it, who may be slow to read, or lost for it.
+  if (!lost.empty()) is_more_to_tell_ = true;
   plan_to_look_in_flight();
 }
 
