@@ -142,6 +142,7 @@ void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescript
   const auto count = static_cast<std::uint64_t>(
       std::count_if(descriptors.begin(), descriptors.end(), [](int fd) { return fd >= 0; }));
   if (queue_.empty()) {
+    flushed_in_vain_ = 0;
     const shm::SendResult result = try_to_send(message, descriptors, count);
     if (result == shm::SendResult::kSent) return;
     if (result == shm::SendResult::kClosed) {
@@ -180,6 +181,7 @@ bool Client::has_room_for(std::uint64_t descriptors) const {
 }
 
 void Client::flush() {
+  ++flushed_in_vain_;
   while (!queue_.empty() && !lost_) {
     const Queued& next = *queue_.front();
     std::array<int, shm::kMaxDescriptors> descriptors{};
@@ -189,6 +191,7 @@ void Client::flush() {
     const shm::SendResult result = try_to_send(next.message, descriptors, count);
     if (result == shm::SendResult::kFull || result == shm::SendResult::kTooMany) return;
     if (result == shm::SendResult::kClosed) lost_ = hung_up_ = true;
+    flushed_in_vain_ = 0;
     queued_descriptors_ -= count;
     queue_.pop_front();
   }

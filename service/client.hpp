@@ -47,6 +47,11 @@ class PutAside {
   ~PutAside();
 
   [[nodiscard]] shm::Received& received() const { return *received_; }
+  // What it costs is given back: whoever puts the message aside again is charged again.
+  void give_back() {
+    bytes_ = {};
+    descriptors_ = {};
+  }
 
  private:
   std::unique_ptr<shm::Received> received_;
@@ -89,8 +94,11 @@ class Client {
   // Whether anything was read ahead, be it that the client has hung up.
   [[nodiscard]] bool has_read_ahead() const { return !ahead_.empty() || ahead_ended_; }
   [[nodiscard]] bool has_queue() const { return !queue_.empty(); }
-  // What is queued waits for others of this user to read, not for its own socket.
+  // What is queued waits until descriptors are read that it, or others of its user, have been sent;
+  // its socket may have room.
   [[nodiscard]] bool is_held_back() const { return held_back_ && !queue_.empty(); }
+  // How many flushes in turn have sent nothing, since it was held back.
+  [[nodiscard]] unsigned flushed_in_vain() const { return flushed_in_vain_; }
   // Looks whether it has read what it was sent.
   void look_in_flight() { in_flight_.look(socket_.get()); }
   // The end: what is to be kept for as long as it has not read all.
@@ -171,6 +179,7 @@ class Client {
   mutable std::optional<std::uint64_t> started_;
   InFlight in_flight_;
   bool held_back_ = false;
+  unsigned flushed_in_vain_ = 0;
   bool lost_ = false;
   bool hung_up_ = false;
   std::deque<std::unique_ptr<Queued>> queue_;

@@ -27,6 +27,8 @@ constexpr shm::Nanoseconds kListenAgainAfter = 100'000'000;
 
 // How often it is looked who has read what he was sent, where somebody waits for that.
 constexpr shm::Nanoseconds kLookInFlightAfter = 5'000'000;
+// Each look in vain doubles that, so often: who never reads costs next to nothing.
+constexpr unsigned kMostDoublings = 5;
 // The same where nobody does, but what was left unread still counts.
 constexpr shm::Nanoseconds kLookLeftUnreadAfter = 1'000'000'000;
 
@@ -47,6 +49,17 @@ uid_t user_of(const shm::FileDescriptor& socket) {
   socklen_t size = sizeof peer;
   static_cast<void>(getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size));
   return peer.uid;
+}
+
+// An errand costs the loop least. But errands of a user who is stuck are not done: each socket
+// would keep a descriptor that is charged to nobody.
+void turn_away(shm::FileDescriptor socket, uid_t user) {
+  Errands& errands = Errands::of_the_process();
+  if (errands.is_stuck(user)) {
+    hang_up(std::move(socket), user);
+  } else {
+    errands.close(user, std::move(socket));
+  }
 }
 
 std::uint64_t event_key(std::uint32_t tag, ClientId client) {
@@ -258,7 +271,7 @@ void Daemon::accept_clients() {
       lobby_.add({user, std::move(socket), std::move(descriptor)});
     } catch (const LimitExceeded& limit) {  // anybody may come again and again: not worth a warning
       log::debug("a client was turned away: {}", limit.what());
-      Errands::of_the_process().close(user, std::move(socket));
+      turn_away(std::move(socket), user);
     }
   }
 }
@@ -308,10 +321,13 @@ void Daemon::look_in_flight(shm::Nanoseconds now) {
 
 // At the end of a round: whoever is held back by now waits for that.
 void Daemon::plan_to_look_in_flight() {
-  const bool is_awaited = std::any_of(clients_.begin(), clients_.end(),
-                                      [](const auto& each) { return each.second->is_held_back(); });
-  if (!is_awaited && left_unread_.empty()) return;
-  const shm::Nanoseconds after = is_awaited ? kLookInFlightAfter : kLookLeftUnreadAfter;
+  shm::Nanoseconds after = left_unread_.empty() ? shm::kForever : kLookLeftUnreadAfter;
+  for (const auto& [id, client] : clients_) {
+    if (!client->is_held_back()) continue;
+    after =
+        std::min(after, kLookInFlightAfter << std::min(client->flushed_in_vain(), kMostDoublings));
+  }
+  if (after == shm::kForever) return;
   look_in_flight_at_ = std::min(look_in_flight_at_, shm::monotonic_now() + after);
 }
 
@@ -394,6 +410,7 @@ void Daemon::retry(Client& client) {
   Postponed request = std::move(client.to_retry.front());
   client.to_retry.pop_front();
   --client.postponed;
+  request.request.give_back();  // or a user who has room for one could not have it wait on
   handle_or_refuse(client, request.request.received(), request.deadline);
 }
 
@@ -467,6 +484,8 @@ void Daemon::settle() {
     }
   }
   for (const ClientId id : lost) drop(id);
+  // Another round: others are told of it, who may be slow to read, or lost for it.
+  if (!lost.empty()) is_more_to_tell_ = true;
   plan_to_look_in_flight();
 }
 

@@ -9,11 +9,11 @@
 //
 // A user has one thread while there is something to do. Once an errand has taken kOverdue its
 // thread is taken for lost, and another goes on with the rest, up to kMaxLostOfAUser: then the rest
-// waits until one comes back. From kMaxWaiting on, or kMostWaiting where errands are slow and none
-// is lost, the user is stuck, and whoever collects errands takes nothing more from that user: what
-// waits keeps descriptors that all share. A process that
-// exits does not wait for them: the kernel makes no socket linger there; only a server of FUSE that
-// does not answer keeps the process from ending, until it is killed itself.
+// waits until one comes back. From kMaxWaiting on, or kMostWaiting where errands are slow and not
+// all of these threads are lost, the user is stuck, and whoever collects errands takes nothing more
+// from that user: what waits keeps descriptors that all share. A process that exits does not wait
+// for them: the kernel makes no socket linger there; only a server of FUSE that does not answer
+// keeps the process from ending, until it is killed itself.
 #pragma once
 
 #include <sys/types.h>

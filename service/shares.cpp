@@ -117,6 +117,7 @@ std::uint64_t Shares::taken_by_privileged(Share what) const {
 }
 
 bool Shares::allows(uid_t user, Share what, std::uint64_t amount) const {
+  if (amount == 0) return true;  // though others have left less than the user has
   const std::uint64_t total = totals_[index(what)];
   const std::uint64_t reserve = total / kReserve;
   const std::uint64_t privileged = taken_by_privileged(what);

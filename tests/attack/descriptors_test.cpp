@@ -8,7 +8,9 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 
+#include <deque>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <arbiter/arbiter.hpp>
@@ -123,6 +125,8 @@ void wait_until_a_thread_is_lost(Daemon& daemon) {
 
 class ALingeringSocket : public testing::Test {
  protected:
+  explicit ALingeringSocket(Daemon::Options options = {}) : daemon_(kNoRules, std::move(options)) {}
+
   RawClient client() {
     RawClient result(daemon_.instance());
     result.hello("attacker");
@@ -239,7 +243,8 @@ class AUserWhoseThreadsAreLost : public ALingeringSocket {
                                            service::Errands::kMaxWaiting +
                                            2 * shm::kMostDescriptorsOfAMessage;
 
-  AUserWhoseThreadsAreLost() {
+  explicit AUserWhoseThreadsAreLost(Daemon::Options options = {})
+      : ALingeringSocket(std::move(options)) {
     RawClient attacker = client();
     daemon_.process().stop();
     for (Lingering& each : lingering_) {
@@ -277,6 +282,45 @@ TEST_F(AUserWhoseThreadsAreLost, IsGivenUpBeforeItKeepsThoseOfOthers) {
   while (daemon_.open_descriptors() > before) {
   }
   expect_that_others_are_served(daemon_);
+}
+
+// Who has all that he may have is turned away before anything is read from him.
+class AUserWithoutThreadsOrShare : public AUserWhoseThreadsAreLost {
+ protected:
+  AUserWithoutThreadsOrShare()
+      : AUserWhoseThreadsAreLost({.arguments = {"--user-share", "10"}, .max_descriptors = 3000}) {}
+
+  void SetUp() override {
+    if (::geteuid() != 0) GTEST_SKIP() << "only root can start processes of other users";
+    ASSERT_EQ(::chmod(daemon_.directory().c_str(), 0711), 0);
+    try {
+      for (;;) clients_.emplace_back(daemon_.instance()).hello();
+    } catch (const std::runtime_error&) {  // has been turned away
+    }
+    clients_.pop_back();
+    const FileDescriptor zero(::open("/dev/zero", O_RDONLY | O_CLOEXEC));
+    for (std::size_t waiting = 0; waiting < service::Errands::kMaxWaiting; waiting += 2) {
+      send_with(clients_.back().socket(), RawClient::message(MessageKind::kConnect),
+                {zero.get(), zero.get()});
+      clients_.back().expect_refusal();
+    }
+  }
+
+  std::deque<RawClient> clients_;
+};
+
+TEST_F(AUserWithoutThreadsOrShare, CostsNothingByConnectingAgainAndAgain) {
+  const std::size_t before = daemon_.open_descriptors();
+  for (int i = 0; i < 2000; ++i) RawClient again(daemon_.instance());
+  // Who comes later is let in later.
+  EXPECT_EQ(as_user(kStranger,
+                    [] {
+                      Node node("honest");
+                      auto out = node.output_port<int>("/honest:o");
+                      return std::string("opened");
+                    }),
+            "opened");
+  EXPECT_LT(daemon_.open_descriptors(), before + 30);
 }
 
 // A daemon of root must not open for others what they could not open themselves.

@@ -80,6 +80,15 @@ TEST(Shares, CountWhatTheDaemonTakesAndDoNotRefuseIt) {
   EXPECT_TRUE(shares.allows(kOne, Share::kInputs, 1));
 }
 
+TEST(Shares, NothingMoreIsAllowedEvenToAUserWhoHasTooMuchByNow) {
+  Shares shares(of_each(1600), 50, kDaemonsUser);
+  std::vector<Charge> charges;
+  take_all(shares, kOne, charges);
+  take_all(shares, kTwo, charges);
+  EXPECT_FALSE(shares.allows(kOne, Share::kClients, 1));
+  EXPECT_TRUE(shares.allows(kOne, Share::kClients, 0));
+}
+
 TEST(Shares, ARefusalSaysWhatIsTheLimitAndWhatToDo) {
   Shares shares(of_each(16), 50, kDaemonsUser);
   const Charge some = shares.take(kOne, Share::kSources, 7);
@@ -122,6 +131,15 @@ TEST(WhatIsPutAside, CountsAsItsSendersAndIsClosedAsHisErrand) {
   EXPECT_EQ(shares.taken(kOne, Share::kQueue), 0u);
   ASSERT_TRUE(Errands::of_the_process().wait_until_done(shm::kForever / 2));
   EXPECT_EQ(::fcntl(number, F_GETFD), -1) << "it is still open";
+}
+
+TEST(WhatIsPutAside, CanWaitOnWhereThereIsRoomForItOnce) {
+  Shares shares(of_each(3 * sizeof(shm::Received)), 50, kDaemonsUser);
+  shm::Received received;
+  PutAside aside(received, kOne, shares);
+  EXPECT_THROW(PutAside(aside.received(), kOne, shares), LimitExceeded);
+  aside.give_back();
+  EXPECT_NO_THROW(PutAside(aside.received(), kOne, shares));
 }
 
 TEST(WhatIsPutAside, IsRefusedBeyondTheShareAndStaysWhatItWas) {
