@@ -216,8 +216,8 @@ TEST(Check, EachCodeOfAWarningOrANoteCanBeSilenced) {
   const auto model = directory.write("m.xml", kTrackModel);
   const std::regex made(R"re((warning|note)\(\s*"([a-z-]+)")re");
   std::set<std::string> codes;
-  for (const auto& file :
-       std::filesystem::directory_iterator(std::string(ARBITER_TEST_DATA) + "/../../rules")) {
+  for (const auto& file : std::filesystem::recursive_directory_iterator(
+           std::string(ARBITER_TEST_DATA) + "/../../rules")) {
     if (file.path().extension() != ".cpp") continue;
     const std::string text = content_of(file.path());
     for (std::sregex_iterator each(text.begin(), text.end(), made), end; each != end; ++each) {
