@@ -311,17 +311,7 @@ TEST_F(HostileClient, CannotBeMoreThanTheLimitOfItsUser) {
 }
 
 TEST_F(HostileClient, ThatRefusesItsPeerIsNotDeliveredTo) {
-  const auto segment = shm::make_segment("input", sizeof(shm::InputSegment));
-  EXPECT_FALSE(shm::allocate(segment, 0, sizeof(shm::InputSegment)));
-  {
-    const shm::Mapping mapping(segment, sizeof(shm::InputSegment), shm::Access::kReadWrite);
-    auto& header = mapping.as<shm::InputSegment>()->header;
-    header.magic = shm::InputHeader::kMagic;
-    header.version = shm::InputHeader::kVersion;
-    header.depth = 1;
-    header.max_held = 1;
-  }
-  shm::seal(segment, shm::Seals::kOneWriter);
+  const auto segment = raw_input_segment();
   { auto closed = std::move(in_); }
   const shm::Bell bell;
   RawClient refusing = client();
