@@ -22,45 +22,12 @@
 namespace arbiter::service {
 namespace {
 
-// Without a descriptor to accept a client with.
-constexpr shm::Nanoseconds kListenAgainAfter = 100'000'000;
-
-// How often it is looked who has read what he was sent, where somebody waits for that.
-constexpr shm::Nanoseconds kLookInFlightAfter = 5'000'000;
-// Each look in vain doubles that, so often: who never reads costs next to nothing.
-constexpr unsigned kMostDoublings = 5;
-// The same where nobody does, but what was left unread still counts.
-constexpr shm::Nanoseconds kLookLeftUnreadAfter = 1'000'000'000;
-
-// How many connections are taken out of the kernel's queue in one round.
-constexpr int kMaxAcceptedAtOnce = 64;
-
 // How many messages of one client are handled before it is the next one's turn.
 constexpr int kMaxMessagesAtOnce = 64;
 // And for how long at most, but for the last of them.
 constexpr shm::Nanoseconds kMaxTurn = 1'000'000;
 // How often the loop looks who has something to say before it serves those of whom it knows.
 constexpr int kMaxRounds = 64;
-
-// Of who has connected; nobody in particular where that cannot be told.
-uid_t user_of(const shm::FileDescriptor& socket) {
-  ucred peer{};
-  peer.uid = LogAccount::kUnknown;
-  socklen_t size = sizeof peer;
-  static_cast<void>(getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size));
-  return peer.uid;
-}
-
-// An errand costs the loop least. But errands of a user who is stuck are not done: each socket
-// would keep a descriptor that is charged to nobody.
-void turn_away(shm::FileDescriptor socket, uid_t user) {
-  Errands& errands = Errands::of_the_process();
-  if (errands.is_stuck(user)) {
-    hang_up(std::move(socket), user);
-  } else {
-    errands.close(user, std::move(socket));
-  }
-}
 
 std::uint64_t event_key(std::uint32_t tag, ClientId client) {
   return std::uint64_t{tag} << 56 | client;
@@ -251,53 +218,6 @@ bool Daemon::handle_signal(int signal_descriptor) {
   return false;
 }
 
-// What waits at the listener's, as far as it goes in one round.
-void Daemon::accept_clients() {
-  for (int i = 0; i < kMaxAcceptedAtOnce; ++i) {
-    shm::FileDescriptor socket(
-        accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
-    if (!socket) {
-      if (errno == EMFILE || errno == ENFILE) {
-        turn_away_client();
-      } else if (errno != EAGAIN && errno != ECONNABORTED) {
-        log::warn("accept: {}", std::strerror(errno));
-      }
-      return;
-    }
-    const uid_t user = user_of(socket);
-    const LogAccount account(user);
-    try {
-      Charge descriptor = shares_.take(user, Share::kDescriptors);
-      lobby_.add({user, std::move(socket), std::move(descriptor)});
-    } catch (const LimitExceeded& limit) {  // anybody may come again and again: not worth a warning
-      log::debug("a client was turned away: {}", limit.what());
-      turn_away(std::move(socket), user);
-    }
-  }
-}
-
-// One of each user's.
-void Daemon::admit_clients() {
-  for (Lobby::Waiting& waiting : lobby_.next()) {
-    const LogAccount account(waiting.user);
-    std::unique_ptr<Client> client;
-    try {
-      const ClientId id = ++last_client_;
-      waiting.descriptor = {};
-      client = std::make_unique<Client>(id, std::move(waiting.socket), shares_);
-      watch_client(*client);
-      if (client->process() >= 0) watch(client->process(), Tag::kProcess, id, EPOLLIN);
-      clients_.emplace(id, std::move(client));
-      drop_oldest_silent_client();
-    } catch (const LimitExceeded& limit) {
-      log::debug("a client was turned away: {}", limit.what());
-    } catch (const std::exception& error) {
-      log::warn("a client was turned away: {}", error.what());
-      if (client != nullptr) unwatch(client->socket());
-    }
-  }
-}
-
 void Daemon::look_after_the_loop(shm::Nanoseconds now) {
   watchdog_.go_round(now);
   if (now >= listen_again_at_) {
@@ -307,67 +227,6 @@ void Daemon::look_after_the_loop(shm::Nanoseconds now) {
   look_in_flight(now);
   const std::string lost = Errands::of_the_process().look_after(now);
   if (!lost.empty()) log::warn("{}", lost);
-}
-
-void Daemon::look_in_flight(shm::Nanoseconds now) {
-  if (now < look_in_flight_at_) return;
-  look_in_flight_at_ = shm::kForever;
-  left_unread_.look();
-  for (const auto& [id, client] : clients_) client->look_in_flight();
-  for (const auto& [id, client] : clients_) {
-    if (client->is_held_back()) client->flush();
-  }
-}
-
-// At the end of a round: whoever is held back by now waits for that.
-void Daemon::plan_to_look_in_flight() {
-  shm::Nanoseconds after = left_unread_.empty() ? shm::kForever : kLookLeftUnreadAfter;
-  for (const auto& [id, client] : clients_) {
-    if (!client->is_held_back()) continue;
-    after =
-        std::min(after, kLookInFlightAfter << std::min(client->flushed_in_vain(), kMostDoublings));
-  }
-  if (after == shm::kForever) return;
-  look_in_flight_at_ = std::min(look_in_flight_at_, shm::monotonic_now() + after);
-}
-
-// It would stay in the listener's queue, and the loop would never rest. Where there is not even a
-// descriptor for that, the listener is left alone for a while.
-void Daemon::turn_away_client() {
-  shm::FileDescriptor socket;
-  {
-    const Headroom::Use use;
-    socket.reset(accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
-  }
-  if (!socket) {
-    listen_again_at_ = shm::monotonic_now() + kListenAgainAfter;
-    watch(listener_.socket.get(), Tag::kListener, 0, 0);
-    return;
-  }
-  const uid_t user = user_of(socket);
-  const LogAccount account(user);
-  log::warn(
-      "a client of user {} was turned away: no descriptors are left (RLIMIT_NOFILE, "
-      "LimitNOFILE= in a systemd unit)",
-      user);
-  hang_up(std::move(socket), user);
-}
-
-// Whoever connects and says nothing costs two descriptors, and gives way to those who come later:
-// of the user who has the most of them.
-void Daemon::drop_oldest_silent_client() {
-  std::map<uid_t, std::pair<std::size_t, ClientId>> silent;  // how many, and the oldest
-  std::size_t count = 0;
-  for (const auto& [id, client] : clients_) {
-    if (!client->name.empty()) continue;
-    ++count;
-    ++silent.try_emplace(client->user(), std::size_t{0}, id).first->second.first;
-  }
-  if (count <= shm::kMaxSilentClients) return;
-  const auto most = std::max_element(
-      silent.begin(), silent.end(),
-      [](const auto& one, const auto& other) { return one.second.first < other.second.first; });
-  drop(most->second.second);
 }
 
 bool Daemon::serve(Client& client) {
