@@ -25,20 +25,20 @@ std::vector<pid_t> tasks_of(pid_t process) {
   return tasks;
 }
 
-// Whether its loop waits with no time set for waking; true, too, where we are not told.
-bool waits_for_ever(pid_t process) {
+// Whether its loop sleeps with no time set for waking; that it sleeps, where no more is told.
+bool rests(pid_t process) {
   std::ifstream file("/proc/" + std::to_string(process) + "/syscall");
   std::string call, epoll, events, count, timeout;
-  file >> call >> epoll >> events >> count >> timeout;
-  if (!file) return true;
-  return timeout.size() >= 8 && timeout.substr(timeout.size() - 8) == "ffffffff";
+  file >> call;
+  if (call.empty()) return state_of(process, process) == 'S';
+  file >> epoll >> events >> count >> timeout;  // nothing, where it is "running"
+  return call == std::to_string(SYS_epoll_wait) && timeout.size() >= 8 &&
+         timeout.substr(timeout.size() - 8) == "ffffffff";
 }
 
-// Until its loop sleeps with no time set for waking.
 void wait_until_it_rests(pid_t process) {
-  do {
-    wait_until_it_sleeps_in(SYS_epoll_wait, process, process);
-  } while (!waits_for_ever(process));
+  while (!rests(process)) {
+  }
 }
 
 // It comes to rest, and none of its threads has been awake since, though much has gone on elsewhere
@@ -88,11 +88,30 @@ TEST(Idle, ItSleepsAgainWhenEverybodyHasLeft) {
   expect_asleep(daemon.process().pid());
 }
 
+// Whether each thread but the loop's, which closes what was a client's, or waits for work, waits.
+bool others_wait(pid_t process) {
+  for (const pid_t task : tasks_of(process)) {
+    if (task == process) continue;
+    const long call = call_of(process, task);
+    if (call >= 0 ? call != SYS_futex : call == -1) return false;
+  }
+  return true;
+}
+
+// Until its loop and all other threads rest: one that has finished may have woken another.
+void wait_until_all_rest(pid_t process) {
+  std::uint64_t before = 0;
+  do {
+    wait_until_it_rests(process);
+    before = sleeps_of(process, process);
+  } while (!others_wait(process) || !rests(process) || sleeps_of(process, process) != before);
+}
+
 // Counts when nobody else is there and the daemon has nothing left to do.
 std::size_t descriptors_at_rest(Daemon& daemon, RawClient& watcher) {
   while (watcher.status()["clients"] != 1) {
   }
-  wait_until_it_rests(daemon.process().pid());
+  wait_until_all_rest(daemon.process().pid());
   return daemon.open_descriptors();
 }
 
