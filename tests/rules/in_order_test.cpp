@@ -14,6 +14,7 @@
 #include "rules/prove/table_rules.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
+#include "tests/support/rounds.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -133,7 +134,7 @@ class Readers {
 TEST(InOrder, RandomRulesDecideAsTheDefinitionSays) {
   std::mt19937 random(20261122);
   int in_order = 0;
-  for (int round = 0; round < 400; ++round) {
+  for (int round = 0; round < rounds(400); ++round) {
     const Rules rules = random_rules(random);
     const rules::RuleSet set = RulesByHand().port("/p", rules, true);
     Diagnostics diagnostics;
@@ -145,12 +146,12 @@ TEST(InOrder, RandomRulesDecideAsTheDefinitionSays) {
     Readers(rules, model).check_all_states();
     if (HasFailure()) return;
   }
-  EXPECT_GT(in_order, 200);
+  EXPECT_GT(in_order, rounds(200));
 }
 
 TEST(InOrder, TheSourcesThatAPortReadsAreThoseThatItsWalksTest) {
   std::mt19937 random(7);
-  for (int round = 0; round < 100; ++round) {
+  for (int round = 0; round < rounds(100); ++round) {
     Diagnostics diagnostics;
     const auto model =
         compile(RulesByHand().port("/p", random_rules(random), true), diagnostics, 0);

@@ -12,6 +12,7 @@
 #include "rules/model/load.hpp"
 #include "tests/rules/random_model.hpp"
 #include "tests/support/live_table.hpp"
+#include "tests/support/rounds.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::test {
@@ -169,7 +170,7 @@ class RandomDiffs : public testing::Test {
 
 TEST_F(RandomDiffs, OfAModelAndTheSameWithAFaultAreCountedExactly) {
   int different = 0;
-  for (unsigned seed = 0; seed < 300; ++seed) {
+  for (unsigned seed = 0; seed < rounds(300u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const RandomModel random = Generator(seed, words_).model();
     const auto before = load(random, ports_);
@@ -177,12 +178,12 @@ TEST_F(RandomDiffs, OfAModelAndTheSameWithAFaultAreCountedExactly) {
     expect_as_brute_force(before, after, words_.sources, seed % 10 == 0);
     different += diff(before, after).differs() ? 1 : 0;
   }
-  EXPECT_GT(different, 100);
+  EXPECT_GT(different, rounds(100));
   EXPECT_LT(different, 300);
 }
 
 TEST_F(RandomDiffs, OfModelsThatHaveNothingToDoWithEachOtherAreCountedExactly) {
-  for (unsigned seed = 0; seed < 100; ++seed) {
+  for (unsigned seed = 0; seed < rounds(100u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const auto before = load(Generator(seed, words_).model(), ports_);
     const auto after = load(Generator(seed + 1000, words_).model(), ports_);
@@ -193,7 +194,7 @@ TEST_F(RandomDiffs, OfModelsThatHaveNothingToDoWithEachOtherAreCountedExactly) {
 // Without conflict="first", since the order means something there.
 TEST_F(RandomDiffs, AnotherOrderAndOtherNamesAreProvedToChangeNothing) {
   int compared = 0;
-  for (unsigned seed = 0; seed < 600; ++seed) {
+  for (unsigned seed = 0; seed < rounds(600u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     RandomModel random = Generator(seed, words_).model();
     rules::Diagnostics diagnostics;
@@ -216,7 +217,7 @@ TEST_F(RandomDiffs, AnotherOrderAndOtherNamesAreProvedToChangeNothing) {
     EXPECT_THAT(found.ports, IsEmpty());
     ++compared;
   }
-  EXPECT_GT(compared, 100);
+  EXPECT_GT(compared, rounds(100));
 }
 
 TEST(ModelDiff, SaysInHowManyStatesWhoWinsInsteadOfWhom) {

@@ -12,6 +12,7 @@
 #include "rules/prove/witness.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
+#include "tests/support/rounds.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -103,7 +104,7 @@ std::vector<const Diagnostic*> conflicts(const Diagnostics& diagnostics) {
 }
 
 TEST(Proof, FindsAConflictExactlyWhereBruteForceDoesWithAShortestWitness) {
-  for (unsigned seed = 0; seed < 400; ++seed) {
+  for (unsigned seed = 0; seed < rounds(400u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     const RuleSet set = random_port(random, false);
@@ -142,7 +143,7 @@ TEST(Proof, FindsAConflictExactlyWhereBruteForceDoesWithAShortestWitness) {
 }
 
 TEST(Proof, WithConflictFirstTheFirstRuleThatHoldsWins) {
-  for (unsigned seed = 0; seed < 400; ++seed) {
+  for (unsigned seed = 0; seed < rounds(400u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     const RuleSet set = random_port(random, true);

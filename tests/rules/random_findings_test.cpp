@@ -10,6 +10,7 @@
 #include "rules/model/load.hpp"
 #include "tests/rules/random_model.hpp"
 #include "tests/support/live_table.hpp"
+#include "tests/support/rounds.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::test {
@@ -235,7 +236,7 @@ TEST(RandomFindings, AreThoseOfAllStates) {
   const Vocabulary words{
       {"/a:o", "/b:o", "/c:o", "/d:o", "/e:o", "/f:o", "/g:o"}, {"/p:i", "/q:i"}, 2, 7};
   Seen seen;
-  for (unsigned seed = 0; seed < 600; ++seed) {
+  for (unsigned seed = 0; seed < rounds(600u); ++seed) {
     const RandomModel random = Generator(seed, words).model();
     const std::set<std::string> first_wins_at =
         seed % 2 == 0 ? std::set<std::string>{"/p:i", "/q:i"} : std::set<std::string>{};
@@ -243,12 +244,12 @@ TEST(RandomFindings, AreThoseOfAllStates) {
     compare(random, words, first_wins_at, seen);
     if (testing::Test::HasFailure()) break;
   }
-  EXPECT_GT(seen.compared, 300);
-  EXPECT_GT(seen.never_runs, 50);
-  EXPECT_GT(seen.unreachable, 20);
-  EXPECT_GT(seen.never_wins, 5);
-  EXPECT_GT(seen.nobody, 300);
-  EXPECT_GT(seen.chains, 50);
+  EXPECT_GT(seen.compared, rounds(300));
+  EXPECT_GT(seen.never_runs, rounds(50));
+  EXPECT_GT(seen.unreachable, rounds(20));
+  EXPECT_GT(seen.never_wins, rounds(5));
+  EXPECT_GT(seen.nobody, rounds(300));
+  EXPECT_GT(seen.chains, rounds(50));
 }
 
 TEST(RandomFindings, AreThoseOfAllStatesOfTenSources) {

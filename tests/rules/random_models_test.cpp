@@ -10,6 +10,7 @@
 #include "rules/prove/compile.hpp"
 #include "tests/rules/random_model.hpp"
 #include "tests/support/live_table.hpp"
+#include "tests/support/rounds.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::test {
@@ -220,12 +221,12 @@ TEST_P(RandomModels, AreExplainedAsTheDefinitionOfARuleSays) {
     reasons += explanations.reasons();
     if (HasFailure()) return;
   }
-  EXPECT_GT(reasons, 300);
+  EXPECT_GT(reasons, rounds(300));
 }
 
 TEST_P(RandomModels, DecideAsTheDefinitionOfARuleSays) {
-  for (unsigned seed = 0; seed < 300; ++seed) check(seed);
-  EXPECT_GT(decided_, 60);
+  for (unsigned seed = 0; seed < rounds(300u); ++seed) check(seed);
+  EXPECT_GT(decided_, rounds(60));
   EXPECT_EQ(refused_ > 60, !GetParam());
 }
 

@@ -8,6 +8,7 @@
 #include "rules/model/statement.hpp"
 #include "tests/rules/random_model.hpp"
 #include "tests/support/live_table.hpp"
+#include "tests/support/rounds.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::test {
@@ -154,7 +155,7 @@ TEST(RandomStatements, AreProvedOrRefutedAsAllStatesSay) {
       {"/a:o", "/b:o", "/c:o", "/d:o", "/e:o", "/f:o", "/g:o"}, {"/p:i", "/q:i"}, 2, 7};
   const auto states = subsets(words.sources);
   Counts counts;
-  for (unsigned seed = 0; seed < 250; ++seed) {
+  for (unsigned seed = 0; seed < rounds(250u); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const RandomModel random = Generator(seed, words).model();
     const TemporaryDirectory directory;
@@ -183,8 +184,8 @@ TEST(RandomStatements, AreProvedOrRefutedAsAllStatesSay) {
     }
     if (testing::Test::HasFailure()) break;
   }
-  EXPECT_GT(counts.proved, 50);
-  EXPECT_GT(counts.refuted, 500);
+  EXPECT_GT(counts.proved, rounds(50));
+  EXPECT_GT(counts.refuted, rounds(500));
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "rules/prove/winners.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
+#include "tests/support/rounds.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -85,7 +86,7 @@ std::vector<rules::Witness> with_one_less(const rules::Witness& witness) {
 
 TEST(StateSearch, FindsWhoCanWinAndStatesOfWhichNothingCanBeLeftOut) {
   std::mt19937 random(20261122);
-  for (int round = 0; round < 200; ++round) {
+  for (int round = 0; round < rounds(200); ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
     const Rules rules = random_rules(random);
     Diagnostics diagnostics;
@@ -142,7 +143,7 @@ std::set<std::string> never_selected(const Diagnostics& diagnostics) {
 TEST(InOrder, WarnsOfTheSameRulesThatCanNeverWin) {
   std::mt19937 random(3);
   std::size_t warned = 0;
-  for (int round = 0; round < 200; ++round) {
+  for (int round = 0; round < rounds(200); ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
     const Rules rules = random_rules(random);
     std::set<std::string> expected(kFiveSources.begin(), kFiveSources.end());
@@ -159,7 +160,7 @@ TEST(InOrder, WarnsOfTheSameRulesThatCanNeverWin) {
       ASSERT_EQ(live.winner("/p"), first_that_holds(rules, now));
     }
   }
-  EXPECT_GT(warned, 50u);
+  EXPECT_GT(warned, rounds(50u));
 }
 
 // `s and not a and not b and not c`, with others at random.

@@ -12,6 +12,7 @@
 #include "rules/ask/findings.hpp"
 #include "rules/prove/compile.hpp"
 #include "tests/rules/rules_by_hand.hpp"
+#include "tests/support/rounds.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -83,7 +84,7 @@ std::pair<int, int> size_of_best(Table function, Table reached) {
 TEST(ShortestImplicant, ReachesWhatItIsToWithAsFewLiteralsAsCan) {
   DiagramBuilder builder;
   std::mt19937 random(20261122);
-  for (int round = 0; round < 3000; ++round) {
+  for (int round = 0; round < rounds(3000); ++round) {
     const Table function = random() & 0xffff, reached = random() & random() & 0xffff;
     if ((function & reached) == 0) continue;
     SCOPED_TRACE(std::to_string(function) + " " + std::to_string(reached));
@@ -108,7 +109,7 @@ TEST(ShortestImplicant, AfterItsBoundIsMetSaysSoAndLeavesTheDiagramsAlone) {
 TEST(LeanImplicant, HasNoLiteralThatCanBeLeftOut) {
   DiagramBuilder builder;
   std::mt19937 random(7);
-  for (int round = 0; round < 3000; ++round) {
+  for (int round = 0; round < rounds(3000); ++round) {
     const Table function = random() & 0xffff, reached = random() & random() & 0xffff;
     if ((function & reached) == 0) continue;
     SCOPED_TRACE(std::to_string(function) + " " + std::to_string(reached));
