@@ -13,10 +13,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "service/errands.hpp"
-#include "service/headroom.hpp"
-#include "service/log.hpp"
-#include "service/log_sink.hpp"
+#include "service/clients/errands.hpp"
+#include "service/clients/headroom.hpp"
+#include "service/log/log.hpp"
+#include "service/log/log_sink.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {

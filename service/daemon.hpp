@@ -20,28 +20,28 @@
 #include <string>
 #include <vector>
 
-#include "service/barriers.hpp"
-#include "service/changes.hpp"
-#include "service/client.hpp"
-#include "service/compiler.hpp"
-#include "service/continuity.hpp"
-#include "service/directory.hpp"
-#include "service/gate.hpp"
-#include "service/history.hpp"
-#include "service/in_flight.hpp"
-#include "service/inheritance.hpp"
-#include "service/library.hpp"
-#include "service/lobby.hpp"
-#include "service/model_copy.hpp"
-#include "service/models.hpp"
-#include "service/observers.hpp"
-#include "service/preparation.hpp"
-#include "service/registry.hpp"
-#include "service/shares.hpp"
-#include "service/status_requests.hpp"
-#include "service/strangers.hpp"
-#include "service/switchboard.hpp"
-#include "service/turns.hpp"
+#include "service/clients/barriers.hpp"
+#include "service/clients/client.hpp"
+#include "service/clients/gate.hpp"
+#include "service/clients/in_flight.hpp"
+#include "service/clients/lobby.hpp"
+#include "service/clients/status_requests.hpp"
+#include "service/clients/turns.hpp"
+#include "service/kept/inheritance.hpp"
+#include "service/kept/registry.hpp"
+#include "service/models/board.hpp"
+#include "service/models/changes.hpp"
+#include "service/models/compiler.hpp"
+#include "service/models/continuity.hpp"
+#include "service/models/document.hpp"
+#include "service/models/history.hpp"
+#include "service/models/library.hpp"
+#include "service/models/preparation.hpp"
+#include "service/policy/shares.hpp"
+#include "service/ports/observers.hpp"
+#include "service/ports/port_names.hpp"
+#include "service/ports/switchboard.hpp"
+#include "service/takeover/strangers.hpp"
 #include "service/watchdog.hpp"
 #include "shm/rendezvous.hpp"
 
@@ -59,7 +59,8 @@ struct DaemonOptions {
   std::string directory;              // where to listen
   std::optional<std::string> policy;  // a file; without one the default policy holds
   bool is_strict = false;             // takes warnings for errors, in all that it reads
-  // How much of what all share one user may have, in percent of what is left (service/shares.hpp).
+  // How much of what all share one user may have, in percent of what is left
+  // (service/policy/shares.hpp).
   unsigned user_share = Shares::kDefaultPercent;
   // Whether the service manager keeps descriptors for the next daemon.
   bool uses_descriptor_store = false;

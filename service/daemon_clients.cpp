@@ -10,11 +10,11 @@
 #include <memory>
 #include <utility>
 
+#include "service/clients/errands.hpp"
+#include "service/clients/headroom.hpp"
 #include "service/daemon.hpp"
-#include "service/errands.hpp"
-#include "service/headroom.hpp"
-#include "service/log.hpp"
-#include "service/log_sink.hpp"
+#include "service/log/log.hpp"
+#include "service/log/log_sink.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {

@@ -10,7 +10,7 @@
 #include <exception>
 
 #include "service/daemon.hpp"
-#include "service/log.hpp"
+#include "service/log/log.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {

@@ -10,9 +10,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "service/comparison.hpp"
 #include "service/daemon.hpp"
-#include "service/log.hpp"
+#include "service/log/log.hpp"
+#include "service/models/comparison.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {

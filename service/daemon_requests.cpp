@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "service/daemon.hpp"
-#include "service/log.hpp"
+#include "service/log/log.hpp"
 #include "service/status.hpp"
 #include "shm/clock.hpp"
 #include "shm/utf8.hpp"

@@ -14,7 +14,7 @@
 #include <algorithm>
 
 #include "service/daemon.hpp"
-#include "service/log.hpp"
+#include "service/log/log.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {

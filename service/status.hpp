@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <string>
 
-#include "service/history.hpp"
-#include "service/models.hpp"
-#include "service/strangers.hpp"
-#include "service/switchboard.hpp"
+#include "service/models/board.hpp"
+#include "service/models/history.hpp"
+#include "service/ports/switchboard.hpp"
+#include "service/takeover/strangers.hpp"
 
 namespace arbiter::service {
 

@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "service/changes.hpp"
-#include "service/history.hpp"
-#include "service/model_files.hpp"
+#include "service/models/arguments.hpp"
+#include "service/models/changes.hpp"
+#include "service/models/history.hpp"
 
 namespace arbiter::service {
 namespace {
