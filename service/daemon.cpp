@@ -14,9 +14,11 @@
 #include <utility>
 
 #include "service/clients/errands.hpp"
+#include "service/clients/hang_up.hpp"
 #include "service/clients/headroom.hpp"
 #include "service/log/log.hpp"
 #include "service/log/log_sink.hpp"
+#include "service/policy/users.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
@@ -119,7 +121,7 @@ void Daemon::run(int signal_descriptor) {
     advance_takeover(now);
     retry_postponed(now);
     advance_changes();
-    if (phase_ == Phase::kServing) give_back_at_ = directory_.give_back(now);
+    if (phase_ == Phase::kServing) give_back_at_ = names_.give_back(now);
     is_more_to_tell_ = observers_.tell(clients_, switchboard_);
     answer_status(now);
     settle();

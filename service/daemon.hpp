@@ -1,4 +1,4 @@
-// The daemon: hosts the shared memory's directory, loads models, introduces components to each
+// The daemon: hosts the memory that all share, loads models, introduces components to each
 // other.
 //
 // One thread, one epoll. It is off the data path: what it does slowly makes nobody publish slowly.
@@ -27,8 +27,9 @@
 #include "service/clients/lobby.hpp"
 #include "service/clients/status_requests.hpp"
 #include "service/clients/turns.hpp"
-#include "service/kept/inheritance.hpp"
+#include "service/kept/descriptor_store.hpp"
 #include "service/kept/registry.hpp"
+#include "service/kept/state_file.hpp"
 #include "service/models/board.hpp"
 #include "service/models/changes.hpp"
 #include "service/models/compiler.hpp"
@@ -250,8 +251,8 @@ class Daemon {
   Gate gate_;
   Shares shares_;
   Registry registry_;
-  Directory directory_{registry_, shares_, stores_};
-  Models models_{directory_, registry_};
+  PortNames names_{registry_, shares_, stores_};
+  Board board_{names_, registry_};
   const std::vector<NamedFiles> files_;
   const bool is_strict_;
   std::vector<ModelPointer> read_at_start_;  // until they are put into the library
@@ -259,8 +260,8 @@ class Daemon {
   LoadedModel in_force_;  // null: none, or a predecessor's
   History history_;
   Continuity continuity_;
-  ModelCopy model_copy_;
-  Switchboard switchboard_{directory_, registry_};
+  ModelDocument model_document_;
+  Switchboard switchboard_{names_, registry_};
   Barriers barriers_;
   shm::Nanoseconds show_growth_at_ = shm::kForever;
   shm::Listener listener_;

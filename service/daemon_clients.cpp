@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "service/clients/errands.hpp"
+#include "service/clients/hang_up.hpp"
 #include "service/clients/headroom.hpp"
 #include "service/daemon.hpp"
 #include "service/log/log.hpp"

@@ -13,6 +13,7 @@
 #include "service/daemon.hpp"
 #include "service/log/log.hpp"
 #include "service/models/comparison.hpp"
+#include "service/policy/users.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
@@ -154,7 +155,7 @@ void Daemon::read_first_models(int stop_descriptor) {
 }
 
 void Daemon::prepare_reload(Swap& swap) {
-  prepare(swap, reading_job([before = in_force_.model, name = models_.name()](
+  prepare(swap, reading_job([before = in_force_.model, name = board_.name()](
                                 Reading& reading, const std::stop_token& stop) {
             const ModelPointer after = find_model(reading.models, name);
             if (before == nullptr || after == nullptr) return;
@@ -169,8 +170,8 @@ void Daemon::finish_reload(Swap& swap, Reading reading) {
     answer_done(swap, nullptr);
     return;
   }
-  Library library(std::move(reading.models), directory_);
-  const LoadedModel* next = library.find(models_.name());
+  Library library(std::move(reading.models), names_);
+  const LoadedModel* next = library.find(board_.name());
   if (next == nullptr) next = library.first();
   swap.to = *next;
   swap.how = "reload";
@@ -200,7 +201,7 @@ void Daemon::reserve_tables(const Library& library) {
   for (const LoadedModel& each : library.models()) {
     words = std::max(words, each.layout->words().size());
   }
-  models_.reserve(words);
+  board_.reserve(words);
 }
 
 void Daemon::prepare_switch(Swap& swap) {
@@ -241,7 +242,7 @@ void Daemon::prepare_rollback(Swap& swap) {
                              " is not kept any longer, or was another daemon's; only its name is "
                              "known");
   }
-  swap.to = {past->model, std::make_shared<const Layout>(past->model->compiled, directory_)};
+  swap.to = {past->model, std::make_shared<const Layout>(past->model->compiled, names_)};
   swap.how = "rollback to " + std::to_string(past->generation);
   swap.back_to = *past;
   swap.content = past->content;
@@ -255,9 +256,9 @@ void Daemon::prepare_rollback(Swap& swap) {
 
 // Throws, and then nothing has changed, `swap` neither.
 void Daemon::begin_swap(Swap& swap) {
-  models_.prepare(*swap.to.layout, swap.to.model->name);
+  board_.prepare(*swap.to.layout, swap.to.model->name);
   swap_ = std::move(swap);
-  auto told = switchboard_.link_all(models_.prepared());
+  auto told = switchboard_.link_all(board_.prepared());
   // The table itself, all who will read it have to map.
   for (const auto& [id, client] : clients_) {
     if (!client->ports.empty()) told.insert(client.get());
@@ -268,16 +269,16 @@ void Daemon::begin_swap(Swap& swap) {
 void Daemon::put_in_force() {
   const Swap swap = std::move(*std::exchange(swap_, std::nullopt));
   if (swap.policy) gate_.put_in_force(*swap.policy);
-  const auto last = models_.in_force();
-  const shm::Nanoseconds last_since = models_.in_force_since();
-  models_.put_in_force();
+  const auto last = board_.in_force();
+  const shm::Nanoseconds last_since = board_.in_force_since();
+  board_.put_in_force();
   const ModelPointer before = std::exchange(in_force_, swap.to).model;
   const Model& model = *in_force_.model;
   if (swap.library) library_ = *swap.library;
-  const auto snapshot = models_.in_force();
+  const auto snapshot = board_.in_force();
   continuity_.change(before == nullptr ? nullptr : &before->compiled, model.compiled, last_since);
   if (last.generation != 0) {
-    continuity_.change_timeouts(directory_, last.table, snapshot.table, models_.in_force_since());
+    continuity_.change_timeouts(names_, last.table, snapshot.table, board_.in_force_since());
   }
   introduce(switchboard_.link_all(snapshot.table), [] {});  // ports that were opened meanwhile
   switchboard_.unlink(snapshot.table);
@@ -309,7 +310,7 @@ void Daemon::prepare_comparison(Swap& swap) {
   std::vector<ModelPointer> loaded;
   for (const LoadedModel& each : library_.models()) loaded.push_back(each.model);
   prepare(swap, reading_job([loaded = std::move(loaded), in_force = in_force_.model,
-                             name = models_.name()](Reading& reading, const std::stop_token& stop) {
+                             name = board_.name()](Reading& reading, const std::stop_token& stop) {
             for (const ModelPointer& read : reading.models) {
               const auto found = std::find_if(loaded.begin(), loaded.end(), [&](const auto& each) {
                 return each->name == read->name;
@@ -328,7 +329,7 @@ void Daemon::finish_comparison(const Swap& swap, const Reading& reading) {
   for (std::size_t i = 0; i < reading.models.size(); ++i) {
     const std::string& name = reading.models[i]->name;
     models.push_back({{"name", name},
-                      {"in_force", name == models_.name()},
+                      {"in_force", name == board_.name()},
                       {"changes", nlohmann::json::parse(reading.diffs[i])}});
   }
   answer(swap, report(swap, {{"ok", true}, {"models", std::move(models)}}));
@@ -336,8 +337,8 @@ void Daemon::finish_comparison(const Swap& swap, const Reading& reading) {
 
 void Daemon::answer_done(const Swap& swap, nlohmann::json changes) {
   answer(swap, report(swap, {{"ok", true},
-                             {"generation", models_.in_force().generation},
-                             {"name", models_.name()},
+                             {"generation", board_.in_force().generation},
+                             {"name", board_.name()},
                              {"back_to", swap.back_to ? to_json(*swap.back_to) : nullptr},
                              {"changes", std::move(changes)}}));
 }
@@ -364,7 +365,7 @@ void Daemon::answer(const Swap& swap, const std::string& report, const std::stri
       refuse(client, each.request, why_not);
     } else {
       auto reply = reply_to(each.request, shm::MessageKind::kDone);
-      reply.value = static_cast<std::uint32_t>(models_.in_force().generation);
+      reply.value = static_cast<std::uint32_t>(board_.in_force().generation);
       client.send(reply);
     }
   }

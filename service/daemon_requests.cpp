@@ -101,7 +101,7 @@ void Daemon::handle(Client& client, shm::Received& received) {
       break;
     case shm::MessageKind::kObserve:
       gate_.require(client, Action::kObserve);
-      observers_.add(client, message.request, directory_.last_news());
+      observers_.add(client, message.request, names_.last_news());
       break;
     case shm::MessageKind::kPeerRefused:
       if (client.ports.count(message.port) != 0) {
@@ -226,7 +226,7 @@ void Daemon::welcome(Client& client) {
   auto welcome = reply_to(client.hello_request, shm::MessageKind::kWelcome);
   welcome.link = client.node;
   strangers_.welcome(client);
-  client.send(welcome, {models_.board().get(), registry_.readable().get()});
+  client.send(welcome, {board_.readable().get(), registry_.readable().get()});
   log::debug("{} is here", client.description());
 }
 
@@ -274,15 +274,15 @@ void Daemon::open_output(Client& client, shm::Received& received) {
   const std::string name = port_name(received.message);
   gate_.require(client, Action::kOutput, name);
   auto port = adopt_output(received, client.user());
-  directory_.give_back(shm::monotonic_now());  // what this client may have closed just before
+  names_.give_back(shm::monotonic_now());  // what this client may have closed just before
   port->charge = shares_.take(client.user(), Share::kDescriptors, kDescriptorsOfOutput);
-  Source& source = directory_.source(name, client.user());
-  directory_.let_go(source);  // if it is not opened after all
+  Source& source = names_.source(name, client.user());
+  names_.let_go(source);  // if it is not opened after all
   require_free(client, source.open, "the output port " + name);
   require_not_kept(source.away, "the output port " + name);
   require_not_changing(source);
   const std::uint64_t request = received.message.request;
-  if (Directory::may_be_given(source, client.user())) {
+  if (PortNames::may_be_given(source, client.user())) {
     finish_opening(client, request, std::move(port), source);
     return;
   }
@@ -296,7 +296,7 @@ void Daemon::open_output(Client& client, shm::Received& received) {
 void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_ptr<OutputPort> port,
                             Source& source) {
   remember_component(client);
-  directory_.give_page(source, client.user());
+  names_.give_page(source, client.user());
   const OutputPort& opened = switchboard_.add(std::move(port), client, source);
   auto reply = reply_to(request, shm::MessageKind::kOpened);
   reply.port = opened.instance;
@@ -310,10 +310,10 @@ void Daemon::open_input(Client& client, shm::Received& received) {
   const std::string name = port_name(received.message);
   gate_.require(client, Action::kInput, name);
   auto port = adopt_input(received, client.user());
-  directory_.give_back(shm::monotonic_now());
+  names_.give_back(shm::monotonic_now());
   port->charge = shares_.take(client.user(), Share::kDescriptors, kDescriptorsOfInput);
-  InputName& input = directory_.input(name, client.user());
-  directory_.let_go(input);
+  InputName& input = names_.input(name, client.user());
+  names_.let_go(input);
   require_free(client, input.open, "the input port " + name);
   require_not_kept(input.away, "the input port " + name);
   remember_component(client);
@@ -328,7 +328,7 @@ void Daemon::open_input(Client& client, shm::Received& received) {
 
 // Introduces a new port to its peers, and tells its component once they know it.
 void Daemon::connect(Client& client, std::uint64_t request, shm::PortInstance port) {
-  const auto in_force = models_.in_force();
+  const auto in_force = board_.in_force();
   auto told = switchboard_.link_one(in_force.table, port);
   switchboard_.tell_unmentioned(in_force, port);
   // Hears of it in order, before the kConnected. But its receivers have to wait for an output port.
@@ -365,8 +365,8 @@ void Daemon::answer_status(shm::Nanoseconds now) {
   std::string why_not;
   try {
     document = make_document(
-        status_document({instance_, models_, library_, in_force_.model, history_, directory_,
-                         registry_, switchboard_, strangers_, clients_.size(), reloads_refused_},
+        status_document({instance_, board_, library_, in_force_.model, history_, names_, registry_,
+                         switchboard_, strangers_, clients_.size(), reloads_refused_},
                         now));
   } catch (const std::exception& error) {  // no descriptors are left
     why_not = error.what();
@@ -401,14 +401,14 @@ void Daemon::send_document(Client& client, std::uint64_t request, shm::MessageKi
 
 void Daemon::send_model(Client& client, std::uint64_t request) {
   auto reply = reply_to(request, shm::MessageKind::kModelReply);
-  const ModelCopyOf of{models_, library_, in_force_.model, history_, continuity_};
-  client.send(reply, {model_copy_.of(of).get(), -1});
+  const ModelDocumentOf of{board_, library_, in_force_.model, history_, continuity_};
+  client.send(reply, {model_document_.of(of).get(), -1});
 }
 
 void Daemon::deactivate(Client& client, const shm::Message& message) {
   const std::string name = port_name(message);
   gate_.require(client, Action::kDeactivate, name);
-  Source* source = directory_.find_source(name);
+  Source* source = names_.find_source(name);
   if (source == nullptr) {
     throw std::runtime_error("no model and no component has named the source " + name);
   }
@@ -419,7 +419,7 @@ void Daemon::deactivate(Client& client, const shm::Message& message) {
   const bool was_active = end_activity(*source);
   const auto answer = [this, was_active, request = message.request](Source& ended, Client& asking) {
     end_activity(ended);  // who had it may have written there until it was replaced
-    directory_.let_go(ended);
+    names_.let_go(ended);
     auto reply = reply_to(request, shm::MessageKind::kDone);
     reply.value = was_active ? 1 : 0;
     asking.send(reply);

@@ -58,7 +58,7 @@ void Daemon::look_for_predecessor() {
       inherit(board->descriptor, registry->descriptor);
       for (const StoredDescriptor& each : stored) {
         if (&each == &*board || &each == &*registry) continue;
-        if (!directory_.take_page(each.descriptor)) discard_stored(each.name);
+        if (!names_.take_page(each.descriptor)) discard_stored(each.name);
       }
       return;
     } catch (const std::exception& error) {
@@ -74,20 +74,20 @@ void Daemon::look_for_predecessor() {
 
 void Daemon::inherit(const shm::FileDescriptor& board, const shm::FileDescriptor& registry) {
   Registry inherited(registry);
-  models_.inherit(board);
+  board_.inherit(board);
   registry_ = std::move(inherited);
-  directory_.restore(models_.in_force().generation);
+  names_.restore(board_.in_force().generation);
   find_absentees();
   phase_ = Phase::kTakingOver;
   log::info("taking over from the last daemon, {} components and model {}", absentees_.size(),
-            models_.in_force().generation);
+            board_.in_force().generation);
 }
 
 void Daemon::find_absentees() {
-  for (const auto& source : directory_.sources()) {
+  for (const auto& source : names_.sources()) {
     if (source->away != 0) add_absentee(registry_.source(source->id).owner());
   }
-  for (const auto& input : directory_.inputs()) {
+  for (const auto& input : names_.inputs()) {
     if (input->away != 0) add_absentee(registry_.input(input->id).owner());
   }
 }
@@ -115,7 +115,7 @@ void Daemon::rejoin(Client& client, const shm::Received& hello) {
       throw std::runtime_error("this daemon's predecessor had other memory");
     }
     inherit(hello.descriptors[0], hello.descriptors[1]);
-  } else if (!(FileIdentity::of(hello.descriptors[0]) == FileIdentity::of(models_.board()))) {
+  } else if (!(FileIdentity::of(hello.descriptors[0]) == FileIdentity::of(board_.readable()))) {
     throw std::runtime_error("this daemon does not know the ports of \"" + client.name +
                              "\", which another daemon has opened; restart the component");
   }
@@ -140,30 +140,30 @@ void Daemon::rejoin(Client& client, const shm::Received& hello) {
 
 void Daemon::take_back_page(Client& client, const shm::Received& received) {
   const shm::SourceId id = received.message.id;
-  const Source* source = directory_.source_by_id(id);
+  const Source* source = names_.source_by_id(id);
   // One that was to come into force next when the last daemon ended.
   if (source != nullptr && received.message.value == source->page_number + 1) return;
-  if (!directory_.take_page(id, received.descriptors[0])) {
+  if (!names_.take_page(id, received.descriptors[0])) {
     throw std::runtime_error("what was handed back is not the page of source " +
                              std::to_string(id));
   }
-  client.pages[id] = directory_.source_by_id(id)->page_number;
+  client.pages[id] = names_.source_by_id(id)->page_number;
 }
 
 void Daemon::take_back_output(Client& client, const shm::Received& received) {
   const shm::Message& message = received.message;
-  Source* source = directory_.source_by_id(message.id);
+  Source* source = names_.source_by_id(message.id);
   if (source == nullptr || source->away != message.port ||
       client.to_hand_back.erase(message.port) == 0) {
     throw std::runtime_error("an output port that it never had was handed back");
   }
-  directory_.take_page(message.id, received.descriptors[1]);
+  names_.take_page(message.id, received.descriptors[1]);
   switchboard_.readmit(adopt_output(received, client.user()), client, *source);
 }
 
 void Daemon::take_back_input(Client& client, const shm::Received& received) {
   const shm::Message& message = received.message;
-  InputName* input = directory_.input_by_id(message.id);
+  InputName* input = names_.input_by_id(message.id);
   if (input == nullptr || input->away != message.port ||
       client.to_hand_back.erase(message.port) == 0) {
     throw std::runtime_error("an input port that it never had was handed back");
@@ -185,12 +185,12 @@ void Daemon::finish_return(Client& client) {
     switchboard_.forget_away(port);  // closed meanwhile
   }
   std::set<shm::PortInstance> away;
-  for (const auto& source : directory_.sources()) away.insert(source->away);
-  for (const auto& input : directory_.inputs()) away.insert(input->away);
+  for (const auto& source : names_.sources()) away.insert(source->away);
+  for (const auto& input : names_.inputs()) away.insert(input->away);
   away.erase(0);
   const auto is_away = [&](shm::PortInstance port) { return away.contains(port); };
   for (const shm::PortInstance port : client.ports) switchboard_.settle_claims(port, is_away);
-  const auto table = models_.in_force().table;
+  const auto table = board_.in_force().table;
   switchboard_.link_all(table);
   switchboard_.unlink(table);
   try_postponed_ = true;
@@ -230,20 +230,20 @@ void Daemon::finish_takeover() {
     if (stores_) {
       discard_stored("board");
       discard_stored("registry");
-      store("board", models_.writable_board());
+      store("board", board_.writable());
       store("registry", registry_.writable());
     }
   }
   phase_ = Phase::kServing;
   try_postponed_ = true;
-  directory_.forget_lost_pages();
-  const auto inherited = models_.in_force().generation;
+  names_.forget_lost_pages();
+  const auto inherited = board_.in_force().generation;
   if (inherited != 0) {
-    history_.add({inherited, 0, models_.name(), {}, calendar_ms(), "takeover", {}, {}, nullptr});
+    history_.add({inherited, 0, board_.name(), {}, calendar_ms(), "takeover", {}, {}, nullptr});
   }
   if (files_.empty()) {
     if (!is_fresh) log::info("no model was given: the one in force stays");
-    switchboard_.link_all(models_.in_force().table);
+    switchboard_.link_all(board_.in_force().table);
     welcome_waiting();
     return;
   }
@@ -259,8 +259,8 @@ void Daemon::finish_takeover() {
 
 // The model that the last daemon had in force, if this one has it by that name, too.
 Daemon::Swap Daemon::first_swap() {
-  Library library(std::exchange(read_at_start_, {}), directory_);
-  const std::string last = models_.name();
+  Library library(std::exchange(read_at_start_, {}), names_);
+  const std::string last = board_.name();
   const LoadedModel* next = library.find(last);
   if (next == nullptr) {
     next = library.first();
@@ -286,7 +286,7 @@ void Daemon::remember_components() {
   for (const auto& [node, absentee] : absentees_) {
     components.push_back({absentee.pid, start_of_process(absentee.pid)});
   }
-  state_.write({FileIdentity::of(models_.board()), FileIdentity::of(registry_.readable())},
+  state_.write({FileIdentity::of(board_.readable()), FileIdentity::of(registry_.readable())},
                components);
 }
 

@@ -13,11 +13,11 @@ namespace arbiter::service {
 
 struct StatusOf {
   const std::string& instance;
-  const Models& models;
+  const Board& models;
   const Library& library;
   const ModelPointer& model;  // in force; null: none, or a predecessor's
   const History& history;
-  const Directory& directory;
+  const PortNames& directory;
   const Registry& registry;
   const Switchboard& switchboard;
   const Strangers& strangers;

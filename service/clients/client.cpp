@@ -1,7 +1,6 @@
 #include "service/clients/client.hpp"
 
 #include <fcntl.h>
-#include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
@@ -14,6 +13,7 @@
 #include <system_error>
 
 #include "service/clients/errands.hpp"
+#include "service/clients/hang_up.hpp"
 #include "service/clients/headroom.hpp"
 #include "service/log/log.hpp"
 #include "shm/foreign.hpp"
@@ -44,32 +44,6 @@ std::string too_much_waits(uid_t user) {
          "those at their other ends";
 }
 
-// The most messages that are looked at before a socket is closed.
-constexpr int kMaxUnread = 1024;
-
-// Whether messages that nobody has read bring descriptors, once nobody can send more of them. Each
-// look has room for the sender's credentials alone: the end of the conversation brings none, a
-// message does, and the kernel says whether more was left out. A look lets go of nothing, so it
-// takes no time; and a message without descriptors can be taken.
-bool brings_descriptors(int socket) noexcept {
-  const int on = 1;
-  if (setsockopt(socket, SOL_SOCKET, SO_PASSCRED, &on, sizeof on) != 0) return true;
-  for (int i = 0; i < kMaxUnread; ++i) {
-    alignas(cmsghdr) char credentials[CMSG_SPACE(sizeof(ucred))];
-    msghdr header{};
-    header.msg_control = credentials;
-    header.msg_controllen = sizeof credentials;
-    if (recvmsg(socket, &header, MSG_PEEK | MSG_DONTWAIT | MSG_CMSG_CLOEXEC) < 0) {
-      if (errno == ECONNRESET) continue;  // said once, before what was sent
-      return true;
-    }
-    if (header.msg_controllen == 0) return false;
-    if ((header.msg_flags & MSG_CTRUNC) != 0) return true;
-    static_cast<void>(!recv(socket, nullptr, 0, MSG_DONTWAIT));
-  }
-  return true;
-}
-
 // On a file system of their own, pidfds of one process have one inode, which is no other's.
 bool is_one_process(int one, int other) {
   struct statfs system {};
@@ -81,15 +55,6 @@ bool is_one_process(int one, int other) {
 }
 
 }  // namespace
-
-// Most conversations end with nothing unread, or nothing that takes time.
-void hang_up(shm::FileDescriptor socket, uid_t user) {
-  if (!socket) return;
-  ::shutdown(socket.get(), SHUT_RDWR);
-  if (brings_descriptors(socket.get())) {
-    Errands::of_the_process().close(user, std::move(socket));
-  }
-}
 
 Client::Client(ClientId id, shm::FileDescriptor socket, Shares& shares)
     : id_(id), shares_(shares), socket_(std::move(socket)) {
@@ -233,14 +198,6 @@ shm::ReceiveResult Client::receive_from_socket(shm::Received& received) {
   return result;
 }
 
-void dispose_of(shm::Received& received, uid_t user) {
-  const auto dispose = [&](shm::FileDescriptor& descriptor) {
-    Errands::of_the_process().close(user, std::move(descriptor));
-  };
-  std::for_each(received.descriptors.begin(), received.descriptors.end(), dispose);
-  std::for_each(received.surplus.begin(), received.surplus.end(), dispose);
-}
-
 void Client::read_ahead() {
   shm::Received received;
   while (!ahead_ended_ && ahead_.size() < kMaxReadAhead &&
@@ -265,30 +222,6 @@ bool Client::take_closing_of(shm::PortInstance port) {
   if (closing == ahead_.end()) return ahead_ended_.has_value();
   ahead_.erase(closing);
   return true;
-}
-
-PutAside::PutAside(shm::Received& received, uid_t user, Shares& shares) : user_(user) {
-  bytes_ = shares.take(user, Share::kQueue, sizeof received);
-  const std::size_t count = received.descriptor_count;
-  if (count != 0) descriptors_ = shares.take(user, Share::kDescriptors, count);
-  received_ = std::make_unique<shm::Received>(std::move(received));
-}
-
-PutAside& PutAside::operator=(PutAside&& other) noexcept {
-  std::swap(received_, other.received_);
-  std::swap(user_, other.user_);
-  std::swap(bytes_, other.bytes_);
-  std::swap(descriptors_, other.descriptors_);
-  return *this;
-}
-
-PutAside::~PutAside() {
-  if (received_ != nullptr) dispose_of(*received_, user_);
-}
-
-bool has_ended(const shm::FileDescriptor& process) {
-  pollfd polled{process.get(), POLLIN, 0};
-  return process && ::poll(&polled, 1, 0) == 1;
 }
 
 // Where it has not ended after that, its number has not been another's meanwhile.

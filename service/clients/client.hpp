@@ -12,7 +12,9 @@
 #include <string>
 
 #include "service/clients/in_flight.hpp"
-#include "service/kept/registry.hpp"
+#include "service/clients/put_aside.hpp"
+#include "service/kept/process.hpp"
+#include "service/kept/registry_entry.hpp"
 #include "service/policy/shares.hpp"
 #include "shm/activity.hpp"
 #include "shm/file_descriptor.hpp"
@@ -22,43 +24,6 @@
 namespace arbiter::service {
 
 using ClientId = std::uint64_t;
-
-// Whether the process of a pidfd has ended.
-[[nodiscard]] bool has_ended(const shm::FileDescriptor& process);
-
-// Closes a client's socket: at once, or, where unread messages in it bring descriptors, which may
-// take any time to close, as an errand of that user.
-void hang_up(shm::FileDescriptor socket, uid_t user);
-
-// Closes what a message has brought and nobody has taken, as errands of the user who sent it.
-void dispose_of(shm::Received& received, uid_t user);
-
-// A message that cannot be handled yet, and what keeping it costs its user. What it has brought and
-// nobody takes is closed as an errand of his.
-class PutAside {
- public:
-  PutAside() = default;
-  // Throws LimitExceeded, and then `received` is as it was.
-  PutAside(shm::Received& received, uid_t user, Shares& shares);
-  PutAside(PutAside&& other) noexcept = default;
-  PutAside& operator=(PutAside&& other) noexcept;
-  PutAside(const PutAside&) = delete;
-  PutAside& operator=(const PutAside&) = delete;
-  ~PutAside();
-
-  [[nodiscard]] shm::Received& received() const { return *received_; }
-  // What it costs is given back: whoever puts the message aside again is charged again.
-  void give_back() {
-    bytes_ = {};
-    descriptors_ = {};
-  }
-
- private:
-  std::unique_ptr<shm::Received> received_;
-  uid_t user_ = 0;
-  Charge bytes_;
-  Charge descriptors_;
-};
 
 // A request that is tried again, at `deadline` for the last time.
 struct Postponed {

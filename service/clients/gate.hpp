@@ -11,14 +11,6 @@
 
 namespace arbiter::service {
 
-// Who is at the other end of a Unix socket: the user and the groups of the process that connected,
-// at that moment, which the kernel keeps with the socket. Nothing that a client says enters.
-// Throws std::system_error.
-Identity peer_identity(int socket);
-
-// "nobody (65534)"; the number alone where it has no name.
-std::string describe_user(uid_t user);
-
 class Gate {
  public:
   // Without a file the default policy holds.

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "service/clients/client.hpp"
+#include "service/clients/hang_up.hpp"
 
 namespace arbiter::service {
 namespace {

@@ -5,6 +5,8 @@
 
 #include <cstdint>
 
+#include "shm/file_descriptor.hpp"
+
 namespace arbiter::service {
 
 struct Process {
@@ -16,5 +18,8 @@ struct Process {
 };
 // When a process began, in clock ticks since boot; 0 where that cannot be told.
 std::uint64_t start_of_process(pid_t pid);
+
+// Whether the process of a pidfd has ended.
+[[nodiscard]] bool has_ended(const shm::FileDescriptor& process);
 
 }  // namespace arbiter::service

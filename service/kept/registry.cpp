@@ -6,7 +6,8 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "service/models/arguments.hpp"
+#include "service/kept/handed_back.hpp"
+#include "service/kept/model_name.hpp"
 #include "shm/table_ring.hpp"
 
 namespace arbiter::service {

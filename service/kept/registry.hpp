@@ -13,7 +13,6 @@
 #include <functional>
 #include <string>
 
-#include "service/kept/inheritance.hpp"
 #include "service/kept/registry_entry.hpp"
 #include "shm/atomic.hpp"
 #include "shm/ids.hpp"

@@ -7,11 +7,6 @@
 namespace arbiter::service {
 namespace {
 
-bool is_name_character(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-         c == '.' || c == '-';
-}
-
 struct Given {
   std::string name;  // empty: none
   std::string file;
@@ -42,11 +37,6 @@ NamedFiles* find(std::vector<NamedFiles>& models, const std::string& name) {
 }
 
 }  // namespace
-
-bool is_model_name(std::string_view text) {
-  return !text.empty() && text.size() <= kMaxModelName && text.front() != '-' &&
-         std::all_of(text.begin(), text.end(), is_name_character);
-}
 
 std::vector<NamedFiles> named_files(const std::vector<std::string>& models,
                                     const std::vector<std::string>& applications) {

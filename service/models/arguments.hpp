@@ -7,21 +7,18 @@
 #include <vector>
 
 #include "rules/model/load.hpp"
+#include "service/kept/model_name.hpp"
 
 namespace arbiter::service {
 
 // What is given without a name is part of this one.
 inline constexpr const char* kDefaultModel = "default";
-inline constexpr std::size_t kMaxModelName = 63;
 inline constexpr std::size_t kMaxModels = 64;
 
 struct NamedFiles {
   std::string name;
   rules::ModelFiles files;
 };
-
-// Letters, digits and _ . - ; the first is no dash, so that it is not taken for an option.
-[[nodiscard]] bool is_model_name(std::string_view text);
 
 // From what is written behind --model and --application: FILE, or NAME=FILE. Several files of one
 // name form one model; the models come in the order of their first files. An application without a

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "service/kept/inheritance.hpp"
+#include "service/kept/handed_back.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
@@ -22,8 +22,8 @@ shm::FileDescriptor make_board() {
 
 }  // namespace
 
-Models::Models(Directory& directory, Registry& registry)
-    : directory_(directory),
+Board::Board(PortNames& names, Registry& registry)
+    : names_(names),
       registry_(registry),
       writable_(make_board()),
       readable_(shm::reopen(writable_, O_RDONLY)),
@@ -31,10 +31,10 @@ Models::Models(Directory& directory, Registry& registry)
       writer_(*mapping_.as<shm::Board>()),
       reader_(*mapping_.as<shm::Board>()) {
   shm::TableWriter::initialize(*mapping_.as<shm::Board>());
-  directory_.use_board(writer_);
+  names_.use_board(writer_);
 }
 
-void Models::inherit(const shm::FileDescriptor& board) {
+void Board::inherit(const shm::FileDescriptor& board) {
   auto writable = reopen_inherited(board, sizeof(shm::Board));
   shm::Mapping mapping(writable, sizeof(shm::Board), shm::Access::kReadWrite);
   const auto& header = *mapping.as<shm::Board>();
@@ -47,10 +47,10 @@ void Models::inherit(const shm::FileDescriptor& board) {
   writer_ = shm::TableWriter(*mapping_.as<shm::Board>());
   reader_ = shm::TableReader(*mapping_.as<shm::Board>());
   writer_.renew_pages();  // the last daemon may have died while it changed one
-  directory_.use_board(writer_);
+  names_.use_board(writer_);
 }
 
-void Models::reserve(std::size_t words) {
+void Board::reserve(std::size_t words) {
   for (std::size_t slot = 0; slot < shm::kTableSlots; ++slot) {
     const std::size_t offset =
         offsetof(shm::Board, tables) + slot * sizeof(shm::Word) * shm::kMaxTableWords;
@@ -60,7 +60,7 @@ void Models::reserve(std::size_t words) {
   }
 }
 
-void Models::prepare(const Layout& layout, const std::string& name) {
+void Board::prepare(const Layout& layout, const std::string& name) {
   const auto& words = layout.words();
   if (const auto error =
           shm::allocate(writable_, writer_.next_offset(), words.size() * sizeof(shm::Word))) {
@@ -72,13 +72,13 @@ void Models::prepare(const Layout& layout, const std::string& name) {
   writer_.write(words);
 }
 
-void Models::put_in_force() {
+void Board::put_in_force() {
   in_force_since_ = shm::monotonic_now();
   writer_.put_in_force();
-  directory_.set_generation(reader_.generation());
+  names_.set_generation(reader_.generation());
 }
 
-std::string Models::name() const {
+std::string Board::name() const {
   const std::uint64_t generation = reader_.generation();
   return generation == 0 ? "" : registry_.model(generation);
 }

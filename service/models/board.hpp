@@ -11,10 +11,10 @@
 
 namespace arbiter::service {
 
-class Models {
+class Board {
  public:
   // An empty board. Throws std::system_error.
-  Models(Directory& directory, Registry& registry);
+  Board(PortNames& names, Registry& registry);
 
   // A predecessor's board takes the place of the empty one, which nobody has been given yet. Throws
   // std::runtime_error where it is not one.
@@ -34,11 +34,11 @@ class Models {
   [[nodiscard]] shm::Nanoseconds in_force_since() const { return in_force_since_; }
   [[nodiscard]] shm::TableView prepared() const { return writer_.next_table(); }
   // Read-only, for clients.
-  [[nodiscard]] const shm::FileDescriptor& board() const { return readable_; }
-  [[nodiscard]] const shm::FileDescriptor& writable_board() const { return writable_; }
+  [[nodiscard]] const shm::FileDescriptor& readable() const { return readable_; }
+  [[nodiscard]] const shm::FileDescriptor& writable() const { return writable_; }
 
  private:
-  Directory& directory_;
+  PortNames& names_;
   Registry& registry_;
   shm::Nanoseconds in_force_since_ = 0;
   shm::FileDescriptor writable_;

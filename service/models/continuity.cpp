@@ -59,9 +59,9 @@ void Continuity::change(const CompiledModel* before, const CompiledModel& after,
   ports_ = std::move(kept);
 }
 
-void Continuity::change_timeouts(const Directory& directory, const shm::TableView& before,
+void Continuity::change_timeouts(const PortNames& names, const shm::TableView& before,
                                  const shm::TableView& after, shm::Nanoseconds now) {
-  for (const auto& source : directory.sources()) {
+  for (const auto& source : names.sources()) {
     const shm::Nanoseconds timeout = before.timeout(source->id);
     if (timeout == after.timeout(source->id)) continue;
     // Relaxed is enough: it is only compared with what the same word says later.

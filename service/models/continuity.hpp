@@ -27,7 +27,7 @@ class Continuity {
   // Remembers of each source the T that it had, where that was another. Of a source to which
   // nothing has happened since an earlier change it stays the T of then, which its last arrival
   // came under.
-  void change_timeouts(const Directory& directory, const shm::TableView& before,
+  void change_timeouts(const PortNames& names, const shm::TableView& before,
                        const shm::TableView& after, shm::Nanoseconds now);
 
   // Of the ports that some earlier model decided as the one in force does: since when.

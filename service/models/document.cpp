@@ -35,7 +35,7 @@ json connections_json(const rules::CompiledModel& model) {
   return ports;
 }
 
-void add_origin(const ModelCopyOf& of, json& document) {
+void add_origin(const ModelDocumentOf& of, json& document) {
   const std::string name = of.models.name();
   const PastModel* latest = of.history.find(of.models.in_force().generation);
   const bool is_named = !name.empty() && name != kDefaultModel;
@@ -49,7 +49,7 @@ void add_origin(const ModelCopyOf& of, json& document) {
   document["in_force_since_ns"] = of.models.in_force_since();
 }
 
-void add_texts(const ModelCopyOf& of, json& document) {
+void add_texts(const ModelDocumentOf& of, json& document) {
   const auto* texts = of.model == nullptr ? nullptr : of.model->compiled.texts.get();
   document["known"] = texts != nullptr;
   document["directory"] = working_directory();
@@ -60,7 +60,7 @@ void add_texts(const ModelCopyOf& of, json& document) {
   if (texts->application) document["application"] = file_json(*texts->application);
 }
 
-void add_past(const ModelCopyOf& of, json& document) {
+void add_past(const ModelDocumentOf& of, json& document) {
   document["ports_since_ns"] = json::object();
   for (const auto& [port, since] : of.continuity.ports()) document["ports_since_ns"][port] = since;
   document["timeouts_before"] = json::object();
@@ -70,7 +70,7 @@ void add_past(const ModelCopyOf& of, json& document) {
   }
 }
 
-std::string document_of(const ModelCopyOf& of) {
+std::string document_of(const ModelDocumentOf& of) {
   json document = {{"generation", of.models.in_force().generation}, {"others", json::array()}};
   add_origin(of, document);
   add_texts(of, document);
@@ -91,7 +91,7 @@ std::string working_directory() {
   return std::filesystem::current_path(error).string();
 }
 
-const shm::FileDescriptor& ModelCopy::of(const ModelCopyOf& of) {
+const shm::FileDescriptor& ModelDocument::of(const ModelDocumentOf& of) {
   const std::uint64_t generation = of.models.in_force().generation;
   if (generation_ == generation) return readable_;
   const std::string document = document_of(of);

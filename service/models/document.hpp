@@ -30,8 +30,8 @@
 
 namespace arbiter::service {
 
-struct ModelCopyOf {
-  const Models& models;
+struct ModelDocumentOf {
+  const Board& models;
   const Library& library;
   const ModelPointer& model;  // in force; null: none, or a predecessor's
   const History& history;
@@ -42,10 +42,10 @@ struct ModelCopyOf {
 [[nodiscard]] std::string working_directory();
 
 // One copy for each model, made when somebody first asks: whoever asks again costs nothing.
-class ModelCopy {
+class ModelDocument {
  public:
   // Read-only. Throws std::system_error, std::runtime_error.
-  const shm::FileDescriptor& of(const ModelCopyOf& of);
+  const shm::FileDescriptor& of(const ModelDocumentOf& of);
 
  private:
   std::optional<std::uint64_t> generation_;

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "rules/model/load.hpp"
-#include "service/models/preparation.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -79,11 +78,11 @@ shm::PortId Layout::Pins::pin(InputName& input) {
   return input.id;
 }
 
-Layout::Layout(const rules::CompiledModel& model, Directory& directory) {
+Layout::Layout(const rules::CompiledModel& model, PortNames& names) {
   try {
     words_ = rules::flatten(
-        model, {[&](const std::string& name) { return pins_.pin(directory.source(name)); },
-                [&](const std::string& name) { return pins_.pin(directory.input(name)); }});
+        model, {[&](const std::string& name) { return pins_.pin(names.source(name)); },
+                [&](const std::string& name) { return pins_.pin(names.input(name)); }});
   } catch (const std::length_error& error) {
     throw BadModel(error.what());
   }
@@ -94,9 +93,9 @@ void Layout::mark_used(std::uint64_t generation) const {
   for (InputName* input : pins_.inputs) input->used_by_generation = generation;
 }
 
-Library::Library(std::vector<ModelPointer> models, Directory& directory) {
+Library::Library(std::vector<ModelPointer> models, PortNames& names) {
   for (ModelPointer& model : models) {
-    auto layout = std::make_shared<const Layout>(model->compiled, directory);
+    auto layout = std::make_shared<const Layout>(model->compiled, names);
     models_.push_back({std::move(model), std::move(layout)});
   }
 }

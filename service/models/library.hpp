@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "rules/prove/budget.hpp"
 #include "rules/prove/compile.hpp"
 #include "service/log/findings.hpp"
 #include "service/models/arguments.hpp"
@@ -33,9 +34,15 @@ using ModelPointer = std::shared_ptr<const Model>;
 // About how many bytes it takes up.
 [[nodiscard]] std::size_t size_of(const Model& model);
 
+// How each model that is read is proved.
+struct Proving {
+  std::uint64_t steps = rules::Budget::kSteps;
+  rules::Budget::Watch watch;  // is called in the compiler's thread
+  bool is_strict = false;      // takes warnings for errors
+};
+
 // Reads, proves and compiles each; all problems of all files are added in one go. The result is to
 // be used only if there is no error. In any thread; throws rules::Stopped.
-struct Proving;
 [[nodiscard]] std::vector<ModelPointer> read_models(const std::vector<NamedFiles>& named,
                                                     const Proving& proving,
                                                     const std::stop_token& stop,
@@ -45,7 +52,7 @@ struct Proving;
 class Layout {
  public:
   // Throws BadModel, where the instance has no room for the names; std::system_error.
-  Layout(const rules::CompiledModel& model, Directory& directory);
+  Layout(const rules::CompiledModel& model, PortNames& names);
 
   [[nodiscard]] const std::vector<shm::Word>& words() const { return words_; }
   // That the table of that generation names what this does.
@@ -79,7 +86,7 @@ class Library {
  public:
   Library() = default;
   // Throws as Layout.
-  Library(std::vector<ModelPointer> models, Directory& directory);
+  Library(std::vector<ModelPointer> models, PortNames& names);
 
   [[nodiscard]] const LoadedModel* find(std::string_view name) const;
   // Null where there is none.

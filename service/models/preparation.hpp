@@ -12,13 +12,6 @@
 
 namespace arbiter::service {
 
-// Of each model that is read.
-struct Proving {
-  std::uint64_t steps = rules::Budget::kSteps;
-  rules::Budget::Watch watch;  // is called in the compiler's thread
-  bool is_strict = false;      // takes warnings for errors
-};
-
 // Reads the policy and all models. In any thread; throws rules::Stopped, std::runtime_error.
 [[nodiscard]] Reading read_files(const std::vector<NamedFiles>& files, const Gate& gate,
                                  const Proving& proving, const std::stop_token& stop);

@@ -6,7 +6,7 @@
 #include <cassert>
 #include <limits>
 
-#include "service/clients/gate.hpp"
+#include "service/policy/users.hpp"
 #include "shm/limits.hpp"
 
 namespace arbiter::service {

@@ -1,6 +1,6 @@
 // Those who have asked to be told of every page and port name.
 //
-// What is to be told stands once, in the directory, in the order of its last change; an observer is
+// What is to be told stands once, in PortNames, in the order of its last change; an observer is
 // a place in it. So an open costs the same however many observe, and one that does not read is not
 // told anything more until it has read: it costs a place.
 #pragma once

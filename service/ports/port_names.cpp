@@ -6,7 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "service/kept/inheritance.hpp"
+#include "service/kept/descriptor_store.hpp"
+#include "service/kept/handed_back.hpp"
 #include "shm/limits.hpp"
 #include "shm/table_ring.hpp"
 
@@ -24,7 +25,7 @@ std::string stored_name(shm::SourceId id, shm::PageNumber number) {
 
 }  // namespace
 
-Page Directory::make_page() const {
+Page PortNames::make_page() const {
   auto page = shm::make_segment("arbiter-activity", sizeof(shm::ActivityPage));
   if (const auto error = shm::allocate(page, 0, sizeof(shm::ActivityPage))) {
     throw std::system_error(error, "allocating an activity page");
@@ -33,7 +34,7 @@ Page Directory::make_page() const {
   return use_page(std::move(page));
 }
 
-Page Directory::use_page(shm::FileDescriptor writable) const {
+Page PortNames::use_page(shm::FileDescriptor writable) const {
   Page page;
   page.readable = shm::reopen(writable, O_RDONLY);
   page.mapping = shm::Mapping(writable, sizeof(shm::ActivityPage), shm::Access::kReadWrite);
@@ -41,15 +42,15 @@ Page Directory::use_page(shm::FileDescriptor writable) const {
   return page;
 }
 
-void Directory::store_page(const Source& source, const Page& page, shm::PageNumber number) const {
+void PortNames::store_page(const Source& source, const Page& page, shm::PageNumber number) const {
   if (stores_) store(stored_name(source.id, number), page.writable);
 }
 
-void Directory::discard_page(const Source& source, shm::PageNumber number) const {
+void PortNames::discard_page(const Source& source, shm::PageNumber number) const {
   if (stores_) discard_stored(stored_name(source.id, number));
 }
 
-void Directory::restore(std::uint64_t generation) {
+void PortNames::restore(std::uint64_t generation) {
   generation_ = generation;
   for (shm::SourceId id = 0; id < registry_.source_count(); ++id) {
     auto source = std::make_unique<Source>();
@@ -87,7 +88,7 @@ void Directory::restore(std::uint64_t generation) {
   }
 }
 
-bool Directory::take_page(shm::SourceId id, const shm::FileDescriptor& page) {
+bool PortNames::take_page(shm::SourceId id, const shm::FileDescriptor& page) {
   Source* source = source_by_id(id);
   if (source == nullptr || source->name.empty() ||
       FileIdentity::of(page).inode != registry_.source(id).page_inode(source->page_number)) {
@@ -100,23 +101,23 @@ bool Directory::take_page(shm::SourceId id, const shm::FileDescriptor& page) {
   return true;
 }
 
-bool Directory::take_page(const shm::FileDescriptor& page) {
+bool PortNames::take_page(const shm::FileDescriptor& page) {
   return std::any_of(sources_.begin(), sources_.end(),
                      [&](const auto& source) { return take_page(source->id, page); });
 }
 
-void Directory::forget_lost_pages() {
+void PortNames::forget_lost_pages() {
   for (const auto& source : sources_) {
     if (!source->has_page() && source->away == 0 && !source->name.empty()) forget(*source);
   }
 }
 
-void Directory::give_page(Source& source, uid_t user) {
+void PortNames::give_page(Source& source, uid_t user) {
   source.page_user = user;
   registry_.source(source.id).set_page_user(source.page_number, user);
 }
 
-void Directory::prepare_page(Source& source, PageUser user) {
+void PortNames::prepare_page(Source& source, PageUser user) {
   if (source.next) return;
   Charge charge = take(user, Share::kDescriptors, kDescriptorsOfPage);
   source.next = make_page();
@@ -126,7 +127,7 @@ void Directory::prepare_page(Source& source, PageUser user) {
 
 // A daemon that is killed here leaves one page in force or the other: the store to the board says
 // which, and what the registry says of both is there before it.
-void Directory::change_page(Source& source, PageUser user) {
+void PortNames::change_page(Source& source, PageUser user) {
   const shm::PageNumber number = source.page_number + 1;
   registry_.source(source.id).set_page(number, FileIdentity::of(source.next.writable).inode, user);
   board_.change_page(source.id, source.activity(), source.activity_on(source.next));
@@ -141,18 +142,18 @@ void Directory::change_page(Source& source, PageUser user) {
 
 // Whom a table in the ring names, or one that may come, or a live port, or who is being changed.
 template <class Entry>
-bool Directory::is_needed(const Entry& entry) const {
+bool PortNames::is_needed(const Entry& entry) const {
   const bool named =
       entry.used_by_generation != 0 && generation_ - entry.used_by_generation < shm::kTableSlots;
   return entry.open != 0 || entry.away != 0 || entry.pins != 0 || named;
 }
 
-void Directory::let_go_all() {
+void PortNames::let_go_all() {
   for (const auto& source : sources_) let_go(*source);
   for (const auto& input : inputs_) let_go(*input);
 }
 
-shm::Nanoseconds Directory::give_back(shm::Nanoseconds now) {
+shm::Nanoseconds PortNames::give_back(shm::Nanoseconds now) {
   while (!running_out_.empty() && running_out_.begin()->first <= now) {
     let_go_sources_.insert(running_out_.begin()->second);
     running_out_.erase(running_out_.begin());
@@ -176,7 +177,7 @@ shm::Nanoseconds Directory::give_back(shm::Nanoseconds now) {
   return running_out_.empty() ? shm::kForever : running_out_.begin()->first;
 }
 
-void Directory::forget(Source& source) {
+void PortNames::forget(Source& source) {
   registry_.forget_source(source.id);
   discard_page(source, source.page_number);
   if (source.next) discard_page(source, source.page_number + 1);
@@ -193,7 +194,7 @@ void Directory::forget(Source& source) {
   free_sources_.push_back(source.id);
 }
 
-void Directory::forget(InputName& input) {
+void PortNames::forget(InputName& input) {
   registry_.forget_input(input.id);
   input_ids_.erase(input.name);
   news_.erase(input.news);
@@ -202,13 +203,13 @@ void Directory::forget(InputName& input) {
   free_inputs_.push_back(input.id);
 }
 
-void Directory::announce(Source& source) {
+void PortNames::announce(Source& source) {
   news_.erase(source.news);
   source.news = ++last_news_;
   news_[source.news] = {true, source.id};
 }
 
-void Directory::announce(InputName& input) {
+void PortNames::announce(InputName& input) {
   news_.erase(input.news);
   input.news = ++last_news_;
   news_[input.news] = {false, input.id};
@@ -216,7 +217,7 @@ void Directory::announce(InputName& input) {
 
 // An id that is nobody's, the longest free first; of those a table in the ring still names, none.
 template <class Id, class Entry>
-Entry* Directory::take_free(std::deque<Id>& free,
+Entry* PortNames::take_free(std::deque<Id>& free,
                             const std::vector<std::unique_ptr<Entry>>& entries) const {
   const auto found =
       std::find_if(free.begin(), free.end(), [&](Id id) { return !is_needed(*entries[id]); });
@@ -226,7 +227,7 @@ Entry* Directory::take_free(std::deque<Id>& free,
   return entry;
 }
 
-Source& Directory::unused_source() {
+Source& PortNames::unused_source() {
   if (sources_.size() < shm::kMaxSources) {
     const auto id = static_cast<shm::SourceId>(sources_.size());
     registry_.reserve_source(id);
@@ -240,7 +241,7 @@ Source& Directory::unused_source() {
   return *source;
 }
 
-InputName& Directory::unused_input() {
+InputName& PortNames::unused_input() {
   if (inputs_.size() < shm::kMaxInputPorts) {
     const auto id = static_cast<shm::PortId>(inputs_.size());
     registry_.reserve_input(id);
@@ -253,7 +254,7 @@ InputName& Directory::unused_input() {
   return *input;
 }
 
-Source& Directory::source(const std::string& name, PageUser user) {
+Source& PortNames::source(const std::string& name, PageUser user) {
   if (const auto found = source_ids_.find(name); found != source_ids_.end()) {
     return *sources_[found->second];
   }
@@ -279,7 +280,7 @@ Source& Directory::source(const std::string& name, PageUser user) {
   return source;
 }
 
-InputName& Directory::input(const std::string& name, PageUser user) {
+InputName& PortNames::input(const std::string& name, PageUser user) {
   if (const auto found = input_ids_.find(name); found != input_ids_.end()) {
     return *inputs_[found->second];
   }
@@ -294,27 +295,27 @@ InputName& Directory::input(const std::string& name, PageUser user) {
   return input;
 }
 
-Source* Directory::find_source(const std::string& name) {
+Source* PortNames::find_source(const std::string& name) {
   const auto found = source_ids_.find(name);
   return found == source_ids_.end() ? nullptr : sources_[found->second].get();
 }
 
-Source* Directory::source_by_id(shm::SourceId id) {
+Source* PortNames::source_by_id(shm::SourceId id) {
   return id < sources_.size() ? sources_[id].get() : nullptr;
 }
 
-InputName* Directory::input_by_id(shm::PortId id) {
+InputName* PortNames::input_by_id(shm::PortId id) {
   return id < inputs_.size() ? inputs_[id].get() : nullptr;
 }
 
-Source* Directory::source_of(shm::PortInstance port) {
+Source* PortNames::source_of(shm::PortInstance port) {
   const auto found = std::find_if(sources_.begin(), sources_.end(), [&](const auto& source) {
     return source->open == port || source->away == port;
   });
   return found == sources_.end() ? nullptr : found->get();
 }
 
-InputName* Directory::input_of(shm::PortInstance port) {
+InputName* PortNames::input_of(shm::PortInstance port) {
   const auto found = std::find_if(inputs_.begin(), inputs_.end(), [&](const auto& input) {
     return input->open == port || input->away == port;
   });

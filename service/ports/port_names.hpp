@@ -73,10 +73,10 @@ struct InputName {
   Charge charge;
 };
 
-class Directory {
+class PortNames {
  public:
   // `stores`: whether activity pages go into the service manager's store too.
-  Directory(Registry& registry, Shares& shares, bool stores)
+  PortNames(Registry& registry, Shares& shares, bool stores)
       : registry_(registry), shares_(shares), stores_(stores) {}
 
   // Where it says which pages are in force.

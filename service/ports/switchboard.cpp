@@ -83,13 +83,13 @@ void Switchboard::remove(shm::PortInstance port) {
 void Switchboard::erase(shm::PortInstance port) {
   if (const auto found = outputs_.find(port); found != outputs_.end()) {
     found->second->source->open = 0;
-    directory_.let_go(*found->second->source);
+    names_.let_go(*found->second->source);
     found->second->client->ports.erase(port);
     outputs_.erase(found);
   }
   if (const auto found = inputs_.find(port); found != inputs_.end()) {
     found->second->name->open = 0;
-    directory_.let_go(*found->second->name);
+    names_.let_go(*found->second->name);
     found->second->client->ports.erase(port);
     inputs_.erase(found);
   }
@@ -98,7 +98,7 @@ void Switchboard::erase(shm::PortInstance port) {
 void Switchboard::want_links(const OutputPort& output, const shm::TableView& table,
                              Wanted& wanted) const {
   const auto want = [&](shm::PortId id, LinkKind kind) {
-    const InputName* name = directory_.input_by_id(id);
+    const InputName* name = names_.input_by_id(id);
     if (name != nullptr && name->open != 0) wanted[{output.instance, name->open}] = kind;
   };
   const auto concerned = table.ports_concerned(output.source->id);
@@ -112,7 +112,7 @@ void Switchboard::want_links(const OutputPort& output, const shm::TableView& tab
 void Switchboard::want_links(const InputPort& input, const shm::TableView& table,
                              Wanted& wanted) const {
   const auto want = [&](shm::SourceId id, LinkKind kind) {
-    const Source* source = directory_.source_by_id(id);
+    const Source* source = names_.source_by_id(id);
     if (source != nullptr && source->open != 0) wanted[{source->open, input.instance}] = kind;
   };
   const auto read = table.sources_read(input.name->id);
@@ -279,7 +279,7 @@ Switchboard::Told Switchboard::unlink(const shm::TableView& table) {
 void Switchboard::send_pages(Client& client, shm::PortId port, const shm::TableView& table,
                              Told& told) {
   const auto send = [&](shm::SourceId id) {
-    const Source* source = directory_.source_by_id(id);
+    const Source* source = names_.source_by_id(id);
     if (source != nullptr && send_page(client, *source)) told.insert(&client);
   };
   const auto read = table.sources_read(port);
@@ -319,21 +319,21 @@ Switchboard::Told Switchboard::show_next_page(const Source& source) {
 }
 
 bool Switchboard::show_news(Client& client, std::uint64_t& told, int& left) {
-  const auto& news = directory_.news();
+  const auto& news = names_.news();
   for (auto next = news.upper_bound(told); next != news.end(); ++next) {
     if (client.has_queue() || client.is_lost()) return false;
     if (left == 0) return true;
     --left;
     told = next->first;
     if (next->second.is_source) {
-      send_page(client, *directory_.source_by_id(next->second.id));
+      send_page(client, *names_.source_by_id(next->second.id));
       continue;
     }
     auto message = message_to(shm::MessageKind::kPortName, 0, 0, next->second.id);
-    message.set_name(directory_.input_by_id(next->second.id)->name);
+    message.set_name(names_.input_by_id(next->second.id)->name);
     client.send(message);
   }
-  told = directory_.last_news();
+  told = names_.last_news();
   return false;
 }
 
@@ -348,7 +348,7 @@ void Switchboard::ring_all() const {
 
 void Switchboard::ring_concerned(const shm::TableView& table, shm::SourceId source) const {
   const auto ring = [&](shm::PortId id) {
-    const InputName* name = directory_.input_by_id(id);
+    const InputName* name = names_.input_by_id(id);
     if (name != nullptr && name->open != 0) inputs_.at(name->open)->bell->ring();
   };
   const auto concerned = table.ports_concerned(source);

@@ -24,8 +24,7 @@ shm::Message message_to(shm::MessageKind kind, shm::PortInstance port, shm::Port
 
 class Switchboard {
  public:
-  Switchboard(Directory& directory, Registry& registry)
-      : directory_(directory), registry_(registry) {}
+  Switchboard(PortNames& names, Registry& registry) : names_(names), registry_(registry) {}
 
   using LinkKey = std::pair<shm::PortInstance, shm::PortInstance>;  // output, input
   using Told = std::set<Client*>;  // clients that have news to take up
@@ -112,7 +111,7 @@ class Switchboard {
   [[nodiscard]] Claims& claims_of(shm::PortInstance port) const;
   [[nodiscard]] Client& client_of(shm::PortInstance port) const;
 
-  Directory& directory_;
+  PortNames& names_;
   Registry& registry_;
   std::map<shm::PortInstance, std::unique_ptr<OutputPort>> outputs_;
   std::map<shm::PortInstance, std::unique_ptr<InputPort>> inputs_;

@@ -35,8 +35,8 @@ void Switchboard::set_away(shm::PortInstance port) {
     if (input == port) outputs_.at(output)->claims[port] = {link->second.number};
     link = output == port || input == port ? links_.erase(link) : std::next(link);
   }
-  Source* source = directory_.source_of(port);
-  InputName* name = directory_.input_of(port);
+  Source* source = names_.source_of(port);
+  InputName* name = names_.input_of(port);
   erase(port);
   if (source != nullptr) source->away = port;
   if (name != nullptr) name->away = port;
@@ -122,14 +122,14 @@ void Switchboard::end_claims_on(shm::PortInstance port) {
 
 void Switchboard::forget_away(shm::PortInstance port) {
   end_claims_on(port);
-  if (Source* source = directory_.source_of(port)) {
+  if (Source* source = names_.source_of(port)) {
     source->away = 0;
-    directory_.let_go(*source);
+    names_.let_go(*source);
     registry_.source(source->id).clear_owner();
   }
-  if (InputName* name = directory_.input_of(port)) {
+  if (InputName* name = names_.input_of(port)) {
     name->away = 0;
-    directory_.let_go(*name);
+    names_.let_go(*name);
     registry_.input(name->id).clear_owner();
   }
 }

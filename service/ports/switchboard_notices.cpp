@@ -47,10 +47,10 @@ std::string Switchboard::unmentioned_text(const shm::TableSnapshot& in_force,
   const std::string what = is_output ? "nothing of this is delivered" : "nothing comes";
   if (in_force.generation == 0) return "no model is in force, so that " + what;
   std::vector<std::string_view> mentioned;
-  for (const auto& source : directory_.sources()) {
+  for (const auto& source : names_.sources()) {
     if (is_output && in_force.table.knows_source(source->id)) mentioned.push_back(source->name);
   }
-  for (const auto& input : directory_.inputs()) {
+  for (const auto& input : names_.inputs()) {
     if (!is_output && in_force.table.knows_port(input->id)) mentioned.push_back(input->name);
   }
   if (mentioned.size() > kMaxCompared) mentioned.clear();

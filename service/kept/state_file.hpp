@@ -1,31 +1,16 @@
-// How a daemon comes by what its predecessor left: from the clients who kept it, or from the
-// service manager.
-//
-// What a client hands back is believed only if it is what the predecessor made: a memfd of our own
-// user with the identity that the predecessor wrote down in the runtime directory, where nobody
-// else may write.
+// Which memory an instance's components live in, and who they are: written down beside the socket,
+// where only the daemon's user may write, for a successor to judge by.
 #pragma once
 
-#include <sys/types.h>
-
-#include <cstdint>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "service/kept/handed_back.hpp"
 #include "service/kept/process.hpp"
-#include "shm/file_descriptor.hpp"
 
 namespace arbiter::service {
-
-// Which file a descriptor is open on.
-struct FileIdentity {
-  dev_t device = 0;
-  ino_t inode = 0;
-
-  static FileIdentity of(const shm::FileDescriptor& file);
-  friend bool operator==(const FileIdentity&, const FileIdentity&) = default;
-};
 
 // The board and the registry that the clients of an instance map.
 struct Realm {
@@ -58,18 +43,5 @@ class StateFile {
   std::string path_;
   std::size_t size_ = 0;
 };
-
-// Opens for writing what a daemon of this user made and clients may only read. Throws
-// std::runtime_error where it is not that.
-shm::FileDescriptor reopen_inherited(const shm::FileDescriptor& handed_back, std::size_t size);
-
-// The service manager's descriptor store. Without a service manager it keeps and gives nothing.
-struct StoredDescriptor {
-  std::string name;
-  shm::FileDescriptor descriptor;
-};
-void store(const std::string& name, const shm::FileDescriptor& descriptor);
-void discard_stored(const std::string& name);
-std::vector<StoredDescriptor> take_stored();
 
 }  // namespace arbiter::service
