@@ -32,15 +32,15 @@ void Daemon::change_page(Source& source, const Client& client, std::uint64_t req
     changing.changing_for = 0;
     try_postponed_ = true;
     names_.let_go(changing);  // if nobody opens it after all
-    const auto found = clients_.find(for_client);
-    if (found == clients_.end()) return;
+    Client* const asking = clients_.find(for_client);
+    if (asking == nullptr) return;
     names_.change_page(changing, user);
     switchboard_.ring_concerned(board_.in_force().table, id);
     try {
-      changed(changing, *found->second);
+      changed(changing, *asking);
     } catch (const std::exception& error) {
-      log::warn("{}: {}", found->second->description(), error.what());
-      refuse(*found->second, request, error.what());
+      log::warn("{}: {}", asking->description(), error.what());
+      refuse(*asking, request, error.what());
     }
   };
   barriers_.raise(switchboard_.show_next_page(source), shm::monotonic_now() + kMaxWaitForClients,

@@ -12,6 +12,9 @@
 
 namespace arbiter::service {
 
+// How long a component that does not run may hold up the opening of a port, or a new model.
+constexpr shm::Nanoseconds kMaxWaitForClients = 200'000'000;
+
 class Barriers {
  public:
   // Asks the clients to say when they are done, and calls `passed` once all have, or at `deadline`.

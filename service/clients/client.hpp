@@ -153,12 +153,4 @@ class Client {
   std::optional<shm::ReceiveResult> ahead_ended_;  // how the conversation ends after `ahead_`
 };
 
-// An answer to a client's question.
-inline shm::Message reply_to(std::uint64_t request, shm::MessageKind kind) {
-  shm::Message message;
-  message.kind = kind;
-  message.request = request;
-  return message;
-}
-
 }  // namespace arbiter::service

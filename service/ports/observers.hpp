@@ -9,7 +9,8 @@
 #include <map>
 #include <vector>
 
-#include "service/clients/client.hpp"
+#include "service/clients/clients.hpp"
+#include "service/clients/replies.hpp"
 #include "service/ports/switchboard.hpp"
 
 namespace arbiter::service {
@@ -28,7 +29,6 @@ class Observers {
   void forget(ClientId client) { observers_.erase(client); }
 
   // Tells some of them something. True: there is more that could be told at once.
-  template <class Clients>
   bool tell(const Clients& clients, Switchboard& switchboard) {
     int left = kMostAtOnce;
     bool is_more = false;
@@ -36,7 +36,7 @@ class Observers {
       auto next = observers_.upper_bound(last_told_);
       if (next == observers_.end()) next = observers_.begin();
       last_told_ = next->first;
-      Client& client = *clients.at(last_told_);
+      Client& client = *clients.find(last_told_);
       Observer& observer = next->second;
       if (!client.has_queue()) {
         is_more = switchboard.show_news(client, observer.told, left) || is_more;

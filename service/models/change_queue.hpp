@@ -34,7 +34,7 @@ struct Change {
   std::vector<Asking> asking;    // are answered when it is over
 };
 
-class Changes {
+class ChangeQueue {
  public:
   static constexpr std::size_t kMaxWaiting = 64;
 
