@@ -2,7 +2,7 @@
 //
 // All that data needs to flow is mapped already, so for the ports nothing changes. The next daemon
 // is handed back the memory that the last one made, and told of each port and its links
-// (service/daemon_takeover.cpp).
+// (service/takeover/takeover.hpp).
 #include <fcntl.h>
 #include <sys/epoll.h>
 #include <sys/stat.h>

@@ -13,10 +13,12 @@
 #include <stdexcept>
 #include <utility>
 
-#include "service/errands.hpp"
-#include "service/headroom.hpp"
-#include "service/log.hpp"
-#include "service/log_sink.hpp"
+#include "service/clients/errands.hpp"
+#include "service/clients/hang_up.hpp"
+#include "service/clients/headroom.hpp"
+#include "service/log/log.hpp"
+#include "service/log/log_sink.hpp"
+#include "service/policy/users.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
@@ -37,16 +39,17 @@ std::uint64_t event_key(std::uint32_t tag, ClientId client) {
 
 Daemon::Daemon(const DaemonOptions& options)
     : instance_(options.instance),
-      stores_(options.uses_descriptor_store),
       gate_(options.policy),
       shares_(totals_of_this_process(), options.user_share, geteuid()),
-      files_(options.models),
-      is_strict_(options.is_strict),
-      state_(options.directory, options.instance),
-      steps_(options.steps),
-      before_reading_(options.before_reading),
-      compiler_(options.compiles_in) {
-  if (!files_.empty() || gate_.has_file()) read_first_models(options.stop_descriptor);
+      names_(registry_, shares_, options.uses_descriptor_store),
+      takeover_({gate_, shares_, registry_, names_, board_, switchboard_, clients_}, *this,
+                StateFile(options.directory, options.instance), options.uses_descriptor_store),
+      changes_({options.instance, options.models, options.is_strict, options.steps,
+                options.compiles_in, options.before_reading},
+               {gate_, names_, board_, switchboard_, introductions_, clients_},
+               [this] { takeover_.welcome_waiting(); }) {
+  changes_.read_first(options.stop_descriptor,
+                      [&] { return handle_signal(options.stop_descriptor); });
   listener_ = shm::listen_at(options.directory, instance_);
   if (fcntl(listener_.socket.get(), F_SETFL, O_NONBLOCK) != 0) {
     throw std::system_error(errno, std::generic_category(), "listening");
@@ -54,15 +57,10 @@ Daemon::Daemon(const DaemonOptions& options)
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   if (!epoll_) throw std::system_error(errno, std::generic_category(), "epoll_create1");
   watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
-  watch(compiler_.descriptor(), Tag::kCompiler, 0, EPOLLIN);
-  if (!Headroom::of_the_process().is_enough()) {
-    log::warn("few descriptors (RLIMIT_NOFILE): a client that sends many can hold up this daemon");
-  }
-  look_for_predecessor();
+  watch(changes_.descriptor(), Tag::kCompiler, 0, EPOLLIN);
+  takeover_.look_for_predecessor();
 }
 
-// Components that live on need the state file to come back by, as what the service manager keeps
-// does.
 Daemon::~Daemon() {
   unlink(listener_.path.c_str());
   // Who has connected and was not accepted may have sent something, too.
@@ -72,8 +70,7 @@ Daemon::~Daemon() {
       Errands::of_the_process().close(each.user, std::move(each.socket));
     }
   }
-  if (!stores_ && phase_ == Phase::kServing && clients_.empty() && absentees_.empty())
-    state_.remove();
+  takeover_.leave_nothing_if_nobody_is_left();
 }
 
 void Daemon::watch(int fd, Tag tag, ClientId client, std::uint32_t events) {
@@ -89,14 +86,14 @@ void Daemon::watch(int fd, Tag tag, ClientId client, std::uint32_t events) {
 void Daemon::unwatch(int fd) const noexcept { epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, fd, nullptr); }
 
 int Daemon::timeout_ms() const {
-  const bool may_change = !swap_ && !preparing_ && phase_ == Phase::kServing && !changes_.empty();
+  const bool may_change = takeover_.is_over() && changes_.can_advance();
   if (!turns_.empty() || !lobby_.empty() || is_more_to_tell_ || may_change ||
       (try_postponed_ && !postponed_.empty()))
     return 0;
   shm::Nanoseconds deadline =
-      std::min({barriers_.next_deadline(), takeover_deadline(), show_growth_at_, give_back_at_,
-                status_requests_.next(), listen_again_at_, look_in_flight_at_, watchdog_.deadline(),
-                Errands::of_the_process().deadline()});
+      std::min({barriers_.next_deadline(), takeover_.deadline(), introductions_.deadline(),
+                give_back_at_, status_requests_.next(), listen_again_at_, look_in_flight_at_,
+                watchdog_.deadline(), Errands::of_the_process().deadline()});
   for (const Postponed& request : postponed_) deadline = std::min(deadline, request.deadline);
   if (deadline == shm::kForever) return -1;
   const shm::Nanoseconds left = std::max<shm::Nanoseconds>(deadline - shm::monotonic_now(), 0);
@@ -111,15 +108,14 @@ void Daemon::run(int signal_descriptor) {
     give_turns();
     const shm::Nanoseconds now = shm::monotonic_now();
     barriers_.expire(now);
-    if (now >= show_growth_at_) {
-      switchboard_.show_growth();
-      show_growth_at_ = switchboard_.has_growth_to_show() ? now + kShowGrowthAfter : shm::kForever;
-    }
+    introductions_.advance(now);
     look_after_the_loop(now);
-    advance_takeover(now);
+    takeover_.advance(now);
     retry_postponed(now);
-    advance_changes();
-    if (phase_ == Phase::kServing) give_back_at_ = directory_.give_back(now);
+    if (takeover_.is_over()) {
+      changes_.advance();
+      give_back_at_ = names_.give_back(now);
+    }
     is_more_to_tell_ = observers_.tell(clients_, switchboard_);
     answer_status(now);
     settle();
@@ -141,9 +137,9 @@ bool Daemon::hear(int signal_descriptor) {
       const auto tag = static_cast<Tag>(events[i].data.u64 >> 56);
       const ClientId id = events[i].data.u64 & ((std::uint64_t{1} << 56) - 1);
       if (tag == Tag::kListener) accept_clients();
-      if (tag == Tag::kCompiler) finish_preparing();
+      if (tag == Tag::kCompiler) changes_.finish_preparing();
       if (tag == Tag::kSignals && handle_signal(signal_descriptor)) return false;
-      if (tag == Tag::kAbsentee) forget_absentee(id);
+      if (tag == Tag::kAbsentee) takeover_.forget_absentee(id);
       if (tag == Tag::kClient) hear_client(id, events[i].events);
       if (tag == Tag::kProcess) hear_death(id);
     }
@@ -154,9 +150,9 @@ bool Daemon::hear(int signal_descriptor) {
 }
 
 void Daemon::hear_client(ClientId id, std::uint32_t events) {
-  const auto found = clients_.find(id);
-  if (found == clients_.end()) return;
-  Client& client = *found->second;
+  Client* const found = clients_.find(id);
+  if (found == nullptr) return;
+  Client& client = *found;
   if ((events & EPOLLOUT) != 0) client.flush();
   if ((events & ~EPOLLOUT) != 0) client.has_turn = true;
   if (client.has_turn) turns_.add(client.user(), id);
@@ -166,9 +162,9 @@ void Daemon::hear_client(ClientId id, std::uint32_t events) {
 // It is given up in a turn of its user's, lest the end of a process that had a thousand nodes keep
 // the others waiting. What it sent before it died is served first.
 void Daemon::hear_death(ClientId id) {
-  const auto found = clients_.find(id);
-  if (found == clients_.end()) return;
-  Client& client = *found->second;
+  Client* const found = clients_.find(id);
+  if (found == nullptr) return;
+  Client& client = *found;
   unwatch(client.process());
   client.has_turn = client.is_last_turn = true;
   turns_.add(client.user(), id);
@@ -180,11 +176,11 @@ void Daemon::give_turns() {
   for (std::size_t left = turns_.users(); left > 0; --left) {
     const auto id = turns_.next();
     if (!id) return;
-    const auto found = clients_.find(*id);
-    if (found == clients_.end()) continue;
-    Client& client = *found->second;
+    Client* const found = clients_.find(*id);
+    if (found == nullptr) continue;
+    Client& client = *found;
     const bool has_more = serve(client);
-    if (clients_.count(*id) == 0) continue;
+    if (clients_.find(*id) == nullptr) continue;
     if (client.is_last_turn || (!has_more && client.is_lost())) {
       drop(*id);
       continue;
@@ -208,8 +204,8 @@ bool Daemon::handle_signal(int signal_descriptor) {
   signalfd_siginfo info{};
   while (::read(signal_descriptor, &info, sizeof info) == static_cast<ssize_t>(sizeof info)) {
     if (info.ssi_signo == SIGHUP) {
-      reload_for_signal("a signal of process " + std::to_string(info.ssi_pid) + ", user " +
-                        describe_user(info.ssi_uid));
+      changes_.reload_for_signal("a signal of process " + std::to_string(info.ssi_pid) + ", user " +
+                                 describe_user(info.ssi_uid));
       continue;
     }
     log::info("stopping: signal {}", info.ssi_signo);
@@ -238,7 +234,7 @@ bool Daemon::serve(Client& client) {
   for (int i = 0; i < kMaxMessagesAtOnce; ++i) {
     if (!client.to_retry.empty()) {
       retry(client);
-      if (clients_.count(id) == 0) return false;
+      if (clients_.find(id) == nullptr) return false;
       if (shm::monotonic_now() >= until) break;
       continue;
     }
@@ -259,7 +255,7 @@ bool Daemon::serve(Client& client) {
     }
     handle_or_refuse(client, received, shm::kForever);
     dispose_of(received, user);
-    if (clients_.count(id) == 0) return false;
+    if (clients_.find(id) == nullptr) return false;
     if (shm::monotonic_now() >= until) break;
   }
   return true;
@@ -305,24 +301,21 @@ void Daemon::handle_or_refuse(Client& client, shm::Received& received, shm::Nano
   refuse(client, received.message.request, why);
 }
 
-void Daemon::drop(ClientId id) {
-  const auto found = clients_.find(id);
-  if (found == clients_.end()) return;
-  const std::unique_ptr<Client> client = std::move(found->second);
-  clients_.erase(found);
-  const LogAccount account(client->user());
-  unwatch(client->socket());  // it is closed later
-  if (!client->name.empty() && !client->is_turned_away) {
-    log::info("{} left, {} ports with it", client->description(), client->ports.size());
+void Daemon::retry_postponed(shm::Nanoseconds now) {
+  const bool all = std::exchange(try_postponed_, false);
+  for (Postponed& request : std::exchange(postponed_, {})) {
+    Client* const found = clients_.find(request.client);
+    if (found == nullptr) continue;
+    if (all || now >= request.deadline) {
+      Client& client = *found;
+      client.to_retry.push_back(std::move(request));
+      client.has_turn = true;
+      turns_.add(client.user(), client.id());
+      watch_client(client);
+    } else {
+      postponed_.push_back(std::move(request));
+    }
   }
-  // One that could not be known again does not come back as what it was.
-  const bool can_be_known = client->is_process(client->pid(), client->process());
-  if (client->comes_back && can_be_known && !client->has_died()) set_away(*client);
-  while (!client->ports.empty()) switchboard_.remove(*client->ports.begin());
-  for (const shm::PortInstance port : client->to_hand_back) switchboard_.forget_away(port);
-  observers_.forget(id);
-  barriers_.forget(id);
-  left_unread_.add(client->release_unread());
 }
 
 // After each round: sends what is queued, and drops who is lost.
@@ -346,6 +339,10 @@ void Daemon::settle() {
   // Another round: others are told of it, who may be slow to read, or lost for it.
   if (!lost.empty()) is_more_to_tell_ = true;
   plan_to_look_in_flight();
+}
+
+void Daemon::watch_absentee(const shm::FileDescriptor& process, NodeId node) {
+  watch(process.get(), Tag::kAbsentee, node, EPOLLIN);
 }
 
 }  // namespace arbiter::service

@@ -1,4 +1,4 @@
-// Who connects, who is turned away, and whose unread messages are waited for.
+// Who connects, who is turned away, who leaves, and whose unread messages are waited for.
 #include <sys/epoll.h>
 #include <sys/socket.h>
 
@@ -10,11 +10,12 @@
 #include <memory>
 #include <utility>
 
+#include "service/clients/errands.hpp"
+#include "service/clients/hang_up.hpp"
+#include "service/clients/headroom.hpp"
 #include "service/daemon.hpp"
-#include "service/errands.hpp"
-#include "service/headroom.hpp"
-#include "service/log.hpp"
-#include "service/log_sink.hpp"
+#include "service/log/log.hpp"
+#include "service/log/log_sink.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
@@ -91,7 +92,7 @@ void Daemon::admit_clients() {
       client = std::make_unique<Client>(id, std::move(waiting.socket), shares_);
       watch_client(*client);
       if (client->process() >= 0) watch(client->process(), Tag::kProcess, id, EPOLLIN);
-      clients_.emplace(id, std::move(client));
+      clients_.add(std::move(client));
       drop_oldest_silent_client();
     } catch (const LimitExceeded& limit) {
       log::debug("a client was turned away: {}", limit.what());
@@ -100,6 +101,24 @@ void Daemon::admit_clients() {
       if (client != nullptr) unwatch(client->socket());
     }
   }
+}
+
+void Daemon::drop(ClientId id) {
+  const std::unique_ptr<Client> client = clients_.take_out(id);
+  if (client == nullptr) return;
+  const LogAccount account(client->user());
+  unwatch(client->socket());  // it is closed later
+  if (!client->name.empty() && !client->is_turned_away) {
+    log::info("{} left, {} ports with it", client->description(), client->ports.size());
+  }
+  // One that could not be known again does not come back as what it was.
+  const bool can_be_known = client->is_process(client->pid(), client->process());
+  if (client->comes_back && can_be_known && !client->has_died()) takeover_.set_away(*client);
+  while (!client->ports.empty()) switchboard_.remove(*client->ports.begin());
+  for (const shm::PortInstance port : client->to_hand_back) switchboard_.forget_away(port);
+  observers_.forget(id);
+  barriers_.forget(id);
+  left_unread_.add(client->release_unread());
 }
 
 void Daemon::look_in_flight(shm::Nanoseconds now) {

@@ -10,7 +10,7 @@
 #include <exception>
 
 #include "service/daemon.hpp"
-#include "service/log.hpp"
+#include "service/log/log.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
@@ -23,24 +23,24 @@ void Daemon::require_not_changing(const Source& source) const {
 
 void Daemon::change_page(Source& source, const Client& client, std::uint64_t request, PageUser user,
                          std::function<void(Source&, Client&)> changed) {
-  directory_.prepare_page(source, user);
+  names_.prepare_page(source, user);
   source.changing_for = client.id();
   const auto pass = [this, id = source.id, user, for_client = client.id(), request,
                      changed = std::move(changed)] {
-    Source& changing = *directory_.source_by_id(id);
+    Source& changing = *names_.source_by_id(id);
     if (changing.changing_for != for_client) return;
     changing.changing_for = 0;
     try_postponed_ = true;
-    directory_.let_go(changing);  // if nobody opens it after all
-    const auto found = clients_.find(for_client);
-    if (found == clients_.end()) return;
-    directory_.change_page(changing, user);
-    switchboard_.ring_concerned(models_.in_force().table, id);
+    names_.let_go(changing);  // if nobody opens it after all
+    Client* const asking = clients_.find(for_client);
+    if (asking == nullptr) return;
+    names_.change_page(changing, user);
+    switchboard_.ring_concerned(board_.in_force().table, id);
     try {
-      changed(changing, *found->second);
+      changed(changing, *asking);
     } catch (const std::exception& error) {
-      log::warn("{}: {}", found->second->description(), error.what());
-      refuse(*found->second, request, error.what());
+      log::warn("{}: {}", asking->description(), error.what());
+      refuse(*asking, request, error.what());
     }
   };
   barriers_.raise(switchboard_.show_next_page(source), shm::monotonic_now() + kMaxWaitForClients,
@@ -61,7 +61,7 @@ bool Daemon::end_activity(const Source& source) {
   activity.write(before, shm::deactivation(now));
   // SYNC POINT: stamped. Fence (a), as of a publisher's own deactivate().
   shm::full_fence();
-  switchboard_.ring_concerned(models_.in_force().table, source.id);
+  switchboard_.ring_concerned(board_.in_force().table, source.id);
   return true;
 }
 

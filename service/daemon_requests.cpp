@@ -1,39 +1,15 @@
-// What clients ask of the daemon.
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <algorithm>
+// What clients say and ask, but for what is about ports and sources.
 #include <stdexcept>
-#include <string_view>
 
+#include "service/clients/given_names.hpp"
+#include "service/clients/replies.hpp"
 #include "service/daemon.hpp"
-#include "service/log.hpp"
+#include "service/log/log.hpp"
 #include "service/status.hpp"
 #include "shm/clock.hpp"
-#include "shm/utf8.hpp"
 
 namespace arbiter::service {
 namespace {
-
-// How long a name is asked for in vain that a component has whose conversation is lost: it may be
-// dying.
-constexpr shm::Nanoseconds kMaxWaitForDeath = 100'000'000;
-
-// Logs, status and terminals show what clients call themselves and their ports: no name may break a
-// line of theirs, or mislead those who read it.
-void require_fine(std::string_view name, const char* whose) {
-  if (const auto fault = shm::find_fault_in_name(name)) {
-    throw std::runtime_error(std::string(whose) + " name \"" + shm::printable(name) + "\" has " +
-                             fault->what + " in it");
-  }
-}
-
-std::string port_name(const shm::Message& message) {
-  const std::string_view name = message.name_view();
-  if (name.empty() || name[0] != '/') throw std::runtime_error("a port's name begins with '/'");
-  require_fine(name, "the port's");
-  return std::string(name);
-}
 
 void require_usable(const shm::Received& received) {
   if (received.is_strange) {
@@ -62,16 +38,17 @@ bool is_question(shm::MessageKind kind) {
 void Daemon::handle(Client& client, shm::Received& received) {
   const shm::Message& message = received.message;
   if (client.is_turned_away) {
-    hear_stranger(client, message);
+    takeover_.hear_stranger(client, message);
     return;
   }
   require_usable(received);
   if (client.node == 0 && message.kind != shm::MessageKind::kHello) {
     throw std::runtime_error("a client must say hello first");
   }
-  if (phase_ != Phase::kServing && is_question(message.kind)) {
+  if (!takeover_.is_over() && is_question(message.kind)) {
     throw NotYet("this daemon is taking over from another", shm::kForever);
   }
+  if (hand_back(client, received) || change_model(client, message)) return;
   switch (message.kind) {
     case shm::MessageKind::kHello:
       hello(client, received);
@@ -83,7 +60,7 @@ void Daemon::handle(Client& client, shm::Received& received) {
       open_input(client, received);
       break;
     case shm::MessageKind::kClosePort:
-      close_port(client, message.port);
+      if (client.ports.count(message.port) != 0) switchboard_.remove(message.port);
       break;
     case shm::MessageKind::kSynced:
       barriers_.synced(client.id(), message.request);
@@ -101,7 +78,7 @@ void Daemon::handle(Client& client, shm::Received& received) {
       break;
     case shm::MessageKind::kObserve:
       gate_.require(client, Action::kObserve);
-      observers_.add(client, message.request, directory_.last_news());
+      observers_.add(client, message.request, names_.last_news());
       break;
     case shm::MessageKind::kPeerRefused:
       if (client.ports.count(message.port) != 0) {
@@ -113,42 +90,9 @@ void Daemon::handle(Client& client, shm::Received& received) {
         switchboard_.note_blind(message.port, std::string(message.text_view()));
       }
       break;
-    case shm::MessageKind::kHandBackPage:
-      take_back_page(client, received);
-      break;
-    case shm::MessageKind::kHandBackOutput:
-      take_back_output(client, received);
-      break;
-    case shm::MessageKind::kHandBackInput:
-      take_back_input(client, received);
-      break;
-    case shm::MessageKind::kHandBackLink:
-      take_back_link(client, message);
-      break;
-    case shm::MessageKind::kHandedBack:
-      finish_return(client);
-      break;
     case shm::MessageKind::kConnect:
       if (client.ports.count(message.port) == 0) throw std::runtime_error("the port is not open");
       connect(client, message.request, message.port);
-      break;
-    case shm::MessageKind::kReload:
-      gate_.require(client, Action::kReload);
-      ask_for({(message.flags & shm::kDryRun) != 0 ? Change::Kind::kCompare : Change::Kind::kReload,
-               {},
-               0,
-               {},
-               {}},
-              client, message);
-      break;
-    case shm::MessageKind::kSwitch:
-      gate_.require(client, Action::kSwitch);
-      ask_for({Change::Kind::kSwitch, std::string(message.name_view()), 0, {}, {}}, client,
-              message);
-      break;
-    case shm::MessageKind::kRollback:
-      gate_.require(client, Action::kReload);
-      ask_for({Change::Kind::kRollback, {}, message.link, {}, {}}, client, message);
       break;
     case shm::MessageKind::kStop:
       gate_.require(client, Action::kStop);
@@ -161,14 +105,52 @@ void Daemon::handle(Client& client, shm::Received& received) {
   }
 }
 
-// `returning`: the node that the newcomer says it was, if it was here before.
-Charge Daemon::make_room_for(const Client& newcomer, NodeId returning) {
-  const auto absentee = absentees_.find(returning);
-  if (absentee != absentees_.end() &&
-      newcomer.is_process(absentee->second.pid, absentee->second.process.get())) {
-    return std::move(absentee->second.charge);
+bool Daemon::hand_back(Client& client, shm::Received& received) {
+  switch (received.message.kind) {
+    case shm::MessageKind::kHandBackPage:
+      takeover_.take_back_page(client, received);
+      return true;
+    case shm::MessageKind::kHandBackOutput:
+      takeover_.take_back_output(client, received);
+      return true;
+    case shm::MessageKind::kHandBackInput:
+      takeover_.take_back_input(client, received);
+      return true;
+    case shm::MessageKind::kHandBackLink:
+      takeover_.take_back_link(client, received.message);
+      return true;
+    case shm::MessageKind::kHandedBack:
+      takeover_.finish_return(client);
+      return true;
+    default:
+      return false;
   }
-  return shares_.take(newcomer.user(), Share::kClients);
+}
+
+bool Daemon::change_model(Client& client, const shm::Message& message) {
+  switch (message.kind) {
+    case shm::MessageKind::kReload:
+      gate_.require(client, Action::kReload);
+      changes_.ask(
+          {(message.flags & shm::kDryRun) != 0 ? Change::Kind::kCompare : Change::Kind::kReload,
+           {},
+           0,
+           {},
+           {}},
+          client, message);
+      return true;
+    case shm::MessageKind::kSwitch:
+      gate_.require(client, Action::kSwitch);
+      changes_.ask({Change::Kind::kSwitch, std::string(message.name_view()), 0, {}, {}}, client,
+                   message);
+      return true;
+    case shm::MessageKind::kRollback:
+      gate_.require(client, Action::kReload);
+      changes_.ask({Change::Kind::kRollback, {}, message.link, {}, {}}, client, message);
+      return true;
+    default:
+      return false;
+  }
 }
 
 void Daemon::hello(Client& client, const shm::Received& received) {
@@ -180,44 +162,18 @@ void Daemon::hello(Client& client, const shm::Received& received) {
   }
   if (message.name_view().empty()) throw std::runtime_error("a client must have a name");
   require_fine(message.name_view(), "the client's");
-  client.charge = make_room_for(client, (message.flags & shm::kRejoins) != 0 ? message.link : 0);
+  const bool returns = (message.flags & shm::kRejoins) != 0;
+  client.charge = takeover_.make_room_for(client, returns ? message.link : 0);
   client.name = message.name_view();
   client.hello_request = message.request;
   client.has_service_thread = (message.flags & shm::kHasServiceThread) != 0;
   client.comes_back = (message.flags & shm::kComesBack) != 0;
-  if ((message.flags & shm::kRejoins) != 0) {
-    try {
-      rejoin(client, received);
-    } catch (const std::exception& error) {
-      client.is_turned_away = true;
-      const std::string why = error.what();
-      if (!strangers_.refuse(client, message.link, why, shm::monotonic_now())) {
-        throw RefusedAgain(why);
-      }
-      throw;
-    }
-  } else if (phase_ == Phase::kServing) {
+  if (returns) {
+    takeover_.rejoin(client, received);
+  } else if (takeover_.is_over()) {
     welcome(client);
   } else {
-    waiting_.push_back(client.id());
-  }
-}
-
-// What cannot be a port of its is not listed; it has been refused already.
-void Daemon::hear_stranger(const Client& client, const shm::Message& message) noexcept {
-  try {
-    if (message.kind == shm::MessageKind::kHandBackOutput) {
-      const std::string port = port_name(message);
-      gate_.require(client, Action::kOutput, port);
-      strangers_.has_output(client, port);
-    } else if (message.kind == shm::MessageKind::kHandBackInput) {
-      const std::string port = port_name(message);
-      gate_.require(client, Action::kInput, port);
-      strangers_.has_input(client, port);
-    } else if (message.kind == shm::MessageKind::kHandedBack) {
-      strangers_.has_said_all(client);
-    }
-  } catch (const std::exception&) {
+    takeover_.let_wait(client);
   }
 }
 
@@ -225,137 +181,9 @@ void Daemon::welcome(Client& client) {
   if (client.node == 0) client.node = registry_.next_node();
   auto welcome = reply_to(client.hello_request, shm::MessageKind::kWelcome);
   welcome.link = client.node;
-  strangers_.welcome(client);
-  client.send(welcome, {models_.board().get(), registry_.readable().get()});
+  takeover_.know(client);
+  client.send(welcome, {board_.readable().get(), registry_.readable().get()});
   log::debug("{} is here", client.description());
-}
-
-void Daemon::require_free(const Client& asking, shm::PortInstance holder, const std::string& what) {
-  if (holder == 0) return;
-  Client* client = nullptr;
-  if (const auto* output = switchboard_.output(holder)) client = output->client;
-  if (const auto* input = switchboard_.input(holder)) client = input->client;
-  if (client == nullptr) return;
-  if (client != &asking) {
-    if (client->has_died()) {
-      drop(client->id());
-      return;
-    }
-    // What others sent earlier may come later, for each has a socket of its own.
-    client->read_ahead();
-    if (client->take_closing_of(holder)) {
-      switchboard_.remove(holder);
-      return;
-    }
-  }
-  throw std::runtime_error(what + " is held by " + client->description());
-}
-
-void Daemon::require_not_kept(shm::PortInstance holder, const std::string& what) {
-  for (const auto& [node, absentee] : absentees_) {
-    if (absentee.ports.count(holder) == 0) continue;
-    if (has_ended(absentee.process)) {
-      forget_absentee(node);
-      return;
-    }
-    throw NotYet(what + " is kept for process " + std::to_string(absentee.pid) +
-                     ", which lives but does not answer",
-                 shm::monotonic_now() + kMaxWaitForDeath);
-  }
-  for (const auto& [id, client] : clients_) {
-    if (client->to_hand_back.count(holder) != 0) {
-      throw NotYet(what + " is kept for " + client->description(),
-                   shm::monotonic_now() + kMaxWaitForDeath);
-    }
-  }
-}
-
-void Daemon::open_output(Client& client, shm::Received& received) {
-  const std::string name = port_name(received.message);
-  gate_.require(client, Action::kOutput, name);
-  auto port = adopt_output(received, client.user());
-  directory_.give_back(shm::monotonic_now());  // what this client may have closed just before
-  port->charge = shares_.take(client.user(), Share::kDescriptors, kDescriptorsOfOutput);
-  Source& source = directory_.source(name, client.user());
-  directory_.let_go(source);  // if it is not opened after all
-  require_free(client, source.open, "the output port " + name);
-  require_not_kept(source.away, "the output port " + name);
-  require_not_changing(source);
-  const std::uint64_t request = received.message.request;
-  if (Directory::may_be_given(source, client.user())) {
-    finish_opening(client, request, std::move(port), source);
-    return;
-  }
-  const auto kept = std::make_shared<std::unique_ptr<OutputPort>>(std::move(port));
-  change_page(source, client, request, client.user(),
-              [this, kept, request](Source& own, Client& opener) {
-                finish_opening(opener, request, std::move(*kept), own);
-              });
-}
-
-void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_ptr<OutputPort> port,
-                            Source& source) {
-  remember_component(client);
-  directory_.give_page(source, client.user());
-  const OutputPort& opened = switchboard_.add(std::move(port), client, source);
-  auto reply = reply_to(request, shm::MessageKind::kOpened);
-  reply.port = opened.instance;
-  reply.id = source.id;
-  client.send(reply, {source.page.writable.get(), -1});
-  log::info("{} opened output port {}", client.description(), source.name);
-  connect(client, request, opened.instance);
-}
-
-void Daemon::open_input(Client& client, shm::Received& received) {
-  const std::string name = port_name(received.message);
-  gate_.require(client, Action::kInput, name);
-  auto port = adopt_input(received, client.user());
-  directory_.give_back(shm::monotonic_now());
-  port->charge = shares_.take(client.user(), Share::kDescriptors, kDescriptorsOfInput);
-  InputName& input = directory_.input(name, client.user());
-  directory_.let_go(input);
-  require_free(client, input.open, "the input port " + name);
-  require_not_kept(input.away, "the input port " + name);
-  remember_component(client);
-  const InputPort& opened = switchboard_.add(std::move(port), client, input);
-  auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
-  reply.port = opened.instance;
-  reply.id = input.id;
-  client.send(reply);
-  log::info("{} opened input port {}", client.description(), name);
-  connect(client, received.message.request, opened.instance);
-}
-
-// Introduces a new port to its peers, and tells its component once they know it.
-void Daemon::connect(Client& client, std::uint64_t request, shm::PortInstance port) {
-  const auto in_force = models_.in_force();
-  auto told = switchboard_.link_one(in_force.table, port);
-  switchboard_.tell_unmentioned(in_force, port);
-  // Hears of it in order, before the kConnected. But its receivers have to wait for an output port.
-  if (switchboard_.output(port) == nullptr) told.erase(&client);
-  introduce(told, [this, id = client.id(), request] {
-    const auto found = clients_.find(id);
-    if (found == clients_.end()) return;
-    found->second->send(reply_to(request, shm::MessageKind::kConnected));
-  });
-}
-
-// Calls `passed` once clients have taken up what they were told: first the publishers, which
-// thereby use more of their segments, then the receivers that map it.
-void Daemon::introduce(const Switchboard::Told& told, std::function<void()> passed) {
-  const shm::Nanoseconds deadline = shm::monotonic_now() + kMaxWaitForClients;
-  barriers_.raise(told, deadline, [this, deadline, passed = std::move(passed)] {
-    const auto receivers = switchboard_.show_segments();
-    if (switchboard_.has_growth_to_show() && show_growth_at_ == shm::kForever) {
-      show_growth_at_ = shm::monotonic_now() + kShowGrowthAfter;
-    }
-    barriers_.raise(receivers, deadline, passed);
-  });
-}
-
-void Daemon::close_port(Client& client, shm::PortInstance port) {
-  if (client.ports.count(port) == 0) return;
-  switchboard_.remove(port);
 }
 
 // One document for all who have asked by now.
@@ -365,16 +193,17 @@ void Daemon::answer_status(shm::Nanoseconds now) {
   std::string why_not;
   try {
     document = make_document(
-        status_document({instance_, models_, library_, in_force_.model, history_, directory_,
-                         registry_, switchboard_, strangers_, clients_.size(), reloads_refused_},
+        status_document({instance_, board_, changes_.library(), changes_.in_force(),
+                         changes_.history(), names_, registry_, switchboard_, takeover_.strangers(),
+                         clients_.size(), changes_.reloads_refused()},
                         now));
   } catch (const std::exception& error) {  // no descriptors are left
     why_not = error.what();
   }
   for (const StatusRequests::Asking& each : status_requests_.take()) {
-    const auto found = clients_.find(each.client);
-    if (found == clients_.end()) continue;
-    Client& client = *found->second;
+    Client* const asking = clients_.find(each.client);
+    if (asking == nullptr) continue;
+    Client& client = *asking;
     --client.waits_for_status;
     if (document) {
       client.send(reply_to(each.request, shm::MessageKind::kStatusReply), {document.get(), -1});
@@ -385,58 +214,8 @@ void Daemon::answer_status(shm::Nanoseconds now) {
   status_requests_.made(now, shm::monotonic_now());
 }
 
-shm::FileDescriptor Daemon::make_document(const std::string& document) {
-  const auto file = shm::make_segment("arbiter-document", document.size());
-  if (pwrite(file.get(), document.data(), document.size(), 0) !=
-      static_cast<ssize_t>(document.size())) {
-    throw std::runtime_error("the document could not be written");
-  }
-  return shm::reopen(file, O_RDONLY);
-}
-
-void Daemon::send_document(Client& client, std::uint64_t request, shm::MessageKind kind,
-                           const std::string& document) {
-  client.send(reply_to(request, kind), {make_document(document).get(), -1});
-}
-
 void Daemon::send_model(Client& client, std::uint64_t request) {
-  auto reply = reply_to(request, shm::MessageKind::kModelReply);
-  const ModelCopyOf of{models_, library_, in_force_.model, history_, continuity_};
-  client.send(reply, {model_copy_.of(of).get(), -1});
-}
-
-void Daemon::deactivate(Client& client, const shm::Message& message) {
-  const std::string name = port_name(message);
-  gate_.require(client, Action::kDeactivate, name);
-  Source* source = directory_.find_source(name);
-  if (source == nullptr) {
-    throw std::runtime_error("no model and no component has named the source " + name);
-  }
-  require_free(client, source->open, "the output port " + name);
-  require_not_kept(source->away, "the output port " + name);
-  require_not_changing(*source);
-  if (!source->has_page()) throw std::runtime_error("nobody has the activity of " + name);
-  const bool was_active = end_activity(*source);
-  const auto answer = [this, was_active, request = message.request](Source& ended, Client& asking) {
-    end_activity(ended);  // who had it may have written there until it was replaced
-    directory_.let_go(ended);
-    auto reply = reply_to(request, shm::MessageKind::kDone);
-    reply.value = was_active ? 1 : 0;
-    asking.send(reply);
-    log::info("{} deactivated {}{}", asking.description(), ended.name,
-              was_active ? "" : ", which was not active");
-  };
-  if (was_active && may_undo(*source)) {
-    change_page(*source, client, message.request, {}, answer);
-  } else {
-    answer(*source, client);
-  }
-}
-
-void Daemon::refuse(Client& client, std::uint64_t request, const std::string& why) {
-  auto reply = reply_to(request, shm::MessageKind::kRefused);
-  reply.set_text(why);
-  client.send(reply);
+  client.send(reply_to(request, shm::MessageKind::kModelReply), {changes_.document().get(), -1});
 }
 
 }  // namespace arbiter::service

@@ -14,8 +14,8 @@
 #include <CLI/CLI.hpp>
 
 #include "service/daemon.hpp"
-#include "service/log.hpp"
-#include "service/log_sink.hpp"
+#include "service/log/log.hpp"
+#include "service/log/log_sink.hpp"
 
 namespace {
 

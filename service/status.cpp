@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "service/model_copy.hpp"
+#include "service/models/document.hpp"
 #include "shm/clock.hpp"
 #include "shm/decision.hpp"
 #include "shm/utf8.hpp"

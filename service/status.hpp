@@ -4,20 +4,20 @@
 #include <cstdint>
 #include <string>
 
-#include "service/history.hpp"
-#include "service/models.hpp"
-#include "service/strangers.hpp"
-#include "service/switchboard.hpp"
+#include "service/models/board.hpp"
+#include "service/models/history.hpp"
+#include "service/ports/switchboard.hpp"
+#include "service/takeover/strangers.hpp"
 
 namespace arbiter::service {
 
 struct StatusOf {
   const std::string& instance;
-  const Models& models;
+  const Board& models;
   const Library& library;
   const ModelPointer& model;  // in force; null: none, or a predecessor's
   const History& history;
-  const Directory& directory;
+  const PortNames& directory;
   const Registry& registry;
   const Switchboard& switchboard;
   const Strangers& strangers;

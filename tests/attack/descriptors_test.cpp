@@ -15,7 +15,7 @@
 
 #include <arbiter/arbiter.hpp>
 
-#include "service/errands.hpp"
+#include "service/clients/errands.hpp"
 #include "shm/bell.hpp"
 #include "shm/foreign.hpp"
 #include "shm/input_segment.hpp"

@@ -1,6 +1,6 @@
 // What a daemon's successor reads of an entry that its predecessor was about to change
-// (service/registry_entry.hpp).
-#include "service/registry_entry.hpp"
+// (service/kept/registry_entry.hpp).
+#include "service/kept/registry_entry.hpp"
 #include "tests/explore/components.hpp"
 
 namespace arbiter::explore {

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "service/policy.hpp"
+#include "service/policy/policy.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 namespace arbiter::fuzz {

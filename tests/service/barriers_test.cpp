@@ -1,6 +1,6 @@
 // Waiting until clients have taken up what they were told: for a bounded time, and for nobody who
 // is gone.
-#include "service/barriers.hpp"
+#include "service/clients/barriers.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>

@@ -1,5 +1,5 @@
 // What is left to threads that may be lost: a user's errands wait for that user's alone.
-#include "service/errands.hpp"
+#include "service/clients/errands.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -8,7 +8,7 @@
 
 #include <arbiter/arbiter.hpp>
 
-#include "service/registry.hpp"
+#include "service/kept/registry.hpp"
 #include "shm/activity.hpp"
 #include "shm/output_segment.hpp"
 #include "shm/table_ring.hpp"

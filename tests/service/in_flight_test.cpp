@@ -1,5 +1,5 @@
 // What a client is sent that does not read, and that is kept back.
-#include "service/in_flight.hpp"
+#include "service/clients/in_flight.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -8,7 +8,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "service/client.hpp"
+#include "service/clients/client.hpp"
 #include "shm/segment.hpp"
 #include "shm/wire.hpp"
 

@@ -1,4 +1,4 @@
-#include "service/lobby.hpp"
+#include "service/clients/lobby.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // What stands in the log: nothing that a client has made up, no more than its user's share, and
 // never at the cost of the loop.
-#include "service/log.hpp"
+#include "service/log/log.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -10,8 +10,8 @@
 #include <sstream>
 #include <thread>
 
-#include "service/log_sink.hpp"
-#include "service/log_writer.hpp"
+#include "service/log/log_sink.hpp"
+#include "service/log/log_writer.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/raw_client.hpp"
 

@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "service/changes.hpp"
-#include "service/history.hpp"
-#include "service/model_files.hpp"
+#include "service/models/arguments.hpp"
+#include "service/models/change_queue.hpp"
+#include "service/models/history.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -86,7 +86,7 @@ Change switch_for(ClientId client, const std::string& name) {
 }
 
 TEST(Changes, ThatAreTheSameAndStandBehindEachOtherAreOne) {
-  Changes changes;
+  ChangeQueue changes;
   for (const ClientId client : {ClientId{1}, ClientId{2}}) changes.add(reload_for(client));
   for (const ClientId client : {ClientId{3}, ClientId{4}}) changes.add(switch_for(client, "a"));
   changes.add(switch_for(5, "b"));
@@ -97,15 +97,15 @@ TEST(Changes, ThatAreTheSameAndStandBehindEachOtherAreOne) {
 }
 
 TEST(Changes, RollbacksCountEachForItself) {
-  Changes changes;
+  ChangeQueue changes;
   for (int i = 0; i < 2; ++i) changes.add({Change::Kind::kRollback, {}, 0, "", {{1, 1}}});
   changes.take_next();
   EXPECT_FALSE(changes.empty());
 }
 
 TEST(Changes, AreBounded) {
-  Changes changes;
-  for (std::size_t i = 0; i < Changes::kMaxWaiting; ++i) {
+  ChangeQueue changes;
+  for (std::size_t i = 0; i < ChangeQueue::kMaxWaiting; ++i) {
     changes.add(switch_for(i, i % 2 == 0 ? "a" : "b"));
   }
   EXPECT_THAT(refusal_of([&] { changes.add(switch_for(1, "a")); }),
@@ -115,11 +115,11 @@ TEST(Changes, AreBounded) {
   changes.add({Change::Kind::kReload, {}, 0, "a signal", {}});
   std::size_t count = 0;
   for (; !changes.empty(); ++count) changes.take_next();
-  EXPECT_EQ(count, Changes::kMaxWaiting + 1) << "a signal cannot be refused";
+  EXPECT_EQ(count, ChangeQueue::kMaxWaiting + 1) << "a signal cannot be refused";
 }
 
 TEST(Changes, OfOneClientAreBounded) {
-  Changes changes;
+  ChangeQueue changes;
   for (std::uint32_t i = 0; i < shm::kMaxPostponed; ++i) changes.add(reload_for(1));
   EXPECT_THAT(refusal_of([&] { changes.add(reload_for(1)); }), HasSubstr("kMaxPostponed"));
   changes.add(reload_for(2));

@@ -1,5 +1,5 @@
 // What a policy file may say, and what it means.
-#include "service/policy.hpp"
+#include "service/policy/policy.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

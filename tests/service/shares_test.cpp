@@ -1,5 +1,5 @@
 // What each user may have, and whose turn it is.
-#include "service/shares.hpp"
+#include "service/policy/shares.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -7,9 +7,9 @@
 
 #include <vector>
 
-#include "service/client.hpp"
-#include "service/errands.hpp"
-#include "service/turns.hpp"
+#include "service/clients/client.hpp"
+#include "service/clients/errands.hpp"
+#include "service/clients/turns.hpp"
 #include "shm/segment.hpp"
 
 namespace arbiter::service {

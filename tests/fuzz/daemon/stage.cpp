@@ -6,8 +6,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "service/errands.hpp"
-#include "service/log.hpp"
+#include "service/clients/errands.hpp"
+#include "service/log/log.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 namespace arbiter::fuzz {

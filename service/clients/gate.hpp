@@ -1,0 +1,33 @@
+// The policy in force, and the clients that it is asked about.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "service/clients/client.hpp"
+#include "service/log/findings.hpp"
+#include "service/policy/policy.hpp"
+
+namespace arbiter::service {
+
+class Gate {
+ public:
+  // Without a file the default policy holds.
+  explicit Gate(std::optional<std::string> file);
+
+  // What the file says now, if there is one; to be used only if nothing is found to be wrong.
+  [[nodiscard]] std::optional<Policy> read(Findings& findings) const;
+  void put_in_force(const Policy& policy);
+  [[nodiscard]] bool has_file() const { return file_.has_value(); }
+
+  // Throws std::runtime_error if the client may not do it. The message says who may not do what,
+  // and which line of the policy says so.
+  void require(const Client& client, Action action, std::string_view port = {}) const;
+
+ private:
+  std::optional<std::string> file_;
+  Policy policy_;
+};
+
+}  // namespace arbiter::service

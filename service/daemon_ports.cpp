@@ -1,0 +1,132 @@
+// Ports that open and are introduced to their peers; sources that an operator deactivates.
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include "service/clients/given_names.hpp"
+#include "service/clients/replies.hpp"
+#include "service/daemon.hpp"
+#include "service/log/log.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::service {
+
+void Daemon::require_free(const Client& asking, shm::PortInstance holder, const std::string& what) {
+  if (holder == 0) return;
+  Client* client = nullptr;
+  if (const auto* output = switchboard_.output(holder)) client = output->client;
+  if (const auto* input = switchboard_.input(holder)) client = input->client;
+  if (client == nullptr) return;
+  if (client != &asking) {
+    if (client->has_died()) {
+      drop(client->id());
+      return;
+    }
+    // What others sent earlier may come later, for each has a socket of its own.
+    client->read_ahead();
+    if (client->take_closing_of(holder)) {
+      switchboard_.remove(holder);
+      return;
+    }
+  }
+  throw std::runtime_error(what + " is held by " + client->description());
+}
+
+void Daemon::open_output(Client& client, shm::Received& received) {
+  const std::string name = port_name(received.message);
+  gate_.require(client, Action::kOutput, name);
+  auto port = adopt_output(received, client.user());
+  names_.give_back(shm::monotonic_now());  // what this client may have closed just before
+  port->charge = shares_.take(client.user(), Share::kDescriptors, kDescriptorsOfOutput);
+  Source& source = names_.source(name, client.user());
+  names_.let_go(source);  // if it is not opened after all
+  require_free(client, source.open, "the output port " + name);
+  takeover_.require_not_kept(source.away, "the output port " + name);
+  require_not_changing(source);
+  const std::uint64_t request = received.message.request;
+  if (PortNames::may_be_given(source, client.user())) {
+    finish_opening(client, request, std::move(port), source);
+    return;
+  }
+  const auto kept = std::make_shared<std::unique_ptr<OutputPort>>(std::move(port));
+  change_page(source, client, request, client.user(),
+              [this, kept, request](Source& own, Client& opener) {
+                finish_opening(opener, request, std::move(*kept), own);
+              });
+}
+
+void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_ptr<OutputPort> port,
+                            Source& source) {
+  takeover_.remember_component(client);
+  names_.give_page(source, client.user());
+  const OutputPort& opened = switchboard_.add(std::move(port), client, source);
+  auto reply = reply_to(request, shm::MessageKind::kOpened);
+  reply.port = opened.instance;
+  reply.id = source.id;
+  client.send(reply, {source.page.writable.get(), -1});
+  log::info("{} opened output port {}", client.description(), source.name);
+  connect(client, request, opened.instance);
+}
+
+void Daemon::open_input(Client& client, shm::Received& received) {
+  const std::string name = port_name(received.message);
+  gate_.require(client, Action::kInput, name);
+  auto port = adopt_input(received, client.user());
+  names_.give_back(shm::monotonic_now());
+  port->charge = shares_.take(client.user(), Share::kDescriptors, kDescriptorsOfInput);
+  InputName& input = names_.input(name, client.user());
+  names_.let_go(input);
+  require_free(client, input.open, "the input port " + name);
+  takeover_.require_not_kept(input.away, "the input port " + name);
+  takeover_.remember_component(client);
+  const InputPort& opened = switchboard_.add(std::move(port), client, input);
+  auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
+  reply.port = opened.instance;
+  reply.id = input.id;
+  client.send(reply);
+  log::info("{} opened input port {}", client.description(), name);
+  connect(client, received.message.request, opened.instance);
+}
+
+// Introduces a new port to its peers, and tells its component once they know it.
+void Daemon::connect(Client& client, std::uint64_t request, shm::PortInstance port) {
+  const auto in_force = board_.in_force();
+  auto told = switchboard_.link_one(in_force.table, port);
+  switchboard_.tell_unmentioned(in_force, port);
+  // Hears of it in order, before the kConnected. But its receivers have to wait for an output port.
+  if (switchboard_.output(port) == nullptr) told.erase(&client);
+  introductions_.introduce(told, [this, id = client.id(), request] {
+    Client* const opener = clients_.find(id);
+    if (opener != nullptr) opener->send(reply_to(request, shm::MessageKind::kConnected));
+  });
+}
+
+void Daemon::deactivate(Client& client, const shm::Message& message) {
+  const std::string name = port_name(message);
+  gate_.require(client, Action::kDeactivate, name);
+  Source* source = names_.find_source(name);
+  if (source == nullptr) {
+    throw std::runtime_error("no model and no component has named the source " + name);
+  }
+  require_free(client, source->open, "the output port " + name);
+  takeover_.require_not_kept(source->away, "the output port " + name);
+  require_not_changing(*source);
+  if (!source->has_page()) throw std::runtime_error("nobody has the activity of " + name);
+  const bool was_active = end_activity(*source);
+  const auto answer = [this, was_active, request = message.request](Source& ended, Client& asking) {
+    end_activity(ended);  // who had it may have written there until it was replaced
+    names_.let_go(ended);
+    auto reply = reply_to(request, shm::MessageKind::kDone);
+    reply.value = was_active ? 1 : 0;
+    asking.send(reply);
+    log::info("{} deactivated {}{}", asking.description(), ended.name,
+              was_active ? "" : ", which was not active");
+  };
+  if (was_active && may_undo(*source)) {
+    change_page(*source, client, message.request, {}, answer);
+  } else {
+    answer(*source, client);
+  }
+}
+
+}  // namespace arbiter::service

@@ -1,0 +1,25 @@
+// A process, told from later ones with the same pid by when it began.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+
+#include "shm/file_descriptor.hpp"
+
+namespace arbiter::service {
+
+struct Process {
+  pid_t pid = 0;
+  std::uint64_t started = 0;
+
+  [[nodiscard]] bool lives() const;
+  friend bool operator==(const Process&, const Process&) = default;
+};
+// When a process began, in clock ticks since boot; 0 where that cannot be told.
+std::uint64_t start_of_process(pid_t pid);
+
+// Whether the process of a pidfd has ended.
+[[nodiscard]] bool has_ended(const shm::FileDescriptor& process);
+
+}  // namespace arbiter::service

@@ -1,0 +1,47 @@
+// Which memory an instance's components live in, and who they are: written down beside the socket,
+// where only the daemon's user may write, for a successor to judge by.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "service/kept/handed_back.hpp"
+#include "service/kept/process.hpp"
+
+namespace arbiter::service {
+
+// The board and the registry that the clients of an instance map.
+struct Realm {
+  FileIdentity board;
+  FileIdentity registry;
+  friend bool operator==(const Realm&, const Realm&) = default;
+};
+
+// What a daemon that is gone has left behind.
+struct Predecessor {
+  Realm realm;
+  bool is_survived = false;  // a component of its lives, and may hand back the realm
+};
+
+// Remembers, beside the socket, which realm the instance's components live in, and who they are.
+class StateFile {
+ public:
+  StateFile(const std::string& directory, const std::string& instance);
+  // Nothing, too, where it is not such a file.
+  [[nodiscard]] std::optional<Predecessor> read() const;
+  // Replaces it at once. Throws std::system_error.
+  void write(const Realm& realm, const std::vector<Process>& components);
+  // One more component. Whoever it cannot be told of may have to start anew after a restart.
+  void add(const Process& component) noexcept;
+  // How many components it names, some of which may have ended.
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  void remove() const noexcept;
+
+ private:
+  std::string path_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace arbiter::service

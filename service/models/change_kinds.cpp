@@ -1,0 +1,215 @@
+// What each kind of change prepares, before its model is swapped in: by the compiler, in its
+// thread, or at once.
+#include <poll.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <memory>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "service/kept/model_name.hpp"
+#include "service/log/log.hpp"
+#include "service/models/comparison.hpp"
+#include "service/models/model_changes.hpp"
+#include "service/models/preparation.hpp"
+
+namespace arbiter::service {
+
+// The job has copies of all that it needs: it may outlive this, if a file holds it up.
+Compiler::Job ModelChanges::reading_job(
+    std::function<void(Reading&, const std::stop_token&)> after_reading) const {
+  if (options_.files.empty() && !gate_.has_file()) {
+    throw std::runtime_error("there is no file to read again; start with --model");
+  }
+  return [options = options_, gate = gate_,
+          after = std::move(after_reading)](const std::stop_token& stop) {
+    if (options.before_reading) options.before_reading(stop);
+    StatusLine line(options.instance);
+    Reading reading =
+        read_files(options.files, gate, {options.steps, line.watch(), options.is_strict}, stop);
+    if (!reading.findings.has_errors()) after(reading, stop);
+    return reading;
+  };
+}
+
+// Nobody is kept waiting by it; but signals are heard.
+void ModelChanges::read_first(int stop_descriptor, const std::function<bool()>& is_to_stop) {
+  if (options_.files.empty() && !gate_.has_file()) return;
+  compiler_.start(reading_job([](Reading&, const std::stop_token&) {}));
+  for (bool is_over = false; !is_over;) {
+    pollfd watched[2] = {{compiler_.descriptor(), POLLIN, 0}, {stop_descriptor, POLLIN, 0}};
+    if (poll(watched, 2, -1) < 0 && errno != EINTR) {
+      throw std::system_error(errno, std::generic_category(), "poll");
+    }
+    if (watched[1].revents != 0 && is_to_stop()) throw rules::Stopped();
+    is_over = watched[0].revents != 0;
+  }
+  Reading reading = compiler_.take();
+  if (reading.findings.has_errors()) {
+    throw BadModel(std::string("not started: the files have errors, told above") +
+                   (options_.is_strict ? "; --strict takes warnings for errors" : ""));
+  }
+  if (reading.policy) gate_.put_in_force(*reading.policy);
+  read_at_start_ = std::move(reading.models);
+}
+
+// The model that the last daemon had in force, if this one has it by that name, too.
+Swap ModelChanges::first_swap() {
+  Library library(std::exchange(read_at_start_, {}), names_);
+  const std::string last = board_.name();
+  const LoadedModel* next = library.find(last);
+  if (next == nullptr) {
+    next = library.first();
+    if (!last.empty()) {
+      log::warn(R"(the last daemon's model "{}" is not among those given: "{}" takes its place)",
+                last, next->model->name);
+    }
+  }
+  Swap swap;
+  swap.to = *next;
+  swap.how = "start";
+  reserve_tables(library);
+  swap.library = std::move(library);
+  return swap;
+}
+
+void ModelChanges::prepare_reload(Swap& swap) {
+  prepare(swap, reading_job([before = in_force_.model, name = board_.name()](
+                                Reading& reading, const std::stop_token& stop) {
+            const ModelPointer after = find_model(reading.models, name);
+            if (before == nullptr || after == nullptr) return;
+            reading.changes = changes_between(*before, *after, kStepsOfChange, stop);
+          }));
+}
+
+// Throws; then nothing has changed, and `swap` knows the findings.
+void ModelChanges::finish_reload(Swap& swap, Reading reading) {
+  if (options_.files.empty()) {
+    gate_.put_in_force(*reading.policy);
+    answer_done(swap, nullptr);
+    return;
+  }
+  Library library(std::move(reading.models), names_);
+  const LoadedModel* next = library.find(board_.name());
+  if (next == nullptr) next = library.first();
+  swap.to = *next;
+  swap.how = "reload";
+  swap.changes = std::move(reading.changes);
+  swap.content = content_of(*next);
+  reserve_tables(library);
+  swap.policy = std::move(reading.policy);
+  swap.library = std::move(library);
+  begin_swap(swap);
+}
+
+// What is in force, and comes into force once more as it is, is no step for a rollback. Tables say
+// so, and not which object it is: what a rollback has put in force is not the library's. While both
+// layouts live, a name has the same id in both.
+std::uint64_t ModelChanges::content_of(const LoadedModel& next) const {
+  const PastModel* const latest = history_.latest();
+  const bool is_same = latest != nullptr && in_force_.layout != nullptr &&
+                       in_force_.model->name == next.model->name &&
+                       in_force_.layout->words() == next.layout->words();
+  return is_same ? latest->content : 0;
+}
+
+// So that a switch does not fail for want of memory, either.
+void ModelChanges::reserve_tables(const Library& library) {
+  if (library.models().size() < 2) return;
+  std::size_t words = 0;
+  for (const LoadedModel& each : library.models()) {
+    words = std::max(words, each.layout->words().size());
+  }
+  board_.reserve(words);
+}
+
+void ModelChanges::prepare_switch(Swap& swap) {
+  const LoadedModel* const next = library_.find(swap.change.name);
+  if (next == nullptr) {
+    const std::string& name = swap.change.name;  // from a client: it must not break lines
+    throw std::runtime_error(
+        "there is no model " + (is_model_name(name) ? '"' + name + '"' : "of that name") +
+        (library_.models().empty() ? "; none is loaded" : "; there are: " + library_.names()));
+  }
+  if (next->model == in_force_.model) {
+    answer_done(swap, nullptr);
+    return;
+  }
+  swap.to = *next;
+  swap.how = "switch";
+  swap.content = content_of(*next);
+  begin_swap(swap);
+}
+
+// The one to go back to. Throws std::runtime_error saying why there is none.
+const PastModel& ModelChanges::past_model(std::uint64_t asked) const {
+  const PastModel* const past = asked == 0 ? history_.previous() : history_.find(asked);
+  if (past == nullptr && asked == 0) {
+    const PastModel* const oldest = history_.latest();
+    if (oldest == nullptr) {
+      throw std::runtime_error("there is no model to go back to: none has been in force");
+    }
+    throw std::runtime_error("model " + std::to_string(oldest->content) +
+                             " is the oldest that is kept; arbiter history shows all");
+  }
+  if (past == nullptr) {
+    throw std::runtime_error("model " + std::to_string(asked) +
+                             " is not in the history; arbiter history shows what is");
+  }
+  if (past->model == nullptr) {
+    throw std::runtime_error("model " + std::to_string(past->generation) +
+                             " is not kept any longer, or was another daemon's; only its name is "
+                             "known");
+  }
+  return *past;
+}
+
+void ModelChanges::prepare_rollback(Swap& swap) {
+  const PastModel& past = past_model(swap.change.generation);
+  swap.to = {past.model, std::make_shared<const Layout>(past.model->compiled, names_)};
+  swap.how = "rollback to " + std::to_string(past.generation);
+  swap.back_to = past;
+  swap.content = past.content;
+  if (in_force_.model == nullptr) return begin_swap(swap);
+  prepare(swap, [before = in_force_.model, after = past.model](const std::stop_token& stop) {
+    Reading reading;
+    reading.changes = changes_between(*before, *after, kStepsOfChange, stop);
+    return reading;
+  });
+}
+
+// What `arbiter reload --dry-run` shows.
+void ModelChanges::prepare_comparison(Swap& swap) {
+  std::vector<ModelPointer> loaded;
+  for (const LoadedModel& each : library_.models()) loaded.push_back(each.model);
+  prepare(swap, reading_job([loaded = std::move(loaded), in_force = in_force_.model,
+                             name = board_.name()](Reading& reading, const std::stop_token& stop) {
+            for (const ModelPointer& read : reading.models) {
+              const auto found = std::find_if(loaded.begin(), loaded.end(), [&](const auto& each) {
+                return each->name == read->name;
+              });
+              ModelPointer before = found == loaded.end() ? nullptr : *found;
+              if (read->name == name) before = in_force;
+              reading.diffs.push_back(before == nullptr
+                                          ? "null"
+                                          : changes_between(*before, *read, kStepsOfDryRun, stop));
+            }
+          }));
+}
+
+void ModelChanges::finish_comparison(const Swap& swap, const Reading& reading) {
+  nlohmann::json models = nlohmann::json::array();
+  for (std::size_t i = 0; i < reading.models.size(); ++i) {
+    const std::string& name = reading.models[i]->name;
+    models.push_back({{"name", name},
+                      {"in_force", name == board_.name()},
+                      {"changes", nlohmann::json::parse(reading.diffs[i])}});
+  }
+  answer(swap, {{"ok", true}, {"models", std::move(models)}});
+}
+
+}  // namespace arbiter::service

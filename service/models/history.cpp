@@ -1,0 +1,82 @@
+#include "service/models/history.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <set>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+namespace arbiter::service {
+
+std::int64_t calendar_ms() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::milliseconds>(now).count();
+}
+
+void History::add(PastModel entry) {
+  if (entry.content == 0) entry.content = entry.generation;
+  models_.push_back(std::move(entry));
+  if (models_.size() > kMaxEntries) models_.pop_front();
+  forget_what_does_not_fit();
+}
+
+// One model may stand at several places, and costs once.
+void History::forget_what_does_not_fit() {
+  std::set<const Model*> kept;
+  std::size_t size = 0;
+  for (auto entry = models_.rbegin(); entry != models_.rend(); ++entry) {
+    if (entry->model == nullptr || kept.count(entry->model.get()) != 0) continue;
+    size += size_of(*entry->model);
+    if (size <= max_bytes_ || entry == models_.rbegin()) {
+      kept.insert(entry->model.get());
+    } else {
+      entry->model = nullptr;
+    }
+  }
+}
+
+void History::set_changes(std::uint64_t generation, const std::string& changes) {
+  for (PastModel& entry : models_) {
+    if (entry.generation == generation) entry.changes = changes;
+  }
+}
+
+const PastModel* History::find(std::uint64_t generation) const {
+  const auto found = std::find_if(models_.begin(), models_.end(), [&](const PastModel& entry) {
+    return entry.generation == generation;
+  });
+  return found == models_.end() ? nullptr : &*found;
+}
+
+const PastModel* History::previous() const {
+  if (models_.empty()) return nullptr;
+  const auto before = std::find_if(models_.rbegin(), models_.rend(), [&](const PastModel& entry) {
+    return entry.generation < models_.back().content;
+  });
+  return before == models_.rend() ? nullptr : &*before;
+}
+
+nlohmann::json to_json(const PastModel& entry) {
+  using Json = nlohmann::json;
+  const auto& application = entry.files.application;
+  return {{"generation", entry.generation},
+          {"content", entry.content},
+          {"name", entry.name},
+          {"files", entry.files.models},
+          {"application", application ? Json(*application) : Json(nullptr)},
+          {"since_ms", entry.since_ms},
+          {"how", entry.how},
+          {"by", entry.by.empty() ? Json(nullptr) : Json(entry.by)},
+          {"changes", entry.changes.empty() ? Json(nullptr) : Json(entry.changes)},
+          {"is_kept", entry.model != nullptr}};
+}
+
+nlohmann::json History::json() const {
+  nlohmann::json result = nlohmann::json::array();
+  for (const PastModel& entry : models_) result.push_back(to_json(entry));
+  std::reverse(result.begin(), result.end());
+  return result;
+}
+
+}  // namespace arbiter::service

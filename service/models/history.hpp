@@ -1,0 +1,65 @@
+// Which models have been in force: what `arbiter history` shows, and a rollback goes back to.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <string>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "service/models/library.hpp"
+
+namespace arbiter::service {
+
+// One that came into force.
+struct PastModel {
+  std::uint64_t generation = 0;
+  // The first generation in the history whose content this is; another for a rollback, and for a
+  // reload or a switch that changed nothing.
+  std::uint64_t content = 0;
+  std::string name;
+  rules::ModelFiles files;
+  std::int64_t since_ms = 0;  // as calendar_ms()
+  std::string how;            // "start", "takeover", "reload", "switch", "rollback to 3"
+  std::string by;             // who asked; empty: nobody
+  std::string changes;        // what decides differently than before; empty: not compared
+  ModelPointer model;         // null: not kept any longer, or a predecessor's
+};
+
+// As it stands in the history's JSON.
+[[nodiscard]] nlohmann::json to_json(const PastModel& entry);
+
+// The calendar's time, in milliseconds since 1970.
+[[nodiscard]] std::int64_t calendar_ms();
+
+class History {
+ public:
+  static constexpr std::size_t kMaxEntries = 16;
+  // Of the models in it. The latest is kept whatever its size; older ones as they fit.
+  static constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
+
+  explicit History(std::size_t max_bytes = kMaxBytes) : max_bytes_(max_bytes) {}
+
+  void add(PastModel entry);
+  // What has changed is told once it is known.
+  void set_changes(std::uint64_t generation, const std::string& changes);
+
+  // Null where it is empty.
+  [[nodiscard]] const PastModel* latest() const {
+    return models_.empty() ? nullptr : &models_.back();
+  }
+  [[nodiscard]] const PastModel* find(std::uint64_t generation) const;
+  // Where a rollback goes that names no generation: to what was in force before the latest; after
+  // a rollback one step further back. Null: nowhere.
+  [[nodiscard]] const PastModel* previous() const;
+  // The latest first.
+  [[nodiscard]] nlohmann::json json() const;
+
+ private:
+  void forget_what_does_not_fit();
+
+  std::size_t max_bytes_;
+  std::deque<PastModel> models_;  // the oldest first
+};
+
+}  // namespace arbiter::service

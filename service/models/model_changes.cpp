@@ -1,0 +1,242 @@
+#include "service/models/model_changes.hpp"
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "service/clients/replies.hpp"
+#include "service/log/log.hpp"
+#include "service/policy/users.hpp"
+
+namespace arbiter::service {
+namespace {
+
+// File names may be any bytes; JSON may not.
+std::string in_bytes(const nlohmann::json& document) {
+  return document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+// What came of it, for those who want all of it.
+std::string full_report(const Swap& swap, nlohmann::json document) {
+  document["text"] = swap.findings.text();
+  document["has_errors"] = swap.findings.has_errors();  // told in the text, in full
+  document["findings"] = swap.findings.json();
+  return in_bytes(document);
+}
+
+}  // namespace
+
+ModelChanges::ModelChanges(Options options, const Parts& parts, std::function<void()> settled)
+    : options_(std::move(options)),
+      gate_(parts.gate),
+      names_(parts.names),
+      board_(parts.board),
+      switchboard_(parts.switchboard),
+      introductions_(parts.introductions),
+      clients_(parts.clients),
+      settled_(std::move(settled)),
+      compiler_(options_.compiles_in) {}
+
+void ModelChanges::start(bool is_fresh) {
+  const auto inherited = board_.in_force().generation;
+  if (inherited != 0) {
+    history_.add({inherited, 0, board_.name(), {}, calendar_ms(), "takeover", {}, {}, nullptr});
+  }
+  if (options_.files.empty()) {
+    if (!is_fresh) log::info("no model was given: the one in force stays");
+    switchboard_.link_all(board_.in_force().table);
+    settled_();
+    return;
+  }
+  try {
+    Swap swap = first_swap();
+    begin_swap(swap);
+  } catch (const std::exception& error) {
+    if (is_fresh) throw;
+    log::error("the model in force stays: {}", error.what());
+    settled_();
+  }
+}
+
+void ModelChanges::ask(Change change, const Client& client, const shm::Message& message) {
+  change.by = client.description() + ", user " + describe_user(client.user());
+  change.asking = {{client.id(), message.request, (message.flags & shm::kWantsReport) != 0}};
+  waiting_.add(std::move(change));
+}
+
+void ModelChanges::reload_for_signal(const std::string& by) {
+  waiting_.add({Change::Kind::kReload, {}, 0, by, {}});
+}
+
+// One at a time, so that others are served in between.
+void ModelChanges::advance() {
+  if (preparing_) stop_preparing_for_nobody();
+  if (!can_advance()) return;
+  Swap swap;
+  swap.change = waiting_.take_next();
+  attempt(swap, [&] {
+    switch (swap.change.kind) {
+      case Change::Kind::kReload:
+        return prepare_reload(swap);
+      case Change::Kind::kCompare:
+        return prepare_comparison(swap);
+      case Change::Kind::kSwitch:
+        return prepare_switch(swap);
+      case Change::Kind::kRollback:
+        return prepare_rollback(swap);
+    }
+  });
+}
+
+void ModelChanges::attempt(Swap& swap, const std::function<void()>& step) {
+  try {
+    step();
+  } catch (const std::exception& error) {
+    if (swap.change.kind == Change::Kind::kReload) ++reloads_refused_;
+    // What is found in files is in the log when they have been read.
+    const char* const why =
+        swap.findings.has_errors() ? "the files have errors, told above" : error.what();
+    if (swap.change.kind == Change::Kind::kCompare) {
+      log::info("{} asks what a reload would do: {}", swap.change.by, why);
+    } else {
+      log::error("the model in force stays: {}", why);
+    }
+    answer_refused(swap, error.what());
+  }
+}
+
+// Throws, and then `swap` is as it was.
+void ModelChanges::prepare(Swap& swap, Compiler::Job job) {
+  compiler_.start(std::move(job));
+  preparing_ = std::move(swap);
+}
+
+void ModelChanges::finish_preparing() {
+  Swap swap = std::move(*std::exchange(preparing_, std::nullopt));
+  attempt(swap, [&] {
+    Reading reading = compiler_.take();
+    swap.findings = std::move(reading.findings);
+    if (swap.findings.has_errors()) throw BadModel(swap.findings.first_error());
+    switch (swap.change.kind) {
+      case Change::Kind::kReload:
+        return finish_reload(swap, std::move(reading));
+      case Change::Kind::kCompare:
+        return finish_comparison(swap, reading);
+      case Change::Kind::kSwitch:  // needs no compiler
+        return;
+      case Change::Kind::kRollback:
+        swap.changes = std::move(reading.changes);
+        return begin_swap(swap);
+    }
+  });
+}
+
+// A comparison is made for those who asked. A reload or a rollback happens all the same.
+void ModelChanges::stop_preparing_for_nobody() {
+  if (preparing_->change.kind != Change::Kind::kCompare) return;
+  const auto& asking = preparing_->change.asking;
+  const bool is_awaited = std::any_of(asking.begin(), asking.end(), [&](const auto& each) {
+    return clients_.find(each.client) != nullptr;
+  });
+  if (!is_awaited) compiler_.stop();
+}
+
+// Throws, and then nothing has changed, `swap` neither.
+void ModelChanges::begin_swap(Swap& swap) {
+  board_.prepare(*swap.to.layout, swap.to.model->name);
+  swap_ = std::move(swap);
+  auto told = switchboard_.link_all(board_.prepared());
+  // The table itself, all who will read it have to map.
+  for (const auto& [id, client] : clients_) {
+    if (!client->ports.empty()) told.insert(client.get());
+  }
+  introductions_.introduce(told, [this] { put_in_force(); });
+}
+
+void ModelChanges::put_in_force() {
+  const Swap swap = std::move(*std::exchange(swap_, std::nullopt));
+  if (swap.policy) gate_.put_in_force(*swap.policy);
+  const auto last = board_.in_force();
+  const shm::Nanoseconds last_since = board_.in_force_since();
+  board_.put_in_force();
+  const ModelPointer before = std::exchange(in_force_, swap.to).model;
+  const Model& model = *in_force_.model;
+  if (swap.library) library_ = *swap.library;
+  const auto snapshot = board_.in_force();
+  continuity_.change(before == nullptr ? nullptr : &before->compiled, model.compiled, last_since);
+  if (last.generation != 0) {
+    continuity_.change_timeouts(names_, last.table, snapshot.table, board_.in_force_since());
+  }
+  // Ports that were opened meanwhile.
+  introductions_.introduce(switchboard_.link_all(snapshot.table), [] {});
+  switchboard_.unlink(snapshot.table);
+  switchboard_.tell_unmentioned(snapshot);
+  switchboard_.ring_all();
+  log::info("model {} is in force: {} \"{}\"{}", snapshot.generation, swap.how, model.name,
+            swap.change.by.empty() ? "" : ", by " + swap.change.by);
+  remember(swap, snapshot.generation);
+  settled_();
+  nlohmann::json changes = nlohmann::json::parse(swap.changes);
+  if (!changes.is_null()) {
+    const std::string summary = changes.at("summary").get<std::string>();
+    log::info("model {} compared with the last: {}", snapshot.generation, summary);
+    history_.set_changes(snapshot.generation, summary);
+  }
+  answer_done(swap, std::move(changes));
+}
+
+void ModelChanges::remember(const Swap& swap, std::uint64_t generation) {
+  history_.add({generation,
+                swap.content,
+                in_force_.model->name,
+                in_force_.model->files,
+                calendar_ms(),
+                swap.how,
+                swap.change.by,
+                {},
+                in_force_.model});
+}
+
+const shm::FileDescriptor& ModelChanges::document() {
+  return document_.of({board_, library_, in_force_.model, history_, continuity_});
+}
+
+void ModelChanges::answer_done(const Swap& swap, nlohmann::json changes) {
+  answer(swap, {{"ok", true},
+                {"generation", board_.in_force().generation},
+                {"name", board_.name()},
+                {"back_to", swap.back_to ? to_json(*swap.back_to) : nullptr},
+                {"changes", std::move(changes)}});
+}
+
+void ModelChanges::answer_refused(const Swap& swap, const std::string& why) {
+  answer(swap, {{"ok", false}, {"why", why}}, why);
+}
+
+void ModelChanges::answer(const Swap& swap, nlohmann::json document, const std::string& why_not) {
+  const std::string report = full_report(swap, std::move(document));
+  for (const Change::Asking& each : swap.change.asking) {
+    Client* const asking = clients_.find(each.client);
+    if (asking == nullptr) continue;
+    Client& client = *asking;
+    if (each.wants_report) {
+      try {
+        send_document(client, each.request, shm::MessageKind::kReport, report);
+      } catch (const std::exception& error) {  // no descriptors are left
+        refuse(client, each.request,
+               (why_not.empty() ? "it is done" : why_not) +
+                   "; the report could not be sent: " + error.what());
+      }
+    } else if (!why_not.empty()) {
+      refuse(client, each.request, why_not);
+    } else {
+      auto reply = reply_to(each.request, shm::MessageKind::kDone);
+      reply.value = static_cast<std::uint32_t>(board_.in_force().generation);
+      client.send(reply);
+    }
+  }
+}
+
+}  // namespace arbiter::service

@@ -1,0 +1,71 @@
+#include "service/models/preparation.hpp"
+
+#include <systemd/sd-daemon.h>
+
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "service/models/comparison.hpp"
+
+namespace arbiter::service {
+namespace {
+
+constexpr std::chrono::seconds kEvery{1};
+// Longer than reading and extracting take, during which nothing is told.
+constexpr int kAtMost = 30;
+
+}  // namespace
+
+Reading read_files(const std::vector<NamedFiles>& files, const Gate& gate, const Proving& proving,
+                   const std::stop_token& stop) {
+  Reading reading;
+  reading.findings = Findings(proving.is_strict);
+  reading.policy = gate.read(reading.findings);
+  reading.models = read_models(files, proving, stop, reading.findings);
+  return reading;
+}
+
+ModelPointer find_model(const std::vector<ModelPointer>& models, const std::string& name) {
+  const auto found = std::find_if(models.begin(), models.end(),
+                                  [&](const auto& model) { return model->name == name; });
+  if (found != models.end()) return *found;
+  return models.empty() ? nullptr : models.front();
+}
+
+std::string changes_between(const Model& before, const Model& after, std::uint64_t steps,
+                            const std::stop_token& stop) {
+  nlohmann::json changes;
+  try {
+    changes = changes_json(before.compiled, after.compiled, steps, stop);
+  } catch (const rules::Stopped&) {
+    throw;
+  } catch (const std::exception& error) {
+    const std::string why_not = std::string("not compared: ") + error.what();
+    changes = {{"summary", why_not}, {"text", why_not + '\n'}, {"diff", nullptr}};
+  }
+  // Names may be any bytes; JSON may not.
+  return changes.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+StatusLine::StatusLine(std::string instance)
+    : instance_(std::move(instance)), next_(Clock::now() + kEvery) {}
+
+StatusLine::~StatusLine() {
+  if (has_told_) sd_notifyf(0, "STATUS=instance %s", instance_.c_str());
+}
+
+rules::Budget::Watch StatusLine::watch() {
+  return [this](const rules::Progress& progress) {
+    if (Clock::now() < next_) return;
+    next_ = Clock::now() + kEvery;
+    has_told_ = true;
+    sd_notifyf(0, "STATUS=%s: %zu of %zu ports (%s)\nEXTEND_TIMEOUT_USEC=%d000000",
+               progress.stage.c_str(), progress.done, progress.of, progress.name.c_str(), kAtMost);
+  };
+}
+
+}  // namespace arbiter::service

@@ -1,0 +1,49 @@
+// The jobs of a compiler: what is read, proved and compared before the loop puts it in force.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "rules/prove/budget.hpp"
+#include "service/models/compiler.hpp"
+
+namespace arbiter::service {
+
+// Reads the policy and all models. In any thread; throws rules::Stopped, std::runtime_error.
+[[nodiscard]] Reading read_files(const std::vector<NamedFiles>& files, const Gate& gate,
+                                 const Proving& proving, const std::stop_token& stop);
+
+// The model of that name, or the first; null where there is none.
+[[nodiscard]] ModelPointer find_model(const std::vector<ModelPointer>& models,
+                                      const std::string& name);
+
+// What the one decides differently from the other: as Reading::changes. It may fail to find that
+// out, and then says so; it throws rules::Stopped only.
+[[nodiscard]] std::string changes_between(const Model& before, const Model& after,
+                                          std::uint64_t steps, const std::stop_token& stop);
+
+// Tells the service manager how far a model is, and that it is worth waiting for; once a second,
+// and nothing of what takes less. At the end it shows the instance again. To be used in the
+// compiler's thread: a manager that does not listen holds up who tells it.
+class StatusLine {
+ public:
+  explicit StatusLine(std::string instance);
+  StatusLine(const StatusLine&) = delete;
+  StatusLine& operator=(const StatusLine&) = delete;
+  ~StatusLine();
+
+  // Must not outlive this.
+  [[nodiscard]] rules::Budget::Watch watch();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  const std::string instance_;
+  Clock::time_point next_;
+  bool has_told_ = false;
+};
+
+}  // namespace arbiter::service

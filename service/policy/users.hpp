@@ -1,0 +1,20 @@
+// Who asks: the user at the other end of a socket, and what to call one.
+#pragma once
+
+#include <sys/types.h>
+
+#include <string>
+
+#include "service/policy/policy.hpp"
+
+namespace arbiter::service {
+
+// Who is at the other end of a Unix socket: the user and the groups of the process that connected,
+// at that moment, which the kernel keeps with the socket. Nothing that a client says enters.
+// Throws std::system_error.
+Identity peer_identity(int socket);
+
+// "nobody (65534)"; the number alone where it has no name.
+std::string describe_user(uid_t user);
+
+}  // namespace arbiter::service

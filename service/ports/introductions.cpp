@@ -1,0 +1,26 @@
+#include "service/ports/introductions.hpp"
+
+#include <utility>
+
+#include "shm/clock.hpp"
+
+namespace arbiter::service {
+
+void Introductions::introduce(const Switchboard::Told& told, std::function<void()> passed) {
+  const shm::Nanoseconds deadline = shm::monotonic_now() + kMaxWaitForClients;
+  barriers_.raise(told, deadline, [this, deadline, passed = std::move(passed)] {
+    const auto receivers = switchboard_.show_segments();
+    if (switchboard_.has_growth_to_show() && show_growth_at_ == shm::kForever) {
+      show_growth_at_ = shm::monotonic_now() + kShowGrowthAfter;
+    }
+    barriers_.raise(receivers, deadline, passed);
+  });
+}
+
+void Introductions::advance(shm::Nanoseconds now) {
+  if (now < show_growth_at_) return;
+  switchboard_.show_growth();
+  show_growth_at_ = switchboard_.has_growth_to_show() ? now + kShowGrowthAfter : shm::kForever;
+}
+
+}  // namespace arbiter::service

@@ -1,0 +1,325 @@
+#include "service/ports/port_names.hpp"
+
+#include <fcntl.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "service/kept/descriptor_store.hpp"
+#include "service/kept/handed_back.hpp"
+#include "shm/limits.hpp"
+#include "shm/table_ring.hpp"
+
+namespace arbiter::service {
+namespace {
+
+std::string stored_name(shm::SourceId id, shm::PageNumber number) {
+  return "page-" + std::to_string(id) + "-" + std::to_string(number);
+}
+
+[[noreturn]] void refuse(const char* what, std::uint32_t limit) {
+  throw std::length_error("limit-exceeded: this instance has " + std::to_string(limit) + " " +
+                          what + " already, the most there can be");
+}
+
+}  // namespace
+
+Page PortNames::make_page() const {
+  auto page = shm::make_segment("arbiter-activity", sizeof(shm::ActivityPage));
+  if (const auto error = shm::allocate(page, 0, sizeof(shm::ActivityPage))) {
+    throw std::system_error(error, "allocating an activity page");
+  }
+  shm::seal(page, shm::Seals::kFixedSize);
+  return use_page(std::move(page));
+}
+
+Page PortNames::use_page(shm::FileDescriptor writable) const {
+  Page page;
+  page.readable = shm::reopen(writable, O_RDONLY);
+  page.mapping = shm::Mapping(writable, sizeof(shm::ActivityPage), shm::Access::kReadWrite);
+  page.writable = std::move(writable);
+  return page;
+}
+
+void PortNames::store_page(const Source& source, const Page& page, shm::PageNumber number) const {
+  if (stores_) store(stored_name(source.id, number), page.writable);
+}
+
+void PortNames::discard_page(const Source& source, shm::PageNumber number) const {
+  if (stores_) discard_stored(stored_name(source.id, number));
+}
+
+void PortNames::restore(std::uint64_t generation) {
+  generation_ = generation;
+  for (shm::SourceId id = 0; id < registry_.source_count(); ++id) {
+    auto source = std::make_unique<Source>();
+    source->id = id;
+    source->page_number = board_.page_number(id);
+    const RegistryEntry& entry = registry_.source(id);
+    source->name = entry.name();
+    if (!source->name.empty()) {
+      source->page_user = entry.page_user(source->page_number);
+      source->used_by_generation = generation;
+      source->away = entry.owner().port;
+      source->charge = shares_.take_own(Share::kSources);
+      source->page_charge = shares_.take_own(Share::kDescriptors, kDescriptorsOfPage);
+      source_ids_[source->name] = id;
+    } else {
+      free_sources_.push_back(id);
+    }
+    sources_.push_back(std::move(source));
+  }
+  for (shm::PortId id = 0; id < registry_.input_count(); ++id) {
+    auto input = std::make_unique<InputName>();
+    input->id = id;
+    const RegistryEntry& entry = registry_.input(id);
+    input->name = entry.name();
+    if (!input->name.empty()) {
+      input->used_by_generation = generation;
+      input->away = entry.owner().port;
+      input->charge = shares_.take_own(Share::kInputs);
+      input_ids_[input->name] = id;
+      announce(*input);
+    } else {
+      free_inputs_.push_back(id);
+    }
+    inputs_.push_back(std::move(input));
+  }
+}
+
+bool PortNames::take_page(shm::SourceId id, const shm::FileDescriptor& page) {
+  Source* source = source_by_id(id);
+  if (source == nullptr || source->name.empty() ||
+      FileIdentity::of(page).inode != registry_.source(id).page_inode(source->page_number)) {
+    return false;
+  }
+  if (source->has_page()) return true;
+  source->page = use_page(reopen_inherited(page, sizeof(shm::ActivityPage)));
+  pages_->attach(id, &source->activity());
+  announce(*source);
+  return true;
+}
+
+bool PortNames::take_page(const shm::FileDescriptor& page) {
+  return std::any_of(sources_.begin(), sources_.end(),
+                     [&](const auto& source) { return take_page(source->id, page); });
+}
+
+void PortNames::forget_lost_pages() {
+  for (const auto& source : sources_) {
+    if (!source->has_page() && source->away == 0 && !source->name.empty()) forget(*source);
+  }
+}
+
+void PortNames::give_page(Source& source, uid_t user) {
+  source.page_user = user;
+  registry_.source(source.id).set_page_user(source.page_number, user);
+}
+
+void PortNames::prepare_page(Source& source, PageUser user) {
+  if (source.next) return;
+  Charge charge = take(user, Share::kDescriptors, kDescriptorsOfPage);
+  source.next = make_page();
+  source.next_charge = std::move(charge);
+  store_page(source, source.next, source.page_number + 1);
+}
+
+// A daemon that is killed here leaves one page in force or the other: the store to the board says
+// which, and what the registry says of both is there before it.
+void PortNames::change_page(Source& source, PageUser user) {
+  const shm::PageNumber number = source.page_number + 1;
+  registry_.source(source.id).set_page(number, FileIdentity::of(source.next.writable).inode, user);
+  board_.change_page(source.id, source.activity(), source.activity_on(source.next));
+  source.page = std::exchange(source.next, {});
+  source.page_charge = std::move(source.next_charge);
+  source.page_number = number;
+  source.page_user = user;
+  pages_->attach(source.id, &source.activity());
+  announce(source);
+  discard_page(source, number - 1);
+}
+
+// Whom a table in the ring names, or one that may come, or a live port, or who is being changed.
+template <class Entry>
+bool PortNames::is_needed(const Entry& entry) const {
+  const bool named =
+      entry.used_by_generation != 0 && generation_ - entry.used_by_generation < shm::kTableSlots;
+  return entry.open != 0 || entry.away != 0 || entry.pins != 0 || named;
+}
+
+void PortNames::let_go_all() {
+  for (const auto& source : sources_) let_go(*source);
+  for (const auto& input : inputs_) let_go(*input);
+}
+
+shm::Nanoseconds PortNames::give_back(shm::Nanoseconds now) {
+  while (!running_out_.empty() && running_out_.begin()->first <= now) {
+    let_go_sources_.insert(running_out_.begin()->second);
+    running_out_.erase(running_out_.begin());
+  }
+  for (const shm::PortId id : std::exchange(let_go_inputs_, {})) {
+    InputName& input = *inputs_[id];
+    if (!input.name.empty() && !is_needed(input)) forget(input);
+  }
+  for (const shm::SourceId id : std::exchange(let_go_sources_, {})) {
+    Source& source = *sources_[id];
+    if (source.name.empty() || is_needed(source) || source.changing_for != 0) continue;
+    const shm::ActivityWord word = source.has_page()
+                                       ? source.activity().word.load(std::memory_order_relaxed)
+                                       : shm::kNeverActive;
+    if (!shm::is_active(word, now)) {
+      forget(source);
+    } else if (shm::is_finite(word)) {
+      running_out_.emplace(word, id);
+    }
+  }
+  return running_out_.empty() ? shm::kForever : running_out_.begin()->first;
+}
+
+void PortNames::forget(Source& source) {
+  registry_.forget_source(source.id);
+  discard_page(source, source.page_number);
+  if (source.next) discard_page(source, source.page_number + 1);
+  source_ids_.erase(source.name);
+  news_.erase(source.news);
+  pages_->attach(source.id, nullptr);
+  source.name.clear();
+  source.page = {};
+  source.next = {};
+  source.page_user.reset();
+  source.charge = {};
+  source.page_charge = {};
+  source.next_charge = {};
+  free_sources_.push_back(source.id);
+}
+
+void PortNames::forget(InputName& input) {
+  registry_.forget_input(input.id);
+  input_ids_.erase(input.name);
+  news_.erase(input.news);
+  input.name.clear();
+  input.charge = {};
+  free_inputs_.push_back(input.id);
+}
+
+void PortNames::announce(Source& source) {
+  news_.erase(source.news);
+  source.news = ++last_news_;
+  news_[source.news] = {true, source.id};
+}
+
+void PortNames::announce(InputName& input) {
+  news_.erase(input.news);
+  input.news = ++last_news_;
+  news_[input.news] = {false, input.id};
+}
+
+// An id that is nobody's, the longest free first; of those a table in the ring still names, none.
+template <class Id, class Entry>
+Entry* PortNames::take_free(std::deque<Id>& free,
+                            const std::vector<std::unique_ptr<Entry>>& entries) const {
+  const auto found =
+      std::find_if(free.begin(), free.end(), [&](Id id) { return !is_needed(*entries[id]); });
+  if (found == free.end()) return nullptr;
+  Entry* const entry = entries[*found].get();
+  free.erase(found);
+  return entry;
+}
+
+Source& PortNames::unused_source() {
+  if (sources_.size() < shm::kMaxSources) {
+    const auto id = static_cast<shm::SourceId>(sources_.size());
+    registry_.reserve_source(id);
+    sources_.push_back(std::make_unique<Source>());
+    sources_.back()->id = id;
+    sources_.back()->page_number = board_.page_number(id);
+    return *sources_.back();
+  }
+  Source* const source = take_free(free_sources_, sources_);
+  if (source == nullptr) refuse("sources (kMaxSources)", shm::kMaxSources);
+  return *source;
+}
+
+InputName& PortNames::unused_input() {
+  if (inputs_.size() < shm::kMaxInputPorts) {
+    const auto id = static_cast<shm::PortId>(inputs_.size());
+    registry_.reserve_input(id);
+    inputs_.push_back(std::make_unique<InputName>());
+    inputs_.back()->id = id;
+    return *inputs_.back();
+  }
+  InputName* const input = take_free(free_inputs_, inputs_);
+  if (input == nullptr) refuse("input ports (kMaxInputPorts)", shm::kMaxInputPorts);
+  return *input;
+}
+
+Source& PortNames::source(const std::string& name, PageUser user) {
+  if (const auto found = source_ids_.find(name); found != source_ids_.end()) {
+    return *sources_[found->second];
+  }
+  Charge charge = take(user, Share::kSources);
+  Charge page_charge = take(user, Share::kDescriptors, kDescriptorsOfPage);
+  Page page = make_page();
+  Source& source = unused_source();
+  source.charge = std::move(charge);
+  source.page_charge = std::move(page_charge);
+  // A page of its own: who had the last one of this id open may still write there.
+  const shm::PageNumber number = source.page_number + 1;
+  registry_.source(source.id).set_page(number, FileIdentity::of(page.writable).inode, {});
+  board_.give_page(source.id, number);
+  registry_.name_source(source.id, name);
+  source.page = std::move(page);
+  source.page_number = number;
+  store_page(source, source.page, number);
+  source.name = name;
+  source.used_by_generation = 0;
+  source_ids_[name] = source.id;
+  pages_->attach(source.id, &source.activity());
+  announce(source);
+  return source;
+}
+
+InputName& PortNames::input(const std::string& name, PageUser user) {
+  if (const auto found = input_ids_.find(name); found != input_ids_.end()) {
+    return *inputs_[found->second];
+  }
+  Charge charge = take(user, Share::kInputs);
+  InputName& input = unused_input();
+  input.charge = std::move(charge);
+  registry_.name_input(input.id, name);
+  input.name = name;
+  input.used_by_generation = 0;
+  input_ids_[name] = input.id;
+  announce(input);
+  return input;
+}
+
+Source* PortNames::find_source(const std::string& name) {
+  const auto found = source_ids_.find(name);
+  return found == source_ids_.end() ? nullptr : sources_[found->second].get();
+}
+
+Source* PortNames::source_by_id(shm::SourceId id) {
+  return id < sources_.size() ? sources_[id].get() : nullptr;
+}
+
+InputName* PortNames::input_by_id(shm::PortId id) {
+  return id < inputs_.size() ? inputs_[id].get() : nullptr;
+}
+
+Source* PortNames::source_of(shm::PortInstance port) {
+  const auto found = std::find_if(sources_.begin(), sources_.end(), [&](const auto& source) {
+    return source->open == port || source->away == port;
+  });
+  return found == sources_.end() ? nullptr : found->get();
+}
+
+InputName* PortNames::input_of(shm::PortInstance port) {
+  const auto found = std::find_if(inputs_.begin(), inputs_.end(), [&](const auto& input) {
+    return input->open == port || input->away == port;
+  });
+  return found == inputs_.end() ? nullptr : found->get();
+}
+
+}  // namespace arbiter::service

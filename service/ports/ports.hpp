@@ -1,0 +1,122 @@
+// The live ports, as the daemon knows them: whose, where their segments are, who they are linked
+// with.
+#pragma once
+
+#include <sys/types.h>
+
+#include <atomic>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "service/clients/client.hpp"
+#include "service/ports/port_names.hpp"
+#include "shm/input_segment.hpp"
+#include "shm/output_segment.hpp"
+#include "shm/segment.hpp"
+
+namespace arbiter::service {
+
+// Links that a component had when it was lost to a daemon, or its peer was: the peer, and the
+// link's number (0: not connected). They stand, in shared memory, until both ends are here again.
+struct Claim {
+  std::uint64_t number = 0;
+  Charge charge{};  // of the user whose component says so
+};
+using Claims = std::map<shm::PortInstance, Claim>;
+
+// The write end of an input port's bell, as its component has handed it in and as it is passed on.
+// The pipe's lock may be held by any process that has it, so ringing and closing are errands of the
+// component's user.
+class PortBell : public std::enable_shared_from_this<PortBell> {
+ public:
+  PortBell(shm::FileDescriptor pipe, uid_t user) : pipe_(std::move(pipe)), user_(user) {}
+  PortBell(const PortBell&) = delete;
+  PortBell& operator=(const PortBell&) = delete;
+  ~PortBell();
+
+  // Soon. Rings that are asked for meanwhile are this one.
+  void ring() const;
+  [[nodiscard]] int descriptor() const { return pipe_.get(); }
+
+ private:
+  shm::FileDescriptor pipe_;
+  const uid_t user_;
+  // Whether an errand has yet to begin. Sequentially consistent, off every fast path: whoever finds
+  // it set asked before the errand cleared it, hence before it rings.
+  mutable std::atomic<bool> asked_{false};
+};
+
+// Descriptors that the daemon keeps of a port.
+inline constexpr std::uint64_t kDescriptorsOfOutput = 1;
+inline constexpr std::uint64_t kDescriptorsOfInput = 2;
+
+struct OutputPort {
+  shm::PortInstance instance = 0;
+  Client* client = nullptr;
+  Source* source = nullptr;
+  shm::TypeInfo type;
+  uid_t user = 0;  // whose the segment is
+  shm::FileDescriptor segment;
+  shm::Mapping mapping;  // of its beginning: the header and the channels
+  shm::OutputLayout layout;
+  Claims claims;
+  bool is_told_unmentioned = false;  // that the model in force does not mention it
+  bool is_known_blind = false;       // the log has it
+  Charge charge;
+
+  ~OutputPort();
+  [[nodiscard]] const shm::OutputHeader& header() const {
+    return *mapping.as<const shm::OutputHeader>();
+  }
+};
+
+struct InputPort {
+  shm::PortInstance instance = 0;
+  Client* client = nullptr;
+  InputName* name = nullptr;
+  shm::TypeInfo type;
+  uid_t user = 0;  // whose the segment is
+  shm::FileDescriptor segment;
+  std::shared_ptr<const PortBell> bell;
+  shm::Mapping mapping;
+  Claims claims;
+  bool is_told_unmentioned = false;
+  bool is_known_blind = false;
+  Charge charge;
+
+  ~InputPort();
+
+  [[nodiscard]] const shm::InputSegment& shared() const {
+    return *mapping.as<const shm::InputSegment>();
+  }
+};
+
+// Take what a client has handed over for a port: its segment and, for an input port, its bell. They
+// are passed on to peers as they came: nothing is opened for anybody with the daemon's rights.
+// Throw std::runtime_error saying what is wrong with it, such as that another user has made it.
+std::unique_ptr<OutputPort> adopt_output(const shm::Received& open, uid_t user);
+std::unique_ptr<InputPort> adopt_input(const shm::Received& open, uid_t user);
+
+// How an output port and an input port stand to each other.
+enum class LinkKind {
+  kSensing,    // the input port's rules read the source, or its selection depends on it
+  kConnected,  // there is a connection
+  kLapsed,     // neither any more; the publisher still heeds what the input port holds
+};
+
+struct Link {
+  LinkKind kind = LinkKind::kSensing;
+  std::uint64_t number = 0;  // if connected: by it both ends know their queue; never given twice
+  std::string mismatch;  // why they are not connected although there is a connection; else empty
+
+  // Both ends have been told of each other; else the publisher alone knows the input port.
+  [[nodiscard]] bool is_mutual() const { return number != 0; }
+  // Both ends have been told that they are not.
+  [[nodiscard]] bool is_refused() const {
+    return kind == LinkKind::kConnected && !mismatch.empty();
+  }
+};
+
+}  // namespace arbiter::service

@@ -1,0 +1,370 @@
+#include "service/ports/switchboard.hpp"
+
+#include "service/log/log.hpp"
+
+namespace arbiter::service {
+namespace {
+
+Owner owner(const Client& client, shm::PortInstance port) {
+  return {port, client.node, client.identity()};
+}
+
+}  // namespace
+
+shm::Message message_to(shm::MessageKind kind, shm::PortInstance port, shm::PortInstance peer,
+                        std::uint32_t id) {
+  shm::Message message;
+  message.kind = kind;
+  message.port = port;
+  message.peer = peer;
+  message.id = id;
+  return message;
+}
+
+OutputPort& Switchboard::add(std::unique_ptr<OutputPort> port, Client& client, Source& source) {
+  port->instance = registry_.next_instance();
+  OutputPort& added = *port;
+  insert(std::move(port), client, source);
+  registry_.source(source.id).set_owner(owner(client, added.instance));
+  return added;
+}
+
+InputPort& Switchboard::add(std::unique_ptr<InputPort> port, Client& client, InputName& name) {
+  port->instance = registry_.next_instance();
+  InputPort& added = *port;
+  insert(std::move(port), client, name);
+  registry_.input(name.id).set_owner(owner(client, added.instance));
+  return added;
+}
+
+void Switchboard::insert(std::unique_ptr<OutputPort> port, Client& client, Source& source) {
+  port->client = &client;
+  port->source = &source;
+  source.open = port->instance;
+  source.away = 0;
+  client.ports.insert(port->instance);
+  outputs_[port->instance] = std::move(port);
+}
+
+void Switchboard::insert(std::unique_ptr<InputPort> port, Client& client, InputName& name) {
+  port->client = &client;
+  port->name = &name;
+  name.open = port->instance;
+  name.away = 0;
+  client.ports.insert(port->instance);
+  inputs_[port->instance] = std::move(port);
+}
+
+void Switchboard::remove(shm::PortInstance port) {
+  for (auto link = links_.begin(); link != links_.end();) {
+    const auto [output, input] = link->first;
+    if (output != port && input != port) {
+      ++link;
+      continue;
+    }
+    const shm::PortInstance peer = output == port ? input : output;
+    if (input == port || link->second.is_mutual() || link->second.is_refused()) {
+      client_of(peer).send(message_to(shm::MessageKind::kPeerGone, peer, port));
+    }
+    // A publisher may have died between delivering and ringing.
+    if (output == port) inputs_.at(peer)->bell->ring();
+    link = links_.erase(link);
+  }
+  end_claims_on(port);
+  if (const auto found = outputs_.find(port); found != outputs_.end()) {
+    registry_.source(found->second->source->id).clear_owner();
+  }
+  if (const auto found = inputs_.find(port); found != inputs_.end()) {
+    registry_.input(found->second->name->id).clear_owner();
+  }
+  erase(port);
+}
+
+void Switchboard::erase(shm::PortInstance port) {
+  if (const auto found = outputs_.find(port); found != outputs_.end()) {
+    found->second->source->open = 0;
+    names_.let_go(*found->second->source);
+    found->second->client->ports.erase(port);
+    outputs_.erase(found);
+  }
+  if (const auto found = inputs_.find(port); found != inputs_.end()) {
+    found->second->name->open = 0;
+    names_.let_go(*found->second->name);
+    found->second->client->ports.erase(port);
+    inputs_.erase(found);
+  }
+}
+
+void Switchboard::want_links(const OutputPort& output, const shm::TableView& table,
+                             Wanted& wanted) const {
+  const auto want = [&](shm::PortId id, LinkKind kind) {
+    const InputName* name = names_.input_by_id(id);
+    if (name != nullptr && name->open != 0) wanted[{output.instance, name->open}] = kind;
+  };
+  const auto concerned = table.ports_concerned(output.source->id);
+  for (shm::Word i = 0; i < concerned.count; ++i) want(concerned[i], LinkKind::kSensing);
+  const auto connections = table.connections_of_source(output.source->id);
+  for (shm::Word i = 0; i < connections.count; ++i) {
+    want(table.rule(connections[i]).port, LinkKind::kConnected);
+  }
+}
+
+void Switchboard::want_links(const InputPort& input, const shm::TableView& table,
+                             Wanted& wanted) const {
+  const auto want = [&](shm::SourceId id, LinkKind kind) {
+    const Source* source = names_.source_by_id(id);
+    if (source != nullptr && source->open != 0) wanted[{source->open, input.instance}] = kind;
+  };
+  const auto read = table.sources_read(input.name->id);
+  for (shm::Word i = 0; i < read.count; ++i) want(read[i], LinkKind::kSensing);
+  const auto range = table.connections_to(input.name->id);
+  for (auto index = range.first; index != range.first + range.count; ++index) {
+    want(table.rule(index).source, LinkKind::kConnected);
+  }
+}
+
+Switchboard::Told Switchboard::link_all(const shm::TableView& table) {
+  Told told;
+  Wanted wanted;
+  for (const auto& [instance, input] : inputs_) {
+    send_pages(*input->client, input->name->id, table, told);
+  }
+  for (const auto& [instance, output] : outputs_) {
+    send_pages(*output, table, told);
+    want_links(*output, table, wanted);
+  }
+  make_links(wanted, told);
+  return told;
+}
+
+Switchboard::Told Switchboard::link_one(const shm::TableView& table, shm::PortInstance port) {
+  Told told;
+  Wanted wanted;
+  if (const auto input = inputs_.find(port); input != inputs_.end()) {
+    send_pages(*input->second->client, input->second->name->id, table, told);
+    want_links(*input->second, table, wanted);
+  }
+  if (const auto output = outputs_.find(port); output != outputs_.end()) {
+    send_pages(*output->second, table, told);
+    want_links(*output->second, table, wanted);
+  }
+  make_links(wanted, told);
+  return told;
+}
+
+void Switchboard::make_links(const Wanted& wanted, Told& told) {
+  for (const auto& [key, kind] : wanted) {
+    // It may have such a link, and be about to say so.
+    if (client_of(key.first).is_returning || client_of(key.second).is_returning) continue;
+    const auto known = links_.find(key);
+    const bool stands = known != links_.end() && known->second.kind != LinkKind::kLapsed &&
+                        (known->second.kind == kind || kind == LinkKind::kSensing);
+    if (!stands) make_link(*outputs_.at(key.first), *inputs_.at(key.second), kind, told);
+  }
+}
+
+// A publisher decides for every port that its source concerns, so it needs all that their rules
+// read.
+void Switchboard::send_pages(const OutputPort& output, const shm::TableView& table, Told& told) {
+  const auto concerned = table.ports_concerned(output.source->id);
+  for (shm::Word i = 0; i < concerned.count; ++i) {
+    send_pages(*output.client, concerned[i], table, told);
+  }
+  const auto connections = table.connections_of_source(output.source->id);
+  for (shm::Word i = 0; i < connections.count; ++i) {
+    send_pages(*output.client, table.rule(connections[i]).port, table, told);
+  }
+}
+
+// A mismatch leaves the two linked as if the input port only sensed the source, and both are told.
+void Switchboard::make_link(const OutputPort& output, const InputPort& input, LinkKind kind,
+                            Told& told) {
+  Link& link = links_[{output.instance, input.instance}];
+  link.kind = kind;
+  link.mismatch = kind == LinkKind::kConnected ? shm::type_mismatch(output.type, input.type) : "";
+  const bool connects = kind == LinkKind::kConnected && link.mismatch.empty();
+  if (!link.mismatch.empty()) {
+    log::warn("{} is not connected to {}: {}", output.source->name, input.name->name,
+              link.mismatch);
+  } else if (connects) {
+    log::debug("{} is connected to {}", output.source->name, input.name->name);
+  }
+  auto to_output =
+      message_to(shm::MessageKind::kInputPeer, output.instance, input.instance, input.name->id);
+  to_output.flags = connects ? shm::kIsConnected : 0u;
+  to_output.link = link.number = connects ? registry_.next_link() : 0;
+  to_output.set_name(input.name->name);
+  output.client->send(to_output, {input.segment.get(), input.bell->descriptor()});
+  told.insert(output.client);
+  if (link.is_refused()) {
+    tell_refusal({output.instance, input.instance}, output.instance, link.mismatch);
+    tell_refusal({output.instance, input.instance}, input.instance, link.mismatch);
+    told.insert(input.client);
+  }
+  if (!connects) return;
+  auto to_input =
+      message_to(shm::MessageKind::kOutputPeer, input.instance, output.instance, output.source->id);
+  to_input.link = link.number;
+  to_input.set_name(output.source->name);
+  input.client->send(to_input, {output.segment.get(), -1});
+  told.insert(input.client);
+  fresh_.emplace_back(output.instance, input.instance);
+}
+
+Switchboard::Told Switchboard::show_segments() {
+  Told told;
+  for (const LinkKey& key : std::exchange(fresh_, {})) {
+    if (!is_connected(key)) continue;
+    Client& receiver = client_of(key.second);
+    receiver.send(message_to(shm::MessageKind::kOutputGrown, key.second, key.first));
+    told.insert(&receiver);
+    for (auto link = links_.lower_bound({key.first, 0});
+         link != links_.end() && link->first.first == key.first; ++link) {
+      if (link->first != key) growth_.insert(link->first);
+    }
+  }
+  return told;
+}
+
+// It is worth a page fault to them, and no more: one that does not read is passed over, for its
+// queue must not fill up with this.
+void Switchboard::show_growth() {
+  constexpr int kMostAtOnce = 512;
+  std::map<const Client*, int> room;
+  for (auto each = growth_.begin(); each != growth_.end();) {
+    if (!is_connected(*each)) {
+      each = growth_.erase(each);
+      continue;
+    }
+    Client& receiver = client_of(each->second);
+    int& left = room.try_emplace(&receiver, receiver.has_queue() ? -1 : kMostAtOnce).first->second;
+    if (left == 0) {
+      ++each;
+      continue;
+    }
+    if (left > 0) {
+      receiver.send(message_to(shm::MessageKind::kOutputGrown, each->second, each->first));
+      --left;
+    }
+    each = growth_.erase(each);
+  }
+}
+
+bool Switchboard::is_connected(const LinkKey& key) const {
+  const auto link = links_.find(key);
+  return link != links_.end() && link->second.is_mutual();
+}
+
+Switchboard::Told Switchboard::unlink(const shm::TableView& table) {
+  Told told;
+  Wanted wanted;
+  for (const auto& [instance, output] : outputs_) want_links(*output, table, wanted);
+  for (auto& [key, link] : links_) {
+    const auto still = wanted.find(key);
+    const LinkKind kind = still == wanted.end() ? LinkKind::kLapsed : still->second;
+    if (kind == link.kind) continue;
+    if (link.is_mutual() || link.is_refused()) {
+      const OutputPort& output = *outputs_.at(key.first);
+      const InputPort& input = *inputs_.at(key.second);
+      output.client->send(message_to(shm::MessageKind::kDisconnected, key.first, key.second));
+      input.client->send(message_to(shm::MessageKind::kDisconnected, key.second, key.first));
+      told.insert(output.client);
+      told.insert(input.client);
+    }
+    link = {kind, 0, ""};
+  }
+  return told;
+}
+
+void Switchboard::send_pages(Client& client, shm::PortId port, const shm::TableView& table,
+                             Told& told) {
+  const auto send = [&](shm::SourceId id) {
+    const Source* source = names_.source_by_id(id);
+    if (source != nullptr && send_page(client, *source)) told.insert(&client);
+  };
+  const auto read = table.sources_read(port);
+  for (shm::Word i = 0; i < read.count; ++i) send(read[i]);
+  const auto range = table.connections_to(port);
+  for (auto index = range.first; index != range.first + range.count; ++index) {
+    send(table.rule(index).source);
+  }
+}
+
+// The page in force, and the next one where there is one. False: the client has them, or nobody has
+// yet.
+bool Switchboard::send_page(Client& client, const Source& source) {
+  if (!source.has_page()) return false;
+  shm::PageNumber& shown = client.pages[source.id];
+  const auto send = [&](const Page& page, shm::PageNumber number) {
+    if (!page || shown >= number) return false;
+    shown = number;
+    auto message = message_to(shm::MessageKind::kSourcePage, 0, 0, source.id);
+    message.value = number;
+    message.set_name(source.name);
+    client.send(message, {page.readable.get(), -1});
+    return true;
+  };
+  const bool is_new = send(source.page, source.page_number);
+  return send(source.next, source.page_number + 1) || is_new;
+}
+
+Switchboard::Told Switchboard::show_next_page(const Source& source) {
+  Told told;
+  const auto show = [&](Client& client) {
+    if (client.pages.count(source.id) != 0 && send_page(client, source)) told.insert(&client);
+  };
+  for (const auto& [instance, output] : outputs_) show(*output->client);
+  for (const auto& [instance, input] : inputs_) show(*input->client);
+  return told;
+}
+
+bool Switchboard::show_news(Client& client, std::uint64_t& told, int& left) {
+  const auto& news = names_.news();
+  for (auto next = news.upper_bound(told); next != news.end(); ++next) {
+    if (client.has_queue() || client.is_lost()) return false;
+    if (left == 0) return true;
+    --left;
+    told = next->first;
+    if (next->second.is_source) {
+      send_page(client, *names_.source_by_id(next->second.id));
+      continue;
+    }
+    auto message = message_to(shm::MessageKind::kPortName, 0, 0, next->second.id);
+    message.set_name(names_.input_by_id(next->second.id)->name);
+    client.send(message);
+  }
+  told = names_.last_news();
+  return false;
+}
+
+Client& Switchboard::client_of(shm::PortInstance port) const {
+  const auto output = outputs_.find(port);
+  return output != outputs_.end() ? *output->second->client : *inputs_.at(port)->client;
+}
+
+void Switchboard::ring_all() const {
+  for (const auto& [instance, input] : inputs_) input->bell->ring();
+}
+
+void Switchboard::ring_concerned(const shm::TableView& table, shm::SourceId source) const {
+  const auto ring = [&](shm::PortId id) {
+    const InputName* name = names_.input_by_id(id);
+    if (name != nullptr && name->open != 0) inputs_.at(name->open)->bell->ring();
+  };
+  const auto concerned = table.ports_concerned(source);
+  for (shm::Word i = 0; i < concerned.count; ++i) ring(concerned[i]);
+  const auto connections = table.connections_of_source(source);
+  for (shm::Word i = 0; i < connections.count; ++i) ring(table.rule(connections[i]).port);
+}
+
+const OutputPort* Switchboard::output(shm::PortInstance instance) const {
+  const auto found = outputs_.find(instance);
+  return found == outputs_.end() ? nullptr : found->second.get();
+}
+
+const InputPort* Switchboard::input(shm::PortInstance instance) const {
+  const auto found = inputs_.find(instance);
+  return found == inputs_.end() ? nullptr : found->second.get();
+}
+
+}  // namespace arbiter::service

@@ -1,0 +1,123 @@
+// Which live ports are linked, under the model in force, and telling their components so.
+//
+// Owns the live ports. Every change (a port opens or closes, a model comes into force) ends in
+// link(): it works out how things should stand and tells clients the difference, no more.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "service/ports/ports.hpp"
+#include "shm/decision_table.hpp"
+#include "shm/table_ring.hpp"
+
+namespace arbiter::service {
+
+// What `port` is to know of `peer`.
+shm::Message message_to(shm::MessageKind kind, shm::PortInstance port, shm::PortInstance peer,
+                        std::uint32_t id = 0);
+
+class Switchboard {
+ public:
+  Switchboard(PortNames& names, Registry& registry) : names_(names), registry_(registry) {}
+
+  using LinkKey = std::pair<shm::PortInstance, shm::PortInstance>;  // output, input
+  using Told = std::set<Client*>;  // clients that have news to take up
+
+  // A new port takes its place. The name must be free. Returns its instance.
+  OutputPort& add(std::unique_ptr<OutputPort> port, Client& client, Source& source);
+  InputPort& add(std::unique_ptr<InputPort> port, Client& client, InputName& name);
+  // A port closes or dies: its peers are told, its name is free.
+  void remove(shm::PortInstance port);
+
+  // The component lives, but its conversation is lost: its links stand, and become claims of its
+  // peers; its name is kept for it.
+  void set_away(shm::PortInstance port);
+  // It comes back, with the instance that it had.
+  OutputPort& readmit(std::unique_ptr<OutputPort> port, Client& client, Source& source);
+  InputPort& readmit(std::unique_ptr<InputPort> port, Client& client, InputName& name);
+  void claim(shm::PortInstance port, shm::PortInstance peer, Claim claim);
+  // Makes links of the port's claims and its peers' where they agree. `is_away`: whether a port may
+  // still come back.
+  void settle_claims(shm::PortInstance port, const std::function<bool(shm::PortInstance)>& is_away);
+  // A port that was away will not come back.
+  void forget_away(shm::PortInstance port);
+
+  // Sends the pages, and makes the links, that a table asks for: all of them, or those of one
+  // port. Links that it does not ask for any more stay until unlink().
+  Told link_all(const shm::TableView& table);
+  Told link_one(const shm::TableView& table, shm::PortInstance port);
+  Told unlink(const shm::TableView& table);
+  // An output port takes up a receiver by using more of its segment. Once it has, receivers must be
+  // told, to map it before they need it: the one that is new, at once; the others by and by, once
+  // for all that have come meanwhile (show_growth(), for as long as there is some to show).
+  Told show_segments();
+  void show_growth();
+  [[nodiscard]] bool has_growth_to_show() const { return !growth_.empty(); }
+  // Shows the source's next page to all components that have been sent the one in force.
+  Told show_next_page(const Source& source);
+  // Tells an observer what has come after `told`, which moves on: at most `left` pieces, and
+  // nothing more once it does not read. True: there is more that it would read.
+  bool show_news(Client& client, std::uint64_t& told, int& left);
+  // A client could not take up a peer.
+  void refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
+  // Tells the components, and the log, once, whose ports the model in force does not mention: of
+  // all ports, or of one. `table` of generation 0: there is no model.
+  void tell_unmentioned(const shm::TableSnapshot& in_force);
+  void tell_unmentioned(const shm::TableSnapshot& in_force, shm::PortInstance port);
+  // A component says that its port cannot see all that its rules read: for the log, once.
+  void note_blind(shm::PortInstance port, const std::string& text);
+  // Wakes every component that waits, to look anew.
+  void ring_all() const;
+  // Wakes those that a source concerns.
+  void ring_concerned(const shm::TableView& table, shm::SourceId source) const;
+
+  [[nodiscard]] const OutputPort* output(shm::PortInstance instance) const;
+  [[nodiscard]] const InputPort* input(shm::PortInstance instance) const;
+  [[nodiscard]] const std::map<shm::PortInstance, std::unique_ptr<OutputPort>>& outputs() const {
+    return outputs_;
+  }
+  [[nodiscard]] const std::map<shm::PortInstance, std::unique_ptr<InputPort>>& inputs() const {
+    return inputs_;
+  }
+  [[nodiscard]] const std::map<LinkKey, Link>& links() const { return links_; }
+
+ private:
+  using Wanted = std::map<LinkKey, LinkKind>;
+  void want_links(const OutputPort& output, const shm::TableView& table, Wanted& wanted) const;
+  void want_links(const InputPort& input, const shm::TableView& table, Wanted& wanted) const;
+  void make_links(const Wanted& wanted, Told& told);
+  void send_pages(const OutputPort& output, const shm::TableView& table, Told& told);
+  void make_link(const OutputPort& output, const InputPort& input, LinkKind kind, Told& told);
+  void send_pages(Client& client, shm::PortId port, const shm::TableView& table, Told& told);
+  [[nodiscard]] bool is_connected(const LinkKey& key) const;
+  // Whoever claims a link with that port is told that it has gone.
+  void end_claims_on(shm::PortInstance port);
+  void tell_refusal(const LinkKey& key, shm::PortInstance to, const std::string& why) const;
+  template <class Port>
+  static void say_unmentioned(Port& port, const std::string& text);
+  [[nodiscard]] std::string unmentioned_text(const shm::TableSnapshot& in_force,
+                                             const std::string& name, bool is_output) const;
+  static bool send_page(Client& client, const Source& source);
+  void insert(std::unique_ptr<OutputPort> port, Client& client, Source& source);
+  void insert(std::unique_ptr<InputPort> port, Client& client, InputName& name);
+  void erase(shm::PortInstance port);
+  void settle(OutputPort& output, InputPort& input);
+  [[nodiscard]] Claims& claims_of(shm::PortInstance port) const;
+  [[nodiscard]] Client& client_of(shm::PortInstance port) const;
+
+  PortNames& names_;
+  Registry& registry_;
+  std::map<shm::PortInstance, std::unique_ptr<OutputPort>> outputs_;
+  std::map<shm::PortInstance, std::unique_ptr<InputPort>> inputs_;
+  std::map<LinkKey, Link> links_;
+  std::vector<LinkKey> fresh_;  // links whose receivers are to be shown the segment
+  std::set<LinkKey> growth_;    // links whose receivers are to be shown that it has grown
+};
+
+}  // namespace arbiter::service

@@ -1,0 +1,137 @@
+// The links of components that are lost to the daemon for a while, or to its predecessor for good.
+//
+// A link lives in shared memory, not here: two components go on using it though no daemon knows of
+// it. So when one end comes back it claims the links that it has. Once both ends are here, a link
+// that they agree upon stands as it is; where only one of them has heard of it, it is ended. An end
+// is here once it has said all (kHandedBack): nothing is concluded before from what it has not
+// claimed.
+#include <optional>
+#include <utility>
+
+#include "service/ports/switchboard.hpp"
+#include "shm/bell.hpp"
+
+namespace arbiter::service {
+namespace {
+
+// Takes a claim out: its number, 0 where it is not one of a connection, nothing where there is
+// none.
+std::optional<std::uint64_t> take(Claims& claims, shm::PortInstance peer) {
+  const auto found = claims.find(peer);
+  if (found == claims.end()) return {};
+  const std::uint64_t number = found->second.number;
+  claims.erase(found);
+  return number;
+}
+
+}  // namespace
+
+void Switchboard::set_away(shm::PortInstance port) {
+  for (auto link = links_.begin(); link != links_.end();) {
+    const auto [output, input] = link->first;
+    if (output == port && (link->second.is_mutual() || link->second.is_refused())) {
+      inputs_.at(input)->claims[port] = {link->second.number};
+    }
+    if (input == port) outputs_.at(output)->claims[port] = {link->second.number};
+    link = output == port || input == port ? links_.erase(link) : std::next(link);
+  }
+  Source* source = names_.source_of(port);
+  InputName* name = names_.input_of(port);
+  erase(port);
+  if (source != nullptr) source->away = port;
+  if (name != nullptr) name->away = port;
+}
+
+OutputPort& Switchboard::readmit(std::unique_ptr<OutputPort> port, Client& client, Source& source) {
+  OutputPort& readmitted = *port;
+  port->instance = source.away;
+  insert(std::move(port), client, source);
+  return readmitted;
+}
+
+InputPort& Switchboard::readmit(std::unique_ptr<InputPort> port, Client& client, InputName& name) {
+  InputPort& readmitted = *port;
+  port->instance = name.away;
+  insert(std::move(port), client, name);
+  return readmitted;
+}
+
+Claims& Switchboard::claims_of(shm::PortInstance port) const {
+  const auto output = outputs_.find(port);
+  return output != outputs_.end() ? output->second->claims : inputs_.at(port)->claims;
+}
+
+void Switchboard::claim(shm::PortInstance port, shm::PortInstance peer, Claim claim) {
+  claims_of(port)[peer] = std::move(claim);
+}
+
+void Switchboard::settle_claims(shm::PortInstance port,
+                                const std::function<bool(shm::PortInstance)>& is_away) {
+  const bool is_output = outputs_.count(port) != 0;
+  // Those of peers that are here count too: this end may not have heard of the link.
+  std::set<shm::PortInstance> peers;
+  for (const auto& [peer, claim] : claims_of(port)) peers.insert(peer);
+  for (const auto& [instance, input] : inputs_) {
+    if (is_output && input->claims.count(port) != 0) peers.insert(instance);
+  }
+  for (const auto& [instance, output] : outputs_) {
+    if (!is_output && output->claims.count(port) != 0) peers.insert(instance);
+  }
+  for (const shm::PortInstance peer : peers) {
+    const auto output = outputs_.find(is_output ? port : peer);
+    const auto input = inputs_.find(is_output ? peer : port);
+    if (output != outputs_.end() && input != inputs_.end()) {
+      if (!client_of(peer).is_returning) settle(*output->second, *input->second);
+    } else if (!is_away(peer)) {
+      claims_of(port).erase(peer);
+      client_of(port).send(message_to(shm::MessageKind::kPeerGone, port, peer));
+    }
+  }
+}
+
+void Switchboard::settle(OutputPort& output, InputPort& input) {
+  const auto by_output = take(output.claims, input.instance);
+  const auto by_input = take(input.claims, output.instance);
+  if (by_output && by_input && *by_output == *by_input && *by_output != 0) {
+    links_[{output.instance, input.instance}] = {LinkKind::kConnected, *by_output, ""};
+    return;
+  }
+  if (by_output.value_or(0) != 0) {
+    output.client->send(
+        message_to(shm::MessageKind::kDisconnected, output.instance, input.instance));
+  }
+  if (by_input.value_or(0) != 0) {
+    input.client->send(
+        message_to(shm::MessageKind::kDisconnected, input.instance, output.instance));
+  }
+  // The publisher knows the port, and heeds what it holds.
+  if (by_output) links_[{output.instance, input.instance}] = {LinkKind::kLapsed, 0, ""};
+}
+
+void Switchboard::end_claims_on(shm::PortInstance port) {
+  for (const auto& [instance, output] : outputs_) {
+    if (!take(output->claims, port)) continue;
+    output->client->send(message_to(shm::MessageKind::kPeerGone, instance, port));
+  }
+  for (const auto& [instance, input] : inputs_) {
+    if (!take(input->claims, port)) continue;
+    input->client->send(message_to(shm::MessageKind::kPeerGone, instance, port));
+    input->bell->ring();  // it may have died between delivering and ringing
+  }
+}
+
+void Switchboard::forget_away(shm::PortInstance port) {
+  end_claims_on(port);
+  if (Source* source = names_.source_of(port)) {
+    source->away = 0;
+    names_.let_go(*source);
+    registry_.source(source->id).clear_owner();
+  }
+  if (InputName* name = names_.input_of(port)) {
+    name->away = 0;
+    names_.let_go(*name);
+    registry_.input(name->id).clear_owner();
+  }
+}
+
+}  // namespace arbiter::service

@@ -1,0 +1,102 @@
+// What components should know of their ports, and the log too: connections that are refused, ports
+// that the model does not mention, ports that cannot see.
+#include <string_view>
+#include <vector>
+
+#include "rules/text/names.hpp"
+#include "service/log/log.hpp"
+#include "service/ports/switchboard.hpp"
+
+namespace arbiter::service {
+namespace {
+
+// Among more names than this no similar one is looked for: the daemon has others to serve.
+constexpr std::size_t kMaxCompared = 512;
+
+}  // namespace
+
+void Switchboard::tell_refusal(const LinkKey& key, shm::PortInstance to,
+                               const std::string& why) const {
+  const OutputPort& output = *outputs_.at(key.first);
+  const InputPort& input = *inputs_.at(key.second);
+  const bool to_output = to == key.first;
+  shm::Message message;
+  message.kind = shm::MessageKind::kConnectionRefused;
+  message.port = to;
+  message.peer = to_output ? key.second : key.first;
+  message.id = to_output ? input.name->id : output.source->id;
+  message.set_name(to_output ? input.name->name : output.source->name);
+  message.set_text(why);
+  client_of(to).send(message);
+}
+
+// The one that refuses knows it.
+void Switchboard::refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
+  for (const LinkKey& key : {LinkKey{port, peer}, LinkKey{peer, port}}) {
+    const auto found = links_.find(key);
+    if (found == links_.end()) continue;
+    found->second.mismatch = why;
+    if (std::exchange(found->second.number, 0) != 0) tell_refusal(key, peer, why);
+    log::warn("{} is not connected to {}: {}", outputs_.at(key.first)->source->name,
+              inputs_.at(key.second)->name->name, why);
+  }
+}
+
+std::string Switchboard::unmentioned_text(const shm::TableSnapshot& in_force,
+                                          const std::string& name, bool is_output) const {
+  const std::string what = is_output ? "nothing of this is delivered" : "nothing comes";
+  if (in_force.generation == 0) return "no model is in force, so that " + what;
+  std::vector<std::string_view> mentioned;
+  for (const auto& source : names_.sources()) {
+    if (is_output && in_force.table.knows_source(source->id)) mentioned.push_back(source->name);
+  }
+  for (const auto& input : names_.inputs()) {
+    if (!is_output && in_force.table.knows_port(input->id)) mentioned.push_back(input->name);
+  }
+  if (mentioned.size() > kMaxCompared) mentioned.clear();
+  return "the model in force does not mention " + name + ", so that " + what +
+         rules::advise(name, mentioned, "`arbiter status` shows the ports that it mentions");
+}
+
+template <class Port>
+void Switchboard::say_unmentioned(Port& port, const std::string& text) {
+  port.is_told_unmentioned = true;
+  log::warn("{}: {}", port.client->description(), text);
+  shm::Message message;
+  message.kind = shm::MessageKind::kUnmentioned;
+  message.port = port.instance;
+  message.set_text(text);
+  port.client->send(message);
+}
+
+void Switchboard::tell_unmentioned(const shm::TableSnapshot& in_force, shm::PortInstance port) {
+  if (const auto found = outputs_.find(port); found != outputs_.end()) {
+    OutputPort& output = *found->second;
+    const bool is_mentioned = in_force.table.knows_source(output.source->id);
+    if (is_mentioned) output.is_told_unmentioned = false;
+    if (is_mentioned || output.is_told_unmentioned) return;
+    say_unmentioned(output, unmentioned_text(in_force, output.source->name, true));
+  }
+  if (const auto found = inputs_.find(port); found != inputs_.end()) {
+    InputPort& input = *found->second;
+    const bool is_mentioned = in_force.table.knows_port(input.name->id);
+    if (is_mentioned) input.is_told_unmentioned = false;
+    if (is_mentioned || input.is_told_unmentioned) return;
+    say_unmentioned(input, unmentioned_text(in_force, input.name->name, false));
+  }
+}
+
+void Switchboard::tell_unmentioned(const shm::TableSnapshot& in_force) {
+  for (const auto& [instance, output] : outputs_) tell_unmentioned(in_force, instance);
+  for (const auto& [instance, input] : inputs_) tell_unmentioned(in_force, instance);
+}
+
+void Switchboard::note_blind(shm::PortInstance port, const std::string& text) {
+  const auto output = outputs_.find(port);
+  const auto input = inputs_.find(port);
+  bool& is_known =
+      output != outputs_.end() ? output->second->is_known_blind : input->second->is_known_blind;
+  if (!std::exchange(is_known, true)) log::warn("{}: {}", client_of(port).description(), text);
+}
+
+}  // namespace arbiter::service

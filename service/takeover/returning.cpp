@@ -1,0 +1,196 @@
+// Components that come back, each with what it had; those that are away; those that cannot be taken
+// back.
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "service/clients/given_names.hpp"
+#include "service/clients/replies.hpp"
+#include "service/log/log.hpp"
+#include "service/takeover/takeover.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::service {
+namespace {
+
+// About what it takes to remember one link that a component says it has.
+constexpr std::uint64_t kBytesOfAClaim = 128;
+
+// How long a name is asked for in vain that a component has whose conversation is lost: it may be
+// dying.
+constexpr shm::Nanoseconds kMaxWaitForDeath = 100'000'000;
+
+}  // namespace
+
+void Takeover::rejoin(Client& client, const shm::Received& hello) {
+  try {
+    take_back(client, hello);
+  } catch (const std::exception& error) {
+    client.is_turned_away = true;
+    const std::string why = error.what();
+    if (!strangers_.refuse(client, hello.message.link, why, shm::monotonic_now())) {
+      throw RefusedAgain(why);
+    }
+    throw;
+  }
+}
+
+void Takeover::take_back(Client& client, const shm::Received& hello) {
+  if (phase_ == Phase::kExpecting) {
+    if (!(Realm{FileIdentity::of(hello.descriptors[0]), FileIdentity::of(hello.descriptors[1])} ==
+          predecessor_->realm)) {
+      throw std::runtime_error("this daemon's predecessor had other memory");
+    }
+    inherit(hello.descriptors[0], hello.descriptors[1]);
+  } else if (!(FileIdentity::of(hello.descriptors[0]) == FileIdentity::of(board_.readable()))) {
+    throw std::runtime_error("this daemon does not know the ports of \"" + client.name +
+                             "\", which another daemon has opened; restart the component");
+  }
+  const NodeId node = hello.message.link;
+  // The conversation that it gave up may not have been seen to end.
+  const auto former = std::find_if(clients_.begin(), clients_.end(), [&](const auto& each) {
+    return each.second->node == node && each.second.get() != &client &&
+           client.is_process(each.second->pid(), each.second->process());
+  });
+  if (former != clients_.end()) host_.drop(former->first);
+  const auto absentee = absentees_.find(node);
+  if (absentee != absentees_.end() &&
+      client.is_process(absentee->second.pid, absentee->second.process.get())) {
+    client.node = node;
+    client.to_hand_back = std::move(absentee->second.ports);
+    absentees_.erase(absentee);
+  }
+  client.is_returning = true;
+  client.is_component = true;
+  host_.welcome(client);
+}
+
+void Takeover::take_back_page(Client& client, const shm::Received& received) {
+  const shm::SourceId id = received.message.id;
+  const Source* source = names_.source_by_id(id);
+  // One that was to come into force next when the last daemon ended.
+  if (source != nullptr && received.message.value == source->page_number + 1) return;
+  if (!names_.take_page(id, received.descriptors[0])) {
+    throw std::runtime_error("what was handed back is not the page of source " +
+                             std::to_string(id));
+  }
+  client.pages[id] = names_.source_by_id(id)->page_number;
+}
+
+void Takeover::take_back_output(Client& client, const shm::Received& received) {
+  const shm::Message& message = received.message;
+  Source* source = names_.source_by_id(message.id);
+  if (source == nullptr || source->away != message.port ||
+      client.to_hand_back.erase(message.port) == 0) {
+    throw std::runtime_error("an output port that it never had was handed back");
+  }
+  names_.take_page(message.id, received.descriptors[1]);
+  switchboard_.readmit(adopt_output(received, client.user()), client, *source);
+}
+
+void Takeover::take_back_input(Client& client, const shm::Received& received) {
+  const shm::Message& message = received.message;
+  InputName* input = names_.input_by_id(message.id);
+  if (input == nullptr || input->away != message.port ||
+      client.to_hand_back.erase(message.port) == 0) {
+    throw std::runtime_error("an input port that it never had was handed back");
+  }
+  switchboard_.readmit(adopt_input(received, client.user()), client, *input);
+}
+
+void Takeover::take_back_link(const Client& client, const shm::Message& message) {
+  if (!client.is_returning || client.ports.count(message.port) == 0) return;
+  // It may claim links with ports that have never been, one after the other.
+  Charge charge = shares_.take(client.user(), Share::kQueue, kBytesOfAClaim);
+  switchboard_.claim(message.port, message.peer, {message.link, std::move(charge)});
+}
+
+void Takeover::finish_return(Client& client) {
+  if (!client.is_returning) return;
+  client.is_returning = false;
+  for (const shm::PortInstance port : std::exchange(client.to_hand_back, {})) {
+    switchboard_.forget_away(port);  // closed meanwhile
+  }
+  std::set<shm::PortInstance> away;
+  for (const auto& source : names_.sources()) away.insert(source->away);
+  for (const auto& input : names_.inputs()) away.insert(input->away);
+  away.erase(0);
+  const auto is_away = [&](shm::PortInstance port) { return away.contains(port); };
+  for (const shm::PortInstance port : client.ports) switchboard_.settle_claims(port, is_away);
+  const auto table = board_.in_force().table;
+  switchboard_.link_all(table);
+  switchboard_.unlink(table);
+  host_.try_postponed();
+  log::info("{} is back, with {} ports", client.description(), client.ports.size());
+}
+
+void Takeover::set_away(Client& client) {
+  if (client.ports.empty() && client.to_hand_back.empty()) return;
+  Absentee& absentee = absentees_[client.node];
+  absentee.pid = client.pid();
+  absentee.user = client.user();
+  absentee.ports = std::exchange(client.to_hand_back, {});
+  absentee.ports.insert(client.ports.begin(), client.ports.end());
+  while (!client.ports.empty()) switchboard_.set_away(*client.ports.begin());
+  absentee.process = client.release_process();
+  absentee.charge = std::move(client.charge);
+  host_.watch_absentee(absentee.process, client.node);
+}
+
+void Takeover::forget_absentee(NodeId node) {
+  const auto found = absentees_.find(node);
+  if (found == absentees_.end()) return;
+  const Absentee absentee = std::move(found->second);
+  absentees_.erase(found);
+  for (const shm::PortInstance port : absentee.ports) switchboard_.forget_away(port);
+  host_.try_postponed();
+  log::info("process {} has ended, {} ports with it", absentee.pid, absentee.ports.size());
+}
+
+Charge Takeover::make_room_for(const Client& newcomer, NodeId former) {
+  const auto absentee = absentees_.find(former);
+  if (absentee != absentees_.end() &&
+      newcomer.is_process(absentee->second.pid, absentee->second.process.get())) {
+    return std::move(absentee->second.charge);
+  }
+  return shares_.take(newcomer.user(), Share::kClients);
+}
+
+void Takeover::require_not_kept(shm::PortInstance holder, const std::string& what) {
+  for (const auto& [node, absentee] : absentees_) {
+    if (absentee.ports.count(holder) == 0) continue;
+    if (has_ended(absentee.process)) {
+      forget_absentee(node);
+      return;
+    }
+    throw NotYet(what + " is kept for process " + std::to_string(absentee.pid) +
+                     ", which lives but does not answer",
+                 shm::monotonic_now() + kMaxWaitForDeath);
+  }
+  for (const auto& [id, client] : clients_) {
+    if (client->to_hand_back.count(holder) != 0) {
+      throw NotYet(what + " is kept for " + client->description(),
+                   shm::monotonic_now() + kMaxWaitForDeath);
+    }
+  }
+}
+
+// What cannot be a port of its is not listed; it has been refused already.
+void Takeover::hear_stranger(const Client& client, const shm::Message& message) noexcept {
+  try {
+    if (message.kind == shm::MessageKind::kHandBackOutput) {
+      const std::string port = port_name(message);
+      gate_.require(client, Action::kOutput, port);
+      strangers_.has_output(client, port);
+    } else if (message.kind == shm::MessageKind::kHandBackInput) {
+      const std::string port = port_name(message);
+      gate_.require(client, Action::kInput, port);
+      strangers_.has_input(client, port);
+    } else if (message.kind == shm::MessageKind::kHandedBack) {
+      strangers_.has_said_all(client);
+    }
+  } catch (const std::exception&) {
+  }
+}
+
+}  // namespace arbiter::service

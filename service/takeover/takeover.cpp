@@ -1,0 +1,190 @@
+#include "service/takeover/takeover.hpp"
+
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include "service/kept/descriptor_store.hpp"
+#include "service/log/log.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::service {
+namespace {
+
+// How long the predecessor's components may take to come back before others are served.
+constexpr shm::Nanoseconds kMaxWaitForReturn = 500'000'000;
+// The same where none of them has handed back its memory yet, though one lives. Later they must
+// start anew.
+constexpr shm::Nanoseconds kMaxWaitForRealm = 2'000'000'000;
+// How many components that have ended the state file may name.
+constexpr std::size_t kMaxForgotten = 64;
+
+shm::FileDescriptor open_process(pid_t pid) {
+  return shm::FileDescriptor(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
+}
+
+// Nobody's, where that cannot be told.
+uid_t user_of_process(pid_t pid) {
+  struct stat status {};
+  if (::stat(("/proc/" + std::to_string(pid)).c_str(), &status) != 0) return uid_t(-1);
+  return status.st_uid;
+}
+
+}  // namespace
+
+Takeover::Takeover(const Parts& parts, Host& host, StateFile state, bool stores)
+    : gate_(parts.gate),
+      shares_(parts.shares),
+      registry_(parts.registry),
+      names_(parts.names),
+      board_(parts.board),
+      switchboard_(parts.switchboard),
+      clients_(parts.clients),
+      host_(host),
+      state_(std::move(state)),
+      stores_(stores) {}
+
+void Takeover::look_for_predecessor() {
+  started_ = shm::monotonic_now();
+  predecessor_ = state_.read();
+  if (stores_ && inherit_stored()) return;
+  if (predecessor_ && predecessor_->is_survived) {
+    phase_ = Phase::kExpecting;
+  } else {
+    finish();
+  }
+}
+
+// What the service manager has kept. False: nothing that is of use.
+bool Takeover::inherit_stored() {
+  const auto stored = take_stored();
+  const auto find = [&](const char* name) {
+    return std::find_if(stored.begin(), stored.end(),
+                        [&](const StoredDescriptor& each) { return each.name == name; });
+  };
+  const auto board = find("board");
+  const auto registry = find("registry");
+  if (board == stored.end() || registry == stored.end()) return false;
+  try {
+    inherit(board->descriptor, registry->descriptor);
+    for (const StoredDescriptor& each : stored) {
+      if (&each == &*board || &each == &*registry) continue;
+      if (!names_.take_page(each.descriptor)) discard_stored(each.name);
+    }
+    return true;
+  } catch (const std::exception& error) {
+    log::warn("what the service manager has kept is of no use: {}", error.what());
+    return false;
+  }
+}
+
+void Takeover::inherit(const shm::FileDescriptor& board, const shm::FileDescriptor& registry) {
+  Registry inherited(registry);
+  board_.inherit(board);
+  registry_ = std::move(inherited);
+  names_.restore(board_.in_force().generation);
+  find_absentees();
+  phase_ = Phase::kTakingOver;
+  log::info("taking over from the last daemon, {} components and model {}", absentees_.size(),
+            board_.in_force().generation);
+}
+
+void Takeover::find_absentees() {
+  for (const auto& source : names_.sources()) {
+    if (source->away != 0) add_absentee(registry_.source(source->id).owner());
+  }
+  for (const auto& input : names_.inputs()) {
+    if (input->away != 0) add_absentee(registry_.input(input->id).owner());
+  }
+}
+
+void Takeover::add_absentee(const Owner& owner) {
+  Absentee& absentee = absentees_[owner.node];
+  if (!absentee.process) {
+    absentee.pid = owner.process.pid;
+    absentee.user = user_of_process(owner.process.pid);
+    absentee.process = open_process(owner.process.pid);
+    if (!absentee.process || !owner.process.lives() || has_ended(absentee.process)) {
+      absentees_.erase(owner.node);
+      switchboard_.forget_away(owner.port);
+      return;
+    }
+    host_.watch_absentee(absentee.process, owner.node);
+  }
+  absentee.ports.insert(owner.port);
+}
+
+// All who came in time are back, or never will be.
+void Takeover::finish() {
+  const bool is_fresh = phase_ != Phase::kTakingOver;
+  remember_components();
+  if (is_fresh) {
+    if (phase_ == Phase::kExpecting) {
+      log::warn("no component has handed back what the last daemon left");
+    }
+    if (stores_) {
+      discard_stored("board");
+      discard_stored("registry");
+      store("board", board_.writable());
+      store("registry", registry_.writable());
+    }
+  }
+  phase_ = Phase::kServing;
+  host_.try_postponed();
+  names_.forget_lost_pages();
+  host_.begin_to_serve(is_fresh);
+}
+
+shm::Nanoseconds Takeover::deadline() const {
+  if (phase_ == Phase::kTakingOver) return started_ + kMaxWaitForReturn;
+  if (phase_ == Phase::kExpecting && !waiting_.empty()) return started_ + kMaxWaitForRealm;
+  return shm::kForever;
+}
+
+void Takeover::advance(shm::Nanoseconds now) {
+  if (phase_ == Phase::kServing) return;
+  const bool all_are_back = phase_ == Phase::kTakingOver && absentees_.empty() &&
+                            std::none_of(clients_.begin(), clients_.end(), [](const auto& each) {
+                              return each.second->is_returning;
+                            });
+  if (all_are_back || now >= deadline()) finish();
+}
+
+// Components that live on need the state file to come back by, as what the service manager keeps
+// does.
+void Takeover::leave_nothing_if_nobody_is_left() const {
+  if (!stores_ && is_over() && clients_.empty() && absentees_.empty()) state_.remove();
+}
+
+void Takeover::welcome_waiting() {
+  for (const ClientId id : std::exchange(waiting_, {})) {
+    if (Client* const client = clients_.find(id)) host_.welcome(*client);
+  }
+}
+
+// For the next daemon.
+void Takeover::remember_components() {
+  std::vector<Process> components;
+  for (const auto& [id, client] : clients_) {
+    if (client->is_component) components.push_back(client->identity());
+  }
+  for (const auto& [node, absentee] : absentees_) {
+    components.push_back({absentee.pid, start_of_process(absentee.pid)});
+  }
+  state_.write({FileIdentity::of(board_.readable()), FileIdentity::of(registry_.readable())},
+               components);
+}
+
+void Takeover::remember_component(Client& client) {
+  if (std::exchange(client.is_component, true)) return;
+  state_.add(client.identity());
+  if (state_.size() > kMaxForgotten + 2 * (clients_.size() + absentees_.size())) {
+    remember_components();
+  }
+}
+
+}  // namespace arbiter::service

@@ -1,0 +1,150 @@
+// How a daemon takes over from its predecessor: what was killed, or stopped, while its components
+// went on.
+//
+// All that decides lives in memory that the components map: tables, activity, queues. The new
+// daemon takes up that very memory and its numbers, so that for the components nothing changes;
+// then it puts its own model in force by an ordinary swap. A component that is not back when it is
+// time for that (it is stopped, or its user services the node late) comes back when it likes; until
+// then its ports and names are kept for it, for as long as its process lives.
+//
+//   takeover.cpp    from finding a predecessor to serving others, and what is written down
+//   returning.cpp   a component that comes back, or goes away
+//
+// Thread safety: none, it is the loop's.
+#pragma once
+
+#include <sys/types.h>
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "service/clients/clients.hpp"
+#include "service/clients/gate.hpp"
+#include "service/kept/registry.hpp"
+#include "service/kept/state_file.hpp"
+#include "service/models/board.hpp"
+#include "service/policy/shares.hpp"
+#include "service/ports/port_names.hpp"
+#include "service/ports/switchboard.hpp"
+#include "service/takeover/strangers.hpp"
+#include "shm/activity.hpp"
+#include "shm/file_descriptor.hpp"
+#include "shm/wire.hpp"
+
+namespace arbiter::service {
+
+class Takeover {
+ public:
+  // What it asks of the daemon around it.
+  class Host {
+   public:
+    // Calls forget_absentee(node) once the process of a pidfd has ended.
+    virtual void watch_absentee(const shm::FileDescriptor& process, NodeId node) = 0;
+    // Ends a conversation.
+    virtual void drop(ClientId client) = 0;
+    // A client is known from now on, and is to hear so.
+    virtual void welcome(Client& client) = 0;
+    // Requests that could not be served may be served now.
+    virtual void try_postponed() = 0;
+    // All who came in time are back. `is_fresh`: there was nobody to come back.
+    virtual void begin_to_serve(bool is_fresh) = 0;
+
+   protected:
+    ~Host() = default;
+  };
+  // What it restores.
+  struct Parts {
+    const Gate& gate;
+    Shares& shares;
+    Registry& registry;
+    PortNames& names;
+    Board& board;
+    Switchboard& switchboard;
+    const Clients& clients;
+  };
+
+  // `stores`: whether the service manager keeps descriptors for the next daemon.
+  Takeover(const Parts& parts, Host& host, StateFile state, bool stores);
+
+  // The beginning: what is there of a predecessor. Without one it is over at once.
+  void look_for_predecessor();
+  // Only then is our own model put in force, and are others served.
+  [[nodiscard]] bool is_over() const { return phase_ == Phase::kServing; }
+  [[nodiscard]] shm::Nanoseconds deadline() const;
+  void advance(shm::Nanoseconds now);
+  // The end, where nobody will come back to a successor: then none must look for them.
+  void leave_nothing_if_nobody_is_left() const;
+
+  // A client that has said hello waits until it is over.
+  void let_wait(const Client& client) { waiting_.push_back(client.id()); }
+  void welcome_waiting();
+
+  // One that says it was here before. Throws std::runtime_error where it cannot be taken back;
+  // RefusedAgain where the log has that already.
+  void rejoin(Client& client, const shm::Received& hello);
+  // What it hands back, each thing that it had. Throw std::runtime_error, LimitExceeded.
+  void take_back_page(Client& client, const shm::Received& received);
+  void take_back_output(Client& client, const shm::Received& received);
+  void take_back_input(Client& client, const shm::Received& received);
+  void take_back_link(const Client& client, const shm::Message& message);
+  void finish_return(Client& client);
+  // One that is not taken back says what it has, all the same.
+  void hear_stranger(const Client& client, const shm::Message& message) noexcept;
+  [[nodiscard]] const Strangers& strangers() const { return strangers_; }
+  // That component is no stranger from now on.
+  void know(const Client& client) { strangers_.welcome(client); }
+
+  // The conversation with a component is lost, and its process lives: its ports are kept for it.
+  void set_away(Client& client);
+  void forget_absentee(NodeId node);
+  // What the absentee has taken of its user's share, for the process that was it. Throws
+  // LimitExceeded where there is no room for another. `former`: who it says that it was; 0: nobody.
+  [[nodiscard]] Charge make_room_for(const Client& newcomer, NodeId former);
+  // That a name is kept for nobody who is away. Throws NotYet.
+  void require_not_kept(shm::PortInstance holder, const std::string& what);
+
+  // For a successor: that client has opened a port.
+  void remember_component(Client& client);
+
+ private:
+  // kExpecting: there was a predecessor, and nobody has handed back its realm yet. kTakingOver: its
+  // components are coming back.
+  enum class Phase : std::uint8_t { kExpecting, kTakingOver, kServing };
+  struct Absentee {
+    pid_t pid = 0;
+    uid_t user = 0;
+    shm::FileDescriptor process;
+    std::set<shm::PortInstance> ports;
+    Charge charge;
+  };
+
+  [[nodiscard]] bool inherit_stored();
+  void inherit(const shm::FileDescriptor& board, const shm::FileDescriptor& registry);
+  void find_absentees();
+  void add_absentee(const Owner& owner);
+  void take_back(Client& client, const shm::Received& hello);
+  void finish();
+  void remember_components();
+
+  const Gate& gate_;
+  Shares& shares_;
+  Registry& registry_;
+  PortNames& names_;
+  Board& board_;
+  Switchboard& switchboard_;
+  const Clients& clients_;
+  Host& host_;
+  StateFile state_;
+  const bool stores_;
+  Phase phase_ = Phase::kServing;
+  std::optional<Predecessor> predecessor_;
+  shm::Nanoseconds started_ = 0;
+  std::map<NodeId, Absentee> absentees_;
+  Strangers strangers_;
+  std::vector<ClientId> waiting_;  // have said hello, and are not welcomed yet
+};
+
+}  // namespace arbiter::service
