@@ -43,7 +43,7 @@
 #include "service/switchboard.hpp"
 #include "service/turns.hpp"
 #include "service/watchdog.hpp"
-#include "shm/rendezvous.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::service {
 
