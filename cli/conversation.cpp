@@ -12,8 +12,8 @@
 
 #include "cli/live.hpp"
 #include "shm/clock.hpp"
-#include "shm/instances.hpp"
-#include "shm/rendezvous.hpp"
+#include "wire/instances.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::cli {
 namespace {

@@ -9,7 +9,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "shm/file_descriptor.hpp"
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::cli {
 

@@ -14,8 +14,8 @@
 #include <utility>
 
 #include "client/node_names.hpp"
-#include "shm/instances.hpp"
-#include "shm/rendezvous.hpp"
+#include "wire/instances.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::detail {
 namespace {

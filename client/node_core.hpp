@@ -31,7 +31,7 @@
 #include "client/memory.hpp"
 #include "client/output_core.hpp"
 #include "shm/descendants.hpp"
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::detail {
 

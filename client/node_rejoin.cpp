@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "client/node_core.hpp"
-#include "shm/rendezvous.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::detail {
 

@@ -13,7 +13,7 @@
 #include "shm/output_segment.hpp"
 #include "shm/residence.hpp"
 #include "shm/segment.hpp"
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::detail {
 

@@ -36,7 +36,7 @@
 #include "service/ports/switchboard.hpp"
 #include "service/takeover/takeover.hpp"
 #include "service/watchdog.hpp"
-#include "shm/rendezvous.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::service {
 

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <iterator>
-#include <string_view>
+#include <optional>
+#include <set>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -12,82 +14,80 @@
 #include "shm/clock.hpp"
 #include "shm/decision.hpp"
 #include "shm/utf8.hpp"
+#include "wire/document.hpp"
+#include "wire/status.hpp"
 
 namespace arbiter::service {
 namespace {
-
-using nlohmann::json;
 
 std::uint64_t read(const shm::Atomic<std::uint64_t>& counter) {
   return counter.load(std::memory_order_relaxed);
 }
 
-json type_json(const shm::TypeInfo& type) {
-  if (!type.is_typed()) return nullptr;
-  return {{"name", shm::printable(type.type_name())},
-          {"size", type.size},
-          {"alignment", type.alignment}};
+std::optional<wire::SampleType> type_of(const shm::TypeInfo& type) {
+  if (!type.is_typed()) return std::nullopt;
+  return wire::SampleType{shm::printable(type.type_name()), type.size, type.alignment};
 }
 
-json client_json(const Client& client) {
-  return {{"node", client.name}, {"pid", client.pid()}, {"user", client.user()}};
+wire::Component component_of(const Client& client) {
+  return {client.name, client.pid(), client.user()};
 }
 
-json stranger_json(const Stranger& stranger) {
-  return {{"node", stranger.node},       {"pid", stranger.process.pid}, {"user", stranger.user},
-          {"why", stranger.why},         {"since_ns", stranger.since},  {"seen_ns", stranger.seen},
-          {"outputs", stranger.outputs}, {"inputs", stranger.inputs}};
+wire::StrangerStatus status_of(const Stranger& of) {
+  return {of.node,
+          of.process.pid,
+          of.user,
+          of.why,
+          of.since,
+          of.seen,
+          {of.outputs.begin(), of.outputs.end()},
+          {of.inputs.begin(), of.inputs.end()}};
 }
 
 // What a full queue had no room for is lost already, though its receiver counts it when it takes.
-void count_lost(json& counters) {
-  const auto waiting = counters["waiting"].get<std::uint64_t>();
-  const auto depth = counters["depth"].get<std::uint64_t>();
-  if (depth == 0 || waiting <= depth) return;
-  counters["waiting"] = depth;
-  counters["overtaken"] = counters["overtaken"].get<std::uint64_t>() + (waiting - depth);
-  counters["lost"] = waiting - depth;
+// Returns how much that is.
+std::uint64_t count_lost(wire::ConnectionStatus& connection) {
+  const std::uint64_t depth = connection.depth.value_or(0);
+  if (depth == 0 || connection.waiting <= depth) return 0;
+  const std::uint64_t lost = connection.waiting - depth;
+  connection.waiting = depth;
+  connection.overtaken += lost;
+  return lost;
 }
 
-// What the publisher's and the receiver's segment say of one connection.
-json connection_counters(const OutputPort* output, const InputPort* input, const Link* link) {
-  json counters{{"accepted", 0}, {"discarded", 0}, {"refused", 0}, {"taken", 0},
-                {"dropped", 0},  {"overtaken", 0}, {"waiting", 0}, {"lost", 0}};
-  if (link == nullptr || link->number == 0) return counters;
+// What the publisher's and the receiver's segment say of one connection. Returns what was lost and
+// is not counted by the receiver yet.
+std::uint64_t add_counters(const OutputPort* output, const InputPort* input, const Link* link,
+                           wire::ConnectionStatus& connection) {
+  if (link == nullptr || link->number == 0) return 0;
+  std::uint64_t lost = 0;
   const shm::OutputSegment segment(output->mapping.data(), output->layout);
   for (std::uint32_t i = 0; i < shm::kMaxDestinations; ++i) {
     const shm::Channel& channel = segment.channel(i);
     if (channel.receiver.load(std::memory_order_relaxed) != link->number) continue;
     const std::uint64_t before = read(channel.first) - 1;
     const std::uint64_t accepted = read(channel.accepted);
-    counters["accepted"] = accepted - before;
-    counters["discarded"] = read(channel.discarded);
-    counters["refused"] = read(channel.refused);
-    counters["depth"] = channel.depth.load(std::memory_order_relaxed);
-    counters["waiting"] = accepted - before;  // a receiver that has never taken has no lane yet
+    connection.accepted = accepted - before;
+    connection.discarded = read(channel.discarded);
+    connection.refused = read(channel.refused);
+    connection.depth = channel.depth.load(std::memory_order_relaxed);
+    connection.waiting = accepted - before;  // a receiver that has never taken has no lane yet
     for (const shm::Lane& lane : input->shared().lanes) {
       if (lane.publisher.load(std::memory_order_relaxed) != output->instance) continue;
       const std::uint64_t consumed = std::max(read(lane.consumed), before);
-      counters["taken"] = read(lane.taken);
-      counters["dropped"] = read(lane.dropped);
-      counters["overtaken"] = read(lane.overtaken);
-      counters["waiting"] = accepted - std::min(consumed, accepted);
+      connection.taken = read(lane.taken);
+      connection.dropped = read(lane.dropped);
+      connection.overtaken = read(lane.overtaken);
+      connection.waiting = accepted - std::min(consumed, accepted);
     }
-    count_lost(counters);
+    lost = count_lost(connection);
   }
-  return counters;
+  return lost;
 }
 
 // An end that is away has not been closed: its connections go on.
-std::string connection_state(const Source& source, const OutputPort* output, const InputName& name,
-                             const InputPort* input) {
-  const char* const out = output != nullptr ? "" : source.away != 0 ? "away" : "closed";
-  const char* const in = input != nullptr ? "" : name.away != 0 ? "away" : "closed";
-  if (output != nullptr && input != nullptr) return "connected";
-  if (output != nullptr) return std::string("input port ") + in;
-  if (input != nullptr) return std::string("output port ") + out;
-  if (std::string_view(out) == in) return std::string("both ends ") + out;
-  return std::string("output port ") + out + ", input port " + in;
+wire::End end_of(const void* port, shm::PortInstance away) {
+  return port != nullptr ? wire::End::kOpen : away != 0 ? wire::End::kAway : wire::End::kClosed;
 }
 
 class Document {
@@ -95,57 +95,43 @@ class Document {
   Document(const StatusOf& of, shm::Nanoseconds now)
       : of_(of), snapshot_(of.models.in_force()), now_(now) {}
 
-  json build() {
-    json document;
-    document["instance"] = of_.instance;
-    document["pid"] = getpid();
-    document["directory"] = working_directory();  // that relative paths are meant from
-    document["model"] = model_json();
-    document["models"] = json::array();
+  wire::Status build() {
+    wire::Status status;
+    status.instance = of_.instance;
+    status.pid = getpid();
+    status.directory = working_directory();  // that relative paths are meant from
+    status.model = model();
     for (const LoadedModel& each : of_.library.models()) {
-      document["models"].push_back(loaded_json(*each.model));
+      status.models.push_back(loaded(*each.model));
     }
-    document["history"] = of_.history.json();
-    document["clients"] = of_.clients;
-    document["strangers"] = json::array();
+    status.history = of_.history.status();
+    status.clients = of_.clients;
     for (const Stranger* each : of_.strangers.living()) {
-      document["strangers"].push_back(stranger_json(*each));
+      status.strangers.push_back(status_of(*each));
     }
-    document["sources"] = json::array();
-    for (const auto& source : of_.directory.sources()) {
-      if (is_worth_showing(*source)) document["sources"].push_back(source_json(*source));
+    for (const auto& each : of_.directory.sources()) {
+      if (is_worth_showing(*each)) status.sources.push_back(source(*each));
     }
-    document["inputs"] = json::array();
-    for (const auto& input : of_.directory.inputs()) {
-      if (input->open != 0 || input->away != 0 || snapshot_.table.knows_port(input->id)) {
-        document["inputs"].push_back(input_json(*input));
+    for (const auto& each : of_.directory.inputs()) {
+      if (each->open != 0 || each->away != 0 || snapshot_.table.knows_port(each->id)) {
+        status.inputs.push_back(input(*each));
       }
     }
-    return document;
+    return status;
   }
 
  private:
-  static void add_files(const rules::ModelFiles& files, json& result) {
-    result["files"] = files.models;
-    result["application"] = files.application ? json(*files.application) : json(nullptr);
-  }
-
-  [[nodiscard]] json model_json() const {
+  [[nodiscard]] wire::ModelStatus model() const {
     const std::string name = of_.models.name();
-    json result{{"generation", snapshot_.generation},
-                {"name", name.empty() ? json(nullptr) : json(name)},
-                {"reloads_refused", of_.reloads_refused}};
-    add_files(of_.model == nullptr ? rules::ModelFiles() : of_.model->files, result);
-    return result;
+    const auto files = of_.model == nullptr ? rules::ModelFiles() : of_.model->files;
+    return {snapshot_.generation, name.empty() ? std::nullopt : std::optional(name),
+            of_.reloads_refused, files.models, files.application};
   }
 
   // After a rollback the model in force has the name of one that is loaded, but is not that one.
-  [[nodiscard]] json loaded_json(const Model& model) const {
-    json result{{"name", model.name},
-                {"in_force", model.name == of_.models.name()},
-                {"as_loaded", &model == of_.model.get()}};
-    add_files(model.files, result);
-    return result;
+  [[nodiscard]] wire::LoadedModelStatus loaded(const Model& model) const {
+    return {model.name, model.name == of_.models.name(), &model == of_.model.get(),
+            model.files.models, model.files.application};
   }
 
   [[nodiscard]] bool is_worth_showing(const Source& source) const {
@@ -158,82 +144,69 @@ class Document {
   }
 
   // Of one that has not come back no more is known than its process.
-  static void add_away(shm::PortInstance away, const RegistryEntry& entry, json& result) {
-    result["away"] = away != 0;
-    result["away_pid"] = away != 0 ? json(entry.owner().process.pid) : json(nullptr);
+  static std::optional<std::int32_t> away_pid(shm::PortInstance away, const RegistryEntry& entry) {
+    return away != 0 ? std::optional(entry.owner().process.pid) : std::nullopt;
   }
 
-  [[nodiscard]] json source_json(const Source& source) const {
-    const shm::Nanoseconds timeout = snapshot_.table.timeout(source.id);
-    json result{{"name", source.name},
-                {"mentioned", snapshot_.table.knows_source(source.id)},
-                {"active", is_active(source)},
-                {"timeout_ns", timeout == shm::kForever ? json("forever") : json(timeout)}};
+  [[nodiscard]] wire::SourceStatus source(const Source& source) const {
+    wire::SourceStatus result;
+    result.name = source.name;
+    result.mentioned = snapshot_.table.knows_source(source.id);
+    result.active = is_active(source);
+    result.timeout = snapshot_.table.timeout(source.id);
+    result.away_pid = away_pid(source.away, of_.registry.source(source.id));
     const OutputPort* output = of_.switchboard.output(source.open);
-    result["open"] = output != nullptr;
-    add_away(source.away, of_.registry.source(source.id), result);
-    if (output == nullptr) return result;
-    const auto& counters = output->header().counters;
-    result["component"] = client_json(*output->client);
-    result["type"] = type_json(output->type);
-    result["published"] = read(counters.published);
-    result["signals"] = read(counters.signals);
-    result["delivered"] = read(counters.delivered);
-    result["discarded"] = read(counters.discarded);
-    result["refused"] = read(counters.refused);
-    result["blind"] = read(counters.blind);
-    result["unsettled"] = read(counters.unsettled);
-    result["no_slot"] = read(counters.no_slot);
+    if (output != nullptr) result.open = open_output(*output);
     return result;
   }
 
-  json input_json(const InputName& name) {
+  static wire::OpenOutput open_output(const OutputPort& output) {
+    const auto& counters = output.header().counters;
+    return {component_of(*output.client), type_of(output.type),     read(counters.published),
+            read(counters.signals),       read(counters.delivered), read(counters.discarded),
+            read(counters.refused),       read(counters.blind),     read(counters.unsettled),
+            read(counters.no_slot)};
+  }
+
+  wire::InputStatus input(const InputName& name) {
     const InputPort* input = of_.switchboard.input(name.open);
     const Command command = command_at(name.id, input);
-    const shm::SourceId winner = command.commander;
-    const bool arbitrated = snapshot_.table.is_arbitrated(name.id);
-    json result{
-        {"name", name.name},
-        {"mentioned", snapshot_.table.knows_port(name.id)},
-        {"arbitrated", arbitrated},
-        {"in_order", is_decided_in_order(name.id)},
-        {"idle", winner == shm::kNone},
-        {"winner", arbitrated && winner != shm::kNone ? json(of_.directory.sources()[winner]->name)
-                                                      : json(nullptr)},
-        {"cannot_deliver", nullptr},
-        {"connections", json::array()},
-        {"senses", json::array()}};
-    if (command.selected != shm::kNone && winner == shm::kNone) {
-      result["cannot_deliver"] = {{"source", of_.directory.sources()[command.selected]->name},
-                                  {"why", command.why}};
+    wire::InputStatus result;
+    result.name = name.name;
+    result.mentioned = snapshot_.table.knows_port(name.id);
+    result.arbitrated = snapshot_.table.is_arbitrated(name.id);
+    result.in_order = is_decided_in_order(name.id);
+    result.idle = command.commander == shm::kNone;
+    if (result.arbitrated && !result.idle) {
+      result.winner = of_.directory.sources()[command.commander]->name;
     }
-    result["open"] = input != nullptr;
-    add_away(name.away, of_.registry.input(name.id), result);
-    if (input != nullptr) add_open(*input, result);
-    add_connections(name, input, winner, result);
+    if (result.idle && command.selected != shm::kNone) {
+      result.cannot_deliver = {of_.directory.sources()[command.selected]->name, command.why};
+    }
+    result.away_pid = away_pid(name.away, of_.registry.input(name.id));
+    if (input != nullptr) result.open = open_input(*input);
+    add_connections(name, input, result);
     return result;
   }
 
-  static void add_open(const InputPort& input, json& result) {
+  static wire::OpenInput open_input(const InputPort& input) {
     const shm::InputHeader& header = input.shared().header;
-    result["component"] = client_json(*input.client);
-    result["type"] = type_json(input.type);
-    result["depth"] = header.depth;
-    result["keep"] = header.keep != 0;
-    result["when_full"] = header.refuse_new != 0 ? "refuse_new" : "drop_oldest";
-    result["taken"] = read(header.counters.taken);
-    result["dropped"] = read(header.counters.dropped);
-    result["overtaken"] = read(header.counters.overtaken);
-    result["blind"] = read(header.counters.blind);
-    result["unsettled"] = read(header.counters.unsettled);
-    result["misbehaved"] = read(header.counters.misbehaved);
-    result["idles"] = read(header.counters.idles);
+    return {component_of(*input.client),
+            type_of(input.type),
+            header.depth,
+            header.keep != 0,
+            header.refuse_new != 0 ? wire::WhenFull::kRefuseNew : wire::WhenFull::kDropOldest,
+            read(header.counters.taken),
+            read(header.counters.dropped),
+            read(header.counters.overtaken),
+            read(header.counters.blind),
+            read(header.counters.unsettled),
+            read(header.counters.misbehaved),
+            read(header.counters.idles)};
   }
 
-  void add_connections(const InputName& name, const InputPort* input, shm::SourceId winner,
-                       json& result) {
+  void add_connections(const InputName& name, const InputPort* input, wire::InputStatus& result) {
     std::set<shm::SourceId> connected;
-    std::uint64_t lost = 0;  // and not counted by the receiver yet
     const auto range = snapshot_.table.connections_to(name.id);
     for (auto index = range.first; index != range.first + range.count; ++index) {
       const shm::SourceId id = snapshot_.table.rule(index).source;
@@ -243,26 +216,22 @@ class Document {
       connected.insert(id);
       const OutputPort* output = of_.switchboard.output(source->open);
       const Link* link = link_between(output, input);
-      json connection = connection_counters(output, input, link);
-      lost += connection["lost"].get<std::uint64_t>();
-      connection.erase("lost");
-      connection["source"] = source->name;
-      connection["active"] = is_active(*source);
-      connection["winner"] = id == winner && snapshot_.table.is_arbitrated(name.id);
-      connection["state"] = connection_state(*source, output, name, input);
-      connection["mismatch"] = nullptr;
-      if (link != nullptr && !link->mismatch.empty()) {
-        connection["state"] = "mismatch";
-        connection["mismatch"] = link->mismatch;
-      }
-      result["connections"].push_back(std::move(connection));
+      wire::ConnectionStatus connection;
+      connection.source = source->name;
+      connection.active = is_active(*source);
+      connection.winner = result.winner == source->name;
+      connection.output = end_of(output, source->away);
+      connection.input = end_of(input, name.away);
+      if (link != nullptr && !link->mismatch.empty()) connection.mismatch = link->mismatch;
+      const std::uint64_t lost = add_counters(output, input, link, connection);
+      if (result.open) result.open->overtaken += lost;
+      result.connections.push_back(std::move(connection));
     }
-    if (input != nullptr) result["overtaken"] = result["overtaken"].get<std::uint64_t>() + lost;
     const auto senses = snapshot_.table.sources_read(name.id);
     for (shm::Word i = 0; i < senses.count; ++i) {
       if (connected.count(senses[i]) != 0 || senses[i] >= of_.directory.sources().size()) continue;
       const Source& source = *of_.directory.sources()[senses[i]];
-      result["senses"].push_back({{"source", source.name}, {"active", is_active(source)}});
+      result.senses.push_back({source.name, is_active(source)});
     }
   }
 
@@ -335,8 +304,7 @@ class Document {
 }  // namespace
 
 std::string status_document(const StatusOf& of, shm::Nanoseconds now) {
-  // Names may be any bytes; JSON may not.
-  return Document(of, now).build().dump(2, ' ', false, json::error_handler_t::replace) + "\n";
+  return wire::write_document(wire::to_json(Document(of, now).build()));  // names may be any bytes
 }
 
 }  // namespace arbiter::service

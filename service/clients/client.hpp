@@ -19,7 +19,7 @@
 #include "shm/activity.hpp"
 #include "shm/file_descriptor.hpp"
 #include "shm/ids.hpp"
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::service {
 

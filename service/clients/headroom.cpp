@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::service {
 namespace {

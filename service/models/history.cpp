@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <set>
 #include <utility>
-
-#include <nlohmann/json.hpp>
 
 namespace arbiter::service {
 
@@ -57,24 +56,18 @@ const PastModel* History::previous() const {
   return before == models_.rend() ? nullptr : &*before;
 }
 
-nlohmann::json to_json(const PastModel& entry) {
-  using Json = nlohmann::json;
-  const auto& application = entry.files.application;
-  return {{"generation", entry.generation},
-          {"content", entry.content},
-          {"name", entry.name},
-          {"files", entry.files.models},
-          {"application", application ? Json(*application) : Json(nullptr)},
-          {"since_ms", entry.since_ms},
-          {"how", entry.how},
-          {"by", entry.by.empty() ? Json(nullptr) : Json(entry.by)},
-          {"changes", entry.changes.empty() ? Json(nullptr) : Json(entry.changes)},
-          {"is_kept", entry.model != nullptr}};
+wire::PastModelStatus status_of(const PastModel& entry) {
+  const auto or_nothing = [](const std::string& text) {
+    return text.empty() ? std::nullopt : std::optional(text);
+  };
+  return {entry.generation,          entry.content,         entry.name, entry.files.models,
+          entry.files.application,   entry.since_ms,        entry.how,  or_nothing(entry.by),
+          or_nothing(entry.changes), entry.model != nullptr};
 }
 
-nlohmann::json History::json() const {
-  nlohmann::json result = nlohmann::json::array();
-  for (const PastModel& entry : models_) result.push_back(to_json(entry));
+std::vector<wire::PastModelStatus> History::status() const {
+  std::vector<wire::PastModelStatus> result;
+  for (const PastModel& entry : models_) result.push_back(status_of(entry));
   std::reverse(result.begin(), result.end());
   return result;
 }

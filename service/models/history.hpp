@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <deque>
 #include <string>
-
-#include <nlohmann/json_fwd.hpp>
+#include <vector>
 
 #include "service/models/library.hpp"
+#include "wire/status.hpp"
 
 namespace arbiter::service {
 
@@ -26,8 +26,8 @@ struct PastModel {
   ModelPointer model;         // null: not kept any longer, or a predecessor's
 };
 
-// As it stands in the history's JSON.
-[[nodiscard]] nlohmann::json to_json(const PastModel& entry);
+// As the status document has it.
+[[nodiscard]] wire::PastModelStatus status_of(const PastModel& entry);
 
 // The calendar's time, in milliseconds since 1970.
 [[nodiscard]] std::int64_t calendar_ms();
@@ -53,7 +53,7 @@ class History {
   // a rollback one step further back. Null: nowhere.
   [[nodiscard]] const PastModel* previous() const;
   // The latest first.
-  [[nodiscard]] nlohmann::json json() const;
+  [[nodiscard]] std::vector<wire::PastModelStatus> status() const;
 
  private:
   void forget_what_does_not_fit();

@@ -12,10 +12,10 @@
 
 #include "service/daemon.hpp"
 #include "shm/file_descriptor.hpp"
-#include "shm/rendezvous.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/raw_client.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::test {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "service/clients/client.hpp"
 #include "shm/segment.hpp"
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::service {
 namespace {

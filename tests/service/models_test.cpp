@@ -170,8 +170,8 @@ TEST(History, KeepsTheLast) {
   for (std::uint64_t i = 1; i <= History::kMaxEntries + 3; ++i) history.add(past(i));
   EXPECT_EQ(history.find(3), nullptr);
   EXPECT_NE(history.find(4), nullptr);
-  EXPECT_EQ(history.json().size(), History::kMaxEntries);
-  EXPECT_EQ(history.json()[0]["generation"], History::kMaxEntries + 3);
+  EXPECT_EQ(history.status().size(), History::kMaxEntries);
+  EXPECT_EQ(history.status()[0].generation, History::kMaxEntries + 3);
 }
 
 TEST(History, KeepsModelsWithinItsBound) {
@@ -188,7 +188,7 @@ TEST(History, KeepsModelsWithinItsBound) {
   history.add(past(5, 0, model_of(40'000)));
   EXPECT_NE(history.find(5)->model, nullptr) << "the one in force is kept whatever it takes";
   EXPECT_EQ(history.find(4)->model, nullptr);
-  EXPECT_EQ(history.json()[4]["is_kept"], false);
+  EXPECT_FALSE(history.status()[4].is_kept);
 }
 
 }  // namespace

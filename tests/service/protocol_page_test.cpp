@@ -1,4 +1,4 @@
-// docs/protocol.md against shm/wire.hpp, and against what a real daemon says.
+// docs/protocol.md against wire/messages.hpp, and against what a real daemon says.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -55,7 +55,7 @@ TEST(ProtocolPage, HasEachFlagAndTheVersion) {
   for (const PageRow& row : rows_of(protocol_page(), {"flag", "value", "of", "meaning"})) {
     flags[quoted(row.cells[0]).at(0)] = static_cast<std::uint32_t>(std::stoul(row.cells[1]));
   }
-  EXPECT_EQ(flags, enumerators(source_of("shm/wire.hpp"), "MessageFlag"));
+  EXPECT_EQ(flags, enumerators(source_of("wire/messages.hpp"), "MessageFlag"));
   EXPECT_THAT(protocol_page(),
               testing::HasSubstr("It describes version " + std::to_string(shm::kWireVersion) +
                                  " (`kWireVersion`)"));

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include "shm/wire.hpp"
+#include <string>
+
+#include "shm/type_info.hpp"
 
 namespace arbiter::shm {
 namespace {
@@ -50,15 +52,6 @@ TEST(Utf8, TypesThatDoNotFitAreNamedSoThatNobodyIsMisled) {
   input.set_name("Pose\n");
   EXPECT_EQ(type_mismatch(output, input),
             "the output port sends Twist\\x1b[2J, the input port takes Pose\\n");
-}
-
-TEST(Utf8, ATextThatIsTooLongForAMessageIsCutBetweenTwoCharacters) {
-  Message message;
-  std::string text(sizeof message.text - 2, 'x');
-  message.set_text(text + "\u00e4\u00e4");
-  EXPECT_EQ(message.text_view(), text);
-  message.set_text(text + "y\u00e4");
-  EXPECT_EQ(message.text_view(), text + "y");
 }
 
 }  // namespace

@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "shm/wire.hpp"
 #include "tests/support/text_files.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::test {
 
@@ -35,7 +35,7 @@ inline Numbers enumerators(const std::string& header, const std::string& name) {
   return numbers;
 }
 inline Numbers kinds_of_header() {
-  return enumerators(source_of("shm/wire.hpp"), "class MessageKind");
+  return enumerators(source_of("wire/messages.hpp"), "class MessageKind");
 }
 
 inline std::string name_of(shm::MessageKind kind) {

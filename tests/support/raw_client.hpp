@@ -12,9 +12,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "shm/rendezvous.hpp"
 #include "shm/segment.hpp"
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::test {
 

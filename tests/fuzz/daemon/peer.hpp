@@ -11,8 +11,8 @@
 
 #include "shm/bell.hpp"
 #include "shm/segment.hpp"
-#include "shm/wire.hpp"
 #include "tests/fuzz/daemon/loop.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::fuzz {
 

@@ -1,4 +1,4 @@
-#include "shm/rendezvous.hpp"
+#include "wire/rendezvous.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "shm/instances.hpp"
+#include "wire/instances.hpp"
 
 #include <dirent.h>
 #include <sys/socket.h>
@@ -8,7 +8,7 @@
 #include <set>
 #include <string_view>
 
-#include "shm/rendezvous.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::shm {
 namespace {

@@ -1,4 +1,4 @@
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 #include <dirent.h>
 #include <fcntl.h>
@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstring>
+#include <string>
 #include <vector>
 
 namespace arbiter::shm {
@@ -192,6 +193,15 @@ TEST_F(Wire, WhatWasSentBeforeHangingUpIsReadThoughTheSenderLeftMessagesUnread) 
   EXPECT_EQ(receive_message(receiver_.get(), received, false), ReceiveResult::kReceived);
   EXPECT_EQ(received.message.kind, MessageKind::kClosePort);
   EXPECT_EQ(receive_message(receiver_.get(), received, false), ReceiveResult::kClosed);
+}
+
+TEST(Message, ATextThatIsTooLongForAMessageIsCutBetweenTwoCharacters) {
+  Message message;
+  std::string text(sizeof message.text - 2, 'x');
+  message.set_text(text + "\u00e4\u00e4");
+  EXPECT_EQ(message.text_view(), text);
+  message.set_text(text + "y\u00e4");
+  EXPECT_EQ(message.text_view(), text + "y");
 }
 
 }  // namespace

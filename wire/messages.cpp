@@ -1,4 +1,4 @@
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 #include <sys/socket.h>
 #include <sys/uio.h>

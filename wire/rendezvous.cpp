@@ -1,4 +1,4 @@
-#include "shm/rendezvous.hpp"
+#include "wire/rendezvous.hpp"
 
 #include <fcntl.h>
 #include <pwd.h>
