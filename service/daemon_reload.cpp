@@ -335,13 +335,11 @@ void Daemon::finish_comparison(const Swap& swap, const Reading& reading) {
 }
 
 void Daemon::answer_done(const Swap& swap, nlohmann::json changes) {
-  answer(
-      swap,
-      report(swap, {{"ok", true},
-                    {"generation", models_.in_force().generation},
-                    {"name", models_.name()},
-                    {"back_to", swap.back_to ? wire::to_json(status_of(*swap.back_to)) : nullptr},
-                    {"changes", std::move(changes)}}));
+  answer(swap, report(swap, {{"ok", true},
+                             {"generation", models_.in_force().generation},
+                             {"name", models_.name()},
+                             {"back_to", swap.back_to ? to_json(*swap.back_to) : nullptr},
+                             {"changes", std::move(changes)}}));
 }
 
 void Daemon::answer_refused(const Swap& swap, const std::string& why) {
