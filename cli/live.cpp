@@ -3,21 +3,25 @@
 #include <poll.h>
 #include <signal.h>
 #include <sys/signalfd.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <iostream>
 #include <utility>
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "shm/clock.hpp"
+#include "wire/document.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::cli {
+namespace {
+
+// What the daemon has to answer a question that changes nothing.
+constexpr std::chrono::milliseconds kAnswerTime{10'000};
+
+}  // namespace
 
 void add_instance_option(CLI::App& verb, std::string& instance) {
   verb.add_option("--instance", instance,
@@ -33,37 +37,31 @@ NodeOptions live_options(const std::string& instance) {
   return options;
 }
 
-std::shared_ptr<detail::NodeCore> connect(const std::string& verb, const std::string& instance) {
-  NodeOptions options = live_options(instance);
-  // Of names that the model does not mention the verbs speak themselves.
-  options.on_notice = [say = std::move(options.on_notice)](const Notice& notice) {
-    if (notice.kind != NoticeKind::unmentioned) say(notice);
+wire::Caller caller(const std::string& verb, const std::string& instance) {
+  wire::Caller caller;
+  caller.name = "arbiter-" + verb;
+  caller.instance = shm::instance_name(instance);
+  caller.patience = kConnectTimeout;
+  caller.on_waiting = [](const std::string& whom) {
+    std::cerr << "arbiter: waiting for " + whom + '\n';
   };
-  return detail::make_node("arbiter-" + verb, options);
+  return caller;
 }
 
-nlohmann::json fetch_document(detail::NodeCore& node, shm::MessageKind kind) {
+std::shared_ptr<watch::Instance> watch_instance(const std::string& verb,
+                                                const std::string& instance) {
+  return std::make_shared<watch::Instance>(caller(verb, instance));
+}
+
+std::string fetch_status_text(const std::string& verb, const std::string& instance) {
+  wire::Call daemon(caller(verb, instance));
   shm::Message question;
-  question.kind = kind;
-  return read_document(node.ask(question, {-1, -1}).descriptors[0]);
+  question.kind = shm::MessageKind::kStatus;
+  return wire::read_document(daemon.ask(question, kAnswerTime).descriptors[0]);
 }
 
-nlohmann::json read_document(const shm::FileDescriptor& descriptor) {
-  const int document = descriptor.get();
-  struct stat status {};
-  if (document < 0 || fstat(document, &status) != 0) throw Error("the daemon sent no document");
-  std::string text(static_cast<std::size_t>(status.st_size), '\0');
-  std::size_t at = 0;
-  while (at < text.size()) {
-    const ssize_t got = pread(document, text.data() + at, text.size() - at, static_cast<off_t>(at));
-    if (got <= 0) throw Error("the daemon's document cannot be read");
-    at += static_cast<std::size_t>(got);
-  }
-  return nlohmann::json::parse(text);
-}
-
-nlohmann::json fetch_status(detail::NodeCore& node) {
-  return fetch_document(node, shm::MessageKind::kStatus);
+wire::Status fetch_status(const std::string& verb, const std::string& instance) {
+  return wire::read_status(fetch_status_text(verb, instance));
 }
 
 shm::FileDescriptor catch_interrupts() {
@@ -84,16 +82,6 @@ bool sleep_until(shm::Nanoseconds time, const shm::FileDescriptor& interrupts) {
     if (ppoll(&interrupt, 1, &span, nullptr) == 1) return true;
     if (left <= 0) return false;
   }
-}
-
-// /proc/PID/stat: "pid (name) state …".
-bool is_stopped(int pid) {
-  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
-  std::string text;
-  std::getline(file, text);
-  const auto end = text.rfind(") ");
-  return end != std::string::npos && end + 2 < text.size() &&
-         (text[end + 2] == 'T' || text[end + 2] == 't');
 }
 
 std::string seconds_text(shm::Nanoseconds span) {

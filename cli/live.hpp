@@ -1,16 +1,17 @@
 // What the verbs that talk to a running daemon have in common.
 #pragma once
 
-#include <cstdint>
+#include <chrono>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include <arbiter/arbiter.hpp>
-#include <nlohmann/json_fwd.hpp>
 
-#include "client/node_core.hpp"
+#include "shm/activity.hpp"
 #include "shm/file_descriptor.hpp"
+#include "watch/instance.hpp"
+#include "wire/call.hpp"
+#include "wire/status.hpp"
 
 namespace CLI {
 class App;
@@ -24,19 +25,19 @@ void add_instance_option(CLI::App& verb, std::string& instance);
 // How long a verb looks for a daemon before it says that there is none.
 inline constexpr std::chrono::milliseconds kConnectTimeout{300};
 
-// Notices go to standard error.
+// Of a component. Notices go to standard error.
 NodeOptions live_options(const std::string& instance);
 
-// Connects to the daemon. Throws arbiter::Error.
-std::shared_ptr<detail::NodeCore> connect(const std::string& verb, const std::string& instance);
+// Says hello as "arbiter-VERB", and on standard error whom it waits for.
+wire::Caller caller(const std::string& verb, const std::string& instance);
 
-// A document that the daemon answers such a question with. Throws arbiter::Error.
-nlohmann::json fetch_document(detail::NodeCore& node, shm::MessageKind kind);
-// The daemon's status document. Throws arbiter::Error.
-nlohmann::json fetch_status(detail::NodeCore& node);
+// The instance, watched. Throws wire::CallError.
+std::shared_ptr<watch::Instance> watch_instance(const std::string& verb,
+                                                const std::string& instance);
 
-// A document that the daemon has sent. Throws arbiter::Error.
-nlohmann::json read_document(const shm::FileDescriptor& descriptor);
+// The daemon's status document, as text. Throws wire::CallError, wire::DocumentError.
+std::string fetch_status_text(const std::string& verb, const std::string& instance);
+wire::Status fetch_status(const std::string& verb, const std::string& instance);
 
 // SIGINT and SIGTERM as a descriptor, so that a stream ends with its summary. Call before threads
 // start.
@@ -44,9 +45,6 @@ shm::FileDescriptor catch_interrupts();
 
 // Sleeps until `time` on CLOCK_MONOTONIC, or until `interrupts` is readable; true: it is.
 bool sleep_until(shm::Nanoseconds time, const shm::FileDescriptor& interrupts);
-
-// Whether a process lives, and does not run: it was sent SIGSTOP, or is being debugged.
-bool is_stopped(int pid);
 
 // 1 500 000 000 -> "1.500 s".
 std::string seconds_text(shm::Nanoseconds span);

@@ -17,11 +17,11 @@ struct DeactivateOptions {
 };
 
 int deactivate(const DeactivateOptions& options) {
-  const auto node = connect("deactivate", options.instance);
+  wire::Call daemon(caller("deactivate", options.instance));
   shm::Message question;
   question.kind = shm::MessageKind::kDeactivate;
   question.set_name(options.source);
-  const bool was_active = node->ask(question, {-1, -1}).message.value != 0;
+  const bool was_active = daemon.ask(question).message.value != 0;
   std::cout << options.source << (was_active ? " is inactive now\n" : " was not active\n");
   return 0;
 }

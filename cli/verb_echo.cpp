@@ -2,6 +2,7 @@
 #include <poll.h>
 
 #include <cstdint>
+#include <exception>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -107,12 +108,10 @@ class Echo {
   }
 
   [[nodiscard]] std::uint64_t overtaken() const try {
-    const auto node = connect("echo-status", options_.instance);
-    for (const auto& input : fetch_status(*node).at("inputs")) {
-      if (input.at("name") == options_.port) return input.value("overtaken", std::uint64_t{0});
-    }
-    return 0;
-  } catch (const Error&) {
+    const auto status = fetch_status("echo-status", options_.instance);
+    const auto* input = status.find_input(options_.port);
+    return input == nullptr || !input->open ? 0 : input->open->overtaken;
+  } catch (const std::exception&) {
     return 0;  // the daemon has gone meanwhile
   }
 

@@ -1,6 +1,7 @@
 // arbiter graph: a model as a picture, still or of the running system.
 #include <algorithm>
 #include <cctype>
+#include <cstdint>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -14,13 +15,15 @@
 
 #include "cli/live.hpp"
 #include "cli/model_files.hpp"
-#include "cli/model_in_force.hpp"
 #include "cli/output_file.hpp"
 #include "cli/verbs.hpp"
 #include "drawing/drawing.hpp"
 #include "drawing/graphviz.hpp"
 #include "rules/ask/report.hpp"
 #include "shm/clock.hpp"
+#include "watch/instance.hpp"
+#include "watch/model_in_force.hpp"
+#include "watch/picture.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -30,6 +33,8 @@ using drawing::View;
 using nlohmann::json;
 
 constexpr shm::Nanoseconds kFollowPeriod = 100'000'000;
+// Where models change faster than they can be drawn.
+constexpr int kMostLoads = 5;
 
 struct GraphOptions {
   rules::ModelFiles files;
@@ -119,67 +124,38 @@ class Picture {
   std::string last_;
 };
 
-std::set<std::string> active_sources(const json& status) {
-  std::set<std::string> active;
-  for (const auto& source : status.at("sources")) {
-    if (source.at("active").get<bool>()) active.insert(source.at("name").get<std::string>());
-  }
-  return active;
-}
-
-// Whether the daemon names the winners that follow from the activities it names.
-bool agrees(const json& status, const Situation& situation) {
-  for (const auto& input : status.at("inputs")) {
-    if (!input.at("arbitrated").get<bool>()) continue;
-    const auto winner = situation.winners.find(input.at("name").get<std::string>());
-    const json& reported = input.at("winner");
-    const bool idle = winner == situation.winners.end();
-    if (idle ? !reported.is_null() : reported.is_null() || reported != winner->second) return false;
-  }
-  return true;
-}
-
+// What the sources do at one moment, and who wins by the rules that are drawn.
 struct LiveSituation {
   Situation situation;
-  bool fits = false;
-  std::shared_ptr<json> model;  // what the daemon has in force
+  std::uint64_t generation = 0;  // of the model in force then
+  bool fits = false;             // the daemon's table has the same winners
 };
 
-// The daemon reads one activity after another while the robot goes on, so that a picture might
-// combine moments; what it says is taken when it fits together. Where it never does, the daemon has
-// other rules than this model.
-LiveSituation look(detail::NodeCore& node, const rules::RuleSet& rules) {
-  constexpr int kTries = 20;
-  LiveSituation seen;
-  for (int i = 0; i < kTries && !seen.fits; ++i) {
-    const json status = fetch_status(node);
-    seen.situation = drawing::decide(rules, active_sources(status));
-    seen.fits = agrees(status, seen.situation);
-    seen.model = std::make_shared<json>(status.at("model"));
-    seen.model->emplace("directory", status.at("directory"));
-  }
-  return seen;
+// Of a port whose name has not come yet nothing is known.
+bool fits(const watch::Instance& instance, const watch::Picture& picture,
+          const Situation& situation) {
+  const auto& names = instance.port_names();
+  return std::all_of(names.begin(), names.end(), [&](const auto& port) {
+    if (!picture.snapshot.table.is_arbitrated(port.first)) return true;
+    const shm::SourceId winner = picture.winner_at(port.first);
+    const auto drawn = situation.winners.find(port.second);
+    if (drawn == situation.winners.end()) return winner == shm::kNone;
+    return winner != shm::kNone && instance.memory()->source_name(winner) == drawn->second;
+  });
 }
 
-// What the daemon has in force.
-struct FetchedModel {
-  json generation;
-  std::optional<rules::ModelTexts> texts;  // none: it has them from a former daemon, as a table
-};
-
-FetchedModel fetch_model(detail::NodeCore& node) {
-  const json document = fetch_document(node, shm::MessageKind::kModel);
-  FetchedModel model{document.at("generation"), {}};
-  if (!document.at("known").get<bool>()) return model;
-  const auto text_of = [](const json& file) {
-    return rules::FileText{file.at("path").get<std::string>(), file.at("text").get<std::string>()};
-  };
-  model.texts.emplace();
-  for (const auto& file : document.at("models")) model.texts->models.push_back(text_of(file));
-  if (const json& application = document.at("application"); !application.is_null()) {
-    model.texts->application = text_of(application);
+LiveSituation look(const watch::Instance& instance, const rules::RuleSet& rules) {
+  const shm::DecisionMemory& memory = *instance.memory();
+  for (;;) {
+    const watch::Picture picture = watch::take_picture(memory, watch::all_sources);
+    std::set<std::string> active;
+    for (const auto& [source, word] : picture.words) {
+      if (picture.is_active(source)) active.insert(memory.source_name(source));
+    }
+    LiveSituation seen{drawing::decide(rules, std::move(active)), picture.snapshot.generation};
+    seen.fits = fits(instance, picture, seen.situation);
+    if (memory.tables().is_whole(picture.snapshot)) return seen;
   }
-  return model;
 }
 
 // As the daemon sends it: what is not UTF-8 has been replaced.
@@ -202,32 +178,35 @@ bool same_texts(const rules::ModelTexts& ours, const rules::ModelTexts& theirs) 
 }
 
 // The files that the daemon names, where it does not know what was in them.
-rules::ModelFiles files_of(const json& model) {
+rules::ModelFiles files_of(const wire::Status& status) {
   rules::ModelFiles files;
-  const auto from_here = [&](const json& file) {  // the daemon may run in another directory
-    return path_from_here(file.get<std::string>(), model.at("directory").get<std::string>());
+  const auto from_here = [&](const std::string& file) {  // the daemon may run in another directory
+    return watch::path_from_here(file, status.directory);
   };
-  for (const auto& file : model.at("files")) files.models.push_back(from_here(file));
-  if (!model.at("application").is_null()) files.application = from_here(model.at("application"));
+  for (const auto& file : status.model.files) files.models.push_back(from_here(file));
+  if (status.model.application) files.application = from_here(*status.model.application);
   if (files.models.empty()) throw Error("the daemon has no model; give one: arbiter graph MODEL");
   return files;
 }
 
 class LivePicture {
  public:
-  LivePicture(const GraphOptions& options, std::shared_ptr<detail::NodeCore> node)
-      : options_(options), node_(std::move(node)), picture_(options) {}
+  LivePicture(const GraphOptions& options, watch::Instance& instance)
+      : options_(options), instance_(instance), picture_(options) {}
 
   // False: the model cannot be drawn.
   bool update() {
-    LiveSituation now = look(*node_, picture_.rules());
-    if (drawn_ != now.model->at("generation")) {
-      if (!load(*now.model)) return false;
-      now = look(*node_, picture_.rules());
-    }
+    LiveSituation now;
+    int tries = 0;
+    do {
+      // Another daemon may count its models from one again.
+      const bool is_drawn =
+          drawn_of_ == instance_.memory() && drawn_ == instance_.memory()->tables().generation();
+      if (!is_drawn && !load()) return false;
+      now = look(instance_, picture_.rules());
+    } while (now.generation != drawn_ && ++tries < kMostLoads);
     fits_ = now.fits;
-    if (!fits_ && is_same_ && now.model->at("generation") == drawn_ &&
-        !std::exchange(warned_, true)) {
+    if (!fits_ && is_same_ && !std::exchange(warned_, true)) {
       std::cerr << "arbiter: the daemon decides otherwise than this model does; is it the one in "
                    "force, and unchanged since? (arbiter status, arbiter reload)\n";
     }
@@ -236,71 +215,79 @@ class LivePicture {
   }
   // Whether the picture is of what the daemon does.
   [[nodiscard]] bool is_true() const { return fits_ && is_same_ && picture_.is_good(); }
-  // Another daemon may count its models from one again.
-  void forget_model() { drawn_ = nullptr; }
 
  private:
-  bool load(const json& model) {
-    const FetchedModel in_force = fetch_model(*node_);
+  bool load() {
+    const auto memory = instance_.memory();
+    const auto in_force = watch::ModelInForce::fetch(instance_);
     if (!options_.files.models.empty()) {
       const rules::ModelTexts given = rules::read_texts(options_.files);
       if (!picture_.load(given)) return false;
-      const bool is_none = in_force.generation == 0;
-      is_same_ = !is_none && (!in_force.texts || same_texts(given, *in_force.texts));
-      if (is_none) {
+      is_same_ =
+          !in_force.is_none() && (!in_force.has_texts() || same_texts(given, in_force.texts()));
+      if (in_force.is_none()) {
         std::cerr << "arbiter: the daemon has no model in force\n";
       } else if (!is_same_) {
         std::cerr << "arbiter: this is not the text of the model in force, model "
-                  << in_force.generation << "; the daemon may decide otherwise than is shown "
+                  << in_force.generation() << "; the daemon may decide otherwise than is shown "
                   << "(arbiter status names its files; arbiter reload has them read again)\n";
       }
-    } else {
-      const auto files = in_force.texts ? std::optional<rules::ModelFiles>() : files_of(model);
-      if (in_force.texts && in_force.texts->models.empty() && !in_force.texts->application) {
+    } else if (in_force.has_texts()) {
+      if (in_force.texts().models.empty() && !in_force.texts().application) {
         throw Error("the daemon has no model; give one: arbiter graph MODEL");
       }
-      if (!picture_.load(files ? rules::read_texts(*files) : *in_force.texts)) return false;
+      if (!picture_.load(in_force.texts())) return false;
+    } else if (!picture_.load(rules::read_texts(files_of(instance_.status())))) {
+      return false;
     }
-    drawn_ = in_force.generation;
+    drawn_of_ = memory;
+    drawn_ = in_force.generation();
     warned_ = false;
     return true;
   }
 
   const GraphOptions& options_;
-  const std::shared_ptr<detail::NodeCore> node_;
+  watch::Instance& instance_;
   Picture picture_;
-  json drawn_;  // the generation of the model that the picture is of
+  std::shared_ptr<const shm::DecisionMemory> drawn_of_;
+  std::uint64_t drawn_ = 0;  // the generation of the model that the picture is of
   bool fits_ = false;
   bool is_same_ = true;  // as far as it is known: given is what is in force
   bool warned_ = false;
 };
 
 int draw_live(const GraphOptions& options) {
-  const auto node = connect("graph", options.instance);
-  LivePicture picture(options, node);
+  const auto instance = watch_instance("graph", options.instance);
+  LivePicture picture(options, *instance);
   if (!picture.update()) return 1;
   return picture.is_true() ? 0 : 1;
 }
 
+// While there is no daemon, what was decided last goes on, and so does the picture of it.
 int follow(const GraphOptions& options) {
   const shm::FileDescriptor interrupts = catch_interrupts();
-  NodeOptions node_options = live_options(options.instance);
-  node_options.on_waiting = [](const std::string&) {};  // said below, once
-  const auto node = detail::make_node("arbiter-graph", node_options);
-  LivePicture picture(options, node);
+  const auto instance = watch_instance("graph", options.instance);
+  LivePicture picture(options, *instance);
   if (!picture.update()) return 1;
   bool is_alone = false;
+  std::string said;
   for (shm::Nanoseconds next = shm::monotonic_now();;) {
     next = std::max(next + kFollowPeriod, shm::monotonic_now());
     if (sleep_until(next, interrupts)) return 0;
+    instance->update();
+    if (is_alone != !instance->has_daemon()) {
+      is_alone = !is_alone;
+      std::cerr << (is_alone ? "arbiter: the daemon has gone; what it decided last goes on, and is "
+                               "drawn on\n"
+                             : "arbiter: a daemon is there again\n");
+    }
     try {
       if (!picture.update()) return 1;
-      if (std::exchange(is_alone, false)) std::cerr << "arbiter: a daemon is there again\n";
+    } catch (const wire::CallError&) {
+      // The daemon has gone before it could be asked for its model: the next one is.
     } catch (const Error& error) {
-      picture.forget_model();
-      if (std::exchange(is_alone, true)) continue;
-      std::cerr << "arbiter: the daemon has gone (" << error.what() << "); " << options.output
-                << " stays as it was until one comes\n";
+      if (std::exchange(said, error.what()) == error.what()) continue;
+      std::cerr << "arbiter: " << error.what() << "; " << options.output << " stays as it was\n";
     }
   }
 }

@@ -8,10 +8,11 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "cli/conversation.hpp"
+#include "cli/changes.hpp"
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
+#include "wire/document.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -33,21 +34,17 @@ struct HistoryOptions {
 };
 
 int history(const HistoryOptions& options) {
-  const auto status = fetch_status(*connect("history", options.instance));
-  const auto& models = status.at("history");
+  const auto models = fetch_status("history", options.instance).history;
   if (options.json) {
-    std::cout << models.dump(2) << '\n';
+    std::cout << wire::write_document(to_json(models));
     return 0;
   }
   for (const auto& model : models) {
-    std::cout << std::setw(4) << model.at("generation").get<std::uint64_t>() << "  "
-              << time_text(model.at("since_ms").get<std::int64_t>()) << "  "
-              << model.at("name").get<std::string>() << "  " << model.at("how").get<std::string>();
-    if (!model.at("by").is_null()) std::cout << ", by " << model.at("by").get<std::string>();
-    std::cout << (model.at("is_kept").get<bool>() ? "\n" : "  (not kept)\n");
-    if (!model.at("changes").is_null()) {
-      std::cout << "      " << model.at("changes").get<std::string>() << '\n';
-    }
+    std::cout << std::setw(4) << model.generation << "  " << time_text(model.since_ms) << "  "
+              << model.name << "  " << model.how;
+    if (model.by) std::cout << ", by " << *model.by;
+    std::cout << (model.is_kept ? "\n" : "  (not kept)\n");
+    if (model.changes) std::cout << "      " << *model.changes << '\n';
   }
   if (models.empty()) std::cout << "no model has been in force\n";
   return 0;
@@ -63,9 +60,8 @@ int rollback(const RollbackOptions& options) {
   shm::Message question;
   question.kind = shm::MessageKind::kRollback;
   question.link = options.generation;
-  return write_result(
-      Conversation("rollback", options.instance).ask_for_change(question, options.json),
-      options.json);
+  return write_result(ask_for_change("rollback", options.instance, question, options.json),
+                      options.json);
 }
 
 }  // namespace

@@ -11,16 +11,21 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/live.hpp"
 #include "cli/verbs.hpp"
+#include "client/node_core.hpp"
 #include "rules/ask/report.hpp"
 #include "rules/explain/simulation.hpp"
+#include "rules/explain/tenure.hpp"
 #include "rules/explain/trace.hpp"
 #include "shm/clock.hpp"
+#include "watch/instance.hpp"
+#include "watch/picture.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -34,18 +39,25 @@ struct PlayOptions {
   double speed = 1;
 };
 
+// Of names that the model does not mention play speaks itself.
+std::shared_ptr<detail::NodeCore> make_node(const std::string& instance) {
+  NodeOptions options = live_options(instance);
+  options.on_notice = [say = std::move(options.on_notice)](const Notice& notice) {
+    if (notice.kind != NoticeKind::unmentioned) say(notice);
+  };
+  return detail::make_node("arbiter-play", options);
+}
+
 class Player {
  public:
   Player(const PlayOptions& options, const std::vector<rules::TraceEvent>& events)
-      : options_(options), node_(connect("play", options.instance)), memory_(node_->memory()) {
-    shm::Message observe;
-    observe.kind = shm::MessageKind::kObserve;
-    static_cast<void>(node_->ask(observe, {-1, -1}));
+      : options_(options), node_(make_node(options.instance)) {
     for (const auto& event : events) {
       if (event.kind == rules::TraceKind::kTick || outputs_.count(event.source) != 0) continue;
       outputs_[event.source] =
           node_->open_output(event.source, detail::port_type<std::uint64_t>(), OutputPortOptions{});
     }
+    instance_ = watch_instance("play", options.instance);  // which sees what has been opened
   }
   Player(const Player&) = delete;
   Player& operator=(const Player&) = delete;
@@ -54,9 +66,10 @@ class Player {
   }
 
   void note_unknown_sources() const {
-    const auto table = memory_->tables().snapshot().table;
+    const auto table = instance_->memory()->tables().snapshot().table;
     for (const auto& [name, output] : outputs_) {
-      if (table.knows_source(output->source())) continue;
+      const auto source = instance_->find_source(name);
+      if (source && table.knows_source(*source)) continue;
       std::cerr << "arbiter: note: the daemon's model does not know " << name << '\n';
     }
   }
@@ -79,67 +92,56 @@ class Player {
 
  private:
   void play(const rules::TraceEvent& event, shm::Nanoseconds at) {
-    detail::OutputCore* output = nullptr;
-    if (event.kind != rules::TraceKind::kTick) output = outputs_.at(event.source).get();
     if (event.kind == rules::TraceKind::kArrival) {
       ++counter_;
-      output->publish_copy(&counter_, sizeof counter_, at);
-    } else if (output != nullptr) {
-      output->deactivate(at);
+      outputs_.at(event.source)->publish_copy(&counter_, sizeof counter_, at);
+    } else if (event.kind == rules::TraceKind::kDeactivation) {
+      outputs_.at(event.source)->deactivate(at);
     }
-    const shm::TableSnapshot snapshot = memory_->tables().snapshot();
-    for (const auto& [name, port] : ports_of(event, output, snapshot.table)) {
-      rules::write_outcome(std::cout,
-                           {event, name, outcome_at(port, event, output, snapshot.table, at)});
+    instance_->update();
+    for (const auto& [name, port] : ports_of(event)) {
+      rules::write_outcome(std::cout, {event, name, outcome_at(port, event, at)});
     }
   }
 
   // In byte order of their names.
-  std::map<std::string, shm::PortId> ports_of(const rules::TraceEvent& event,
-                                              const detail::OutputCore* output,
-                                              const shm::TableView& table) {
-    std::map<std::string, shm::PortId> ports;
-    const auto names = node_->port_names();
-    if (event.kind == rules::TraceKind::kArrival) {
-      const auto concerned = table.ports_concerned(output->source());
-      for (shm::Word i = 0; i < concerned.count; ++i) {
-        if (const auto name = names.find(concerned[i]); name != names.end()) {
-          ports[name->second] = name->first;
-        }
-      }
-      return ports;
+  [[nodiscard]] std::map<std::string, shm::PortId> ports_of(const rules::TraceEvent& event) const {
+    const auto table = instance_->memory()->tables().snapshot().table;
+    std::set<shm::PortId> concerned;
+    const bool is_arrival = event.kind == rules::TraceKind::kArrival;
+    if (const auto source = instance_->find_source(event.source); is_arrival && source) {
+      const auto ports = table.ports_concerned(*source);
+      for (shm::Word i = 0; i < ports.count; ++i) concerned.insert(ports[i]);
     }
-    for (const auto& [port, name] : names) {
-      if (table.is_arbitrated(port)) ports[name] = port;
+    std::map<std::string, shm::PortId> result;
+    for (const auto& [port, name] : instance_->port_names()) {
+      if (is_arrival ? concerned.count(port) != 0 : table.is_arbitrated(port)) result[name] = port;
     }
-    return ports;
+    return result;
   }
 
   // By the live tables and activities, whether or not a component has the port open.
-  rules::PortOutcome outcome_at(shm::PortId port, const rules::TraceEvent& event,
-                                const detail::OutputCore* output, const shm::TableView& table,
-                                shm::Nanoseconds at) const {
-    shm::DecisionClock clock(at, true);
-    shm::Decider decider(table, memory_->pages(), clock);
+  [[nodiscard]] rules::PortOutcome outcome_at(shm::PortId port, const rules::TraceEvent& event,
+                                              shm::Nanoseconds at) const {
+    const shm::DecisionMemory& memory = *instance_->memory();
+    watch::Picture picture = watch::take_picture(memory, watch::sources_at(port));
+    picture.now = at;
+    const shm::TableView& table = picture.snapshot.table;
+    const auto is_active = [&](shm::SourceId source) { return picture.is_active(source); };
+    const shm::SourceId winner = rules::winner_at(table, port, is_active);
     rules::PortOutcome outcome;
-    if (event.kind == rules::TraceKind::kArrival && output != nullptr) {
-      const shm::Rule own = table.rule(table.find(output->source(), port));
-      outcome.delivered = decider.decide(own) == shm::Verdict::kWins;
-    }
-    const auto range = table.connections_to(port);
-    for (auto index = range.first; index != range.first + range.count; ++index) {
-      const shm::Rule rule = table.rule(index);
-      if (decider.decide_with_own(rule) != shm::Verdict::kWins) continue;
-      outcome.winner = memory_->source_name(rule.source);
-      break;
-    }
+    if (winner != shm::kNone) outcome.winner = memory.source_name(winner);
+    if (event.kind != rules::TraceKind::kArrival) return outcome;
+    const auto own = instance_->find_source(event.source);
+    outcome.delivered = own && table.find(*own, port) != shm::kNone &&
+                        (winner == *own || !table.is_arbitrated(port));
     return outcome;
   }
 
   const PlayOptions& options_;
   std::shared_ptr<detail::NodeCore> node_;
-  const std::shared_ptr<const detail::SharedMemory> memory_;
   std::map<std::string, std::shared_ptr<detail::OutputCore>> outputs_;
+  std::shared_ptr<watch::Instance> instance_;
   std::uint64_t counter_ = 0;
 };
 

@@ -2,11 +2,11 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
-#include "cli/conversation.hpp"
+#include "cli/changes.hpp"
 #include "cli/live.hpp"
 #include "cli/verbs.hpp"
 
@@ -20,29 +20,19 @@ struct ReloadOptions {
 };
 
 // One model of several, in a dry run.
-void write_changes(const nlohmann::json& model, bool is_alone) {
-  const auto& changes = model.at("changes");
-  if (!is_alone) {
-    std::cout << model.at("name").get<std::string>()
-              << (model.at("in_force").get<bool>() ? " (in force)" : "") << ": ";
-  }
-  if (changes.is_null()) {
-    std::cout << "not compared: what is in force is a former daemon's\n";
-    return;
-  }
-  std::cout << changes.at("text").get<std::string>();
+void write_changes(const wire::ModelComparison& model, bool is_alone) {
+  if (!is_alone) std::cout << model.name << (model.in_force ? " (in force)" : "") << ": ";
+  std::cout << (model.changes ? model.changes->text
+                              : "not compared: what is in force is a former daemon's\n");
 }
 
 int reload(const ReloadOptions& options) {
   shm::Message question;
   question.kind = shm::MessageKind::kReload;
   question.flags = options.dry_run ? shm::kDryRun : 0u;
-  const auto report =
-      Conversation("reload", options.instance).ask_for_change(question, options.json);
-  if (!options.dry_run || options.json || !report.at("ok").get<bool>()) {
-    return write_result(report, options.json);
-  }
-  const auto& models = report.at("models");
+  const auto report = ask_for_change("reload", options.instance, question, options.json);
+  if (!options.dry_run || options.json || !report.ok) return write_result(report, options.json);
+  const auto models = report.models.value_or(std::vector<wire::ModelComparison>());
   for (const auto& model : models) write_changes(model, models.size() == 1);
   std::cout << "nothing was changed; arbiter reload puts it in force\n";
   return 0;

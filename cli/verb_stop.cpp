@@ -5,7 +5,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/conversation.hpp"
 #include "cli/live.hpp"
 #include "cli/verbs.hpp"
 
@@ -13,7 +12,7 @@ namespace arbiter::cli {
 namespace {
 
 int stop(const std::string& instance) {
-  Conversation daemon("stop", instance);
+  wire::Call daemon(caller("stop", instance));
   const shm::FileDescriptor process = daemon.process();
   shm::Message question;
   question.kind = shm::MessageKind::kStop;

@@ -6,9 +6,10 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "cli/conversation.hpp"
+#include "cli/changes.hpp"
 #include "cli/live.hpp"
 #include "cli/verbs.hpp"
+#include "wire/document.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -20,20 +21,16 @@ struct SwitchOptions {
 };
 
 int list(const SwitchOptions& options) {
-  const auto status = fetch_status(*connect("switch", options.instance));
-  const auto& models = status.at("models");
+  const auto models = fetch_status("switch", options.instance).models;
   if (options.json) {
-    std::cout << models.dump(2) << '\n';
+    std::cout << wire::write_document(to_json(models));
     return 0;
   }
   for (const auto& model : models) {
-    const bool is_in_force = model.at("in_force").get<bool>();
-    std::cout << (is_in_force ? "* " : "  ") << model.at("name").get<std::string>();
-    for (const auto& file : model.at("files")) std::cout << ' ' << file.get<std::string>();
-    if (!model.at("application").is_null()) {
-      std::cout << ", application " << model.at("application").get<std::string>();
-    }
-    if (is_in_force && !model.at("as_loaded").get<bool>()) {
+    std::cout << (model.in_force ? "* " : "  ") << model.name;
+    for (const auto& file : model.files) std::cout << ' ' << file;
+    if (model.application) std::cout << ", application " << *model.application;
+    if (model.in_force && !model.as_loaded) {
       std::cout << "  (in force is an older one: a rollback)";
     }
     std::cout << '\n';
@@ -47,9 +44,8 @@ int switch_model(const SwitchOptions& options) {
   shm::Message question;
   question.kind = shm::MessageKind::kSwitch;
   question.set_name(options.model);
-  return write_result(
-      Conversation("switch", options.instance).ask_for_change(question, options.json),
-      options.json);
+  return write_result(ask_for_change("switch", options.instance, question, options.json),
+                      options.json);
 }
 
 }  // namespace

@@ -8,34 +8,34 @@
 #include <utility>
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
-#include "cli/live_port.hpp"
+#include "cli/live.hpp"
 #include "cli/name_warnings.hpp"
 #include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
 #include "cli/why_answer.hpp"
 #include "cli/why_follow.hpp"
+#include "watch/port.hpp"
 
 namespace arbiter::cli {
 namespace {
 
 int answer(const WhyOptions& options) {
-  const auto node = connect("why", options.instance);
-  LivePort port(node, options.port);
+  const auto instance = watch_instance("why", options.instance);
+  watch::Port port(instance, options.port);
   for (;;) {
-    Look look = port.look();
+    watch::Look look = port.look();
     auto explanation = port.explain(look);
     if (!explanation) continue;  // another model has come into force: that is rare
     port.add_timeouts(look);
-    const nlohmann::json status = fetch_status(*node);
+    const wire::Status status = instance->status();
     const WhyAnswer answer(options, port, std::move(look), std::move(*explanation), status);
     answer.check_source();
     if (options.json) {
       answer.write_json();
     } else {
       answer.write_text();
-      write_text(std::cout, port.name_warnings());
+      write_text(std::cout, name_warnings(port.diagnostics()));
     }
     return 0;
   }

@@ -8,7 +8,9 @@
 #include <string_view>
 #include <utility>
 
+#include "cli/model_report.hpp"
 #include "cli/name_warnings.hpp"
+#include "cli/why_report.hpp"
 #include "cli/why_summary.hpp"
 #include "rules/text/names.hpp"
 
@@ -17,6 +19,9 @@ namespace {
 
 using nlohmann::json;
 using rules::ConnectionExplanation;
+using watch::Look;
+using watch::ModelInForce;
+using watch::Obstacle;
 
 // Of ports with more connections than this, inactive ones are told of in short.
 constexpr std::size_t kMaxTold = 8;
@@ -41,25 +46,6 @@ void write_obstacles(const std::vector<Obstacle>& obstacles, const std::string& 
   for (const auto& each : obstacles) std::cout << "  ! " << of << each.text << '\n';
 }
 
-// Of a file of the model in force; empty where it is as it was read.
-std::string file_advice(FileNow::State state, bool is_older) {
-  switch (state) {
-    case FileNow::State::kSame:
-      return {};
-    case FileNow::State::kGone:
-      return " is not there any more: arbiter reload would be refused";
-    case FileNow::State::kUnreadable:
-      return " cannot be read from here: whether it has changed since is not known";
-    case FileNow::State::kChanged:
-      break;
-  }
-  return is_older ? " says something else: in force is an older one, a rollback; arbiter reload "
-                    "would leave it for what the file says now (arbiter reload --dry-run tells "
-                    "what that changes)"
-                  : " has changed since; arbiter reload puts it in force, unless it has errors "
-                    "(arbiter reload --dry-run tells)";
-}
-
 // The winner first, then who would like to win.
 int rank(const ConnectionExplanation& connection) {
   return connection.wins ? 0 : connection.is_active ? 1 : 2;
@@ -67,17 +53,17 @@ int rank(const ConnectionExplanation& connection) {
 
 }  // namespace
 
-WhyAnswer::WhyAnswer(const WhyOptions& options, const LivePort& port, Look look,
-                     rules::PortExplanation explanation, const json& status)
+WhyAnswer::WhyAnswer(const WhyOptions& options, const watch::Port& port, Look look,
+                     rules::PortExplanation explanation, const wire::Status& status)
     : options_(options),
       port_(port),
       look_(std::move(look)),
       explanation_(std::move(explanation)),
       obstacles_(status, port.name(), look_.sources, port.known_sources(), port.known_ports()),
       tenure_(
-          rules::tenure_of(look_.snapshot.table, port.id(), look_.winner,
+          rules::tenure_of(look_.table(), port.id(), look_.winner,
                            {look_.sources.now(), port.model().since(port.name()),
-                            [this](shm::SourceId source) { return look_.words.at(source); },
+                            [this](shm::SourceId source) { return look_.picture.words.at(source); },
                             [this](shm::SourceId source) {
                               return look_.sources.state(port_.source_name(source)).arrived_by();
                             }})),
@@ -106,9 +92,9 @@ void WhyAnswer::check_source() const {
       other ? "; model \"" + *other + "\" has it: arbiter switch " + *other
             : rules::advise(options_.source, known,
                             "a behaviour's <config> or a <select> makes a connection");
-  throw Error("there is no connection from " + options_.source + " to " + port_.name() +
-              ", and its rules do not read it, in " + model.text() + ", which is in force" +
-              advice);
+  throw watch::WatchError("there is no connection from " + options_.source + " to " + port_.name() +
+                          ", and its rules do not read it, in " + model.text() +
+                          ", which is in force" + advice);
 }
 
 bool WhyAnswer::is_only_named(const std::string& source) const {
@@ -220,7 +206,7 @@ void WhyAnswer::write_port() const {
   }
   write_model();
   write_obstacles(obstacles_.of_port());
-  if (!look_.is_settled) {
+  if (!look_.picture.is_settled) {
     std::cout << "  ! sources change faster than they can be looked at: this may be of several "
                  "moments\n";
   }
@@ -233,7 +219,7 @@ void WhyAnswer::write_port() const {
 void WhyAnswer::write_model() const {
   const ModelInForce& model = port_.model();
   if (!model.is_none()) {
-    std::cout << "  by " << model.text() << model.origin_text(look_.sources.now()) << '\n';
+    std::cout << "  by " << model.text() << origin_text(model, look_.sources.now()) << '\n';
   }
   for (const auto& file : model.files_now()) {
     const std::string advice = file_advice(file.state, model.is_older());
@@ -285,7 +271,7 @@ json WhyAnswer::since_json() const {
 }
 
 std::string WhyAnswer::state_text(const std::string& source) const {
-  std::string text = look_.sources.describe(source);
+  std::string text = activity_text(look_.sources, source);
   const std::string component = obstacles_.component_of(source);
   if (component.empty()) return text;
   text += "; component " + component + " has it open";
@@ -371,18 +357,18 @@ void WhyAnswer::write_json() const {
       explanation_.winner && !obstacles_.why_it_cannot_deliver(*explanation_.winner).empty();
   json document = {{"port", port_.name()},
                    {"at_ns", look_.sources.now()},
-                   {"settled", look_.is_settled},
-                   {"model", port_.model().to_json()},
+                   {"settled", look_.picture.is_settled},
+                   {"model", model_json(port_.model())},
                    {"arbitrated", look_.is_arbitrated},
                    {"mentioned", look_.is_mentioned},
                    {"selected", selected},
                    {"winner", is_useless ? json(nullptr) : selected},
                    {"nothing_comes_of_it", nullptr},
                    {"since", nullptr},
-                   {"obstacles", to_json(obstacles_.of_port())},
+                   {"obstacles", obstacles_json(obstacles_.of_port())},
                    {"connections", json::array()},
                    {"senses", json::array()},
-                   {"warnings", to_json(port_.name_warnings())}};
+                   {"warnings", to_json(name_warnings(port_.diagnostics()))}};
   if (look_.is_arbitrated) document["since"] = since_json();
   if (explanation_.winner) {
     const std::string why = is_useless ? obstacles_.why_it_cannot_deliver(*explanation_.winner)
@@ -392,14 +378,14 @@ void WhyAnswer::write_json() const {
   for (const auto& each : shown_) {
     json connection = connection_json(each, look_.sources);
     connection["component"] = component_json(each.source);
-    connection["obstacles"] = to_json(obstacles_.of_connection(each.source));
+    connection["obstacles"] = obstacles_json(obstacles_.of_connection(each.source));
     document["connections"].push_back(std::move(connection));
   }
   for (const auto& source : explanation_.senses) {
     if (!options_.source.empty() && source != options_.source) continue;
-    json sensed = look_.sources.to_json(source);
+    json sensed = activity_json(look_.sources, source);
     sensed["component"] = component_json(source);
-    sensed["obstacles"] = to_json(obstacles_.of_source(source));
+    sensed["obstacles"] = obstacles_json(obstacles_.of_source(source));
     document["senses"].push_back(std::move(sensed));
   }
   std::cout << document.dump(2, ' ', false, json::error_handler_t::replace) << '\n';

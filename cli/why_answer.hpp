@@ -6,19 +6,20 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/live_port.hpp"
-#include "cli/obstacles.hpp"
 #include "cli/why_follow.hpp"
 #include "rules/explain/explain.hpp"
 #include "rules/explain/tenure.hpp"
+#include "watch/obstacles.hpp"
+#include "watch/port.hpp"
+#include "wire/status.hpp"
 
 namespace arbiter::cli {
 
 class WhyAnswer {
  public:
   // Keeps references.
-  WhyAnswer(const WhyOptions& options, const LivePort& port, Look look,
-            rules::PortExplanation explanation, const nlohmann::json& status);
+  WhyAnswer(const WhyOptions& options, const watch::Port& port, watch::Look look,
+            rules::PortExplanation explanation, const wire::Status& status);
 
   // Throws Error where the source is none of this port's.
   void check_source() const;
@@ -50,10 +51,10 @@ class WhyAnswer {
   [[nodiscard]] std::string state_text(const std::string& source) const;
 
   const WhyOptions& options_;
-  const LivePort& port_;
-  const Look look_;
+  const watch::Port& port_;
+  const watch::Look look_;
   const rules::PortExplanation explanation_;
-  const Obstacles obstacles_;
+  const watch::Obstacles obstacles_;
   const rules::Tenure tenure_;
   std::vector<rules::ConnectionExplanation> shown_;  // as the model has them
   std::vector<std::string> reasons_;                 // sources that keep active connections out

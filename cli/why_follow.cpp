@@ -6,6 +6,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/live.hpp"
+#include "cli/model_report.hpp"
+#include "cli/why_report.hpp"
 #include "rules/explain/change.hpp"
 #include "shm/clock.hpp"
 
@@ -13,6 +16,7 @@ namespace arbiter::cli {
 namespace {
 
 using nlohmann::json;
+using watch::Look;
 
 // How often --follow looks, beside the times at which it knows that an activity ends: publishers do
 // not ring for those who merely observe.
@@ -23,7 +27,7 @@ class Follower {
   Follower(const WhyOptions& options, shm::FileDescriptor interrupts)
       : options_(options),
         interrupts_(std::move(interrupts)),
-        port_(connect("why", options.instance), options.port),
+        port_(watch_instance("why", options.instance), options.port),
         started_(shm::monotonic_now()),
         last_(port_.look()) {
     static_cast<void>(port_.explain(last_));  // fetches the model while there is a daemon
@@ -34,7 +38,7 @@ class Follower {
     std::uint64_t changes = 0;
     while (std::cout) {
       const shm::Nanoseconds soon = shm::monotonic_now() + kLookEvery;
-      if (sleep_until(std::min(soon, last_.next_end()), interrupts_)) return 0;
+      if (sleep_until(std::min(soon, last_.picture.next_end()), interrupts_)) return 0;
       watch_daemon();
       Look look = port_.look();
       if (look.winner != last_.winner || name_of(look) != name_of(last_)) {
@@ -49,7 +53,8 @@ class Follower {
  private:
   // Not among the changes: decisions do not depend on it.
   void watch_daemon() {
-    const bool is_alone = !port_.has_daemon();
+    port_.instance().update();
+    const bool is_alone = !port_.instance().has_daemon();
     if (is_alone == std::exchange(is_alone_, is_alone)) return;
     std::cerr << (is_alone ? "arbiter: the daemon has gone; what it decided last goes on, and is "
                              "followed on\n"
@@ -57,7 +62,7 @@ class Follower {
   }
 
   [[nodiscard]] std::string name_of(const Look& look) const {
-    if (look.snapshot.generation == 0) return "no model";
+    if (look.generation() == 0) return "no model";
     if (!look.is_mentioned) return "not mentioned";  // nothing comes; else all comes:
     if (!look.is_arbitrated) return "not arbitrated";
     return look.winner == shm::kNone ? "idle" : port_.source_name(look.winner);
@@ -76,7 +81,7 @@ class Follower {
       return;
     }
     std::cout << seconds_text(last_.sources.now() - started_) << "  " << port_.name() << ": ";
-    if (last_.snapshot.generation == 0) {
+    if (last_.generation() == 0) {
       std::cout << "no model is in force";
     } else if (!last_.is_mentioned) {
       std::cout << port_.model().text() << " does not mention it: no connection leads to it";
@@ -95,22 +100,22 @@ class Follower {
     const auto explanation = port_.explain(look);
     if (!explanation) return false;
     port_.add_timeouts(look);
-    const bool is_new_model = look.snapshot.generation != last_.snapshot.generation;
+    const bool is_new_model = look.generation() != last_.generation();
     const auto causes = rules::causes_of_change(
-        look.snapshot.table, port_.id(),
-        [&](shm::SourceId source) { return last_.is_active(source); },
-        [&](shm::SourceId source) { return look.is_active(source); });
+        look.table(), port_.id(),
+        [&](shm::SourceId source) { return last_.picture.is_active(source); },
+        [&](shm::SourceId source) { return look.picture.is_active(source); });
     // What has happened has happened before it was seen.
     shm::Nanoseconds at = look.sources.now();
     for (const shm::SourceId source : causes) {
       at = std::min(at,
                     event_time(look.sources.state(port_.source_name(source)), look.sources.now()));
     }
-    const ModelInForce& model = port_.model();
+    const watch::ModelInForce& model = port_.model();
     if (is_new_model && model.since() != 0) at = model.since();
     std::string because;
     if (is_new_model) {
-      because = model.text() + " came into force" + model.how_text();
+      because = model.text() + " came into force" + how_text(model);
     }
     if (!causes.empty() && !is_new_model) because = events_text(port_, causes, look);
     const std::string loser = loss_text(*explanation, name_of(last_), look.sources);
@@ -127,7 +132,7 @@ class Follower {
                   {"old", winner_json(last_)},
                   {"winner", winner_json(look)},
                   {"because", std::move(events)},
-                  {"model", is_new_model ? json(look.snapshot.generation) : json(nullptr)},
+                  {"model", is_new_model ? json(look.generation()) : json(nullptr)},
                   {"old_loses", loser.empty() ? json(nullptr) : json(loser)}});
       return true;
     }
@@ -139,7 +144,7 @@ class Follower {
 
   const WhyOptions& options_;
   const shm::FileDescriptor interrupts_;
-  LivePort port_;
+  watch::Port port_;
   const shm::Nanoseconds started_;
   Look last_;
   bool is_alone_ = false;
@@ -147,7 +152,7 @@ class Follower {
 
 }  // namespace
 
-std::string events_text(const LivePort& port, const std::vector<shm::SourceId>& sources,
+std::string events_text(const watch::Port& port, const std::vector<shm::SourceId>& sources,
                         const Look& look) {
   std::string text;
   for (const shm::SourceId source : sources) {

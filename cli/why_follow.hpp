@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/live_port.hpp"
+#include "shm/ids.hpp"
+#include "watch/port.hpp"
 
 namespace arbiter::cli {
 
@@ -19,11 +20,11 @@ struct WhyOptions {
   std::uint64_t count = 0;  // of changes; 0: until interrupted
 };
 
-// Returns the exit code. Throws Error.
+// Returns the exit code. Throws as watch::Port does.
 int follow_winners(const WhyOptions& options);
 
 // What happened to these sources last: "/a became active and /b was deactivated".
-std::string events_text(const LivePort& port, const std::vector<shm::SourceId>& sources,
-                        const Look& look);
+std::string events_text(const watch::Port& port, const std::vector<shm::SourceId>& sources,
+                        const watch::Look& look);
 
 }  // namespace arbiter::cli

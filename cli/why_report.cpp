@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <optional>
 
 #include "rules/model/print_rules.hpp"
 #include "rules/text/names.hpp"
@@ -41,7 +42,7 @@ std::string literals_text(const std::vector<rules::Literal>& literals, const Sou
   std::string text;
   for (std::size_t i = 0; i < std::min(literals.size(), kMaxNamed); ++i) {
     if (i != 0) text += i + 1 == literals.size() ? " and " : ", ";
-    text += literals[i].source + " is " + sources.describe(literals[i].source);
+    text += literals[i].source + " is " + activity_text(sources, literals[i].source);
   }
   if (literals.size() > kMaxNamed) {
     text += ", and " + std::to_string(literals.size() - kMaxNamed) + " more as they are";
@@ -74,28 +75,6 @@ std::string inhibition_text(const rules::Cause& cause, const Sources& sources) {
 }
 
 }  // namespace
-
-// The word tells the end; the arrival follows from the T that was in force then.
-std::optional<shm::Nanoseconds> SourceState::last_arrival() const {
-  if (word == shm::kNeverActive || shm::is_deactivation(word)) return std::nullopt;
-  if (timeout_before && shm::is_finite(word)) {
-    const bool has_stood = word == word_at_change;
-    if (has_stood || timeout == shm::kForever || word - timeout < timeout_changed) {
-      return std::nullopt;
-    }
-  }
-  return shm::arrival_of(word, timeout);
-}
-
-std::optional<shm::Nanoseconds> SourceState::arrived_by() const {
-  if (!timeout_before || !shm::is_finite(word) || word == shm::kNeverActive) return std::nullopt;
-  return last_arrival() ? std::nullopt : std::optional(timeout_changed);
-}
-
-SourceState Sources::state(const std::string& name) const {
-  const auto found = states_.find(name);
-  return found == states_.end() ? SourceState() : found->second;
-}
 
 std::string span_text(shm::Nanoseconds span) {
   char text[64];
@@ -131,37 +110,40 @@ std::string past_timeout_text(const SourceState& source) {
          timeout_text(source) + ")";
 }
 
+// Of those whose last arrival is not known.
+std::string ending_text(const SourceState& source, shm::Nanoseconds now) {
+  return "active (for " + span_text(source.word - now) + " more; " + past_timeout_text(source);
+}
+
+std::string ended_text(const SourceState& source, shm::Nanoseconds now) {
+  return "inactive (since " + span_text(now - source.word) + " ago; " + past_timeout_text(source);
+}
+
 }  // namespace
 
-std::string Sources::ending_text(const SourceState& source) const {
-  return "active (for " + span_text(source.word - now_) + " more; " + past_timeout_text(source);
-}
-
-std::string Sources::ended_text(const SourceState& source) const {
-  return "inactive (since " + span_text(now_ - source.word) + " ago; " + past_timeout_text(source);
-}
-
-std::string Sources::describe(const std::string& name) const {
-  const SourceState source = state(name);
+std::string activity_text(const Sources& sources, const std::string& name) {
+  const SourceState source = sources.state(name);
+  const shm::Nanoseconds now = sources.now();
   if (!source.is_visible) return "not to be seen yet (the daemon has no page of its activity)";
   if (source.word == shm::kNeverActive) return "inactive (it has never arrived)";
   if (shm::is_deactivation(source.word)) {
-    const shm::Nanoseconds ago = now_ - (source.word & ~shm::kDeactivatedFlag);
+    const shm::Nanoseconds ago = now - (source.word & ~shm::kDeactivatedFlag);
     return "inactive (deactivated " + (ago <= 0 ? "just now" : span_text(ago) + " ago") + ")";
   }
   const auto arrival = source.last_arrival();
-  if (!arrival) return is_active(name) ? ending_text(source) : ended_text(source);
-  const shm::Nanoseconds span = now_ - *arrival;
+  const bool is_active = sources.is_active(name);
+  if (!arrival) return is_active ? ending_text(source, now) : ended_text(source, now);
+  const shm::Nanoseconds span = now - *arrival;
   const std::string since =
       (span <= 0 ? "just now" : span_text(span) + " ago") + ", " + timeout_text(source) + ")";
-  return is_active(name) ? "active (arrived " + since : "inactive (last arrival " + since;
+  return is_active ? "active (arrived " + since : "inactive (last arrival " + since;
 }
 
-json Sources::to_json(const std::string& name) const {
-  const SourceState source = state(name);
+json activity_json(const Sources& sources, const std::string& name) {
+  const SourceState source = sources.state(name);
   json result = {
       {"source", name},
-      {"active", is_active(name)},
+      {"active", sources.is_active(name)},
       {"timeout_ns", source.timeout == shm::kForever ? json("forever") : json(source.timeout)},
       {"timeout_from", source.timeout_place.empty() ? json(nullptr) : json(source.timeout_place)},
       {"last_arrival_ns", nullptr},
@@ -225,7 +207,7 @@ std::string headline(const rules::Cause& cause) {
 
 std::string first_cause(const rules::ConnectionExplanation& connection, const Sources& sources) {
   if (!connection.has_rule) return "no rule selects it, so that it never delivers here";
-  if (!connection.is_active) return "it is " + sources.describe(connection.source);
+  if (!connection.is_active) return "it is " + activity_text(sources, connection.source);
   if (connection.earlier) {
     return *connection.earlier + " comes before it in the model, and conflict=\"first\" is set";
   }
@@ -282,7 +264,7 @@ void write_causes(std::ostream& out, const rules::ConnectionExplanation& connect
 }
 
 json connection_json(const rules::ConnectionExplanation& connection, const Sources& sources) {
-  json result = sources.to_json(connection.source);
+  json result = activity_json(sources, connection.source);
   result["winner"] = connection.wins;
   result["has_rule"] = connection.has_rule;
   if (!connection.has_rule) {
@@ -324,6 +306,12 @@ json event_json(const std::string& source, const SourceState& state, shm::Nanose
                      : shm::is_active(state.word, now) ? "active"
                                                        : "expired";
   return {{"source", source}, {"became", what}, {"at_ns", event_time(state, now)}};
+}
+
+json obstacles_json(const std::vector<watch::Obstacle>& obstacles) {
+  json result = json::array();
+  for (const auto& each : obstacles) result.push_back({{"code", each.code}, {"text", each.text}});
+  return result;
 }
 
 }  // namespace arbiter::cli

@@ -1,9 +1,7 @@
 // How explanations are told: in words and as JSON.
 #pragma once
 
-#include <functional>
-#include <map>
-#include <optional>
+#include <cstddef>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -12,48 +10,17 @@
 
 #include "rules/explain/explain.hpp"
 #include "shm/activity.hpp"
+#include "watch/obstacles.hpp"
+#include "watch/sources.hpp"
 
 namespace arbiter::cli {
 
-// What is known of a source at the time of the explanation.
-struct SourceState {
-  shm::ActivityWord word = shm::kNeverActive;
-  shm::Nanoseconds timeout = shm::kDefaultTimeout;
-  bool is_visible = true;       // else the daemon has no page of its activity yet
-  std::string timeout_place{};  // "model.xml:3", "default"; empty: not to be told
-  // Of a source whose T is another than before: which it was, and until when.
-  std::optional<shm::Nanoseconds> timeout_before{};
-  shm::Nanoseconds timeout_changed = 0;
-  shm::ActivityWord word_at_change = shm::kNeverActive;
+using watch::Sources;
+using watch::SourceState;
 
-  // Nothing where it cannot be told, because T may have been another one then.
-  [[nodiscard]] std::optional<shm::Nanoseconds> last_arrival() const;
-  // In that case: when it was at the latest.
-  [[nodiscard]] std::optional<shm::Nanoseconds> arrived_by() const;
-};
-
-// The activities that an explanation is about.
-class Sources {
- public:
-  void set(const std::string& name, const SourceState& state) { states_[name] = state; }
-  void set_time(shm::Nanoseconds now) { now_ = now; }
-
-  [[nodiscard]] shm::Nanoseconds now() const { return now_; }
-  [[nodiscard]] SourceState state(const std::string& name) const;
-  [[nodiscard]] bool is_active(const std::string& name) const {
-    return shm::is_active(state(name).word, now_);
-  }
-  // "active (arrived 40 ms ago, T 500ms)", "inactive (last arrival 3.2 s ago, T 500ms)".
-  [[nodiscard]] std::string describe(const std::string& name) const;
-  [[nodiscard]] nlohmann::json to_json(const std::string& name) const;
-
- private:
-  [[nodiscard]] std::string ending_text(const SourceState& source) const;
-  [[nodiscard]] std::string ended_text(const SourceState& source) const;
-
-  std::map<std::string, SourceState> states_;
-  shm::Nanoseconds now_ = 0;
-};
+// "active (arrived 40 ms ago, T 500ms)", "inactive (last arrival 3.2 s ago, T 500ms)".
+std::string activity_text(const Sources& sources, const std::string& name);
+nlohmann::json activity_json(const Sources& sources, const std::string& name);
 
 // 3 200 000 000 -> "3.2 s".
 std::string span_text(shm::Nanoseconds span);
@@ -87,5 +54,7 @@ nlohmann::json event_json(const std::string& source, const SourceState& state,
                           shm::Nanoseconds now);
 // When a source has last changed, as its word tells.
 shm::Nanoseconds event_time(const SourceState& state, shm::Nanoseconds now);
+
+nlohmann::json obstacles_json(const std::vector<watch::Obstacle>& obstacles);
 
 }  // namespace arbiter::cli

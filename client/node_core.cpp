@@ -1,7 +1,6 @@
 // Connecting, opening and closing ports, questions and answers.
 #include "client/node_core.hpp"
 
-#include <poll.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <sys/timerfd.h>
@@ -14,7 +13,7 @@
 #include <utility>
 
 #include "client/node_names.hpp"
-#include "wire/instances.hpp"
+#include "wire/call.hpp"
 #include "wire/rendezvous.hpp"
 
 namespace arbiter::detail {
@@ -22,14 +21,12 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// How often a client looks for a daemon that does not answer yet.
+// Without a service thread: how often a caller that waits looks whether there is news.
 constexpr milliseconds kConnectInterval{20};
 // The longest time to wait for one; longer means for ever.
 constexpr milliseconds kMaxConnectTimeout = std::chrono::hours(24 * 365);
 // A daemon that is there has at least this long to answer: it may be taking over from another.
 constexpr milliseconds kMinAnswerTime{1000};
-// The longest wait for an answer before looking for another daemon.
-constexpr milliseconds kMaxAnswerTime = std::chrono::seconds(60);
 // The most that max_memory may be: a segment has queues and headers beside the samples.
 constexpr std::size_t kMostMemory = shm::kMaxSegmentSize - (std::size_t{16} << 20);
 // Nobody is told of a shorter wait.
@@ -47,21 +44,6 @@ shm::Message message_of(shm::MessageKind kind, std::string_view name = {}) {
   message.kind = kind;
   message.set_name(name);
   return message;
-}
-
-// Whether nobody has hung up.
-bool is_open(const shm::FileDescriptor& socket) {
-  pollfd hung_up{socket.get(), POLLRDHUP, 0};
-  return ::poll(&hung_up, 1, 0) == 0;
-}
-
-// What to say of a daemon that has accepted us and does not answer: it is stopped, or busy.
-std::string silence_of(const shm::FileDescriptor& socket, const std::string& instance,
-                       std::chrono::steady_clock::time_point since) {
-  const auto span =
-      std::chrono::duration_cast<milliseconds>(std::chrono::steady_clock::now() - since);
-  return shm::describe_daemon(socket.get(), instance) + " runs, but did not answer within " +
-         std::to_string(span.count()) + " ms: it is stopped, or busy";
 }
 
 }  // namespace
@@ -94,28 +76,12 @@ void NodeCore::hang_up() const noexcept {
 }
 
 void NodeCore::connect() {
-  const auto begin = Clock::now();
-  const auto give_up = begin + std::min(options_.connect_timeout, kMaxConnectTimeout);
-  bool said = false;
-  std::string why_not, who_is_silent;
-  for (;;) {
-    who_is_silent.clear();
-    if (auto socket = shm::connect_to_daemon(instance_, why_not)) {
-      socket_ = std::make_shared<const shm::FileDescriptor>(std::move(*socket));
-      shm::close_in_children(*socket_);
-      const auto asked = Clock::now();
-      if (say_hello(give_up)) break;
-      if (is_open(*socket_)) who_is_silent = silence_of(*socket_, instance_, asked);
-    }
-    const auto now = Clock::now();
-    if (now >= give_up && !who_is_silent.empty()) throw Error(who_is_silent);
-    if (now >= give_up) throw Error(nobody_answers(why_not) + shm::describe_listening_instances());
-    if (!said && now - begin >= kQuietWait) {
-      say_that_we_wait();
-      said = true;
-    }
-    std::this_thread::sleep_for(std::min<Clock::duration>(kConnectInterval, give_up - now));
-  }
+  wire::Welcome welcome = wire::join(caller());
+  socket_ = std::make_shared<const shm::FileDescriptor>(std::move(welcome.socket));
+  auto& [board, registry] = welcome.received.descriptors;
+  memory_ = std::make_shared<SharedMemory>(std::move(board), std::move(registry), service_bell_,
+                                           residence());
+  node_ = welcome.received.message.link;
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   timer_.reset(timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
   shm::close_in_children(epoll_);
@@ -128,44 +94,23 @@ void NodeCore::connect() {
   }
 }
 
-// False: it does not answer. Throws Error where it refuses.
-bool NodeCore::say_hello(Clock::time_point give_up) {
-  pollfd readable{socket_->get(), POLLIN, 0};
-  const auto left = std::clamp(std::chrono::duration_cast<milliseconds>(give_up - Clock::now()),
-                               kMinAnswerTime, kMaxAnswerTime);
-  shm::Received welcome;
-  if (shm::send_message(socket_->get(), hello()) != shm::SendResult::kSent ||
-      ::poll(&readable, 1, static_cast<int>(left.count())) != 1 ||
-      shm::receive_message(socket_->get(), welcome, false) != shm::ReceiveResult::kReceived) {
-    return false;
-  }
-  if (welcome.message.kind == shm::MessageKind::kRefused) {
-    throw Error("the daemon refuses: " + std::string(welcome.message.text_view()));
-  }
-  memory_ =
-      std::make_shared<SharedMemory>(std::move(welcome.descriptors[0]),
-                                     std::move(welcome.descriptors[1]), service_bell_, residence());
-  node_ = welcome.message.link;
-  return true;
-}
-
 shm::Residence NodeCore::residence() const noexcept {
   return options_.lock_memory ? shm::Residence::kLocked : shm::Residence::kMapped;
 }
 
-shm::Message NodeCore::hello() const {
-  shm::Message hello = message_of(shm::MessageKind::kHello, name_);
-  hello.value = shm::kWireVersion;
-  hello.flags = shm::kComesBack | (options_.service_thread ? shm::kHasServiceThread : 0u);
-  return hello;
+wire::Caller NodeCore::caller() const {
+  wire::Caller caller;
+  caller.name = name_;
+  caller.instance = instance_;
+  caller.flags = shm::kComesBack | (options_.service_thread ? shm::kHasServiceThread : 0u);
+  caller.patience = options_.connect_timeout;
+  caller.answer_time = kMinAnswerTime;
+  caller.quiet = kQuietWait;
+  caller.on_waiting = [this](const std::string&) { say_that_we_wait(); };
+  return caller;
 }
 
-std::string NodeCore::nobody_answers(const std::string& why_not) const {
-  return "no arbiterd of instance \"" + instance_ + "\" answered within " +
-         std::to_string(options_.connect_timeout.count()) + " ms" +
-         (why_not.empty() ? "" : " (" + why_not + ")") +
-         "; start one with: arbiterd --model FILE --instance " + instance_;
-}
+shm::Message NodeCore::hello() const { return wire::hello_of(caller()); }
 
 // Not under a lock: a callback may do what it likes, and throw.
 void NodeCore::say_that_we_wait() const {
@@ -196,11 +141,6 @@ std::shared_ptr<SharedMemory> NodeCore::memory() {
   return memory_;
 }
 
-bool NodeCore::has_daemon() {
-  const std::lock_guard lock(mutex_);
-  return standing_ == Standing::kMember;
-}
-
 void NodeCore::say(const shm::Message& message) noexcept {
   if (socket_ != nullptr) static_cast<void>(shm::send_message(socket_->get(), message));
 }
@@ -220,17 +160,11 @@ void NodeCore::forget_port(shm::PortInstance port) {
 
 shm::Received NodeCore::ask(const shm::Message& question,
                             std::array<int, shm::kMaxDescriptors> descriptors) {
-  shm::Received answer;
   try {
-    answer = converse(question, descriptors);
+    return converse(question, descriptors);
   } catch (const ThrownByCallback& callback) {
     std::rethrow_exception(callback.thrown);
   }
-  if (question.kind == shm::MessageKind::kObserve) {
-    const std::lock_guard lock(mutex_);
-    observes_ = true;
-  }
-  return answer;
 }
 
 bool NodeCore::wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_point give_up) {
@@ -311,7 +245,7 @@ shm::Received NodeCore::converse(const shm::Message& question,
     const bool is_there = standing_ == Standing::kMember;
     give_up_on(request);
     throw Error(is_there ? "the daemon is there, but has not answered in time"
-                         : nobody_answers(turned_away_));
+                         : wire::nobody_answers(caller(), turned_away_));
   }
   const auto answered = replies_.extract(request);
   if (!answered.mapped().refusal.empty()) {
@@ -392,11 +326,6 @@ void NodeCore::close(shm::PortInstance port) noexcept {
   }
   given_.erase(port);
   say_closed(port);
-}
-
-std::map<shm::PortId, std::string> NodeCore::port_names() {
-  const std::lock_guard lock(mutex_);
-  return port_names_;
 }
 
 }  // namespace arbiter::detail

@@ -31,6 +31,7 @@
 #include "client/memory.hpp"
 #include "client/output_core.hpp"
 #include "shm/descendants.hpp"
+#include "wire/call.hpp"
 #include "wire/messages.hpp"
 
 namespace arbiter::detail {
@@ -65,12 +66,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   shm::Received ask(const shm::Message& question,
                     std::array<int, shm::kMaxDescriptors> descriptors);
 
-  [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
   [[nodiscard]] std::shared_ptr<SharedMemory> memory();
-  // Else the last one has gone, or stopped listening to us, and another is looked for.
-  [[nodiscard]] bool has_daemon();
-  // Names of input ports, as far as the daemon has told them (kObserve).
-  [[nodiscard]] std::map<shm::PortId, std::string> port_names();
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -95,14 +91,13 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   enum class Standing : std::uint8_t { kMember, kRejoining, kAlone };
 
   void connect();
-  bool say_hello(Clock::time_point give_up);
   // May throw what a callback throws, as ThrownByCallback.
   void say_that_we_wait() const;
   // The same, without the lock meanwhile. If it throws, the request is given up.
   void say_that_we_wait(std::unique_lock<std::mutex>& lock, std::uint64_t request);
   void give_up_on(std::uint64_t request);
   [[nodiscard]] shm::Message hello() const;
-  [[nodiscard]] std::string nobody_answers(const std::string& why_not) const;
+  [[nodiscard]] wire::Caller caller() const;
 
   void start_service_thread();
   void run_service_thread();
@@ -191,13 +186,11 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::uint64_t node_ = 0;          // our number among all nodes
   std::string turned_away_;         // why the last daemon did not take us back
   bool is_anew_ = false;            // rejoining with nothing to hand back
-  bool observes_ = false;
   bool stopping_ = false;
   std::uint64_t next_request_ = 1;
   std::map<std::uint64_t, Reply> replies_;
   std::map<shm::PortInstance, std::shared_ptr<OutputCore>> outputs_;
   std::map<shm::PortInstance, std::shared_ptr<InputCore>> inputs_;
-  std::map<shm::PortId, std::string> port_names_;
   std::vector<Notice> notices_;  // to be given
   bool is_giving_ = false;
   std::map<shm::PortInstance, std::set<std::string>> given_;  // texts, by port

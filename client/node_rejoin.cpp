@@ -176,7 +176,6 @@ void NodeCore::be_welcomed(shm::Received& welcome) {
       memory_ = std::make_shared<SharedMemory>(std::move(welcome.descriptors[0]),
                                                std::move(welcome.descriptors[1]), service_bell_,
                                                residence());
-      port_names_.clear();
     } catch (const std::exception& error) {
       turned_away_ = error.what();
       be_alone(kTurnedAwayInterval);
@@ -187,11 +186,6 @@ void NodeCore::be_welcomed(shm::Received& welcome) {
   ++conversation_;
   node_ = welcome.message.link;
   turned_away_.clear();
-  if (observes_) {
-    shm::Message observe;
-    observe.kind = shm::MessageKind::kObserve;
-    say(observe);
-  }
   news_.notify_all();
 }
 

@@ -196,11 +196,6 @@ void NodeCore::handle(shm::Received& received) {
     case shm::MessageKind::kOutputGrown:
       hear_of_growth(message);
       break;
-    case shm::MessageKind::kPortName: {
-      const std::lock_guard lock(mutex_);
-      port_names_[message.id] = message.name_view();
-      break;
-    }
     case shm::MessageKind::kPeerGone:
     case shm::MessageKind::kDisconnected:
       end_peer(message);

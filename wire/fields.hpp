@@ -129,7 +129,7 @@ class FieldReader {
   }
   template <class T>
   void maybe(const char* key, std::optional<T>& value) {
-    if (const auto* found = find(key)) read(*found, path_of(key), value.emplace());
+    if (const auto* found = find(key)) read(*found, path_of(key), value);
   }
   template <class T>
   void beside(const char* key, std::optional<T>& value) {
@@ -185,7 +185,8 @@ class FieldReader {
     if (!from.is_array()) refuse_type(path, from, "an array");
     values.clear();
     for (const Json& each : from) {
-      read(each, path + '[' + std::to_string(values.size()) + ']', values.emplace_back());
+      const std::string place = path + '[' + std::to_string(values.size()) + ']';
+      read(each, place, values.emplace_back());
     }
   }
   template <class T>

@@ -7,6 +7,7 @@
 
 #include "wire/document.hpp"
 #include "wire/fields.hpp"
+#include "wire/past_model_fields.hpp"
 
 namespace arbiter::wire {
 namespace {
@@ -85,19 +86,6 @@ void describe(auto& field, Is<LoadedModelStatus> auto& of) {
   field("as_loaded", of.as_loaded);
   field("files", of.files);
   field("application", of.application);
-}
-
-void describe(auto& field, Is<PastModelStatus> auto& of) {
-  field("generation", of.generation);
-  field("content", of.content);
-  field("name", of.name);
-  field("files", of.files);
-  field("application", of.application);
-  field("since_ms", of.since_ms);
-  field("how", of.how);
-  field("by", of.by);
-  field("changes", of.changes);
-  field("is_kept", of.is_kept);
 }
 
 void describe(auto& field, Is<StrangerStatus> auto& of) {

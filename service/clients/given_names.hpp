@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::service {
 

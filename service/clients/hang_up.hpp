@@ -5,7 +5,7 @@
 #include <sys/types.h>
 
 #include "shm/file_descriptor.hpp"
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::service {
 

@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "service/policy/shares.hpp"
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::service {
 

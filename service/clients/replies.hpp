@@ -8,7 +8,7 @@
 #include "service/clients/client.hpp"
 #include "shm/activity.hpp"
 #include "shm/file_descriptor.hpp"
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::service {
 

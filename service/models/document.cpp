@@ -5,83 +5,74 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <system_error>
-
-#include <nlohmann/json.hpp>
+#include <vector>
 
 #include "shm/segment.hpp"
+#include "wire/model_document.hpp"
 
 namespace arbiter::service {
 namespace {
 
-using nlohmann::json;
-
-json file_json(const rules::FileText& file) {
-  return {{"path", file.path}, {"text", file.content}};
+std::optional<std::string> or_nothing(const std::string& text) {
+  return text.empty() ? std::nullopt : std::optional(text);
 }
 
-json timeout_json(shm::Nanoseconds timeout) {
-  return timeout == shm::kForever ? json("forever") : json(timeout);
-}
-
-json connections_json(const rules::CompiledModel& model) {
-  json ports = json::object();
+std::map<std::string, std::vector<std::string>> connections_of(const rules::CompiledModel& model) {
+  std::map<std::string, std::vector<std::string>> ports;
   for (const auto& port : model.ports) {
-    json& sources = ports[port.port] = json::array();
+    auto& sources = ports[port.port];
     for (const auto& rule : port.rules) sources.push_back(rule.source);
   }
   return ports;
 }
 
-void add_origin(const ModelDocumentOf& of, json& document) {
+void add_origin(const ModelDocumentOf& of, wire::ModelDocument& document) {
   const std::string name = of.models.name();
   const PastModel* latest = of.history.find(of.models.in_force().generation);
-  const bool is_named = !name.empty() && name != kDefaultModel;
-  document["name"] = is_named ? json(name) : json(nullptr);
-  document["how"] = latest == nullptr ? json(nullptr) : json(latest->how);
+  if (name != kDefaultModel) document.name = or_nothing(name);
+  if (latest != nullptr) {
+    document.how = latest->how;
+    document.by = or_nothing(latest->by);
+  }
   const auto& loaded = of.library.models();
   const auto is_it = [&](const LoadedModel& each) { return each.model == of.model; };
-  document["as_loaded"] =
-      of.model == nullptr ? json(nullptr) : json(std::any_of(loaded.begin(), loaded.end(), is_it));
-  document["by"] = latest == nullptr || latest->by.empty() ? json(nullptr) : json(latest->by);
-  document["in_force_since_ns"] = of.models.in_force_since();
+  if (of.model != nullptr) {
+    document.as_loaded = std::any_of(loaded.begin(), loaded.end(), is_it);
+  }
+  document.in_force_since = of.models.in_force_since();
 }
 
-void add_texts(const ModelDocumentOf& of, json& document) {
+void add_texts(const ModelDocumentOf& of, wire::ModelDocument& document) {
   const auto* texts = of.model == nullptr ? nullptr : of.model->compiled.texts.get();
-  document["known"] = texts != nullptr;
-  document["directory"] = working_directory();
-  document["models"] = json::array();
-  document["application"] = nullptr;
+  document.known = texts != nullptr;
+  document.directory = working_directory();
   if (texts == nullptr) return;
-  for (const auto& file : texts->models) document["models"].push_back(file_json(file));
-  if (texts->application) document["application"] = file_json(*texts->application);
-}
-
-void add_past(const ModelDocumentOf& of, json& document) {
-  document["ports_since_ns"] = json::object();
-  for (const auto& [port, since] : of.continuity.ports()) document["ports_since_ns"][port] = since;
-  document["timeouts_before"] = json::object();
-  for (const auto& [source, past] : of.continuity.timeouts()) {
-    document["timeouts_before"][source] = {
-        {"timeout_ns", timeout_json(past.timeout)}, {"until_ns", past.until}, {"word", past.word}};
+  for (const auto& file : texts->models) document.models.push_back({file.path, file.content});
+  if (texts->application) {
+    document.application = {texts->application->path, texts->application->content};
   }
 }
 
 std::string document_of(const ModelDocumentOf& of) {
-  json document = {{"generation", of.models.in_force().generation}, {"others", json::array()}};
+  wire::ModelDocument document;
+  document.generation = of.models.in_force().generation;
   add_origin(of, document);
   add_texts(of, document);
-  add_past(of, document);
+  for (const auto& [port, since] : of.continuity.ports()) document.ports_since[port] = since;
+  for (const auto& [source, past] : of.continuity.timeouts()) {
+    document.timeouts_before[source] = {past.timeout, past.until, past.word};
+  }
   for (const LoadedModel& each : of.library.models()) {
     if (each.model == of.model) continue;
-    document["others"].push_back(
-        {{"name", each.model->name}, {"ports", connections_json(each.model->compiled)}});
+    document.others.push_back({each.model->name, connections_of(each.model->compiled)});
   }
   // Application files may be in Latin-1; JSON may not.
-  return document.dump(-1, ' ', false, json::error_handler_t::replace);
+  return wire::write_model_document(document);
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <set>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
 namespace arbiter::service {
 
 std::int64_t calendar_ms() {
@@ -64,6 +66,8 @@ wire::PastModelStatus status_of(const PastModel& entry) {
           entry.files.application,   entry.since_ms,        entry.how,  or_nothing(entry.by),
           or_nothing(entry.changes), entry.model != nullptr};
 }
+
+nlohmann::json to_json(const PastModel& entry) { return wire::to_json(status_of(entry)); }
 
 std::vector<wire::PastModelStatus> History::status() const {
   std::vector<wire::PastModelStatus> result;

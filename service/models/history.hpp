@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "service/models/library.hpp"
 #include "wire/status.hpp"
 
@@ -28,6 +30,7 @@ struct PastModel {
 
 // As the status document has it.
 [[nodiscard]] wire::PastModelStatus status_of(const PastModel& entry);
+[[nodiscard]] nlohmann::json to_json(const PastModel& entry);
 
 // The calendar's time, in milliseconds since 1970.
 [[nodiscard]] std::int64_t calendar_ms();

@@ -32,7 +32,7 @@
 #include "service/takeover/strangers.hpp"
 #include "shm/activity.hpp"
 #include "shm/file_descriptor.hpp"
-#include "shm/wire.hpp"
+#include "wire/messages.hpp"
 
 namespace arbiter::service {
 

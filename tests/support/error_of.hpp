@@ -1,8 +1,7 @@
 #pragma once
 
+#include <exception>
 #include <string>
-
-#include <arbiter/arbiter.hpp>
 
 namespace arbiter::test {
 
@@ -11,7 +10,7 @@ template <class Act>
 std::string error_of(Act act) {
   try {
     act();
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     return error.what();
   }
   return "no error";

@@ -5,11 +5,10 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
+#include "watch/sources.hpp"
+#include "wire/status.hpp"
 
-#include "cli/why_report.hpp"
-
-namespace arbiter::cli {
+namespace arbiter::watch {
 
 struct Obstacle {
   const char* code;  // docs/explaining.md has them
@@ -18,9 +17,9 @@ struct Obstacle {
 
 class Obstacles {
  public:
-  // Keeps references. `known_sources` and `known_ports`: those that the model mentions; empty where
-  // that is not known.
-  Obstacles(const nlohmann::json& status, const std::string& port, const Sources& sources,
+  // Keeps references, and looks into /proc. `known_sources` and `known_ports`: those that the model
+  // mentions; empty where that is not known.
+  Obstacles(const wire::Status& status, const std::string& port, const Sources& sources,
             std::vector<std::string> known_sources, std::vector<std::string> known_ports);
 
   [[nodiscard]] std::vector<Obstacle> of_port() const;
@@ -38,24 +37,24 @@ class Obstacles {
   [[nodiscard]] std::string component_of(const std::string& source) const;
 
  private:
-  using Json = nlohmann::json;
-  [[nodiscard]] const Json* connection_of(const std::string& source) const;
-  [[nodiscard]] bool is_away() const;
-  // A component that this daemon does not know, and that has the port open. `ports`: "inputs" or
-  // "outputs".
-  [[nodiscard]] const Json* stranger_with(const char* ports, const std::string& name) const;
+  using Ports = std::vector<std::string> wire::StrangerStatus::*;
+
+  [[nodiscard]] const wire::ConnectionStatus* connection_of(const std::string& source) const;
+  [[nodiscard]] bool is_away() const { return input_ != nullptr && input_->away_pid; }
+  [[nodiscard]] bool is_open() const { return input_ != nullptr && input_->open; }
+  // A component that this daemon does not know, and that has the port open.
+  [[nodiscard]] const wire::StrangerStatus* stranger_with(Ports ports,
+                                                          const std::string& name) const;
   void add_other_strangers(std::vector<Obstacle>& result) const;
   void add_port_name(std::vector<Obstacle>& result) const;
   void add_publisher(const std::string& source, std::vector<Obstacle>& result) const;
   [[nodiscard]] std::optional<Obstacle> other_source(const std::string& name) const;
 
-  const Json& status_;
+  const wire::Status& status_;
   const std::string port_;
   const Sources& sources_;
   const std::vector<std::string> known_sources_, known_ports_;
-  const Json* input_;  // null: the status does not have it
+  const wire::InputStatus* input_;  // null: the status does not have it
 };
 
-nlohmann::json to_json(const std::vector<Obstacle>& obstacles);
-
-}  // namespace arbiter::cli
+}  // namespace arbiter::watch

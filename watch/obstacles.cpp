@@ -1,4 +1,4 @@
-#include "cli/obstacles.hpp"
+#include "watch/obstacles.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -6,29 +6,28 @@
 #include <string_view>
 #include <utility>
 
-#include "cli/live.hpp"
 #include "rules/text/names.hpp"
+#include "watch/process.hpp"
 
-namespace arbiter::cli {
+namespace arbiter::watch {
 namespace {
 
-using nlohmann::json;
+using wire::StrangerStatus;
 
-// Of whatever the status tells the node and the pid.
-std::string process_text(const json& component) {
-  return component.at("node").get<std::string>() + " (pid " +
-         std::to_string(component.at("pid").get<int>()) + ")";
+// Of a component, or a stranger.
+std::string process_text(const auto& process) {
+  return process.node + " (pid " + std::to_string(process.pid) + ")";
 }
 
-std::string component_text(const json& port) { return process_text(port.at("component")); }
+// Of a port that is open.
+std::string component_text(const auto& port) { return process_text(port.open->component); }
 
 void add_stopped(int pid, const std::string& who, std::vector<Obstacle>& result) {
   if (!is_stopped(pid)) return;
   result.push_back({"component-stopped", who + " is stopped: its process does not run"});
 }
 
-void add_away(const json& port, std::vector<Obstacle>& result) {
-  const int pid = port.at("away_pid").get<int>();
+void add_away(int pid, std::vector<Obstacle>& result) {
   const std::string who = "its component (pid " + std::to_string(pid) + ")";
   result.push_back({"component-away", who +
                                           " lives, but has not come back to this daemon yet: what "
@@ -36,63 +35,57 @@ void add_away(const json& port, std::vector<Obstacle>& result) {
   add_stopped(pid, who, result);
 }
 
-void add_unknown(const json& stranger, std::vector<Obstacle>& result) {
+void add_unknown(const StrangerStatus& stranger, std::vector<Obstacle>& result) {
   const std::string who = "component " + process_text(stranger);
   result.push_back({"component-unknown",
                     who + " lives and has it open, but this daemon does not know it, for what the "
                           "last one knew is lost: it goes on by itself, as was decided last; "
                           "restart it"});
-  add_stopped(stranger.at("pid").get<int>(), who, result);
-}
-
-const json* find_named(const json& list, const char* key, const std::string& name) {
-  for (const auto& each : list) {
-    if (each.at(key) == name) return &each;
-  }
-  return nullptr;
+  add_stopped(stranger.pid, who, result);
 }
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// The open ports of a list that the model does not mention, and that `name` may stand for.
-const json* find_near(const json& list, const std::vector<std::string>& known,
+// The open port of a list that the model does not mention, and that `name` may stand for.
+template <class Port>
+const Port* find_near(const std::vector<Port>& list, const std::vector<std::string>& known,
                       const std::string& name) {
   if (known.empty()) return nullptr;  // what it mentions is not known
   std::vector<std::string_view> names;
-  for (const auto& each : list) {
-    const auto& candidate = each.at("name").get_ref<const std::string&>();
-    if (each.at("open").get<bool>() && !contains(known, candidate)) names.push_back(candidate);
+  for (const Port& each : list) {
+    if (each.open && !contains(known, each.name)) names.push_back(each.name);
   }
   const auto similar = rules::find_similar(name, names);
-  return similar ? find_named(list, "name", *similar) : nullptr;
+  if (!similar) return nullptr;
+  return &*std::find_if(list.begin(), list.end(),
+                        [&](const Port& each) { return each.name == *similar; });
 }
 
-std::string unmentioned_text(const json& port) {
-  return "component " + component_text(port) + " has " + port.at("name").get<std::string>() +
+std::string unmentioned_text(const auto& port) {
+  return "component " + component_text(port) + " has " + port.name +
          " open, which the model does not mention; is that the one meant?";
 }
 
 }  // namespace
 
-Obstacles::Obstacles(const json& status, const std::string& port, const Sources& sources,
+Obstacles::Obstacles(const wire::Status& status, const std::string& port, const Sources& sources,
                      std::vector<std::string> known_sources, std::vector<std::string> known_ports)
     : status_(status),
       port_(port),
       sources_(sources),
       known_sources_(std::move(known_sources)),
       known_ports_(std::move(known_ports)),
-      input_(find_named(status.at("inputs"), "name", port)) {}
+      input_(status.find_input(port)) {}
 
 std::vector<Obstacle> Obstacles::of_port() const {
   std::vector<Obstacle> result;
-  const json* stranger = stranger_with("inputs", port_);
-  if (input_ != nullptr && input_->at("open").get<bool>()) {
-    add_stopped(input_->at("component").at("pid").get<int>(),
-                "its component " + component_text(*input_), result);
+  const StrangerStatus* stranger = stranger_with(&StrangerStatus::inputs, port_);
+  if (is_open()) {
+    add_stopped(input_->open->component.pid, "its component " + component_text(*input_), result);
   } else if (is_away()) {
-    add_away(*input_, result);
+    add_away(*input_->away_pid, result);
   } else if (stranger == nullptr) {
     result.push_back({"port-not-open", "no component has the port open: nothing is taken"});
   }
@@ -102,28 +95,27 @@ std::vector<Obstacle> Obstacles::of_port() const {
   return result;
 }
 
-bool Obstacles::is_away() const { return input_ != nullptr && input_->at("away").get<bool>(); }
-
-const json* Obstacles::stranger_with(const char* ports, const std::string& name) const {
-  for (const auto& each : status_.at("strangers")) {
-    const json& list = each.at(ports);
-    if (std::find(list.begin(), list.end(), name) != list.end()) return &each;
-  }
-  return nullptr;
+const StrangerStatus* Obstacles::stranger_with(Ports ports, const std::string& name) const {
+  const auto found =
+      std::find_if(status_.strangers.begin(), status_.strangers.end(),
+                   [&](const StrangerStatus& each) { return contains(each.*ports, name); });
+  return found == status_.strangers.end() ? nullptr : &*found;
 }
 
-// Those that no port and no source which is told of here names: who is said not to be there may be
-// one of them.
+// Those that no port and no source that is spoken of here names: one of them may be what seems to
+// be missing.
 void Obstacles::add_other_strangers(std::vector<Obstacle>& result) const {
-  std::set<const json*> told{stranger_with("inputs", port_)};
-  for (const char* list : {"connections", "senses"}) {
-    if (input_ == nullptr) break;
-    for (const auto& each : input_->at(list)) {
-      told.insert(stranger_with("outputs", each.at("source").get<std::string>()));
-    }
+  std::set<const StrangerStatus*> told{stranger_with(&StrangerStatus::inputs, port_)};
+  const auto tell = [&](const std::string& source) {
+    told.insert(stranger_with(&StrangerStatus::outputs, source));
+  };
+  if (input_ != nullptr) {
+    for (const auto& each : input_->connections) tell(each.source);
+    for (const auto& each : input_->senses) tell(each.source);
   }
-  const auto others = std::count_if(status_.at("strangers").begin(), status_.at("strangers").end(),
-                                    [&](const json& each) { return told.count(&each) == 0; });
+  const auto others =
+      std::count_if(status_.strangers.begin(), status_.strangers.end(),
+                    [&](const StrangerStatus& each) { return told.count(&each) == 0; });
   if (others == 0) return;
   result.push_back({"others-unknown", (others == 1 ? "a component runs"
                                                    : std::to_string(others) + " components run") +
@@ -139,47 +131,49 @@ void Obstacles::add_port_name(std::vector<Obstacle>& result) const {
       result.push_back(
           {"near-name", "the model mentions " + *similar + "; is that the one meant?"});
     }
-  } else if (input_ == nullptr || !input_->at("open").get<bool>()) {
-    const json* other = find_near(status_.at("inputs"), known_ports_, port_);
+  } else if (!is_open()) {
+    const auto* other = find_near(status_.inputs, known_ports_, port_);
     if (other != nullptr) result.push_back({"near-name", unmentioned_text(*other)});
   }
 }
 
-const json* Obstacles::connection_of(const std::string& source) const {
-  return input_ == nullptr ? nullptr : find_named(input_->at("connections"), "source", source);
+const wire::ConnectionStatus* Obstacles::connection_of(const std::string& source) const {
+  if (input_ == nullptr) return nullptr;
+  const auto found = std::find_if(input_->connections.begin(), input_->connections.end(),
+                                  [&](const auto& each) { return each.source == source; });
+  return found == input_->connections.end() ? nullptr : &*found;
 }
 
 std::vector<Obstacle> Obstacles::of_connection(const std::string& source) const {
   std::vector<Obstacle> result;
   add_publisher(source, result);
-  const json* found = connection_of(source);
+  const wire::ConnectionStatus* found = connection_of(source);
   if (found == nullptr) return result;
-  const json& connection = *found;
-  if (connection.at("state") == "mismatch") {
-    result.push_back({"type-mismatch", "not connected, the two ports do not fit: " +
-                                           connection.at("mismatch").get<std::string>()});
+  const wire::ConnectionStatus& connection = *found;
+  if (connection.mismatch) {
+    result.push_back(
+        {"type-mismatch", "not connected, the two ports do not fit: " + *connection.mismatch});
     return result;
   }
-  const auto count = [&](const char* key) { return connection.value(key, std::uint64_t{0}); };
-  const auto say = [&](const char* key, const char* code, const std::string& what) {
-    if (count(key) != 0) result.push_back({code, std::to_string(count(key)) + what});
+  const auto say = [&](std::uint64_t count, const char* code, const std::string& what) {
+    if (count != 0) result.push_back({code, std::to_string(count) + what});
   };
   const std::string component =
-      input_->at("open").get<bool>() ? "component " + component_text(*input_) : "the component";
+      is_open() ? "component " + component_text(*input_) : "the component";
   // Counted from the opening of the ports on: it may be long ago.
-  say("refused", "refused",
+  say(connection.refused, "refused",
       " samples were refused since the ports were opened, because the queue was full then "
       "(refuse_new)");
-  say("overtaken", "overtaken",
+  say(connection.overtaken, "overtaken",
       " samples were lost to newer ones since the ports were opened, because " + component +
           " took too slowly then");
-  say("dropped", "dropped",
+  say(connection.dropped, "dropped",
       " samples that had been accepted were dropped at the take since the ports were opened, "
       "because it was not the winner any more then");
-  say("waiting", "waiting", " samples wait to be taken");
-  if (count("accepted") != 0 && count("taken") + count("dropped") == 0) {
+  say(connection.waiting, "waiting", " samples wait to be taken");
+  if (connection.accepted != 0 && connection.taken + connection.dropped == 0) {
     result.push_back({"none-taken", component + " has not taken any of the " +
-                                        std::to_string(count("accepted")) + " accepted samples"});
+                                        std::to_string(connection.accepted) + " accepted samples"});
   }
   return result;
 }
@@ -191,19 +185,18 @@ std::vector<Obstacle> Obstacles::of_source(const std::string& source) const {
 }
 
 void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& result) const {
-  const json* output = find_named(status_.at("sources"), "name", source);
-  const json* stranger = stranger_with("outputs", source);
+  const wire::SourceStatus* output = status_.find_source(source);
+  const StrangerStatus* stranger = stranger_with(&StrangerStatus::outputs, source);
   if (stranger != nullptr) add_unknown(*stranger, result);
   if (output == nullptr) return;
   const bool is_latched =
       sources_.is_active(source) && sources_.state(source).timeout == shm::kForever;
-  if (output->at("open").get<bool>()) {
-    add_stopped(output->at("component").at("pid").get<int>(),
-                "its component " + component_text(*output), result);
+  if (output->open) {
+    add_stopped(output->open->component.pid, "its component " + component_text(*output), result);
     return;
   }
-  if (output->at("away").get<bool>()) {
-    add_away(*output, result);
+  if (output->away_pid) {
+    add_away(*output->away_pid, result);
     return;
   }
   if (stranger != nullptr) return;
@@ -224,51 +217,44 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
 }
 
 std::optional<Obstacle> Obstacles::other_source(const std::string& name) const {
-  const json* other = find_near(status_.at("sources"), known_sources_, name);
+  const auto* other = find_near(status_.sources, known_sources_, name);
   if (other == nullptr) return std::nullopt;
   return Obstacle{"near-name", unmentioned_text(*other)};
 }
 
 std::string Obstacles::why_it_cannot_deliver(const std::string& source) const {
-  if (input_ == nullptr || input_->at("cannot_deliver").is_null()) return {};
-  const json& selected = input_->at("cannot_deliver");
-  return selected.at("source") == source ? selected.at("why").get<std::string>() : std::string();
+  if (input_ == nullptr || !input_->cannot_deliver) return {};
+  return input_->cannot_deliver->source == source ? input_->cannot_deliver->why : std::string();
 }
 
 std::string Obstacles::why_nothing_comes_of(const std::string& source) const {
-  if (!is_away() && (input_ == nullptr || !input_->at("open").get<bool>())) {
-    const json* stranger = stranger_with("inputs", port_);
+  if (!is_away() && !is_open()) {
+    const StrangerStatus* stranger = stranger_with(&StrangerStatus::inputs, port_);
     if (stranger == nullptr) return "no component has it open";
     return process_text(*stranger) + " has it open, which this daemon does not know";
   }
-  const json* connection = connection_of(source);
-  if (connection != nullptr && connection->at("state") == "mismatch") {
-    return "the two ports do not fit, " + connection->at("mismatch").get<std::string>();
+  const wire::ConnectionStatus* connection = connection_of(source);
+  if (connection != nullptr && connection->mismatch) {
+    return "the two ports do not fit, " + *connection->mismatch;
   }
-  const json* output = find_named(status_.at("sources"), "name", source);
-  if (output == nullptr || !output->at("open").get<bool>()) return "";
-  if (output->at("published") == 0 && output->at("signals") != 0) {
+  const wire::SourceStatus* output = status_.find_source(source);
+  if (output == nullptr || !output->open) return "";
+  if (output->open->published == 0 && output->open->signals != 0) {
     return component_text(*output) + " only signals, and publishes no samples";
   }
   return "";
 }
 
 bool Obstacles::was_never_started(const std::string& source) const {
-  const json* output = find_named(status_.at("sources"), "name", source);
-  return output != nullptr && !output->at("open").get<bool>() && !output->at("away").get<bool>() &&
-         stranger_with("outputs", source) == nullptr &&
+  const wire::SourceStatus* output = status_.find_source(source);
+  return output != nullptr && !output->open && !output->away_pid &&
+         stranger_with(&StrangerStatus::outputs, source) == nullptr &&
          sources_.state(source).word == shm::kNeverActive && !other_source(source);
 }
 
 std::string Obstacles::component_of(const std::string& source) const {
-  const json* output = find_named(status_.at("sources"), "name", source);
-  return output == nullptr || !output->at("open").get<bool>() ? "" : component_text(*output);
+  const wire::SourceStatus* output = status_.find_source(source);
+  return output == nullptr || !output->open ? "" : component_text(*output);
 }
 
-json to_json(const std::vector<Obstacle>& obstacles) {
-  json result = json::array();
-  for (const auto& each : obstacles) result.push_back({{"code", each.code}, {"text", each.text}});
-  return result;
-}
-
-}  // namespace arbiter::cli
+}  // namespace arbiter::watch

@@ -8,13 +8,13 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
-#include "client/node_core.hpp"
 #include "rules/model/model_texts.hpp"
 #include "shm/activity.hpp"
+#include "wire/model_document.hpp"
 
-namespace arbiter::cli {
+namespace arbiter::watch {
+
+class Instance;
 
 // A file of the model, as it is by now.
 struct FileNow {
@@ -25,42 +25,37 @@ struct FileNow {
 
 class ModelInForce {
  public:
-  struct PastTimeout {
-    shm::Nanoseconds timeout = 0;  // T until then
-    shm::Nanoseconds until = 0;
-    shm::ActivityWord word = shm::kNeverActive;  // what the activity was then
-  };
-
+  // No model.
   ModelInForce() = default;
-  // Throws Error.
-  static ModelInForce fetch(detail::NodeCore& node);
+  explicit ModelInForce(wire::ModelDocument document);
+  // Throws wire::CallError, wire::DocumentError.
+  static ModelInForce fetch(Instance& instance);
 
-  [[nodiscard]] std::uint64_t generation() const { return generation_; }
-  [[nodiscard]] bool is_none() const { return generation_ == 0; }
+  [[nodiscard]] std::uint64_t generation() const { return document_.generation; }
+  [[nodiscard]] bool is_none() const { return document_.generation == 0; }
+  [[nodiscard]] const std::optional<std::string>& name() const { return document_.name; }
+  // "reload", "switch", …, and who asked for it.
+  [[nodiscard]] const std::optional<std::string>& how() const { return document_.how; }
+  [[nodiscard]] const std::optional<std::string>& by() const { return document_.by; }
   // The daemon knows its texts, and not only its decisions.
-  [[nodiscard]] bool has_texts() const { return has_texts_; }
-  // Their paths are such as the reader, in the directory where this program runs, can open.
+  [[nodiscard]] bool has_texts() const { return document_.known; }
+  // Their paths are such as a reader in the directory where this program runs can open.
   [[nodiscard]] const rules::ModelTexts& texts() const { return texts_; }
 
-  // 0: not known.
-  [[nodiscard]] shm::Nanoseconds since() const { return since_; }
+  // CLOCK_MONOTONIC; 0: since before this daemon came.
+  [[nodiscard]] shm::Nanoseconds since() const { return document_.in_force_since; }
   // Since when the port is decided as it is; earlier than that where the model before did the same.
   [[nodiscard]] shm::Nanoseconds since(const std::string& port) const;
   // Nothing where the source's T has always been the one that it is.
-  [[nodiscard]] std::optional<PastTimeout> timeout_before(const std::string& source) const;
+  [[nodiscard]] std::optional<wire::PastTimeout> timeout_before(const std::string& source) const;
 
   // `model 2 "work" (work.xml)`, `no model`.
   [[nodiscard]] std::string text() const;
-  // " (switch, by node …)", empty where it is not known.
-  [[nodiscard]] std::string how_text() const;
-  // ", in force since 3.2 s ago (switch, by node …)"
-  [[nodiscard]] std::string origin_text(shm::Nanoseconds now) const;
-  [[nodiscard]] nlohmann::json to_json() const;
 
   // What has become of the files that were read. Looks at them.
   [[nodiscard]] std::vector<FileNow> files_now() const;
   // The files were read again after it: it has been rolled back to.
-  [[nodiscard]] bool is_older() const { return is_older_; }
+  [[nodiscard]] bool is_older() const { return document_.as_loaded == false; }
 
   // Of the models that could be switched to, the first that connects something to the port, or that
   // source if one is given.
@@ -68,19 +63,12 @@ class ModelInForce {
       const std::string& port, const std::optional<std::string>& source = {}) const;
 
  private:
-  std::uint64_t generation_ = 0;
-  std::string name_, how_, by_;
-  bool has_texts_ = false;
-  bool is_older_ = false;
+  wire::ModelDocument document_;  // without its texts
   rules::ModelTexts texts_;
-  shm::Nanoseconds since_ = 0;
-  std::map<std::string, shm::Nanoseconds> ports_since_;
-  std::map<std::string, PastTimeout> timeouts_before_;
-  nlohmann::json others_ = nlohmann::json::array();
 };
 
 // A path that the daemon has been given, which runs in `directory`: relative where it lies below
 // the directory in which this program runs, else absolute.
-std::string path_from_here(const std::string& path, const std::string& directory);
+[[nodiscard]] std::string path_from_here(const std::string& path, const std::string& directory);
 
-}  // namespace arbiter::cli
+}  // namespace arbiter::watch

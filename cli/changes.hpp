@@ -1,0 +1,20 @@
+// Changes of the model that verbs ask for: to one daemon, once, and for as long as it takes.
+#pragma once
+
+#include <string>
+
+#include "wire/change_report.hpp"
+#include "wire/messages.hpp"
+
+namespace arbiter::cli {
+
+// The daemon's report on the change, which may be a refusal. Writes the report to standard output
+// (`json`), or what was found in files, and why the change is refused, to standard error. Throws
+// wire::CallError where there is no daemon, or it does not allow it.
+wire::ChangeReport ask_for_change(const std::string& verb, const std::string& instance,
+                                  shm::Message question, bool json);
+
+// Unless `json`: "model 5 is in force", and what that changes. Gives the verb's exit code.
+int write_result(const wire::ChangeReport& report, bool json);
+
+}  // namespace arbiter::cli

@@ -1,0 +1,60 @@
+// arbiter play: what a running daemon makes of a trace is what arbiter simulate says.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::HasSubstr;
+
+// /u has no rule: all that comes is delivered.
+const std::string kModel = R"(<behaviors timeout="50ms">
+  <source port="/stop" timeout="forever"/>
+  <behavior name="Low"><config at="/p">/low</config><condition>not /stop</condition></behavior>
+  <behavior name="High"><config at="/p">/high</config><inhibition>Low</inhibition></behavior>
+  <arbiter at="/r" conflict="first">
+    <select from="/high"/><select from="/low"/>
+  </arbiter>
+</behaviors>
+)";
+const std::string kApplication = R"(<application>
+  <connection><from>/low</from><to>/p</to></connection>
+  <connection><from>/high</from><to>/p</to></connection>
+  <connection><from>/low</from><to>/r</to></connection>
+  <connection><from>/high</from><to>/r</to></connection>
+  <connection><from>/low</from><to>/u</to></connection>
+</application>
+)";
+// 51 ms: /high ends exactly then. A tick, a deactivation, and one that the model does not know.
+const std::string kTrace =
+    "t_ns,source,event\n0,/low,\n1000000,/high,\n2000000,/low,\n51000000,/low,\n52000000,,\n"
+    "53000000,/stop,\n54000000,/low,\n55000000,/stop,deactivate\n56000000,/low,\n";
+
+TEST(Play, DecidesAsSimulateSays) {
+  Daemon daemon(kModel, {.application = kApplication});
+  const TemporaryDirectory files;
+  const auto trace = files.write("trace.csv", kTrace);
+  const auto simulated = arbiter({"simulate", files.write("m.xml", kModel), "--application",
+                                  files.write("a.xml", kApplication), "--trace", trace});
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+  EXPECT_THAT(simulated.out, HasSubstr("/low,/u,delivered,/low"));
+  const auto played = arbiter({"play", trace});
+  EXPECT_EQ(played.exit_code, 0) << played.err;
+  EXPECT_EQ(played.err, "");
+  EXPECT_EQ(played.out, simulated.out);
+}
+
+TEST(Play, NotesSourcesThatTheModelDoesNotKnow) {
+  Daemon daemon(kModel);
+  const TemporaryDirectory files;
+  const auto played = arbiter({"play", files.write("trace.csv", "t_ns,source\n0,/hgih\n")});
+  EXPECT_EQ(played.exit_code, 0);
+  EXPECT_THAT(played.err, HasSubstr("note: the daemon's model does not know /hgih"));
+  EXPECT_EQ(played.out, "t_ns,source,destination,decision,winner\n");
+}
+
+}  // namespace
+}  // namespace arbiter::test

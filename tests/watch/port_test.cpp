@@ -1,0 +1,111 @@
+// A port that is watched: one look, what explains it, and the model in force.
+#include "watch/port.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/support/error_of.hpp"
+#include "tests/watch/watched.hpp"
+#include "watch/obstacles.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+const std::string kModel = R"(<behaviors timeout="3600s">
+  <source port="/low" timeout="forever"/>
+  <behavior name="Low"><config at="/p">/low</config></behavior>
+  <behavior name="High"><config at="/p">/high</config><inhibition>Low</inhibition></behavior>
+</behaviors>
+)";
+
+TEST(WatchedPort, IsSeenWithAllThatMattersToIt) {
+  Daemon daemon(kModel);
+  Node node("component");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  watch::Port port(watched(daemon), "/p");
+  low.signal();
+  watch::Look look = port.look();
+  EXPECT_TRUE(look.is_arbitrated && look.is_mentioned);
+  EXPECT_EQ(look.generation(), 1u);
+  EXPECT_EQ(port.source_name(look.winner), "/low");
+  EXPECT_TRUE(look.sources.is_active("/low"));
+  EXPECT_EQ(look.sources.state("/low").timeout, shm::kForever);
+  EXPECT_EQ(look.picture.next_end(), shm::kForever);
+  high.signal();
+  look = port.look();
+  EXPECT_EQ(port.source_name(look.winner), "/high");
+  EXPECT_EQ(look.picture.next_end(),
+            *look.sources.state("/high").last_arrival() + look.sources.state("/high").timeout);
+}
+
+TEST(WatchedPort, IsExplainedByTheModelOfTheLook) {
+  Daemon daemon(kModel);
+  Node node("component");
+  auto high = node.output_port<int>("/high");
+  watch::Port port(watched(daemon), "/p");
+  high.signal();
+  const watch::Look before = port.look();
+  const auto explanation = port.explain(before);
+  ASSERT_TRUE(explanation);
+  EXPECT_EQ(explanation->winner, "/high");
+  EXPECT_EQ(port.model().generation(), 1u);
+  EXPECT_THAT(port.known_sources(), ElementsAre("/high", "/low"));
+  daemon.load("<behaviors><arbiter at='/p'><select from='/high'/></arbiter></behaviors>");
+  const watch::Look after = port.look();
+  ASSERT_TRUE(port.explain(after));
+  EXPECT_FALSE(port.explain(before)) << "the daemon does not have that model's texts any more";
+  EXPECT_THAT(port.known_sources(), ElementsAre("/high"));
+}
+
+TEST(WatchedPort, ThatNobodyHasNamedIsRefusedWithAdvice) {
+  Daemon daemon(kModel);
+  const auto instance = watched(daemon);
+  EXPECT_THAT(error_of([&] { watch::Port(instance, "/P"); }),
+              testing::AllOf(HasSubstr("has named the input port /P"), HasSubstr("/p")));
+  EXPECT_THAT(error_of([&] { watch::Port(instance, "/low"); }),
+              HasSubstr("/low is an output port; give the input port first"));
+}
+
+TEST(WatchedPort, OfADaemonThatHasMemoryOfItsOwnIsSeenNoMore) {
+  Daemon daemon(kModel);
+  const auto instance = watched(daemon);
+  const watch::Port port(instance, "/p");
+  const auto memory = instance->memory();
+  daemon.kill();
+  EXPECT_EQ(port.look().winner, shm::kNone);
+  daemon.lose_state();
+  daemon.restart();
+  update_until(*instance, [&] { return instance->memory() != memory; });
+  EXPECT_THAT(error_of([&] { static_cast<void>(port.look()); }),
+              HasSubstr("another daemon has come, without the memory of the last one"));
+}
+
+TEST(WatchedPort, KnowsWhatKeepsSamplesFromIt) {
+  Daemon daemon(kModel);
+  Node node("component");
+  auto low = node.output_port<int>("/low");
+  low.signal();
+  const auto instance = watched(daemon);
+  watch::Port port(instance, "/p");
+  const watch::Look look = port.look();
+  ASSERT_TRUE(port.explain(look));
+  const wire::Status status = instance->status();
+  const watch::Obstacles obstacles(status, "/p", look.sources, port.known_sources(),
+                                   port.known_ports());
+  const auto of_port = obstacles.of_port();
+  ASSERT_EQ(of_port.size(), 1u);
+  EXPECT_STREQ(of_port[0].code, "port-not-open");
+  EXPECT_EQ(obstacles.component_of("/low"), "component (pid " + std::to_string(::getpid()) + ")");
+  EXPECT_TRUE(obstacles.was_never_started("/high"));
+}
+
+}  // namespace
+}  // namespace arbiter::test

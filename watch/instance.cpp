@@ -1,0 +1,222 @@
+#include "watch/instance.hpp"
+
+#include <poll.h>
+#include <sys/epoll.h>
+#include <sys/stat.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "shm/descendants.hpp"
+#include "wire/document.hpp"
+#include "wire/rendezvous.hpp"
+
+namespace arbiter::watch {
+namespace {
+
+using std::chrono::milliseconds;
+
+// How often a daemon is looked for, and one that did not want us.
+constexpr milliseconds kLookInterval{50};
+constexpr milliseconds kTurnedAwayInterval{1000};
+// Of those that update() takes up in one go, so that its caller comes to its own work.
+constexpr int kMostMessages = 4096;
+
+bool are_same(const shm::FileDescriptor& one, const shm::FileDescriptor& other) {
+  struct stat a {};
+  struct stat b {};
+  return fstat(one.get(), &a) == 0 && fstat(other.get(), &b) == 0 && a.st_ino == b.st_ino &&
+         a.st_dev == b.st_dev;
+}
+
+shm::Message message_of(shm::MessageKind kind) {
+  shm::Message message;
+  message.kind = kind;
+  return message;
+}
+
+}  // namespace
+
+Instance::Instance(wire::Caller caller) : caller_(std::move(caller)) {
+  wire::Welcome welcome = wire::join(caller_);
+  epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
+  timer_.reset(timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
+  shm::close_in_children(epoll_);
+  shm::close_in_children(timer_);
+  socket_ = std::move(welcome.socket);
+  epoll_event event{};
+  event.events = EPOLLIN;
+  if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, timer_.get(), &event) != 0 || !watch_socket()) {
+    throw std::system_error(errno, std::generic_category(), "no descriptor to watch the daemon");
+  }
+  take_up_memory(welcome.received);
+  standing_ = Standing::kIn;
+  daemons_ = 1;
+  static_cast<void>(ask(message_of(shm::MessageKind::kObserve)));
+}
+
+// Nothing is handed on to a daemon's successor: components do that.
+void Instance::take_up_memory(shm::Received& welcome) {
+  if (memory_ != nullptr && are_same(welcome.descriptors[0], memory_->board())) return;
+  memory_ = std::make_shared<shm::DecisionMemory>(std::move(welcome.descriptors[0]),
+                                                  shm::Residence::kMapped, 0);
+  shared_ = memory_;
+  port_names_.clear();
+  sources_.clear();
+}
+
+void Instance::update() {
+  std::uint64_t rings = 0;
+  if (standing_ == Standing::kAlone) {
+    if (::read(timer_.get(), &rings, sizeof rings) > 0) look_for_daemon();
+    return;
+  }
+  shm::Received received;
+  for (int i = 0; i < kMostMessages && standing_ != Standing::kAlone; ++i) {
+    switch (shm::receive_message(socket_.get(), received, false)) {
+      case shm::ReceiveResult::kReceived:
+        handle(received);
+        break;
+      case shm::ReceiveResult::kNothing:
+        return;
+      case shm::ReceiveResult::kClosed:
+      case shm::ReceiveResult::kMalformed:
+        lose_daemon(kLookInterval);
+        break;
+    }
+  }
+}
+
+void Instance::handle(shm::Received& received) {
+  const shm::Message& message = received.message;
+  if (standing_ == Standing::kGreeting) {
+    be_greeted(received);
+    return;
+  }
+  if (message.kind == shm::MessageKind::kSourcePage) {
+    add_page(received);
+  } else if (message.kind == shm::MessageKind::kPortName) {
+    if (message.id < shm::kMaxInputPorts) port_names_[message.id] = message.name_view();
+  } else if (message.request == asked_) {
+    answer_ = std::move(received);
+  }
+}
+
+// A source whose page cannot be had stays unseen.
+void Instance::add_page(shm::Received& received) {
+  const shm::Message& message = received.message;
+  try {
+    memory_->add_page(message.id, message.value, std::string(message.name_view()),
+                      std::move(received.descriptors[0]));
+    sources_.insert_or_assign(std::string(message.name_view()), message.id);
+  } catch (const std::exception&) {
+  }
+}
+
+void Instance::look_for_daemon() {
+  std::string why_not;
+  std::optional<shm::FileDescriptor> found;
+  try {
+    found = shm::connect_to_daemon(caller_.instance, why_not);
+  } catch (const std::exception&) {  // no descriptors are left: another time
+  }
+  if (!found) return;
+  socket_ = std::move(*found);
+  shm::close_in_children(socket_);
+  if (!say(wire::hello_of(caller_)) || !watch_socket()) {
+    socket_.reset();
+    return;
+  }
+  standing_ = Standing::kGreeting;
+  ring_timer_every({});
+}
+
+void Instance::be_greeted(shm::Received& welcome) {
+  if (welcome.message.kind != shm::MessageKind::kWelcome) {
+    lose_daemon(kTurnedAwayInterval);
+    return;
+  }
+  try {
+    take_up_memory(welcome);
+  } catch (const std::exception&) {  // of another version, or no memory is left
+    lose_daemon(kTurnedAwayInterval);
+    return;
+  }
+  standing_ = Standing::kIn;
+  ++daemons_;
+  say(message_of(shm::MessageKind::kObserve));
+}
+
+void Instance::lose_daemon(Clock::duration look_again_in) {
+  socket_.reset();  // and is watched no more
+  standing_ = Standing::kAlone;
+  ring_timer_every(look_again_in);
+}
+
+bool Instance::watch_socket() const {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  return epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, socket_.get(), &event) == 0;
+}
+
+// 0: never.
+void Instance::ring_timer_every(Clock::duration time) const {
+  const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(time).count();
+  itimerspec at{};
+  at.it_value = at.it_interval = {ns / 1'000'000'000, ns % 1'000'000'000};
+  timerfd_settime(timer_.get(), 0, &at, nullptr);
+}
+
+bool Instance::say(const shm::Message& message) const {
+  return shm::send_message(socket_.get(), message) == shm::SendResult::kSent;
+}
+
+std::optional<shm::PortId> Instance::find_port(std::string_view name) const {
+  const auto found = std::find_if(port_names_.begin(), port_names_.end(),
+                                  [&](const auto& each) { return each.second == name; });
+  return found == port_names_.end() ? std::nullopt : std::optional(found->first);
+}
+
+std::optional<shm::SourceId> Instance::find_source(std::string_view name) const {
+  const auto found = sources_.find(name);
+  return found == sources_.end() ? std::nullopt : std::optional(found->second);
+}
+
+shm::Received Instance::ask(const shm::Message& question) {
+  const auto give_up = Clock::now() + caller_.answer_time;
+  shm::Message numbered = question;
+  numbered.request = ++last_request_;
+  asked_ = numbered.request;
+  answer_.reset();
+  std::uint64_t asked_of = 0;
+  while (!answer_) {
+    if (has_daemon() && asked_of != daemons_) {
+      asked_of = daemons_;
+      say(numbered);  // if it cannot be sent the conversation is over, and the next one is asked
+    }
+    const auto left = std::chrono::ceil<milliseconds>(give_up - Clock::now());
+    if (left.count() <= 0) {
+      throw wire::CallError(has_daemon() ? "the daemon is there, but has not answered in time"
+                                         : "the daemon has gone, and no other has come");
+    }
+    pollfd readable{epoll_.get(), POLLIN, 0};
+    static_cast<void>(::poll(&readable, 1, static_cast<int>(left.count())));
+    update();
+  }
+  shm::Received answer = std::move(*std::exchange(answer_, std::nullopt));
+  if (answer.message.kind == shm::MessageKind::kRefused) {
+    throw wire::CallError(std::string(answer.message.text_view()));
+  }
+  return answer;
+}
+
+wire::Status Instance::status() {
+  const shm::Received answer = ask(message_of(shm::MessageKind::kStatus));
+  return wire::read_status(wire::read_document(answer.descriptors[0]));
+}
+
+}  // namespace arbiter::watch

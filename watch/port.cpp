@@ -1,0 +1,106 @@
+#include "watch/port.hpp"
+
+#include <string_view>
+#include <utility>
+
+#include "rules/model/load.hpp"
+#include "rules/prove/table_rules.hpp"
+#include "rules/text/names.hpp"
+
+namespace arbiter::watch {
+namespace {
+
+shm::PortId require_port(Instance& instance, const std::string& name) {
+  if (const auto found = instance.find_port(name)) return *found;
+  if (instance.status().find_source(name) != nullptr) {
+    std::string message = name + " is an output port; give the input port first";
+    message += ": arbiter why PORT " + name;
+    throw WatchError(message);
+  }
+  std::vector<std::string_view> known;
+  for (const auto& [id, each] : instance.port_names()) known.push_back(each);
+  const auto model = ModelInForce::fetch(instance);
+  throw WatchError("no model and no component has named the input port " + name + " (" +
+                   model.text() + " is in force)" +
+                   rules::advise(name, known, "`arbiter status` shows those that there are"));
+}
+
+}  // namespace
+
+Port::Port(std::shared_ptr<Instance> instance, std::string name)
+    : instance_(std::move(instance)),
+      memory_(instance_->memory()),
+      name_(std::move(name)),
+      id_(require_port(*instance_, name_)) {}
+
+Look Port::look() const {
+  if (instance_->memory() != memory_) {
+    throw WatchError("another daemon has come, without the memory of the last one; ask again");
+  }
+  Look look;
+  do {
+    look = {};
+    look.picture = take_picture(*memory_, sources_at(id_));
+    look.is_arbitrated = look.table().is_arbitrated(id_);
+    look.is_mentioned = look.table().knows_port(id_);
+    look.winner = look.picture.winner_at(id_);
+    look.sources.set_time(look.picture.now);
+    for (const auto& [source, word] : look.picture.words) {
+      look.sources.set(source_name(source),
+                       {word, look.table().timeout(source), !look.picture.is_unseen(source)});
+    }
+  } while (!memory_->tables().is_whole(look.picture.snapshot));
+  return look;
+}
+
+void Port::fetch_model() {
+  model_ = ModelInForce::fetch(*instance_);
+  generation_ = model_.generation();
+  rules_ = {};
+  diagnostics_ = {};
+  if (!model_.has_texts()) return;
+  rules_ = rules::load(model_.texts(), diagnostics_, rules::Keep::kProvenance);
+  if (diagnostics_.has_errors()) {
+    throw WatchError("this program cannot read the daemon's model; are both of one version?");
+  }
+}
+
+void Port::add_timeouts(Look& look) const {
+  const rules::Explainer explainer(rules_);
+  for (const auto& [source, word] : look.picture.words) {
+    const std::string& name = source_name(source);
+    SourceState state = look.sources.state(name);
+    if (model_.has_texts()) {
+      const auto where = explainer.place_of_timeout(name);
+      state.timeout_place =
+          where.file.empty() ? "default" : where.file + ":" + std::to_string(where.line);
+    }
+    if (const auto before = model_.timeout_before(name)) {
+      state.timeout_before = before->timeout;
+      state.timeout_changed = before->until;
+      state.word_at_change = before->word;
+    }
+    look.sources.set(name, state);
+  }
+}
+
+std::optional<rules::PortExplanation> Port::explain(const Look& look) {
+  if (generation_ != look.generation()) fetch_model();
+  if (generation_ != look.generation()) return std::nullopt;
+  const auto is_active = [&](const std::string& source) { return look.sources.is_active(source); };
+  if (!model_.has_texts()) {
+    const auto name_of = [this](shm::SourceId source) { return source_name(source); };
+    const auto rules = rules::rules_of_table(look.table(), id_, name_, name_of);
+    return rules::Explainer(rules).explain(name_, is_active);
+  }
+  auto explanation = rules::Explainer(rules_).explain(name_, is_active);
+  const auto winner =
+      look.winner == shm::kNone ? std::nullopt : std::optional(source_name(look.winner));
+  if (explanation.winner != winner) {
+    throw WatchError("the decision table and the model that it was made of differ at " + name_ +
+                     "; this is a mistake in arbiter: please report it");
+  }
+  return explanation;
+}
+
+}  // namespace arbiter::watch

@@ -1,0 +1,22 @@
+#include "watch/sources.hpp"
+
+namespace arbiter::watch {
+
+// The word gives the end; the arrival follows from the T that was in force then.
+std::optional<shm::Nanoseconds> SourceState::last_arrival() const {
+  if (word == shm::kNeverActive || shm::is_deactivation(word)) return std::nullopt;
+  if (timeout_before && shm::is_finite(word)) {
+    const bool has_stood = word == word_at_change;
+    if (has_stood || timeout == shm::kForever || word - timeout < timeout_changed) {
+      return std::nullopt;
+    }
+  }
+  return shm::arrival_of(word, timeout);
+}
+
+std::optional<shm::Nanoseconds> SourceState::arrived_by() const {
+  if (!timeout_before || !shm::is_finite(word) || word == shm::kNeverActive) return std::nullopt;
+  return last_arrival() ? std::nullopt : std::optional(timeout_changed);
+}
+
+}  // namespace arbiter::watch

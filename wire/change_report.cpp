@@ -1,0 +1,34 @@
+#include "wire/change_report.hpp"
+
+#include "wire/fields.hpp"
+#include "wire/past_model_fields.hpp"
+
+namespace arbiter::wire {
+
+void describe(auto& field, Is<ModelChanges> auto& of) {
+  field("summary", of.summary);
+  field("text", of.text);
+}
+
+void describe(auto& field, Is<ModelComparison> auto& of) {
+  field("name", of.name);
+  field("in_force", of.in_force);
+  field("changes", of.changes);
+}
+
+void describe(auto& field, Is<ChangeReport> auto& of) {
+  field("ok", of.ok);
+  field("has_errors", of.has_errors);
+  field("text", of.text);
+  field.maybe("why", of.why);
+  field.maybe("generation", of.generation);
+  field.maybe("back_to", of.back_to);
+  field.maybe("changes", of.changes);
+  field.maybe("models", of.models);
+}
+
+ChangeReport read_change_report(std::string_view text) {
+  return FieldReader::read_whole<ChangeReport>(text);
+}
+
+}  // namespace arbiter::wire

@@ -1,0 +1,44 @@
+// What came of a change of the model: the report on a reload, a switch, a rollback or a dry run.
+//
+// docs/changing-models.md says what each field means.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "wire/status.hpp"
+
+namespace arbiter::wire {
+
+// What is decided differently.
+struct ModelChanges {
+  std::string summary;  // a line
+  std::string text;     // as `arbiter diff` writes it
+};
+
+// One model, in a dry run.
+struct ModelComparison {
+  std::string name;
+  bool in_force = false;
+  std::optional<ModelChanges> changes;  // none: not compared
+};
+
+struct ChangeReport {
+  bool ok = false;
+  bool has_errors = false;         // files have; the text says which
+  std::string text;                // what was found in files, for people
+  std::optional<std::string> why;  // it is refused
+  // Of what is in force now.
+  std::optional<std::uint64_t> generation;
+  std::optional<PastModelStatus> back_to;              // a rollback
+  std::optional<ModelChanges> changes;                 // none: not compared
+  std::optional<std::vector<ModelComparison>> models;  // of a dry run
+};
+
+// Throws DocumentError.
+[[nodiscard]] ChangeReport read_change_report(std::string_view text);
+
+}  // namespace arbiter::wire
