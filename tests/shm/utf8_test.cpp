@@ -44,14 +44,6 @@ TEST(Utf8, WhatIsPrintedCannotForgeALineNorSteerATerminal) {
   EXPECT_EQ(printable(std::string_view("\0x", 2)), "\\x00x");
 }
 
-TEST(Utf8, TypesThatDoNotFitAreNamedSoThatNobodyIsMisled) {
-  TypeInfo output, input;
-  output.set_name("Twist\x1b[2J");
-  input.set_name("Pose\n");
-  EXPECT_EQ(type_mismatch(output, input),
-            "the output port sends Twist\\x1b[2J, the input port takes Pose\\n");
-}
-
 TEST(Utf8, ATextThatIsTooLongForAMessageIsCutBetweenTwoCharacters) {
   Message message;
   std::string text(sizeof message.text - 2, 'x');
