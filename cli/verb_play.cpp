@@ -55,7 +55,7 @@ class Player {
     for (const auto& event : events) {
       if (event.kind == rules::TraceKind::kTick || outputs_.count(event.source) != 0) continue;
       outputs_[event.source] =
-          node_->open_output(event.source, detail::port_type<std::uint64_t>(), OutputPortOptions{});
+          node_->open_output(event.source, type_of<std::uint64_t>(), OutputPortOptions{});
     }
     instance_ = watch_instance("play", options.instance);  // which sees what has been opened
   }

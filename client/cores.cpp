@@ -28,7 +28,7 @@ void switch_model(NodeCore& node, std::string_view name) {
   node.ask(question, {-1, -1});
 }
 
-std::shared_ptr<OutputCore> open_output(NodeCore& node, std::string_view name, const PortType& type,
+std::shared_ptr<OutputCore> open_output(NodeCore& node, std::string_view name, const Type& type,
                                         const OutputPortOptions& options) {
   require_own(node);
   return node.open_output(name, type, options);
@@ -63,8 +63,9 @@ void deactivate(OutputCore& core) noexcept {
 }
 std::size_t max_size(const OutputCore& core) noexcept { return core.type().size; }
 const std::string& name(const OutputCore& core) noexcept { return core.name(); }
+const Type& type(const OutputCore& core) noexcept { return core.declared_type(); }
 
-std::shared_ptr<InputCore> open_input(NodeCore& node, std::string_view name, const PortType& type,
+std::shared_ptr<InputCore> open_input(NodeCore& node, std::string_view name, const Type& type,
                                       const InputPortOptions& options) {
   require_own(node);
   return node.open_input(name, type, options);
@@ -107,6 +108,10 @@ bool is_idle(InputCore& core) noexcept { return !is_own(core) || core.is_idle();
 const std::string& source_name(const InputCore& core, std::uint32_t source) noexcept {
   return core.memory().source_name(source);
 }
+const Type& sample_type(const InputCore& core, std::uint32_t hold) noexcept {
+  return core.type_of_held(hold);
+}
 const std::string& name(const InputCore& core) noexcept { return core.name(); }
+const Type& type(const InputCore& core) noexcept { return core.declared_type(); }
 
 }  // namespace arbiter::detail

@@ -8,6 +8,7 @@
 
 #include "client/count.hpp"
 #include "client/predecessors.hpp"
+#include "client/types.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -16,10 +17,11 @@ const shm::Atomic<std::uint64_t> nothing_seen{0};
 
 }  // namespace
 
-InputCore::InputCore(std::string name, const shm::TypeInfo& type, const InputPortOptions& options,
+InputCore::InputCore(std::string name, const Type& type, const InputPortOptions& options,
                      std::shared_ptr<SharedMemory> memory)
     : name_(std::move(name)),
-      type_(type),
+      declared_type_(type),
+      type_(as_info(type)),
       max_held_(options.max_held),
       keep_(options.keep),
       memory_(std::move(memory)),

@@ -29,7 +29,7 @@ namespace arbiter::detail {
 class InputCore {
  public:
   // Makes and seals the segment, and the bell. Throws std::system_error.
-  InputCore(std::string name, const shm::TypeInfo& type, const InputPortOptions& options,
+  InputCore(std::string name, const Type& type, const InputPortOptions& options,
             std::shared_ptr<SharedMemory> memory);
 
   // Service thread.
@@ -65,6 +65,10 @@ class InputCore {
   [[nodiscard]] std::optional<std::string_view> winner() noexcept;
   [[nodiscard]] bool is_idle() noexcept;
   [[nodiscard]] std::uint32_t held() const noexcept { return held_; }
+  // Of a sample that is held. It stays until that is given back.
+  [[nodiscard]] const Type& type_of_held(std::uint32_t hold) const noexcept {
+    return held_from_[hold]->type;
+  }
 
   // Either.
 
@@ -72,6 +76,7 @@ class InputCore {
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] shm::PortInstance instance() const noexcept { return instance_; }
   [[nodiscard]] const shm::TypeInfo& type() const noexcept { return type_; }
+  [[nodiscard]] const Type& declared_type() const noexcept { return declared_type_; }
   [[nodiscard]] const shm::FileDescriptor& segment_descriptor() const noexcept {
     return descriptor_;
   }
@@ -153,7 +158,8 @@ class InputCore {
 
   // Constant once bound.
   const std::string name_;
-  const shm::TypeInfo type_;
+  const Type declared_type_;
+  const shm::TypeInfo type_;  // the same, as it lies in memory
   const std::uint32_t max_held_;
   const bool keep_;
   const std::shared_ptr<SharedMemory> memory_;

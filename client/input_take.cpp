@@ -295,8 +295,11 @@ bool InputCore::hold(Queue& queue, HeldSample& sample) noexcept {
     const shm::OutputSegment& from = queue.reader.segment();
     const shm::SlotHeader& header = from.slot_header(slot);
     sample.data = from.payload(slot);
-    sample.size =
-        std::min<std::uint64_t>(header.size.load(std::memory_order_relaxed), from.layout().stride);
+    // Of a type all samples have one size, whatever the publisher says.
+    sample.size = type_.is_typed()
+                      ? type_.size
+                      : std::min<std::uint64_t>(header.size.load(std::memory_order_relaxed),
+                                                from.layout().stride);
     sample.sequence = header.sequence.load(std::memory_order_relaxed);
     sample.stamp_ns = header.stamp.load(std::memory_order_relaxed);
   } else if (!copy(queue, slot, sample)) {
@@ -330,7 +333,7 @@ bool InputCore::copy(const Queue& queue, std::uint32_t slot, HeldSample& sample)
   CopiedSample copied;
   if (!copies_.copy(*queue.peer, slot, type_.is_typed(), sample.hold, copied)) return false;
   sample.data = copied.data;
-  sample.size = copied.size;
+  sample.size = type_.is_typed() ? type_.size : copied.size;
   sample.sequence = copied.sequence;
   sample.stamp_ns = copied.stamp;
   return true;

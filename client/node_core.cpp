@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "client/node_names.hpp"
+#include "client/types.hpp"
 #include "wire/call.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -269,16 +270,16 @@ auto NodeCore::open(std::string_view name, Make make) {
   }
 }
 
-std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const PortType& type,
+std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const Type& type,
                                                   const OutputPortOptions& options) {
   check_port_name(name);
   check_bounds<std::uint32_t>(name, "max_loans", options.max_loans, 1, shm::kMaxLoans);
-  check_bounds<std::size_t>(name, "max_size", type.size, 0, std::size_t{1} << 40);
+  check_bounds<std::size_t>(name, "max_size", type.size(), 0, std::size_t{shm::kMaxTypeSize});
   check_bounds<std::size_t>(name, "max_memory", options.max_memory,
-                            OutputCore::least_memory(type_info(type), options.max_loans),
+                            OutputCore::least_memory(as_info(type), options.max_loans),
                             kMostMemory);
   return open(name, [&](const std::shared_ptr<SharedMemory>& memory) {
-    auto core = std::make_shared<OutputCore>(std::string(name), type_info(type), options, memory);
+    auto core = std::make_shared<OutputCore>(std::string(name), type, options, memory);
     core->node = shared_from_this();
     core->process = process_;
     shm::Message question = message_of(shm::MessageKind::kOpenOutput, name);
@@ -292,13 +293,13 @@ std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const P
   });
 }
 
-std::shared_ptr<InputCore> NodeCore::open_input(std::string_view name, const PortType& type,
+std::shared_ptr<InputCore> NodeCore::open_input(std::string_view name, const Type& type,
                                                 const InputPortOptions& options) {
   check_port_name(name);
   check_bounds<std::uint32_t>(name, "depth", options.depth, 1, shm::kMaxDepth);
   check_bounds<std::uint32_t>(name, "max_held", options.max_held, 1, shm::kMaxHeld);
   return open(name, [&](const std::shared_ptr<SharedMemory>& memory) {
-    auto core = std::make_shared<InputCore>(std::string(name), type_info(type), options, memory);
+    auto core = std::make_shared<InputCore>(std::string(name), type, options, memory);
     core->node = shared_from_this();
     core->process = process_;
     shm::Message question = message_of(shm::MessageKind::kOpenInput, name);

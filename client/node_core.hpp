@@ -46,9 +46,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   NodeCore& operator=(const NodeCore&) = delete;
   ~NodeCore();
 
-  std::shared_ptr<OutputCore> open_output(std::string_view name, const PortType& type,
+  std::shared_ptr<OutputCore> open_output(std::string_view name, const Type& type,
                                           const OutputPortOptions& options);
-  std::shared_ptr<InputCore> open_input(std::string_view name, const PortType& type,
+  std::shared_ptr<InputCore> open_input(std::string_view name, const Type& type,
                                         const InputPortOptions& options);
   void close(shm::PortInstance port) noexcept;
 

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "client/types.hpp"
+
 namespace arbiter::detail {
 namespace {
 
@@ -28,10 +30,11 @@ std::uint64_t OutputCore::least_memory(const shm::TypeInfo& type, std::uint32_t 
   return stride_of(type) * (slots_of_our_own(max_loans) + std::uint64_t{2});
 }
 
-OutputCore::OutputCore(std::string name, const shm::TypeInfo& type,
-                       const OutputPortOptions& options, std::shared_ptr<SharedMemory> memory)
+OutputCore::OutputCore(std::string name, const Type& type, const OutputPortOptions& options,
+                       std::shared_ptr<SharedMemory> memory)
     : name_(std::move(name)),
-      type_(type),
+      declared_type_(type),
+      type_(as_info(type)),
       max_loans_(options.max_loans),
       memory_(std::move(memory)) {
   const auto layout = shm::OutputLayout::plan(type_, reserved_slots(type_, options));

@@ -26,7 +26,7 @@ namespace arbiter::detail {
 class OutputCore {
  public:
   // Makes and seals the segment. Throws std::system_error.
-  OutputCore(std::string name, const shm::TypeInfo& type, const OutputPortOptions& options,
+  OutputCore(std::string name, const Type& type, const OutputPortOptions& options,
              std::shared_ptr<SharedMemory> memory);
 
   // What max_memory must be at least: the loans, a copy, and the smallest queue.
@@ -67,6 +67,7 @@ class OutputCore {
   [[nodiscard]] shm::PortInstance instance() const noexcept { return instance_; }
   [[nodiscard]] shm::SourceId source() const noexcept { return source_; }
   [[nodiscard]] const shm::TypeInfo& type() const noexcept { return type_; }
+  [[nodiscard]] const Type& declared_type() const noexcept { return declared_type_; }
   [[nodiscard]] const shm::FileDescriptor& segment_descriptor() const noexcept { return readable_; }
   [[nodiscard]] const shm::FileDescriptor& page_descriptor() const noexcept {
     return page_descriptor_;
@@ -124,7 +125,8 @@ class OutputCore {
 
   // Constant once bound.
   const std::string name_;
-  const shm::TypeInfo type_;
+  const Type declared_type_;
+  const shm::TypeInfo type_;  // the same, as it lies in memory
   const std::uint32_t max_loans_;
   const std::shared_ptr<SharedMemory> memory_;
   shm::FileDescriptor descriptor_;

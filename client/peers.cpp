@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "client/types.hpp"
+
 namespace arbiter::detail {
 
 namespace {
@@ -73,14 +75,18 @@ std::shared_ptr<const OutputPeer> map_output_peer(const shm::Received& announced
   }
   peer->mapping = shm::Mapping(segment, size, shm::Access::kReadOnly);
   const auto* header = peer->mapping.as<const shm::OutputHeader>();
-  const shm::OutputLayout layout = shm::OutputLayout::checked(*header, size);
+  const shm::TypeInfo type = header->type;
+  const shm::OutputLayout layout = shm::OutputLayout::checked(*header, type, size);
   if (layout.total_size == 0) {
     throw std::runtime_error("the output port's segment is not one of this version");
   }
-  const shm::TypeInfo type = header->type;
+  if (const auto fault = shm::fault_of(type)) {
+    throw std::runtime_error("the output port's type is not one: " + *fault);
+  }
   if (const auto mismatch = shm::type_mismatch(type, own); !mismatch.empty()) {
     throw std::runtime_error(mismatch);
   }
+  peer->type = as_type(type);
   peer->segment = shm::OutputSegment(peer->mapping.data(), layout);
   shm::make_written_resident(peer->file, peer->mapping, residence);
   survey(*peer);

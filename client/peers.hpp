@@ -5,6 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include <arbiter/type.hpp>
+
 #include "shm/atomic.hpp"
 #include "shm/bell.hpp"
 #include "shm/descendants.hpp"
@@ -55,6 +57,7 @@ struct OutputPeer {
   shm::PortInstance instance = 0;
   std::uint64_t link = 0;  // as InputLink::number: the queue that is ours bears it
   shm::SourceId source = shm::kNone;
+  Type type = Type::untyped(0);  // as it was judged; samples tell it
   shm::Mapping mapping;
   std::optional<shm::Bequest> bequest;  // a child keeps it if it was forked while samples were held
   mutable std::uint32_t held = 0;       // port's thread: samples of it that the component holds

@@ -3,14 +3,17 @@
 
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <string_view>
 
-#include "shm/utf8.hpp"
+#include "shm/limits.hpp"
 
 namespace arbiter::shm {
 
 inline constexpr std::uint32_t kMaxTypeName = 239;
+inline constexpr std::uint64_t kMaxTypeSize = std::uint64_t{1} << 40;
+inline constexpr std::uint64_t kMaxAlignment = kPageSize;
 
 // Plain data: lies in segments and travels in messages.
 struct TypeInfo {
@@ -27,28 +30,27 @@ struct TypeInfo {
     if (length != 0) std::memcpy(name, text.data(), length);  // an empty view may point nowhere
     name[length] = '\0';
   }
+
+  // The rule: two types are equal if their names are, byte for byte, and their sizes, and their
+  // alignments. Nothing else is known of them.
+  friend bool operator==(const TypeInfo& one, const TypeInfo& other) noexcept {
+    return one.type_name() == other.type_name() && one.size == other.size &&
+           one.alignment == other.alignment;
+  }
 };
 
-// Empty if samples of `output` may go to `input`; else what is wrong, as a sentence's end. Types
-// are what components say they are: their names are made printable.
-inline std::string type_mismatch(const TypeInfo& output, const TypeInfo& input) {
-  if (!input.is_typed()) return {};
-  const std::string wanted = printable(input.type_name());
-  if (!output.is_typed()) return "the output port is untyped, the input port takes " + wanted;
-  if (output.type_name() != input.type_name()) {
-    return "the output port sends " + printable(output.type_name()) + ", the input port takes " +
-           wanted;
-  }
-  if (output.size != input.size) {
-    return wanted + " has " + std::to_string(output.size) + " bytes at the output port and " +
-           std::to_string(input.size) + " at the input port";
-  }
-  if (output.alignment != input.alignment) {
-    return wanted + " is aligned to " + std::to_string(output.alignment) +
-           " bytes at the output port and to " + std::to_string(input.alignment) +
-           " at the input port";
-  }
-  return {};
-}
+// What is wrong with a type as somebody declares it, as a sentence's end; empty: nothing. Blanks
+// are fine in its name, for C++ writes them ("unsigned int").
+[[nodiscard]] std::optional<std::string> fault_of(const TypeInfo& type);
+
+// "geometry/Twist (48 bytes, aligned to 8)". The name is made printable.
+[[nodiscard]] std::string describe(const TypeInfo& type);
+
+// Empty if samples of `output` may go to `input`; else what is wrong, as a sentence's end, which
+// names both. `sender` and `receiver`: the components' nodes, where they are known. It fits into a
+// message: type names are told in full, nodes' names are cut.
+[[nodiscard]] std::string type_mismatch(const TypeInfo& output, const TypeInfo& input,
+                                        std::string_view sender = {},
+                                        std::string_view receiver = {});
 
 }  // namespace arbiter::shm

@@ -9,6 +9,7 @@
 #include "service/clients/errands.hpp"
 #include "shm/bell.hpp"
 #include "shm/foreign.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -34,6 +35,15 @@ void require_own(const shm::FileDescriptor& descriptor, const std::string& what,
   if (user == 0 || maker == user) return;
   throw std::runtime_error(what + " was made by user " + std::to_string(maker) +
                            ", and handed in by user " + std::to_string(user));
+}
+
+// The names of types stand in logs and documents, as those of ports do.
+shm::TypeInfo fine_type(const shm::Message& open) {
+  if (const auto fault = shm::fault_of(open.type)) {
+    throw std::runtime_error("the port's type \"" + shm::printable(open.type.type_name()) +
+                             "\" is not one: " + *fault);
+  }
+  return open.type;
 }
 
 // Of a segment, so much of it allocated as is read: a hole would be filled, and paid, by who reads.
@@ -93,7 +103,7 @@ std::unique_ptr<OutputPort> adopt_output(const shm::Received& open, uid_t user) 
   }
   port->segment = kept(open.descriptors[0]);
   port->user = user;
-  port->type = open.message.type;
+  port->type = fine_type(open.message);
   return port;
 }
 
@@ -111,7 +121,7 @@ std::unique_ptr<InputPort> adopt_input(const shm::Received& open, uid_t user) {
   port->bell = own_bell(open.descriptors[1], user);
   port->segment = kept(open.descriptors[0]);
   port->user = user;
-  port->type = open.message.type;
+  port->type = fine_type(open.message);
   return port;
 }
 

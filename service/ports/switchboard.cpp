@@ -181,7 +181,10 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
                             Told& told) {
   Link& link = links_[{output.instance, input.instance}];
   link.kind = kind;
-  link.mismatch = kind == LinkKind::kConnected ? shm::type_mismatch(output.type, input.type) : "";
+  link.mismatch =
+      kind == LinkKind::kConnected
+          ? shm::type_mismatch(output.type, input.type, output.client->name, input.client->name)
+          : "";
   const bool connects = kind == LinkKind::kConnected && link.mismatch.empty();
   if (!link.mismatch.empty()) {
     log::warn("{} is not connected to {}: {}", output.source->name, input.name->name,

@@ -160,8 +160,12 @@ struct Wrong {
 };
 
 const std::string kTypesDiffer =
-    "/out is not connected to /in: the output port sends arbiter::test::(anonymous "
-    "namespace)::Wrong, the input port takes arbiter::test::Number";
+    " sends arbiter::test::(anonymous namespace)::Wrong (4 bytes, aligned to 4), the input port";
+// What is said of it, given the nodes.
+std::string types_differ(const std::string& sender, const std::string& receiver) {
+  return "/out is not connected to /in: the output port of \"" + sender + "\"" + kTypesDiffer +
+         " of \"" + receiver + "\" takes arbiter::test::Number (8 bytes, aligned to 8)";
+}
 
 TEST(OnNotice, ARefusalIsKnownToWhoeverOpensThePortWhenItIsOpen) {
   Daemon daemon(single_model());
@@ -176,12 +180,12 @@ TEST(OnNotice, ARefusalIsKnownToWhoeverOpensThePortWhenItIsOpen) {
   EXPECT_EQ(by_sender[0].kind, NoticeKind::refused);
   EXPECT_EQ(by_sender[0].port, "/out");
   EXPECT_EQ(by_sender[0].peer, "/in");
-  EXPECT_EQ(by_sender[0].text, kTypesDiffer);
+  EXPECT_EQ(by_sender[0].text, types_differ("sender", "receiver"));
   const auto by_receiver = of_receiver.take();
   ASSERT_EQ(by_receiver.size(), 1u);
   EXPECT_EQ(by_receiver[0].port, "/in");
   EXPECT_EQ(by_receiver[0].peer, "/out");
-  EXPECT_EQ(by_receiver[0].text, kTypesDiffer);
+  EXPECT_EQ(by_receiver[0].text, types_differ("sender", "receiver"));
 }
 
 // Another daemon finds out the same, and it is no news.
@@ -293,7 +297,7 @@ TEST(OnNotice, WithoutOneStandardErrorSaysIt) {
   Node node("test", options);
   auto in = node.input_port<Number>("/in");
   auto out = node.output_port<Wrong>("/out");
-  const std::string line = "arbiter: \"test\": " + kTypesDiffer + "\n";
+  const std::string line = "arbiter: \"test\": " + types_differ("test", "test") + "\n";
   EXPECT_EQ(testing::internal::GetCapturedStderr(), line + line) << "the node has both ends";
 }
 

@@ -1,13 +1,21 @@
 // What a port carries: type name, size and alignment are checked at both ends.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+
 #include <arbiter/arbiter.hpp>
 
+#include "shm/bell.hpp"
 #include "shm/output_segment.hpp"
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/error_of.hpp"
+#include "tests/support/raw_port.hpp"
 
 namespace arbiter::test {
 
@@ -26,7 +34,25 @@ template <char... kLetters>
 struct Named {
   int value;
 };
+struct Twist {
+  double linear[3], angular[3];
+};
+struct SameTwist {
+  double linear[3], angular[3];
+};
+struct NewTwist {
+  double linear[3], angular[3], covariance[36];
+};
+using Pair = std::array<float, 2>;
 
+}  // namespace arbiter::test
+
+ARBITER_TYPE(arbiter::test::Twist, "geometry/Twist");
+ARBITER_TYPE(arbiter::test::SameTwist, "geometry/Twist");
+ARBITER_TYPE(arbiter::test::NewTwist, "geometry/Twist");
+ARBITER_TYPE(arbiter::test::Pair, "Paar \u00e4\u00f6\u00fc");
+
+namespace arbiter::test {
 namespace {
 
 // Both orders of opening are tried; both must say the same.
@@ -70,6 +96,12 @@ template <class T>
 auto input() {
   return [](Node& node) { return node.input_port<T>("/in"); };
 }
+auto output(const Type& type) {
+  return [type](Node& node) { return node.output_port("/out", type); };
+}
+auto input(const Type& type) {
+  return [type](Node& node) { return node.input_port("/in", type); };
+}
 auto untyped_output() {
   return [](Node& node) { return node.output_port("/out"); };
 }
@@ -110,11 +142,12 @@ TEST(Types, NamesThatDifferOnlyFarBehindAreTold) {
 
 // Another program's idea of the same type, as its segment declares it.
 void declare(Daemon& daemon, std::uint64_t size, std::uint64_t alignment,
-             const std::string& expected) {
+             const std::string& expected, const std::string& told_to_the_daemon = {},
+             const std::string& name = "arbiter::test::Number") {
   Node node("test");
   auto in = node.input_port<Number>("/in");
   shm::TypeInfo type;
-  type.set_name("arbiter::test::Number");
+  type.set_name(name);
   type.size = size;
   type.alignment = alignment;
   const auto layout = shm::OutputLayout::plan(type, 8);
@@ -131,6 +164,7 @@ void declare(Daemon& daemon, std::uint64_t size, std::uint64_t alignment,
   client.hello();
   auto open = RawClient::message(shm::MessageKind::kOpenOutput, "/out");
   open.type = type;
+  if (!told_to_the_daemon.empty()) open.type.set_name(told_to_the_daemon);
   client.send(open, {segment.get(), -1});
   client.expect(shm::MessageKind::kConnected);
   const std::string why = daemon.connection("/out", "/in")["mismatch"].dump();
@@ -139,12 +173,157 @@ void declare(Daemon& daemon, std::uint64_t size, std::uint64_t alignment,
 
 TEST(Types, AnotherSizeIsRefused) {
   Daemon daemon(single_model());
-  declare(daemon, 16, 8, "has 16 bytes at the output port and 8 at the input port");
+  declare(daemon, 16, 8, "sends arbiter::test::Number (16 bytes, aligned to 8), the input port");
 }
 
 TEST(Types, AnotherAlignmentIsRefused) {
   Daemon daemon(single_model());
-  declare(daemon, 8, 16, "is aligned to 16 bytes at the output port and to 8 at the input port");
+  declare(daemon, 8, 16, "sends arbiter::test::Number (8 bytes, aligned to 16), the input port");
+}
+
+TEST(Types, ANameThatIsGivenIsTheTypes) {
+  EXPECT_EQ(type_of<Twist>(), Type("geometry/Twist", 48, 8));
+  EXPECT_EQ(type_of<Pair>().name(), "Paar \u00e4\u00f6\u00fc");
+  EXPECT_EQ(type_of<Number>(), Type("arbiter::test::Number", 8, 8)) << "as the compiler writes it";
+  EXPECT_NE(type_of<Twist>(), type_of<NewTwist>());
+  EXPECT_NE(Type("a", 8, 8), Type("b", 8, 8));
+  EXPECT_NE(Type("a", 8, 8), Type("a", 8, 4));
+}
+
+TEST(Types, TypesOfOneNameAndLayoutConnectWhateverTheProgramsCallThem) {
+  EXPECT_EQ(mismatch(output<Twist>(), input<SameTwist>()), "");
+  EXPECT_EQ(mismatch(output<Twist>(), input(Type("geometry/Twist", 48, 8))), "");
+  EXPECT_EQ(mismatch(output(Type("geometry/Twist", 48, 8)), input<Twist>()), "");
+  EXPECT_EQ(mismatch(output(Type("arbiter::test::Number", 8, 8)), input<Number>()), "");
+  EXPECT_EQ(mismatch(output(Type("geometry/Twist", 48, 8)), untyped_input()), "");
+}
+
+TEST(Types, AMismatchNamesBothTypesAndBothComponents) {
+  EXPECT_EQ(mismatch(output<NewTwist>(), input<Twist>()),
+            "the output port of \"sender\" sends geometry/Twist (336 bytes, aligned to 8), the "
+            "input port of \"receiver\" takes geometry/Twist (48 bytes, aligned to 8)");
+  EXPECT_EQ(mismatch(output(Type("Pose", 8, 8)), input(Type("Pose", 8, 4))),
+            "the output port of \"sender\" sends Pose (8 bytes, aligned to 8), the input port of "
+            "\"receiver\" takes Pose (8 bytes, aligned to 4)");
+  EXPECT_EQ(mismatch(untyped_output(), input<Twist>()),
+            "the output port of \"sender\" sends untyped samples (up to 4096 bytes), the input "
+            "port of \"receiver\" takes geometry/Twist (48 bytes, aligned to 8)");
+}
+
+TEST(Types, ARunTimeTypeFeedsATypedPortAndIsFedByOne) {
+  Daemon daemon(fan_out_model(2));
+  Node node("test");
+  const Type type("geometry/Twist", sizeof(Twist), alignof(Twist));
+  auto out = node.output_port("/out", type);
+  auto typed = node.input_port<Twist>("/in0");
+  auto bytes = node.input_port("/in1", type);
+  Twist twist{};
+  twist.angular[2] = 0.5;
+  const auto* data = reinterpret_cast<const std::byte*>(&twist);
+  EXPECT_EQ(out.publish(Bytes(data, sizeof twist)).delivered, 2u);
+  const auto sample = typed.take();
+  ASSERT_TRUE(sample);
+  EXPECT_EQ((*sample)->angular[2], 0.5);
+  const auto raw = bytes.take();
+  ASSERT_TRUE(raw);
+  ASSERT_EQ(raw->size(), sizeof twist);
+  EXPECT_EQ(std::memcmp(raw->data(), &twist, sizeof twist), 0);
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(raw->data()) % alignof(Twist), 0u);
+  EXPECT_EQ(out.type(), type);
+  EXPECT_EQ(typed.type(), type);
+  EXPECT_EQ(bytes.type(), type);
+  EXPECT_EQ(sample->type(), type);
+  EXPECT_EQ(raw->type(), type);
+}
+
+TEST(Types, OfARunTimeTypeEachSampleHasItsSize) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port("/out", Type("Three", 3, 1));
+  auto in = node.input_port("/in");
+  const std::array<std::byte, 4> bytes{};
+  EXPECT_EQ(out.max_size(), 3u);
+  EXPECT_THROW(out.publish(Bytes(bytes.data(), 2)), std::invalid_argument);
+  EXPECT_THROW(out.publish(Bytes(bytes.data(), 4)), std::invalid_argument);
+  EXPECT_FALSE(out.loan(2));
+  EXPECT_FALSE(out.loan(4));
+  auto loan = out.loan(3);
+  ASSERT_TRUE(loan);
+  loan->shrink(1);
+  EXPECT_THROW(out.publish(std::move(*loan)), std::invalid_argument);
+  EXPECT_FALSE(in.take()) << "none of these was an arrival";
+  EXPECT_EQ(out.publish(Bytes(bytes.data(), 3)).delivered, 1u);
+}
+
+TEST(Types, AnUntypedPortsSamplesSayWhatTheyAre) {
+  Daemon daemon(rules(arbiter_at("/in", select("/typed") + select("/bytes", "not /typed"))));
+  Node node("test");
+  auto in = node.input_port("/in");
+  auto typed = node.output_port<Twist>("/typed");
+  auto bytes = node.output_port("/bytes", {.max_size = 16});
+  EXPECT_TRUE(in.type().is_untyped());
+  EXPECT_EQ(bytes.type(), Type::untyped(16));
+  const std::array<std::byte, 2> two{};
+  bytes.publish(Bytes(two.data(), two.size()));
+  {
+    const auto sample = in.take();
+    ASSERT_TRUE(sample);
+    EXPECT_TRUE(sample->type().is_untyped());
+    EXPECT_EQ(sample->size(), 2u);
+  }
+  typed.publish(Twist());
+  const auto sample = in.take();
+  ASSERT_TRUE(sample);
+  EXPECT_EQ(sample->type(), type_of<Twist>());
+  EXPECT_EQ(sample->type().name(), "geometry/Twist");
+}
+
+TEST(Types, WhatCannotBeATypeIsRefusedWithTheReason) {
+  const auto why_not = [](const std::string& name, std::size_t size, std::size_t alignment) {
+    return error_of([&] { static_cast<void>(Type(name, size, alignment)); });
+  };
+  EXPECT_NE(why_not("", 8, 8).find("1 to 239 bytes"), std::string::npos);
+  EXPECT_NE(why_not(std::string(240, 'x'), 8, 8).find("1 to 239 bytes"), std::string::npos);
+  EXPECT_EQ(why_not(std::string(239, 'x'), 8, 8), "no error");
+  EXPECT_EQ(why_not("a\nb", 8, 8),
+            "\"a\\nb\" cannot be a port's type: its name has a control character or an invisible "
+            "one in it");
+  EXPECT_NE(why_not("a\u202eb", 8, 8).find("invisible"), std::string::npos);
+  EXPECT_NE(why_not("a\xff", 8, 8).find("not UTF-8"), std::string::npos);
+  EXPECT_NE(why_not("a", 0, 8).find("no bytes"), std::string::npos);
+  EXPECT_NE(why_not("a", 8, 0).find("power of two"), std::string::npos);
+  EXPECT_NE(why_not("a", 8, 3).find("power of two"), std::string::npos);
+  EXPECT_NE(why_not("a", 8, 8192).find("at most 4096"), std::string::npos);
+  EXPECT_NE(why_not("a", (std::size_t{1} << 40) + 1, 8).find("more than"), std::string::npos);
+}
+
+// What a component says of its type is judged by the daemon, which shows it to others.
+TEST(Types, ATypeWhoseNameWouldMisleadIsNotTaken) {
+  Daemon daemon(single_model());
+  for (const char* name : {"Twist\x1b[2J", "Twist\nno", "Twist\xff", "Twist\u202e"}) {
+    RawClient client(daemon.instance());
+    client.hello();
+    auto open = RawClient::message(shm::MessageKind::kOpenInput, "/in");
+    open.type.set_name(name);
+    open.type.size = open.type.alignment = 8;
+    const auto segment = raw_input_segment();
+    const shm::Bell bell;
+    client.send(open, {segment.get(), bell.for_publishers().get()});
+    const auto refused = client.expect(shm::MessageKind::kRefused);
+    EXPECT_NE(std::string(refused.message.text_view()).find("the port's type"), std::string::npos);
+  }
+}
+
+// A receiver judges what the publisher's memory says, whatever the daemon was told.
+TEST(Types, AReceiverBelievesTheMemoryThatItReads) {
+  Daemon daemon(single_model());
+  declare(daemon, 8, 8, "the output port sends Other (8 bytes, aligned to 8), the input port takes",
+          "arbiter::test::Number", "Other");
+}
+TEST(Types, AReceiverTakesNothingOfATypeWhoseNameWouldMislead) {
+  Daemon daemon(single_model());
+  declare(daemon, 8, 8, "the output port's type is not one: its name has a control character",
+          "arbiter::test::Number", "arbiter::test::Number\x1b");
 }
 
 TEST(Types, AMismatchDeliversNothingAndIsRefused) {

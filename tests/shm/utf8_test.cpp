@@ -5,8 +5,6 @@
 
 #include <string>
 
-#include "shm/type_info.hpp"
-
 namespace arbiter::shm {
 namespace {
 
@@ -44,14 +42,6 @@ TEST(Utf8, WhatIsPrintedCannotForgeALineNorSteerATerminal) {
   EXPECT_EQ(printable("a\u202eb\u2028c"), "a\\xe2\\x80\\xaeb\\xe2\\x80\\xa8c");
   EXPECT_EQ(printable("\xff\xc3"), "\\xff\\xc3");
   EXPECT_EQ(printable(std::string_view("\0x", 2)), "\\x00x");
-}
-
-TEST(Utf8, TypesThatDoNotFitAreNamedSoThatNobodyIsMisled) {
-  TypeInfo output, input;
-  output.set_name("Twist\x1b[2J");
-  input.set_name("Pose\n");
-  EXPECT_EQ(type_mismatch(output, input),
-            "the output port sends Twist\\x1b[2J, the input port takes Pose\\n");
 }
 
 }  // namespace

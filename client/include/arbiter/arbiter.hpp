@@ -34,3 +34,4 @@
 #include <arbiter/options.hpp>
 #include <arbiter/output_port.hpp>
 #include <arbiter/result.hpp>
+#include <arbiter/type.hpp>

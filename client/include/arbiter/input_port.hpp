@@ -13,6 +13,7 @@
 #include <arbiter/bytes.hpp>
 #include <arbiter/detail/cores.hpp>
 #include <arbiter/result.hpp>
+#include <arbiter/type.hpp>
 
 namespace arbiter {
 
@@ -27,6 +28,11 @@ class SampleBase {
   }
   // The source's own count of its samples, from 1.
   [[nodiscard]] std::uint64_t sequence() const noexcept { return held_.sequence; }
+  // What it is: the type of the output port it came from, also where the input port is untyped. It
+  // stays as it is while the sample is held. Wait-free.
+  [[nodiscard]] const Type& type() const noexcept {
+    return detail::sample_type(*core_, core_.get_deleter().hold);
+  }
   // When it arrived: CLOCK_MONOTONIC, in nanoseconds.
   [[nodiscard]] std::int64_t stamp_ns() const noexcept { return held_.stamp_ns; }
 
@@ -158,6 +164,8 @@ class InputPort {
   // inhibits stays inhibited. Wait-free.
   [[nodiscard]] bool idle() noexcept { return detail::is_idle(*core_); }
   [[nodiscard]] const std::string& name() const noexcept { return detail::name(*core_); }
+  // What it takes; untyped: anything.
+  [[nodiscard]] const Type& type() const noexcept { return detail::type(*core_); }
 
  private:
   friend class Node;

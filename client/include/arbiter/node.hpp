@@ -7,7 +7,6 @@
 // In a child that was forked all calls throw arbiter::Error, but service_fd(), which answers -1.
 #pragma once
 
-#include <cstddef>
 #include <memory>
 #include <string_view>
 #include <type_traits>
@@ -17,6 +16,7 @@
 #include <arbiter/input_port.hpp>
 #include <arbiter/options.hpp>
 #include <arbiter/output_port.hpp>
+#include <arbiter/type.hpp>
 
 namespace arbiter {
 
@@ -46,14 +46,20 @@ class Node {
     if constexpr (std::is_void_v<T>) {
       return output_port(name, options);
     } else {
-      return OutputPort<T>(detail::open_output(*core_, name, detail::port_type<T>(), options));
+      return OutputPort<T>(detail::open_output(*core_, name, type_of<T>(), options));
     }
   }
-  // An untyped one, for samples of up to options.max_size bytes.
+  // One of a type that is known only now: its samples are bytes, type.size() of them each. To those
+  // at the other end it is as if a program had opened it with the C++ type of that name.
+  [[nodiscard]] OutputPort<void> output_port(std::string_view name, const Type& type,
+                                             const OutputPortOptions& options = {}) {
+    return OutputPort<void>(detail::open_output(*core_, name, type, options));
+  }
+  // An untyped one, for samples of up to options.max_size bytes. Only untyped input ports take
+  // them.
   [[nodiscard]] OutputPort<void> output_port(std::string_view name,
                                              const OutputPortOptions& options = {}) {
-    return OutputPort<void>(detail::open_output(
-        *core_, name, {nullptr, options.max_size, alignof(std::max_align_t)}, options));
+    return output_port(name, Type::untyped(options.max_size), options);
   }
 
   // Opens an input port; as for output_port().
@@ -63,12 +69,19 @@ class Node {
     if constexpr (std::is_void_v<T>) {
       return input_port(name, options);
     } else {
-      return InputPort<T>(detail::open_input(*core_, name, detail::port_type<T>(), options));
+      return InputPort<T>(detail::open_input(*core_, name, type_of<T>(), options));
     }
   }
+  // One that takes samples of this type alone, and gives them as bytes, type.size() of them each.
+  [[nodiscard]] InputPort<void> input_port(std::string_view name, const Type& type,
+                                           const InputPortOptions& options = {}) {
+    return InputPort<void>(detail::open_input(*core_, name, type, options));
+  }
+  // An untyped one: it takes samples of any type and size, and each says what it is
+  // (Sample::type()).
   [[nodiscard]] InputPort<void> input_port(std::string_view name,
                                            const InputPortOptions& options = {}) {
-    return InputPort<void>(detail::open_input(*core_, name, {}, options));
+    return input_port(name, Type::untyped(0), options);
   }
 
   // Puts another of the models in force that the daemon has loaded (arbiterd --model NAME=FILE):

@@ -13,6 +13,7 @@
 #include <arbiter/bytes.hpp>
 #include <arbiter/detail/cores.hpp>
 #include <arbiter/result.hpp>
+#include <arbiter/type.hpp>
 
 namespace arbiter {
 
@@ -80,6 +81,7 @@ class OutputPortBase {
   void deactivate() noexcept { detail::deactivate(*core_); }
   // The port's name, which is also its source's.
   [[nodiscard]] const std::string& name() const noexcept { return detail::name(*core_); }
+  [[nodiscard]] const Type& type() const noexcept { return detail::type(*core_); }
 
  protected:
   explicit OutputPortBase(std::shared_ptr<detail::OutputCore> core) noexcept
@@ -121,29 +123,45 @@ class OutputPort : public OutputPortBase {
 template <>
 class OutputPort<void> : public OutputPortBase {
  public:
-  // Memory for `size` bytes; empty if max_loans are out or size is above max_size. Wait-free.
+  // Memory for `size` bytes; empty if max_loans are out, or `size` is not what a sample may have:
+  // that of its type, or for an untyped port, up to max_size. Wait-free.
   [[nodiscard]] std::optional<Loan<void>> loan(std::size_t size) noexcept {
+    if (!may_have(size)) return std::nullopt;
     const detail::LoanedSlot slot = detail::loan(*core_, size);
     if (slot.data == nullptr) return std::nullopt;
     return Loan<void>(*core_, slot, size);
   }
+  // As for a typed port. Throws std::invalid_argument, too, for a loan that was shrunk where a type
+  // says how large samples are.
   Outcome publish(Loan<void> loan) {
     if (loan.core_ == nullptr || loan.core_.get() != core_.get()) {
       throw std::invalid_argument("the loan is not one of this port");
     }
+    require_size(loan.size());
     static_cast<void>(loan.core_.release());
     return detail::publish(*core_, loan.core_.get_deleter().slot, loan.size());
   }
-  // With a copy. Throws std::invalid_argument for more than max_size bytes.
+  // With a copy. Throws std::invalid_argument for a size that loan() would not give.
   Outcome publish(Bytes bytes) {
-    if (bytes.size() > max_size()) throw std::invalid_argument("the sample is above max_size");
+    require_size(bytes.size());
     return detail::publish_copy(*core_, bytes.data(), bytes.size());
   }
+  // The largest sample, in bytes; where the port has a type, that of each.
   [[nodiscard]] std::size_t max_size() const noexcept { return detail::max_size(*core_); }
 
  private:
   friend class Node;
   using OutputPortBase::OutputPortBase;
+
+  [[nodiscard]] bool may_have(std::size_t size) const noexcept {
+    return size == max_size() || (size < max_size() && type().is_untyped());
+  }
+  void require_size(std::size_t size) const {
+    if (may_have(size)) return;
+    throw std::invalid_argument(name() + ": a sample of " + std::to_string(size) +
+                                " bytes, but its type or max_size says " +
+                                std::to_string(max_size()));
+  }
 };
 
 }  // namespace arbiter

@@ -7,23 +7,16 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <type_traits>
-#include <typeinfo>
 
 #include <arbiter/options.hpp>
 #include <arbiter/result.hpp>
+#include <arbiter/type.hpp>
 
 namespace arbiter::detail {
 
 class InputCore;
 class NodeCore;
 class OutputCore;
-
-struct PortType {
-  const char* name = nullptr;  // null: untyped
-  std::size_t size = 0;
-  std::size_t alignment = 1;
-};
 
 struct LoanedSlot {
   std::byte* data = nullptr;  // null: none to be had
@@ -48,7 +41,7 @@ void service(NodeCore& node);
 int service_fd(const NodeCore& node) noexcept;
 void switch_model(NodeCore& node, std::string_view name);
 
-std::shared_ptr<OutputCore> open_output(NodeCore& node, std::string_view name, const PortType& type,
+std::shared_ptr<OutputCore> open_output(NodeCore& node, std::string_view name, const Type& type,
                                         const OutputPortOptions& options);
 void close_output(std::shared_ptr<OutputCore> core) noexcept;
 LoanedSlot loan(OutputCore& core, std::size_t size) noexcept;
@@ -59,8 +52,9 @@ Outcome signal(OutputCore& core) noexcept;
 void deactivate(OutputCore& core) noexcept;
 std::size_t max_size(const OutputCore& core) noexcept;
 const std::string& name(const OutputCore& core) noexcept;
+const Type& type(const OutputCore& core) noexcept;
 
-std::shared_ptr<InputCore> open_input(NodeCore& node, std::string_view name, const PortType& type,
+std::shared_ptr<InputCore> open_input(NodeCore& node, std::string_view name, const Type& type,
                                       const InputPortOptions& options);
 void close_input(std::shared_ptr<InputCore> core) noexcept;
 HeldSample take(InputCore& core);
@@ -70,7 +64,9 @@ int wait_descriptor(InputCore& core);
 std::optional<std::string_view> winner(InputCore& core) noexcept;
 bool is_idle(InputCore& core) noexcept;
 const std::string& source_name(const InputCore& core, std::uint32_t source) noexcept;
+const Type& sample_type(const InputCore& core, std::uint32_t hold) noexcept;
 const std::string& name(const InputCore& core) noexcept;
+const Type& type(const InputCore& core) noexcept;
 
 // A sample, and a loan, keep the port's core in being without counting references to it: samples
 // and loans are counted anyway, by their port's thread, where an atomic count would hold up each
@@ -86,15 +82,5 @@ struct EndLoan {
   std::uint32_t slot = 0;
 };
 using LoanedBy = std::unique_ptr<OutputCore, EndLoan>;
-
-template <class T>
-PortType port_type() noexcept {
-  static_assert(
-      std::is_trivially_copyable_v<T>,
-      "a sample is read in place by other processes: its type must be trivially copyable");
-  static_assert(!std::is_pointer_v<T>, "a pointer means nothing in another process");
-  static_assert(alignof(T) <= 4096, "samples are aligned to at most a page");
-  return {typeid(T).name(), sizeof(T), alignof(T)};
-}
 
 }  // namespace arbiter::detail

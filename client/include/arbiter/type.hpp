@@ -1,0 +1,117 @@
+// What a port carries: a name, a size and an alignment.
+//
+//   struct Twist { double linear[3], angular[3]; };
+//   ARBITER_TYPE(Twist, "geometry/Twist");               // beside its definition, in no namespace
+//
+//   auto out = node.output_port<Twist>("/Joystick/cmd:o");
+//   auto in = node.input_port("/Base/cmd:i", arbiter::Type("geometry/Twist", 48, 8));  // elsewhere
+//
+// Two types are equal if and only if their names are, byte for byte, and their sizes, and their
+// alignments. Nothing else is compared: two programs that give one name to two layouts of one size
+// understand each other wrongly; put a version into the name where the layout changes.
+//
+// Samples go from an output port to an input port if the two ports' types are equal, or the input
+// port is untyped. Otherwise the two are not connected; a notice to both (NoticeKind::refused), the
+// daemon's log, `arbiter status` and `arbiter why` name both types and both components.
+//
+// A type's name is 1 to 239 bytes of UTF-8, without control characters and invisible ones. A C++
+// type that is given none is called as the compiler writes it, with its namespaces
+// ("robot::Twist"; demangled, as GCC and Clang do it; where that is above 239 bytes, its end is
+// replaced by a hash of the whole). Programs in one language, built alike, may rely on it. Name
+// what others shall feed or read: a script, a gateway, another language, another standard library.
+//
+// Threads: a Type is a value. Blocking: none. Cost: a copy may allocate; nothing here is on the
+// data path.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <typeinfo>
+
+namespace arbiter {
+
+class Type {
+ public:
+  // `size` of a sample and `alignment` are in bytes: 1 to 2^40, and a power of two up to 4096.
+  // Throws arbiter::Error where one of the three is not as it must be.
+  Type(std::string_view name, std::size_t size, std::size_t alignment);
+  // Samples of any size up to `max_size`, which are bytes to whoever has not agreed upon more.
+  [[nodiscard]] static Type untyped(std::size_t max_size) noexcept;
+
+  // Empty: untyped.
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  // Bytes of a sample; untyped: the most that one may have, 0 at an input port, which takes any.
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  // In bytes. Untyped: of where a sample begins in memory; 1 at an input port.
+  [[nodiscard]] std::size_t alignment() const noexcept { return alignment_; }
+  [[nodiscard]] bool is_untyped() const noexcept { return name_.empty(); }
+
+  // The rule that is written above.
+  friend bool operator==(const Type& one, const Type& other) noexcept {
+    return one.name_ == other.name_ && one.size_ == other.size_ &&
+           one.alignment_ == other.alignment_;
+  }
+  friend bool operator!=(const Type& one, const Type& other) noexcept { return !(one == other); }
+
+ private:
+  Type() = default;
+
+  std::string name_;
+  std::size_t size_ = 0;
+  std::size_t alignment_ = 1;
+};
+
+// The name of T, where somebody has given one. Specialise it as ARBITER_TYPE does it, or partially:
+//
+//   template <class Scalar>
+//   struct arbiter::TypeName<Grid<Scalar>> {
+//     static constexpr std::string_view value = "maps/Grid." + …;
+//   };
+template <class T>
+struct TypeName {
+  static constexpr std::string_view value{};  // none
+};
+
+namespace detail {
+
+Type type_of_cpp(const char* mangled_name, std::size_t size, std::size_t alignment);
+
+// As far as it can be said while compiling; Type() looks at the rest.
+constexpr bool may_be_type_name(std::string_view name) noexcept {
+  for (const char byte : name) {
+    if ((static_cast<unsigned char>(byte) < 0x20) || byte == 0x7f) return false;
+  }
+  return !name.empty() && name.size() <= 239;
+}
+
+}  // namespace detail
+
+// T as its ports declare it. Throws arbiter::Error where it has been given no proper name.
+template <class T>
+[[nodiscard]] Type type_of() {
+  static_assert(
+      std::is_trivially_copyable_v<T>,
+      "a sample is read in place by other processes: its type must be trivially copyable");
+  static_assert(!std::is_pointer_v<T>, "a pointer means nothing in another process");
+  static_assert(alignof(T) <= 4096, "samples are aligned to at most a page");
+  if constexpr (TypeName<T>::value.empty()) {
+    return detail::type_of_cpp(typeid(T).name(), sizeof(T), alignof(T));
+  } else {
+    return Type(TypeName<T>::value, sizeof(T), alignof(T));
+  }
+}
+
+}  // namespace arbiter
+
+// Names a C++ type. In no namespace, after the type is defined and before a port of it is opened,
+// in each program that opens one: best in the header that defines it. A type with a comma in it
+// needs an alias.
+#define ARBITER_TYPE(CppType, type_name)                                          \
+  template <>                                                                     \
+  struct arbiter::TypeName<CppType> {                                             \
+    static constexpr ::std::string_view value = type_name;                        \
+    static_assert(::arbiter::detail::may_be_type_name(value),                     \
+                  "a type's name has 1 to 239 bytes, and no control characters"); \
+  }
