@@ -7,6 +7,7 @@
 #include "service/log/log.hpp"
 #include "service/status.hpp"
 #include "shm/clock.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::service {
 namespace {
