@@ -48,9 +48,9 @@ TEST(BehavioursView, PutsBehavioursIntoTheBoxesOfTheirMetaBehaviours) {
 
 TEST(BehavioursView, ArrowsLeadFromInhibitorsToTheInhibitedAndEndAtTheirBoxes) {
   const std::string dot = draw(load(kNested), View::kBehaviours);
-  EXPECT_THAT(dot, HasSubstr("b2 -> b3 [color=\"#D55E00\" penwidth=1.8"));
-  EXPECT_THAT(dot, HasSubstr("b4 -> b2 [lhead=cluster_b1 "));
-  EXPECT_THAT(dot, HasSubstr("C inhibits Inner\\n"));
+  EXPECT_THAT(dot, HasSubstr("b2 -> b3 [color=\"#C8102E\" penwidth=1.8"));
+  EXPECT_THAT(dot, HasSubstr("b4 -> b2 [color=\"#C8102E\" penwidth=1.8 lhead=cluster_b1 "));
+  EXPECT_THAT(dot, HasSubstr("C inhibits Inner, "));
 }
 
 TEST(BehavioursView, AModelOfRulesByHandHasNone) {
