@@ -103,6 +103,7 @@ void DotWriter::statement(std::string_view what, std::initializer_list<Attribute
 void DotWriter::line(LineKind kind, std::string_view what, Attributes attributes) {
   const Line& look = look_of(kind);
   lines_.insert(kind);
+  ++line_count_;
   const Attributes of_look{{"color", quoted(look.colour)},
                            {"penwidth", look.width},
                            {"style", look.style},

@@ -39,6 +39,7 @@ class DotWriter {
   // A statement that looks as such lines do, and is noted for the legend.
   void line(LineKind kind, std::string_view what, Attributes attributes = {});
   [[nodiscard]] const std::set<LineKind>& lines() const { return lines_; }
+  [[nodiscard]] std::size_t line_count() const { return line_count_; }
   // Signs that occur, for the legend as well.
   void note_sign(std::string_view sign) { signs_.insert(sign); }
   [[nodiscard]] bool has_sign(std::string_view sign) const { return signs_.contains(sign); }
@@ -51,6 +52,7 @@ class DotWriter {
   std::string text_;
   std::size_t depth_ = 0;
   std::set<LineKind> lines_;
+  std::size_t line_count_ = 0;
   std::set<std::string_view> signs_;
 };
 

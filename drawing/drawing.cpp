@@ -8,6 +8,8 @@ namespace {
 
 constexpr const char* kFont = "\"Helvetica,Arial,sans-serif\"";
 constexpr std::size_t kMaxTitle = 70;  // characters
+// Of more lines, Graphviz would seek the best places for minutes, and nobody could follow them.
+constexpr std::size_t kMaxCarefulLines = 400;
 
 std::string row(const std::string& content) {
   return R"(<TR><TD ALIGN="LEFT">)" + content + "</TD></TR>";
@@ -92,6 +94,10 @@ std::string draw(const rules::LoadedModel& model, View view, const Page& page,
   out.statement("edge", {{"fontname", kFont}, {"fontsize", "9"}, {"arrowsize", "0.8"}});
   if (view != View::kConnections) draw_behaviours(model, situation, out);
   if (view != View::kBehaviours) draw_connections(model, situation, out);
+  if (out.line_count() > kMaxCarefulLines) {
+    for (const char* effort : {"mclimit", "nslimit", "nslimit1"}) out.attribute(effort, "0.1");
+    out.attribute("splines", "line");
+  }
   draw_title(page, view, situation != nullptr, out);
   out.close();
   return out.take();

@@ -194,6 +194,26 @@ TEST(Picture, OfAListOfFortyHasAnArrowFromEachToTheNext) {
   EXPECT_EQ(count(dot, kAllAfter), 38u + 1);  // and in the legend
 }
 
+// Sixty behaviours of which each inhibits every second other one took dot more than a minute.
+TEST(Picture, OfATangleIsLaidOutWithLessCare) {
+  const auto tangle = [](std::size_t count) {
+    std::string text = "<behaviors>";
+    for (std::size_t i = 0; i < count; ++i) {
+      text += "<behavior name='T" + std::to_string(i) + "'><config at='/p'>/s" + std::to_string(i) +
+              "</config>";
+      for (std::size_t j = (i + 1) % 2; j < count; j += 2) {
+        text += "<inhibition>T" +
+                std::to_string((i * 7 + j) % count == i ? (i + 1) % count : (i * 7 + j) % count) +
+                "</inhibition>";
+      }
+      text += "</behavior>";
+    }
+    return draw(load(text + "</behaviors>"), View::kBehaviours);
+  };
+  EXPECT_THAT(tangle(60), HasSubstr("splines=line"));
+  EXPECT_THAT(tangle(7), Not(HasSubstr("splines")));
+}
+
 TEST(Picture, SaysWhatItIsOf) {
   const auto model = load(list_of(3));
   const Page page{"a & b", {"files/a.xml", "model 3 in force"}, 0};
