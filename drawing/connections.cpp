@@ -15,6 +15,10 @@ namespace {
 // More arrows than this cross each other too often to be followed.
 constexpr std::size_t kMaxArrows = 16;
 
+// Of sources that a port only senses, the others share a row: inhibition across ports may make them
+// as many as there are behaviours.
+constexpr std::size_t kMaxSensed = 6;
+
 // "/Gaze/pos:i" and "/Gaze" belong to "Gaze": components put their name in front of their ports'.
 std::string component_of(std::string_view port) {
   if (port.starts_with('/')) port.remove_prefix(1);
@@ -124,14 +128,28 @@ class PortsView {
   }
 
  private:
-  static std::size_t lines_of(const Input& in) { return 4 + 2 * count_arrows(in); }
+  static std::size_t lines_of(const Input& in) {
+    return 4 + 4 * count_rules(in) + in.others.size() + std::min(in.sensed.size(), kMaxSensed);
+  }
 
   void hold(std::size_t left, std::size_t right) {
     out_.statement("p" + std::to_string(left) + " -> s" + std::to_string(right),
                    {{"style", "invis"}, {"weight", "0"}});
   }
 
-  void draw_port(const Input& in, std::size_t number) {
+  // Those who are active first: a live picture shows these.
+  std::vector<std::string> take_rest(Input& in) const {
+    std::stable_partition(in.sensed.begin(), in.sensed.end(),
+                          [&](const std::string& source) { return ports_.is_active(source); });
+    if (in.sensed.size() <= kMaxSensed) return {};
+    const auto rest = in.sensed.begin() + kMaxSensed - 1;
+    std::vector<std::string> result(rest, in.sensed.end());
+    in.sensed.erase(rest, in.sensed.end());
+    return result;
+  }
+
+  void draw_port(Input in, std::size_t number) {
+    const std::vector<std::string> rest = take_rest(in);
     const std::string port = "p" + std::to_string(number), sources = "s" + std::to_string(number);
     std::map<std::string, std::string> ids;
     std::string rows;
@@ -141,6 +159,7 @@ class PortsView {
     };
     // In the order in which arrows end: at the port's name, at its rules, at the others.
     for (const std::string& source : in.sensed) add(source, nullptr);
+    if (!rest.empty()) rows += ports_.rest_row(rest, "rest");
     for (std::size_t i = 0; i < count_rules(in); ++i) {
       add(in.rules->rules[i].source, &in.rules->rules[i]);
     }
@@ -150,6 +169,7 @@ class PortsView {
     out_.statement(port, {{"tooltip", quoted(in.port)},
                           {"label", Ports::table(Ports::title_row(component_of(in.port)) +
                                                  ports_.input_rows(in, "i"))}});
+    if (!rest.empty()) ports_.draw_rest(rest, in.port, sources + ":rest", port + ":i");
     ports_.draw_arrows(in, port, "i",
                        [&](const std::string& source) { return sources + ":" + ids.at(source); });
   }

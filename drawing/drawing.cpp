@@ -31,7 +31,7 @@ const char* in_words(View view) {
 }
 
 // Only what there is in the picture.
-std::string legend_rows(const DotWriter& out, bool is_live) {
+std::string legend_rows(const DotWriter& out, View view, bool is_live) {
   const std::string small = "POINT-SIZE=\"9\"";
   std::string rows;
   for (const LineKind kind : out.lines()) {
@@ -46,6 +46,7 @@ std::string legend_rows(const DotWriter& out, bool is_live) {
   }
   for (const Mark& mark : kMarks) {
     if (!is_live) break;
+    if (view == View::kBehaviours && mark.kind == MarkKind::kActive) continue;
     rows += R"(<TR><TD ALIGN="LEFT" BGCOLOR=")" + std::string(mark.colour) + "\">" +
             font(small, html(std::string(mark.sign) + " " + mark.meaning)) + "</TD></TR>";
   }
@@ -61,7 +62,7 @@ void draw_title(const Page& page, View view, bool is_live, DotWriter& out) {
   for (const std::string& detail : page.details) {
     rows += row(font("POINT-SIZE=\"10\"", html(shortened(detail, kMaxTitle))));
   }
-  rows += legend_rows(out, is_live);
+  rows += legend_rows(out, view, is_live);
   if (rows.empty()) return;
   out.attribute("labelloc", "t");
   out.attribute("labeljust", "l");

@@ -116,6 +116,23 @@ std::string Ports::output_row(const std::string& source, const std::string& id,
               beside == nullptr ? 1 : count_lines(lines_of(*beside)));
 }
 
+std::string Ports::rest_row(const std::vector<std::string>& sources, const std::string& id) const {
+  const auto active = std::count_if(sources.begin(), sources.end(),
+                                    [&](const std::string& source) { return is_active(source); });
+  const Mark& mark = look_of(active != 0 ? MarkKind::kActive : MarkKind::kInactive);
+  std::string text = "and " + std::to_string(sources.size()) + " more, only sensed";
+  if (situation_ != nullptr) text += ", " + std::to_string(active) + " of them active";
+  return cell(id, "RIGHT", mark.colour, small("<I>" + html(text) + "</I>"));
+}
+
+void Ports::draw_rest(const std::vector<std::string>& sources, const std::string& port,
+                      const std::string& tail, const std::string& head) {
+  std::string text;
+  for (const std::string& source : sources) text += source + " is sensed at " + port + "\n";
+  text.pop_back();
+  out_.line(LineKind::kSensed, tail + ":e -> " + head + ":w", {{"tooltip", quoted(text)}});
+}
+
 void Ports::draw_selected(const rules::ConnectionRule& rule, const std::string& port,
                           const std::string& arrow) {
   const LineKind kind = situation_ == nullptr     ? LineKind::kSelected

@@ -35,8 +35,15 @@ class Ports {
   // As high as the rule's row, where it stands beside that.
   [[nodiscard]] std::string output_row(const std::string& source, const std::string& id,
                                        const rules::ConnectionRule* beside = nullptr) const;
+  // For several sources that are only sensed, and have no rows.
+  [[nodiscard]] std::string rest_row(const std::vector<std::string>& sources,
+                                     const std::string& id) const;
   static std::string title_row(const std::string& name);
   static std::string table(const std::string& rows);
+
+  // One line for all of them.
+  void draw_rest(const std::vector<std::string>& sources, const std::string& port,
+                 const std::string& tail, const std::string& head);
 
   // Arrows to the input port whose rows are in `node`; `tail` names the end of a source.
   template <typename Tail>

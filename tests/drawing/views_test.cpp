@@ -86,6 +86,22 @@ TEST(ConnectionsView, PutsThePortsOfAComponentTogether) {
   EXPECT_THAT(dot, HasSubstr("c0:o1:e -> c0:i0r0:w"));
 }
 
+// By inhibition across ports, each behaviour of a large model may matter to each port.
+TEST(ConnectionsView, SourcesThatAreOnlySensedShareARowWhereTheyAreMany) {
+  std::string rules, condition = "not /Sensor0:o";
+  for (int i = 1; i < 40; ++i) condition += " and not /Sensor" + std::to_string(i) + ":o";
+  for (int i = 0; i < 20; ++i) {
+    rules += "<arbiter at='/P" + std::to_string(i) + "/in:i'><select from='/A" + std::to_string(i) +
+             "/out:o'>" + condition + "</select></arbiter>";
+  }
+  const auto loaded = load("<behaviors>" + rules + "</behaviors>");
+  const std::string dot = draw(loaded, View::kConnections);
+  EXPECT_THAT(dot, HasSubstr("and 35 more, only sensed"));
+  EXPECT_THAT(dot, HasSubstr("/Sensor39:o is sensed at /P0/in:i"));
+  const Situation now = decide(loaded.rules, {"/Sensor39:o"});
+  EXPECT_THAT(draw(loaded, View::kConnections, {}, &now), HasSubstr("● /Sensor39:o"));
+}
+
 // Ten thousand behaviours, a thousand boxes in each other: large, but no trouble.
 TEST(Views, OfLargeModelsAreDrawnToo) {
   std::string model = "<behaviors>";
