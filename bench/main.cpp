@@ -11,9 +11,12 @@
 #include "bench/harness/html.hpp"
 #include "bench/harness/interruption.hpp"
 #include "bench/harness/machine.hpp"
+#include "bench/harness/picture.hpp"
 #include "bench/harness/program.hpp"
+#include "bench/harness/rounds.hpp"
 #include "bench/measures/measures.hpp"
 #include "bench/targets.hpp"
+#include "cli/progress.hpp"
 
 namespace arbiter::bench {
 namespace {
@@ -23,6 +26,7 @@ struct Arguments {
   std::vector<std::string> only;
   std::string json = "report.json";
   std::string html = "report.html";
+  std::string picture = "report.svg";
 };
 
 constexpr int kWrongUse = 2;
@@ -89,18 +93,37 @@ std::string first_unknown(const std::vector<std::string>& names) {
   return "";
 }
 
+std::vector<MeasureEntry> chosen(const std::vector<std::string>& only) {
+  auto measures = all_measures();
+  std::erase_if(measures, [&](const MeasureEntry& entry) {
+    return !only.empty() && std::find(only.begin(), only.end(), entry.name) == only.end();
+  });
+  return measures;
+}
+
 void run(const Arguments& arguments) {
   std::ofstream json_file = open(arguments.json);
   std::ofstream html_file = open(arguments.html);
+  std::ofstream picture_file = open(arguments.picture);
   Report report;
   report.quick = arguments.quick;
   processors();  // as they are now, before anything is pinned
   const MachineWatch watch;
-  for (const MeasureEntry& entry : all_measures()) {
-    const auto& only = arguments.only;
-    if (!only.empty() && std::find(only.begin(), only.end(), entry.name) == only.end()) continue;
+  const auto measures = chosen(arguments.only);
+  for (std::size_t i = 0; i < measures.size(); ++i) {
     throw_if_interrupted();
-    report.measures.push_back(entry.run({arguments.quick}));
+    const std::string which = std::to_string(i + 1) + " of " + std::to_string(measures.size());
+    std::cerr << "measuring " << which << ": " << measures[i].name << "\n";
+    cli::ProgressLine progress;
+    watch_rounds([&](const Round& round) {
+      progress.show([&] {
+        return measures[i].name + ": round " + std::to_string(round.number) + " of " +
+               std::to_string(round.of) + " (" + round.system + ")";
+      });
+    });
+    report.measures.push_back(measures[i].run({arguments.quick}));
+    progress.clear();
+    watch_rounds({});
     print(report.measures.back());
   }
   report.machine = watch.finish(report.warnings);
@@ -110,8 +133,12 @@ void run(const Arguments& arguments) {
   const nlohmann::json json = report.json();
   json_file << json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
   html_file << html(json);
-  if (!json_file.flush() || !html_file.flush()) throw std::runtime_error("cannot write the report");
-  std::cout << "\n\nThe report is in " << arguments.json << " and " << arguments.html << "\n";
+  picture_file << picture(json);
+  if (!json_file.flush() || !html_file.flush() || !picture_file.flush()) {
+    throw std::runtime_error("cannot write the report");
+  }
+  std::cout << "\n\nThe report is in " << arguments.json << " and " << arguments.html
+            << ", its targets as a picture in " << arguments.picture << "\n";
 }
 
 int run_or_explain(const Arguments& arguments) {
@@ -144,6 +171,8 @@ int main(int argc, char** argv) {
   app.add_flag("--list", is_list, "Name the measures, and end");
   app.add_option("--json", arguments.json, "Where the figures are written")->type_name("FILE");
   app.add_option("--html", arguments.html, "Where the page is written")->type_name("FILE");
+  app.add_option("--picture", arguments.picture, "Where the targets are drawn, as SVG")
+      ->type_name("FILE");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -32,19 +32,24 @@ ProgressLine::ProgressLine(std::ostream& out, bool is_terminal,
     : out_(out),
       is_terminal_(is_terminal),
       now_(std::move(now)),
-      next_(now_() + (is_terminal ? kFirstOnTerminal : kFirstInLog)) {}
+      start_(now_()),
+      next_(start_ + (is_terminal ? kFirstOnTerminal : kFirstInLog)) {}
 
 rules::Budget::Watch ProgressLine::watch() {
-  return [this](const rules::Progress& progress) { show(progress); };
+  return [this](const rules::Progress& progress) {
+    if (progress.of == 0) return;
+    show([&] {
+      return progress.stage + ": " + std::to_string(progress.done) + " of " +
+             std::to_string(progress.of) + " (" + shortened(progress.name) + ')';
+    });
+  };
 }
 
-void ProgressLine::show(const rules::Progress& progress) {
+void ProgressLine::show(const std::function<std::string()>& text) {
   const Clock::time_point now = now_();
-  if (progress.of == 0 || now < next_) return;
+  if (now < next_) return;
   next_ = now + (is_terminal_ ? kEveryOnTerminal : kEveryInLog);
-  out_ << (is_terminal_ ? "\r\033[K" : "") << progress.stage << ": " << progress.done << " of "
-       << progress.of << " (" << shortened(progress.name) << ')' << (is_terminal_ ? "" : "\n")
-       << std::flush;
+  out_ << (is_terminal_ ? "\r\033[K" : "") << text() << (is_terminal_ ? "" : "\n") << std::flush;
   is_shown_ = is_terminal_;
 }
 

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <functional>
 #include <ostream>
+#include <string>
 
 #include "rules/prove/budget.hpp"
 
@@ -26,15 +27,20 @@ class ProgressLine {
 
   // Must not outlive this.
   rules::Budget::Watch watch();
+  // Shows the line if it is time for it; to be called often. `text` is called only then.
+  void show(const std::function<std::string()>& text);
+  // Since this was made.
+  [[nodiscard]] std::chrono::seconds elapsed() const {
+    return std::chrono::duration_cast<std::chrono::seconds>(now_() - start_);
+  }
   // Before anything else is written there.
   void clear();
 
  private:
-  void show(const rules::Progress& progress);
-
   std::ostream& out_;
   const bool is_terminal_;
   const std::function<Clock::time_point()> now_;
+  const Clock::time_point start_;
   Clock::time_point next_;
   bool is_shown_ = false;
 };

@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/model_files.hpp"
+#include "cli/progress.hpp"
 #include "cli/verbs.hpp"
 #include "cli/why_simulated.hpp"
 #include "rules/ask/report.hpp"
@@ -68,6 +69,20 @@ void note_unknown_sources(const rules::Simulation& simulation, const std::string
   }
 }
 
+// Calls use(event) for each; says how far it is where the results do not show it.
+template <typename Use>
+void replay(const std::vector<rules::TraceEvent>& events, const Use& use) {
+  const bool shows_itself = isatty(STDOUT_FILENO) != 0;
+  ProgressLine progress;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    use(events[i]);
+    if (shows_itself || i % 256 != 0) continue;
+    progress.show([&] {
+      return "replaying: " + std::to_string(i) + " of " + std::to_string(events.size()) + " events";
+    });
+  }
+}
+
 // All problems, those of the trace as well as those of the model, come before the first result.
 int simulate(const SimulateOptions& options) {
   require_no_port_among_files(options);
@@ -86,13 +101,13 @@ int simulate(const SimulateOptions& options) {
   if (is_why) {
     const std::string port = options.why == all_ports ? "" : options.why;
     WhySimulated why(model->rules, simulation, {port, options.json});
-    for (const auto& event : events) why.step(event, std::cout);
+    replay(events, [&](const auto& event) { why.step(event, std::cout); });
     return 0;
   }
   rules::write_outcome_header(std::cout);
-  for (const auto& event : events) {
+  replay(events, [&](const auto& event) {
     for (const auto& row : simulation.step(event)) rules::write_outcome(std::cout, row);
-  }
+  });
   return 0;
 }
 

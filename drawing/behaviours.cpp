@@ -1,12 +1,12 @@
 // The paper's figure 3: behaviours nested in meta-behaviours, red arrows for inhibitions.
 #include <algorithm>
-#include <iterator>
 #include <map>
 #include <set>
 #include <string>
 #include <vector>
 
-#include "drawing/siblings.hpp"
+#include "drawing/families.hpp"
+#include "drawing/text.hpp"
 #include "drawing/views.hpp"
 #include "rules/model/hierarchy.hpp"
 #include "rules/model/print_rules.hpp"
@@ -17,96 +17,87 @@ namespace {
 using rules::Behaviour;
 using rules::Hierarchy;
 
-constexpr std::size_t kNobody = Hierarchy::kNobody;
+constexpr const char* kUnseen = "invis";
+constexpr std::size_t kMaxName = 32, kMaxPort = 26, kMaxFormula = 38;  // characters
+constexpr std::size_t kMaxLines = 3;                                   // of a condition
+constexpr std::size_t kMaxRows = 6;                                    // connections of a behaviour
+constexpr std::size_t kMaxTooltip = 60;                                // lines
+
+std::string id(std::size_t b) { return "b" + std::to_string(b); }
+
+std::string row(const std::string& content) {
+  return "<TR><TD ALIGN=\"LEFT\">" + content + "</TD></TR>";
+}
+
+std::string small(const std::string& content) {
+  return "<FONT POINT-SIZE=\"9\">" + content + "</FONT>";
+}
+
+std::string in_red(const char* sign) {
+  return "<FONT POINT-SIZE=\"9\" COLOR=\"" + std::string(colour::kRed) + "\">" + sign + "</FONT>";
+}
+
+std::string table(const std::string& rows) {
+  return R"(<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1">)" + rows +
+         "</TABLE>>";
+}
 
 class BehavioursView {
  public:
   BehavioursView(const rules::LoadedModel& loaded, const Situation* situation, DotWriter& out)
       : model_(loaded.model),
         hierarchy_(model_, ignored_),
+        families_(model_, hierarchy_),
         situation_(situation),
         out_(out),
-        states_(model_.behaviours.size(), State::kSilent) {
-    std::vector<std::size_t> roots;
-    for (std::size_t b = 0; b < model_.behaviours.size(); ++b) {
-      if (hierarchy_.parent(b) == kNobody) roots.push_back(b);
-    }
+        states_(model_.behaviours.size(), State::kSilent),
+        implied_(model_.behaviours.size()) {
     find_states(loaded.rules);
-    // Without recursion: the depth is the model's to choose.
-    add_family(kNobody, std::move(roots));
-    std::vector<std::size_t> boxes;
-    const auto note_boxes = [&] {
-      const auto& members = families_.back().members;
-      std::copy_if(members.rbegin(), members.rend(), std::back_inserter(boxes),
-                   [&](std::size_t member) { return is_box(member); });
-    };
-    for (note_boxes(); !boxes.empty(); note_boxes()) {
-      const std::size_t box = boxes.back();
-      boxes.pop_back();
-      add_family(box, hierarchy_.children(box));
-    }
-    find_edges_of_boxes();
   }
 
-  void draw() { draw_members(); }
+  // Without recursion: the depth is the model's to choose.
+  void draw() {
+    std::vector<Open> open;
+    enter(open, families_.top());
+    while (!open.empty()) {
+      Open& at = open.back();
+      if (at.next == at.family->units.size()) {
+        leave(open);
+        continue;
+      }
+      const Unit& unit = at.family->units[at.next++];
+      if (unit.is_box) {
+        open_box(unit.members.front(), static_cast<int>(open.size()) - 1);
+        enter(open, families_.of(unit.members.front()));
+      } else {
+        draw_group(unit);
+      }
+    }
+  }
 
  private:
-  // Those under one parent.
-  struct Family {
-    std::size_t parent;
-    std::vector<std::size_t> members;  // in document order of the parent's list
-    Inhibitions inhibitions;           // by places in `members`
-    std::vector<const rules::Mention*> mentions;
+  // A family of which some units are drawn.
+  struct Open {
+    const Family* family;
+    std::size_t next = 0;
   };
 
-  // A meta-behaviour is drawn as a box around others, if there are others.
-  [[nodiscard]] bool is_box(std::size_t b) const { return !hierarchy_.children(b).empty(); }
-
-  void add_family(std::size_t parent, std::vector<std::size_t> members) {
-    Family family{parent, std::move(members), {}, {}};
-    std::map<std::size_t, std::size_t> places;
-    for (std::size_t i = 0; i < family.members.size(); ++i) places[family.members[i]] = i;
-    std::set<std::pair<std::size_t, std::size_t>> known;
-    for (const std::size_t inhibited : family.members) {
-      for (const Hierarchy::Inhibitor& inhibitor : hierarchy_.inhibitors(inhibited)) {
-        const std::pair pair{places.at(inhibitor.behaviour), places.at(inhibited)};
-        if (!known.insert(pair).second) continue;
-        family.inhibitions.push_back(pair);
-        family.mentions.push_back(
-            &model_.behaviours[inhibitor.behaviour].inhibitions[inhibitor.mention]);
-      }
-    }
-    family_of_[parent] = families_.size();
-    families_.push_back(std::move(family));
-  }
-
-  // Who stands highest and lowest in a box: whom nobody inhibits there, and who inhibits nobody.
-  // Where inhibitions go in a circle, the first one.
-  void find_edges_of_boxes() {
-    tops_.resize(model_.behaviours.size());
-    bottoms_.resize(model_.behaviours.size());
-    for (std::size_t b = 0; b < model_.behaviours.size(); ++b) tops_[b] = bottoms_[b] = {b};
-    for (std::size_t f = families_.size(); f-- > 1;) {
-      const Family& family = families_[f];
-      std::vector<bool> is_inhibited(family.members.size()), inhibits(family.members.size());
-      for (const auto& [who, whom] : family.inhibitions) {
-        inhibits[who] = true;
-        is_inhibited[whom] = true;
-      }
-      tops_[family.parent] = collect(family, is_inhibited, tops_);
-      bottoms_[family.parent] = collect(family, inhibits, bottoms_);
+  void enter(std::vector<Open>& open, const Family& family) {
+    open.push_back({&family});
+    for (const Arrow& arrow : family.arrows) {
+      if (arrow.stroke != Stroke::kImplied) continue;
+      for (const Inhibition& each : arrow.inhibitions) implied_[each.who].push_back(each);
+      out_.note_sign(kAllAfter);
     }
   }
 
-  static std::vector<std::size_t> collect(const Family& family, const std::vector<bool>& excluded,
-                                          const std::vector<std::vector<std::size_t>>& edges) {
-    std::vector<std::size_t> result;
-    for (std::size_t i = 0; i < family.members.size(); ++i) {
-      if (excluded[i]) continue;
-      const auto& edge = edges[family.members[i]];
-      result.insert(result.end(), edge.begin(), edge.end());
-    }
-    return result.empty() ? edges[family.members.front()] : result;
+  void leave(std::vector<Open>& open) {
+    draw_arrows(*open.back().family);
+    open.pop_back();
+    if (open.empty()) return;
+    const Unit& box = open.back().family->units[open.back().next - 1];
+    draw_ends(box);
+    out_.close();
   }
 
   void find_states(const rules::RuleSet& rules) {
@@ -118,152 +109,223 @@ class BehavioursView {
     for (std::size_t b = 0; b < model_.behaviours.size(); ++b) {
       const auto state = by_name.find(model_.behaviours[b].name);
       if (state == by_name.end()) continue;
-      for (std::size_t at = b; at != kNobody; at = hierarchy_.parent(at)) {
+      for (std::size_t at = b; at != Hierarchy::kNobody; at = hierarchy_.parent(at)) {
         states_[at] = std::max(states_[at], state->second);
       }
     }
   }
 
-  [[nodiscard]] const char* mark(std::size_t b) const {
-    if (situation_ == nullptr) return "";
-    return states_[b] == State::kRuns ? "▶ " : states_[b] == State::kOverridden ? "✕ " : "○ ";
-  }
-  [[nodiscard]] std::string fill(std::size_t b) const {
-    return quoted(states_[b] == State::kRuns         ? colour::kPaleWins
-                  : states_[b] == State::kOverridden ? colour::kPaleOverridden
-                                                     : colour::kPaper);
-  }
-
-  static std::string row(const std::string& content) {
-    return "<TR><TD ALIGN=\"LEFT\">" + content + "</TD></TR>";
+  [[nodiscard]] const Mark& mark(std::size_t b) const {
+    return look_of(states_[b] == State::kRuns         ? MarkKind::kRuns
+                   : states_[b] == State::kOverridden ? MarkKind::kOverridden
+                                                      : MarkKind::kInactive);
   }
 
   // What is the same for a behaviour and a box: name and conditions.
   [[nodiscard]] std::string heading(std::size_t b) const {
     const Behaviour& behaviour = model_.behaviours[b];
-    std::string rows = row("<B>" + html(mark(b) + behaviour.name) + "</B>");
+    std::string name = situation_ == nullptr ? "" : std::string(mark(b).sign) + " ";
+    name = "<B>" + html(name + shortened(behaviour.name, kMaxName)) + "</B>";
+    if (!implied_[b].empty()) {
+      name += "  " + in_red(kAllAfter);
+    }
+    std::string rows = row(name);
     for (const rules::Condition& condition : behaviour.conditions) {
-      rows += row("<FONT POINT-SIZE=\"9\"><I>" + html("if " + to_string(*condition.expression)) +
-                  "</I></FONT>");
+      const std::string text = "if " + to_string(*condition.expression);
+      rows += row(small("<I>" + html_lines(in_lines(text, kMaxFormula, kMaxLines)) + "</I>"));
     }
     return rows;
   }
 
-  static std::string table(const std::string& rows) {
-    return R"(<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1">)" + rows +
-           "</TABLE>>";
+  static void add_line(std::string& text, std::size_t number, std::size_t of,
+                       const std::string& line) {
+    if (number < kMaxTooltip) text.append("\n").append(line);
+    if (number + 1 == of && of > kMaxTooltip) {
+      text.append("\nand ").append(std::to_string(of - kMaxTooltip)).append(" more");
+    }
   }
 
-  static std::string id(std::size_t b) { return "b" + std::to_string(b); }
-  static std::string cluster(std::size_t b) { return "cluster_b" + std::to_string(b); }
+  // All that is shortened, or has no arrow.
+  [[nodiscard]] std::string tooltip(std::size_t b) const {
+    const Behaviour& behaviour = model_.behaviours[b];
+    std::string text = behaviour.name + "\n" + place(behaviour.where);
+    for (const rules::Condition& condition : behaviour.conditions) {
+      text += "\nif " + to_string(*condition.expression);
+    }
+    const auto& configs = behaviour.configs;
+    for (std::size_t i = 0; i < configs.size(); ++i) {
+      add_line(text, i, configs.size(), configs[i].source + " → " + configs[i].port);
+    }
+    const auto& implied = implied_[b];
+    for (std::size_t i = 0; i < implied.size(); ++i) {
+      add_line(text, i, implied.size(), in_words(implied[i]));
+    }
+    return quoted(text);
+  }
+
+  [[nodiscard]] std::string in_words(const Inhibition& inhibition) const {
+    return model_.behaviours[inhibition.who].name + " inhibits " +
+           model_.behaviours[inhibition.whom].name + ", " + place(inhibition.mention->where);
+  }
 
   void draw_behaviour(std::size_t b) {
     const Behaviour& behaviour = model_.behaviours[b];
     std::string rows = heading(b);
-    for (const rules::Config& config : behaviour.configs) {
-      rows +=
-          row("<FONT POINT-SIZE=\"9\">" + html(config.source + " → " + config.port) + "</FONT>");
+    const std::size_t count = behaviour.configs.size();
+    const std::size_t shown = count > kMaxRows ? kMaxRows - 1 : count;
+    for (std::size_t i = 0; i < shown; ++i) {
+      const rules::Config& config = behaviour.configs[i];
+      rows += row(small(
+          html(shortened(config.source, kMaxPort) + " → " + shortened(config.port, kMaxPort))));
     }
+    if (shown < count) rows += row(small("and " + std::to_string(count - shown) + " more"));
     out_.statement(id(b), {{"shape", "box"},
                            {"style", "\"rounded,filled\""},
                            {"margin", "\"0.08,0.04\""},
-                           {"color", quoted(colour::kPlain)},
+                           {"color", quoted(colour::kBlack)},
                            {"penwidth", states_[b] == State::kRuns ? "2.5" : "1"},
-                           {"fillcolor", fill(b)},
-                           {"tooltip", quoted(behaviour.name + "\n" + place(behaviour.where))},
+                           {"fillcolor", quoted(mark(b).colour)},
+                           {"tooltip", tooltip(b)},
                            {"label", table(rows)}});
   }
 
+  void draw_group(const Unit& unit) {
+    if (unit.is_framed()) open_group(unit);
+    for (const std::size_t member : unit.members) draw_behaviour(member);
+    if (unit.is_group()) draw_columns(unit);
+    if (!unit.is_framed()) return;
+    draw_ends(unit);
+    out_.close();
+  }
+
+  void open_group(const Unit& unit) {
+    const bool is_mutual = !unit.within.empty();
+    std::string text = "an arrow to or from this is one for each in it";
+    for (std::size_t i = 0; i < unit.within.size(); ++i) {
+      add_line(text, i, unit.within.size(), in_words(unit.within[i]));
+    }
+    out_.open("subgraph " + cluster(unit));
+    out_.attribute("style", "\"rounded,dashed\"");
+    out_.attribute("color",
+                   quoted(is_mutual ? look_of(LineKind::kInhibits).colour : colour::kGrey));
+    out_.attribute("penwidth", is_mutual ? "1.8" : "1");
+    out_.attribute("labeljust", "l");
+    out_.attribute("margin", "8");
+    out_.attribute("tooltip", quoted(text));
+    out_.attribute("label", is_mutual ? table(row(in_red(kMutual))) : "\"\"");
+    if (is_mutual) out_.note_sign(kMutual);
+  }
+
+  void draw_columns(const Unit& unit) {
+    const std::size_t height = (unit.members.size() + unit.tops.size() - 1) / unit.tops.size();
+    for (std::size_t i = 1; i < unit.members.size(); ++i) {
+      if (i % height == 0) continue;
+      out_.statement(id(unit.members[i - 1]) + " -> " + id(unit.members[i]),
+                     {{"style", kUnseen}, {"weight", "10"}});
+    }
+  }
+
   void open_box(std::size_t b, int depth) {
-    const Behaviour& behaviour = model_.behaviours[b];
-    out_.open("subgraph " + cluster(b));
+    out_.open("subgraph cluster_" + id(b));
     out_.attribute("style", "\"rounded,filled\"");
     // Its colour shows the depth; that it runs, its border.
     const bool runs = states_[b] == State::kRuns;
-    out_.attribute("color", quoted(runs ? colour::kWins : colour::kPlain));
+    out_.attribute("color", quoted(runs ? colour::kGreen : colour::kBlack));
     out_.attribute("penwidth", runs ? "2.5" : "1");
-    out_.attribute("fillcolor", quoted(depth % 2 == 0 ? "#F4F4F4" : colour::kShade));
+    out_.attribute("fillcolor", quoted(depth % 2 == 0 ? colour::kPaleGrey : colour::kShade));
     out_.attribute("labeljust", "l");
     out_.attribute("margin", "12");
-    out_.attribute("tooltip", quoted(behaviour.name + "\n" + place(behaviour.where)));
+    out_.attribute("tooltip", tooltip(b));
     out_.attribute("label", table(heading(b)));
   }
 
-  void draw_members() {
-    struct Open {
-      const Family* family;
-      std::size_t next = 0;
-    };
-    std::vector<Open> open{{&families_.front()}};
-    while (!open.empty()) {
-      Open& at = open.back();
-      if (at.next == at.family->members.size()) {
-        draw_family(*at.family);
-        if (open.size() > 1) out_.close();
-        open.pop_back();
-        continue;
-      }
-      const std::size_t member = at.family->members[at.next++];
-      if (is_box(member)) {
-        open_box(member, static_cast<int>(open.size()) - 1);
-        open.push_back({&families_[family_of_.at(member)]});
-      } else {
-        draw_behaviour(member);
-      }
+  static std::string cluster(const Unit& unit) {
+    return (unit.is_box ? "cluster_" : "cluster_of_") + id(unit.members.front());
+  }
+
+  // Where arrows to a unit end: at a behaviour, or at an unseen point above all that is in the
+  // unit. They are cut off at its border.
+  static std::string head(const Unit& unit) {
+    return unit.tops.size() == 1 ? id(unit.tops.front()) : "above_" + id(unit.members.front());
+  }
+  // Where they begin. A point below as well would cost room, so it is for many only.
+  static bool has_point_below(const Unit& unit) { return unit.inhibits && unit.bottoms.size() > 1; }
+  static std::string tail(const Unit& unit) {
+    return has_point_below(unit) ? "below_" + id(unit.members.front())
+                                 : id(unit.bottoms[unit.bottoms.size() / 2]);
+  }
+
+  void draw_point(const std::string& name) {
+    out_.statement(name, {{"shape", "point"}, {"width", "0"}, {"style", kUnseen}});
+  }
+
+  void draw_ends(const Unit& unit) {
+    if (unit.is_inhibited && unit.tops.size() > 1) {
+      draw_point(head(unit));
+      for (const std::size_t b : unit.tops) hold(head(unit), id(b));
+    }
+    if (has_point_below(unit)) {
+      draw_point(tail(unit));
+      for (const std::size_t b : unit.bottoms) hold(id(b), tail(unit));
     }
   }
 
-  void draw_family(const Family& family) {
-    const auto detours = find_detours(family.members.size(), family.inhibitions);
-    for (std::size_t i = 0; i < family.inhibitions.size(); ++i) {
-      const std::size_t who = family.members[family.inhibitions[i].first];
-      const std::size_t whom = family.members[family.inhibitions[i].second];
-      const bool faint = detours[i];
-      out_.statement(id(bottoms_[who].front()) + " -> " + id(tops_[whom].front()),
-                     {{"ltail", is_box(who) ? cluster(who) : ""},
-                      {"lhead", is_box(whom) ? cluster(whom) : ""},
-                      {"minlen", is_box(who) || is_box(whom) ? "2" : ""},  // a box cuts its end off
-                      {"color", quoted(std::string(colour::kInhibition) + (faint ? "70" : ""))},
-                      {"penwidth", faint ? "0.8" : "1.8"},
-                      {"tooltip", quoted(model_.behaviours[who].name + " inhibits " +
-                                         model_.behaviours[whom].name + "\n" +
-                                         place(family.mentions[i]->where))}});
-      if (!faint && (is_box(who) || is_box(whom))) put_below(who, whom);
+  // Holds the one above the other.
+  void hold(const std::string& above, const std::string& below) {
+    out_.statement(above + " -> " + below, {{"style", kUnseen}, {"weight", "1"}});
+  }
+
+  void draw_arrows(const Family& family) {
+    for (const Arrow& arrow : family.arrows) {
+      if (arrow.stroke != Stroke::kImplied) draw_arrow(family, arrow);
     }
-    for (const auto& column : arrange_loners(family.members.size(), family.inhibitions)) {
-      for (std::size_t i = 1; i < column.size(); ++i) {
-        put_below(family.members[column[i - 1]], family.members[column[i]]);
-      }
+    for (const auto& heads : family.folds) put_beside(family, heads);
+    for (std::size_t i = 1; i < family.rows.size(); ++i) {
+      const std::string joint = "joint" + std::to_string(joints_++);
+      draw_point(joint);
+      for (const std::size_t b : family.rows[i - 1].bottoms) hold(id(b), joint);
+      for (const std::size_t b : family.rows[i].tops) hold(joint, id(b));
     }
   }
 
-  // An arrow holds two in order, not the rest of their boxes. An unseen point between the boxes
-  // does: all of the one are above it, all of the other below.
-  void put_below(std::size_t above, std::size_t below) {
-    static constexpr const char* kUnseen = "invis";
-    if (!is_box(above) && !is_box(below)) {
-      out_.statement(id(above) + " -> " + id(below), {{"style", kUnseen}});
-      return;
+  // In this order, from the left to the right: Graphviz keeps the order of lines from one point
+  // where nothing speaks against it.
+  void put_beside(const Family& family, const std::vector<std::size_t>& units) {
+    const std::string joint = "joint" + std::to_string(joints_++);
+    draw_point(joint);
+    for (const std::size_t unit : units) hold(joint, id(family.units[unit].tops.front()));
+  }
+
+  void draw_arrow(const Family& family, const Arrow& arrow) {
+    const Unit& from = family.units[arrow.from];
+    const Unit& to = family.units[arrow.to];
+    std::string text;
+    for (std::size_t i = 0; i < arrow.inhibitions.size(); ++i) {
+      add_line(text, i, arrow.inhibitions.size(), in_words(arrow.inhibitions[i]));
     }
-    const std::string joint = "j" + std::to_string(joints_++);
-    out_.statement(joint, {{"shape", "point"}, {"width", "0"}, {"style", kUnseen}});
-    for (const std::size_t b : bottoms_[above]) {
-      out_.statement(id(b) + " -> " + joint, {{"style", kUnseen}, {"weight", "0"}});
-    }
-    for (const std::size_t b : tops_[below]) {
-      out_.statement(joint + " -> " + id(b), {{"style", kUnseen}, {"weight", "0"}});
+    out_.line(arrow.stroke == Stroke::kPast ? LineKind::kInhibitsPast : LineKind::kInhibits,
+              tail(from) + " -> " + head(to),
+              {{"ltail", from.is_framed() ? cluster(from) : ""},
+               {"lhead", to.is_framed() ? cluster(to) : ""},
+               // A border cuts its end off.
+               {"minlen", from.is_framed() || to.is_framed() ? "2" : ""},
+               {"weight", "3"},
+               {"constraint", arrow.leads_back ? "false" : ""},
+               {"tooltip", quoted(text.substr(1))}});
+    if (arrow.leads_back || has_point_below(from)) return;
+    for (const std::size_t b : from.bottoms) {
+      if (id(b) != tail(from)) hold(id(b), head(to));
     }
   }
 
   const rules::Model& model_;
   rules::Diagnostics ignored_;  // it was all reported when the model was loaded
   const Hierarchy hierarchy_;
+  const Families families_;
   const Situation* situation_;
   DotWriter& out_;
-  std::vector<State> states_;  // of a box, the liveliest in it
-  std::vector<Family> families_;
-  std::map<std::size_t, std::size_t> family_of_;  // by parent
-  std::vector<std::vector<std::size_t>> tops_, bottoms_;
+  std::vector<State> states_;                     // of a box, the liveliest in it
+  std::vector<std::vector<Inhibition>> implied_;  // that have no arrow, by who inhibits
   int joints_ = 0;
 };
 

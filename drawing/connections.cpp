@@ -1,15 +1,23 @@
 // The paper's figure 2: components and their ports, the connections, and what each arbiter selects.
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "drawing/ports.hpp"
 #include "drawing/views.hpp"
-#include "rules/model/print_rules.hpp"
 
 namespace arbiter::drawing {
 namespace {
+
+// More arrows than this cross each other too often to be followed.
+constexpr std::size_t kMaxArrows = 16;
+
+// Of sources that a port only senses, the others share a row: inhibition across ports may make them
+// as many as there are behaviours.
+constexpr std::size_t kMaxSensed = 6;
 
 // "/Gaze/pos:i" and "/Gaze" belong to "Gaze": components put their name in front of their ports'.
 std::string component_of(std::string_view port) {
@@ -20,36 +28,25 @@ std::string component_of(std::string_view port) {
   return std::string(colon == std::string_view::npos || colon == 0 ? port : port.substr(0, colon));
 }
 
-// Breaks a long rule in front of its conjuncts.
-std::string broken(const std::string& rule) {
-  constexpr std::size_t kWidth = 60;
-  static constexpr std::string_view kAnd = " ∧ ";
-  std::string result;
-  std::size_t line = 0, done = 0;
-  for (std::size_t at = rule.find(kAnd); done < rule.size(); at = rule.find(kAnd, at + 1)) {
-    const std::size_t end = std::min(at, rule.size());
-    if (line > 0 && line + (end - done) > kWidth) {
-      result += "\n    ";
-      line = 4;
-    }
-    result += rule.substr(done, end - done);
-    line += end - done;
-    done = end;
-    if (at == std::string::npos) break;
-  }
-  return result;
+std::size_t count_rules(const Input& in) {
+  return in.rules == nullptr ? 0 : in.rules->rules.size();
 }
 
-class ConnectionsView {
+std::size_t count_arrows(const Input& in) {
+  return count_rules(in) + in.others.size() + in.sensed.size();
+}
+
+// Each component once, with all its ports.
+class ComponentsView {
  public:
-  ConnectionsView(const rules::LoadedModel& loaded, const Situation* situation, DotWriter& out)
-      : rules_(loaded.rules), situation_(situation), out_(out) {
-    for (const rules::PortRules& port : rules_.ports) input(port.port).rules = &port;
-    for (const rules::Connection& connection : rules_.other_connections) {
-      input(connection.port).others.push_back(connection.source);
-      output(connection.source);
+  ComponentsView(const rules::RuleSet& rules, const std::map<std::string, Input>& inputs,
+                 const Situation* situation, DotWriter& out)
+      : ports_(situation, out), out_(out) {
+    for (const auto& [port, in] : inputs) {
+      components_[component_of(port)].inputs[port].in = &in;
+      for (const std::string& source : in.others) add_output(source);
     }
-    for (const std::string& source : rules_.sources) output(source);
+    for (const std::string& source : rules.sources) add_output(source);
     int component = 0;
     for (auto& [name, ports] : components_) {
       ports.id = "c" + std::to_string(component++);
@@ -61,168 +58,138 @@ class ConnectionsView {
 
   void draw() {
     for (const auto& [name, component] : components_) draw_component(name, component);
+    const auto tail = [&](const std::string& source) {
+      const Component& component = components_.at(component_of(source));
+      return component.id + ":" + component.outputs.at(source);
+    };
     for (const auto& [name, component] : components_) {
-      for (const auto& [port, in] : component.inputs) draw_edges(component.id, port, in);
+      for (const auto& [port, in] : component.inputs) {
+        ports_.draw_arrows(*in.in, component.id, in.id, tail);
+      }
     }
   }
 
  private:
-  struct Input {
-    const rules::PortRules* rules = nullptr;
-    std::vector<std::string> others;  // sources whose connections no rule selects
+  struct InputOfComponent {
+    const Input* in = nullptr;
     std::string id;
   };
   struct Component {
-    std::map<std::string, Input> inputs;
+    std::map<std::string, InputOfComponent> inputs;
     std::map<std::string, std::string> outputs;  // ids
     std::string id;
   };
 
-  Input& input(const std::string& port) { return components_[component_of(port)].inputs[port]; }
-  std::string& output(const std::string& port) {
-    return components_[component_of(port)].outputs[port];
-  }
-
-  [[nodiscard]] bool is_active(const std::string& source) const {
-    return situation_ != nullptr && situation_->active.contains(source);
-  }
-  [[nodiscard]] bool wins(const std::string& source, const std::string& port) const {
-    if (situation_ == nullptr) return false;
-    const auto winner = situation_->winners.find(port);
-    return winner != situation_->winners.end() && winner->second == source;
-  }
-
-  static std::string cell(const std::string& id, const char* align, const char* fill,
-                          const std::string& content) {
-    return "<TR><TD PORT=\"" + id + "\" ALIGN=\"" + align + "\" BGCOLOR=\"" + fill + "\">" +
-           content + "</TD></TR>";
-  }
-
-  static std::string lines(const std::string& text) {
-    // Each line to the left, which a table's cell does for breaks that say so.
-    std::string result = html(text);
-    static constexpr std::string_view kBreak = "<BR/>";
-    const bool is_broken = result.find(kBreak) != std::string::npos;
-    for (std::size_t at = result.find(kBreak); at != std::string::npos;
-         at = result.find(kBreak, at + 1)) {
-      result.replace(at, kBreak.size(), "<BR ALIGN=\"LEFT\"/>");
-    }
-    return is_broken ? result + "<BR ALIGN=\"LEFT\"/>" : result;
-  }
-
-  [[nodiscard]] std::string rule_row(const rules::ConnectionRule& rule, const std::string& port,
-                                     const std::string& id) const {
-    const bool winning = wins(rule.source, port);
-    const bool losing = !winning && is_active(rule.source);
-    const std::string mark = situation_ == nullptr ? "" : winning ? "▶ " : losing ? "✕ " : "○ ";
-    return cell(id, "LEFT",
-                winning  ? colour::kPaleWins
-                : losing ? colour::kPaleOverridden
-                         : colour::kPaper,
-                "<FONT POINT-SIZE=\"9\">" + lines(mark + broken(to_string(rule))) + "</FONT>");
-  }
-
-  [[nodiscard]] std::string input_rows(const std::string& port, const Input& in) const {
-    std::string rows;
-    if (in.rules == nullptr) return cell(in.id, "LEFT", colour::kPaper, html("▸ " + port));
-    rows += cell(in.id, "LEFT", colour::kShade,
-                 html("▸ " + port) + "  <FONT POINT-SIZE=\"9\"><I>arbiter" +
-                     (in.rules->first_wins ? ", the first that holds" : "") + "</I></FONT>");
-    for (std::size_t i = 0; i < in.rules->rules.size(); ++i) {
-      rows += rule_row(in.rules->rules[i], port, in.id + "r" + std::to_string(i));
-    }
-    for (std::size_t i = 0; i < in.others.size(); ++i) {
-      rows += cell(in.id + "n" + std::to_string(i), "LEFT", colour::kPaper,
-                   "<FONT POINT-SIZE=\"9\"><I>" + html(in.others[i] + ": no rule, never delivers") +
-                       "</I></FONT>");
-    }
-    return rows;
-  }
+  void add_output(const std::string& source) { components_[component_of(source)].outputs[source]; }
 
   void draw_component(const std::string& name, const Component& component) {
-    std::string rows = R"(<TR><TD BGCOLOR=")" + std::string(colour::kPlain) +
-                       R"("><FONT COLOR="white"><B>)" + html(name) + "</B></FONT></TD></TR>";
-    for (const auto& [port, in] : component.inputs) rows += input_rows(port, in);
-    for (const auto& [port, id] : component.outputs) {
-      const std::string mark = situation_ == nullptr ? "" : is_active(port) ? "● " : "○ ";
-      rows += cell(id, "RIGHT", is_active(port) ? colour::kPaleActive : colour::kPaper,
-                   html(mark + port + " ▸"));
-    }
-    out_.statement(component.id, {{"tooltip", quoted(name)},
-                                  {"label",
-                                   "<<TABLE BORDER=\"0\" CELLBORDER=\"1\" CELLSPACING=\"0\" "
-                                   "CELLPADDING=\"3\">" +
-                                       rows + "</TABLE>>"}});
+    std::string rows = Ports::title_row(name);
+    for (const auto& [port, in] : component.inputs) rows += ports_.input_rows(*in.in, in.id);
+    for (const auto& [port, id] : component.outputs) rows += ports_.output_row(port, id);
+    out_.statement(component.id, {{"tooltip", quoted(name)}, {"label", Ports::table(rows)}});
   }
 
-  [[nodiscard]] std::string arrow(const std::string& source, const std::string& inlet) const {
-    const Component& component = components_.at(component_of(source));
-    return component.id + ":" + component.outputs.at(source) + ":e -> " + inlet;
-  }
-
-  void draw_edges(const std::string& component, const std::string& port, const Input& in) {
-    const auto inlet = [&](const std::string& id) { return component + ":" + id + ":w"; };
-    std::set<std::string> sensed;
-    std::set<const rules::Expression*> seen;
-    std::set<std::string> connected(in.others.begin(), in.others.end());
-    if (in.rules != nullptr) {
-      for (std::size_t i = 0; i < in.rules->rules.size(); ++i) {
-        const rules::ConnectionRule& rule = in.rules->rules[i];
-        connected.insert(rule.source);
-        rules::add_sources_of(*rule.condition, sensed, seen);
-        draw_selected(rule, port, inlet(in.id + "r" + std::to_string(i)));
-      }
-    }
-    for (std::size_t i = 0; i < in.others.size(); ++i) {
-      const bool arbitrated = in.rules != nullptr;
-      out_.statement(
-          arrow(in.others[i], inlet(arbitrated ? in.id + "n" + std::to_string(i) : in.id)),
-          {{"color", quoted(colour::kSilent)},
-           {"style", arbitrated ? "dotted" : ""},
-           {"tooltip", quoted(in.others[i] + " → " + port +
-                              (arbitrated ? "\nno rule selects it" : "\nnot arbitrated"))}});
-    }
-    for (const std::string& source : sensed) {
-      if (connected.contains(source)) continue;
-      std::string tooltip = source + " is sensed at ";
-      tooltip += port;
-      out_.statement(arrow(source, inlet(in.id)), {{"color", quoted(colour::kSensed)},
-                                                   {"style", "dashed"},
-                                                   {"arrowhead", "odot"},
-                                                   {"penwidth", is_active(source) ? "2.5" : "1"},
-                                                   {"tooltip", quoted(tooltip)}});
-    }
-  }
-
-  void draw_selected(const rules::ConnectionRule& rule, const std::string& port,
-                     const std::string& inlet) {
-    const bool winning = wins(rule.source, port);
-    const bool losing = !winning && is_active(rule.source);
-    const char* const hue = situation_ == nullptr ? colour::kPlain
-                            : winning             ? colour::kWins
-                            : losing              ? colour::kOverridden
-                                                  : colour::kSilent;
-    out_.statement(arrow(rule.source, inlet),
-                   {{"color", quoted(hue)},
-                    {"penwidth", winning  ? "3"
-                                 : losing ? "1.5"
-                                          : "1"},
-                    {"style", losing ? "dashed" : ""},
-                    {"tooltip", quoted(rule.source + " → " + port +
-                                       (rule.behaviour.empty() ? "" : "\n" + rule.behaviour) +
-                                       "\n" + place(rule.where))}});
-  }
-
-  const rules::RuleSet& rules_;
-  const Situation* situation_;
+  Ports ports_;
   DotWriter& out_;
   std::map<std::string, Component> components_;
+};
+
+// Each input port with its own sources beside it, so that no arrow crosses another: a source stands
+// at each port that it leads to.
+class PortsView {
+ public:
+  PortsView(const std::map<std::string, Input>& inputs, const Situation* situation, DotWriter& out)
+      : ports_(situation, out), out_(out) {
+    for (const auto& [port, in] : inputs) inputs_.push_back(&in);
+  }
+
+  void draw() {
+    std::size_t lines = 0;
+    for (const Input* in : inputs_) lines += lines_of(*in);
+    // A column is about as wide as fifty lines are high.
+    const auto columns = std::max(1.0, std::round(std::sqrt(static_cast<double>(lines) / 50)));
+    const double share = static_cast<double>(lines) / columns;
+    std::vector<std::vector<std::size_t>> grid(1);
+    double used = 0;
+    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+      const auto height = static_cast<double>(lines_of(*inputs_[i]));
+      if (!grid.back().empty() && used + height / 2 > share * static_cast<double>(grid.size())) {
+        grid.emplace_back();
+      }
+      grid.back().push_back(i);
+      used += height;
+    }
+    for (std::size_t i = 0; i < inputs_.size(); ++i) draw_port(*inputs_[i], i);
+    for (std::size_t column = 1; column < grid.size(); ++column) {
+      for (const std::size_t left : grid[column - 1]) {
+        for (const std::size_t right : grid[column]) hold(left, right);
+      }
+    }
+  }
+
+ private:
+  static std::size_t lines_of(const Input& in) {
+    return 4 + 4 * count_rules(in) + in.others.size() + std::min(in.sensed.size(), kMaxSensed);
+  }
+
+  void hold(std::size_t left, std::size_t right) {
+    out_.statement("p" + std::to_string(left) + " -> s" + std::to_string(right),
+                   {{"style", "invis"}, {"weight", "0"}});
+  }
+
+  // Those who are active first: a live picture shows these.
+  std::vector<std::string> take_rest(Input& in) const {
+    std::stable_partition(in.sensed.begin(), in.sensed.end(),
+                          [&](const std::string& source) { return ports_.is_active(source); });
+    if (in.sensed.size() <= kMaxSensed) return {};
+    const auto rest = in.sensed.begin() + kMaxSensed - 1;
+    std::vector<std::string> result(rest, in.sensed.end());
+    in.sensed.erase(rest, in.sensed.end());
+    return result;
+  }
+
+  void draw_port(Input in, std::size_t number) {
+    const std::vector<std::string> rest = take_rest(in);
+    const std::string port = "p" + std::to_string(number), sources = "s" + std::to_string(number);
+    std::map<std::string, std::string> ids;
+    std::string rows;
+    const auto add = [&](const std::string& source, const rules::ConnectionRule* beside) {
+      const auto [id, is_new] = ids.try_emplace(source, "o" + std::to_string(ids.size()));
+      if (is_new) rows += ports_.output_row(source, id->second, beside);
+    };
+    // In the order in which arrows end: at the port's name, at its rules, at the others.
+    for (const std::string& source : in.sensed) add(source, nullptr);
+    if (!rest.empty()) rows += ports_.rest_row(rest, "rest");
+    for (std::size_t i = 0; i < count_rules(in); ++i) {
+      add(in.rules->rules[i].source, &in.rules->rules[i]);
+    }
+    for (const std::string& source : in.others) add(source, nullptr);
+    out_.statement(sources,
+                   {{"tooltip", quoted("sources of " + in.port)}, {"label", Ports::table(rows)}});
+    out_.statement(port, {{"tooltip", quoted(in.port)},
+                          {"label", Ports::table(Ports::title_row(component_of(in.port)) +
+                                                 ports_.input_rows(in, "i"))}});
+    if (!rest.empty()) ports_.draw_rest(rest, in.port, sources + ":rest", port + ":i");
+    ports_.draw_arrows(in, port, "i",
+                       [&](const std::string& source) { return sources + ":" + ids.at(source); });
+  }
+
+  Ports ports_;
+  DotWriter& out_;
+  std::vector<const Input*> inputs_;
 };
 
 }  // namespace
 
 void draw_connections(const rules::LoadedModel& model, const Situation* situation, DotWriter& out) {
-  ConnectionsView(model, situation, out).draw();
+  const auto inputs = find_inputs(model.rules);
+  std::size_t arrows = 0;
+  for (const auto& [port, in] : inputs) arrows += count_arrows(in);
+  if (arrows > kMaxArrows) {
+    PortsView(inputs, situation, out).draw();
+  } else {
+    ComponentsView(model.rules, inputs, situation, out).draw();
+  }
 }
 
 }  // namespace arbiter::drawing

@@ -53,6 +53,17 @@ std::string html(std::string_view text) {
   return result;
 }
 
+std::string html_lines(std::string_view text) {
+  static constexpr std::string_view kBreak = "<BR/>", kLeft = "<BR ALIGN=\"LEFT\"/>";
+  std::string result = html(text);
+  std::size_t at = result.find(kBreak);
+  if (at == std::string::npos) return result;
+  for (; at != std::string::npos; at = result.find(kBreak, at)) {
+    result.replace(at, kBreak.size(), kLeft);
+  }
+  return result.append(kLeft);
+}
+
 std::string place(const rules::Location& where) {
   return where.file + ':' + std::to_string(where.line);
 }
@@ -72,15 +83,32 @@ void DotWriter::close() {
 }
 
 void DotWriter::statement(std::string_view what, Attributes attributes) {
+  statement(what, std::initializer_list<Attributes>{attributes});
+}
+
+void DotWriter::statement(std::string_view what, std::initializer_list<Attributes> lists) {
   indent();
   text_ += what;
   const char* separator = " [";
-  for (const auto& [name, value] : attributes) {
-    if (value.empty()) continue;
-    text_.append(separator).append(name).append("=").append(value);
-    separator = " ";
+  for (const Attributes& attributes : lists) {
+    for (const auto& [name, value] : attributes) {
+      if (value.empty()) continue;
+      text_.append(separator).append(name).append("=").append(value);
+      separator = " ";
+    }
   }
   text_ += separator[1] == '[' ? "\n" : "]\n";
+}
+
+void DotWriter::line(LineKind kind, std::string_view what, Attributes attributes) {
+  const Line& look = look_of(kind);
+  lines_.insert(kind);
+  ++line_count_;
+  const Attributes of_look{{"color", quoted(look.colour)},
+                           {"penwidth", look.width},
+                           {"style", look.style},
+                           {"arrowhead", look.head}};
+  statement(what, {of_look, attributes});
 }
 
 void DotWriter::attribute(std::string_view name, std::string_view value) {

@@ -1,23 +1,73 @@
 #include "drawing/drawing.hpp"
 
+#include "drawing/text.hpp"
 #include "drawing/views.hpp"
 
 namespace arbiter::drawing {
 namespace {
 
 constexpr const char* kFont = "\"Helvetica,Arial,sans-serif\"";
+constexpr std::size_t kMaxTitle = 70;  // characters
+// Of more lines, Graphviz would seek the best places for minutes, and nobody could follow them.
+constexpr std::size_t kMaxCarefulLines = 400;
 
-void draw_legend(DotWriter& out) {
-  const auto row = [](const char* fill, const char* text) {
-    return std::string(R"(<TR><TD ALIGN="LEFT" BGCOLOR=")") + fill + "\">" + text + "</TD></TR>";
-  };
-  out.statement("legend", {{"shape", "plain"},
-                           {"tooltip", "\"legend\""},
-                           {"label", R"(<<TABLE BORDER="0" CELLBORDER="1" CELLSPACING="0">)" +
-                                         row(colour::kPaleWins, "▶ wins, runs") +
-                                         row(colour::kPaleOverridden, "✕ active, and overridden") +
-                                         row(colour::kPaleActive, "● active") +
-                                         row(colour::kPaper, "○ inactive") + "</TABLE>>"}});
+std::string row(const std::string& content) {
+  return R"(<TR><TD ALIGN="LEFT">)" + content + "</TD></TR>";
+}
+
+std::string font(const std::string& attributes, const std::string& content) {
+  return "<FONT " + attributes + ">" + content + "</FONT>";
+}
+
+const char* in_words(View view) {
+  switch (view) {
+    case View::kBehaviours:
+      return "behaviours";
+    case View::kConnections:
+      return "connections";
+    default:
+      return "behaviours and connections";
+  }
+}
+
+// Only what there is in the picture.
+std::string legend_rows(const DotWriter& out, View view, bool is_live) {
+  const std::string small = "POINT-SIZE=\"9\"";
+  std::string rows;
+  for (const LineKind kind : out.lines()) {
+    const Line& line = look_of(kind);
+    rows += row(font(small + " COLOR=\"" + line.colour + "\"", line.sample) + " " +
+                font(small, html(std::string(line.word) + ": " + line.meaning)));
+  }
+  for (const Sign& sign : kSigns) {
+    if (!out.has_sign(sign.text)) continue;
+    rows += row(font(small + " COLOR=\"" + colour::kRed + "\"", sign.text) + " " +
+                font(small, html(sign.meaning)));
+  }
+  for (const Mark& mark : kMarks) {
+    if (!is_live) break;
+    if (view == View::kBehaviours && mark.kind == MarkKind::kActive) continue;
+    rows += R"(<TR><TD ALIGN="LEFT" BGCOLOR=")" + std::string(mark.colour) + "\">" +
+            font(small, html(std::string(mark.sign) + " " + mark.meaning)) + "</TD></TR>";
+  }
+  return rows;
+}
+
+void draw_title(const Page& page, View view, bool is_live, DotWriter& out) {
+  std::string rows;
+  if (!page.name.empty()) {
+    rows = row(font("POINT-SIZE=\"14\"",
+                    "<B>" + html(shortened(page.name, kMaxTitle)) + "</B> · " + in_words(view)));
+  }
+  for (const std::string& detail : page.details) {
+    rows += row(font("POINT-SIZE=\"10\"", html(shortened(detail, kMaxTitle))));
+  }
+  rows += legend_rows(out, view, is_live);
+  if (rows.empty()) return;
+  out.attribute("labelloc", "t");
+  out.attribute("labeljust", "l");
+  out.attribute("label", R"(<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="1" CELLPADDING="0">)" +
+                             rows + "</TABLE>>");
 }
 
 }  // namespace
@@ -26,29 +76,45 @@ View natural_view(const rules::LoadedModel& model) {
   return model.model.behaviours.empty() ? View::kConnections : View::kBehaviours;
 }
 
-std::string draw(const rules::LoadedModel& model, View view, const Situation* situation) {
+std::string draw(const rules::LoadedModel& model, View view, const Page& page,
+                 const Situation* situation) {
   DotWriter out;
   out.open("digraph arbiter");
   // Behaviours stand in the order of who overrides whom, from above; data flows to the right.
   const bool downwards = view == View::kBehaviours;
-  // Many connections need room to be told apart.
-  const bool is_large = model.rules.sources.size() > 25;
   out.statement("graph", {{"rankdir", downwards ? "TB" : "LR"},
                           {"compound", "true"},
+                          {"newrank", "true"},  // boxes stand below those who inhibit them
                           {"fontname", kFont},
                           {"fontsize", "12"},
                           {"nodesep", "0.25"},
-                          {"ranksep", downwards  ? "0.45"
-                                      : is_large ? "3"
-                                                 : "1.2"},
+                          {"ranksep", downwards ? "0.28" : "1.2"},
+                          {"dpi", page.dpi == 0 ? "" : std::to_string(page.dpi)},
                           {"tooltip", "\" \""}});
   out.statement("node", {{"fontname", kFont}, {"fontsize", "11"}, {"shape", "plain"}});
   out.statement("edge", {{"fontname", kFont}, {"fontsize", "9"}, {"arrowsize", "0.8"}});
   if (view != View::kConnections) draw_behaviours(model, situation, out);
   if (view != View::kBehaviours) draw_connections(model, situation, out);
-  if (situation != nullptr) draw_legend(out);
+  if (out.line_count() > kMaxCarefulLines) {
+    for (const char* effort : {"mclimit", "nslimit", "nslimit1"}) out.attribute(effort, "0.1");
+    out.attribute("splines", "line");
+  }
+  draw_title(page, view, situation != nullptr, out);
   out.close();
   return out.take();
+}
+
+std::string legend_in_words() {
+  std::string text;
+  const auto add = [&](const std::string& sample, const std::string& meaning) {
+    text += "  " + sample + "  " + meaning + "\n";
+  };
+  for (const Line& line : kLines) add(line.sample, std::string(line.word) + ": " + line.meaning);
+  for (const Sign& sign : kSigns) add(sign.text, sign.meaning);
+  for (const Mark& mark : kMarks) {
+    add(mark.sign, "with --live, " + std::string(mark.word) + ": " + mark.meaning);
+  }
+  return text;
 }
 
 }  // namespace arbiter::drawing

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "drawing/situation.hpp"
 #include "rules/model/load.hpp"
@@ -19,8 +20,20 @@ enum class View : std::uint8_t {
 // Behaviours where the model has some; one of rules by hand has connections only.
 View natural_view(const rules::LoadedModel& model);
 
+struct Page {
+  // What stands above the picture: the name of the model, and a line each for its files, what it is
+  // doing where, of which port. Nothing where there is no name.
+  std::string name;
+  std::vector<std::string> details;
+  int dpi = 0;  // dots per inch, where a picture is made of dots; 0: what Graphviz takes
+};
+
 // With a situation it is coloured by who is active and who wins. The model must have no errors, but
 // its rules need not be proved.
-std::string draw(const rules::LoadedModel& model, View view, const Situation* situation = nullptr);
+std::string draw(const rules::LoadedModel& model, View view, const Page& page = {},
+                 const Situation* situation = nullptr);
+
+// What each line and sign means, in lines of text, for those who cannot see the picture's legend.
+std::string legend_in_words();
 
 }  // namespace arbiter::drawing

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include "shm/file_descriptor.hpp"
 
@@ -47,8 +48,8 @@ pid_t start(const std::string& format, const Pipe& in, const Pipe& out, const Pi
   const int error = posix_spawnp(&child, "dot", &files.actions, nullptr, arguments.data(), environ);
   if (error == ENOENT) {
     throw std::runtime_error(
-        "Graphviz's program dot is needed to draw, and is not installed: apt install graphviz; or "
-        "take --format dot, which needs it not");
+        "Graphviz's program dot is needed to draw, and is not installed: apt install graphviz, or "
+        "give --format dot, which does without it");
   }
   if (error != 0) throw std::runtime_error(std::string("cannot run dot: ") + std::strerror(error));
   return child;
@@ -68,16 +69,12 @@ bool drain(shm::FileDescriptor& from, std::string& text) {
 // program.
 void exchange(std::string_view input, Pipe& in, std::string& output, Pipe& out, std::string& errors,
               Pipe& err, const Waiting& waiting) {
-  auto patience = waiting.first;
   while (out.read || err.read) {
     std::array<pollfd, 3> polled{
         {{in.write.get(), POLLOUT, 0}, {out.read.get(), POLLIN, 0}, {err.read.get(), POLLIN, 0}}};
-    const int ready = poll(polled.data(), polled.size(), static_cast<int>(patience.count()));
+    const int ready = poll(polled.data(), polled.size(), static_cast<int>(waiting.period.count()));
     if (ready < 0 && errno != EINTR) break;
-    if (ready == 0) {
-      waiting.tell();
-      patience = waiting.then;
-    }
+    if (ready == 0) waiting.tell();
     if (ready <= 0) continue;
     if (polled[0].revents != 0) {
       // A piece that fits into an empty pipe, so that a write does not block for long.
@@ -93,7 +90,7 @@ void exchange(std::string_view input, Pipe& in, std::string& output, Pipe& out, 
 
 }  // namespace
 
-std::string lay_out(const std::string& dot, const std::string& format, const Waiting& waiting) {
+Layout lay_out(const std::string& dot, const std::string& format, const Waiting& waiting) {
   Pipe in, out, err;
   const pid_t child = start(format, in, out, err);
   in.read.reset();
@@ -108,7 +105,7 @@ std::string lay_out(const std::string& dot, const std::string& format, const Wai
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || picture.empty()) {
     throw std::runtime_error("dot could not draw this: " + errors);
   }
-  return picture;
+  return {std::move(picture), errors.find("too large for cairo") != std::string::npos};
 }
 
 }  // namespace arbiter::drawing

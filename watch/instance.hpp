@@ -41,6 +41,7 @@ class Instance {
   Instance(const Instance&) = delete;
   Instance& operator=(const Instance&) = delete;
 
+  [[nodiscard]] const std::string& name() const noexcept { return caller_.instance; }
   // Readable when update() has something to do.
   [[nodiscard]] int descriptor() const noexcept { return epoll_.get(); }
   // Takes up what the daemon has said, and looks for another where it has gone, twenty times a

@@ -1,10 +1,21 @@
 #include "bench/harness/rounds.hpp"
 
 #include <exception>
+#include <utility>
 
 #include "bench/harness/interruption.hpp"
 
 namespace arbiter::bench {
+namespace {
+
+std::function<void(const Round&)>& watcher() {
+  static std::function<void(const Round&)> watch;
+  return watch;
+}
+
+}  // namespace
+
+void watch_rounds(std::function<void(const Round&)> watch) { watcher() = std::move(watch); }
 
 std::vector<Result> run_rounds(std::vector<Contender> contenders, const Budget& budget) {
   std::vector<Result> results;
@@ -15,6 +26,7 @@ std::vector<Result> run_rounds(std::vector<Contender> contenders, const Budget& 
       const std::size_t index = (i + static_cast<std::size_t>(round)) % contenders.size();
       if (!contenders[index].round) continue;
       throw_if_interrupted();
+      if (watcher()) watcher()({round, budget.rounds, contenders[index].system});
       const bool warms_up = round == 0;
       try {
         const Histogram seen =

@@ -22,6 +22,14 @@ struct Budget {
   double seconds_each = 0.1;
 };
 
+// What is measured now.
+struct Round {
+  int number = 0, of = 0;  // of those that count; 0: the warm-up
+  std::string system;
+};
+// Called before each contender's turn, in the thread that measures, until it is replaced.
+void watch_rounds(std::function<void(const Round&)> watch);
+
 // The first round is a warm-up and does not count.
 std::vector<Result> run_rounds(std::vector<Contender> contenders, const Budget& budget);
 

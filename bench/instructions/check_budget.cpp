@@ -2,6 +2,8 @@
 //
 //   instruction_budget            compare with budget.txt; exit code 1 where a call costs more
 //   instruction_budget --update   write budget.txt
+#include <poll.h>
+
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -13,6 +15,7 @@
 
 #include "bench/instructions/budget.hpp"
 #include "bench/instructions/scenes.hpp"
+#include "cli/progress.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -44,6 +47,26 @@ Counts read_counts(const std::string& path) {
   return counts;
 }
 
+// Says how far it is, which takes a minute, until it has ended.
+void watch(const test::ChildProcess& operations, const std::string& output) {
+  std::size_t all = 0;
+  try {
+    all = read_budget(BUDGET).counts.size();
+  } catch (const std::runtime_error&) {
+    // It is about to be written.
+  }
+  cli::ProgressLine progress;
+  pollfd end{operations.descriptor(), POLLIN, 0};
+  while (poll(&end, 1, 100) == 0) {
+    progress.show([&] {
+      const Counts counts = read_counts(output);
+      return "counting under callgrind: " + std::to_string(counts.size()) +
+             (all == 0 ? "" : " of " + std::to_string(all)) + " measures" +
+             (counts.empty() ? "" : ", the last: " + counts.back().measure);
+    });
+  }
+}
+
 Budget measure() {
   const test::TemporaryDirectory directory;
   const Model model;
@@ -62,6 +85,7 @@ Budget measure() {
       {"/usr/bin/valgrind", "--tool=callgrind", "--quiet", "--collect-atstart=no",
        "--combine-dumps=yes", "--callgrind-out-file=" + output, OPERATIONS},
       environment, {-1, -1, STDERR_FILENO});
+  watch(operations, output);
   if (operations.wait() != 0) throw std::runtime_error("the operations failed under valgrind");
   Budget measured{BUILT_WITH, read_counts(output)};
   if (measured.counts.empty()) throw std::runtime_error("callgrind has counted nothing");

@@ -49,6 +49,18 @@ TEST(Rounds, TheWarmUpIsShorterAndDoesNotCount) {
   EXPECT_EQ(results[0].note, "");
 }
 
+TEST(Rounds, CanBeWatched) {
+  std::string seen;
+  watch_rounds([&](const Round& round) {
+    seen += round.system + std::to_string(round.number) + "/" + std::to_string(round.of) + " ";
+  });
+  const auto measure = [](double) { return one(1); };
+  run_rounds({{"a", Role::kOurs, measure}, {"b", Role::kPeer, measure}}, {1, 0.1});
+  watch_rounds({});
+  run_rounds({{"c", Role::kOurs, measure}}, {1, 0.1});
+  EXPECT_EQ(seen, "a0/1 b0/1 b1/1 a1/1 ");
+}
+
 TEST(Rounds, WhoFailsIsOutAndTheReportSaysWhyWhileOthersGoOn) {
   int failing_rounds = 0;
   const auto results = run_rounds({{"broken", Role::kPeer,

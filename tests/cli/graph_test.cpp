@@ -31,7 +31,7 @@ TEST(Graph, IsTheSameEachTime) {
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.out, HasSubstr("<B>Low</B>"));
   EXPECT_THAT(result.out, HasSubstr("b1 -> b0 "));
-  EXPECT_THAT(result.out, HasSubstr("High inhibits Low\\n" + model + ":3"));
+  EXPECT_THAT(result.out, HasSubstr("High inhibits Low, " + model + ":3"));
   EXPECT_EQ(arbiter({"graph", model, "--format", "dot"}).out, result.out);
 }
 
@@ -127,6 +127,80 @@ TEST(Graph, SaysThatThereAreNoBehavioursToDraw) {
   EXPECT_THAT(said_of(rules, "behaviours"), HasSubstr("no behaviours"));
   EXPECT_EQ(said_of(rules, "connections"), "");
   EXPECT_EQ(said_of(behaviours, "behaviours"), "");
+}
+
+TEST(Graph, HasATitleThatSaysWhatItIsOf) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const auto dot = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"graph", model, "--format", "dot"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arbiter(arguments).out;
+  };
+  EXPECT_THAT(dot({}), HasSubstr("<B>m</B> · behaviours"));
+  EXPECT_THAT(dot({}), HasSubstr(model));
+  EXPECT_THAT(dot({"--view", "connections"}), HasSubstr("<B>m</B> · connections"));
+  std::filesystem::create_directory(directory.path() + "/robot");
+  const auto nameless = directory.write("robot/model.xml", kOverrideModel);
+  EXPECT_THAT(arbiter({"graph", nameless, "--format", "dot"}).out,
+              HasSubstr("<B>robot</B> · behaviours"));
+}
+
+TEST(Graph, DrawsOnlyWhatDecidesAtAPort) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", R"(<behaviors>
+    <behavior name="One"><config at="/p">/one</config></behavior>
+    <behavior name="Two"><config at="/q">/two</config></behavior>
+    <behavior name="Three"><config at="/r">/three</config></behavior></behaviors>)");
+  const auto one = arbiter({"graph", model, "--format", "dot", "--port", "/p"});
+  EXPECT_EQ(one.exit_code, 0);
+  EXPECT_THAT(one.out, HasSubstr("only what decides at /p"));
+  EXPECT_THAT(one.out, HasSubstr("One"));
+  EXPECT_THAT(one.out, Not(HasSubstr("Two")));
+  const auto two = arbiter({"graph", "--port", "/p", "--port", "/q", model, "--format", "dot"});
+  EXPECT_THAT(two.out, HasSubstr("Two"));
+  EXPECT_THAT(two.out, Not(HasSubstr("Three")));
+  const auto none = arbiter({"graph", model, "--format", "dot", "--port", "/s"});
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_THAT(none.err, HasSubstr("no input port /s"));
+}
+
+// Bytes 16 to 23 of a PNG are its width and height.
+unsigned width_of(const std::string& png) {
+  unsigned width = 0;
+  for (std::size_t i = 16; i < 20; ++i) width = width << 8 | static_cast<unsigned char>(png.at(i));
+  return width;
+}
+
+TEST(Graph, HasAsManyDotsPerInchAsIsSaid) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const auto width = [&](const std::string& dpi) {
+    return width_of(arbiter({"graph", model, "--format", "png", "--dpi", dpi}).out);
+  };
+  EXPECT_NEAR(width("288"), 3 * width("96"), 4);
+  EXPECT_THAT(arbiter({"graph", model, "--format", "dot", "--dpi", "288"}).out,
+              HasSubstr("dpi=288"));
+}
+
+TEST(Graph, RefusesDotsThatNoPictureHas) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  for (const char* dpi : {"19", "1201", "-5", "x", "1e3", "96.5"}) {
+    const auto result = arbiter({"graph", model, "--format", "png", std::string("--dpi=") + dpi});
+    EXPECT_EQ(result.exit_code, 2) << dpi;
+    EXPECT_EQ(result.out, "") << dpi;
+    EXPECT_THAT(result.err, HasSubstr("whole number from 20 to 1200"));
+  }
+  const auto result = arbiter({"graph", model, "--format", "svg", "--dpi", "96"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("no dots"));
+}
+
+TEST(Graph, SaysWhichFormatsThereAre) {
+  const auto result = arbiter({"graph", "m.xml", "--format", "gif"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("gif is none of svg, png"));
 }
 
 TEST(Graph, NeedsAModelOrADaemon) {

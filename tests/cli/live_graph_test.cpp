@@ -45,6 +45,29 @@ TEST(LiveGraph, ShowsWhoRunsAndWhoIsOverridden) {
   EXPECT_THAT(live("behaviours"), HasSubstr("▶ High"));
 }
 
+TEST(LiveGraph, SaysWhichModelOfWhichInstanceItIsOf) {
+  Daemon daemon(kModel);
+  EXPECT_THAT(live("behaviours"), HasSubstr("model 1 ("));
+  EXPECT_THAT(live("behaviours"), HasSubstr(" in force, instance "));
+  daemon.load(kModel + "<!-- the same again -->");
+  EXPECT_THAT(live("behaviours"), HasSubstr("model 2 ("));
+}
+
+TEST(LiveGraph, DrawsOnePortOfMany) {
+  Daemon daemon(R"(<behaviors timeout="3600s">
+    <behavior name="One"><config at="/p">/one</config></behavior>
+    <behavior name="Two"><config at="/q">/two</config></behavior></behaviors>)");
+  Node node("test");
+  auto one = node.output_port<int>("/one");
+  auto two = node.output_port<int>("/two");
+  one.signal();
+  two.signal();
+  const auto result = arbiter({"graph", "--live", "--format", "dot", "--port", "/p"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("▶ One"));
+  EXPECT_THAT(result.out, Not(HasSubstr("Two")));
+}
+
 TEST(LiveGraph, ShowsActiveSourcesAndTheWinningRule) {
   Daemon daemon(kModel);
   Node node("test");

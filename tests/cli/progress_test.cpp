@@ -51,6 +51,19 @@ TEST(Progress, ElsewhereThereIsALineAfterTwoSecondsAndThenOneEveryTen) {
   EXPECT_EQ(watched.out.str(), "proving: 1 of 9 (/p)\nproving: 3 of 9 (/p)\n");
 }
 
+TEST(Progress, OfWhatHasNoStepsSaysForHowLongItTakes) {
+  Watched watched(false);
+  const auto show = [&](std::chrono::milliseconds time) {
+    watched.now = ProgressLine::Clock::time_point(time);
+    watched.line.show([&] { return std::to_string(watched.line.elapsed().count()) + " s"; });
+  };
+  show(1999ms);
+  show(2500ms);
+  show(12'499ms);
+  show(12'500ms);
+  EXPECT_EQ(watched.out.str(), "2 s\n12 s\n");
+}
+
 TEST(Progress, ALongStatementIsCutBetweenCharacters) {
   Watched watched(false);
   watched.at(2000ms, 1, std::string(47, 'a') + "∧ and more");

@@ -48,9 +48,9 @@ TEST(BehavioursView, PutsBehavioursIntoTheBoxesOfTheirMetaBehaviours) {
 
 TEST(BehavioursView, ArrowsLeadFromInhibitorsToTheInhibitedAndEndAtTheirBoxes) {
   const std::string dot = draw(load(kNested), View::kBehaviours);
-  EXPECT_THAT(dot, HasSubstr("b2 -> b3 [color=\"#D55E00\" penwidth=1.8"));
-  EXPECT_THAT(dot, HasSubstr("b4 -> b2 [lhead=cluster_b1 "));
-  EXPECT_THAT(dot, HasSubstr("C inhibits Inner\\n"));
+  EXPECT_THAT(dot, HasSubstr("b2 -> b3 [color=\"#C8102E\" penwidth=1.8"));
+  EXPECT_THAT(dot, HasSubstr("b4 -> b2 [color=\"#C8102E\" penwidth=1.8 lhead=cluster_b1 "));
+  EXPECT_THAT(dot, HasSubstr("C inhibits Inner, "));
 }
 
 TEST(BehavioursView, AModelOfRulesByHandHasNone) {
@@ -84,6 +84,22 @@ TEST(ConnectionsView, PutsThePortsOfAComponentTogether) {
   EXPECT_THAT(dot, HasSubstr("c2 [tooltip=\"single\""));
   EXPECT_THAT(dot, Not(HasSubstr("c3 [")));
   EXPECT_THAT(dot, HasSubstr("c0:o1:e -> c0:i0r0:w"));
+}
+
+// By inhibition across ports, each behaviour of a large model may matter to each port.
+TEST(ConnectionsView, SourcesThatAreOnlySensedShareARowWhereTheyAreMany) {
+  std::string rules, condition = "not /Sensor0:o";
+  for (int i = 1; i < 40; ++i) condition += " and not /Sensor" + std::to_string(i) + ":o";
+  for (int i = 0; i < 20; ++i) {
+    rules += "<arbiter at='/P" + std::to_string(i) + "/in:i'><select from='/A" + std::to_string(i) +
+             "/out:o'>" + condition + "</select></arbiter>";
+  }
+  const auto loaded = load("<behaviors>" + rules + "</behaviors>");
+  const std::string dot = draw(loaded, View::kConnections);
+  EXPECT_THAT(dot, HasSubstr("and 35 more, only sensed"));
+  EXPECT_THAT(dot, HasSubstr("/Sensor39:o is sensed at /P0/in:i"));
+  const Situation now = decide(loaded.rules, {"/Sensor39:o"});
+  EXPECT_THAT(draw(loaded, View::kConnections, {}, &now), HasSubstr("● /Sensor39:o"));
 }
 
 // Ten thousand behaviours, a thousand boxes in each other: large, but no trouble.

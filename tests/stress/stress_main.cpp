@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <stdexcept>
+#include <string>
 
+#include "cli/progress.hpp"
 #include "tests/stress/round.hpp"
 
 namespace {
@@ -57,6 +59,7 @@ void run(const Options& options, Records& records, Totals& totals) {
     if (options.operations != 0) return totals.operations() < options.operations;
     return seconds() < options.seconds;
   };
+  arbiter::cli::ProgressLine progress;
   for (std::uint64_t i = 0; goes_on() && !records.has_failed(); ++i) {
     const Plan plan = make_plan(options, options.seed + i);
     // Every other round is left in peace, as a measure for the others' pauses.
@@ -65,7 +68,14 @@ void run(const Options& options, Records& records, Totals& totals) {
     round.run(peace ? 0 : options.kills - std::min(options.kills, totals.kills),
               peace ? 0 : options.stops - std::min(options.stops, totals.stops),
               options.keep_daemon_dead || options.daemon_kills != 0);
+    progress.show([&] {
+      return std::to_string(progress.elapsed().count()) +
+             " s: " + std::to_string(totals.operations()) + " operations checked in " +
+             std::to_string(totals.rounds) + " rounds" +
+             (totals.kills == 0 ? "" : ", " + std::to_string(totals.kills) + " killed");
+    });
   }
+  progress.clear();
   report(totals, records, seconds());
 }
 

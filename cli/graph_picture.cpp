@@ -1,0 +1,171 @@
+#include "cli/graph_picture.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <filesystem>
+#include <iostream>
+#include <set>
+#include <string_view>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/model_files.hpp"
+#include "cli/output_file.hpp"
+#include "cli/progress.hpp"
+#include "drawing/graphviz.hpp"
+#include "drawing/only_ports.hpp"
+#include "rules/ask/report.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using drawing::View;
+
+// All that Graphviz makes of it but dot, which is ours.
+constexpr std::array<std::string_view, 7> kFormats{"svg", "png", "dot", "pdf", "ps", "eps", "jpg"};
+constexpr int kLeastDpi = 20, kMostDpi = 1200;
+
+std::string format_of(const GraphOptions& options) {
+  const auto is_known = [](const std::string& name) {
+    return std::find(kFormats.begin(), kFormats.end(), name) != kFormats.end();
+  };
+  if (!options.format.empty()) {
+    if (is_known(options.format)) return options.format;
+    throw CLI::ValidationError("--format", options.format + " is none of " + kGraphFormats);
+  }
+  std::string ending = fs::path(options.output).extension().string();
+  if (ending.empty()) return "svg";
+  ending.erase(0, 1);
+  for (char& each : ending) {
+    each = static_cast<char>(std::tolower(static_cast<unsigned char>(each)));
+  }
+  if (ending == "gv") return "dot";
+  if (is_known(ending)) return ending;
+  throw CLI::ValidationError("--output", "no picture is made of the ending of " + options.output +
+                                             "; give --format, or one of .svg, .png, .pdf, .ps, "
+                                             ".eps, .jpg, .dot and .gv");
+}
+
+int dpi_of(const std::string& text, const std::string& format) {
+  if (text.empty()) return 0;
+  int dpi = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), dpi);
+  if (error != std::errc() || end != text.data() + text.size() || dpi < kLeastDpi ||
+      dpi > kMostDpi) {
+    throw CLI::ValidationError("--dpi", text + " is not a whole number from " +
+                                            std::to_string(kLeastDpi) + " to " +
+                                            std::to_string(kMostDpi));
+  }
+  if (format != "png" && format != "jpg" && format != "dot") {
+    throw CLI::ValidationError("--dpi", "a picture in " + format +
+                                            " has no dots and is sharp at any size; --dpi is for "
+                                            "png, jpg and dot");
+  }
+  return dpi;
+}
+
+// "search_and_track" of search_and_track.xml, "humanoid" of humanoid/model.xml.
+std::string name_of(const std::string& path) {
+  const fs::path file(path);
+  const std::string stem = file.stem().string();
+  const std::string folder = file.parent_path().filename().string();
+  const bool says_nothing = stem == "model" && !folder.empty() && folder.front() != '.';
+  return says_nothing ? folder : stem;
+}
+
+}  // namespace
+
+const std::string kGraphFormats = "svg, png, dot, pdf, ps, eps or jpg";
+
+Picture::Picture(const GraphOptions& options) : options_(options), format_(format_of(options)) {
+  page_.dpi = dpi_of(options.dpi, format_);
+}
+
+bool Picture::load(const rules::ModelTexts& texts, const std::string& in_force) {
+  require_no_input(options_.output, texts);
+  rules::Diagnostics diagnostics;
+  model_ = rules::load_all(texts, diagnostics);
+  diagnostics.drop_notes();
+  rules::write_text(std::cerr, diagnostics);
+  is_good_ = !diagnostics.has_errors();
+  if (!is_good_) return false;
+  if (!options_.ports.empty()) {
+    const std::set<std::string> ports(options_.ports.begin(), options_.ports.end());
+    drawing::require_ports(model_.rules, ports);
+    part_ = drawing::only_ports(model_, ports);
+  }
+  choose_view();
+  set_title(texts, in_force);
+  check();
+  return true;
+}
+
+void Picture::choose_view() {
+  const rules::LoadedModel& drawn = part_ ? *part_ : model_;
+  view_ = options_.view == "behaviours"    ? View::kBehaviours
+          : options_.view == "connections" ? View::kConnections
+          : options_.view == "both"        ? View::kBoth
+                                           : drawing::natural_view(drawn);
+  if (options_.view == "behaviours" && drawn.model.behaviours.empty()) {
+    std::cerr << "arbiter: "
+              << (part_ ? "no behaviour has to do with this"
+                        : "the model has no behaviours, only rules")
+              << ": --view connections draws them\n";
+  }
+}
+
+void Picture::set_title(const rules::ModelTexts& texts, const std::string& in_force) {
+  const auto list = [](const auto& items, const auto& text_of) {
+    std::string text;
+    for (const auto& item : items) text += (text.empty() ? "" : ", ") + text_of(item);
+    return text;
+  };
+  const auto path_of = [](const rules::FileText& file) { return file.path; };
+  page_.name = texts.models.empty() ? "" : name_of(texts.models.front().path);
+  if (page_.name.empty() && texts.application) page_.name = name_of(texts.application->path);
+  page_.details = {list(texts.models, path_of)};
+  if (texts.application) page_.details.push_back("application: " + texts.application->path);
+  if (!in_force.empty()) page_.details.push_back(in_force);
+  if (part_) {
+    page_.details.push_back("only what decides at " +
+                            list(options_.ports, [](const std::string& port) { return port; }));
+  }
+  std::erase(page_.details, "");
+}
+
+void Picture::check() {
+  rules::Diagnostics proof;
+  compile_model(model_.rules, proof, options_.effort);
+  is_good_ = !proof.has_errors();
+  proof.drop_notes();
+  if (!is_good_) rules::write_text(std::cerr, proof);
+}
+
+std::string Picture::lay_out(const std::string& text) const {
+  ProgressLine progress;
+  const drawing::Waiting waiting{[&] {
+    progress.show([&] {
+      return "Graphviz lays the picture out, for " + std::to_string(progress.elapsed().count()) +
+             " s now; --port draws a part, --format dot does without it";
+    });
+  }};
+  drawing::Layout layout = drawing::lay_out(text, format_, waiting);
+  progress.clear();
+  if (layout.is_shrunk) {
+    std::cerr << "arbiter: Graphviz makes at most 32767 dots on a side, so the picture is smaller "
+                 "than --dpi says; svg has no such bound\n";
+  }
+  return std::move(layout.picture);
+}
+
+void Picture::write(const drawing::Situation* situation) {
+  std::string text = drawing::draw(part_ ? *part_ : model_, view_, page_, situation);
+  if (text == last_) return;
+  write_output(options_.output, format_ == "dot" ? text : lay_out(text));
+  last_ = std::move(text);
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,76 @@
+#include "drawing/only_ports.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "drawing/drawing.hpp"
+#include "tests/rules/model_text.hpp"
+
+namespace arbiter::drawing {
+namespace {
+
+using rules::Folder;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// At /arm: Reach, and Stop, which has nothing there but inhibits its box. Look is at /gaze only.
+const std::string kModel = R"(<behaviors>
+  <meta_behavior name="Work"><behavior>Reach</behavior><behavior>Look</behavior></meta_behavior>
+  <meta_behavior name="Safety"><behavior>Stop</behavior><inhibition>Work</inhibition></meta_behavior>
+  <behavior name="Reach"><config at="/arm">/reach</config><inhibition>Look</inhibition></behavior>
+  <behavior name="Look"><config at="/gaze">/look</config></behavior>
+  <behavior name="Stop"><config at="/base">/stop</config></behavior>
+  <behavior name="Hum"><config at="/voice">/hum</config></behavior>
+</behaviors>)";
+
+rules::LoadedModel load() {
+  const Folder folder;
+  rules::Diagnostics diagnostics;
+  return rules::load_all(rules::read_texts({{folder.write("a.xml", kModel)}, {}}), diagnostics);
+}
+
+std::vector<std::string> names_at(const std::set<std::string>& ports) {
+  std::vector<std::string> names;
+  for (const auto& behaviour : only_ports(load(), ports).model.behaviours) {
+    names.push_back(behaviour.name);
+  }
+  return names;
+}
+
+TEST(OnlyPorts, KeepsWhoIsThereWithTheirBoxesAndWhoSilencesThem) {
+  EXPECT_THAT(names_at({"/arm"}), ElementsAre("Work", "Safety", "Reach", "Stop"));
+  EXPECT_THAT(names_at({"/gaze"}), ElementsAre("Work", "Safety", "Reach", "Look", "Stop"));
+  EXPECT_THAT(names_at({"/base"}), ElementsAre("Safety", "Stop"));
+  EXPECT_THAT(names_at({"/base", "/voice"}), ElementsAre("Safety", "Stop", "Hum"));
+}
+
+TEST(OnlyPorts, KeepsTheRulesThereAndTheSourcesThatTheyRead) {
+  const auto part = only_ports(load(), {"/arm"});
+  ASSERT_EQ(part.rules.ports.size(), 1u);
+  EXPECT_EQ(part.rules.ports[0].port, "/arm");
+  EXPECT_THAT(part.rules.sources, ElementsAre("/reach", "/stop"));
+}
+
+TEST(OnlyPorts, CanBeDrawn) {
+  const auto part = only_ports(load(), {"/arm"});
+  EXPECT_THAT(draw(part, View::kBehaviours), HasSubstr("Safety inhibits Work"));
+  EXPECT_THAT(draw(part, View::kConnections), HasSubstr("/stop is sensed at /arm"));
+}
+
+TEST(OnlyPorts, OfAPortThatIsNotThereAreNone) {
+  const auto loaded = load();
+  EXPECT_NO_THROW(require_ports(loaded.rules, {"/arm", "/gaze"}));
+  try {
+    require_ports(loaded.rules, {"/arm", "/gazee"});
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no input port /gazee; did you mean \"/gaze\"?"));
+  }
+}
+
+}  // namespace
+}  // namespace arbiter::drawing
