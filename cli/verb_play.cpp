@@ -4,6 +4,7 @@
 // Each arrival bears the time that the trace gives it, counted from the start, not the moment at
 // which the scheduler let us run; so what simulate says of a boundary holds here too.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <iostream>
@@ -45,6 +46,7 @@ class Player {
       if (event.kind == rules::TraceKind::kTick || outputs_.count(event.source) != 0) continue;
       outputs_[event.source] =
           node_->open_output(event.source, type_of<std::uint64_t>(), OutputPortOptions{});
+      outputs_[event.source]->require_replay();
     }
   }
   Player(const Player&) = delete;
@@ -69,8 +71,9 @@ class Player {
       const shm::Nanoseconds at =
           start + (options_.speed == 1 ? event.at - events.front().at
                                        : std::llround(since_first / options_.speed));
-      if (sleep_until(at, interrupts)) return false;
-      play(event, at);
+      last_ = time_of(event, at);
+      if (sleep_until(last_, interrupts)) return false;
+      play(event, last_);
       std::cout.flush();
       if (!std::cout) return false;
     }
@@ -78,14 +81,25 @@ class Player {
   }
 
  private:
+  // At the moment of its deactivation a source can arrive no more (OutputPort::publish_at()): the
+  // trace goes on a nanosecond later.
+  shm::Nanoseconds time_of(const rules::TraceEvent& event, shm::Nanoseconds at) {
+    at = std::max(at, last_);
+    const auto deactivated = deactivated_.find(event.source);
+    if (deactivated != deactivated_.end() && deactivated->second == at) ++at;
+    if (event.kind == rules::TraceKind::kDeactivation) deactivated_[event.source] = at;
+    return at;
+  }
+
   void play(const rules::TraceEvent& event, shm::Nanoseconds at) {
     detail::OutputCore* output = nullptr;
     if (event.kind != rules::TraceKind::kTick) output = outputs_.at(event.source).get();
     if (event.kind == rules::TraceKind::kArrival) {
       ++counter_;
-      output->publish_copy(&counter_, sizeof counter_, at);
+      detail::publish_copy_at(*output, Time(std::chrono::nanoseconds(at)), &counter_,
+                              sizeof counter_);
     } else if (output != nullptr) {
-      output->deactivate(at);
+      detail::deactivate_at(*output, Time(std::chrono::nanoseconds(at)));
     }
     const shm::TableSnapshot snapshot = memory_->tables().snapshot();
     for (const auto& [name, port] : ports_of(event, output, snapshot.table)) {
@@ -140,6 +154,8 @@ class Player {
   std::shared_ptr<detail::NodeCore> node_;
   const std::shared_ptr<const detail::SharedMemory> memory_;
   std::map<std::string, std::shared_ptr<detail::OutputCore>> outputs_;
+  std::map<std::string, shm::Nanoseconds> deactivated_;  // when last
+  shm::Nanoseconds last_ = 0;                            // time of the last event
   std::uint64_t counter_ = 0;
 };
 

@@ -97,7 +97,7 @@ void print_source(const json& source, bool has_model) {
             << ']';
   if (source.at("open").get<bool>()) {
     std::cout << counts(source, {"published"}, true)
-              << counts(source, {"signals", "blind", "unsettled", "no_slot"}, false);
+              << counts(source, {"signals", "late", "blind", "unsettled", "no_slot"}, false);
   }
   const std::string mark = unmentioned(source, has_model);
   std::cout << (mark.empty() ? "" : " " + mark) << '\n';

@@ -184,6 +184,7 @@ class Document {
     result["blind"] = read(counters.blind);
     result["unsettled"] = read(counters.unsettled);
     result["no_slot"] = read(counters.no_slot);
+    result["late"] = read(counters.late);
     return result;
   }
 
