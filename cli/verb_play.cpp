@@ -4,6 +4,7 @@
 // Each arrival bears the time that the trace gives it, counted from the start, not the moment at
 // which the scheduler let us run; so what simulate says of a boundary holds here too.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <iostream>
@@ -18,7 +19,6 @@
 
 #include "cli/live.hpp"
 #include "cli/verbs.hpp"
-#include "client/node_core.hpp"
 #include "rules/ask/report.hpp"
 #include "rules/explain/simulation.hpp"
 #include "rules/explain/tenure.hpp"
@@ -40,30 +40,27 @@ struct PlayOptions {
 };
 
 // Of names that the model does not mention play speaks itself.
-std::shared_ptr<detail::NodeCore> make_node(const std::string& instance) {
+NodeOptions node_options(const std::string& instance) {
   NodeOptions options = live_options(instance);
   options.on_notice = [say = std::move(options.on_notice)](const Notice& notice) {
     if (notice.kind != NoticeKind::unmentioned) say(notice);
   };
-  return detail::make_node("arbiter-play", options);
+  return options;
 }
 
 class Player {
  public:
   Player(const PlayOptions& options, const std::vector<rules::TraceEvent>& events)
-      : options_(options), node_(make_node(options.instance)) {
+      : options_(options), node_("arbiter-play", node_options(options.instance)) {
     for (const auto& event : events) {
       if (event.kind == rules::TraceKind::kTick || outputs_.count(event.source) != 0) continue;
-      outputs_[event.source] =
-          node_->open_output(event.source, type_of<std::uint64_t>(), OutputPortOptions{});
+      outputs_.emplace(event.source, node_.output_port<std::uint64_t>(event.source))
+          .first->second.require_replay();
     }
     instance_ = watch_instance("play", options.instance);  // which sees what has been opened
   }
   Player(const Player&) = delete;
   Player& operator=(const Player&) = delete;
-  ~Player() {
-    for (auto& [name, output] : outputs_) detail::close_output(std::move(output));
-  }
 
   void note_unknown_sources() const {
     const auto table = instance_->memory()->tables().snapshot().table;
@@ -82,8 +79,9 @@ class Player {
       const shm::Nanoseconds at =
           start + (options_.speed == 1 ? event.at - events.front().at
                                        : std::llround(since_first / options_.speed));
-      if (sleep_until(at, interrupts)) return false;
-      play(event, at);
+      last_ = time_of(event, at);
+      if (sleep_until(last_, interrupts)) return false;
+      play(event, last_);
       std::cout.flush();
       if (!std::cout) return false;
     }
@@ -91,12 +89,22 @@ class Player {
   }
 
  private:
+  // At the moment of its deactivation a source can arrive no more (OutputPort::publish_at()): the
+  // trace goes on a nanosecond later.
+  shm::Nanoseconds time_of(const rules::TraceEvent& event, shm::Nanoseconds at) {
+    at = std::max(at, last_);
+    const auto deactivated = deactivated_.find(event.source);
+    if (deactivated != deactivated_.end() && deactivated->second == at) ++at;
+    if (event.kind == rules::TraceKind::kDeactivation) deactivated_[event.source] = at;
+    return at;
+  }
+
   void play(const rules::TraceEvent& event, shm::Nanoseconds at) {
     if (event.kind == rules::TraceKind::kArrival) {
       ++counter_;
-      outputs_.at(event.source)->publish_copy(&counter_, sizeof counter_, at);
+      outputs_.at(event.source).publish_at(Time(std::chrono::nanoseconds(at)), counter_);
     } else if (event.kind == rules::TraceKind::kDeactivation) {
-      outputs_.at(event.source)->deactivate(at);
+      outputs_.at(event.source).deactivate_at(Time(std::chrono::nanoseconds(at)));
     }
     instance_->update();
     for (const auto& [name, port] : ports_of(event)) {
@@ -139,9 +147,11 @@ class Player {
   }
 
   const PlayOptions& options_;
-  std::shared_ptr<detail::NodeCore> node_;
-  std::map<std::string, std::shared_ptr<detail::OutputCore>> outputs_;
+  Node node_;
+  std::map<std::string, OutputPort<std::uint64_t>> outputs_;
   std::shared_ptr<watch::Instance> instance_;
+  std::map<std::string, shm::Nanoseconds> deactivated_;  // when last
+  shm::Nanoseconds last_ = 0;                            // time of the last event
   std::uint64_t counter_ = 0;
 };
 

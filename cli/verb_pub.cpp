@@ -24,6 +24,8 @@ struct PubOptions {
   std::uint64_t count = 0;  // 0: until interrupted
   std::size_t size = 8;
   std::string text;
+  std::string type;  // empty: untyped
+  std::size_t alignment = 8;
   bool quiet = false;
 };
 
@@ -59,7 +61,10 @@ int pub(const PubOptions& options) {
   Node node("arbiter-pub", live_options(options.instance));
   OutputPortOptions port_options;
   port_options.max_size = payload.size();
-  auto out = node.output_port(options.port, port_options);
+  auto out =
+      options.type.empty()
+          ? node.output_port(options.port, port_options)
+          : node.output_port(options.port, Type(options.type, payload.size(), options.alignment));
   warn_if_nobody_is_there(options);
   const auto period = static_cast<shm::Nanoseconds>(1e9 / options.rate_hz);
   shm::Nanoseconds next = shm::monotonic_now();
@@ -102,9 +107,17 @@ void add_pub(CLI::App& app, int& exit_code) {
                    ->type_name("BYTES")
                    ->check(CLI::Range(std::size_t{0}, std::size_t{1} << 32));
   verb->add_option("--text", options->text, "The sample, as text")->excludes(size);
+  auto* type = verb->add_option("--type", options->type,
+                                "The type's name, for input ports that take no other")
+                   ->type_name("NAME");
+  verb->add_option("--alignment", options->alignment, "The type's alignment (default 8)")
+      ->type_name("BYTES")
+      ->needs(type);
   verb->add_flag("--quiet", options->quiet, "Print the summary only");
   add_instance_option(*verb, options->instance);
-  verb->footer("Example:\n  arbiter pub /Face/pos:o --rate 10 --count 50 --text hello");
+  verb->footer(
+      "Examples:\n  arbiter pub /Face/pos:o --rate 10 --count 50 --text hello\n"
+      "  arbiter pub /Joystick/cmd:o --type geometry/Twist --size 48");
   verb->callback([options, &exit_code] { exit_code = pub(*options); });
 }
 

@@ -95,6 +95,7 @@ void print_source(const wire::SourceStatus& source, bool has_model) {
   if (const auto& open = source.open) {
     std::cout << counts({{"published", open->published}}, true)
               << counts({{"signals", open->signals},
+                         {"late", open->late},
                          {"blind", open->blind},
                          {"unsettled", open->unsettled},
                          {"no_slot", open->no_slot}},

@@ -6,6 +6,16 @@
 #include "client/node_core.hpp"
 
 namespace arbiter::detail {
+namespace {
+
+shm::Nanoseconds nanoseconds(Time time) noexcept { return time.time_since_epoch().count(); }
+
+void begin_replay(OutputCore& core, Time at) {
+  require_own(core);
+  core.begin_replay(nanoseconds(at), shm::monotonic_now());
+}
+
+}  // namespace
 
 std::shared_ptr<NodeCore> make_node(std::string_view name, const NodeOptions& options) {
   return std::make_shared<NodeCore>(name, options);
@@ -58,8 +68,38 @@ Outcome publish_copy(OutputCore& core, const void* data, std::size_t size) noexc
 Outcome signal(OutputCore& core) noexcept {
   return is_own(core) ? core.signal(shm::monotonic_now()) : Outcome{};
 }
+Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline) noexcept {
+  if (!is_own(core)) return {};
+  return core.publish_loan_by(nanoseconds(deadline), slot, size, shm::monotonic_now());
+}
+Outcome publish_copy(OutputCore& core, const void* data, std::size_t size, Time deadline) noexcept {
+  if (!is_own(core)) return {};
+  return core.publish_copy_by(nanoseconds(deadline), data, size, shm::monotonic_now());
+}
+Outcome signal(OutputCore& core, Time deadline) noexcept {
+  return is_own(core) ? core.signal_by(nanoseconds(deadline), shm::monotonic_now()) : Outcome{};
+}
 void deactivate(OutputCore& core) noexcept {
   if (is_own(core)) core.deactivate(shm::monotonic_now());
+}
+Outcome publish_at(OutputCore& core, Time at, std::uint32_t slot, std::size_t size) {
+  LoanedBy loan(&core, {slot});  // given back where this is refused
+  begin_replay(core, at);
+  static_cast<void>(loan.release());
+  return core.publish_loan(slot, size, nanoseconds(at));
+}
+Outcome publish_copy_at(OutputCore& core, Time at, const void* data, std::size_t size) {
+  begin_replay(core, at);
+  return core.publish_copy(data, size, nanoseconds(at));
+}
+Outcome signal_at(OutputCore& core, Time at) {
+  begin_replay(core, at);
+  return core.signal(nanoseconds(at));
+}
+void require_replay(const OutputCore& core) { core.require_replay(); }
+void deactivate_at(OutputCore& core, Time at) {
+  begin_replay(core, at);
+  core.deactivate(nanoseconds(at));
 }
 std::size_t max_size(const OutputCore& core) noexcept { return core.type().size; }
 const std::string& name(const OutputCore& core) noexcept { return core.name(); }

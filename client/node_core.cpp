@@ -286,7 +286,11 @@ std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const T
     question.type = core->type();
     converse(question, {core->segment_descriptor().get(), -1}, memory.get(),
              [&](shm::Received& opened) {
-               core->bind(opened.message.port, opened.message.id, std::move(opened.descriptors[0]));
+               const shm::Message& said = opened.message;
+               if ((said.flags & shm::kMayReplay) == 0) {
+                 core->forbid_replay(std::string(said.text_view()));
+               }
+               core->bind(said.port, said.id, std::move(opened.descriptors[0]));
                outputs_[opened.message.port] = core;
              });
     return core;

@@ -36,6 +36,8 @@ class OutputCore {
 
   // The port is open: the daemon has given it its place.
   void bind(shm::PortInstance instance, shm::SourceId source, shm::FileDescriptor page);
+  // Before the component has the port: `why`, a sentence of the daemon's.
+  void forbid_replay(std::string why) { why_no_replay_ = std::move(why); }
   // `link`: its number if they are connected, else 0.
   void add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t link);
   void remove_peer(shm::PortInstance peer);
@@ -60,6 +62,18 @@ class OutputCore {
   Outcome publish_copy(const void* data, std::size_t size, shm::Nanoseconds now) noexcept;
   Outcome signal(shm::Nanoseconds now) noexcept;
   void deactivate(shm::Nanoseconds now) noexcept;
+  // The same unless `deadline` has passed by `now`. Then nothing has happened: no word that others
+  // read is written but the count of those that came late, and a loan is free again.
+  Outcome publish_loan_by(shm::Nanoseconds deadline, std::uint32_t slot, std::size_t size,
+                          shm::Nanoseconds now) noexcept;
+  Outcome publish_copy_by(shm::Nanoseconds deadline, const void* data, std::size_t size,
+                          shm::Nanoseconds now) noexcept;
+  Outcome signal_by(shm::Nanoseconds deadline, shm::Nanoseconds now) noexcept;
+  // For replay: the next call of those above may be given the time `at`, as if it had read the
+  // clock then and had been held up until `now`. Throws Error.
+  void begin_replay(shm::Nanoseconds at, shm::Nanoseconds now);
+  // Throws Error where the policy does not allow replay.
+  void require_replay() const;
 
   // Either.
 
@@ -83,6 +97,9 @@ class OutputCore {
  private:
   // How often a decision is taken anew because seven models were loaded during it.
   static constexpr int kMaxTableRetries = 3;
+
+  // As last_, before this port's first arrival: a predecessor's.
+  static constexpr shm::Nanoseconds kUnknown = -1;
 
   // A link as the port's thread works with it.
   struct Destination {
@@ -110,6 +127,7 @@ class OutputCore {
   void bind_rules_and_view() noexcept;
   void bind_decisions() noexcept;
 
+  Outcome be_late() noexcept;
   // With the sample in `slot`, or without one (kNoSlot).
   Outcome arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
   void stamp(shm::ActivityWord word) noexcept;
@@ -118,9 +136,8 @@ class OutputCore {
   [[nodiscard]] Outcome refuse(const Destination& destination, bool is_sample) const noexcept;
   [[nodiscard]] bool is_full(Destination& destination) const noexcept;
   static void ring_if_waiting(Destination& destination) noexcept;
-  void ring_where_selection_changed(shm::Nanoseconds now) noexcept;
-  [[nodiscard]] bool selection_differs(const Destination& destination,
-                                       shm::Nanoseconds now) noexcept;
+  void ring_where_selection_changed() noexcept;
+  [[nodiscard]] bool selection_differs(const Destination& destination) noexcept;
   std::uint32_t acquire_slot() noexcept;
 
   // Constant once bound.
@@ -140,6 +157,7 @@ class OutputCore {
   shm::Mapping page_;
   std::optional<shm::Bequest> page_bequest_;
   shm::Activity* activity_ = nullptr;
+  std::string why_no_replay_;  // empty: it is allowed
 
   // Service thread.
   std::map<shm::PortInstance, InputLink> links_;
@@ -163,6 +181,7 @@ class OutputCore {
   std::uint32_t loans_ = 0;
   std::uint64_t sequence_ = 0;
   shm::ActivityWord own_word_ = shm::kNeverActive;
+  shm::Nanoseconds last_ = kUnknown;  // time of the last arrival or deactivation
   shm::Epoch bound_epoch_ = UINT64_MAX;
   std::uint64_t bound_pages_ = 0;
   shm::TableSnapshot snapshot_;

@@ -1,4 +1,4 @@
-// publish(), signal() and deactivate(): what becomes of an arrival.
+// publish(), signal() and deactivate(), with deadlines and given times: what becomes of an arrival.
 //
 //   stamp     the source's activity; from here on everybody sees it
 //   decide    at each connected port
@@ -56,11 +56,12 @@ Outcome OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanosecond
   if (!rules_are_bound()) bind_rules_and_view();
   const bool begins = !shm::is_active(own_word_, now);
   stamp(shm::arrival(now, timeout_));
+  last_ = now;
   Outcome outcome;
   if (!destinations_.empty()) {
     decide_all(now);
     outcome = hand_over(slot, size, now);
-    if (begins) ring_where_selection_changed(now);
+    if (begins) ring_where_selection_changed();
   }
   auto& counters = segment_.header().counters;
   count(slot == shm::kNoSlot ? counters.signals : counters.published);
@@ -206,21 +207,23 @@ void OutputCore::ring_if_waiting(Destination& destination) noexcept {
 }
 
 // Our activity has begun or ended. A component that waits, and believes of its port what is no
-// longer so, is woken: to stop its motor, or to know when it will have to.
-void OutputCore::ring_where_selection_changed(shm::Nanoseconds now) noexcept {
+// longer so, is woken: to stop its motor, or to know when it will have to. What it believes is of
+// its own time, so the clock is read again: by our arrival's time, an activity that has ended since
+// would still be active.
+void OutputCore::ring_where_selection_changed() noexcept {
   for (Destination& destination : destinations_) {
     const std::uint64_t wait =
         destination.peer->segment->header.wait.load(std::memory_order_relaxed);
     if ((wait & 1) == 0 || wait == destination.rung) continue;
-    if (selection_differs(destination, now)) ring_if_waiting(destination);
+    if (selection_differs(destination)) ring_if_waiting(destination);
   }
 }
 
-bool OutputCore::selection_differs(const Destination& destination, shm::Nanoseconds now) noexcept {
+bool OutputCore::selection_differs(const Destination& destination) noexcept {
   const shm::SourceId believed =
       destination.peer->segment->header.believed.load(std::memory_order_relaxed);
   const shm::TableView& table = snapshot_.table;
-  shm::DecisionClock clock(now, true);
+  shm::DecisionClock clock(shm::monotonic_now(), true);
   shm::Decider decider(table, memory_->pages(), clock);
   const auto range = table.connections_to(destination.peer->port);
   for (auto index = range.first; index != range.first + range.count; ++index) {
@@ -255,12 +258,67 @@ Outcome OutputCore::publish_copy(const void* data, std::size_t size,
 
 Outcome OutputCore::signal(shm::Nanoseconds now) noexcept { return arrive(shm::kNoSlot, 0, now); }
 
+// What comes at the deadline itself is in time.
+Outcome OutputCore::publish_loan_by(shm::Nanoseconds deadline, std::uint32_t slot, std::size_t size,
+                                    shm::Nanoseconds now) noexcept {
+  if (now <= deadline) return publish_loan(slot, size, now);
+  end_loan(slot);
+  return be_late();
+}
+
+Outcome OutputCore::publish_copy_by(shm::Nanoseconds deadline, const void* data, std::size_t size,
+                                    shm::Nanoseconds now) noexcept {
+  return now <= deadline ? publish_copy(data, size, now) : be_late();
+}
+
+Outcome OutputCore::signal_by(shm::Nanoseconds deadline, shm::Nanoseconds now) noexcept {
+  return now <= deadline ? signal(now) : be_late();
+}
+
+Outcome OutputCore::be_late() noexcept {
+  count(segment_.header().counters.late);
+  Outcome outcome;
+  outcome.late = true;
+  return outcome;
+}
+
 void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
   if (!rules_are_bound()) bind_rules();
   const bool ends = shm::is_active(own_word_, now);
   stamp(shm::deactivation(now));
-  if (ends) ring_where_selection_changed(now);
+  last_ = now;
+  if (ends) ring_where_selection_changed();
+}
+
+// An arrival at a given time is one whose publisher has read the clock at that time and has been
+// held up since. That is all that others see of it, and what they must cope with anyway; so the
+// order of the data path is the same. What a reading of the clock warrants must be asked for: it is
+// not in the future, and not before the source's last event. Nor at the time of a deactivation: the
+// value of the word before that might come back (activity.hpp, invariant 2).
+void OutputCore::begin_replay(shm::Nanoseconds at, shm::Nanoseconds now) {
+  require_replay();
+  const auto refuse = [&](shm::Nanoseconds by, const char* what) {
+    throw Error(name_ + ": an arrival at " + std::to_string(at) + " ns is refused: that is " +
+                std::to_string(by) + " ns " + what);
+  };
+  if (handover_.has_offer()) accept_view();
+  // Verdicts were found for times that may be later than `at`: they are forgotten.
+  bind_rules_and_view();
+  if (last_ == kUnknown) {
+    last_ = std::clamp(shm::time_of(own_word_, timeout_), shm::Nanoseconds{0}, now);
+  }
+  if (at > now) refuse(at - now, "later than now");
+  if (at < last_) refuse(last_ - at, "before the last arrival or deactivation of this source");
+  if (at == last_ && shm::is_deactivation(own_word_)) {
+    refuse(0, "after the last deactivation of this source; later is allowed");
+  }
+  // Whoever waits has seen our activity end, be it later than `at`: it begins for them.
+  if (shm::is_finite(own_word_) && !shm::is_active(own_word_, now)) own_word_ = shm::kNeverActive;
+}
+
+void OutputCore::require_replay() const {
+  if (!why_no_replay_.empty()) throw Error(name_ + ": " + why_no_replay_);
 }
 
 }  // namespace arbiter::detail

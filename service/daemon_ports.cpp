@@ -63,6 +63,12 @@ void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_p
   auto reply = reply_to(request, shm::MessageKind::kOpened);
   reply.port = opened.instance;
   reply.id = source.id;
+  const auto why_no_replay = gate_.why_not(client, Action::kReplay, source.name);
+  if (why_no_replay) {
+    reply.set_text(*why_no_replay);
+  } else {
+    reply.flags = shm::kMayReplay;
+  }
   client.send(reply, {source.page.writable.get(), -1});
   log::info("{} opened output port {}", client.description(), source.name);
   connect(client, request, opened.instance);

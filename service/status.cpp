@@ -165,7 +165,7 @@ class Document {
     return {component_of(*output.client), type_of(output.type),     read(counters.published),
             read(counters.signals),       read(counters.delivered), read(counters.discarded),
             read(counters.refused),       read(counters.blind),     read(counters.unsettled),
-            read(counters.no_slot)};
+            read(counters.no_slot),       read(counters.late)};
   }
 
   wire::InputStatus input(const InputName& name) {

@@ -61,6 +61,13 @@ constexpr Nanoseconds arrival_of(ActivityWord word, Nanoseconds timeout) noexcep
   return timeout == kForever ? word : word - timeout;
 }
 
+// The time of the arrival or deactivation that wrote a word, given the source's T. Of one that was
+// never written it is below 0.
+constexpr Nanoseconds time_of(ActivityWord word, Nanoseconds timeout) noexcept {
+  if (is_deactivation(word)) return word & ~kDeactivatedFlag;
+  return word == kNeverActive ? -1 : arrival_of(word, timeout);
+}
+
 struct Activity {
   Atomic<ActivityWord> word{kNeverActive};
   Atomic<std::uint64_t> breaks{0};  // how often an arrival has followed a deactivation

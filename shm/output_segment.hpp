@@ -76,6 +76,7 @@ struct OutputCounters {
   Atomic<std::uint64_t> blind;      // discarded because a source could not be seen yet
   Atomic<std::uint64_t> unsettled;  // discarded because no consistent picture could be taken
   Atomic<std::uint64_t> no_slot;    // loan() found none: more samples are held than were allowed
+  Atomic<std::uint64_t> late;       // no arrivals: their deadlines had passed
 };
 
 struct OutputHeader {

@@ -64,7 +64,8 @@ enum class MessageKind : std::uint32_t {
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; descriptors: the board, the registry, read-only
-  kOpened,         // port: its instance; id: its source or port id; descriptor: an output's page
+  kOpened,         // port: its instance; id: its source or port id; of an output port also flags
+                   // (kMayReplay), text: why not; descriptor: its page
   kConnected,
   kRefused,       // text: why
   kSourcePage,    // id, name: a source; value: the number of its page, in force or to come;
@@ -93,6 +94,7 @@ enum MessageFlag : std::uint32_t {
   kRejoins = 8,       // it does so now
   kWantsReport = 16,  // of a change of the model: kReport is the answer, whatever comes of it
   kDryRun = 32,       // of a reload: only say what it would do
+  kMayReplay = 64,    // the output port may be given times of arrival (Action::kReplay)
 };
 
 struct Message {

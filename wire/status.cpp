@@ -110,6 +110,7 @@ void describe(auto& field, Is<OpenOutput> auto& of) {
   field.counter("blind", of.blind);
   field.counter("unsettled", of.unsettled);
   field.counter("no_slot", of.no_slot);
+  field.counter("late", of.late);
 }
 
 void describe(auto& field, Is<SourceStatus> auto& of) {

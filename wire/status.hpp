@@ -85,6 +85,7 @@ struct OpenOutput {
   std::uint64_t blind = 0;
   std::uint64_t unsettled = 0;
   std::uint64_t no_slot = 0;
+  std::uint64_t late = 0;
 };
 
 struct SourceStatus {

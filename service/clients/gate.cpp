@@ -29,6 +29,8 @@ std::string describe(Action action, std::string_view port) {
       return "switch to another model";
     case Action::kStop:
       return "stop the daemon";
+    case Action::kReplay:
+      return "replay the source " + name + " (give its arrivals their times)";
   }
   return "do that";
 }
@@ -68,12 +70,17 @@ void Gate::put_in_force(const Policy& policy) {
   log::info("the policy of {} is in force, {} rules", *file_, policy_.size());
 }
 
-void Gate::require(const Client& client, Action action, std::string_view port) const {
+std::optional<std::string> Gate::why_not(const Client& client, Action action,
+                                         std::string_view port) const {
   const Identity who = peer_identity(client.socket());
   const Policy::Verdict verdict = policy_.may(who, action, port);
-  if (verdict.allowed) return;
-  throw std::runtime_error("user " + describe_user(who.user) + " may not " +
-                           describe(action, port) + ": " + verdict.reason);
+  if (verdict.allowed) return {};
+  return "user " + describe_user(who.user) + " may not " + describe(action, port) + ": " +
+         verdict.reason;
+}
+
+void Gate::require(const Client& client, Action action, std::string_view port) const {
+  if (const auto why = why_not(client, action, port)) throw std::runtime_error(*why);
 }
 
 }  // namespace arbiter::service

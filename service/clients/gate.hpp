@@ -21,8 +21,10 @@ class Gate {
   void put_in_force(const Policy& policy);
   [[nodiscard]] bool has_file() const { return file_.has_value(); }
 
-  // Throws std::runtime_error if the client may not do it. The message says who may not do what,
-  // and which line of the policy says so.
+  // Empty if the client may do it; else who may not do what, and which line of the policy says so.
+  [[nodiscard]] std::optional<std::string> why_not(const Client& client, Action action,
+                                                   std::string_view port = {}) const;
+  // The same, thrown as std::runtime_error.
   void require(const Client& client, Action action, std::string_view port = {}) const;
 
  private:

@@ -13,7 +13,7 @@ constexpr std::uint8_t bit(Action action) {
 }
 
 constexpr std::uint8_t kOnPorts =
-    bit(Action::kOutput) | bit(Action::kInput) | bit(Action::kDeactivate);
+    bit(Action::kOutput) | bit(Action::kInput) | bit(Action::kDeactivate) | bit(Action::kReplay);
 
 bool is_about_a_port(Action action) { return (kOnPorts & bit(action)) != 0; }
 
@@ -31,7 +31,8 @@ bool glob_covers(std::string_view earlier, std::string_view later) {
 
 Policy::Policy(uid_t owner) : owner_(owner) {
   // Whoever may open an output port could end its activity by opening it, too.
-  rules_.push_back({true, {}, kOnPorts, "*", 1, "allow everyone output,input,deactivate *"});
+  constexpr auto kUse = bit(Action::kOutput) | bit(Action::kInput) | bit(Action::kDeactivate);
+  rules_.push_back({true, {}, kUse, "*", 1, "allow everyone output,input,deactivate *"});
   rules_.push_back({true, {}, bit(Action::kObserve), "*", 2, "allow everyone observe"});
 }
 

@@ -4,7 +4,8 @@
 //
 //   WHO      everyone, owner (the user that the daemon runs as), user NAME, group NAME; numbers
 //            serve as names, too
-//   ACTION   output, input, deactivate: each on the ports whose names match one of the globs;
+//   ACTION   output, input, deactivate, replay: each on the ports whose names match one of the
+//   globs;
 //            observe, reload, switch, stop: without globs; all: every action on every port
 //
 // Behind the last line stand, unwritten: allow user root all; allow owner all; deny everyone all.
@@ -32,9 +33,10 @@ enum class Action : std::uint8_t {
   kObserve,
   kReload,
   kSwitch,
-  kStop
+  kStop,
+  kReplay
 };
-inline constexpr std::size_t kActionCount = 7;
+inline constexpr std::size_t kActionCount = 8;
 
 // Who asks, as the kernel knows him.
 struct Identity {

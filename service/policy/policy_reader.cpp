@@ -31,6 +31,7 @@ constexpr std::array<NamedAction, kActionCount> kActions{{
     {"reload", Action::kReload, false},
     {"switch", Action::kSwitch, false},
     {"stop", Action::kStop, false},
+    {"replay", Action::kReplay, true},
 }};
 constexpr std::string_view kShape = "a line is: allow|deny WHO ACTION[,ACTION...] [GLOB...]";
 
@@ -206,10 +207,11 @@ class PolicyReader {
     }
     error("unknown-action", word,
           quote(word) + " is no action" +
-              (word == "all" ? std::string("; all stands alone")
-                             : advise(word, known,
-                                      "write output, input, deactivate, observe, reload, stop or "
-                                      "all, with commas and no blanks between them")));
+              (word == "all"
+                   ? std::string("; all stands alone")
+                   : advise(word, known,
+                            "write output, input, deactivate, replay, observe, reload, "
+                            "switch, stop or all, with commas and no blanks between them")));
     return nullptr;
   }
 

@@ -9,12 +9,7 @@
 namespace arbiter::explore {
 namespace {
 
-shm::TypeInfo sample_type() {
-  shm::TypeInfo type;
-  type.size = sizeof(std::uint64_t);
-  type.alignment = alignof(std::uint64_t);
-  return type;
-}
+Type sample_type() { return Type::untyped(sizeof(std::uint64_t)); }
 
 }  // namespace
 
@@ -117,7 +112,7 @@ std::unique_ptr<Output> Instance::make_output(std::uint32_t slots) {
   options.max_memory = shm::kCacheLine * std::size_t{slots == 0 ? 64 : slots};
   output->core =
       std::make_unique<detail::OutputCore>("output", sample_type(), options, output->memory);
-  const auto layout = shm::OutputLayout::plan(sample_type(), slots == 0 ? 64 : slots);
+  const auto layout = shm::OutputLayout::plan(output->core->type(), slots == 0 ? 64 : slots);
   output->mapping =
       shm::Mapping(output->core->segment_descriptor(), layout.total_size, shm::Access::kReadOnly);
   return output;

@@ -30,7 +30,8 @@ inline wire::Status full_status() {
                  105,
                  106,
                  107,
-                 108};
+                 108,
+                 109};
   wire::SourceStatus latched;
   latched.name = "/stop";
   latched.active = true;

@@ -59,10 +59,10 @@ bool ends_with(const json::json_pointer& pointer, const std::set<std::string>& k
   return keys.contains(pointer.back());
 }
 
-const std::set<std::string> kCounters{"reloads_refused", "published",  "signals",  "delivered",
-                                      "discarded",       "refused",    "blind",    "unsettled",
-                                      "no_slot",         "misbehaved", "idles",    "taken",
-                                      "dropped",         "overtaken",  "accepted", "waiting"};
+const std::set<std::string> kCounters{
+    "reloads_refused", "published", "signals",   "delivered", "discarded",  "refused",
+    "blind",           "unsettled", "no_slot",   "late",      "misbehaved", "idles",
+    "taken",           "dropped",   "overtaken", "accepted",  "waiting"};
 
 TEST(Status, IsReadAsItWasWritten) {
   const json document = to_json(full_status());

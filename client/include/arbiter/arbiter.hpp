@@ -16,15 +16,21 @@
 // other does. Errors are thrown as arbiter::Error when ports are opened; nothing on the data path
 // throws, except for misuse that is named where it applies.
 //
+// Units: bytes, and times by CLOCK_MONOTONIC: nanoseconds (arbiter::Time), or any
+// std::chrono::duration. Cost: data path calls take no lock, allocate nothing and wait for nobody
+// (docs/real-time.md has the exceptions); docs/benchmarks.md has what they take.
+//
+// Each header says the same of what is its own.
+//
 // Processes: a node and its ports belong to the process that made them. A child that this process
 // forks may do with its copies what it likes, and end as it likes: nothing of it reaches the ports.
-// take(), wait_for(), fd() and all that opens ports throw arbiter::Error there, which says so;
-// publish(), signal(), deactivate() and loan() do nothing, and say so on standard error, once for
-// each port; idle() is true, and there is no winner(). A child may read samples that were held at
-// the fork for as long as its parent holds them, and may make a Node of its own. So a program that
-// calls daemon(3) makes its node after it. If the process ends, its ports are closed, whatever its
-// children do. A child of vfork() runs in its parent's memory: it may call exec or _exit, and
-// nothing else.
+// take(), wait_for(), fd(), publish_at() and its like, and all that opens ports throw
+// arbiter::Error there, which says so; publish(), signal(), deactivate() and loan() do nothing, and
+// say so on standard error, once for each port; idle() is true, and there is no winner(). A child
+// may read samples that were held at the fork for as long as its parent holds them, and may make a
+// Node of its own. So a program that calls daemon(3) makes its node after it. If the process ends,
+// its ports are closed, whatever its children do. A child of vfork() runs in its parent's memory:
+// it may call exec or _exit, and nothing else.
 #pragma once
 
 #include <arbiter/bytes.hpp>

@@ -1,5 +1,9 @@
-// Views of bytes, for untyped ports: C++17's lack of std::span made good. Each converts to a
-// std::span.
+// Views of bytes, for ports without a C++ type: C++17's lack of std::span made good. Each converts
+// to a std::span.
+//
+// Units: bytes. Threads: a view is a value, and owns nothing: what it shows is there for as long as
+// the sample or loan that gave it. Cost: a pointer and a size. Errors: none; as with a pointer,
+// what lies outside is not looked after. The paper has nothing of it.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,10 @@
 // Input ports: where data reaches a component, past the port's arbiter (paper, section III).
+//
+// Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC. Threads: a port, and its samples,
+// are used by one thread at a time. Blocking: wait_for() alone. Cost: take() is without
+// a lock, an allocation or a system call (docs/benchmarks.md has its time); wait_for() sleeps in
+// the kernel. Errors: take() and wait_for() throw arbiter::Error for more than max_held samples,
+// and what else does says so.
 #pragma once
 
 #include <chrono>
@@ -26,15 +32,17 @@ class SampleBase {
   [[nodiscard]] const std::string& source() const noexcept {
     return detail::source_name(*core_, held_.source);
   }
-  // The source's own count of its samples, from 1.
+  // The source's own count of its samples, from 1, by its publisher: a successor begins again.
   [[nodiscard]] std::uint64_t sequence() const noexcept { return held_.sequence; }
   // What it is: the type of the output port it came from, also where the input port is untyped. It
   // stays as it is while the sample is held. Wait-free.
   [[nodiscard]] const Type& type() const noexcept {
     return detail::sample_type(*core_, core_.get_deleter().hold);
   }
-  // When it arrived: CLOCK_MONOTONIC, in nanoseconds.
+  // When it arrived, by its publisher's reading of this host's clock, or by what publish_at() was
+  // given: CLOCK_MONOTONIC, in nanoseconds. Wait-free, as the two before.
   [[nodiscard]] std::int64_t stamp_ns() const noexcept { return held_.stamp_ns; }
+  [[nodiscard]] Time stamp() const noexcept { return Time(std::chrono::nanoseconds(stamp_ns())); }
 
  protected:
   SampleBase(detail::InputCore& core, const detail::HeldSample& held) noexcept

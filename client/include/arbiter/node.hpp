@@ -4,6 +4,12 @@
 // daemon of the instance, about twenty times a second, and hands back what it has; it need not be
 // told to. The service thread does this, or service() where there is none.
 //
+// Threads: a node may be used by several threads at once. Blocking: as each call says; none is for
+// a thread with deadlines. Cost: opening a port takes three messages, some maps and
+// allocations, typically below a millisecond; the service thread sleeps unless something comes or
+// goes. Errors: arbiter::Error, which says what to do; nothing has been opened then. The paper:
+// ports are those of section III, switch_model() of section V.
+//
 // In a child that was forked all calls throw arbiter::Error, but service_fd(), which answers -1.
 #pragma once
 
@@ -99,8 +105,9 @@ class Node {
   // path: it allocates, and talks to the daemon.
   void switch_model(std::string_view name) { detail::switch_model(*core_, name); }
 
-  // Without a service thread: takes up what the daemon has announced. Does not block. service_fd()
-  // is readable when there is something to do.
+  // Without a service thread: takes up what the daemon has announced, and calls on_notice for what
+  // there is to say, on this thread. Does not wait for the daemon, but maps and allocates. With one
+  // it does nothing. service_fd() is readable when there is something to do; it stays the node's.
   void service() { detail::service(*core_); }
   [[nodiscard]] int service_fd() const noexcept { return detail::service_fd(*core_); }
 

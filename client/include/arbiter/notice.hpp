@@ -1,4 +1,8 @@
 // What a component should know of its ports, and does not see by its own calls.
+//
+// Threads, blocking and errors are those of the callback: NodeOptions::on_notice. Cost: off the
+// data path; notices of a port that say the same are given once, at most 64 of each port, and at
+// most 1024 wait for a callback that is slow. The paper has nothing of it.
 #pragma once
 
 #include <cstdint>
@@ -7,8 +11,9 @@
 namespace arbiter {
 
 enum class NoticeKind : std::uint8_t {
-  // The model connects the port with `peer`, and they are not connected: their types differ, or
-  // memory is short. While that source is selected there its samples are refused, and the input
+  // The model connects the port with `peer`, and they are not connected: their types differ (the
+  // text names both, with their components: type.hpp), or memory is short. While that source is
+  // selected there its samples are refused, and the input
   // port is idle.
   refused,
   // The model in force does not mention the port, or there is none: nothing of an output port is

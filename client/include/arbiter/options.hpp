@@ -1,4 +1,8 @@
 // What can be chosen when nodes and ports are made. C++20: {.depth = 4}; C++17: member by member.
+//
+// Threads: values, which are read while the node or the port is made, and not looked at after.
+// Errors: what is out of its bounds makes that throw arbiter::Error, which names the option and
+// the bounds. The paper leaves all of it open.
 #pragma once
 
 #include <chrono>
@@ -15,7 +19,8 @@ namespace arbiter {
 struct NodeOptions {
   // Which daemon; empty: $ARBITER_INSTANCE, else "default".
   std::string instance{};
-  // How long Node(), and the opening of a port, wait for a daemon before they throw.
+  // How long Node() waits for a daemon before it throws; and, at least a second, the opening of a
+  // port and switch_model(). Above a year it is a year.
   std::chrono::milliseconds connect_timeout{5000};
   // Called once by each Node(), opening of a port or switch_model() that has waited half a second
   // for a daemon, with a sentence that says so. Empty: the sentence goes to standard error. On the
@@ -56,9 +61,10 @@ struct NodeOptions {
 struct OutputPortOptions {
   // Untyped ports: the largest sample, in bytes.
   std::size_t max_size = 4096;
-  // How many samples may be on loan at once, 1 to 64.
+  // How many samples may be on loan at once, 1 to 64. Each costs the memory of a sample.
   std::uint32_t max_loans = 2;
-  // The most memory, in bytes, that this port's samples may take up. It is taken as input ports
+  // The most memory, in bytes, that this port's samples may take up, as many as fit, each at a
+  // multiple of 64 bytes; at least max_loans + 3 of them. It is taken as input ports
   // connect: each needs its depth and what it may hold. One that does not fit gets a smaller depth.
   std::size_t max_memory = std::size_t{1} << 30;
 };

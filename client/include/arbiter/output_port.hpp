@@ -1,7 +1,14 @@
 // Output ports: where a component's data leaves it (paper, section III).
+//
+// Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC (arbiter::Time). Threads: a port,
+// and its loans, are used by one thread at a time. Blocking: no call does, and none takes a lock or
+// allocates, but the first after a connection has come or gone, which allocates some 200 bytes for
+// each. Errors: what a call throws is said at it; all that do not are noexcept. Cost: with
+// publish(); measured in docs/benchmarks.md.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <new>
 #include <optional>
@@ -31,6 +38,7 @@ class Loan {
 
  private:
   friend class OutputPort<T>;
+  friend class OutputPortBase;
   Loan(detail::OutputCore& core, detail::LoanedSlot slot) noexcept
       : core_(&core, {slot.slot}), data_(slot.data) {}
 
@@ -53,6 +61,7 @@ class Loan<void> {
 
  private:
   friend class OutputPort<void>;
+  friend class OutputPortBase;
   Loan(detail::OutputCore& core, detail::LoanedSlot slot, std::size_t size) noexcept
       : core_(&core, {slot.slot}), bytes_(slot.data, size) {}
 
@@ -77,15 +86,37 @@ class OutputPortBase {
   // Activity without a sample: the source becomes, or stays, active. `discarded` counts the
   // connected input ports at which it is not the winner; nothing is delivered. Wait-free.
   Outcome signal() noexcept { return detail::signal(*core_); }
-  // Ends the source's activity at once. Wait-free.
+  // The same, unless it is too late: as publish() with a deadline.
+  Outcome signal(Time deadline) noexcept { return detail::signal(*core_, deadline); }
+  // Ends the source's activity at once. Never too late. Wait-free.
   void deactivate() noexcept { detail::deactivate(*core_); }
+
+  // For replay: as signal() and deactivate(), at a given time. See publish_at().
+  Outcome signal_at(Time at) { return detail::signal_at(*core_, at); }
+  void deactivate_at(Time at) { detail::deactivate_at(*core_, at); }
+  // Throws arbiter::Error where the policy does not allow it: to ask before the first arrival.
+  void require_replay() const { detail::require_replay(*core_); }
+
   // The port's name, which is also its source's.
   [[nodiscard]] const std::string& name() const noexcept { return detail::name(*core_); }
+  // What a sample is; untyped: bytes.
   [[nodiscard]] const Type& type() const noexcept { return detail::type(*core_); }
 
  protected:
   explicit OutputPortBase(std::shared_ptr<detail::OutputCore> core) noexcept
       : core_(std::move(core)) {}
+
+  template <class T>
+  void require_own(const Loan<T>& loan) const {
+    if (loan.core_ != nullptr && loan.core_.get() == core_.get()) return;
+    throw std::invalid_argument("the loan is not one of this port");
+  }
+  // The loan's slot, which is the callee's from here on.
+  template <class T>
+  static std::uint32_t release(Loan<T>& loan) noexcept {
+    static_cast<void>(loan.core_.release());
+    return loan.core_.get_deleter().slot;
+  }
 
   std::shared_ptr<detail::OutputCore> core_;
 };
@@ -104,15 +135,49 @@ class OutputPort : public OutputPortBase {
   // port, and hands the sample to those where it wins. A loser wakes nobody. Wait-free; 50 ns and
   // up. Throws std::invalid_argument for a loan that is empty or another port's.
   Outcome publish(Loan<T> loan) {
-    if (loan.core_ == nullptr || loan.core_.get() != core_.get()) {
-      throw std::invalid_argument("the loan is not one of this port");
-    }
-    static_cast<void>(loan.core_.release());
-    return detail::publish(*core_, loan.core_.get_deleter().slot, sizeof(T));
+    require_own(loan);
+    return detail::publish(*core_, release(loan), sizeof(T));
   }
   // The same with a copy of `sample`.
   Outcome publish(const T& sample) noexcept {
     return detail::publish_copy(*core_, &sample, sizeof(T));
+  }
+
+  // Never late: the same, unless `deadline` has passed by the reading of the clock that publish()
+  // takes first of all, and that is the arrival's time. (What comes at the deadline itself is in
+  // time.) Where it has, there is no arrival: the source's activity is as it was, no sequence
+  // number is used, nobody is woken, a loan is free again. The outcome says `late`, and
+  // `arbiter status` counts it. For whatever hands on what has come from elsewhere and may have
+  // waited: a sample above its T is better lost than obeyed. No promise is made about the time
+  // after that reading: who is stopped within publish() arrives when he goes on, at the time that
+  // he has read.
+  Outcome publish(Loan<T> loan, Time deadline) {
+    require_own(loan);
+    return detail::publish(*core_, release(loan), sizeof(T), deadline);
+  }
+  Outcome publish(const T& sample, Time deadline) noexcept {
+    return detail::publish_copy(*core_, &sample, sizeof(T), deadline);
+  }
+
+  // For replay: an arrival whose time is given. It is as if publish() had been called at that time,
+  // had read the clock, and had been held up until now: it is decided for `at`, the sample says so
+  // (stamp_ns()), and the source is active until `at` + T, which may have passed already. So a
+  // trace that is replayed in its order is decided as `arbiter simulate` says, however late each
+  // call comes; where an arrival at another time, such as a live one, has come between, it is
+  // decided for the time of the call.
+  //
+  // Throws arbiter::Error, and there is no arrival, a loan is free again: `at` is later than now;
+  // or before the last arrival or deactivation of this source, or at the time of a deactivation;
+  // or the daemon's policy had not allowed `replay` of this source to this user when the port was
+  // opened. That protects against mistakes: a component writes the activity of its own source, so
+  // who may open it can pretend any arrival. Wait-free; but each call binds the rules
+  // anew, as publish() does it only after another model has come into force.
+  Outcome publish_at(Time at, Loan<T> loan) {
+    require_own(loan);
+    return detail::publish_at(*core_, at, release(loan), sizeof(T));
+  }
+  Outcome publish_at(Time at, const T& sample) {
+    return detail::publish_copy_at(*core_, at, &sample, sizeof(T));
   }
 
  private:
@@ -131,20 +196,31 @@ class OutputPort<void> : public OutputPortBase {
     if (slot.data == nullptr) return std::nullopt;
     return Loan<void>(*core_, slot, size);
   }
-  // As for a typed port. Throws std::invalid_argument, too, for a loan that was shrunk where a type
-  // says how large samples are.
+  // All as for a typed port. Throws std::invalid_argument, too, for a loan that was shrunk where a
+  // type says how large samples are, and for bytes of a size that loan() would not give.
   Outcome publish(Loan<void> loan) {
-    if (loan.core_ == nullptr || loan.core_.get() != core_.get()) {
-      throw std::invalid_argument("the loan is not one of this port");
-    }
-    require_size(loan.size());
-    static_cast<void>(loan.core_.release());
-    return detail::publish(*core_, loan.core_.get_deleter().slot, loan.size());
+    const std::size_t size = size_of(loan);
+    return detail::publish(*core_, release(loan), size);
   }
-  // With a copy. Throws std::invalid_argument for a size that loan() would not give.
   Outcome publish(Bytes bytes) {
     require_size(bytes.size());
     return detail::publish_copy(*core_, bytes.data(), bytes.size());
+  }
+  Outcome publish(Loan<void> loan, Time deadline) {
+    const std::size_t size = size_of(loan);
+    return detail::publish(*core_, release(loan), size, deadline);
+  }
+  Outcome publish(Bytes bytes, Time deadline) {
+    require_size(bytes.size());
+    return detail::publish_copy(*core_, bytes.data(), bytes.size(), deadline);
+  }
+  Outcome publish_at(Time at, Loan<void> loan) {
+    const std::size_t size = size_of(loan);
+    return detail::publish_at(*core_, at, release(loan), size);
+  }
+  Outcome publish_at(Time at, Bytes bytes) {
+    require_size(bytes.size());
+    return detail::publish_copy_at(*core_, at, bytes.data(), bytes.size());
   }
   // The largest sample, in bytes; where the port has a type, that of each.
   [[nodiscard]] std::size_t max_size() const noexcept { return detail::max_size(*core_); }
@@ -155,6 +231,11 @@ class OutputPort<void> : public OutputPortBase {
 
   [[nodiscard]] bool may_have(std::size_t size) const noexcept {
     return size == max_size() || (size < max_size() && type().is_untyped());
+  }
+  [[nodiscard]] std::size_t size_of(const Loan<void>& loan) const {
+    require_own(loan);
+    require_size(loan.size());
+    return loan.size();
   }
   void require_size(std::size_t size) const {
     if (may_have(size)) return;

@@ -1,24 +1,33 @@
-// What calls answer: errors that are thrown, outcomes that are returned.
+// What calls answer: errors that are thrown, outcomes that are returned; and how they tell time.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <stdexcept>
 
 namespace arbiter {
 
-// What went wrong, as a sentence.
+// What went wrong, as a sentence that says what to do where that is known. Thrown by what opens
+// nodes and ports, and by what each call names.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// What became of one arrival, counted in input ports that are open and connected.
+// A point of time by this host's CLOCK_MONOTONIC, in nanoseconds: what std::chrono::steady_clock
+// tells. Clocks of other hosts, and of this one before it was started, have nothing to do with it.
+using Time = std::chrono::time_point<std::chrono::steady_clock, std::chrono::nanoseconds>;
+
+// What became of one arrival (paper, section III.A), counted in input ports that are open and
+// connected.
 struct Outcome {
   std::uint32_t delivered = 0;  // accepted: the connection is the winner there
   std::uint32_t discarded = 0;  // another connection is, or none
   // It is the winner, but the queue is full (refuse_new); or the connection is refused, because the
   // ports' types differ or memory is short (NoticeKind::refused), and the input port is idle.
   std::uint32_t refused = 0;
+  // There was no arrival: its deadline had passed. The three above are 0.
+  bool late = false;
 };
 
 }  // namespace arbiter

@@ -63,6 +63,19 @@ int main(int, char** argv) {
   const std::vector<std::byte> copied(7);
   bytes.publish(arbiter::Bytes(copied.data(), copied.size()));
 
+  // A type that is known only at run time, and what is never late.
+  require(in.type() == arbiter::Type("geometry/Position", 24, 8), "the type's name");
+  require(arbiter::type_of<Position>() == out.type() && in.type() != bytes.type(), "types");
+  while (in.take()) {
+  }
+  const arbiter::Time now = std::chrono::steady_clock::now();
+  require(out.publish(Position{4, 5, 6}, now + std::chrono::hours(1)).delivered == 1, "in time");
+  require(in.take()->type().name() == "geometry/Position", "a sample tells its type");
+  const arbiter::Outcome late = out.publish(Position{7, 8, 9}, now - std::chrono::seconds(1));
+  require(late.late && late.delivered == 0 && !in.take(), "late");
+  require(out.publish_at(std::chrono::steady_clock::now(), Position{0, 1, 2}).delivered == 1,
+          "at a given time");
+
   try {
     auto taken = node.output_port<Position>("/Object/pos:o");
     require(false, "a name is taken once");

@@ -50,6 +50,16 @@ int main(int, char** argv) {
   }
   const std::byte few[3]{};
   bytes.publish({few, sizeof few});
+  {
+    const arbiter::Type type("geometry/Position", sizeof(Position), alignof(Position));
+    auto by_name = node.output_port("/Script/pos:o", type, {.max_loans = 1});
+    require(by_name.type() == arbiter::type_of<Position>(), "as the typed port has it");
+    auto loan = by_name.loan(type.size());
+    by_name.publish(std::move(*loan), std::chrono::steady_clock::now() + 1h);
+    require(by_name.signal(arbiter::Time()).late, "late");
+    auto any = node.input_port("/Script/pos:i", type, {.keep = true});
+    require(any.type().alignment() == alignof(double), "its alignment");
+  }
   auto reliable = node.input_port<Position>(
       "/Elsewhere", {.when_full = arbiter::refuse_new, .keep = true, .max_held = 2});
   require(reliable.name() == "/Elsewhere", "a name");

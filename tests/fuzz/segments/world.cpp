@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "client/peers.hpp"
+#include "client/types.hpp"
 #include "tests/fuzz/segments/guarded_mapping.hpp"
 #include "tests/shm/table_builder.hpp"
 #include "tests/support/segments.hpp"
@@ -107,12 +108,12 @@ World::World(const Choices& choices)
       pages_{make_page(false), make_page(true), make_page(false)},
       honest_(make_memory()),
       hostile_(make_memory()),
-      p("/p", type(), output_options(), honest_),
-      s("/s", type(), output_options(), honest_),
-      h("/h", type(), output_options(), hostile_),
-      r("/r", type(), input_options(choices, false), honest_),
-      r2("/r2", type(), input_options(choices, choices.refuse_new), honest_),
-      x("/x", type(), input_options(choices, choices.refuse_new), hostile_) {
+      p("/p", detail::as_type(type()), output_options(), honest_),
+      s("/s", detail::as_type(type()), output_options(), honest_),
+      h("/h", detail::as_type(type()), output_options(), hostile_),
+      r("/r", detail::as_type(type()), input_options(choices, false), honest_),
+      r2("/r2", detail::as_type(type()), input_options(choices, choices.refuse_new), honest_),
+      x("/x", detail::as_type(type()), input_options(choices, choices.refuse_new), hostile_) {
   declare_hostile(h.segment_descriptor().get());
   declare_hostile(x.segment_descriptor().get());
   p.bind(++last_instance_, kP, copy_of(pages_[kP].get()));

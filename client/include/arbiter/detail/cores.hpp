@@ -49,6 +49,16 @@ void end_loan(OutputCore& core, std::uint32_t slot) noexcept;
 Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size) noexcept;
 Outcome publish_copy(OutputCore& core, const void* data, std::size_t size) noexcept;
 Outcome signal(OutputCore& core) noexcept;
+// With a deadline.
+Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline) noexcept;
+Outcome publish_copy(OutputCore& core, const void* data, std::size_t size, Time deadline) noexcept;
+Outcome signal(OutputCore& core, Time deadline) noexcept;
+// With a given time of arrival. Throw Error.
+Outcome publish_at(OutputCore& core, Time at, std::uint32_t slot, std::size_t size);
+Outcome publish_copy_at(OutputCore& core, Time at, const void* data, std::size_t size);
+Outcome signal_at(OutputCore& core, Time at);
+void deactivate_at(OutputCore& core, Time at);
+void require_replay(const OutputCore& core);
 void deactivate(OutputCore& core) noexcept;
 std::size_t max_size(const OutputCore& core) noexcept;
 const std::string& name(const OutputCore& core) noexcept;
