@@ -73,11 +73,11 @@ std::shared_ptr<const OutputPeer> map_output_peer(const shm::Received& announced
   }
   peer->mapping = shm::Mapping(segment, size, shm::Access::kReadOnly);
   const auto* header = peer->mapping.as<const shm::OutputHeader>();
-  const shm::OutputLayout layout = shm::OutputLayout::checked(*header, size);
+  const shm::TypeInfo type = header->type;
+  const shm::OutputLayout layout = shm::OutputLayout::checked(*header, type, size);
   if (layout.total_size == 0) {
     throw std::runtime_error("the output port's segment is not one of this version");
   }
-  const shm::TypeInfo type = header->type;
   if (const auto mismatch = shm::type_mismatch(type, own); !mismatch.empty()) {
     throw std::runtime_error(mismatch);
   }

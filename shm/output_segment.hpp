@@ -124,8 +124,10 @@ struct OutputLayout {
   }
 
   // The layout that a header tells, if a segment of `size` bytes can hold it; else one of size 0.
-  static OutputLayout checked(const OutputHeader& header, std::uint64_t size) noexcept {
-    const TypeInfo type = header.type;
+  // `type`: a copy of the header's, for its writer may change it at any time: what is believed of
+  // the type must be what the layout was computed with.
+  static OutputLayout checked(const OutputHeader& header, const TypeInfo& type,
+                              std::uint64_t size) noexcept {
     const std::uint32_t slots = header.slot_count;
     const bool sane = header.magic == OutputHeader::kMagic &&
                       header.version == OutputHeader::kVersion && slots != 0 &&
@@ -134,6 +136,10 @@ struct OutputLayout {
     if (!sane) return {};
     const OutputLayout layout = plan(type, slots);
     return layout.total_size == size ? layout : OutputLayout{};
+  }
+  static OutputLayout checked(const OutputHeader& header, std::uint64_t size) noexcept {
+    const TypeInfo type = header.type;
+    return checked(header, type, size);
   }
 };
 
