@@ -1,5 +1,7 @@
 // The compiled side of the public headers: from plain calls to the cores. Here it is seen whether
 // the caller is the process that made them (client/foreign.hpp).
+#include <algorithm>
+
 #include <arbiter/detail/cores.hpp>
 
 #include "client/foreign.hpp"
@@ -106,6 +108,11 @@ std::optional<std::string_view> winner(InputCore& core) noexcept {
 bool is_idle(InputCore& core) noexcept { return !is_own(core) || core.is_idle(); }
 const std::string& source_name(const InputCore& core, std::uint32_t source) noexcept {
   return core.memory().source_name(source);
+}
+// A publisher that lies, or whose memory is damaged, must not keep a motor from stopping, nor make
+// an age overflow.
+std::int64_t believable_time(std::int64_t stamp_ns) noexcept {
+  return std::clamp<std::int64_t>(stamp_ns, 0, shm::monotonic_now());
 }
 const std::string& name(const InputCore& core) noexcept { return core.name(); }
 

@@ -70,6 +70,7 @@ int wait_descriptor(InputCore& core);
 std::optional<std::string_view> winner(InputCore& core) noexcept;
 bool is_idle(InputCore& core) noexcept;
 const std::string& source_name(const InputCore& core, std::uint32_t source) noexcept;
+std::int64_t believable_time(std::int64_t stamp_ns) noexcept;
 const std::string& name(const InputCore& core) noexcept;
 
 // A sample, and a loan, keep the port's core in being without counting references to it: samples
