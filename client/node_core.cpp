@@ -13,7 +13,9 @@
 #include <exception>
 #include <utility>
 
+#include "client/meeting.hpp"
 #include "client/node_names.hpp"
+#include "shm/clock.hpp"
 #include "shm/instances.hpp"
 #include "shm/rendezvous.hpp"
 
@@ -97,10 +99,10 @@ void NodeCore::connect() {
   const auto begin = Clock::now();
   const auto give_up = begin + std::min(options_.connect_timeout, kMaxConnectTimeout);
   bool said = false;
-  std::string why_not, who_is_silent;
+  std::string why_not, who_is_silent, directory;
   for (;;) {
     who_is_silent.clear();
-    if (auto socket = shm::connect_to_daemon(instance_, why_not)) {
+    if (auto socket = shm::connect_to_daemon(instance_, why_not, &directory)) {
       socket_ = std::make_shared<const shm::FileDescriptor>(std::move(*socket));
       shm::close_in_children(*socket_);
       const auto asked = Clock::now();
@@ -126,6 +128,16 @@ void NodeCore::connect() {
       epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, timer_.get(), &event) != 0 || !watch_socket()) {
     throw Error(std::string("no descriptor for the daemon's messages: ") + std::strerror(errno));
   }
+  note_second_daemons(directory);
+}
+
+void NodeCore::note_second_daemons(const std::string& met_in) {
+  for (const std::string& path : shm::other_daemons(instance_, met_in)) {
+    const std::string met = met_in + "/" + instance_ + ".sock";
+    const std::lock_guard lock(mutex_);
+    note(NoticeKind::apart, 0, {}, describe_second_daemon(instance_, met, path));
+  }
+  give_notices();
 }
 
 // False: it does not answer. Throws Error where it refuses.
@@ -134,6 +146,7 @@ bool NodeCore::say_hello(Clock::time_point give_up) {
   const auto left = std::clamp(std::chrono::duration_cast<milliseconds>(give_up - Clock::now()),
                                kMinAnswerTime, kMaxAnswerTime);
   shm::Received welcome;
+  const shm::Nanoseconds asked = shm::monotonic_now();
   if (shm::send_message(socket_->get(), hello()) != shm::SendResult::kSent ||
       ::poll(&readable, 1, static_cast<int>(left.count())) != 1 ||
       shm::receive_message(socket_->get(), welcome, false) != shm::ReceiveResult::kReceived) {
@@ -142,6 +155,8 @@ bool NodeCore::say_hello(Clock::time_point give_up) {
   if (welcome.message.kind == shm::MessageKind::kRefused) {
     throw Error("the daemon refuses: " + std::string(welcome.message.text_view()));
   }
+  const std::string fault = find_fault_in_clock(welcome.message, asked);
+  if (!fault.empty()) throw Error(fault);
   memory_ =
       std::make_shared<SharedMemory>(std::move(welcome.descriptors[0]),
                                      std::move(welcome.descriptors[1]), service_bell_, residence());

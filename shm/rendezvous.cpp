@@ -144,6 +144,48 @@ void pass_over(const std::string& directory, const std::string& instance, const 
   why_not.append(directory).append("/").append(instance).append(".sock: ").append(why);
 }
 
+// The daemon of the instance that listens in the directory, if it is trusted.
+std::optional<FileDescriptor> connect_in(const std::string& directory, const std::string& instance,
+                                         std::string& why_not) {
+  // Not even connected to: who listens there could let nobody in, for a second each time.
+  if (const auto stranger = stranger_who_owns(directory)) {
+    char why[112];
+    std::snprintf(
+        why, sizeof why,
+        "that directory belongs to user %u, who is neither root, nor \"arbiter\", nor you",
+        *stranger);
+    pass_over(directory, instance, why, why_not);
+    return {};
+  }
+  FileDescriptor socket = make_socket();
+  const Address at = address_of(directory, instance + ".sock");
+  const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
+  if (connect(socket.get(), address, sizeof at.address) != 0) {
+    pass_over(directory, instance, why_not_connected(errno), why_not);
+    return {};
+  }
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  if (getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
+    pass_over(directory, instance, "it is not known whose daemon that is", why_not);
+    return {};
+  }
+  if (is_trusted(peer.uid, directory)) return socket;
+  char why[96];
+  std::snprintf(why, sizeof why,
+                "that daemon runs as user %u, who is neither root, nor \"arbiter\", nor you",
+                peer.uid);
+  pass_over(directory, instance, why, why_not);
+  return {};
+}
+
+bool are_same_file(const std::string& one, const std::string& other) {
+  struct stat a {};
+  struct stat b {};
+  return stat(one.c_str(), &a) == 0 && stat(other.c_str(), &b) == 0 && a.st_dev == b.st_dev &&
+         a.st_ino == b.st_ino;
+}
+
 }  // namespace
 
 std::string instance_name(const std::string& given) {
@@ -216,41 +258,37 @@ Listener listen_at(const std::string& directory, const std::string& instance) {
   return listener;
 }
 
-std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not) {
+std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not,
+                                                std::string* found_in) {
   why_not.clear();
   for (const std::string& directory : client_directories()) {
-    // Not even connected to: who listens there could let nobody in, for a second each time.
-    if (const auto stranger = stranger_who_owns(directory)) {
-      char why[112];
-      std::snprintf(
-          why, sizeof why,
-          "that directory belongs to user %u, who is neither root, nor \"arbiter\", nor you",
-          *stranger);
-      pass_over(directory, instance, why, why_not);
-      continue;
-    }
-    FileDescriptor socket = make_socket();
-    const Address at = address_of(directory, instance + ".sock");
-    const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
-    if (connect(socket.get(), address, sizeof at.address) != 0) {
-      pass_over(directory, instance, why_not_connected(errno), why_not);
-      continue;
-    }
-    ucred peer{};
-    socklen_t size = sizeof peer;
-    if (getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
-      pass_over(directory, instance, "it is not known whose daemon that is", why_not);
-    } else if (is_trusted(peer.uid, directory)) {
-      return socket;
-    } else {
-      char why[96];
-      std::snprintf(why, sizeof why,
-                    "that daemon runs as user %u, who is neither root, nor \"arbiter\", nor you",
-                    peer.uid);
-      pass_over(directory, instance, why, why_not);
-    }
+    auto socket = connect_in(directory, instance, why_not);
+    if (!socket) continue;
+    if (found_in != nullptr) *found_in = directory;
+    return socket;
   }
   return {};
+}
+
+std::vector<std::string> other_daemons(const std::string& instance, const std::string& directory) {
+  std::vector<std::string> directories = client_directories();
+  // Where this user's session meets, though this process is not of it.
+  directories.push_back("/run/user/" + std::to_string(geteuid()) + "/arbiter");
+  std::vector<std::string> known{directory + "/" + instance + ".sock"};
+  for (const std::string& other : directories) {
+    const std::string path = other + "/" + instance + ".sock";
+    const bool is_known = std::any_of(known.begin(), known.end(), [&](const std::string& each) {
+      return are_same_file(each, path);
+    });
+    if (is_known) continue;
+    try {
+      std::string why_not;
+      if (connect_in(other, instance, why_not)) known.push_back(path);
+    } catch (const std::exception&) {  // no descriptor is left: that is told where one is needed
+    }
+  }
+  known.erase(known.begin());
+  return known;
 }
 
 }  // namespace arbiter::shm
