@@ -280,7 +280,7 @@ TEST(Load, SeveralSourcesAtAPortWithoutRulesAreNoted) {
   };
   EXPECT_THAT(load("").findings(), IsEmpty());
   const auto noted = load("<connection><from>/c</from><to>/motor</to></connection>");
-  EXPECT_THAT(noted.findings(), ElementsAre("1:119 note not-arbitrated"));
+  EXPECT_THAT(noted.findings(), ElementsAre("1:120 note not-arbitrated"));
   EXPECT_THAT(noted.message(), HasSubstr("/b and /c are connected to /motor, and no rule decides"));
   EXPECT_THAT(load("<connection><from>/c</from><to>/p</to></connection>").findings(), IsEmpty());
 }
