@@ -1,5 +1,7 @@
 // The compiled side of the public headers: from plain calls to the cores. Here it is seen whether
 // the caller is the process that made them (client/foreign.hpp).
+#include <algorithm>
+
 #include <arbiter/detail/cores.hpp>
 
 #include "client/foreign.hpp"
@@ -150,6 +152,11 @@ const std::string& source_name(const InputCore& core, std::uint32_t source) noex
 }
 const Type& sample_type(const InputCore& core, std::uint32_t hold) noexcept {
   return core.type_of_held(hold);
+}
+// A publisher that lies, or whose memory is damaged, must not keep a motor from stopping, nor make
+// an age overflow.
+std::int64_t believable_time(std::int64_t stamp_ns) noexcept {
+  return std::clamp<std::int64_t>(stamp_ns, 0, shm::monotonic_now());
 }
 const std::string& name(const InputCore& core) noexcept { return core.name(); }
 const Type& type(const InputCore& core) noexcept { return core.declared_type(); }

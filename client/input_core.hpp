@@ -147,6 +147,7 @@ class InputCore {
   [[nodiscard]] Command who_commands() noexcept;
   [[nodiscard]] bool can_deliver(const shm::Rule& rule) noexcept;
   [[nodiscard]] bool is_refused(shm::SourceId source) const noexcept;
+  [[nodiscard]] bool ends_by_itself(shm::SourceId source) const noexcept;
 
   // wait() in parts.
   [[nodiscard]] shm::Nanoseconds next_change(const shm::Rule* commander) const noexcept;

@@ -129,10 +129,16 @@ bool InputCore::can_deliver(const shm::Rule& rule) noexcept {
     queue.head = 0;  // for a take to find
   }
   if (refused) return false;
-  const shm::Activity* const activity = memory_->pages().find(rule.source);
-  const bool ends_by_itself =
-      activity == nullptr || shm::is_finite(activity->word.load(std::memory_order_relaxed));
-  return waits || ends_by_itself;
+  return waits || ends_by_itself(rule.source);
+}
+
+// Relaxed is enough: where an arrival comes at this very moment its publisher has the source open,
+// of which the next view tells.
+bool InputCore::ends_by_itself(shm::SourceId source) const noexcept {
+  const shm::Activity* const activity = memory_->pages().find(source);
+  if (activity == nullptr) return true;
+  const shm::ActivityWord word = activity->word.load(std::memory_order_relaxed);
+  return shm::ends_within(word, snapshot_.table.timeout(source), shm::monotonic_now());
 }
 
 bool InputCore::is_refused(shm::SourceId source) const noexcept {

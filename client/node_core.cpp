@@ -15,6 +15,7 @@
 #include "client/node_names.hpp"
 #include "client/types.hpp"
 #include "wire/call.hpp"
+#include "wire/meeting.hpp"
 #include "wire/rendezvous.hpp"
 
 namespace arbiter::detail {
@@ -78,6 +79,8 @@ void NodeCore::hang_up() const noexcept {
 
 void NodeCore::connect() {
   wire::Welcome welcome = wire::join(caller());
+  const std::string fault = wire::find_fault_in_clock(welcome.received.message, welcome.asked);
+  if (!fault.empty()) throw Error(fault);
   socket_ = std::make_shared<const shm::FileDescriptor>(std::move(welcome.socket));
   auto& [board, registry] = welcome.received.descriptors;
   memory_ = std::make_shared<SharedMemory>(std::move(board), std::move(registry), service_bell_,
@@ -93,6 +96,16 @@ void NodeCore::connect() {
       epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, timer_.get(), &event) != 0 || !watch_socket()) {
     throw Error(std::string("no descriptor for the daemon's messages: ") + std::strerror(errno));
   }
+  note_second_daemons(welcome.directory);
+}
+
+void NodeCore::note_second_daemons(const std::string& met_in) {
+  for (const std::string& path : shm::other_daemons(instance_, met_in)) {
+    const std::string met = met_in + "/" + instance_ + ".sock";
+    const std::lock_guard lock(mutex_);
+    note(NoticeKind::apart, 0, {}, wire::describe_second_daemon(instance_, met, path));
+  }
+  give_notices();
 }
 
 shm::Residence NodeCore::residence() const noexcept {

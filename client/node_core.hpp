@@ -96,6 +96,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // The same, without the lock meanwhile. If it throws, the request is given up.
   void say_that_we_wait(std::unique_lock<std::mutex>& lock, std::uint64_t request);
   void give_up_on(std::uint64_t request);
+  void note_second_daemons(const std::string& met_in);
   [[nodiscard]] shm::Message hello() const;
   [[nodiscard]] wire::Caller caller() const;
 
@@ -186,6 +187,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::uint64_t node_ = 0;          // our number among all nodes
   std::string turned_away_;         // why the last daemon did not take us back
   bool is_anew_ = false;            // rejoining with nothing to hand back
+  shm::Nanoseconds asked_ = 0;      // when we asked to rejoin
   bool stopping_ = false;
   std::uint64_t next_request_ = 1;
   std::map<std::uint64_t, Reply> replies_;

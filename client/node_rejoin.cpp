@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "client/node_core.hpp"
+#include "shm/clock.hpp"
+#include "wire/meeting.hpp"
 #include "wire/rendezvous.hpp"
 
 namespace arbiter::detail {
@@ -129,6 +131,7 @@ void NodeCore::rejoin() {
   }
   // With nothing to hand back there is nothing to keep of the old memory either.
   is_anew_ = ports.empty();
+  asked_ = shm::monotonic_now();
   const bool is_said = is_anew_ ? is_sent(*socket, hello()) : hand_back(*socket, ports);
   if (!is_said) return;
   shm::close_in_children(*socket);
@@ -170,6 +173,12 @@ bool NodeCore::hand_back(const shm::FileDescriptor& socket,
 void NodeCore::be_welcomed(shm::Received& welcome) {
   const std::lock_guard lock(mutex_);
   if (standing_ != Standing::kRejoining) return;
+  turned_away_ = wire::find_fault_in_clock(welcome.message, asked_);
+  if (!turned_away_.empty()) {
+    note(NoticeKind::apart, 0, {}, turned_away_);
+    be_alone(kTurnedAwayInterval);
+    return;
+  }
   if (!are_same(welcome.descriptors[0], memory_->board())) {
     try {
       if (!is_anew_) throw std::runtime_error("the daemon has other memory");

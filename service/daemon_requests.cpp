@@ -182,6 +182,7 @@ void Daemon::welcome(Client& client) {
   if (client.node == 0) client.node = registry_.next_node();
   auto welcome = reply_to(client.hello_request, shm::MessageKind::kWelcome);
   welcome.link = client.node;
+  welcome.peer = static_cast<std::uint64_t>(shm::monotonic_now());
   takeover_.know(client);
   client.send(welcome, {board_.readable().get(), registry_.readable().get()});
   log::debug("{} is here", client.description());

@@ -2,6 +2,7 @@
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/signalfd.h>
+#include <sys/stat.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
@@ -16,6 +17,7 @@
 #include "service/daemon.hpp"
 #include "service/log/log.hpp"
 #include "service/log/log_sink.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace {
 
@@ -50,9 +52,13 @@ arbiter::shm::FileDescriptor catch_signals() {
   sigemptyset(&caught);
   for (const int number : {SIGHUP, SIGTERM, SIGINT}) sigaddset(&caught, number);
   sigprocmask(SIG_BLOCK, &caught, nullptr);
-  signal(SIGPIPE, SIG_IGN);
+  // What they are about, the calls say that fail (SIGXFSZ: for a limit of files' sizes).
+  for (const int number : {SIGPIPE, SIGXFSZ}) signal(number, SIG_IGN);
   return arbiter::shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
 }
+
+// Whatever umask it was started with: what its successor will believe, no other user may write.
+void keep_files_from_others() { umask(umask(0) | S_IWGRP | S_IWOTH); }
 
 // Says all that is left to be said, unless nobody reads it, and ends.
 class Log {
@@ -73,6 +79,12 @@ int serve(const arbiter::service::DaemonOptions& options, const std::string& ins
   raise_descriptor_limit();
   Daemon daemon(options);
   log::info("instance \"{}\" is ready at {}", instance, daemon.path());
+  for (const std::string& other : arbiter::shm::other_daemons(instance, options.directory)) {
+    log::warn(
+        "another daemon of instance \"{}\" listens at {}: components that meet there share nothing "
+        "with those that meet here; stop one of the two, or give it another --instance",
+        instance, other);
+  }
   sd_notifyf(0, "READY=1\nSTATUS=instance %s", instance.c_str());
   daemon.run(signals.get());
   sd_notify(0, "STOPPING=1");
@@ -126,6 +138,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
+  keep_files_from_others();
   const auto signals = catch_signals();  // before there are threads: they inherit what is blocked
   const Log logging(level);
   if (!policy.empty()) options.policy = policy;

@@ -279,10 +279,13 @@ class Document {
     const Source& source = *of_.directory.sources()[id];
     const Link* link = link_between(of_.switchboard.output(source.open), input);
     if (link != nullptr && link->is_refused()) return link->mismatch;
+    if (source.open != 0 || source.away != 0) return {};
     const shm::ActivityWord word = source.activity().word.load(std::memory_order_relaxed);
-    if (source.open != 0 || source.away != 0 || shm::is_finite(word) || waits(id, input)) return {};
-    return "no component has " + source.name + " open, and its activity lasts for ever (`arbiter " +
-           "deactivate " + source.name + "` ends it)";
+    const shm::Nanoseconds timeout = snapshot_.table.timeout(id);
+    if (shm::ends_within(word, timeout, shm::monotonic_now()) || waits(id, input)) return {};
+    return "no component has " + source.name + " open, and its activity lasts " +
+           (shm::is_finite(word) ? "for longer than its T" : "for ever") +
+           " (`arbiter deactivate " + source.name + "` ends it)";
   }
 
   // Whether a receiver still has a queue of a publisher that has gone: once it has found it empty,

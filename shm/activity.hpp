@@ -53,6 +53,12 @@ constexpr bool is_newer_than(ActivityWord word, Nanoseconds timeout, Nanoseconds
   return timeout != kForever && word - timeout > now;
 }
 
+// Whether activity that nobody renews is over within T, as what an arrival has made is. What lasts
+// for ever is not, nor what a page was made to say by no arrival.
+constexpr bool ends_within(ActivityWord word, Nanoseconds timeout, Nanoseconds now) noexcept {
+  return is_finite(word) && timeout != kForever && word - now <= timeout;
+}
+
 constexpr bool is_deactivation(ActivityWord word) noexcept { return word < 0; }
 
 // The arrival that wrote a word that is not a deactivation, given the source's T.

@@ -11,8 +11,10 @@
 #include <system_error>
 #include <utility>
 
+#include "shm/clock.hpp"
 #include "shm/descendants.hpp"
 #include "wire/document.hpp"
+#include "wire/meeting.hpp"
 #include "wire/rendezvous.hpp"
 
 namespace arbiter::watch {
@@ -43,6 +45,8 @@ shm::Message message_of(shm::MessageKind kind) {
 
 Instance::Instance(wire::Caller caller) : caller_(std::move(caller)) {
   wire::Welcome welcome = wire::join(caller_);
+  const std::string fault = wire::find_fault_in_clock(welcome.received.message, welcome.asked);
+  if (!fault.empty()) throw wire::CallError(fault);
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   timer_.reset(timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
   shm::close_in_children(epoll_);
@@ -127,6 +131,7 @@ void Instance::look_for_daemon() {
   if (!found) return;
   socket_ = std::move(*found);
   shm::close_in_children(socket_);
+  greeted_ = shm::monotonic_now();
   if (!say(wire::hello_of(caller_)) || !watch_socket()) {
     socket_.reset();
     return;
@@ -136,7 +141,8 @@ void Instance::look_for_daemon() {
 }
 
 void Instance::be_greeted(shm::Received& welcome) {
-  if (welcome.message.kind != shm::MessageKind::kWelcome) {
+  if (welcome.message.kind != shm::MessageKind::kWelcome ||
+      !wire::find_fault_in_clock(welcome.message, greeted_).empty()) {
     lose_daemon(kTurnedAwayInterval);
     return;
   }

@@ -90,6 +90,7 @@ class Instance {
   shm::FileDescriptor socket_;
   Standing standing_ = Standing::kAlone;
   std::uint64_t daemons_ = 0;
+  shm::Nanoseconds greeted_ = 0;  // when another daemon was
   std::shared_ptr<shm::DecisionMemory> memory_;
   std::shared_ptr<const shm::DecisionMemory> shared_;  // the same
   std::map<shm::PortId, std::string> port_names_;

@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include "shm/clock.hpp"
 #include "shm/descendants.hpp"
 #include "wire/instances.hpp"
 #include "wire/rendezvous.hpp"
@@ -65,7 +66,7 @@ class Joining {
     for (;;) {
       silence_.clear();
       Welcome welcome;
-      if (auto socket = shm::connect_to_daemon(caller_.instance, why_not)) {
+      if (auto socket = shm::connect_to_daemon(caller_.instance, why_not, &welcome.directory)) {
         welcome.socket = std::move(*socket);
         shm::close_in_children(welcome.socket);
         if (is_let_in(welcome)) return welcome;
@@ -87,6 +88,7 @@ class Joining {
  private:
   // False: it has not answered.
   bool is_let_in(Welcome& welcome) {
+    welcome.asked = shm::monotonic_now();
     if (shm::send_message(welcome.socket.get(), hello_of(caller_)) != shm::SendResult::kSent)
       return false;
     const auto asked = Clock::now();

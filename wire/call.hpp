@@ -43,6 +43,8 @@ struct Caller {
 struct Welcome {
   shm::FileDescriptor socket;
   shm::Received received;  // kWelcome
+  std::string directory;   // where we have met
+  shm::Nanoseconds asked = 0;
 };
 
 [[nodiscard]] shm::Message hello_of(const Caller& caller);

@@ -63,7 +63,8 @@ enum class MessageKind : std::uint32_t {
   kBlind,    // port, text: it cannot see a source that its rules read, for the log
 
   // From the daemon.
-  kWelcome = 100,  // link: the node's number; descriptors: the board, the registry, read-only
+  kWelcome = 100,  // link: the node's number; peer: the daemon's clock, 0 if it does not say;
+                   // descriptors: the board, the registry, read-only
   kOpened,         // port: its instance; id: its source or port id; of an output port also flags
                    // (kMayReplay), text: why not; descriptor: its page
   kConnected,

@@ -63,13 +63,19 @@ bool may_use_system_directory() {
          status.st_uid == geteuid();
 }
 
-std::optional<uid_t> arbiter_user() {
+// Asks the name services, one of which may wait for a network that is not there: so only where
+// nothing else tells, and once.
+std::optional<uid_t> look_up_arbiter_user() {
   passwd entry{};
   passwd* found = nullptr;
   std::vector<char> buffer(4096);
   if (getpwnam_r("arbiter", &entry, buffer.data(), buffer.size(), &found) != 0) return {};
   if (found == nullptr) return {};
   return entry.pw_uid;
+}
+std::optional<uid_t> arbiter_user() {
+  static const std::optional<uid_t> user = look_up_arbiter_user();
+  return user;
 }
 
 // An address for a path of any length: a long one goes by way of its directory's descriptor.
@@ -111,8 +117,8 @@ bool has_system_directory(uid_t user) {
 }
 
 bool is_trusted(uid_t user, const std::string& directory) {
-  return user == 0 || user == geteuid() || user == arbiter_user() ||
-         (directory == kSystemDirectory && has_system_directory(user));
+  return user == 0 || user == geteuid() ||
+         (directory == kSystemDirectory && has_system_directory(user)) || user == arbiter_user();
 }
 
 // Whose it is, if it is a stranger's: a daemon listens in a directory of its own, so that nobody
@@ -142,6 +148,48 @@ void pass_over(const std::string& directory, const std::string& instance, const 
                std::string& why_not) {
   why_not.append(why_not.empty() ? "tried " : ", ");
   why_not.append(directory).append("/").append(instance).append(".sock: ").append(why);
+}
+
+// The daemon of the instance that listens in the directory, if it is trusted.
+std::optional<FileDescriptor> connect_in(const std::string& directory, const std::string& instance,
+                                         std::string& why_not) {
+  // Not even connected to: who listens there could let nobody in, for a second each time.
+  if (const auto stranger = stranger_who_owns(directory)) {
+    char why[112];
+    std::snprintf(
+        why, sizeof why,
+        "that directory belongs to user %u, who is neither root, nor \"arbiter\", nor you",
+        *stranger);
+    pass_over(directory, instance, why, why_not);
+    return {};
+  }
+  FileDescriptor socket = make_socket();
+  const Address at = address_of(directory, instance + ".sock");
+  const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
+  if (connect(socket.get(), address, sizeof at.address) != 0) {
+    pass_over(directory, instance, why_not_connected(errno), why_not);
+    return {};
+  }
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  if (getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
+    pass_over(directory, instance, "it is not known whose daemon that is", why_not);
+    return {};
+  }
+  if (is_trusted(peer.uid, directory)) return socket;
+  char why[96];
+  std::snprintf(why, sizeof why,
+                "that daemon runs as user %u, who is neither root, nor \"arbiter\", nor you",
+                peer.uid);
+  pass_over(directory, instance, why, why_not);
+  return {};
+}
+
+bool are_same_file(const std::string& one, const std::string& other) {
+  struct stat a {};
+  struct stat b {};
+  return stat(one.c_str(), &a) == 0 && stat(other.c_str(), &b) == 0 && a.st_dev == b.st_dev &&
+         a.st_ino == b.st_ino;
 }
 
 }  // namespace
@@ -176,7 +224,10 @@ bool is_a_strangers(const std::string& directory) {
   return stranger_who_owns(directory).has_value();
 }
 
-std::vector<std::string> client_directories() {
+namespace {
+
+// Those that are known without asking who the user `arbiter` is, and last his.
+std::vector<std::string> usual_directories() {
   std::vector<std::string> directories;
   const auto add = [&](std::string directory) {
     if (std::find(directories.begin(), directories.end(), directory) == directories.end()) {
@@ -190,7 +241,21 @@ std::vector<std::string> client_directories() {
   add(kSystemDirectory);
   add(temporary_directory(geteuid()));
   add(temporary_directory(0));
-  if (const auto user = arbiter_user()) add(temporary_directory(*user));
+  return directories;
+}
+std::optional<std::string> last_directory() {
+  const auto user = arbiter_user();
+  return user ? std::optional(temporary_directory(*user)) : std::nullopt;
+}
+
+}  // namespace
+
+std::vector<std::string> client_directories() {
+  std::vector<std::string> directories = usual_directories();
+  const auto last = last_directory();
+  const bool is_new =
+      last && std::find(directories.begin(), directories.end(), *last) == directories.end();
+  if (is_new) directories.push_back(*last);
   return directories;
 }
 
@@ -216,41 +281,42 @@ Listener listen_at(const std::string& directory, const std::string& instance) {
   return listener;
 }
 
-std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not) {
+std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not,
+                                                std::string* found_in) {
   why_not.clear();
-  for (const std::string& directory : client_directories()) {
-    // Not even connected to: who listens there could let nobody in, for a second each time.
-    if (const auto stranger = stranger_who_owns(directory)) {
-      char why[112];
-      std::snprintf(
-          why, sizeof why,
-          "that directory belongs to user %u, who is neither root, nor \"arbiter\", nor you",
-          *stranger);
-      pass_over(directory, instance, why, why_not);
-      continue;
-    }
-    FileDescriptor socket = make_socket();
-    const Address at = address_of(directory, instance + ".sock");
-    const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
-    if (connect(socket.get(), address, sizeof at.address) != 0) {
-      pass_over(directory, instance, why_not_connected(errno), why_not);
-      continue;
-    }
-    ucred peer{};
-    socklen_t size = sizeof peer;
-    if (getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
-      pass_over(directory, instance, "it is not known whose daemon that is", why_not);
-    } else if (is_trusted(peer.uid, directory)) {
-      return socket;
-    } else {
-      char why[96];
-      std::snprintf(why, sizeof why,
-                    "that daemon runs as user %u, who is neither root, nor \"arbiter\", nor you",
-                    peer.uid);
-      pass_over(directory, instance, why, why_not);
+  const auto try_in = [&](const std::string& directory) {
+    auto socket = connect_in(directory, instance, why_not);
+    if (socket && found_in != nullptr) *found_in = directory;
+    return socket;
+  };
+  const std::vector<std::string> usual = usual_directories();
+  for (const std::string& directory : usual) {
+    if (auto socket = try_in(directory)) return socket;
+  }
+  const auto last = last_directory();
+  const bool is_new = last && std::find(usual.begin(), usual.end(), *last) == usual.end();
+  return is_new ? try_in(*last) : std::nullopt;
+}
+
+std::vector<std::string> other_daemons(const std::string& instance, const std::string& directory) {
+  std::vector<std::string> directories = usual_directories();
+  // Where this user's session meets, though this process is not of it.
+  directories.push_back("/run/user/" + std::to_string(geteuid()) + "/arbiter");
+  std::vector<std::string> known{directory + "/" + instance + ".sock"};
+  for (const std::string& other : directories) {
+    const std::string path = other + "/" + instance + ".sock";
+    const bool is_known = std::any_of(known.begin(), known.end(), [&](const std::string& each) {
+      return are_same_file(each, path);
+    });
+    if (is_known) continue;
+    try {
+      std::string why_not;
+      if (connect_in(other, instance, why_not)) known.push_back(path);
+    } catch (const std::exception&) {  // no descriptor is left: that is told where one is needed
     }
   }
-  return {};
+  known.erase(known.begin());
+  return known;
 }
 
 }  // namespace arbiter::shm

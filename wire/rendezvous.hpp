@@ -41,6 +41,12 @@ Listener listen_at(const std::string& directory, const std::string& instance);
 // runs as root, as the user `arbiter`, as this user, or, in /run/arbiter, as the user to whom root
 // has given that directory. Where there is none, `why_not` lists the sockets that were tried, each
 // with what was wrong.
-std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not);
+// `directory`, where it is given: the one in which it was found.
+std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not,
+                                                std::string* directory = nullptr);
+
+// The sockets of trusted daemons of the instance that listen elsewhere than in `directory`: whose
+// environment is another meets them, and shares nothing with who meets here.
+std::vector<std::string> other_daemons(const std::string& instance, const std::string& directory);
 
 }  // namespace arbiter::shm

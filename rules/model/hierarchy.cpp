@@ -226,10 +226,12 @@ void Hierarchy::check_emptiness() const {
                            {.behaviour = behaviour.name});
     }
     if (!behaviour.is_meta && behaviour.configs.empty()) {
-      diagnostics_.warning("no-config", behaviour.where,
-                           "the behaviour " + quote(behaviour.name) +
-                               " selects no connection; write a <config> for each one",
-                           {.behaviour = behaviour.name});
+      diagnostics_.warning(
+          "no-config", behaviour.where,
+          "the behaviour " + quote(behaviour.name) + " selects no connection" +
+              (behaviour.inhibitions.empty() ? "" : ", so that it inhibits nothing") +
+              "; write a <config> for each one",
+          {.behaviour = behaviour.name});
     }
   }
 }

@@ -79,6 +79,7 @@ LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
     has_all_names = !doubts.everything && !may_lack_names(loaded.model, application);
   } else {
     note_commands_forever(loaded.model, rules, whole, found);
+    if (application) note_unarbitrated(*application, rules, found);
   }
   const RuleSet* sound = found.has_errors() ? nullptr : &rules;
   if (has_all_names) check_names(loaded.model, application, sound, whole, order, found);

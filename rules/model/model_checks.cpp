@@ -284,6 +284,27 @@ void check_application(const Application& application, const Model& model, RuleS
   }
 }
 
+void note_unarbitrated(const Application& application, const RuleSet& rules,
+                       Diagnostics& diagnostics) {
+  std::set<std::string_view> arbitrated;
+  for (const PortRules& port : rules.ports) arbitrated.insert(port.port);
+  std::map<std::string_view, std::vector<const Application::Link*>> links_at;
+  for (const Application::Link& link : application.connections) {
+    if (!arbitrated.contains(link.port)) links_at[link.port].push_back(&link);
+  }
+  for (const auto& [port, links] : links_at) {
+    if (links.size() < 2) continue;
+    std::vector<std::string> sources;
+    for (const Application::Link* link : links) sources.push_back(link->source);
+    diagnostics.note("not-arbitrated", links[1]->where,
+                     enumerate(sources) + " are connected to " + std::string(port) +
+                         ", and no rule decides there: it takes what each of them sends, as it "
+                         "comes; where one is to command at a time, write a <config> or a <select> "
+                         "for each of them",
+                     {.ports = {std::string(port)}});
+  }
+}
+
 void check_limits(const RuleSet& rules, const Application* application, const Location& whole,
                   const DocumentOrder& order, Diagnostics& diagnostics) {
   LimitCheck(rules, application, order, diagnostics).check(whole);

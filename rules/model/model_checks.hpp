@@ -16,6 +16,11 @@ void check_sources(const Model& model, Diagnostics& diagnostics);
 void check_application(const Application& application, const Model& model, RuleSet& rules,
                        Diagnostics& diagnostics);
 
+// Input ports to which the application connects several sources, and of which no rule speaks: notes
+// "not-arbitrated".
+void note_unarbitrated(const Application& application, const RuleSet& rules,
+                       Diagnostics& diagnostics);
+
 // The limits of shm/limits.hpp that a model can exceed. `whole` is the place for what cannot be
 // pinned to a line. `application` may be null.
 void check_limits(const RuleSet& rules, const Application* application, const Location& whole,

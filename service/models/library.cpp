@@ -1,5 +1,7 @@
 #include "service/models/library.hpp"
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -14,6 +16,16 @@ std::size_t size_of(const std::vector<std::string>& names) {
     if (name.capacity() >= sizeof(std::string) / 2) size += name.capacity();
   }
   return size;
+}
+
+// Whoever may write a model says who commands.
+void warn_if_all_may_write(const std::string& path, rules::Diagnostics& diagnostics) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) != 0 || (status.st_mode & S_IWOTH) == 0) return;
+  diagnostics.warning("open-to-all", {path, 1, 1},
+                      "every user may write this file, and so decide who commands from the next "
+                      "reload on; run: chmod o-w " +
+                          path);
 }
 
 }  // namespace
@@ -47,6 +59,8 @@ std::vector<ModelPointer> read_models(const std::vector<NamedFiles>& named, cons
     auto model = std::make_shared<Model>();
     model->name = each.name;
     model->files = each.files;
+    for (const std::string& path : each.files.models) warn_if_all_may_write(path, diagnostics);
+    if (each.files.application) warn_if_all_may_write(*each.files.application, diagnostics);
     try {
       const rules::RuleSet rules =
           rules::load(rules::read_texts(each.files, rules::Accept::kRegularFile), diagnostics);

@@ -2,6 +2,7 @@
 // of it.
 #pragma once
 
+#include <fcntl.h>
 #include <grp.h>
 #include <poll.h>
 #include <sys/prctl.h>

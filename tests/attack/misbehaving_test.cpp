@@ -2,6 +2,7 @@
 // document and in the daemon's log.
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <string>
 
 #include "tests/attack/prey.hpp"
@@ -57,6 +58,34 @@ TEST(AMisbehavingReceiver, IsNamed) {
   // The queue ends when the service thread's word has come to the port.
   while (prey.out().publish(2).delivered != 0) {
   }
+}
+
+// By the age of the last sample a motor knows that its commander has fallen silent.
+TEST(ASampleFromTheFuture, IsNotNewerThanNow) {
+  for (const std::int64_t stamp : {INT64_MAX, INT64_MIN}) {
+    Prey prey;
+    prey.activate_attacker();
+    prey.publish_as_attacker(stamp);
+    const auto sample = prey.in().take();
+    ASSERT_TRUE(sample);
+    const std::int64_t believed = sample->stamp_ns();
+    EXPECT_LE(believed, arbiter::shm::monotonic_now());
+    EXPECT_GE(believed, 0);
+    EXPECT_EQ(sample->stamp_ns(), believed);
+  }
+}
+
+// It was active until 73 years from now, says a page of T = 500 ms.
+TEST(ActivityThatNoArrivalHasMade, DoesNotCommandAfterItsOwner) {
+  Prey prey;
+  prey.activate_attacker_until(arbiter::shm::kForeverFlag - 1);
+  EXPECT_FALSE(prey.in().idle());
+  prey.remove_attacker();
+  EXPECT_TRUE(prey.in().wait_for(std::chrono::seconds(10)).idle());
+  EXPECT_TRUE(prey.in().idle());
+  const auto input = prey.daemon().input("/prey:i");
+  EXPECT_TRUE(input["idle"]);
+  EXPECT_EQ(input["cannot_deliver"]["source"], "/attacker:o");
 }
 
 }  // namespace

@@ -34,10 +34,29 @@ class Prey {
 
   // The attacker's source says that it is active.
   void activate_attacker() const {
-    const shm::Mapping mapped(own_page_, sizeof(shm::ActivityPage), shm::Access::kReadWrite);
-    mapped.as<shm::ActivityPage>()->of(own_source_).word =
-        shm::arrival(shm::monotonic_now(), shm::kForever);
+    activate_attacker_until(shm::arrival(shm::monotonic_now(), shm::kForever));
   }
+  void activate_attacker_until(shm::ActivityWord word) const {
+    const shm::Mapping mapped(own_page_, sizeof(shm::ActivityPage), shm::Access::kReadWrite);
+    mapped.as<shm::ActivityPage>()->of(own_source_).word = word;
+  }
+
+  // Its first sample, with a time of arrival of its own making.
+  void publish_as_attacker(std::int64_t stamp) const {
+    shm::SlotHeader& header = attackers_output.slot_header(0);
+    header.sequence = 1;
+    header.stamp = stamp;
+    header.size = sizeof(int);
+    shm::Channel& channel = attackers_output.channel(0);
+    channel.first = 1;
+    channel.depth = 1;
+    attackers_output.ring(0, link_to_prey)[0] = shm::make_entry(1, 0);
+    channel.accepted = 1;
+    channel.receiver = link_to_prey;
+    attackers_output.header().joins = 1;
+  }
+
+  void remove_attacker() { attacker_.hang_up(); }
 
   Prey()
       : daemon_(

@@ -151,6 +151,11 @@ TEST(Hierarchy, EmptyOnesAreWarnedOf) {
                                              "3:17 warning no-config"));
   EXPECT_THAT(loaded.message(0), HasSubstr("\"B\" selects no connection; write a <config>"));
   EXPECT_THAT(loaded.message(1), HasSubstr("\"M\" contains nothing; name its behaviours"));
+  EXPECT_THAT(load_text("<behavior name='B'><config at='/p'>/s</config></behavior>\n"
+                        "<behavior name='Stop'><condition>/estop</condition>"
+                        "<inhibition>B</inhibition></behavior>")
+                  .message(),
+              HasSubstr("selects no connection, so that it inhibits nothing; write a <config>"));
   EXPECT_THAT(load_text("<behavior name='B'><config at='/p'>s</config></behavior>").findings(),
               ElementsAre("1:36 error invalid-port-name"))
       << "it has a config, though a wrong one";

@@ -270,6 +270,21 @@ TEST(Load, ASourceThatIsSensedMustBelongToAModuleOrAConnection) {
   }
 }
 
+// Two programs command one motor, and nothing decides between them.
+TEST(Load, SeveralSourcesAtAPortWithoutRulesAreNoted) {
+  const auto load = [](const std::string& connection) {
+    return load_with_application("<behavior name='A'><config at='/p'>/a</config></behavior>",
+                                 "<application><connection><from>/a</from><to>/p</to></connection>"
+                                 "<connection><from>/b</from><to>/motor</to></connection>" +
+                                     connection + "</application>");
+  };
+  EXPECT_THAT(load("").findings(), IsEmpty());
+  const auto noted = load("<connection><from>/c</from><to>/motor</to></connection>");
+  EXPECT_THAT(noted.findings(), ElementsAre("1:120 note not-arbitrated"));
+  EXPECT_THAT(noted.message(), HasSubstr("/b and /c are connected to /motor, and no rule decides"));
+  EXPECT_THAT(load("<connection><from>/c</from><to>/p</to></connection>").findings(), IsEmpty());
+}
+
 TEST(Load, ASourceThatNobodyPublishesIsShownWhereItIsReadWithTheNameThatWasMeant) {
   const auto load = [](const std::string& condition) {
     return load_with_application(

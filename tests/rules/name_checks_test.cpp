@@ -214,7 +214,7 @@ TEST(NameChecks, TheApplicationKnowsNamesAndItsOwnAreNotJudged) {
   EXPECT_THAT(with("<connection><from>/estop:o</from><to>/log:i</to></connection>"
                    "<connection><from>/nightly:o</from><to>/log:i</to></connection>"
                    "<connection><from>/nigthly:o</from><to>/log:i</to></connection>"),
-              ElementsAre("2:16 warning similar-name"));
+              ElementsAre("2:16 warning similar-name", "1:143 note not-arbitrated"));
 }
 
 // It may have been the very name that is missing.

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/inotify.h>
+#include <sys/stat.h>
 
 #include <arbiter/arbiter.hpp>
 
@@ -108,6 +109,21 @@ TEST_F(ChangingModels, AStrictDaemonRefusesWarningsAndKeepsWhatItHas) {
   daemon_->write_model(only("c"));
   EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
   EXPECT_EQ(source_in_force(), "/c");
+}
+
+// As of a policy, but that a model has no more than a warning.
+TEST_F(ChangingModels, AFileThatEveryUserMayWriteIsToldAndRefusedByAStrictDaemon) {
+  for (const bool is_strict : {false, true}) {
+    start(is_strict ? std::vector<std::string>{"--strict"} : std::vector<std::string>{});
+    daemon_->write_model(only("c"));
+    const std::string path = daemon_->directory() + "/model.xml";
+    ASSERT_EQ(::chmod(path.c_str(), 0666), 0);
+    const auto result = arbiter({"reload"});
+    EXPECT_EQ(result.exit_code, is_strict ? 1 : 0);
+    EXPECT_THAT(result.err, HasSubstr("every user may write this file"));
+    ASSERT_EQ(::chmod(path.c_str(), 0644), 0);
+    EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
+  }
 }
 
 TEST_F(ChangingModels, ReloadReadsAllAndStaysWithTheOneInForce) {

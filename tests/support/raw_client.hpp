@@ -105,6 +105,8 @@ class RawClient {
     return read_document(expect(shm::MessageKind::kStatusReply));
   }
 
+  void hang_up() { socket_.reset(); }
+
   [[nodiscard]] int socket() const { return socket_.get(); }
 
  private:

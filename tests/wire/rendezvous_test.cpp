@@ -3,14 +3,33 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <pwd.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+int asked_for_arbiter = 0;
+
+}  // namespace
+
+// In the place of the C library's, for this program: a name service may ask a network that is not
+// there.
+extern "C" int getpwnam_r(const char*, passwd*, char*, size_t, passwd** found) {
+  ++asked_for_arbiter;
+  *found = nullptr;
+  return ENOENT;
+}
 
 namespace arbiter::shm {
 namespace {
@@ -96,6 +115,19 @@ TEST_F(Rendezvous, AClientLooksInEachPlaceWhereADaemonMayBeInOrder) {
   EXPECT_EQ(directories[1], "/session/arbiter");
   EXPECT_EQ(directories[2], "/run/arbiter");
   EXPECT_EQ(directories[3], directory_ + "/arbiter-" + std::to_string(geteuid()));
+}
+
+// Nobody's start waits for a name service where a daemon is found without.
+TEST_F(Rendezvous, WhoTheUserArbiterIsIsNotAskedWhereADaemonListens) {
+  const std::string session = make("session");
+  setenv("XDG_RUNTIME_DIR", session.c_str(), 1);
+  const Listener listener = listen_at(daemon_directory(), "one");
+  asked_for_arbiter = 0;
+  std::string why_not, directory;
+  EXPECT_TRUE(connect_to_daemon("one", why_not, &directory)) << why_not;
+  EXPECT_EQ(directory, session + "/arbiter");
+  EXPECT_EQ(other_daemons("one", directory), std::vector<std::string>());
+  EXPECT_EQ(asked_for_arbiter, 0);
 }
 
 TEST_F(Rendezvous, ADirectoryThatOthersMayWriteInIsRefused) {

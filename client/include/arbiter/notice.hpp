@@ -21,6 +21,9 @@ enum class NoticeKind : std::uint8_t {
   unmentioned,
   // The port cannot see a source that its rules read: it delivers nothing until it can.
   blind,
+  // This node and others of the instance do not see each other: they have met at two daemons, or
+  // the next daemon has another clock, as in another time namespace. It is about no port.
+  apart,
   // Memory could not be locked (NodeOptions::lock_memory), and is used nevertheless.
   not_locked,
 };

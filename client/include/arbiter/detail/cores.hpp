@@ -75,6 +75,7 @@ std::optional<std::string_view> winner(InputCore& core) noexcept;
 bool is_idle(InputCore& core) noexcept;
 const std::string& source_name(const InputCore& core, std::uint32_t source) noexcept;
 const Type& sample_type(const InputCore& core, std::uint32_t hold) noexcept;
+std::int64_t believable_time(std::int64_t stamp_ns) noexcept;
 const std::string& name(const InputCore& core) noexcept;
 const Type& type(const InputCore& core) noexcept;
 
