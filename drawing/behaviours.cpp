@@ -34,7 +34,7 @@ std::string small(const std::string& content) {
 }
 
 std::string in_red(const char* sign) {
-  return "<FONT POINT-SIZE=\"9\" COLOR=\"" + std::string(colour::kRed) + "\">" + sign + "</FONT>";
+  return R"(<FONT POINT-SIZE="9" COLOR=")" + std::string(colour::kRed) + "\">" + sign + "</FONT>";
 }
 
 std::string table(const std::string& rows) {

@@ -128,7 +128,9 @@ std::string Ports::rest_row(const std::vector<std::string>& sources, const std::
 void Ports::draw_rest(const std::vector<std::string>& sources, const std::string& port,
                       const std::string& tail, const std::string& head) {
   std::string text;
-  for (const std::string& source : sources) text += source + " is sensed at " + port + "\n";
+  for (const std::string& source : sources) {
+    text.append(source).append(" is sensed at ").append(port).append("\n");
+  }
   text.pop_back();
   out_.line(LineKind::kSensed, tail + ":e -> " + head + ":w", {{"tooltip", quoted(text)}});
 }
