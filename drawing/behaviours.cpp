@@ -126,9 +126,7 @@ class BehavioursView {
     const Behaviour& behaviour = model_.behaviours[b];
     std::string name = situation_ == nullptr ? "" : std::string(mark(b).sign) + " ";
     name = "<B>" + html(name + shortened(behaviour.name, kMaxName)) + "</B>";
-    if (!implied_[b].empty()) {
-      name += "  " + in_red(kAllAfter);
-    }
+    if (!implied_[b].empty()) name += "  " + in_red(kAllAfter);
     std::string rows = row(name);
     for (const rules::Condition& condition : behaviour.conditions) {
       const std::string text = "if " + to_string(*condition.expression);
@@ -217,9 +215,8 @@ class BehavioursView {
   }
 
   void draw_columns(const Unit& unit) {
-    const std::size_t height = (unit.members.size() + unit.tops.size() - 1) / unit.tops.size();
     for (std::size_t i = 1; i < unit.members.size(); ++i) {
-      if (i % height == 0) continue;
+      if (i % unit.height == 0) continue;
       out_.statement(id(unit.members[i - 1]) + " -> " + id(unit.members[i]),
                      {{"style", kUnseen}, {"weight", "10"}});
     }
@@ -243,16 +240,14 @@ class BehavioursView {
     return (unit.is_box ? "cluster_" : "cluster_of_") + id(unit.members.front());
   }
 
-  // Where arrows to a unit end: at a behaviour, or at an unseen point above all that is in the
-  // unit. They are cut off at its border.
+  // Where arrows to a unit end, and those from it begin: at a behaviour, or at an unseen point
+  // above or below all that is in the unit. They are cut off at its border.
   static std::string head(const Unit& unit) {
     return unit.tops.size() == 1 ? id(unit.tops.front()) : "above_" + id(unit.members.front());
   }
-  // Where they begin. A point below as well would cost room, so it is for many only.
-  static bool has_point_below(const Unit& unit) { return unit.inhibits && unit.bottoms.size() > 1; }
   static std::string tail(const Unit& unit) {
-    return has_point_below(unit) ? "below_" + id(unit.members.front())
-                                 : id(unit.bottoms[unit.bottoms.size() / 2]);
+    return unit.bottoms.size() == 1 ? id(unit.bottoms.front())
+                                    : "below_" + id(unit.members.front());
   }
 
   void draw_point(const std::string& name) {
@@ -264,7 +259,7 @@ class BehavioursView {
       draw_point(head(unit));
       for (const std::size_t b : unit.tops) hold(head(unit), id(b));
     }
-    if (has_point_below(unit)) {
+    if (unit.inhibits && unit.bottoms.size() > 1) {
       draw_point(tail(unit));
       for (const std::size_t b : unit.bottoms) hold(id(b), tail(unit));
     }
@@ -312,10 +307,6 @@ class BehavioursView {
                {"weight", "3"},
                {"constraint", arrow.leads_back ? "false" : ""},
                {"tooltip", quoted(text.substr(1))}});
-    if (arrow.leads_back || has_point_below(from)) return;
-    for (const std::size_t b : from.bottoms) {
-      if (id(b) != tail(from)) hold(id(b), head(to));
-    }
   }
 
   const rules::Model& model_;

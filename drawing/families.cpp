@@ -16,6 +16,7 @@ constexpr double kHeightOfTitle = 0.5;  // of a box, in cells
 
 void arrange_group(Unit& group, std::size_t height) {
   const Members& members = group.members;
+  group.height = height;
   const std::size_t columns = (members.size() + height - 1) / height;
   group.extent = {static_cast<double>(columns),
                   static_cast<double>(std::min(height, members.size()))};
