@@ -230,6 +230,10 @@ std::string picture(const json& given) {
     out.text(16, y, "soft", line);
     y += 18;
   }
+  for (const json& warning : report.value("warnings", json::array())) {
+    out.text(16, y, "soft", "⚠ " + warning.get<std::string>());
+    y += 18;
+  }
   out.line(24, y - 9, 24, y + 7, "limit");
   out.text(34, y + 4, "soft", "the most that the project allows itself");
   y += 24;

@@ -67,6 +67,13 @@ TEST(Picture, HidesNothing) {
   EXPECT_THAT(svg, HasSubstr("0 %"));
 }
 
+TEST(Picture, SaysWhatMayHaveSpoiltTheFigures) {
+  Report report = some_report();
+  report.warnings = {"Noisy neighbours", "Only one processor may be used."};
+  EXPECT_THAT(picture(report.json()), HasSubstr("⚠ Noisy neighbours</text>"));
+  EXPECT_THAT(picture(report.json()), HasSubstr("⚠ Only one processor may be used.</text>"));
+}
+
 TEST(Picture, OfFiguresThatNoAxisHoldsIsWellFormed) {
   Report report;
   report.targets = {{"a", 1e300, 1e-300, "x"}, {"b", 0, 0, "x"}, {"c", 1, 1e308, "ns"}};
