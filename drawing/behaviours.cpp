@@ -18,24 +18,14 @@ using rules::Behaviour;
 using rules::Hierarchy;
 
 constexpr const char* kUnseen = "invis";
-constexpr std::size_t kMaxName = 32, kMaxPort = 26, kMaxFormula = 38;  // characters
-constexpr std::size_t kMaxLines = 3;                                   // of a condition
-constexpr std::size_t kMaxRows = 6;                                    // connections of a behaviour
-constexpr std::size_t kMaxTooltip = 60;                                // lines
+constexpr std::size_t kNameWidth = 32, kPortWidth = 26, kFormulaWidth = 38;  // characters
+constexpr std::size_t kConditionLines = 3;                                   // of a condition
+constexpr std::size_t kMostRows = 6;       // connections of a behaviour
+constexpr std::size_t kTooltipLines = 60;  // lines
 
 std::string id(std::size_t b) { return "b" + std::to_string(b); }
 
-std::string row(const std::string& content) {
-  return "<TR><TD ALIGN=\"LEFT\">" + content + "</TD></TR>";
-}
-
-std::string small(const std::string& content) {
-  return "<FONT POINT-SIZE=\"9\">" + content + "</FONT>";
-}
-
-std::string in_red(const char* sign) {
-  return R"(<FONT POINT-SIZE="9" COLOR=")" + std::string(colour::kRed) + "\">" + sign + "</FONT>";
-}
+std::string in_red(const char* sign) { return small(sign, colour::kRed); }
 
 std::string table(const std::string& rows) {
   return R"(<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1">)" + rows +
@@ -125,21 +115,22 @@ class BehavioursView {
   [[nodiscard]] std::string heading(std::size_t b) const {
     const Behaviour& behaviour = model_.behaviours[b];
     std::string name = situation_ == nullptr ? "" : std::string(mark(b).sign) + " ";
-    name = "<B>" + html(name + shortened(behaviour.name, kMaxName)) + "</B>";
+    name = "<B>" + html(name + shortened(behaviour.name, kNameWidth)) + "</B>";
     if (!implied_[b].empty()) name += "  " + in_red(kAllAfter);
     std::string rows = row(name);
     for (const rules::Condition& condition : behaviour.conditions) {
       const std::string text = "if " + to_string(*condition.expression);
-      rows += row(small("<I>" + html_lines(in_lines(text, kMaxFormula, kMaxLines)) + "</I>"));
+      rows +=
+          row(small("<I>" + html_lines(in_lines(text, kFormulaWidth, kConditionLines)) + "</I>"));
     }
     return rows;
   }
 
   static void add_line(std::string& text, std::size_t number, std::size_t of,
                        const std::string& line) {
-    if (number < kMaxTooltip) text.append("\n").append(line);
-    if (number + 1 == of && of > kMaxTooltip) {
-      text.append("\nand ").append(std::to_string(of - kMaxTooltip)).append(" more");
+    if (number < kTooltipLines) text.append("\n").append(line);
+    if (number + 1 == of && of > kTooltipLines) {
+      text.append("\nand ").append(std::to_string(of - kTooltipLines)).append(" more");
     }
   }
 
@@ -170,11 +161,11 @@ class BehavioursView {
     const Behaviour& behaviour = model_.behaviours[b];
     std::string rows = heading(b);
     const std::size_t count = behaviour.configs.size();
-    const std::size_t shown = count > kMaxRows ? kMaxRows - 1 : count;
+    const std::size_t shown = count > kMostRows ? kMostRows - 1 : count;
     for (std::size_t i = 0; i < shown; ++i) {
       const rules::Config& config = behaviour.configs[i];
       rows += row(small(
-          html(shortened(config.source, kMaxPort) + " → " + shortened(config.port, kMaxPort))));
+          html(shortened(config.source, kPortWidth) + " → " + shortened(config.port, kPortWidth))));
     }
     if (shown < count) rows += row(small("and " + std::to_string(count - shown) + " more"));
     out_.statement(id(b), {{"shape", "box"},

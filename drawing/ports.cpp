@@ -27,10 +27,6 @@ std::size_t count_lines(const std::string& text) {
   return 1 + static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
 }
 
-std::string small(const std::string& content) {
-  return "<FONT POINT-SIZE=\"9\">" + content + "</FONT>";
-}
-
 void find_sensed(Input& in) {
   if (in.rules == nullptr) return;
   std::set<std::string> read, connected(in.others.begin(), in.others.end());
