@@ -78,8 +78,6 @@ std::string name_of(const std::string& path) {
 
 }  // namespace
 
-const std::string kGraphFormats = "svg, png, dot, pdf, ps, eps or jpg";
-
 Picture::Picture(const GraphOptions& options) : options_(options), format_(format_of(options)) {
   page_.dpi = dpi_of(options.dpi, format_);
 }

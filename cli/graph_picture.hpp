@@ -59,6 +59,6 @@ class Picture {
 };
 
 // The formats of pictures, for the help.
-extern const std::string kGraphFormats;
+inline constexpr const char* kGraphFormats = "svg, png, dot, pdf, ps, eps or jpg";
 
 }  // namespace arbiter::cli

@@ -52,7 +52,8 @@ void add_graph(CLI::App& app, int& exit_code) {
       ->type_name("PORT")
       ->allow_extra_args(false);
   verb->add_option("--format", options->format,
-                   kGraphFormats + "; without it by the ending of the file, svg where it has none")
+                   std::string(kGraphFormats) +
+                       "; without it by the ending of the file, svg where it has none")
       ->type_name("FORMAT");
   verb->add_option("--dpi", options->dpi,
                    "Dots per inch of a png or jpg, from 20 to 1200; without it 96")

@@ -18,24 +18,14 @@ using rules::Behaviour;
 using rules::Hierarchy;
 
 constexpr const char* kUnseen = "invis";
-constexpr std::size_t kMaxName = 32, kMaxPort = 26, kMaxFormula = 38;  // characters
-constexpr std::size_t kMaxLines = 3;                                   // of a condition
-constexpr std::size_t kMaxRows = 6;                                    // connections of a behaviour
-constexpr std::size_t kMaxTooltip = 60;                                // lines
+constexpr std::size_t kNameWidth = 32, kPortWidth = 26, kFormulaWidth = 38;  // characters
+constexpr std::size_t kConditionLines = 3;                                   // of a condition
+constexpr std::size_t kMostRows = 6;       // connections of a behaviour
+constexpr std::size_t kTooltipLines = 60;  // lines
 
 std::string id(std::size_t b) { return "b" + std::to_string(b); }
 
-std::string row(const std::string& content) {
-  return "<TR><TD ALIGN=\"LEFT\">" + content + "</TD></TR>";
-}
-
-std::string small(const std::string& content) {
-  return "<FONT POINT-SIZE=\"9\">" + content + "</FONT>";
-}
-
-std::string in_red(const char* sign) {
-  return "<FONT POINT-SIZE=\"9\" COLOR=\"" + std::string(colour::kRed) + "\">" + sign + "</FONT>";
-}
+std::string in_red(const char* sign) { return small(sign, colour::kRed); }
 
 std::string table(const std::string& rows) {
   return R"(<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1">)" + rows +
@@ -125,23 +115,22 @@ class BehavioursView {
   [[nodiscard]] std::string heading(std::size_t b) const {
     const Behaviour& behaviour = model_.behaviours[b];
     std::string name = situation_ == nullptr ? "" : std::string(mark(b).sign) + " ";
-    name = "<B>" + html(name + shortened(behaviour.name, kMaxName)) + "</B>";
-    if (!implied_[b].empty()) {
-      name += "  " + in_red(kAllAfter);
-    }
+    name = "<B>" + html(name + shortened(behaviour.name, kNameWidth)) + "</B>";
+    if (!implied_[b].empty()) name += "  " + in_red(kAllAfter);
     std::string rows = row(name);
     for (const rules::Condition& condition : behaviour.conditions) {
       const std::string text = "if " + to_string(*condition.expression);
-      rows += row(small("<I>" + html_lines(in_lines(text, kMaxFormula, kMaxLines)) + "</I>"));
+      rows +=
+          row(small("<I>" + html_lines(in_lines(text, kFormulaWidth, kConditionLines)) + "</I>"));
     }
     return rows;
   }
 
   static void add_line(std::string& text, std::size_t number, std::size_t of,
                        const std::string& line) {
-    if (number < kMaxTooltip) text.append("\n").append(line);
-    if (number + 1 == of && of > kMaxTooltip) {
-      text.append("\nand ").append(std::to_string(of - kMaxTooltip)).append(" more");
+    if (number < kTooltipLines) text.append("\n").append(line);
+    if (number + 1 == of && of > kTooltipLines) {
+      text.append("\nand ").append(std::to_string(of - kTooltipLines)).append(" more");
     }
   }
 
@@ -172,11 +161,11 @@ class BehavioursView {
     const Behaviour& behaviour = model_.behaviours[b];
     std::string rows = heading(b);
     const std::size_t count = behaviour.configs.size();
-    const std::size_t shown = count > kMaxRows ? kMaxRows - 1 : count;
+    const std::size_t shown = count > kMostRows ? kMostRows - 1 : count;
     for (std::size_t i = 0; i < shown; ++i) {
       const rules::Config& config = behaviour.configs[i];
       rows += row(small(
-          html(shortened(config.source, kMaxPort) + " → " + shortened(config.port, kMaxPort))));
+          html(shortened(config.source, kPortWidth) + " → " + shortened(config.port, kPortWidth))));
     }
     if (shown < count) rows += row(small("and " + std::to_string(count - shown) + " more"));
     out_.statement(id(b), {{"shape", "box"},
@@ -217,9 +206,8 @@ class BehavioursView {
   }
 
   void draw_columns(const Unit& unit) {
-    const std::size_t height = (unit.members.size() + unit.tops.size() - 1) / unit.tops.size();
     for (std::size_t i = 1; i < unit.members.size(); ++i) {
-      if (i % height == 0) continue;
+      if (i % unit.height == 0) continue;
       out_.statement(id(unit.members[i - 1]) + " -> " + id(unit.members[i]),
                      {{"style", kUnseen}, {"weight", "10"}});
     }
@@ -243,16 +231,14 @@ class BehavioursView {
     return (unit.is_box ? "cluster_" : "cluster_of_") + id(unit.members.front());
   }
 
-  // Where arrows to a unit end: at a behaviour, or at an unseen point above all that is in the
-  // unit. They are cut off at its border.
+  // Where arrows to a unit end, and those from it begin: at a behaviour, or at an unseen point
+  // above or below all that is in the unit. They are cut off at its border.
   static std::string head(const Unit& unit) {
     return unit.tops.size() == 1 ? id(unit.tops.front()) : "above_" + id(unit.members.front());
   }
-  // Where they begin. A point below as well would cost room, so it is for many only.
-  static bool has_point_below(const Unit& unit) { return unit.inhibits && unit.bottoms.size() > 1; }
   static std::string tail(const Unit& unit) {
-    return has_point_below(unit) ? "below_" + id(unit.members.front())
-                                 : id(unit.bottoms[unit.bottoms.size() / 2]);
+    return unit.bottoms.size() == 1 ? id(unit.bottoms.front())
+                                    : "below_" + id(unit.members.front());
   }
 
   void draw_point(const std::string& name) {
@@ -264,7 +250,7 @@ class BehavioursView {
       draw_point(head(unit));
       for (const std::size_t b : unit.tops) hold(head(unit), id(b));
     }
-    if (has_point_below(unit)) {
+    if (unit.inhibits && unit.bottoms.size() > 1) {
       draw_point(tail(unit));
       for (const std::size_t b : unit.bottoms) hold(id(b), tail(unit));
     }
@@ -312,10 +298,6 @@ class BehavioursView {
                {"weight", "3"},
                {"constraint", arrow.leads_back ? "false" : ""},
                {"tooltip", quoted(text.substr(1))}});
-    if (arrow.leads_back || has_point_below(from)) return;
-    for (const std::size_t b : from.bottoms) {
-      if (id(b) != tail(from)) hold(id(b), head(to));
-    }
   }
 
   const rules::Model& model_;

@@ -53,6 +53,15 @@ std::string html(std::string_view text) {
   return result;
 }
 
+std::string small(const std::string& content, const char* colour) {
+  const std::string attribute = colour == nullptr ? "" : " COLOR=\"" + std::string(colour) + "\"";
+  return "<FONT POINT-SIZE=\"9\"" + attribute + ">" + content + "</FONT>";
+}
+
+std::string row(const std::string& content) {
+  return R"(<TR><TD ALIGN="LEFT">)" + content + "</TD></TR>";
+}
+
 std::string html_lines(std::string_view text) {
   static constexpr std::string_view kBreak = "<BR/>", kLeft = "<BR ALIGN=\"LEFT\"/>";
   std::string result = html(text);

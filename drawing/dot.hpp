@@ -20,7 +20,11 @@ std::string quoted(std::string_view text);
 // Graphviz stops at them.
 std::string html(std::string_view text);
 
-// The same of several lines, which all begin at the left.
+// Parts of such labels, of content that is safe already: small print, and a row of one cell.
+std::string small(const std::string& content, const char* colour = nullptr);
+std::string row(const std::string& content);
+
+// html() of several lines, which all begin at the left.
 std::string html_lines(std::string_view text);
 
 // "file:line"

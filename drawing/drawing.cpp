@@ -11,10 +11,6 @@ constexpr std::size_t kMaxTitle = 70;  // characters
 // Of more lines, Graphviz would seek the best places for minutes, and nobody could follow them.
 constexpr std::size_t kMaxCarefulLines = 400;
 
-std::string row(const std::string& content) {
-  return R"(<TR><TD ALIGN="LEFT">)" + content + "</TD></TR>";
-}
-
 std::string font(const std::string& attributes, const std::string& content) {
   return "<FONT " + attributes + ">" + content + "</FONT>";
 }
@@ -32,23 +28,21 @@ const char* in_words(View view) {
 
 // Only what there is in the picture.
 std::string legend_rows(const DotWriter& out, View view, bool is_live) {
-  const std::string small = "POINT-SIZE=\"9\"";
   std::string rows;
   for (const LineKind kind : out.lines()) {
     const Line& line = look_of(kind);
-    rows += row(font(small + " COLOR=\"" + line.colour + "\"", line.sample) + " " +
-                font(small, html(std::string(line.word) + ": " + line.meaning)));
+    rows += row(small(line.sample, line.colour) + " " +
+                small(html(std::string(line.word) + ": " + line.meaning)));
   }
   for (const Sign& sign : kSigns) {
     if (!out.has_sign(sign.text)) continue;
-    rows += row(font(small + " COLOR=\"" + colour::kRed + "\"", sign.text) + " " +
-                font(small, html(sign.meaning)));
+    rows += row(small(sign.text, colour::kRed) + " " + small(html(sign.meaning)));
   }
   for (const Mark& mark : kMarks) {
     if (!is_live) break;
     if (view == View::kBehaviours && mark.kind == MarkKind::kActive) continue;
     rows += R"(<TR><TD ALIGN="LEFT" BGCOLOR=")" + std::string(mark.colour) + "\">" +
-            font(small, html(std::string(mark.sign) + " " + mark.meaning)) + "</TD></TR>";
+            small(html(std::string(mark.sign) + " " + mark.meaning)) + "</TD></TR>";
   }
   return rows;
 }

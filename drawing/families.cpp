@@ -16,7 +16,9 @@ constexpr double kHeightOfTitle = 0.5;  // of a box, in cells
 
 void arrange_group(Unit& group, std::size_t height) {
   const Members& members = group.members;
-  group.extent = {static_cast<double>((members.size() + height - 1) / height),
+  group.height = height;
+  const std::size_t columns = (members.size() + height - 1) / height;
+  group.extent = {static_cast<double>(columns),
                   static_cast<double>(std::min(height, members.size()))};
   group.tops.clear();
   group.bottoms.clear();
@@ -150,9 +152,9 @@ Families::Families(const rules::Model& model, const Hierarchy& hierarchy)
   }
   // Without recursion: the depth is the model's to choose.
   add_family(Hierarchy::kNobody, roots);
-  for (std::size_t f = 0; f < families_.size(); ++f) {
+  for (std::size_t done = 0; done < families_.size();) {
     Members boxes;
-    for (const Unit& unit : families_[f].units) {
+    for (const Unit& unit : families_[done++].units) {
       if (unit.is_box) boxes.push_back(unit.members.front());
     }
     for (const std::size_t box : boxes) add_family(box, hierarchy_.children(box));

@@ -23,6 +23,7 @@ struct Unit {
   bool inhibits = false, is_inhibited = false;
   std::vector<Inhibition> within;  // a group in which each inhibits the others
   Extent extent;
+  std::size_t height = 1;  // of a group's columns
   // The behaviours that stand highest and lowest in it.
   std::vector<std::size_t> tops, bottoms;
 

@@ -27,10 +27,6 @@ std::size_t count_lines(const std::string& text) {
   return 1 + static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
 }
 
-std::string small(const std::string& content) {
-  return "<FONT POINT-SIZE=\"9\">" + content + "</FONT>";
-}
-
 void find_sensed(Input& in) {
   if (in.rules == nullptr) return;
   std::set<std::string> read, connected(in.others.begin(), in.others.end());
@@ -128,7 +124,9 @@ std::string Ports::rest_row(const std::vector<std::string>& sources, const std::
 void Ports::draw_rest(const std::vector<std::string>& sources, const std::string& port,
                       const std::string& tail, const std::string& head) {
   std::string text;
-  for (const std::string& source : sources) text += source + " is sensed at " + port + "\n";
+  for (const std::string& source : sources) {
+    text.append(source).append(" is sensed at ").append(port).append("\n");
+  }
   text.pop_back();
   out_.line(LineKind::kSensed, tail + ":e -> " + head + ":w", {{"tooltip", quoted(text)}});
 }

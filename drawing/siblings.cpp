@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <tuple>
 
 namespace arbiter::drawing {
 namespace {
@@ -77,7 +78,9 @@ std::vector<Stroke> find_strokes(std::size_t siblings, const Inhibitions& inhibi
 Lists find_twins(const Inhibitions& inhibitions, const std::vector<bool>& may_join) {
   struct Relations {
     std::vector<std::size_t> inhibitors, inhibited;
-    auto operator<=>(const Relations&) const = default;
+    bool operator<(const Relations& other) const {
+      return std::tie(inhibitors, inhibited) < std::tie(other.inhibitors, other.inhibited);
+    }
   };
   const std::size_t siblings = may_join.size();
   std::vector<Relations> relations(siblings);

@@ -7,9 +7,8 @@
 
 namespace arbiter::drawing {
 
-// At most so many characters, with "…" for what is left out: at the end, or in the middle, for
-// names of ports and files, which end in what tells them apart.
-std::string shortened(std::string_view text, std::size_t characters);
+// At most so many characters, with "…" for what is left out of the middle: names that begin alike
+// end in what tells them apart.
 std::string shortened(std::string_view text, std::size_t characters);
 
 // A formula in lines of about `width` characters, broken in front of " ∧ " and " ∨ ", all but the

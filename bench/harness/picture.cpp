@@ -11,7 +11,7 @@
 namespace arbiter::bench {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 // In pixels. A row has its name, a bar, and what was measured.
 constexpr double kWidth = 880, kLeft = 330, kRight = 690, kRow = 22;
@@ -59,12 +59,12 @@ std::string amount(double value, const std::string& unit) {
          (unit == "x" ? "×" : unit);
 }
 
-std::vector<Target> targets_of(const json& report) {
+std::vector<Target> targets_of(const Json& report) {
   std::vector<Target> targets;
   if (!report.contains("targets")) {
     throw std::runtime_error("this is no report: it has no targets");
   }
-  for (const json& each : report.at("targets")) {
+  for (const Json& each : report.at("targets")) {
     Target target{each.at("name").get<std::string>(), each.at("unit").get<std::string>(),
                   each.at("limit").get<double>(), std::nullopt, each.at("met").get<bool>()};
     if (each.contains("measured")) target.measured = each.at("measured").get<double>();
@@ -194,11 +194,11 @@ double draw_group(const Group& group, double y, Svg& out) {
 }
 
 // What there is of these facts, in a line.
-std::string facts(const json& machine, const std::vector<std::string>& keys) {
+std::string facts(const Json& machine, const std::vector<std::string>& keys) {
   std::string text;
   for (const std::string& key : keys) {
     if (!machine.contains(key)) continue;
-    const json& fact = machine.at(key);
+    const Json& fact = machine.at(key);
     const std::string value = fact.is_string() ? fact.get<std::string>() : fact.dump();
     if (value.empty() || value == "none") continue;
     text += (text.empty() ? "" : " · ") + (fact.is_string() ? value : value + " " + key);
@@ -208,9 +208,9 @@ std::string facts(const json& machine, const std::vector<std::string>& keys) {
 
 }  // namespace
 
-std::string picture(const json& given) {
+std::string picture(const Json& given) {
   // What others have said may be in whatever encoding.
-  const json report = json::parse(given.dump(-1, ' ', false, json::error_handler_t::replace));
+  const Json report = Json::parse(given.dump(-1, ' ', false, Json::error_handler_t::replace));
   const auto targets = targets_of(report);
   const auto met = std::count_if(targets.begin(), targets.end(),
                                  [](const Target& target) { return target.is_met; });
@@ -221,13 +221,17 @@ std::string picture(const json& given) {
                std::string(": ") + std::to_string(met) + " of " + std::to_string(targets.size()) +
                " targets met. Medians, unless a row says otherwise. Left is better; all axes are "
                "logarithmic.");
-  const json machine = report.value("machine", json::object());
+  const Json machine = report.value("machine", Json::object());
   double y = 70;
   for (const std::string& line :
        {facts(machine, {"date", "processor", "virtualised", "usable processors", "arbiter"}),
         report.value("source", "")}) {
     if (line.empty()) continue;
     out.text(16, y, "soft", line);
+    y += 18;
+  }
+  for (const Json& warning : report.value("warnings", Json::array())) {
+    out.text(16, y, "soft", "⚠ " + warning.get<std::string>());
     y += 18;
   }
   out.line(24, y - 9, 24, y + 7, "limit");

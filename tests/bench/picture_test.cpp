@@ -19,7 +19,7 @@ using testing::HasSubstr;
 
 const std::string kFigures = ARBITER_SOURCE "/docs/figures/";
 
-Report some_report() {
+Report judged_report() {
   Report report;
   report.machine = {
       {"date", "2026-01-02 03:04 UTC"}, {"processor", "Robot PC 9000"}, {"usable processors", 2}};
@@ -41,17 +41,17 @@ void expect_well_formed(const std::string& svg) {
 }
 
 TEST(Picture, IsWellFormedAndHasEachTarget) {
-  const std::string svg = picture(some_report().json());
+  const std::string svg = picture(judged_report().json());
   expect_well_formed(svg);
   EXPECT_THAT(svg, HasSubstr(">spinning, to &lt;iceoryx> &amp; &quot;others&quot;</text>"));
-  for (const Verdict& target : some_report().targets) {
+  for (const Verdict& target : judged_report().targets) {
     if (target.name.find('<') != std::string::npos) continue;
     EXPECT_THAT(svg, HasSubstr(">" + target.name + "</text>"));
   }
 }
 
 TEST(Picture, SaysWhereAndWhenAndWithWhatItWasMeasured) {
-  Report report = some_report();
+  Report report = judged_report();
   EXPECT_THAT(picture(report.json()), HasSubstr("2026-01-02 03:04 UTC · Robot PC 9000 · 2 usable"));
   EXPECT_THAT(picture(report.json()), HasSubstr("./run bench: 4 of 6 targets met"));
   report.quick = true;
@@ -60,11 +60,18 @@ TEST(Picture, SaysWhereAndWhenAndWithWhatItWasMeasured) {
 
 // Honest: what is missed and what could not be measured is in it, and looks so.
 TEST(Picture, HidesNothing) {
-  const std::string svg = picture(some_report().json());
+  const std::string svg = picture(judged_report().json());
   EXPECT_THAT(svg, HasSubstr("0.75 ×  ✗ over 0.5 ×"));
   EXPECT_THAT(svg, HasSubstr("not measured"));
   EXPECT_THAT(svg, HasSubstr("750 ms"));
   EXPECT_THAT(svg, HasSubstr("0 %"));
+}
+
+TEST(Picture, SaysWhatMayHaveSpoiltTheFigures) {
+  Report report = judged_report();
+  report.warnings = {"Noisy neighbours", "Only one processor may be used."};
+  EXPECT_THAT(picture(report.json()), HasSubstr("⚠ Noisy neighbours</text>"));
+  EXPECT_THAT(picture(report.json()), HasSubstr("⚠ Only one processor may be used.</text>"));
 }
 
 TEST(Picture, OfFiguresThatNoAxisHoldsIsWellFormed) {

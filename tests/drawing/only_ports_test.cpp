@@ -18,7 +18,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 // At /arm: Reach, and Stop, which has nothing there but inhibits its box. Look is at /gaze only.
-const std::string kModel = R"(<behaviors>
+const std::string kArmAndGaze = R"(<behaviors>
   <meta_behavior name="Work"><behavior>Reach</behavior><behavior>Look</behavior></meta_behavior>
   <meta_behavior name="Safety"><behavior>Stop</behavior><inhibition>Work</inhibition></meta_behavior>
   <behavior name="Reach"><config at="/arm">/reach</config><inhibition>Look</inhibition></behavior>
@@ -27,15 +27,16 @@ const std::string kModel = R"(<behaviors>
   <behavior name="Hum"><config at="/voice">/hum</config></behavior>
 </behaviors>)";
 
-rules::LoadedModel load() {
+rules::LoadedModel load_arm_and_gaze() {
   const Folder folder;
   rules::Diagnostics diagnostics;
-  return rules::load_all(rules::read_texts({{folder.write("a.xml", kModel)}, {}}), diagnostics);
+  return rules::load_all(rules::read_texts({{folder.write("a.xml", kArmAndGaze)}, {}}),
+                         diagnostics);
 }
 
 std::vector<std::string> names_at(const std::set<std::string>& ports) {
   std::vector<std::string> names;
-  for (const auto& behaviour : only_ports(load(), ports).model.behaviours) {
+  for (const auto& behaviour : only_ports(load_arm_and_gaze(), ports).model.behaviours) {
     names.push_back(behaviour.name);
   }
   return names;
@@ -49,20 +50,20 @@ TEST(OnlyPorts, KeepsWhoIsThereWithTheirBoxesAndWhoSilencesThem) {
 }
 
 TEST(OnlyPorts, KeepsTheRulesThereAndTheSourcesThatTheyRead) {
-  const auto part = only_ports(load(), {"/arm"});
+  const auto part = only_ports(load_arm_and_gaze(), {"/arm"});
   ASSERT_EQ(part.rules.ports.size(), 1u);
   EXPECT_EQ(part.rules.ports[0].port, "/arm");
   EXPECT_THAT(part.rules.sources, ElementsAre("/reach", "/stop"));
 }
 
 TEST(OnlyPorts, CanBeDrawn) {
-  const auto part = only_ports(load(), {"/arm"});
+  const auto part = only_ports(load_arm_and_gaze(), {"/arm"});
   EXPECT_THAT(draw(part, View::kBehaviours), HasSubstr("Safety inhibits Work"));
   EXPECT_THAT(draw(part, View::kConnections), HasSubstr("/stop is sensed at /arm"));
 }
 
 TEST(OnlyPorts, OfAPortThatIsNotThereAreNone) {
-  const auto loaded = load();
+  const auto loaded = load_arm_and_gaze();
   EXPECT_NO_THROW(require_ports(loaded.rules, {"/arm", "/gaze"}));
   try {
     require_ports(loaded.rules, {"/arm", "/gazee"});

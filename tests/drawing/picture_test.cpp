@@ -32,7 +32,7 @@ struct Drawable {
   Pairs inhibitions;  // by name
 };
 
-rules::LoadedModel load(const std::string& text) {
+rules::LoadedModel load_model(const std::string& text) {
   const Folder folder;
   rules::Diagnostics diagnostics;
   auto loaded =
@@ -84,7 +84,7 @@ Drawable make_model(std::size_t behaviours, double density, bool has_circles, un
     text =
         std::regex_replace(text, std::regex("(<meta_behavior name='" + box + "'>)"), "$1" + list);
   }
-  return {load(text + "</behaviors>"), inhibitions};
+  return {load_model(text + "</behaviors>"), inhibitions};
 }
 
 std::vector<std::string> lines_of(const std::string& dot) {
@@ -182,7 +182,7 @@ std::string list_of(std::size_t count) {
 
 // 780 inhibitions.
 TEST(Picture, OfAListOfFortyHasAnArrowFromEachToTheNext) {
-  const std::string dot = draw(load(list_of(40)), View::kBehaviours);
+  const std::string dot = draw(load_model(list_of(40)), View::kBehaviours);
   EXPECT_EQ(count(dot, " inhibits L1,"), 1u);
   int arrows = 0;
   for (const std::string& line : lines_of(dot)) {
@@ -208,14 +208,14 @@ TEST(Picture, OfATangleIsLaidOutWithLessCare) {
       }
       text += "</behavior>";
     }
-    return draw(load(text + "</behaviors>"), View::kBehaviours);
+    return draw(load_model(text + "</behaviors>"), View::kBehaviours);
   };
   EXPECT_THAT(tangle(60), HasSubstr("splines=line"));
   EXPECT_THAT(tangle(7), Not(HasSubstr("splines")));
 }
 
 TEST(Picture, SaysWhatItIsOf) {
-  const auto model = load(list_of(3));
+  const auto model = load_model(list_of(3));
   const Page page{"a & b", {"files/a.xml", "model 3 in force"}, 0};
   const std::string dot = draw(model, View::kBehaviours, page);
   EXPECT_THAT(dot, HasSubstr("<B>a &amp; b</B> · behaviours"));
@@ -225,7 +225,7 @@ TEST(Picture, SaysWhatItIsOf) {
 }
 
 TEST(Picture, HasTheDotsThatItIsAskedFor) {
-  const auto model = load(list_of(3));
+  const auto model = load_model(list_of(3));
   EXPECT_THAT(draw(model, View::kBehaviours, {"", {}, 300}), HasSubstr(" dpi=300 "));
   EXPECT_THAT(draw(model, View::kBehaviours), Not(HasSubstr("dpi")));
 }
@@ -233,23 +233,24 @@ TEST(Picture, HasTheDotsThatItIsAskedFor) {
 TEST(Picture, HasALegendOfWhatThereIsInIt) {
   const auto inhibits = std::string("red: ") + look_of(LineKind::kInhibits).meaning;
   const auto sensed = std::string("blue: ") + look_of(LineKind::kSensed).meaning;
-  const std::string behaviours = draw(load(list_of(3)), View::kBehaviours);
+  const std::string behaviours = draw(load_model(list_of(3)), View::kBehaviours);
   EXPECT_THAT(behaviours, HasSubstr(inhibits));
   EXPECT_THAT(behaviours, Not(HasSubstr(sensed)));
-  const std::string connections = draw(
-      load("<arbiter at='/p'><select from='/a'>not /b</select></arbiter>"), View::kConnections);
+  const std::string connections =
+      draw(load_model("<arbiter at='/p'><select from='/a'>not /b</select></arbiter>"),
+           View::kConnections);
   EXPECT_THAT(connections, HasSubstr(sensed));
   EXPECT_THAT(connections, Not(HasSubstr(inhibits)));
-  const Situation situation = decide(load(list_of(3)).rules, {"/s1"});
-  EXPECT_THAT(draw(load(list_of(3)), View::kBehaviours, {}, &situation),
+  const Situation situation = decide(load_model(list_of(3)).rules, {"/s1"});
+  EXPECT_THAT(draw(load_model(list_of(3)), View::kBehaviours, {}, &situation),
               HasSubstr(look_of(MarkKind::kRuns).meaning));
 }
 
 TEST(Picture, ShortensWhatIsLongAndHasItAllInTheTooltip) {
   const std::string name = "Begin " + std::string(80, 'x') + " End";
   const std::string port = "/" + std::string(80, 'y') + "/pos:i";
-  const std::string dot = draw(load("<behaviors><behavior name='" + name + "'><config at='" + port +
-                                    "'>/s</config></behavior></behaviors>"),
+  const std::string dot = draw(load_model("<behaviors><behavior name='" + name + "'><config at='" +
+                                          port + "'>/s</config></behavior></behaviors>"),
                                View::kBehaviours);
   EXPECT_EQ(count(dot, name), 1u);
   EXPECT_THAT(dot, HasSubstr("tooltip=\"" + name));
