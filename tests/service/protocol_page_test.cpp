@@ -204,7 +204,11 @@ std::map<std::string, Heard> hear_all() {
   const std::string mine = arbiter_at("/in-a", select("/mine")) +
                            arbiter_at("/in-b", select("/mine")) +
                            arbiter_at("/in-c", select("/mine"));
-  Daemon daemon(rules(first(select("/out") + select("/other")) + mine));
+  const TemporaryDirectory files;
+  const std::string policy =
+      files.write("policy", "deny everyone replay /mine\nallow everyone all\n");
+  Daemon daemon(rules(first(select("/out") + select("/other")) + mine),
+                {.arguments = {"--policy", policy}});
   Node node("peer", [] {
     NodeOptions options;
     options.on_notice = [](const Notice&) {};
@@ -219,6 +223,7 @@ std::map<std::string, Heard> hear_all() {
   client.hello();
   client.open_input("/in");
   client.open_output("/mine");
+  client.open_output("/may-be-replayed");
   client.open_input("/unmentioned");
   client.ask(MessageKind::kObserve);
   client.ask(MessageKind::kStatus);
