@@ -101,7 +101,8 @@ void print_source(const wire::SourceStatus& source, bool has_model) {
                          {"no_slot", open->no_slot}},
                         false);
   }
-  std::cout << unmentioned(source, has_model) << '\n';
+  const std::string mark = unmentioned(source, has_model);
+  std::cout << (mark.empty() ? "" : " " + mark) << '\n';
 }
 
 // `is_useless`: it is selected, and cannot deliver.

@@ -70,7 +70,6 @@ void Instance::take_up_memory(shm::Received& welcome) {
                                                   shm::Residence::kMapped, 0);
   shared_ = memory_;
   port_names_.clear();
-  sources_.clear();
 }
 
 void Instance::update() {
@@ -116,7 +115,6 @@ void Instance::add_page(shm::Received& received) {
   try {
     memory_->add_page(message.id, message.value, std::string(message.name_view()),
                       std::move(received.descriptors[0]));
-    sources_.insert_or_assign(std::string(message.name_view()), message.id);
   } catch (const std::exception&) {
   }
 }
@@ -188,8 +186,10 @@ std::optional<shm::PortId> Instance::find_port(std::string_view name) const {
 }
 
 std::optional<shm::SourceId> Instance::find_source(std::string_view name) const {
-  const auto found = sources_.find(name);
-  return found == sources_.end() ? std::nullopt : std::optional(found->second);
+  for (shm::SourceId source = 0; source < shm::kMaxSources; ++source) {
+    if (memory_->pages().knows(source) && memory_->source_name(source) == name) return source;
+  }
+  return std::nullopt;
 }
 
 shm::Received Instance::ask(const shm::Message& question) {

@@ -16,7 +16,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -60,7 +59,7 @@ class Instance {
   [[nodiscard]] const std::map<shm::PortId, std::string>& port_names() const noexcept {
     return port_names_;
   }
-  // Nothing: nobody has named it.
+  // Nothing: nobody has named it. A search among all names.
   [[nodiscard]] std::optional<shm::PortId> find_port(std::string_view name) const;
   [[nodiscard]] std::optional<shm::SourceId> find_source(std::string_view name) const;
 
@@ -94,7 +93,6 @@ class Instance {
   std::shared_ptr<shm::DecisionMemory> memory_;
   std::shared_ptr<const shm::DecisionMemory> shared_;  // the same
   std::map<shm::PortId, std::string> port_names_;
-  std::map<std::string, shm::SourceId, std::less<>> sources_;
   std::uint64_t last_request_ = 0;
   std::uint64_t asked_ = 0;              // the question that is to be answered
   std::optional<shm::Received> answer_;  // to it

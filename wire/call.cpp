@@ -72,10 +72,11 @@ class Joining {
         if (is_let_in(welcome)) return welcome;
       }
       const auto now = Clock::now();
-      if (now >= give_up_)
+      if (now >= give_up_) {
         throw CallError(silence_.empty()
                             ? nobody_answers(caller_, why_not) + shm::describe_listening_instances()
                             : silence_);
+      }
       if (!has_told_ && since(begin_) >= caller_.quiet) {
         has_told_ = true;
         if (caller_.on_waiting)

@@ -102,8 +102,7 @@ RawClient connected_to(const std::string& path) {
 void ask_and_not_read(std::deque<RawClient>& clients, const std::string& path) {
   constexpr int kClients = 10;
   constexpr int kRequests = 200;
-  auto hello = RawClient::message(MessageKind::kHello, "deaf");
-  hello.value = shm::kWireVersion;
+  const auto hello = RawClient::hello_message("deaf");
   RawClient last = connected_to(path);
   for (int i = 0; i < kClients; ++i) {
     clients.push_back(connected_to(path));
@@ -145,13 +144,10 @@ TEST(Claims, AreNoMoreThanTheShareOfTheirUser) {
   constexpr std::uint64_t kMost = 1'000'000;
   Daemon daemon;
   RawClient known(daemon.instance());
-  auto hello = RawClient::message(MessageKind::kHello, "liar");
-  hello.value = shm::kWireVersion;
-  known.send(hello);
-  const shm::Received welcome = known.expect(MessageKind::kWelcome);
+  const shm::Received welcome = known.hello("liar");
   RawClient liar(daemon.instance());
-  hello.flags = shm::kRejoins;
-  liar.send(hello, {welcome.descriptors[0].get(), welcome.descriptors[1].get()});
+  liar.send(RawClient::hello_message("liar", shm::kRejoins),
+            {welcome.descriptors[0].get(), welcome.descriptors[1].get()});
   liar.expect(MessageKind::kWelcome);
   const auto segment = raw_output_segment();
   auto claim = RawClient::message(MessageKind::kHandBackLink);

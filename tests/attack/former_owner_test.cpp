@@ -62,10 +62,7 @@ class FormerOwner {
     try {
       if (!become(kStranger)) return 2;
       RawClient client(instance);
-      auto hello = RawClient::message(MessageKind::kHello, "former");
-      hello.value = shm::kWireVersion;
-      client.send(hello);
-      const shm::Received welcome = client.expect(MessageKind::kWelcome);
+      const shm::Received welcome = client.hello("former");
       const auto segment = raw_output_segment();
       const shm::Received opened = open_raw_output(client, "/estop:o", segment);
       const shm::Mapping page(opened.descriptors[0], sizeof(shm::ActivityPage),
@@ -92,9 +89,7 @@ class FormerOwner {
   static bool hand_back(const std::string& instance, const shm::Received& welcome,
                         const shm::Received& opened) {
     RawClient back(instance);
-    auto hello = RawClient::message(MessageKind::kHello, "former");
-    hello.value = shm::kWireVersion;
-    hello.flags = shm::kRejoins;
+    auto hello = RawClient::hello_message("former", shm::kRejoins);
     hello.link = welcome.message.link;
     back.send(hello, {welcome.descriptors[0].get(), welcome.descriptors[1].get()});
     back.expect(MessageKind::kWelcome);

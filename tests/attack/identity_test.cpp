@@ -36,11 +36,8 @@ class InANamespaceOfItsOwn {
 // Comes back as each of the nodes that there may have been.
 std::string come_back_as_others(const std::string& instance) {
   RawClient known(instance);
-  auto hello = RawClient::message(MessageKind::kHello, "thief");
-  hello.value = shm::kWireVersion;
-  known.send(hello);
-  const shm::Received welcome = known.expect(MessageKind::kWelcome);
-  hello.flags = shm::kRejoins | shm::kComesBack;
+  const shm::Received welcome = known.hello("thief");
+  auto hello = RawClient::hello_message("thief", shm::kRejoins | shm::kComesBack);
   for (hello.link = 1; hello.link < welcome.message.link; ++hello.link) {
     RawClient thief(instance);
     thief.send(hello, {welcome.descriptors[0].get(), welcome.descriptors[1].get()});

@@ -296,9 +296,7 @@ TEST_F(HostileClient, CannotBeMoreThanTheLimitOfItsUser) {
   std::string refusal;
   while (refusal.empty() && many.size() < shm::kMaxClients) {
     many.emplace_back(daemon_.instance());
-    auto hello = RawClient::message(MessageKind::kHello, "many");
-    hello.value = shm::kWireVersion;
-    many.back().send(hello);
+    many.back().send(RawClient::hello_message("many"));
     shm::Received answer;
     ASSERT_TRUE(many.back().receive(answer));
     if (answer.message.kind == MessageKind::kRefused) refusal = answer.message.text_view();

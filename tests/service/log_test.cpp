@@ -189,9 +189,7 @@ TEST(Log, NamesThatWouldMisleadItsReadersAreRefused) {
     EXPECT_THAT(client.expect_refusal(), HasSubstr(" in it")) << name;
   }
   RawClient client(daemon.instance());
-  auto hello = RawClient::message(shm::MessageKind::kHello, "evil\u009b");
-  hello.value = shm::kWireVersion;
-  client.send(hello);
+  client.send(RawClient::hello_message("evil\u009b"));
   EXPECT_THAT(client.expect_refusal(), HasSubstr("an invisible character"));
 }
 

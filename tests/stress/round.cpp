@@ -97,10 +97,7 @@ Round::~Round() {
 
 void Round::meet_daemon() {
   client_ = std::make_unique<test::RawClient>(daemon_.instance());
-  auto hello = test::RawClient::message(shm::MessageKind::kHello, "stress");
-  hello.value = shm::kWireVersion;
-  client_->send(hello);
-  const shm::Received welcome = client_->expect(shm::MessageKind::kWelcome);
+  const shm::Received welcome = client_->hello("stress");
   board_ = shm::Mapping(welcome.descriptors[0], sizeof(shm::Board), shm::Access::kReadOnly);
 }
 

@@ -64,12 +64,7 @@ class Listener {
     message.flags = flags;
     return ask(message);
   }
-  Words hello() {
-    auto message = RawClient::message(shm::MessageKind::kHello, "listener");
-    message.value = shm::kWireVersion;
-    message.flags = shm::kHasServiceThread;
-    return ask(message);
-  }
+  Words hello() { return ask(RawClient::hello_message("listener", shm::kHasServiceThread)); }
   // The kinds that answer a message of which there may be no answer: it comes before that to a
   // question that is asked after it.
   Words say(shm::MessageKind kind) {

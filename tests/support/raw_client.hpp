@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "shm/segment.hpp"
+#include "wire/call.hpp"
 #include "wire/messages.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -92,12 +93,18 @@ class RawClient {
     return true;
   }
 
-  void hello(const std::string& name = "raw", bool has_service_thread = false) {
-    auto hello = message(shm::MessageKind::kHello, name);
-    hello.value = shm::kWireVersion;
-    hello.flags = has_service_thread ? shm::kHasServiceThread : 0u;
-    send(hello);
-    expect(shm::MessageKind::kWelcome);
+  static shm::Message hello_message(const std::string& name, std::uint32_t flags = 0) {
+    wire::Caller caller;
+    caller.name = name;
+    caller.flags = flags;
+    shm::Message hello = wire::hello_of(caller);
+    hello.request = 77;
+    return hello;
+  }
+  // What it is welcomed with.
+  shm::Received hello(const std::string& name = "raw", std::uint32_t flags = 0) {
+    send(hello_message(name, flags));
+    return expect(shm::MessageKind::kWelcome);
   }
 
   nlohmann::json status() {
