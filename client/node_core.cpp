@@ -156,6 +156,7 @@ shm::Residence NodeCore::residence() const noexcept {
 shm::Message NodeCore::hello() const {
   shm::Message hello = message_of(shm::MessageKind::kHello, name_);
   hello.value = shm::kWireVersion;
+  hello.link = node_;
   hello.flags = shm::kComesBack | (options_.service_thread ? shm::kHasServiceThread : 0u);
   return hello;
 }
