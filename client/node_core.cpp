@@ -124,7 +124,11 @@ wire::Caller NodeCore::caller() const {
   return caller;
 }
 
-shm::Message NodeCore::hello() const { return wire::hello_of(caller()); }
+shm::Message NodeCore::hello() const {
+  shm::Message hello = wire::hello_of(caller());
+  hello.link = node_;
+  return hello;
+}
 
 // Not under a lock: a callback may do what it likes, and throw.
 void NodeCore::say_that_we_wait() const {

@@ -129,7 +129,8 @@ void NodeCore::rejoin() {
                                    core->bell().for_publishers()));
     }
   }
-  // With nothing to hand back there is nothing to keep of the old memory either.
+  // With nothing to hand back there is nothing to keep of the old memory either. But the hello says
+  // which node this was, lest the daemon keep names for it that it has closed or never got.
   is_anew_ = ports.empty();
   asked_ = shm::monotonic_now();
   const bool is_said = is_anew_ ? is_sent(*socket, hello()) : hand_back(*socket, ports);
@@ -153,7 +154,6 @@ bool NodeCore::hand_back(const shm::FileDescriptor& socket,
                          const std::vector<PortAtHand>& ports) const {
   shm::Message message = hello();
   message.flags |= shm::kRejoins;
-  message.link = node_;
   if (!is_sent(socket, message, {memory_->board().get(), memory_->registry().get()})) return false;
   for (const auto& page : memory_->pages_at_hand()) {
     message = {};

@@ -16,9 +16,11 @@
 #include "service/clients/errands.hpp"
 #include "service/clients/hang_up.hpp"
 #include "service/clients/headroom.hpp"
+#include "service/kept/step.hpp"
 #include "service/log/log.hpp"
 #include "service/log/log_sink.hpp"
 #include "service/policy/users.hpp"
+#include "shm/assertion.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
@@ -63,6 +65,7 @@ Daemon::Daemon(const DaemonOptions& options)
 
 Daemon::~Daemon() {
   unlink(listener_.path.c_str());
+  at_step("socket-removed");
   // Who has connected and was not accepted may have sent something, too.
   Errands::of_the_process().close(geteuid(), std::move(listener_.socket));
   while (!lobby_.empty()) {
@@ -71,6 +74,7 @@ Daemon::~Daemon() {
     }
   }
   takeover_.leave_nothing_if_nobody_is_left();
+  at_step("state-removed");
 }
 
 void Daemon::watch(int fd, Tag tag, ClientId client, std::uint32_t events) {
@@ -264,6 +268,7 @@ bool Daemon::serve(Client& client) {
 void Daemon::retry(Client& client) {
   Postponed request = std::move(client.to_retry.front());
   client.to_retry.pop_front();
+  ARBITER_ASSERT(client.postponed != 0, "a request is tried again that was not postponed");
   --client.postponed;
   request.request.give_back();  // or a user who has room for one could not have it wait on
   handle_or_refuse(client, request.request.received(), request.deadline);

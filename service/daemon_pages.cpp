@@ -10,6 +10,7 @@
 #include <exception>
 
 #include "service/daemon.hpp"
+#include "service/kept/step.hpp"
 #include "service/log/log.hpp"
 #include "shm/clock.hpp"
 
@@ -36,6 +37,7 @@ void Daemon::change_page(Source& source, const Client& client, std::uint64_t req
     if (asking == nullptr) return;
     names_.change_page(changing, user);
     switchboard_.ring_concerned(board_.in_force().table, id);
+    at_step("page-change-rung");
     try {
       changed(changing, *asking);
     } catch (const std::exception& error) {
@@ -43,8 +45,9 @@ void Daemon::change_page(Source& source, const Client& client, std::uint64_t req
       refuse(*asking, request, error.what());
     }
   };
-  barriers_.raise(switchboard_.show_next_page(source), shm::monotonic_now() + kMaxWaitForClients,
-                  pass);
+  const auto told = switchboard_.show_next_page(source);
+  at_step("next-page-shown");
+  barriers_.raise(told, shm::monotonic_now() + kMaxWaitForClients, pass);
 }
 
 bool Daemon::may_undo(const Source& source) const {

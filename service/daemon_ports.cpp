@@ -6,6 +6,7 @@
 #include "service/clients/given_names.hpp"
 #include "service/clients/replies.hpp"
 #include "service/daemon.hpp"
+#include "service/kept/step.hpp"
 #include "service/log/log.hpp"
 #include "shm/clock.hpp"
 
@@ -70,6 +71,7 @@ void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_p
     reply.flags = shm::kMayReplay;
   }
   client.send(reply, {source.page.writable.get(), -1});
+  at_step("output-open");
   log::info("{} opened output port {}", client.description(), source.name);
   connect(client, request, opened.instance);
 }
@@ -90,6 +92,7 @@ void Daemon::open_input(Client& client, shm::Received& received) {
   reply.port = opened.instance;
   reply.id = input.id;
   client.send(reply);
+  at_step("input-open");
   log::info("{} opened input port {}", client.description(), name);
   connect(client, received.message.request, opened.instance);
 }
@@ -102,6 +105,7 @@ void Daemon::connect(Client& client, std::uint64_t request, shm::PortInstance po
   // Hears of it in order, before the kConnected. But its receivers have to wait for an output port.
   if (switchboard_.output(port) == nullptr) told.erase(&client);
   introductions_.introduce(told, [this, id = client.id(), request] {
+    at_step("peers-ready");
     Client* const opener = clients_.find(id);
     if (opener != nullptr) opener->send(reply_to(request, shm::MessageKind::kConnected));
   });

@@ -6,6 +6,7 @@
 #include "service/daemon.hpp"
 #include "service/log/log.hpp"
 #include "service/status.hpp"
+#include "shm/assertion.hpp"
 #include "shm/clock.hpp"
 #include "shm/utf8.hpp"
 
@@ -164,11 +165,12 @@ void Daemon::hello(Client& client, const shm::Received& received) {
   if (message.name_view().empty()) throw std::runtime_error("a client must have a name");
   require_fine(message.name_view(), "the client's");
   const bool returns = (message.flags & shm::kRejoins) != 0;
-  client.charge = takeover_.make_room_for(client, returns ? message.link : 0);
+  client.charge = takeover_.make_room_for(client, message.link);
   client.name = message.name_view();
   client.hello_request = message.request;
   client.has_service_thread = (message.flags & shm::kHasServiceThread) != 0;
   client.comes_back = (message.flags & shm::kComesBack) != 0;
+  client.former = returns ? 0 : message.link;
   if (returns) {
     takeover_.rejoin(client, received);
   } else if (takeover_.is_over()) {
@@ -206,6 +208,8 @@ void Daemon::answer_status(shm::Nanoseconds now) {
     Client* const asking = clients_.find(each.client);
     if (asking == nullptr) continue;
     Client& client = *asking;
+    ARBITER_ASSERT(client.waits_for_status != 0,
+                   "a client is sent more documents than it asked for");
     --client.waits_for_status;
     if (document) {
       client.send(reply_to(each.request, shm::MessageKind::kStatusReply), {document.get(), -1});

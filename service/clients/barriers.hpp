@@ -9,6 +9,7 @@
 
 #include "service/clients/client.hpp"
 #include "shm/activity.hpp"
+#include "shm/assertion.hpp"
 
 namespace arbiter::service {
 
@@ -31,7 +32,8 @@ class Barriers {
       client->send(sync);
       barrier.waiting.insert(client->id());
     }
-    barriers_.emplace(number, std::move(barrier));
+    const bool is_first = barriers_.emplace(number, std::move(barrier)).second;
+    ARBITER_ASSERT(is_first, "a barrier is raised twice");
     pass(number);
   }
 
@@ -78,6 +80,7 @@ class Barriers {
     const auto found = barriers_.find(number);
     if (found == barriers_.end() || !found->second.waiting.empty()) return;
     const auto passed = std::move(found->second.passed);
+    ARBITER_ASSERT(passed != nullptr, "a barrier is passed twice");
     barriers_.erase(found);
     passed();
   }

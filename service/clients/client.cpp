@@ -16,6 +16,7 @@
 #include "service/clients/hang_up.hpp"
 #include "service/clients/headroom.hpp"
 #include "service/log/log.hpp"
+#include "shm/assertion.hpp"
 #include "shm/foreign.hpp"
 
 #ifndef SO_PEERPIDFD
@@ -134,8 +135,8 @@ void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescript
       lost_ = true;
       return;
     }
-    ++queued_descriptors_;
   }
+  queued_descriptors_ += count;  // of those that are queued: the above may give the client up
   queue_.push_back(std::move(queued));
 }
 
@@ -157,9 +158,12 @@ void Client::flush() {
     if (result == shm::SendResult::kFull || result == shm::SendResult::kTooMany) return;
     if (result == shm::SendResult::kClosed) lost_ = hung_up_ = true;
     flushed_in_vain_ = 0;
+    ARBITER_ASSERT(queued_descriptors_ >= count, "more descriptors leave a queue than were in it");
     queued_descriptors_ -= count;
     queue_.pop_front();
   }
+  ARBITER_ASSERT(!queue_.empty() || queued_descriptors_ == 0,
+                 "an empty queue is said to have descriptors in it");
 }
 
 shm::ReceiveResult Client::receive(shm::Received& received) {

@@ -91,8 +91,9 @@ class Client {
   // For messages to people: node "object-detector" (pid 4711).
   [[nodiscard]] std::string description() const;
 
-  std::string name;  // of the node; empty until it has said hello
-  NodeId node = 0;   // 0 until it has been welcomed
+  std::string name;   // of the node; empty until it has said hello
+  NodeId node = 0;    // 0 until it has been welcomed
+  NodeId former = 0;  // that it was before, and has nothing left of
   std::uint64_t hello_request = 0;
   bool is_turned_away = false;  // what it says after that is not heard
   bool has_service_thread = false;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "service/clients/hang_up.hpp"
+#include "shm/assertion.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -22,9 +23,11 @@ void InFlight::add(Shares& shares, uid_t user, std::uint64_t descriptors) {
   sent_.push_back(is_within_share ? shares.take(user, Share::kInFlight, descriptors)
                                   : shares.take_own(Share::kInFlight, descriptors));
   count_ += descriptors;
+  ARBITER_ASSERT(count_ >= descriptors, "more descriptors are under way than can be counted");
 }
 
 void InFlight::look(int socket) {
+  ARBITER_ASSERT(sent_.empty() == (count_ == 0), "descriptors are under way that were not sent");
   int unread = 0;
   if (sent_.empty() || ioctl(socket, SIOCOUTQ, &unread) != 0 || unread != 0) return;
   sent_.clear();

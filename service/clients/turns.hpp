@@ -12,6 +12,8 @@
 #include <optional>
 #include <set>
 
+#include "shm/assertion.hpp"
+
 namespace arbiter::service {
 
 class Turns {
@@ -34,7 +36,8 @@ class Turns {
     const auto queue = by_user_.find(user);
     const ClientId client = queue->second.front();
     queue->second.pop_front();
-    waiting_.erase(client);
+    const bool has_waited = waiting_.erase(client) == 1;
+    ARBITER_ASSERT(has_waited, "a client that does not wait has its turn");
     if (queue->second.empty()) {
       by_user_.erase(queue);
     } else {

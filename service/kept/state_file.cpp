@@ -7,6 +7,8 @@
 #include <fstream>
 #include <system_error>
 
+#include "service/kept/step.hpp"
+
 namespace arbiter::service {
 
 StateFile::StateFile(const std::string& directory, const std::string& instance)
@@ -42,15 +44,18 @@ void StateFile::write(const Realm& realm, const std::vector<Process>& components
       throw std::system_error(errno, std::generic_category(), "writing " + draft);
     }
   }
+  at_step("state-drafted");
   if (std::rename(draft.c_str(), path_.c_str()) != 0) {
     throw std::system_error(errno, std::generic_category(), "writing " + path_);
   }
+  at_step("state-replaced");
   size_ = components.size();
 }
 
 void StateFile::add(const Process& component) noexcept {
   std::ofstream(path_, std::ios::app)
       << "component " << component.pid << ' ' << component.started << std::endl;
+  at_step("component-written-down");
   ++size_;
 }
 

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "service/kept/handed_back.hpp"
+#include "service/kept/step.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
@@ -47,6 +48,7 @@ void Board::inherit(const shm::FileDescriptor& board) {
   writer_ = shm::TableWriter(*mapping_.as<shm::Board>());
   reader_ = shm::TableReader(*mapping_.as<shm::Board>());
   writer_.renew_pages();  // the last daemon may have died while it changed one
+  at_step("board-taken-up");
   names_.use_board(writer_);
 }
 
@@ -69,12 +71,15 @@ void Board::prepare(const Layout& layout, const std::string& name) {
   const std::uint64_t generation = writer_.next_generation();
   layout.mark_used(generation);
   registry_.name_model(generation, name);
+  at_step("model-named");
   writer_.write(words);
+  at_step("table-written");
 }
 
 void Board::put_in_force() {
   in_force_since_ = shm::monotonic_now();
   writer_.put_in_force();
+  at_step("table-in-force");
   names_.set_generation(reader_.generation());
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "rules/model/load.hpp"
+#include "shm/assertion.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -76,8 +77,12 @@ std::vector<ModelPointer> read_models(const std::vector<NamedFiles>& named, cons
 }
 
 Layout::Pins::~Pins() {
-  for (Source* source : sources) --source->pins;
-  for (InputName* input : inputs) --input->pins;
+  const auto unpin = [](std::uint32_t& pins) {
+    ARBITER_ASSERT(pins != 0, "a name is let go more often than it was kept");
+    --pins;
+  };
+  for (Source* source : sources) unpin(source->pins);
+  for (InputName* input : inputs) unpin(input->pins);
 }
 
 shm::SourceId Layout::Pins::pin(Source& source) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "service/clients/replies.hpp"
+#include "service/kept/step.hpp"
 #include "service/log/log.hpp"
 #include "service/policy/users.hpp"
 
@@ -148,6 +149,7 @@ void ModelChanges::begin_swap(Swap& swap) {
   board_.prepare(*swap.to.layout, swap.to.model->name);
   swap_ = std::move(swap);
   auto told = switchboard_.link_all(board_.prepared());
+  at_step("links-made-ahead");
   // The table itself, all who will read it have to map.
   for (const auto& [id, client] : clients_) {
     if (!client->ports.empty()) told.insert(client.get());
@@ -171,12 +173,15 @@ void ModelChanges::put_in_force() {
   }
   // Ports that were opened meanwhile.
   introductions_.introduce(switchboard_.link_all(snapshot.table), [] {});
+  at_step("links-made-late");
   switchboard_.unlink(snapshot.table);
   switchboard_.tell_unmentioned(snapshot);
   switchboard_.ring_all();
+  at_step("all-rung");
   log::info("model {} is in force: {} \"{}\"{}", snapshot.generation, swap.how, model.name,
             swap.change.by.empty() ? "" : ", by " + swap.change.by);
   remember(swap, snapshot.generation);
+  at_step("change-remembered");
   settled_();
   nlohmann::json changes = nlohmann::json::parse(swap.changes);
   if (!changes.is_null()) {

@@ -3,10 +3,10 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <cassert>
 #include <limits>
 
 #include "service/policy/users.hpp"
+#include "shm/assertion.hpp"
 #include "shm/limits.hpp"
 
 namespace arbiter::service {
@@ -71,8 +71,10 @@ Charge::~Charge() {
 }
 
 Shares::~Shares() {
-  assert(accounts_.empty());
-  assert(std::all_of(all_.taken.begin(), all_.taken.end(), [](auto left) { return left == 0; }));
+  ARBITER_ASSERT(accounts_.empty(), "a user's share is still taken when the daemon ends");
+  for (const std::uint64_t left : all_.taken) {
+    ARBITER_ASSERT(left == 0, "a share is still taken when the daemon ends");
+  }
 }
 
 void Shares::add(Account& account, Share what, std::uint64_t amount) {
@@ -93,13 +95,16 @@ Charge Shares::take_own(Share what, std::uint64_t amount) {
 
 void Shares::give_back(const Charge& charge) noexcept {
   const std::size_t at = index(charge.what_);
+  ARBITER_ASSERT(all_.taken[at] >= charge.amount_, "more of a share is given back than was taken");
   all_.taken[at] -= charge.amount_;
   if (charge.own_) {
+    ARBITER_ASSERT(own_.taken[at] >= charge.amount_, "the daemon gives back more than it took");
     own_.taken[at] -= charge.amount_;
     return;
   }
   const auto account = accounts_.find(charge.user_);
-  assert(account != accounts_.end() && account->second.taken[at] >= charge.amount_);
+  ARBITER_ASSERT(account != accounts_.end() && account->second.taken[at] >= charge.amount_,
+                 "more of a user's share is given back than was taken");
   account->second.taken[at] -= charge.amount_;
   const auto& taken = account->second.taken;
   const bool is_empty =

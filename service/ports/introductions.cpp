@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "service/kept/step.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
@@ -10,6 +11,7 @@ void Introductions::introduce(const Switchboard::Told& told, std::function<void(
   const shm::Nanoseconds deadline = shm::monotonic_now() + kMaxWaitForClients;
   barriers_.raise(told, deadline, [this, deadline, passed = std::move(passed)] {
     const auto receivers = switchboard_.show_segments();
+    at_step("segments-shown");
     if (switchboard_.has_growth_to_show() && show_growth_at_ == shm::kForever) {
       show_growth_at_ = shm::monotonic_now() + kShowGrowthAfter;
     }

@@ -8,6 +8,8 @@
 
 #include "service/kept/descriptor_store.hpp"
 #include "service/kept/handed_back.hpp"
+#include "service/kept/step.hpp"
+#include "shm/assertion.hpp"
 #include "shm/limits.hpp"
 #include "shm/table_ring.hpp"
 
@@ -58,6 +60,7 @@ void PortNames::restore(std::uint64_t generation) {
     source->page_number = board_.page_number(id);
     const RegistryEntry& entry = registry_.source(id);
     source->name = entry.name();
+    if (source_ids_.contains(source->name)) source->name.clear();  // no daemon of ours writes that
     if (!source->name.empty()) {
       source->page_user = entry.page_user(source->page_number);
       source->used_by_generation = generation;
@@ -75,6 +78,7 @@ void PortNames::restore(std::uint64_t generation) {
     input->id = id;
     const RegistryEntry& entry = registry_.input(id);
     input->name = entry.name();
+    if (input_ids_.contains(input->name)) input->name.clear();
     if (!input->name.empty()) {
       input->used_by_generation = generation;
       input->away = entry.owner().port;
@@ -115,14 +119,17 @@ void PortNames::forget_lost_pages() {
 void PortNames::give_page(Source& source, uid_t user) {
   source.page_user = user;
   registry_.source(source.id).set_page_user(source.page_number, user);
+  at_step("page-given");
 }
 
 void PortNames::prepare_page(Source& source, PageUser user) {
   if (source.next) return;
   Charge charge = take(user, Share::kDescriptors, kDescriptorsOfPage);
   source.next = make_page();
+  at_step("next-page-made");
   source.next_charge = std::move(charge);
   store_page(source, source.next, source.page_number + 1);
+  at_step("next-page-stored");
 }
 
 // A daemon that is killed here leaves one page in force or the other: the store to the board says
@@ -130,7 +137,9 @@ void PortNames::prepare_page(Source& source, PageUser user) {
 void PortNames::change_page(Source& source, PageUser user) {
   const shm::PageNumber number = source.page_number + 1;
   registry_.source(source.id).set_page(number, FileIdentity::of(source.next.writable).inode, user);
+  at_step("next-page-registered");
   board_.change_page(source.id, source.activity(), source.activity_on(source.next));
+  at_step("page-changed");
   source.page = std::exchange(source.next, {});
   source.page_charge = std::move(source.next_charge);
   source.page_number = number;
@@ -138,6 +147,7 @@ void PortNames::change_page(Source& source, PageUser user) {
   pages_->attach(source.id, &source.activity());
   announce(source);
   discard_page(source, number - 1);
+  at_step("former-page-discarded");
 }
 
 // Whom a table in the ring names, or one that may come, or a live port, or who is being changed.
@@ -178,7 +188,9 @@ shm::Nanoseconds PortNames::give_back(shm::Nanoseconds now) {
 }
 
 void PortNames::forget(Source& source) {
+  ARBITER_ASSERT(source.open == 0 && source.away == 0, "a source is forgotten that somebody has");
   registry_.forget_source(source.id);
+  at_step("source-forgotten");
   discard_page(source, source.page_number);
   if (source.next) discard_page(source, source.page_number + 1);
   source_ids_.erase(source.name);
@@ -195,7 +207,9 @@ void PortNames::forget(Source& source) {
 }
 
 void PortNames::forget(InputName& input) {
+  ARBITER_ASSERT(input.open == 0 && input.away == 0, "a port is forgotten that somebody has");
   registry_.forget_input(input.id);
+  at_step("input-forgotten");
   input_ids_.erase(input.name);
   news_.erase(input.news);
   input.name.clear();
@@ -267,11 +281,15 @@ Source& PortNames::source(const std::string& name, PageUser user) {
   // A page of its own: who had the last one of this id open may still write there.
   const shm::PageNumber number = source.page_number + 1;
   registry_.source(source.id).set_page(number, FileIdentity::of(page.writable).inode, {});
+  at_step("first-page-registered");
   board_.give_page(source.id, number);
+  at_step("first-page-numbered");
   registry_.name_source(source.id, name);
+  at_step("source-named");
   source.page = std::move(page);
   source.page_number = number;
   store_page(source, source.page, number);
+  at_step("first-page-stored");
   source.name = name;
   source.used_by_generation = 0;
   source_ids_[name] = source.id;
@@ -288,6 +306,7 @@ InputName& PortNames::input(const std::string& name, PageUser user) {
   InputName& input = unused_input();
   input.charge = std::move(charge);
   registry_.name_input(input.id, name);
+  at_step("input-named");
   input.name = name;
   input.used_by_generation = 0;
   input_ids_[name] = input.id;

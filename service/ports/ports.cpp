@@ -79,9 +79,9 @@ PortBell::~PortBell() {
 }
 
 void PortBell::ring() const {
-  if (asked_.exchange(true)) return;
+  if (pending_.ask()) return;
   Errands::of_the_process().run(user_, [self = shared_from_this()] {
-    self->asked_.store(false);
+    self->pending_.begin();
     shm::ring_bell(self->pipe_.get());
   });
 }

@@ -4,13 +4,13 @@
 
 #include <sys/types.h>
 
-#include <atomic>
 #include <map>
 #include <memory>
 #include <string>
 #include <utility>
 
 #include "service/clients/client.hpp"
+#include "service/ports/pending_ring.hpp"
 #include "service/ports/port_names.hpp"
 #include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
@@ -43,9 +43,7 @@ class PortBell : public std::enable_shared_from_this<PortBell> {
  private:
   shm::FileDescriptor pipe_;
   const uid_t user_;
-  // Whether an errand has yet to begin. Sequentially consistent, off every fast path: whoever finds
-  // it set asked before the errand cleared it, hence before it rings.
-  mutable std::atomic<bool> asked_{false};
+  mutable PendingRing pending_;
 };
 
 // Descriptors that the daemon keeps of a port.

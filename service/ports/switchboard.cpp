@@ -1,6 +1,8 @@
 #include "service/ports/switchboard.hpp"
 
+#include "service/kept/step.hpp"
 #include "service/log/log.hpp"
+#include "shm/assertion.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -26,6 +28,7 @@ OutputPort& Switchboard::add(std::unique_ptr<OutputPort> port, Client& client, S
   OutputPort& added = *port;
   insert(std::move(port), client, source);
   registry_.source(source.id).set_owner(owner(client, added.instance));
+  at_step("output-owner-registered");
   return added;
 }
 
@@ -34,12 +37,14 @@ InputPort& Switchboard::add(std::unique_ptr<InputPort> port, Client& client, Inp
   InputPort& added = *port;
   insert(std::move(port), client, name);
   registry_.input(name.id).set_owner(owner(client, added.instance));
+  at_step("input-owner-registered");
   return added;
 }
 
 void Switchboard::insert(std::unique_ptr<OutputPort> port, Client& client, Source& source) {
   port->client = &client;
   port->source = &source;
+  ARBITER_ASSERT(source.open == 0, "a source would have two writers");
   source.open = port->instance;
   source.away = 0;
   client.ports.insert(port->instance);
@@ -49,6 +54,7 @@ void Switchboard::insert(std::unique_ptr<OutputPort> port, Client& client, Sourc
 void Switchboard::insert(std::unique_ptr<InputPort> port, Client& client, InputName& name) {
   port->client = &client;
   port->name = &name;
+  ARBITER_ASSERT(name.open == 0, "an input port would have two owners");
   name.open = port->instance;
   name.away = 0;
   client.ports.insert(port->instance);
@@ -71,23 +77,33 @@ void Switchboard::remove(shm::PortInstance port) {
     link = links_.erase(link);
   }
   end_claims_on(port);
+  at_step("peers-told-of-the-end");
   if (const auto found = outputs_.find(port); found != outputs_.end()) {
     registry_.source(found->second->source->id).clear_owner();
+    at_step("output-owner-cleared");
   }
   if (const auto found = inputs_.find(port); found != inputs_.end()) {
     registry_.input(found->second->name->id).clear_owner();
+    at_step("input-owner-cleared");
   }
   erase(port);
 }
 
 void Switchboard::erase(shm::PortInstance port) {
+  ARBITER_ASSERT(outputs_.count(port) + inputs_.count(port) == 1, "a port is closed twice");
+  const auto link = links_.lower_bound({port, 0});
+  ARBITER_ASSERT(link == links_.end() || link->first.first != port,
+                 "a port has links when it is closed");
   if (const auto found = outputs_.find(port); found != outputs_.end()) {
+    ARBITER_ASSERT(found->second->source->open == port,
+                   "a port is closed that is not its source's");
     found->second->source->open = 0;
     names_.let_go(*found->second->source);
     found->second->client->ports.erase(port);
     outputs_.erase(found);
   }
   if (const auto found = inputs_.find(port); found != inputs_.end()) {
+    ARBITER_ASSERT(found->second->name->open == port, "a port is closed that is not its name's");
     found->second->name->open = 0;
     names_.let_go(*found->second->name);
     found->second->client->ports.erase(port);
@@ -198,6 +214,7 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
   to_output.link = link.number = connects ? registry_.next_link() : 0;
   to_output.set_name(input.name->name);
   output.client->send(to_output, {input.segment.get(), input.bell->descriptor()});
+  at_step("publisher-introduced");
   told.insert(output.client);
   if (link.is_refused()) {
     tell_refusal({output.instance, input.instance}, output.instance, link.mismatch);
@@ -210,6 +227,7 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
   to_input.link = link.number;
   to_input.set_name(output.source->name);
   input.client->send(to_input, {output.segment.get(), -1});
+  at_step("receiver-introduced");
   told.insert(input.client);
   fresh_.emplace_back(output.instance, input.instance);
 }
@@ -270,7 +288,9 @@ Switchboard::Told Switchboard::unlink(const shm::TableView& table) {
       const OutputPort& output = *outputs_.at(key.first);
       const InputPort& input = *inputs_.at(key.second);
       output.client->send(message_to(shm::MessageKind::kDisconnected, key.first, key.second));
+      at_step("publisher-disconnected");
       input.client->send(message_to(shm::MessageKind::kDisconnected, key.second, key.first));
+      at_step("receiver-disconnected");
       told.insert(output.client);
       told.insert(input.client);
     }

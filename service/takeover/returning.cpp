@@ -6,6 +6,7 @@
 
 #include "service/clients/given_names.hpp"
 #include "service/clients/replies.hpp"
+#include "service/kept/step.hpp"
 #include "service/log/log.hpp"
 #include "service/takeover/takeover.hpp"
 #include "shm/clock.hpp"
@@ -62,6 +63,7 @@ void Takeover::take_back(Client& client, const shm::Received& hello) {
   }
   client.is_returning = true;
   client.is_component = true;
+  at_step("node-known-again");
   host_.welcome(client);
 }
 
@@ -81,21 +83,30 @@ void Takeover::take_back_output(Client& client, const shm::Received& received) {
   const shm::Message& message = received.message;
   Source* source = names_.source_by_id(message.id);
   if (source == nullptr || source->away != message.port ||
-      client.to_hand_back.erase(message.port) == 0) {
+      client.to_hand_back.count(message.port) == 0) {
     throw std::runtime_error("an output port that it never had was handed back");
   }
-  names_.take_page(message.id, received.descriptors[1]);
-  switchboard_.readmit(adopt_output(received, client.user()), client, *source);
+  // Without the page that is in force nobody would know of its activity.
+  if (!names_.take_page(message.id, received.descriptors[1])) {
+    throw std::runtime_error("an output port was handed back with a page that is not its own");
+  }
+  auto port = adopt_output(received, client.user());
+  client.to_hand_back.erase(message.port);
+  switchboard_.readmit(std::move(port), client, *source);
+  at_step("output-readmitted");
 }
 
 void Takeover::take_back_input(Client& client, const shm::Received& received) {
   const shm::Message& message = received.message;
   InputName* input = names_.input_by_id(message.id);
   if (input == nullptr || input->away != message.port ||
-      client.to_hand_back.erase(message.port) == 0) {
+      client.to_hand_back.count(message.port) == 0) {
     throw std::runtime_error("an input port that it never had was handed back");
   }
-  switchboard_.readmit(adopt_input(received, client.user()), client, *input);
+  auto port = adopt_input(received, client.user());
+  client.to_hand_back.erase(message.port);
+  switchboard_.readmit(std::move(port), client, *input);
+  at_step("input-readmitted");
 }
 
 void Takeover::take_back_link(const Client& client, const shm::Message& message) {
@@ -117,6 +128,7 @@ void Takeover::finish_return(Client& client) {
   away.erase(0);
   const auto is_away = [&](shm::PortInstance port) { return away.contains(port); };
   for (const shm::PortInstance port : client.ports) switchboard_.settle_claims(port, is_away);
+  at_step("claims-settled");
   const auto table = board_.in_force().table;
   switchboard_.link_all(table);
   switchboard_.unlink(table);
@@ -140,11 +152,32 @@ void Takeover::set_away(Client& client) {
 void Takeover::forget_absentee(NodeId node) {
   const auto found = absentees_.find(node);
   if (found == absentees_.end()) return;
-  const Absentee absentee = std::move(found->second);
-  absentees_.erase(found);
+  log::info("process {} has ended, {} ports with it", found->second.pid,
+            found->second.ports.size());
+  give_up(node);
+}
+
+void Takeover::give_up(NodeId node) {
+  const Absentee absentee = std::move(absentees_.at(node));
+  absentees_.erase(node);
   for (const shm::PortInstance port : absentee.ports) switchboard_.forget_away(port);
   host_.try_postponed();
-  log::info("process {} has ended, {} ports with it", absentee.pid, absentee.ports.size());
+}
+
+void Takeover::forget_former(const Client& client) {
+  const auto found = absentees_.find(client.former);
+  if (found == absentees_.end() ||
+      !client.is_process(found->second.pid, found->second.process.get())) {
+    return;
+  }
+  log::info("{} is here again, without the {} ports that were kept for it", client.description(),
+            found->second.ports.size());
+  give_up(client.former);
+}
+
+void Takeover::know(const Client& client) {
+  strangers_.welcome(client);
+  forget_former(client);
 }
 
 Charge Takeover::make_room_for(const Client& newcomer, NodeId former) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "service/kept/descriptor_store.hpp"
+#include "service/kept/step.hpp"
 #include "service/log/log.hpp"
 #include "shm/clock.hpp"
 
@@ -86,7 +87,9 @@ void Takeover::inherit(const shm::FileDescriptor& board, const shm::FileDescript
   Registry inherited(registry);
   board_.inherit(board);
   registry_ = std::move(inherited);
+  at_step("registry-taken-up");
   names_.restore(board_.in_force().generation);
+  at_step("names-restored");
   find_absentees();
   phase_ = Phase::kTakingOver;
   log::info("taking over from the last daemon, {} components and model {}", absentees_.size(),
@@ -128,14 +131,19 @@ void Takeover::finish() {
     }
     if (stores_) {
       discard_stored("board");
+      at_step("store-half-emptied");
       discard_stored("registry");
+      at_step("store-emptied");
       store("board", board_.writable());
+      at_step("board-stored");
       store("registry", registry_.writable());
+      at_step("registry-stored");
     }
   }
   phase_ = Phase::kServing;
   host_.try_postponed();
   names_.forget_lost_pages();
+  at_step("about-to-serve");
   host_.begin_to_serve(is_fresh);
 }
 
@@ -147,6 +155,9 @@ shm::Nanoseconds Takeover::deadline() const {
 
 void Takeover::advance(shm::Nanoseconds now) {
   if (phase_ == Phase::kServing) return;
+  for (const ClientId id : waiting_) {
+    if (const Client* const client = clients_.find(id)) forget_former(*client);
+  }
   const bool all_are_back = phase_ == Phase::kTakingOver && absentees_.empty() &&
                             std::none_of(clients_.begin(), clients_.end(), [](const auto& each) {
                               return each.second->is_returning;

@@ -95,7 +95,7 @@ class Takeover {
   void hear_stranger(const Client& client, const shm::Message& message) noexcept;
   [[nodiscard]] const Strangers& strangers() const { return strangers_; }
   // That component is no stranger from now on.
-  void know(const Client& client) { strangers_.welcome(client); }
+  void know(const Client& client);
 
   // The conversation with a component is lost, and its process lives: its ports are kept for it.
   void set_away(Client& client);
@@ -126,6 +126,10 @@ class Takeover {
   void find_absentees();
   void add_absentee(const Owner& owner);
   void take_back(Client& client, const shm::Received& hello);
+  // Nothing is kept for the node that a client was and has nothing left of: what it closed without
+  // a daemon, or was never told that it got.
+  void forget_former(const Client& client);
+  void give_up(NodeId node);
   void finish();
   void remember_components();
 

@@ -6,6 +6,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "tests/support/child_process.hpp"
 
@@ -13,8 +14,9 @@ namespace arbiter::test {
 
 class Component {
  public:
-  // Starts the process and makes its node.
-  explicit Component(const std::string& node) {
+  // Starts the process and makes its node. `by`: a program that is given the command line to
+  // execute.
+  explicit Component(const std::string& node, std::vector<std::string> by = {}) {
     int in[2];
     int out[2];
     if (::pipe2(in, O_CLOEXEC) != 0 || ::pipe2(out, O_CLOEXEC) != 0) {
@@ -24,7 +26,8 @@ class Component {
     const shm::FileDescriptor child_out(out[1]);
     say_.reset(in[1]);
     hear_.reset(out[0]);
-    process_ = ChildProcess({ARBITER_COMPONENT}, {}, {child_in.get(), child_out.get(), -1});
+    by.push_back(ARBITER_COMPONENT);
+    process_ = ChildProcess(by, {}, {child_in.get(), child_out.get(), -1});
     if (const auto answer = tell("node " + node); answer != "done") {
       throw std::runtime_error(answer);
     }
@@ -56,6 +59,9 @@ class Component {
       heard_.append(buffer, static_cast<std::size_t>(size));
     }
   }
+
+  // Readable once there is an answer.
+  [[nodiscard]] int descriptor() const { return hear_.get(); }
 
   [[nodiscard]] ChildProcess& process() { return process_; }
   // At whatever instruction it is.

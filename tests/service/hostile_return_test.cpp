@@ -16,6 +16,7 @@
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/raw_port.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -154,6 +155,37 @@ TEST(HostileReturn, PutsNoPageInPlaceOfAnother) {
 }
 
 // What a successor believes is what the predecessor wrote down, not what comes first.
+// Its activity would be nowhere. The port is not taken back then, and its name is free.
+TEST(HostileReturn, HandsBackNoOutputWithoutThePageInForce) {
+  Daemon daemon(single_model());
+  auto hello = RawClient::message(MessageKind::kHello, "liar");
+  hello.value = shm::kWireVersion;
+  hello.flags = shm::kComesBack;
+  RawClient former(daemon.instance());
+  former.send(hello);
+  const shm::Received welcome = former.expect(MessageKind::kWelcome);
+  const auto segment = raw_output_segment();
+  const shm::Message opened = open_raw_output(former, "/out", segment).message;
+  daemon.kill();
+  daemon.restart();
+  RawClient liar(daemon.instance());
+  liar.send(return_as(welcome.message.link),
+            {welcome.descriptors[0].get(), welcome.descriptors[1].get()});
+  liar.expect(MessageKind::kWelcome);
+  auto output = RawClient::message(MessageKind::kHandBackOutput, "/out");
+  output.port = opened.port;
+  output.id = opened.id;
+  const auto page = sealed(sizeof(shm::ActivityPage));
+  liar.send(output, {segment.get(), page.get()});
+  EXPECT_NE(liar.expect_refusal().find("a page that is not its own"), std::string::npos);
+  liar.send(RawClient::message(MessageKind::kHandedBack));
+  Node node("honest");
+  auto in = node.input_port<Number>("/in");
+  auto out = node.output_port<Number>("/out");
+  EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
+  EXPECT_EQ(take_from(in), 1);
+}
+
 TEST(HostileReturn, ToANewDaemonWithAnOldBoardIsRefusedAndOthersAreTakenBack) {
   Daemon daemon(single_model());
   const Given old(daemon);

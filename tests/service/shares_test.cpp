@@ -52,6 +52,17 @@ TEST(Shares, SomethingIsKeptForRootAndTheDaemonsUser) {
   EXPECT_GE(take_all(shares, 0, charges) + take_all(shares, kDaemonsUser, charges), 100u);
 }
 
+// In releases too (shm/assertion.hpp).
+TEST(SharesDeathTest, EndInADeathIfSomethingWasNotGivenBack) {
+  const auto forget = [] {
+    Charge charge;
+    Shares shares(of_each(1600), 50, kDaemonsUser);
+    charge = shares.take(kOne, Share::kInputs, 700);
+  };
+  EXPECT_DEATH(forget(),
+               "a mistake in the program: a user's share is still taken when the daemon ends");
+}
+
 TEST(Shares, AreGivenBackWithTheCharge) {
   Shares shares(of_each(1600), 50, kDaemonsUser);
   {

@@ -179,6 +179,22 @@ TEST(Takeover, WhatClosedMeanwhileIsClosed) {
   EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
 }
 
+// Then it comes back without anything, and is not what it was.
+TEST(Takeover, WhatClosedMeanwhileIsClosedThoughItWasAllThereWas) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto in = node.input_port<Number>("/in");
+  Component sender("sender");
+  ASSERT_EQ(sender.tell("output /out"), "open");
+  daemon.kill();
+  ASSERT_EQ(sender.tell("close /out"), "closed");
+  daemon.restart();
+  auto out = node.output_port<Number>("/out");
+  EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
+  EXPECT_EQ(take_from(in), 1);
+  EXPECT_EQ(sender.tell("output /other"), "open");
+}
+
 TEST(Takeover, OpeningWaitsForADaemon) {
   Daemon daemon(single_model());
   const auto patient = [](std::atomic<int>& told) {

@@ -76,7 +76,7 @@ class NotifySocket {
       if (message.empty() && polled[1].revents != 0) return false;
     }
   }
-  // What the daemon has asked to be kept (FDSTORE=1), by name.
+  // What the daemon has asked to be kept (FDSTORE=1) and not to be given up, by name.
   const std::map<std::string, shm::FileDescriptor>& stored() {
     while (!receive().empty()) {
     }
@@ -84,6 +84,10 @@ class NotifySocket {
   }
 
  private:
+  static std::string name_in(const std::string& message) {
+    const auto name = message.find("FDNAME=") + std::strlen("FDNAME=");
+    return message.substr(name, message.find('\n', name) - name);
+  }
   // Empty: there is none.
   std::string receive() {
     char text[512];
@@ -97,11 +101,11 @@ class NotifySocket {
     const ssize_t size = ::recvmsg(socket_.get(), &header, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
     if (size <= 0) return {};
     const std::string message(text, static_cast<std::size_t>(size));
+    if (message.find("FDSTOREREMOVE=1") != std::string::npos) stored_.erase(name_in(message));
     if (const cmsghdr* part = CMSG_FIRSTHDR(&header); part != nullptr) {
       int fd = -1;
       std::memcpy(&fd, CMSG_DATA(part), sizeof fd);
-      const auto name = message.find("FDNAME=") + std::strlen("FDNAME=");
-      stored_[message.substr(name, message.find('\n', name) - name)].reset(fd);
+      stored_[name_in(message)].reset(fd);
     }
     return message;
   }
@@ -127,6 +131,7 @@ class Daemon {
     std::optional<std::string> runtime_directory{};  // else one of its own
     std::optional<int> max_descriptors{};
     std::vector<std::string> by{};  // a program that is given the daemon's command line to execute
+    std::string program = arbiterd_path();
   };
 
   explicit Daemon(const std::string& model = kNoRules) : Daemon(model, Options()) {}
@@ -255,7 +260,7 @@ class Daemon {
   }
 
   void start(const std::vector<std::string>& by = {}) {
-    std::vector<std::string> argv{arbiterd_path(), "--instance", options_.instance, "--log-level",
+    std::vector<std::string> argv{options_.program, "--instance", options_.instance, "--log-level",
                                   "debug"};
     if (!options_.without_model) {
       argv.insert(argv.end(), {"--model", directory_.path() + "/model.xml"});
