@@ -7,7 +7,7 @@
 #include <cerrno>
 #include <cstddef>
 
-#include "service/gate.hpp"
+#include "service/policy/users.hpp"
 
 namespace {
 
