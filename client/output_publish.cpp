@@ -51,13 +51,13 @@ void OutputCore::stamp(shm::ActivityWord word) noexcept {
   shm::full_fence();
 }
 
-Outcome OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
+Counts OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
   if (!rules_are_bound()) bind_rules_and_view();
   const bool begins = !shm::is_active(own_word_, now);
   stamp(shm::arrival(now, timeout_));
   last_ = now;
-  Outcome outcome;
+  Counts outcome;
   if (!destinations_.empty()) {
     decide_all(now);
     outcome = hand_over(slot, size, now);
@@ -92,8 +92,8 @@ void OutputCore::decide_all(shm::Nanoseconds now) noexcept {
   for (SharedDecision& decision : decisions_) decision.verdict = shm::Verdict::kUnsettled;
 }
 
-Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
-  Outcome outcome;
+Counts OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
+  Counts outcome;
   const bool is_sample = slot != shm::kNoSlot;
   if (is_sample) {
     shm::SlotHeader& header = segment_.slot_header(slot);
@@ -106,7 +106,7 @@ Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanosec
   for (Destination& destination : destinations_) {
     if (!destination.joined) {
       if (!destination.refused) continue;
-      const Outcome refusal = refuse(destination, is_sample);
+      const Counts refusal = refuse(destination, is_sample);
       outcome.discarded += refusal.discarded;
       outcome.refused += refusal.refused;
       continue;
@@ -161,8 +161,8 @@ Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanosec
 
 // What becomes of an arrival at a port whose connection is refused: it may be the winner there, but
 // is never handed over.
-Outcome OutputCore::refuse(const Destination& destination, bool is_sample) const noexcept {
-  Outcome outcome;
+Counts OutputCore::refuse(const Destination& destination, bool is_sample) const noexcept {
+  Counts outcome;
   if (!destination.has_rule) return outcome;
   const bool wins = decisions_[destination.decision].verdict == shm::Verdict::kWins;
   outcome.discarded = wins ? 0 : 1;
@@ -235,15 +235,14 @@ bool OutputCore::selection_differs(const Destination& destination) noexcept {
   return believed != shm::kNone;
 }
 
-Outcome OutputCore::publish_loan(std::uint32_t slot, std::size_t size,
-                                 shm::Nanoseconds now) noexcept {
-  const Outcome outcome = arrive(slot, size, now);
+Counts OutputCore::publish_loan(std::uint32_t slot, std::size_t size,
+                                shm::Nanoseconds now) noexcept {
+  const Counts outcome = arrive(slot, size, now);
   end_loan(slot);
   return outcome;
 }
 
-Outcome OutputCore::publish_copy(const void* data, std::size_t size,
-                                 shm::Nanoseconds now) noexcept {
+Counts OutputCore::publish_copy(const void* data, std::size_t size, shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
   const std::uint32_t slot = acquire_slot();
   if (slot == shm::kNoSlot) {
@@ -251,12 +250,12 @@ Outcome OutputCore::publish_copy(const void* data, std::size_t size,
     return signal(now);  // it did arrive
   }
   if (size != 0) std::memcpy(segment_.payload(slot), data, size);
-  const Outcome outcome = arrive(slot, size, now);
+  const Counts outcome = arrive(slot, size, now);
   pool_.end_loan(slot);
   return outcome;
 }
 
-Outcome OutputCore::signal(shm::Nanoseconds now) noexcept { return arrive(shm::kNoSlot, 0, now); }
+Counts OutputCore::signal(shm::Nanoseconds now) noexcept { return arrive(shm::kNoSlot, 0, now); }
 
 // What comes at the deadline itself is in time.
 Outcome OutputCore::publish_loan_by(shm::Nanoseconds deadline, std::uint32_t slot, std::size_t size,
@@ -268,11 +267,13 @@ Outcome OutputCore::publish_loan_by(shm::Nanoseconds deadline, std::uint32_t slo
 
 Outcome OutputCore::publish_copy_by(shm::Nanoseconds deadline, const void* data, std::size_t size,
                                     shm::Nanoseconds now) noexcept {
-  return now <= deadline ? publish_copy(data, size, now) : be_late();
+  if (now <= deadline) return publish_copy(data, size, now);
+  return be_late();
 }
 
 Outcome OutputCore::signal_by(shm::Nanoseconds deadline, shm::Nanoseconds now) noexcept {
-  return now <= deadline ? signal(now) : be_late();
+  if (now <= deadline) return signal(now);
+  return be_late();
 }
 
 Outcome OutputCore::be_late() noexcept {
