@@ -61,14 +61,14 @@ void end_loan(OutputCore& core, std::uint32_t slot) noexcept {
   std::shared_ptr<OutputCore> last;
   if (core.loans() == 0) last.swap(core.kept_by_loans);
 }
-Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size) noexcept {
-  return is_own(core) ? core.publish_loan(slot, size, shm::monotonic_now()) : Outcome{};
+Counts publish(OutputCore& core, std::uint32_t slot, std::size_t size) noexcept {
+  return is_own(core) ? core.publish_loan(slot, size, shm::monotonic_now()) : Counts{};
 }
-Outcome publish_copy(OutputCore& core, const void* data, std::size_t size) noexcept {
-  return is_own(core) ? core.publish_copy(data, size, shm::monotonic_now()) : Outcome{};
+Counts publish_copy(OutputCore& core, const void* data, std::size_t size) noexcept {
+  return is_own(core) ? core.publish_copy(data, size, shm::monotonic_now()) : Counts{};
 }
-Outcome signal(OutputCore& core) noexcept {
-  return is_own(core) ? core.signal(shm::monotonic_now()) : Outcome{};
+Counts signal(OutputCore& core) noexcept {
+  return is_own(core) ? core.signal(shm::monotonic_now()) : Counts{};
 }
 Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline) noexcept {
   if (!is_own(core)) return {};
@@ -84,17 +84,17 @@ Outcome signal(OutputCore& core, Time deadline) noexcept {
 void deactivate(OutputCore& core) noexcept {
   if (is_own(core)) core.deactivate(shm::monotonic_now());
 }
-Outcome publish_at(OutputCore& core, Time at, std::uint32_t slot, std::size_t size) {
+Counts publish_at(OutputCore& core, Time at, std::uint32_t slot, std::size_t size) {
   LoanedBy loan(&core, {slot});  // given back where this is refused
   begin_replay(core, at);
   static_cast<void>(loan.release());
   return core.publish_loan(slot, size, nanoseconds(at));
 }
-Outcome publish_copy_at(OutputCore& core, Time at, const void* data, std::size_t size) {
+Counts publish_copy_at(OutputCore& core, Time at, const void* data, std::size_t size) {
   begin_replay(core, at);
   return core.publish_copy(data, size, nanoseconds(at));
 }
-Outcome signal_at(OutputCore& core, Time at) {
+Counts signal_at(OutputCore& core, Time at) {
   begin_replay(core, at);
   return core.signal(nanoseconds(at));
 }

@@ -58,9 +58,9 @@ class OutputCore {
   void end_loan(std::uint32_t slot) noexcept;
   [[nodiscard]] std::uint32_t loans() const noexcept { return loans_; }
   // Arrivals at `now`, a reading of the clock.
-  Outcome publish_loan(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
-  Outcome publish_copy(const void* data, std::size_t size, shm::Nanoseconds now) noexcept;
-  Outcome signal(shm::Nanoseconds now) noexcept;
+  Counts publish_loan(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
+  Counts publish_copy(const void* data, std::size_t size, shm::Nanoseconds now) noexcept;
+  Counts signal(shm::Nanoseconds now) noexcept;
   void deactivate(shm::Nanoseconds now) noexcept;
   // The same unless `deadline` has passed by `now`. Then nothing has happened: no word that others
   // read is written but the count of those that came late, and a loan is free again.
@@ -129,11 +129,11 @@ class OutputCore {
 
   Outcome be_late() noexcept;
   // With the sample in `slot`, or without one (kNoSlot).
-  Outcome arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
+  Counts arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
   void stamp(shm::ActivityWord word) noexcept;
   void decide_all(shm::Nanoseconds now) noexcept;
-  Outcome hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
-  [[nodiscard]] Outcome refuse(const Destination& destination, bool is_sample) const noexcept;
+  Counts hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
+  [[nodiscard]] Counts refuse(const Destination& destination, bool is_sample) const noexcept;
   [[nodiscard]] bool is_full(Destination& destination) const noexcept;
   static void ring_if_waiting(Destination& destination) noexcept;
   void ring_where_selection_changed() noexcept;

@@ -1,4 +1,4 @@
-// publish(), signal() and deactivate(), with deadlines and given times: what becomes of an arrival.
+// publish(), signal() and deactivate(): what becomes of an arrival.
 //
 //   stamp     the source's activity; from here on everybody sees it
 //   decide    at each connected port
@@ -51,13 +51,13 @@ void OutputCore::stamp(shm::ActivityWord word) noexcept {
   shm::full_fence();
 }
 
-Outcome OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
+Counts OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
   if (!rules_are_bound()) bind_rules_and_view();
   const bool begins = !shm::is_active(own_word_, now);
   stamp(shm::arrival(now, timeout_));
   last_ = now;
-  Outcome outcome;
+  Counts outcome;
   if (!destinations_.empty()) {
     decide_all(now);
     outcome = hand_over(slot, size, now);
@@ -92,8 +92,8 @@ void OutputCore::decide_all(shm::Nanoseconds now) noexcept {
   for (SharedDecision& decision : decisions_) decision.verdict = shm::Verdict::kUnsettled;
 }
 
-Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
-  Outcome outcome;
+Counts OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
+  Counts outcome;
   const bool is_sample = slot != shm::kNoSlot;
   if (is_sample) {
     shm::SlotHeader& header = segment_.slot_header(slot);
@@ -106,7 +106,7 @@ Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanosec
   for (Destination& destination : destinations_) {
     if (!destination.joined) {
       if (!destination.refused) continue;
-      const Outcome refusal = refuse(destination, is_sample);
+      const Counts refusal = refuse(destination, is_sample);
       outcome.discarded += refusal.discarded;
       outcome.refused += refusal.refused;
       continue;
@@ -161,8 +161,8 @@ Outcome OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanosec
 
 // What becomes of an arrival at a port whose connection is refused: it may be the winner there, but
 // is never handed over.
-Outcome OutputCore::refuse(const Destination& destination, bool is_sample) const noexcept {
-  Outcome outcome;
+Counts OutputCore::refuse(const Destination& destination, bool is_sample) const noexcept {
+  Counts outcome;
   if (!destination.has_rule) return outcome;
   const bool wins = decisions_[destination.decision].verdict == shm::Verdict::kWins;
   outcome.discarded = wins ? 0 : 1;
@@ -235,15 +235,14 @@ bool OutputCore::selection_differs(const Destination& destination) noexcept {
   return believed != shm::kNone;
 }
 
-Outcome OutputCore::publish_loan(std::uint32_t slot, std::size_t size,
-                                 shm::Nanoseconds now) noexcept {
-  const Outcome outcome = arrive(slot, size, now);
+Counts OutputCore::publish_loan(std::uint32_t slot, std::size_t size,
+                                shm::Nanoseconds now) noexcept {
+  const Counts outcome = arrive(slot, size, now);
   end_loan(slot);
   return outcome;
 }
 
-Outcome OutputCore::publish_copy(const void* data, std::size_t size,
-                                 shm::Nanoseconds now) noexcept {
+Counts OutputCore::publish_copy(const void* data, std::size_t size, shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
   const std::uint32_t slot = acquire_slot();
   if (slot == shm::kNoSlot) {
@@ -251,36 +250,12 @@ Outcome OutputCore::publish_copy(const void* data, std::size_t size,
     return signal(now);  // it did arrive
   }
   if (size != 0) std::memcpy(segment_.payload(slot), data, size);
-  const Outcome outcome = arrive(slot, size, now);
+  const Counts outcome = arrive(slot, size, now);
   pool_.end_loan(slot);
   return outcome;
 }
 
-Outcome OutputCore::signal(shm::Nanoseconds now) noexcept { return arrive(shm::kNoSlot, 0, now); }
-
-// What comes at the deadline itself is in time.
-Outcome OutputCore::publish_loan_by(shm::Nanoseconds deadline, std::uint32_t slot, std::size_t size,
-                                    shm::Nanoseconds now) noexcept {
-  if (now <= deadline) return publish_loan(slot, size, now);
-  end_loan(slot);
-  return be_late();
-}
-
-Outcome OutputCore::publish_copy_by(shm::Nanoseconds deadline, const void* data, std::size_t size,
-                                    shm::Nanoseconds now) noexcept {
-  return now <= deadline ? publish_copy(data, size, now) : be_late();
-}
-
-Outcome OutputCore::signal_by(shm::Nanoseconds deadline, shm::Nanoseconds now) noexcept {
-  return now <= deadline ? signal(now) : be_late();
-}
-
-Outcome OutputCore::be_late() noexcept {
-  count(segment_.header().counters.late);
-  Outcome outcome;
-  outcome.late = true;
-  return outcome;
-}
+Counts OutputCore::signal(shm::Nanoseconds now) noexcept { return arrive(shm::kNoSlot, 0, now); }
 
 void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
@@ -289,36 +264,6 @@ void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
   stamp(shm::deactivation(now));
   last_ = now;
   if (ends) ring_where_selection_changed();
-}
-
-// An arrival at a given time is one whose publisher has read the clock at that time and has been
-// held up since. That is all that others see of it, and what they must cope with anyway; so the
-// order of the data path is the same. What a reading of the clock warrants must be asked for: it is
-// not in the future, and not before the source's last event. Nor at the time of a deactivation: the
-// value of the word before that might come back (activity.hpp, invariant 2).
-void OutputCore::begin_replay(shm::Nanoseconds at, shm::Nanoseconds now) {
-  require_replay();
-  const auto refuse = [&](shm::Nanoseconds by, const char* what) {
-    throw Error(name_ + ": an arrival at " + std::to_string(at) + " ns is refused: that is " +
-                std::to_string(by) + " ns " + what);
-  };
-  if (handover_.has_offer()) accept_view();
-  // Verdicts were found for times that may be later than `at`: they are forgotten.
-  bind_rules_and_view();
-  if (last_ == kUnknown) {
-    last_ = std::clamp(shm::time_of(own_word_, timeout_), shm::Nanoseconds{0}, now);
-  }
-  if (at > now) refuse(at - now, "later than now");
-  if (at < last_) refuse(last_ - at, "before the last arrival or deactivation of this source");
-  if (at == last_ && shm::is_deactivation(own_word_)) {
-    refuse(0, "after the last deactivation of this source; later is allowed");
-  }
-  // Whoever waits has seen our activity end, be it later than `at`: it begins for them.
-  if (shm::is_finite(own_word_) && !shm::is_active(own_word_, now)) own_word_ = shm::kNeverActive;
-}
-
-void OutputCore::require_replay() const {
-  if (!why_no_replay_.empty()) throw Error(name_ + ": " + why_no_replay_);
 }
 
 }  // namespace arbiter::detail

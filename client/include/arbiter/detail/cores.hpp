@@ -23,6 +23,18 @@ struct LoanedSlot {
   std::uint32_t slot = 0;
 };
 
+// What became of an arrival that was in time. Smaller than an Outcome by a word, which each publish
+// would have to put together on its way out of several calls.
+struct Counts {
+  std::uint32_t delivered = 0;
+  std::uint32_t discarded = 0;
+  std::uint32_t refused = 0;
+
+  operator Outcome() const noexcept {  // NOLINT: that is what it is for
+    return {delivered, discarded, refused, false};
+  }
+};
+
 // A sample that a component holds; `data` null: none.
 struct HeldSample {
   const std::byte* data = nullptr;
@@ -46,17 +58,17 @@ std::shared_ptr<OutputCore> open_output(NodeCore& node, std::string_view name, c
 void close_output(std::shared_ptr<OutputCore> core) noexcept;
 LoanedSlot loan(OutputCore& core, std::size_t size) noexcept;
 void end_loan(OutputCore& core, std::uint32_t slot) noexcept;
-Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size) noexcept;
-Outcome publish_copy(OutputCore& core, const void* data, std::size_t size) noexcept;
-Outcome signal(OutputCore& core) noexcept;
+Counts publish(OutputCore& core, std::uint32_t slot, std::size_t size) noexcept;
+Counts publish_copy(OutputCore& core, const void* data, std::size_t size) noexcept;
+Counts signal(OutputCore& core) noexcept;
 // With a deadline.
 Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline) noexcept;
 Outcome publish_copy(OutputCore& core, const void* data, std::size_t size, Time deadline) noexcept;
 Outcome signal(OutputCore& core, Time deadline) noexcept;
 // With a given time of arrival. Throw Error.
-Outcome publish_at(OutputCore& core, Time at, std::uint32_t slot, std::size_t size);
-Outcome publish_copy_at(OutputCore& core, Time at, const void* data, std::size_t size);
-Outcome signal_at(OutputCore& core, Time at);
+Counts publish_at(OutputCore& core, Time at, std::uint32_t slot, std::size_t size);
+Counts publish_copy_at(OutputCore& core, Time at, const void* data, std::size_t size);
+Counts signal_at(OutputCore& core, Time at);
 void deactivate_at(OutputCore& core, Time at);
 void require_replay(const OutputCore& core);
 void deactivate(OutputCore& core) noexcept;
