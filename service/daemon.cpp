@@ -48,8 +48,10 @@ Daemon::Daemon(const DaemonOptions& options)
                 StateFile(options.directory, options.instance), options.uses_descriptor_store),
       changes_({options.instance, options.models, options.is_strict, options.steps,
                 options.compiles_in, options.before_reading},
-               {gate_, names_, board_, switchboard_, introductions_, clients_},
-               [this] { takeover_.welcome_waiting(); }) {
+               {gate_, names_, board_, switchboard_, introductions_, clients_}, [this] {
+                 takeover_.welcome_waiting();
+                 try_postponed_ = true;
+               }) {
   changes_.read_first(options.stop_descriptor,
                       [&] { return handle_signal(options.stop_descriptor); });
   listener_ = shm::listen_at(options.directory, instance_);

@@ -140,6 +140,9 @@ class Daemon final : private Takeover::Host {
   // What a takeover asks.
   void watch_absentee(const shm::FileDescriptor& process, NodeId node) override;
   void try_postponed() override { try_postponed_ = true; }
+  // Whether newcomers and questions are served: not before it is decided which model is in force,
+  // or a port that opens meanwhile would be told that no model mentions it.
+  [[nodiscard]] bool serves() const { return takeover_.is_over() && changes_.has_settled(); }
   void begin_to_serve(bool is_fresh) override { changes_.start(is_fresh); }
 
   const std::string instance_;

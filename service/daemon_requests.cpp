@@ -47,7 +47,7 @@ void Daemon::handle(Client& client, shm::Received& received) {
   if (client.node == 0 && message.kind != shm::MessageKind::kHello) {
     throw std::runtime_error("a client must say hello first");
   }
-  if (!takeover_.is_over() && is_question(message.kind)) {
+  if (!serves() && is_question(message.kind)) {
     throw NotYet("this daemon is taking over from another", shm::kForever);
   }
   if (hand_back(client, received) || change_model(client, message)) return;
@@ -173,7 +173,7 @@ void Daemon::hello(Client& client, const shm::Received& received) {
   client.former = returns ? 0 : message.link;
   if (returns) {
     takeover_.rejoin(client, received);
-  } else if (takeover_.is_over()) {
+  } else if (serves()) {
     welcome(client);
   } else {
     takeover_.let_wait(client);

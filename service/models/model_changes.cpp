@@ -48,7 +48,7 @@ void ModelChanges::start(bool is_fresh) {
   if (options_.files.empty()) {
     if (!is_fresh) log::info("no model was given: the one in force stays");
     switchboard_.link_all(board_.in_force().table);
-    settled_();
+    settle();
     return;
   }
   try {
@@ -57,7 +57,7 @@ void ModelChanges::start(bool is_fresh) {
   } catch (const std::exception& error) {
     if (is_fresh) throw;
     log::error("the model in force stays: {}", error.what());
-    settled_();
+    settle();
   }
 }
 
@@ -182,7 +182,7 @@ void ModelChanges::put_in_force() {
             swap.change.by.empty() ? "" : ", by " + swap.change.by);
   remember(swap, snapshot.generation);
   at_step("change-remembered");
-  settled_();
+  settle();
   nlohmann::json changes = nlohmann::json::parse(swap.changes);
   if (!changes.is_null()) {
     const std::string summary = changes.at("summary").get<std::string>();
@@ -190,6 +190,11 @@ void ModelChanges::put_in_force() {
     history_.set_changes(snapshot.generation, summary);
   }
   answer_done(swap, std::move(changes));
+}
+
+void ModelChanges::settle() {
+  has_settled_ = true;
+  settled_();
 }
 
 void ModelChanges::remember(const Swap& swap, std::uint64_t generation) {

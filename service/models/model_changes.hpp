@@ -68,6 +68,9 @@ class ModelChanges {
   // was none, and nothing is in force without it. Throws then, if it cannot be.
   void start(bool is_fresh);
 
+  // Whether `settled` has been called.
+  [[nodiscard]] bool has_settled() const { return has_settled_; }
+
   // Each is answered when it is over. Throws std::length_error where too many wait.
   void ask(Change change, const Client& client, const shm::Message& message);
   void reload_for_signal(const std::string& by);
@@ -109,6 +112,7 @@ class ModelChanges {
   void reserve_tables(const Library& library);
   void begin_swap(Swap& swap);
   void put_in_force();
+  void settle();
   void remember(const Swap& swap, std::uint64_t generation);
 
   void answer_done(const Swap& swap, nlohmann::json changes);
@@ -124,6 +128,7 @@ class ModelChanges {
   Introductions& introductions_;
   const Clients& clients_;
   const std::function<void()> settled_;
+  bool has_settled_ = false;
   std::vector<ModelPointer> read_at_start_;  // until they are put into the library
   Library library_;
   LoadedModel in_force_;  // null: none, or a predecessor's

@@ -11,6 +11,7 @@
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/raw_port.hpp"
 #include "tests/support/threads.hpp"
 
 namespace arbiter::test {
@@ -193,6 +194,38 @@ TEST(Takeover, WhatClosedMeanwhileIsClosedThoughItWasAllThereWas) {
   EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
   EXPECT_EQ(take_from(in), 1);
   EXPECT_EQ(sender.tell("output /other"), "open");
+}
+
+// Its swap has to wait for a component that is back and does not answer. What opened meanwhile was
+// said to be in no model, and got nothing.
+TEST(Takeover, WhoeverComesBeforeTheModelIsInForceWaitsForIt) {
+  Daemon daemon(single_model());
+  auto hello = RawClient::message(shm::MessageKind::kHello, "deaf");
+  hello.value = shm::kWireVersion;
+  hello.flags = shm::kComesBack | shm::kHasServiceThread;
+  RawClient former(daemon.instance());
+  former.send(hello);
+  const shm::Received welcome = former.expect(shm::MessageKind::kWelcome);
+  const auto segment = raw_output_segment();
+  const shm::Received opened = open_raw_output(former, "/other", segment);
+  daemon.kill();
+  daemon.restart();
+  RawClient back(daemon.instance());
+  hello.flags |= shm::kRejoins;
+  hello.link = welcome.message.link;
+  back.send(hello, {welcome.descriptors[0].get(), welcome.descriptors[1].get()});
+  back.expect(shm::MessageKind::kWelcome);
+  auto output = RawClient::message(shm::MessageKind::kHandBackOutput, "/other");
+  output.port = opened.message.port;
+  output.id = opened.message.id;
+  back.send(output, {segment.get(), opened.descriptors[0].get()});
+  back.send(RawClient::message(shm::MessageKind::kHandedBack));
+  back.expect(shm::MessageKind::kSync);
+  Node node("test");
+  auto in = node.input_port<Number>("/in");
+  auto out = node.output_port<Number>("/out");
+  EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
+  EXPECT_EQ(take_from(in), 1);
 }
 
 TEST(Takeover, OpeningWaitsForADaemon) {
