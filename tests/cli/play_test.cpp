@@ -10,7 +10,7 @@ namespace {
 
 using testing::HasSubstr;
 
-const std::string kModel = R"(<behaviors timeout="50ms">
+const std::string kPlayedModel = R"(<behaviors timeout="50ms">
   <source port="/stop" timeout="forever"/>
   <behavior name="Low"><config at="/p">/low</config><condition>not /stop</condition></behavior>
   <behavior name="High"><config at="/p">/high</config><inhibition>Low</inhibition></behavior>
@@ -32,10 +32,10 @@ const std::string kTrace =
     "53000000,/stop,\n54000000,/low,\n55000000,/stop,deactivate\n56000000,/low,\n";
 
 TEST(Play, DecidesAsSimulateSays) {
-  Daemon daemon(kModel, {.application = kApplication});
+  Daemon daemon(kPlayedModel, {.application = kApplication});
   const TemporaryDirectory files;
   const auto trace = files.write("trace.csv", kTrace);
-  const auto simulated = arbiter({"simulate", files.write("m.xml", kModel), "--application",
+  const auto simulated = arbiter({"simulate", files.write("m.xml", kPlayedModel), "--application",
                                   files.write("a.xml", kApplication), "--trace", trace});
   ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
   EXPECT_THAT(simulated.out, HasSubstr("51000000,/low,/p,delivered,/low\n"));
@@ -46,7 +46,7 @@ TEST(Play, DecidesAsSimulateSays) {
 }
 
 TEST(Play, NotesSourcesThatTheModelDoesNotKnow) {
-  Daemon daemon(kModel);
+  Daemon daemon(kPlayedModel);
   const TemporaryDirectory files;
   const auto played = arbiter({"play", files.write("trace.csv", "t_ns,source\n0,/hgih\n")});
   EXPECT_EQ(played.exit_code, 0);

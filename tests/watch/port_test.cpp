@@ -18,7 +18,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-const std::string kModel = R"(<behaviors timeout="3600s">
+const std::string kGazeModel = R"(<behaviors timeout="3600s">
   <source port="/low" timeout="forever"/>
   <behavior name="Low"><config at="/p">/low</config></behavior>
   <behavior name="High"><config at="/p">/high</config><inhibition>Low</inhibition></behavior>
@@ -26,7 +26,7 @@ const std::string kModel = R"(<behaviors timeout="3600s">
 )";
 
 TEST(WatchedPort, IsSeenWithAllThatMattersToIt) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   Node node("component");
   auto low = node.output_port<int>("/low");
   auto high = node.output_port<int>("/high");
@@ -47,7 +47,7 @@ TEST(WatchedPort, IsSeenWithAllThatMattersToIt) {
 }
 
 TEST(WatchedPort, IsExplainedByTheModelOfTheLook) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   Node node("component");
   auto high = node.output_port<int>("/high");
   watch::Port port(watched(daemon), "/p");
@@ -66,7 +66,7 @@ TEST(WatchedPort, IsExplainedByTheModelOfTheLook) {
 }
 
 TEST(WatchedPort, ThatNobodyHasNamedIsRefusedWithAdvice) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   const auto instance = watched(daemon);
   EXPECT_THAT(error_of([&] { watch::Port(instance, "/P"); }),
               testing::AllOf(HasSubstr("has named the input port /P"), HasSubstr("/p")));
@@ -75,7 +75,7 @@ TEST(WatchedPort, ThatNobodyHasNamedIsRefusedWithAdvice) {
 }
 
 TEST(WatchedPort, OfADaemonThatHasMemoryOfItsOwnIsSeenNoMore) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   const auto instance = watched(daemon);
   const watch::Port port(instance, "/p");
   const auto memory = instance->memory();
@@ -89,7 +89,7 @@ TEST(WatchedPort, OfADaemonThatHasMemoryOfItsOwnIsSeenNoMore) {
 }
 
 TEST(WatchedPort, KnowsWhatKeepsSamplesFromIt) {
-  Daemon daemon(kModel);
+  Daemon daemon(kGazeModel);
   Node node("component");
   auto low = node.output_port<int>("/low");
   low.signal();
