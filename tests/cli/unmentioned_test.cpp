@@ -61,9 +61,11 @@ TEST(Unmentioned, PubSaysThatTheTypesDiffer) {
   auto in = node.input_port<int>("/Gaze/pos:i");
   const auto result = arbiter({"pub", "/Face/pos:o", "--count", "1"});
   EXPECT_EQ(result.exit_code, 0);
-  EXPECT_EQ(result.err,
-            "arbiter: /Face/pos:o is not connected to /Gaze/pos:i: the output port is untyped, the "
-            "input port takes int\n");
+  EXPECT_EQ(
+      result.err,
+      "arbiter: /Face/pos:o is not connected to /Gaze/pos:i: the output port of \"arbiter-pub\" "
+      "sends untyped samples (up to 8 bytes), the input port of \"test\" takes int (4 bytes, "
+      "aligned to 4)\n");
   EXPECT_THAT(result.out, HasSubstr("refused 1"));
 }
 

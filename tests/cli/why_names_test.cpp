@@ -121,8 +121,9 @@ TEST(WhyNames, SaysOnTheFirstLineThatNothingOfTheWinnerArrives) {
   EXPECT_THAT(first_line(), HasSubstr(nothing + "no component has it open"));
   {
     auto in = node.input_port<double>("/base");
-    EXPECT_THAT(first_line(), AllOf(HasSubstr("idle, though /wander is selected"),
-                                    HasSubstr("; it cannot deliver: the output port sends int")));
+    EXPECT_THAT(first_line(),
+                AllOf(HasSubstr("idle, though /wander is selected"),
+                      HasSubstr("; it cannot deliver: the output port of \"test\" sends int")));
     const json answer = why_json({"/base"});
     EXPECT_EQ(answer["winner"], nullptr);
     EXPECT_EQ(answer["selected"], "/wander");
