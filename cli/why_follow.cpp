@@ -156,7 +156,7 @@ std::string events_text(const watch::Port& port, const std::vector<shm::SourceId
                         const Look& look) {
   std::string text;
   for (const shm::SourceId source : sources) {
-    const std::string name = port.source_name(source);
+    const std::string& name = port.source_name(source);
     if (!text.empty()) text += " and ";
     text += event_text(name, look.sources.state(name), look.sources.now());
   }

@@ -65,7 +65,7 @@ class Daemon final : private Takeover::Host {
   explicit Daemon(const DaemonOptions& options);
   Daemon(const Daemon&) = delete;
   Daemon& operator=(const Daemon&) = delete;
-  ~Daemon();
+  ~Daemon() override;
 
   // Serves until stop_descriptor is readable. SIGHUP and SIGTERM come by signalfd, see main.cpp.
   void run(int signal_descriptor);

@@ -41,6 +41,7 @@ class Takeover {
   // What it asks of the daemon around it.
   class Host {
    public:
+    virtual ~Host() = default;
     // Calls forget_absentee(node) once the process of a pidfd has ended.
     virtual void watch_absentee(const shm::FileDescriptor& process, NodeId node) = 0;
     // Ends a conversation.
@@ -51,9 +52,6 @@ class Takeover {
     virtual void try_postponed() = 0;
     // All who came in time are back. `is_fresh`: there was nobody to come back.
     virtual void begin_to_serve(bool is_fresh) = 0;
-
-   protected:
-    ~Host() = default;
   };
   // What it restores.
   struct Parts {

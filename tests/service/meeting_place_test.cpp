@@ -9,9 +9,9 @@
 
 #include <arbiter/arbiter.hpp>
 
-#include "wire/rendezvous.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/text_files.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::test {
 namespace {

@@ -71,7 +71,7 @@ class Type {
 //   };
 template <class T>
 struct TypeName {
-  static constexpr std::string_view value{};  // none
+  static constexpr std::string_view value{};  // none. NOLINT(readability-identifier-naming)
 };
 
 namespace detail {
