@@ -109,7 +109,7 @@ class LivePicture {
     } while (now.generation != drawn_ && ++tries < kMostLoads);
     fits_ = now.fits;
     if (!fits_ && is_same_ && !std::exchange(warned_, true)) {
-      std::cerr << "arbiter: the daemon decides otherwise than this model does; is it the one in "
+      std::cerr << "arbiter: the daemon decides differently from this model; is it the model in "
                    "force, and unchanged since? (arbiter status, arbiter reload)\n";
     }
     picture_.write(&now.situation);

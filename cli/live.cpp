@@ -24,8 +24,9 @@ constexpr std::chrono::milliseconds kAnswerTime{10'000};
 }  // namespace
 
 void add_instance_option(CLI::App& verb, std::string& instance) {
-  verb.add_option("--instance", instance,
-                  "Which daemon; without it $ARBITER_INSTANCE, else \"default\"")
+  verb.add_option(
+          "--instance", instance,
+          "Which daemon to use; by default $ARBITER_INSTANCE, or \"default\" if that is not set")
       ->type_name("NAME");
 }
 

@@ -46,9 +46,22 @@ bool knows_verb(const CLI::App& app, const std::string& word) {
   return false;
 }
 
+// Those of each verb that does not list its own.
+void add_exit_codes(CLI::App& app) {
+  for (CLI::App* verb : app.get_subcommands({})) {
+    const std::string footer = verb->get_footer();
+    if (footer.find("Exit codes:") != std::string::npos) continue;
+    verb->footer(
+        footer +
+        "\n\nExit codes: 0 done; 1 an error in what you asked about, or no daemon; 2 wrong "
+        "use, or a file\nthat cannot be opened or written");
+  }
+}
+
 int run(int argc, char** argv) {
-  CLI::App app("Port arbitration for robot components: at most one connection of a port wins.",
-               "arbiter");
+  CLI::App app(
+      "Port arbitration for robot components: at each input port, at most one connection wins.",
+      "arbiter");
   app.set_version_flag("--version", "arbiter " ARBITER_VERSION);
   app.require_subcommand(1);
   int exit_code = 0;
@@ -69,6 +82,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_rollback(app, exit_code);
   arbiter::cli::add_history(app, exit_code);
   arbiter::cli::add_stop(app, exit_code);
+  add_exit_codes(app);
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
     return arbiter::shm::printable(CLI::FailureMessage::simple(failed, error), "\n\t");
   });

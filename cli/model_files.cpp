@@ -12,14 +12,15 @@ void add_model_options(CLI::App& verb, rules::ModelFiles& files) {
   verb.add_option("MODEL", files.models, "Files of behaviours and rules; together one model")
       ->type_name("FILE")
       ->required();
-  verb.add_option("--application", files.application,
-                  "File that says which connections exist; without it, those of the model")
+  verb.add_option(
+          "--application", files.application,
+          "File that says which connections exist; without it, the model's connections exist")
       ->type_name("FILE");
 }
 
 void add_effort_option(CLI::App& verb, double& effort) {
   verb.add_option("--effort", effort,
-                  "How many times as many steps as usual proofs may take, such as 10 or 0.1")
+                  "Allow proofs this many times the usual number of steps, such as 10 or 0.1")
       ->type_name("FACTOR")
       ->check(CLI::Range(rules::Budget::kLeastEffort, rules::Budget::kMostEffort));
 }

@@ -32,9 +32,9 @@ std::string file_advice(FileNow::State state, bool is_older) {
     case FileNow::State::kSame:
       return {};
     case FileNow::State::kGone:
-      return " is not there any more: arbiter reload would be refused";
+      return " no longer exists: arbiter reload would be refused";
     case FileNow::State::kUnreadable:
-      return " cannot be read from here: whether it has changed since is not known";
+      return " cannot be read from here, so it is not known whether it has changed";
     case FileNow::State::kChanged:
       break;
   }

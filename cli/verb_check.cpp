@@ -129,7 +129,7 @@ int check(const CheckOptions& options) {
   }
   if (!model && !options.statements.empty()) {
     diagnostics.note("left-open", {options.statements.front(), 1, 1},
-                     "whether the statements are true was not looked at: the model has errors");
+                     "the statements were not checked, because the model has errors");
   }
   progress.clear();
   diagnostics.silence(options.silenced);
@@ -156,36 +156,38 @@ int check(const CheckOptions& options) {
 
 void add_check(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<CheckOptions>();
-  CLI::App* verb = app.add_subcommand("check", "Check a model, and prove that one wins at most");
+  CLI::App* verb = app.add_subcommand(
+      "check", "Check a model, and prove that at most one connection wins at each port");
   add_model_options(*verb, options->files);
   verb->add_option("--assert", options->statements,
                    "File of statements that must be true in every state, one on each line")
       ->type_name("FILE")
       ->allow_extra_args(false);
   verb->add_option("--silence", options->silenced,
-                   "Say nothing of warnings and notes of this code, such as nobody-wins")
+                   "Hide warnings and notes with this code, such as nobody-wins")
       ->type_name("CODE")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(CLI::Validator(problem_of_code, ""));
   add_effort_option(*verb, options->effort);
-  verb->add_flag("--strict", options->strict, "Take warnings for errors, but for silenced ones");
-  verb->add_flag("--json", options->json, "Write what is found as JSON, to standard output");
+  verb->add_flag("--strict", options->strict, "Treat warnings as errors, except silenced ones");
+  verb->add_flag("--json", options->json, "Write the findings as JSON, to standard output");
   verb->footer(
       "Example:\n"
       "  arbiter check search_and_track.xml --application application.xml\n"
       "  arbiter check search_and_track.xml --assert safety.txt --silence nobody-wins,starved\n"
-      "Statements speak of sources and winners:\n"
+      "\nStatements are about sources and winners:\n"
       "  /collision:o -> idle(/Arm/pos:i)\n"
       "  winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o\n"
       "  winner(/Base/vel:i) = any(/Nav/*) -> winner(/Arm/pos:i) != winner(/Hand/pos:i)\n"
-      "Proofs take a bounded number of steps, the same on every machine, shared out fairly. What\n"
-      "they leave open is named: a port that is not proved and a statement are errors, the rest "
-      "is\n"
-      "the note left-open. A model that needs --effort here needs it at arbiterd, too.\n"
-      "Exit code 0: no error; with --strict, no warning either; 1: an error, or a statement that "
-      "is not proved; 2: wrong use,\n"
-      "or a file cannot be opened, or the output not be written.");
+      "\nProofs take a bounded number of steps, the same on every machine, shared fairly. The "
+      "check\n"
+      "names each question that stays open: for a port or a statement that is an error, for "
+      "anything\n"
+      "else the note left-open. A model that needs --effort here also needs it at arbiterd.\n\n"
+      "Exit codes: 0 no error (with --strict, no warning either); 1 an error, or a statement that "
+      "is not\n"
+      "proved; 2 wrong use, or a file that cannot be opened or written");
   verb->callback([options, &exit_code] { exit_code = check(*options); });
 }
 

@@ -64,7 +64,8 @@ void check_by_reading_back(const std::string& content, const rules::RuleSet& rul
                              item.message);
   }
   if (!rules::same_rules(read, rules)) {
-    throw std::logic_error("what was written reads back as other rules; this is a bug of arbiter");
+    throw std::logic_error(
+        "the result reads back as different rules; this is a bug in arbiter: please report it");
   }
 }
 
@@ -90,11 +91,10 @@ void add_compile(CLI::App& app, int& exit_code) {
   add_effort_option(*verb, options->effort);
   verb->add_option("-o,--output", options->output, kOutputHelp)->type_name("FILE");
   verb->footer(
-      "The application file stays as it is and gets one element more, <arbitration>, with the "
-      "rules "
-      "of each\ninput port. The result can be given as an application, and as a model, which then "
-      "decides alike.\nWithout --application, one is made of the connections that the model "
-      "configures.\n\n"
+      "The result is the text of the application file with one more element, <arbitration>, which "
+      "holds\nthe rules of each input port. You can use it as an application, and as a model that "
+      "decides in\nthe same way. Without --application, the result is a new application with the "
+      "connections that\nthe model configures.\n\n"
       "Exit codes: 0 written; 1 an error in the model, or rules too large to be read again; 2 "
       "wrong use, a file\n"
       "that cannot be opened or written, or an output that is one of the inputs\n\n"

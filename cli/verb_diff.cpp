@@ -66,7 +66,7 @@ int diff(const DiffOptions& options) {
 void add_diff(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<DiffOptions>();
   CLI::App* verb = app.add_subcommand("diff", "Show in which states two models decide differently");
-  verb->add_option("BEFORE", options->before, "A model; several files of one: a.xml,b.xml")
+  verb->add_option("BEFORE", options->before, "A model; if it has several files: a.xml,b.xml")
       ->type_name("FILE")
       ->required();
   verb->add_option("AFTER", options->after, "The model to compare it with")
@@ -79,10 +79,11 @@ void add_diff(CLI::App& app, int& exit_code) {
   verb->add_option("--application-after", options->application_after, "Connections of AFTER")
       ->type_name("FILE");
   add_effort_option(*verb, options->effort);
-  verb->add_flag("--json", options->json, "Write what is found as JSON");
+  verb->add_flag("--json", options->json, "Write the differences as JSON");
   verb->footer(
-      "Exit code 0: they decide alike in every state; 1: they differ; 2: that cannot be told,\n"
-      "or not be written.\n"
+      "Exit codes: 0 they decide alike in every state; 1 they differ; 2 diff cannot tell, wrong "
+      "use,\n"
+      "or a file that cannot be opened or written\n\n"
       "Example:\n  arbiter diff search_and_track.xml new.xml");
   verb->callback([options, &exit_code] { exit_code = diff(*options); });
 }

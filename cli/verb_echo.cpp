@@ -138,7 +138,7 @@ void add_echo(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<EchoOptions>();
   CLI::App* verb = app.add_subcommand("echo", "Open an input port and print what it accepts");
   verb->add_option("PORT", options->port, "The input port's name")->required();
-  verb->add_option("--count", options->count, "End after so many samples")
+  verb->add_option("--count", options->count, "Stop after this many samples")
       ->type_name("N")
       ->check(at_least_one());
   verb->add_option_function<std::string>(

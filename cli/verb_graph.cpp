@@ -37,10 +37,12 @@ void add_graph(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<GraphOptions>();
   CLI::App* verb = app.add_subcommand("graph", "Draw a model, or what it is doing now");
   verb->add_option("MODEL", options->files.models,
-                   "Files of behaviours and rules; with --live, without it those in force")
+                   "Files of behaviours and rules; with --live you may leave them out: the model "
+                   "in force is drawn")
       ->type_name("FILE");
-  verb->add_option("--application", options->files.application,
-                   "File that says which connections exist; without it, those of the model")
+  verb->add_option(
+          "--application", options->files.application,
+          "File that says which connections exist; without it, the model's connections exist")
       ->type_name("FILE");
   verb->add_option("--view", options->view,
                    "behaviours: in meta-behaviours, with inhibitions; connections: components, "
@@ -61,7 +63,8 @@ void add_graph(CLI::App& app, int& exit_code) {
   verb->add_option("-o,--output", options->output, kOutputHelp)->type_name("FILE");
   add_effort_option(*verb, options->effort);
   verb->add_flag("--live", options->live, "Colour it by who is active and who wins now");
-  verb->add_flag("--follow", options->follow, "As --live, and write it anew on each change");
+  verb->add_flag("--follow", options->follow,
+                 "Like --live, and write the picture again at each change");
   add_instance_option(*verb, options->instance);
   verb->footer(
       "What is drawn:\n" + drawing::legend_in_words() +

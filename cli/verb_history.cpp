@@ -69,7 +69,8 @@ int rollback(const RollbackOptions& options) {
 void add_history(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<HistoryOptions>();
   CLI::App* verb = app.add_subcommand(
-      "history", "Show which models were in force, the latest first: since when, and by whom");
+      "history",
+      "Show the models that were in force, latest first: since when, and who asked for them");
   verb->add_flag("--json", options->json, "As the daemon's JSON document");
   add_instance_option(*verb, options->instance);
   verb->footer("Example:\n  arbiter history");
@@ -79,14 +80,14 @@ void add_history(CLI::App& app, int& exit_code) {
 void add_rollback(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<RollbackOptions>();
   CLI::App* verb = app.add_subcommand(
-      "rollback", "Put a model in force again that was; without GENERATION, the one before");
-  verb->add_option("GENERATION", options->generation, "As arbiter history shows it")
+      "rollback", "Return to an earlier model; without GENERATION, to the previous one");
+  verb->add_option("GENERATION", options->generation, "Its number in arbiter history")
       ->type_name("N")
       ->check(at_least_one());
   verb->add_flag("--json", options->json, "Write the daemon's report as JSON");
   add_instance_option(*verb, options->instance);
   verb->footer(R"(Example:
-  arbiter rollback        # to the one before; again: one further back
+  arbiter rollback        # to the previous model; a second time: to the one before that
   arbiter rollback 3
 
 No file is read or changed: the next reload, and the next daemon, read them again.)");

@@ -172,7 +172,7 @@ int play(const PlayOptions& options) {
 void add_play(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<PlayOptions>();
   CLI::App* verb =
-      app.add_subcommand("play", "Publish a trace in real time, and tell who was heard");
+      app.add_subcommand("play", "Publish a trace in real time, and show what was delivered");
   verb->add_option("TRACE", options->trace, "CSV: t_ns,source or t_ns,source,event")->required();
   verb->add_option("--speed", options->speed, "How many times faster than the trace (default 1)")
       ->type_name("X")

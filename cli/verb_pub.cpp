@@ -100,7 +100,7 @@ void add_pub(CLI::App& app, int& exit_code) {
   verb->add_option("--rate", options->rate_hz, "Samples in a second (default 1)")
       ->type_name("HZ")
       ->check(CLI::Range(1e-3, 1e6));
-  verb->add_option("--count", options->count, "How many (default: until interrupted)")
+  verb->add_option("--count", options->count, "How many samples (default: until interrupted)")
       ->type_name("N")
       ->check(at_least_one());
   auto* size = verb->add_option("--size", options->size, "Bytes of a sample (default 8), zeroed")

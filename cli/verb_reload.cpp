@@ -23,7 +23,7 @@ struct ReloadOptions {
 void write_changes(const wire::ModelComparison& model, bool is_alone) {
   if (!is_alone) std::cout << model.name << (model.in_force ? " (in force)" : "") << ": ";
   std::cout << (model.changes ? model.changes->text
-                              : "not compared: what is in force is a former daemon's\n");
+                              : "not compared: the model in force comes from an earlier daemon\n");
 }
 
 int reload(const ReloadOptions& options) {
@@ -34,7 +34,7 @@ int reload(const ReloadOptions& options) {
   if (!options.dry_run || options.json || !report.ok) return write_result(report, options.json);
   const auto models = report.models.value_or(std::vector<wire::ModelComparison>());
   for (const auto& model : models) write_changes(model, models.size() == 1);
-  std::cout << "nothing was changed; arbiter reload puts it in force\n";
+  std::cout << "nothing has changed; arbiter reload puts the files in force\n";
   return 0;
 }
 
@@ -43,16 +43,17 @@ int reload(const ReloadOptions& options) {
 void add_reload(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<ReloadOptions>();
   CLI::App* verb = app.add_subcommand(
-      "reload", "Have the daemon read its models and its policy again; a bad one changes nothing");
+      "reload",
+      "Make the daemon read its models and its policy again; if one has errors, nothing changes");
   verb->add_flag("--dry-run", options->dry_run,
-                 "Only check the files, and show what would be decided differently");
+                 "Only check the files, and show which decisions would change");
   verb->add_flag("--json", options->json, "Write the daemon's report as JSON");
   add_instance_option(*verb, options->instance);
   verb->footer(R"(Example:
   arbiter reload
   arbiter reload --dry-run     # 0: the files are good; 1: a reload would be refused
 
-What is found in the files is shown as `arbiter check` does. To go back: arbiter rollback.)");
+Findings are shown as by `arbiter check`. To go back: arbiter rollback.)");
   verb->callback([options, &exit_code] { exit_code = reload(*options); });
 }
 

@@ -36,7 +36,8 @@ int show_rules(const RulesOptions& options) {
 
 void add_rules(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<RulesOptions>();
-  CLI::App* verb = app.add_subcommand("rules", "Show the rules that a model comes to, by port");
+  CLI::App* verb =
+      app.add_subcommand("rules", "Show the rules that Arbiter extracts from a model, by port");
   add_model_options(*verb, options->files);
   verb->add_flag("--json", options->json, "Write them as JSON");
   verb->footer("Example:\n  arbiter rules search_and_track.xml");

@@ -115,15 +115,16 @@ int simulate(const SimulateOptions& options) {
 
 void add_simulate(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<SimulateOptions>();
-  CLI::App* verb = app.add_subcommand("simulate", "Replay a trace: who would have been heard?");
+  CLI::App* verb =
+      app.add_subcommand("simulate", "Replay a trace, and show what would have been delivered");
   add_model_options(*verb, options->files);
   verb->add_option("--trace", options->trace, "CSV: t_ns,source or t_ns,source,event")
       ->type_name("FILE")
       ->required();
   // A flag takes a value only behind '=': what follows it may be the model.
   auto* why = verb->add_flag("--why", options->why,
-                             "Instead of the CSV: each change of a winner and each arrival that "
-                             "was discarded, with its cause; --why=PORT: of this port only");
+                             "Instead of the CSV, show each change of a winner and each discarded "
+                             "arrival, with its cause; --why=PORT: for this port only");
   add_effort_option(*verb, options->effort);
   verb->add_flag("--json", options->json, "With --why: one object a line")->needs(why);
   verb->footer(

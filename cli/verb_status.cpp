@@ -34,7 +34,7 @@ std::string holder(const auto& port) {
   if (port.away_pid) {
     return "pid " + std::to_string(*port.away_pid) +
            (watch::is_stopped(*port.away_pid) ? ", stopped" : "") +
-           ", has not come back yet: what is connected goes on";
+           ", has not come back yet: its connections keep working";
   }
   return port.open ? process_text(port.open->component) : "not open";
 }
@@ -79,8 +79,8 @@ const char* unmentioned(const auto& port, bool has_model) {
 // Who else runs, though nothing of it is seen below.
 void print_strangers(const std::vector<wire::StrangerStatus>& strangers) {
   if (strangers.empty()) return;
-  std::cout << "\nunknown to this daemon, for what the last one knew is lost; they go on by "
-               "themselves: restart them\n";
+  std::cout << "\nunknown to this daemon, because the state of the last daemon is lost; they "
+               "continue by themselves: restart them\n";
   for (const auto& each : strangers) {
     std::cout << "  " << process_text({each.node, each.pid, each.user});
     for (const auto& port : each.outputs) std::cout << ' ' << port;

@@ -18,7 +18,7 @@ int stop(const std::string& instance) {
   question.kind = shm::MessageKind::kStop;
   daemon.ask(question);
   daemon.wait_until_gone(process);
-  std::cout << "the daemon has stopped; ports that are connected work on\n";
+  std::cout << "the daemon has stopped; connected ports keep working\n";
   return 0;
 }
 
@@ -26,7 +26,7 @@ int stop(const std::string& instance) {
 
 void add_stop(CLI::App& app, int& exit_code) {
   const auto instance = std::make_shared<std::string>();
-  CLI::App* verb = app.add_subcommand("stop", "End the daemon; returns when it is gone");
+  CLI::App* verb = app.add_subcommand("stop", "Stop the daemon; returns when it has gone");
   add_instance_option(*verb, *instance);
   verb->footer("Example:\n  arbiter stop");
   verb->callback([instance, &exit_code] { exit_code = stop(*instance); });

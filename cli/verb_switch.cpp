@@ -52,8 +52,8 @@ int switch_model(const SwitchOptions& options) {
 
 void add_switch(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<SwitchOptions>();
-  CLI::App* verb = app.add_subcommand(
-      "switch", "Put another of the loaded models in force; without NAME, list them");
+  CLI::App* verb =
+      app.add_subcommand("switch", "Put another loaded model in force; without NAME, list them");
   verb->add_option("NAME", options->model, "As in arbiterd --model NAME=FILE")->type_name("NAME");
   verb->add_flag("--json", options->json, "Write the list, or the daemon's report, as JSON");
   add_instance_option(*verb, options->instance);

@@ -51,19 +51,19 @@ int why(const WhyOptions& options) {
 void add_why(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<WhyOptions>();
   CLI::App* verb = app.add_subcommand(
-      "why", "Tell who wins at an input port, since when, and what keeps the others out");
+      "why", "Show who wins at an input port, since when, and what keeps the others out");
   verb->add_option("PORT", options->port, "An input port's name")->required();
-  auto* source = verb->add_option(
-      "SOURCE", options->source, "Of the connections to the port, tell of this output port's only");
+  auto* source = verb->add_option("SOURCE", options->source,
+                                  "An output port's name: show its connection only");
   auto* follow = verb->add_flag("--follow", options->follow,
                                 "Print each change of the winner, and its cause, as it comes");
   source->excludes(follow);
-  verb->add_option("--count", options->count, "With --follow: end after so many changes")
+  verb->add_option("--count", options->count, "With --follow: stop after this many changes")
       ->type_name("N")
       ->needs(follow)
       ->check(at_least_one());
   verb->add_flag("--all", options->all,
-                 "Tell all of every connection; otherwise a port with many fits a screen")
+                 "Show everything about every connection; otherwise the answer fits a screen")
       ->excludes(follow);
   verb->add_flag("--json", options->json, "As JSON; with --follow one object a line");
   add_instance_option(*verb, options->instance);
@@ -72,8 +72,8 @@ void add_why(CLI::App& app, int& exit_code) {
       "  arbiter why /Gaze/pos:i\n"
       "  arbiter why /Gaze/pos:i /Face/pos:o\n"
       "  arbiter why /Gaze/pos:i --follow\n\n"
-      "Exit code: 0 answered, whoever wins; 1 no daemon, no such port, no such source, or not\n"
-      "allowed to observe; 2 wrong use, or the answer cannot be written.");
+      "Exit codes: 0 answered, whoever wins; 1 no daemon, no such port or source, or you may not\n"
+      "observe; 2 wrong use, or the answer cannot be written");
   verb->callback([options, &exit_code] { exit_code = why(*options); });
 }
 

@@ -139,7 +139,7 @@ void WhyAnswer::write_rest(const std::vector<const ConnectionExplanation*>& rest
     if (!obstacles_.of_connection(each->source).empty()) obstructed.push_back(each->source);
   }
   if (!obstructed.empty()) {
-    std::cout << "  ! there is more to say of " << rules::enumerate(obstructed) << '\n';
+    std::cout << "  ! there is more to say about " << rules::enumerate(obstructed) << '\n';
   }
   std::cout << "\narbiter why " << port_.name() << " SOURCE tells of one of them, --all of all\n";
 }
@@ -182,12 +182,12 @@ void WhyAnswer::write_port() const {
   const ModelInForce& model = port_.model();
   std::cout << port_.name();
   if (model.is_none()) {
-    std::cout << ": no model is in force, so that no connection leads to it\n";
+    std::cout << ": no model is in force, so no connection leads to it\n";
   } else if (!look_.is_mentioned) {
-    std::cout << ": the model in force does not mention it, so that no connection leads to it\n";
+    std::cout << ": the model in force does not mention it, so no connection leads to it\n";
   } else if (!look_.is_arbitrated) {
-    std::cout << ": not arbitrated, for no rule mentions it; all that its connections bring is "
-                 "delivered\n";
+    std::cout << ": not arbitrated, because no rule mentions it; everything that its connections "
+                 "bring is delivered\n";
   } else {
     const std::string useless =
         explanation_.winner ? obstacles_.why_it_cannot_deliver(*explanation_.winner) : "";
@@ -207,12 +207,12 @@ void WhyAnswer::write_port() const {
   write_model();
   write_obstacles(obstacles_.of_port());
   if (!look_.picture.is_settled) {
-    std::cout << "  ! sources change faster than they can be looked at: this may be of several "
-                 "moments\n";
+    std::cout
+        << "  ! sources change faster than they can be read: this answer may mix several moments\n";
   }
   if (look_.is_arbitrated && !model.has_texts()) {
-    std::cout << "  ! the daemon has this model from its predecessor, and knows its decisions, but "
-                 "not whose behaviours they come from (started without --model)\n";
+    std::cout << "  ! the daemon took this model over from its predecessor (it was started without "
+                 "--model): it knows the decisions, but not the behaviours behind them\n";
   }
 }
 

@@ -70,7 +70,7 @@ std::string inhibition_text(const rules::Cause& cause, const Sources& sources) {
     }
     if (cause.also.size() > kMaxNamed) text += ", …";
   }
-  if (cause.across_ports) text += "; it has no connection here, and inhibits by all its sources";
+  if (cause.across_ports) text += "; it has no connection here, so each of its sources inhibits";
   return text;
 }
 
@@ -106,7 +106,7 @@ std::string timeout_text(const SourceState& source) {
 // Of one whose last arrival is not known.
 std::string past_timeout_text(const SourceState& source) {
   return "T was " + rules::to_string(*source.timeout_before) +
-         " before the model changed it, so that when it arrived is not known; now " +
+         " before the model changed it, so the time of its arrival is not known; now " +
          timeout_text(source) + ")";
 }
 
@@ -124,7 +124,7 @@ std::string ended_text(const SourceState& source, shm::Nanoseconds now) {
 std::string activity_text(const Sources& sources, const std::string& name) {
   const SourceState source = sources.state(name);
   const shm::Nanoseconds now = sources.now();
-  if (!source.is_visible) return "not to be seen yet (the daemon has no page of its activity)";
+  if (!source.is_visible) return "not visible yet (the daemon has no page of its activity)";
   if (source.word == shm::kNeverActive) return "inactive (it has never arrived)";
   if (shm::is_deactivation(source.word)) {
     const shm::Nanoseconds ago = now - (source.word & ~shm::kDeactivatedFlag);
@@ -239,9 +239,9 @@ void write_causes(std::ostream& out, const rules::ConnectionExplanation& connect
   }
   if (connection.earlier) {
     out << "  " << *connection.earlier
-        << (connection.is_active ? " comes before it in the model, and where two rules hold"
-                                 : " would win even if it were active, for it comes before it in "
-                                   "the model, and where two rules hold")
+        << (connection.is_active ? " comes before it in the model, and if two rules hold"
+                                 : " would win even if it were active: it comes first in the "
+                                   "model, and if two rules hold")
         << " the first wins (conflict=\"first\")\n";
   }
   for (const auto& part : connection.parts) {

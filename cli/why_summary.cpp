@@ -22,7 +22,7 @@ std::set<std::string> causes_by_themselves(const ConnectionExplanation& connecti
   if (connection.earlier) {
     return {"behind " + *connection.earlier + " in the model, which wins by conflict=\"first\""};
   }
-  if (connection.parts.size() != 1) return {"kept out as each of their behaviours has them"};
+  if (connection.parts.size() != 1) return {"kept out by their behaviours, for a reason each"};
   std::set<std::string> reasons;
   for (const auto& cause : connection.parts.front().causes) reasons.insert(headline(cause));
   return reasons;

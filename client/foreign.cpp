@@ -32,7 +32,7 @@ void warn_once_that_foreign(const std::string& whose, const shm::ProcessMark& pr
   if (std::exchange(warned, self) == self) return;
   try {
     const std::string line =
-        "arbiter: " + is_foreign(whose, process) + "; what it does to the port is ignored\n";
+        "arbiter: " + is_foreign(whose, process) + "; its calls to the port are ignored\n";
     static_cast<void>(!::write(STDERR_FILENO, line.data(), line.size()));
   } catch (const std::exception&) {  // no memory for the line
   }

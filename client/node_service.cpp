@@ -134,16 +134,18 @@ void NodeCore::tidy_ports(
   for (auto& [instance, output] : outputs_) {
     output->tidy();
     for (const shm::PortInstance peer : output->misbehaving()) {
-      say_refused(instance, peer,
-                  "the input port misbehaves: it says that it has read what was never published");
+      say_refused(
+          instance, peer,
+          "the input port misbehaves: it says that it has read samples that were never published");
     }
     if (output->has_become_blind()) say_blind(instance, "discards its samples");
   }
   for (auto& [instance, input] : inputs_) {
     input->tidy();
     for (const shm::PortInstance peer : input->misbehaving()) {
-      say_refused(instance, peer,
-                  "the output port misbehaves: its queue has what no honest publisher writes");
+      say_refused(
+          instance, peer,
+          "the output port misbehaves: its queue has an entry that no honest publisher writes");
     }
     if (input->has_become_blind()) say_blind(instance, "delivers nothing");
     for (auto& peer : input->copied_from()) copied_from.emplace_back(instance, std::move(peer));

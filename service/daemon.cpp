@@ -250,7 +250,7 @@ bool Daemon::serve(Client& client) {
       case shm::ReceiveResult::kReceived:
         break;
       case shm::ReceiveResult::kMalformed:
-        log::warn("{} sent what is no message; dropped", client.description());
+        log::warn("{} sent something that is not a message; dropped", client.description());
         dispose_of(received, user);
         drop(id);
         return false;

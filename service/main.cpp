@@ -103,31 +103,34 @@ int run(int argc, char** argv) {
   std::string level = "info";
   double effort = 1;
   app.add_option("--model", models,
-                 "Model file; several of one NAME, or without one, form one model. The first model "
-                 "is put in force, `arbiter switch` goes to the others")
+                 "Model file; several files with the same NAME, or without one, form one model. "
+                 "The first model comes into force; `arbiter switch` goes to the others")
       ->type_name("[NAME=]FILE");
-  app.add_option("--application", applications,
-                 "Application file: which connections exist; without NAME for all models")
-      ->type_name("[NAME=]FILE");
-  app.add_option("--policy", policy,
-                 "Policy file: who may open which ports, reload, switch, stop, observe")
-      ->type_name("FILE");
-  app.add_flag("--strict", options.is_strict,
-               "Take warnings for errors: refuse files with them, at the start and at a reload");
-  app.add_option("--instance", instance,
-                 "Name of this daemon; without it $ARBITER_INSTANCE, else \"default\"")
-      ->type_name("NAME");
   app.add_option(
-         "--user-share", options.user_share,
-         "How much of names, clients, descriptors and unread messages one user may have, in "
-         "percent; what another has left counts")
+         "--application", applications,
+         "Application file, which says which connections exist; without NAME, for all models")
+      ->type_name("[NAME=]FILE");
+  app.add_option(
+         "--policy", policy,
+         "Policy file, which says who may open which ports, reload, switch, stop and observe")
+      ->type_name("FILE");
+  app.add_flag(
+      "--strict", options.is_strict,
+      "Treat warnings as errors: refuse files that have any, at the start and at a reload");
+  app.add_option(
+         "--instance", instance,
+         "Name of this daemon; by default $ARBITER_INSTANCE, or \"default\" if that is not set")
+      ->type_name("NAME");
+  app.add_option("--user-share", options.user_share,
+                 "The percentage of names, clients, descriptors and unread messages that one user "
+                 "may have, of what the others have left")
       ->type_name("PERCENT")
       ->check(CLI::Range(1u, 99u))
       ->capture_default_str();
   app.add_flag("--descriptor-store", options.uses_descriptor_store,
                "Leave descriptors with the service manager for the next daemon");
   app.add_option("--effort", effort,
-                 "How many times as many steps as usual the proof of a model may take")
+                 "Allow the proof of a model this many times the usual number of steps")
       ->type_name("FACTOR")
       ->check(
           CLI::Range(arbiter::rules::Budget::kLeastEffort, arbiter::rules::Budget::kMostEffort));

@@ -29,9 +29,8 @@ void add_stopped(int pid, const std::string& who, std::vector<Obstacle>& result)
 
 void add_away(int pid, std::vector<Obstacle>& result) {
   const std::string who = "its component (pid " + std::to_string(pid) + ")";
-  result.push_back({"component-away", who +
-                                          " lives, but has not come back to this daemon yet: what "
-                                          "is connected goes on, what is new waits for it"});
+  result.push_back({"component-away", who + " lives, but has not come back to this daemon yet: its "
+                                            "connections keep working, new ones wait for it"});
   add_stopped(pid, who, result);
 }
 
@@ -117,10 +116,10 @@ void Obstacles::add_other_strangers(std::vector<Obstacle>& result) const {
       std::count_if(status_.strangers.begin(), status_.strangers.end(),
                     [&](const StrangerStatus& each) { return told.count(&each) == 0; });
   if (others == 0) return;
-  result.push_back({"others-unknown", (others == 1 ? "a component runs"
-                                                   : std::to_string(others) + " components run") +
-                                          std::string(" that this daemon does not know: arbiter "
-                                                      "status tells which")});
+  result.push_back(
+      {"others-unknown",
+       (others == 1 ? "a component runs" : std::to_string(others) + " components run") +
+           std::string(" that this daemon does not know: arbiter status lists them")});
 }
 
 // One of the two names is misspelt: the model's, or the component's.
@@ -165,11 +164,11 @@ std::vector<Obstacle> Obstacles::of_connection(const std::string& source) const 
       " samples were refused since the ports were opened, because the queue was full then "
       "(refuse_new)");
   say(connection.overtaken, "overtaken",
-      " samples were lost to newer ones since the ports were opened, because " + component +
-          " took too slowly then");
+      " samples have been lost to newer ones since the ports were opened, because " + component +
+          " took them too slowly");
   say(connection.dropped, "dropped",
       " samples that had been accepted were dropped at the take since the ports were opened, "
-      "because it was not the winner any more then");
+      "because this connection no longer won");
   say(connection.waiting, "waiting", " samples wait to be taken");
   if (connection.accepted != 0 && connection.taken + connection.dropped == 0) {
     result.push_back({"none-taken", component + " has not taken any of the " +
@@ -210,8 +209,8 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
                       "its process has died"});
   }
   if (is_latched) {
-    result.push_back({"latched", "T is forever, so that it stays active; arbiter deactivate " +
-                                     source + " ends it"});
+    result.push_back(
+        {"latched", "T is forever, so it stays active; arbiter deactivate " + source + " ends it"});
   }
   if (auto other = other_source(source)) result.push_back(std::move(*other));
 }
@@ -231,7 +230,7 @@ std::string Obstacles::why_nothing_comes_of(const std::string& source) const {
   if (!is_away() && !is_open()) {
     const StrangerStatus* stranger = stranger_with(&StrangerStatus::inputs, port_);
     if (stranger == nullptr) return "no component has it open";
-    return process_text(*stranger) + " has it open, which this daemon does not know";
+    return process_text(*stranger) + " has it open, but this daemon does not know that component";
   }
   const wire::ConnectionStatus* connection = connection_of(source);
   if (connection != nullptr && connection->mismatch) {

@@ -22,7 +22,7 @@ shm::PortId require_port(Instance& instance, const std::string& name) {
   const auto model = ModelInForce::fetch(instance);
   throw WatchError("no model and no component has named the input port " + name + " (" +
                    model.text() + " is in force)" +
-                   rules::advise(name, known, "`arbiter status` shows those that there are"));
+                   rules::advise(name, known, "`arbiter status` lists the ports that exist"));
 }
 
 }  // namespace
@@ -35,7 +35,7 @@ Port::Port(std::shared_ptr<Instance> instance, std::string name)
 
 Look Port::look() const {
   if (instance_->memory() != memory_) {
-    throw WatchError("another daemon has come, without the memory of the last one; ask again");
+    throw WatchError("another daemon has started without the memory of the last one; ask again");
   }
   Look look;
   do {
@@ -97,8 +97,8 @@ std::optional<rules::PortExplanation> Port::explain(const Look& look) {
   const auto winner =
       look.winner == shm::kNone ? std::nullopt : std::optional(source_name(look.winner));
   if (explanation.winner != winner) {
-    throw WatchError("the decision table and the model that it was made of differ at " + name_ +
-                     "; this is a mistake in arbiter: please report it");
+    throw WatchError("the decision table and the model that it was made from differ at " + name_ +
+                     "; this is a bug in arbiter: please report it");
   }
   return explanation;
 }

@@ -409,8 +409,7 @@ FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
   const std::string first = open.size() > 1 ? "at " + open.front() + ", " : "";
   const std::string message = "not all states in which nobody wins at " + enumerate(open) +
                               " were looked at: " + first + "it takes " + why_open +
-                              "; the model is in order, this is only not known: --effort allows "
-                              "more";
+                              "; the model is still valid; --effort allows more steps";
   diagnostics.note("left-open", first_open, message, {.ports = std::move(open)});
   return account;
 }

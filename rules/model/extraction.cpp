@@ -87,7 +87,7 @@ class Extraction {
       if (!gives_advice_) continue;
       diagnostics_.warning("matches-nothing", where,
                            "no source that the model names matches " + quote(pattern) +
-                               ": any() is false of it, all() and none() are true; correct it, or "
+                               ": any() of it is false, all() and none() are true; correct it, or "
                                "name the source with <source>");
     }
   }

@@ -158,10 +158,9 @@ class ModelReader {
   void report_unknown(const XmlNode& element) {
     refuse(element, model_);
     if (element.text == "application") {
-      reader_.error(
-          "unknown-element", reader_.where(element),
-          "this is an application file, not a model, for it has no <arbitration>; give it "
-          "as the application");
+      reader_.error("unknown-element", reader_.where(element),
+                    "this is an application file, not a model, because it has no <arbitration>; "
+                    "give it as the application");
     } else if (is_root(element.text)) {
       reader_.error("unknown-element", reader_.where(element),
                     "<" + std::string(element.text) +
@@ -268,7 +267,7 @@ class ModelReader {
       reader_.error("invalid-conflict", text->where(),
                     "conflict=" + quote(value) +
                         " is not known; write conflict=\"first\", or "
-                        "leave it away so that conflicts are errors");
+                        "leave it out, so that conflicts are errors");
     }
     return arbiter.first_wins;
   }

@@ -175,17 +175,17 @@ class WrongEnds {
       warn(use,
            name + " stands here as a source" + origin_of(use) +
                (port != nullptr ? ", and as an input port at " + describe(port->where)
-                                : std::string(", and is called as input ports are")) +
-               ": nobody publishes at an input port, so that it is never active; write the output "
-               "port that was meant",
+                                : std::string(", but is named like an input port")) +
+               ": nobody publishes at an input port, so it is never active; write the output port "
+               "that you meant",
            {.source = name});
     }
     for (const auto& [name, use] : model_.port_uses) {
       if (end_of(name) != ":o") continue;
       warn(use,
            name + " stands here as an input port" + origin_of(use) +
-               ", and is called as output ports are: nobody takes samples there, so that nothing "
-               "is commanded; write the input port that was meant",
+               ", but is named like an output port: nobody takes samples there, so it commands "
+               "nothing; write the input port that you meant",
            {.ports = {name}});
     }
   }
@@ -222,8 +222,8 @@ void check_names(const Model& model, const std::optional<Application>& applicati
   WrongEnds(model, diagnostics).warn();
   if (!source_check.is_exhausted() && !port_check.is_exhausted()) return;
   diagnostics.note("left-open", whole,
-                   "whether names are a slip away from each other was not found out of all: too "
-                   "many long ones are nearly the same; misspelt ones may be among them");
+                   "not all names were compared with each other: too many long ones are nearly the "
+                   "same; there may be misspelt ones among them");
 }
 
 void note_commands_forever(const Model& model, const RuleSet& rules, const Location& whole,
@@ -251,7 +251,7 @@ void note_commands_forever(const Model& model, const RuleSet& rules, const Locat
             " process is killed, its activity does not end, and the port does not fall back to "
             "another source by itself; give " +
             (one ? "it" : "them") +
-            " a finite T, or see to it that somebody deactivates what has died (arbiter "
+            " a finite T, or make sure that something deactivates a source that has died (arbiter "
             "deactivate)");
   };
   std::vector<std::string> by_default;

@@ -35,8 +35,8 @@ class StatementReader {
     finish();
     if (statements_.empty() && malformed_ == 0) {
       diagnostics_.error("no-statements", file_.locate(0),
-                         "there is no statement in this file, so that nothing would be proved; "
-                         "write one on each line, or do not give the file");
+                         "this file has no statement, so nothing would be proved; write one on "
+                         "each line, or do not give the file");
     }
     return std::move(statements_);
   }

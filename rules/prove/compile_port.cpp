@@ -301,7 +301,7 @@ void PortCompiler::report_conflicts() {
     context_.diagnostics.note("more-conflicts", port_.where,
                               std::to_string(pairs.size() - kMaxReportedPairs) +
                                   " more pairs of connections can both win at " + port_.port +
-                                  "; mend those reported first",
+                                  "; correct the first ones",
                               {.ports = {port_.port}});
   }
 }
@@ -351,8 +351,8 @@ void PortCompiler::report_in_order(const InOrder& order) {
       "the rules at " + port_.port + " are tried one after the other, up to " +
           std::to_string(port_.rules.size()) + " of them, for each decision, which reads up to " +
           std::to_string(order.reads.size()) +
-          " sources: diagrams that say of each that none before it holds would be too large; the "
-          "winners are the same, and docs/performance.md says what it costs");
+          " sources: one diagram for each, with those before it multiplied out, would be too "
+          "large; the winners are the same, and docs/performance.md says what it costs");
 }
 
 void PortCompiler::report_outgrown(const ConnectionRule* rule) {

@@ -129,7 +129,8 @@ void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescript
     queued->descriptors[i].reset(fcntl(descriptors[i], F_DUPFD_CLOEXEC, 0));
     if (!queued->descriptors[i]) {
       log::warn(
-          "{} cannot be told, and is given up: {} (the limit is RLIMIT_NOFILE, LimitNOFILE= in "
+          "{} cannot be sent a message, and is given up: {} (the limit is RLIMIT_NOFILE, "
+          "LimitNOFILE= in "
           "a systemd unit)",
           description(), std::strerror(errno));
       lost_ = true;

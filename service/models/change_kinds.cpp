@@ -50,8 +50,8 @@ void ModelChanges::read_first(int stop_descriptor, const std::function<bool()>& 
   }
   Reading reading = compiler_.take();
   if (reading.findings.has_errors()) {
-    throw BadModel(std::string("not started: the files have errors, told above") +
-                   (options_.is_strict ? "; --strict takes warnings for errors" : ""));
+    throw BadModel(std::string("not started: the files have errors, listed above") +
+                   (options_.is_strict ? "; --strict treats warnings as errors" : ""));
   }
   if (reading.policy) gate_.put_in_force(*reading.policy);
   read_at_start_ = std::move(reading.models);

@@ -92,8 +92,8 @@ class PolicyReader {
     }
     if (policy_.rules_.empty() && !diagnostics_.has_errors()) {
       diagnostics_.error("empty-file", file_.locate(0),
-                         "the policy has no line; if root and the daemon's own user alone shall "
-                         "do anything, write: deny everyone all");
+                         "the policy has no lines; if only root and the daemon's own user may do "
+                         "anything, write: deny everyone all");
     }
     return std::move(policy_);
   }

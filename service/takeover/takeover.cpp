@@ -78,7 +78,7 @@ bool Takeover::inherit_stored() {
     }
     return true;
   } catch (const std::exception& error) {
-    log::warn("what the service manager has kept is of no use: {}", error.what());
+    log::warn("the memory kept by the service manager cannot be used: {}", error.what());
     return false;
   }
 }

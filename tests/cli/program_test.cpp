@@ -8,6 +8,7 @@
 namespace arbiter::test {
 namespace {
 
+using testing::ContainsRegex;
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::MatchesRegex;
@@ -18,14 +19,17 @@ TEST(Program, TellsItsVersion) {
   EXPECT_THAT(result.out, MatchesRegex("arbiter [0-9]+\\.[0-9]+\\.[0-9]+\n"));
 }
 
-TEST(Program, ExplainsEachVerbWithAnExample) {
+TEST(Program, ExplainsEachVerbWithAnExampleAndItsExitCodes) {
   EXPECT_EQ(arbiter({"--help"}).exit_code, 0);
-  for (const std::string verb : {"check", "rules", "simulate"}) {
+  for (const std::string verb :
+       {"check", "diff", "rules", "graph", "compile", "simulate", "play", "echo", "pub", "status",
+        "why", "deactivate", "reload", "switch", "rollback", "history", "stop"}) {
     EXPECT_THAT(arbiter({"--help"}).out, HasSubstr(verb));
     const auto result = arbiter({verb, "--help"});
     EXPECT_EQ(result.exit_code, 0);
     EXPECT_EQ(result.err, "");
-    EXPECT_THAT(result.out, HasSubstr("Example:\n  arbiter " + verb));
+    EXPECT_THAT(result.out, ContainsRegex("Examples?:\n  arbiter " + verb));
+    EXPECT_THAT(result.out, HasSubstr("Exit codes: 0 "));
   }
 }
 

@@ -7,30 +7,30 @@
 //   auto in = node.input_port<Position>("/Arm/pos:i");
 //   if (auto sample = in.take()) use(**sample);
 //
-// An arbiter stands at each input port: of the connections to it at most one, the winner, delivers
-// (paper, section III). Which one follows from the model that the daemon has loaded; components do
-// not know of it. docs/semantics.md says exactly what is decided, and when.
+// Each input port has an arbiter: at most one of the connections to the port, the winner, delivers
+// (paper, section III). The model that the daemon has loaded says which one; components know
+// nothing about it. docs/semantics.md says exactly what is decided, and when.
 //
-// C++17 or later. Threads: each port is used by one thread at a time, different ports by different
-// threads as you like. Node is safe to use from several threads. Calls that may block say so; no
-// other does. Errors are thrown as arbiter::Error when ports are opened; nothing on the data path
-// throws, except for misuse that is named where it applies.
+// C++17 or later. Threads: use a port from one thread at a time; different ports may be used by
+// different threads at once. Node is safe to use from several threads. A call that may block says
+// so; the others never block. Opening a port throws arbiter::Error if it fails; nothing on the data
+// path throws, except for the misuse that a call names.
 //
 // Units: bytes, and times by CLOCK_MONOTONIC: nanoseconds (arbiter::Time), or any
 // std::chrono::duration. Cost: data path calls take no lock, allocate nothing and wait for nobody
 // (docs/real-time.md has the exceptions); docs/benchmarks.md has what they take.
 //
-// Each header says the same of what is its own.
+// Each header says the same about its own calls.
 //
-// Processes: a node and its ports belong to the process that made them. A child that this process
-// forks may do with its copies what it likes, and end as it likes: nothing of it reaches the ports.
-// take(), wait_for(), fd(), publish_at() and its like, and all that opens ports throw
-// arbiter::Error there, which says so; publish(), signal(), deactivate() and loan() do nothing, and
-// say so on standard error, once for each port; idle() is true, and there is no winner(). A child
-// may read samples that were held at the fork for as long as its parent holds them, and may make a
-// Node of its own. So a program that calls daemon(3) makes its node after it. If the process ends,
-// its ports are closed, whatever its children do. A child of vfork() runs in its parent's memory:
-// it may call exec or _exit, and nothing else.
+// Processes: a node and its ports belong to the process that made them. A forked child may do
+// anything with its copies, and end in any way: nothing that it does reaches the ports. In the
+// child, take(), wait_for(), fd(), publish_at(), signal_at(), deactivate_at() and all calls that
+// open ports throw an arbiter::Error that says so; publish(), signal(), deactivate() and loan() do
+// nothing, and say so on standard error once for each port; idle() is true, and winner() is empty.
+// A child may read the samples that were held at the fork for as long as its parent holds them, and
+// may make a Node of its own. A program that calls daemon(3) must therefore make its node
+// afterwards. When the process ends, its ports are closed, whatever its children do. A child of
+// vfork() runs in its parent's memory: it may only call exec or _exit.
 #pragma once
 
 #include <arbiter/bytes.hpp>

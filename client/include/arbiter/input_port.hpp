@@ -1,10 +1,10 @@
 // Input ports: where data reaches a component, past the port's arbiter (paper, section III).
 //
-// Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC. Threads: a port, and its samples,
-// are used by one thread at a time. Blocking: wait_for() alone. Cost: take() is without
-// a lock, an allocation or a system call (docs/benchmarks.md has its time); wait_for() sleeps in
-// the kernel. Errors: take() and wait_for() throw arbiter::Error for more than max_held samples,
-// and what else does says so.
+// Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC. Threads: use a port, and its
+// samples, from one thread at a time. Blocking: only wait_for() blocks. Cost: take() needs no lock,
+// no allocation and no system call (docs/benchmarks.md has its time); wait_for() sleeps in the
+// kernel. Errors: take() and wait_for() throw arbiter::Error for more than max_held samples; other
+// calls that throw say so.
 #pragma once
 
 #include <chrono>
@@ -23,25 +23,24 @@
 
 namespace arbiter {
 
-// A sample, read in place. It is given back when it goes out of scope; until then its memory is not
-// used again. Use it on the port's thread. The port stays open for as long as one of its samples is
-// held.
+// A sample, read in place. It goes back when it leaves its scope; until then its memory is not
+// reused. Use it on the port's thread. The port stays open while one of its samples is held.
 class SampleBase {
  public:
-  // The name of the output port it came from. It stays as it is while the port is open. Wait-free.
+  // The name of the output port it came from; valid while the port is open. Wait-free.
   [[nodiscard]] const std::string& source() const noexcept {
     return detail::source_name(*core_, held_.source);
   }
   // The source's own count of its samples, from 1, by its publisher: a successor begins again.
   [[nodiscard]] std::uint64_t sequence() const noexcept { return held_.sequence; }
-  // What it is: the type of the output port it came from, also where the input port is untyped. It
-  // stays as it is while the sample is held. Wait-free.
+  // The type of the output port it came from, even if the input port is untyped; valid while the
+  // sample is held. Wait-free.
   [[nodiscard]] const Type& type() const noexcept {
     return detail::sample_type(*core_, core_.get_deleter().hold);
   }
-  // When it arrived: CLOCK_MONOTONIC, in nanoseconds. Its publisher wrote that; where he says that
-  // it is yet to come, it is when he was first asked: so a motor can stop by a sample's age. Reads
-  // the clock, about 30 ns.
+  // When it arrived: CLOCK_MONOTONIC, in nanoseconds. Its publisher wrote that time; if it lies in
+  // the future, this returns the time of the first call instead, so that a motor can stop by a
+  // sample's age. Reads the clock, about 30 ns.
   [[nodiscard]] std::int64_t stamp_ns() const noexcept {
     return held_.stamp_ns = detail::believable_time(held_.stamp_ns);
   }
@@ -90,8 +89,8 @@ class Sample<void> : public SampleBase {
 
 enum class WaitStatus : std::uint8_t {
   sample,   // here it is
-  idle,     // the port has become idle, see InputPort::idle(); told once for each time
-  timeout,  // nothing of the kind happened in time
+  idle,     // the port has become idle, see InputPort::idle(); reported once each time
+  timeout,  // neither happened in time
 };
 
 // What wait_for() returns: converts to bool and dereferences as take()'s result.
@@ -164,14 +163,13 @@ class InputPort {
   // Throws arbiter::Error if the system has no descriptor left.
   [[nodiscard]] int fd() { return detail::wait_descriptor(*core_); }
 
-  // The source of the connection that is selected now, if one is and the port is not idle. At a
-  // port that is not arbitrated nothing is selected. The name stays as it is while the port is
-  // open. Wait-free, without a lock.
+  // The source of the connection that is selected now, unless the port is idle. At a port that is
+  // not arbitrated nothing is selected. The name is valid while the port is open. Wait-free.
   [[nodiscard]] std::optional<std::string_view> winner() noexcept { return detail::winner(*core_); }
-  // True if no connection is selected now; at a port that is not arbitrated, if none is active. And
-  // true while the one that is selected cannot deliver: it is refused (NoticeKind::refused); or it
-  // stays active for ever, or for longer than T, no component has its source open, and nothing of
-  // it waits. Then what it inhibits stays inhibited. Wait-free.
+  // True if no connection is selected now; at a port that is not arbitrated, if none is active.
+  // Also true while the selected connection cannot deliver: it is refused (NoticeKind::refused); or
+  // its source stays active for ever, or for longer than T, no component has it open, and none of
+  // its samples waits. What it inhibits stays inhibited. Wait-free.
   [[nodiscard]] bool idle() noexcept { return detail::is_idle(*core_); }
   [[nodiscard]] const std::string& name() const noexcept { return detail::name(*core_); }
   // What it takes; untyped: anything.

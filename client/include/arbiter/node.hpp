@@ -1,16 +1,16 @@
 // A component's connection to the daemon, and the maker of its ports.
 //
-// If the daemon dies, data flows on between the ports that are open. The node looks for a new
-// daemon of the instance, about twenty times a second, and hands back what it has; it need not be
-// told to. The service thread does this, or service() where there is none.
+// If the daemon dies, data continues to flow between the ports that are open. The node looks for a
+// new daemon of the instance, about twenty times a second, and hands back its ports by itself. The
+// service thread does this, or service() if there is none.
 //
-// Threads: a node may be used by several threads at once. Blocking: as each call says; none is for
-// a thread with deadlines. Cost: opening a port takes three messages, some maps and
+// Threads: several threads may use a node at once. Blocking: as each call says; call none of them
+// from a thread with deadlines. Cost: opening a port takes three messages, some maps and
 // allocations, typically below a millisecond; the service thread sleeps unless something comes or
 // goes. Errors: arbiter::Error, which says what to do; nothing has been opened then. The paper:
 // ports are those of section III, switch_model() of section V.
 //
-// In a child that was forked all calls throw arbiter::Error, but service_fd(), which answers -1.
+// In a forked child all calls throw arbiter::Error, except service_fd(), which returns -1.
 #pragma once
 
 #include <memory>
@@ -32,7 +32,7 @@ class Node {
   // arbiter::Error. `name` is for people to read; several nodes may share one.
   explicit Node(std::string_view name, const NodeOptions& options = {})
       : core_(detail::make_node(name, options)) {}
-  // Copies are of one component: it stays connected until the last of them, and of its ports, goes.
+  // Copies belong to one component: it stays connected until the last copy and the last port go.
   Node(const Node&) = default;
   Node(Node&&) noexcept = default;
   Node& operator=(Node other) noexcept {
@@ -91,24 +91,23 @@ class Node {
     return input_port(name, Type::untyped(0), options);
   }
 
-  // Puts another of the models in force that the daemon has loaded (arbiterd --model NAME=FILE):
-  // the same components, coordinated as another application (paper, section V). Returns when it
-  // is: every publish() and take() that begins afterwards, in any process, obeys it. All ports
-  // change at one instant; no component is stopped. The one that is in force already changes
-  // nothing.
+  // Puts another loaded model in force (arbiterd --model NAME=FILE): the same components form
+  // another application (paper, section V). Returns when that is done: every publish() and take()
+  // that begins afterwards, in any process, obeys the new model. All ports change at one instant;
+  // no component is stopped. Choosing the model that is already in force changes nothing.
   //
-  // Blocks while components take up what they need to know, typically below a millisecond, or up to
-  // 0.2 s where one does not run; behind reloads and switches that were asked for before, as long
-  // as they take. Throws arbiter::Error: there is no such model (the message names those that there
-  // are), the policy does not allow `switch` to this user, or no daemon has answered within
-  // NodeOptions::connect_timeout (at least a second); then it may come into force yet. Where the
-  // daemon dies meanwhile, the next one is asked again. Any thread may call it; not for the data
-  // path: it allocates, and talks to the daemon.
+  // Blocks while components take up the news: typically below a millisecond, up to 0.2 s if one of
+  // them does not run, and as long as earlier reloads and switches take. Throws arbiter::Error if
+  // there is no such model (the message lists the models that exist), if the policy does not allow
+  // this user to `switch`, or if no daemon has answered within NodeOptions::connect_timeout (at
+  // least a second); in that last case the model may still come into force. If the daemon dies
+  // meanwhile, the next one is asked. Any thread may call it, but not on the data path: it
+  // allocates, and talks to the daemon.
   void switch_model(std::string_view name) { detail::switch_model(*core_, name); }
 
-  // Without a service thread: takes up what the daemon has announced, and calls on_notice for what
-  // there is to say, on this thread. Does not wait for the daemon, but maps and allocates. With one
-  // it does nothing. service_fd() is readable when there is something to do; it stays the node's.
+  // Without a service thread: takes up the daemon's news, and calls on_notice on this thread. Does
+  // not wait for the daemon, but maps and allocates. With a service thread it does nothing.
+  // service_fd() is readable when there is something to do; the node owns the descriptor.
   void service() { detail::service(*core_); }
   [[nodiscard]] int service_fd() const noexcept { return detail::service_fd(*core_); }
 

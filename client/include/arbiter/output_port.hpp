@@ -1,9 +1,9 @@
 // Output ports: where a component's data leaves it (paper, section III).
 //
-// Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC (arbiter::Time). Threads: a port,
-// and its loans, are used by one thread at a time. Blocking: no call does, and none takes a lock or
-// allocates, but the first after a connection has come or gone, which allocates some 200 bytes for
-// each. Errors: what a call throws is said at it; all that do not are noexcept. Cost: with
+// Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC (arbiter::Time). Threads: use a
+// port, and its loans, from one thread at a time. Blocking: no call blocks. None takes a lock or
+// allocates, except the first call after a connection has come or gone, which allocates some 200
+// bytes for each. Errors: each call says what it throws; the others are noexcept. Cost: see
 // publish(); measured in docs/benchmarks.md.
 #pragma once
 
@@ -27,8 +27,8 @@ namespace arbiter {
 template <class T = void>
 class OutputPort;
 
-// A sample being written, in the memory in which receivers will read it. It belongs to the port
-// that lent it; given up without being published, it is free again. May outlive its port.
+// A sample that you write in the memory where receivers will read it. It belongs to the port that
+// lent it; if you drop it without publishing, it is free again. May outlive its port.
 template <class T>
 class Loan {
  public:
@@ -143,14 +143,13 @@ class OutputPort : public OutputPortBase {
     return detail::publish_copy(*core_, &sample, sizeof(T));
   }
 
-  // Never late: the same, unless `deadline` has passed by the reading of the clock that publish()
-  // takes first of all, and that is the arrival's time. (What comes at the deadline itself is in
-  // time.) Where it has, there is no arrival: the source's activity is as it was, no sequence
-  // number is used, nobody is woken, a loan is free again. The outcome says `late`, and
-  // `arbiter status` counts it. For whatever hands on what has come from elsewhere and may have
-  // waited: a sample above its T is better lost than obeyed. No promise is made about the time
-  // after that reading: who is stopped within publish() arrives when he goes on, at the time that
-  // he has read.
+  // The same, but never late: publish() first reads the clock, which gives the arrival's time. If
+  // `deadline` has passed by then, there is no arrival: the source's activity stays as it was, no
+  // sequence number is used, nobody is woken, and a loan is free again. The outcome says `late`,
+  // and `arbiter status` counts it. (At the deadline itself a sample is in time.) Use it to pass on
+  // samples that may have waited somewhere: one that is older than its T is better lost than
+  // obeyed. The deadline says nothing about the time after that reading: a publisher that is
+  // stopped inside publish() arrives when it continues, with the time that it has read.
   Outcome publish(Loan<T> loan, Time deadline) {
     require_own(loan);
     return detail::publish(*core_, release(loan), sizeof(T), deadline);
@@ -159,19 +158,19 @@ class OutputPort : public OutputPortBase {
     return detail::publish_copy(*core_, &sample, sizeof(T), deadline);
   }
 
-  // For replay: an arrival whose time is given. It is as if publish() had been called at that time,
-  // had read the clock, and had been held up until now: it is decided for `at`, the sample says so
+  // For replay: an arrival at a given time, as if publish() had been called then, had read the
+  // clock, and had been held up until now. It is decided for `at`, the sample bears that time
   // (stamp_ns()), and the source is active until `at` + T, which may have passed already. So a
   // trace that is replayed in its order is decided as `arbiter simulate` says, however late each
-  // call comes; where an arrival at another time, such as a live one, has come between, it is
+  // call comes. If an arrival at another time, such as a live one, has come in between, it is
   // decided for the time of the call.
   //
-  // Throws arbiter::Error, and there is no arrival, a loan is free again: `at` is later than now;
-  // or before the last arrival or deactivation of this source, or at the time of a deactivation;
-  // or the daemon's policy had not allowed `replay` of this source to this user when the port was
-  // opened. That protects against mistakes: a component writes the activity of its own source, so
-  // who may open it can pretend any arrival. Wait-free; but each call binds the rules
-  // anew, as publish() does it only after another model has come into force.
+  // Throws arbiter::Error if `at` is later than now, before the last arrival or deactivation of
+  // this source, or at the time of a deactivation; or if the daemon's policy did not allow this
+  // user to `replay` this source when the port was opened. Then there is no arrival, and a loan is
+  // free again. The policy protects against mistakes only: a component writes the activity of its
+  // own source, so whoever may open it can pretend any arrival. Wait-free; but each call binds the
+  // rules again, which publish() does only after another model has come into force.
   Outcome publish_at(Time at, Loan<T> loan) {
     require_own(loan);
     return detail::publish_at(*core_, at, release(loan), sizeof(T));

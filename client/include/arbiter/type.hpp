@@ -6,19 +6,19 @@
 //   auto out = node.output_port<Twist>("/Joystick/cmd:o");
 //   auto in = node.input_port("/Base/cmd:i", arbiter::Type("geometry/Twist", 48, 8));  // elsewhere
 //
-// Two types are equal if and only if their names are, byte for byte, and their sizes, and their
-// alignments. Nothing else is compared: two programs that give one name to two layouts of one size
-// understand each other wrongly; put a version into the name where the layout changes.
+// Two types are equal if and only if their names are equal, byte for byte, and their sizes and
+// alignments are, too. Nothing else is compared: two programs that give one name to two layouts of
+// the same size misunderstand each other. Put a version into the name when the layout changes.
 //
 // Samples go from an output port to an input port if the two ports' types are equal, or the input
 // port is untyped. Otherwise the two are not connected; a notice to both (NoticeKind::refused), the
 // daemon's log, `arbiter status` and `arbiter why` name both types and both components.
 //
-// A type's name is 1 to 239 bytes of UTF-8, without control characters and invisible ones. A C++
-// type that is given none is called as the compiler writes it, with its namespaces
-// ("robot::Twist"; demangled, as GCC and Clang do it; where that is above 239 bytes, its end is
-// replaced by a hash of the whole). Programs in one language, built alike, may rely on it. Name
-// what others shall feed or read: a script, a gateway, another language, another standard library.
+// A type's name is 1 to 239 bytes of UTF-8, without control or invisible characters. A C++ type
+// without a name of its own has the name that the compiler writes, with its namespaces
+// ("robot::Twist", demangled as GCC and Clang do it; beyond 239 bytes, a hash of the whole replaces
+// its end). Programs that are built alike may rely on that. Name the types that others feed or
+// read: a script, a gateway, another language, another standard library.
 //
 // Threads: a Type is a value. Blocking: none. Cost: a copy may allocate; nothing here is on the
 // data path.
@@ -35,20 +35,21 @@ namespace arbiter {
 class Type {
  public:
   // `size` of a sample and `alignment` are in bytes: 1 to 2^40, and a power of two up to 4096.
-  // Throws arbiter::Error where one of the three is not as it must be.
+  // Throws arbiter::Error if one of the three is out of bounds.
   Type(std::string_view name, std::size_t size, std::size_t alignment);
-  // Samples of any size up to `max_size`, which are bytes to whoever has not agreed upon more.
+  // Samples of any size up to `max_size`: plain bytes, whose meaning the programs agree upon.
   [[nodiscard]] static Type untyped(std::size_t max_size) noexcept;
 
   // Empty: untyped.
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
-  // Bytes of a sample; untyped: the most that one may have, 0 at an input port, which takes any.
+  // Bytes of a sample. Untyped: the most that a sample may have; 0 at an input port, which takes
+  // any.
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  // In bytes. Untyped: of where a sample begins in memory; 1 at an input port.
+  // In bytes. Untyped: the alignment of a sample in memory; 1 at an input port.
   [[nodiscard]] std::size_t alignment() const noexcept { return alignment_; }
   [[nodiscard]] bool is_untyped() const noexcept { return name_.empty(); }
 
-  // The rule that is written above.
+  // By the rule above.
   friend bool operator==(const Type& one, const Type& other) noexcept {
     return one.name_ == other.name_ && one.size_ == other.size_ &&
            one.alignment_ == other.alignment_;
@@ -63,7 +64,7 @@ class Type {
   std::size_t alignment_ = 1;
 };
 
-// The name of T, where somebody has given one. Specialise it as ARBITER_TYPE does it, or partially:
+// The name of T, if it has been given one. Specialise it as ARBITER_TYPE does, or partially:
 //
 //   template <class Scalar>
 //   struct arbiter::TypeName<Grid<Scalar>> {
@@ -78,7 +79,7 @@ namespace detail {
 
 Type type_of_cpp(const char* mangled_name, std::size_t size, std::size_t alignment);
 
-// As far as it can be said while compiling; Type() looks at the rest.
+// What can be checked while compiling; Type() checks the rest.
 constexpr bool may_be_type_name(std::string_view name) noexcept {
   for (const char byte : name) {
     if ((static_cast<unsigned char>(byte) < 0x20) || byte == 0x7f) return false;
@@ -88,7 +89,7 @@ constexpr bool may_be_type_name(std::string_view name) noexcept {
 
 }  // namespace detail
 
-// T as its ports declare it. Throws arbiter::Error where it has been given no proper name.
+// T as its ports declare it. Throws arbiter::Error if its given name is not a proper one.
 template <class T>
 [[nodiscard]] Type type_of() {
   static_assert(
