@@ -66,11 +66,9 @@ Type::Type(std::string_view name, std::size_t size, std::size_t alignment)
   if (const auto fault = shm::fault_of(detail::as_info(*this))) refuse(*fault);
 }
 
-Type Type::untyped(std::size_t max_size) noexcept {
-  Type type;
-  type.size_ = max_size;
-  type.alignment_ = max_size == 0 ? 1 : alignof(std::max_align_t);
-  return type;
-}
+Type::Type(Untyped untyped) noexcept
+    : size_(untyped.max_size), alignment_(untyped.max_size == 0 ? 1 : alignof(std::max_align_t)) {}
+
+Type Type::untyped(std::size_t max_size) noexcept { return Type(Untyped(max_size)); }
 
 }  // namespace arbiter

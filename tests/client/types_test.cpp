@@ -299,6 +299,12 @@ TEST(Types, AnUntypedPortsSamplesSayWhatTheyAre) {
   EXPECT_EQ(sample->type().name(), "geometry/Twist");
 }
 
+// {} are options, for a type has no default.
+static_assert(requires(Node & node) {
+  node.output_port("/a", {});
+  node.input_port("/a", {});
+});
+
 TEST(Types, WhatCannotBeATypeIsRefusedWithTheReason) {
   const auto why_not = [](const std::string& name, std::size_t size, std::size_t alignment) {
     return error_of([&] { static_cast<void>(Type(name, size, alignment)); });
