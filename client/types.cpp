@@ -63,6 +63,8 @@ Type::Type(std::string_view name, std::size_t size, std::size_t alignment)
   if (name.empty() || name.size() > shm::kMaxTypeName) {
     refuse("its name must have 1 to " + std::to_string(shm::kMaxTypeName) + " bytes");
   }
+  // In memory it would end there; where that is at once, the port would be untyped.
+  if (name.find('\0') != std::string_view::npos) refuse("its name has a zero byte in it");
   if (const auto fault = shm::fault_of(detail::as_info(*this))) refuse(*fault);
 }
 

@@ -315,6 +315,8 @@ TEST(Types, WhatCannotBeATypeIsRefusedWithTheReason) {
   EXPECT_EQ(why_not("a\nb", 8, 8),
             "\"a\\nb\" cannot be a port's type: its name has a control character or an invisible "
             "one in it");
+  EXPECT_NE(why_not(std::string("a\0b", 3), 8, 8).find("zero byte"), std::string::npos);
+  EXPECT_NE(why_not(std::string(1, '\0'), 8, 8).find("zero byte"), std::string::npos);
   EXPECT_NE(why_not("a\u202eb", 8, 8).find("invisible"), std::string::npos);
   EXPECT_NE(why_not("a\xff", 8, 8).find("not UTF-8"), std::string::npos);
   EXPECT_NE(why_not("a", 0, 8).find("no bytes"), std::string::npos);
