@@ -32,6 +32,8 @@ struct NodeOptions {
   // Called for what a component should know of its ports (notice.hpp), once for each port and
   // sentence. Empty: the sentence goes to standard error.
   // On the service thread; where there is none, on a thread that calls service() or opens a port.
+  // And before Node() returns, on the thread that makes the node, where there are two daemons
+  // (NoticeKind::apart): the callback must not use the node then.
   // One call at a time, and no lock of the library is held meanwhile: the callback may open and
   // close ports of this node. But it must not destroy the node, nor the last of its ports after it;
   // and be quick: until it returns, this node takes up nothing that is new. What it throws is
