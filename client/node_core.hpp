@@ -188,6 +188,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::string turned_away_;         // why the last daemon did not take us back
   bool is_anew_ = false;            // rejoining with nothing to hand back
   shm::Nanoseconds asked_ = 0;      // when we asked to rejoin
+  bool has_told_of_clock_ = false;  // that the daemon's is another
   bool stopping_ = false;
   std::uint64_t next_request_ = 1;
   std::map<std::uint64_t, Reply> replies_;

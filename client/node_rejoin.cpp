@@ -9,6 +9,7 @@
 #include <sys/timerfd.h>
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "client/node_core.hpp"
@@ -175,10 +176,12 @@ void NodeCore::be_welcomed(shm::Received& welcome) {
   if (standing_ != Standing::kRejoining) return;
   turned_away_ = wire::find_fault_in_clock(welcome.message, asked_);
   if (!turned_away_.empty()) {
-    note(NoticeKind::apart, 0, {}, turned_away_);
+    // Once, though each time it is measured a little otherwise.
+    if (!std::exchange(has_told_of_clock_, true)) note(NoticeKind::apart, 0, {}, turned_away_);
     be_alone(kTurnedAwayInterval);
     return;
   }
+  has_told_of_clock_ = false;
   if (!are_same(welcome.descriptors[0], memory_->board())) {
     try {
       if (!is_anew_) throw std::runtime_error("the daemon has other memory");

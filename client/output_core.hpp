@@ -36,8 +36,11 @@ class OutputCore {
 
   // The port is open: the daemon has given it its place.
   void bind(shm::PortInstance instance, shm::SourceId source, shm::FileDescriptor page);
-  // Before the component has the port: `why`, a sentence of the daemon's.
-  void forbid_replay(std::string why) { why_no_replay_ = std::move(why); }
+  // Before the component has the port: `why`, a sentence of the daemon's, and empty of one that
+  // does not know what replay is.
+  void forbid_replay(std::string why) {
+    why_no_replay_ = why.empty() ? "this daemon does not allow replay" : std::move(why);
+  }
   // `link`: its number if they are connected, else 0.
   void add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t link);
   void remove_peer(shm::PortInstance peer);

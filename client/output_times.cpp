@@ -51,7 +51,10 @@ void OutputCore::begin_replay(shm::Nanoseconds at, shm::Nanoseconds now) {
     last_ = std::clamp(shm::time_of(own_word_, timeout_), shm::Nanoseconds{0}, now);
   }
   if (at > now) refuse(at - now, "later than now");
-  if (at < last_) refuse(last_ - at, "before the last arrival or deactivation of this source");
+  if (at < last_) {
+    refuse(last_ - std::max(at, shm::Nanoseconds{0}),  // Time::min() is no reading of a clock
+           "before the last arrival or deactivation of this source");
+  }
   if (at == last_ && shm::is_deactivation(own_word_)) {
     refuse(0, "after the last deactivation of this source; later is allowed");
   }

@@ -63,14 +63,14 @@ Type::Type(std::string_view name, std::size_t size, std::size_t alignment)
   if (name.empty() || name.size() > shm::kMaxTypeName) {
     refuse("its name must have 1 to " + std::to_string(shm::kMaxTypeName) + " bytes");
   }
+  // In memory it would end there; where that is at once, the port would be untyped.
+  if (name.find('\0') != std::string_view::npos) refuse("its name has a zero byte in it");
   if (const auto fault = shm::fault_of(detail::as_info(*this))) refuse(*fault);
 }
 
-Type Type::untyped(std::size_t max_size) noexcept {
-  Type type;
-  type.size_ = max_size;
-  type.alignment_ = max_size == 0 ? 1 : alignof(std::max_align_t);
-  return type;
-}
+Type::Type(Untyped untyped) noexcept
+    : size_(untyped.max_size), alignment_(untyped.max_size == 0 ? 1 : alignof(std::max_align_t)) {}
+
+Type Type::untyped(std::size_t max_size) noexcept { return Type(Untyped(max_size)); }
 
 }  // namespace arbiter

@@ -70,6 +70,8 @@ void Instance::take_up_memory(shm::Received& welcome) {
                                                   shm::Residence::kMapped, 0);
   shared_ = memory_;
   port_names_.clear();
+  port_ids_.clear();
+  source_ids_.clear();
 }
 
 void Instance::update() {
@@ -103,7 +105,7 @@ void Instance::handle(shm::Received& received) {
   if (message.kind == shm::MessageKind::kSourcePage) {
     add_page(received);
   } else if (message.kind == shm::MessageKind::kPortName) {
-    if (message.id < shm::kMaxInputPorts) port_names_[message.id] = message.name_view();
+    add_port_name(message.id, std::string(message.name_view()));
   } else if (message.request == asked_) {
     answer_ = std::move(received);
   }
@@ -112,11 +114,28 @@ void Instance::handle(shm::Received& received) {
 // A source whose page cannot be had stays unseen.
 void Instance::add_page(shm::Received& received) {
   const shm::Message& message = received.message;
+  const std::string name(message.name_view());
+  const std::string before = memory_->source_name(message.id);
   try {
-    memory_->add_page(message.id, message.value, std::string(message.name_view()),
-                      std::move(received.descriptors[0]));
+    memory_->add_page(message.id, message.value, name, std::move(received.descriptors[0]));
+    const auto known = source_ids_.find(before);
+    const bool is_renamed = known != source_ids_.end() && known->second == message.id;
+    if (is_renamed && before != name) source_ids_.erase(known);
+    source_ids_[name] = message.id;
   } catch (const std::exception&) {
   }
+}
+
+// A name that nobody needs is given back, of which nobody is told; when it is taken again it has
+// another id: the last one counts.
+void Instance::add_port_name(shm::PortId id, std::string name) {
+  if (id >= shm::kMaxInputPorts) return;
+  if (const auto [known, is_new] = port_ids_.try_emplace(name, id); !is_new) {
+    if (known->second != id) port_names_.erase(std::exchange(known->second, id));
+  }
+  std::string& of_id = port_names_[id];
+  if (!of_id.empty() && of_id != name) port_ids_.erase(of_id);
+  of_id = std::move(name);
 }
 
 void Instance::look_for_daemon() {
@@ -180,16 +199,15 @@ bool Instance::say(const shm::Message& message) const {
 }
 
 std::optional<shm::PortId> Instance::find_port(std::string_view name) const {
-  const auto found = std::find_if(port_names_.begin(), port_names_.end(),
-                                  [&](const auto& each) { return each.second == name; });
-  return found == port_names_.end() ? std::nullopt : std::optional(found->first);
+  const auto found = port_ids_.find(name);
+  return found == port_ids_.end() ? std::nullopt : std::optional(found->second);
 }
 
 std::optional<shm::SourceId> Instance::find_source(std::string_view name) const {
-  for (shm::SourceId source = 0; source < shm::kMaxSources; ++source) {
-    if (memory_->pages().knows(source) && memory_->source_name(source) == name) return source;
-  }
-  return std::nullopt;
+  const auto found = source_ids_.find(name);
+  // The id may be another source's by now.
+  const bool is_known = found != source_ids_.end() && memory_->source_name(found->second) == name;
+  return is_known ? std::optional(found->second) : std::nullopt;
 }
 
 shm::Received Instance::ask(const shm::Message& question) {

@@ -16,6 +16,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -55,11 +56,11 @@ class Instance {
   [[nodiscard]] const std::shared_ptr<const shm::DecisionMemory>& memory() const noexcept {
     return shared_;
   }
-  // Of all input ports that anybody has named.
+  // Of all input ports that anybody has named; of those of one name the last.
   [[nodiscard]] const std::map<shm::PortId, std::string>& port_names() const noexcept {
     return port_names_;
   }
-  // Nothing: nobody has named it. A search among all names.
+  // Nothing: nobody has named it. What was closed and opened again may have another id since.
   [[nodiscard]] std::optional<shm::PortId> find_port(std::string_view name) const;
   [[nodiscard]] std::optional<shm::SourceId> find_source(std::string_view name) const;
 
@@ -76,6 +77,7 @@ class Instance {
   void take_up_memory(shm::Received& welcome);
   void handle(shm::Received& received);
   void add_page(shm::Received& received);
+  void add_port_name(shm::PortId id, std::string name);
   void look_for_daemon();
   void be_greeted(shm::Received& welcome);
   void lose_daemon(Clock::duration look_again_in);
@@ -93,6 +95,8 @@ class Instance {
   std::shared_ptr<shm::DecisionMemory> memory_;
   std::shared_ptr<const shm::DecisionMemory> shared_;  // the same
   std::map<shm::PortId, std::string> port_names_;
+  std::map<std::string, shm::PortId, std::less<>> port_ids_;
+  std::map<std::string, shm::SourceId, std::less<>> source_ids_;
   std::uint64_t last_request_ = 0;
   std::uint64_t asked_ = 0;              // the question that is to be answered
   std::optional<shm::Received> answer_;  // to it

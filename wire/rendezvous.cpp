@@ -116,9 +116,19 @@ bool has_system_directory(uid_t user) {
          (status.st_mode & (S_IWGRP | S_IWOTH)) == 0;
 }
 
-bool is_trusted(uid_t user, const std::string& directory) {
+// As far as no name service needs to be asked.
+bool is_surely_trusted(uid_t user, const std::string& directory) {
   return user == 0 || user == geteuid() ||
-         (directory == kSystemDirectory && has_system_directory(user)) || user == arbiter_user();
+         (directory == kSystemDirectory && has_system_directory(user));
+}
+
+bool is_trusted(uid_t user, const std::string& directory) {
+  return is_surely_trusted(user, directory) || user == arbiter_user();
+}
+
+bool is_surely_trusted_ones(const std::string& directory) {
+  struct stat status {};
+  return lstat(directory.c_str(), &status) == 0 && is_surely_trusted(status.st_uid, directory);
 }
 
 // Whose it is, if it is a stranger's: a daemon listens in a directory of its own, so that nobody
@@ -304,6 +314,9 @@ std::vector<std::string> other_daemons(const std::string& instance, const std::s
   directories.push_back("/run/user/" + std::to_string(geteuid()) + "/arbiter");
   std::vector<std::string> known{directory + "/" + instance + ".sock"};
   for (const std::string& other : directories) {
+    // What lies in a stranger's is not looked at; and he makes nobody wait for a name service by
+    // making a directory: here a daemon has been found.
+    if (!is_surely_trusted_ones(other)) continue;
     const std::string path = other + "/" + instance + ".sock";
     const bool is_known = std::any_of(known.begin(), known.end(), [&](const std::string& each) {
       return are_same_file(each, path);

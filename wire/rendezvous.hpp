@@ -46,7 +46,8 @@ std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std
                                                 std::string* directory = nullptr);
 
 // The sockets of trusted daemons of the instance that listen elsewhere than in `directory`: whose
-// environment is another meets them, and shares nothing with who meets here.
+// environment is another meets them, and shares nothing with who meets here. Not looked for in
+// directories of others than root, this user, and the owner of /run/arbiter.
 std::vector<std::string> other_daemons(const std::string& instance, const std::string& directory);
 
 }  // namespace arbiter::shm

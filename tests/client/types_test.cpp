@@ -299,6 +299,12 @@ TEST(Types, AnUntypedPortsSamplesSayWhatTheyAre) {
   EXPECT_EQ(sample->type().name(), "geometry/Twist");
 }
 
+// {} are options, for a type has no default.
+static_assert(requires(Node & node) {
+  node.output_port("/a", {});
+  node.input_port("/a", {});
+});
+
 TEST(Types, WhatCannotBeATypeIsRefusedWithTheReason) {
   const auto why_not = [](const std::string& name, std::size_t size, std::size_t alignment) {
     return error_of([&] { static_cast<void>(Type(name, size, alignment)); });
@@ -309,6 +315,8 @@ TEST(Types, WhatCannotBeATypeIsRefusedWithTheReason) {
   EXPECT_EQ(why_not("a\nb", 8, 8),
             "\"a\\nb\" cannot be a port's type: its name has a control character or an invisible "
             "one in it");
+  EXPECT_NE(why_not(std::string("a\0b", 3), 8, 8).find("zero byte"), std::string::npos);
+  EXPECT_NE(why_not(std::string(1, '\0'), 8, 8).find("zero byte"), std::string::npos);
   EXPECT_NE(why_not("a\u202eb", 8, 8).find("invisible"), std::string::npos);
   EXPECT_NE(why_not("a\xff", 8, 8).find("not UTF-8"), std::string::npos);
   EXPECT_NE(why_not("a", 0, 8).find("no bytes"), std::string::npos);

@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include <arbiter/arbiter.hpp>
@@ -93,6 +95,29 @@ TEST(Instance, HearsOfPortsThatAreNewAndOfModels) {
   update_until(*instance, [&] { return instance->find_port("/s").has_value(); });
   out.signal();
   EXPECT_EQ(winner(*instance, "/s"), "/new");
+}
+
+// A name that nobody needs is given back; who opens it again has another id.
+TEST(Instance, FindsANameThatHasBeenGivenBackAndTakenAgain) {
+  Daemon daemon(kModel);
+  Node node("component");
+  const auto instance = watched(daemon);
+  std::optional<shm::PortId> port;
+  std::optional<shm::SourceId> source;
+  for (int i = 0; i < 3; ++i) {
+    const auto in = node.input_port<int>("/again");
+    const auto out = node.output_port<int>("/again:o");
+    update_until(*instance, [&] {
+      return instance->find_port("/again") != port && instance->find_source("/again:o") != source;
+    });
+    port = instance->find_port("/again");
+    source = instance->find_source("/again:o");
+    ASSERT_TRUE(port && source);
+  }
+  const auto& names = instance->port_names();
+  EXPECT_EQ(std::count_if(names.begin(), names.end(),
+                          [](const auto& each) { return each.second == "/again"; }),
+            1);
 }
 
 TEST(Instance, SeesOnWhileTheDaemonIsStoppedOrGone) {

@@ -130,6 +130,20 @@ TEST_F(Rendezvous, WhoTheUserArbiterIsIsNotAskedWhereADaemonListens) {
   EXPECT_EQ(asked_for_arbiter, 0);
 }
 
+// Anybody may make /tmp/arbiter-0.
+TEST_F(Rendezvous, WhoTheUserArbiterIsIsNotAskedForTheSakeOfAStrangersDirectory) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root can give a directory away";
+  const std::string session = make("session");
+  setenv("XDG_RUNTIME_DIR", session.c_str(), 1);
+  const Listener listener = listen_at(daemon_directory(), "one");
+  const std::string planted = make("arbiter-0");
+  const Listener another = listen_at(planted, "one");
+  ASSERT_EQ(chown(planted.c_str(), 65534, 65534), 0);
+  asked_for_arbiter = 0;
+  EXPECT_EQ(other_daemons("one", session + "/arbiter"), std::vector<std::string>());
+  EXPECT_EQ(asked_for_arbiter, 0);
+}
+
 TEST_F(Rendezvous, ADirectoryThatOthersMayWriteInIsRefused) {
   for (const mode_t mode : {0775u, 0757u, 0777u, 01777u}) {
     const std::string unsafe = make("unsafe" + std::to_string(mode), mode);

@@ -32,11 +32,13 @@ struct NodeOptions {
   // Called with what a component should know about its ports (notice.hpp), once for each port and
   // sentence. Empty: the sentence goes to standard error.
   // Runs on the service thread, or, if there is none, on a thread that calls service() or opens a
-  // port; one call at a time, and with no lock of the library held. The callback may open and close
-  // ports of this node, but must not destroy the node, nor its last port after the node. It should
-  // be quick: until it returns, this node takes up no news. An exception is written to standard
-  // error, and has no other effect. Calls may come until the node and all of its ports have gone.
-  // If something is known when a port is opened, the call begins before the opening returns.
+  // port; one call at a time, and with no lock of the library held. If there are two daemons
+  // (NoticeKind::apart), it also runs inside Node(), on the thread that makes the node: it must not
+  // use the node then. The callback may open and close ports of this node, but must not destroy the
+  // node, nor its last port after the node. It should be quick: until it returns, this node takes up
+  // no news. An exception is written to standard error, and has no other effect. Calls may come
+  // until the node and all of its ports have gone. If something is known when a port is opened, the
+  // call begins before the opening returns.
   std::function<void(const Notice&)> on_notice{};
   // Whether a thread of low priority takes up what the daemon announces (ports that come and go,
   // new models). Without it, call Node::service() often: until you do, this node's ports see no

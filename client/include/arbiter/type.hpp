@@ -57,11 +57,16 @@ class Type {
   friend bool operator!=(const Type& one, const Type& other) noexcept { return !(one == other); }
 
  private:
-  Type() = default;
+  // Not a default constructor: {} for the options of a port would be ambiguous.
+  struct Untyped {
+    explicit Untyped(std::size_t size) noexcept : max_size(size) {}
+    std::size_t max_size;
+  };
+  explicit Type(Untyped untyped) noexcept;
 
   std::string name_;
-  std::size_t size_ = 0;
-  std::size_t alignment_ = 1;
+  std::size_t size_;
+  std::size_t alignment_;
 };
 
 // The name of T, if it has been given one. Specialise it as ARBITER_TYPE does, or partially:
