@@ -44,6 +44,10 @@ void Daemon::open_output(Client& client, shm::Received& received) {
   require_free(client, source.open, "the output port " + name);
   takeover_.require_not_kept(source.away, "the output port " + name);
   require_not_changing(source);
+  if (!source.has_page()) {  // its last publisher has ended, and nobody has handed it back
+    names_.replace_lost_page(source);
+    introductions_.introduce(switchboard_.link_all(board_.in_force().table), [] {});
+  }
   const std::uint64_t request = received.message.request;
   if (PortNames::may_be_given(source, client.user())) {
     finish_opening(client, request, std::move(port), source);
