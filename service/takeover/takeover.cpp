@@ -28,11 +28,12 @@ shm::FileDescriptor open_process(pid_t pid) {
   return shm::FileDescriptor(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
 }
 
-// Nobody's, where that cannot be told.
-uid_t user_of_process(pid_t pid) {
+// Empty where that cannot be told: what belongs to a process that may not be looked into is said to
+// be root's.
+std::optional<uid_t> user_of_process(pid_t pid) {
   struct stat status {};
-  if (::stat(("/proc/" + std::to_string(pid)).c_str(), &status) != 0) return uid_t(-1);
-  return status.st_uid;
+  if (::stat(("/proc/" + std::to_string(pid)).c_str(), &status) != 0) return {};
+  return status.st_uid == 0 ? std::nullopt : std::optional(status.st_uid);
 }
 
 }  // namespace

@@ -115,7 +115,7 @@ class Takeover {
   enum class Phase : std::uint8_t { kExpecting, kTakingOver, kServing };
   struct Absentee {
     pid_t pid = 0;
-    uid_t user = 0;
+    std::optional<uid_t> user;  // empty: it cannot be told
     shm::FileDescriptor process;
     std::set<shm::PortInstance> ports;
     Charge charge;
@@ -126,6 +126,7 @@ class Takeover {
   void find_absentees();
   void add_absentee(const Owner& owner);
   void take_back(Client& client, const shm::Received& hello);
+  [[nodiscard]] static bool is_that(const Client& client, const Absentee& absentee);
   // Nothing is kept for the node that a client was and has nothing left of: what it closed without
   // a daemon, or was never told that it got.
   void forget_former(const Client& client);
