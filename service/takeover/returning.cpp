@@ -186,7 +186,8 @@ void Takeover::know(const Client& client) {
 
 Charge Takeover::make_room_for(const Client& newcomer, NodeId former) {
   const auto absentee = absentees_.find(former);
-  if (absentee != absentees_.end() && is_that(newcomer, absentee->second)) {
+  if (absentee != absentees_.end() && is_that(newcomer, absentee->second) &&
+      absentee->second.charge) {
     return std::move(absentee->second.charge);
   }
   return shares_.take(newcomer.user(), Share::kClients);

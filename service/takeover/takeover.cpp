@@ -117,6 +117,10 @@ void Takeover::add_absentee(const Owner& owner) {
       switchboard_.forget_away(owner.port);
       return;
     }
+    // As it had it of the last daemon, whatever is left by now.
+    absentee.charge = absentee.user && shares_.allows(*absentee.user, Share::kClients, 1)
+                          ? shares_.take(*absentee.user, Share::kClients)
+                          : shares_.take_own(Share::kClients);
     host_.watch_absentee(absentee.process, owner.node);
   }
   absentee.ports.insert(owner.port);
