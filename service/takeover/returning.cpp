@@ -23,6 +23,13 @@ constexpr shm::Nanoseconds kMaxWaitForDeath = 100'000'000;
 
 }  // namespace
 
+bool Takeover::knows(const shm::FileDescriptor& board) const {
+  if (!board) return false;
+  const auto known =
+      phase_ == Phase::kExpecting ? predecessor_->realm.board : FileIdentity::of(board_.readable());
+  return FileIdentity::of(board) == known;
+}
+
 void Takeover::rejoin(Client& client, const shm::Received& hello) {
   try {
     take_back(client, hello);

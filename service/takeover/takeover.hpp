@@ -82,6 +82,9 @@ class Takeover {
   void let_wait(const Client& client) { waiting_.push_back(client.id()); }
   void welcome_waiting();
 
+  // Whether that is the board of this daemon or of its predecessor: other memory has other nodes of
+  // the same numbers.
+  [[nodiscard]] bool knows(const shm::FileDescriptor& board) const;
   // One that says it was here before. Throws std::runtime_error where it cannot be taken back;
   // RefusedAgain where the log has that already.
   void rejoin(Client& client, const shm::Received& hello);
