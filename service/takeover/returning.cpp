@@ -55,13 +55,7 @@ void Takeover::take_back(Client& client, const shm::Received& hello) {
                              "\", which another daemon has opened; restart the component");
   }
   const NodeId node = hello.message.link;
-  // The conversation that it gave up may not have been seen to end.
-  const auto former = std::find_if(clients_.begin(), clients_.end(), [&](const auto& each) {
-    return each.second->node == node && each.second.get() != &client &&
-           each.second->user() == client.user() &&
-           client.is_process(each.second->pid(), each.second->process());
-  });
-  if (former != clients_.end()) host_.drop(former->first);
+  end_conversation_of(client, node);
   const auto absentee = absentees_.find(node);
   if (absentee != absentees_.end() && is_that(client, absentee->second)) {
     client.node = node;
@@ -72,6 +66,16 @@ void Takeover::take_back(Client& client, const shm::Received& hello) {
   client.is_component = true;
   at_step("node-known-again");
   host_.welcome(client);
+}
+
+// The conversation that it gave up may not have been seen to end.
+void Takeover::end_conversation_of(const Client& client, NodeId node) {
+  const auto former = std::find_if(clients_.begin(), clients_.end(), [&](const auto& each) {
+    return each.second->node == node && each.second.get() != &client &&
+           each.second->user() == client.user() &&
+           client.is_process(each.second->pid(), each.second->process());
+  });
+  if (former != clients_.end()) host_.drop(former->first);
 }
 
 // A process goes on by its number when it executes a program that runs as another user; who it was
@@ -179,6 +183,8 @@ void Takeover::give_up(NodeId node) {
 }
 
 void Takeover::forget_former(const Client& client) {
+  if (client.former == 0) return;
+  end_conversation_of(client, client.former);
   const auto found = absentees_.find(client.former);
   if (found == absentees_.end() || !is_that(client, found->second)) return;
   log::info("{} is here again, without the {} ports that were kept for it", client.description(),

@@ -160,7 +160,7 @@ shm::Nanoseconds Takeover::deadline() const {
 
 void Takeover::advance(shm::Nanoseconds now) {
   if (phase_ == Phase::kServing) return;
-  for (const ClientId id : waiting_) {
+  for (const ClientId id : std::vector(waiting_)) {  // who is dropped may end others' waiting
     if (const Client* const client = clients_.find(id)) forget_former(*client);
   }
   const bool all_are_back = phase_ == Phase::kTakingOver && absentees_.empty() &&
