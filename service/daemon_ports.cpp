@@ -62,13 +62,13 @@ void Daemon::open_output(Client& client, shm::Received& received) {
 
 void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_ptr<OutputPort> port,
                             Source& source) {
+  const auto why_no_replay = gate_.why_not(client, Action::kReplay, source.name);
   takeover_.remember_component(client);
   names_.give_page(source, client.user());
   const OutputPort& opened = switchboard_.add(std::move(port), client, source);
   auto reply = reply_to(request, shm::MessageKind::kOpened);
   reply.port = opened.instance;
   reply.id = source.id;
-  const auto why_no_replay = gate_.why_not(client, Action::kReplay, source.name);
   if (why_no_replay) {
     reply.set_text(*why_no_replay);
   } else {
