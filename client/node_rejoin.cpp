@@ -131,10 +131,12 @@ void NodeCore::rejoin() {
     }
   }
   // With nothing to hand back there is nothing to keep of the old memory either. But the hello says
-  // which node this was, lest the daemon keep names for it that it has closed or never got.
+  // which node this was, and of which memory, lest the daemon keep names for it that it has closed
+  // or never got.
   is_anew_ = ports.empty();
   asked_ = shm::monotonic_now();
-  const bool is_said = is_anew_ ? is_sent(*socket, hello()) : hand_back(*socket, ports);
+  const bool is_said = is_anew_ ? is_sent(*socket, hello(), {memory_->board().get(), -1})
+                                : hand_back(*socket, ports);
   if (!is_said) return;
   shm::close_in_children(*socket);
   const std::lock_guard lock(mutex_);

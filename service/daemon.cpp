@@ -62,6 +62,9 @@ Daemon::Daemon(const DaemonOptions& options)
   if (!epoll_) throw std::system_error(errno, std::generic_category(), "epoll_create1");
   watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
   watch(changes_.descriptor(), Tag::kCompiler, 0, EPOLLIN);
+  if (!Headroom::of_the_process().is_enough()) {
+    log::warn("few descriptors (RLIMIT_NOFILE): a client that sends many can hold up this daemon");
+  }
   takeover_.look_for_predecessor();
 }
 

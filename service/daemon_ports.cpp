@@ -44,6 +44,10 @@ void Daemon::open_output(Client& client, shm::Received& received) {
   require_free(client, source.open, "the output port " + name);
   takeover_.require_not_kept(source.away, "the output port " + name);
   require_not_changing(source);
+  if (!source.has_page()) {  // its last publisher has ended, and nobody has handed it back
+    names_.replace_lost_page(source);
+    introductions_.introduce(switchboard_.link_all(board_.in_force().table), [] {});
+  }
   const std::uint64_t request = received.message.request;
   if (PortNames::may_be_given(source, client.user())) {
     finish_opening(client, request, std::move(port), source);
@@ -58,13 +62,13 @@ void Daemon::open_output(Client& client, shm::Received& received) {
 
 void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_ptr<OutputPort> port,
                             Source& source) {
+  const auto why_no_replay = gate_.why_not(client, Action::kReplay, source.name);
   takeover_.remember_component(client);
   names_.give_page(source, client.user());
   const OutputPort& opened = switchboard_.add(std::move(port), client, source);
   auto reply = reply_to(request, shm::MessageKind::kOpened);
   reply.port = opened.instance;
   reply.id = source.id;
-  const auto why_no_replay = gate_.why_not(client, Action::kReplay, source.name);
   if (why_no_replay) {
     reply.set_text(*why_no_replay);
   } else {

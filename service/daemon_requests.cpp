@@ -165,12 +165,13 @@ void Daemon::hello(Client& client, const shm::Received& received) {
   if (message.name_view().empty()) throw std::runtime_error("a client must have a name");
   require_fine(message.name_view(), "the client's");
   const bool returns = (message.flags & shm::kRejoins) != 0;
-  client.charge = takeover_.make_room_for(client, message.link);
+  const NodeId former = takeover_.knows(received.descriptors[0]) ? message.link : 0;
+  client.charge = takeover_.make_room_for(client, former);
   client.name = message.name_view();
   client.hello_request = message.request;
   client.has_service_thread = (message.flags & shm::kHasServiceThread) != 0;
   client.comes_back = (message.flags & shm::kComesBack) != 0;
-  client.former = returns ? 0 : message.link;
+  client.former = returns ? 0 : former;
   if (returns) {
     takeover_.rejoin(client, received);
   } else if (serves()) {

@@ -39,7 +39,8 @@ enum class MessageKind : std::uint32_t {
   // From a client.
   kHello = 1,  // name, flags (kHasServiceThread, kComesBack, kRejoins); value = kWireVersion; link:
                // the node it was welcomed as before, or 0; if it rejoins, descriptors: board,
-               // registry. One that was here and does not rejoin has nothing left of what it was
+               // registry. One that was here and does not rejoin has nothing left of what it was;
+               // descriptor: the board, of which the number is
   kOpenOutput,   // name, type; descriptor: its segment
   kOpenInput,    // name, type; descriptors: its segment, its bell
   kClosePort,    // port

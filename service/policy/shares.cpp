@@ -83,6 +83,8 @@ void Shares::add(Account& account, Share what, std::uint64_t amount) {
 }
 
 Charge Shares::take(uid_t user, Share what, std::uint64_t amount) {
+  // Or its account might be closed before it is given back.
+  if (amount == 0) return {};
   if (!allows(user, what, amount)) throw LimitExceeded(refusal(user, what));
   add(accounts_[user], what, amount);
   return {*this, what, amount, user, false};

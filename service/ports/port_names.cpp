@@ -116,6 +116,20 @@ void PortNames::forget_lost_pages() {
   }
 }
 
+void PortNames::replace_lost_page(Source& source) {
+  Page page = make_page();
+  const shm::PageNumber number = source.page_number + 1;
+  registry_.source(source.id).set_page(number, FileIdentity::of(page.writable).inode, {});
+  board_.give_page(source.id, number);
+  board_.renew_pages();
+  source.page = std::move(page);
+  source.page_number = number;
+  source.page_user.reset();
+  pages_->attach(source.id, &source.activity());
+  announce(source);
+  store_page(source, source.page, number);
+}
+
 void PortNames::give_page(Source& source, uid_t user) {
   source.page_user = user;
   registry_.source(source.id).set_page_user(source.page_number, user);

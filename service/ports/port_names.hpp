@@ -91,6 +91,11 @@ class PortNames {
   // they get another id, so that who might still look at the old page sees nothing at all.
   void forget_lost_pages();
 
+  // The same of a source that somebody is about to open, and that a table names by its id: another
+  // page takes the place of the lost one, under the next number, which no old page has. Nobody's
+  // activity is on it. Throws std::system_error.
+  void replace_lost_page(Source& source);
+
   // Whether a user may be given the page in force, to write it: if no other has ever been.
   [[nodiscard]] static bool may_be_given(const Source& source, uid_t user) {
     return !source.page_user || *source.page_user == user;

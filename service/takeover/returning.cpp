@@ -23,6 +23,13 @@ constexpr shm::Nanoseconds kMaxWaitForDeath = 100'000'000;
 
 }  // namespace
 
+bool Takeover::knows(const shm::FileDescriptor& board) const {
+  if (!board) return false;
+  const auto known =
+      phase_ == Phase::kExpecting ? predecessor_->realm.board : FileIdentity::of(board_.readable());
+  return FileIdentity::of(board) == known;
+}
+
 void Takeover::rejoin(Client& client, const shm::Received& hello) {
   try {
     take_back(client, hello);
@@ -48,15 +55,9 @@ void Takeover::take_back(Client& client, const shm::Received& hello) {
                              "\", which another daemon has opened; restart the component");
   }
   const NodeId node = hello.message.link;
-  // The conversation that it gave up may not have been seen to end.
-  const auto former = std::find_if(clients_.begin(), clients_.end(), [&](const auto& each) {
-    return each.second->node == node && each.second.get() != &client &&
-           client.is_process(each.second->pid(), each.second->process());
-  });
-  if (former != clients_.end()) host_.drop(former->first);
+  end_conversation_of(client, node);
   const auto absentee = absentees_.find(node);
-  if (absentee != absentees_.end() &&
-      client.is_process(absentee->second.pid, absentee->second.process.get())) {
+  if (absentee != absentees_.end() && is_that(client, absentee->second)) {
     client.node = node;
     client.to_hand_back = std::move(absentee->second.ports);
     absentees_.erase(absentee);
@@ -65,6 +66,23 @@ void Takeover::take_back(Client& client, const shm::Received& hello) {
   client.is_component = true;
   at_step("node-known-again");
   host_.welcome(client);
+}
+
+// The conversation that it gave up may not have been seen to end.
+void Takeover::end_conversation_of(const Client& client, NodeId node) {
+  const auto former = std::find_if(clients_.begin(), clients_.end(), [&](const auto& each) {
+    return each.second->node == node && each.second.get() != &client &&
+           each.second->user() == client.user() &&
+           client.is_process(each.second->pid(), each.second->process());
+  });
+  if (former != clients_.end()) host_.drop(former->first);
+}
+
+// A process goes on by its number when it executes a program that runs as another user; who it was
+// may have kept a socket from before.
+bool Takeover::is_that(const Client& client, const Absentee& absentee) {
+  return (!absentee.user || client.user() == *absentee.user) &&
+         client.is_process(absentee.pid, absentee.process.get());
 }
 
 void Takeover::take_back_page(Client& client, const shm::Received& received) {
@@ -165,11 +183,10 @@ void Takeover::give_up(NodeId node) {
 }
 
 void Takeover::forget_former(const Client& client) {
+  if (client.former == 0) return;
+  end_conversation_of(client, client.former);
   const auto found = absentees_.find(client.former);
-  if (found == absentees_.end() ||
-      !client.is_process(found->second.pid, found->second.process.get())) {
-    return;
-  }
+  if (found == absentees_.end() || !is_that(client, found->second)) return;
   log::info("{} is here again, without the {} ports that were kept for it", client.description(),
             found->second.ports.size());
   give_up(client.former);
@@ -182,8 +199,8 @@ void Takeover::know(const Client& client) {
 
 Charge Takeover::make_room_for(const Client& newcomer, NodeId former) {
   const auto absentee = absentees_.find(former);
-  if (absentee != absentees_.end() &&
-      newcomer.is_process(absentee->second.pid, absentee->second.process.get())) {
+  if (absentee != absentees_.end() && is_that(newcomer, absentee->second) &&
+      absentee->second.charge) {
     return std::move(absentee->second.charge);
   }
   return shares_.take(newcomer.user(), Share::kClients);

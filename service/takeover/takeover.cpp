@@ -28,11 +28,12 @@ shm::FileDescriptor open_process(pid_t pid) {
   return shm::FileDescriptor(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
 }
 
-// Nobody's, where that cannot be told.
-uid_t user_of_process(pid_t pid) {
+// Empty where that cannot be told: what belongs to a process that may not be looked into is said to
+// be root's.
+std::optional<uid_t> user_of_process(pid_t pid) {
   struct stat status {};
-  if (::stat(("/proc/" + std::to_string(pid)).c_str(), &status) != 0) return uid_t(-1);
-  return status.st_uid;
+  if (::stat(("/proc/" + std::to_string(pid)).c_str(), &status) != 0) return {};
+  return status.st_uid == 0 ? std::nullopt : std::optional(status.st_uid);
 }
 
 }  // namespace
@@ -116,6 +117,10 @@ void Takeover::add_absentee(const Owner& owner) {
       switchboard_.forget_away(owner.port);
       return;
     }
+    // As it had it of the last daemon, whatever is left by now.
+    absentee.charge = absentee.user && shares_.allows(*absentee.user, Share::kClients, 1)
+                          ? shares_.take(*absentee.user, Share::kClients)
+                          : shares_.take_own(Share::kClients);
     host_.watch_absentee(absentee.process, owner.node);
   }
   absentee.ports.insert(owner.port);
@@ -155,7 +160,7 @@ shm::Nanoseconds Takeover::deadline() const {
 
 void Takeover::advance(shm::Nanoseconds now) {
   if (phase_ == Phase::kServing) return;
-  for (const ClientId id : waiting_) {
+  for (const ClientId id : std::vector(waiting_)) {  // who is dropped may end others' waiting
     if (const Client* const client = clients_.find(id)) forget_former(*client);
   }
   const bool all_are_back = phase_ == Phase::kTakingOver && absentees_.empty() &&

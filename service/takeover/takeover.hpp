@@ -80,6 +80,9 @@ class Takeover {
   void let_wait(const Client& client) { waiting_.push_back(client.id()); }
   void welcome_waiting();
 
+  // Whether that is the board of this daemon or of its predecessor: other memory has other nodes of
+  // the same numbers.
+  [[nodiscard]] bool knows(const shm::FileDescriptor& board) const;
   // One that says it was here before. Throws std::runtime_error where it cannot be taken back;
   // RefusedAgain where the log has that already.
   void rejoin(Client& client, const shm::Received& hello);
@@ -113,7 +116,7 @@ class Takeover {
   enum class Phase : std::uint8_t { kExpecting, kTakingOver, kServing };
   struct Absentee {
     pid_t pid = 0;
-    uid_t user = 0;
+    std::optional<uid_t> user;  // empty: it cannot be told
     shm::FileDescriptor process;
     std::set<shm::PortInstance> ports;
     Charge charge;
@@ -124,6 +127,8 @@ class Takeover {
   void find_absentees();
   void add_absentee(const Owner& owner);
   void take_back(Client& client, const shm::Received& hello);
+  void end_conversation_of(const Client& client, NodeId node);
+  [[nodiscard]] static bool is_that(const Client& client, const Absentee& absentee);
   // Nothing is kept for the node that a client was and has nothing left of: what it closed without
   // a daemon, or was never told that it got.
   void forget_former(const Client& client);

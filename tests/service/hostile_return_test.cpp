@@ -204,6 +204,31 @@ TEST(HostileReturn, ToANewDaemonWithAnOldBoardIsRefusedAndOthersAreTakenBack) {
   EXPECT_EQ(daemon.generation(), 2u);
 }
 
+// Numbers of nodes begin anew with each daemon's memory: another node of this process may have had
+// the same one elsewhere.
+TEST(HostileReturn, WithANumberOfOtherMemoryCostsNobodyWhatIsKept) {
+  Daemon daemon(single_model());
+  shm::Received welcome;
+  {
+    RawClient lost(daemon.instance());
+    welcome = lost.hello("lost", shm::kComesBack);
+    const auto segment = raw_output_segment();
+    open_raw_output(lost, "/out", segment);
+  }
+  while (daemon.source("/out")["away"] != true) {
+  }
+  auto hello = RawClient::hello_message("another");
+  hello.link = welcome.message.link;
+  RawClient another(daemon.instance());
+  another.send(hello);
+  another.expect(MessageKind::kWelcome);
+  EXPECT_TRUE(daemon.source("/out")["away"]);
+  RawClient itself(daemon.instance());
+  itself.send(hello, {welcome.descriptors[0].get(), -1});
+  itself.expect(MessageKind::kWelcome);
+  EXPECT_FALSE(daemon.source("/out")["away"]);
+}
+
 std::set<int> sockets() {
   std::set<int> found;
   for (int fd = 0; fd < 1024; ++fd) {

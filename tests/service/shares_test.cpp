@@ -100,6 +100,16 @@ TEST(Shares, NothingMoreIsAllowedEvenToAUserWhoHasTooMuchByNow) {
   EXPECT_TRUE(shares.allows(kOne, Share::kClients, 0));
 }
 
+TEST(Shares, NothingIsGivenBackOnce) {
+  Shares shares(of_each(1600), 50, kDaemonsUser);
+  Charge one = shares.take(kOne, Share::kDescriptors, 0);
+  Charge other = shares.take(kOne, Share::kDescriptors, 0);
+  EXPECT_FALSE(one);
+  one = {};
+  other = {};
+  EXPECT_EQ(shares.taken(kOne, Share::kDescriptors), 0u);
+}
+
 TEST(Shares, ARefusalSaysWhatIsTheLimitAndWhatToDo) {
   Shares shares(of_each(16), 50, kDaemonsUser);
   const Charge some = shares.take(kOne, Share::kSources, 7);

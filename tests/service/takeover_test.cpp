@@ -373,6 +373,24 @@ TEST(Takeover, TheNameOfOneThatDiesWhileItIsAwayIsFree) {
   EXPECT_EQ(take_from(in), 1);
 }
 
+// Nobody else has its activity page, so that it is lost with it. The other brings the memory back.
+TEST(Takeover, TheNameOfOneThatDiesWithItsPageIsFree) {
+  Daemon daemon(single_model());
+  Component stopped("stopped");
+  ASSERT_EQ(stopped.tell("output /out"), "open");
+  Node node("test");
+  auto other = node.output_port<Number>("/other");
+  daemon.kill();
+  stopped.process().stop();
+  daemon.restart();
+  EXPECT_TRUE(daemon.source("/out")["away"]);
+  stopped.kill();
+  auto in = node.input_port<Number>("/in");
+  auto out = node.output_port<Number>("/out");
+  EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
+  EXPECT_EQ(take_from(in), 1);
+}
+
 TEST(Takeover, ABadModelStopsTheNewDaemonAndHarmsNobody) {
   Daemon daemon(single_model());
   Node node("test");

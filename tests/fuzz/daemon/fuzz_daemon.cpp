@@ -164,6 +164,9 @@ class Run {
     if ((message.flags & shm::kRejoins) != 0) {
       message.link = one_of(hostile->numbers);
       descriptors = {given(0), given(1)};
+    } else if (script_.byte() % 2 == 0) {  // it has nothing left of what it was
+      message.link = one_of(hostile->numbers);
+      descriptors = {given(0)};
     }
     say(*hostile, message, descriptors);
     stage_.run();
