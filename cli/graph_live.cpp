@@ -176,7 +176,7 @@ int draw_live(const GraphOptions& options) {
 // While there is no daemon, what was decided last goes on, and so does the picture of it.
 int draw_and_follow(const GraphOptions& options) {
   const shm::FileDescriptor interrupts = catch_interrupts();
-  const auto instance = watch_instance("graph", options.instance);
+  const auto instance = follow_instance("graph", options.instance);
   LivePicture picture(options, *instance);
   if (!picture.update()) return 1;
   bool is_alone = false;
@@ -193,8 +193,10 @@ int draw_and_follow(const GraphOptions& options) {
     }
     try {
       if (!picture.update()) return 1;
-    } catch (const wire::CallError&) {
-      // The daemon has gone before it could be asked for its model: the next one is.
+    } catch (const wire::CallError& error) {
+      // If it has gone before it could be asked for its model, the next one is asked.
+      if (!instance->has_daemon() || std::exchange(said, error.what()) == error.what()) continue;
+      std::cerr << "arbiter: " << error.what() << "; " << options.output << " stays as it was\n";
     } catch (const Error& error) {
       if (std::exchange(said, error.what()) == error.what()) continue;
       std::cerr << "arbiter: " << error.what() << "; " << options.output << " stays as it was\n";

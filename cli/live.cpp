@@ -54,6 +54,13 @@ std::shared_ptr<watch::Instance> watch_instance(const std::string& verb,
   return std::make_shared<watch::Instance>(caller(verb, instance));
 }
 
+std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
+                                                 const std::string& instance) {
+  wire::Caller follower = caller(verb, instance);
+  follower.answer_time = std::chrono::milliseconds(1000);
+  return std::make_shared<watch::Instance>(std::move(follower));
+}
+
 std::string fetch_status_text(const std::string& verb, const std::string& instance) {
   wire::Call daemon(caller(verb, instance));
   shm::Message question;

@@ -34,6 +34,10 @@ wire::Caller caller(const std::string& verb, const std::string& instance);
 // The instance, watched. Throws wire::CallError.
 std::shared_ptr<watch::Instance> watch_instance(const std::string& verb,
                                                 const std::string& instance);
+// The same for a verb that goes on until it is interrupted: a question holds it up for a second at
+// most, for meanwhile it does not hear Ctrl-C.
+std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
+                                                 const std::string& instance);
 
 // The daemon's status document, as text. Throws wire::CallError, wire::DocumentError.
 std::string fetch_status_text(const std::string& verb, const std::string& instance);

@@ -27,7 +27,7 @@ class Follower {
   Follower(const WhyOptions& options, shm::FileDescriptor interrupts)
       : options_(options),
         interrupts_(std::move(interrupts)),
-        port_(watch_instance("why", options.instance), options.port),
+        port_(follow_instance("why", options.instance), options.port),
         started_(shm::monotonic_now()),
         last_(port_.look()) {
     static_cast<void>(port_.explain(last_));  // fetches the model while there is a daemon

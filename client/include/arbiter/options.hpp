@@ -35,8 +35,8 @@ struct NodeOptions {
   // port; one call at a time, and with no lock of the library held. If there are two daemons
   // (NoticeKind::apart), it also runs inside Node(), on the thread that makes the node: it must not
   // use the node then. The callback may open and close ports of this node, but must not destroy the
-  // node, nor its last port after the node. It should be quick: until it returns, this node takes up
-  // no news. An exception is written to standard error, and has no other effect. Calls may come
+  // node, nor its last port after the node. It should be quick: until it returns, this node takes
+  // up no news. An exception is written to standard error, and has no other effect. Calls may come
   // until the node and all of its ports have gone. If something is known when a port is opened, the
   // call begins before the opening returns.
   std::function<void(const Notice&)> on_notice{};
