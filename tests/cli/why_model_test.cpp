@@ -101,7 +101,7 @@ TEST_F(WhyOfTwoModels, TellsThatAFileSaysSomethingElseByNow) {
   std::filesystem::remove(first_);
   EXPECT_EQ(why_json({"/arm"})["model"]["changed_files"], json::array({first_}));
   EXPECT_EQ(why_json({"/arm"})["model"]["missing_files"], json::array({first_}));
-  EXPECT_THAT(why({"/arm"}), HasSubstr("! " + first_ + " is not there any more: arbiter reload "));
+  EXPECT_THAT(why({"/arm"}), HasSubstr("! " + first_ + " no longer exists: arbiter reload "));
   std::filesystem::create_directory(first_);
   EXPECT_EQ(why_json({"/arm"})["model"]["unreadable_files"], json::array({first_}));
   EXPECT_THAT(why({"/arm"}), HasSubstr("! " + first_ + " cannot be read from here"));

@@ -252,7 +252,7 @@ TEST(Why, TellsWhatItCanOfAModelThatThePredecessorHasRead) {
   EXPECT_EQ(answer["winner"], "/object");
   EXPECT_EQ(connection(answer, "/random")["reason"],
             json::parse(R"([{"source": "/object", "active": true}])"));
-  EXPECT_THAT(why({"/gaze"}), AllOf(HasSubstr("not whose behaviours they come from"),
+  EXPECT_THAT(why({"/gaze"}), AllOf(HasSubstr("but not the behaviours behind them"),
                                     HasSubstr("its rule does not hold: /object is active")));
 }
 

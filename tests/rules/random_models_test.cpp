@@ -225,8 +225,8 @@ TEST_P(RandomModels, AreExplainedAsTheDefinitionOfARuleSays) {
 }
 
 TEST_P(RandomModels, DecideAsTheDefinitionOfARuleSays) {
-  for (unsigned seed = 0; seed < rounds(300u); ++seed) check(seed);
-  EXPECT_GT(decided_, rounds(60));
+  for (unsigned seed = 0; seed < 300; ++seed) check(seed);
+  EXPECT_GT(decided_, 60);
   EXPECT_EQ(refused_ > 60, !GetParam());
 }
 
