@@ -287,7 +287,7 @@ TEST(Check, StatementsAreReadEvenIfTheModelHasErrors) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("[both-can-win]"));
   EXPECT_THAT(result.err, HasSubstr(statements + ":1:7: error: the statement ends where"));
-  EXPECT_THAT(result.err, HasSubstr("was not looked at: the model has errors [left-open]"));
+  EXPECT_THAT(result.err, HasSubstr("were not checked, because the model has errors [left-open]"));
   EXPECT_EQ(result.out, "failed: 2 errors, 1 note\n");
 }
 
@@ -298,7 +298,7 @@ TEST(Check, AFileWithoutStatementsIsAnErrorForItProvesNothing) {
     const auto statements = directory.write("s.txt", text);
     const auto result = arbiter({"check", model, "--assert", statements});
     EXPECT_EQ(result.exit_code, 1);
-    EXPECT_THAT(result.err, HasSubstr(statements + ":1:1: error: there is no statement in this "));
+    EXPECT_THAT(result.err, HasSubstr(statements + ":1:1: error: this file has no statement"));
     EXPECT_THAT(result.out, EndsWith("failed: 1 error, 2 notes\n"));
   }
 }

@@ -260,7 +260,7 @@ TEST(NameChecks, ASourceThatIsAnInputPortIsToldAndTheOtherWayRound) {
       "<behavior name='C'><config at='/Base/vel:i'>/Rest/vel:o</config></behavior></behaviors>");
   EXPECT_THAT(exchanged.findings(),
               ElementsAre("1:43 warning wrong-end", "1:55 warning wrong-end"));
-  EXPECT_THAT(exchanged.message(0), HasSubstr("/Nav/vel:o stands here as an input port, and is "));
+  EXPECT_THAT(exchanged.message(0), HasSubstr("/Nav/vel:o stands here as an input port, but is "));
   // Who has no such endings is judged by what he does with the names.
   EXPECT_THAT(load_text("<behaviors><behavior name='B'><config at='/base'>/nav</config></behavior>"
                         "<behavior name='C'><config at='/arm'>/base</config></behavior>"

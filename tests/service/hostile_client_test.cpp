@@ -287,7 +287,9 @@ TEST_F(HostileClient, TenThousandThatConnectAndSayNothingHarmNobody) {
     if (silent.size() > 400) silent.pop_front();
     if (i % 1000 == 0) client();
   }
-  EXPECT_LE(daemon_.open_descriptors(), 2 * shm::kMaxSilentClients + 2 * 400 + 64);
+  // Once it has taken up who came last, and threads have closed what was of those who went.
+  while (daemon_.open_descriptors() > 2 * shm::kMaxSilentClients + 64) {
+  }
   EXPECT_TRUE(silent.front().is_hung_up_on());
 }
 

@@ -52,7 +52,7 @@ TEST(Start, IsRefusedForWarningsIfItIsStrict) {
   const auto [code, log] = start_in_vain({"--strict", "--model", model}, environment);
   EXPECT_EQ(code, 1);
   EXPECT_NE(log.find(model + ":1:12: no rule reads or selects /unread"), std::string::npos) << log;
-  EXPECT_NE(log.find("--strict takes warnings for errors"), std::string::npos) << log;
+  EXPECT_NE(log.find("--strict treats warnings as errors"), std::string::npos) << log;
 }
 
 TEST(Start, StopsOnAnInterruptToo) {

@@ -85,7 +85,7 @@ TEST(WatchedPort, OfADaemonThatHasMemoryOfItsOwnIsSeenNoMore) {
   daemon.restart();
   update_until(*instance, [&] { return instance->memory() != memory; });
   EXPECT_THAT(error_of([&] { static_cast<void>(port.look()); }),
-              HasSubstr("another daemon has come, without the memory of the last one"));
+              HasSubstr("another daemon has started without the memory of the last one"));
 }
 
 TEST(WatchedPort, KnowsWhatKeepsSamplesFromIt) {
