@@ -59,8 +59,8 @@ class Node {
   // at the other end it is as if a program had opened it with the C++ type of that name.
   [[nodiscard]] OutputPort<void> output_port(std::string_view name, const Type& type,
                                              const OutputPortOptions& options = {}) {
-    auto core = detail::open_output(*core_, name, type, options);
-    return OutputPort<void>(std::move(core));
+    // Its constructor is explicit. NOLINTNEXTLINE(modernize-return-braced-init-list)
+    return OutputPort<void>(detail::open_output(*core_, name, type, options));
   }
   // An untyped one, for samples of up to options.max_size bytes. Only untyped input ports take
   // them.
