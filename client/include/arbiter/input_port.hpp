@@ -44,6 +44,7 @@ class SampleBase {
   [[nodiscard]] std::int64_t stamp_ns() const noexcept {
     return held_.stamp_ns = detail::believable_time(held_.stamp_ns);
   }
+  // The same, as a point in time.
   [[nodiscard]] Time stamp() const noexcept { return Time(std::chrono::nanoseconds(stamp_ns())); }
 
  protected:
