@@ -200,7 +200,7 @@ class InputCore {
   Copies copies_;                                             // likewise
   // Publishers that are gone and of whom samples are held: kept mapped, each in a view of its own.
   std::vector<std::unique_ptr<InputView>> lingering_;
-  bool commanded_ = false;  // seen selected since idle was last told
+  bool commanded_ = false;  // a commander was seen, or a sample taken, since idle was last told
   shm::FileDescriptor epoll_;
   shm::FileDescriptor timer_;
 };

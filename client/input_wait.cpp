@@ -47,7 +47,6 @@ Waited InputCore::wait_once(shm::Nanoseconds timeout, HeldSample& sample) {
       count(segment_->header.counters.idles);
       return Waited::kIdle;
     }
-    commanded_ = command.commander != nullptr;
     const shm::Nanoseconds now = shm::monotonic_now();
     if (deadline < 0) deadline = after(now, timeout);
     if (now >= deadline) return Waited::kTimeout;
@@ -108,6 +107,7 @@ InputCore::Command InputCore::who_commands() noexcept {
     if (commander != end) command.commander = &*commander;
   }
   last_reading_ = clock.reading();
+  if (command.commander != nullptr) commanded_ = true;
   return command;
 }
 

@@ -114,6 +114,23 @@ TEST(Wait, IdleIsToldOnceForEachChangeToIdle) {
   EXPECT_EQ(daemon.input("/in")["idles"], 3);
 }
 
+// Whatever has shown it a commander: it may have set its motor moving by that.
+TEST(Wait, IdleIsToldAfterACommanderThatWasOnlyAskedFor) {
+  Daemon daemon(override_model());
+  Node node("test");
+  auto low = node.output_port<Number>("/low");
+  auto in = node.input_port<Number>("/in");
+  const auto is_told_after = [&](const auto& asks) {
+    low.signal();
+    asks();
+    low.deactivate();
+    return in.wait_for(1ns).idle();
+  };
+  EXPECT_TRUE(is_told_after([&] { EXPECT_FALSE(in.idle()); }));
+  EXPECT_TRUE(is_told_after([&] { EXPECT_EQ(in.winner(), "/low"); }));
+  EXPECT_FALSE(is_told_after([] {})) << "of what it has not seen it is not told";
+}
+
 TEST(Wait, ASampleComesBeforeIdle) {
   Daemon daemon(single_model());
   Node node("test");
