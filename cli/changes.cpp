@@ -24,8 +24,8 @@ void write_in_force(const wire::ChangeReport& report) {
 }  // namespace
 
 wire::ChangeReport ask_for_change(const std::string& verb, const std::string& instance,
-                                  shm::Message question, bool json) {
-  question.flags |= shm::kWantsReport;
+                                  wire::Message question, bool json) {
+  question.flags |= wire::kWantsReport;
   wire::Call daemon(caller(verb, instance));
   const std::string text = wire::read_document(daemon.ask(question).descriptors[0]);
   wire::ChangeReport report = wire::read_change_report(text);

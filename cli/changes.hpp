@@ -12,7 +12,7 @@ namespace arbiter::cli {
 // (`json`), or what was found in files, and why the change is refused, to standard error. Throws
 // wire::CallError where there is no daemon, or it does not allow it.
 wire::ChangeReport ask_for_change(const std::string& verb, const std::string& instance,
-                                  shm::Message question, bool json);
+                                  wire::Message question, bool json);
 
 // Unless `json`: "model 5 is in force", and what that changes. Gives the verb's exit code.
 int write_result(const wire::ChangeReport& report, bool json);

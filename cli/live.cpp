@@ -41,7 +41,7 @@ NodeOptions live_options(const std::string& instance) {
 wire::Caller caller(const std::string& verb, const std::string& instance) {
   wire::Caller caller;
   caller.name = "arbiter-" + verb;
-  caller.instance = shm::instance_name(instance);
+  caller.instance = wire::instance_name(instance);
   caller.patience = kConnectTimeout;
   caller.on_waiting = [](const std::string& whom) {
     std::cerr << "arbiter: waiting for " + whom + '\n';
@@ -63,8 +63,8 @@ std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
 
 std::string fetch_status_text(const std::string& verb, const std::string& instance) {
   wire::Call daemon(caller(verb, instance));
-  shm::Message question;
-  question.kind = shm::MessageKind::kStatus;
+  wire::Message question;
+  question.kind = wire::MessageKind::kStatus;
   return wire::read_document(daemon.ask(question, kAnswerTime).descriptors[0]);
 }
 

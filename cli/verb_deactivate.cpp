@@ -18,8 +18,8 @@ struct DeactivateOptions {
 
 int deactivate(const DeactivateOptions& options) {
   wire::Call daemon(caller("deactivate", options.instance));
-  shm::Message question;
-  question.kind = shm::MessageKind::kDeactivate;
+  wire::Message question;
+  question.kind = wire::MessageKind::kDeactivate;
   question.set_name(options.source);
   const bool was_active = daemon.ask(question).message.value != 0;
   std::cout << options.source << (was_active ? " is inactive now\n" : " was not active\n");

@@ -57,8 +57,8 @@ struct RollbackOptions {
 };
 
 int rollback(const RollbackOptions& options) {
-  shm::Message question;
-  question.kind = shm::MessageKind::kRollback;
+  wire::Message question;
+  question.kind = wire::MessageKind::kRollback;
   question.link = options.generation;
   return write_result(ask_for_change("rollback", options.instance, question, options.json),
                       options.json);

@@ -27,9 +27,9 @@ void write_changes(const wire::ModelComparison& model, bool is_alone) {
 }
 
 int reload(const ReloadOptions& options) {
-  shm::Message question;
-  question.kind = shm::MessageKind::kReload;
-  question.flags = options.dry_run ? shm::kDryRun : 0u;
+  wire::Message question;
+  question.kind = wire::MessageKind::kReload;
+  question.flags = options.dry_run ? wire::kDryRun : 0u;
   const auto report = ask_for_change("reload", options.instance, question, options.json);
   if (!options.dry_run || options.json || !report.ok) return write_result(report, options.json);
   const auto models = report.models.value_or(std::vector<wire::ModelComparison>());

@@ -14,8 +14,8 @@ namespace {
 int stop(const std::string& instance) {
   wire::Call daemon(caller("stop", instance));
   const shm::FileDescriptor process = daemon.process();
-  shm::Message question;
-  question.kind = shm::MessageKind::kStop;
+  wire::Message question;
+  question.kind = wire::MessageKind::kStop;
   daemon.ask(question);
   daemon.wait_until_gone(process);
   std::cout << "the daemon has stopped; connected ports keep working\n";

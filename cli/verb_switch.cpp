@@ -41,8 +41,8 @@ int list(const SwitchOptions& options) {
 
 int switch_model(const SwitchOptions& options) {
   if (options.model.empty()) return list(options);
-  shm::Message question;
-  question.kind = shm::MessageKind::kSwitch;
+  wire::Message question;
+  question.kind = wire::MessageKind::kSwitch;
   question.set_name(options.model);
   return write_result(ask_for_change("switch", options.instance, question, options.json),
                       options.json);

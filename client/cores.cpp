@@ -34,8 +34,8 @@ int service_fd(const NodeCore& node) noexcept {
 }
 void switch_model(NodeCore& node, std::string_view name) {
   require_own(node);
-  shm::Message question;
-  question.kind = shm::MessageKind::kSwitch;
+  wire::Message question;
+  question.kind = wire::MessageKind::kSwitch;
   question.set_name(name);  // one that is cut off is no model's
   node.ask(question, {-1, -1});
 }

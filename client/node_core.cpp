@@ -41,8 +41,8 @@ void check_bounds(std::string_view port, const char* option, Value value, Value 
               ", but must be from " + std::to_string(least) + " to " + std::to_string(most));
 }
 
-shm::Message message_of(shm::MessageKind kind, std::string_view name = {}) {
-  shm::Message message;
+wire::Message message_of(wire::MessageKind kind, std::string_view name = {}) {
+  wire::Message message;
   message.kind = kind;
   message.set_name(name);
   return message;
@@ -55,7 +55,7 @@ NodeCore::NodeCore(std::string_view name, const NodeOptions& options)
   check_name(name, "a node");
   try {
     service_bell_ = std::make_shared<const ServiceBell>();
-    instance_ = shm::instance_name(options.instance);
+    instance_ = wire::instance_name(options.instance);
     connect();
     if (options.service_thread) start_service_thread();
   } catch (const Error&) {
@@ -100,7 +100,7 @@ void NodeCore::connect() {
 }
 
 void NodeCore::note_second_daemons(const std::string& met_in) {
-  for (const std::string& path : shm::other_daemons(instance_, met_in)) {
+  for (const std::string& path : wire::other_daemons(instance_, met_in)) {
     const std::string met = met_in + "/" + instance_ + ".sock";
     const std::lock_guard lock(mutex_);
     note(NoticeKind::apart, 0, {}, wire::describe_second_daemon(instance_, met, path));
@@ -116,7 +116,7 @@ wire::Caller NodeCore::caller() const {
   wire::Caller caller;
   caller.name = name_;
   caller.instance = instance_;
-  caller.flags = shm::kComesBack | (options_.service_thread ? shm::kHasServiceThread : 0u);
+  caller.flags = wire::kComesBack | (options_.service_thread ? wire::kHasServiceThread : 0u);
   caller.patience = options_.connect_timeout;
   caller.answer_time = kMinAnswerTime;
   caller.quiet = kQuietWait;
@@ -124,8 +124,8 @@ wire::Caller NodeCore::caller() const {
   return caller;
 }
 
-shm::Message NodeCore::hello() const {
-  shm::Message hello = wire::hello_of(caller());
+wire::Message NodeCore::hello() const {
+  wire::Message hello = wire::hello_of(caller());
   hello.link = node_;
   return hello;
 }
@@ -159,12 +159,12 @@ std::shared_ptr<SharedMemory> NodeCore::memory() {
   return memory_;
 }
 
-void NodeCore::say(const shm::Message& message) noexcept {
-  if (socket_ != nullptr) static_cast<void>(shm::send_message(socket_->get(), message));
+void NodeCore::say(const wire::Message& message) noexcept {
+  if (socket_ != nullptr) static_cast<void>(wire::send_message(socket_->get(), message));
 }
 
 void NodeCore::say_closed(shm::PortInstance port) noexcept {
-  shm::Message message = message_of(shm::MessageKind::kClosePort);
+  wire::Message message = message_of(wire::MessageKind::kClosePort);
   message.port = port;
   say(message);
 }
@@ -176,8 +176,8 @@ void NodeCore::forget_port(shm::PortInstance port) {
   say_closed(port);
 }
 
-shm::Received NodeCore::ask(const shm::Message& question,
-                            std::array<int, shm::kMaxDescriptors> descriptors) {
+wire::Received NodeCore::ask(const wire::Message& question,
+                             std::array<int, wire::kMaxDescriptors> descriptors) {
   try {
     return converse(question, descriptors);
   } catch (const ThrownByCallback& callback) {
@@ -222,15 +222,15 @@ void NodeCore::say_that_we_wait(std::unique_lock<std::mutex>& lock, std::uint64_
   lock.lock();
 }
 
-shm::Received NodeCore::converse(const shm::Message& question,
-                                 std::array<int, shm::kMaxDescriptors> descriptors,
-                                 const SharedMemory* memory,
-                                 std::function<void(shm::Received&)> on_opened) {
+wire::Received NodeCore::converse(const wire::Message& question,
+                                  std::array<int, wire::kMaxDescriptors> descriptors,
+                                  const SharedMemory* memory,
+                                  std::function<void(wire::Received&)> on_opened) {
   const auto begin = Clock::now();
   const auto give_up =
       begin + std::clamp(options_.connect_timeout, kMinAnswerTime, kMaxConnectTimeout);
   bool said = false;
-  shm::Message numbered = question;
+  wire::Message numbered = question;
   std::unique_lock lock(mutex_);
   const std::uint64_t request = numbered.request = next_request_++;
   Reply& reply = replies_[request];
@@ -245,13 +245,13 @@ shm::Received NodeCore::converse(const shm::Message& question,
       // A port that another daemon has opened was handed back to this one: what is left is to be
       // connected.
       if (reply.opened != 0) {
-        numbered = message_of(shm::MessageKind::kConnect);
+        numbered = message_of(wire::MessageKind::kConnect);
         numbered.request = request;
         numbered.port = reply.opened;
         descriptors = {-1, -1};
       }
       // If it cannot be sent the conversation is over, and the next one asks again.
-      static_cast<void>(shm::send_message(socket_->get(), numbered, descriptors));
+      static_cast<void>(wire::send_message(socket_->get(), numbered, descriptors));
     }
     if (!said && standing_ != Standing::kMember && Clock::now() - begin >= kQuietWait) {
       said = true;
@@ -299,12 +299,12 @@ std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const T
     auto core = std::make_shared<OutputCore>(std::string(name), type, options, memory);
     core->node = shared_from_this();
     core->process = process_;
-    shm::Message question = message_of(shm::MessageKind::kOpenOutput, name);
+    wire::Message question = message_of(wire::MessageKind::kOpenOutput, name);
     question.type = core->type();
     converse(question, {core->segment_descriptor().get(), -1}, memory.get(),
-             [&](shm::Received& opened) {
-               const shm::Message& said = opened.message;
-               if ((said.flags & shm::kMayReplay) == 0) {
+             [&](wire::Received& opened) {
+               const wire::Message& said = opened.message;
+               if ((said.flags & wire::kMayReplay) == 0) {
                  core->forbid_replay(std::string(said.text_view()));
                }
                core->bind(said.port, said.id, std::move(opened.descriptors[0]));
@@ -323,10 +323,10 @@ std::shared_ptr<InputCore> NodeCore::open_input(std::string_view name, const Typ
     auto core = std::make_shared<InputCore>(std::string(name), type, options, memory);
     core->node = shared_from_this();
     core->process = process_;
-    shm::Message question = message_of(shm::MessageKind::kOpenInput, name);
+    wire::Message question = message_of(wire::MessageKind::kOpenInput, name);
     question.type = core->type();
     converse(question, {core->segment_descriptor().get(), core->bell().for_publishers().get()},
-             memory.get(), [&](shm::Received& opened) {
+             memory.get(), [&](wire::Received& opened) {
                core->bind(opened.message.port, opened.message.id);
                inputs_[opened.message.port] = core;
              });

@@ -63,8 +63,8 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
 
   // Asks the daemon and waits for the answer; a daemon that takes over is asked again. Throws Error
   // where it refuses, or none answers in time.
-  shm::Received ask(const shm::Message& question,
-                    std::array<int, shm::kMaxDescriptors> descriptors);
+  wire::Received ask(const wire::Message& question,
+                     std::array<int, wire::kMaxDescriptors> descriptors);
 
   [[nodiscard]] std::shared_ptr<SharedMemory> memory();
 
@@ -77,8 +77,8 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
     bool finished = false;
     std::uint64_t asked_in = 0;  // the conversation in which the question was asked last
     std::string refusal;
-    shm::Received received;
-    std::function<void(shm::Received&)> on_opened;
+    wire::Received received;
+    std::function<void(wire::Received&)> on_opened;
   };
   // The daemon is one that has other memory: what was made for the old has to be made anew.
   struct MemoryIsNew {};
@@ -97,7 +97,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void say_that_we_wait(std::unique_lock<std::mutex>& lock, std::uint64_t request);
   void give_up_on(std::uint64_t request);
   void note_second_daemons(const std::string& met_in);
-  [[nodiscard]] shm::Message hello() const;
+  [[nodiscard]] wire::Message hello() const;
   [[nodiscard]] wire::Caller caller() const;
 
   void start_service_thread();
@@ -109,21 +109,21 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void tidy_ports(
       std::vector<std::pair<shm::PortInstance, std::shared_ptr<const OutputPeer>>>& copied_from);
   [[nodiscard]] bool has_predecessors();
-  void handle(shm::Received& received);
-  void handle_without_descriptors(const shm::Message& message);
-  void handle_reply(shm::Received& received);
+  void handle(wire::Received& received);
+  void handle_without_descriptors(const wire::Message& message);
+  void handle_reply(wire::Received& received);
   void wake_inputs();
-  void add_receiver(const shm::Received& received);
-  void add_publisher(const shm::Received& received);
-  void end_peer(const shm::Message& message);
+  void add_receiver(const wire::Received& received);
+  void add_publisher(const wire::Received& received);
+  void end_peer(const wire::Message& message);
   [[nodiscard]] std::optional<shm::TypeInfo> type_of_port(shm::PortInstance port);
-  void refuse_peer(const shm::Message& announced, const std::string& why);
-  void handle_refusal(const shm::Message& refusal);
-  void handle_unmentioned(const shm::Message& message);
-  void add_page(shm::Received& received);
+  void refuse_peer(const wire::Message& announced, const std::string& why);
+  void handle_refusal(const wire::Message& refusal);
+  void handle_unmentioned(const wire::Message& message);
+  void add_page(wire::Received& received);
   void note_unseen(const std::string& source, const std::string& why);
   void make_tables_resident();
-  void hear_of_growth(const shm::Message& message);
+  void hear_of_growth(const wire::Message& message);
   void look_at_growth(shm::PortInstance port, const OutputPeer& peer);
   void say_not_locked(shm::PortInstance port, const std::string& why);
   void say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
@@ -131,7 +131,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // Notices (node_notices.cpp). Under mutex_:
   void note(NoticeKind kind, shm::PortInstance port, const std::string& peer,
             const std::string& text);
-  void note_refusal(const shm::Message& about, const std::string& why);
+  void note_refusal(const wire::Message& about, const std::string& why);
   void say_blind(shm::PortInstance port, const char* what_it_does);
   // Empty where it is not open.
   [[nodiscard]] const std::string& name_of_port(shm::PortInstance port) const;
@@ -148,19 +148,19 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void rejoin();
   [[nodiscard]] bool hand_back(const shm::FileDescriptor& socket,
                                const std::vector<PortAtHand>& ports) const;
-  void be_welcomed(shm::Received& welcome);
-  void be_turned_away(const shm::Message& refusal);
+  void be_welcomed(wire::Received& welcome);
+  void be_turned_away(const wire::Message& refusal);
 
   [[nodiscard]] Socket socket();
   // Under mutex_. What is lost with the conversation, rejoining makes good.
-  void say(const shm::Message& message) noexcept;
+  void say(const wire::Message& message) noexcept;
   void say_closed(shm::PortInstance port) noexcept;
   void forget_port(shm::PortInstance port);
   // `memory`: that which the question is about, if any. Throws Error, MemoryIsNew.
-  shm::Received converse(const shm::Message& question,
-                         std::array<int, shm::kMaxDescriptors> descriptors,
-                         const SharedMemory* memory = nullptr,
-                         std::function<void(shm::Received&)> on_opened = nullptr);
+  wire::Received converse(const wire::Message& question,
+                          std::array<int, wire::kMaxDescriptors> descriptors,
+                          const SharedMemory* memory = nullptr,
+                          std::function<void(wire::Received&)> on_opened = nullptr);
   // Opens a port: calls make(memory) again where the memory is replaced meanwhile.
   template <class Make>
   auto open(std::string_view name, Make make);

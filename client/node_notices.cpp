@@ -68,16 +68,16 @@ void NodeCore::give(const Notice& notice) const noexcept {
 
 // Of a peer that the daemon has announced and that we cannot take up. Tells the daemon, so that it
 // shows in its status, and the other end.
-void NodeCore::refuse_peer(const shm::Message& announced, const std::string& why) {
+void NodeCore::refuse_peer(const wire::Message& announced, const std::string& why) {
   const std::lock_guard lock(mutex_);
   say_refused(announced.port, announced.peer, why);
   const auto input = inputs_.find(announced.port);
-  const bool is_output_peer = announced.kind == shm::MessageKind::kOutputPeer;
+  const bool is_output_peer = announced.kind == wire::MessageKind::kOutputPeer;
   if (is_output_peer && input != inputs_.end()) {
     input->second->refuse_peer(announced.peer, announced.id);
   }
   const auto output = outputs_.find(announced.port);
-  const bool is_to_connect = is_output_peer || (announced.flags & shm::kIsConnected) != 0;
+  const bool is_to_connect = is_output_peer || (announced.flags & wire::kIsConnected) != 0;
   if (is_to_connect && output != outputs_.end()) {
     output->second->refuse_peer(announced.peer, announced.id);
   }
@@ -85,15 +85,15 @@ void NodeCore::refuse_peer(const shm::Message& announced, const std::string& why
 }
 
 void NodeCore::say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
-  shm::Message refusal;
-  refusal.kind = shm::MessageKind::kPeerRefused;
+  wire::Message refusal;
+  refusal.kind = wire::MessageKind::kPeerRefused;
   refusal.port = port;
   refusal.peer = peer;
   refusal.set_text(why);
   say(refusal);
 }
 
-void NodeCore::note_refusal(const shm::Message& about, const std::string& why) {
+void NodeCore::note_refusal(const wire::Message& about, const std::string& why) {
   const std::string& own = name_of_port(about.port);
   if (own.empty()) return;  // closed meanwhile
   const std::string peer(about.name_view());
@@ -107,8 +107,8 @@ void NodeCore::say_blind(shm::PortInstance port, const char* what_it_does) {
   const std::string text = name_of_port(port) + " " + what_it_does +
                            " while it cannot see all sources that its rules read";
   note(NoticeKind::blind, port, {}, text);
-  shm::Message message;
-  message.kind = shm::MessageKind::kBlind;
+  wire::Message message;
+  message.kind = wire::MessageKind::kBlind;
   message.port = port;
   message.set_text(text);
   say(message);
@@ -121,7 +121,7 @@ void NodeCore::note_unseen(const std::string& source, const std::string& why) {
 }
 
 // A refusal that the daemon or the peer has found.
-void NodeCore::handle_refusal(const shm::Message& refusal) {
+void NodeCore::handle_refusal(const wire::Message& refusal) {
   const std::lock_guard lock(mutex_);
   if (const auto output = outputs_.find(refusal.port); output != outputs_.end()) {
     output->second->refuse_peer(refusal.peer, refusal.id);
@@ -132,7 +132,7 @@ void NodeCore::handle_refusal(const shm::Message& refusal) {
   note_refusal(refusal, std::string(refusal.text_view()));
 }
 
-void NodeCore::handle_unmentioned(const shm::Message& message) {
+void NodeCore::handle_unmentioned(const wire::Message& message) {
   const std::lock_guard lock(mutex_);
   if (name_of_port(message.port).empty()) return;  // closed meanwhile
   note(NoticeKind::unmentioned, message.port, {}, std::string(message.text_view()));

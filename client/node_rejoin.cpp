@@ -21,7 +21,7 @@ namespace arbiter::detail {
 
 // A port as it is handed back.
 struct PortAtHand {
-  shm::Message message;
+  wire::Message message;
   shm::FileDescriptor first;
   shm::FileDescriptor second;
   std::vector<HeldLink> links;
@@ -41,9 +41,9 @@ bool are_same(const shm::FileDescriptor& one, const shm::FileDescriptor& other) 
          a.st_dev == b.st_dev;
 }
 
-bool is_sent(const shm::FileDescriptor& socket, const shm::Message& message,
-             std::array<int, shm::kMaxDescriptors> descriptors = {-1, -1}) {
-  return shm::send_message(socket.get(), message, descriptors) == shm::SendResult::kSent;
+bool is_sent(const shm::FileDescriptor& socket, const wire::Message& message,
+             std::array<int, wire::kMaxDescriptors> descriptors = {-1, -1}) {
+  return wire::send_message(socket.get(), message, descriptors) == wire::SendResult::kSent;
 }
 
 // A descriptor of our own, for the port may be closed while it is on its way.
@@ -52,7 +52,7 @@ shm::FileDescriptor duplicate(const shm::FileDescriptor& descriptor) {
 }
 
 template <class Core>
-PortAtHand port_at_hand(shm::MessageKind kind, const Core& core, std::uint32_t id,
+PortAtHand port_at_hand(wire::MessageKind kind, const Core& core, std::uint32_t id,
                         const shm::FileDescriptor& second) {
   PortAtHand port;
   port.message.kind = kind;
@@ -69,8 +69,8 @@ PortAtHand port_at_hand(shm::MessageKind kind, const Core& core, std::uint32_t i
 bool is_handed_back(const shm::FileDescriptor& socket, const PortAtHand& port) {
   if (!is_sent(socket, port.message, {port.first.get(), port.second.get()})) return false;
   for (const HeldLink& link : port.links) {
-    shm::Message message;
-    message.kind = shm::MessageKind::kHandBackLink;
+    wire::Message message;
+    message.kind = wire::MessageKind::kHandBackLink;
     message.port = port.message.port;
     message.peer = link.peer;
     message.link = link.number;
@@ -113,7 +113,7 @@ void NodeCore::rejoin() {
   std::string why_not;
   std::optional<shm::FileDescriptor> found;
   try {
-    found = shm::connect_to_daemon(instance_, why_not);
+    found = wire::connect_to_daemon(instance_, why_not);
   } catch (const std::exception&) {  // no descriptors are left: another time
   }
   if (!found) return;
@@ -122,11 +122,11 @@ void NodeCore::rejoin() {
   {
     const std::lock_guard lock(mutex_);
     for (const auto& [instance, core] : outputs_) {
-      ports.push_back(port_at_hand(shm::MessageKind::kHandBackOutput, *core, core->source(),
+      ports.push_back(port_at_hand(wire::MessageKind::kHandBackOutput, *core, core->source(),
                                    core->page_descriptor()));
     }
     for (const auto& [instance, core] : inputs_) {
-      ports.push_back(port_at_hand(shm::MessageKind::kHandBackInput, *core, core->port(),
+      ports.push_back(port_at_hand(wire::MessageKind::kHandBackInput, *core, core->port(),
                                    core->bell().for_publishers()));
     }
   }
@@ -155,12 +155,12 @@ void NodeCore::rejoin() {
 
 bool NodeCore::hand_back(const shm::FileDescriptor& socket,
                          const std::vector<PortAtHand>& ports) const {
-  shm::Message message = hello();
-  message.flags |= shm::kRejoins;
+  wire::Message message = hello();
+  message.flags |= wire::kRejoins;
   if (!is_sent(socket, message, {memory_->board().get(), memory_->registry().get()})) return false;
   for (const auto& page : memory_->pages_at_hand()) {
     message = {};
-    message.kind = shm::MessageKind::kHandBackPage;
+    message.kind = wire::MessageKind::kHandBackPage;
     message.id = page.source;
     message.value = page.number;
     if (!is_sent(socket, message, {page.descriptor, -1})) return false;
@@ -169,11 +169,11 @@ bool NodeCore::hand_back(const shm::FileDescriptor& socket,
     if (!is_handed_back(socket, port)) return false;
   }
   message = {};
-  message.kind = shm::MessageKind::kHandedBack;
+  message.kind = wire::MessageKind::kHandedBack;
   return is_sent(socket, message);
 }
 
-void NodeCore::be_welcomed(shm::Received& welcome) {
+void NodeCore::be_welcomed(wire::Received& welcome) {
   const std::lock_guard lock(mutex_);
   if (standing_ != Standing::kRejoining) return;
   turned_away_ = wire::find_fault_in_clock(welcome.message, asked_);
@@ -204,7 +204,7 @@ void NodeCore::be_welcomed(shm::Received& welcome) {
 }
 
 // The conversation is over; but the daemon may be replaced by one that knows us.
-void NodeCore::be_turned_away(const shm::Message& refusal) {
+void NodeCore::be_turned_away(const wire::Message& refusal) {
   turned_away_ = refusal.text_view();
   be_alone(kTurnedAwayInterval);
 }

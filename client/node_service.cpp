@@ -104,16 +104,16 @@ void NodeCore::pump(int timeout_ms) {
     if (::read(timer_.get(), &rings, sizeof rings) > 0) rejoin();
     return;
   }
-  shm::Received received;
+  wire::Received received;
   for (;;) {
-    switch (shm::receive_message(socket->get(), received, false)) {
-      case shm::ReceiveResult::kReceived:
+    switch (wire::receive_message(socket->get(), received, false)) {
+      case wire::ReceiveResult::kReceived:
         handle(received);
         break;
-      case shm::ReceiveResult::kNothing:
+      case wire::ReceiveResult::kNothing:
         return;
-      case shm::ReceiveResult::kClosed:
-      case shm::ReceiveResult::kMalformed:
+      case wire::ReceiveResult::kClosed:
+      case wire::ReceiveResult::kMalformed:
         lose_daemon();
         return;
     }
@@ -154,26 +154,26 @@ void NodeCore::tidy_ports(
 
 // This process has no descriptor left for what came with a message. Nothing is lost by that but
 // what the message was about.
-void NodeCore::handle_without_descriptors(const shm::Message& message) {
+void NodeCore::handle_without_descriptors(const wire::Message& message) {
   const std::string why = "process " + std::to_string(getpid()) +
                           " has no descriptor left for what the daemon sends: raise RLIMIT_NOFILE "
                           "(ulimit -n, LimitNOFILE= in a systemd unit)";
   switch (message.kind) {
-    case shm::MessageKind::kWelcome:
+    case wire::MessageKind::kWelcome:
       lose_daemon();  // and tries again
       return;
-    case shm::MessageKind::kOutputPeer:
-    case shm::MessageKind::kInputPeer:
+    case wire::MessageKind::kOutputPeer:
+    case wire::MessageKind::kInputPeer:
       refuse_peer(message, why);
       return;
-    case shm::MessageKind::kSourcePage:
+    case wire::MessageKind::kSourcePage:
       note_unseen(std::string(message.name_view()), why);
       return;
     default:
       break;
   }
   const std::lock_guard lock(mutex_);
-  const bool is_opened = message.kind == shm::MessageKind::kOpened;
+  const bool is_opened = message.kind == wire::MessageKind::kOpened;
   if (is_opened) say_closed(message.port);  // what it is answered ends the wait
   const auto found = replies_.find(message.request);
   if (found == replies_.end()) return;
@@ -182,31 +182,31 @@ void NodeCore::handle_without_descriptors(const shm::Message& message) {
   news_.notify_all();
 }
 
-void NodeCore::handle(shm::Received& received) {
-  const shm::Message& message = received.message;
+void NodeCore::handle(wire::Received& received) {
+  const wire::Message& message = received.message;
   if (received.lost_descriptors) {
     handle_without_descriptors(message);
     return;
   }
   switch (message.kind) {
-    case shm::MessageKind::kWelcome:
+    case wire::MessageKind::kWelcome:
       be_welcomed(received);
       break;
-    case shm::MessageKind::kSourcePage:
+    case wire::MessageKind::kSourcePage:
       add_page(received);
       break;
-    case shm::MessageKind::kOutputGrown:
+    case wire::MessageKind::kOutputGrown:
       hear_of_growth(message);
       break;
-    case shm::MessageKind::kPeerGone:
-    case shm::MessageKind::kDisconnected:
+    case wire::MessageKind::kPeerGone:
+    case wire::MessageKind::kDisconnected:
       end_peer(message);
       break;
-    case shm::MessageKind::kInputPeer:
-    case shm::MessageKind::kOutputPeer:
+    case wire::MessageKind::kInputPeer:
+    case wire::MessageKind::kOutputPeer:
       try {
-        message.kind == shm::MessageKind::kInputPeer ? add_receiver(received)
-                                                     : add_publisher(received);
+        message.kind == wire::MessageKind::kInputPeer ? add_receiver(received)
+                                                      : add_publisher(received);
       } catch (const std::system_error& error) {
         refuse_peer(message, error.what());
         if (options_.lock_memory) say_not_locked(message.port, error.what());
@@ -214,22 +214,22 @@ void NodeCore::handle(shm::Received& received) {
         refuse_peer(message, error.what());
       }
       break;
-    case shm::MessageKind::kConnectionRefused:
+    case wire::MessageKind::kConnectionRefused:
       handle_refusal(message);
       break;
-    case shm::MessageKind::kUnmentioned:
+    case wire::MessageKind::kUnmentioned:
       handle_unmentioned(message);
       break;
-    case shm::MessageKind::kSync: {
+    case wire::MessageKind::kSync: {
       make_tables_resident();
-      shm::Message synced;
-      synced.kind = shm::MessageKind::kSynced;
+      wire::Message synced;
+      synced.kind = wire::MessageKind::kSynced;
       synced.request = message.request;
       const std::lock_guard lock(mutex_);
       say(synced);
       break;
     }
-    case shm::MessageKind::kOpened:
+    case wire::MessageKind::kOpened:
       make_tables_resident();
       handle_reply(received);
       break;
@@ -239,8 +239,8 @@ void NodeCore::handle(shm::Received& received) {
   }
 }
 
-void NodeCore::add_page(shm::Received& received) {
-  const shm::Message& message = received.message;
+void NodeCore::add_page(wire::Received& received) {
+  const wire::Message& message = received.message;
   const std::string source(message.name_view());
   try {
     memory_->add_page(message.id, message.value, source, std::move(received.descriptors[0]));
@@ -297,7 +297,7 @@ void NodeCore::look_at_growth(shm::PortInstance port, const OutputPeer& peer) {
   if (is_more) wake_inputs();
 }
 
-void NodeCore::hear_of_growth(const shm::Message& message) {
+void NodeCore::hear_of_growth(const wire::Message& message) {
   std::shared_ptr<const OutputPeer> grown;
   {
     const std::lock_guard lock(mutex_);
@@ -307,8 +307,8 @@ void NodeCore::hear_of_growth(const shm::Message& message) {
   if (grown != nullptr) look_at_growth(message.port, *grown);
 }
 
-void NodeCore::add_receiver(const shm::Received& received) {
-  const shm::Message& message = received.message;
+void NodeCore::add_receiver(const wire::Received& received) {
+  const wire::Message& message = received.message;
   const auto type = type_of_port(message.port);
   if (!type) return;  // closed meanwhile, as it may be below
   auto receiver = map_input_peer(received, *type, residence());
@@ -316,11 +316,11 @@ void NodeCore::add_receiver(const shm::Received& received) {
   const auto output = outputs_.find(message.port);
   if (output == outputs_.end()) return;
   output->second->add_peer(std::move(receiver),
-                           (message.flags & shm::kIsConnected) != 0 ? message.link : 0);
+                           (message.flags & wire::kIsConnected) != 0 ? message.link : 0);
 }
 
-void NodeCore::add_publisher(const shm::Received& received) {
-  const shm::Message& message = received.message;
+void NodeCore::add_publisher(const wire::Received& received) {
+  const wire::Message& message = received.message;
   const auto type = type_of_port(message.port);
   if (!type) return;
   auto publisher = map_output_peer(received, *type, residence());
@@ -340,8 +340,8 @@ std::optional<shm::TypeInfo> NodeCore::type_of_port(shm::PortInstance port) {
   return input->second->type();
 }
 
-void NodeCore::end_peer(const shm::Message& message) {
-  const bool is_gone = message.kind == shm::MessageKind::kPeerGone;
+void NodeCore::end_peer(const wire::Message& message) {
+  const bool is_gone = message.kind == wire::MessageKind::kPeerGone;
   const std::lock_guard lock(mutex_);
   if (const auto output = outputs_.find(message.port); output != outputs_.end()) {
     OutputCore& core = *output->second;
@@ -353,21 +353,21 @@ void NodeCore::end_peer(const shm::Message& message) {
   }
 }
 
-void NodeCore::handle_reply(shm::Received& received) {
-  const shm::Message& message = received.message;
+void NodeCore::handle_reply(wire::Received& received) {
+  const wire::Message& message = received.message;
   const std::lock_guard lock(mutex_);
-  if (message.kind == shm::MessageKind::kRefused && standing_ == Standing::kRejoining) {
+  if (message.kind == wire::MessageKind::kRefused && standing_ == Standing::kRejoining) {
     be_turned_away(message);
     return;
   }
   const auto found = replies_.find(message.request);
   if (found == replies_.end()) {
     // Nobody waits for it any more.
-    if (message.kind == shm::MessageKind::kOpened) say_closed(message.port);
+    if (message.kind == wire::MessageKind::kOpened) say_closed(message.port);
     return;
   }
   Reply& reply = found->second;
-  if (message.kind == shm::MessageKind::kOpened) {
+  if (message.kind == wire::MessageKind::kOpened) {
     try {
       if (reply.on_opened) reply.on_opened(received);
       reply.opened = message.port;
@@ -377,7 +377,7 @@ void NodeCore::handle_reply(shm::Received& received) {
     }
     return;
   }
-  if (message.kind == shm::MessageKind::kRefused) reply.refusal = message.text_view();
+  if (message.kind == wire::MessageKind::kRefused) reply.refusal = message.text_view();
   reply.received = std::move(received);
   reply.finished = true;
   news_.notify_all();

@@ -24,7 +24,7 @@ std::uint32_t allocated_slots(const OutputPeer& peer) {
 
 }  // namespace
 
-std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
+std::shared_ptr<const InputPeer> map_input_peer(const wire::Received& announced,
                                                 const shm::TypeInfo& own,
                                                 shm::Residence residence) {
   auto peer = std::make_shared<InputPeer>();
@@ -47,7 +47,7 @@ std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
       peer->max_held < 1 || peer->max_held > shm::kMaxHeld) {
     throw std::runtime_error("the input port's segment is not one of this version");
   }
-  const bool connected = (announced.message.flags & shm::kIsConnected) != 0;
+  const bool connected = (announced.message.flags & wire::kIsConnected) != 0;
   const shm::TypeInfo type = header.type;
   if (const auto mismatch = shm::type_mismatch(own, type); connected && !mismatch.empty()) {
     throw std::runtime_error(mismatch);
@@ -58,7 +58,7 @@ std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
   return peer;
 }
 
-std::shared_ptr<const OutputPeer> map_output_peer(const shm::Received& announced,
+std::shared_ptr<const OutputPeer> map_output_peer(const wire::Received& announced,
                                                   const shm::TypeInfo& own,
                                                   shm::Residence residence) {
   auto peer = std::make_shared<OutputPeer>();

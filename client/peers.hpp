@@ -103,11 +103,11 @@ struct HeldLink {
 // Map what the daemon has announced, and check it: the segment must be whole, and carry a type that
 // `own` can take or give. Throw std::runtime_error saying what is wrong, std::system_error where it
 // cannot be locked.
-std::shared_ptr<const InputPeer> map_input_peer(const shm::Received& announced,
+std::shared_ptr<const InputPeer> map_input_peer(const wire::Received& announced,
                                                 const shm::TypeInfo& own,
                                                 shm::Residence residence = shm::Residence::kMapped);
 std::shared_ptr<const OutputPeer> map_output_peer(
-    const shm::Received& announced, const shm::TypeInfo& own,
+    const wire::Received& announced, const shm::TypeInfo& own,
     shm::Residence residence = shm::Residence::kMapped);
 
 // In the place of an input port that should be connected and cannot be mapped: it holds nothing and

@@ -54,7 +54,7 @@ Daemon::Daemon(const DaemonOptions& options)
                }) {
   changes_.read_first(options.stop_descriptor,
                       [&] { return handle_signal(options.stop_descriptor); });
-  listener_ = shm::listen_at(options.directory, instance_);
+  listener_ = wire::listen_at(options.directory, instance_);
   if (fcntl(listener_.socket.get(), F_SETFL, O_NONBLOCK) != 0) {
     throw std::system_error(errno, std::generic_category(), "listening");
   }
@@ -239,7 +239,7 @@ bool Daemon::serve(Client& client) {
   const ClientId id = client.id();
   const uid_t user = client.user();
   const shm::Nanoseconds until = shm::monotonic_now() + kMaxTurn;
-  shm::Received received;
+  wire::Received received;
   for (int i = 0; i < kMaxMessagesAtOnce; ++i) {
     if (!client.to_retry.empty()) {
       retry(client);
@@ -248,16 +248,16 @@ bool Daemon::serve(Client& client) {
       continue;
     }
     switch (client.receive(received)) {
-      case shm::ReceiveResult::kNothing:
+      case wire::ReceiveResult::kNothing:
         return false;
-      case shm::ReceiveResult::kReceived:
+      case wire::ReceiveResult::kReceived:
         break;
-      case shm::ReceiveResult::kMalformed:
+      case wire::ReceiveResult::kMalformed:
         log::warn("{} sent something that is not a message; dropped", client.description());
         dispose_of(received, user);
         drop(id);
         return false;
-      case shm::ReceiveResult::kClosed:
+      case wire::ReceiveResult::kClosed:
         dispose_of(received, user);
         drop(id);
         return false;
@@ -280,7 +280,7 @@ void Daemon::retry(Client& client) {
 }
 
 // `deadline`: of a request that was postponed.
-void Daemon::handle_or_refuse(Client& client, shm::Received& received, shm::Nanoseconds deadline) {
+void Daemon::handle_or_refuse(Client& client, wire::Received& received, shm::Nanoseconds deadline) {
   const LogAccount account(client.user());
   std::string why;
   try {

@@ -92,7 +92,7 @@ class Daemon final : private Takeover::Host {
   // Handles what it has sent, a bounded part of it: others wait too. True: there may be more.
   bool serve(Client& client);
   void retry(Client& client);
-  void handle_or_refuse(Client& client, shm::Received& received, shm::Nanoseconds deadline);
+  void handle_or_refuse(Client& client, wire::Received& received, shm::Nanoseconds deadline);
   // Those that are to be tried again are in the next turns of who asked.
   void retry_postponed(shm::Nanoseconds now);
   void settle();
@@ -107,23 +107,23 @@ class Daemon final : private Takeover::Host {
   void plan_to_look_in_flight();
 
   // What clients ask (daemon_requests.cpp).
-  void handle(Client& client, shm::Received& received);
+  void handle(Client& client, wire::Received& received);
   // False: it is not for the takeover.
-  bool hand_back(Client& client, shm::Received& received);
+  bool hand_back(Client& client, wire::Received& received);
   // False: it is about no change of the model.
-  bool change_model(Client& client, const shm::Message& message);
-  void hello(Client& client, const shm::Received& received);
+  bool change_model(Client& client, const wire::Message& message);
+  void hello(Client& client, const wire::Received& received);
   void welcome(Client& client) override;
   void answer_status(shm::Nanoseconds now);
   void send_model(Client& client, std::uint64_t request);
 
   // Ports and sources (daemon_ports.cpp, daemon_pages.cpp).
-  void open_output(Client& client, shm::Received& received);
+  void open_output(Client& client, wire::Received& received);
   void finish_opening(Client& client, std::uint64_t request, std::unique_ptr<OutputPort> port,
                       Source& source);
-  void open_input(Client& client, shm::Received& received);
+  void open_input(Client& client, wire::Received& received);
   void connect(Client& client, std::uint64_t request, shm::PortInstance port);
-  void deactivate(Client& client, const shm::Message& message);
+  void deactivate(Client& client, const wire::Message& message);
   // Throws std::runtime_error if a live component has the name. One that has closed its port, or
   // has ended, before `asking` asked, has not.
   void require_free(const Client& asking, shm::PortInstance holder, const std::string& what);
@@ -154,7 +154,7 @@ class Daemon final : private Takeover::Host {
   Switchboard switchboard_{names_, registry_};
   Barriers barriers_;
   Introductions introductions_{switchboard_, barriers_};
-  shm::Listener listener_;
+  wire::Listener listener_;
   shm::FileDescriptor epoll_;
   // Not before: there was no descriptor even to turn a client away.
   shm::Nanoseconds listen_again_at_ = shm::kForever;

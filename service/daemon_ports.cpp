@@ -33,7 +33,7 @@ void Daemon::require_free(const Client& asking, shm::PortInstance holder, const 
   throw std::runtime_error(what + " is held by " + client->description());
 }
 
-void Daemon::open_output(Client& client, shm::Received& received) {
+void Daemon::open_output(Client& client, wire::Received& received) {
   const std::string name = port_name(received.message);
   gate_.require(client, Action::kOutput, name);
   auto port = adopt_output(received, client.user());
@@ -66,13 +66,13 @@ void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_p
   takeover_.remember_component(client);
   names_.give_page(source, client.user());
   const OutputPort& opened = switchboard_.add(std::move(port), client, source);
-  auto reply = reply_to(request, shm::MessageKind::kOpened);
+  auto reply = reply_to(request, wire::MessageKind::kOpened);
   reply.port = opened.instance;
   reply.id = source.id;
   if (why_no_replay) {
     reply.set_text(*why_no_replay);
   } else {
-    reply.flags = shm::kMayReplay;
+    reply.flags = wire::kMayReplay;
   }
   client.send(reply, {source.page.writable.get(), -1});
   at_step("output-open");
@@ -80,7 +80,7 @@ void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_p
   connect(client, request, opened.instance);
 }
 
-void Daemon::open_input(Client& client, shm::Received& received) {
+void Daemon::open_input(Client& client, wire::Received& received) {
   const std::string name = port_name(received.message);
   gate_.require(client, Action::kInput, name);
   auto port = adopt_input(received, client.user());
@@ -92,7 +92,7 @@ void Daemon::open_input(Client& client, shm::Received& received) {
   takeover_.require_not_kept(input.away, "the input port " + name);
   takeover_.remember_component(client);
   const InputPort& opened = switchboard_.add(std::move(port), client, input);
-  auto reply = reply_to(received.message.request, shm::MessageKind::kOpened);
+  auto reply = reply_to(received.message.request, wire::MessageKind::kOpened);
   reply.port = opened.instance;
   reply.id = input.id;
   client.send(reply);
@@ -111,11 +111,11 @@ void Daemon::connect(Client& client, std::uint64_t request, shm::PortInstance po
   introductions_.introduce(told, [this, id = client.id(), request] {
     at_step("peers-ready");
     Client* const opener = clients_.find(id);
-    if (opener != nullptr) opener->send(reply_to(request, shm::MessageKind::kConnected));
+    if (opener != nullptr) opener->send(reply_to(request, wire::MessageKind::kConnected));
   });
 }
 
-void Daemon::deactivate(Client& client, const shm::Message& message) {
+void Daemon::deactivate(Client& client, const wire::Message& message) {
   const std::string name = port_name(message);
   gate_.require(client, Action::kDeactivate, name);
   Source* source = names_.find_source(name);
@@ -130,7 +130,7 @@ void Daemon::deactivate(Client& client, const shm::Message& message) {
   const auto answer = [this, was_active, request = message.request](Source& ended, Client& asking) {
     end_activity(ended);  // who had it may have written there until it was replaced
     names_.let_go(ended);
-    auto reply = reply_to(request, shm::MessageKind::kDone);
+    auto reply = reply_to(request, wire::MessageKind::kDone);
     reply.value = was_active ? 1 : 0;
     asking.send(reply);
     log::info("{} deactivated {}{}", asking.description(), ended.name,

@@ -13,7 +13,7 @@
 namespace arbiter::service {
 namespace {
 
-void require_usable(const shm::Received& received) {
+void require_usable(const wire::Received& received) {
   if (received.is_strange) {
     throw std::runtime_error(
         "a descriptor of the message is neither a memfd nor an anonymous pipe: nothing else is "
@@ -26,8 +26,8 @@ void require_usable(const shm::Received& received) {
 }
 
 // What is not said while components come back to a new daemon.
-bool is_question(shm::MessageKind kind) {
-  using shm::MessageKind;
+bool is_question(wire::MessageKind kind) {
+  using wire::MessageKind;
   return kind == MessageKind::kOpenOutput || kind == MessageKind::kOpenInput ||
          kind == MessageKind::kConnect || kind == MessageKind::kReload ||
          kind == MessageKind::kStatus || kind == MessageKind::kDeactivate ||
@@ -37,14 +37,14 @@ bool is_question(shm::MessageKind kind) {
 
 }  // namespace
 
-void Daemon::handle(Client& client, shm::Received& received) {
-  const shm::Message& message = received.message;
+void Daemon::handle(Client& client, wire::Received& received) {
+  const wire::Message& message = received.message;
   if (client.is_turned_away) {
     takeover_.hear_stranger(client, message);
     return;
   }
   require_usable(received);
-  if (client.node == 0 && message.kind != shm::MessageKind::kHello) {
+  if (client.node == 0 && message.kind != wire::MessageKind::kHello) {
     throw std::runtime_error("a client must say hello first");
   }
   if (!serves() && is_question(message.kind)) {
@@ -52,54 +52,54 @@ void Daemon::handle(Client& client, shm::Received& received) {
   }
   if (hand_back(client, received) || change_model(client, message)) return;
   switch (message.kind) {
-    case shm::MessageKind::kHello:
+    case wire::MessageKind::kHello:
       hello(client, received);
       break;
-    case shm::MessageKind::kOpenOutput:
+    case wire::MessageKind::kOpenOutput:
       open_output(client, received);
       break;
-    case shm::MessageKind::kOpenInput:
+    case wire::MessageKind::kOpenInput:
       open_input(client, received);
       break;
-    case shm::MessageKind::kClosePort:
+    case wire::MessageKind::kClosePort:
       if (client.ports.count(message.port) != 0) switchboard_.remove(message.port);
       break;
-    case shm::MessageKind::kSynced:
+    case wire::MessageKind::kSynced:
       barriers_.synced(client.id(), message.request);
       break;
-    case shm::MessageKind::kStatus:
+    case wire::MessageKind::kStatus:
       gate_.require(client, Action::kObserve);
       status_requests_.add(client, message.request);
       break;
-    case shm::MessageKind::kModel:
+    case wire::MessageKind::kModel:
       gate_.require(client, Action::kObserve);
       send_model(client, message.request);
       break;
-    case shm::MessageKind::kDeactivate:
+    case wire::MessageKind::kDeactivate:
       deactivate(client, message);
       break;
-    case shm::MessageKind::kObserve:
+    case wire::MessageKind::kObserve:
       gate_.require(client, Action::kObserve);
       observers_.add(client, message.request, names_.last_news());
       break;
-    case shm::MessageKind::kPeerRefused:
+    case wire::MessageKind::kPeerRefused:
       if (client.ports.count(message.port) != 0) {
         switchboard_.refuse(message.port, message.peer, shm::printable(message.text_view()));
       }
       break;
-    case shm::MessageKind::kBlind:
+    case wire::MessageKind::kBlind:
       if (client.ports.count(message.port) != 0) {
         switchboard_.note_blind(message.port, std::string(message.text_view()));
       }
       break;
-    case shm::MessageKind::kConnect:
+    case wire::MessageKind::kConnect:
       if (client.ports.count(message.port) == 0) throw std::runtime_error("the port is not open");
       connect(client, message.request, message.port);
       break;
-    case shm::MessageKind::kStop:
+    case wire::MessageKind::kStop:
       gate_.require(client, Action::kStop);
       log::info("stopping: {} asks for it", client.description());
-      client.send(reply_to(message.request, shm::MessageKind::kDone));
+      client.send(reply_to(message.request, wire::MessageKind::kDone));
       stop_wanted_ = true;
       break;
     default:
@@ -107,21 +107,21 @@ void Daemon::handle(Client& client, shm::Received& received) {
   }
 }
 
-bool Daemon::hand_back(Client& client, shm::Received& received) {
+bool Daemon::hand_back(Client& client, wire::Received& received) {
   switch (received.message.kind) {
-    case shm::MessageKind::kHandBackPage:
+    case wire::MessageKind::kHandBackPage:
       takeover_.take_back_page(client, received);
       return true;
-    case shm::MessageKind::kHandBackOutput:
+    case wire::MessageKind::kHandBackOutput:
       takeover_.take_back_output(client, received);
       return true;
-    case shm::MessageKind::kHandBackInput:
+    case wire::MessageKind::kHandBackInput:
       takeover_.take_back_input(client, received);
       return true;
-    case shm::MessageKind::kHandBackLink:
+    case wire::MessageKind::kHandBackLink:
       takeover_.take_back_link(client, received.message);
       return true;
-    case shm::MessageKind::kHandedBack:
+    case wire::MessageKind::kHandedBack:
       takeover_.finish_return(client);
       return true;
     default:
@@ -129,24 +129,24 @@ bool Daemon::hand_back(Client& client, shm::Received& received) {
   }
 }
 
-bool Daemon::change_model(Client& client, const shm::Message& message) {
+bool Daemon::change_model(Client& client, const wire::Message& message) {
   switch (message.kind) {
-    case shm::MessageKind::kReload:
+    case wire::MessageKind::kReload:
       gate_.require(client, Action::kReload);
       changes_.ask(
-          {(message.flags & shm::kDryRun) != 0 ? Change::Kind::kCompare : Change::Kind::kReload,
+          {(message.flags & wire::kDryRun) != 0 ? Change::Kind::kCompare : Change::Kind::kReload,
            {},
            0,
            {},
            {}},
           client, message);
       return true;
-    case shm::MessageKind::kSwitch:
+    case wire::MessageKind::kSwitch:
       gate_.require(client, Action::kSwitch);
       changes_.ask({Change::Kind::kSwitch, std::string(message.name_view()), 0, {}, {}}, client,
                    message);
       return true;
-    case shm::MessageKind::kRollback:
+    case wire::MessageKind::kRollback:
       gate_.require(client, Action::kReload);
       changes_.ask({Change::Kind::kRollback, {}, message.link, {}, {}}, client, message);
       return true;
@@ -155,22 +155,22 @@ bool Daemon::change_model(Client& client, const shm::Message& message) {
   }
 }
 
-void Daemon::hello(Client& client, const shm::Received& received) {
-  const shm::Message& message = received.message;
+void Daemon::hello(Client& client, const wire::Received& received) {
+  const wire::Message& message = received.message;
   if (!client.name.empty()) throw std::runtime_error("a client says hello once");
-  if (message.value != shm::kWireVersion) {
+  if (message.value != wire::kWireVersion) {
     throw std::runtime_error("the client speaks version " + std::to_string(message.value) +
-                             ", this daemon version " + std::to_string(shm::kWireVersion));
+                             ", this daemon version " + std::to_string(wire::kWireVersion));
   }
   if (message.name_view().empty()) throw std::runtime_error("a client must have a name");
   require_fine(message.name_view(), "the client's");
-  const bool returns = (message.flags & shm::kRejoins) != 0;
+  const bool returns = (message.flags & wire::kRejoins) != 0;
   const NodeId former = takeover_.knows(received.descriptors[0]) ? message.link : 0;
   client.charge = takeover_.make_room_for(client, former);
   client.name = message.name_view();
   client.hello_request = message.request;
-  client.has_service_thread = (message.flags & shm::kHasServiceThread) != 0;
-  client.comes_back = (message.flags & shm::kComesBack) != 0;
+  client.has_service_thread = (message.flags & wire::kHasServiceThread) != 0;
+  client.comes_back = (message.flags & wire::kComesBack) != 0;
   client.former = returns ? 0 : former;
   if (returns) {
     takeover_.rejoin(client, received);
@@ -183,7 +183,7 @@ void Daemon::hello(Client& client, const shm::Received& received) {
 
 void Daemon::welcome(Client& client) {
   if (client.node == 0) client.node = registry_.next_node();
-  auto welcome = reply_to(client.hello_request, shm::MessageKind::kWelcome);
+  auto welcome = reply_to(client.hello_request, wire::MessageKind::kWelcome);
   welcome.link = client.node;
   welcome.peer = static_cast<std::uint64_t>(shm::monotonic_now());
   takeover_.know(client);
@@ -213,7 +213,7 @@ void Daemon::answer_status(shm::Nanoseconds now) {
                    "a client is sent more documents than it asked for");
     --client.waits_for_status;
     if (document) {
-      client.send(reply_to(each.request, shm::MessageKind::kStatusReply), {document.get(), -1});
+      client.send(reply_to(each.request, wire::MessageKind::kStatusReply), {document.get(), -1});
     } else {
       refuse(client, each.request, why_not);
     }
@@ -222,7 +222,7 @@ void Daemon::answer_status(shm::Nanoseconds now) {
 }
 
 void Daemon::send_model(Client& client, std::uint64_t request) {
-  client.send(reply_to(request, shm::MessageKind::kModelReply), {changes_.document().get(), -1});
+  client.send(reply_to(request, wire::MessageKind::kModelReply), {changes_.document().get(), -1});
 }
 
 }  // namespace arbiter::service

@@ -79,7 +79,7 @@ int serve(const arbiter::service::DaemonOptions& options, const std::string& ins
   raise_descriptor_limit();
   Daemon daemon(options);
   log::info("instance \"{}\" is ready at {}", instance, daemon.path());
-  for (const std::string& other : arbiter::shm::other_daemons(instance, options.directory)) {
+  for (const std::string& other : arbiter::wire::other_daemons(instance, options.directory)) {
     log::warn(
         "another daemon of instance \"{}\" listens at {}: components that meet there share nothing "
         "with those that meet here; stop one of the two, or give it another --instance",
@@ -148,8 +148,8 @@ int run(int argc, char** argv) {
   options.steps = arbiter::rules::Budget::steps_of(effort);
   try {
     options.models = arbiter::service::named_files(models, applications);
-    options.instance = arbiter::shm::instance_name(instance);
-    options.directory = arbiter::shm::daemon_directory();
+    options.instance = arbiter::wire::instance_name(instance);
+    options.directory = arbiter::wire::daemon_directory();
     options.stop_descriptor = signals.get();
     return serve(options, options.instance, signals);
   } catch (const arbiter::rules::Stopped&) {  // by a signal, before it was ready

@@ -35,8 +35,8 @@ bool are_same(const shm::FileDescriptor& one, const shm::FileDescriptor& other) 
          a.st_dev == b.st_dev;
 }
 
-shm::Message message_of(shm::MessageKind kind) {
-  shm::Message message;
+wire::Message message_of(wire::MessageKind kind) {
+  wire::Message message;
   message.kind = kind;
   return message;
 }
@@ -60,11 +60,11 @@ Instance::Instance(wire::Caller caller) : caller_(std::move(caller)) {
   take_up_memory(welcome.received);
   standing_ = Standing::kIn;
   daemons_ = 1;
-  static_cast<void>(ask(message_of(shm::MessageKind::kObserve)));
+  static_cast<void>(ask(message_of(wire::MessageKind::kObserve)));
 }
 
 // Nothing is handed on to a daemon's successor: components do that.
-void Instance::take_up_memory(shm::Received& welcome) {
+void Instance::take_up_memory(wire::Received& welcome) {
   if (memory_ != nullptr && are_same(welcome.descriptors[0], memory_->board())) return;
   memory_ = std::make_shared<shm::DecisionMemory>(std::move(welcome.descriptors[0]),
                                                   shm::Residence::kMapped, 0);
@@ -80,31 +80,31 @@ void Instance::update() {
     if (::read(timer_.get(), &rings, sizeof rings) > 0) look_for_daemon();
     return;
   }
-  shm::Received received;
+  wire::Received received;
   for (int i = 0; i < kMostMessages && standing_ != Standing::kAlone; ++i) {
-    switch (shm::receive_message(socket_.get(), received, false)) {
-      case shm::ReceiveResult::kReceived:
+    switch (wire::receive_message(socket_.get(), received, false)) {
+      case wire::ReceiveResult::kReceived:
         handle(received);
         break;
-      case shm::ReceiveResult::kNothing:
+      case wire::ReceiveResult::kNothing:
         return;
-      case shm::ReceiveResult::kClosed:
-      case shm::ReceiveResult::kMalformed:
+      case wire::ReceiveResult::kClosed:
+      case wire::ReceiveResult::kMalformed:
         lose_daemon(kLookInterval);
         break;
     }
   }
 }
 
-void Instance::handle(shm::Received& received) {
-  const shm::Message& message = received.message;
+void Instance::handle(wire::Received& received) {
+  const wire::Message& message = received.message;
   if (standing_ == Standing::kGreeting) {
     be_greeted(received);
     return;
   }
-  if (message.kind == shm::MessageKind::kSourcePage) {
+  if (message.kind == wire::MessageKind::kSourcePage) {
     add_page(received);
-  } else if (message.kind == shm::MessageKind::kPortName) {
+  } else if (message.kind == wire::MessageKind::kPortName) {
     add_port_name(message.id, std::string(message.name_view()));
   } else if (message.request == asked_) {
     answer_ = std::move(received);
@@ -112,8 +112,8 @@ void Instance::handle(shm::Received& received) {
 }
 
 // A source whose page cannot be had stays unseen.
-void Instance::add_page(shm::Received& received) {
-  const shm::Message& message = received.message;
+void Instance::add_page(wire::Received& received) {
+  const wire::Message& message = received.message;
   const std::string name(message.name_view());
   const std::string before = memory_->source_name(message.id);
   try {
@@ -142,7 +142,7 @@ void Instance::look_for_daemon() {
   std::string why_not;
   std::optional<shm::FileDescriptor> found;
   try {
-    found = shm::connect_to_daemon(caller_.instance, why_not);
+    found = wire::connect_to_daemon(caller_.instance, why_not);
   } catch (const std::exception&) {  // no descriptors are left: another time
   }
   if (!found) return;
@@ -157,8 +157,8 @@ void Instance::look_for_daemon() {
   ring_timer_every({});
 }
 
-void Instance::be_greeted(shm::Received& welcome) {
-  if (welcome.message.kind != shm::MessageKind::kWelcome ||
+void Instance::be_greeted(wire::Received& welcome) {
+  if (welcome.message.kind != wire::MessageKind::kWelcome ||
       !wire::find_fault_in_clock(welcome.message, greeted_).empty()) {
     lose_daemon(kTurnedAwayInterval);
     return;
@@ -171,7 +171,7 @@ void Instance::be_greeted(shm::Received& welcome) {
   }
   standing_ = Standing::kIn;
   ++daemons_;
-  say(message_of(shm::MessageKind::kObserve));
+  say(message_of(wire::MessageKind::kObserve));
 }
 
 void Instance::lose_daemon(Clock::duration look_again_in) {
@@ -194,8 +194,8 @@ void Instance::ring_timer_every(Clock::duration time) const {
   timerfd_settime(timer_.get(), 0, &at, nullptr);
 }
 
-bool Instance::say(const shm::Message& message) const {
-  return shm::send_message(socket_.get(), message) == shm::SendResult::kSent;
+bool Instance::say(const wire::Message& message) const {
+  return wire::send_message(socket_.get(), message) == wire::SendResult::kSent;
 }
 
 std::optional<shm::PortId> Instance::find_port(std::string_view name) const {
@@ -210,9 +210,9 @@ std::optional<shm::SourceId> Instance::find_source(std::string_view name) const 
   return is_known ? std::optional(found->second) : std::nullopt;
 }
 
-shm::Received Instance::ask(const shm::Message& question) {
+wire::Received Instance::ask(const wire::Message& question) {
   const auto give_up = Clock::now() + caller_.answer_time;
-  shm::Message numbered = question;
+  wire::Message numbered = question;
   numbered.request = ++last_request_;
   asked_ = numbered.request;
   answer_.reset();
@@ -231,15 +231,15 @@ shm::Received Instance::ask(const shm::Message& question) {
     static_cast<void>(::poll(&readable, 1, static_cast<int>(left.count())));
     update();
   }
-  shm::Received answer = std::move(*std::exchange(answer_, std::nullopt));
-  if (answer.message.kind == shm::MessageKind::kRefused) {
+  wire::Received answer = std::move(*std::exchange(answer_, std::nullopt));
+  if (answer.message.kind == wire::MessageKind::kRefused) {
     throw wire::CallError(std::string(answer.message.text_view()));
   }
   return answer;
 }
 
 wire::Status Instance::status() {
-  const shm::Received answer = ask(message_of(shm::MessageKind::kStatus));
+  const wire::Received answer = ask(message_of(wire::MessageKind::kStatus));
   return wire::read_status(wire::read_document(answer.descriptors[0]));
 }
 

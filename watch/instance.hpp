@@ -66,7 +66,7 @@ class Instance {
 
   // The answer to a question that changes nothing; where the daemon goes meanwhile, that of the
   // next. Throws wire::CallError where it refuses, or none answers within the caller's answer_time.
-  shm::Received ask(const shm::Message& question);
+  wire::Received ask(const wire::Message& question);
   // Throws wire::CallError, wire::DocumentError.
   wire::Status status();
 
@@ -74,16 +74,16 @@ class Instance {
   using Clock = std::chrono::steady_clock;
   enum class Standing : std::uint8_t { kIn, kGreeting, kAlone };
 
-  void take_up_memory(shm::Received& welcome);
-  void handle(shm::Received& received);
-  void add_page(shm::Received& received);
+  void take_up_memory(wire::Received& welcome);
+  void handle(wire::Received& received);
+  void add_page(wire::Received& received);
   void add_port_name(shm::PortId id, std::string name);
   void look_for_daemon();
-  void be_greeted(shm::Received& welcome);
+  void be_greeted(wire::Received& welcome);
   void lose_daemon(Clock::duration look_again_in);
   bool watch_socket() const;
   void ring_timer_every(Clock::duration time) const;
-  bool say(const shm::Message& message) const;
+  bool say(const wire::Message& message) const;
 
   const wire::Caller caller_;
   shm::FileDescriptor epoll_;
@@ -98,8 +98,8 @@ class Instance {
   std::map<std::string, shm::PortId, std::less<>> port_ids_;
   std::map<std::string, shm::SourceId, std::less<>> source_ids_;
   std::uint64_t last_request_ = 0;
-  std::uint64_t asked_ = 0;              // the question that is to be answered
-  std::optional<shm::Received> answer_;  // to it
+  std::uint64_t asked_ = 0;               // the question that is to be answered
+  std::optional<wire::Received> answer_;  // to it
 };
 
 }  // namespace arbiter::watch

@@ -53,9 +53,9 @@ ModelInForce::ModelInForce(wire::ModelDocument document) : document_(std::move(d
 }
 
 ModelInForce ModelInForce::fetch(Instance& instance) {
-  shm::Message question;
-  question.kind = shm::MessageKind::kModel;
-  const shm::Received answer = instance.ask(question);
+  wire::Message question;
+  question.kind = wire::MessageKind::kModel;
+  const wire::Received answer = instance.ask(question);
   return ModelInForce(wire::read_model_document(wire::read_document(answer.descriptors[0])));
 }
 

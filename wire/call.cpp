@@ -53,7 +53,7 @@ bool wait_readable(const Caller& caller, int descriptor, std::optional<milliseco
 
 std::string silence_text(const shm::FileDescriptor& socket, const Caller& caller,
                          Clock::time_point asked) {
-  return shm::describe_daemon(socket.get(), caller.instance) + " runs, but did not answer within " +
+  return describe_daemon(socket.get(), caller.instance) + " runs, but did not answer within " +
          std::to_string(since(asked).count()) + " ms: it is stopped, or busy";
 }
 
@@ -66,7 +66,7 @@ class Joining {
     for (;;) {
       silence_.clear();
       Welcome welcome;
-      if (auto socket = shm::connect_to_daemon(caller_.instance, why_not, &welcome.directory)) {
+      if (auto socket = connect_to_daemon(caller_.instance, why_not, &welcome.directory)) {
         welcome.socket = std::move(*socket);
         shm::close_in_children(welcome.socket);
         if (is_let_in(welcome)) return welcome;
@@ -74,7 +74,7 @@ class Joining {
       const auto now = Clock::now();
       if (now >= give_up_) {
         throw CallError(silence_.empty()
-                            ? nobody_answers(caller_, why_not) + shm::describe_listening_instances()
+                            ? nobody_answers(caller_, why_not) + describe_listening_instances()
                             : silence_);
       }
       if (!has_told_ && since(begin_) >= caller_.quiet) {
@@ -90,27 +90,25 @@ class Joining {
   // False: it has not answered.
   bool is_let_in(Welcome& welcome) {
     welcome.asked = shm::monotonic_now();
-    if (shm::send_message(welcome.socket.get(), hello_of(caller_)) != shm::SendResult::kSent)
-      return false;
+    if (send_message(welcome.socket.get(), hello_of(caller_)) != SendResult::kSent) return false;
     const auto asked = Clock::now();
     const auto left = std::chrono::duration_cast<milliseconds>(give_up_ - asked);
     const auto limit =
         std::clamp(left, std::min(caller_.answer_time, kMaxAnswerTime), kMaxAnswerTime);
-    const std::string whom =
-        shm::describe_daemon(welcome.socket.get(), caller_.instance) + " to answer";
+    const std::string whom = describe_daemon(welcome.socket.get(), caller_.instance) + " to answer";
     if (!wait_readable(caller_, welcome.socket.get(), limit, whom, has_told_)) {
       silence_ = silence_text(welcome.socket, caller_, asked) + "; nothing was asked of it";
       return false;
     }
-    if (shm::receive_message(welcome.socket.get(), welcome.received, false) !=
-        shm::ReceiveResult::kReceived) {
+    if (receive_message(welcome.socket.get(), welcome.received, false) !=
+        ReceiveResult::kReceived) {
       return false;
     }
-    const shm::Message& answer = welcome.received.message;
-    if (answer.kind == shm::MessageKind::kRefused) {
+    const Message& answer = welcome.received.message;
+    if (answer.kind == MessageKind::kRefused) {
       throw CallError("the daemon refuses: " + std::string(answer.text_view()));
     }
-    return answer.kind == shm::MessageKind::kWelcome;
+    return answer.kind == MessageKind::kWelcome;
   }
 
   const Caller& caller_;
@@ -122,10 +120,10 @@ class Joining {
 
 }  // namespace
 
-shm::Message hello_of(const Caller& caller) {
-  shm::Message hello;
-  hello.kind = shm::MessageKind::kHello;
-  hello.value = shm::kWireVersion;
+Message hello_of(const Caller& caller) {
+  Message hello;
+  hello.kind = MessageKind::kHello;
+  hello.value = kWireVersion;
   hello.flags = caller.flags;
   hello.set_name(caller.name);
   return hello;
@@ -142,18 +140,18 @@ Welcome join(const Caller& caller) { return Joining(caller).run(); }
 
 Call::Call(Caller caller) : caller_(std::move(caller)), socket_(join(caller_).socket) {}
 
-shm::Received Call::ask(shm::Message question, std::optional<milliseconds> limit) {
+Received Call::ask(Message question, std::optional<milliseconds> limit) {
   question.request = ++last_request_;
   const auto asked = Clock::now();
-  shm::Received answer;
-  if (shm::send_message(socket_.get(), question) == shm::SendResult::kSent) {
+  Received answer;
+  if (send_message(socket_.get(), question) == SendResult::kSent) {
     while (wait_for(socket_.get(), limit ? std::optional(*limit - since(asked)) : limit,
                     "to answer")) {
-      if (shm::receive_message(socket_.get(), answer, false) != shm::ReceiveResult::kReceived) {
+      if (receive_message(socket_.get(), answer, false) != ReceiveResult::kReceived) {
         throw CallError("the daemon has gone without an answer");
       }
       if (answer.message.request != question.request) continue;
-      if (answer.message.kind == shm::MessageKind::kRefused) {
+      if (answer.message.kind == MessageKind::kRefused) {
         throw CallError(std::string(answer.message.text_view()));
       }
       return answer;
@@ -165,8 +163,7 @@ shm::Received Call::ask(shm::Message question, std::optional<milliseconds> limit
 
 bool Call::wait_for(int descriptor, std::optional<milliseconds> limit, const char* what) {
   return wait_readable(caller_, descriptor, limit,
-                       shm::describe_daemon(socket_.get(), caller_.instance) + ' ' + what,
-                       has_told_);
+                       describe_daemon(socket_.get(), caller_.instance) + ' ' + what, has_told_);
 }
 
 shm::FileDescriptor Call::process() const {
@@ -177,10 +174,10 @@ shm::FileDescriptor Call::process() const {
 }
 
 void Call::wait_until_gone(const shm::FileDescriptor& process) {
-  shm::Received rest;
+  Received rest;
   do {
     wait_for(socket_.get(), {}, "to end");
-  } while (shm::receive_message(socket_.get(), rest, false) == shm::ReceiveResult::kReceived);
+  } while (receive_message(socket_.get(), rest, false) == ReceiveResult::kReceived);
   if (process) wait_for(process.get(), {}, "to end");
 }
 

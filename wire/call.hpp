@@ -42,12 +42,12 @@ struct Caller {
 // A daemon that has let us in. Children do not inherit the socket.
 struct Welcome {
   shm::FileDescriptor socket;
-  shm::Received received;  // kWelcome
-  std::string directory;   // where we have met
+  Received received;      // kWelcome
+  std::string directory;  // where we have met
   shm::Nanoseconds asked = 0;
 };
 
-[[nodiscard]] shm::Message hello_of(const Caller& caller);
+[[nodiscard]] Message hello_of(const Caller& caller);
 // "no arbiterd of instance "x" answered within 300 ms (…); start one with: …". `why_not`: what was
 // wrong with each socket.
 [[nodiscard]] std::string nobody_answers(const Caller& caller, const std::string& why_not);
@@ -62,7 +62,7 @@ class Call {
 
   // The answer to the question; what else the daemon says is passed over. Without a limit it waits
   // for as long as the daemon lives. Throws CallError where it refuses, goes, or is too late.
-  shm::Received ask(shm::Message question, std::optional<std::chrono::milliseconds> limit = {});
+  Received ask(Message question, std::optional<std::chrono::milliseconds> limit = {});
 
   // The daemon's process as a descriptor; none where it cannot be seen from here.
   [[nodiscard]] shm::FileDescriptor process() const;

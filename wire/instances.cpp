@@ -10,7 +10,7 @@
 
 #include "wire/rendezvous.hpp"
 
-namespace arbiter::shm {
+namespace arbiter::wire {
 namespace {
 
 constexpr std::string_view kEnding = ".sock";
@@ -67,4 +67,4 @@ std::string describe_daemon(int socket, const std::string& instance) {
          " of instance \"" + instance + "\"";
 }
 
-}  // namespace arbiter::shm
+}  // namespace arbiter::wire

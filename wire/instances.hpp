@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace arbiter::shm {
+namespace arbiter::wire {
 
 // Instances whose daemon listens where this client would look: the first few, in the order of the
 // directories.
@@ -16,4 +16,4 @@ std::string describe_listening_instances();
 // "arbiterd (pid 42) of instance "x"": the one at the other end of this socket.
 std::string describe_daemon(int socket, const std::string& instance);
 
-}  // namespace arbiter::shm
+}  // namespace arbiter::wire

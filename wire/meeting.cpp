@@ -8,7 +8,7 @@ namespace arbiter::wire {
 
 // The daemon read its clock after we had asked and before its answer came. All processors tell the
 // same time, so one clock cannot say otherwise.
-std::string find_fault_in_clock(const shm::Message& welcome, shm::Nanoseconds asked) {
+std::string find_fault_in_clock(const Message& welcome, shm::Nanoseconds asked) {
   const auto theirs = static_cast<shm::Nanoseconds>(welcome.peer);
   const shm::Nanoseconds now = shm::monotonic_now();
   if (theirs == 0 || (asked <= theirs && theirs <= now)) return {};

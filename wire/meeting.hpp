@@ -12,7 +12,7 @@ namespace arbiter::wire {
 // Why this process cannot work with the daemon that welcomes it, which it asked at that time: its
 // CLOCK_MONOTONIC is another. Activity that it begins would be over already, or last for days.
 // Empty: the clocks are the same.
-[[nodiscard]] std::string find_fault_in_clock(const shm::Message& welcome, shm::Nanoseconds asked);
+[[nodiscard]] std::string find_fault_in_clock(const Message& welcome, shm::Nanoseconds asked);
 
 // That clients whose environment is another may meet at `path`; `met`: where this one has met its
 // daemon.

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <utility>
 
-namespace arbiter::shm {
+namespace arbiter::wire {
 namespace {
 
 constexpr std::size_t kShortest = offsetof(Message, type);
@@ -34,7 +34,7 @@ std::size_t take_descriptors(msghdr& header, Received& received) noexcept {
     for (std::size_t i = 0; i < count; ++i) {
       int fd = -1;
       std::memcpy(&fd, CMSG_DATA(part) + i * sizeof(int), sizeof fd);
-      FileDescriptor owned(fd);
+      shm::FileDescriptor owned(fd);
       if (taken < kMaxDescriptors) {
         received.descriptors[taken] = std::move(owned);
       } else if (taken < kMostDescriptorsOfAMessage) {
@@ -106,8 +106,8 @@ ReceiveResult receive_message(int socket, Received& received, bool wait) noexcep
   Message& message = received.message;
   message.name[sizeof message.name - 1] = '\0';
   message.text[sizeof message.text - 1] = '\0';
-  message.type.name[kMaxTypeName] = '\0';
+  message.type.name[shm::kMaxTypeName] = '\0';
   return ReceiveResult::kReceived;
 }
 
-}  // namespace arbiter::shm
+}  // namespace arbiter::wire

@@ -31,7 +31,7 @@
 #include "shm/limits.hpp"
 #include "shm/type_info.hpp"
 
-namespace arbiter::shm {
+namespace arbiter::wire {
 
 inline constexpr std::uint32_t kWireVersion = 4;
 
@@ -103,18 +103,18 @@ enum MessageFlag : std::uint32_t {
 struct Message {
   MessageKind kind = MessageKind::kHello;
   std::uint32_t flags = 0;
-  std::uint64_t request = 0;  // a reply bears that of its question
-  PortInstance port = 0;      // of the receiver of the message
-  PortInstance peer = 0;
+  std::uint64_t request = 0;   // a reply bears that of its question
+  shm::PortInstance port = 0;  // of the receiver of the message
+  shm::PortInstance peer = 0;
   std::uint64_t link = 0;  // number of the link; another each time that two ports are connected
   std::uint32_t id = 0;
   std::uint32_t value = 0;
-  TypeInfo type;
-  char name[kMaxNameLength + 1] = {};
+  shm::TypeInfo type;
+  char name[shm::kMaxNameLength + 1] = {};
   char text[1024] = {};
 
   [[nodiscard]] std::string_view name_view() const noexcept {
-    return {name, strnlen(name, kMaxNameLength)};
+    return {name, strnlen(name, shm::kMaxNameLength)};
   }
   [[nodiscard]] std::string_view text_view() const noexcept {
     return {text, strnlen(text, sizeof text - 1)};
@@ -142,12 +142,12 @@ inline constexpr std::size_t kMostDescriptorsOfAMessage = 253;
 
 struct Received {
   Message message;
-  std::array<FileDescriptor, kMaxDescriptors> descriptors;
+  std::array<shm::FileDescriptor, kMaxDescriptors> descriptors;
   std::size_t descriptor_count = 0;
   bool lost_descriptors = false;  // this process had no descriptor left for one that came
   bool is_strange = false;        // the daemon's word: one of them is nothing that is taken
   // Those beyond what a message may carry: it is malformed, and who received it disposes of them.
-  std::array<FileDescriptor, kMostDescriptorsOfAMessage - kMaxDescriptors> surplus{};
+  std::array<shm::FileDescriptor, kMostDescriptorsOfAMessage - kMaxDescriptors> surplus{};
 };
 
 // kTooMany: this user has as many descriptors under way, to whomever, as it may.
@@ -162,4 +162,4 @@ enum class ReceiveResult { kReceived, kNothing, kClosed, kMalformed };
                                                                                       -1}) noexcept;
 [[nodiscard]] ReceiveResult receive_message(int socket, Received& received, bool wait) noexcept;
 
-}  // namespace arbiter::shm
+}  // namespace arbiter::wire

@@ -17,7 +17,7 @@
 #include <stdexcept>
 #include <system_error>
 
-namespace arbiter::shm {
+namespace arbiter::wire {
 namespace {
 
 constexpr const char* kSystemDirectory = "/run/arbiter";
@@ -81,7 +81,7 @@ std::optional<uid_t> arbiter_user() {
 // An address for a path of any length: a long one goes by way of its directory's descriptor.
 struct Address {
   sockaddr_un address{};
-  FileDescriptor directory;
+  shm::FileDescriptor directory;
 };
 
 Address address_of(const std::string& directory, const std::string& file) {
@@ -96,8 +96,8 @@ Address address_of(const std::string& directory, const std::string& file) {
   return result;
 }
 
-FileDescriptor make_socket() {
-  FileDescriptor made(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+shm::FileDescriptor make_socket() {
+  shm::FileDescriptor made(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
   if (!made) fail("cannot make a socket");
   // A daemon that is stopped holds nobody up for longer than this, be it in connect() or sendmsg().
   const timeval limit{1, 0};
@@ -161,8 +161,8 @@ void pass_over(const std::string& directory, const std::string& instance, const 
 }
 
 // The daemon of the instance that listens in the directory, if it is trusted.
-std::optional<FileDescriptor> connect_in(const std::string& directory, const std::string& instance,
-                                         std::string& why_not) {
+std::optional<shm::FileDescriptor> connect_in(const std::string& directory,
+                                              const std::string& instance, std::string& why_not) {
   // Not even connected to: who listens there could let nobody in, for a second each time.
   if (const auto stranger = stranger_who_owns(directory)) {
     char why[112];
@@ -173,7 +173,7 @@ std::optional<FileDescriptor> connect_in(const std::string& directory, const std
     pass_over(directory, instance, why, why_not);
     return {};
   }
-  FileDescriptor socket = make_socket();
+  shm::FileDescriptor socket = make_socket();
   const Address at = address_of(directory, instance + ".sock");
   const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
   if (connect(socket.get(), address, sizeof at.address) != 0) {
@@ -291,8 +291,8 @@ Listener listen_at(const std::string& directory, const std::string& instance) {
   return listener;
 }
 
-std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not,
-                                                std::string* found_in) {
+std::optional<shm::FileDescriptor> connect_to_daemon(const std::string& instance,
+                                                     std::string& why_not, std::string* found_in) {
   why_not.clear();
   const auto try_in = [&](const std::string& directory) {
     auto socket = connect_in(directory, instance, why_not);
@@ -332,4 +332,4 @@ std::vector<std::string> other_daemons(const std::string& instance, const std::s
   return known;
 }
 
-}  // namespace arbiter::shm
+}  // namespace arbiter::wire

@@ -7,7 +7,7 @@
 
 #include "shm/file_descriptor.hpp"
 
-namespace arbiter::shm {
+namespace arbiter::wire {
 
 inline constexpr const char* kDefaultInstance = "default";
 
@@ -31,8 +31,8 @@ bool is_a_strangers(const std::string& directory);
 // A listening socket at DIRECTORY/INSTANCE.sock that every user may connect to. Holds a lock beside
 // it for as long as the result lives; throws std::runtime_error if another daemon has it.
 struct Listener {
-  FileDescriptor lock;
-  FileDescriptor socket;
+  shm::FileDescriptor lock;
+  shm::FileDescriptor socket;
   std::string path;
 };
 Listener listen_at(const std::string& directory, const std::string& instance);
@@ -42,12 +42,13 @@ Listener listen_at(const std::string& directory, const std::string& instance);
 // has given that directory. Where there is none, `why_not` lists the sockets that were tried, each
 // with what was wrong.
 // `directory`, where it is given: the one in which it was found.
-std::optional<FileDescriptor> connect_to_daemon(const std::string& instance, std::string& why_not,
-                                                std::string* directory = nullptr);
+std::optional<shm::FileDescriptor> connect_to_daemon(const std::string& instance,
+                                                     std::string& why_not,
+                                                     std::string* directory = nullptr);
 
 // The sockets of trusted daemons of the instance that listen elsewhere than in `directory`: whose
 // environment is another meets them, and shares nothing with who meets here. Not looked for in
 // directories of others than root, this user, and the owner of /run/arbiter.
 std::vector<std::string> other_daemons(const std::string& instance, const std::string& directory);
 
-}  // namespace arbiter::shm
+}  // namespace arbiter::wire

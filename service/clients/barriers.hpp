@@ -26,8 +26,8 @@ class Barriers {
     Barrier barrier{{}, deadline, std::move(passed)};
     for (Client* client : clients) {
       if (!client->has_service_thread) continue;
-      shm::Message sync;
-      sync.kind = shm::MessageKind::kSync;
+      wire::Message sync;
+      sync.kind = wire::MessageKind::kSync;
       sync.request = number;
       client->send(sync);
       barrier.waiting.insert(client->id());

@@ -92,26 +92,27 @@ LeftUnread::Client Client::release_unread() {
   return {user_, std::move(socket_), std::move(in_flight_), std::move(descriptors_)};
 }
 
-shm::SendResult Client::try_to_send(const shm::Message& message, const Descriptors& descriptors,
-                                    std::uint64_t count) {
+wire::SendResult Client::try_to_send(const wire::Message& message, const Descriptors& descriptors,
+                                     std::uint64_t count) {
   if (count != 0) in_flight_.look(socket_.get());
   held_back_ = !in_flight_.allows(shares_, user_, count);
-  if (held_back_) return shm::SendResult::kTooMany;
-  const shm::SendResult result = shm::send_message(socket_.get(), message, descriptors);
-  if (result == shm::SendResult::kSent) in_flight_.add(shares_, user_, count);
-  held_back_ = result == shm::SendResult::kTooMany;
+  if (held_back_) return wire::SendResult::kTooMany;
+  const wire::SendResult result = wire::send_message(socket_.get(), message, descriptors);
+  if (result == wire::SendResult::kSent) in_flight_.add(shares_, user_, count);
+  held_back_ = result == wire::SendResult::kTooMany;
   return result;
 }
 
-void Client::send(const shm::Message& message, std::array<int, shm::kMaxDescriptors> descriptors) {
+void Client::send(const wire::Message& message,
+                  std::array<int, wire::kMaxDescriptors> descriptors) {
   if (lost_) return;
   const auto count = static_cast<std::uint64_t>(
       std::count_if(descriptors.begin(), descriptors.end(), [](int fd) { return fd >= 0; }));
   if (queue_.empty()) {
     flushed_in_vain_ = 0;
-    const shm::SendResult result = try_to_send(message, descriptors, count);
-    if (result == shm::SendResult::kSent) return;
-    if (result == shm::SendResult::kClosed) {
+    const wire::SendResult result = try_to_send(message, descriptors, count);
+    if (result == wire::SendResult::kSent) return;
+    if (result == wire::SendResult::kClosed) {
       lost_ = hung_up_ = true;
       return;
     }
@@ -151,13 +152,13 @@ void Client::flush() {
   ++flushed_in_vain_;
   while (!queue_.empty() && !lost_) {
     const Queued& next = *queue_.front();
-    std::array<int, shm::kMaxDescriptors> descriptors{};
+    std::array<int, wire::kMaxDescriptors> descriptors{};
     for (std::size_t i = 0; i < descriptors.size(); ++i) descriptors[i] = next.descriptors[i].get();
     const auto count = static_cast<std::size_t>(
         std::count_if(descriptors.begin(), descriptors.end(), [](int fd) { return fd >= 0; }));
-    const shm::SendResult result = try_to_send(next.message, descriptors, count);
-    if (result == shm::SendResult::kFull || result == shm::SendResult::kTooMany) return;
-    if (result == shm::SendResult::kClosed) lost_ = hung_up_ = true;
+    const wire::SendResult result = try_to_send(next.message, descriptors, count);
+    if (result == wire::SendResult::kFull || result == wire::SendResult::kTooMany) return;
+    if (result == wire::SendResult::kClosed) lost_ = hung_up_ = true;
     flushed_in_vain_ = 0;
     ARBITER_ASSERT(queued_descriptors_ >= count, "more descriptors leave a queue than were in it");
     queued_descriptors_ -= count;
@@ -167,11 +168,11 @@ void Client::flush() {
                  "an empty queue is said to have descriptors in it");
 }
 
-shm::ReceiveResult Client::receive(shm::Received& received) {
+wire::ReceiveResult Client::receive(wire::Received& received) {
   if (!ahead_.empty()) {
     received = std::move(ahead_.front().received());
     ahead_.pop_front();
-    return shm::ReceiveResult::kReceived;
+    return wire::ReceiveResult::kReceived;
   }
   if (ahead_ended_) return *ahead_ended_;
   return receive_from_socket(received);
@@ -180,16 +181,16 @@ shm::ReceiveResult Client::receive(shm::Received& received) {
 // What is neither a memfd nor an anonymous pipe is not looked at. What has come by the last
 // descriptors that there are is given up, lest the next message find none. Of a user who is stuck
 // nothing more is received: what is unread counts against the limit of who has sent it.
-shm::ReceiveResult Client::receive_from_socket(shm::Received& received) {
+wire::ReceiveResult Client::receive_from_socket(wire::Received& received) {
   dispose_of(received, user_);
   if (Errands::of_the_process().is_stuck(user_)) {
     log::warn("{} is given up: {}", description(), too_much_waits(user_));
-    return shm::ReceiveResult::kClosed;
+    return wire::ReceiveResult::kClosed;
   }
-  shm::ReceiveResult result{};
+  wire::ReceiveResult result{};
   {
     const Headroom::Use use;
-    result = shm::receive_message(socket_.get(), received, false);
+    result = wire::receive_message(socket_.get(), received, false);
   }
   const rlim_t limit = Headroom::of_the_process().limit();
   for (auto& descriptor : received.descriptors) {
@@ -204,13 +205,13 @@ shm::ReceiveResult Client::receive_from_socket(shm::Received& received) {
 }
 
 void Client::read_ahead() {
-  shm::Received received;
+  wire::Received received;
   while (!ahead_ended_ && ahead_.size() < kMaxReadAhead &&
          shares_.allows(user_, Share::kQueue, sizeof received) &&
-         shares_.allows(user_, Share::kDescriptors, shm::kMaxDescriptors)) {
-    const shm::ReceiveResult result = receive_from_socket(received);
-    if (result == shm::ReceiveResult::kNothing) return;
-    if (result == shm::ReceiveResult::kReceived) {
+         shares_.allows(user_, Share::kDescriptors, wire::kMaxDescriptors)) {
+    const wire::ReceiveResult result = receive_from_socket(received);
+    if (result == wire::ReceiveResult::kNothing) return;
+    if (result == wire::ReceiveResult::kReceived) {
       ahead_.push_back(put_aside(received));
     } else {
       ahead_ended_ = result;
@@ -221,8 +222,8 @@ void Client::read_ahead() {
 
 bool Client::take_closing_of(shm::PortInstance port) {
   const auto closing = std::find_if(ahead_.begin(), ahead_.end(), [&](const PutAside& each) {
-    const shm::Message& message = each.received().message;
-    return message.kind == shm::MessageKind::kClosePort && message.port == port;
+    const wire::Message& message = each.received().message;
+    return message.kind == wire::MessageKind::kClosePort && message.port == port;
   });
   if (closing == ahead_.end()) return ahead_ended_.has_value();
   ahead_.erase(closing);

@@ -42,18 +42,18 @@ class Client {
   ~Client();
 
   // Sends, or queues where the client is slow to read. Descriptors are duplicated if need be.
-  void send(const shm::Message& message,
-            std::array<int, shm::kMaxDescriptors> descriptors = {-1, -1});
+  void send(const wire::Message& message,
+            std::array<int, wire::kMaxDescriptors> descriptors = {-1, -1});
   // Sends what is queued, as far as it goes.
   void flush();
   // The next message that it has sent; those that were read ahead come first. Its descriptors are
   // memfds and anonymous pipes, whoever made them; where others came with it, `is_strange` is set.
-  [[nodiscard]] shm::ReceiveResult receive(shm::Received& received);
+  [[nodiscard]] wire::ReceiveResult receive(wire::Received& received);
   // Reads what it has sent by now, at most kMaxReadAhead messages, and sets it aside; less where
   // its user has no share left.
   void read_ahead();
   // Throws LimitExceeded, and then `received` is as it was.
-  [[nodiscard]] PutAside put_aside(shm::Received& received) { return {received, user_, shares_}; }
+  [[nodiscard]] PutAside put_aside(wire::Received& received) { return {received, user_, shares_}; }
   // Of what was read ahead: takes out the closing of a port, if it is there.
   [[nodiscard]] bool take_closing_of(shm::PortInstance port);
   // Whether anything was read ahead, be it that the client has hung up.
@@ -119,21 +119,21 @@ class Client {
     ~Queued();  // a bell among them may take any time to close
 
     const uid_t user;
-    shm::Message message;
-    std::array<shm::FileDescriptor, shm::kMaxDescriptors> descriptors;
+    wire::Message message;
+    std::array<shm::FileDescriptor, wire::kMaxDescriptors> descriptors;
     Charge bytes;
     Charge open;  // the descriptors
   };
-  using Descriptors = std::array<int, shm::kMaxDescriptors>;
+  using Descriptors = std::array<int, wire::kMaxDescriptors>;
 
   [[nodiscard]] bool has_room_for(std::uint64_t descriptors) const;
-  [[nodiscard]] shm::SendResult try_to_send(const shm::Message& message,
-                                            const Descriptors& descriptors, std::uint64_t count);
+  [[nodiscard]] wire::SendResult try_to_send(const wire::Message& message,
+                                             const Descriptors& descriptors, std::uint64_t count);
   static constexpr std::size_t kMaxReadAhead = 256;
   static constexpr std::size_t kMaxQueue = 16384;
   static constexpr std::size_t kMaxQueuedDescriptors = 4096;  // so that others find some left
 
-  [[nodiscard]] shm::ReceiveResult receive_from_socket(shm::Received& received);
+  [[nodiscard]] wire::ReceiveResult receive_from_socket(wire::Received& received);
 
   const ClientId id_;
   Shares& shares_;
@@ -151,7 +151,7 @@ class Client {
   std::deque<std::unique_ptr<Queued>> queue_;
   std::size_t queued_descriptors_ = 0;
   std::deque<PutAside> ahead_;
-  std::optional<shm::ReceiveResult> ahead_ended_;  // how the conversation ends after `ahead_`
+  std::optional<wire::ReceiveResult> ahead_ended_;  // how the conversation ends after `ahead_`
 };
 
 }  // namespace arbiter::service

@@ -13,7 +13,7 @@ void require_fine(std::string_view name, const char* whose) {
   }
 }
 
-std::string port_name(const shm::Message& message) {
+std::string port_name(const wire::Message& message) {
   const std::string_view name = message.name_view();
   if (name.empty() || name[0] != '/') throw std::runtime_error("a port's name begins with '/'");
   require_fine(name, "the port's");

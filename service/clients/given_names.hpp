@@ -14,6 +14,6 @@ namespace arbiter::service {
 void require_fine(std::string_view name, const char* whose);
 
 // The port that a message is about. Throws likewise.
-[[nodiscard]] std::string port_name(const shm::Message& message);
+[[nodiscard]] std::string port_name(const wire::Message& message);
 
 }  // namespace arbiter::service

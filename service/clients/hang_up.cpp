@@ -48,7 +48,7 @@ void hang_up(shm::FileDescriptor socket, uid_t user) {
   }
 }
 
-void dispose_of(shm::Received& received, uid_t user) {
+void dispose_of(wire::Received& received, uid_t user) {
   const auto dispose = [&](shm::FileDescriptor& descriptor) {
     Errands::of_the_process().close(user, std::move(descriptor));
   };

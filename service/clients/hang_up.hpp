@@ -14,6 +14,6 @@ namespace arbiter::service {
 void hang_up(shm::FileDescriptor socket, uid_t user);
 
 // Closes what a message has brought and nobody has taken, as errands of the user who sent it.
-void dispose_of(shm::Received& received, uid_t user);
+void dispose_of(wire::Received& received, uid_t user);
 
 }  // namespace arbiter::service

@@ -8,7 +8,7 @@ namespace arbiter::service {
 namespace {
 
 constexpr rlim_t kWanted = 256;
-static_assert(kWanted >= shm::kMostDescriptorsOfAMessage);
+static_assert(kWanted >= wire::kMostDescriptorsOfAMessage);
 
 }  // namespace
 
@@ -26,7 +26,7 @@ Headroom::Headroom() {
 }
 
 bool Headroom::is_enough() const {
-  return whole_ == RLIM_INFINITY || whole_ - lowered_ >= shm::kMostDescriptorsOfAMessage;
+  return whole_ == RLIM_INFINITY || whole_ - lowered_ >= wire::kMostDescriptorsOfAMessage;
 }
 
 void Headroom::set(rlim_t limit) {

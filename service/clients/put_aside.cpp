@@ -7,11 +7,11 @@
 
 namespace arbiter::service {
 
-PutAside::PutAside(shm::Received& received, uid_t user, Shares& shares) : user_(user) {
+PutAside::PutAside(wire::Received& received, uid_t user, Shares& shares) : user_(user) {
   bytes_ = shares.take(user, Share::kQueue, sizeof received);
   const std::size_t count = received.descriptor_count;
   if (count != 0) descriptors_ = shares.take(user, Share::kDescriptors, count);
-  received_ = std::make_unique<shm::Received>(std::move(received));
+  received_ = std::make_unique<wire::Received>(std::move(received));
 }
 
 PutAside& PutAside::operator=(PutAside&& other) noexcept {

@@ -16,14 +16,14 @@ class PutAside {
  public:
   PutAside() = default;
   // Throws LimitExceeded, and then `received` is as it was.
-  PutAside(shm::Received& received, uid_t user, Shares& shares);
+  PutAside(wire::Received& received, uid_t user, Shares& shares);
   PutAside(PutAside&& other) noexcept = default;
   PutAside& operator=(PutAside&& other) noexcept;
   PutAside(const PutAside&) = delete;
   PutAside& operator=(const PutAside&) = delete;
   ~PutAside();
 
-  [[nodiscard]] shm::Received& received() const { return *received_; }
+  [[nodiscard]] wire::Received& received() const { return *received_; }
   // What it costs is given back: whoever puts the message aside again is charged again.
   void give_back() {
     bytes_ = {};
@@ -31,7 +31,7 @@ class PutAside {
   }
 
  private:
-  std::unique_ptr<shm::Received> received_;
+  std::unique_ptr<wire::Received> received_;
   uid_t user_ = 0;
   Charge bytes_;
   Charge descriptors_;

@@ -8,7 +8,7 @@
 namespace arbiter::service {
 
 void refuse(Client& client, std::uint64_t request, const std::string& why) {
-  auto reply = reply_to(request, shm::MessageKind::kRefused);
+  auto reply = reply_to(request, wire::MessageKind::kRefused);
   reply.set_text(why);
   client.send(reply);
 }
@@ -22,7 +22,7 @@ shm::FileDescriptor make_document(const std::string& document) {
   return shm::reopen(file, O_RDONLY);
 }
 
-void send_document(Client& client, std::uint64_t request, shm::MessageKind kind,
+void send_document(Client& client, std::uint64_t request, wire::MessageKind kind,
                    const std::string& document) {
   client.send(reply_to(request, kind), {make_document(document).get(), -1});
 }

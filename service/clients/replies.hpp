@@ -27,8 +27,8 @@ class RefusedAgain : public std::runtime_error {
 };
 
 // An answer to a client's question.
-inline shm::Message reply_to(std::uint64_t request, shm::MessageKind kind) {
-  shm::Message message;
+inline wire::Message reply_to(std::uint64_t request, wire::MessageKind kind) {
+  wire::Message message;
   message.kind = kind;
   message.request = request;
   return message;
@@ -38,7 +38,7 @@ void refuse(Client& client, std::uint64_t request, const std::string& why);
 
 // A file in memory that can only be read. Throws std::system_error, std::runtime_error.
 [[nodiscard]] shm::FileDescriptor make_document(const std::string& document);
-void send_document(Client& client, std::uint64_t request, shm::MessageKind kind,
+void send_document(Client& client, std::uint64_t request, wire::MessageKind kind,
                    const std::string& document);
 
 }  // namespace arbiter::service

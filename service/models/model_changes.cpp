@@ -61,9 +61,9 @@ void ModelChanges::start(bool is_fresh) {
   }
 }
 
-void ModelChanges::ask(Change change, const Client& client, const shm::Message& message) {
+void ModelChanges::ask(Change change, const Client& client, const wire::Message& message) {
   change.by = client.description() + ", user " + describe_user(client.user());
-  change.asking = {{client.id(), message.request, (message.flags & shm::kWantsReport) != 0}};
+  change.asking = {{client.id(), message.request, (message.flags & wire::kWantsReport) != 0}};
   waiting_.add(std::move(change));
 }
 
@@ -233,7 +233,7 @@ void ModelChanges::answer(const Swap& swap, nlohmann::json document, const std::
     Client& client = *asking;
     if (each.wants_report) {
       try {
-        send_document(client, each.request, shm::MessageKind::kReport, report);
+        send_document(client, each.request, wire::MessageKind::kReport, report);
       } catch (const std::exception& error) {  // no descriptors are left
         refuse(client, each.request,
                (why_not.empty() ? "it is done" : why_not) +
@@ -242,7 +242,7 @@ void ModelChanges::answer(const Swap& swap, nlohmann::json document, const std::
     } else if (!why_not.empty()) {
       refuse(client, each.request, why_not);
     } else {
-      auto reply = reply_to(each.request, shm::MessageKind::kDone);
+      auto reply = reply_to(each.request, wire::MessageKind::kDone);
       reply.value = static_cast<std::uint32_t>(board_.in_force().generation);
       client.send(reply);
     }

@@ -72,7 +72,7 @@ class ModelChanges {
   [[nodiscard]] bool has_settled() const { return has_settled_; }
 
   // Each is answered when it is over. Throws std::length_error where too many wait.
-  void ask(Change change, const Client& client, const shm::Message& message);
+  void ask(Change change, const Client& client, const wire::Message& message);
   void reload_for_signal(const std::string& by);
   // Begins the next change, if one waits and no other is under way.
   void advance();

@@ -42,7 +42,7 @@ class Observers {
         is_more = switchboard.show_news(client, observer.told, left) || is_more;
       }
       while (!observer.waiting.empty() && observer.waiting.front().news <= observer.told) {
-        client.send(reply_to(observer.waiting.front().request, shm::MessageKind::kDone));
+        client.send(reply_to(observer.waiting.front().request, wire::MessageKind::kDone));
         observer.waiting.erase(observer.waiting.begin());
       }
     }

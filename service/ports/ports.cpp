@@ -14,7 +14,7 @@
 namespace arbiter::service {
 namespace {
 
-void require(const shm::Received& open, std::size_t descriptors) {
+void require(const wire::Received& open, std::size_t descriptors) {
   if (open.descriptor_count != descriptors) {
     throw std::runtime_error("the request came with " + std::to_string(open.descriptor_count) +
                              " descriptors instead of " + std::to_string(descriptors));
@@ -38,7 +38,7 @@ void require_own(const shm::FileDescriptor& descriptor, const std::string& what,
 }
 
 // The names of types stand in logs and documents, as those of ports do.
-shm::TypeInfo fine_type(const shm::Message& open) {
+shm::TypeInfo fine_type(const wire::Message& open) {
   if (const auto fault = shm::fault_of(open.type)) {
     throw std::runtime_error("the port's type \"" + shm::printable(open.type.type_name()) +
                              "\" is not one: " + *fault);
@@ -90,9 +90,9 @@ void PortBell::ring() const {
 OutputPort::~OutputPort() { Errands::of_the_process().close(user, std::move(segment)); }
 InputPort::~InputPort() { Errands::of_the_process().close(user, std::move(segment)); }
 
-std::unique_ptr<OutputPort> adopt_output(const shm::Received& open, uid_t user) {
+std::unique_ptr<OutputPort> adopt_output(const wire::Received& open, uid_t user) {
   // What is handed back comes with the activity page.
-  require(open, open.message.kind == shm::MessageKind::kHandBackOutput ? 2 : 1);
+  require(open, open.message.kind == wire::MessageKind::kHandBackOutput ? 2 : 1);
   auto port = std::make_unique<OutputPort>();
   constexpr std::size_t kRead = shm::kOutputHeadBytes;
   const std::size_t size = own_segment(open.descriptors[0], user, kRead);
@@ -107,7 +107,7 @@ std::unique_ptr<OutputPort> adopt_output(const shm::Received& open, uid_t user) 
   return port;
 }
 
-std::unique_ptr<InputPort> adopt_input(const shm::Received& open, uid_t user) {
+std::unique_ptr<InputPort> adopt_input(const wire::Received& open, uid_t user) {
   require(open, 2);
   auto port = std::make_unique<InputPort>();
   const std::size_t size = own_segment(open.descriptors[0], user, sizeof(shm::InputSegment));

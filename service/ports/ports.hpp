@@ -94,8 +94,8 @@ struct InputPort {
 // Take what a client has handed over for a port: its segment and, for an input port, its bell. They
 // are passed on to peers as they came: nothing is opened for anybody with the daemon's rights.
 // Throw std::runtime_error saying what is wrong with it, such as that another user has made it.
-std::unique_ptr<OutputPort> adopt_output(const shm::Received& open, uid_t user);
-std::unique_ptr<InputPort> adopt_input(const shm::Received& open, uid_t user);
+std::unique_ptr<OutputPort> adopt_output(const wire::Received& open, uid_t user);
+std::unique_ptr<InputPort> adopt_input(const wire::Received& open, uid_t user);
 
 // How an output port and an input port stand to each other.
 enum class LinkKind {

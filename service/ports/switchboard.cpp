@@ -13,9 +13,9 @@ Owner owner(const Client& client, shm::PortInstance port) {
 
 }  // namespace
 
-shm::Message message_to(shm::MessageKind kind, shm::PortInstance port, shm::PortInstance peer,
-                        std::uint32_t id) {
-  shm::Message message;
+wire::Message message_to(wire::MessageKind kind, shm::PortInstance port, shm::PortInstance peer,
+                         std::uint32_t id) {
+  wire::Message message;
   message.kind = kind;
   message.port = port;
   message.peer = peer;
@@ -70,7 +70,7 @@ void Switchboard::remove(shm::PortInstance port) {
     }
     const shm::PortInstance peer = output == port ? input : output;
     if (input == port || link->second.is_mutual() || link->second.is_refused()) {
-      client_of(peer).send(message_to(shm::MessageKind::kPeerGone, peer, port));
+      client_of(peer).send(message_to(wire::MessageKind::kPeerGone, peer, port));
     }
     // A publisher may have died between delivering and ringing.
     if (output == port) inputs_.at(peer)->bell->ring();
@@ -209,8 +209,8 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
     log::debug("{} is connected to {}", output.source->name, input.name->name);
   }
   auto to_output =
-      message_to(shm::MessageKind::kInputPeer, output.instance, input.instance, input.name->id);
-  to_output.flags = connects ? shm::kIsConnected : 0u;
+      message_to(wire::MessageKind::kInputPeer, output.instance, input.instance, input.name->id);
+  to_output.flags = connects ? wire::kIsConnected : 0u;
   to_output.link = link.number = connects ? registry_.next_link() : 0;
   to_output.set_name(input.name->name);
   output.client->send(to_output, {input.segment.get(), input.bell->descriptor()});
@@ -222,8 +222,8 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
     told.insert(input.client);
   }
   if (!connects) return;
-  auto to_input =
-      message_to(shm::MessageKind::kOutputPeer, input.instance, output.instance, output.source->id);
+  auto to_input = message_to(wire::MessageKind::kOutputPeer, input.instance, output.instance,
+                             output.source->id);
   to_input.link = link.number;
   to_input.set_name(output.source->name);
   input.client->send(to_input, {output.segment.get(), -1});
@@ -237,7 +237,7 @@ Switchboard::Told Switchboard::show_segments() {
   for (const LinkKey& key : std::exchange(fresh_, {})) {
     if (!is_connected(key)) continue;
     Client& receiver = client_of(key.second);
-    receiver.send(message_to(shm::MessageKind::kOutputGrown, key.second, key.first));
+    receiver.send(message_to(wire::MessageKind::kOutputGrown, key.second, key.first));
     told.insert(&receiver);
     for (auto link = links_.lower_bound({key.first, 0});
          link != links_.end() && link->first.first == key.first; ++link) {
@@ -264,7 +264,7 @@ void Switchboard::show_growth() {
       continue;
     }
     if (left > 0) {
-      receiver.send(message_to(shm::MessageKind::kOutputGrown, each->second, each->first));
+      receiver.send(message_to(wire::MessageKind::kOutputGrown, each->second, each->first));
       --left;
     }
     each = growth_.erase(each);
@@ -287,9 +287,9 @@ Switchboard::Told Switchboard::unlink(const shm::TableView& table) {
     if (link.is_mutual() || link.is_refused()) {
       const OutputPort& output = *outputs_.at(key.first);
       const InputPort& input = *inputs_.at(key.second);
-      output.client->send(message_to(shm::MessageKind::kDisconnected, key.first, key.second));
+      output.client->send(message_to(wire::MessageKind::kDisconnected, key.first, key.second));
       at_step("publisher-disconnected");
-      input.client->send(message_to(shm::MessageKind::kDisconnected, key.second, key.first));
+      input.client->send(message_to(wire::MessageKind::kDisconnected, key.second, key.first));
       at_step("receiver-disconnected");
       told.insert(output.client);
       told.insert(input.client);
@@ -321,7 +321,7 @@ bool Switchboard::send_page(Client& client, const Source& source) {
   const auto send = [&](const Page& page, shm::PageNumber number) {
     if (!page || shown >= number) return false;
     shown = number;
-    auto message = message_to(shm::MessageKind::kSourcePage, 0, 0, source.id);
+    auto message = message_to(wire::MessageKind::kSourcePage, 0, 0, source.id);
     message.value = number;
     message.set_name(source.name);
     client.send(message, {page.readable.get(), -1});
@@ -352,7 +352,7 @@ bool Switchboard::show_news(Client& client, std::uint64_t& told, int& left) {
       send_page(client, *names_.source_by_id(next->second.id));
       continue;
     }
-    auto message = message_to(shm::MessageKind::kPortName, 0, 0, next->second.id);
+    auto message = message_to(wire::MessageKind::kPortName, 0, 0, next->second.id);
     message.set_name(names_.input_by_id(next->second.id)->name);
     client.send(message);
   }

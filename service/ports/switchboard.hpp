@@ -19,8 +19,8 @@
 namespace arbiter::service {
 
 // What `port` is to know of `peer`.
-shm::Message message_to(shm::MessageKind kind, shm::PortInstance port, shm::PortInstance peer,
-                        std::uint32_t id = 0);
+wire::Message message_to(wire::MessageKind kind, shm::PortInstance port, shm::PortInstance peer,
+                         std::uint32_t id = 0);
 
 class Switchboard {
  public:

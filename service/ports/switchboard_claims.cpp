@@ -84,7 +84,7 @@ void Switchboard::settle_claims(shm::PortInstance port,
       if (!client_of(peer).is_returning) settle(*output->second, *input->second);
     } else if (!is_away(peer)) {
       claims_of(port).erase(peer);
-      client_of(port).send(message_to(shm::MessageKind::kPeerGone, port, peer));
+      client_of(port).send(message_to(wire::MessageKind::kPeerGone, port, peer));
     }
   }
 }
@@ -98,11 +98,11 @@ void Switchboard::settle(OutputPort& output, InputPort& input) {
   }
   if (by_output.value_or(0) != 0) {
     output.client->send(
-        message_to(shm::MessageKind::kDisconnected, output.instance, input.instance));
+        message_to(wire::MessageKind::kDisconnected, output.instance, input.instance));
   }
   if (by_input.value_or(0) != 0) {
     input.client->send(
-        message_to(shm::MessageKind::kDisconnected, input.instance, output.instance));
+        message_to(wire::MessageKind::kDisconnected, input.instance, output.instance));
   }
   // The publisher knows the port, and heeds what it holds.
   if (by_output) links_[{output.instance, input.instance}] = {LinkKind::kLapsed, 0, ""};
@@ -111,11 +111,11 @@ void Switchboard::settle(OutputPort& output, InputPort& input) {
 void Switchboard::end_claims_on(shm::PortInstance port) {
   for (const auto& [instance, output] : outputs_) {
     if (!take(output->claims, port)) continue;
-    output->client->send(message_to(shm::MessageKind::kPeerGone, instance, port));
+    output->client->send(message_to(wire::MessageKind::kPeerGone, instance, port));
   }
   for (const auto& [instance, input] : inputs_) {
     if (!take(input->claims, port)) continue;
-    input->client->send(message_to(shm::MessageKind::kPeerGone, instance, port));
+    input->client->send(message_to(wire::MessageKind::kPeerGone, instance, port));
     input->bell->ring();  // it may have died between delivering and ringing
   }
 }

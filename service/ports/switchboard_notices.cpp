@@ -20,8 +20,8 @@ void Switchboard::tell_refusal(const LinkKey& key, shm::PortInstance to,
   const OutputPort& output = *outputs_.at(key.first);
   const InputPort& input = *inputs_.at(key.second);
   const bool to_output = to == key.first;
-  shm::Message message;
-  message.kind = shm::MessageKind::kConnectionRefused;
+  wire::Message message;
+  message.kind = wire::MessageKind::kConnectionRefused;
   message.port = to;
   message.peer = to_output ? key.second : key.first;
   message.id = to_output ? input.name->id : output.source->id;
@@ -62,8 +62,8 @@ template <class Port>
 void Switchboard::say_unmentioned(Port& port, const std::string& text) {
   port.is_told_unmentioned = true;
   log::warn("{}: {}", port.client->description(), text);
-  shm::Message message;
-  message.kind = shm::MessageKind::kUnmentioned;
+  wire::Message message;
+  message.kind = wire::MessageKind::kUnmentioned;
   message.port = port.instance;
   message.set_text(text);
   port.client->send(message);

@@ -30,7 +30,7 @@ bool Takeover::knows(const shm::FileDescriptor& board) const {
   return FileIdentity::of(board) == known;
 }
 
-void Takeover::rejoin(Client& client, const shm::Received& hello) {
+void Takeover::rejoin(Client& client, const wire::Received& hello) {
   try {
     take_back(client, hello);
   } catch (const std::exception& error) {
@@ -43,7 +43,7 @@ void Takeover::rejoin(Client& client, const shm::Received& hello) {
   }
 }
 
-void Takeover::take_back(Client& client, const shm::Received& hello) {
+void Takeover::take_back(Client& client, const wire::Received& hello) {
   if (phase_ == Phase::kExpecting) {
     if (!(Realm{FileIdentity::of(hello.descriptors[0]), FileIdentity::of(hello.descriptors[1])} ==
           predecessor_->realm)) {
@@ -85,7 +85,7 @@ bool Takeover::is_that(const Client& client, const Absentee& absentee) {
          client.is_process(absentee.pid, absentee.process.get());
 }
 
-void Takeover::take_back_page(Client& client, const shm::Received& received) {
+void Takeover::take_back_page(Client& client, const wire::Received& received) {
   const shm::SourceId id = received.message.id;
   const Source* source = names_.source_by_id(id);
   // One that was to come into force next when the last daemon ended.
@@ -97,8 +97,8 @@ void Takeover::take_back_page(Client& client, const shm::Received& received) {
   client.pages[id] = names_.source_by_id(id)->page_number;
 }
 
-void Takeover::take_back_output(Client& client, const shm::Received& received) {
-  const shm::Message& message = received.message;
+void Takeover::take_back_output(Client& client, const wire::Received& received) {
+  const wire::Message& message = received.message;
   Source* source = names_.source_by_id(message.id);
   if (source == nullptr || source->away != message.port ||
       client.to_hand_back.count(message.port) == 0) {
@@ -114,8 +114,8 @@ void Takeover::take_back_output(Client& client, const shm::Received& received) {
   at_step("output-readmitted");
 }
 
-void Takeover::take_back_input(Client& client, const shm::Received& received) {
-  const shm::Message& message = received.message;
+void Takeover::take_back_input(Client& client, const wire::Received& received) {
+  const wire::Message& message = received.message;
   InputName* input = names_.input_by_id(message.id);
   if (input == nullptr || input->away != message.port ||
       client.to_hand_back.count(message.port) == 0) {
@@ -127,7 +127,7 @@ void Takeover::take_back_input(Client& client, const shm::Received& received) {
   at_step("input-readmitted");
 }
 
-void Takeover::take_back_link(const Client& client, const shm::Message& message) {
+void Takeover::take_back_link(const Client& client, const wire::Message& message) {
   if (!client.is_returning || client.ports.count(message.port) == 0) return;
   // It may claim links with ports that have never been, one after the other.
   Charge charge = shares_.take(client.user(), Share::kQueue, kBytesOfAClaim);
@@ -226,17 +226,17 @@ void Takeover::require_not_kept(shm::PortInstance holder, const std::string& wha
 }
 
 // What cannot be a port of its is not listed; it has been refused already.
-void Takeover::hear_stranger(const Client& client, const shm::Message& message) noexcept {
+void Takeover::hear_stranger(const Client& client, const wire::Message& message) noexcept {
   try {
-    if (message.kind == shm::MessageKind::kHandBackOutput) {
+    if (message.kind == wire::MessageKind::kHandBackOutput) {
       const std::string port = port_name(message);
       gate_.require(client, Action::kOutput, port);
       strangers_.has_output(client, port);
-    } else if (message.kind == shm::MessageKind::kHandBackInput) {
+    } else if (message.kind == wire::MessageKind::kHandBackInput) {
       const std::string port = port_name(message);
       gate_.require(client, Action::kInput, port);
       strangers_.has_input(client, port);
-    } else if (message.kind == shm::MessageKind::kHandedBack) {
+    } else if (message.kind == wire::MessageKind::kHandedBack) {
       strangers_.has_said_all(client);
     }
   } catch (const std::exception&) {

@@ -85,15 +85,15 @@ class Takeover {
   [[nodiscard]] bool knows(const shm::FileDescriptor& board) const;
   // One that says it was here before. Throws std::runtime_error where it cannot be taken back;
   // RefusedAgain where the log has that already.
-  void rejoin(Client& client, const shm::Received& hello);
+  void rejoin(Client& client, const wire::Received& hello);
   // What it hands back, each thing that it had. Throw std::runtime_error, LimitExceeded.
-  void take_back_page(Client& client, const shm::Received& received);
-  void take_back_output(Client& client, const shm::Received& received);
-  void take_back_input(Client& client, const shm::Received& received);
-  void take_back_link(const Client& client, const shm::Message& message);
+  void take_back_page(Client& client, const wire::Received& received);
+  void take_back_output(Client& client, const wire::Received& received);
+  void take_back_input(Client& client, const wire::Received& received);
+  void take_back_link(const Client& client, const wire::Message& message);
   void finish_return(Client& client);
   // One that is not taken back says what it has, all the same.
-  void hear_stranger(const Client& client, const shm::Message& message) noexcept;
+  void hear_stranger(const Client& client, const wire::Message& message) noexcept;
   [[nodiscard]] const Strangers& strangers() const { return strangers_; }
   // That component is no stranger from now on.
   void know(const Client& client);
@@ -126,7 +126,7 @@ class Takeover {
   void inherit(const shm::FileDescriptor& board, const shm::FileDescriptor& registry);
   void find_absentees();
   void add_absentee(const Owner& owner);
-  void take_back(Client& client, const shm::Received& hello);
+  void take_back(Client& client, const wire::Received& hello);
   void end_conversation_of(const Client& client, NodeId node);
   [[nodiscard]] static bool is_that(const Client& client, const Absentee& absentee);
   // Nothing is kept for the node that a client was and has nothing left of: what it closed without

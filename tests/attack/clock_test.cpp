@@ -59,7 +59,7 @@ TEST(AnotherClock, IsNotMadeANodeWith) {
 }
 
 TEST(AnotherClock, IsFoundOutHoweverLittleItIsOff) {
-  shm::Message welcome;
+  wire::Message welcome;
   const auto asked = shm::monotonic_now();
   const auto fault = [&](shm::Nanoseconds theirs) {
     welcome.peer = static_cast<std::uint64_t>(theirs);

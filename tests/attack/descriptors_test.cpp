@@ -29,7 +29,7 @@ namespace arbiter::test {
 namespace {
 
 using shm::FileDescriptor;
-using shm::MessageKind;
+using wire::MessageKind;
 
 // A TCP connection whose peer does not read: closing it waits for an hour. The last who closes it
 // waits; so whoever sends it stops the daemon, closes its own, and lets the daemon go on.
@@ -89,9 +89,9 @@ FileDescriptor output_segment(std::uint64_t sample_size, std::uint32_t slots) {
 }
 
 // Any number of descriptors, more than a client library would send. False: nobody listens.
-bool try_to_send_with(int socket, const shm::Message& message,
+bool try_to_send_with(int socket, const wire::Message& message,
                       const std::vector<int>& descriptors) {
-  iovec data{const_cast<shm::Message*>(&message), sizeof message};
+  iovec data{const_cast<wire::Message*>(&message), sizeof message};
   std::vector<char> control(CMSG_SPACE(sizeof(int) * descriptors.size()));
   msghdr header{};
   header.msg_iov = &data;
@@ -106,7 +106,7 @@ bool try_to_send_with(int socket, const shm::Message& message,
   return ::sendmsg(socket, &header, MSG_NOSIGNAL) > 0;
 }
 
-void send_with(int socket, const shm::Message& message, const std::vector<int>& descriptors) {
+void send_with(int socket, const wire::Message& message, const std::vector<int>& descriptors) {
   ASSERT_TRUE(try_to_send_with(socket, message, descriptors));
 }
 
@@ -166,7 +166,7 @@ TEST_F(ALingeringSocket, AsOneTooManyHoldsUpNobody) {
   RawClient attacker = client();
   const FileDescriptor zero(::open("/dev/zero", O_RDONLY | O_CLOEXEC));
   give(lingering, [&](int fd) {
-    std::vector<int> many(shm::kMostDescriptorsOfAMessage, zero.get());
+    std::vector<int> many(wire::kMostDescriptorsOfAMessage, zero.get());
     many.back() = fd;
     send_with(attacker.socket(), RawClient::message(MessageKind::kStatus), many);
   });
@@ -241,7 +241,7 @@ class AUserWhoseThreadsAreLost : public ALingeringSocket {
   // A thread, and all that may wait for one, and a message that is read before that is seen.
   static constexpr std::size_t kMostKept = service::Errands::kMaxLostOfAUser +
                                            service::Errands::kMaxWaiting +
-                                           2 * shm::kMostDescriptorsOfAMessage;
+                                           2 * wire::kMostDescriptorsOfAMessage;
 
   explicit AUserWhoseThreadsAreLost(Daemon::Options options = {})
       : ALingeringSocket(std::move(options)) {
@@ -271,7 +271,7 @@ TEST_F(AUserWhoseThreadsAreLost, CostsNothingByConnectingAgainAndAgain) {
 TEST_F(AUserWhoseThreadsAreLost, IsGivenUpBeforeItKeepsThoseOfOthers) {
   const std::size_t before = daemon_.open_descriptors();
   const FileDescriptor zero(::open("/dev/zero", O_RDONLY | O_CLOEXEC));
-  const std::vector<int> many(shm::kMostDescriptorsOfAMessage, zero.get());
+  const std::vector<int> many(wire::kMostDescriptorsOfAMessage, zero.get());
   for (int i = 0; i < 20; ++i) {
     RawClient again(daemon_.instance());
     try_to_send_with(again.socket(), RawClient::message(MessageKind::kStatus), many);

@@ -19,8 +19,8 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
 using testing::HasSubstr;
+using wire::MessageKind;
 
 constexpr int kFewDescriptors = 400;
 
@@ -144,9 +144,9 @@ TEST(Claims, AreNoMoreThanTheShareOfTheirUser) {
   constexpr std::uint64_t kMost = 1'000'000;
   Daemon daemon;
   RawClient known(daemon.instance());
-  const shm::Received welcome = known.hello("liar");
+  const wire::Received welcome = known.hello("liar");
   RawClient liar(daemon.instance());
-  liar.send(RawClient::hello_message("liar", shm::kRejoins),
+  liar.send(RawClient::hello_message("liar", wire::kRejoins),
             {welcome.descriptors[0].get(), welcome.descriptors[1].get()});
   liar.expect(MessageKind::kWelcome);
   const auto segment = raw_output_segment();

@@ -17,7 +17,7 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
+using wire::MessageKind;
 
 constexpr const char* kModel =
     "<behaviors timeout='forever'>"
@@ -62,9 +62,9 @@ class FormerOwner {
     try {
       if (!become(kStranger)) return 2;
       RawClient client(instance);
-      const shm::Received welcome = client.hello("former");
+      const wire::Received welcome = client.hello("former");
       const auto segment = raw_output_segment();
-      const shm::Received opened = open_raw_output(client, "/estop:o", segment);
+      const wire::Received opened = open_raw_output(client, "/estop:o", segment);
       const shm::Mapping page(opened.descriptors[0], sizeof(shm::ActivityPage),
                               shm::Access::kReadWrite);
       shm::Activity& activity = page.as<shm::ActivityPage>()->of(opened.message.id);
@@ -86,10 +86,10 @@ class FormerOwner {
     return 0;
   }
 
-  static bool hand_back(const std::string& instance, const shm::Received& welcome,
-                        const shm::Received& opened) {
+  static bool hand_back(const std::string& instance, const wire::Received& welcome,
+                        const wire::Received& opened) {
     RawClient back(instance);
-    auto hello = RawClient::hello_message("former", shm::kRejoins);
+    auto hello = RawClient::hello_message("former", wire::kRejoins);
     hello.link = welcome.message.link;
     back.send(hello, {welcome.descriptors[0].get(), welcome.descriptors[1].get()});
     back.expect(MessageKind::kWelcome);

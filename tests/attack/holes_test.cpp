@@ -14,7 +14,7 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
+using wire::MessageKind;
 
 constexpr std::uint32_t kSlots = 64;
 
@@ -45,7 +45,7 @@ class ASampleThatIsAHole : public testing::Test {
     auto open = RawClient::message(MessageKind::kOpenOutput, "/attacker:o");
     open.type = type_;
     attacker_.send(open, {file_.get(), -1});
-    shm::Received received;
+    wire::Received received;
     while (attacker_.receive(received) && received.message.kind != MessageKind::kConnected) {
       if (received.message.kind == MessageKind::kInputPeer) link_ = received.message.link;
     }

@@ -16,7 +16,7 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
+using wire::MessageKind;
 
 // Processes that are started meanwhile see none of those that are here: to them, all have the
 // number 0.
@@ -36,8 +36,8 @@ class InANamespaceOfItsOwn {
 // Comes back as each of the nodes that there may have been.
 std::string come_back_as_others(const std::string& instance) {
   RawClient known(instance);
-  const shm::Received welcome = known.hello("thief");
-  auto hello = RawClient::hello_message("thief", shm::kRejoins | shm::kComesBack);
+  const wire::Received welcome = known.hello("thief");
+  auto hello = RawClient::hello_message("thief", wire::kRejoins | wire::kComesBack);
   for (hello.link = 1; hello.link < welcome.message.link; ++hello.link) {
     RawClient thief(instance);
     thief.send(hello, {welcome.descriptors[0].get(), welcome.descriptors[1].get()});

@@ -68,10 +68,10 @@ class Prey {
         out_(node_.output_port<int>("/prey:o")),
         in_(node_.input_port<int>("/prey:i")),
         attacker_(daemon_.instance()) {
-    auto hello = RawClient::message(shm::MessageKind::kHello, "attacker");
-    hello.value = shm::kWireVersion;
+    auto hello = RawClient::message(wire::MessageKind::kHello, "attacker");
+    hello.value = wire::kWireVersion;
     attacker_.send(hello);
-    shm::Received welcome = attacker_.expect(shm::MessageKind::kWelcome);
+    wire::Received welcome = attacker_.expect(wire::MessageKind::kWelcome);
     board = std::move(welcome.descriptors[0]);
     registry = std::move(welcome.descriptors[1]);
     open_ports();
@@ -96,7 +96,7 @@ class Prey {
     header.slot_count = layout.slot_count;
     header.type = type;
     shm::seal(own_output_, shm::Seals::kOneWriter);
-    auto open = RawClient::message(shm::MessageKind::kOpenOutput, "/attacker:o");
+    auto open = RawClient::message(wire::MessageKind::kOpenOutput, "/attacker:o");
     open.type = type;
     attacker_.send(open, {own_output_.get(), -1});
     collect();
@@ -114,7 +114,7 @@ class Prey {
     input_header.refuse_new = 1;
     input_header.type = type;
     shm::seal(own_input_, shm::Seals::kOneWriter);
-    auto open_input = RawClient::message(shm::MessageKind::kOpenInput, "/attacker:i");
+    auto open_input = RawClient::message(wire::MessageKind::kOpenInput, "/attacker:i");
     open_input.type = type;
     attacker_.send(open_input, {own_input_.get(), own_bell_.write_end().get()});
     collect();
@@ -134,29 +134,29 @@ class Prey {
   }
 
   void collect() {
-    shm::Received received;
+    wire::Received received;
     while (attacker_.receive(received)) {
       switch (received.message.kind) {
-        case shm::MessageKind::kSourcePage:
+        case wire::MessageKind::kSourcePage:
           if (received.message.name_view() == "/prey:o") page = std::move(received.descriptors[0]);
           break;
-        case shm::MessageKind::kOpened:
+        case wire::MessageKind::kOpened:
           if (!received.descriptors[0]) break;
           own_page_ = std::move(received.descriptors[0]);
           own_source_ = received.message.id;
           break;
-        case shm::MessageKind::kOutputPeer:
+        case wire::MessageKind::kOutputPeer:
           preys_output = received.message.peer;
           output = std::move(received.descriptors[0]);
           break;
-        case shm::MessageKind::kInputPeer:
+        case wire::MessageKind::kInputPeer:
           link_to_prey = received.message.link;
           input = std::move(received.descriptors[0]);
           bell = std::move(received.descriptors[1]);
           break;
-        case shm::MessageKind::kRefused:
+        case wire::MessageKind::kRefused:
           throw std::runtime_error(std::string(received.message.text_view()));
-        case shm::MessageKind::kConnected:
+        case wire::MessageKind::kConnected:
           return;
         default:
           break;

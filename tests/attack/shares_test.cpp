@@ -16,8 +16,8 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
 using testing::HasSubstr;
+using wire::MessageKind;
 
 constexpr int kFewDescriptors = 400;
 
@@ -151,7 +151,7 @@ TEST(DeafObservers, CostNothing) {
   // Once it reads it hears of each.
   std::set<std::string> heard;
   while (heard.size() < kNames) {
-    shm::Received received;
+    wire::Received received;
     ASSERT_TRUE(deaf.front().receive(received));
     if (received.message.kind == MessageKind::kSourcePage) {
       heard.emplace(received.message.name_view());
@@ -175,7 +175,7 @@ TEST(StatusDocuments, AreSharedByThoseWhoAskTogether) {
   daemon.process().signal(SIGCONT);
   std::set<ino_t> documents;
   for (RawClient& client : asking) {
-    const shm::Received reply = client.expect(MessageKind::kStatusReply);
+    const wire::Received reply = client.expect(MessageKind::kStatusReply);
     struct stat status {};
     ASSERT_EQ(::fstat(reply.descriptors[0].get(), &status), 0);
     documents.insert(status.st_ino);

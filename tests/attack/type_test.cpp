@@ -44,7 +44,7 @@ TEST(ATypeThatChangesWhileItIsLookedAt, GivesNoSlotTooSmallForASample) {
   });
   int deceived = 0;
   for (int i = 0; i < 20'000; ++i) {
-    shm::Received announced;
+    wire::Received announced;
     announced.descriptors[0] = shm::reopen(segment, O_RDONLY);
     try {
       const auto peer = detail::map_output_peer(announced, wanted, shm::Residence::kMapped);

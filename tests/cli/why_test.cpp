@@ -219,7 +219,7 @@ TEST(Why, TellsThatThereIsNoDaemonOrThatThePolicyForbidsIt) {
   EXPECT_THAT(result.err, HasSubstr("deny everyone observe"));
   RawClient client(daemon.instance());
   client.hello();
-  client.send(RawClient::message(shm::MessageKind::kModel));
+  client.send(RawClient::message(wire::MessageKind::kModel));
   EXPECT_THAT(client.expect_refusal(), HasSubstr("deny everyone observe"));
 }
 

@@ -182,11 +182,11 @@ TEST(Activity, AnOperatorCanDeactivateASourceWhoseProcessIsGone) {
   commander.tell("signal /high");
   RawClient operator_(daemon.instance());
   operator_.hello("operator");
-  operator_.send(RawClient::message(shm::MessageKind::kDeactivate, "/high"));
+  operator_.send(RawClient::message(wire::MessageKind::kDeactivate, "/high"));
   EXPECT_NE(operator_.expect_refusal().find("held by node \"commander\""), std::string::npos);
   commander.kill();
-  operator_.send(RawClient::message(shm::MessageKind::kDeactivate, "/high"));
-  EXPECT_EQ(operator_.expect(shm::MessageKind::kDone).message.value, 1u);
+  operator_.send(RawClient::message(wire::MessageKind::kDeactivate, "/high"));
+  EXPECT_EQ(operator_.expect(wire::MessageKind::kDone).message.value, 1u);
   EXPECT_EQ(low.publish(Number{1}).delivered, 1u);
 }
 
@@ -202,8 +202,8 @@ TEST(Activity, AnOperatorsDeactivationTellsAPortThatWaitsThatItIsIdle) {
   arm.begin("wait /in");
   RawClient operator_(daemon.instance());
   operator_.hello("operator");
-  operator_.send(RawClient::message(shm::MessageKind::kDeactivate, "/high"));
-  operator_.expect(shm::MessageKind::kDone);
+  operator_.send(RawClient::message(wire::MessageKind::kDeactivate, "/high"));
+  operator_.expect(wire::MessageKind::kDone);
   EXPECT_EQ(arm.answer(), "idle");
 }
 

@@ -163,11 +163,11 @@ void declare(Daemon& daemon, std::uint64_t size, std::uint64_t alignment,
   shm::seal(segment, shm::Seals::kOneWriter);
   RawClient client(daemon.instance());
   client.hello();
-  auto open = RawClient::message(shm::MessageKind::kOpenOutput, "/out");
+  auto open = RawClient::message(wire::MessageKind::kOpenOutput, "/out");
   open.type = type;
   if (!told_to_the_daemon.empty()) open.type.set_name(told_to_the_daemon);
   client.send(open, {segment.get(), -1});
-  client.expect(shm::MessageKind::kConnected);
+  client.expect(wire::MessageKind::kConnected);
   const std::string why = daemon.connection("/out", "/in")["mismatch"].dump();
   EXPECT_NE(why.find(expected), std::string::npos) << why;
 }
@@ -332,13 +332,13 @@ TEST(Types, ATypeWhoseNameWouldMisleadIsNotTaken) {
   for (const char* name : {"Twist\x1b[2J", "Twist\nno", "Twist\xff", "Twist\u202e"}) {
     RawClient client(daemon.instance());
     client.hello();
-    auto open = RawClient::message(shm::MessageKind::kOpenInput, "/in");
+    auto open = RawClient::message(wire::MessageKind::kOpenInput, "/in");
     open.type.set_name(name);
     open.type.size = open.type.alignment = 8;
     const auto segment = raw_input_segment();
     const shm::Bell bell;
     client.send(open, {segment.get(), bell.for_publishers().get()});
-    const auto refused = client.expect(shm::MessageKind::kRefused);
+    const auto refused = client.expect(wire::MessageKind::kRefused);
     EXPECT_NE(std::string(refused.message.text_view()).find("the port's type"), std::string::npos);
   }
 }

@@ -135,10 +135,10 @@ std::unique_ptr<Input> Instance::make_input(shm::PortId port, const InputPortOpt
 
 // Descriptors that the message carries, lent for the time of the call.
 void Instance::tell_output(Output& output, const Input& input, std::uint64_t link) {
-  shm::Received received;
+  wire::Received received;
   received.message.peer = input.core->instance();
   received.message.id = input.port;
-  if (link != 0) received.message.flags = shm::kIsConnected;
+  if (link != 0) received.message.flags = wire::kIsConnected;
   received.descriptors[0] = shm::FileDescriptor(input.core->segment_descriptor().get());
   received.descriptors[1] = shm::FileDescriptor(input.core->bell().write_end().get());
   output.core->add_peer(detail::map_input_peer(received, output.core->type()), link);
@@ -146,7 +146,7 @@ void Instance::tell_output(Output& output, const Input& input, std::uint64_t lin
 }
 
 void Instance::tell_input(Input& input, const Output& output, std::uint64_t link) {
-  shm::Received received;
+  wire::Received received;
   received.message.peer = output.core->instance();
   received.message.id = output.core->source();
   received.message.link = link;

@@ -111,8 +111,8 @@ bool DaemonScene::reload() {
   try {
     RawClient client(daemon_.instance());
     client.hello("reload");
-    client.send(RawClient::message(shm::MessageKind::kReload));
-    client.expect(shm::MessageKind::kDone);
+    client.send(RawClient::message(wire::MessageKind::kReload));
+    client.expect(wire::MessageKind::kDone);
   } catch (const std::exception&) {
     return !has_died();
   }

@@ -63,8 +63,8 @@ bool wait_too(Scene& scene, Victim& victim) {
   arbiter::test::RawClient client("test");
   client.hello("undertaker");
   client.send(
-      arbiter::test::RawClient::message(arbiter::shm::MessageKind::kDeactivate, "/victim:o"));
-  client.expect(arbiter::shm::MessageKind::kDone);
+      arbiter::test::RawClient::message(arbiter::wire::MessageKind::kDeactivate, "/victim:o"));
+  client.expect(arbiter::wire::MessageKind::kDone);
   static_cast<void>(scene.first().publish(make_number(10)));
   waiting.join();
   return unharmed;

@@ -84,16 +84,16 @@ Scene::Scene() : daemon_(kModel), observer_(daemon_.instance()) {
 // Asks for all there is to be seen: the victim's activity page, the id of the survivors' port.
 void Scene::meet_daemon() {
   observer_.hello("observer");
-  observer_.send(RawClient::message(shm::MessageKind::kObserve));
-  shm::Received received;
-  while (observer_.receive(received) && received.message.kind != shm::MessageKind::kDone) {
+  observer_.send(RawClient::message(wire::MessageKind::kObserve));
+  wire::Received received;
+  while (observer_.receive(received) && received.message.kind != wire::MessageKind::kDone) {
     const auto name = received.message.name_view();
-    if (received.message.kind == shm::MessageKind::kSourcePage && name == "/victim:o") {
+    if (received.message.kind == wire::MessageKind::kSourcePage && name == "/victim:o") {
       source_id_ = received.message.id;
       page_ =
           shm::Mapping(received.descriptors[0], sizeof(shm::ActivityPage), shm::Access::kReadOnly);
     }
-    if (received.message.kind == shm::MessageKind::kPortName && name == "/survivor:i") {
+    if (received.message.kind == wire::MessageKind::kPortName && name == "/survivor:i") {
       port_id_ = received.message.id;
     }
   }

@@ -26,10 +26,10 @@ class BarriersTest : public testing::Test {
   }
   // The number of the barrier that a client has been asked about.
   std::uint64_t asked(std::size_t client) {
-    shm::Received received;
-    const auto result = shm::receive_message(others_[client].get(), received, false);
-    if (result != shm::ReceiveResult::kReceived) return 0;
-    EXPECT_EQ(received.message.kind, shm::MessageKind::kSync);
+    wire::Received received;
+    const auto result = wire::receive_message(others_[client].get(), received, false);
+    if (result != wire::ReceiveResult::kReceived) return 0;
+    EXPECT_EQ(received.message.kind, wire::MessageKind::kSync);
     return received.message.request;
   }
   void raise(const std::set<Client*>& clients, shm::Nanoseconds deadline = 100) {

@@ -15,10 +15,10 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
+using wire::MessageKind;
 
 // The models "default", which takes /a, and "other", which takes /b.
 class ChangingModels : public testing::Test {
@@ -329,7 +329,7 @@ TEST_F(ChangingModels, WaitForEachOther) {
   daemon_->process().signal(SIGCONT);
   std::vector<std::pair<std::uint64_t, std::uint32_t>> answers;
   for (int i = 0; i < 6; ++i) {
-    shm::Received received;
+    wire::Received received;
     ASSERT_TRUE(client.receive(received));
     answers.emplace_back(received.message.request, received.message.value);
     if (i == 5) {

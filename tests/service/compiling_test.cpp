@@ -20,8 +20,8 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
 using testing::HasSubstr;
+using wire::MessageKind;
 
 // Where the compiler's thread waits before it reads files.
 class Gate {
@@ -80,7 +80,7 @@ class Compiling : public testing::Test {
     files_.write("model.xml", model("/a"));
     options_.models = {{"one", {{files_.path() + "/model.xml"}, {}}}};
     options_.instance = kInstance;
-    options_.directory = shm::daemon_directory();
+    options_.directory = wire::daemon_directory();
     options_.stop_descriptor = signals_.get();
     options_.before_reading = [this](const std::stop_token& stop) { gate_.wait(stop); };
   }
@@ -142,7 +142,7 @@ TEST_F(Compiling, OthersAreServedMeanwhile) {
 TEST_F(Compiling, OthersAreServedWhileADryRunIsPrepared) {
   start();
   const auto asking = client("asking");
-  ask_for_reload(*asking, shm::kWantsReport | shm::kDryRun);
+  ask_for_reload(*asking, wire::kWantsReport | wire::kDryRun);
   gate_.await();
   EXPECT_EQ(client("other")->status()["model"]["generation"], 1);
   gate_.open();
@@ -225,7 +225,7 @@ TEST_F(Compiling, AReloadHappensThoughWhoAskedHasGone) {
 TEST_F(Compiling, ADryRunStopsWhenWhoAskedHasGone) {
   start();
   auto asking = client("asking");
-  ask_for_reload(*asking, shm::kWantsReport | shm::kDryRun);
+  ask_for_reload(*asking, wire::kWantsReport | wire::kDryRun);
   gate_.await();
   asking.reset();
   gate_.await_stop();

@@ -15,9 +15,9 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
 using testing::HasSubstr;
 using testing::Not;
+using wire::MessageKind;
 
 ProgramResult arbiter(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), std::string(ARBITER_PROGRAMS) + "/arbiter");
@@ -169,7 +169,7 @@ TEST(Control, AVerbTellsWhomItWaitsFor) {
   const ScopedVariable directory("XDG_RUNTIME_DIR", runtime.path());
   const ScopedVariable own("RUNTIME_DIRECTORY", std::nullopt);
   std::filesystem::create_directory(runtime.path() + "/arbiter");
-  const auto listener = shm::listen_at(runtime.path() + "/arbiter", "slow");
+  const auto listener = wire::listen_at(runtime.path() + "/arbiter", "slow");
   int ends[2];
   ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
   const shm::FileDescriptor err(ends[0]);
@@ -179,8 +179,8 @@ TEST(Control, AVerbTellsWhomItWaitsFor) {
   their_err.reset();
   const shm::FileDescriptor client(::accept(listener.socket.get(), nullptr, nullptr));
   const auto answer = [&](MessageKind kind, const std::string& text) {
-    shm::Received question;
-    ASSERT_EQ(shm::receive_message(client.get(), question, true), shm::ReceiveResult::kReceived);
+    wire::Received question;
+    ASSERT_EQ(wire::receive_message(client.get(), question, true), wire::ReceiveResult::kReceived);
     std::string said;
     while (said.find(text) == std::string::npos) {
       char part[512];
@@ -188,9 +188,9 @@ TEST(Control, AVerbTellsWhomItWaitsFor) {
       ASSERT_GT(count, 0) << said;
       said.append(part, static_cast<std::size_t>(count));
     }
-    shm::Message reply = RawClient::message(kind);
+    wire::Message reply = RawClient::message(kind);
     reply.request = question.message.request;
-    ASSERT_EQ(shm::send_message(client.get(), reply), shm::SendResult::kSent);
+    ASSERT_EQ(wire::send_message(client.get(), reply), wire::SendResult::kSent);
   };
   answer(MessageKind::kWelcome, "");
   answer(MessageKind::kRefused, "waiting for arbiterd (pid " + std::to_string(::getpid()) +

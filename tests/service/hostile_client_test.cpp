@@ -21,7 +21,7 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
+using wire::MessageKind;
 
 const std::string kModel =
     "<behaviors><arbiter at='/in'><select from='/out'/></arbiter></behaviors>";
@@ -43,7 +43,7 @@ class HostileClient : public testing::Test {
     result.hello("hostile");
     return result;
   }
-  std::string refusal(const shm::Message& message, RawClient::Descriptors descriptors = {-1, -1}) {
+  std::string refusal(const wire::Message& message, RawClient::Descriptors descriptors = {-1, -1}) {
     RawClient hostile = client();
     hostile.send(message, descriptors);
     return hostile.expect_refusal();
@@ -68,7 +68,7 @@ shm::FileDescriptor output_segment(shm::TypeInfo type, std::uint32_t slots = 4) 
   return segment;
 }
 
-shm::Message open_output(const std::string& name) {
+wire::Message open_output(const std::string& name) {
   auto message = RawClient::message(MessageKind::kOpenOutput, name);
   message.type.size = 8;
   return message;
@@ -81,7 +81,7 @@ TEST_F(HostileClient, ThatSendsNoiseIsDropped) {
     std::vector<unsigned char> noise(random() % 3000 + 1);
     for (auto& byte : noise) byte = static_cast<unsigned char>(random());
     hostile.send_bytes(noise.data(), noise.size());
-    shm::Received received;
+    wire::Received received;
     while (hostile.receive(received)) {
       ASSERT_EQ(received.message.kind, MessageKind::kRefused);
       break;
@@ -94,7 +94,7 @@ TEST_F(HostileClient, ThatSendsRandomMessagesAfterItsHelloHarmsNobody) {
   for (int round = 0; round < 50; ++round) {
     RawClient hostile = client();
     for (int i = 0; i < 40; ++i) {
-      shm::Message message;
+      wire::Message message;
       message.kind =
           static_cast<MessageKind>(random() % 4 == 0 ? 40 + random() % 6 : random() % 14);
       if (message.kind == MessageKind::kStop) continue;  // this user may, and would
@@ -106,14 +106,14 @@ TEST_F(HostileClient, ThatSendsRandomMessagesAfterItsHelloHarmsNobody) {
       message.value = static_cast<std::uint32_t>(random());
       if (random() % 2 == 0) message.set_name(random() % 2 == 0 ? "/out" : "/in");
       if (random() % 4 == 0) message.set_text("why not");
-      if (hostile.send(message) != shm::SendResult::kSent) break;
+      if (hostile.send(message) != wire::SendResult::kSent) break;
     }
   }
 }
 
 TEST_F(HostileClient, ThatSendsTruncatedOrOversizedMessagesIsDropped) {
   for (const std::size_t size :
-       {std::size_t{1}, std::size_t{7}, sizeof(shm::Message) + 1, std::size_t{60000}}) {
+       {std::size_t{1}, std::size_t{7}, sizeof(wire::Message) + 1, std::size_t{60000}}) {
     RawClient hostile = client();
     const std::vector<char> bytes(size, 3);
     hostile.send_bytes(bytes.data(), bytes.size());
@@ -133,7 +133,7 @@ TEST_F(HostileClient, MustSayHelloFirstAndOnce) {
 TEST_F(HostileClient, OfAnotherVersionIsToldSo) {
   RawClient hostile(daemon_.instance());
   auto hello = RawClient::message(MessageKind::kHello, "old");
-  hello.value = shm::kWireVersion + 1;
+  hello.value = wire::kWireVersion + 1;
   hostile.send(hello);
   EXPECT_NE(hostile.expect_refusal().find("speaks version"), std::string::npos);
 }
@@ -250,7 +250,7 @@ TEST_F(HostileClient, ThatAsksAndNeverReadsIsGivenUpInTheEnd) {
   RawClient deaf = client();
   int asked = 0;
   while (asked < 100000 &&
-         deaf.send(RawClient::message(MessageKind::kStatus)) == shm::SendResult::kSent) {
+         deaf.send(RawClient::message(MessageKind::kStatus)) == wire::SendResult::kSent) {
     ++asked;
   }
   EXPECT_LT(asked, 100000);
@@ -299,7 +299,7 @@ TEST_F(HostileClient, CannotBeMoreThanTheLimitOfItsUser) {
   while (refusal.empty() && many.size() < shm::kMaxClients) {
     many.emplace_back(daemon_.instance());
     many.back().send(RawClient::hello_message("many"));
-    shm::Received answer;
+    wire::Received answer;
     ASSERT_TRUE(many.back().receive(answer));
     if (answer.message.kind == MessageKind::kRefused) refusal = answer.message.text_view();
   }
@@ -347,7 +347,7 @@ TEST_F(HostileClient, ThatObservesIsToldEachNameOnce) {
     EXPECT_EQ(told.message.name_view(), "/many" + std::to_string(i));
   }
   observer.send(RawClient::message(MessageKind::kObserve));
-  shm::Received next;
+  wire::Received next;
   ASSERT_TRUE(observer.receive(next));
   EXPECT_EQ(next.message.kind, MessageKind::kDone) << "there is no more to tell";
 }
@@ -358,7 +358,7 @@ TEST(Descriptors, WhenTheyRunOutClientsAreTurnedAwayAndTheDaemonRests) {
   {
     std::vector<RawClient> many;
     for (int i = 0; i < 80; ++i) many.emplace_back(daemon.instance());
-    shm::Received received;
+    wire::Received received;
     EXPECT_FALSE(many.back().receive(received)) << "turned away";
     wait_until_it_sleeps_in(SYS_epoll_wait, daemon.process().pid(), daemon.process().pid());
   }

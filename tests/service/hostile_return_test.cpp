@@ -21,12 +21,12 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
+using wire::MessageKind;
 
-shm::Message return_as(std::uint64_t node) {
+wire::Message return_as(std::uint64_t node) {
   auto message = RawClient::message(MessageKind::kHello, "impostor");
-  message.value = shm::kWireVersion;
-  message.flags = shm::kComesBack | shm::kRejoins;
+  message.value = wire::kWireVersion;
+  message.flags = wire::kComesBack | wire::kRejoins;
   message.link = node;
   return message;
 }
@@ -40,9 +40,9 @@ struct Given {
   explicit Given(const Daemon& daemon) {
     RawClient client(daemon.instance());
     auto hello = RawClient::message(MessageKind::kHello, "curious");
-    hello.value = shm::kWireVersion;
+    hello.value = wire::kWireVersion;
     client.send(hello);
-    shm::Received welcome = client.expect(MessageKind::kWelcome);
+    wire::Received welcome = client.expect(MessageKind::kWelcome);
     board = std::move(welcome.descriptors[0]);
     registry = std::move(welcome.descriptors[1]);
     node = welcome.message.link;
@@ -96,7 +96,7 @@ TEST(HostileReturn, GetsNoPortOfAnotherProcess) {
     for (std::uint64_t id = 0; id <= given.node; ++id) {
       RawClient impostor(daemon.instance());
       ASSERT_EQ(impostor.send(return_as(id), {given.board.get(), given.registry.get()}),
-                shm::SendResult::kSent);
+                wire::SendResult::kSent);
       impostor.expect(MessageKind::kWelcome);
       for (std::uint64_t port = 0; port < 4; ++port) {
         auto claim = RawClient::message(MessageKind::kHandBackOutput, "/out");
@@ -159,13 +159,13 @@ TEST(HostileReturn, PutsNoPageInPlaceOfAnother) {
 TEST(HostileReturn, HandsBackNoOutputWithoutThePageInForce) {
   Daemon daemon(single_model());
   auto hello = RawClient::message(MessageKind::kHello, "liar");
-  hello.value = shm::kWireVersion;
-  hello.flags = shm::kComesBack;
+  hello.value = wire::kWireVersion;
+  hello.flags = wire::kComesBack;
   RawClient former(daemon.instance());
   former.send(hello);
-  const shm::Received welcome = former.expect(MessageKind::kWelcome);
+  const wire::Received welcome = former.expect(MessageKind::kWelcome);
   const auto segment = raw_output_segment();
-  const shm::Message opened = open_raw_output(former, "/out", segment).message;
+  const wire::Message opened = open_raw_output(former, "/out", segment).message;
   daemon.kill();
   daemon.restart();
   RawClient liar(daemon.instance());
@@ -208,10 +208,10 @@ TEST(HostileReturn, ToANewDaemonWithAnOldBoardIsRefusedAndOthersAreTakenBack) {
 // the same one elsewhere.
 TEST(HostileReturn, WithANumberOfOtherMemoryCostsNobodyWhatIsKept) {
   Daemon daemon(single_model());
-  shm::Received welcome;
+  wire::Received welcome;
   {
     RawClient lost(daemon.instance());
-    welcome = lost.hello("lost", shm::kComesBack);
+    welcome = lost.hello("lost", wire::kComesBack);
     const auto segment = raw_output_segment();
     open_raw_output(lost, "/out", segment);
   }

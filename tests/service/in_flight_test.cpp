@@ -28,7 +28,7 @@ class ADeafClient : public testing::Test {
   }
 
   void send(bool with_descriptors) {
-    shm::Message message;
+    wire::Message message;
     message.request = ++sent_;
     const int segment = with_descriptors ? segment_.get() : -1;
     client_->send(message, {segment, segment});
@@ -36,8 +36,9 @@ class ADeafClient : public testing::Test {
   // How many there are to be read, all in the order in which they were sent.
   std::uint64_t read_all() {
     std::uint64_t count = 0;
-    shm::Received received;
-    while (shm::receive_message(far_end_.get(), received, false) == shm::ReceiveResult::kReceived) {
+    wire::Received received;
+    while (wire::receive_message(far_end_.get(), received, false) ==
+           wire::ReceiveResult::kReceived) {
       EXPECT_EQ(received.message.request, ++read_);
       ++count;
     }

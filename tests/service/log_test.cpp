@@ -185,7 +185,7 @@ TEST(Log, NamesThatWouldMisleadItsReadersAreRefused) {
   for (const std::string name : {"/a\u009b2J", "/a\x1b", "/a\u202e", "/a\xff", "/a b"}) {
     RawClient client(daemon.instance());
     client.hello();
-    client.send(RawClient::message(shm::MessageKind::kOpenOutput, name));
+    client.send(RawClient::message(wire::MessageKind::kOpenOutput, name));
     EXPECT_THAT(client.expect_refusal(), HasSubstr(" in it")) << name;
   }
   RawClient client(daemon.instance());
@@ -199,7 +199,7 @@ TEST(Log, AClientThatIsRefusedAllTheTimeDoesNotFillTheLog) {
   RawClient client(daemon.instance());
   client.hello("noisy");
   for (int i = 0; i < 5000; ++i) {
-    client.send(RawClient::message(shm::MessageKind::kOpenOutput, "no slash"));
+    client.send(RawClient::message(wire::MessageKind::kOpenOutput, "no slash"));
     client.expect_refusal();
   }
   const std::string log = daemon.log();

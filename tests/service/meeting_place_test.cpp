@@ -142,7 +142,7 @@ TEST(MeetingPlace, OfASecondDaemonOfTheInstanceIsTold) {
     EXPECT_EQ(notices[0].kind, NoticeKind::apart);
     EXPECT_NE(notices[0].text.find(first.path()), std::string::npos) << notices[0].text;
     EXPECT_NE(notices[0].text.find(second.path()), std::string::npos) << notices[0].text;
-    EXPECT_EQ(shm::other_daemons("place", first.path() + "/arbiter"),
+    EXPECT_EQ(wire::other_daemons("place", first.path() + "/arbiter"),
               std::vector<std::string>{second.path() + "/arbiter/place.sock"});
   };
   const auto start_another = [&] { EXPECT_EQ(run_in(second, in(second), meet_both), 0); };

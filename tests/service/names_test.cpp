@@ -12,9 +12,9 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
+using wire::MessageKind;
 
-shm::Message open_output(const std::string& name) {
+wire::Message open_output(const std::string& name) {
   return RawClient::message(MessageKind::kOpenOutput, name);
 }
 

@@ -18,8 +18,8 @@ namespace arbiter::test {
 namespace {
 
 using nlohmann::json;
-using shm::MessageKind;
 using testing::IsEmpty;
+using wire::MessageKind;
 
 std::string protocol_page() { return source_of("docs/protocol.md"); }
 
@@ -57,12 +57,12 @@ TEST(ProtocolPage, HasEachFlagAndTheVersion) {
   }
   EXPECT_EQ(flags, enumerators(source_of("wire/messages.hpp"), "MessageFlag"));
   EXPECT_THAT(protocol_page(),
-              testing::HasSubstr("It describes version " + std::to_string(shm::kWireVersion) +
+              testing::HasSubstr("It describes version " + std::to_string(wire::kWireVersion) +
                                  " (`kWireVersion`)"));
 }
 
 TEST(ProtocolPage, SaysWhereEachFieldOfAMessageLies) {
-  using Message = shm::Message;
+  using Message = wire::Message;
   using Place = std::pair<std::size_t, std::size_t>;
   const std::map<std::string, Place> places{
       {"kind", {offsetof(Message, kind), sizeof Message::kind}},
@@ -151,7 +151,7 @@ TEST(ProtocolPage, SaysWhatAnswersWhat) {
   for (const MessageKind kind :
        {MessageKind::kReload, MessageKind::kSwitch, MessageKind::kRollback}) {
     note(kind, client.ask(kind, "default"));
-    note(kind, client.ask(kind, "default", shm::kWantsReport));
+    note(kind, client.ask(kind, "default", wire::kWantsReport));
   }
   note(MessageKind::kDeactivate, client.ask(MessageKind::kDeactivate, "/low"));
   for (const MessageKind kind :
@@ -233,7 +233,7 @@ std::map<std::string, Heard> hear_all() {
   client.hear(MessageKind::kPeerGone);
   daemon.write_model(rules(first(select("/out")) + mine));
   client.ask(MessageKind::kReload);
-  client.ask(MessageKind::kReload, {}, shm::kWantsReport);
+  client.ask(MessageKind::kReload, {}, wire::kWantsReport);
   return client.heard();
 }
 

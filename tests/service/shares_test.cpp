@@ -138,7 +138,7 @@ TEST(Turns, AreByUserHoweverManyOfHisClientsWait) {
 
 TEST(WhatIsPutAside, CountsAsItsSendersAndIsClosedAsHisErrand) {
   Shares shares(of_each(1 << 20), 50, kDaemonsUser);
-  shm::Received received;
+  wire::Received received;
   received.descriptors[0] = shm::make_segment("test", 1);
   received.descriptor_count = 1;
   const int number = received.descriptors[0].get();
@@ -146,7 +146,7 @@ TEST(WhatIsPutAside, CountsAsItsSendersAndIsClosedAsHisErrand) {
     const PutAside aside(received, kOne, shares);
     EXPECT_EQ(aside.received().descriptors[0].get(), number);
     EXPECT_EQ(shares.taken(kOne, Share::kDescriptors), 1u);
-    EXPECT_GE(shares.taken(kOne, Share::kQueue), sizeof(shm::Message));
+    EXPECT_GE(shares.taken(kOne, Share::kQueue), sizeof(wire::Message));
   }
   EXPECT_EQ(shares.taken(kOne, Share::kDescriptors), 0u);
   EXPECT_EQ(shares.taken(kOne, Share::kQueue), 0u);
@@ -155,8 +155,8 @@ TEST(WhatIsPutAside, CountsAsItsSendersAndIsClosedAsHisErrand) {
 }
 
 TEST(WhatIsPutAside, CanWaitOnWhereThereIsRoomForItOnce) {
-  Shares shares(of_each(3 * sizeof(shm::Received)), 50, kDaemonsUser);
-  shm::Received received;
+  Shares shares(of_each(3 * sizeof(wire::Received)), 50, kDaemonsUser);
+  wire::Received received;
   PutAside aside(received, kOne, shares);
   EXPECT_THROW(PutAside(aside.received(), kOne, shares), LimitExceeded);
   aside.give_back();
@@ -165,7 +165,7 @@ TEST(WhatIsPutAside, CanWaitOnWhereThereIsRoomForItOnce) {
 
 TEST(WhatIsPutAside, IsRefusedBeyondTheShareAndStaysWhatItWas) {
   Shares shares(of_each(1), 50, kDaemonsUser);
-  shm::Received received;
+  wire::Received received;
   received.descriptors[0] = shm::make_segment("test", 1);
   received.descriptor_count = 1;
   EXPECT_THROW(PutAside(received, kOne, shares), LimitExceeded);

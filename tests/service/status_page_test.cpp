@@ -21,11 +21,11 @@ using testing::IsEmpty;
 std::string status_page() { return content_of(std::string(ARBITER_SOURCE) + "/docs/status.md"); }
 
 // A change that a client asks for, until it is in force.
-void change(const Daemon& daemon, shm::MessageKind kind, const std::string& name = {}) {
+void change(const Daemon& daemon, wire::MessageKind kind, const std::string& name = {}) {
   RawClient client(daemon.instance());
   client.hello("operator");
   client.send(RawClient::message(kind, name));
-  client.expect(shm::MessageKind::kDone);
+  client.expect(wire::MessageKind::kDone);
 }
 
 // Two models, an application, and each way in which a model comes into force.
@@ -38,8 +38,8 @@ void see_models(ObservedFields& observed) {
                 {.application = application(connection("/a", "/in") + connection("/b", "/in")),
                  .arguments = {"--model", "other=" + files.write("b.xml", only("/b"))}});
   daemon.load(only("/b"));
-  change(daemon, shm::MessageKind::kSwitch, "other");
-  change(daemon, shm::MessageKind::kRollback);
+  change(daemon, wire::MessageKind::kSwitch, "other");
+  change(daemon, wire::MessageKind::kRollback);
   observed.see(daemon.status());
   // One that knows the model that is in force, and not its files.
   Node node("test");

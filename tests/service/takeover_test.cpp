@@ -200,27 +200,27 @@ TEST(Takeover, WhatClosedMeanwhileIsClosedThoughItWasAllThereWas) {
 // said to be in no model, and got nothing.
 TEST(Takeover, WhoeverComesBeforeTheModelIsInForceWaitsForIt) {
   Daemon daemon(single_model());
-  auto hello = RawClient::message(shm::MessageKind::kHello, "deaf");
-  hello.value = shm::kWireVersion;
-  hello.flags = shm::kComesBack | shm::kHasServiceThread;
+  auto hello = RawClient::message(wire::MessageKind::kHello, "deaf");
+  hello.value = wire::kWireVersion;
+  hello.flags = wire::kComesBack | wire::kHasServiceThread;
   RawClient former(daemon.instance());
   former.send(hello);
-  const shm::Received welcome = former.expect(shm::MessageKind::kWelcome);
+  const wire::Received welcome = former.expect(wire::MessageKind::kWelcome);
   const auto segment = raw_output_segment();
-  const shm::Received opened = open_raw_output(former, "/other", segment);
+  const wire::Received opened = open_raw_output(former, "/other", segment);
   daemon.kill();
   daemon.restart();
   RawClient back(daemon.instance());
-  hello.flags |= shm::kRejoins;
+  hello.flags |= wire::kRejoins;
   hello.link = welcome.message.link;
   back.send(hello, {welcome.descriptors[0].get(), welcome.descriptors[1].get()});
-  back.expect(shm::MessageKind::kWelcome);
-  auto output = RawClient::message(shm::MessageKind::kHandBackOutput, "/other");
+  back.expect(wire::MessageKind::kWelcome);
+  auto output = RawClient::message(wire::MessageKind::kHandBackOutput, "/other");
   output.port = opened.message.port;
   output.id = opened.message.id;
   back.send(output, {segment.get(), opened.descriptors[0].get()});
-  back.send(RawClient::message(shm::MessageKind::kHandedBack));
-  back.expect(shm::MessageKind::kSync);
+  back.send(RawClient::message(wire::MessageKind::kHandedBack));
+  back.expect(wire::MessageKind::kSync);
   Node node("test");
   auto in = node.input_port<Number>("/in");
   auto out = node.output_port<Number>("/out");

@@ -13,9 +13,9 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
 using testing::HasSubstr;
 using testing::StartsWith;
+using wire::MessageKind;
 
 constexpr const char* kOneArm =
     "<behaviors><arbiter at='/Arm/in'><select from='/Arm/out'/></arbiter></behaviors>";
@@ -177,7 +177,7 @@ TEST_F(Users, CannotPretendToBeOthers) {
     RawClient client(daemon_->instance());
     client.hello("root");
     const auto message = RawClient::message(MessageKind::kReload);
-    iovec data{const_cast<shm::Message*>(&message), offsetof(shm::Message, name)};
+    iovec data{const_cast<wire::Message*>(&message), offsetof(wire::Message, name)};
     alignas(cmsghdr) char control[CMSG_SPACE(sizeof(ucred))] = {};
     msghdr header{};
     header.msg_iov = &data;
@@ -192,7 +192,7 @@ TEST_F(Users, CannotPretendToBeOthers) {
     if (::sendmsg(client.socket(), &header, MSG_NOSIGNAL) < 0) {
       return std::string("the kernel: ") + std::strerror(errno);
     }
-    shm::Received reply;
+    wire::Received reply;
     if (!client.receive(reply)) return std::string("(hung up)");
     return reply.message.kind == MessageKind::kDone ? std::string("done")
                                                     : std::string(reply.message.text_view());

@@ -52,7 +52,7 @@ TEST(TypeInfo, AMismatchOfTheLongestNamesFitsIntoAMessage) {
   const std::string why =
       type_mismatch(type(long_name + "a", kMaxTypeSize, kMaxAlignment),
                     type(long_name + "b", kMaxTypeSize, kMaxAlignment), node, node);
-  Message message;
+  wire::Message message;
   message.set_text(std::string(kMaxNameLength, 'p') + why);
   EXPECT_NE(message.text_view().find(long_name + "a ("), std::string::npos);
   message.set_text(why);

@@ -97,16 +97,16 @@ Round::~Round() {
 
 void Round::meet_daemon() {
   client_ = std::make_unique<test::RawClient>(daemon_.instance());
-  const shm::Received welcome = client_->hello("stress");
+  const wire::Received welcome = client_->hello("stress");
   board_ = shm::Mapping(welcome.descriptors[0], sizeof(shm::Board), shm::Access::kReadOnly);
 }
 
 PortIds Round::port_ids() {
   PortIds ids;
-  client_->send(test::RawClient::message(shm::MessageKind::kObserve));
-  shm::Received received;
-  while (client_->receive(received) && received.message.kind != shm::MessageKind::kDone) {
-    if (received.message.kind == shm::MessageKind::kPortName) {
+  client_->send(test::RawClient::message(wire::MessageKind::kObserve));
+  wire::Received received;
+  while (client_->receive(received) && received.message.kind != wire::MessageKind::kDone) {
+    if (received.message.kind == wire::MessageKind::kPortName) {
       ids[std::string(received.message.name_view())] = received.message.id;
     }
   }

@@ -23,7 +23,7 @@ struct Heard {
   std::set<std::size_t> descriptors;
 };
 
-inline Words used_fields(const shm::Message& message) {
+inline Words used_fields(const wire::Message& message) {
   Words fields;
   const auto add = [&](const char* name, bool is_used) {
     if (is_used) fields.insert(name);
@@ -47,69 +47,69 @@ class Listener {
   explicit Listener(const Daemon& daemon) : client_(daemon.instance()) {}
 
   // Sends it with a number of its own, and returns the kinds that answer it.
-  Words ask(shm::Message message, RawClient::Descriptors descriptors = {-1, -1}) {
+  Words ask(wire::Message message, RawClient::Descriptors descriptors = {-1, -1}) {
     message.request = ++last_request_;
     client_.send(message, descriptors);
     Words kinds;
     do {
-      const shm::Message answer = hear_next();
-      if (answer.kind == shm::MessageKind::kSync || answer.request != message.request) continue;
+      const wire::Message answer = hear_next();
+      if (answer.kind == wire::MessageKind::kSync || answer.request != message.request) continue;
       kinds.insert(name_of(answer.kind));
       last_answer_ = answer;
     } while (kinds.empty() || kinds == Words{"kOpened"});
     return kinds;
   }
-  Words ask(shm::MessageKind kind, const std::string& name = {}, std::uint32_t flags = 0) {
+  Words ask(wire::MessageKind kind, const std::string& name = {}, std::uint32_t flags = 0) {
     auto message = RawClient::message(kind, name);
     message.flags = flags;
     return ask(message);
   }
-  Words hello() { return ask(RawClient::hello_message("listener", shm::kHasServiceThread)); }
+  Words hello() { return ask(RawClient::hello_message("listener", wire::kHasServiceThread)); }
   // The kinds that answer a message of which there may be no answer: it comes before that to a
   // question that is asked after it.
-  Words say(shm::MessageKind kind) {
+  Words say(wire::MessageKind kind) {
     auto message = RawClient::message(kind);
     const std::uint64_t request = message.request = ++last_request_;
     client_.send(message);
-    auto question = RawClient::message(shm::MessageKind::kStatus);
+    auto question = RawClient::message(wire::MessageKind::kStatus);
     question.request = ++last_request_;
     client_.send(question);
     Words kinds;
     for (;;) {
-      const shm::Message answer = hear_next();
+      const wire::Message answer = hear_next();
       if (answer.request == question.request) return kinds;
       if (answer.request == request) kinds.insert(name_of(answer.kind));
     }
   }
   Words open_output(const std::string& name) {
     const auto segment = raw_output_segment();
-    return ask(RawClient::message(shm::MessageKind::kOpenOutput, name), {segment.get(), -1});
+    return ask(RawClient::message(wire::MessageKind::kOpenOutput, name), {segment.get(), -1});
   }
   Words open_input(const std::string& name) {
     const auto segment = raw_input_segment();
     const shm::Bell bell;
-    return ask(RawClient::message(shm::MessageKind::kOpenInput, name),
+    return ask(RawClient::message(wire::MessageKind::kOpenInput, name),
                {segment.get(), bell.for_publishers().get()});
   }
-  void hear(shm::MessageKind kind) {
+  void hear(wire::MessageKind kind) {
     while (hear_next().kind != kind) {
     }
   }
   [[nodiscard]] const std::map<std::string, Heard>& heard() const { return heard_; }
-  [[nodiscard]] const shm::Message& last_answer() const { return last_answer_; }
+  [[nodiscard]] const wire::Message& last_answer() const { return last_answer_; }
   [[nodiscard]] shm::PortInstance last_opened() const { return last_opened_; }
 
  private:
-  shm::Message hear_next() {
-    shm::Received received;
+  wire::Message hear_next() {
+    wire::Received received;
     if (!client_.receive(received)) throw std::runtime_error("the daemon has hung up");
-    const shm::Message& message = received.message;
+    const wire::Message& message = received.message;
     Heard& heard = heard_[name_of(message.kind)];
     heard.fields.merge(used_fields(message));
     heard.descriptors.insert(received.descriptor_count);
-    if (message.kind == shm::MessageKind::kOpened) last_opened_ = message.port;
-    if (message.kind == shm::MessageKind::kSync) {
-      auto synced = RawClient::message(shm::MessageKind::kSynced);
+    if (message.kind == wire::MessageKind::kOpened) last_opened_ = message.port;
+    if (message.kind == wire::MessageKind::kSync) {
+      auto synced = RawClient::message(wire::MessageKind::kSynced);
       synced.request = message.request;
       client_.send(synced);
     }
@@ -119,7 +119,7 @@ class Listener {
   RawClient client_;
   std::uint64_t last_request_ = 1'000'000;  // beyond the numbers of barriers
   std::map<std::string, Heard> heard_;
-  shm::Message last_answer_;
+  wire::Message last_answer_;
   shm::PortInstance last_opened_ = 0;
 };
 

@@ -38,7 +38,7 @@ inline Numbers kinds_of_header() {
   return enumerators(source_of("wire/messages.hpp"), "class MessageKind");
 }
 
-inline std::string name_of(shm::MessageKind kind) {
+inline std::string name_of(wire::MessageKind kind) {
   static const Numbers kinds = kinds_of_header();
   for (const auto& [name, number] : kinds) {
     if (number == static_cast<std::uint32_t>(kind)) return name;

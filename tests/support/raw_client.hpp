@@ -20,7 +20,7 @@
 namespace arbiter::test {
 
 // What a reply has brought, of kStatusReply or the like.
-inline nlohmann::json read_document(const shm::Received& reply) {
+inline nlohmann::json read_document(const wire::Received& reply) {
   std::string text;
   std::array<char, 65536> buffer;
   ssize_t count = 0;
@@ -34,42 +34,42 @@ inline nlohmann::json read_document(const shm::Received& reply) {
 
 class RawClient {
  public:
-  using Descriptors = std::array<int, shm::kMaxDescriptors>;
+  using Descriptors = std::array<int, wire::kMaxDescriptors>;
 
   // Connected by other means.
   explicit RawClient(shm::FileDescriptor socket) : socket_(std::move(socket)) {}
 
   explicit RawClient(const std::string& instance) {
     std::string why_not;
-    auto socket = shm::connect_to_daemon(instance, why_not);
+    auto socket = wire::connect_to_daemon(instance, why_not);
     if (!socket) throw std::runtime_error("no daemon of instance " + instance + " " + why_not);
     socket_ = std::move(*socket);
   }
 
-  static shm::Message message(shm::MessageKind kind, const std::string& name = {}) {
-    shm::Message result;
+  static wire::Message message(wire::MessageKind kind, const std::string& name = {}) {
+    wire::Message result;
     result.kind = kind;
     result.request = 77;
     result.set_name(name);
     return result;
   }
 
-  shm::SendResult send(const shm::Message& message, Descriptors descriptors = {-1, -1}) {
-    return shm::send_message(socket_.get(), message, descriptors);
+  wire::SendResult send(const wire::Message& message, Descriptors descriptors = {-1, -1}) {
+    return wire::send_message(socket_.get(), message, descriptors);
   }
   bool send_bytes(const void* data, std::size_t size) {
     return ::send(socket_.get(), data, size, MSG_NOSIGNAL) == static_cast<ssize_t>(size);
   }
   // Blocks. False: the daemon has closed the connection.
-  bool receive(shm::Received& received) {
-    return shm::receive_message(socket_.get(), received, true) == shm::ReceiveResult::kReceived;
+  bool receive(wire::Received& received) {
+    return wire::receive_message(socket_.get(), received, true) == wire::ReceiveResult::kReceived;
   }
   // Waits for the next message of that kind, and lets others pass.
-  shm::Received expect(shm::MessageKind kind) {
-    shm::Received received;
+  wire::Received expect(wire::MessageKind kind) {
+    wire::Received received;
     while (receive(received)) {
       if (received.message.kind == kind) return received;
-      if (received.message.kind == shm::MessageKind::kRefused) {
+      if (received.message.kind == wire::MessageKind::kRefused) {
         throw std::runtime_error(std::string(received.message.text_view()));
       }
     }
@@ -77,9 +77,9 @@ class RawClient {
   }
   // The text of the refusal that comes next.
   std::string expect_refusal() {
-    shm::Received received;
+    wire::Received received;
     while (receive(received)) {
-      if (received.message.kind == shm::MessageKind::kRefused) {
+      if (received.message.kind == wire::MessageKind::kRefused) {
         return std::string(received.message.text_view());
       }
     }
@@ -87,29 +87,29 @@ class RawClient {
   }
   // True once the daemon has closed the connection.
   bool is_hung_up_on() {
-    shm::Received received;
+    wire::Received received;
     while (receive(received)) {
     }
     return true;
   }
 
-  static shm::Message hello_message(const std::string& name, std::uint32_t flags = 0) {
+  static wire::Message hello_message(const std::string& name, std::uint32_t flags = 0) {
     wire::Caller caller;
     caller.name = name;
     caller.flags = flags;
-    shm::Message hello = wire::hello_of(caller);
+    wire::Message hello = wire::hello_of(caller);
     hello.request = 77;
     return hello;
   }
   // What it is welcomed with.
-  shm::Received hello(const std::string& name = "raw", std::uint32_t flags = 0) {
+  wire::Received hello(const std::string& name = "raw", std::uint32_t flags = 0) {
     send(hello_message(name, flags));
-    return expect(shm::MessageKind::kWelcome);
+    return expect(wire::MessageKind::kWelcome);
   }
 
   nlohmann::json status() {
-    send(message(shm::MessageKind::kStatus));
-    return read_document(expect(shm::MessageKind::kStatusReply));
+    send(message(wire::MessageKind::kStatus));
+    return read_document(expect(wire::MessageKind::kStatusReply));
   }
 
   void hang_up() { socket_.reset(); }

@@ -43,16 +43,16 @@ inline shm::FileDescriptor raw_input_segment() {
 }
 
 // kOpened, with the source's page. Throws what the daemon refuses with.
-inline shm::Received open_raw_output(RawClient& client, const std::string& name,
-                                     const shm::FileDescriptor& segment) {
-  client.send(RawClient::message(shm::MessageKind::kOpenOutput, name), {segment.get(), -1});
-  shm::Received opened = client.expect(shm::MessageKind::kOpened);
-  client.expect(shm::MessageKind::kConnected);
+inline wire::Received open_raw_output(RawClient& client, const std::string& name,
+                                      const shm::FileDescriptor& segment) {
+  client.send(RawClient::message(wire::MessageKind::kOpenOutput, name), {segment.get(), -1});
+  wire::Received opened = client.expect(wire::MessageKind::kOpened);
+  client.expect(wire::MessageKind::kConnected);
   return opened;
 }
 
 inline void close_raw(RawClient& client, shm::PortInstance port) {
-  auto close = RawClient::message(shm::MessageKind::kClosePort);
+  auto close = RawClient::message(wire::MessageKind::kClosePort);
   close.port = port;
   client.send(close);
 }

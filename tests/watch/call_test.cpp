@@ -18,13 +18,13 @@
 namespace arbiter::test {
 namespace {
 
-using shm::MessageKind;
 using std::chrono::milliseconds;
 using testing::AllOf;
 using testing::HasSubstr;
+using wire::MessageKind;
 
-shm::Message question(MessageKind kind) {
-  shm::Message message;
+wire::Message question(MessageKind kind) {
+  wire::Message message;
   message.kind = kind;
   return message;
 }
@@ -93,14 +93,14 @@ TEST(Call, WaitsForADaemonThatIsNotThereYetAndSaysForWhom) {
   caller.on_waiting = [&](const std::string& whom) {
     told.push_back(whom);
     daemon = std::thread([&] {
-      const auto listener = shm::listen_at(runtime.path() + "/arbiter", "late");
+      const auto listener = wire::listen_at(runtime.path() + "/arbiter", "late");
       const shm::FileDescriptor client(::accept(listener.socket.get(), nullptr, nullptr));
-      shm::Received hello;
-      ASSERT_EQ(shm::receive_message(client.get(), hello, true), shm::ReceiveResult::kReceived);
+      wire::Received hello;
+      ASSERT_EQ(wire::receive_message(client.get(), hello, true), wire::ReceiveResult::kReceived);
       EXPECT_EQ(hello.message.name_view(), "early");
-      shm::Message refusal = question(MessageKind::kRefused);
+      wire::Message refusal = question(MessageKind::kRefused);
       refusal.set_text("not you");
-      ASSERT_EQ(shm::send_message(client.get(), refusal), shm::SendResult::kSent);
+      ASSERT_EQ(wire::send_message(client.get(), refusal), wire::SendResult::kSent);
     });
   };
   EXPECT_EQ(error_of([&] { static_cast<void>(wire::join(caller)); }),

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-namespace arbiter::shm {
+namespace arbiter::wire {
 namespace {
 
 std::size_t open_descriptors() {
@@ -52,8 +52,8 @@ class Wire : public testing::Test {
   }
   ReceiveResult receive() { return receive_message(receiver_.get(), received_, false); }
 
-  FileDescriptor sender_;
-  FileDescriptor receiver_;
+  shm::FileDescriptor sender_;
+  shm::FileDescriptor receiver_;
   Received received_;
 };
 
@@ -100,9 +100,9 @@ TEST_F(Wire, NamesAndTextsOfAnyLengthAreCutAndEnded) {
   message.type.set_name(endless);
   ASSERT_EQ(send_message(sender_.get(), message), SendResult::kSent);
   ASSERT_EQ(receive(), ReceiveResult::kReceived);
-  EXPECT_EQ(received_.message.name_view().size(), kMaxNameLength);
+  EXPECT_EQ(received_.message.name_view().size(), shm::kMaxNameLength);
   EXPECT_EQ(received_.message.text_view().size(), sizeof message.text - 1);
-  EXPECT_EQ(received_.message.type.type_name().size(), kMaxTypeName);
+  EXPECT_EQ(received_.message.type.type_name().size(), shm::kMaxTypeName);
 }
 
 TEST_F(Wire, ANameWithoutAnEndIsGivenOne) {
@@ -114,7 +114,7 @@ TEST_F(Wire, ANameWithoutAnEndIsGivenOne) {
   ASSERT_EQ(receive(), ReceiveResult::kReceived);
   EXPECT_EQ(received_.message.name[sizeof message.name - 1], '\0');
   EXPECT_EQ(received_.message.text[sizeof message.text - 1], '\0');
-  EXPECT_EQ(received_.message.type.name[kMaxTypeName], '\0');
+  EXPECT_EQ(received_.message.type.name[shm::kMaxTypeName], '\0');
 }
 
 TEST_F(Wire, AMessageCutBeforeItsFixedPartEndsIsMalformed) {
@@ -205,4 +205,4 @@ TEST(Message, ATextThatIsTooLongForAMessageIsCutBetweenTwoCharacters) {
 }
 
 }  // namespace
-}  // namespace arbiter::shm
+}  // namespace arbiter::wire

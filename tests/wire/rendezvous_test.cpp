@@ -31,7 +31,7 @@ extern "C" int getpwnam_r(const char*, passwd*, char*, size_t, passwd** found) {
   return ENOENT;
 }
 
-namespace arbiter::shm {
+namespace arbiter::wire {
 namespace {
 
 using testing::ElementsAre;
@@ -235,4 +235,4 @@ TEST_F(Rendezvous, ADirectoryThatIsNotThereIsNoErrorForAClient) {
 }
 
 }  // namespace
-}  // namespace arbiter::shm
+}  // namespace arbiter::wire

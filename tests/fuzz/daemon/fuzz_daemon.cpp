@@ -26,7 +26,7 @@
 namespace arbiter::fuzz {
 namespace {
 
-using shm::MessageKind;
+using wire::MessageKind;
 
 // They bound what an input costs, not what the daemon must bear.
 constexpr std::size_t kMostHostile = 6;
@@ -61,7 +61,7 @@ struct Hostile {
 
   Process process;
   std::unique_ptr<Connection> connection;
-  std::vector<std::pair<shm::Message, std::vector<int>>> said;
+  std::vector<std::pair<wire::Message, std::vector<int>>> said;
   std::vector<shm::PortInstance> ports;
   std::vector<std::uint64_t> numbers;  // of nodes, links and barriers
 };
@@ -135,7 +135,7 @@ class Run {
     return each.connection ? &each : nullptr;
   }
 
-  void say(Hostile& who, const shm::Message& message, std::vector<int> descriptors) {
+  void say(Hostile& who, const wire::Message& message, std::vector<int> descriptors) {
     declare_makers(who, descriptors);
     if (who.said.size() < kMostRemembered) who.said.emplace_back(message, descriptors);
     who.connection->send(message, std::move(descriptors));
@@ -155,13 +155,13 @@ class Run {
   void say_hello() {
     Hostile* const hostile = who();
     if (hostile == nullptr) return;
-    shm::Message message;
+    wire::Message message;
     message.kind = MessageKind::kHello;
-    message.value = shm::kWireVersion;
+    message.value = wire::kWireVersion;
     message.flags = script_.byte() % 16;
     message.set_name("hostile");
     std::vector<int> descriptors;
-    if ((message.flags & shm::kRejoins) != 0) {
+    if ((message.flags & wire::kRejoins) != 0) {
       message.link = one_of(hostile->numbers);
       descriptors = {given(0), given(1)};
     } else if (script_.byte() % 2 == 0) {  // it has nothing left of what it was
@@ -175,7 +175,7 @@ class Run {
   void open(MessageKind kind) {
     Hostile* const hostile = who();
     if (hostile == nullptr) return;
-    shm::Message message;
+    wire::Message message;
     message.kind = kind;
     message.set_name(kNames[script_.byte() % std::size(kNames)]);
     message.type.size = script_.byte() % 16;
@@ -188,8 +188,8 @@ class Run {
     say(*hostile, message, descriptors);
   }
 
-  shm::Message anything(const Hostile& hostile) {
-    shm::Message message;
+  wire::Message anything(const Hostile& hostile) {
+    wire::Message message;
     message.kind = static_cast<MessageKind>(script_.byte());
     if (static_cast<std::size_t>(message.kind) >= 240 &&
         static_cast<std::size_t>(message.kind) < 250) {
@@ -204,7 +204,7 @@ class Run {
     message.link = script_.byte() % 2 == 0 ? one_of(hostile.numbers) : script_.number();
     message.id = static_cast<std::uint32_t>(script_.number());
     message.value =
-        script_.byte() % 2 == 0 ? shm::kWireVersion : static_cast<std::uint32_t>(script_.number());
+        script_.byte() % 2 == 0 ? wire::kWireVersion : static_cast<std::uint32_t>(script_.number());
     message.set_name(kNames[script_.byte() % std::size(kNames)]);
     if (script_.byte() % 4 == 0) {
       message.set_name(std::string(script_.byte(), static_cast<char>(script_.byte())));
@@ -221,7 +221,7 @@ class Run {
   void say_anything() {
     Hostile* const hostile = who();
     if (hostile == nullptr) return;
-    const shm::Message message = anything(*hostile);
+    const wire::Message message = anything(*hostile);
     say(*hostile, message, descriptors(*hostile));
   }
 
@@ -229,7 +229,7 @@ class Run {
   void say_noise() {
     Hostile* const hostile = who();
     if (hostile == nullptr) return;
-    const shm::Message message = anything(*hostile);
+    const wire::Message message = anything(*hostile);
     std::vector<std::uint8_t> bytes(4096);
     std::memcpy(bytes.data(), &message, sizeof message);
     for (int i = script_.byte() % 8; i > 0; --i) {
@@ -246,7 +246,7 @@ class Run {
     if (hostile == nullptr || hostile->said.empty()) return;
     const auto& [message, descriptors] = hostile->said[script_.byte() % hostile->said.size()];
     for (int times = script_.byte(); times >= 0; --times) {
-      if (hostile->connection->send(message, descriptors) != shm::SendResult::kSent) break;
+      if (hostile->connection->send(message, descriptors) != wire::SendResult::kSent) break;
     }
   }
 
@@ -283,16 +283,16 @@ class Run {
   void read(bool answers) {
     Hostile* const hostile = who();
     if (hostile == nullptr) return;
-    shm::Received received;
-    while (shm::receive_message(hostile->connection->socket(), received, false) ==
-           shm::ReceiveResult::kReceived) {
-      const shm::Message& message = received.message;
+    wire::Received received;
+    while (wire::receive_message(hostile->connection->socket(), received, false) ==
+           wire::ReceiveResult::kReceived) {
+      const wire::Message& message = received.message;
       if (message.kind == MessageKind::kOpened) hostile->ports.push_back(message.port);
       if (message.peer != 0) hostile->ports.push_back(message.peer);
       if (message.link != 0) hostile->numbers.push_back(message.link);
       if (message.kind == MessageKind::kSync) {
         hostile->numbers.push_back(message.request);
-        shm::Message synced;
+        wire::Message synced;
         synced.kind = MessageKind::kSynced;
         synced.request = message.request;
         if (answers) hostile->connection->send(synced);
@@ -395,7 +395,8 @@ class Run {
     if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) return {};
     shm::FileDescriptor inner(ends[0]);
     const shm::FileDescriptor outer(ends[1]);
-    static_cast<void>(shm::send_message(outer.get(), {}, {hostile.process.identity().process, -1}));
+    static_cast<void>(
+        wire::send_message(outer.get(), {}, {hostile.process.identity().process, -1}));
     return inner;
   }
 

@@ -12,13 +12,13 @@
 namespace arbiter::fuzz {
 namespace {
 
-using shm::MessageKind;
+using wire::MessageKind;
 
-shm::Message message(MessageKind kind, const std::string& name) {
-  shm::Message result;
+wire::Message message(MessageKind kind, const std::string& name) {
+  wire::Message result;
   result.kind = kind;
-  result.value = shm::kWireVersion;
-  result.flags = shm::kComesBack;
+  result.value = wire::kWireVersion;
+  result.flags = wire::kComesBack;
   result.set_name(name);
   return result;
 }
@@ -37,9 +37,9 @@ std::string refusal(Stage& stage, const Process& process) {
   stage.run();
   connection.send(message(MessageKind::kHello, "newcomer"));
   stage.run();
-  shm::Received received;
-  EXPECT_EQ(shm::receive_message(connection.socket(), received, false),
-            shm::ReceiveResult::kReceived);
+  wire::Received received;
+  EXPECT_EQ(wire::receive_message(connection.socket(), received, false),
+            wire::ReceiveResult::kReceived);
   return std::string(received.message.text_view());
 }
 

@@ -14,7 +14,7 @@
 
 namespace arbiter::fuzz {
 
-using shm::MessageKind;
+using wire::MessageKind;
 
 Process::Process(pid_t pid, uid_t user) : pid_(pid), user_(user) {
   int ends[2];
@@ -105,8 +105,8 @@ Connection::Connection(const std::string& path, const Process& process)
       "the daemon can be connected to");
 }
 
-shm::SendResult Connection::send_bytes(const void* data, std::size_t size,
-                                       const std::vector<int>& descriptors) const {
+wire::SendResult Connection::send_bytes(const void* data, std::size_t size,
+                                        const std::vector<int>& descriptors) const {
   for (const int fd : Loop::senders_are_makers ? descriptors : std::vector<int>()) {
     Loop::forget_maker(fd);
     Loop::declare_maker(fd, user_);
@@ -126,12 +126,13 @@ shm::SendResult Connection::send_bytes(const void* data, std::size_t size,
     std::memcpy(CMSG_DATA(rights), descriptors.data(), sizeof(int) * descriptors.size());
   }
   if (::sendmsg(socket_.get(), &header, MSG_NOSIGNAL | MSG_DONTWAIT) >= 0) {
-    return shm::SendResult::kSent;
+    return wire::SendResult::kSent;
   }
-  return errno == EAGAIN ? shm::SendResult::kFull : shm::SendResult::kClosed;
+  return errno == EAGAIN ? wire::SendResult::kFull : wire::SendResult::kClosed;
 }
 
-shm::SendResult Connection::send(const shm::Message& message, std::vector<int> descriptors) const {
+wire::SendResult Connection::send(const wire::Message& message,
+                                  std::vector<int> descriptors) const {
   return send_bytes(&message, sizeof message, descriptors);
 }
 
@@ -139,34 +140,34 @@ void Connection::half_close(int how) const { ::shutdown(socket_.get(), how); }
 
 Honest::Honest(const std::string& path, const Process& process, const std::string& name)
     : connection_(path, process) {
-  shm::Message hello;
+  wire::Message hello;
   hello.kind = MessageKind::kHello;
-  hello.flags = shm::kHasServiceThread;
-  hello.value = shm::kWireVersion;
+  hello.flags = wire::kHasServiceThread;
+  hello.value = wire::kWireVersion;
   hello.set_name(name);
-  require(connection_.send(hello) == shm::SendResult::kSent, "an honest client can say hello");
+  require(connection_.send(hello) == wire::SendResult::kSent, "an honest client can say hello");
 }
 
 bool Honest::read() {
   bool any = false;
   for (;;) {
-    shm::Received received;
-    switch (shm::receive_message(connection_.socket(), received, false)) {
-      case shm::ReceiveResult::kReceived:
+    wire::Received received;
+    switch (wire::receive_message(connection_.socket(), received, false)) {
+      case wire::ReceiveResult::kReceived:
         any = true;
         hear(received);
         break;
-      case shm::ReceiveResult::kNothing:
+      case wire::ReceiveResult::kNothing:
         return any;
-      case shm::ReceiveResult::kClosed:
-      case shm::ReceiveResult::kMalformed:
+      case wire::ReceiveResult::kClosed:
+      case wire::ReceiveResult::kMalformed:
         require(false, "an honest client is not hung up on");
     }
   }
 }
 
-void Honest::hear(const shm::Received& received) {
-  const shm::Message& message = received.message;
+void Honest::hear(const wire::Received& received) {
+  const wire::Message& message = received.message;
   const auto has = [&](std::size_t count) {
     require(received.descriptor_count == count, "messages come with their descriptors");
   };
@@ -202,10 +203,10 @@ void Honest::hear(const shm::Received& received) {
       require(peers_.erase(message.peer) == 1, "only a peer goes");
       break;
     case MessageKind::kSync: {
-      shm::Message synced;
+      wire::Message synced;
       synced.kind = MessageKind::kSynced;
       synced.request = message.request;
-      require(connection_.send(synced) == shm::SendResult::kSent, "an honest client can answer");
+      require(connection_.send(synced) == wire::SendResult::kSent, "an honest client can answer");
       break;
     }
     case MessageKind::kStatusReply: {
@@ -241,16 +242,16 @@ void Honest::hear(const shm::Received& received) {
   }
 }
 
-void Honest::open(const shm::Message& message, const std::vector<int>& descriptors) {
+void Honest::open(const wire::Message& message, const std::vector<int>& descriptors) {
   port_ = 0;
   connected_ = false;
   refusal_.clear();
-  require(connection_.send(message, descriptors) == shm::SendResult::kSent,
+  require(connection_.send(message, descriptors) == wire::SendResult::kSent,
           "an honest client can ask");
 }
 
 void Honest::open_output(const std::string& name) {
-  shm::Message message;
+  wire::Message message;
   message.kind = MessageKind::kOpenOutput;
   message.set_name(name);
   message.type.size = 8;
@@ -260,7 +261,7 @@ void Honest::open_output(const std::string& name) {
 }
 
 void Honest::open_input(const std::string& name) {
-  shm::Message message;
+  wire::Message message;
   message.kind = MessageKind::kOpenInput;
   message.set_name(name);
   message.type.size = 8;
@@ -270,20 +271,20 @@ void Honest::open_input(const std::string& name) {
 }
 
 void Honest::close_port() {
-  shm::Message message;
+  wire::Message message;
   message.kind = MessageKind::kClosePort;
   message.port = port_;
-  require(connection_.send(message) == shm::SendResult::kSent, "an honest client can close");
+  require(connection_.send(message) == wire::SendResult::kSent, "an honest client can close");
   port_ = 0;
   peers_.clear();
 }
 
 void Honest::ask(MessageKind kind, const std::string& name) {
-  shm::Message message;
+  wire::Message message;
   message.kind = kind;
   message.set_name(name);
   refusal_.clear();
-  require(connection_.send(message) == shm::SendResult::kSent, "an honest client can ask");
+  require(connection_.send(message) == wire::SendResult::kSent, "an honest client can ask");
 }
 
 }  // namespace arbiter::fuzz

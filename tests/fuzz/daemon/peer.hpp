@@ -43,9 +43,9 @@ class Connection {
   Connection(const std::string& path, const Process& process);
 
   [[nodiscard]] int socket() const { return socket_.get(); }
-  shm::SendResult send(const shm::Message& message, std::vector<int> descriptors = {}) const;
-  shm::SendResult send_bytes(const void* data, std::size_t size,
-                             const std::vector<int>& descriptors) const;
+  wire::SendResult send(const wire::Message& message, std::vector<int> descriptors = {}) const;
+  wire::SendResult send_bytes(const void* data, std::size_t size,
+                              const std::vector<int>& descriptors) const;
   void half_close(int how) const;
 
  private:
@@ -64,7 +64,7 @@ class Honest {
   void open_output(const std::string& name);
   void open_input(const std::string& name);
   void close_port();
-  void ask(shm::MessageKind kind, const std::string& name = {});
+  void ask(wire::MessageKind kind, const std::string& name = {});
 
   [[nodiscard]] bool is_welcome() const { return welcome_; }
   [[nodiscard]] shm::PortInstance port() const { return port_; }
@@ -78,8 +78,8 @@ class Honest {
   [[nodiscard]] const std::string& status() const { return status_; }
 
  private:
-  void hear(const shm::Received& received);
-  void open(const shm::Message& message, const std::vector<int>& descriptors);
+  void hear(const wire::Received& received);
+  void open(const wire::Message& message, const std::vector<int>& descriptors);
 
   Connection connection_;
   shm::Bell bell_;

@@ -7,12 +7,12 @@
 namespace arbiter::fuzz {
 namespace {
 
-using shm::MessageKind;
+using wire::MessageKind;
 
-shm::Message message(MessageKind kind, const char* name) {
-  shm::Message result;
+wire::Message message(MessageKind kind, const char* name) {
+  wire::Message result;
   result.kind = kind;
-  result.value = shm::kWireVersion;
+  result.value = wire::kWireVersion;
   result.set_name(name);
   return result;
 }
@@ -24,9 +24,9 @@ struct Answers {
 
 Answers read(const Connection& connection) {
   Answers answers;
-  shm::Received received;
-  while (shm::receive_message(connection.socket(), received, false) ==
-         shm::ReceiveResult::kReceived) {
+  wire::Received received;
+  while (wire::receive_message(connection.socket(), received, false) ==
+         wire::ReceiveResult::kReceived) {
     if (received.message.kind != MessageKind::kRefused) continue;
     const bool names_it =
         received.message.text_view().find("kMaxPostponed") != std::string_view::npos;
@@ -40,7 +40,7 @@ class Postponed : public testing::Test {
   // A port whose process lives and does not answer: its name is kept for a while.
   Postponed() {
     auto hello = message(MessageKind::kHello, "away");
-    hello.flags = shm::kComesBack;
+    hello.flags = wire::kComesBack;
     Connection connection(stage_.path(), away_);
     stage_.run();
     connection.send(hello);
@@ -51,7 +51,7 @@ class Postponed : public testing::Test {
   void ask(const Connection& connection, std::uint32_t times) {
     for (std::uint32_t i = 0; i < times; ++i) {
       ASSERT_EQ(connection.send(message(MessageKind::kOpenOutput, "/kept"), {segment_.get()}),
-                shm::SendResult::kSent);
+                wire::SendResult::kSent);
       stage_.run();
     }
   }

@@ -10,7 +10,7 @@
 namespace arbiter::fuzz {
 namespace {
 
-using shm::MessageKind;
+using wire::MessageKind;
 
 // A component with one port, at /a or at /b, and the link between them.
 class Component {
@@ -41,8 +41,8 @@ class Component {
     stage_.run();
   }
   void hand_back_port() {
-    shm::Message message = hello();
-    message.flags |= shm::kRejoins;
+    wire::Message message = hello();
+    message.flags |= wire::kRejoins;
     message.link = node_;
     say(message, {board_.get(), registry_.get()});
     message = port_;
@@ -50,7 +50,7 @@ class Component {
     say(message, {segment_.get(), is_output() ? page_.get() : bell_.write_end().get()});
   }
   void hand_back_link(shm::PortInstance peer, std::uint64_t number) {
-    shm::Message message;
+    wire::Message message;
     message.kind = MessageKind::kHandBackLink;
     message.port = port_.port;
     message.peer = peer;
@@ -62,13 +62,13 @@ class Component {
   }
 
   void close() {
-    shm::Message message;
+    wire::Message message;
     message.kind = MessageKind::kClosePort;
     message.port = port_.port;
     say(message);
   }
 
-  const shm::Received& peer() {
+  const wire::Received& peer() {
     return find(is_output() ? MessageKind::kInputPeer : MessageKind::kOutputPeer);
   }
   bool has_heard(MessageKind kind) {
@@ -80,27 +80,27 @@ class Component {
 
  private:
   [[nodiscard]] bool is_output() const { return opens_ == MessageKind::kOpenOutput; }
-  static shm::Message hello() {
-    shm::Message message;
+  static wire::Message hello() {
+    wire::Message message;
     message.kind = MessageKind::kHello;
-    message.flags = shm::kComesBack;
-    message.value = shm::kWireVersion;
+    message.flags = wire::kComesBack;
+    message.value = wire::kWireVersion;
     message.set_name("component");
     return message;
   }
-  void say(const shm::Message& message, std::vector<int> descriptors = {}) {
+  void say(const wire::Message& message, std::vector<int> descriptors = {}) {
     if (message.kind == MessageKind::kOpenOutput) descriptors.resize(1);
-    ASSERT_EQ(connection_->send(message, std::move(descriptors)), shm::SendResult::kSent);
+    ASSERT_EQ(connection_->send(message, std::move(descriptors)), wire::SendResult::kSent);
     stage_.run();
   }
   void read() {
-    shm::Received received;
-    while (shm::receive_message(connection_->socket(), received, false) ==
-           shm::ReceiveResult::kReceived) {
+    wire::Received received;
+    while (wire::receive_message(connection_->socket(), received, false) ==
+           wire::ReceiveResult::kReceived) {
       heard_.push_back(std::move(received));
     }
   }
-  shm::Received& find(MessageKind kind) {
+  wire::Received& find(MessageKind kind) {
     read();
     for (auto& each : heard_) {
       if (each.message.kind == kind) return each;
@@ -115,12 +115,12 @@ class Component {
   const shm::FileDescriptor segment_ =
       opens_ == MessageKind::kOpenOutput ? make_output_segment({}, 1) : make_input_segment(1);
   std::unique_ptr<Connection> connection_;
-  shm::Message port_;
+  wire::Message port_;
   std::uint64_t node_ = 0;
   shm::FileDescriptor board_;
   shm::FileDescriptor registry_;
   shm::FileDescriptor page_;
-  std::vector<shm::Received> heard_;
+  std::vector<wire::Received> heard_;
 };
 
 class Return : public testing::Test {

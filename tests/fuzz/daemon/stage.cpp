@@ -71,7 +71,7 @@ Stage::Stage() : owner_(::getpid(), ::geteuid()) {
   require(sender_->is_connected() && receiver_->is_connected(), "ports open");
   sources_ = count_sources();
   // The one copy of the model's texts that the daemon keeps once somebody has asked for it.
-  sender_->ask(shm::MessageKind::kModel);
+  sender_->ask(wire::MessageKind::kModel);
   run();
   descriptors_ = count_descriptors();
 }
@@ -103,7 +103,7 @@ void Stage::run(shm::Nanoseconds time) {
 void Stage::reload() {
   write_model(1 - model_);
   const std::uint64_t before = sender_->done();
-  sender_->ask(shm::MessageKind::kReload);
+  sender_->ask(wire::MessageKind::kReload);
   run();
   run(kMostTime);
   require(sender_->done() == before + 1, "a model comes into force");
@@ -112,7 +112,7 @@ void Stage::reload() {
 void Stage::switch_model() {
   const std::uint64_t before = sender_->done();
   is_other_ = !is_other_;
-  sender_->ask(shm::MessageKind::kSwitch, is_other_ ? "other" : "one");
+  sender_->ask(wire::MessageKind::kSwitch, is_other_ ? "other" : "one");
   run();
   run(kMostTime);
   require(sender_->done() == before + 1, "a model is switched to");
@@ -120,12 +120,12 @@ void Stage::switch_model() {
 
 void Stage::roll_back() {
   const std::uint64_t before = sender_->done();
-  sender_->ask(shm::MessageKind::kRollback);
+  sender_->ask(wire::MessageKind::kRollback);
   run();
   run(kMostTime);
   require((sender_->done() == before + 1) == sender_->refusal().empty(),
           "a rollback is made, or refused");
-  sender_->ask(shm::MessageKind::kStatus);
+  sender_->ask(wire::MessageKind::kStatus);
   run();
   is_other_ = nlohmann::json::parse(sender_->status())["model"]["name"] == "other";
 }
@@ -153,7 +153,7 @@ void Stage::serve_newcomer() {
 }
 
 void Stage::require_status() {
-  sender_->ask(shm::MessageKind::kStatus);
+  sender_->ask(wire::MessageKind::kStatus);
   run();
   const auto status = nlohmann::json::parse(sender_->status());
   require(status["model"]["reloads_refused"] == 0, "good models are not refused");
@@ -177,7 +177,7 @@ std::size_t Stage::count_sources() {
   Process process(::getpid(), ::geteuid());
   newcomer_ = std::make_unique<Honest>(path(), process, "observer");
   run();
-  newcomer_->ask(shm::MessageKind::kObserve);
+  newcomer_->ask(wire::MessageKind::kObserve);
   run();
   require(newcomer_->done() == 1, "an observer is told all");
   const std::size_t count = newcomer_->pages();

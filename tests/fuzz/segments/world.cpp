@@ -131,10 +131,10 @@ World::World(const Choices& choices)
 
 void World::connect(detail::OutputCore& from, detail::InputCore& to) {
   const std::uint64_t link = ++last_link_;
-  shm::Received to_output;
+  wire::Received to_output;
   to_output.message.peer = to.instance();
   to_output.message.id = &to == &r ? kR : &to == &r2 ? kR2 : kX;
-  to_output.message.flags = shm::kIsConnected;
+  to_output.message.flags = wire::kIsConnected;
   to_output.descriptors[0] = copy_of(to.segment_descriptor().get());
   to_output.descriptors[1] = copy_of(to.bell().write_end().get());
   try {
@@ -142,7 +142,7 @@ void World::connect(detail::OutputCore& from, detail::InputCore& to) {
   } catch (const std::runtime_error&) {  // others have taken up its max_memory
     return;
   }
-  shm::Received to_input;
+  wire::Received to_input;
   to_input.message.peer = from.instance();
   to_input.message.id = from.source();
   to_input.message.link = link;
@@ -189,7 +189,7 @@ void World::introduce_output(std::uint32_t slots, int more, const std::vector<Pa
   header.version = shm::OutputHeader::kVersion;
   header.slot_count = slots;
   header.type = type();
-  shm::Received received;
+  wire::Received received;
   received.message.peer = ++last_instance_;
   received.message.id = kH;
   received.message.link = ++last_link_;
@@ -220,10 +220,10 @@ void World::introduce_input(const std::vector<Patch>& patches) {
   header.depth = 2;
   header.max_held = 2;
   header.type = type();
-  shm::Received received;
+  wire::Received received;
   received.message.peer = ++last_instance_;
   received.message.id = kX;
-  received.message.flags = shm::kIsConnected;
+  received.message.flags = wire::kIsConnected;
   received.descriptors[0] =
       make_hostile(sizeof(shm::InputSegment), &header, offsetof(shm::InputHeader, wait), patches);
   received.descriptors[1] = copy_of(x.bell().write_end().get());
