@@ -5,7 +5,7 @@
 #include <arbiter/detail/cores.hpp>
 
 #include "client/foreign.hpp"
-#include "client/node_core.hpp"
+#include "client/node/node_core.hpp"
 
 namespace arbiter::detail {
 namespace {

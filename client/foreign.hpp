@@ -9,9 +9,9 @@
 #include <memory>
 #include <string>
 
-#include "client/input_core.hpp"
-#include "client/node_core.hpp"
-#include "client/output_core.hpp"
+#include "client/input/input_core.hpp"
+#include "client/node/node_core.hpp"
+#include "client/output/output_core.hpp"
 
 namespace arbiter::detail {
 

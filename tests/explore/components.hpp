@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "client/input_core.hpp"
-#include "client/output_core.hpp"
+#include "client/input/input_core.hpp"
+#include "client/output/output_core.hpp"
 #include "shm/table_ring.hpp"
 #include "tests/explore/case.hpp"
 #include "tests/explore/explorer.hpp"

@@ -284,7 +284,7 @@ void World::require_accounts() {
 
 std::uint64_t World::require_whole(const detail::HeldSample& held) const {
   if (held.source != kP && held.source != kH) die("a sample of nobody");
-  // One of a hostile publisher may be a copy (client/copies.hpp): all of it can be read.
+  // One of a hostile publisher may be a copy (client/input/copies.hpp): all of it can be read.
   if (held.source == kH) {
     read_ += static_cast<std::size_t>(std::count(held.data, held.data + held.size, std::byte{1}));
     return 0;  // says what it likes

@@ -15,8 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "client/input_core.hpp"
-#include "client/output_core.hpp"
+#include "client/input/input_core.hpp"
+#include "client/output/output_core.hpp"
 #include "shm/table_ring.hpp"
 
 namespace arbiter::fuzz {

@@ -14,8 +14,8 @@
 
 #include <arbiter/detail/cores.hpp>
 
-#include "client/copies.hpp"
 #include "client/handover.hpp"
+#include "client/input/copies.hpp"
 #include "client/memory.hpp"
 #include "client/peers.hpp"
 #include "shm/bell.hpp"

@@ -27,9 +27,9 @@
 
 #include <arbiter/detail/cores.hpp>
 
-#include "client/input_core.hpp"
+#include "client/input/input_core.hpp"
 #include "client/memory.hpp"
-#include "client/output_core.hpp"
+#include "client/output/output_core.hpp"
 #include "shm/descendants.hpp"
 #include "wire/call.hpp"
 #include "wire/messages.hpp"

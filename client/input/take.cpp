@@ -10,7 +10,7 @@
 #include <algorithm>
 
 #include "client/count.hpp"
-#include "client/input_core.hpp"
+#include "client/input/input_core.hpp"
 
 namespace arbiter::detail {
 namespace {

@@ -12,7 +12,7 @@
 #include <system_error>
 #include <utility>
 
-#include "client/node_core.hpp"
+#include "client/node/node_core.hpp"
 
 namespace arbiter::detail {
 namespace {

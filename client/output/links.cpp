@@ -1,11 +1,12 @@
-#include "client/output_core.hpp"
-
+// The service thread's side of an output port: its segment, its peers, the memory of its samples,
+// and the views that it offers.
 #include <fcntl.h>
 
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
 
+#include "client/output/output_core.hpp"
 #include "client/types.hpp"
 
 namespace arbiter::detail {
@@ -77,8 +78,6 @@ void OutputCore::bind(shm::PortInstance instance, shm::SourceId source, shm::Fil
   instance_ = instance;
   source_ = source;
 }
-
-// Service thread.
 
 void OutputCore::add_peer(std::shared_ptr<const InputPeer> peer, std::uint64_t number) {
   const auto instance = peer->instance;
@@ -212,98 +211,6 @@ void OutputCore::offer_view() {
   }
   view->slots = allocated_slots_;
   handover_.offer(std::move(view));
-}
-
-// Port's thread.
-
-// Leaves what has gone, joins what has come.
-void OutputCore::accept_view() noexcept {
-  std::unique_ptr<OutputView> view = handover_.accept();
-  if (view == nullptr) return;
-  leave_all_but(*view);
-  pool_.grow(view->slots);
-  std::vector<Destination> destinations;
-  destinations.reserve(view->links.size());
-  decisions_.reserve(view->links.size());
-  for (const InputLink& link : view->links) {
-    Destination destination;
-    for (const Destination& old : destinations_) {
-      if (old.peer == link.peer.get()) destination = old;
-    }
-    destination.peer = link.peer.get();
-    destination.refused = link.refused;
-    if (link.channel != shm::kNone && !destination.joined) {
-      destination.joined = true;
-      destination.link = link.number;
-      destination.channel = link.channel;
-      destination.writer = shm::ChannelWriter(segment_, link.channel);
-      // What the ring names its reader by: another for each link, lest a port that was disconnected
-      // and connected again takes the old queue for the new one.
-      destination.writer.join(link.number, link.peer->port, link.depth);
-    }
-    destinations.push_back(std::move(destination));
-  }
-  destinations_ = std::move(destinations);
-  handover_.retire(std::exchange(view_, std::move(view)));
-  memory_->service_bell().ring();  // to dispose of the old one
-  bound_epoch_ = UINT64_MAX;
-  // (b) for the queues that we left: their slots may be reclaimed before the next publish.
-  shm::full_fence();
-}
-
-void OutputCore::leave_all_but(const OutputView& view) noexcept {
-  for (Destination& destination : destinations_) {
-    if (!destination.joined) continue;
-    const bool stays =
-        std::any_of(view.links.begin(), view.links.end(), [&](const InputLink& link) {
-          return link.peer.get() == destination.peer && link.number == destination.link &&
-                 link.channel == destination.channel;
-        });
-    if (stays) continue;
-    destination.writer.leave([&](std::uint32_t slot) { pool_.evict(slot); });
-    destination.joined = false;
-    destination.channel = shm::kNone;
-  }
-}
-
-bool OutputCore::rules_are_bound() const noexcept {
-  return memory_->tables().epoch() == bound_epoch_ && memory_->pages().changes() == bound_pages_;
-}
-
-// Again where seven models were loaded meanwhile, for T is used before a decision checks the table.
-void OutputCore::bind_rules() noexcept {
-  for (int tries = 0; tries <= kMaxTableRetries; ++tries) {
-    bound_pages_ = memory_->pages().changes();
-    snapshot_ = memory_->tables().snapshot();
-    bound_epoch_ = snapshot_.epoch;
-    timeout_ = snapshot_.table.timeout(source_);
-    bind_decisions();
-    if (memory_->tables().is_whole(snapshot_)) return;
-  }
-}
-
-void OutputCore::bind_decisions() noexcept {
-  decisions_.clear();
-  std::size_t reads = 0;
-  for (Destination& destination : destinations_) {
-    if (!destination.joined && !destination.refused) continue;
-    const shm::TableView& table = snapshot_.table;
-    const shm::Rule rule = table.rule(table.find(source_, destination.peer->port));
-    destination.has_rule = rule.source != shm::kNone;
-    const auto same = std::find_if(
-        decisions_.begin(), decisions_.end(),
-        [&](const SharedDecision& decision) { return decision.rule.decides_as(rule); });
-    destination.decision = static_cast<std::uint32_t>(same - decisions_.begin());
-    if (same != decisions_.end()) continue;
-    decisions_.push_back({rule, {}, {}});
-    reads += shm::BoundRule::reads_of(rule);
-  }
-  reads_.resize(std::max(reads_.size(), reads));
-  shm::Read* next = reads_.data();
-  for (SharedDecision& decision : decisions_) {
-    decision.bound.bind(decision.rule, memory_->pages(), next, false);
-    next += shm::BoundRule::reads_of(decision.rule);
-  }
 }
 
 }  // namespace arbiter::detail

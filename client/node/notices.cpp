@@ -4,7 +4,7 @@
 // before the next message is handled: so a port's opening returns after what was known of it.
 #include <cstdio>
 
-#include "client/node_core.hpp"
+#include "client/node/node_core.hpp"
 
 namespace arbiter::detail {
 namespace {

@@ -1,4 +1,4 @@
-#include "client/predecessors.hpp"
+#include "client/input/predecessors.hpp"
 
 #include <algorithm>
 

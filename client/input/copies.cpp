@@ -1,4 +1,4 @@
-#include "client/copies.hpp"
+#include "client/input/copies.hpp"
 
 #include <algorithm>
 

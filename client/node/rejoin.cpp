@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/node_core.hpp"
+#include "client/node/node_core.hpp"
 #include "shm/clock.hpp"
 #include "wire/meeting.hpp"
 #include "wire/rendezvous.hpp"

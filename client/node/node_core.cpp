@@ -1,5 +1,5 @@
 // Connecting, opening and closing ports, questions and answers.
-#include "client/node_core.hpp"
+#include "client/node/node_core.hpp"
 
 #include <sys/epoll.h>
 #include <sys/socket.h>
@@ -12,7 +12,7 @@
 #include <exception>
 #include <utility>
 
-#include "client/node_names.hpp"
+#include "client/node/names.hpp"
 #include "client/types.hpp"
 #include "wire/call.hpp"
 #include "wire/meeting.hpp"

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "client/count.hpp"
-#include "client/output_core.hpp"
+#include "client/output/output_core.hpp"
 
 namespace arbiter::detail {
 

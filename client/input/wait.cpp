@@ -13,7 +13,7 @@
 #include <cstring>
 
 #include "client/count.hpp"
-#include "client/input_core.hpp"
+#include "client/input/input_core.hpp"
 
 namespace arbiter::detail {
 namespace {

@@ -8,7 +8,7 @@
 #include <cstring>
 
 #include "client/count.hpp"
-#include "client/output_core.hpp"
+#include "client/output/output_core.hpp"
 #include "shm/prefetch.hpp"
 
 namespace arbiter::detail {

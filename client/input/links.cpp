@@ -1,21 +1,14 @@
-// The service thread's side of an input port, and the taking up of what it offers.
-#include "client/input_core.hpp"
-
+// The service thread's side of an input port: its segment, its peers, and the views that it offers.
 #include <fcntl.h>
 
 #include <algorithm>
 #include <system_error>
 
-#include "client/count.hpp"
-#include "client/predecessors.hpp"
+#include "client/input/input_core.hpp"
+#include "client/input/predecessors.hpp"
 #include "client/types.hpp"
 
 namespace arbiter::detail {
-namespace {
-
-const shm::Atomic<std::uint64_t> nothing_seen{0};
-
-}  // namespace
 
 InputCore::InputCore(std::string name, const Type& type, const InputPortOptions& options,
                      std::shared_ptr<SharedMemory> memory)
@@ -159,138 +152,6 @@ bool InputCore::offer_links() {
     link.offered = true;
   }
   return was_accepted;
-}
-
-// Port's thread.
-
-void InputCore::accept_view() {
-  std::unique_ptr<InputView> view = handover_.accept();
-  if (view == nullptr) return;
-  const auto link_of = [&](const Queue& queue) {
-    return std::find_if(view->links.begin(), view->links.end(),
-                        [&](const OutputLink& link) { return link.peer == queue.peer; });
-  };
-  for (Queue& queue : queues_) {
-    const auto link = link_of(queue);
-    if (link != view->links.end()) {
-      queue.gone = link->gone;
-    } else {
-      retire_queue(queue, *view);
-    }
-  }
-  std::erase_if(queues_, [](const Queue& queue) { return queue.lane == nullptr; });
-  count(segment_->header.counters.overtaken,
-        view->let_go - std::exchange(counted_let_go_, view->let_go));
-  for (const OutputLink& link : view->links) {
-    const bool known = std::any_of(queues_.begin(), queues_.end(),
-                                   [&](const Queue& queue) { return queue.peer == link.peer; });
-    if (known || link.peer->drained.load(std::memory_order_relaxed)) continue;
-    Queue queue;
-    queue.peer = link.peer;
-    queue.gone = link.gone;
-    queue.allocated_slots = link.peer->allocated_slots.load(std::memory_order_relaxed);
-    queue.reader = shm::ChannelReader(link.peer->segment, link.peer->instance, link.peer->link);
-    queue.lane = free_lane();
-    if (queue.lane == nullptr) continue;
-    queue.lane->source.store(link.peer->source, std::memory_order_relaxed);
-    queue.lane->link.store(link.peer->link, std::memory_order_relaxed);
-    queue.lane->consumed.store(0, std::memory_order_relaxed);
-    queue.lane->taken.store(0, std::memory_order_relaxed);
-    queue.lane->dropped.store(0, std::memory_order_relaxed);
-    queue.lane->overtaken.store(0, std::memory_order_relaxed);
-    // SYNC POINT: lane-given. Release, with the acquire in OutputCore::is_full().
-    queue.lane->publisher.store(link.peer->instance, std::memory_order_release);
-    queues_.push_back(std::move(queue));
-  }
-  // Nothing is known of them yet: no word says so.
-  watches_.assign(queues_.size(), {&nothing_seen, 1});
-  waiting_.clear();
-  waiting_.reserve(queues_.size());
-  handover_.retire(std::exchange(view_, std::move(view)));
-  memory_->service_bell().ring();  // to dispose of the old one
-  bound_epoch_ = UINT64_MAX;
-}
-
-shm::Lane* InputCore::free_lane() noexcept {
-  for (shm::Lane& lane : segment_->lanes) {
-    if (lane.publisher.load(std::memory_order_relaxed) == 0) return &lane;
-  }
-  return nullptr;
-}
-
-// What the queue still has is lost: its connection is gone; or its publisher is, and a later one of
-// the same source has pushed all of it out.
-void InputCore::retire_queue(Queue& queue, const InputView& next) {
-  const bool is_succeeded =
-      std::any_of(next.links.begin(), next.links.end(), [&](const OutputLink& link) {
-        return link.peer->source == queue.peer->source &&
-               link.peer->instance > queue.peer->instance;
-      });
-  shm::InputCounters& counters = segment_->header.counters;
-  if (is_succeeded) {
-    join(queue);
-    count(counters.overtaken, queue.reader.left_behind());
-  } else {
-    count(counters.dropped, queue.reader.backlog(queue.reader.backlog_end()));
-  }
-  if (queue.peer->held != 0) {
-    auto kept = std::make_unique<InputView>();
-    kept->links.push_back({queue.peer, true});
-    lingering_.push_back(std::move(kept));
-  }
-  queue.peer->drained.store(true, std::memory_order_relaxed);
-  queue.lane->publisher.store(0, std::memory_order_relaxed);
-  queue.lane = nullptr;
-}
-
-void InputCore::bind_rules() {
-  bound_pages_ = memory_->pages().changes();
-  snapshot_ = memory_->tables().snapshot();
-  bound_epoch_ = snapshot_.epoch;
-  const shm::TableView& table = snapshot_.table;
-  rules_.clear();
-  sources_.clear();
-  const auto range = table.connections_to(port_);
-  for (auto index = range.first; index != range.first + range.count; ++index) {
-    rules_.push_back(table.rule(index));
-    sources_.push_back(rules_.back().source);
-  }
-  bind_queues();
-  const shm::WordList read = table.sources_read(port_);
-  for (shm::Word i = 0; i < read.count && i < shm::kMaxSourcesPerPort; ++i) {
-    sources_.push_back(read[i]);
-  }
-  std::sort(sources_.begin(), sources_.end());
-  sources_.erase(std::unique(sources_.begin(), sources_.end()), sources_.end());
-  picture_.resize(sources_.size());
-  activities_.resize(sources_.size());
-  std::transform(sources_.begin(), sources_.end(), activities_.begin(),
-                 [&](shm::SourceId source) { return memory_->pages().find(source); });
-}
-
-void InputCore::bind_queues() {
-  const auto rule_of = [&](const Queue& queue) {
-    const auto found = std::find_if(rules_.begin(), rules_.end(), [&](const shm::Rule& rule) {
-      return rule.source == queue.peer->source;
-    });
-    return found == rules_.end() ? shm::Rule{} : *found;
-  };
-  std::size_t reads = 0;
-  for (const Queue& queue : queues_) reads += shm::BoundRule::reads_of(rule_of(queue));
-  reads_.resize(std::max(reads_.size(), reads));
-  shm::Read* next = reads_.data();
-  for (Queue& queue : queues_) {
-    const shm::Rule rule = rule_of(queue);
-    queue.rule.bind(rule, memory_->pages(), next, false);
-    next += shm::BoundRule::reads_of(rule);
-  }
-}
-
-void InputCore::refresh() {
-  if (handover_.has_offer()) accept_view();
-  if (memory_->tables().epoch() != bound_epoch_ || memory_->pages().changes() != bound_pages_) {
-    bind_rules();
-  }
 }
 
 }  // namespace arbiter::detail

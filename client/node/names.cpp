@@ -1,4 +1,4 @@
-#include "client/node_names.hpp"
+#include "client/node/names.hpp"
 
 #include <string>
 
