@@ -38,8 +38,8 @@ std::string file_advice(FileNow::State state, bool is_older) {
     case FileNow::State::kChanged:
       break;
   }
-  return is_older ? " says something else: in force is an older one, a rollback; arbiter reload "
-                    "would leave it for what the file says now (arbiter reload --dry-run tells "
+  return is_older ? " differs from the model in force, which is an older one, after a rollback; "
+                    "arbiter reload would replace it by the file's (arbiter reload --dry-run shows "
                     "what that changes)"
                   : " has changed since; arbiter reload puts it in force, unless it has errors "
                     "(arbiter reload --dry-run tells)";

@@ -145,7 +145,7 @@ int check(const CheckOptions& options) {
   }
   if (failed) {
     std::cout << "failed: " << rules::counts(diagnostics)
-              << (options.strict ? " (--strict takes warnings for errors)\n" : "\n");
+              << (options.strict ? " (--strict treats warnings as errors)\n" : "\n");
   } else {
     std::cout << "ok: " << summary_of(model->compiled) << '\n';
   }

@@ -71,7 +71,7 @@ void add_history(CLI::App& app, int& exit_code) {
   CLI::App* verb = app.add_subcommand(
       "history",
       "Show the models that were in force, latest first: since when, and who asked for them");
-  verb->add_flag("--json", options->json, "As the daemon's JSON document");
+  verb->add_flag("--json", options->json, "Write the daemon's JSON document");
   add_instance_option(*verb, options->instance);
   verb->footer("Example:\n  arbiter history");
   verb->callback([options, &exit_code] { exit_code = history(*options); });

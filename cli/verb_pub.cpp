@@ -49,8 +49,8 @@ void warn_if_nobody_is_there(const PubOptions& options) try {
   }
   if (missing.empty()) return;
   std::cerr << "arbiter: no component has " << rules::enumerate(missing)
-            << " open, to which the model connects " << options.port
-            << ", so that nothing of this is delivered\n";
+            << " open, which the model connects to " << options.port
+            << ", so none of these samples is delivered\n";
 } catch (const std::exception&) {
   // It is not allowed, or the daemon has gone meanwhile: that is no reason not to publish.
 }

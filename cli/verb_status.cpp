@@ -183,7 +183,7 @@ int status(const StatusOptions& options) {
 void add_status(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<StatusOptions>();
   CLI::App* verb = app.add_subcommand("status", "Show ports, connections, winners and counters");
-  verb->add_flag("--json", options->json, "As the daemon's JSON document");
+  verb->add_flag("--json", options->json, "Write the daemon's JSON document");
   add_instance_option(*verb, options->instance);
   verb->footer("Example:\n  arbiter status");
   verb->callback([options, &exit_code] { exit_code = status(*options); });

@@ -31,7 +31,7 @@ int list(const SwitchOptions& options) {
     for (const auto& file : model.files) std::cout << ' ' << file;
     if (model.application) std::cout << ", application " << *model.application;
     if (model.in_force && !model.as_loaded) {
-      std::cout << "  (in force is an older one: a rollback)";
+      std::cout << "  (after a rollback, an older one is in force)";
     }
     std::cout << '\n';
   }

@@ -141,7 +141,7 @@ void WhyAnswer::write_rest(const std::vector<const ConnectionExplanation*>& rest
   if (!obstructed.empty()) {
     std::cout << "  ! there is more to say about " << rules::enumerate(obstructed) << '\n';
   }
-  std::cout << "\narbiter why " << port_.name() << " SOURCE tells of one of them, --all of all\n";
+  std::cout << "\narbiter why " << port_.name() << " SOURCE shows one of them, --all shows all\n";
 }
 
 void WhyAnswer::write_senses() const {
@@ -174,7 +174,7 @@ void WhyAnswer::write_only_named() const {
   names.insert(names.end(), explanation_.senses.begin(), explanation_.senses.end());
   std::erase_if(names, [this](const std::string& source) { return !is_only_named(source); });
   if (names.empty()) return;
-  std::cout << "\nNever started, nobody has them open: " << rules::enumerate(names)
+  std::cout << "\nNever started (no component has opened them): " << rules::enumerate(names)
             << (names.size() > rules::kMaxNamesInWords ? " (--all shows all)" : "") << '\n';
 }
 

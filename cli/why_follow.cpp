@@ -56,8 +56,8 @@ class Follower {
     port_.instance().update();
     const bool is_alone = !port_.instance().has_daemon();
     if (is_alone == std::exchange(is_alone_, is_alone)) return;
-    std::cerr << (is_alone ? "arbiter: the daemon has gone; what it decided last goes on, and is "
-                             "followed on\n"
+    std::cerr << (is_alone ? "arbiter: the daemon has gone; its last decisions stay in force, and "
+                             "arbiter keeps following them\n"
                            : "arbiter: a daemon is there again\n");
   }
 

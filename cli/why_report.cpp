@@ -206,7 +206,7 @@ std::string headline(const rules::Cause& cause) {
 }
 
 std::string first_cause(const rules::ConnectionExplanation& connection, const Sources& sources) {
-  if (!connection.has_rule) return "no rule selects it, so that it never delivers here";
+  if (!connection.has_rule) return "no rule selects it, so it never delivers here";
   if (!connection.is_active) return "it is " + activity_text(sources, connection.source);
   if (connection.earlier) {
     return *connection.earlier + " comes before it in the model, and conflict=\"first\" is set";
@@ -231,7 +231,7 @@ std::string loss_text(const rules::PortExplanation& port, const std::string& los
 void write_causes(std::ostream& out, const rules::ConnectionExplanation& connection,
                   const Sources& sources, std::size_t max_lines) {
   if (!connection.has_rule) {
-    out << "  no rule selects it, so that it never delivers here" << place(connection.where)
+    out << "  no rule selects it, so it never delivers here" << place(connection.where)
         << (connection.is_read ? "; its activity counts for the rules that read it"
                                : "; nor does any rule read it")
         << '\n';

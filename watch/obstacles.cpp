@@ -36,10 +36,10 @@ void add_away(int pid, std::vector<Obstacle>& result) {
 
 void add_unknown(const StrangerStatus& stranger, std::vector<Obstacle>& result) {
   const std::string who = "component " + process_text(stranger);
-  result.push_back({"component-unknown",
-                    who + " lives and has it open, but this daemon does not know it, for what the "
-                          "last one knew is lost: it goes on by itself, as was decided last; "
-                          "restart it"});
+  result.push_back(
+      {"component-unknown",
+       who + " lives and has it open, but this daemon does not know it, because the state of the "
+             "last daemon is lost: it continues under the last decisions it knew; restart it"});
   add_stopped(stranger.pid, who, result);
 }
 
@@ -64,7 +64,7 @@ const Port* find_near(const std::vector<Port>& list, const std::vector<std::stri
 
 std::string unmentioned_text(const auto& port) {
   return "component " + component_text(port) + " has " + port.name +
-         " open, which the model does not mention; is that the one meant?";
+         " open, which the model does not mention; did you mean that one?";
 }
 
 }  // namespace
@@ -128,7 +128,7 @@ void Obstacles::add_port_name(std::vector<Obstacle>& result) const {
     const std::vector<std::string_view> ports(known_ports_.begin(), known_ports_.end());
     if (const auto similar = rules::find_similar(port_, ports)) {
       result.push_back(
-          {"near-name", "the model mentions " + *similar + "; is that the one meant?"});
+          {"near-name", "the model mentions " + *similar + "; did you mean that one?"});
     }
   } else if (!is_open()) {
     const auto* other = find_near(status_.inputs, known_ports_, port_);
@@ -161,7 +161,7 @@ std::vector<Obstacle> Obstacles::of_connection(const std::string& source) const 
       is_open() ? "component " + component_text(*input_) : "the component";
   // Counted from the opening of the ports on: it may be long ago.
   say(connection.refused, "refused",
-      " samples were refused since the ports were opened, because the queue was full then "
+      " samples have been refused since the ports were opened, because the queue was full "
       "(refuse_new)");
   say(connection.overtaken, "overtaken",
       " samples have been lost to newer ones since the ports were opened, because " + component +
@@ -204,9 +204,9 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
                       "no component has the output port open: it was never "
                       "started, or opens it under another name"});
   } else {
-    result.push_back({"output-not-open",
-                      "no component has the output port open any more: it has closed the port, or "
-                      "its process has died"});
+    result.push_back(
+        {"output-not-open",
+         "no component has the output port open any longer: its component closed it, or died"});
   }
   if (is_latched) {
     result.push_back(

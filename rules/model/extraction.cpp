@@ -172,7 +172,7 @@ class Extraction {
                         quote(behaviour.name) + " inhibits " +
                             quote(model_.behaviours[inhibited].name) + " at " + *port_names_[port] +
                             " without a connection there; it does so while " + describe(voice) +
-                            " active, which is fine if it is meant so",
+                            " active, which is fine if you intend it",
                         {.ports = {*port_names_[port]}, .behaviour = behaviour.name});
     }
     return voice.anywhere;

@@ -98,7 +98,7 @@ void ModelChanges::attempt(Swap& swap, const std::function<void()>& step) {
     if (swap.change.kind == Change::Kind::kReload) ++reloads_refused_;
     // What is found in files is in the log when they have been read.
     const char* const why =
-        swap.findings.has_errors() ? "the files have errors, told above" : error.what();
+        swap.findings.has_errors() ? "the files have errors, listed above" : error.what();
     if (swap.change.kind == Change::Kind::kCompare) {
       log::info("{} asks what a reload would do: {}", swap.change.by, why);
     } else {

@@ -44,8 +44,8 @@ void Switchboard::refuse(shm::PortInstance port, shm::PortInstance peer, const s
 
 std::string Switchboard::unmentioned_text(const shm::TableSnapshot& in_force,
                                           const std::string& name, bool is_output) const {
-  const std::string what = is_output ? "nothing of this is delivered" : "nothing comes";
-  if (in_force.generation == 0) return "no model is in force, so that " + what;
+  const std::string what = is_output ? "none of these samples is delivered" : "no sample arrives";
+  if (in_force.generation == 0) return "no model is in force, so " + what;
   std::vector<std::string_view> mentioned;
   for (const auto& source : names_.sources()) {
     if (is_output && in_force.table.knows_source(source->id)) mentioned.push_back(source->name);
@@ -54,7 +54,7 @@ std::string Switchboard::unmentioned_text(const shm::TableSnapshot& in_force,
     if (!is_output && in_force.table.knows_port(input->id)) mentioned.push_back(input->name);
   }
   if (mentioned.size() > kMaxCompared) mentioned.clear();
-  return "the model in force does not mention " + name + ", so that " + what +
+  return "the model in force does not mention " + name + ", so " + what +
          rules::advise(name, mentioned, "`arbiter status` shows the ports that it mentions");
 }
 

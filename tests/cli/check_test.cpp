@@ -124,7 +124,7 @@ TEST(Check, StrictTakesWarningsForErrorsButForSilencedOnes) {
   const auto model = directory.write("m.xml", kMisspeltModel);
   auto result = arbiter({"check", model, "--strict"});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.out, "failed: 2 errors, 1 note (--strict takes warnings for errors)\n");
+  EXPECT_EQ(result.out, "failed: 2 errors, 1 note (--strict treats warnings as errors)\n");
   EXPECT_THAT(result.err, HasSubstr(model + ":4:20: error: the name /safety/estopp:o "));
   result = arbiter({"check", model, "--strict", "--json"});
   EXPECT_EQ(result.exit_code, 1);

@@ -23,7 +23,7 @@ TEST(Unmentioned, PubAndEchoSayThatNothingPasses) {
   auto result = arbiter({"pub", "/Fase/pos:o", "--count", "1"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.err,
-            "arbiter: the model in force does not mention /Fase/pos:o, so that nothing of this is "
+            "arbiter: the model in force does not mention /Fase/pos:o, so none of these samples is "
             "delivered; did you mean \"/Face/pos:o\"?\n");
   result = arbiter({"pub", "/other", "--count", "1"});
   EXPECT_THAT(result.err, HasSubstr("; `arbiter status` shows the ports that it mentions\n"));
@@ -49,8 +49,8 @@ TEST(Unmentioned, PubSaysWhereNobodyHasTheInputPortOpen) {
   const auto result = arbiter({"pub", "/Face/pos:o", "--count", "1"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.err,
-            "arbiter: no component has /Gaze/pos:i open, to which the model connects /Face/pos:o, "
-            "so that nothing of this is delivered\n");
+            "arbiter: no component has /Gaze/pos:i open, which the model connects to /Face/pos:o, "
+            "so none of these samples is delivered\n");
 }
 
 TEST(Unmentioned, PubSaysThatTheTypesDiffer) {
@@ -85,7 +85,7 @@ TEST(Unmentioned, TheLogWarnsOnceOfEachPort) {
   auto in = node.input_port<int>("/Gaze/po:i");
   daemon.load(kModel);
   daemon.load(kModel);
-  EXPECT_EQ(count("the model in force does not mention /Fase/pos:o, so that nothing of this is "
+  EXPECT_EQ(count("the model in force does not mention /Fase/pos:o, so none of these samples is "
                   "delivered; did you mean \"/Face/pos:o\"?"),
             1);
   EXPECT_EQ(count("the model in force does not mention /Gaze/po:i, so that nothing comes"), 1);
@@ -94,7 +94,7 @@ TEST(Unmentioned, TheLogWarnsOnceOfEachPort) {
 TEST(Unmentioned, WithoutAModelThatIsSaid) {
   Daemon daemon("", Daemon::Options{.without_model = true});
   EXPECT_EQ(arbiter({"pub", "/a", "--count", "1"}).err,
-            "arbiter: no model is in force, so that nothing of this is delivered\n");
+            "arbiter: no model is in force, so none of these samples is delivered\n");
   Node node("test");
   auto out = node.output_port<int>("/a");
   EXPECT_THAT(arbiter({"status"}).out, Not(HasSubstr("mention")));

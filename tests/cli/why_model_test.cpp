@@ -116,8 +116,8 @@ TEST_F(WhyOfTwoModels, AfterARollbackDoesNotAdviseToGoBackToWhatWasFledFrom) {
   EXPECT_EQ(why_json({"/arm"})["model"]["is_older"], true);
   EXPECT_THAT(why({"/arm"}),
               AllOf(HasSubstr("! " + first_ +
-                              " says something else: in force is an older one, "
-                              "a rollback; arbiter reload would leave it"),
+                              " differs from the model in force, which is an older one, "
+                              "after a rollback; arbiter reload would replace it"),
                     HasSubstr("arbiter reload --dry-run"), Not(HasSubstr("has changed since"))));
   ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
   EXPECT_EQ(why_json({"/arm"})["model"]["is_older"], false);

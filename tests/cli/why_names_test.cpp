@@ -23,7 +23,7 @@ const std::string kMisnamed = R"(<behaviors timeout="forever">
   <condition>/deadmann</condition><inhibition>Wander</inhibition></behavior>
 </behaviors>)";
 
-const char* const kMeant = "which the model does not mention; is that the one meant?";
+const char* const kMeant = "which the model does not mention; did you mean that one?";
 
 std::string pid() { return std::to_string(::getpid()); }
 
@@ -61,7 +61,7 @@ TEST(WhyNames, TellsOfPortsUnderANearName) {
   auto in = node.input_port<int>("/bas");
   auto out = node.output_port<int>("/wandr");
   EXPECT_THAT(why({"/base"}), HasSubstr("component test (pid " + pid() + ") has /bas open, "));
-  EXPECT_THAT(why({"/bas"}), HasSubstr("! the model mentions /base; is that the one meant?"));
+  EXPECT_THAT(why({"/bas"}), HasSubstr("! the model mentions /base; did you mean that one?"));
   EXPECT_THAT(codes(connection(why_json({"/base"}), "/wander")["obstacles"]),
               ElementsAre("output-not-open", "near-name"));
   // What the model mentions is meant as it is.
@@ -169,7 +169,7 @@ TEST(WhyNames, TellsWhoWouldLikeToWinFirstAndOnlyNamesWhoWasNeverStarted) {
   EXPECT_LT(text.find("\n/s111 is kept out"), text.find("\n/s100 is kept out"));
   EXPECT_THAT(text, AllOf(HasSubstr("has it open, and has sent nothing since\n  and by the rules: "
                                     "arbiter why /base /s100"),
-                          HasSubstr("Never started, nobody has them open: /s101, /s102"),
+                          HasSubstr("Never started (no component has opened them): /s101, /s102"),
                           HasSubstr("\n/go is sensed"), Not(HasSubstr("\n/s101"))));
   EXPECT_THAT(why({"/base", "--all"}),
               AllOf(HasSubstr("\n/s101 is kept out"), Not(HasSubstr("Never started"))));
@@ -201,7 +201,7 @@ TEST(WhyNames, OfAPortWithAsManyConnectionsAsCanBeTellsWhatFitsAScreen) {
                     HasSubstr("\n252 more are kept out by the rules:\n"
                               "  252 inhibited by behaviour \"B254\" ("),
                     HasSubstr(": /s1002, /s1003, /s1004, /s1005, /s1006, /s1007 and 246 more"),
-                    HasSubstr("arbiter why /base SOURCE tells of one of them, --all of all")));
+                    HasSubstr("arbiter why /base SOURCE shows one of them, --all shows all")));
   const std::string all = why({"/base", "--all"});
   EXPECT_THAT(all, AllOf(HasSubstr("\n/s1253 is kept out\n"), Not(HasSubstr("more are kept out"))));
   for (int i = 0; i + 1 < kCount; ++i) ports[static_cast<std::size_t>(i)].deactivate();

@@ -138,10 +138,11 @@ TEST(Why, TellsOfSamplesThatDidNotGetThrough) {
   auto face = node.output_port<int>("/face");
   auto in = node.input_port<int>("/gaze", {.depth = 2, .when_full = refuse_new});
   for (int i = 0; i < 5; ++i) random.publish(i);
-  EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
-              ElementsAre(HasSubstr("3 samples were refused since the ports were opened, because"),
-                          HasSubstr("2 samples wait to be taken"),
-                          HasSubstr("has not taken any of the 2 accepted samples")));
+  EXPECT_THAT(
+      texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
+      ElementsAre(HasSubstr("3 samples have been refused since the ports were opened, because"),
+                  HasSubstr("2 samples wait to be taken"),
+                  HasSubstr("has not taken any of the 2 accepted samples")));
   face.signal();
   EXPECT_FALSE(in.take());
   EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
@@ -164,7 +165,7 @@ TEST(Why, TellsOfComponentsThatAreStoppedAndThatHaveDied) {
   const json random = connection(why_json({"/gaze"}), "/random");
   EXPECT_EQ(random["winner"], true) << "activity belongs to the source, not to the process";
   EXPECT_THAT(texts(random["obstacles"]),
-              ElementsAre(HasSubstr("its process has died"),
+              ElementsAre(HasSubstr("its component closed it, or died"),
                           HasSubstr("arbiter deactivate /random ends it")));
 }
 
@@ -176,7 +177,7 @@ TEST(Why, TellsOfConnectionsAndPortsWithoutRules) {
 <connection><from>/other</from><to>/gaze</to></connection>
 <connection><from>/other</from><to>/free</to></connection></application>)"});
   EXPECT_THAT(why({"/gaze", "/other"}),
-              HasSubstr("/other is kept out\n  no rule selects it, so that it never delivers"));
+              HasSubstr("/other is kept out\n  no rule selects it, so it never delivers"));
   EXPECT_THAT(why({"/free"}),
               AllOf(HasSubstr("/free: not arbitrated"), HasSubstr("/other is delivered")));
   Node node("test");

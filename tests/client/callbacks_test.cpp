@@ -218,7 +218,7 @@ TEST(OnNotice, TellsOfPortsThatTheModelDoesNotMention) {
   EXPECT_EQ(given[0].kind, NoticeKind::unmentioned);
   EXPECT_EQ(given[0].port, "/ouut");
   EXPECT_EQ(given[0].text,
-            "the model in force does not mention /ouut, so that nothing of this is delivered; did "
+            "the model in force does not mention /ouut, so none of these samples is delivered; did "
             "you mean \"/out\"?");
   EXPECT_EQ(given[1].port, "/elsewhere");
   // A model that has them, and one that has not.

@@ -229,7 +229,7 @@ TEST_F(ChangingModels, RollbackGoesBackStepByStepOrToOneByItsNumber) {
                             "/model.xml (reload)\n"
                             "  1 of 1 port decides differently (/in)\n");
   EXPECT_EQ(source_in_force(), "/b");
-  EXPECT_THAT(arbiter({"switch"}).out, HasSubstr("(in force is an older one: a rollback)"));
+  EXPECT_THAT(arbiter({"switch"}).out, HasSubstr("(after a rollback, an older one is in force)"));
   ASSERT_EQ(arbiter({"rollback"}).exit_code, 0);
   EXPECT_EQ(source_in_force(), "/a");
   expect_refusal(arbiter({"rollback"}),
