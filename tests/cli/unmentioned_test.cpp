@@ -30,7 +30,7 @@ TEST(Unmentioned, PubAndEchoSayThatNothingPasses) {
   result = arbiter({"echo", "/Gaze/po:i", "--for", "1ms"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.err,
-            "arbiter: the model in force does not mention /Gaze/po:i, so that nothing comes; did "
+            "arbiter: the model in force does not mention /Gaze/po:i, so no sample arrives; did "
             "you mean \"/Gaze/pos:i\"?\n");
 }
 
