@@ -88,7 +88,7 @@ TEST(Unmentioned, TheLogWarnsOnceOfEachPort) {
   EXPECT_EQ(count("the model in force does not mention /Fase/pos:o, so none of these samples is "
                   "delivered; did you mean \"/Face/pos:o\"?"),
             1);
-  EXPECT_EQ(count("the model in force does not mention /Gaze/po:i, so that nothing comes"), 1);
+  EXPECT_EQ(count("the model in force does not mention /Gaze/po:i, so no sample arrives"), 1);
 }
 
 TEST(Unmentioned, WithoutAModelThatIsSaid) {
