@@ -1,9 +1,11 @@
 #include "bench/harness/program.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -25,8 +27,8 @@ void pass_on(int number) { ::kill(supervised.load(), number); }
 
 }  // namespace
 
-Program::Program(const std::vector<std::string>& argv,
-                 const std::map<std::string, std::string>& variables, const std::string& log) {
+Program::Program(const std::vector<std::string>& argv, const Variables& variables,
+                 const std::string& log) {
   const pid_t parent = ::getpid();
   pid_ = ::fork();
   if (pid_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
@@ -34,7 +36,9 @@ Program::Program(const std::vector<std::string>& argv,
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(126);
   ::setpgid(0, 0);  // Ctrl-C is the benchmark's to hear; it ends its programs in order
-  for (const auto& [name, value] : variables) ::setenv(name.c_str(), value.c_str(), 1);
+  for (const auto& [name, value] : variables) {
+    value ? ::setenv(name.c_str(), value->c_str(), 1) : ::unsetenv(name.c_str());
+  }
   const int in = ::open("/dev/null", O_RDONLY);
   const int out = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
   if (in < 0 || out < 0) ::_exit(126);
@@ -48,12 +52,14 @@ Program::Program(const std::vector<std::string>& argv,
   ::_exit(127);
 }
 
-Program::Program(Program&& other) noexcept : pid_(std::exchange(other.pid_, -1)) {}
+Program::Program(Program&& other) noexcept
+    : pid_(std::exchange(other.pid_, -1)), exit_code_(other.exit_code_) {}
 
 Program& Program::operator=(Program&& other) noexcept {
   if (this != &other) {
     end();
     pid_ = std::exchange(other.pid_, -1);
+    exit_code_ = other.exit_code_;
   }
   return *this;
 }
@@ -61,6 +67,21 @@ Program& Program::operator=(Program&& other) noexcept {
 Program::~Program() { end(); }
 
 void Program::signal(int number) const { ::kill(pid_, number); }
+
+bool Program::ends_within(std::chrono::milliseconds limit) {
+  if (pid_ < 0) return true;
+  const int process = static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0));
+  if (process < 0) throw std::system_error(errno, std::generic_category(), "pidfd_open");
+  pollfd end{process, POLLIN, 0};
+  const bool has_ended = ::poll(&end, 1, static_cast<int>(limit.count())) > 0;
+  ::close(process);
+  if (!has_ended) return false;
+  int status = 0;
+  ::waitpid(pid_, &status, 0);
+  exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  pid_ = -1;
+  return true;
+}
 
 void Program::end() noexcept {
   if (pid_ < 0) return;

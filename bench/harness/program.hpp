@@ -3,8 +3,10 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,10 +14,12 @@ namespace arbiter::bench {
 
 class Program {
  public:
+  // Changes to the environment that it is started in; nullopt: not set.
+  using Variables = std::map<std::string, std::optional<std::string>>;
+
   Program() = default;
-  // Starts it with these variables set; what it prints goes to `log`. It ends with the benchmark.
-  Program(const std::vector<std::string>& argv, const std::map<std::string, std::string>& variables,
-          const std::string& log);
+  // What it prints goes to `log`, at its end. It ends with the benchmark.
+  Program(const std::vector<std::string>& argv, const Variables& variables, const std::string& log);
   Program(Program&& other) noexcept;
   Program& operator=(Program&& other) noexcept;
   // Asks it to end (SIGTERM), and waits until it has.
@@ -23,11 +27,16 @@ class Program {
 
   [[nodiscard]] pid_t pid() const { return pid_; }
   void signal(int number) const;
+  // False: it has not ended by then.
+  [[nodiscard]] bool ends_within(std::chrono::milliseconds limit);
+  // Of one that has ended; 128 and the signal's number if a signal ended it.
+  [[nodiscard]] int exit_code() const { return exit_code_; }
 
  private:
   void end() noexcept;
 
   pid_t pid_ = -1;
+  int exit_code_ = -1;
 };
 
 // A directory that goes with its object.

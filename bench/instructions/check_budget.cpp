@@ -2,22 +2,21 @@
 //
 //   instruction_budget            compare with budget.txt; exit code 1 where a call costs more
 //   instruction_budget --update   write budget.txt
-#include <poll.h>
-
+#include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <exception>
 #include <fstream>
 #include <iostream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "bench/harness/program.hpp"
 #include "bench/instructions/budget.hpp"
 #include "bench/instructions/scenes.hpp"
 #include "cli/progress.hpp"
-#include "tests/support/child_process.hpp"
-#include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::bench {
 namespace {
@@ -48,7 +47,7 @@ Counts read_counts(const std::string& path) {
 }
 
 // Says how far it is, which takes a minute, until it has ended.
-void watch(const test::ChildProcess& operations, const std::string& output) {
+void watch(Program& operations, const std::string& output) {
   std::size_t all = 0;
   try {
     all = read_budget(BUDGET).counts.size();
@@ -56,8 +55,7 @@ void watch(const test::ChildProcess& operations, const std::string& output) {
     // It is about to be written.
   }
   cli::ProgressLine progress;
-  pollfd end{operations.descriptor(), POLLIN, 0};
-  while (poll(&end, 1, 100) == 0) {
+  while (!operations.ends_within(std::chrono::milliseconds(100))) {
     progress.show([&] {
       const Counts counts = read_counts(output);
       return "counting under callgrind: " + std::to_string(counts.size()) +
@@ -67,26 +65,38 @@ void watch(const test::ChildProcess& operations, const std::string& output) {
   }
 }
 
+std::string write(const std::string& path, const std::string& text) {
+  std::ofstream(path) << text;
+  return path;
+}
+
+std::string read(const std::string& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
 Budget measure() {
-  const test::TemporaryDirectory directory;
+  const ScratchDirectory directory;
+  const std::string log = directory.path() + "/log";
   const Model model;
-  const std::string model_file = directory.write("model.xml", model.model());
-  const std::string application = directory.write("application.xml", model.application());
+  const std::string model_file = write(directory.path() + "/model.xml", model.model());
+  const std::string application = write(directory.path() + "/application.xml", model.application());
   const std::string output = directory.path() + "/callgrind.out";
   // The C library picks its memcpy() by the processor; this is the one that all have.
-  const test::Environment environment{{"XDG_RUNTIME_DIR", directory.path()},
-                                      {"RUNTIME_DIRECTORY", std::nullopt},
-                                      {"ARBITER_INSTANCE", "instructions"},
-                                      {"GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX2,-AVX,-ERMS"}};
-  const test::ChildProcess daemon(
+  const Program::Variables environment{{"XDG_RUNTIME_DIR", directory.path()},
+                                       {"RUNTIME_DIRECTORY", std::nullopt},
+                                       {"ARBITER_INSTANCE", "instructions"},
+                                       {"GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX2,-AVX,-ERMS"}};
+  const Program daemon(
       {ARBITERD, "--model", model_file, "--application", application, "--log-level", "warn"},
-      environment, {-1, -1, STDERR_FILENO});
-  test::ChildProcess operations(
-      {"/usr/bin/valgrind", "--tool=callgrind", "--quiet", "--collect-atstart=no",
-       "--combine-dumps=yes", "--callgrind-out-file=" + output, OPERATIONS},
-      environment, {-1, -1, STDERR_FILENO});
+      environment, log);
+  Program operations({"/usr/bin/valgrind", "--tool=callgrind", "--quiet", "--collect-atstart=no",
+                      "--combine-dumps=yes", "--callgrind-out-file=" + output, OPERATIONS},
+                     environment, log);
   watch(operations, output);
-  if (operations.wait() != 0) throw std::runtime_error("the operations failed under valgrind");
+  if (operations.exit_code() != 0) {
+    throw std::runtime_error("the operations failed under valgrind: " + read(log));
+  }
   Budget measured{BUILT_WITH, read_counts(output)};
   if (measured.counts.empty()) throw std::runtime_error("callgrind has counted nothing");
   return measured;

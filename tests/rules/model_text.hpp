@@ -1,8 +1,6 @@
 // Models given as text, read through load() as everybody else reads them.
 #pragma once
 
-#include <stdlib.h>
-
 #include <ctime>
 #include <filesystem>
 #include <fstream>
@@ -14,30 +12,11 @@
 #include "rules/model/load.hpp"
 #include "rules/model/rule_set.hpp"
 #include "rules/text/diagnostic.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::rules {
 
-// A directory that lives as long as the test.
-class Folder {
- public:
-  Folder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "arbiter-XXXXXX").string();
-    if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("mkdtemp");
-    path_ = pattern;
-  }
-  ~Folder() { std::filesystem::remove_all(path_); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  [[nodiscard]] std::string file(const std::string& name) const { return (path_ / name).string(); }
-  std::string write(const std::string& name, std::string_view content) const {
-    std::ofstream(path_ / name, std::ios::binary) << content;
-    return file(name);
-  }
-
- private:
-  std::filesystem::path path_;
-};
+using Folder = test::TemporaryDirectory;
 
 // Seconds of processor time since it was made: other programs on the machine do not count.
 class Stopwatch {

@@ -17,6 +17,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/temporary_directory.hpp"
+
 namespace {
 
 int asked_for_arbiter = 0;
@@ -47,12 +49,9 @@ class Rendezvous : public testing::Test {
       before_[name] = value == nullptr ? std::string() : value;
       unsetenv(name);
     }
-    char pattern[] = "/tmp/arbiter-rendezvous-XXXXXX";
-    directory_ = mkdtemp(pattern);
     setenv("TMPDIR", directory_.c_str(), 1);
   }
   ~Rendezvous() override {
-    std::filesystem::remove_all(directory_);
     for (const auto& [name, value] : before_) {
       value.empty() ? unsetenv(name.c_str()) : setenv(name.c_str(), value.c_str(), 1);
     }
@@ -74,7 +73,8 @@ class Rendezvous : public testing::Test {
     return "not refused";
   }
 
-  std::string directory_;
+  const test::TemporaryDirectory folder_;
+  const std::string directory_ = folder_.path();
 
  private:
   std::map<std::string, std::string> before_;
