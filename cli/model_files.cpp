@@ -8,14 +8,16 @@
 
 namespace arbiter::cli {
 
-void add_model_options(CLI::App& verb, rules::ModelFiles& files) {
-  verb.add_option("MODEL", files.models, "Files of behaviours and rules; together one model")
-      ->type_name("FILE")
-      ->required();
+CLI::Option& add_model_options(CLI::App& verb, rules::ModelFiles& files) {
+  CLI::Option* models =
+      verb.add_option("MODEL", files.models, "Files of behaviours and rules; together one model")
+          ->type_name("FILE")
+          ->required();
   verb.add_option(
           "--application", files.application,
           "File that says which connections exist; without it, the model's connections exist")
       ->type_name("FILE");
+  return *models;
 }
 
 void add_effort_option(CLI::App& verb, double& effort) {

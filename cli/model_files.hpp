@@ -9,12 +9,13 @@
 
 namespace CLI {
 class App;
-}
+class Option;
+}  // namespace CLI
 
 namespace arbiter::cli {
 
-// MODEL... and --application.
-void add_model_options(CLI::App& verb, rules::ModelFiles& files);
+// MODEL..., which it gives back, and --application.
+CLI::Option& add_model_options(CLI::App& verb, rules::ModelFiles& files);
 
 // --effort
 void add_effort_option(CLI::App& verb, double& effort);

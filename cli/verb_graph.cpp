@@ -36,14 +36,11 @@ int graph(const GraphOptions& options) {
 void add_graph(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<GraphOptions>();
   CLI::App* verb = app.add_subcommand("graph", "Draw a model, or what it is doing now");
-  verb->add_option("MODEL", options->files.models,
-                   "Files of behaviours and rules; with --live you may leave them out: the model "
-                   "in force is drawn")
-      ->type_name("FILE");
-  verb->add_option(
-          "--application", options->files.application,
-          "File that says which connections exist; without it, the model's connections exist")
-      ->type_name("FILE");
+  add_model_options(*verb, options->files)
+      .required(false)
+      ->description(
+          "Files of behaviours and rules; with --live you may leave them out: the model in force "
+          "is drawn");
   verb->add_option("--view", options->view,
                    "behaviours: in meta-behaviours, with inhibitions; connections: components, "
                    "ports, rules; both; auto: behaviours if there are any")

@@ -305,6 +305,49 @@ void note_unarbitrated(const Application& application, const RuleSet& rules,
   }
 }
 
+void note_commands_forever(const Model& model, const RuleSet& rules, const Location& whole,
+                           Diagnostics& diagnostics) {
+  std::map<std::string, std::vector<std::string>> ports_of;
+  for (const PortRules& port : rules.ports) {
+    for (const ConnectionRule& rule : port.rules) {
+      const auto own = rules.timeouts.find(rule.source);
+      const auto timeout = own == rules.timeouts.end() ? rules.timeout : own->second;
+      if (timeout == shm::kForever) ports_of[rule.source].push_back(port.port);
+    }
+  }
+  if (ports_of.empty()) return;
+  std::map<std::string_view, const Location*> declared;
+  for (const SourceDeclaration& source : model.sources) {
+    if (source.timeout) declared.emplace(source.name, &source.where);
+  }
+  const auto note = [&](const Location& where, const std::vector<std::string>& sources,
+                        const std::vector<std::string>& ports) {
+    const bool one = sources.size() == 1;
+    diagnostics.note(
+        "forever-commands", where,
+        enumerate(sources) + (one ? " commands " : " command ") + enumerate(ports) +
+            (one ? ", and its T is forever: if its" : ", and their T is forever: if a") +
+            " process is killed, its activity does not end, and the port does not fall back to "
+            "another source by itself; give " +
+            (one ? "it" : "them") +
+            " a finite T, or make sure that something deactivates a source that has died (arbiter "
+            "deactivate)");
+  };
+  std::vector<std::string> by_default;
+  std::set<std::string> ports_by_default;
+  for (const auto& [source, ports] : ports_of) {
+    if (const auto own = declared.find(source); own != declared.end()) {
+      note(*own->second, {source}, ports);
+    } else {
+      by_default.push_back(source);
+      ports_by_default.insert(ports.begin(), ports.end());
+    }
+  }
+  if (by_default.empty()) return;
+  const Location where = model.timeout ? model.timeout->where : whole;
+  note(where, by_default, {ports_by_default.begin(), ports_by_default.end()});
+}
+
 void check_limits(const RuleSet& rules, const Application* application, const Location& whole,
                   const DocumentOrder& order, Diagnostics& diagnostics) {
   LimitCheck(rules, application, order, diagnostics).check(whole);

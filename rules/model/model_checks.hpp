@@ -21,6 +21,11 @@ void check_application(const Application& application, const Model& model, RuleS
 void note_unarbitrated(const Application& application, const RuleSet& rules,
                        Diagnostics& diagnostics);
 
+// Notes "forever-commands", of sources with T = forever that a rule selects somewhere. `whole` is
+// the place for what cannot be pinned to a line.
+void note_commands_forever(const Model& model, const RuleSet& rules, const Location& whole,
+                           Diagnostics& diagnostics);
+
 // The limits of shm/limits.hpp that a model can exceed. `whole` is the place for what cannot be
 // pinned to a line. `application` may be null.
 void check_limits(const RuleSet& rules, const Application* application, const Location& whole,

@@ -19,9 +19,4 @@ void check_names(const Model& model, const std::optional<Application>& applicati
                  const RuleSet* rules, const Location& whole, const DocumentOrder& order,
                  Diagnostics& diagnostics);
 
-// Notes "forever-commands", of sources with T = forever that a rule selects somewhere. `whole` is
-// the place for what cannot be pinned to a line.
-void note_commands_forever(const Model& model, const RuleSet& rules, const Location& whole,
-                           Diagnostics& diagnostics);
-
 }  // namespace arbiter::rules

@@ -211,7 +211,7 @@ TEST(Check, ACodeThatThereIsNotCannotBeSilenced) {
 }
 
 // Whatever reading and checking may find, by the text of the program.
-TEST(Check, EachCodeOfAWarningOrANoteCanBeSilenced) {
+TEST(Check, EachCodeOfAWarningOrANoteIsOnThePageAndCanBeSilenced) {
   TemporaryDirectory directory;
   const auto model = directory.write("m.xml", kTrackModel);
   const std::regex made(R"re((warning|note)\(\s*"([a-z-]+)")re");
@@ -225,8 +225,10 @@ TEST(Check, EachCodeOfAWarningOrANoteCanBeSilenced) {
     }
   }
   EXPECT_GE(codes.size(), 15u);
+  const std::string page = content_of(std::string(ARBITER_TEST_DATA) + "/../../docs/checking.md");
   for (const std::string& code : codes) {
     EXPECT_EQ(arbiter({"check", model, "--silence", code}).exit_code, 0) << code;
+    EXPECT_NE(page.find("`" + code + "`"), std::string::npos) << "checking.md lacks " << code;
   }
 }
 

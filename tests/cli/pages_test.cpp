@@ -1,11 +1,12 @@
 // Runs the listings of pages. In a page,
 //
-//   ```xml FILE and ```csv FILE   make that file (of a README in examples/models: the folder's own
-//                                 files are there already);
-//   ```console                    holds commands behind "$ ", and below each what it prints, both
-//                                 streams, to the letter; one that prints nothing must succeed.
+//   ```xml FILE, ```csv FILE and ```text FILE
+//                make that file (of a README in examples/models: the folder's own files are there
+//                already);
+//   ```console   holds commands behind "$ ", and below each what it prints, both streams, to the
+//                letter; one that prints nothing must succeed. $? is that of the command before.
 //
-// Any other listing has nothing to be run, and must be marked as ```text.
+// Any other listing has nothing to be run, and must be marked as ```text, without a file.
 //
 // ARBITER_UPDATE_PAGES=1 writes what is printed into the pages instead; read the difference.
 #include <gtest/gtest-spi.h>
@@ -96,13 +97,15 @@ class PageRun {
     for (const Listing& listing : listings_of(page_)) {
       SCOPED_TRACE(page_ + ":" + std::to_string(listing.line));
       ++counts[listing.kind];
-      if (listing.kind == "xml" || listing.kind == "csv") {
+      const bool is_prose = listing.kind == "text" && listing.file.empty();
+      if (is_prose) continue;
+      if (listing.kind == "xml" || listing.kind == "csv" || listing.kind == "text") {
         EXPECT_FALSE(listing.file.empty()) << "a listing that no command can use: name its file";
         std::ofstream(fs::path(folder_) / listing.file) << listing.content;
       } else if (listing.kind == "console") {
         run_commands(listing);
       } else {
-        EXPECT_EQ(listing.kind, "text") << "nobody runs this";
+        ADD_FAILURE() << "nobody runs this: " << listing.kind;
       }
     }
     if (updates()) correct();
@@ -118,9 +121,11 @@ class PageRun {
     correction.count =
         static_cast<int>(std::count(listing.content.begin(), listing.content.end(), '\n'));
     for (const Command& command : commands_of(listing.content)) {
-      const auto result = run_program({"/bin/sh", "-c",
-                                       "PATH=" ARBITER_PROGRAMS ":$PATH; cd '" + folder_ +
-                                           "' && { " + command.text + "\n} 2>&1"});
+      const auto result =
+          run_program({"/bin/sh", "-c",
+                       "PATH=" ARBITER_PROGRAMS ":$PATH; cd '" + folder_ + "' && { (exit " +
+                           std::to_string(exit_code_) + "); " + command.text + "\n} 2>&1"});
+      exit_code_ = result.exit_code;
       correction.text += "$ " + command.text + "\n" + result.out;
       if (updates()) continue;
       EXPECT_EQ(result.out, command.output) << "$ " << command.text;
@@ -150,6 +155,7 @@ class PageRun {
   }
 
   std::string page_, folder_;
+  int exit_code_ = 0;                    // of the command before
   std::vector<Correction> corrections_;  // of each listing of commands, in order
 };
 
@@ -164,6 +170,13 @@ TEST(Pages, TheTutorialOfModelsRuns) {
   EXPECT_GE(counts["xml"], 6);
   EXPECT_GE(counts["csv"], 3);
   EXPECT_GE(counts["console"], 12);
+}
+
+TEST(Pages, OnCheckingRun) {
+  const TemporaryDirectory directory;
+  Counts counts = run_listings(ARBITER_SOURCE "/docs/checking.md", directory.path());
+  EXPECT_GE(counts["xml"], 7);
+  EXPECT_GE(counts["console"], 9);
 }
 
 TEST(Pages, OfTheLibraryOfModelsRun) {
@@ -195,6 +208,8 @@ TEST(Pages, WhoseListingsSaySomethingElseAreFound) {
     return found.size();
   };
   EXPECT_EQ(failures_of("```console\n$ echo a; echo b >&2\na\nb\n$ true\n```\n"), 0);
+  EXPECT_EQ(failures_of("```text t\na\n```\n```console\n$ cat t; false\na\n$ echo $?\n1\n```\n"),
+            0);
   EXPECT_EQ(failures_of("```csv t.csv\na\n```\n```console\n$ cat t.csv\na\n```\n"), 0);
   EXPECT_EQ(failures_of("```console\n$ echo a\nb\n```\n"), 1);
   EXPECT_EQ(failures_of("```console\n$ echo a\n```\n"), 1);
