@@ -4,6 +4,7 @@
 
 #include "client/count.hpp"
 #include "client/input/input_core.hpp"
+#include "client/input/lanes.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -51,6 +52,7 @@ void InputCore::accept_view() {
     queue.lane->publisher.store(link.peer->instance, std::memory_order_release);
     queues_.push_back(std::move(queue));
   }
+  require_lanes_balance(*segment_, queues_);
   // Nothing is known of them yet: no word says so.
   watches_.assign(queues_.size(), {&nothing_seen, 1});
   waiting_.clear();

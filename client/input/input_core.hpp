@@ -32,6 +32,10 @@ class InputCore {
   // Makes and seals the segment, and the bell. Throws std::system_error.
   InputCore(std::string name, const Type& type, const InputPortOptions& options,
             std::shared_ptr<SharedMemory> memory);
+  InputCore(const InputCore&) = delete;
+  InputCore& operator=(const InputCore&) = delete;
+  // All samples are given back. In the process that made it; a child never destroys its copy.
+  ~InputCore();
 
   // Service thread.
 

@@ -7,10 +7,13 @@
 //   hold    the sample, and see that it is still there
 // A decision drops only what was there before it: a sample accepted later was accepted by a later
 // one.
+//
+// take_once() asserts nothing: client/output/publish.cpp says why.
 #include <algorithm>
 
 #include "client/count.hpp"
 #include "client/input/input_core.hpp"
+#include "shm/assertion.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -328,6 +331,7 @@ bool InputCore::copy(const Queue& queue, std::uint32_t slot, HeldSample& sample)
 void InputCore::give_back(std::uint32_t hold) noexcept {
   shm::ChannelReader::release(segment_->header.holds[hold]);
   const OutputPeer* const from = std::exchange(held_from_[hold], nullptr);
+  ARBITER_ASSERT(from != nullptr, "a sample is given back twice");
   --from->held;
   --held_;
   if (!lingering_.empty()) let_go_of(from);

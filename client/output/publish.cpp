@@ -4,6 +4,11 @@
 //   decide    at each connected port
 //   hand over to the queues of those where it wins, and ring for those that wait
 //   ring      where the activity's beginning or end changed the selection without a sample
+//
+// What is called here is one of the two places that assert nothing: it is the hottest, and each
+// check would be paid again for each connection, or slot. The other is take_once() of an input
+// port. What both do to the accounts is asserted around them: where a loan ends that is not
+// published (cores.cpp), a sample is given back, a queue is joined, and the port ends.
 #include <algorithm>
 #include <cstring>
 
