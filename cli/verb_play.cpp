@@ -21,9 +21,9 @@
 #include "cli/verbs.hpp"
 #include "rules/ask/report.hpp"
 #include "rules/explain/simulation.hpp"
-#include "rules/explain/tenure.hpp"
 #include "rules/explain/trace.hpp"
 #include "shm/clock.hpp"
+#include "shm/picture.hpp"
 #include "watch/instance.hpp"
 #include "watch/picture.hpp"
 
@@ -136,7 +136,7 @@ class Player {
     picture.now = at;
     const shm::TableView& table = picture.snapshot.table;
     const auto is_active = [&](shm::SourceId source) { return picture.is_active(source); };
-    const shm::SourceId winner = rules::winner_at(table, port, is_active);
+    const shm::SourceId winner = shm::selected_at(table, port, is_active).source;
     rules::PortOutcome outcome;
     if (winner != shm::kNone) outcome.winner = memory.source_name(winner);
     if (event.kind != rules::TraceKind::kArrival) return outcome;

@@ -74,25 +74,20 @@ void WhySimulated::schedule(const rules::TraceEvent& event) {
   if (shm::is_finite(word)) ends_.emplace(word, source);
 }
 
-bool WhySimulated::is_active(shm::SourceId source) const {
-  return shm::is_active(simulation_.activity(source), simulation_.now());
-}
-
 void WhySimulated::tell_changes(std::ostream& out) {
   std::set<shm::PortId> concerned;
   for (shm::SourceId source = 0; source < was_active_.size(); ++source) {
-    if (is_active(source) == was_active_[source]) continue;
+    if (simulation_.is_active(source) == was_active_[source]) continue;
     const auto ports = simulation_.table().ports_concerned(source);
     for (shm::Word i = 0; i < ports.count; ++i) concerned.insert(ports[i]);
   }
   for (const shm::PortId port : concerned) {
     const shm::SourceId before = winners_[port];
-    const auto active = [this](shm::SourceId source) { return is_active(source); };
-    winners_[port] = rules::winner_at(simulation_.table(), port, active);
+    winners_[port] = simulation_.winner_at(port);
     if (winners_[port] != before) tell_change(port, before, winners_[port], out);
   }
   for (shm::SourceId source = 0; source < was_active_.size(); ++source) {
-    was_active_[source] = is_active(source);
+    was_active_[source] = simulation_.is_active(source);
   }
 }
 
@@ -122,7 +117,7 @@ void WhySimulated::tell_change(shm::PortId port, shm::SourceId before, shm::Sour
   const Sources sources = sources_at(port);
   const auto causes = rules::causes_of_change(
       simulation_.table(), port, [this](shm::SourceId source) { return was_active_[source]; },
-      [this](shm::SourceId source) { return is_active(source); });
+      [this](shm::SourceId source) { return simulation_.is_active(source); });
   const std::string loss = loss_text(explain(port, sources), name_of(before), sources);
   if (options_.json) {
     json because = json::array();

@@ -34,7 +34,6 @@ class WhySimulated {
   void tell_changes(std::ostream& out);
   void tell_change(shm::PortId port, shm::SourceId before, shm::SourceId now, std::ostream& out);
   void tell_discarded(const rules::OutcomeRow& row, std::ostream& out);
-  [[nodiscard]] bool is_active(shm::SourceId source) const;
   [[nodiscard]] Sources sources_at(shm::PortId port) const;
   [[nodiscard]] std::string name_of(shm::SourceId winner) const;
   [[nodiscard]] rules::PortExplanation explain(shm::PortId port, const Sources& sources) const;

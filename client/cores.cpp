@@ -6,6 +6,7 @@
 
 #include "client/foreign.hpp"
 #include "client/node/node_core.hpp"
+#include "shm/assertion.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -57,6 +58,7 @@ LoanedSlot loan(OutputCore& core, std::size_t size) noexcept {
 }
 void end_loan(OutputCore& core, std::uint32_t slot) noexcept {
   if (!core.process.is_here()) return;
+  ARBITER_ASSERT(core.loans() != 0, "a loan ends twice");
   core.end_loan(slot);
   std::shared_ptr<OutputCore> last;
   if (core.loans() == 0) last.swap(core.kept_by_loans);

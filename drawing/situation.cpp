@@ -1,44 +1,14 @@
 #include "drawing/situation.hpp"
 
-#include <algorithm>
 #include <utility>
 
+#include "rules/explain/sufficient_reason.hpp"
+
 namespace arbiter::drawing {
-namespace {
-
-using rules::Operator;
-
-// Of an expression whose quantifiers were expanded.
-bool is_true(const rules::Expression& expression, const std::set<std::string>& active) {
-  const auto& operands = expression.operands;
-  const auto operand = [&](std::size_t i) { return is_true(*operands[i], active); };
-  const auto each = [&](const rules::ExpressionPtr& part) { return is_true(*part, active); };
-  switch (expression.op) {
-    case Operator::kTrue:
-      return true;
-    case Operator::kSource:
-      return active.contains(expression.name);
-    case Operator::kNot:
-      return !operand(0);
-    case Operator::kAnd:
-      return std::all_of(operands.begin(), operands.end(), each);
-    case Operator::kOr:
-      return std::any_of(operands.begin(), operands.end(), each);
-    case Operator::kXor:
-      return operand(0) != operand(1);
-    case Operator::kImplies:
-      return !operand(0) || operand(1);
-    case Operator::kIff:
-      return operand(0) == operand(1);
-    default:
-      return false;
-  }
-}
-
-}  // namespace
 
 bool holds(const rules::ConnectionRule& rule, const std::set<std::string>& active) {
-  return active.contains(rule.source) && is_true(*rule.condition, active);
+  const auto is_active = [&](const std::string& source) { return active.contains(source); };
+  return is_active(rule.source) && rules::evaluate(*rule.condition, is_active);
 }
 
 Situation decide(const rules::RuleSet& rules, std::set<std::string> active) {

@@ -12,7 +12,7 @@
 
 #include "service/models/document.hpp"
 #include "shm/clock.hpp"
-#include "shm/decision.hpp"
+#include "shm/picture.hpp"
 #include "shm/utf8.hpp"
 #include "wire/document.hpp"
 #include "wire/status.hpp"
@@ -170,18 +170,19 @@ class Document {
 
   wire::InputStatus input(const InputName& name) {
     const InputPort* input = of_.switchboard.input(name.open);
-    const Command command = command_at(name.id, input);
+    std::string why_not;
+    const shm::Command command = command_at(name.id, input, why_not);
     wire::InputStatus result;
     result.name = name.name;
     result.mentioned = snapshot_.table.knows_port(name.id);
     result.arbitrated = snapshot_.table.is_arbitrated(name.id);
     result.in_order = is_decided_in_order(name.id);
-    result.idle = command.commander == shm::kNone;
+    result.idle = command.commander.source == shm::kNone;
     if (result.arbitrated && !result.idle) {
-      result.winner = of_.directory.sources()[command.commander]->name;
+      result.winner = of_.directory.sources()[command.commander.source]->name;
     }
-    if (result.idle && command.selected != shm::kNone) {
-      result.cannot_deliver = {of_.directory.sources()[command.selected]->name, command.why};
+    if (result.idle && command.selected.source != shm::kNone) {
+      result.cannot_deliver = {of_.directory.sources()[command.selected.source]->name, why_not};
     }
     result.away_pid = away_pid(name.away, of_.registry.input(name.id));
     if (input != nullptr) result.open = open_input(*input);
@@ -249,29 +250,19 @@ class Document {
     return false;
   }
 
-  // As InputCore::who_commands().
-  struct Command {
-    shm::SourceId selected = shm::kNone;
-    shm::SourceId commander = shm::kNone;  // else the port is idle
-    std::string why;                       // the one that is selected cannot deliver
-  };
-  [[nodiscard]] Command command_at(shm::PortId port, const InputPort* input) const {
+  // `why_not`: why the first that is selected cannot deliver.
+  [[nodiscard]] shm::Command command_at(shm::PortId port, const InputPort* input,
+                                        std::string& why_not) const {
     shm::DecisionClock clock(now_, true);
-    shm::Decider decider(snapshot_.table, of_.directory.pages(), clock);
-    Command command;
-    const auto range = snapshot_.table.connections_to(port);
-    for (auto index = range.first; index != range.first + range.count; ++index) {
-      const shm::Rule rule = snapshot_.table.rule(index);
-      if (decider.decide_with_own(rule) != shm::Verdict::kWins) continue;
-      const std::string why = why_nothing_can_come(rule.source, input);
-      if (why.empty()) command.commander = rule.source;
-      if (command.selected == shm::kNone) {
-        command.selected = rule.source;
-        command.why = why;
-      }
-      if (why.empty() || snapshot_.table.is_arbitrated(port)) break;
-    }
-    return command;
+    shm::PortPicture picture;
+    picture.bind(snapshot_.table, port, of_.directory.pages());
+    static_cast<void>(picture.take(clock));  // else nobody is active in it
+    return picture.command([&](const shm::Rule& rule) {
+      std::string why = why_nothing_can_come(rule.source, input);
+      const bool can_deliver = why.empty();
+      if (why_not.empty()) why_not = std::move(why);
+      return can_deliver;
+    });
   }
 
   // Of an active source. Empty: something can.

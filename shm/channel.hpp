@@ -21,6 +21,7 @@
 
 #include <cstdint>
 
+#include "shm/assertion.hpp"
 #include "shm/atomic.hpp"
 #include "shm/ids.hpp"
 #include "shm/input_segment.hpp"
@@ -46,6 +47,9 @@ class ChannelWriter {
   // SYNC POINT: channel-joined. The release pairs with the acquire in ChannelReader::join(): who
   // finds itself named finds `first` and `depth`.
   void join(PortInstance receiver, PortId port, std::uint32_t depth) noexcept {
+    // Relaxed is enough: we alone write it.
+    ARBITER_ASSERT(channel_->receiver.load(std::memory_order_relaxed) == 0,
+                   "a queue begins where another has not ended");
     ring_ = segment_.ring(index_, receiver);
     depth_ = depth;
     next_ = 0;

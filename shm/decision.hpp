@@ -70,6 +70,26 @@ inline constexpr int kMaxPictures = 64;
 // The most nodes of one walk. A diagram tests each source once; rules in order each do.
 inline constexpr Word kMaxWalk = (kMaxSourcesPerPort + 1) * (kMaxSourcesPerPort + 1);
 
+// Where a walk through a diagram's nodes ends. `is_active(position)`: whether the source at that
+// place of the rule's `reads` reads is. Each step goes to a node further on, so a whole table ends
+// the walk within `max_steps`; a torn one is cut short.
+template <class IsActive>
+[[nodiscard]] bool walk_holds(const WordList& nodes, Word root, Word reads, Word max_steps,
+                              const IsActive& is_active) noexcept {
+  Word node = root;
+  for (Word steps = 0; steps <= max_steps; ++steps) {
+    if (node >= nodes.count / table::kNodeWords) return false;
+    const Word base = node * table::kNodeWords;
+    const Word position = nodes[base + table::kNodePosition];
+    if (position >= reads) return false;
+    const Word next = nodes[base + (is_active(position) ? table::kNodeHigh : table::kNodeLow)];
+    if (next == table::kTrue) return true;
+    if (next == table::kFalse) return false;
+    node = next;
+  }
+  return false;
+}
+
 // In place of a connection's own source, where its rule is to take that as active.
 inline const Activity always_active{{kForeverFlag}, {0}};
 
@@ -247,27 +267,16 @@ class BoundRule {
       if (is && is_finite(read.word) && read.word < until_) until_ = read.word;
       if (i < literals_ && is != read.expect_active && denied_by_ == kNobody) denied_by_ = i;
     }
-    const bool holds = denied_by_ == kNobody && (!walks_ || walk_holds(active));
+    const bool holds = denied_by_ == kNobody && (!walks_ || walk(active));
     verdict_ = holds ? Verdict::kWins : Verdict::kLoses;
   }
 
-  // Each step goes to a node further on, so a whole table ends the walk; a torn one is cut short.
   static constexpr std::size_t kActiveWords = kMaxSourcesPerPort / 64 + 1;
-  [[nodiscard]] bool walk_holds(
-      const std::array<std::uint64_t, kActiveWords>& active) const noexcept {
-    Word node = root_;
-    for (Word steps = 0; steps <= max_walk_; ++steps) {
-      if (node >= nodes_.count / table::kNodeWords) return false;
-      const Word base = node * table::kNodeWords;
-      const std::uint64_t position = std::uint64_t{nodes_[base + table::kNodePosition]} + own_;
-      if (position >= count_) return false;
-      const bool high = (active[position / 64] >> (position % 64) & 1) != 0;
-      const Word next = nodes_[base + (high ? table::kNodeHigh : table::kNodeLow)];
-      if (next == table::kTrue) return true;
-      if (next == table::kFalse) return false;
-      node = next;
-    }
-    return false;
+  [[nodiscard]] bool walk(const std::array<std::uint64_t, kActiveWords>& active) const noexcept {
+    return walk_holds(nodes_, root_, count_ - own_, max_walk_, [&](Word read) {
+      const Word position = read + own_;
+      return (active[position / 64] >> (position % 64) & 1) != 0;
+    });
   }
 
   Read* reads_ = nullptr;

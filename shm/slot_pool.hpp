@@ -7,11 +7,16 @@
 // Invariant: with at least (sum of the queues' depths) + (sum of the receivers' max_held) + (loans)
 // slots, acquire() always finds one: at worst every queue is full of samples of its own, every
 // receiver holds as many others, and the other loans are out.
+//
+// Each slot is free, retired, named by a queue, or loaned, and only one of these. That is our own
+// memory, so it is asserted, but not where publish() would pay for each slot that goes round: when
+// the port ends, by require_balance().
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
+#include "shm/assertion.hpp"
 #include "shm/atomic.hpp"
 #include "shm/channel.hpp"
 #include "shm/input_segment.hpp"
@@ -47,6 +52,26 @@ class SlotPool {
   // One queue has let go of the slot.
   void evict(std::uint32_t slot) {
     if (--references_[slot] == 0) retired_.push_back(slot);
+  }
+  // That no slot is lost and none is in two places, while no loan is out. Goes through all of them.
+  void require_balance() const noexcept {
+    std::uint64_t count = 0;
+    std::uint64_t sum = 0;  // of their numbers
+    const auto add = [&](std::uint64_t slot) {
+      ++count;
+      sum += slot;
+    };
+    for (const auto* list : {&free_, &retired_}) {
+      for (const std::uint32_t slot : *list) {
+        ARBITER_ASSERT(references_[slot] == 0, "a slot is free that a queue names");
+        add(slot);
+      }
+    }
+    for (std::size_t slot = 0; slot < references_.size(); ++slot) {
+      if (references_[slot] != 0) add(slot);
+    }
+    const std::uint64_t all = references_.size();
+    ARBITER_ASSERT(count == all && sum == all * (all - 1) / 2, "a slot is lost, or in two places");
   }
   // A loan ended: back to the free slots if no queue took it.
   void end_loan(std::uint32_t slot) {

@@ -5,40 +5,29 @@
 
 #include "rules/explain/tenure.hpp"
 #include "shm/clock.hpp"
-#include "shm/decision.hpp"
 #include "shm/limits.hpp"
+#include "shm/picture.hpp"
 
 namespace arbiter::watch {
 namespace {
 
-// A source as it is looked at twice.
-struct Seen {
-  shm::SourceId source = shm::kNone;
-  const shm::Activity* page = nullptr;  // null: there is none here yet
-  shm::SeenActivity first{};
-};
-
-// All words are collected, the clock is read, and all are looked at again: if they stand, they
-// stood together when the clock was read.
 bool try_once(const shm::DecisionMemory& memory, const SourcesOf& sources_of, Picture& picture) {
   picture = {};
   picture.snapshot = memory.tables().snapshot();
   const shm::TableView& table = picture.snapshot.table;
-  std::vector<Seen> seen;
+  std::vector<shm::Sight> sights;
   if (picture.snapshot.generation != 0) {
     for (const shm::SourceId source : sources_of(table)) {
-      const shm::Activity* page = memory.pages().find(source);
-      seen.push_back({source, page, page ? shm::SeenActivity::of(*page) : shm::SeenActivity{}});
+      sights.push_back({source, memory.pages().find(source), {}});
     }
   }
-  picture.now = shm::monotonic_now();
-  picture.is_settled = std::all_of(seen.begin(), seen.end(), [&](const Seen& each) {
-    return each.page == nullptr || each.first.stands(shm::SeenActivity::of(*each.page),
-                                                     table.timeout(each.source), picture.now);
-  });
-  for (const Seen& each : seen) {
-    picture.words[each.source] = each.page ? each.first.word : shm::kNeverActive;
-    if (each.page == nullptr) picture.unseen.push_back(each.source);
+  shm::DecisionClock clock(0, false);
+  picture.is_settled = shm::take_picture(sights, table, clock);
+  picture.now = clock.reading();
+  for (const shm::Sight& each : sights) {
+    const bool is_seen = each.activity != nullptr;
+    picture.words[each.source] = is_seen ? each.seen.word : shm::kNeverActive;
+    if (!is_seen) picture.unseen.push_back(each.source);
   }
   return memory.tables().is_in_force(picture.snapshot) && picture.is_settled;
 }
@@ -51,8 +40,8 @@ bool Picture::is_unseen(shm::SourceId source) const {
 
 shm::SourceId Picture::winner_at(shm::PortId port) const {
   if (!snapshot.table.is_arbitrated(port)) return shm::kNone;
-  return rules::winner_at(snapshot.table, port,
-                          [this](shm::SourceId source) { return is_active(source); });
+  const auto active = [this](shm::SourceId source) { return is_active(source); };
+  return shm::selected_at(snapshot.table, port, active).source;
 }
 
 shm::Nanoseconds Picture::next_end() const {

@@ -4,6 +4,7 @@
 
 #include "client/count.hpp"
 #include "client/input/input_core.hpp"
+#include "client/input/lanes.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -51,6 +52,7 @@ void InputCore::accept_view() {
     queue.lane->publisher.store(link.peer->instance, std::memory_order_release);
     queues_.push_back(std::move(queue));
   }
+  require_lanes_balance(*segment_, queues_);
   // Nothing is known of them yet: no word says so.
   watches_.assign(queues_.size(), {&nothing_seen, 1});
   waiting_.clear();
@@ -97,41 +99,17 @@ void InputCore::bind_rules() {
   snapshot_ = memory_->tables().snapshot();
   bound_epoch_ = snapshot_.epoch;
   const shm::TableView& table = snapshot_.table;
-  rules_.clear();
-  sources_.clear();
-  const auto range = table.connections_to(port_);
-  for (auto index = range.first; index != range.first + range.count; ++index) {
-    rules_.push_back(table.rule(index));
-    sources_.push_back(rules_.back().source);
-  }
-  bind_queues();
-  const shm::WordList read = table.sources_read(port_);
-  for (shm::Word i = 0; i < read.count && i < shm::kMaxSourcesPerPort; ++i) {
-    sources_.push_back(read[i]);
-  }
-  std::sort(sources_.begin(), sources_.end());
-  sources_.erase(std::unique(sources_.begin(), sources_.end()), sources_.end());
-  picture_.resize(sources_.size());
-  activities_.resize(sources_.size());
-  std::transform(sources_.begin(), sources_.end(), activities_.begin(),
-                 [&](shm::SourceId source) { return memory_->pages().find(source); });
-}
-
-void InputCore::bind_queues() {
-  const auto rule_of = [&](const Queue& queue) {
-    const auto found = std::find_if(rules_.begin(), rules_.end(), [&](const shm::Rule& rule) {
-      return rule.source == queue.peer->source;
-    });
-    return found == rules_.end() ? shm::Rule{} : *found;
-  };
+  picture_.bind(table, port_, memory_->pages());
   std::size_t reads = 0;
-  for (const Queue& queue : queues_) reads += shm::BoundRule::reads_of(rule_of(queue));
+  for (Queue& queue : queues_) {
+    queue.connection = table.rule(table.find(queue.peer->source, port_));
+    reads += shm::BoundRule::reads_of(queue.connection);
+  }
   reads_.resize(std::max(reads_.size(), reads));
   shm::Read* next = reads_.data();
   for (Queue& queue : queues_) {
-    const shm::Rule rule = rule_of(queue);
-    queue.rule.bind(rule, memory_->pages(), next, false);
-    next += shm::BoundRule::reads_of(rule);
+    queue.rule.bind(queue.connection, memory_->pages(), next, false);
+    next += shm::BoundRule::reads_of(queue.connection);
   }
 }
 

@@ -23,6 +23,7 @@
 #include "shm/clock.hpp"
 #include "shm/descendants.hpp"
 #include "shm/input_segment.hpp"
+#include "shm/picture.hpp"
 
 namespace arbiter::detail {
 
@@ -31,6 +32,10 @@ class InputCore {
   // Makes and seals the segment, and the bell. Throws std::system_error.
   InputCore(std::string name, const Type& type, const InputPortOptions& options,
             std::shared_ptr<SharedMemory> memory);
+  InputCore(const InputCore&) = delete;
+  InputCore& operator=(const InputCore&) = delete;
+  // All samples are given back. In the process that made it; a child never destroys its copy.
+  ~InputCore();
 
   // Service thread.
 
@@ -96,7 +101,8 @@ class InputCore {
     bool gone = false;
     shm::ChannelReader reader;
     shm::Lane* lane = nullptr;
-    shm::BoundRule rule;                // of the connection, under snapshot_
+    shm::Rule connection;               // the connection's rule, under snapshot_
+    shm::BoundRule rule;                // the same
     std::uint32_t allocated_slots = 0;  // of the peer's, when it was last looked at
     // Of the take under way.
     shm::Entry head = 0;
@@ -111,7 +117,6 @@ class InputCore {
   shm::Lane* free_lane() noexcept;
   void retire_queue(Queue& queue, const InputView& next);
   void bind_rules();
-  void bind_queues();
   void refresh();
 
   // take() in parts: look at the queues, decide, hold.
@@ -137,22 +142,15 @@ class InputCore {
   void count_overtaken(Queue& queue, std::uint64_t lost) noexcept;
   void let_go_of(const OutputPeer* peer) noexcept;
 
-  // Who commands. `selected`: the connection whose rule holds, or null; of several, where the port
-  // is not arbitrated, the first. `commander`: the same if anything of it can come, or null: then
-  // the port is idle.
-  struct Command {
-    const shm::Rule* selected = nullptr;
-    const shm::Rule* commander = nullptr;
-  };
-  [[nodiscard]] Command who_commands() noexcept;
+  [[nodiscard]] shm::Command who_commands() noexcept;
   [[nodiscard]] bool can_deliver(const shm::Rule& rule) noexcept;
   [[nodiscard]] bool is_refused(shm::SourceId source) const noexcept;
   [[nodiscard]] bool ends_by_itself(shm::SourceId source) const noexcept;
 
   // wait() in parts.
-  [[nodiscard]] shm::Nanoseconds next_change(const shm::Rule* commander) const noexcept;
+  [[nodiscard]] shm::Nanoseconds next_change(const shm::Rule& commander) const noexcept;
   Waited wait_once(shm::Nanoseconds timeout, HeldSample& sample);
-  bool arm(HeldSample& sample, Command& command);
+  bool arm(HeldSample& sample, shm::Command& command);
   void disarm() noexcept;
   void arm_descriptor(HeldSample& sample);
   HeldSample take_once();
@@ -189,12 +187,9 @@ class InputCore {
   shm::TableSnapshot snapshot_;
   shm::Epoch bound_epoch_ = UINT64_MAX;
   std::uint64_t bound_pages_ = 0;
-  std::vector<shm::Rule> rules_;        // of all connections to the port, in document order
-  std::vector<shm::Read> reads_;        // what the queues' rules have bound
-  std::vector<shm::SourceId> sources_;  // those that the rules and connections name
-  std::vector<const shm::Activity*> activities_;  // theirs; null where there is no page in force
-  std::vector<shm::SeenActivity> picture_;        // scratch, parallel to sources_
-  shm::Nanoseconds last_reading_ = 0;             // of the clock, by this port
+  std::vector<shm::Read> reads_;       // what the queues' rules have bound
+  shm::PortPicture picture_;           // of all sources that the port heeds, under snapshot_
+  shm::Nanoseconds last_reading_ = 0;  // of the clock, by this port
   std::uint32_t held_ = 0;
   std::array<const OutputPeer*, shm::kMaxHeld> held_from_{};  // by hold
   Copies copies_;                                             // likewise

@@ -7,6 +7,7 @@
 #include "client/input/input_core.hpp"
 #include "client/input/predecessors.hpp"
 #include "client/types.hpp"
+#include "shm/assertion.hpp"
 
 namespace arbiter::detail {
 
@@ -37,6 +38,14 @@ InputCore::InputCore(std::string name, const Type& type, const InputPortOptions&
   descriptor_ = shm::reopen(descriptor_, O_RDONLY);  // for others: the daemon passes it on as it is
   bequest_.emplace(mapping_.data(), mapping_.size(), shm::Bequest::Kind::kPrivateZeros);
   shm::close_in_children(descriptor_);
+}
+
+InputCore::~InputCore() {
+  ARBITER_ASSERT(held_ == 0, "an input port ends while its samples are held");
+  for (const auto& hold : segment_->header.holds) {
+    ARBITER_ASSERT(hold.load(std::memory_order_relaxed) == 0, "a hold is left of no sample");
+  }
+  ARBITER_ASSERT(lingering_.empty(), "a publisher is kept of which nothing is held");
 }
 
 void InputCore::bind(shm::PortInstance instance, shm::PortId port) {

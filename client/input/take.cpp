@@ -7,10 +7,13 @@
 //   hold    the sample, and see that it is still there
 // A decision drops only what was there before it: a sample accepted later was accepted by a later
 // one.
+//
+// take_once() asserts nothing: client/output/publish.cpp says why.
 #include <algorithm>
 
 #include "client/count.hpp"
 #include "client/input/input_core.hpp"
+#include "shm/assertion.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -205,9 +208,7 @@ InputCore::Choice InputCore::be_blind() noexcept {
   return Choice::kNothing;
 }
 
-// The oldest head loses: what of the others? Decides for every queue, and accepts the decisions
-// only if no source has changed from before the first to after the last, and time has not been read
-// again.
+// The oldest head loses: what of the others? Decides for every queue, in one picture.
 InputCore::Choice InputCore::choose_among_all(Queue*& chosen) noexcept {
   if (!decide_all()) return Choice::kAgain;
   chosen = nullptr;
@@ -221,23 +222,11 @@ InputCore::Choice InputCore::choose_among_all(Queue*& chosen) noexcept {
 }
 
 bool InputCore::decide_all() noexcept {
-  const auto look_at = [](const shm::Activity* activity) {
-    return activity == nullptr ? shm::SeenActivity{} : shm::SeenActivity::of(*activity);
-  };
-  std::transform(activities_.begin(), activities_.end(), picture_.begin(), look_at);
-  const shm::Nanoseconds now = shm::monotonic_now();
-  // The time does not pass: the picture was begun before it, and is seen to stand after it.
-  last_reading_ = now;
-  shm::FixedClock clock(now);
-  for (Queue* const queue : waiting_) {
-    queue->verdict = queue->rule.decide(snapshot_.table, clock);
-    if (queue->verdict == shm::Verdict::kUnsettled) return false;
-  }
-  bool stands = true;
-  for (std::size_t i = 0; stands && i < sources_.size(); ++i) {
-    stands = picture_[i].stands(look_at(activities_[i]), snapshot_.table.timeout(sources_[i]), now);
-  }
-  return stands && memory_->tables().is_in_force(snapshot_);
+  shm::DecisionClock clock(last_reading_, false);
+  const bool is_settled = picture_.take(clock, 1);
+  last_reading_ = clock.reading();
+  for (Queue* const queue : waiting_) queue->verdict = picture_.decide(queue->connection);
+  return is_settled && memory_->tables().is_in_force(snapshot_);
 }
 
 // Drops what waited in losing queues before the decision and is older than the sample that is
@@ -342,6 +331,7 @@ bool InputCore::copy(const Queue& queue, std::uint32_t slot, HeldSample& sample)
 void InputCore::give_back(std::uint32_t hold) noexcept {
   shm::ChannelReader::release(segment_->header.holds[hold]);
   const OutputPeer* const from = std::exchange(held_from_[hold], nullptr);
+  ARBITER_ASSERT(from != nullptr, "a sample is given back twice");
   --from->held;
   --held_;
   if (!lingering_.empty()) let_go_of(from);

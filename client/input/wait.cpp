@@ -18,10 +18,6 @@
 namespace arbiter::detail {
 namespace {
 
-shm::SourceId source_of(const shm::Rule* rule) noexcept {
-  return rule == nullptr ? shm::kNone : rule->source;
-}
-
 shm::Nanoseconds after(shm::Nanoseconds now, shm::Nanoseconds timeout) {
   return timeout > shm::kMaxTime - now ? shm::kForever : now + timeout;
 }
@@ -41,8 +37,8 @@ Waited InputCore::wait_once(shm::Nanoseconds timeout, HeldSample& sample) {
   for (;;) {
     sample = take_once();
     if (sample.data != nullptr) return Waited::kSample;
-    Command command = who_commands();
-    if (commanded_ && command.commander == nullptr) {
+    shm::Command command = who_commands();
+    if (commanded_ && command.commander.source == shm::kNone) {
       commanded_ = false;
       count(segment_->header.counters.idles);
       return Waited::kIdle;
@@ -63,10 +59,10 @@ Waited InputCore::wait_once(shm::Nanoseconds timeout, HeldSample& sample) {
 // SYNC POINT: waiting. Fence (d), between our wait word and our last look. Pairs with fences (a)
 // and (b) of publishers: either we see what they did, or they see us wait.
 // What we believe is the selection, which publishers can judge, and not whether it can deliver.
-bool InputCore::arm(HeldSample& sample, Command& command) {
+bool InputCore::arm(HeldSample& sample, shm::Command& command) {
   shm::InputHeader& header = segment_->header;
-  const shm::SourceId believed = source_of(command.selected);
-  const shm::SourceId commander = source_of(command.commander);
+  const shm::SourceId believed = command.selected.source;
+  const shm::SourceId commander = command.commander.source;
   header.believed.store(believed, std::memory_order_relaxed);
   // Relaxed is enough: a publisher that sees us wait and does not see what we believe has passed
   // its fence before ours; then our last look sees what it has done, and we do not sleep.
@@ -77,7 +73,7 @@ bool InputCore::arm(HeldSample& sample, Command& command) {
   sample = take_once();
   if (sample.data != nullptr) return false;
   command = who_commands();
-  return source_of(command.selected) == believed && source_of(command.commander) == commander;
+  return command.selected.source == believed && command.commander.source == commander;
 }
 
 // The next wait has another number. What rang for this one is forgotten before the next begins.
@@ -88,26 +84,17 @@ void InputCore::disarm() noexcept {
   bell_.silence();
 }
 
-InputCore::Command InputCore::who_commands() noexcept {
-  refresh();
-  shm::DecisionClock clock(shm::monotonic_now(), true);
-  shm::Decider decider(snapshot_.table, memory_->pages(), clock);
-  const auto wins = [&](const shm::Rule& rule) {
-    return decider.decide_with_own(rule) == shm::Verdict::kWins;
-  };
-  Command command;
-  const auto selected = std::find_if(rules_.begin(), rules_.end(), wins);
-  if (selected != rules_.end()) {
-    command.selected = &*selected;
-    // Where an arbiter has selected, nobody takes the place of one that cannot deliver.
-    const auto end = snapshot_.table.is_arbitrated(port_) ? selected + 1 : rules_.end();
-    const auto commander = std::find_if(selected, end, [&](const shm::Rule& rule) {
-      return (&rule == command.selected || wins(rule)) && can_deliver(rule);
-    });
-    if (commander != end) command.commander = &*commander;
+// In one picture, under the model that was in force while it was taken.
+shm::Command InputCore::who_commands() noexcept {
+  shm::DecisionClock clock(last_reading_, false);
+  for (int tries = 0; tries < shm::kMaxPictures; ++tries) {
+    refresh();
+    if (picture_.take(clock, 1) && memory_->tables().is_in_force(snapshot_)) break;
   }
   last_reading_ = clock.reading();
-  if (command.commander != nullptr) commanded_ = true;
+  const shm::Command command =
+      picture_.command([this](const shm::Rule& rule) { return can_deliver(rule); });
+  if (command.commander.source != shm::kNone) commanded_ = true;
   return command;
 }
 
@@ -150,29 +137,29 @@ bool InputCore::is_refused(shm::SourceId source) const noexcept {
 // When the command will change of itself: at the first end among the activities that the
 // commander's rule reads. Whatever else happens rings: a sample, or a begin or an end that makes
 // another the winner. Then, or there, it is looked at anew.
-shm::Nanoseconds InputCore::next_change(const shm::Rule* commander) const noexcept {
+shm::Nanoseconds InputCore::next_change(const shm::Rule& commander) const noexcept {
   shm::Nanoseconds next = shm::kForever;
-  if (commander == nullptr) return next;
+  if (commander.source == shm::kNone) return next;
   const auto heed = [&](shm::SourceId source) {
     const auto* activity = memory_->pages().find(source);
     if (activity == nullptr) return;
     const shm::ActivityWord word = activity->word.load(std::memory_order_relaxed);
     if (shm::is_finite(word) && word > last_reading_) next = std::min(next, word);
   };
-  heed(commander->source);
-  for (shm::Word i = 0; i < commander->reads.count; ++i) {
-    heed(commander->reads[i] & ~shm::table::kExpectActive);
+  heed(commander.source);
+  for (shm::Word i = 0; i < commander.reads.count; ++i) {
+    heed(commander.reads[i] & ~shm::table::kExpectActive);
   }
   return next;
 }
 
 std::optional<std::string_view> InputCore::winner() noexcept {
-  const shm::Rule* const commander = who_commands().commander;
-  if (commander == nullptr || !snapshot_.table.is_arbitrated(port_)) return std::nullopt;
-  return memory_->source_name(commander->source);
+  const shm::SourceId commander = who_commands().commander.source;
+  if (commander == shm::kNone || !snapshot_.table.is_arbitrated(port_)) return std::nullopt;
+  return memory_->source_name(commander);
 }
 
-bool InputCore::is_idle() noexcept { return who_commands().commander == nullptr; }
+bool InputCore::is_idle() noexcept { return who_commands().commander.source == shm::kNone; }
 
 // A descriptor for the user's own loop: the bell, and a timer for the time at which activity runs
 // out.
@@ -198,7 +185,7 @@ int InputCore::wait_descriptor() {
 void InputCore::arm_descriptor(HeldSample& sample) {
   for (;;) {
     disarm();
-    Command command = who_commands();
+    shm::Command command = who_commands();
     const bool armed = arm(sample, command);
     if (sample.data != nullptr) return;
     if (!armed) continue;

@@ -8,6 +8,7 @@
 
 #include "client/output/output_core.hpp"
 #include "client/types.hpp"
+#include "shm/assertion.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -62,6 +63,11 @@ OutputCore::OutputCore(std::string name, const Type& type, const OutputPortOptio
   shm::close_in_children(descriptor_);
   readable_ = shm::reopen(descriptor_, O_RDONLY);
   shm::close_in_children(readable_);
+}
+
+OutputCore::~OutputCore() {
+  ARBITER_ASSERT(loans_ == 0, "an output port ends while its loans are out");
+  pool_.require_balance();
 }
 
 void OutputCore::bind(shm::PortInstance instance, shm::SourceId source, shm::FileDescriptor page) {

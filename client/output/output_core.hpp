@@ -28,6 +28,10 @@ class OutputCore {
   // Makes and seals the segment. Throws std::system_error.
   OutputCore(std::string name, const Type& type, const OutputPortOptions& options,
              std::shared_ptr<SharedMemory> memory);
+  OutputCore(const OutputCore&) = delete;
+  OutputCore& operator=(const OutputCore&) = delete;
+  // All loans are over. In the process that made it; a child never destroys its copy.
+  ~OutputCore();
 
   // What max_memory must be at least: the loans, a copy, and the smallest queue.
   static std::uint64_t least_memory(const shm::TypeInfo& type, std::uint32_t max_loans);

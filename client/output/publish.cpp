@@ -4,11 +4,17 @@
 //   decide    at each connected port
 //   hand over to the queues of those where it wins, and ring for those that wait
 //   ring      where the activity's beginning or end changed the selection without a sample
+//
+// What is called here is one of the two places that assert nothing: it is the hottest, and each
+// check would be paid again for each connection, or slot. The other is take_once() of an input
+// port. What both do to the accounts is asserted around them: where a loan ends that is not
+// published (cores.cpp), a sample is given back, a queue is joined, and the port ends.
 #include <algorithm>
 #include <cstring>
 
 #include "client/count.hpp"
 #include "client/output/output_core.hpp"
+#include "shm/picture.hpp"
 #include "shm/prefetch.hpp"
 
 namespace arbiter::detail {
@@ -222,17 +228,13 @@ void OutputCore::ring_where_selection_changed() noexcept {
 bool OutputCore::selection_differs(const Destination& destination) noexcept {
   const shm::SourceId believed =
       destination.peer->segment->header.believed.load(std::memory_order_relaxed);
-  const shm::TableView& table = snapshot_.table;
-  shm::DecisionClock clock(shm::monotonic_now(), true);
-  shm::Decider decider(table, memory_->pages(), clock);
-  const auto range = table.connections_to(destination.peer->port);
-  for (auto index = range.first; index != range.first + range.count; ++index) {
-    const shm::Rule rule = table.rule(index);
-    const shm::Verdict verdict = decider.decide_with_own(rule);
-    if (verdict == shm::Verdict::kWins) return believed != rule.source;
-    if (verdict != shm::Verdict::kLoses) return true;  // not known here: let it look for itself
-  }
-  return believed != shm::kNone;
+  shm::PortPicture picture;
+  picture.bind(snapshot_.table, destination.peer->port, memory_->pages());
+  shm::DecisionClock clock(0, false);
+  if (!picture.take(clock)) return true;
+  const auto selection = picture.selection();
+  // What is not known here, let it look at for itself.
+  return !selection.is_sure || selection.rule.source != believed;
 }
 
 Counts OutputCore::publish_loan(std::uint32_t slot, std::size_t size,

@@ -1,6 +1,7 @@
 #include "rules/explain/change.hpp"
 
 #include "rules/explain/tenure.hpp"
+#include "shm/picture.hpp"
 
 namespace arbiter::rules {
 
@@ -10,12 +11,12 @@ std::vector<shm::SourceId> causes_of_change(const shm::TableView& table, shm::Po
   for (const shm::SourceId source : sources_heeded(table, port)) {
     if (before(source) != after(source)) changed.push_back(source);
   }
-  const shm::SourceId now = winner_at(table, port, after);
+  const shm::SourceId now = shm::selected_at(table, port, after).source;
   for (const shm::SourceId source : changed) {
-    const shm::SourceId alone = winner_at(table, port, [&](shm::SourceId each) {
+    const auto after_it_alone = [&](shm::SourceId each) {
       return each == source ? after(each) : before(each);
-    });
-    if (alone == now) return {source};
+    };
+    if (shm::selected_at(table, port, after_it_alone).source == now) return {source};
   }
   return changed;
 }

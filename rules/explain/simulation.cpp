@@ -75,21 +75,21 @@ void Simulation::apply(const TraceEvent& event) {
 }
 
 PortOutcome Simulation::outcome_at(shm::PortId port, const TraceEvent& event) {
-  shm::Decider decider(table_, *pages_, clock_);
   PortOutcome outcome;
   if (event.kind == TraceKind::kArrival) {
     const shm::ConnectionIndex connection = table_.find(ids_.at(event.source), port);
+    shm::Decider decider(table_, *pages_, clock_);
     outcome.delivered =
         connection != shm::kNone && decider.decide(table_.rule(connection)) == shm::Verdict::kWins;
   }
-  const auto range = table_.connections_to(port);
-  for (auto connection = range.first; connection < range.first + range.count; ++connection) {
-    const shm::Rule rule = table_.rule(connection);
-    if (decider.decide_with_own(rule) != shm::Verdict::kWins) continue;
-    outcome.winner = sources_[rule.source];
-    break;
-  }
+  const shm::SourceId winner = winner_at(port);
+  if (winner != shm::kNone) outcome.winner = sources_[winner];
   return outcome;
+}
+
+shm::SourceId Simulation::winner_at(shm::PortId port) const {
+  const auto active = [this](shm::SourceId source) { return is_active(source); };
+  return shm::selected_at(table_, port, active).source;
 }
 
 void write_outcome_header(std::ostream& out) { out << "t_ns,source,destination,decision,winner\n"; }

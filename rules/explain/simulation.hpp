@@ -10,7 +10,7 @@
 
 #include "rules/explain/trace.hpp"
 #include "rules/prove/compile.hpp"
-#include "shm/decision.hpp"
+#include "shm/picture.hpp"
 
 namespace arbiter::rules {
 
@@ -59,6 +59,11 @@ class Simulation {
   [[nodiscard]] shm::ActivityWord activity(shm::SourceId source) const {
     return activity_[source].word.load(std::memory_order_relaxed);
   }
+  [[nodiscard]] bool is_active(shm::SourceId source) const {
+    return shm::is_active(activity(source), clock_.now);
+  }
+  // The source that the port selects; shm::kNone: none.
+  [[nodiscard]] shm::SourceId winner_at(shm::PortId port) const;
   [[nodiscard]] const std::vector<std::string>& port_names() const { return ports_; }  // by id
 
  private:

@@ -5,6 +5,8 @@
 #include <map>
 #include <set>
 
+#include "shm/picture.hpp"
+
 namespace arbiter::rules {
 namespace {
 
@@ -130,24 +132,8 @@ Activation evaluate(const shm::Rule& rule,
 
 std::vector<shm::SourceId> sources_heeded(const shm::TableView& table, shm::PortId port) {
   std::set<shm::SourceId> sources;
-  const auto read = table.sources_read(port);
-  for (shm::Word i = 0; i < read.count; ++i) sources.insert(read[i]);
-  const auto range = table.connections_to(port);
-  for (auto index = range.first; index != range.first + range.count; ++index) {
-    sources.insert(table.rule(index).source);
-  }
+  shm::for_each_heeded(table, port, [&](shm::SourceId source) { sources.insert(source); });
   return {sources.begin(), sources.end()};
-}
-
-shm::SourceId winner_at(const shm::TableView& table, shm::PortId port,
-                        const std::function<bool(shm::SourceId)>& is_active) {
-  const auto known = [&](shm::SourceId source) { return activation(is_active(source)); };
-  const auto range = table.connections_to(port);
-  for (auto index = range.first; index != range.first + range.count; ++index) {
-    const shm::Rule rule = table.rule(index);
-    if (evaluate(rule, known) == Activation::kActive) return rule.source;
-  }
-  return shm::kNone;
 }
 
 Tenure tenure_of(const shm::TableView& table, shm::PortId port, shm::SourceId winner,

@@ -33,10 +33,6 @@ Activation evaluate(const shm::Rule& rule,
 // All sources that a port is connected to or reads, ascending.
 std::vector<shm::SourceId> sources_heeded(const shm::TableView& table, shm::PortId port);
 
-// The source that a port selects, kNone if it selects none.
-shm::SourceId winner_at(const shm::TableView& table, shm::PortId port,
-                        const std::function<bool(shm::SourceId)>& is_active);
-
 struct Tenure {
   // It has been as it is since this time at least.
   shm::Nanoseconds at_least = 0;

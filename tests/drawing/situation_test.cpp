@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "tests/rules/model_text.hpp"
+#include "tests/rules/random_model.hpp"
+#include "tests/support/live_table.hpp"
 #include "tests/support/meaning.hpp"
 
 namespace arbiter::drawing {
@@ -51,6 +53,24 @@ TEST(Situation, WhereMoreThanOneMayHoldTheFirstOneWins) {
     <behavior name="B"><config at="/p">/b</config></behavior>
     <arbiter at="/p" conflict="first"/></behaviors>)");
   EXPECT_THAT(decide(loaded.rules, {"/a", "/b"}).winners, UnorderedElementsAre(Pair("/p", "/a")));
+}
+
+// Against the definition of a rule, over all activities.
+TEST(Situation, NamesTheWinnersOfRandomModels) {
+  const test::Vocabulary words;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    const test::RandomModel random = test::Generator(seed).model();
+    const auto loaded = load_text(test::to_xml(random, {words.ports.begin(), words.ports.end()}));
+    ASSERT_FALSE(loaded.has_errors) << loaded.message();
+    const test::NaiveEvaluator naive(random);
+    for (const auto& active : test::subsets(words.sources)) {
+      std::map<std::string, std::string> winners;
+      for (const auto& port : words.ports) {
+        if (const auto winner = naive.winner(port, active)) winners[port] = *winner;
+      }
+      EXPECT_EQ(decide(loaded.rules, active).winners, winners) << "seed " << seed;
+    }
+  }
 }
 
 // Against the meaning of conditions by the book, over all activities of four sources.

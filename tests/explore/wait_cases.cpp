@@ -113,6 +113,25 @@ void news(const Explore& explore) {
 }
 const Register kNews("AReceiverThatWaitsIsWokenForAPublisherThatItDidNotKnow", {3, 6}, news);
 
+// B overrides A, which is active all the time: one of the two commands at every moment.
+void always_commanded(const Explore& explore) {
+  explore_anew<Scene>(
+      explore,
+      [](Scene& scene, Execution& execution) {
+        scene.a().publish();
+        scene.b().signal();
+        execution.thread([&scene] {
+          scene.b().deactivate();
+          scene.b().signal();
+        });
+        execution.thread([&scene] {
+          require(!scene.input->core->is_idle(), "it is idle, though somebody commands always");
+        });
+      },
+      b_overrides_a(), depth(1), std::initializer_list<SourceId>{kA, kB});
+}
+const Register kAlways("APortThatIsCommandedAllTheTimeIsNeverIdle", {4, 3}, always_commanded);
+
 // The descriptor for a loop of one's own.
 struct Polling : Scene {
   Polling() : Scene(b_overrides_a(), depth(1), {kA}) {

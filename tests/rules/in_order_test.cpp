@@ -10,7 +10,6 @@
 
 #include "rules/explain/explain.hpp"
 #include "rules/explain/simulation.hpp"
-#include "rules/explain/tenure.hpp"
 #include "rules/prove/table_rules.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
@@ -110,7 +109,7 @@ class Readers {
   void check_table(const Active& now, const std::optional<std::string>& expected) {
     const auto table = live_.view();
     const auto is_active = [&](shm::SourceId id) { return now.contains(name_of(id)); };
-    const shm::SourceId winner = rules::winner_at(table, live_.port_id("/p"), is_active);
+    const shm::SourceId winner = shm::selected_at(table, live_.port_id("/p"), is_active).source;
     EXPECT_EQ(winner == shm::kNone ? std::nullopt : std::optional(name_of(winner)), expected);
     const auto set = rules::rules_of_table(table, live_.port_id("/p"), "/p",
                                            [&](shm::SourceId id) { return name_of(id); });

@@ -52,11 +52,7 @@ class Past {
                              [this](shm::SourceId source) { return simulation_.activity(source); },
                              [arrived_by](shm::SourceId) { return std::optional(arrived_by); }});
   }
-  [[nodiscard]] shm::SourceId winner() const {
-    return rules::winner_at(simulation_.table(), 0, [this](shm::SourceId source) {
-      return shm::is_active(simulation_.activity(source), simulation_.now());
-    });
-  }
+  [[nodiscard]] shm::SourceId winner() const { return simulation_.winner_at(0); }
   [[nodiscard]] shm::SourceId winner_at(Nanoseconds time) const {
     return winners_.at(static_cast<std::size_t>(time));
   }

@@ -184,12 +184,13 @@ TEST_F(Channels, AQueueIsFullWhenDepthSamplesWait) {
 
 TEST_F(Channels, APublisherThatNamesAnImpossibleDepthIsGivenUp) {
   for (const std::uint32_t depth : {0u, kMaxDepth + 1, UINT32_MAX}) {
-    join(depth);
+    ChannelWriter writer = join(depth);
     ChannelReader receiver = reader();
     EXPECT_FALSE(receiver.join());
     EXPECT_EQ(receiver.state(), ChannelReader::State::kMisbehaved);
     std::uint64_t lost = 0;
     EXPECT_EQ(receiver.peek(lost), 0u);
+    writer.leave([](std::uint32_t) {});
   }
 }
 
@@ -219,7 +220,7 @@ TEST_F(Channels, GarbageInARingNeverLeadsOutsideItAndEveryLookEnds) {
     for (const Entry garbage : {Entry{1}, ~Entry{0}, make_entry(kSequenceMask / 2, 0),
                                 make_entry(kSequenceMask / 2 + 2, 0), make_entry(1 + depth, 0),
                                 make_entry(1 + 1000 * std::uint64_t{depth}, 99)}) {
-      join(depth);
+      ChannelWriter writer = join(depth);
       ChannelReader receiver = reader();
       ASSERT_TRUE(receiver.join());
       for (std::uint32_t i = 0; i < kMaxDepth; ++i) segment_.ring(0, kReceiver)[i] = garbage;
@@ -233,6 +234,7 @@ TEST_F(Channels, GarbageInARingNeverLeadsOutsideItAndEveryLookEnds) {
       }
       for (std::uint32_t i = 0; i < kMaxDepth; ++i) segment_.ring(0, kReceiver)[i] = 0;
       segment_.channel(0).accepted = 0;
+      writer.leave([](std::uint32_t) {});
     }
   }
 }
@@ -248,6 +250,16 @@ TEST_F(Channels, SequencesPassTheEndOfTheirBits) {
     EXPECT_EQ(take(receiver, lost), slot);
   }
   EXPECT_EQ(lost, 0u);
+}
+
+// In releases too (shm/assertion.hpp).
+using ChannelsDeathTest = Channels;
+TEST_F(ChannelsDeathTest, AQueueBeginsOnlyWhereNoOtherIs) {
+  ChannelWriter writer = join(2);
+  push(writer, 1);
+  EXPECT_DEATH(join(2, kOther), "a mistake in the program: a queue begins where another has not");
+  writer.leave([](std::uint32_t) {});
+  join(2, kOther);
 }
 
 }  // namespace

@@ -158,6 +158,42 @@ TEST(SlotPool, ALoanThatNobodyAcceptsIsFreeAgain) {
   EXPECT_EQ(play.pool().free_count(), play.pool().size());
 }
 
+TEST(SlotPool, BalancesWhereverTheSlotsAre) {
+  Play play(2, 2, 2, 1);
+  for (unsigned round = 0; round < 50; ++round) {
+    play.pool().require_balance();
+    play.publish(play.loan(), round % 4);
+    play.hold(round % 2, round / 2 % 2);
+  }
+  play.pool().grow(play.pool().size() + 3);
+  play.pool().require_balance();
+}
+
+// In releases too (shm/assertion.hpp).
+TEST(SlotPoolDeathTest, ASlotIsNeverLostNorInTwoPlaces) {
+  EXPECT_DEATH(
+      {
+        Play play(1, 1, 1, 0);
+        static_cast<void>(play.loan());
+        play.pool().require_balance();
+      },
+      "a mistake in the program: a slot is lost, or in two places");
+  EXPECT_DEATH(
+      {
+        Play play(1, 1, 1, 0);
+        play.pool().end_loan(play.pool().size() - 1);  // it was not out
+        play.pool().require_balance();
+      },
+      "a slot is lost, or in two places");
+  EXPECT_DEATH(
+      {
+        Play play(1, 1, 1, 0);
+        play.pool().add_reference(play.pool().size() - 1);
+        play.pool().require_balance();
+      },
+      "a slot is free that a queue names");
+}
+
 TEST(SlotPool, GrowingKeepsWhatIsInUseAndNeverShrinks) {
   Play play(1, 1, 1, 0);
   const std::uint32_t first = play.loan();

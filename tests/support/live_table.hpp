@@ -6,11 +6,12 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "rules/prove/compile.hpp"
-#include "shm/decision.hpp"
+#include "shm/picture.hpp"
 
 namespace arbiter::test {
 
@@ -36,6 +37,14 @@ class LiveTable {
   }
   [[nodiscard]] shm::PortId port_id(const std::string& name) const { return port_ids_.at(name); }
 
+  // Nothing for shm::kNone, and for ids that are nobody's.
+  [[nodiscard]] std::optional<std::string> name_of(shm::SourceId id) const {
+    for (const auto& [name, each] : source_ids_) {
+      if (each == id) return name;
+    }
+    return std::nullopt;
+  }
+
   void activate_only(const std::set<std::string>& active) {
     for (const auto& [name, id] : source_ids_) {
       activity_[id].word = active.contains(name) ? shm::arrival(clock_.now, shm::kForever)
@@ -52,6 +61,13 @@ class LiveTable {
            shm::Verdict::kWins;
   }
 
+  [[nodiscard]] shm::PortPicture picture(const std::string& port) {
+    shm::PortPicture picture;
+    picture.bind(view(), port_id(port), *pages_);
+    if (!picture.take(clock_)) throw std::logic_error("nothing changes, and it is not settled");
+    return picture;
+  }
+
   [[nodiscard]] std::vector<std::string> winners(const std::string& port) {
     const shm::TableView table = view();
     shm::Decider decider(table, *pages_, clock_);
@@ -60,9 +76,7 @@ class LiveTable {
     for (auto c = range.first; c < range.first + range.count; ++c) {
       const shm::Rule rule = table.rule(c);
       if (decider.decide_with_own(rule) != shm::Verdict::kWins) continue;
-      for (const auto& [name, id] : source_ids_) {
-        if (id == rule.source) result.push_back(name);
-      }
+      result.push_back(name_of(rule.source).value());
     }
     return result;
   }

@@ -257,11 +257,12 @@ class Run {
     }
   }
   void x_takes() {
-    if (world_.x.held() == 2) {
-      world_.x.give_back(0);
-      world_.x.give_back(1);
-    }
-    static_cast<void>(world_.x.take());
+    if (world_.x.held() == 2) x_gives_back();
+    const detail::HeldSample sample = world_.x.take();
+    if (sample.data != nullptr) x_holds_.push_back(sample.hold);
+  }
+  void x_gives_back() {
+    for (; !x_holds_.empty(); x_holds_.pop_back()) world_.x.give_back(x_holds_.back());
   }
 
   std::vector<Patch> patches() {
@@ -284,6 +285,7 @@ class Run {
   void finish() {
     Seam::current = nullptr;
     while (!held_.empty()) give_back();
+    x_gives_back();
     world_.require_accounts();
   }
 
@@ -294,6 +296,7 @@ class Run {
   std::uint64_t last_r_ = 0;
   std::uint64_t last_r2_ = 0;
   std::deque<Held> held_;
+  std::vector<std::uint32_t> x_holds_;
 };
 
 }  // namespace
