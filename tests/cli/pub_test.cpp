@@ -9,6 +9,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "tests/cli/arbiter_program.hpp"
+#include "tests/client/component.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::test {
@@ -223,6 +224,28 @@ TEST(Pub, AdvisesNothingToWhoChoseATypeThatSomebodyTakes) {
   const auto untyped = pub({"/both"});
   EXPECT_THAT(untyped.err, AllOf(HasSubstr("run: arbiter pub /both --like /in2 --count 1"),
                                  HasSubstr("run: arbiter pub /both --like /in3 --count 1")));
+}
+
+// A daemon that takes over does not know the type of a port before its component is back.
+TEST(Pub, SaysThatAComponentHasNotComeBackYet) {
+  Daemon daemon(kPubModel);
+  Node keeper("keeper", quiet());  // of what the last daemon leaves
+  auto kept = keeper.output_port<PubNumber>("/stop");
+  Component component("stopped");
+  ASSERT_EQ(component.tell("input /in"), "open");
+  component.process().stop();
+  daemon.kill();
+  daemon.restart();
+  const auto like = pub({"/out", "--like", "/in"});
+  EXPECT_EQ(like.exit_code, 1);
+  EXPECT_THAT(like.err,
+              HasSubstr("has /in open (process " + std::to_string(component.process().pid()) +
+                        ") has not come back to this daemon yet; try again, or name"));
+  const auto strict = pub({"/out", "--strict"});
+  EXPECT_EQ(strict.exit_code, 1);
+  EXPECT_THAT(strict.err, HasSubstr("arbiter: nothing is delivered at /in before its component "
+                                    "comes back to this daemon\n"));
+  component.process().resume();
 }
 
 TEST(Pub, StrictPublishesNothingThatNobodyCanTake) {
