@@ -4,15 +4,19 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
+#include "cli/pub_payload.hpp"
+#include "cli/pub_takers.hpp"
+#include "cli/pub_type.hpp"
 #include "cli/verbs.hpp"
-#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -22,50 +26,50 @@ struct PubOptions {
   std::string instance;
   double rate_hz = 1;
   std::uint64_t count = 0;  // 0: until interrupted
-  std::size_t size = 8;
-  std::string text;
-  std::string type;  // empty: untyped
-  std::size_t alignment = 8;
+  PayloadOptions payload;
+  std::string type;  // with `like` empty: untyped
+  std::string like;
+  bool strict = false;
   bool quiet = false;
+  PubCommand command;
 };
 
-std::vector<std::byte> payload_of(const PubOptions& options) {
-  if (options.text.empty()) return std::vector<std::byte>(options.size);
-  const auto* bytes = reinterpret_cast<const std::byte*>(options.text.data());
-  return {bytes, bytes + options.text.size()};
+// What an untyped sample has where nothing else is said.
+constexpr std::size_t kDefaultSize = 8;
+
+Type type_of(const PubOptions& options, std::size_t untyped_size) {
+  if (!options.type.empty()) return parse_type(options.type);
+  if (options.like.empty()) return Type::untyped(untyped_size);
+  return type_like(fetch_status("pub-like", options.instance), options.like);
 }
 
-// Of ports that do not fit, or of which the model knows nothing, there was a notice. Says nothing
-// where the source is only sensed, or the daemon does not let us observe.
-void warn_if_nobody_is_there(const PubOptions& options) try {
-  const auto status = fetch_status("pub-status", options.instance);
-  std::vector<std::string> missing;
-  for (const auto& input : status.inputs) {
-    for (const auto& connection : input.connections) {
-      if (connection.source != options.port) continue;
-      if (connection.is_connected()) return;
-      if (!input.open) missing.push_back(input.name);
-    }
-  }
-  if (missing.empty()) return;
-  std::cerr << "arbiter: no component has " << rules::enumerate(missing)
-            << " open, which the model connects to " << options.port
-            << ", so none of these samples is delivered\n";
-} catch (const std::exception&) {
-  // It is not allowed, or the daemon has gone meanwhile: that is no reason not to publish.
-}
-
-int pub(const PubOptions& options) {
-  const auto interrupts = catch_interrupts();
-  const std::vector<std::byte> payload = payload_of(options);
-  Node node("arbiter-pub", live_options(options.instance));
+OutputPort<void> open(Node& node, const PubOptions& options, const Type& type) {
+  if (!type.is_untyped()) return node.output_port(options.port, type);
   OutputPortOptions port_options;
-  port_options.max_size = payload.size();
-  auto out =
-      options.type.empty()
-          ? node.output_port(options.port, port_options)
-          : node.output_port(options.port, Type(options.type, payload.size(), options.alignment));
-  warn_if_nobody_is_there(options);
+  port_options.max_size = type.size();
+  return node.output_port(options.port, port_options);
+}
+
+// Says what keeps samples from being taken. False: nobody can take any.
+bool check_takers(const PubOptions& options, const Type& type) try {
+  const Takers takers = find_takers(fetch_status("pub-status", options.instance), options.port,
+                                    type, options.command);
+  for (const std::string& message : takers.messages) {
+    std::cerr << "arbiter: " << shm::printable(message) << '\n';
+  }
+  return takers.is_any;
+} catch (const std::exception& error) {
+  // It is not allowed, or the daemon has gone meanwhile: that is no reason not to publish, unless
+  // the user wants to be sure.
+  if (options.strict) {
+    std::cerr << "arbiter: who can take the samples is not known: " << shm::printable(error.what())
+              << '\n';
+  }
+  return false;
+}
+
+int publish(const PubOptions& options, OutputPort<void>& out, const std::vector<std::byte>& payload,
+            const shm::FileDescriptor& interrupts) {
   const auto period = static_cast<shm::Nanoseconds>(1e9 / options.rate_hz);
   shm::Nanoseconds next = shm::monotonic_now();
   std::uint64_t published = 0;
@@ -91,6 +95,58 @@ int pub(const PubOptions& options) {
   return 0;
 }
 
+int pub(PubOptions& options) {
+  // All that may fail or block comes before the port opens, and before Ctrl-C is only heard by the
+  // loop: standard input may never end.
+  auto given = read_payload(options.payload);
+  const Type type = type_of(options, given ? given->size() : kDefaultSize);
+  const auto payload = payload_of(std::move(given), options.payload, type);
+  options.command.payload_size = payload.size();
+  const auto interrupts = catch_interrupts();
+  Node node("arbiter-pub", live_options(options.instance));
+  auto out = open(node, options, type);
+  if (!check_takers(options, type) && options.strict) {
+    std::cerr << "arbiter: nobody can take what " << options.port
+              << " sends, so nothing was published (--strict)\n";
+    return 1;
+  }
+  return publish(options, out, payload, interrupts);
+}
+
+// As the user has typed it, to advise another.
+PubCommand command_of(const CLI::App& verb) {
+  PubCommand command;
+  for (const CLI::Option* option : verb.parse_order()) {
+    const bool is_flag = option->get_items_expected_max() == 0;
+    const std::string name = option->nonpositional() ? option->get_name() : "";
+    command.arguments.emplace_back(name, is_flag ? "" : option->as<std::string>());
+    command.has_type |= name == "--type" || name == "--like";
+  }
+  return command;
+}
+
+void add_payload_options(CLI::App& verb, PayloadOptions& payload) {
+  auto* size = verb.add_option("--size", payload.size,
+                               "Bytes of a sample, zeroed (default: as the type has, untyped 8)")
+                   ->type_name("BYTES")
+                   ->check(CLI::Range(std::size_t{0}, kMaxPayload));
+  auto* text = verb.add_option("--text", payload.text, "The sample, as text")
+                   ->type_name("TEXT")
+                   ->excludes(size);
+  auto* hex = verb.add_option("--hex", payload.hex,
+                              "The sample, two hexadecimal digits for each byte; blanks between "
+                              "them are passed over")
+                  ->type_name("0A0B")
+                  ->excludes(size)
+                  ->excludes(text);
+  verb.add_option("--file", payload.file,
+                  "The sample: all of a file, at most 1 GiB; - is standard input")
+      ->type_name("FILE")
+      ->excludes(size)
+      ->excludes(text)
+      ->excludes(hex);
+}
+
 }  // namespace
 
 void add_pub(CLI::App& app, int& exit_code) {
@@ -103,22 +159,36 @@ void add_pub(CLI::App& app, int& exit_code) {
   verb->add_option("--count", options->count, "How many samples (default: until interrupted)")
       ->type_name("N")
       ->check(at_least_one());
-  auto* size = verb->add_option("--size", options->size, "Bytes of a sample (default 8), zeroed")
-                   ->type_name("BYTES")
-                   ->check(CLI::Range(std::size_t{0}, std::size_t{1} << 32));
-  verb->add_option("--text", options->text, "The sample, as text")->excludes(size);
+  add_payload_options(*verb, options->payload);
   auto* type = verb->add_option("--type", options->type,
-                                "The type's name, for input ports that take no other")
-                   ->type_name("NAME");
-  verb->add_option("--alignment", options->alignment, "The type's alignment (default 8)")
-      ->type_name("BYTES")
-      ->needs(type);
+                                "The samples' type, for input ports that take no other: its name, "
+                                "which may have colons, the bytes of a sample, and its alignment")
+                   ->type_name(kTypeForm);
+  verb->add_option("--like", options->like,
+                   "The samples' type is that of this input or output port, which a component "
+                   "must have open; of a source that nobody has open, that of its input ports")
+      ->type_name("PORT")
+      ->excludes(type);
+  verb->add_flag("--strict", options->strict, "Publish nothing unless somebody can take it");
   verb->add_flag("--quiet", options->quiet, "Print the summary only");
   add_instance_option(*verb, options->instance);
-  verb->footer(
-      "Examples:\n  arbiter pub /Face/pos:o --rate 10 --count 50 --text hello\n"
-      "  arbiter pub /Joystick/cmd:o --type geometry/Twist --size 48");
-  verb->callback([options, &exit_code] { exit_code = pub(*options); });
+  verb->footer(R"(Examples:
+  arbiter pub /Face/pos:o --rate 10 --count 50 --text hello
+  arbiter pub /Joystick/cmd:o --like /Base/cmd:i --file twist.bin
+  arbiter pub /Number:o --type arbiter::test::Number:8:8 --hex "0100 0000 0000 0000" --count 1
+
+Standard error says at once if nobody can take the samples: no component has an input port open that
+the model connects to PORT, the types differ or the connection is refused for another reason, or the
+model does not mention PORT. Without --strict they are published all the same: they make the source
+active, and somebody may come who takes them.
+
+Exit codes: 0 published, whoever took it; 1 no daemon, a port that cannot be opened, no type for
+--like, or with --strict nobody who can take it; 2 wrong use, a payload that does not fit the type,
+or a file that cannot be read)");
+  verb->callback([options, verb, &exit_code] {
+    options->command = command_of(*verb);
+    exit_code = pub(*options);
+  });
 }
 
 }  // namespace arbiter::cli

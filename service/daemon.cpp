@@ -13,10 +13,12 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rules/text/names.hpp"
 #include "service/clients/errands.hpp"
 #include "service/clients/hang_up.hpp"
 #include "service/clients/headroom.hpp"
 #include "service/kept/step.hpp"
+#include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "service/log/log_sink.hpp"
 #include "service/policy/users.hpp"
@@ -217,7 +219,7 @@ bool Daemon::handle_signal(int signal_descriptor) {
                                  describe_user(info.ssi_uid));
       continue;
     }
-    log::info("stopping: signal {}", info.ssi_signo);
+    log_event({EventKind::kStopping}, log::level::info, "stopping: signal {}", info.ssi_signo);
     return true;
   }
   return false;
@@ -253,7 +255,8 @@ bool Daemon::serve(Client& client) {
       case wire::ReceiveResult::kReceived:
         break;
       case wire::ReceiveResult::kMalformed:
-        log::warn("{} sent something that is not a message; dropped", client.description());
+        log_event({EventKind::kGivenUp, {client.name}}, log::level::warn,
+                  "{} sent something that is not a message; dropped", client.description());
         dispose_of(received, user);
         drop(id);
         return false;
@@ -278,6 +281,23 @@ void Daemon::retry(Client& client) {
   request.request.give_back();  // or a user who has room for one could not have it wait on
   handle_or_refuse(client, request.request.received(), request.deadline);
 }
+
+namespace {
+
+// What it is about, as far as the request says: only a name that has passed for one is a name.
+void log_refusal(const Client& client, const wire::Message& request, const std::string& why) {
+  Event event{EventKind::kRefused, {client.name}};
+  const std::string name(request.name_view());
+  const bool is_port = !rules::find_problem_in_port(name);
+  if (is_port && request.kind == wire::MessageKind::kOpenInput) event.ports = {name};
+  if (is_port && (request.kind == wire::MessageKind::kOpenOutput ||
+                  request.kind == wire::MessageKind::kDeactivate)) {
+    event.sources = {name};
+  }
+  log_event(event, log::level::warn, "{}: {}", client.description(), why);
+}
+
+}  // namespace
 
 // `deadline`: of a request that was postponed.
 void Daemon::handle_or_refuse(Client& client, wire::Received& received, shm::Nanoseconds deadline) {
@@ -307,7 +327,7 @@ void Daemon::handle_or_refuse(Client& client, wire::Received& received, shm::Nan
   } catch (const std::exception& error) {
     why = error.what();
   }
-  log::warn("{}: {}", client.description(), why);
+  log_refusal(client, received.message, why);
   refuse(client, received.message.request, why);
 }
 

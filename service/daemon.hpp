@@ -102,6 +102,7 @@ class Daemon final : private Takeover::Host {
   void admit_clients();
   void turn_away_client();
   void drop(ClientId id) override;
+  void log_end_of(const Client& client, bool is_away) const;
   void drop_oldest_silent_client();
   void look_in_flight(shm::Nanoseconds now);
   void plan_to_look_in_flight();
@@ -122,6 +123,7 @@ class Daemon final : private Takeover::Host {
   void finish_opening(Client& client, std::uint64_t request, std::unique_ptr<OutputPort> port,
                       Source& source);
   void open_input(Client& client, wire::Received& received);
+  void close_port(const Client& client, shm::PortInstance port);
   void connect(Client& client, std::uint64_t request, shm::PortInstance port);
   void deactivate(Client& client, const wire::Message& message);
   // Throws std::runtime_error if a live component has the name. One that has closed its port, or

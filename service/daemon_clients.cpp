@@ -14,6 +14,7 @@
 #include "service/clients/hang_up.hpp"
 #include "service/clients/headroom.hpp"
 #include "service/daemon.hpp"
+#include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "service/log/log_sink.hpp"
 #include "shm/clock.hpp"
@@ -75,7 +76,8 @@ void Daemon::accept_clients() {
       Charge descriptor = shares_.take(user, Share::kDescriptors);
       lobby_.add({user, std::move(socket), std::move(descriptor)});
     } catch (const LimitExceeded& limit) {  // anybody may come again and again: not worth a warning
-      log::debug("a client was turned away: {}", limit.what());
+      log_event({EventKind::kTurnedAway}, log::level::debug, "a client was turned away: {}",
+                limit.what());
       turn_away(std::move(socket), user);
     }
   }
@@ -95,12 +97,29 @@ void Daemon::admit_clients() {
       clients_.add(std::move(client));
       drop_oldest_silent_client();
     } catch (const LimitExceeded& limit) {
-      log::debug("a client was turned away: {}", limit.what());
+      log_event({EventKind::kTurnedAway}, log::level::debug, "a client was turned away: {}",
+                limit.what());
     } catch (const std::exception& error) {
-      log::warn("a client was turned away: {}", error.what());
+      log_event({EventKind::kTurnedAway}, log::level::warn, "a client was turned away: {}",
+                error.what());
       if (client != nullptr) unwatch(client->socket());
     }
   }
+}
+
+// Whoever ends in good order has closed its ports before.
+void Daemon::log_end_of(const Client& client, bool is_away) const {
+  Event event{EventKind::kLeft, {client.name}};
+  if (!client.ports.empty()) event.kind = is_away ? EventKind::kAway : EventKind::kDied;
+  for (const shm::PortInstance port : client.ports) {
+    if (const OutputPort* const output = switchboard_.output(port)) {
+      event.sources.push_back(output->source->name);
+    } else if (const InputPort* const input = switchboard_.input(port)) {
+      event.ports.push_back(input->name->name);
+    }
+  }
+  log_event(event, log::level::info, "{} left, {} ports with it", client.description(),
+            client.ports.size());
 }
 
 void Daemon::drop(ClientId id) {
@@ -108,12 +127,11 @@ void Daemon::drop(ClientId id) {
   if (client == nullptr) return;
   const LogAccount account(client->user());
   unwatch(client->socket());  // it is closed later
-  if (!client->name.empty() && !client->is_turned_away) {
-    log::info("{} left, {} ports with it", client->description(), client->ports.size());
-  }
   // One that could not be known again does not come back as what it was.
   const bool can_be_known = client->is_process(client->pid(), client->process());
-  if (client->comes_back && can_be_known && !client->has_died()) takeover_.set_away(*client);
+  const bool is_away = client->comes_back && can_be_known && !client->has_died();
+  if (!client->name.empty() && !client->is_turned_away) log_end_of(*client, is_away);
+  if (is_away) takeover_.set_away(*client);
   while (!client->ports.empty()) switchboard_.remove(*client->ports.begin());
   for (const shm::PortInstance port : client->to_hand_back) switchboard_.forget_away(port);
   observers_.forget(id);
@@ -158,10 +176,10 @@ void Daemon::turn_away_client() {
   }
   const uid_t user = user_of(socket);
   const LogAccount account(user);
-  log::warn(
-      "a client of user {} was turned away: no descriptors are left (RLIMIT_NOFILE, "
-      "LimitNOFILE= in a systemd unit)",
-      user);
+  log_event({EventKind::kTurnedAway}, log::level::warn,
+            "a client of user {} was turned away: no descriptors are left (RLIMIT_NOFILE, "
+            "LimitNOFILE= in a systemd unit)",
+            user);
   hang_up(std::move(socket), user);
 }
 

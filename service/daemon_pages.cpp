@@ -11,6 +11,7 @@
 
 #include "service/daemon.hpp"
 #include "service/kept/step.hpp"
+#include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "shm/clock.hpp"
 
@@ -41,7 +42,8 @@ void Daemon::change_page(Source& source, const Client& client, std::uint64_t req
     try {
       changed(changing, *asking);
     } catch (const std::exception& error) {
-      log::warn("{}: {}", asking->description(), error.what());
+      log_event({EventKind::kRefused, {asking->name}, {changing.name}}, log::level::warn, "{}: {}",
+                asking->description(), error.what());
       refuse(*asking, request, error.what());
     }
   };

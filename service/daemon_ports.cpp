@@ -7,6 +7,7 @@
 #include "service/clients/replies.hpp"
 #include "service/daemon.hpp"
 #include "service/kept/step.hpp"
+#include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "shm/clock.hpp"
 
@@ -76,7 +77,8 @@ void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_p
   }
   client.send(reply, {source.page.writable.get(), -1});
   at_step("output-open");
-  log::info("{} opened output port {}", client.description(), source.name);
+  log_event({EventKind::kOpened, {client.name}, {source.name}}, log::level::info,
+            "{} opened output port {}", client.description(), source.name);
   connect(client, request, opened.instance);
 }
 
@@ -97,8 +99,21 @@ void Daemon::open_input(Client& client, wire::Received& received) {
   reply.id = input.id;
   client.send(reply);
   at_step("input-open");
-  log::info("{} opened input port {}", client.description(), name);
+  log_event({EventKind::kOpened, {client.name}, {}, {name}}, log::level::info,
+            "{} opened input port {}", client.description(), name);
   connect(client, received.message.request, opened.instance);
+}
+
+void Daemon::close_port(const Client& client, shm::PortInstance port) {
+  if (client.ports.count(port) == 0) return;
+  if (const OutputPort* const output = switchboard_.output(port)) {
+    log_event({EventKind::kClosed, {client.name}, {output->source->name}}, log::level::info,
+              "{} closed output port {}", client.description(), output->source->name);
+  } else if (const InputPort* const input = switchboard_.input(port)) {
+    log_event({EventKind::kClosed, {client.name}, {}, {input->name->name}}, log::level::info,
+              "{} closed input port {}", client.description(), input->name->name);
+  }
+  switchboard_.remove(port);
 }
 
 // Introduces a new port to its peers, and tells its component once they know it.
@@ -133,7 +148,8 @@ void Daemon::deactivate(Client& client, const wire::Message& message) {
     auto reply = reply_to(request, wire::MessageKind::kDone);
     reply.value = was_active ? 1 : 0;
     asking.send(reply);
-    log::info("{} deactivated {}{}", asking.description(), ended.name,
+    log_event({EventKind::kDeactivated, {asking.name}, {ended.name}}, log::level::info,
+              "{} deactivated {}{}", asking.description(), ended.name,
               was_active ? "" : ", which was not active");
   };
   if (was_active && may_undo(*source)) {

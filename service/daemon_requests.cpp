@@ -4,6 +4,7 @@
 #include "service/clients/given_names.hpp"
 #include "service/clients/replies.hpp"
 #include "service/daemon.hpp"
+#include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "service/status.hpp"
 #include "shm/assertion.hpp"
@@ -62,7 +63,7 @@ void Daemon::handle(Client& client, wire::Received& received) {
       open_input(client, received);
       break;
     case wire::MessageKind::kClosePort:
-      if (client.ports.count(message.port) != 0) switchboard_.remove(message.port);
+      close_port(client, message.port);
       break;
     case wire::MessageKind::kSynced:
       barriers_.synced(client.id(), message.request);
@@ -98,7 +99,8 @@ void Daemon::handle(Client& client, wire::Received& received) {
       break;
     case wire::MessageKind::kStop:
       gate_.require(client, Action::kStop);
-      log::info("stopping: {} asks for it", client.description());
+      log_event({EventKind::kStopping, {client.name}}, log::level::info, "stopping: {} asks for it",
+                client.description());
       client.send(reply_to(message.request, wire::MessageKind::kDone));
       stop_wanted_ = true;
       break;

@@ -10,11 +10,14 @@
 #include <cstdlib>
 #include <exception>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include <CLI/CLI.hpp>
 
 #include "service/daemon.hpp"
+#include "service/log/event.hpp"
+#include "service/log/journal.hpp"
 #include "service/log/log.hpp"
 #include "service/log/log_sink.hpp"
 #include "wire/rendezvous.hpp"
@@ -22,6 +25,8 @@
 namespace {
 
 using arbiter::service::Daemon;
+using arbiter::service::EventKind;
+using arbiter::service::log_event;
 namespace log = arbiter::service::log;
 
 constexpr const char* kExample = R"(
@@ -29,7 +34,8 @@ Example:
   arbiterd --model search_and_track.xml
   arbiterd --model search=search.xml --model dance=dance.xml     # and then: arbiter switch dance
 
-It runs in the foreground, needs no configuration and no privileges, and logs to standard error.
+It runs in the foreground, needs no configuration and no privileges, and logs to standard error;
+under systemd to the journal, where journalctl ARBITER_PORT=/Arm/pos:i shows what is about one port.
 Files must be regular ones. Warnings about them are logged; with --strict they refuse the files.
 SIGHUP and `arbiter reload` read all again; a bad one changes nothing.
 SIGTERM, SIGINT and `arbiter stop` stop it. Without --policy every user may open ports and observe,
@@ -60,12 +66,22 @@ arbiter::shm::FileDescriptor catch_signals() {
 // Whatever umask it was started with: what its successor will believe, no other user may write.
 void keep_files_from_others() { umask(umask(0) | S_IWGRP | S_IWOTH); }
 
+// None where standard error does not lead to it. Its socket lies elsewhere in tests, and in a
+// container that has it from outside.
+std::optional<arbiter::service::JournalSocket> find_journal() {
+  using namespace arbiter::service;
+  if (!is_journal(STDERR_FILENO, std::getenv("JOURNAL_STREAM"))) return {};
+  const char* const path = std::getenv("ARBITER_JOURNAL_SOCKET");
+  return JournalSocket(path != nullptr ? path : kJournalSocket);
+}
+
 // Says all that is left to be said, unless nobody reads it, and ends.
 class Log {
  public:
   explicit Log(const std::string& level) {
     using namespace arbiter::service;
-    auto sink = std::make_shared<LogSink>(std::make_shared<LogWriter>(STDERR_FILENO));
+    auto sink =
+        std::make_shared<LogSink>(std::make_shared<LogWriter>(STDERR_FILENO, find_journal()));
     log::set_default_logger(std::make_shared<log::logger>("arbiterd", std::move(sink)));
     log::set_level(log::level::from_str(level));
   }
@@ -78,7 +94,8 @@ int serve(const arbiter::service::DaemonOptions& options, const std::string& ins
           const arbiter::shm::FileDescriptor& signals) {
   raise_descriptor_limit();
   Daemon daemon(options);
-  log::info("instance \"{}\" is ready at {}", instance, daemon.path());
+  log_event({EventKind::kReady}, log::level::info, "instance \"{}\" is ready at {}", instance,
+            daemon.path());
   for (const std::string& other : arbiter::wire::other_daemons(instance, options.directory)) {
     log::warn(
         "another daemon of instance \"{}\" listens at {}: components that meet there share nothing "

@@ -15,6 +15,7 @@
 #include "service/clients/errands.hpp"
 #include "service/clients/hang_up.hpp"
 #include "service/clients/headroom.hpp"
+#include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "shm/assertion.hpp"
 #include "shm/foreign.hpp"
@@ -118,7 +119,8 @@ void Client::send(const wire::Message& message,
     }
   }
   if (!has_room_for(count)) {
-    log::warn("{} does not read its messages: {} wait; giving it up", description(), queue_.size());
+    log_event({EventKind::kGivenUp, {name}}, log::level::warn,
+              "{} does not read its messages: {} wait; giving it up", description(), queue_.size());
     lost_ = true;
     return;
   }
@@ -129,11 +131,11 @@ void Client::send(const wire::Message& message,
   for (std::size_t i = 0; i < descriptors.size() && descriptors[i] >= 0; ++i) {
     queued->descriptors[i].reset(fcntl(descriptors[i], F_DUPFD_CLOEXEC, 0));
     if (!queued->descriptors[i]) {
-      log::warn(
-          "{} cannot be sent a message, and is given up: {} (the limit is RLIMIT_NOFILE, "
-          "LimitNOFILE= in "
-          "a systemd unit)",
-          description(), std::strerror(errno));
+      log_event({EventKind::kGivenUp, {name}}, log::level::warn,
+                "{} cannot be sent a message, and is given up: {} (the limit is RLIMIT_NOFILE, "
+                "LimitNOFILE= in "
+                "a systemd unit)",
+                description(), std::strerror(errno));
       lost_ = true;
       return;
     }
@@ -184,7 +186,8 @@ wire::ReceiveResult Client::receive(wire::Received& received) {
 wire::ReceiveResult Client::receive_from_socket(wire::Received& received) {
   dispose_of(received, user_);
   if (Errands::of_the_process().is_stuck(user_)) {
-    log::warn("{} is given up: {}", description(), too_much_waits(user_));
+    log_event({EventKind::kGivenUp, {name}}, log::level::warn, "{} is given up: {}", description(),
+              too_much_waits(user_));
     return wire::ReceiveResult::kClosed;
   }
   wire::ReceiveResult result{};

@@ -70,19 +70,23 @@ void LogSink::sink_it_(const spdlog::details::log_msg& message) {
   while (const auto left_out = shares_.next_left_out(message.time)) {
     spdlog::details::log_msg summary = message;
     summary.level = spdlog::level::warn;
-    write(std::move(summary), describe(*left_out));
+    write(std::move(summary), describe(*left_out), nullptr, left_out->user);
   }
   const auto user = LogAccount::current();
   if (user && !shares_.take(*user, message.time)) return;
-  write(message, {message.payload.data(), message.payload.size()});
+  write(message, {message.payload.data(), message.payload.size()}, EventScope::current(), user);
 }
 
-void LogSink::write(spdlog::details::log_msg message, std::string_view text) {
+void LogSink::write(spdlog::details::log_msg message, std::string_view text, const Event* event,
+                    std::optional<uid_t> user) {
   const std::string clean = shm::printable(text);
   message.payload = clean;
   spdlog::memory_buf_t line;
   formatter_->format(message, line);
-  writer_->put({line.data(), line.size()});
+  if (user == LogAccount::kUnknown) user.reset();
+  writer_->put({line.data(), line.size()}, writer_->has_journal()
+                                               ? journal_record(clean, message.level, event, user)
+                                               : std::string());
 }
 
 }  // namespace arbiter::service

@@ -18,6 +18,7 @@
 #include <optional>
 #include <string>
 
+#include "service/log/event.hpp"
 #include "service/log/log_writer.hpp"
 
 namespace arbiter::service {
@@ -75,7 +76,8 @@ class LogSink : public spdlog::sinks::base_sink<std::mutex> {
   void sink_it_(const spdlog::details::log_msg& message) override;
   void flush_() override {}  // the writer is always at it
 
-  void write(spdlog::details::log_msg message, std::string_view text);
+  void write(spdlog::details::log_msg message, std::string_view text, const Event* event,
+             std::optional<uid_t> user);
 
   std::shared_ptr<LogWriter> writer_;
   LogShares shares_;

@@ -12,20 +12,11 @@
 #include <mutex>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "shm/file_descriptor.hpp"
 
 namespace arbiter::service {
-
-struct LogWriter::Shared {
-  shm::FileDescriptor fd;
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::string waiting;
-  std::uint64_t lost = 0;  // lines that did not fit, since the last that did
-  bool is_ending = false;
-  bool has_ended = false;  // all is written
-};
 
 namespace {
 
@@ -50,14 +41,55 @@ void write_all(int fd, const std::string& text) {
   }
 }
 
-std::string loss(std::uint64_t lines) {
-  return "[log] " + std::to_string(lines) + " lines were lost here: nobody read the log\n";
-}
-
 }  // namespace
 
-LogWriter::LogWriter(int fd)
-    : needs_reader_(!is_regular_file(fd)), shared_(std::make_shared<Shared>()) {
+struct LogWriter::Shared {
+  struct Line {
+    std::string text;
+    std::string record;  // for the journal
+
+    [[nodiscard]] std::size_t bytes() const { return sizeof(Line) + text.size() + record.size(); }
+  };
+
+  shm::FileDescriptor fd;
+  std::optional<JournalSocket> journal;
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<Line> waiting;
+  std::size_t bytes_waiting = 0;
+  std::uint64_t lost = 0;  // lines that did not fit, since the last that did
+  bool is_ending = false;
+  bool has_ended = false;  // all is written
+
+  void add(Line line) {
+    bytes_waiting += line.bytes();
+    waiting.push_back(std::move(line));
+  }
+  void add_loss();
+  void write(const std::vector<Line>& lines) const;
+};
+
+// The text in as few calls as there can be.
+void LogWriter::Shared::write(const std::vector<Line>& lines) const {
+  std::string text;
+  for (const Line& line : lines) {
+    if (!journal || !journal->send(line.record)) text += line.text;
+  }
+  write_all(fd.get(), text);
+}
+
+void LogWriter::Shared::add_loss() {
+  const std::uint64_t lines = std::exchange(lost, 0);
+  if (lines == 0) return;
+  const std::string text = std::to_string(lines) + " lines were lost here: nobody read the log";
+  add({"[log] " + text + "\n", journal_record(text, log::level::warn, nullptr, {})});
+}
+
+LogWriter::LogWriter(int fd, std::optional<JournalSocket> journal)
+    : has_journal_(journal.has_value()),
+      needs_reader_(has_journal_ || !is_regular_file(fd)),
+      shared_(std::make_shared<Shared>()) {
+  shared_->journal = std::move(journal);
   shared_->fd.reset(fcntl(fd, F_DUPFD_CLOEXEC, 0));
   if (!shared_->fd)
     throw std::system_error(errno, std::generic_category(), "no log can be written");
@@ -72,9 +104,10 @@ LogWriter::LogWriter(int fd)
     for (;;) {
       shared->changed.wait(lock, [&] { return !shared->waiting.empty() || shared->is_ending; });
       if (shared->waiting.empty()) break;
-      const std::string text = std::exchange(shared->waiting, {});
+      const std::vector<Shared::Line> lines = std::exchange(shared->waiting, {});
+      shared->bytes_waiting = 0;
       lock.unlock();
-      write_all(shared->fd.get(), text);
+      shared->write(lines);
       lock.lock();
     }
     shared->has_ended = true;
@@ -84,26 +117,27 @@ LogWriter::LogWriter(int fd)
 
 LogWriter::~LogWriter() { finish(std::chrono::seconds(1)); }
 
-void LogWriter::put(std::string line) {
+void LogWriter::put(std::string line, std::string record) {
   const std::lock_guard lock(shared_->mutex);
   if (shared_->is_ending) return;
   if (!needs_reader_) {
     write_all(shared_->fd.get(), line);
     return;
   }
-  if (shared_->waiting.size() + line.size() > kMaxWaiting) {
+  Shared::Line added{std::move(line), std::move(record)};
+  if (shared_->bytes_waiting + added.bytes() > kMaxWaiting) {
     ++shared_->lost;
     return;
   }
-  if (const std::uint64_t lost = std::exchange(shared_->lost, 0)) shared_->waiting += loss(lost);
-  shared_->waiting += line;
+  shared_->add_loss();
+  shared_->add(std::move(added));
   shared_->changed.notify_all();
 }
 
 bool LogWriter::finish(std::chrono::milliseconds limit) {
   if (!thread_.joinable()) return !needs_reader_;
   std::unique_lock lock(shared_->mutex);
-  if (const std::uint64_t lost = std::exchange(shared_->lost, 0)) shared_->waiting += loss(lost);
+  shared_->add_loss();
   shared_->is_ending = true;
   shared_->changed.notify_all();
   const bool is_done = shared_->changed.wait_for(lock, limit, [&] { return shared_->has_ended; });

@@ -6,6 +6,9 @@
 // it puts lines into a bounded queue, and this thread alone waits for the reader. What does not fit
 // is lost, and counted; the count is written where the lines would have stood.
 //
+// Where there is a journal, lines are sent there as records, from the same thread; a line that the
+// journal does not take goes to the descriptor.
+//
 // Thread safety: put() may be called by any thread. One mutex guards the queue; the thread does not
 // hold it while it writes.
 #pragma once
@@ -13,8 +16,11 @@
 #include <chrono>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
+
+#include "service/log/journal.hpp"
 
 namespace arbiter::service {
 
@@ -24,14 +30,15 @@ class LogWriter {
   static constexpr std::size_t kMaxWaiting = 1 << 20;
 
   // Writes to a copy of `fd`. Throws std::system_error where no descriptor or thread can be had.
-  explicit LogWriter(int fd);
+  explicit LogWriter(int fd, std::optional<JournalSocket> journal = {});
   LogWriter(const LogWriter&) = delete;
   LogWriter& operator=(const LogWriter&) = delete;
   // As finish(), within a second.
   ~LogWriter();
 
-  // Never waits for the reader. `line` has its line end.
-  void put(std::string line);
+  [[nodiscard]] bool has_journal() const noexcept { return has_journal_; }
+  // Never waits for the reader. `line` has its line end; `record` is the same for the journal.
+  void put(std::string line, std::string record = {});
   // Waits until all is written, at most `limit`; then leaves the thread, which may be blocked for
   // ever, to the end of the process. False: not all was written. Lines put later are lost.
   bool finish(std::chrono::milliseconds limit);
@@ -39,6 +46,7 @@ class LogWriter {
  private:
   struct Shared;
 
+  const bool has_journal_;
   const bool needs_reader_;
   std::shared_ptr<Shared> shared_;  // the thread's too: it may outlive this
   std::thread thread_;

@@ -8,6 +8,7 @@
 
 #include "service/clients/replies.hpp"
 #include "service/kept/step.hpp"
+#include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "service/policy/users.hpp"
 
@@ -17,6 +18,20 @@ namespace {
 // File names may be any bytes; JSON may not.
 std::string in_bytes(const nlohmann::json& document) {
   return document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+EventKind event_of(const Swap& swap) {
+  if (swap.how == "start") return EventKind::kStarted;
+  switch (swap.change.kind) {
+    case Change::Kind::kSwitch:
+      return EventKind::kSwitched;
+    case Change::Kind::kRollback:
+      return EventKind::kRolledBack;
+    case Change::Kind::kReload:
+    case Change::Kind::kCompare:  // never in force
+      break;
+  }
+  return EventKind::kReloaded;
 }
 
 // What came of it, for those who want all of it.
@@ -56,7 +71,8 @@ void ModelChanges::start(bool is_fresh) {
     begin_swap(swap);
   } catch (const std::exception& error) {
     if (is_fresh) throw;
-    log::error("the model in force stays: {}", error.what());
+    log_event({EventKind::kChangeRefused, {}, {}, {}, inherited}, log::level::err,
+              "the model in force stays: {}", error.what());
     settle();
   }
 }
@@ -102,7 +118,8 @@ void ModelChanges::attempt(Swap& swap, const std::function<void()>& step) {
     if (swap.change.kind == Change::Kind::kCompare) {
       log::info("{} asks what a reload would do: {}", swap.change.by, why);
     } else {
-      log::error("the model in force stays: {}", why);
+      log_event({EventKind::kChangeRefused, {}, {}, {}, board_.in_force().generation},
+                log::level::err, "the model in force stays: {}", why);
     }
     answer_refused(swap, error.what());
   }
@@ -178,7 +195,8 @@ void ModelChanges::put_in_force() {
   switchboard_.tell_unmentioned(snapshot);
   switchboard_.ring_all();
   at_step("all-rung");
-  log::info("model {} is in force: {} \"{}\"{}", snapshot.generation, swap.how, model.name,
+  log_event({event_of(swap), {}, {}, {}, snapshot.generation}, log::level::info,
+            "model {} is in force: {} \"{}\"{}", snapshot.generation, swap.how, model.name,
             swap.change.by.empty() ? "" : ", by " + swap.change.by);
   remember(swap, snapshot.generation);
   at_step("change-remembered");

@@ -1,6 +1,7 @@
 #include "service/ports/switchboard.hpp"
 
 #include "service/kept/step.hpp"
+#include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "shm/assertion.hpp"
 
@@ -203,8 +204,12 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
           : "";
   const bool connects = kind == LinkKind::kConnected && link.mismatch.empty();
   if (!link.mismatch.empty()) {
-    log::warn("{} is not connected to {}: {}", output.source->name, input.name->name,
-              link.mismatch);
+    log_event({EventKind::kMismatch,
+               {output.client->name, input.client->name},
+               {output.source->name},
+               {input.name->name}},
+              log::level::warn, "{} is not connected to {}: {}", output.source->name,
+              input.name->name, link.mismatch);
   } else if (connects) {
     log::debug("{} is connected to {}", output.source->name, input.name->name);
   }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "rules/text/names.hpp"
+#include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "service/ports/switchboard.hpp"
 
@@ -12,6 +13,14 @@ namespace {
 
 // Among more names than this no similar one is looked for: the daemon has others to serve.
 constexpr std::size_t kMaxCompared = 512;
+
+Event about(EventKind kind, const OutputPort& port) {
+  return {kind, {port.client->name}, {port.source->name}};
+}
+
+Event about(EventKind kind, const InputPort& port) {
+  return {kind, {port.client->name}, {}, {port.name->name}};
+}
 
 }  // namespace
 
@@ -37,8 +46,14 @@ void Switchboard::refuse(shm::PortInstance port, shm::PortInstance peer, const s
     if (found == links_.end()) continue;
     found->second.mismatch = why;
     if (std::exchange(found->second.number, 0) != 0) tell_refusal(key, peer, why);
-    log::warn("{} is not connected to {}: {}", outputs_.at(key.first)->source->name,
-              inputs_.at(key.second)->name->name, why);
+    const OutputPort& output = *outputs_.at(key.first);
+    const InputPort& input = *inputs_.at(key.second);
+    log_event({EventKind::kMismatch,
+               {output.client->name, input.client->name},
+               {output.source->name},
+               {input.name->name}},
+              log::level::warn, "{} is not connected to {}: {}", output.source->name,
+              input.name->name, why);
   }
 }
 
@@ -61,7 +76,8 @@ std::string Switchboard::unmentioned_text(const shm::TableSnapshot& in_force,
 template <class Port>
 void Switchboard::say_unmentioned(Port& port, const std::string& text) {
   port.is_told_unmentioned = true;
-  log::warn("{}: {}", port.client->description(), text);
+  log_event(about(EventKind::kUnmentioned, port), log::level::warn, "{}: {}",
+            port.client->description(), text);
   wire::Message message;
   message.kind = wire::MessageKind::kUnmentioned;
   message.port = port.instance;
@@ -96,7 +112,10 @@ void Switchboard::note_blind(shm::PortInstance port, const std::string& text) {
   const auto input = inputs_.find(port);
   bool& is_known =
       output != outputs_.end() ? output->second->is_known_blind : input->second->is_known_blind;
-  if (!std::exchange(is_known, true)) log::warn("{}: {}", client_of(port).description(), text);
+  if (std::exchange(is_known, true)) return;
+  log_event(output != outputs_.end() ? about(EventKind::kBlind, *output->second)
+                                     : about(EventKind::kBlind, *input->second),
+            log::level::warn, "{}: {}", client_of(port).description(), text);
 }
 
 }  // namespace arbiter::service

@@ -7,7 +7,9 @@
 #include "service/clients/given_names.hpp"
 #include "service/clients/replies.hpp"
 #include "service/kept/step.hpp"
+#include "service/log/event.hpp"
 #include "service/log/log.hpp"
+#include "service/log/log_sink.hpp"
 #include "service/takeover/takeover.hpp"
 #include "shm/clock.hpp"
 
@@ -151,12 +153,14 @@ void Takeover::finish_return(Client& client) {
   switchboard_.link_all(table);
   switchboard_.unlink(table);
   host_.try_postponed();
-  log::info("{} is back, with {} ports", client.description(), client.ports.size());
+  log_event({EventKind::kBack, {client.name}}, log::level::info, "{} is back, with {} ports",
+            client.description(), client.ports.size());
 }
 
 void Takeover::set_away(Client& client) {
   if (client.ports.empty() && client.to_hand_back.empty()) return;
   Absentee& absentee = absentees_[client.node];
+  absentee.name = client.name;
   absentee.pid = client.pid();
   absentee.user = client.user();
   absentee.ports = std::exchange(client.to_hand_back, {});
@@ -167,11 +171,25 @@ void Takeover::set_away(Client& client) {
   host_.watch_absentee(absentee.process, client.node);
 }
 
+void Takeover::log_end_of(const Absentee& absentee) const {
+  std::optional<LogAccount> account;
+  if (absentee.user) account.emplace(*absentee.user);
+  Event event{EventKind::kDied};
+  if (!absentee.name.empty()) event.components = {absentee.name};
+  for (const auto& source : names_.sources()) {
+    if (absentee.ports.contains(source->away)) event.sources.push_back(source->name);
+  }
+  for (const auto& input : names_.inputs()) {
+    if (absentee.ports.contains(input->away)) event.ports.push_back(input->name);
+  }
+  log_event(event, log::level::info, "process {} has ended, {} ports with it", absentee.pid,
+            absentee.ports.size());
+}
+
 void Takeover::forget_absentee(NodeId node) {
   const auto found = absentees_.find(node);
   if (found == absentees_.end()) return;
-  log::info("process {} has ended, {} ports with it", found->second.pid,
-            found->second.ports.size());
+  log_end_of(found->second);
   give_up(node);
 }
 

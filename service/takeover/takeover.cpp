@@ -10,6 +10,7 @@
 
 #include "service/kept/descriptor_store.hpp"
 #include "service/kept/step.hpp"
+#include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "shm/clock.hpp"
 
@@ -93,8 +94,10 @@ void Takeover::inherit(const shm::FileDescriptor& board, const shm::FileDescript
   at_step("names-restored");
   find_absentees();
   phase_ = Phase::kTakingOver;
-  log::info("taking over from the last daemon, {} components and model {}", absentees_.size(),
-            board_.in_force().generation);
+  const auto generation = board_.in_force().generation;
+  log_event({EventKind::kTakeover, {}, {}, {}, generation}, log::level::info,
+            "taking over from the last daemon, {} components and model {}", absentees_.size(),
+            generation);
 }
 
 void Takeover::find_absentees() {

@@ -115,6 +115,7 @@ class Takeover {
   // components are coming back.
   enum class Phase : std::uint8_t { kExpecting, kTakingOver, kServing };
   struct Absentee {
+    std::string name;  // of its node; empty where an earlier daemon knew it
     pid_t pid = 0;
     std::optional<uid_t> user;  // empty: it cannot be told
     shm::FileDescriptor process;
@@ -127,6 +128,7 @@ class Takeover {
   void find_absentees();
   void add_absentee(const Owner& owner);
   void take_back(Client& client, const wire::Received& hello);
+  void log_end_of(const Absentee& absentee) const;
   void end_conversation_of(const Client& client, NodeId node);
   [[nodiscard]] static bool is_that(const Client& client, const Absentee& absentee);
   // Nothing is kept for the node that a client was and has nothing left of: what it closed without

@@ -65,7 +65,9 @@ TEST(Unmentioned, PubSaysThatTheTypesDiffer) {
       result.err,
       "arbiter: /Face/pos:o is not connected to /Gaze/pos:i: the output port of \"arbiter-pub\" "
       "sends untyped samples (up to 8 bytes), the input port of \"test\" takes int (4 bytes, "
-      "aligned to 4)\n");
+      "aligned to 4)\n"
+      "arbiter: to send what /Gaze/pos:i takes, run: arbiter pub /Face/pos:o --like /Gaze/pos:i "
+      "--count 1  (samples of 4 bytes: add them by --hex, --file or --text, or they are zeros)\n");
   EXPECT_THAT(result.out, HasSubstr("refused 1"));
 }
 

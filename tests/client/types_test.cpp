@@ -241,20 +241,20 @@ TEST(Types, AScriptFeedsATypedPort) {
   Daemon daemon(single_model());
   Node node("test");
   auto in = node.input_port<Twist>("/in");
-  const auto pub = [](const std::string& type, const std::string& size) {
+  const auto pub = [](const std::string& type) {
     return run_program({std::string(ARBITER_PROGRAMS) + "/arbiter", "pub", "/out", "--type", type,
-                        "--size", size, "--count", "1"});
+                        "--count", "1"});
   };
-  EXPECT_EQ(pub("geometry/Twist", "48").exit_code, 0);
+  EXPECT_EQ(pub("geometry/Twist:48:8").exit_code, 0);
   const auto sample = in.take();
   ASSERT_TRUE(sample);
   EXPECT_EQ((*sample)->linear[0], 0);
-  const auto other = pub("geometry/Twist", "40");
+  const auto other = pub("geometry/Twist:40:8");
   EXPECT_NE(other.err.find("sends geometry/Twist (40 bytes, aligned to 8), the input port of "
                            "\"test\" takes geometry/Twist (48 bytes, aligned to 8)"),
             std::string::npos)
       << other.err;
-  EXPECT_NE(pub("a\nb", "40").exit_code, 0);
+  EXPECT_NE(pub("a\nb:40:8").exit_code, 0);
 }
 
 TEST(Types, OfARunTimeTypeEachSampleHasItsSize) {

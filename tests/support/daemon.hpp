@@ -7,7 +7,6 @@
 #include <poll.h>
 #include <signal.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -23,6 +22,7 @@
 #include <vector>
 
 #include "tests/support/child_process.hpp"
+#include "tests/support/datagram_socket.hpp"
 #include "tests/support/raw_client.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -55,15 +55,8 @@ class ScopedVariable {
 // Where a service manager would hear that the daemon is ready.
 class NotifySocket {
  public:
-  explicit NotifySocket(std::string path) : path_(std::move(path)) {
-    socket_.reset(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    std::strncpy(address.sun_path, path_.c_str(), sizeof address.sun_path - 1);
-    if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-      throw std::runtime_error("cannot listen at " + path_);
-    }
-  }
+  explicit NotifySocket(std::string path)
+      : path_(std::move(path)), socket_(datagram_socket_at(path_)) {}
 
   [[nodiscard]] const std::string& path() const { return path_; }
   // True: a message that contains `text` has come; false: the process ended before it.

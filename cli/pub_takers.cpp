@@ -1,0 +1,98 @@
+#include "cli/pub_takers.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+#include "cli/pub_type.hpp"
+#include "rules/text/names.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+// As a shell reads it: bare where nothing in it has a meaning to any shell.
+std::string shell_word(const std::string& text) {
+  constexpr std::string_view kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./:@%+=,-";
+  if (!text.empty() && text.find_first_not_of(kPlain) == std::string::npos) return text;
+  std::string word = "'";
+  for (const char each : text) word += each == '\'' ? std::string(R"('\'')") : std::string(1, each);
+  return word + "'";
+}
+
+bool is_payload(const std::string& option) {
+  return option == "--hex" || option == "--file" || option == "--text" || option == "--size";
+}
+
+std::string advice(const PubCommand& command, const wire::InputStatus& input) {
+  const std::size_t size = input.open->type->size;
+  std::string text =
+      "to send what " + input.name + " takes, run: " + command.like(input.name, size);
+  if (command.payload_size != size) {
+    text += "  (samples of " + std::to_string(size) + (size == 1 ? " byte" : " bytes") +
+            ": add them by --hex, --file or --text, or they are zeros)";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string PubCommand::like(const std::string& port, std::size_t size) const {
+  std::string line = "arbiter pub";
+  bool is_said = false;
+  for (const auto& [option, value] : arguments) {
+    if (option == "--type" || option == "--like") continue;
+    if (is_payload(option) && (payload_size != size || option == "--size")) continue;
+    if (!option.empty()) line += ' ' + option;
+    if (!value.empty() || option.empty()) line += ' ' + shell_word(value);
+    if (!option.empty() || is_said) continue;
+    line += " --like " + shell_word(port);
+    is_said = true;
+  }
+  return line;
+}
+
+Takers find_takers(const wire::Status& status, const std::string& port, const Type& type,
+                   const PubCommand& command) {
+  Takers takers;
+  std::vector<std::string> closed, away;
+  std::vector<const wire::InputStatus*> refused;
+  const auto* const source = status.find_source(port);
+  bool has_connections = false;
+  for (const auto& input : status.inputs) {
+    for (const auto& connection : input.connections) {
+      if (connection.source != port) continue;
+      has_connections = true;
+      takers.is_any |= connection.is_connected();
+      if (!input.open) (input.away_pid ? away : closed).push_back(input.name);
+      if (connection.mismatch && input.open && input.open->type &&
+          !is_same(*input.open->type, type)) {
+        refused.push_back(&input);
+      }
+    }
+  }
+  if (!has_connections) takers.is_any = source != nullptr && source->mentioned;
+  if (!takers.is_any && !closed.empty()) {
+    takers.messages.push_back("no component has " + rules::enumerate(closed) +
+                              " open, which the model connects to " + port +
+                              ", so none of these samples is delivered");
+  }
+  if (!takers.is_any && !away.empty()) {
+    takers.messages.push_back("nothing is delivered at " + rules::enumerate(away) +
+                              " before its component comes back to this daemon");
+  }
+  if (command.has_type && takers.is_any) return takers;  // it was chosen for those who can
+  std::vector<wire::SampleType> said;
+  for (const wire::InputStatus* input : refused) {
+    const Type taken(input->open->type->name, input->open->type->size,
+                     input->open->type->alignment);
+    const bool is_said = std::any_of(said.begin(), said.end(), [&](const wire::SampleType& each) {
+      return is_same(each, taken);
+    });
+    if (is_said) continue;
+    said.push_back(*input->open->type);
+    takers.messages.push_back(advice(command, *input));
+  }
+  return takers;
+}
+
+}  // namespace arbiter::cli

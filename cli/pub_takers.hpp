@@ -1,0 +1,39 @@
+// Who can take what arbiter pub sends, as the daemon sees it once the port is open.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <arbiter/type.hpp>
+
+#include "wire/status.hpp"
+
+namespace arbiter::cli {
+
+// The command line as it was given: an option and its value, or a positional argument and no
+// option. The same with another type can be made of it.
+struct PubCommand {
+  using Argument = std::pair<std::string, std::string>;  // {"--count", "1"}, {"", "/Face/pos:o"}
+  std::vector<Argument> arguments;
+  std::size_t payload_size = 0;
+  bool has_type = false;
+
+  // "arbiter pub /Face/pos:o --like /Gaze/pos:i --count 1", to be pasted into a shell. A payload of
+  // another size is left out.
+  [[nodiscard]] std::string like(const std::string& port, std::size_t size) const;
+};
+
+struct Takers {
+  bool is_any = false;                // somebody can; or nobody should, for the source is only read
+  std::vector<std::string> messages;  // what else a user should know, a sentence each
+};
+
+// Refused connections and ports that the model does not mention come as notices, and are not said
+// again: for the former there is advice.
+[[nodiscard]] Takers find_takers(const wire::Status& status, const std::string& port,
+                                 const Type& type, const PubCommand& command);
+
+}  // namespace arbiter::cli
