@@ -39,9 +39,14 @@ std::shared_ptr<watch::Instance> watch_instance(const std::string& verb,
 std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
                                                  const std::string& instance);
 
+// How often a verb that follows decisions looks, beside the times at which it knows that an activity
+// ends: publishers do not ring for those who merely observe.
+inline constexpr shm::Nanoseconds kLookEvery = 2'000'000;
+
 // The daemon's status document, as text. Throws wire::CallError, wire::DocumentError.
 std::string fetch_status_text(const std::string& verb, const std::string& instance);
 wire::Status fetch_status(const std::string& verb, const std::string& instance);
+wire::Status fetch_status(wire::Caller caller, std::chrono::milliseconds answer_time);
 
 // SIGINT and SIGTERM as a descriptor, so that a stream ends with its summary. Call before threads
 // start.

@@ -31,7 +31,6 @@ using rules::Truth;
 using watch::LiveStatement;
 
 constexpr int kTimedOut = 3;
-constexpr shm::Nanoseconds kLookEvery = 2'000'000;
 constexpr const char* kArgument = "--until";
 
 struct WaitOptions {

@@ -18,10 +18,6 @@ namespace {
 using nlohmann::json;
 using watch::Look;
 
-// How often --follow looks, beside the times at which it knows that an activity ends: publishers do
-// not ring for those who merely observe.
-constexpr shm::Nanoseconds kLookEvery = 2'000'000;
-
 class Follower {
  public:
   Follower(const WhyOptions& options, shm::FileDescriptor interrupts)
