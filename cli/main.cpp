@@ -78,6 +78,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_why(app, exit_code);
   arbiter::cli::add_wait(app, exit_code);
   arbiter::cli::add_metrics(app, exit_code);
+  arbiter::cli::add_doctor(app, exit_code);
   arbiter::cli::add_deactivate(app, exit_code);
   arbiter::cli::add_reload(app, exit_code);
   arbiter::cli::add_switch(app, exit_code);

@@ -28,5 +28,6 @@ void add_stop(CLI::App& app, int& exit_code);
 void add_why(CLI::App& app, int& exit_code);
 void add_wait(CLI::App& app, int& exit_code);
 void add_metrics(CLI::App& app, int& exit_code);
+void add_doctor(CLI::App& app, int& exit_code);
 
 }  // namespace arbiter::cli
