@@ -169,6 +169,16 @@ void add_strangers(const wire::Status& status, Findings& found) {
   }
 }
 
+Finding silence(const std::string& text) {
+  if (text.starts_with("no arbiterd of instance")) {
+    return {"no-daemon", text, "no port can be opened, and no model changed",
+            "systemctl start arbiterd, or arbiterd --model FILE"};
+  }
+  return {"silent-daemon", text, "no port can be opened, and no model changed",
+          "kill -CONT its process if it is stopped (ps -o pid,stat,wchan -C arbiterd); otherwise "
+          "systemctl restart arbiterd: components go on meanwhile"};
+}
+
 // By what the daemon says when it turns us away.
 Finding refusal(const std::string& text) {
   if (text.find("speaks version") != std::string::npos) {
@@ -236,14 +246,10 @@ Findings examine_daemon(const wire::Caller& caller, std::optional<wire::Status>&
     question.kind = wire::MessageKind::kStatus;
     const auto answer = call.ask(question, caller.answer_time);
     status = wire::read_status(wire::read_document(answer.descriptors[0]));
+  } catch (const wire::RefusedError& error) {
+    found.push_back(refusal(error.what()));
   } catch (const wire::CallError& error) {
-    const std::string text = error.what();
-    if (text.starts_with("no arbiterd of instance")) {
-      found.push_back({"no-daemon", text, "no port can be opened, and no model changed",
-                       "systemctl start arbiterd, or arbiterd --model FILE"});
-    } else {
-      found.push_back(refusal(text));
-    }
+    found.push_back(silence(error.what()));
   } catch (const wire::DocumentError& error) {
     found.push_back(
         {"other-version", std::string("the daemon's status cannot be read: ") + error.what(),
@@ -296,6 +302,7 @@ const std::vector<std::string>& finding_codes() {
                                               "strangers-directory",
                                               "stale-socket",
                                               "no-daemon",
+                                              "silent-daemon",
                                               "other-version",
                                               "refused",
                                               "clock",

@@ -233,7 +233,7 @@ wire::Received Instance::ask(const wire::Message& question) {
   }
   wire::Received answer = std::move(*std::exchange(answer_, std::nullopt));
   if (answer.message.kind == wire::MessageKind::kRefused) {
-    throw wire::CallError(std::string(answer.message.text_view()));
+    throw wire::RefusedError(std::string(answer.message.text_view()));
   }
   return answer;
 }

@@ -63,14 +63,15 @@ bool LiveStatement::is_bound() const {
          memory_->tables().generation() == generation_;
 }
 
-// False: there is nobody who could tell the names of this model, or it is not in force any more.
+// False: nobody tells the names of this model now, or it is not in force any more.
 bool LiveStatement::bind() {
   if (!instance_->has_daemon()) return false;
   try {
     instance_->catch_up();
-  } catch (const wire::CallError&) {
-    if (!instance_->has_daemon()) return false;
+  } catch (const wire::RefusedError&) {
     throw;
+  } catch (const wire::CallError&) {  // it has gone, is stopped, or is busy: another time
+    return false;
   }
   memory_.reset();  // nothing is bound if this fails
   const auto memory = instance_->memory();

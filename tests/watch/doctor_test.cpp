@@ -233,6 +233,18 @@ TEST(Doctor, FindsThatThereIsNoDaemon) {
   EXPECT_FALSE(status);
 }
 
+TEST(Doctor, FindsADaemonThatDoesNotAnswer) {
+  Daemon daemon;
+  daemon.process().stop();
+  wire::Caller caller = caller_of(daemon);
+  caller.answer_time = std::chrono::milliseconds(1);
+  std::optional<wire::Status> status;
+  const Findings findings = watch::examine_daemon(caller, status);
+  daemon.process().resume();
+  ASSERT_THAT(codes_of(findings), ElementsAre("silent-daemon"));
+  EXPECT_THAT(findings[0].what, HasSubstr("(pid " + std::to_string(daemon.process().pid()) + ")"));
+}
+
 TEST(Doctor, FindsThatTheDaemonKeepsAUserOut) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can be another user";
   const TemporaryDirectory files;

@@ -168,6 +168,20 @@ TEST(LiveStatement, GoesOnWhileNoDaemonRuns) {
   EXPECT_EQ(statement.look().truth, Truth::kFalse);
 }
 
+TEST(LiveStatement, IsUnknownWhileNobodyTellsTheNamesOfAnotherModel) {
+  Daemon daemon(kTwoPortsModel);
+  wire::Caller caller = caller_of(daemon);
+  caller.answer_time = std::chrono::milliseconds(300);
+  const auto instance = std::make_shared<watch::Instance>(std::move(caller));
+  auto statement = live(instance, "idle(/p)");
+  EXPECT_EQ(statement.look().truth, Truth::kTrue);
+  daemon.load(kTwoPortsModel);
+  daemon.process().stop();
+  EXPECT_EQ(statement.look().truth, Truth::kUnknown);
+  daemon.process().resume();
+  EXPECT_EQ(statement.look().truth, Truth::kTrue);
+}
+
 // What the old one's components do is seen no more: they are strangers there.
 TEST(LiveStatement, IsOfTheMemoryOfADaemonThatComesWithItsOwn) {
   Daemon daemon(kTwoPortsModel);
