@@ -39,8 +39,8 @@ std::shared_ptr<watch::Instance> watch_instance(const std::string& verb,
 std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
                                                  const std::string& instance);
 
-// How often a verb that follows decisions looks, beside the times at which it knows that an activity
-// ends: publishers do not ring for those who merely observe.
+// How often a verb that follows decisions looks, beside the times at which it knows that an
+// activity ends: publishers do not ring for those who merely observe.
 inline constexpr shm::Nanoseconds kLookEvery = 2'000'000;
 
 // The daemon's status document, as text. Throws wire::CallError, wire::DocumentError.
