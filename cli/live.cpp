@@ -68,6 +68,17 @@ std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
   return std::make_shared<watch::Instance>(std::move(follower));
 }
 
+void DaemonNews::tell(const watch::Instance& instance) {
+  const bool is_alone = !instance.has_daemon();
+  if (is_alone == std::exchange(is_alone_, is_alone)) return;
+  if (is_alone) {
+    std::cerr << "arbiter: the daemon has gone; what it decided last goes on, and " << goes_on_
+              << '\n';
+  } else {
+    std::cerr << "arbiter: a daemon is there again\n";
+  }
+}
+
 std::string fetch_status_text(const std::string& verb, const std::string& instance) {
   return status_text(caller(verb, instance), kAnswerTime);
 }

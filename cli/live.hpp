@@ -4,6 +4,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <arbiter/arbiter.hpp>
 
@@ -38,6 +39,18 @@ std::shared_ptr<watch::Instance> watch_instance(const std::string& verb,
 // most, for meanwhile it does not hear Ctrl-C.
 std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
                                                  const std::string& instance);
+
+// Says on standard error that the daemon has gone, and that one is there again.
+class DaemonNews {
+ public:
+  // `goes_on`: what the verb does meanwhile, as in "is followed on".
+  explicit DaemonNews(std::string goes_on) : goes_on_(std::move(goes_on)) {}
+  void tell(const watch::Instance& instance);
+
+ private:
+  const std::string goes_on_;
+  bool is_alone_ = false;
+};
 
 // How often a verb that follows decisions looks, beside the times at which it knows that an
 // activity ends: publishers do not ring for those who merely observe.

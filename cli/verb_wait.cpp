@@ -70,7 +70,8 @@ class Waiting {
     const shm::Nanoseconds deadline =
         options_.timeout >= shm::kForever - started_ ? shm::kForever : started_ + options_.timeout;
     for (;;) {
-      watch_daemon();
+      instance_->update();
+      news_.tell(*instance_);
       const LiveStatement::Look look = take_look();
       const shm::Nanoseconds now = shm::monotonic_now();
       if (is_fulfilled(look)) return report(true, look, now);
@@ -87,15 +88,6 @@ class Waiting {
       rules::write_text(std::cerr, statement_.diagnostics());
     }
     return look;
-  }
-
-  void watch_daemon() {
-    instance_->update();
-    const bool is_alone = !instance_->has_daemon();
-    if (is_alone == std::exchange(is_alone_, is_alone)) return;
-    std::cerr << (is_alone ? "arbiter: the daemon has gone; what it decided last goes on, and is "
-                             "watched on\n"
-                           : "arbiter: a daemon is there again\n");
   }
 
   // What is not known is not true: it may have been false just then.
@@ -174,7 +166,7 @@ class Waiting {
   const shm::FileDescriptor nobody_;  // no interrupts: a signal ends this as any program
   std::optional<shm::Nanoseconds> held_since_;
   std::uint64_t warned_of_ = 0;
-  bool is_alone_ = false;
+  DaemonNews news_{"is watched on"};
 };
 
 int wait(const WaitOptions& options) {

@@ -92,8 +92,10 @@ void examine_governors(const Machine& machine, Findings& found) {
     processors += (processors.empty() ? "" : ", ") + name;
   }
   for (const auto& [governor, processors] : slow) {
+    std::string what = "the frequency governor of " + processors;
+    what += " is " + governor;
     found.push_back(
-        {"governor", "the frequency governor of " + processors + " is " + governor,
+        {"governor", std::move(what),
          "a processor that has slept begins slowly, so that the first sample after a "
          "pause is late",
          "echo performance | tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor"});

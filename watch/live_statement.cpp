@@ -104,6 +104,7 @@ void LiveStatement::bind_names(const shm::TableView& table) {
   for (const shm::SourceId source : all_sources(table)) {
     ids[instance_->memory()->source_name(source)] = source;
   }
+  names.reserve(ids.size());
   for (const auto& [name, id] : ids) names.push_back(name);
   rules::StatementNames known(names, ports_of(*instance_, table));
   if (!known.admit(statement_, diagnostics_)) return;

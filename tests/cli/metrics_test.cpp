@@ -42,8 +42,7 @@ class Served {
     if (!instance.empty()) argv.insert(argv.end(), {"--instance", instance});
     process_ = ChildProcess(argv, {}, {-1, -1, err.get()});
     pollfd ended{process_.descriptor(), POLLIN, 0};
-    while (error().find(" /metrics\n") == std::string::npos &&
-           error().find("/metrics\n") == std::string::npos) {
+    while (error().find("/metrics\n") == std::string::npos) {
       if (::poll(&ended, 1, 1) == 1) throw std::runtime_error("it has ended: " + error());
     }
   }
