@@ -39,7 +39,7 @@ int write_once(const MetricsOptions& options) {
 class Source {
  public:
   explicit Source(const std::string& instance) : caller_(caller("metrics", instance)) {
-    caller_.patience = std::chrono::milliseconds(0);
+    caller_.patience = std::chrono::milliseconds(10);
     caller_.answer_time = kAnswerTime;
     caller_.on_waiting = {};
   }
