@@ -179,7 +179,7 @@ int draw_and_follow(const GraphOptions& options) {
   const auto instance = follow_instance("graph", options.instance);
   LivePicture picture(options, *instance);
   if (!picture.update()) return 1;
-  DaemonNews news("is drawn on");
+  DaemonNews news("drawing");
   std::string said;
   for (shm::Nanoseconds next = shm::monotonic_now();;) {
     next = std::max(next + kFollowPeriod, shm::monotonic_now());

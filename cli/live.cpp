@@ -72,8 +72,9 @@ void DaemonNews::tell(const watch::Instance& instance) {
   const bool is_alone = !instance.has_daemon();
   if (is_alone == std::exchange(is_alone_, is_alone)) return;
   if (is_alone) {
-    std::cerr << "arbiter: the daemon has gone; what it decided last goes on, and " << goes_on_
-              << '\n';
+    std::cerr
+        << "arbiter: the daemon has gone; its last decisions stay in force, and arbiter keeps "
+        << goes_on_ << " them\n";
   } else {
     std::cerr << "arbiter: a daemon is there again\n";
   }

@@ -43,7 +43,7 @@ std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
 // Says on standard error that the daemon has gone, and that one is there again.
 class DaemonNews {
  public:
-  // `goes_on`: what the verb does meanwhile, as in "is followed on".
+  // `goes_on`: what the verb does with the last decisions meanwhile, as in "following".
   explicit DaemonNews(std::string goes_on) : goes_on_(std::move(goes_on)) {}
   void tell(const watch::Instance& instance);
 

@@ -166,7 +166,7 @@ class Waiting {
   const shm::FileDescriptor nobody_;  // no interrupts: a signal ends this as any program
   std::optional<shm::Nanoseconds> held_since_;
   std::uint64_t warned_of_ = 0;
-  DaemonNews news_{"is watched on"};
+  DaemonNews news_{"watching"};
 };
 
 int wait(const WaitOptions& options) {

@@ -134,7 +134,7 @@ class Follower {
   watch::Port port_;
   const shm::Nanoseconds started_;
   Look last_;
-  DaemonNews news_{"is followed on"};
+  DaemonNews news_{"following"};
 };
 
 }  // namespace

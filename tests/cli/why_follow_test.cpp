@@ -174,7 +174,7 @@ TEST(WhyFollow, SaysThatTheDaemonHasGoneAndThatOneIsThereAgain) {
   EXPECT_THAT(followed.line(), HasSubstr("  /gaze: idle"));
   daemon.kill();
   EXPECT_THAT(followed.error_line(),
-              HasSubstr("arbiter: the daemon has gone; what it decided last goes on"));
+              HasSubstr("arbiter: the daemon has gone; its last decisions stay in force"));
   random.signal();
   EXPECT_THAT(followed.line(), HasSubstr("  idle -> /random  because"));
   daemon.restart();
