@@ -179,18 +179,13 @@ int draw_and_follow(const GraphOptions& options) {
   const auto instance = follow_instance("graph", options.instance);
   LivePicture picture(options, *instance);
   if (!picture.update()) return 1;
-  bool is_alone = false;
+  DaemonNews news("drawing");
   std::string said;
   for (shm::Nanoseconds next = shm::monotonic_now();;) {
     next = std::max(next + kFollowPeriod, shm::monotonic_now());
     if (sleep_until(next, interrupts)) return 0;
     instance->update();
-    if (is_alone != !instance->has_daemon()) {
-      is_alone = !is_alone;
-      std::cerr << (is_alone ? "arbiter: the daemon has gone; what it decided last goes on, and is "
-                               "drawn on\n"
-                             : "arbiter: a daemon is there again\n");
-    }
+    news.tell(*instance);
     try {
       if (!picture.update()) return 1;
     } catch (const wire::CallError& error) {

@@ -21,6 +21,13 @@ namespace {
 // What the daemon has to answer a question that changes nothing.
 constexpr std::chrono::milliseconds kAnswerTime{10'000};
 
+std::string status_text(wire::Caller caller, std::chrono::milliseconds answer_time) {
+  wire::Call daemon(std::move(caller));
+  wire::Message question;
+  question.kind = wire::MessageKind::kStatus;
+  return wire::read_document(daemon.ask(question, answer_time).descriptors[0]);
+}
+
 }  // namespace
 
 void add_instance_option(CLI::App& verb, std::string& instance) {
@@ -61,15 +68,28 @@ std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
   return std::make_shared<watch::Instance>(std::move(follower));
 }
 
+void DaemonNews::tell(const watch::Instance& instance) {
+  const bool is_alone = !instance.has_daemon();
+  if (is_alone == std::exchange(is_alone_, is_alone)) return;
+  if (is_alone) {
+    std::cerr
+        << "arbiter: the daemon has gone; its last decisions stay in force, and arbiter keeps "
+        << goes_on_ << " them\n";
+  } else {
+    std::cerr << "arbiter: a daemon is there again\n";
+  }
+}
+
 std::string fetch_status_text(const std::string& verb, const std::string& instance) {
-  wire::Call daemon(caller(verb, instance));
-  wire::Message question;
-  question.kind = wire::MessageKind::kStatus;
-  return wire::read_document(daemon.ask(question, kAnswerTime).descriptors[0]);
+  return status_text(caller(verb, instance), kAnswerTime);
 }
 
 wire::Status fetch_status(const std::string& verb, const std::string& instance) {
-  return wire::read_status(fetch_status_text(verb, instance));
+  return fetch_status(caller(verb, instance), kAnswerTime);
+}
+
+wire::Status fetch_status(wire::Caller caller, std::chrono::milliseconds answer_time) {
+  return wire::read_status(status_text(std::move(caller), answer_time));
 }
 
 shm::FileDescriptor catch_interrupts() {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <arbiter/arbiter.hpp>
 
@@ -39,9 +40,26 @@ std::shared_ptr<watch::Instance> watch_instance(const std::string& verb,
 std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
                                                  const std::string& instance);
 
+// Says on standard error that the daemon has gone, and that one is there again.
+class DaemonNews {
+ public:
+  // `goes_on`: what the verb does with the last decisions meanwhile, as in "following".
+  explicit DaemonNews(std::string goes_on) : goes_on_(std::move(goes_on)) {}
+  void tell(const watch::Instance& instance);
+
+ private:
+  const std::string goes_on_;
+  bool is_alone_ = false;
+};
+
+// How often a verb that follows decisions looks, beside the times at which it knows that an
+// activity ends: publishers do not ring for those who merely observe.
+inline constexpr shm::Nanoseconds kLookEvery = 2'000'000;
+
 // The daemon's status document, as text. Throws wire::CallError, wire::DocumentError.
 std::string fetch_status_text(const std::string& verb, const std::string& instance);
 wire::Status fetch_status(const std::string& verb, const std::string& instance);
+wire::Status fetch_status(wire::Caller caller, std::chrono::milliseconds answer_time);
 
 // SIGINT and SIGTERM as a descriptor, so that a stream ends with its summary. Call before threads
 // start.

@@ -76,6 +76,9 @@ int run(int argc, char** argv) {
   arbiter::cli::add_pub(app, exit_code);
   arbiter::cli::add_status(app, exit_code);
   arbiter::cli::add_why(app, exit_code);
+  arbiter::cli::add_wait(app, exit_code);
+  arbiter::cli::add_metrics(app, exit_code);
+  arbiter::cli::add_doctor(app, exit_code);
   arbiter::cli::add_deactivate(app, exit_code);
   arbiter::cli::add_reload(app, exit_code);
   arbiter::cli::add_switch(app, exit_code);

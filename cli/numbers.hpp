@@ -1,12 +1,15 @@
-// Numbers on the command line.
+// Numbers and times on the command line.
 #pragma once
 
 #include <charconv>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <system_error>
 
 #include <CLI/CLI.hpp>
+
+#include "rules/text/duration.hpp"
 
 namespace arbiter::cli {
 
@@ -20,6 +23,15 @@ inline CLI::Validator at_least_one() {
             return '"' + text + "\" is no whole number of at least 1";
           },
           ""};
+}
+
+// 0s, 250ns, 10us, 500ms, 2s, forever. Throws CLI::ValidationError.
+inline shm::Nanoseconds read_time(const std::string& option, const std::string& text) {
+  const std::size_t unit = text.find_first_not_of('0');
+  const bool is_zero = unit != 0 && unit != std::string::npos && text[unit] > '9';
+  const auto parsed = rules::parse_duration(is_zero ? "1" + text.substr(unit) : text);
+  if (!parsed.problem.empty()) throw CLI::ValidationError(option, parsed.problem);
+  return is_zero ? 0 : parsed.value;
 }
 
 }  // namespace arbiter::cli

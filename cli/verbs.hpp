@@ -26,5 +26,8 @@ void add_rollback(CLI::App& app, int& exit_code);
 void add_history(CLI::App& app, int& exit_code);
 void add_stop(CLI::App& app, int& exit_code);
 void add_why(CLI::App& app, int& exit_code);
+void add_wait(CLI::App& app, int& exit_code);
+void add_metrics(CLI::App& app, int& exit_code);
+void add_doctor(CLI::App& app, int& exit_code);
 
 }  // namespace arbiter::cli

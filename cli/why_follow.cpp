@@ -18,10 +18,6 @@ namespace {
 using nlohmann::json;
 using watch::Look;
 
-// How often --follow looks, beside the times at which it knows that an activity ends: publishers do
-// not ring for those who merely observe.
-constexpr shm::Nanoseconds kLookEvery = 2'000'000;
-
 class Follower {
  public:
   Follower(const WhyOptions& options, shm::FileDescriptor interrupts)
@@ -39,7 +35,8 @@ class Follower {
     while (std::cout) {
       const shm::Nanoseconds soon = shm::monotonic_now() + kLookEvery;
       if (sleep_until(std::min(soon, last_.picture.next_end()), interrupts_)) return 0;
-      watch_daemon();
+      port_.instance().update();
+      news_.tell(port_.instance());  // decisions do not depend on it
       Look look = port_.look();
       if (look.winner != last_.winner || name_of(look) != name_of(last_)) {
         if (!write_change(look)) continue;
@@ -51,16 +48,6 @@ class Follower {
   }
 
  private:
-  // Not among the changes: decisions do not depend on it.
-  void watch_daemon() {
-    port_.instance().update();
-    const bool is_alone = !port_.instance().has_daemon();
-    if (is_alone == std::exchange(is_alone_, is_alone)) return;
-    std::cerr << (is_alone ? "arbiter: the daemon has gone; its last decisions stay in force, and "
-                             "arbiter keeps following them\n"
-                           : "arbiter: a daemon is there again\n");
-  }
-
   [[nodiscard]] std::string name_of(const Look& look) const {
     if (look.generation() == 0) return "no model";
     if (!look.is_mentioned) return "not mentioned";  // nothing comes; else all comes:
@@ -147,7 +134,7 @@ class Follower {
   watch::Port port_;
   const shm::Nanoseconds started_;
   Look last_;
-  bool is_alone_ = false;
+  DaemonNews news_{"following"};
 };
 
 }  // namespace

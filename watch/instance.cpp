@@ -60,7 +60,7 @@ Instance::Instance(wire::Caller caller) : caller_(std::move(caller)) {
   take_up_memory(welcome.received);
   standing_ = Standing::kIn;
   daemons_ = 1;
-  static_cast<void>(ask(message_of(wire::MessageKind::kObserve)));
+  catch_up();
 }
 
 // Nothing is handed on to a daemon's successor: components do that.
@@ -233,10 +233,12 @@ wire::Received Instance::ask(const wire::Message& question) {
   }
   wire::Received answer = std::move(*std::exchange(answer_, std::nullopt));
   if (answer.message.kind == wire::MessageKind::kRefused) {
-    throw wire::CallError(std::string(answer.message.text_view()));
+    throw wire::RefusedError(std::string(answer.message.text_view()));
   }
   return answer;
 }
+
+void Instance::catch_up() { static_cast<void>(ask(message_of(wire::MessageKind::kObserve))); }
 
 wire::Status Instance::status() {
   const wire::Received answer = ask(message_of(wire::MessageKind::kStatus));

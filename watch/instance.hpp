@@ -67,6 +67,9 @@ class Instance {
   // The answer to a question that changes nothing; where the daemon goes meanwhile, that of the
   // next. Throws wire::CallError where it refuses, or none answers within the caller's answer_time.
   wire::Received ask(const wire::Message& question);
+  // Returns when all pages and names have come that the daemon had when it was asked: those of the
+  // model in force among them. Throws as ask().
+  void catch_up();
   // Throws wire::CallError, wire::DocumentError.
   wire::Status status();
 

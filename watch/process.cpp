@@ -1,18 +1,11 @@
 #include "watch/process.hpp"
 
-#include <fstream>
 #include <string>
+
+#include "watch/machine.hpp"
 
 namespace arbiter::watch {
 
-// /proc/PID/stat: "pid (name) state …".
-bool is_stopped(int pid) {
-  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
-  std::string text;
-  std::getline(file, text);
-  const auto end = text.rfind(") ");
-  return end != std::string::npos && end + 2 < text.size() &&
-         (text[end + 2] == 'T' || text[end + 2] == 't');
-}
+bool is_stopped(int pid) { return Machine().is_stopped(std::to_string(pid)); }
 
 }  // namespace arbiter::watch

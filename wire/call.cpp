@@ -106,7 +106,7 @@ class Joining {
     }
     const Message& answer = welcome.received.message;
     if (answer.kind == MessageKind::kRefused) {
-      throw CallError("the daemon refuses: " + std::string(answer.text_view()));
+      throw RefusedError("the daemon refuses: " + std::string(answer.text_view()));
     }
     return answer.kind == MessageKind::kWelcome;
   }
@@ -152,7 +152,7 @@ Received Call::ask(Message question, std::optional<milliseconds> limit) {
       }
       if (answer.message.request != question.request) continue;
       if (answer.message.kind == MessageKind::kRefused) {
-        throw CallError(std::string(answer.message.text_view()));
+        throw RefusedError(std::string(answer.message.text_view()));
       }
       return answer;
     }

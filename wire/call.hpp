@@ -25,6 +25,12 @@ class CallError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// A daemon that is there, and says no.
+class RefusedError : public CallError {
+ public:
+  using CallError::CallError;
+};
+
 // Who calls, and how long it may take.
 struct Caller {
   std::string name;                         // what the hello says: "arbiter-status"

@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <map>
 #include <set>
-#include <unordered_map>
 
 #include "rules/model/quantifiers.hpp"
+#include "rules/model/statement_names.hpp"
 #include "rules/prove/question.hpp"
 #include "rules/prove/winners.hpp"
-#include "rules/text/names.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -55,7 +54,7 @@ class Judge {
       : diagnostics_(diagnostics),
         budget_(budget),
         expansion_(model.sources),
-        sources_(model.sources.begin(), model.sources.end()) {
+        names_(model.sources, ports_of(model)) {
     for (const auto& port : model.ports) ports_.emplace(port.port, &port);
   }
 
@@ -79,20 +78,9 @@ class Judge {
  private:
   // Unless it speaks of what the model does not have, which is reported.
   void admit(const Statement& statement) {
-    statement_ = &statement;
-    bool has_meaning = true;
+    if (!names_.admit(statement, diagnostics_)) return;
     Case admitted;
-    for (const auto& term : statement.parsed.terms) {
-      const auto found = find_term(term);
-      has_meaning = has_meaning && found.has_value();
-      if (!found) continue;
-      admitted.terms.push_back(*found);
-    }
-    for (const auto& source : statement.parsed.sources) {
-      has_meaning = is_known(source) && has_meaning;
-    }
-    for (const auto& glob : statement.parsed.globs) warn_if_unmatched(glob);
-    if (!has_meaning) return;
+    for (const auto& term : statement.parsed.terms) admitted.terms.push_back(term_of(term));
     admitted.expression = expansion_.expand(statement.parsed.expression);
     admitted.verdict.statement = statement.text;
     admitted.verdict.where = statement.where;
@@ -197,6 +185,16 @@ class Judge {
     return has_room ? all : sources;
   }
 
+  static StatementNames::Ports ports_of(const CompiledModel& model) {
+    StatementNames::Ports ports;
+    for (const auto& port : model.ports) {
+      StatementNames::Port& known = ports[port.port];
+      known.is_arbitrated = port.arbitrated;
+      for (const auto& rule : port.rules) known.sources.push_back(rule.source);
+    }
+    return ports;
+  }
+
   // Each once.
   static std::vector<const CompiledPort*> ports_of(const std::vector<Term>& terms) {
     std::vector<const CompiledPort*> ports;
@@ -209,116 +207,28 @@ class Judge {
     return ports;
   }
 
-  std::optional<Term> find_term(const WinnerTerm& term) {
-    const CompiledPort* const port = find_port(term.port);
-    const CompiledPort* const other = term.other_port ? find_port(*term.other_port) : nullptr;
-    if (port == nullptr || (term.other_port && other == nullptr)) return std::nullopt;
-    Term result{port};
-    if (other != nullptr) {
-      result.other = other;
-    } else if (term.pattern) {
-      result.rules = find_rules(*port, *term.pattern);
-    } else if (term.source) {
-      const CompiledRule* const rule = find_rule(*port, *term.source);
-      if (rule == nullptr) return std::nullopt;
-      result.rules = {rule};
-    } else {
+  [[nodiscard]] Term term_of(const WinnerTerm& term) const {
+    const CompiledPort& port = *ports_.at(term.port.name);
+    Term result{&port};
+    if (term.other_port) {
+      result.other = ports_.at(term.other_port->name);
+    } else if (!term.source && !term.pattern) {
       result.nobody = true;
+    } else {
+      for (const auto& rule : port.rules) {
+        const bool may_win = term.source ? rule.source == term.source->name
+                                         : matches(term.pattern->name, rule.source);
+        if (may_win) result.rules.push_back(&rule);
+      }
     }
     return result;
-  }
-
-  // An arbitrated one; null, reported, if it is none.
-  const CompiledPort* find_port(const Mention& mention) {
-    const auto port = ports_.find(mention.name);
-    if (port == ports_.end()) {
-      std::vector<std::string_view> names;
-      if (may_suggest()) {
-        for (const auto& [name, known] : ports_) names.push_back(name);
-      }
-      report("unknown-port", mention,
-             "the model has no input port " + mention.name +
-                 advise(mention.name, names, "name one that is arbitrated"),
-             {.ports = {mention.name}});
-      return nullptr;
-    }
-    if (port->second->arbitrated) return port->second;
-    report("not-arbitrated", mention,
-           "no rule mentions " + mention.name +
-               ": it is not arbitrated, everything is delivered there and nobody wins or loses; "
-               "name a port that is arbitrated",
-           {.ports = {mention.name}});
-    return nullptr;
-  }
-
-  // Of a connection; null, reported, if there is none.
-  const CompiledRule* find_rule(const CompiledPort& port, const Mention& source) {
-    for (const auto& rule : port.rules) {
-      if (rule.source == source.name) return &rule;
-    }
-    std::vector<std::string_view> names;
-    if (may_suggest()) {
-      for (const auto& rule : port.rules) names.push_back(rule.source);
-    }
-    report("not-connected", source,
-           source.name + " is not connected to " + port.port + ", so that it can never win there" +
-               advise(source.name, names, "name one of its connections"),
-           {.ports = {port.port}, .source = source.name});
-    return nullptr;
-  }
-
-  std::vector<const CompiledRule*> find_rules(const CompiledPort& port, const Mention& pattern) {
-    std::vector<const CompiledRule*> rules;
-    for (const auto& rule : port.rules) {
-      if (matches(pattern.name, rule.source)) rules.push_back(&rule);
-    }
-    if (rules.empty()) {
-      diagnostics_.warning("matches-nothing", pattern.where,
-                           "no source that is connected to " + port.port + " matches " +
-                               quote(pattern.name) + ", so that none of these can win; correct it",
-                           {.ports = {port.port}, .statement = statement_->text});
-    }
-    return rules;
-  }
-
-  void report(std::string code, const Mention& mention, std::string message, Subject about) {
-    about.statement = statement_->text;
-    diagnostics_.error(std::move(code), mention.where, std::move(message), std::move(about));
-  }
-
-  bool is_known(const Mention& source) {
-    if (sources_.contains(source.name)) return true;
-    std::vector<std::string_view> names;
-    if (may_suggest()) names.assign(sources_.begin(), sources_.end());
-    report("unknown-source", source,
-           "neither the model nor its application names a source " + source.name +
-               advise(source.name, names, "name one that it reads or connects"),
-           {.source = source.name});
-    return false;
-  }
-
-  // To compare a name with all others takes long, and nobody reads so many.
-  bool may_suggest() { return ++unknown_ <= kMaxSuggestions; }
-
-  void warn_if_unmatched(const Mention& glob) {
-    const auto [known, is_new] = matched_.try_emplace(glob.name);
-    const auto fits = [&](const auto& source) { return matches(glob.name, source); };
-    if (is_new) known->second = std::any_of(sources_.begin(), sources_.end(), fits);
-    if (known->second) return;
-    diagnostics_.warning("matches-nothing", glob.where,
-                         "no source matches " + quote(glob.name) +
-                             ": any() is false of it, all() and none() are true; correct it",
-                         {.statement = statement_->text});
   }
 
   Diagnostics& diagnostics_;
   Budget& budget_;
   QuantifierExpansion expansion_;
-  std::set<std::string, std::less<>> sources_;
+  StatementNames names_;
   std::map<std::string, const CompiledPort*> ports_;
-  std::unordered_map<std::string, bool> matched_;  // by pattern: whether any source does
-  const Statement* statement_ = nullptr;           // the one that is admitted
-  std::size_t unknown_ = 0;
   std::vector<Case> cases_;
   std::map<std::set<std::string>, std::set<std::string>> read_with_;  // by ports
   std::optional<SharedScene> shared_;                                 // of these ports and sources

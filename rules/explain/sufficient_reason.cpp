@@ -13,80 +13,10 @@
 #include <unordered_set>
 #include <utility>
 
+#include "rules/model/evaluation.hpp"
+
 namespace arbiter::rules {
 namespace {
-
-// Kleene's logic: what can be said while some sources are unknown.
-enum class Truth : std::uint8_t { kFalse, kTrue, kUnknown };
-
-Truth truth(bool value) { return value ? Truth::kTrue : Truth::kFalse; }
-Truth negate(Truth value) {
-  if (value == Truth::kUnknown) return value;
-  return truth(value == Truth::kFalse);
-}
-
-// Expressions may share parts, so that each is looked at once. They are no deeper than
-// kMaxConditionDepth, or than a diagram, hence recursion is fine here and below.
-class KleeneEvaluation {
- public:
-  using Look = std::function<Truth(const std::string& source)>;
-  explicit KleeneEvaluation(Look look) : look_(std::move(look)) {}
-
-  Truth of(const Expression& expression) {
-    if (expression.op == Operator::kSource) return look_(expression.name);
-    if (const auto known = known_.find(&expression); known != known_.end()) return known->second;
-    const Truth result = evaluate_new(expression);
-    known_.emplace(&expression, result);
-    return result;
-  }
-
- private:
-  Truth evaluate_new(const Expression& expression) {
-    const auto operand = [&](std::size_t i) { return of(*expression.operands[i]); };
-    switch (expression.op) {
-      case Operator::kFalse:
-        return Truth::kFalse;
-      case Operator::kTrue:
-        return Truth::kTrue;
-      case Operator::kNot:
-        return negate(operand(0));
-      case Operator::kAnd:
-        return join(expression, Truth::kFalse);
-      case Operator::kOr:
-        return join(expression, Truth::kTrue);
-      case Operator::kXor:
-        return negate(equal(operand(0), operand(1)));
-      case Operator::kIff:
-        return equal(operand(0), operand(1));
-      case Operator::kImplies: {
-        const Truth left = operand(0);
-        if (left == Truth::kFalse) return Truth::kTrue;
-        const Truth right = operand(1);
-        return left == Truth::kTrue || right == Truth::kTrue ? right : Truth::kUnknown;
-      }
-      default:
-        throw std::logic_error("a quantifier in an expression that should have been expanded");
-    }
-  }
-
-  Truth join(const Expression& expression, Truth decisive) {
-    Truth result = negate(decisive);
-    for (const auto& operand : expression.operands) {
-      const Truth value = of(*operand);
-      if (value == decisive) return decisive;
-      if (value == Truth::kUnknown) result = value;
-    }
-    return result;
-  }
-
-  static Truth equal(Truth left, Truth right) {
-    if (left == Truth::kUnknown || right == Truth::kUnknown) return Truth::kUnknown;
-    return truth(left == right);
-  }
-
-  const Look look_;
-  std::unordered_map<const Expression*, Truth> known_;
-};
 
 void collect_sources(const Expression& expression, std::unordered_set<const Expression*>& seen,
                      std::set<std::string>& sources) {
@@ -184,7 +114,7 @@ class StructuralReason {
   }
 
   const std::vector<Literal>& literals_;
-  KleeneEvaluation evaluation_;
+  Evaluation evaluation_;
   std::unordered_map<const Expression*, Places> known_;  // its values stay where they are
 };
 
@@ -322,7 +252,7 @@ std::vector<Literal> lean_reason(const Expression& expression, bool value,
   for (std::size_t i = literals.size(); i-- > 0;) {
     const Literal left_out = literals[i];
     literals.erase(literals.begin() + static_cast<std::ptrdiff_t>(i));
-    KleeneEvaluation evaluation([&](const std::string& source) {
+    Evaluation evaluation([&](const std::string& source) {
       for (const Literal& literal : literals) {
         if (literal.source == source) return truth(literal.active);
       }
@@ -347,7 +277,7 @@ std::vector<Literal> large_reason(const Expression& expression,
 }  // namespace
 
 bool evaluate(const Expression& expression, const IsActive& is_active) {
-  KleeneEvaluation evaluation([&](const std::string& source) { return truth(is_active(source)); });
+  Evaluation evaluation([&](const std::string& source) { return truth(is_active(source)); });
   return evaluation.of(expression) == Truth::kTrue;
 }
 

@@ -19,6 +19,7 @@
 #include <map>
 #include <sstream>
 
+#include "tests/support/daemon.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/text_files.hpp"
@@ -191,6 +192,17 @@ TEST(Pages, OfTheLibraryOfModelsRun) {
     ++pages;
   }
   EXPECT_GE(pages, 7);
+}
+
+// Beside a daemon with the first model on the page.
+TEST(Pages, OnWatchingARunningInstanceRun) {
+  const std::string page = ARBITER_SOURCE "/docs/watching.md";
+  const Listing model = listings_of(page).at(0);
+  ASSERT_EQ(model.file, "base.xml");
+  const Daemon daemon(model.content);
+  const TemporaryDirectory directory;
+  Counts counts = run_listings(page, directory.path());
+  EXPECT_GE(counts["console"], 1);
 }
 
 // What the tests above rest upon.

@@ -1,0 +1,215 @@
+// arbiter wait: sleeps until a condition about a running instance is true.
+//
+// Nobody rings for those who merely observe, so this looks every 2 ms and at each time at which it
+// knows that an activity ends, in memory. The daemon is asked once for each model that comes into
+// force, for its names.
+#include <algorithm>
+#include <cstdint>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "cli/live.hpp"
+#include "cli/numbers.hpp"
+#include "cli/verbs.hpp"
+#include "rules/ask/report.hpp"
+#include "rules/text/names.hpp"
+#include "shm/clock.hpp"
+#include "watch/live_statement.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+using nlohmann::json;
+using rules::Truth;
+using watch::LiveStatement;
+
+constexpr int kTimedOut = 3;
+constexpr const char* kArgument = "--until";
+
+struct WaitOptions {
+  std::string condition;
+  std::string instance;
+  shm::Nanoseconds timeout = shm::kForever;
+  shm::Nanoseconds hold = 0;
+  bool json = false;
+};
+
+// Throws CLI::ValidationError, so that it is wrong use.
+rules::Statement read_condition(const std::string& text) {
+  const rules::TextFile file(kArgument, text);
+  rules::Diagnostics diagnostics;
+  rules::Text condition(file, 0);
+  condition.append(file.content(), 0);
+  if (condition.is_blank()) throw CLI::ValidationError(kArgument, "the condition is empty");
+  if (rules::check_characters(file, diagnostics)) {
+    if (auto parsed = rules::parse_statement(condition, diagnostics)) {
+      return {rules::collapse_blanks(condition.bytes()), condition.where(), std::move(*parsed)};
+    }
+  }
+  rules::write_text(std::cerr, diagnostics);
+  throw CLI::ValidationError(kArgument, "the condition cannot be read");
+}
+
+class Waiting {
+ public:
+  explicit Waiting(const WaitOptions& options)
+      : options_(options),
+        condition_(read_condition(options.condition)),
+        started_(shm::monotonic_now()),
+        instance_(follow_instance("wait", options.instance)),
+        statement_(instance_, condition_) {}
+
+  int run() {
+    const shm::Nanoseconds deadline =
+        options_.timeout >= shm::kForever - started_ ? shm::kForever : started_ + options_.timeout;
+    for (;;) {
+      instance_->update();
+      news_.tell(*instance_);
+      const LiveStatement::Look look = take_look();
+      const shm::Nanoseconds now = shm::monotonic_now();
+      if (is_fulfilled(look)) return report(true, look, now);
+      if (now >= deadline) return report(false, look, now);
+      sleep_until(std::min({now + kLookEvery, next_event(look, now), deadline}), nobody_);
+    }
+  }
+
+ private:
+  LiveStatement::Look take_look() {
+    LiveStatement::Look look = statement_.look();
+    if (warned_of_ != statement_.generation()) {
+      warned_of_ = statement_.generation();
+      rules::write_text(std::cerr, statement_.diagnostics());
+    }
+    return look;
+  }
+
+  // What is not known is not true: it may have been false just then.
+  bool is_fulfilled(const LiveStatement::Look& look) {
+    if (look.truth != Truth::kTrue) {
+      held_since_.reset();
+      return false;
+    }
+    if (!held_since_) held_since_ = look.picture.now;
+    return look.picture.now - *held_since_ >= options_.hold;
+  }
+
+  [[nodiscard]] shm::Nanoseconds next_event(const LiveStatement::Look& look,
+                                            shm::Nanoseconds now) const {
+    shm::Nanoseconds next = shm::kForever;
+    if (look.truth != Truth::kUnknown) next = std::max(look.picture.next_end(), now);
+    if (held_since_) next = std::min(next, *held_since_ + options_.hold);
+    return next;
+  }
+
+  [[nodiscard]] int report(bool fulfilled, const LiveStatement::Look& look,
+                           shm::Nanoseconds now) const {
+    if (options_.json) {
+      write_json(fulfilled, look, now);
+    } else if (!fulfilled) {
+      write_why_not(look);
+    }
+    return fulfilled ? 0 : kTimedOut;
+  }
+
+  void write_json(bool fulfilled, const LiveStatement::Look& look, shm::Nanoseconds now) const {
+    json winners = json::object();
+    for (const auto& [port, winner] : look.winners) {
+      winners[port] = winner ? json(*winner) : json(nullptr);
+    }
+    const json answer{
+        {"condition", condition_.text},
+        {"fulfilled", fulfilled},
+        {"holds", look.truth == Truth::kUnknown ? json(nullptr) : json(look.truth == Truth::kTrue)},
+        {"at_ns", look.truth == Truth::kUnknown ? now : look.picture.now},
+        {"waited_ns", now - started_},
+        {"model", statement_.generation()},
+        {"winners", std::move(winners)},
+        {"active", look.active}};
+    std::cout << answer.dump(2, ' ', false, json::error_handler_t::replace) << '\n';
+  }
+
+  void write_why_not(const LiveStatement::Look& look) const {
+    std::cerr << "arbiter: timed out after " << seconds_text(options_.timeout) << ": "
+              << rules::quote(condition_.text) << ' ';
+    if (look.truth == Truth::kUnknown) {
+      std::cerr << (instance_->has_daemon()
+                        ? "cannot be judged: the sources change too fast for one picture of them"
+                        : "cannot be judged: the daemon that put this model in force has gone")
+                << '\n';
+      return;
+    }
+    std::cerr << (look.truth == Truth::kTrue
+                      ? "holds, but has not done so for " + seconds_text(options_.hold)
+                      : std::string("does not hold"))
+              << '\n';
+    for (const auto& [port, winner] : look.winners) {
+      std::cerr << "  " << winner.value_or("nobody") << " wins at " << port << "  (arbiter why "
+                << port << ")\n";
+    }
+    for (const auto& [source, is_active] : look.active) {
+      std::cerr << "  " << source << (is_active ? " is active\n" : " is inactive\n");
+    }
+  }
+
+  const WaitOptions& options_;
+  const rules::Statement condition_;
+  const shm::Nanoseconds started_;
+  const std::shared_ptr<watch::Instance> instance_;
+  LiveStatement statement_;
+  const shm::FileDescriptor nobody_;  // no interrupts: a signal ends this as any program
+  std::optional<shm::Nanoseconds> held_since_;
+  std::uint64_t warned_of_ = 0;
+  DaemonNews news_{"watching"};
+};
+
+int wait(const WaitOptions& options) {
+  try {
+    return Waiting(options).run();
+  } catch (const watch::StatementError& error) {
+    rules::write_text(std::cerr, error.diagnostics());
+    throw;
+  }
+}
+
+}  // namespace
+
+void add_wait(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<WaitOptions>();
+  CLI::App* verb =
+      app.add_subcommand("wait", "Wait until a condition about winners and active sources is true");
+  verb->add_option(kArgument, options->condition,
+                   "What to wait for: a statement as `arbiter check --assert` reads it")
+      ->type_name("CONDITION")
+      ->required();
+  verb->add_option_function<std::string>(
+          "--timeout",
+          [options](const std::string& text) { options->timeout = read_time("--timeout", text); },
+          "Give up after this time, such as 500ms or 5s; 0s looks once; by default, never")
+      ->type_name("DURATION");
+  verb->add_option_function<std::string>(
+          "--for", [options](const std::string& text) { options->hold = read_time("--for", text); },
+          "Wait until the condition has been true for this time, at every look")
+      ->type_name("DURATION");
+  verb->add_flag("--json", options->json, "Write what was seen at the end as JSON");
+  add_instance_option(*verb, options->instance);
+  verb->footer(
+      "Example:\n"
+      "  arbiter wait --until 'winner(/Gaze/pos:i) = /Face/pos:o' --timeout 5s\n"
+      "  arbiter wait --until 'idle(/Arm/pos:i) and not /collision:o' --for 200ms\n\n"
+      "A source's name says that it is active; winner(PORT) = SOURCE, winner(PORT) = any(GLOB),\n"
+      "idle(PORT), and, or, not, implies, iff, any(GLOB), all(GLOB) and none(GLOB) are as in\n"
+      "statements. A change is seen within about 2 ms. One that lasts for less may be missed.\n\n"
+      "Exit codes: 0 the condition is true; 1 no daemon, you may not observe, or the model in "
+      "force does\nnot have a name of the condition; 2 wrong use, or a condition that cannot be "
+      "read; 3 timed out");
+  verb->callback([options, &exit_code] { exit_code = wait(*options); });
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,74 @@
+// arbiter doctor, as it is run by hand.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+// Directories that every user's clients look into may hold anything.
+const std::string kOfTheMachine = "stale-socket,strangers-directory";
+
+ProgramResult doctor(const TemporaryDirectory& root, std::vector<std::string> more = {}) {
+  more.insert(more.begin(), {"doctor", "--root", root.path(), "--silence", kOfTheMachine});
+  return arbiter(more);
+}
+
+TEST(DoctorProgram, FindsNothing) {
+  const TemporaryDirectory root;
+  Daemon daemon;
+  const auto result = doctor(root);
+  EXPECT_EQ(result.exit_code, 0) << result.out;
+  EXPECT_THAT(result.out, HasSubstr("nothing found"));
+  EXPECT_EQ(result.err, "");
+  EXPECT_EQ(json::parse(doctor(root, {"--json"}).out),
+            (json{{"instance", "test"}, {"findings", json::array()}}));
+}
+
+TEST(DoctorProgram, SaysWhatIsWrongWhyItMattersAndHowToMendIt) {
+  const TemporaryDirectory root;
+  std::filesystem::create_directories(root.path() + "/proc");
+  root.write("proc/meminfo", "MemAvailable: 1000 kB\n");
+  Daemon daemon;
+  auto result = doctor(root);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, HasSubstr("the machine has 1000 KiB of memory left  [memory]\n  why:  "));
+  EXPECT_THAT(result.out, HasSubstr("\n  mend: ps -eo"));
+  EXPECT_THAT(result.out, HasSubstr("1 finding"));
+  result = doctor(root, {"--json"});
+  EXPECT_EQ(result.exit_code, 1);
+  const json findings = json::parse(result.out)["findings"];
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_EQ(findings[0]["code"], "memory");
+  for (const char* field : {"what", "why", "mend"}) {
+    EXPECT_NE(findings[0][field].get<std::string>(), "") << field;
+  }
+  result = doctor(root, {"--silence", "memory"});
+  EXPECT_EQ(result.exit_code, 0) << result.out;
+  EXPECT_THAT(result.out, HasSubstr("nothing found; silenced: "));
+}
+
+TEST(DoctorProgram, FindsThatThereIsNoDaemon) {
+  const TemporaryDirectory root;
+  const auto result = doctor(root, {"--instance", "nobody-has-this-instance"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, HasSubstr("[no-daemon]"));
+}
+
+TEST(DoctorProgram, RefusesWhatItCannotLookAt) {
+  EXPECT_EQ(arbiter({"doctor", "--root", "/nowhere"}).exit_code, 2);
+  EXPECT_EQ(arbiter({"doctor", "--silence", "nonsense"}).exit_code, 2);
+  EXPECT_EQ(arbiter({"doctor", "--instance", "no/name"}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace arbiter::test

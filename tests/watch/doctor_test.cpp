@@ -1,0 +1,339 @@
+// What the doctor finds on machines that a test has made up, and beside real daemons.
+#include "watch/doctor.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/support/other_user.hpp"
+#include "tests/support/page_tables.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/text_files.hpp"
+#include "tests/watch/watched.hpp"
+#include "tests/wire/full_status.hpp"
+#include "watch/abandoned_sockets.hpp"
+#include "wire/rendezvous.hpp"
+
+namespace arbiter::test {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using watch::Findings;
+
+std::vector<std::string> codes_of(const Findings& findings) {
+  std::vector<std::string> codes;
+  for (const auto& finding : findings) codes.push_back(finding.code);
+  return codes;
+}
+
+std::string limits(const std::string& locked, const std::string& files,
+                   const std::string& priority) {
+  return "Limit                     Soft Limit           Hard Limit           Units     \n"
+         "Max open files            " +
+         files +
+         "                524288               files     \n"
+         "Max locked memory         " +
+         locked +
+         "              unlimited            bytes     \n"
+         "Max realtime priority     " +
+         priority + "                    99                   \n";
+}
+
+// A machine where nothing is wrong, to begin with.
+class MadeUpMachine {
+ public:
+  MadeUpMachine() {
+    set("proc/self/limits", limits("unlimited", "65536", "80"));
+    set("proc/self/status", "Name:\tarbiter\nCapEff:\t0000000000000000\n");
+    set("proc/meminfo", "MemTotal:        8000000 kB\nMemAvailable:    4000000 kB\n");
+    set(kClock + "current_clocksource", "tsc\n");
+    set(kClock + "available_clocksource", "tsc hpet acpi_pm \n");
+    for (const std::string cpu : {"cpu0", "cpu1"}) set_governor(cpu, "performance");
+    set("sys/devices/system/cpu/online", "0-1\n");
+  }
+
+  void set(const std::string& path, const std::string& content) const {
+    fs::create_directories((fs::path(directory_.path()) / path).parent_path());
+    directory_.write(path, content);
+  }
+  void set_link(const std::string& path, const std::string& target) const {
+    const auto whole = fs::path(directory_.path()) / path;
+    fs::create_directories(whole.parent_path());
+    fs::create_symlink(target, whole);
+  }
+  void set_governor(const std::string& cpu, const std::string& governor) const {
+    set("sys/devices/system/cpu/" + cpu + "/cpufreq/scaling_governor", governor + "\n");
+  }
+  [[nodiscard]] watch::Machine machine() const { return watch::Machine(directory_.path()); }
+  [[nodiscard]] Findings findings() const { return watch::examine_machine(machine()); }
+
+  const std::string kClock = "sys/devices/system/clocksource/clocksource0/";
+
+ private:
+  const TemporaryDirectory directory_;
+};
+
+TEST(Doctor, HasAllOfItsCodesOnThePage) {
+  std::vector<std::string> codes;
+  for (const PageRow& row :
+       rows_of(content_of(ARBITER_SOURCE "/docs/watching.md"), {"code", "found if"})) {
+    codes.push_back(quoted(row.cells.at(0)).at(0));
+  }
+  EXPECT_EQ(codes, watch::finding_codes());
+}
+
+TEST(Doctor, FindsNothingOnAMachineThatIsWell) {
+  EXPECT_THAT(codes_of(MadeUpMachine().findings()), IsEmpty());
+}
+
+TEST(Doctor, FindsNothingWhereItCanReadNothing) {
+  const TemporaryDirectory empty;
+  EXPECT_THAT(codes_of(watch::examine_machine(watch::Machine(empty.path()))), IsEmpty());
+  const MadeUpMachine machine;
+  machine.set("proc/self/limits", "Max locked memory\nMax open files     many\n");
+  machine.set("proc/meminfo", "MemAvailable:\n");
+  EXPECT_THAT(codes_of(machine.findings()), IsEmpty());
+}
+
+TEST(Doctor, FindsLimitsThatAreTooLow) {
+  const MadeUpMachine machine;
+  machine.set("proc/self/limits", limits("8388608", "256", "0"));
+  const Findings findings = machine.findings();
+  ASSERT_THAT(codes_of(findings), ElementsAre("locked-memory", "realtime-priority", "descriptors"));
+  EXPECT_THAT(findings[0].what, HasSubstr("may lock 8192 KiB"));
+  EXPECT_THAT(findings[0].mend, HasSubstr("LimitMEMLOCK=infinity"));
+  EXPECT_THAT(findings[2].what, HasSubstr("256 descriptors"));
+  machine.set("proc/self/limits", limits("67108864", "1024", "1"));
+  EXPECT_THAT(codes_of(machine.findings()), IsEmpty()) << "just enough";
+}
+
+TEST(Doctor, KnowsWhoNeedsNoLimits) {
+  const MadeUpMachine machine;
+  machine.set("proc/self/limits", limits("0", "65536", "0"));
+  machine.set("proc/self/status", "CapEff:\t0000000000004000\n");
+  EXPECT_THAT(codes_of(machine.findings()), ElementsAre("realtime-priority"));
+  machine.set("proc/self/status", "CapEff:\t0000000000800000\n");
+  EXPECT_THAT(codes_of(machine.findings()), ElementsAre("locked-memory"));
+  machine.set("proc/self/status", "CapEff:\t000001ffffffffff\n");
+  EXPECT_THAT(codes_of(machine.findings()), IsEmpty());
+}
+
+TEST(Doctor, FindsAClockThatTakesASystemCall) {
+  const MadeUpMachine machine;
+  machine.set(machine.kClock + "current_clocksource", "hpet\n");
+  Findings findings = machine.findings();
+  ASSERT_THAT(codes_of(findings), ElementsAre("clock-source"));
+  EXPECT_THAT(findings[0].mend, HasSubstr("echo tsc > /sys/"));
+  machine.set(machine.kClock + "available_clocksource", "hpet acpi_pm\n");
+  findings = machine.findings();
+  ASSERT_THAT(codes_of(findings), ElementsAre("clock-source"));
+  EXPECT_THAT(findings[0].mend, testing::Not(HasSubstr("echo")));
+  machine.set(machine.kClock + "current_clocksource", "kvm-clock\n");
+  EXPECT_THAT(codes_of(machine.findings()), IsEmpty());
+}
+
+TEST(Doctor, FindsGovernorsThatSave) {
+  const MadeUpMachine machine;
+  machine.set_governor("cpu1", "powersave");
+  machine.set_governor("cpu2", "powersave");
+  machine.set_governor("cpu3", "schedutil");
+  const Findings findings = machine.findings();
+  ASSERT_THAT(codes_of(findings), ElementsAre("governor", "governor"));
+  EXPECT_THAT(findings[0].what, HasSubstr("of cpu1, cpu2 is powersave"));
+  EXPECT_THAT(findings[1].what, HasSubstr("of cpu3 is schedutil"));
+}
+
+TEST(Doctor, FindsThatMemoryIsShort) {
+  const MadeUpMachine machine;
+  machine.set("proc/meminfo", "MemAvailable:    262143 kB\n");
+  EXPECT_THAT(codes_of(machine.findings()), ElementsAre("memory"));
+  machine.set("proc/meminfo", "MemAvailable:    262144 kB\n");
+  EXPECT_THAT(codes_of(machine.findings()), IsEmpty());
+}
+
+// full_status() has a daemon (42), components (44 and 46), some away (45 and 47), and a stranger.
+TEST(Doctor, LooksAtTheProcessesOfTheStatus) {
+  const MadeUpMachine machine;
+  wire::Status status = full_status();
+  const Findings stranger = watch::examine_processes(machine.machine(), status);
+  ASSERT_THAT(codes_of(stranger), ElementsAre("stranger"));
+  EXPECT_THAT(stranger[0].what, HasSubstr("lost (pid 43, user 1000)"));
+  status.strangers.clear();
+  machine.set("proc/42/limits", limits("unlimited", "4095", "0"));
+  machine.set("proc/42/stat", "42 (arbiterd) S 1\n");
+  machine.set("proc/44/stat", "44 (a) ) b) T 1\n");
+  machine.set("proc/45/stat", "45 (x) t 1\n");
+  machine.set_link("proc/42/exe", "/usr/bin/arbiterd (deleted)");
+  machine.set_link("proc/44/exe", "/home/robot/face");
+  machine.set_link("proc/self/ns/time", "time:[4026531834]");
+  machine.set_link("proc/44/ns/time", "time:[4026531834]");
+  machine.set_link("proc/46/ns/time", "time:[4026532000]");
+  const Findings findings = watch::examine_processes(machine.machine(), status);
+  ASSERT_THAT(codes_of(findings), ElementsAre("daemon-descriptors", "replaced-program", "stopped",
+                                              "stopped", "time-namespace"));
+  EXPECT_THAT(findings[1].what, HasSubstr("arbiterd (pid 42)"));
+  EXPECT_THAT(findings[2].what, HasSubstr("face (pid 44) is stopped"));
+  EXPECT_EQ(findings[2].mend, "kill -CONT 44");
+  EXPECT_THAT(findings[3].what, HasSubstr("the component of /stop (pid 45)"));
+  EXPECT_THAT(findings[4].what, HasSubstr("gaze (pid 46)"));
+}
+
+TEST(Doctor, FindsSocketsWhereNobodyListens) {
+  const TemporaryDirectory directory;
+  const std::string dead = wire::listen_at(directory.path(), "dead").path;
+  const auto alive = wire::listen_at(directory.path(), "alive");
+  directory.write("file.sock", "");
+  fs::create_symlink(dead, directory.path() + "/link.sock");
+  EXPECT_THAT(watch::abandoned_sockets(directory.path()), ElementsAre(dead));
+  EXPECT_THAT(watch::abandoned_sockets(directory.path() + "/none"), IsEmpty());
+}
+
+TEST(Doctor, LooksWhereClientsLook) {
+  Daemon daemon;
+  daemon.kill();
+  Findings findings = watch::examine_meeting_places();
+  const auto is_ours = [&](const auto& finding) {
+    return finding.code == "stale-socket" &&
+           finding.mend.find(daemon.socket_path()) != std::string::npos;
+  };
+  EXPECT_EQ(std::count_if(findings.begin(), findings.end(), is_ours), 1);
+  daemon.restart();
+  findings = watch::examine_meeting_places();
+  EXPECT_EQ(std::count_if(findings.begin(), findings.end(), is_ours), 0);
+}
+
+TEST(Doctor, DisturbsNoDaemon) {
+  Daemon daemon;
+  const auto before = daemon.status()["clients"];
+  std::optional<wire::Status> status;
+  EXPECT_THAT(codes_of(watch::examine_daemon(caller_of(daemon), status)), IsEmpty());
+  ASSERT_TRUE(status);
+  EXPECT_EQ(status->pid, daemon.process().pid());
+  while (daemon.status()["clients"] != before) {
+  }
+}
+
+TEST(Doctor, FindsThatThereIsNoDaemon) {
+  Daemon daemon;
+  wire::Caller caller = caller_of(daemon);
+  caller.instance = "nobody-has-this-instance";
+  std::optional<wire::Status> status;
+  EXPECT_THAT(codes_of(watch::examine_daemon(caller, status)), ElementsAre("no-daemon"));
+  EXPECT_FALSE(status);
+}
+
+TEST(Doctor, FindsADaemonThatDoesNotAnswer) {
+  Daemon daemon;
+  daemon.process().stop();
+  wire::Caller caller = caller_of(daemon);
+  caller.answer_time = std::chrono::milliseconds(1);
+  std::optional<wire::Status> status;
+  const Findings findings = watch::examine_daemon(caller, status);
+  daemon.process().resume();
+  ASSERT_THAT(codes_of(findings), ElementsAre("silent-daemon"));
+  EXPECT_THAT(findings[0].what, HasSubstr("(pid " + std::to_string(daemon.process().pid()) + ")"));
+}
+
+TEST(Doctor, FindsThatTheDaemonKeepsAUserOut) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can be another user";
+  const TemporaryDirectory files;
+  const std::string policy = files.write("policy", "allow user root observe\n");
+  Daemon daemon(kNoRules, {.arguments = {"--policy", policy}});
+  ASSERT_EQ(::chmod(daemon.directory().c_str(), 0755), 0);
+  const std::string said = as_user(kStranger, [&] {
+    std::optional<wire::Status> status;
+    const Findings findings = watch::examine_daemon(caller_of(daemon), status);
+    return findings.size() == 1 ? findings[0].code + ": " + findings[0].what : "not one finding";
+  });
+  EXPECT_THAT(said, testing::StartsWith("refused: "));
+  EXPECT_THAT(said, HasSubstr("may not observe"));
+}
+
+// It answers each hello as a daemon of another version does.
+class OtherVersion {
+ public:
+  explicit OtherVersion(const std::string& directory)
+      : listener_(wire::listen_at(directory, "test")), thread_([this] { serve(); }) {}
+  ~OtherVersion() {
+    ::shutdown(listener_.socket.get(), SHUT_RDWR);
+    thread_.join();
+  }
+
+ private:
+  void serve() const {
+    for (;;) {
+      const shm::FileDescriptor client(
+          ::accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
+      if (!client) return;
+      wire::Received hello;
+      if (wire::receive_message(client.get(), hello, true) != wire::ReceiveResult::kReceived) {
+        continue;
+      }
+      wire::Message answer;
+      answer.kind = wire::MessageKind::kRefused;
+      answer.set_text("the client speaks version " + std::to_string(hello.message.value) +
+                      ", this daemon version 99");
+      static_cast<void>(wire::send_message(client.get(), answer));
+    }
+  }
+
+  wire::Listener listener_;
+  std::thread thread_;
+};
+
+TEST(Doctor, FindsADaemonOfAnotherVersion) {
+  const TemporaryDirectory directory;
+  const ScopedVariable session("XDG_RUNTIME_DIR", directory.path());
+  const ScopedVariable own("RUNTIME_DIRECTORY", std::nullopt);
+  fs::create_directory(directory.path() + "/arbiter");
+  const OtherVersion daemon(directory.path() + "/arbiter");
+  std::optional<wire::Status> status;
+  wire::Caller caller;
+  caller.name = "test";
+  caller.instance = "test";
+  const Findings findings = watch::examine_daemon(caller, status);
+  ASSERT_THAT(codes_of(findings), ElementsAre("other-version"));
+  EXPECT_THAT(findings[0].what, HasSubstr("this daemon version 99"));
+}
+
+// That is what the real one says to another version.
+TEST(Doctor, KnowsWhatADaemonSaysToAnotherVersion) {
+  Daemon daemon;
+  RawClient client(daemon.instance());
+  wire::Message hello = wire::hello_of(caller_of(daemon));
+  hello.value = 99;
+  client.send(hello);
+  wire::Received answer;
+  ASSERT_TRUE(client.receive(answer));
+  EXPECT_EQ(answer.message.kind, wire::MessageKind::kRefused);
+  EXPECT_THAT(std::string(answer.message.text_view()), HasSubstr("speaks version 99"));
+}
+
+TEST(Doctor, FindsASecondDaemonOfTheInstance) {
+  Daemon daemon;
+  const TemporaryDirectory elsewhere;
+  const ScopedVariable temporary("TMPDIR", elsewhere.path());
+  const std::string directory = elsewhere.path() + "/arbiter-" + std::to_string(::geteuid());
+  fs::create_directory(directory);
+  ASSERT_EQ(::chmod(directory.c_str(), 0700), 0);
+  const auto second = wire::listen_at(directory, daemon.instance());
+  std::optional<wire::Status> status;
+  const Findings findings = watch::examine_daemon(caller_of(daemon), status);
+  ASSERT_THAT(codes_of(findings), ElementsAre("second-daemon"));
+  EXPECT_THAT(findings[0].what, AllOf(HasSubstr(second.path), HasSubstr(daemon.socket_path())));
+  EXPECT_TRUE(status);
+}
+
+}  // namespace
+}  // namespace arbiter::test

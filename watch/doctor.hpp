@@ -1,0 +1,41 @@
+// What is wrong around an instance: the machine's settings, the places where daemons and components
+// meet, and the processes that take part. For each finding what it is, why it matters, and what to
+// type to mend it.
+//
+// Nothing is changed. The daemon is asked for its status, once.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "watch/machine.hpp"
+#include "wire/call.hpp"
+#include "wire/status.hpp"
+
+namespace arbiter::watch {
+
+struct Finding {
+  std::string code;  // docs/watching.md has them
+  std::string what;
+  std::string why;
+  std::string mend;
+};
+using Findings = std::vector<Finding>;
+
+// Limits of this process, which components that are started from here inherit; clock, processors,
+// memory.
+[[nodiscard]] Findings examine_machine(const Machine& machine);
+// The directories where daemons and components meet, and the sockets in them.
+[[nodiscard]] Findings examine_meeting_places();
+// The daemon of the caller's instance: whether there is one and only one, whether it and this
+// program fit together, and its status if it gives it.
+[[nodiscard]] Findings examine_daemon(const wire::Caller& caller,
+                                      std::optional<wire::Status>& status);
+// The processes that a status names.
+[[nodiscard]] Findings examine_processes(const Machine& machine, const wire::Status& status);
+
+// All codes, in the order in which they are looked for.
+[[nodiscard]] const std::vector<std::string>& finding_codes();
+
+}  // namespace arbiter::watch
