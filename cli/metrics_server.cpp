@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <map>
@@ -77,8 +78,8 @@ class MetricsServer::Implementation {
       pollfd ready[2]{{epoll_, POLLIN, 0}, {interrupts.get(), POLLIN, 0}};
       if (::poll(ready, 2, time_left()) < 0 && errno != EINTR) throw Error("cannot wait");
       if (ready[1].revents != 0) return;
-      MHD_run(daemon_.get());
-      hang_up_on_slow_ones();
+      take_turns();
+      if (hang_up_on_slow_ones()) take_turns();
     }
   }
 
@@ -87,15 +88,26 @@ class MetricsServer::Implementation {
     void operator()(MHD_Daemon* daemon) const { MHD_stop_daemon(daemon); }
   };
 
+  // The library listens again at the turn after the one in which a place became free, and nothing
+  // would wake us for that one.
+  void take_turns() {
+    std::uint64_t before = 0;
+    do {
+      before = closed_;
+      MHD_run(daemon_.get());
+    } while (closed_ != before);
+  }
+
   static void say_nothing(void*, const char*, va_list) {}
 
   static void note_connection(void* self, MHD_Connection* connection, void**,
                               MHD_ConnectionNotificationCode code) {
-    auto& ends = static_cast<Implementation*>(self)->ends_;
+    auto& server = *static_cast<Implementation*>(self);
     if (code == MHD_CONNECTION_NOTIFY_CLOSED) {
-      ends.erase(connection);
+      server.ends_.erase(connection);
+      ++server.closed_;
     } else {
-      ends[connection] = shm::monotonic_now() + kMostTime;
+      server.ends_[connection] = shm::monotonic_now() + kMostTime;
     }
   }
 
@@ -144,8 +156,9 @@ class MetricsServer::Implementation {
                             kMillisecond);
   }
 
-  // Its end is seen by the library at its next turn, which closes the connection and says so.
-  void hang_up_on_slow_ones() {
+  // The library sees the end at its next turn, closes the connection and says so. False: there was
+  // none.
+  bool hang_up_on_slow_ones() {
     const shm::Nanoseconds now = shm::monotonic_now();
     bool any = false;
     for (auto& [connection, end] : ends_) {
@@ -155,12 +168,13 @@ class MetricsServer::Implementation {
       end = now + kMostTime;
       any = true;
     }
-    if (any) MHD_run(daemon_.get());
+    return any;
   }
 
   const std::function<std::string()> document_;
   Listening listening_;
   std::map<MHD_Connection*, shm::Nanoseconds> ends_;  // when each has had its time
+  std::uint64_t closed_ = 0;                          // connections, so far
   Response fresh_{nullptr, &MHD_destroy_response};
   shm::Nanoseconds fresh_until_ = 0;
   int epoll_ = -1;
