@@ -95,11 +95,11 @@ Receivers receivers_of(const wire::Status& status, const std::string& source) {
   return result;
 }
 
-[[noreturn]] void fail(const std::string& why, const std::string& what_to_do) {
+[[noreturn]] void fail_like(const std::string& why, const std::string& what_to_do) {
   throw std::runtime_error("--like: " + why + "; " + what_to_do);
 }
 
-const std::string kOrNameIt = std::string("or name the type with --type ") + kTypeForm;
+const std::string or_name_it = std::string("or name the type with --type ") + kTypeForm;
 
 [[noreturn]] void fail_without_ports(const wire::Status& status, const std::string& port,
                                      const std::vector<std::string>& closed) {
@@ -109,18 +109,18 @@ const std::string kOrNameIt = std::string("or name the type with --type ") + kTy
                     : source != nullptr && source->away_pid ? source->away_pid
                                                             : std::nullopt;
   if (away) {
-    fail("the component that has " + port + " open (process " + std::to_string(*away) +
-             ") has not come back to this daemon yet",
-         "try again, " + kOrNameIt);
+    fail_like("the component that has " + port + " open (process " + std::to_string(*away) +
+                  ") has not come back to this daemon yet",
+              "try again, " + or_name_it);
   }
   if (!closed.empty()) {
-    fail("no component has " + port + " open, nor " + rules::enumerate(closed) +
-             ", which the model connects to it, so its type is not known",
-         "start one of the components, " + kOrNameIt);
+    fail_like("no component has " + port + " open, nor " + rules::enumerate(closed) +
+                  ", which the model connects to it, so its type is not known",
+              "start one of the components, " + or_name_it);
   }
   if (input != nullptr || source != nullptr) {
-    fail("no component has " + port + " open, so its type is not known",
-         "start its component, " + kOrNameIt);
+    fail_like("no component has " + port + " open, so its type is not known",
+              "start its component, " + or_name_it);
   }
   std::vector<std::string_view> names;
   for (const auto& each : status.inputs) names.emplace_back(each.name);
@@ -147,23 +147,23 @@ Type parse_type(const std::string& text) {
 Type type_like(const wire::Status& status, const std::string& port) {
   std::vector<Known> known = open_ports(status, port);
   if (known.size() == 2 && !are_same(known[0], known[1])) {
-    fail("two ports have that name: " + enumerate(known),
-         std::string("name the type with --type ") + kTypeForm);
+    fail_like("two ports have that name: " + enumerate(known),
+              std::string("name the type with --type ") + kTypeForm);
   }
   if (known.empty()) {
     Receivers receivers = receivers_of(status, port);
     for (const Known& each : receivers.typed) {
       if (are_same(each, receivers.typed.front())) continue;
-      fail("the model connects " + port +
-               " to input ports that take different types: " + enumerate(receivers.typed),
-           "choose one of them, such as --like " + each.port);
+      fail_like("the model connects " + port +
+                    " to input ports that take different types: " + enumerate(receivers.typed),
+                "choose one of them, such as --like " + each.port);
     }
     known = receivers.typed.empty() ? receivers.untyped : receivers.typed;
     if (known.empty()) fail_without_ports(status, port, receivers.closed);
   }
   const Known& model = known.front();
   if (!*model.type) {
-    fail(model.text(), "leave --like out to send untyped samples, " + kOrNameIt);
+    fail_like(model.text(), "leave --like out to send untyped samples, " + or_name_it);
   }
   return {(*model.type)->name, (*model.type)->size, (*model.type)->alignment};
 }

@@ -34,7 +34,7 @@ struct DoctorOptions {
   bool json = false;
 };
 
-std::string problem_of_code(std::string& code) {
+std::string problem_of_finding(std::string& code) {
   const auto& codes = watch::finding_codes();
   if (std::find(codes.begin(), codes.end(), code) != codes.end()) return "";
   return "no finding has the code " + rules::quote(code) +
@@ -110,7 +110,7 @@ void add_doctor(CLI::App& app, int& exit_code) {
       ->type_name("CODE")
       ->delimiter(',')
       ->allow_extra_args(false)
-      ->check(CLI::Validator(problem_of_code, ""));
+      ->check(CLI::Validator(problem_of_finding, ""));
   verb->add_option("--root", options->root,
                    "Read /proc and /sys below this directory, such as a copy of another machine's")
       ->type_name("DIRECTORY")

@@ -116,19 +116,19 @@ FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
   warn_of_losers(rules, model, diagnostics);
   std::map<std::string, const CompiledPort*> compiled;
   for (const auto& port : model.ports) compiled.emplace(port.port, &port);
-  struct Question {
+  struct PortQuestion {
     const PortRules* rules;
     const CompiledPort* port;
     Diagnostics found;
     std::string limit;  // why it is open
   };
-  std::vector<Question> questions;
+  std::vector<PortQuestion> questions;
   for (const auto& port : rules.ports) {
     const auto found = compiled.find(port.port);
     if (found != compiled.end()) questions.push_back({&port, found->second, {}, {}});
   }
   const auto ask = [&](std::size_t i) {
-    Question& question = questions[i];
+    PortQuestion& question = questions[i];
     question.found = {};
     question.limit.clear();
     try {
@@ -147,7 +147,7 @@ FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
   std::vector<std::string> open;  // ports
   std::string why_open;           // of the first
   Location first_open;
-  for (Question& question : questions) {
+  for (PortQuestion& question : questions) {
     diagnostics.add(std::move(question.found));
     if (question.limit.empty()) continue;
     if (open.empty()) first_open = question.rules->where, why_open = question.limit;

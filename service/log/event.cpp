@@ -7,7 +7,7 @@ thread_local const Event* in_hand = nullptr;
 
 }  // namespace
 
-const std::array<EventName, kEventKinds> kEventNames{{
+const std::array<EventName, kEventKinds> event_names{{
     {EventKind::kReady, "ready", "8f3968e0860541c885b576654e66ff53"},
     {EventKind::kStopping, "stopping", "cba16e2ffd594facaa99abdf6e283be9"},
     {EventKind::kOpened, "opened", "1dd3351df96645ce88c0e3302a8dbbd6"},

@@ -45,7 +45,7 @@ struct EventName {
   const char* message_id;  // MESSAGE_ID: 128 bits, chosen at random once and never changed
 };
 inline constexpr std::size_t kEventKinds = 21;
-extern const std::array<EventName, kEventKinds> kEventNames;  // in the order of the kinds
+extern const std::array<EventName, kEventKinds> event_names;  // in the order of the kinds
 
 // The names are the caller's, and must live until the line is written.
 struct Event {

@@ -60,7 +60,7 @@ std::string journal_record(std::string_view message, log::level::level_enum leve
   add(record, "SYSLOG_IDENTIFIER", "arbiterd");
   if (user) add(record, "ARBITER_USER", std::to_string(*user));
   if (event == nullptr) return record;
-  const EventName& name = kEventNames.at(static_cast<std::size_t>(event->kind));
+  const EventName& name = event_names.at(static_cast<std::size_t>(event->kind));
   add(record, "MESSAGE_ID", name.message_id);
   add(record, "ARBITER_EVENT", name.name);
   if (event->generation != 0) {

@@ -86,7 +86,7 @@ TEST(Journal, HasEachLineWithWhatItIsAbout) {
   EXPECT_EQ(records[0], (JournalRecord{{"MESSAGE", "/Nav/cmd:o is not connected"},
                                        {"PRIORITY", "4"},
                                        {"SYSLOG_IDENTIFIER", "arbiterd"},
-                                       {"MESSAGE_ID", kEventNames.at(11).message_id},
+                                       {"MESSAGE_ID", event_names.at(11).message_id},
                                        {"ARBITER_EVENT", "mismatch"},
                                        {"ARBITER_USER", "1234"},
                                        {"ARBITER_GENERATION", "7"},
@@ -149,8 +149,8 @@ TEST(Journal, ThatNobodyReadsHoldsNobodyUpAndSaysWhatItLost) {
 
 TEST(Journal, EachKindOfEventHasItsNameAndItsId) {
   std::set<std::string> names, ids;
-  for (std::size_t i = 0; i < kEventNames.size(); ++i) {
-    const EventName& each = kEventNames.at(i);
+  for (std::size_t i = 0; i < event_names.size(); ++i) {
+    const EventName& each = event_names.at(i);
     EXPECT_EQ(static_cast<std::size_t>(each.kind), i);
     EXPECT_TRUE(names.insert(each.name).second) << each.name;
     const std::string id = each.message_id;
@@ -184,10 +184,10 @@ TEST(Journal, IsAsThePageSays) {
   }
   EXPECT_EQ(documented, fields);
   const auto events = rows_below("Events");
-  ASSERT_EQ(events.size(), kEventNames.size());
-  for (std::size_t i = 0; i < kEventNames.size(); ++i) {
-    const std::string name = kEventNames.at(i).name;
-    const std::string id = kEventNames.at(i).message_id;
+  ASSERT_EQ(events.size(), event_names.size());
+  for (std::size_t i = 0; i < event_names.size(); ++i) {
+    const std::string name = event_names.at(i).name;
+    const std::string id = event_names.at(i).message_id;
     EXPECT_THAT(events[i], testing::StartsWith("| `" + name + "` | `" + id + "` | "));
   }
 }
