@@ -1,5 +1,6 @@
 #include "cli/pub_type.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <optional>
 #include <stdexcept>
@@ -55,8 +56,9 @@ bool are_same(const Known& one, const Known& other) {
 }
 
 std::string enumerate(const std::vector<Known>& all) {
-  std::vector<std::string> texts;
-  for (const Known& each : all) texts.push_back(each.text());
+  std::vector<std::string> texts(all.size());
+  std::transform(all.begin(), all.end(), texts.begin(),
+                 [](const Known& each) { return each.text(); });
   return rules::enumerate(texts);
 }
 
