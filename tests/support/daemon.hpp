@@ -11,6 +11,7 @@
 
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -147,8 +148,9 @@ class Daemon {
   Daemon(const Daemon&) = delete;
   Daemon& operator=(const Daemon&) = delete;
 
-  void write_model(const std::string& text) { directory_.write("model.xml", text); }
-  void write_application(const std::string& text) { directory_.write("application.xml", text); }
+  // Whole or not at all, for the daemon may be reading what was there.
+  void write_model(const std::string& text) { replace("model.xml", text); }
+  void write_application(const std::string& text) { replace("application.xml", text); }
 
   // Puts a model in force; returns when it is.
   void load(const std::string& model) {
@@ -245,6 +247,10 @@ class Daemon {
   }
 
  private:
+  void replace(const std::string& name, const std::string& text) {
+    std::filesystem::rename(directory_.write(name + ".new", text), directory_.file(name));
+  }
+
   static nlohmann::json named(const nlohmann::json& list, const std::string& name) {
     for (const auto& each : list) {
       if (each["name"] == name) return each;
