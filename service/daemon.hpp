@@ -122,6 +122,7 @@ class Daemon final : private Takeover::Host {
   void finish_opening(Client& client, std::uint64_t request, std::unique_ptr<OutputPort> port,
                       Source& source);
   void open_input(Client& client, wire::Received& received);
+  void open_tap(Client& client, wire::Received& received);
   void connect(Client& client, std::uint64_t request, shm::PortInstance port);
   void deactivate(Client& client, const wire::Message& message);
   // Throws std::runtime_error if a live component has the name. One that has closed its port, or

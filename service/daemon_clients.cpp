@@ -113,7 +113,9 @@ void Daemon::drop(ClientId id) {
   }
   // One that could not be known again does not come back as what it was.
   const bool can_be_known = client->is_process(client->pid(), client->process());
-  if (client->comes_back && can_be_known && !client->has_died()) takeover_.set_away(*client);
+  const bool lives = client->comes_back && can_be_known && !client->has_died();
+  switchboard_.lose_taps(*client, lives);
+  if (lives) takeover_.set_away(*client);
   while (!client->ports.empty()) switchboard_.remove(*client->ports.begin());
   for (const shm::PortInstance port : client->to_hand_back) switchboard_.forget_away(port);
   observers_.forget(id);

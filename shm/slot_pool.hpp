@@ -6,7 +6,8 @@
 //
 // Invariant: with at least (sum of the queues' depths) + (sum of the receivers' max_held) + (loans)
 // slots, acquire() always finds one: at worst every queue is full of samples of its own, every
-// receiver holds as many others, and the other loans are out.
+// receiver holds as many others, and the other loans are out. What is kept for taps counts as a
+// queue, and a tap as a receiver.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +15,7 @@
 
 #include "shm/atomic.hpp"
 #include "shm/channel.hpp"
+#include "shm/event_segment.hpp"
 #include "shm/input_segment.hpp"
 
 namespace arbiter::shm {
@@ -27,7 +29,8 @@ class SlotPool {
     references_.resize(count);
     make_room(free_, count);
     make_room(retired_, count);
-    make_room(held_, std::size_t{kMaxHeld} * kMaxDestinations);
+    make_room(held_,
+              std::size_t{kMaxHeld} * kMaxDestinations + std::size_t{kMaxTapHeld} * kMaxTaps);
     for (std::uint32_t slot = count; slot-- > before;) free_.push_back(slot);
   }
 

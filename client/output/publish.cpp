@@ -15,6 +15,11 @@ namespace arbiter::detail {
 
 std::uint32_t OutputCore::acquire_slot() noexcept {
   const std::uint32_t slot = pool_.acquire(instance_, [&](auto&& each) {
+    // SYNC POINT: kept-sample-held. Fence (b) for what is kept for taps, here and not in each
+    // publish: between what has given way and our reading of holds. Pairs with fence (e) of a tap.
+    if (!teller_.seats().empty()) shm::full_fence();
+    for (const TapSeat& seat : teller_.seats())
+      each(seat.peer->segment->holds, seat.peer->max_held);
     for (const Destination& destination : destinations_) {
       each(destination.peer->segment->header.holds, destination.peer->max_held);
     }
@@ -58,7 +63,7 @@ Counts OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds
   stamp(shm::arrival(now, timeout_));
   last_ = now;
   Counts outcome;
-  if (!destinations_.empty()) {
+  if (!destinations_.empty() || teller_.is_on()) {
     decide_all(now);
     outcome = hand_over(slot, size, now);
     if (begins) ring_where_selection_changed();
@@ -127,6 +132,7 @@ Counts OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseco
     if (destination.peer->refuse_new && is_full(destination)) {
       destination.verdict = shm::Verdict::kLoses;  // nothing to ring for
       ++outcome.refused;
+      teller_.note_refusal(destination.mask);
       count(destination.writer.channel().refused, 1);
       continue;
     }
@@ -135,6 +141,7 @@ Counts OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseco
     const std::uint32_t evicted = destination.writer.push(slot);
     if (evicted != shm::kNoSlot) pool_.evict(evicted);
   }
+  if (teller_.is_on()) tell_arrival(slot, size);
   if (outcome.delivered != 0) {
     // SYNC POINT: entry-announced. Fence (b), between our entries and our reading of wait words and
     // holds. Pairs with fence (d) of a receiver about to wait: either it sees the entry, or we see
@@ -263,6 +270,7 @@ void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
   const bool ends = shm::is_active(own_word_, now);
   stamp(shm::deactivation(now));
   last_ = now;
+  if (teller_.is_on()) tell_deactivation();
   if (ends) ring_where_selection_changed();
 }
 
