@@ -80,6 +80,28 @@ void join(const Explore& explore) {
 }
 const Register kJoin("ATapThatJoinsSeesAllFromThereOnAndHoldsUpNobody", {2, 1, 1}, join);
 
+// A sample that is kept for taps gives way to a later one while a tap takes hold of it, and its
+// slot is used again by the next publish: there are no others.
+struct Overwriting : Watched {
+  Overwriting() : Watched(false) {
+    Instance::tell_tap(a(), *watcher);
+    // 64 samples are kept; the queue, the hold, the tap's hold and the copy have a slot each, and
+    // all of these but one have been used once more since the pool has last looked for free ones.
+    for (int i = 0; i < 71; ++i) a().publish();
+    while (watcher->last < 7) watcher->take();
+  }
+};
+
+void overwrite(const Explore& explore) {
+  explore_anew<Overwriting>(explore, [](Overwriting& scene, Execution& execution) {
+    execution.thread([&scene] {
+      for (int i = 0; i < 2; ++i) scene.a().publish();
+    });
+    execution.mortal_thread([&scene] { scene.watcher->take(); });
+  });
+}
+const Register kOverwrite("NoSampleIsWrittenWhileATapOfARealPortReadsIt", {3, 2, 1}, overwrite);
+
 // One that holds a sample closes, or dies and is told of, while the port publishes.
 struct Leaving : Watched {
   Leaving() : Watched(false) {
