@@ -31,6 +31,7 @@ struct TapSeat {
   std::shared_ptr<const TapPeer> peer;
   std::uint32_t place = 0;
   std::uint64_t link = 0;    // the port's own number for it; never given twice
+  bool has_ended = false;    // service thread: it reads us no more, but may hold samples
   bool is_doubtful = false;  // service thread: no daemon says that it lives
   std::uint64_t rung = 0;    // port's thread: the wait that we rang for last
 };

@@ -44,7 +44,7 @@ class EventWriter {
   // Keeps a sample; returns the slot of the one that gave way to it, or kNoSlot. Relaxed is enough:
   // the event that tells of the sample is written afterwards, with a release.
   [[nodiscard]] std::uint32_t keep(Entry sample) noexcept {
-    Atomic<Entry>& entry = segment_->kept[sequence_of(sample) % shape_.kept];
+    Atomic<Entry>& entry = segment_->kept[sequence_of(sample) & (shape_.kept - 1)];
     const Entry before = entry.load(std::memory_order_relaxed);  // our own store
     entry.store(sample, std::memory_order_relaxed);
     return before == 0 ? kNoSlot : slot_of(before);
@@ -149,7 +149,7 @@ class EventReader {
     word.store(make_hold(publisher_, slot_of(sample)), std::memory_order_release);
     full_fence();  // (e)
     const bool named = segment_->places[place_].link.load(std::memory_order_relaxed) == link_;
-    const Atomic<Entry>& entry = segment_->kept[sequence_of(sample) % shape_.kept];
+    const Atomic<Entry>& entry = segment_->kept[sequence_of(sample) & (shape_.kept - 1)];
     if (named && entry.load(std::memory_order_relaxed) == sample) return true;
     ChannelReader::release(word);
     return false;

@@ -101,13 +101,13 @@ struct DestinationList {
 
 // How much of the segment is in use.
 struct EventShape {
-  std::uint32_t events = kMaxEvents;  // a power of two
+  std::uint32_t events = kMaxEvents;  // a power of two, as the next
   std::uint32_t kept = kMaxKept;
   std::uint32_t lists = kMaxLists;
 
   [[nodiscard]] bool is_sane() const noexcept {
     return events >= 4 && events <= kMaxEvents && (events & (events - 1)) == 0 && kept >= 1 &&
-           kept <= kMaxKept && lists >= 1 && lists <= kMaxLists;
+           kept <= kMaxKept && (kept & (kept - 1)) == 0 && lists >= 1 && lists <= kMaxLists;
   }
 };
 

@@ -358,7 +358,7 @@ void NodeCore::end_peer(const wire::Message& message) {
   const std::lock_guard lock(mutex_);
   if (const auto output = outputs_.find(message.port); output != outputs_.end()) {
     OutputCore& core = *output->second;
-    if (is_gone) core.remove_tap(message.peer);
+    is_gone ? core.remove_tap(message.peer) : core.end_tap(message.peer);
     is_gone ? core.remove_peer(message.peer) : core.disconnect_peer(message.peer);
   }
   if (const auto input = inputs_.find(message.port); input != inputs_.end()) {

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 
 #include <algorithm>
+#include <bit>
 #include <stdexcept>
 #include <system_error>
 
@@ -54,6 +55,7 @@ const TapSeat& TapSeats::add(std::shared_ptr<const TapPeer> peer, const std::str
     TapSeat seat = std::move(known->second);
     seats_.erase(known);
     seat.is_doubtful = false;
+    if (std::exchange(seat.has_ended, false)) seat.link = ++last_link_;
     return seats_[peer->instance] = std::move(seat);
   }
   if (slots_reserved < kMinTapSlots) {
@@ -78,7 +80,7 @@ const TapSeat& TapSeats::add(std::shared_ptr<const TapPeer> peer, const std::str
   }
   if (memory_ == nullptr) {
     shm::EventShape shape;
-    shape.kept = std::min(slots_reserved / 2, shm::kMaxKept);
+    shape.kept = std::min(std::bit_floor(slots_reserved / 2), shm::kMaxKept);
     memory_ = std::make_shared<const EventMemory>(shape, residence);
   }
   TapSeat& seat = seats_[peer->instance];
@@ -97,6 +99,11 @@ void TapSeats::doubt_all() {
 void TapSeats::doubt(shm::PortInstance tap) {
   const auto found = seats_.find(tap);
   if (found != seats_.end()) found->second.is_doubtful = true;
+}
+
+void TapSeats::end(shm::PortInstance tap) {
+  const auto found = seats_.find(tap);
+  if (found != seats_.end()) found->second.has_ended = found->second.is_doubtful = true;
 }
 
 bool TapSeats::has_doubtful() const {

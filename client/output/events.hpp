@@ -65,6 +65,8 @@ class TapSeats {
   // Nobody has said lately that they live.
   void doubt_all();
   void doubt(shm::PortInstance tap);
+  // It reads no more, until it is added again: then it reads on from there.
+  void end(shm::PortInstance tap);
   [[nodiscard]] bool has_doubtful() const;
   // Removes those that are in doubt and whose programs have gone. True: there were some.
   bool remove_dead();

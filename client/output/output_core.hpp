@@ -61,6 +61,7 @@ class OutputCore {
   // has gone. All of them: another daemon has come, which does not know them yet.
   void doubt_tap(shm::PortInstance tap) { taps_.doubt(tap); }
   void doubt_taps() { taps_.doubt_all(); }
+  void end_tap(shm::PortInstance tap) { taps_.end(tap); }
   [[nodiscard]] bool has_doubtful_taps() const { return taps_.has_doubtful(); }
   // Whether a decision has missed a source that it could not see, for the first time.
   [[nodiscard]] bool has_become_blind() noexcept { return blindness_.is_news(); }
@@ -154,7 +155,7 @@ class OutputCore {
   Counts hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
   [[nodiscard]] shm::EventRecord state() const noexcept;
   [[nodiscard]] shm::Masks masks() noexcept;
-  void tell_arrival(std::uint32_t slot, std::size_t size) noexcept;
+  void tell_arrival(std::uint32_t slot) noexcept;
   void tell_deactivation() noexcept;
   [[nodiscard]] Counts refuse(const Destination& destination, bool is_sample) const noexcept;
   [[nodiscard]] bool is_full(Destination& destination) const noexcept;

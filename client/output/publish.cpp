@@ -68,6 +68,7 @@ Counts OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds
     outcome = hand_over(slot, size, now);
     if (begins) ring_where_selection_changed();
   }
+  if (teller_.is_on()) tell_arrival(slot);
   auto& counters = segment_.header().counters;
   count(slot == shm::kNoSlot ? counters.signals : counters.published);
   return outcome;
@@ -141,7 +142,6 @@ Counts OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseco
     const std::uint32_t evicted = destination.writer.push(slot);
     if (evicted != shm::kNoSlot) pool_.evict(evicted);
   }
-  if (teller_.is_on()) tell_arrival(slot, size);
   if (outcome.delivered != 0) {
     // SYNC POINT: entry-announced. Fence (b), between our entries and our reading of wait words and
     // holds. Pairs with fence (d) of a receiver about to wait: either it sees the entry, or we see

@@ -37,14 +37,15 @@ shm::Masks OutputCore::masks() noexcept {
   return masks;
 }
 
-void OutputCore::tell_arrival(std::uint32_t slot, std::size_t size) noexcept {
+// After the receivers have been woken: what a tap costs, none of them waits for.
+void OutputCore::tell_arrival(std::uint32_t slot) noexcept {
   shm::EventRecord record = state();
   record.masks = masks();
   record.kind = shm::EventKind::kSignal;
   if (slot != shm::kNoSlot) {
     record.kind = shm::EventKind::kSample;
     record.sample = shm::make_entry(sequence_ & shm::kSequenceMask, slot);
-    record.size = size;
+    record.size = segment_.slot_header(slot).size.load(std::memory_order_relaxed);  // our own store
     pool_.add_reference(slot);
     const std::uint32_t evicted = teller_.keep(record.sample);
     if (evicted != shm::kNoSlot) pool_.evict(evicted);

@@ -92,11 +92,12 @@ void Taps::unlink(const shm::TableView& table, const Outputs& outputs) {
     const auto output = outputs.find(key.first);
     const Tap& tap = *taps_.at(key.second);
     if (output == outputs.end() || wants(tap, *output->second, table)) return false;
-    // The publisher heeds what the tap holds until it closes.
     if (link.is_told) {
       tap.client->send(message_to(wire::MessageKind::kDisconnected, key.second, key.first));
     }
-    output->second->client->send(message_to(wire::MessageKind::kTapAway, key.first, key.second));
+    // Which heeds what the tap holds for as long as that lives.
+    output->second->client->send(
+        message_to(wire::MessageKind::kDisconnected, key.first, key.second));
     return true;
   });
 }

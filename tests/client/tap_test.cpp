@@ -427,5 +427,63 @@ TEST(Tap, OfAnInputPortSeesAllSourcesThatTheModelConnectsToIt) {
   EXPECT_FALSE(next_of(tap)) << "/stop is only sensed";
 }
 
+TEST(Tap, OfAnInputPortSeesNothingOfASourceWhileTheModelDoesNotConnectIt) {
+  Daemon daemon(only("a"));
+  Node node("test");
+  auto a = node.output_port<Number>("/a");
+  auto tap = node.tap<Number>("/in", {.of = TapOf::input});
+  for (std::int64_t i = 0; i < 10; ++i) {
+    a.publish(Number{3 * i});
+    EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 3 * i);
+    daemon.load(only("b"));
+    a.publish(Number{3 * i + 1});
+    static_cast<void>(wait_for_kind(tap, TapEventKind::closed));
+    EXPECT_FALSE(next_of(tap));
+    daemon.load(only("a"));
+  }
+  EXPECT_EQ(tap.lost(), 0u);
+}
+
+// To the last: what is seen, and what is said to be lost, is what was published; and the fates are
+// those that the publisher was told.
+TEST(Tap, ItsAccountBalancesUnderAPublisherThatDoesNotStop) {
+  Daemon daemon(override_model());
+  Node node("test");
+  auto in = node.input_port<Number>("/in");
+  Component sender("sender");
+  ASSERT_EQ(sender.tell("output /low"), "open");
+  auto high = node.output_port<Number>("/high");
+  auto tap = node.tap<Number>("/low");
+  constexpr std::uint64_t kPublished = 300'000;
+  sender.tell("publish /low 1");
+  EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sequence(), 1u);  // from here on all are
+  sender.begin("publish /low 2 " + std::to_string(kPublished - 1));
+  std::uint64_t seen = 1;
+  std::uint64_t last = 1;
+  for (int round = 0; last < kPublished; ++round) {
+    const auto event = tap.take();
+    if (!event) continue;
+    if (event->kind() == TapEventKind::state) {
+      if (event->lost() != 0) last = event->sequence();
+      if (round % 2 == 0) {
+        high.signal();
+      } else {
+        high.deactivate();
+      }
+      continue;
+    }
+    if (event->kind() != TapEventKind::sample) continue;
+    ++seen;
+    ASSERT_EQ(event->sequence(), ++last);
+    ASSERT_NE(event->at("/in"), Fate::none);
+    if (event->sample() != nullptr) {
+      ASSERT_EQ(event->sample()->value, static_cast<std::int64_t>(last));
+    }
+  }
+  sender.answer();
+  EXPECT_EQ(seen + tap.lost(), kPublished);
+  EXPECT_EQ(daemon.source("/low")["no_slot"], 0);
+}
+
 }  // namespace
 }  // namespace arbiter::test

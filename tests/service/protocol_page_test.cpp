@@ -140,10 +140,10 @@ TEST(ProtocolPage, SaysWhatAnswersWhat) {
   note(MessageKind::kHello, client.hello());
   note(MessageKind::kOpenOutput, client.open_output("/out"));
   note(MessageKind::kOpenInput, client.open_input("/in"));
-  note(MessageKind::kOpenTap, client.open_tap("/out"));
   auto connect = RawClient::message(MessageKind::kConnect);
   connect.port = client.last_opened();
   note(MessageKind::kConnect, client.ask(connect));
+  note(MessageKind::kOpenTap, client.open_tap("/out"));
   for (const MessageKind kind :
        {MessageKind::kStatus, MessageKind::kModel, MessageKind::kObserve}) {
     note(kind, client.ask(kind));
@@ -236,6 +236,16 @@ std::map<std::string, Heard> hear_all() {
   client.ask(MessageKind::kSwitch, "no model");
   out.reset();
   client.hear(MessageKind::kPeerGone);
+  {
+    RawClient lost(daemon.instance());  // whose process lives
+    lost.hello("lost", wire::kComesBack);
+    const auto segment = raw_tap_segment();
+    const shm::Bell bell;
+    lost.send(RawClient::message(MessageKind::kOpenTap, "/mine"),
+              {segment.get(), bell.for_publishers().get()});
+    lost.expect(MessageKind::kOpened);
+  }
+  client.hear(MessageKind::kTapAway);
   daemon.write_model(rules(first(select("/out")) + mine));
   client.ask(MessageKind::kReload);
   client.ask(MessageKind::kReload, {}, wire::kWantsReport);
