@@ -186,12 +186,22 @@ void Instance::tell_input(Input& input, const Output& output, std::uint64_t link
 }
 
 void Instance::tell_tap(Output& output, Watcher& watcher) {
+  tell_watcher(output, watcher, tell_tapped(output, watcher));
+}
+
+detail::OutputCore::TapEntry Instance::tell_tapped(Output& output, const Watcher& watcher) {
   wire::Received received;
   received.message.peer = watcher.core->instance();
   received.descriptors[0] = shm::FileDescriptor(watcher.core->segment_descriptor().get());
   received.descriptors[1] = shm::FileDescriptor(watcher.core->bell().write_end().get());
-  const auto entry = output.core->add_tap(detail::map_tap_peer(received, shm::Residence::kMapped));
+  auto entry = output.core->add_tap(detail::map_tap_peer(received, shm::Residence::kMapped));
   for (auto& lent : received.descriptors) static_cast<void>(lent.release());
+  return entry;
+}
+
+void Instance::tell_watcher(const Output& output, Watcher& watcher,
+                            const detail::OutputCore::TapEntry& entry) {
+  wire::Received received;
   received.message.peer = output.core->instance();
   received.message.id = output.core->source();
   received.message.link = entry.link;

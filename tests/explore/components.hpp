@@ -102,6 +102,9 @@ class Instance {
   void connect(Output& output, Input& input);
   // The same of a tap.
   static void tell_tap(Output& output, Watcher& watcher);
+  static detail::OutputCore::TapEntry tell_tapped(Output& output, const Watcher& watcher);
+  static void tell_watcher(const Output& output, Watcher& watcher,
+                           const detail::OutputCore::TapEntry& entry);
   std::unique_ptr<Watcher> make_watcher(const TapOptions& options);
 
   // As the daemon does it: writes a model's table behind the one in force, and puts it in force.

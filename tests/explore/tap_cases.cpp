@@ -43,6 +43,29 @@ void wait(const Explore& explore) {
 }
 const Register kWait("ATapThatWaitsIsWokenForEachEvent", {2, 1}, wait);
 
+// A tap waits, and is told of a source that has told it something already.
+struct Unknown : Watched {
+  Unknown() : Watched(true), other(instance.make_watcher(options(false))) {
+    Instance::tell_tap(a(), *other);
+    a().settle();
+  }
+  std::unique_ptr<Watcher> other;  // that is there already
+};
+
+void hear_of_a_source(const Explore& explore) {
+  explore_anew<Unknown>(explore, [](Unknown& scene, Execution& execution) {
+    execution.thread([&scene] {
+      const auto entry = Instance::tell_tapped(scene.a(), *scene.watcher);
+      scene.a().publish();
+      Instance::tell_watcher(scene.a(), *scene.watcher, entry);
+    });
+    execution.thread([&scene] {
+      while (scene.watcher->seen == 0) scene.watcher->wait();
+    });
+  });
+}
+const Register kUnknown("ATapThatWaitsIsWokenForASourceThatItDidNotKnow", {3, 2}, hear_of_a_source);
+
 // One joins while its source publishes and a receiver takes; the tap may die anywhere.
 struct Joining : Watched {
   Joining() : Watched(false), other(instance.make_watcher(options(false))) {
