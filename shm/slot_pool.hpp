@@ -70,8 +70,9 @@ class SlotPool {
     list.resize(size);
   }
 
+  // By itself: its registers would be saved by each call that finds a free slot at once.
   template <class ForEachHolds>
-  void reclaim(PortInstance publisher, ForEachHolds for_each_holds) {
+  [[gnu::noinline]] void reclaim(PortInstance publisher, ForEachHolds for_each_holds) {
     held_.clear();
     for_each_holds([&](const Atomic<Hold>* holds, std::uint32_t count) {
       for (std::uint32_t i = 0; i < count; ++i) {

@@ -155,6 +155,8 @@ class OutputCore {
   Counts hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
   [[nodiscard]] shm::EventRecord state() const noexcept;
   [[nodiscard]] shm::Masks masks() noexcept;
+  // The same for a port that is tapped, from the decision on.
+  Counts hand_over_and_tell(std::uint32_t slot, std::size_t size, bool begins) noexcept;
   void tell_arrival(std::uint32_t slot) noexcept;
   void tell_deactivation() noexcept;
   [[nodiscard]] Counts refuse(const Destination& destination, bool is_sample) const noexcept;

@@ -63,12 +63,13 @@ Counts OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds
   stamp(shm::arrival(now, timeout_));
   last_ = now;
   Counts outcome;
-  if (!destinations_.empty() || teller_.is_on()) {
+  if (teller_.is_on()) [[unlikely]] {
+    outcome = hand_over_and_tell(slot, size, begins);
+  } else if (!destinations_.empty()) {
     decide_all(now);
     outcome = hand_over(slot, size, now);
     if (begins) ring_where_selection_changed();
   }
-  if (teller_.is_on()) tell_arrival(slot);
   auto& counters = segment_.header().counters;
   count(slot == shm::kNoSlot ? counters.signals : counters.published);
   return outcome;

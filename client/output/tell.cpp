@@ -37,7 +37,15 @@ shm::Masks OutputCore::masks() noexcept {
   return masks;
 }
 
-// After the receivers have been woken: what a tap costs, none of them waits for.
+// The event comes after the receivers have been woken: what a tap costs, none of them waits for.
+Counts OutputCore::hand_over_and_tell(std::uint32_t slot, std::size_t size, bool begins) noexcept {
+  decide_all(last_);
+  const Counts outcome = hand_over(slot, size, last_);
+  if (begins) ring_where_selection_changed();
+  tell_arrival(slot);
+  return outcome;
+}
+
 void OutputCore::tell_arrival(std::uint32_t slot) noexcept {
   shm::EventRecord record = state();
   record.masks = masks();
