@@ -155,6 +155,46 @@ const std::string& source_name(const InputCore& core, std::uint32_t source) noex
 const Type& sample_type(const InputCore& core, std::uint32_t hold) noexcept {
   return core.type_of_held(hold);
 }
+
+std::shared_ptr<TapCore> open_tap(NodeCore& node, std::string_view name, const Type& type,
+                                  const TapOptions& options) {
+  require_own(node);
+  return node.open_tap(name, type, options);
+}
+// While events with samples are kept the samples must stay announced as held: the tap closes after
+// them.
+void close_tap(std::shared_ptr<TapCore> core) noexcept {
+  if (core == nullptr) return;
+  if (!core->process.is_surely_here()) return keep_for_ever(std::move(core));
+  if (core->held() != 0) {
+    core->kept_by_events = core;
+  } else {
+    core->node->close(core->instance());
+  }
+}
+bool take(TapCore& core, TapEventData& event) {
+  require_own(core);
+  return core.take(event);
+}
+bool wait(TapCore& core, std::int64_t timeout_ns, TapEventData& event) {
+  require_own(core);
+  return core.wait(timeout_ns, event);
+}
+void give_back(TapCore& core, std::uint32_t hold) noexcept {
+  if (!core.process.is_here()) return;
+  core.give_back(hold);
+  if (core.kept_by_events != nullptr && core.held() == 0) {
+    close_tap(std::move(core.kept_by_events));
+  }
+}
+int wait_descriptor(TapCore& core) {
+  require_own(core);
+  return core.wait_descriptor();
+}
+const std::string& name(const TapCore& core) noexcept { return core.name(); }
+std::uint64_t lost_events(const TapCore& core) noexcept { return core.lost_events(); }
+std::uint64_t lost_samples(const TapCore& core) noexcept { return core.lost_samples(); }
+
 // A publisher that lies, or whose memory is damaged, must not keep a motor from stopping, nor make
 // an age overflow.
 std::int64_t believable_time(std::int64_t stamp_ns) noexcept {

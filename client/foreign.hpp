@@ -12,6 +12,7 @@
 #include "client/input/input_core.hpp"
 #include "client/node/node_core.hpp"
 #include "client/output/output_core.hpp"
+#include "client/tap/tap_core.hpp"
 
 namespace arbiter::detail {
 

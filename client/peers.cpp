@@ -30,6 +30,7 @@ std::shared_ptr<const InputPeer> map_input_peer(const wire::Received& announced,
   auto peer = std::make_shared<InputPeer>();
   peer->instance = announced.message.peer;
   peer->port = announced.message.id;
+  peer->name = announced.message.name_view();
   const shm::FileDescriptor& segment = announced.descriptors[0];
   if (shm::checked_size(segment, shm::Seals::kOneWriter) != sizeof(shm::InputSegment)) {
     throw std::runtime_error("the input port's segment has another size");
@@ -103,11 +104,13 @@ bool survey(const OutputPeer& peer) {
   return allocated > known;
 }
 
-std::shared_ptr<const InputPeer> unmapped_input_peer(shm::PortInstance instance, shm::PortId port) {
+std::shared_ptr<const InputPeer> unmapped_input_peer(shm::PortInstance instance, shm::PortId port,
+                                                     std::string_view name) {
   static const shm::InputSegment nobody{};
   auto peer = std::make_shared<InputPeer>();
   peer->instance = instance;
   peer->port = port;
+  peer->name = name;
   peer->segment = &nobody;
   peer->is_mapped = false;
   peer->max_held = 0;

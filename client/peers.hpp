@@ -3,10 +3,13 @@
 
 #include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include <arbiter/type.hpp>
 
+#include "client/output/events.hpp"
 #include "shm/atomic.hpp"
 #include "shm/bell.hpp"
 #include "shm/descendants.hpp"
@@ -24,6 +27,7 @@ namespace arbiter::detail {
 struct InputPeer {
   shm::PortInstance instance = 0;
   shm::PortId port = shm::kNone;
+  std::string name;
   shm::Mapping mapping;
   std::optional<shm::Bequest> bequest;
   const shm::InputSegment* segment = nullptr;
@@ -44,10 +48,12 @@ struct InputLink {
   std::uint64_t number = 0;  // the daemon's: each time that it is connected another
   std::uint32_t channel = shm::kNone;  // none: waits until another link's is free
   std::uint32_t depth = 1;             // of the queue: the peer's, or less where memory is short
+  std::uint64_t mask = 0;              // its bit in the masks of events; 0: it is no destination
 };
 
 struct OutputView {
   std::vector<InputLink> links;
+  TapView taps;
   std::uint32_t slots = 0;  // allocated for the pool by now
   OutputView* next_retired = nullptr;
 };
@@ -112,7 +118,8 @@ std::shared_ptr<const OutputPeer> map_output_peer(
 
 // In the place of an input port that should be connected and cannot be mapped: it holds nothing and
 // waits for nothing.
-std::shared_ptr<const InputPeer> unmapped_input_peer(shm::PortInstance instance, shm::PortId port);
+std::shared_ptr<const InputPeer> unmapped_input_peer(shm::PortInstance instance, shm::PortId port,
+                                                     std::string_view name);
 
 // Service thread: looks how much the publisher has allocated by now. True: it is more than was
 // known. Waits while the publisher allocates.

@@ -124,6 +124,7 @@ class Daemon final : private Takeover::Host {
                       Source& source);
   void open_input(Client& client, wire::Received& received);
   void close_port(const Client& client, shm::PortInstance port);
+  void open_tap(Client& client, wire::Received& received);
   void connect(Client& client, std::uint64_t request, shm::PortInstance port);
   void deactivate(Client& client, const wire::Message& message);
   // Throws std::runtime_error if a live component has the name. One that has closed its port, or

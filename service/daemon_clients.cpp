@@ -131,6 +131,7 @@ void Daemon::drop(ClientId id) {
   const bool can_be_known = client->is_process(client->pid(), client->process());
   const bool is_away = client->comes_back && can_be_known && !client->has_died();
   if (!client->name.empty() && !client->is_turned_away) log_end_of(*client, is_away);
+  switchboard_.lose_taps(*client, is_away);
   if (is_away) takeover_.set_away(*client);
   while (!client->ports.empty()) switchboard_.remove(*client->ports.begin());
   for (const shm::PortInstance port : client->to_hand_back) switchboard_.forget_away(port);

@@ -116,6 +116,28 @@ void Daemon::close_port(const Client& client, shm::PortInstance port) {
   switchboard_.remove(port);
 }
 
+// A tap is told by those whom it taps, before its program is told that it is open.
+void Daemon::open_tap(Client& client, wire::Received& received) {
+  const std::string name = port_name(received.message);
+  gate_.require(client, Action::kTap, name);
+  auto tap = adopt_tap(received, client.user());
+  tap->name = name;
+  tap->charge = shares_.take(client.user(), Share::kDescriptors, kDescriptorsOfTap);
+  const bool is_input = tap->is_input;
+  const Tap& opened = *tap;
+  const std::uint64_t request = received.message.request;
+  auto told = switchboard_.add_tap(std::move(tap), client, board_.in_force().table, [&] {
+    auto reply = reply_to(request, wire::MessageKind::kOpened);
+    reply.port = opened.instance;
+    client.send(reply);
+  });
+  log::info("{} taps the {} port {}", client.description(), is_input ? "input" : "output", name);
+  introductions_.introduce(told, [this, id = client.id(), request] {
+    Client* const opener = clients_.find(id);
+    if (opener != nullptr) opener->send(reply_to(request, wire::MessageKind::kConnected));
+  });
+}
+
 // Introduces a new port to its peers, and tells its component once they know it.
 void Daemon::connect(Client& client, std::uint64_t request, shm::PortInstance port) {
   const auto in_force = board_.in_force();

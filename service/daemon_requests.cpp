@@ -30,10 +30,11 @@ void require_usable(const wire::Received& received) {
 bool is_question(wire::MessageKind kind) {
   using wire::MessageKind;
   return kind == MessageKind::kOpenOutput || kind == MessageKind::kOpenInput ||
-         kind == MessageKind::kConnect || kind == MessageKind::kReload ||
-         kind == MessageKind::kStatus || kind == MessageKind::kDeactivate ||
-         kind == MessageKind::kObserve || kind == MessageKind::kSwitch ||
-         kind == MessageKind::kRollback || kind == MessageKind::kModel;
+         kind == MessageKind::kOpenTap || kind == MessageKind::kConnect ||
+         kind == MessageKind::kReload || kind == MessageKind::kStatus ||
+         kind == MessageKind::kDeactivate || kind == MessageKind::kObserve ||
+         kind == MessageKind::kSwitch || kind == MessageKind::kRollback ||
+         kind == MessageKind::kModel;
 }
 
 }  // namespace
@@ -62,8 +63,15 @@ void Daemon::handle(Client& client, wire::Received& received) {
     case wire::MessageKind::kOpenInput:
       open_input(client, received);
       break;
+    case wire::MessageKind::kOpenTap:
+      open_tap(client, received);
+      break;
+    case wire::MessageKind::kTapped:
+      if (client.ports.count(message.port) != 0) switchboard_.tell_tap(received);
+      break;
     case wire::MessageKind::kClosePort:
       close_port(client, message.port);
+      if (switchboard_.has_tap(client, message.port)) switchboard_.remove_tap(message.port);
       break;
     case wire::MessageKind::kSynced:
       barriers_.synced(client.id(), message.request);

@@ -94,6 +94,11 @@ Ringer::Ringer(const FileDescriptor& write_end) {
 
 void Ringer::ring() const noexcept { ring_bell(write_.get()); }
 
+bool Ringer::is_deserted() const noexcept {
+  pollfd bell{write_.get(), 0, 0};
+  return ::poll(&bell, 1, 0) == 1 && (bell.revents & POLLERR) != 0;
+}
+
 void ring_bell(int write_end) noexcept {
   const int saved = errno;
   const SigpipeGuard guard;

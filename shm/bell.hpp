@@ -43,6 +43,8 @@ class Ringer {
 
   // Never blocks; a full pipe is rung already, and one without a reader raises no SIGPIPE.
   void ring() const noexcept;
+  // Whether nobody can hear it any more: its reader has closed it, or died.
+  [[nodiscard]] bool is_deserted() const noexcept;
 
  private:
   FileDescriptor write_;

@@ -82,6 +82,14 @@ std::size_t checked_size(const FileDescriptor& segment, Seals wanted) {
   return static_cast<std::size_t>(status.st_size);
 }
 
+SegmentIdentity identity_of(const FileDescriptor& segment) {
+  struct stat file {};
+  if (fstat(segment.get(), &file) != 0) {
+    throw std::system_error(errno, std::generic_category(), "looking at a segment");
+  }
+  return {file.st_dev, file.st_ino};
+}
+
 std::size_t allocated_size(const FileDescriptor& segment) noexcept {
   struct stat status {};
   if (fstat(segment.get(), &status) != 0) return 0;

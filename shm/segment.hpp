@@ -8,6 +8,8 @@
 //     writing, belongs to the daemon, and is handed out read-only except to its one writer.
 #pragma once
 
+#include <sys/types.h>
+
 #include <cstddef>
 #include <system_error>
 
@@ -45,6 +47,16 @@ FileDescriptor reopen(const FileDescriptor& segment, int flags);
 // neither shrink nor grow under us, nor be written by anyone but its owner. Throws
 // std::runtime_error with what is wrong with it.
 std::size_t checked_size(const FileDescriptor& segment, Seals wanted);
+
+// Which segment it is: the same for all descriptors of one, and another for each that lives. Throws
+// std::system_error.
+struct SegmentIdentity {
+  dev_t device = 0;
+  ino_t inode = 0;
+
+  friend bool operator==(const SegmentIdentity&, const SegmentIdentity&) = default;
+};
+SegmentIdentity identity_of(const FileDescriptor& segment);
 
 // How much of a foreign segment is allocated, once checked_size() has passed. It never falls where
 // a segment is sealed to its size and its one writer: it can be truncated no more, nor holes be

@@ -6,7 +6,8 @@
 //
 // Invariant: with at least (sum of the queues' depths) + (sum of the receivers' max_held) + (loans)
 // slots, acquire() always finds one: at worst every queue is full of samples of its own, every
-// receiver holds as many others, and the other loans are out.
+// receiver holds as many others, and the other loans are out. What is kept for taps counts as a
+// queue, and a tap as a receiver.
 //
 // Each slot is free, retired, named by a queue, or loaned, and only one of these. That is our own
 // memory, so it is asserted, but not where publish() would pay for each slot that goes round: when
@@ -19,6 +20,7 @@
 #include "shm/assertion.hpp"
 #include "shm/atomic.hpp"
 #include "shm/channel.hpp"
+#include "shm/event_segment.hpp"
 #include "shm/input_segment.hpp"
 
 namespace arbiter::shm {
@@ -32,7 +34,8 @@ class SlotPool {
     references_.resize(count);
     make_room(free_, count);
     make_room(retired_, count);
-    make_room(held_, std::size_t{kMaxHeld} * kMaxDestinations);
+    make_room(held_,
+              std::size_t{kMaxHeld} * kMaxDestinations + std::size_t{kMaxTapHeld} * kMaxTaps);
     for (std::uint32_t slot = count; slot-- > before;) free_.push_back(slot);
   }
 
@@ -92,16 +95,20 @@ class SlotPool {
     list.resize(size);
   }
 
+  // By itself: its registers would be saved by each call that finds a free slot at once.
   template <class ForEachHolds>
-  void reclaim(PortInstance publisher, ForEachHolds for_each_holds) {
+  [[gnu::noinline]] void reclaim(PortInstance publisher, ForEachHolds for_each_holds) {
     held_.clear();
-    for_each_holds([&](const Atomic<Hold>* holds, std::uint32_t count) {
+    // Once for receivers and once for taps: a call for each would cost more than the look.
+    const auto note = [&](const Atomic<Hold>* holds, std::uint32_t count)
+        __attribute__((always_inline)) {
       for (std::uint32_t i = 0; i < count; ++i) {
         // SYNC POINT: slot-released (see ChannelReader::release()).
         const Hold hold = holds[i].load(std::memory_order_acquire);
         if (publisher_of(hold) == publisher) held_.push_back(slot_of(hold));
       }
-    });
+    };
+    for_each_holds(note);
     std::size_t kept = 0;
     for (const std::uint32_t slot : retired_) {
       bool held = false;

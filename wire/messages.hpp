@@ -8,6 +8,8 @@
 //                          <- kOpened (or kRefused), kSourcePage…,
 //                          kInputPeer… / kOutputPeer…, kConnected
 // kConnected says that the peers have mapped the new port too, or were given up waiting for.
+// A tap is opened likewise: kOpenTap -> kOpened, kTapSource…, kConnected. For each source the
+// daemon asks the component that has it open: kTap -> kTapped (or kPeerRefused).
 //
 // The daemon changes what a client sees: kSourcePage…, kInputPeer…, then kSync; the client answers
 // kSynced when it has taken up all that came before. An output port takes up a peer by writing more
@@ -63,6 +65,9 @@ enum class MessageKind : std::uint32_t {
              // missing
   kModel,    // ask for the texts of the model in force
   kBlind,    // port, text: it cannot see a source that its rules read, for the log
+  kOpenTap,  // name, flags (kTapsInput); descriptors: its segment, its bell. kOpened and kConnected
+             // as for a port; it is closed as one. One that another daemon has opened asks again
+  kTapped,   // answers kTap. port, peer; link, value: where the tap reads; descriptor: the events
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; peer: the daemon's clock, 0 if it does not say;
@@ -88,6 +93,10 @@ enum class MessageKind : std::uint32_t {
   kConnectionRefused,  // `port` is not connected to `peer`, though the model says so, and is not to
                        // be; id = source, or port id; name: the peer's; text: why
   kUnmentioned,        // port, text: the model in force does not mention it
+  kTap,        // to output `port`: tap `peer` watches it; descriptors: the tap's segment, its bell
+  kTapAway,    // to output `port`: the conversation with tap `peer` is lost, its process lives
+  kTapSource,  // to tap `port`: peer, id = source, name; link, value: of kTapped; descriptors: the
+               // segment of the output port, its events
 };
 
 enum MessageFlag : std::uint32_t {
@@ -98,6 +107,7 @@ enum MessageFlag : std::uint32_t {
   kWantsReport = 16,  // of a change of the model: kReport is the answer, whatever comes of it
   kDryRun = 32,       // of a reload: only say what it would do
   kMayReplay = 64,    // the output port may be given times of arrival (Action::kReplay)
+  kTapsInput = 128,   // the tap is of an input port: of all sources that are connected to it
 };
 
 struct Message {

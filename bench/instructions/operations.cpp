@@ -49,7 +49,13 @@ class Scenes {
       auto source = out(fan_out_source(ports));
       count_publish("publish, wins at " + std::to_string(ports), source,
                     static_cast<std::uint32_t>(ports));
-      if (ports == 1) count_loan("loan and publish, wins at 1", source);
+      if (ports == 1) {
+        count_loan("loan and publish, wins at 1", source);
+        const auto tap = tap_of(fan_out_source(ports), false);
+        count_publish("publish, wins at 1, tapped", source, 1);
+        const auto sleeper = tap_of(fan_out_source(ports), true);
+        count_publish("publish, wins at 1, tapped by one that may wait", source, 1);
+      }
     }
     for (const int ports : kFanOuts) {
       std::vector<InputPort<Payload>> receivers;
@@ -61,6 +67,8 @@ class Scenes {
       auto receiver = in("/loses_by_one/in");
       auto source = out("/loses_by_one");
       count_publish("publish, loses at 1, by 1 activity", source, 0);
+      const auto tap = tap_of("/loses_by_one", false);
+      count_publish("publish, loses at 1, by 1 activity, tapped", source, 0);
     }
     auto receiver = in("/free/in");
     auto source = out("/free");
@@ -93,6 +101,10 @@ class Scenes {
   OutputPort<Payload> out(const std::string& name) { return node_.output_port<Payload>(name); }
   InputPort<Payload> in(const std::string& name, std::uint32_t depth = 8) {
     return node_.input_port<Payload>(name, {.depth = depth});
+  }
+
+  Tap<> tap_of(const std::string& name, bool may_wait) {
+    return node_.tap(name, {.max_held = 1, .may_wait = may_wait});
   }
 
   void count_publish(const std::string& measure, OutputPort<Payload>& source,

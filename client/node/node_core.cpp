@@ -172,6 +172,7 @@ void NodeCore::say_closed(shm::PortInstance port) noexcept {
 void NodeCore::forget_port(shm::PortInstance port) {
   outputs_.erase(port);
   inputs_.erase(port);
+  taps_.erase(port);
   given_.erase(port);
   say_closed(port);
 }
@@ -244,7 +245,7 @@ wire::Received NodeCore::converse(const wire::Message& question,
       reply.asked_in = conversation_;
       // A port that another daemon has opened was handed back to this one: what is left is to be
       // connected.
-      if (reply.opened != 0) {
+      if (reply.opened != 0 && question.kind != wire::MessageKind::kOpenTap) {
         numbered = message_of(wire::MessageKind::kConnect);
         numbered.request = request;
         numbered.port = reply.opened;
@@ -334,9 +335,33 @@ std::shared_ptr<InputCore> NodeCore::open_input(std::string_view name, const Typ
   });
 }
 
+std::shared_ptr<TapCore> NodeCore::open_tap(std::string_view name, const Type& type,
+                                            const TapOptions& options) {
+  check_port_name(name);
+  check_bounds<std::uint32_t>(name, "max_held", options.max_held, 0, shm::kMaxTapHeld);
+  return open(name, [&](const std::shared_ptr<SharedMemory>&) {
+    auto core =
+        std::make_shared<TapCore>(std::string(name), type, options, service_bell_, residence());
+    core->node = shared_from_this();
+    core->process = process_;
+    wire::Message question = message_of(wire::MessageKind::kOpenTap, name);
+    question.flags = options.of == TapOf::input ? wire::kTapsInput : 0u;
+    converse(question, {core->segment_descriptor().get(), core->bell().for_publishers().get()},
+             nullptr, [&](wire::Received& opened) {
+               taps_.erase(core->instance());  // that another daemon has opened
+               core->bind(opened.message.port);
+               taps_[opened.message.port] = core;
+             });
+    const std::lock_guard lock(mutex_);
+    core->is_open = true;
+    return core;
+  });
+}
+
 void NodeCore::close(shm::PortInstance port) noexcept {
   std::shared_ptr<OutputCore> output;  // destroyed after the lock is released
   std::shared_ptr<InputCore> input;
+  std::shared_ptr<TapCore> tap;
   const std::lock_guard lock(mutex_);
   if (const auto found = outputs_.find(port); found != outputs_.end()) {
     output = std::move(found->second);
@@ -345,6 +370,10 @@ void NodeCore::close(shm::PortInstance port) noexcept {
   if (const auto found = inputs_.find(port); found != inputs_.end()) {
     input = std::move(found->second);
     inputs_.erase(found);
+  }
+  if (const auto found = taps_.find(port); found != taps_.end()) {
+    tap = std::move(found->second);
+    taps_.erase(found);
   }
   given_.erase(port);
   say_closed(port);

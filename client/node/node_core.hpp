@@ -4,6 +4,7 @@
 //   node_notices.cpp  what the component should know
 //   node_service.cpp  what the daemon says, and the thread that hears it
 //   node_rejoin.cpp   losing the daemon, and coming back to another
+//   taps.cpp          taps that this node opens, and taps of its output ports
 //
 // Thread safety: opening and closing ports may come from any thread; what the daemon says is
 // handled by one thread at a time, the service thread, or whoever calls service() where there is
@@ -30,6 +31,7 @@
 #include "client/input/input_core.hpp"
 #include "client/memory.hpp"
 #include "client/output/output_core.hpp"
+#include "client/tap/tap_core.hpp"
 #include "shm/descendants.hpp"
 #include "wire/call.hpp"
 #include "wire/messages.hpp"
@@ -50,6 +52,8 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
                                           const OutputPortOptions& options);
   std::shared_ptr<InputCore> open_input(std::string_view name, const Type& type,
                                         const InputPortOptions& options);
+  std::shared_ptr<TapCore> open_tap(std::string_view name, const Type& type,
+                                    const TapOptions& options);
   void close(shm::PortInstance port) noexcept;
 
   // Without a service thread: takes up what the daemon has said so far, without blocking.
@@ -108,13 +112,24 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void tidy();
   void tidy_ports(
       std::vector<std::pair<shm::PortInstance, std::shared_ptr<const OutputPeer>>>& copied_from);
-  [[nodiscard]] bool has_predecessors();
+  void tidy_taps(
+      std::vector<std::pair<shm::PortInstance, std::shared_ptr<const OutputPeer>>>& copied_from);
+  // Whether there is something that nobody will ring for.
+  [[nodiscard]] bool has_to_look_again();
   void handle(wire::Received& received);
   void handle_without_descriptors(const wire::Message& message);
   void handle_reply(wire::Received& received);
   void wake_inputs();
   void add_receiver(const wire::Received& received);
   void add_publisher(const wire::Received& received);
+  // Taps (taps.cpp).
+  void handle_about_tap(wire::Received& received);
+  void add_tap(const wire::Received& received);
+  void add_tap_source(const wire::Received& received);
+  void refuse_tap(const wire::Message& announced, const std::string& why);
+  [[nodiscard]] bool note_tap_refusal(const wire::Message& refusal);
+  void reopen_taps();
+  bool handle_tap_reopened(const wire::Message& message);
   void end_peer(const wire::Message& message);
   [[nodiscard]] std::optional<shm::TypeInfo> type_of_port(shm::PortInstance port);
   void refuse_peer(const wire::Message& announced, const std::string& why);
@@ -194,7 +209,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::map<std::uint64_t, Reply> replies_;
   std::map<shm::PortInstance, std::shared_ptr<OutputCore>> outputs_;
   std::map<shm::PortInstance, std::shared_ptr<InputCore>> inputs_;
-  std::vector<Notice> notices_;  // to be given
+  std::map<shm::PortInstance, std::shared_ptr<TapCore>> taps_;
+  std::map<std::uint64_t, std::weak_ptr<TapCore>> reopened_;  // by request
+  std::vector<Notice> notices_;                               // to be given
   bool is_giving_ = false;
   std::map<shm::PortInstance, std::set<std::string>> given_;  // texts, by port
 

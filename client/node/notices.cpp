@@ -21,6 +21,7 @@ const std::string& NodeCore::name_of_port(shm::PortInstance port) const {
   if (const auto output = outputs_.find(port); output != outputs_.end()) {
     return output->second->name();
   }
+  if (const auto tap = taps_.find(port); tap != taps_.end()) return tap->second->name();
   const auto input = inputs_.find(port);
   return input != inputs_.end() ? input->second->name() : none;
 }
@@ -79,7 +80,7 @@ void NodeCore::refuse_peer(const wire::Message& announced, const std::string& wh
   const auto output = outputs_.find(announced.port);
   const bool is_to_connect = is_output_peer || (announced.flags & wire::kIsConnected) != 0;
   if (is_to_connect && output != outputs_.end()) {
-    output->second->refuse_peer(announced.peer, announced.id);
+    output->second->refuse_peer(announced.peer, announced.id, announced.name_view());
   }
   if (is_to_connect) note_refusal(announced, why);
 }
@@ -123,8 +124,9 @@ void NodeCore::note_unseen(const std::string& source, const std::string& why) {
 // A refusal that the daemon or the peer has found.
 void NodeCore::handle_refusal(const wire::Message& refusal) {
   const std::lock_guard lock(mutex_);
+  if (note_tap_refusal(refusal)) return;
   if (const auto output = outputs_.find(refusal.port); output != outputs_.end()) {
-    output->second->refuse_peer(refusal.peer, refusal.id);
+    output->second->refuse_peer(refusal.peer, refusal.id, refusal.name_view());
   }
   if (const auto input = inputs_.find(refusal.port); input != inputs_.end()) {
     input->second->refuse_peer(refusal.peer, refusal.id);

@@ -200,6 +200,8 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
   ++conversation_;
   node_ = welcome.message.link;
   turned_away_.clear();
+  for (const auto& [instance, output] : outputs_) output->doubt_taps();
+  reopen_taps();
   news_.notify_all();
 }
 

@@ -20,7 +20,8 @@ namespace {
 // How much less than a normal thread the service thread presses for the processor.
 constexpr int kServiceNiceness = 5;
 // While a publisher that is gone has samples waiting: how often it is looked whether those of its
-// successor have pushed them out. The successor rings nobody for that.
+// successor have pushed them out. The successor rings nobody for that. The same for taps that no
+// daemon knows: whether their programs live.
 constexpr int kTidyInterval = 1000;  // ms
 
 }  // namespace
@@ -71,15 +72,17 @@ void NodeCore::run_service_thread() {
       const std::lock_guard lock(mutex_);
       if (stopping_) return;
     }
-    pump(has_predecessors() ? kTidyInterval : -1);
+    pump(has_to_look_again() ? kTidyInterval : -1);
     give_notices();
   }
 }
 
-bool NodeCore::has_predecessors() {
+bool NodeCore::has_to_look_again() {
   const std::lock_guard lock(mutex_);
   return std::any_of(inputs_.begin(), inputs_.end(),
-                     [](const auto& input) { return input.second->has_predecessors(); });
+                     [](const auto& input) { return input.second->has_predecessors(); }) ||
+         std::any_of(outputs_.begin(), outputs_.end(),
+                     [](const auto& output) { return output.second->has_doubtful_taps(); });
 }
 
 // Where there is a service thread, it does this.
@@ -150,6 +153,7 @@ void NodeCore::tidy_ports(
     if (input->has_become_blind()) say_blind(instance, "delivers nothing");
     for (auto& peer : input->copied_from()) copied_from.emplace_back(instance, std::move(peer));
   }
+  tidy_taps(copied_from);
 }
 
 // This process has no descriptor left for what came with a message. Nothing is lost by that but
@@ -165,6 +169,10 @@ void NodeCore::handle_without_descriptors(const wire::Message& message) {
     case wire::MessageKind::kOutputPeer:
     case wire::MessageKind::kInputPeer:
       refuse_peer(message, why);
+      return;
+    case wire::MessageKind::kTap:
+    case wire::MessageKind::kTapSource:
+      refuse_tap(message, why);
       return;
     case wire::MessageKind::kSourcePage:
       note_unseen(std::string(message.name_view()), why);
@@ -213,6 +221,11 @@ void NodeCore::handle(wire::Received& received) {
       } catch (const std::exception& error) {
         refuse_peer(message, error.what());
       }
+      break;
+    case wire::MessageKind::kTap:
+    case wire::MessageKind::kTapAway:
+    case wire::MessageKind::kTapSource:
+      handle_about_tap(received);
       break;
     case wire::MessageKind::kConnectionRefused:
       handle_refusal(message);
@@ -345,11 +358,15 @@ void NodeCore::end_peer(const wire::Message& message) {
   const std::lock_guard lock(mutex_);
   if (const auto output = outputs_.find(message.port); output != outputs_.end()) {
     OutputCore& core = *output->second;
+    is_gone ? core.remove_tap(message.peer) : core.end_tap(message.peer);
     is_gone ? core.remove_peer(message.peer) : core.disconnect_peer(message.peer);
   }
   if (const auto input = inputs_.find(message.port); input != inputs_.end()) {
     InputCore& core = *input->second;
     is_gone ? core.lose_peer(message.peer) : core.disconnect_peer(message.peer);
+  }
+  if (const auto tap = taps_.find(message.port); tap != taps_.end()) {
+    tap->second->lose_source(message.peer);
   }
 }
 
@@ -360,6 +377,7 @@ void NodeCore::handle_reply(wire::Received& received) {
     be_turned_away(message);
     return;
   }
+  if (handle_tap_reopened(message)) return;
   const auto found = replies_.find(message.request);
   if (found == replies_.end()) {
     // Nobody waits for it any more.

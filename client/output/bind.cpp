@@ -22,6 +22,7 @@ void OutputCore::accept_view() noexcept {
     }
     destination.peer = link.peer.get();
     destination.refused = link.refused;
+    destination.mask = link.mask;
     if (link.channel != shm::kNone && !destination.joined) {
       destination.joined = true;
       destination.link = link.number;
@@ -34,10 +35,12 @@ void OutputCore::accept_view() noexcept {
     destinations.push_back(std::move(destination));
   }
   destinations_ = std::move(destinations);
+  teller_.accept(view->taps, state(), pool_);
   handover_.retire(std::exchange(view_, std::move(view)));
   memory_->service_bell().ring();  // to dispose of the old one
   bound_epoch_ = UINT64_MAX;
-  // (b) for the queues that we left: their slots may be reclaimed before the next publish.
+  // (b) for the queues that we left, and for what is kept for taps no longer: their slots may be
+  // reclaimed before the next publish.
   shm::full_fence();
 }
 

@@ -22,7 +22,7 @@ std::uint64_t stride_of(const shm::TypeInfo& type) {
 
 std::uint32_t reserved_slots(const shm::TypeInfo& type, const OutputPortOptions& options) {
   const std::uint64_t fit = options.max_memory / stride_of(type);
-  return static_cast<std::uint32_t>(std::min<std::uint64_t>(fit, shm::kMaxSlots));
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(fit, shm::kMaxSlots - kMaxTapSlots));
 }
 
 }  // namespace
@@ -38,8 +38,10 @@ OutputCore::OutputCore(std::string name, const Type& type, const OutputPortOptio
       declared_type_(type),
       type_(as_info(type)),
       max_loans_(options.max_loans),
-      memory_(std::move(memory)) {
-  const auto layout = shm::OutputLayout::plan(type_, reserved_slots(type_, options));
+      memory_(std::move(memory)),
+      slots_of_components_(reserved_slots(type_, options)),
+      slots_of_taps_(slots_for_taps(stride_of(type_), slots_of_components_)) {
+  const auto layout = shm::OutputLayout::plan(type_, slots_of_components_ + slots_of_taps_);
   descriptor_ = shm::make_segment("arbiter-output", layout.total_size);
   mapping_ = shm::Mapping(descriptor_, layout.total_size, shm::Access::kReadWrite);
   segment_ = shm::OutputSegment(mapping_.data(), layout);
@@ -118,9 +120,9 @@ void OutputCore::disconnect_peer(shm::PortInstance peer) {
   offer_view();
 }
 
-void OutputCore::refuse_peer(shm::PortInstance peer, shm::PortId port) {
+void OutputCore::refuse_peer(shm::PortInstance peer, shm::PortId port, std::string_view name) {
   InputLink& link = links_[peer];
-  if (link.peer == nullptr) link.peer = unmapped_input_peer(peer, port);
+  if (link.peer == nullptr) link.peer = unmapped_input_peer(peer, port, name);
   link.connected = false;
   link.refused = true;
   link.channel = shm::kNone;
@@ -133,7 +135,27 @@ std::vector<HeldLink> OutputCore::held_links() const {
   return held;
 }
 
-void OutputCore::tidy() { handover_.collect(); }
+OutputCore::TapEntry OutputCore::add_tap(std::shared_ptr<const TapPeer> tap) {
+  const shm::PortInstance instance = tap->instance;
+  const TapSeat seat = taps_.add(std::move(tap), name_, slots_of_taps_, memory_->residence());
+  try {
+    allocate_slots();
+  } catch (...) {
+    taps_.remove(instance);
+    throw;
+  }
+  offer_view();
+  return {seat.place, seat.link, taps_.memory()};
+}
+
+void OutputCore::remove_tap(shm::PortInstance tap) {
+  if (taps_.remove(tap)) offer_view();
+}
+
+void OutputCore::tidy() {
+  handover_.collect();
+  if (taps_.has_doubtful() && taps_.remove_dead()) offer_view();
+}
 
 std::vector<shm::PortInstance> OutputCore::misbehaving() {
   std::vector<shm::PortInstance> found;
@@ -142,7 +164,10 @@ std::vector<shm::PortInstance> OutputCore::misbehaving() {
       found.push_back(instance);
     }
   }
-  for (const shm::PortInstance peer : found) refuse_peer(peer, links_.at(peer).peer->port);
+  for (const shm::PortInstance peer : found) {
+    const InputPeer& known = *links_.at(peer).peer;
+    refuse_peer(peer, known.port, known.name);
+  }
   return found;
 }
 
@@ -164,12 +189,13 @@ void OutputCore::assign_channel(InputLink& link) {
 
 // Allocates as many slots as all links can need at worst (slot_pool.hpp). Where max_memory does not
 // allow it, the queues that have come last get a smaller depth; one that has begun keeps its own.
+// Taps have slots of their own beside: no queue is shorter for them.
 void OutputCore::allocate_slots() {
   std::uint64_t needed = slots_of_our_own(max_loans_);
   for (const auto& [instance, link] : links_) {
     needed += link.peer->max_held + (link.channel == shm::kNone ? 0 : link.depth);
   }
-  const std::uint64_t reserved = segment_.layout().slot_count;
+  const std::uint64_t reserved = slots_of_components_;
   for (auto& [instance, link] : links_) {
     if (link.channel == shm::kNone || link.depth != 0) continue;
     if (needed >= reserved) {
@@ -179,7 +205,7 @@ void OutputCore::allocate_slots() {
         static_cast<std::uint32_t>(std::min<std::uint64_t>(link.peer->depth, reserved - needed));
     needed += link.depth;
   }
-  const auto wanted = static_cast<std::uint32_t>(std::min(needed, reserved));
+  const auto wanted = static_cast<std::uint32_t>(std::min(needed, reserved)) + taps_.slots();
   if (wanted <= allocated_slots_) return;
   const shm::OutputLayout& layout = segment_.layout();
   const auto headers = shm::allocate(descriptor_, layout.headers_offset,
@@ -209,12 +235,28 @@ void OutputCore::connect_waiting(InputLink& link) noexcept {
   }
 }
 
+// Which bit of a mask is whose. Connections that are refused are among them: of one source, all
+// that a model makes are at most kMaxDestinations. What is more for a moment, because another model
+// comes into force, has none.
+shm::Destinations OutputCore::number_destinations() {
+  shm::Destinations destinations;
+  for (auto& [instance, link] : links_) {
+    link.mask = 0;
+    if (link.channel == shm::kNone && !link.refused) continue;
+    if (destinations.size() == shm::kMaxDestinations) continue;
+    link.mask = std::uint64_t{1} << destinations.size();
+    destinations.push_back({link.peer->port, link.peer->name});
+  }
+  return destinations;
+}
+
 void OutputCore::offer_view() {
   auto view = std::make_unique<OutputView>();
   for (auto& [instance, link] : links_) {
     if (link.connected && link.channel == shm::kNone) connect_waiting(link);
-    view->links.push_back(link);
   }
+  view->taps = taps_.view(number_destinations());
+  for (const auto& [instance, link] : links_) view->links.push_back(link);
   view->slots = allocated_slots_;
   handover_.offer(std::move(view));
 }

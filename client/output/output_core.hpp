@@ -50,8 +50,23 @@ class OutputCore {
   void remove_peer(shm::PortInstance peer);
   void disconnect_peer(shm::PortInstance peer);
   // The connection is refused: its arrivals are counted as that, be the peer mapped or not.
-  void refuse_peer(shm::PortInstance peer, shm::PortId port);
+  void refuse_peer(shm::PortInstance peer, shm::PortId port, std::string_view name);
   [[nodiscard]] std::vector<HeldLink> held_links() const;
+  // What a tap is to be told: where it reads, and what. Throws std::runtime_error where it does not
+  // fit, std::system_error where there is no memory.
+  struct TapEntry {
+    std::uint32_t place = 0;
+    std::uint64_t link = 0;
+    std::shared_ptr<const EventMemory> memory;
+  };
+  TapEntry add_tap(std::shared_ptr<const TapPeer> tap);
+  void remove_tap(shm::PortInstance tap);
+  // A tap whose conversation is lost lives, as far as anybody knows: it is heeded until its program
+  // has gone. All of them: another daemon has come, which does not know them yet.
+  void doubt_tap(shm::PortInstance tap) { taps_.doubt(tap); }
+  void doubt_taps() { taps_.doubt_all(); }
+  void end_tap(shm::PortInstance tap) { taps_.end(tap); }
+  [[nodiscard]] bool has_doubtful_taps() const { return taps_.has_doubtful(); }
   // Whether a decision has missed a source that it could not see, for the first time.
   [[nodiscard]] bool has_become_blind() noexcept { return blindness_.is_news(); }
   // Unmaps what the port's thread has let go of.
@@ -121,10 +136,12 @@ class OutputCore {
     shm::Verdict verdict = shm::Verdict::kLoses;
     std::uint64_t rung = 0;           // the wait that we rang for last
     const shm::Lane* lane = nullptr;  // ours in the peer's segment, once found
+    std::uint64_t mask = 0;           // its bit in the masks of events
   };
 
   void assign_channel(InputLink& link);
   void allocate_slots();
+  [[nodiscard]] shm::Destinations number_destinations();
   void connect_waiting(InputLink& link) noexcept;
   void offer_view();
   void accept_view() noexcept;
@@ -140,6 +157,12 @@ class OutputCore {
   void stamp(shm::ActivityWord word) noexcept;
   void decide_all(shm::Nanoseconds now) noexcept;
   Counts hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
+  [[nodiscard]] shm::EventRecord state() const noexcept;
+  [[nodiscard]] shm::Masks masks() noexcept;
+  // The same for a port that is tapped, from the decision on.
+  Counts hand_over_and_tell(std::uint32_t slot, std::size_t size, bool begins) noexcept;
+  void tell_arrival(std::uint32_t slot) noexcept;
+  void tell_deactivation() noexcept;
   [[nodiscard]] Counts refuse(const Destination& destination, bool is_sample) const noexcept;
   [[nodiscard]] bool is_full(Destination& destination) const noexcept;
   static void ring_if_waiting(Destination& destination) noexcept;
@@ -153,6 +176,8 @@ class OutputCore {
   const shm::TypeInfo type_;  // the same, as it lies in memory
   const std::uint32_t max_loans_;
   const std::shared_ptr<SharedMemory> memory_;
+  const std::uint32_t slots_of_components_;  // that max_memory allows
+  const std::uint32_t slots_of_taps_;        // beside them
   shm::FileDescriptor descriptor_;
   shm::FileDescriptor readable_;  // for others: the daemon passes it on as it is
   shm::Mapping mapping_;
@@ -168,6 +193,7 @@ class OutputCore {
 
   // Service thread.
   std::map<shm::PortInstance, InputLink> links_;
+  TapSeats taps_;
   std::uint32_t allocated_slots_ = 0;
 
   Handover<OutputView> handover_;
@@ -185,6 +211,7 @@ class OutputCore {
   std::vector<SharedDecision> decisions_;
   std::vector<shm::Read> reads_;  // what decisions_ have bound
   shm::SlotPool pool_;
+  EventTeller teller_;
   std::uint32_t loans_ = 0;
   std::uint64_t sequence_ = 0;
   shm::ActivityWord own_word_ = shm::kNeverActive;

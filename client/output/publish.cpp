@@ -21,6 +21,11 @@ namespace arbiter::detail {
 
 std::uint32_t OutputCore::acquire_slot() noexcept {
   const std::uint32_t slot = pool_.acquire(instance_, [&](auto&& each) {
+    // SYNC POINT: kept-sample-held. Fence (b) for what is kept for taps, here and not in each
+    // publish: between what has given way and our reading of holds. Pairs with fence (e) of a tap.
+    if (!teller_.seats().empty()) shm::full_fence();
+    for (const TapSeat& seat : teller_.seats())
+      each(seat.peer->segment->holds, seat.peer->max_held);
     for (const Destination& destination : destinations_) {
       each(destination.peer->segment->header.holds, destination.peer->max_held);
     }
@@ -64,7 +69,9 @@ Counts OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds
   stamp(shm::arrival(now, timeout_));
   last_ = now;
   Counts outcome;
-  if (!destinations_.empty()) {
+  if (teller_.is_on()) [[unlikely]] {
+    outcome = hand_over_and_tell(slot, size, begins);
+  } else if (!destinations_.empty()) {
     decide_all(now);
     outcome = hand_over(slot, size, now);
     if (begins) ring_where_selection_changed();
@@ -133,6 +140,7 @@ Counts OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseco
     if (destination.peer->refuse_new && is_full(destination)) {
       destination.verdict = shm::Verdict::kLoses;  // nothing to ring for
       ++outcome.refused;
+      teller_.note_refusal(destination.mask);
       count(destination.writer.channel().refused, 1);
       continue;
     }
@@ -265,6 +273,7 @@ void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
   const bool ends = shm::is_active(own_word_, now);
   stamp(shm::deactivation(now));
   last_ = now;
+  if (teller_.is_on()) tell_deactivation();
   if (ends) ring_where_selection_changed();
 }
 

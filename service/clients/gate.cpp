@@ -31,6 +31,8 @@ std::string describe(Action action, std::string_view port) {
       return "stop the daemon";
     case Action::kReplay:
       return "replay the source " + name + " (give its arrivals their times)";
+    case Action::kTap:
+      return "tap the port " + name;
   }
   return "do that";
 }

@@ -8,12 +8,13 @@
 namespace arbiter::service {
 namespace {
 
-constexpr std::uint8_t bit(Action action) {
-  return static_cast<std::uint8_t>(1u << static_cast<unsigned>(action));
+constexpr std::uint16_t bit(Action action) {
+  return static_cast<std::uint16_t>(1u << static_cast<unsigned>(action));
 }
 
-constexpr std::uint8_t kOnPorts =
-    bit(Action::kOutput) | bit(Action::kInput) | bit(Action::kDeactivate) | bit(Action::kReplay);
+constexpr std::uint16_t kOnPorts = bit(Action::kOutput) | bit(Action::kInput) |
+                                   bit(Action::kDeactivate) | bit(Action::kReplay) |
+                                   bit(Action::kTap);
 
 bool is_about_a_port(Action action) { return (kOnPorts & bit(action)) != 0; }
 

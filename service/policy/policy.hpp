@@ -4,7 +4,7 @@
 //
 //   WHO      everyone, owner (the user that the daemon runs as), user NAME, group NAME; numbers
 //            serve as names, too
-//   ACTION   output, input, deactivate, replay: each on the ports whose names match one of the
+//   ACTION   output, input, deactivate, replay, tap: each on the ports whose names match one of the
 //   globs;
 //            observe, reload, switch, stop: without globs; all: every action on every port
 //
@@ -34,9 +34,10 @@ enum class Action : std::uint8_t {
   kReload,
   kSwitch,
   kStop,
-  kReplay
+  kReplay,
+  kTap
 };
-inline constexpr std::size_t kActionCount = 8;
+inline constexpr std::size_t kActionCount = 9;
 
 // Who asks, as the kernel knows him.
 struct Identity {
@@ -87,8 +88,8 @@ class Policy {
   struct Rule {
     bool allows = false;
     Subject who;
-    std::uint8_t actions = 0;  // a bit for each
-    std::string glob;          // of ports; what is about no port does not look at it
+    std::uint16_t actions = 0;  // a bit for each
+    std::string glob;           // of ports; what is about no port does not look at it
     std::uint32_t line = 1;
     std::string text;  // as written, for messages
 

@@ -32,6 +32,7 @@ constexpr std::array<NamedAction, kActionCount> kActions{{
     {"switch", Action::kSwitch, false},
     {"stop", Action::kStop, false},
     {"replay", Action::kReplay, true},
+    {"tap", Action::kTap, true},
 }};
 constexpr std::string_view kShape = "a line is: allow|deny WHO ACTION[,ACTION...] [GLOB...]";
 
@@ -186,7 +187,7 @@ class PolicyReader {
       const std::size_t comma = std::min(rest.find(','), rest.size());
       const NamedAction* action = read_action(rest.substr(0, comma));
       if (action == nullptr) return false;
-      rule.actions |= static_cast<std::uint8_t>(1u << static_cast<unsigned>(action->action));
+      rule.actions |= static_cast<std::uint16_t>(1u << static_cast<unsigned>(action->action));
       (action->on_ports ? on_ports : on_daemon) = true;
       if (comma == rest.size()) break;
       rest.remove_prefix(comma + 1);
@@ -205,13 +206,14 @@ class PolicyReader {
       if (action.name == word) return &action;
       known.push_back(action.name);
     }
-    error("unknown-action", word,
-          quote(word) + " is no action" +
-              (word == "all"
-                   ? std::string("; all stands alone")
-                   : advise(word, known,
-                            "write output, input, deactivate, replay, observe, reload, "
-                            "switch, stop or all, with commas and no blanks between them")));
+    error(
+        "unknown-action", word,
+        quote(word) + " is no action" +
+            (word == "all"
+                 ? std::string("; all stands alone")
+                 : advise(word, known,
+                          "write output, input, deactivate, replay, tap, observe, "
+                          "reload, switch, stop or all, with commas and no blanks between them")));
     return nullptr;
   }
 

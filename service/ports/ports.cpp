@@ -7,26 +7,13 @@
 #include <system_error>
 
 #include "service/clients/errands.hpp"
+#include "service/ports/foreign_parts.hpp"
 #include "shm/bell.hpp"
 #include "shm/foreign.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::service {
 namespace {
-
-void require(const wire::Received& open, std::size_t descriptors) {
-  if (open.descriptor_count != descriptors) {
-    throw std::runtime_error("the request came with " + std::to_string(open.descriptor_count) +
-                             " descriptors instead of " + std::to_string(descriptors));
-  }
-}
-
-// The request may have to wait, and come again with what it came with.
-shm::FileDescriptor kept(const shm::FileDescriptor& descriptor) {
-  shm::FileDescriptor copy(fcntl(descriptor.get(), F_DUPFD_CLOEXEC, 0));
-  if (!copy) throw std::system_error(errno, std::generic_category(), "keeping a descriptor");
-  return copy;
-}
 
 // A descriptor says what a process was given, not what it may open: root's daemon would pass on
 // what another user's program was tricked into sending. Root may make what it likes.
@@ -46,7 +33,21 @@ shm::TypeInfo fine_type(const wire::Message& open) {
   return open.type;
 }
 
-// Of a segment, so much of it allocated as is read: a hole would be filled, and paid, by who reads.
+}  // namespace
+
+void require_descriptors(const wire::Received& open, std::size_t descriptors) {
+  if (open.descriptor_count != descriptors) {
+    throw std::runtime_error("the request came with " + std::to_string(open.descriptor_count) +
+                             " descriptors instead of " + std::to_string(descriptors));
+  }
+}
+
+shm::FileDescriptor kept(const shm::FileDescriptor& descriptor) {
+  shm::FileDescriptor copy(fcntl(descriptor.get(), F_DUPFD_CLOEXEC, 0));
+  if (!copy) throw std::system_error(errno, std::generic_category(), "keeping a descriptor");
+  return copy;
+}
+
 std::size_t own_segment(const shm::FileDescriptor& segment, uid_t user, std::size_t least) {
   const std::size_t size = shm::checked_size(segment, shm::Seals::kOneWriter);
   require_own(segment, "the segment", user);
@@ -72,8 +73,6 @@ std::shared_ptr<const PortBell> own_bell(const shm::FileDescriptor& bell, uid_t 
   return std::make_shared<const PortBell>(kept(bell), user);
 }
 
-}  // namespace
-
 PortBell::~PortBell() {
   Errands::of_the_process().close(user_, shm::FileDescriptor(pipe_.release()));
 }
@@ -92,7 +91,7 @@ InputPort::~InputPort() { Errands::of_the_process().close(user, std::move(segmen
 
 std::unique_ptr<OutputPort> adopt_output(const wire::Received& open, uid_t user) {
   // What is handed back comes with the activity page.
-  require(open, open.message.kind == wire::MessageKind::kHandBackOutput ? 2 : 1);
+  require_descriptors(open, open.message.kind == wire::MessageKind::kHandBackOutput ? 2 : 1);
   auto port = std::make_unique<OutputPort>();
   constexpr std::size_t kRead = shm::kOutputHeadBytes;
   const std::size_t size = own_segment(open.descriptors[0], user, kRead);
@@ -108,7 +107,7 @@ std::unique_ptr<OutputPort> adopt_output(const wire::Received& open, uid_t user)
 }
 
 std::unique_ptr<InputPort> adopt_input(const wire::Received& open, uid_t user) {
-  require(open, 2);
+  require_descriptors(open, 2);
   auto port = std::make_unique<InputPort>();
   const std::size_t size = own_segment(open.descriptors[0], user, sizeof(shm::InputSegment));
   if (size != sizeof(shm::InputSegment)) {

@@ -78,6 +78,7 @@ void Switchboard::remove(shm::PortInstance port) {
     link = links_.erase(link);
   }
   end_claims_on(port);
+  taps_.end(port);
   at_step("peers-told-of-the-end");
   if (const auto found = outputs_.find(port); found != outputs_.end()) {
     registry_.source(found->second->source->id).clear_owner();
@@ -151,6 +152,7 @@ Switchboard::Told Switchboard::link_all(const shm::TableView& table) {
     want_links(*output, table, wanted);
   }
   make_links(wanted, told);
+  taps_.link(table, outputs_, [&](Client* client) { told.insert(client); });
   return told;
 }
 
@@ -164,9 +166,25 @@ Switchboard::Told Switchboard::link_one(const shm::TableView& table, shm::PortIn
   if (const auto output = outputs_.find(port); output != outputs_.end()) {
     send_pages(*output->second, table, told);
     want_links(*output->second, table, wanted);
+    taps_.link(table, *output->second, [&](Client* client) { told.insert(client); });
   }
   make_links(wanted, told);
   return told;
+}
+
+Switchboard::Told Switchboard::add_tap(std::unique_ptr<Tap> tap, Client& client,
+                                       const shm::TableView& table,
+                                       const std::function<void()>& opened) {
+  Told told;
+  taps_.add(std::move(tap), client);
+  opened();
+  taps_.link(table, outputs_, [&](Client* publisher) { told.insert(publisher); });
+  return told;
+}
+
+void Switchboard::tell_tap(const wire::Received& answer) {
+  const auto output = outputs_.find(answer.message.port);
+  if (output != outputs_.end()) taps_.tell(*output->second, answer);
 }
 
 void Switchboard::make_links(const Wanted& wanted, Told& told) {
@@ -283,6 +301,7 @@ bool Switchboard::is_connected(const LinkKey& key) const {
 
 Switchboard::Told Switchboard::unlink(const shm::TableView& table) {
   Told told;
+  taps_.unlink(table, outputs_);
   Wanted wanted;
   for (const auto& [instance, output] : outputs_) want_links(*output, table, wanted);
   for (auto& [key, link] : links_) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "service/ports/ports.hpp"
+#include "service/ports/taps.hpp"
 #include "shm/decision_table.hpp"
 #include "shm/table_ring.hpp"
 
@@ -24,7 +25,8 @@ wire::Message message_to(wire::MessageKind kind, shm::PortInstance port, shm::Po
 
 class Switchboard {
  public:
-  Switchboard(PortNames& names, Registry& registry) : names_(names), registry_(registry) {}
+  Switchboard(PortNames& names, Registry& registry)
+      : names_(names), registry_(registry), taps_(names, registry) {}
 
   using LinkKey = std::pair<shm::PortInstance, shm::PortInstance>;  // output, input
   using Told = std::set<Client*>;  // clients that have news to take up
@@ -34,6 +36,18 @@ class Switchboard {
   InputPort& add(std::unique_ptr<InputPort> port, Client& client, InputName& name);
   // A port closes or dies: its peers are told, its name is free.
   void remove(shm::PortInstance port);
+
+  // Taps of live ports: one is opened, its client closes a port or tap, or has gone.
+  // `opened` is called when it has its number, and before anybody is told.
+  Told add_tap(std::unique_ptr<Tap> tap, Client& client, const shm::TableView& table,
+               const std::function<void()>& opened);
+  [[nodiscard]] bool has_tap(const Client& client, shm::PortInstance tap) const {
+    return taps_.is_of(client, tap);
+  }
+  void remove_tap(shm::PortInstance tap) { taps_.remove(tap, outputs_); }
+  void lose_taps(const Client& client, bool lives) { taps_.lose(client, lives, outputs_); }
+  // What the component of an output port has answered to a tap.
+  void tell_tap(const wire::Received& answer);
 
   // The component lives, but its conversation is lost: its links stand, and become claims of its
   // peers; its name is kept for it.
@@ -116,6 +130,7 @@ class Switchboard {
   std::map<shm::PortInstance, std::unique_ptr<OutputPort>> outputs_;
   std::map<shm::PortInstance, std::unique_ptr<InputPort>> inputs_;
   std::map<LinkKey, Link> links_;
+  Taps taps_;
   std::vector<LinkKey> fresh_;  // links whose receivers are to be shown the segment
   std::set<LinkKey> growth_;    // links whose receivers are to be shown that it has grown
 };

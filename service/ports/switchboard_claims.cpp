@@ -35,6 +35,7 @@ void Switchboard::set_away(shm::PortInstance port) {
     if (input == port) outputs_.at(output)->claims[port] = {link->second.number};
     link = output == port || input == port ? links_.erase(link) : std::next(link);
   }
+  taps_.set_away(port);
   Source* source = names_.source_of(port);
   InputName* name = names_.input_of(port);
   erase(port);
@@ -122,6 +123,7 @@ void Switchboard::end_claims_on(shm::PortInstance port) {
 
 void Switchboard::forget_away(shm::PortInstance port) {
   end_claims_on(port);
+  taps_.end(port);
   if (Source* source = names_.source_of(port)) {
     source->away = 0;
     names_.let_go(*source);

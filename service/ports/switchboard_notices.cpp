@@ -41,6 +41,9 @@ void Switchboard::tell_refusal(const LinkKey& key, shm::PortInstance to,
 
 // The one that refuses knows it.
 void Switchboard::refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
+  if (const auto output = outputs_.find(port); output != outputs_.end()) {
+    taps_.refuse(*output->second, peer, why);
+  }
   for (const LinkKey& key : {LinkKey{port, peer}, LinkKey{peer, port}}) {
     const auto found = links_.find(key);
     if (found == links_.end()) continue;

@@ -27,11 +27,20 @@ TEST(Unmentioned, PubAndEchoSayThatNothingPasses) {
             "delivered; did you mean \"/Face/pos:o\"?\n");
   result = arbiter({"pub", "/other", "--count", "1"});
   EXPECT_THAT(result.err, HasSubstr("; `arbiter status` shows the ports that it mentions\n"));
-  result = arbiter({"echo", "/Gaze/po:i", "--for", "1ms"});
+  result = arbiter({"echo", "/Gaze/po:i", "--for", "1ms", "--as-component"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.err,
             "arbiter: the model in force does not mention /Gaze/po:i, so no sample arrives; did "
             "you mean \"/Gaze/pos:i\"?\n");
+}
+
+TEST(Unmentioned, AWatcherSaysThatNobodyHasNamedThePort) {
+  Daemon daemon(kModel);
+  const auto result = arbiter({"echo", "/Gaze/po:i", "--for", "1ms"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err,
+            "arbiter: no model and no component has named /Gaze/po:i yet; did you mean "
+            "\"/Gaze/pos:i\"?\n");
 }
 
 TEST(Unmentioned, NothingIsSaidOfPortsThatTheModelConnectsOrReads) {

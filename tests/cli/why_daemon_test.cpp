@@ -35,7 +35,7 @@ TEST(WhyDaemon, OfAComponentThatHasNotComeBackSaysThatWhatIsConnectedGoesOn) {
   Daemon daemon(kOneDefault);
   Node node("test");
   auto rest = node.output_port<int>("/rest");
-  ChildProcess echo({ARBITER_PROGRAMS "/arbiter", "echo", "/arm"}, {}, {});
+  ChildProcess echo({ARBITER_PROGRAMS "/arbiter", "echo", "/arm", "--as-component"}, {}, {});
   while (daemon.connection("/rest", "/arm")["state"] != "connected") {
   }
   rest.publish(1);

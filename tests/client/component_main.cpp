@@ -32,6 +32,7 @@ class Component {
     if (verb == "node") return node(words);
     if (verb == "output") return output(words);
     if (verb == "input") return input(words);
+    if (verb == "tap") return tap(words);
     if (verb == "images-out") return images_out(words);
     if (verb == "images-in") return images_in(words);
     if (verb == "fork") return fork_child(words);
@@ -42,6 +43,9 @@ class Component {
     if (verb == "deactivate") return outputs_.at(port)->deactivate(), "done";
     if (verb == "take") return answer(inputs_.at(port)->take());
     if (verb == "hold") return hold(port);
+    if (verb == "hold-event") return hold_event(port);
+    if (verb == "held-event") return std::to_string(event_->sample()->value);
+    if (verb == "watch") return watch(port);
     if (verb == "held") return std::to_string(held_.at(port)->value);
     if (verb == "give") return held_.erase(port), "done";
     if (verb == "wait") return wait(port);
@@ -70,6 +74,23 @@ class Component {
     words >> name >> options.depth >> options.max_held >> options.keep;
     inputs_[name] = std::make_unique<InputPort<Number>>(node_->input_port<Number>(name, options));
     return "open";
+  }
+  std::string tap(std::istringstream& words) {
+    std::string name;
+    TapOptions options;
+    words >> name >> options.max_held;
+    taps_.insert_or_assign(name, node_->tap<Number>(name, options));
+    return "open";
+  }
+  std::string hold_event(const std::string& port) {
+    do {
+      event_ = taps_.at(port).wait_for(std::chrono::hours::max());
+    } while (event_->sample() == nullptr);
+    return std::to_string(event_->sample()->value);
+  }
+  // For ever.
+  std::string watch(const std::string& port) {
+    for (;;) static_cast<void>(taps_.at(port).wait_for(std::chrono::hours::max()));
   }
   // A child that ends as if this component did; or one that stays, whose number it answers.
   std::string fork_child(std::istringstream& words) {
@@ -154,6 +175,8 @@ class Component {
   std::map<std::string, std::unique_ptr<OutputPort<Number>>> outputs_;
   std::map<std::string, std::unique_ptr<InputPort<Number>>> inputs_;
   std::map<std::string, Sample<Number>> held_;
+  std::map<std::string, Tap<Number>> taps_;
+  std::optional<TapEvent<Number>> event_;
   std::unique_ptr<OutputPort<Image>> images_out_;
   std::unique_ptr<InputPort<Image>> images_in_;
   std::optional<Sample<Image>> image_;

@@ -73,6 +73,36 @@ std::uint64_t Input::taken_of_all() const {
   return std::accumulate(std::begin(taken), std::end(taken), std::uint64_t{0});
 }
 
+// Each event once and in order; a sample is as it was published.
+bool Watcher::note(const detail::TapEventData& event) {
+  lost += event.lost;
+  const auto kind = static_cast<shm::EventKind>(event.kind);
+  if (kind != shm::EventKind::kSample) return true;
+  if (event.data != nullptr) {
+    if (Explorer* explorer = Explorer::current()) explorer->read_plain(event.data);
+    std::uint64_t which = 0;
+    std::memcpy(&which, event.data, sizeof which);
+    require(which == event.sequence, "a sample was torn or replaced");
+    core->give_back(event.hold);
+  }
+  require(event.sequence > last, "an event came twice, or late");
+  require(event.sequence == last + 1 || last == 0, "an event was passed over");
+  last = event.sequence;
+  accepted += event.accepted != 0 ? 1 : 0;
+  ++seen;
+  return true;
+}
+
+bool Watcher::take() {
+  detail::TapEventData event;
+  return core->take(event) && note(event);
+}
+
+bool Watcher::wait() {
+  detail::TapEventData event;
+  return core->wait(shm::kForever, event) && note(event);
+}
+
 namespace {
 
 // A segment's descriptor is but a number here (kernel.cpp), which several may have.
@@ -112,9 +142,9 @@ std::unique_ptr<Output> Instance::make_output(std::uint32_t slots) {
   options.max_memory = shm::kCacheLine * std::size_t{slots == 0 ? 64 : slots};
   output->core =
       std::make_unique<detail::OutputCore>("output", sample_type(), options, output->memory);
-  const auto layout = shm::OutputLayout::plan(output->core->type(), slots == 0 ? 64 : slots);
-  output->mapping =
-      shm::Mapping(output->core->segment_descriptor(), layout.total_size, shm::Access::kReadOnly);
+  const shm::FileDescriptor& segment = output->core->segment_descriptor();
+  output->mapping = shm::Mapping(segment, shm::checked_size(segment, shm::Seals::kOneWriter),
+                                 shm::Access::kReadOnly);
   return output;
 }
 
@@ -155,10 +185,47 @@ void Instance::tell_input(Input& input, const Output& output, std::uint64_t link
   for (auto& lent : received.descriptors) static_cast<void>(lent.release());
 }
 
+void Instance::tell_tap(Output& output, Watcher& watcher) {
+  tell_watcher(output, watcher, tell_tapped(output, watcher));
+}
+
+detail::OutputCore::TapEntry Instance::tell_tapped(Output& output, const Watcher& watcher) {
+  wire::Received received;
+  received.message.peer = watcher.core->instance();
+  received.descriptors[0] = shm::FileDescriptor(watcher.core->segment_descriptor().get());
+  received.descriptors[1] = shm::FileDescriptor(watcher.core->bell().write_end().get());
+  auto entry = output.core->add_tap(detail::map_tap_peer(received, shm::Residence::kMapped));
+  for (auto& lent : received.descriptors) static_cast<void>(lent.release());
+  return entry;
+}
+
+void Instance::tell_watcher(const Output& output, Watcher& watcher,
+                            const detail::OutputCore::TapEntry& entry) {
+  wire::Received received;
+  received.message.peer = output.core->instance();
+  received.message.id = output.core->source();
+  received.message.link = entry.link;
+  received.message.value = entry.place;
+  received.descriptors[0] = shm::FileDescriptor(output.core->segment_descriptor().get());
+  received.descriptors[1] = shm::FileDescriptor(entry.memory->readable().get());
+  watcher.core->add_source(
+      detail::map_tap_source(received, watcher.core->type(), shm::Residence::kMapped));
+  for (auto& lent : received.descriptors) static_cast<void>(lent.release());
+}
+
 void Instance::connect(Output& output, Input& input) {
   const std::uint64_t link = next_link_++;
   tell_output(output, input, link);
   tell_input(input, output, link);
+}
+
+std::unique_ptr<Watcher> Instance::make_watcher(const TapOptions& options) {
+  auto watcher = std::make_unique<Watcher>();
+  watcher->core = std::make_unique<detail::TapCore>("tap", Type::untyped(0), options,
+                                                    std::make_shared<const detail::ServiceBell>(),
+                                                    shm::Residence::kMapped);
+  watcher->core->bind(next_instance_++);
+  return watcher;
 }
 
 void Instance::prepare(const test::TableBuilder& model) {

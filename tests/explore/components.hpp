@@ -11,6 +11,7 @@
 
 #include "client/input/input_core.hpp"
 #include "client/output/output_core.hpp"
+#include "client/tap/tap_core.hpp"
 #include "shm/table_ring.hpp"
 #include "tests/explore/case.hpp"
 #include "tests/explore/explorer.hpp"
@@ -67,6 +68,23 @@ struct Input {
   void note(const detail::HeldSample& sample);
 };
 
+// A tap, and what it has seen.
+struct Watcher {
+  // Takes an event, and reads its sample; false: there was none.
+  bool take();
+  // As take(), of what the wait has brought.
+  bool wait();
+
+  std::unique_ptr<detail::TapCore> core;
+  std::uint64_t seen = 0;      // samples
+  std::uint64_t accepted = 0;  // of them, at any port
+  std::uint64_t lost = 0;
+  std::uint64_t last = 0;
+
+ private:
+  bool note(const detail::TapEventData& event);
+};
+
 // What belongs to one instance of Arbiter. Its ports see the pages of all sources.
 class Instance {
  public:
@@ -82,6 +100,12 @@ class Instance {
   static void tell_output(Output& output, const Input& input, std::uint64_t link);
   static void tell_input(Input& input, const Output& output, std::uint64_t link);
   void connect(Output& output, Input& input);
+  // The same of a tap.
+  static void tell_tap(Output& output, Watcher& watcher);
+  static detail::OutputCore::TapEntry tell_tapped(Output& output, const Watcher& watcher);
+  static void tell_watcher(const Output& output, Watcher& watcher,
+                           const detail::OutputCore::TapEntry& entry);
+  std::unique_ptr<Watcher> make_watcher(const TapOptions& options);
 
   // As the daemon does it: writes a model's table behind the one in force, and puts it in force.
   void prepare(const test::TableBuilder& model);

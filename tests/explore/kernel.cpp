@@ -89,6 +89,10 @@ FileDescriptor reopen(const FileDescriptor& segment, int) {
 std::size_t checked_size(const FileDescriptor& segment, Seals) {
   return explore::segments.at(segment.get()).size;
 }
+SegmentIdentity identity_of(const FileDescriptor& segment) {
+  const auto base = reinterpret_cast<std::uintptr_t>(explore::segments.at(segment.get()).base);
+  return {0, static_cast<ino_t>(base)};
+}
 std::size_t allocated_size(const FileDescriptor& segment) noexcept {
   return explore::segments.at(segment.get()).size;
 }
@@ -154,6 +158,7 @@ Ringer::Ringer(const FileDescriptor& write_end) : write_(explore::kFirstRinger +
   explore::bells[write_.get()] = explore::bells.at(write_end.get());
 }
 void Ringer::ring() const noexcept { explore::ring(write_.get()); }
+bool Ringer::is_deserted() const noexcept { return false; }
 void ring_bell(int write_end) noexcept { explore::ring(write_end); }
 
 }  // namespace shm

@@ -40,7 +40,7 @@ std::vector<std::string> words_of(std::string line) {
 }
 
 constexpr auto kActions = std::to_array<const char*>(
-    {"output", "input", "deactivate", "observe", "reload", "switch", "stop", "replay"});
+    {"output", "input", "deactivate", "observe", "reload", "switch", "stop", "replay", "tap"});
 static_assert(kActions.size() == service::kActionCount);
 
 bool includes_action(const std::string& list, const std::string& action) {

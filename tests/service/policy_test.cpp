@@ -109,7 +109,7 @@ TEST(Policy, AnActionIsAllowedByItself) {
       {"output *", Action::kOutput},         {"input *", Action::kInput},
       {"deactivate *", Action::kDeactivate}, {"observe", Action::kObserve},
       {"reload", Action::kReload},           {"stop", Action::kStop},
-      {"replay *", Action::kReplay}};
+      {"replay *", Action::kReplay},         {"tap *", Action::kTap}};
   for (const auto& [text, allowed] : actions) {
     const Policy policy = good("allow everyone " + text);
     for (const auto& [other, action] : actions) {
@@ -144,7 +144,7 @@ TEST(Policy, WithoutAFileEveryoneMayOpenPortsAndObserve) {
     EXPECT_TRUE(may(policy, kOther, action, "/x"));
   }
   EXPECT_TRUE(may(policy, kOther, Action::kObserve));
-  for (const Action action : {Action::kReload, Action::kStop, Action::kReplay}) {
+  for (const Action action : {Action::kReload, Action::kStop, Action::kReplay, Action::kTap}) {
     EXPECT_FALSE(may(policy, kOther, action));
     EXPECT_THAT(policy.may(kOther, action).reason, HasSubstr("--policy"));
     EXPECT_TRUE(may(policy, kRoot, action));

@@ -143,6 +143,7 @@ TEST(ProtocolPage, SaysWhatAnswersWhat) {
   auto connect = RawClient::message(MessageKind::kConnect);
   connect.port = client.last_opened();
   note(MessageKind::kConnect, client.ask(connect));
+  note(MessageKind::kOpenTap, client.open_tap("/out"));
   for (const MessageKind kind :
        {MessageKind::kStatus, MessageKind::kModel, MessageKind::kObserve}) {
     note(kind, client.ask(kind));
@@ -156,7 +157,8 @@ TEST(ProtocolPage, SaysWhatAnswersWhat) {
   note(MessageKind::kDeactivate, client.ask(MessageKind::kDeactivate, "/low"));
   for (const MessageKind kind :
        {MessageKind::kClosePort, MessageKind::kSynced, MessageKind::kPeerRefused,
-        MessageKind::kHandBackLink, MessageKind::kHandedBack, MessageKind::kBlind}) {
+        MessageKind::kHandBackLink, MessageKind::kHandedBack, MessageKind::kBlind,
+        MessageKind::kTapped}) {
     note(kind, client.say(kind));
   }
   // To nobody who has lost no daemon.
@@ -175,8 +177,9 @@ TEST(ProtocolPage, SaysWhatThePolicyMustAllow) {
   const auto numbers = kinds_of_header();
   const auto rows = rows_of(protocol_page(), kFromClient);
   for (const std::string action :
-       {"output", "input", "deactivate", "observe", "reload", "switch", "stop"}) {
-    const bool has_ports = action == "output" || action == "input" || action == "deactivate";
+       {"output", "input", "deactivate", "tap", "observe", "reload", "switch", "stop"}) {
+    const bool has_ports =
+        action == "output" || action == "input" || action == "deactivate" || action == "tap";
     const TemporaryDirectory files;
     const std::string policy = files.write(
         "policy", "deny everyone " + action + (has_ports ? " *" : "") + "\nallow everyone all\n");
@@ -201,13 +204,13 @@ std::map<std::string, Heard> hear_all() {
   const auto first = [](const std::string& selects) {
     return "<arbiter at='/in' conflict='first'>" + selects + "</arbiter>";
   };
-  const std::string mine = arbiter_at("/in-a", select("/mine")) +
-                           arbiter_at("/in-b", select("/mine")) +
-                           arbiter_at("/in-c", select("/mine"));
+  const std::string mine =
+      arbiter_at("/in-a", select("/mine")) + arbiter_at("/in-b", select("/mine"));
+  const std::string mine_too = arbiter_at("/in-c", select("/mine"));
   const TemporaryDirectory files;
   const std::string policy =
       files.write("policy", "deny everyone replay /mine\nallow everyone all\n");
-  Daemon daemon(rules(first(select("/out") + select("/other")) + mine),
+  Daemon daemon(rules(first(select("/out") + select("/other")) + mine + mine_too),
                 {.arguments = {"--policy", policy}});
   Node node("peer", [] {
     NodeOptions options;
@@ -225,12 +228,24 @@ std::map<std::string, Heard> hear_all() {
   client.open_output("/mine");
   client.open_output("/may-be-replayed");
   client.open_input("/unmentioned");
+  for (int i = 0; i < 2; ++i) client.open_tap("/other");  // the second one's place is not 0
+  auto tap = node.tap("/in-c", {.of = TapOf::input});     // which the last model does not mention
   client.ask(MessageKind::kObserve);
   client.ask(MessageKind::kStatus);
   client.ask(MessageKind::kModel);
   client.ask(MessageKind::kSwitch, "no model");
   out.reset();
   client.hear(MessageKind::kPeerGone);
+  {
+    RawClient lost(daemon.instance());  // whose process lives
+    lost.hello("lost", wire::kComesBack);
+    const auto segment = raw_tap_segment();
+    const shm::Bell bell;
+    lost.send(RawClient::message(MessageKind::kOpenTap, "/mine"),
+              {segment.get(), bell.for_publishers().get()});
+    lost.expect(MessageKind::kOpened);
+  }
+  client.hear(MessageKind::kTapAway);
   daemon.write_model(rules(first(select("/out")) + mine));
   client.ask(MessageKind::kReload);
   client.ask(MessageKind::kReload, {}, wire::kWantsReport);

@@ -91,6 +91,12 @@ class Listener {
     return ask(RawClient::message(wire::MessageKind::kOpenInput, name),
                {segment.get(), bell.for_publishers().get()});
   }
+  Words open_tap(const std::string& name) {
+    const auto segment = raw_tap_segment();
+    const shm::Bell bell;
+    return ask(RawClient::message(wire::MessageKind::kOpenTap, name),
+               {segment.get(), bell.for_publishers().get()});
+  }
   void hear(wire::MessageKind kind) {
     while (hear_next().kind != kind) {
     }

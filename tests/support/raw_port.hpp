@@ -6,6 +6,7 @@
 
 #include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
+#include "shm/tap_segment.hpp"
 #include "tests/support/raw_client.hpp"
 
 namespace arbiter::test {
@@ -37,6 +38,20 @@ inline shm::FileDescriptor raw_input_segment() {
     header.version = shm::InputHeader::kVersion;
     header.depth = 1;
     header.max_held = 1;
+  }
+  shm::seal(segment, shm::Seals::kOneWriter);
+  return segment;
+}
+
+inline shm::FileDescriptor raw_tap_segment() {
+  auto segment = shm::make_segment("test", sizeof(shm::TapSegment));
+  if (shm::allocate(segment, 0, sizeof(shm::TapSegment))) throw std::runtime_error("no memory");
+  {
+    const shm::Mapping mapping(segment, sizeof(shm::TapSegment), shm::Access::kReadWrite);
+    auto& tap = *mapping.as<shm::TapSegment>();
+    tap.magic = shm::TapSegment::kMagic;
+    tap.version = shm::TapSegment::kVersion;
+    tap.max_held = 1;
   }
   shm::seal(segment, shm::Seals::kOneWriter);
   return segment;

@@ -40,4 +40,5 @@
 #include <arbiter/options.hpp>
 #include <arbiter/output_port.hpp>
 #include <arbiter/result.hpp>
+#include <arbiter/tap.hpp>
 #include <arbiter/type.hpp>

@@ -22,6 +22,7 @@
 #include <arbiter/input_port.hpp>
 #include <arbiter/options.hpp>
 #include <arbiter/output_port.hpp>
+#include <arbiter/tap.hpp>
 #include <arbiter/type.hpp>
 
 namespace arbiter {
@@ -89,6 +90,25 @@ class Node {
   [[nodiscard]] InputPort<void> input_port(std::string_view name,
                                            const InputPortOptions& options = {}) {
     return input_port(name, Type::untyped(0), options);
+  }
+
+  // Watches an output port (or, with TapOptions::of, an input port) of any component: see tap.hpp.
+  // Blocks as the opening of a port. The port need not be there yet. Throws arbiter::Error: the
+  // name is malformed, an option is out of bounds, the policy does not allow this user to `tap` it,
+  // the component that has the port open refuses because the tap does not fit or T is not what its
+  // samples are, or no daemon has answered within NodeOptions::connect_timeout. A source that comes
+  // later and refuses is told by a notice (NoticeKind::refused).
+  template <class T>
+  [[nodiscard]] Tap<T> tap(std::string_view name, const TapOptions& options = {}) {
+    if constexpr (std::is_void_v<T>) {
+      return tap(name, options);
+    } else {
+      return Tap<T>(detail::open_tap(*core_, name, type_of<T>(), options));
+    }
+  }
+  // An untyped one, which gives bytes.
+  [[nodiscard]] Tap<void> tap(std::string_view name, const TapOptions& options = {}) {
+    return Tap<void>(detail::open_tap(*core_, name, Type::untyped(0), options));
   }
 
   // Puts another loaded model in force (arbiterd --model NAME=FILE): the same components form

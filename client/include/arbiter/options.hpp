@@ -89,4 +89,22 @@ struct InputPortOptions {
   std::uint32_t max_held = 1;
 };
 
+// What a tap watches.
+enum class TapOf : std::uint8_t {
+  output,  // an output port: one source
+  input,   // an input port: all sources that the model in force connects to it
+};
+
+struct TapOptions {
+  TapOf of = TapOf::output;
+  // How many events with samples the program may keep at once, 0 to 16. With 0 the tap gives no
+  // samples, but says how large each is. The taps of one output port share what may be held: 64
+  // samples, or as many as fit into 32 MiB where those are fewer; a tap that wants more than is
+  // left is refused.
+  std::uint32_t max_held = 1;
+  // Whether the program may wait: wait_for() and fd(). A tap that only polls costs the publishers
+  // less.
+  bool may_wait = true;
+};
+
 }  // namespace arbiter

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <arbiter/options.hpp>
 #include <arbiter/result.hpp>
@@ -17,6 +18,7 @@ namespace arbiter::detail {
 class InputCore;
 class NodeCore;
 class OutputCore;
+class TapCore;
 
 struct LoanedSlot {
   std::byte* data = nullptr;  // null: none to be had
@@ -46,6 +48,28 @@ struct HeldSample {
 };
 
 enum class Waited : std::uint8_t { kSample, kIdle, kTimeout };
+
+// What the events of a source have in common, until its destinations change.
+struct TapContext {
+  std::string source;
+  Type type = Type::untyped(0);
+  std::vector<std::string> destinations;  // names of input ports, by bit of the masks
+};
+
+// An event of a tap.
+struct TapEventData {
+  std::uint8_t kind = 0;  // as TapEventKind
+  std::int64_t time_ns = 0;
+  std::uint64_t sequence = 0;
+  std::uint64_t generation = 0;
+  std::int64_t activity = 0;  // as shm/activity.hpp has it
+  std::uint64_t lost = 0;
+  std::uint64_t accepted = 0, discarded = 0, refused = 0, blind = 0;
+  std::size_t size = 0;
+  const std::byte* data = nullptr;  // null: no sample is held
+  std::uint32_t hold = 0;
+  std::shared_ptr<const TapContext> context;
+};
 
 std::shared_ptr<NodeCore> make_node(std::string_view name, const NodeOptions& options);
 void drop_node(std::shared_ptr<NodeCore> node) noexcept;
@@ -91,6 +115,17 @@ std::int64_t believable_time(std::int64_t stamp_ns) noexcept;
 const std::string& name(const InputCore& core) noexcept;
 const Type& type(const InputCore& core) noexcept;
 
+std::shared_ptr<TapCore> open_tap(NodeCore& node, std::string_view name, const Type& type,
+                                  const TapOptions& options);
+void close_tap(std::shared_ptr<TapCore> core) noexcept;
+bool take(TapCore& core, TapEventData& event);
+bool wait(TapCore& core, std::int64_t timeout_ns, TapEventData& event);
+void give_back(TapCore& core, std::uint32_t hold) noexcept;
+int wait_descriptor(TapCore& core);
+const std::string& name(const TapCore& core) noexcept;
+std::uint64_t lost_events(const TapCore& core) noexcept;
+std::uint64_t lost_samples(const TapCore& core) noexcept;
+
 // A sample, and a loan, keep the port's core in being without counting references to it: samples
 // and loans are counted anyway, by their port's thread, where an atomic count would hold up each
 // call until all that was stored before it has reached the cache.
@@ -99,6 +134,12 @@ struct GiveBack {
   std::uint32_t hold = 0;
 };
 using HeldBy = std::unique_ptr<InputCore, GiveBack>;
+
+struct GiveBackToTap {
+  void operator()(TapCore* core) const noexcept { give_back(*core, hold); }
+  std::uint32_t hold = 0;
+};
+using HeldByTap = std::unique_ptr<TapCore, GiveBackToTap>;
 
 struct EndLoan {
   void operator()(OutputCore* core) const noexcept { end_loan(*core, slot); }

@@ -1,0 +1,47 @@
+// arbiter echo: watching a port, or opening it.
+//
+//   verb_echo.cpp       its options
+//   echo_tap.cpp        prints what a tap tells
+//   echo_rate.cpp       prints how often, how regularly and how much
+//   echo_component.cpp  opens an input port itself, and prints what it takes
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <arbiter/arbiter.hpp>
+
+#include "shm/activity.hpp"
+#include "shm/file_descriptor.hpp"
+
+namespace arbiter::cli {
+
+struct EchoOptions {
+  std::string port;
+  std::string instance;
+  std::uint64_t count = 0;  // 0: no limit
+  shm::Nanoseconds duration = shm::kForever;
+  bool json = false;
+  bool losers = false;
+  bool hex = false;
+  bool rate = false;
+  bool as_component = false;
+};
+
+// Each returns the exit code when the time is over, enough has been printed, or `interrupts` is
+// readable. Throw Error.
+int echo_tap(const EchoOptions& options, const shm::FileDescriptor& interrupts);
+int echo_rate(const EchoOptions& options, const shm::FileDescriptor& interrupts);
+int echo_component(const EchoOptions& options, const shm::FileDescriptor& interrupts);
+
+// Whether PORT is an output port or an input port, as far as the daemon knows; else by the end of
+// its name. Says on standard error if nobody has named it.
+TapOf kind_of_port(const EchoOptions& options);
+
+// "01 02 … ", all bytes or the first few.
+std::string hex_of(const Bytes& bytes, std::size_t most);
+std::string preview(const Bytes& bytes);
+// A line for each 16 bytes, with its offset.
+std::string hex_dump(const Bytes& bytes);
+
+}  // namespace arbiter::cli

@@ -1,0 +1,112 @@
+// An input port that is opened: what its arbiter lets through.
+#include <poll.h>
+
+#include <cstdint>
+#include <exception>
+#include <iostream>
+#include <map>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/echo.hpp"
+#include "cli/live.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+constexpr std::uint32_t kDepth = 1024;
+
+class Echo {
+ public:
+  Echo(const EchoOptions& options, const shm::FileDescriptor& interrupts)
+      : options_(options),
+        interrupts_(interrupts),
+        node_("arbiter-echo", live_options(options.instance)),
+        in_(open(node_, options.port)),
+        started_(shm::monotonic_now()) {}
+
+  int run() {
+    const shm::Nanoseconds end =
+        options_.duration == shm::kForever ? shm::kForever : started_ + options_.duration;
+    pollfd ready[] = {{in_.fd(), POLLIN, 0}, {interrupts_.get(), POLLIN, 0}};
+    for (;;) {
+      while (auto sample = in_.take()) {
+        print(*sample);
+        if (++samples_ == options_.count || !std::cout) return finish();
+      }
+      std::cout.flush();
+      const shm::Nanoseconds left = end - shm::monotonic_now();
+      if (left <= 0) return finish();
+      const timespec span{left / 1'000'000'000, left % 1'000'000'000};
+      ppoll(ready, 2, end == shm::kForever ? nullptr : &span, nullptr);
+      if (ready[1].revents != 0) return finish();
+    }
+  }
+
+ private:
+  static InputPort<void> open(Node& node, const std::string& port) {
+    InputPortOptions options;
+    options.keep = true;
+    options.depth = kDepth;
+    return node.input_port(port, options);
+  }
+
+  void print(const Sample<void>& sample) {
+    ++by_source_[sample.source()];
+    if (options_.json) {
+      std::cout << nlohmann::json{{"port", options_.port},
+                                  {"source", sample.source()},
+                                  {"sequence", sample.sequence()},
+                                  {"stamp_ns", sample.stamp_ns()},
+                                  {"size", sample.size()}}
+                       .dump()
+                << '\n';
+      return;
+    }
+    std::cout << seconds_text(sample.stamp_ns() - started_) << "  " << sample.source() << "  #"
+              << sample.sequence() << "  " << sample.size() << " bytes";
+    if (options_.hex) {
+      std::cout << '\n' << hex_dump(*sample);
+    } else {
+      std::cout << "  " << preview(*sample) << '\n';
+    }
+  }
+
+  // On standard error beside JSON, which is for programs.
+  int finish() {
+    std::ostream& out = options_.json ? std::cerr : std::cout;
+    out << samples_ << " samples in " << seconds_text(shm::monotonic_now() - started_);
+    for (const auto& [source, count] : by_source_) out << ", " << count << " from " << source;
+    out << '\n';
+    if (const auto lost = overtaken(); lost != 0) {
+      std::cerr << "arbiter: " << lost << " more came faster than they could be printed\n";
+    }
+    return 0;
+  }
+
+  [[nodiscard]] std::uint64_t overtaken() const try {
+    const auto status = fetch_status("echo-status", options_.instance);
+    const auto* input = status.find_input(options_.port);
+    return input == nullptr || !input->open ? 0 : input->open->overtaken;
+  } catch (const std::exception&) {
+    return 0;  // the daemon has gone meanwhile
+  }
+
+  const EchoOptions& options_;
+  const shm::FileDescriptor& interrupts_;
+  Node node_;
+  InputPort<void> in_;
+  const shm::Nanoseconds started_;
+  std::uint64_t samples_ = 0;
+  std::map<std::string, std::uint64_t> by_source_;
+};
+
+}  // namespace
+
+int echo_component(const EchoOptions& options, const shm::FileDescriptor& interrupts) {
+  return Echo(options, interrupts).run();
+}
+
+}  // namespace arbiter::cli

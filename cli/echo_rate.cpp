@@ -1,0 +1,168 @@
+// How often samples arrive, how regularly, and how many bytes they have: once a second, by source.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <map>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/echo.hpp"
+#include "cli/live.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+constexpr shm::Nanoseconds kSecond = 1'000'000'000;
+// How often the tap is looked at: a publisher keeps 1024 events, so that none is lost up to 50 kHz.
+constexpr shm::Nanoseconds kLookInterval = 20'000'000;
+
+// Of one source, since the last line.
+class Rate {
+ public:
+  void note(shm::Nanoseconds time, std::size_t size) {
+    bytes_ += size;
+    ++samples_;
+    if (last_ != 0) note_interval(static_cast<double>(time - last_));
+    last_ = time;
+  }
+  // What comes next is behind a gap.
+  void forget_last() { last_ = 0; }
+
+  [[nodiscard]] std::uint64_t samples() const { return samples_; }
+  [[nodiscard]] double hz(double seconds) const { return static_cast<double>(samples_) / seconds; }
+  [[nodiscard]] double bytes_per_second(double seconds) const {
+    return static_cast<double>(bytes_) / seconds;
+  }
+  // The standard deviation of the time between two arrivals; 0: there were not enough of them.
+  [[nodiscard]] double jitter_ns() const {
+    return intervals_ < 2 ? 0 : std::sqrt(squares_ / static_cast<double>(intervals_));
+  }
+  [[nodiscard]] double longest_ns() const { return longest_; }
+  void begin_again() { *this = Rate(last_); }
+
+  Rate() = default;
+
+ private:
+  explicit Rate(shm::Nanoseconds last) : last_(last) {}
+  // Welford's, which loses no digits.
+  void note_interval(double interval) {
+    ++intervals_;
+    const double before = interval - mean_;
+    mean_ += before / static_cast<double>(intervals_);
+    squares_ += before * (interval - mean_);
+    longest_ = std::max(longest_, interval);
+  }
+
+  std::uint64_t samples_ = 0;
+  std::uint64_t bytes_ = 0;
+  std::uint64_t intervals_ = 0;
+  double mean_ = 0;
+  double squares_ = 0;
+  double longest_ = 0;
+  shm::Nanoseconds last_ = 0;
+};
+
+std::string with_digits(double value, int digits) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", digits, value);
+  return text;
+}
+
+std::string bytes_text(double bytes) {
+  if (bytes >= 1e6) return with_digits(bytes / 1e6, 2) + " MB/s";
+  if (bytes >= 1e3) return with_digits(bytes / 1e3, 2) + " kB/s";
+  return with_digits(bytes, 0) + " B/s";
+}
+
+class RateEcho {
+ public:
+  RateEcho(const EchoOptions& options, TapOf of, const shm::FileDescriptor& interrupts)
+      : options_(options),
+        is_input_(of == TapOf::input),
+        interrupts_(interrupts),
+        node_("arbiter-echo", live_options(options.instance)),
+        tap_(node_.tap(options.port, tap_options(of))) {}
+
+  int run() {
+    const shm::Nanoseconds started = shm::monotonic_now();
+    const shm::Nanoseconds end =
+        options_.duration == shm::kForever ? shm::kForever : started + options_.duration;
+    shm::Nanoseconds line = started;
+    while (std::cout) {
+      const shm::Nanoseconds next = std::min(line + kSecond, end);
+      const bool is_interrupted =
+          sleep_until(std::min(shm::monotonic_now() + kLookInterval, next), interrupts_);
+      look();
+      const shm::Nanoseconds now = shm::monotonic_now();
+      if (now < next && !is_interrupted) continue;
+      print(static_cast<double>(now - line) / kSecond);
+      line = now;
+      if (is_interrupted || now >= end || ++lines_ == options_.count) break;
+    }
+    if (tap_.lost() != 0) {
+      std::cerr << "arbiter: " << tap_.lost() << " events came faster than they could be counted\n";
+    }
+    return 0;
+  }
+
+ private:
+  static TapOptions tap_options(TapOf of) {
+    TapOptions options;
+    options.of = of;
+    options.max_held = 0;
+    options.may_wait = false;
+    return options;
+  }
+
+  void look() {
+    while (const auto event = tap_.take()) {
+      Rate& rate = rates_[event->source()];
+      if (event->lost() != 0) rate.forget_last();
+      if (event->kind() != TapEventKind::sample) continue;
+      const bool is_counted =
+          !is_input_ || options_.losers || event->at(options_.port) == Fate::accepted;
+      if (is_counted) rate.note(event->time().time_since_epoch().count(), event->size());
+    }
+  }
+
+  void print(double seconds) {
+    for (auto& [source, rate] : rates_) {
+      if (options_.json) {
+        std::cout << nlohmann::json{{"port", options_.port},
+                                    {"source", source},
+                                    {"samples", rate.samples()},
+                                    {"hz", rate.hz(seconds)},
+                                    {"jitter_ns", rate.jitter_ns()},
+                                    {"longest_ns", rate.longest_ns()},
+                                    {"bytes_per_second", rate.bytes_per_second(seconds)}}
+                         .dump()
+                  << '\n';
+      } else {
+        std::cout << source << "  " << with_digits(rate.hz(seconds), 1) << " Hz  jitter "
+                  << with_digits(rate.jitter_ns() / 1e6, 3) << " ms  longest "
+                  << with_digits(rate.longest_ns() / 1e6, 3) << " ms  "
+                  << bytes_text(rate.bytes_per_second(seconds)) << '\n';
+      }
+      rate.begin_again();
+    }
+    std::cout.flush();
+  }
+
+  const EchoOptions& options_;
+  const bool is_input_;
+  const shm::FileDescriptor& interrupts_;
+  Node node_;
+  Tap<> tap_;
+  std::map<std::string, Rate> rates_;
+  std::uint64_t lines_ = 0;
+};
+
+}  // namespace
+
+int echo_rate(const EchoOptions& options, const shm::FileDescriptor& interrupts) {
+  return RateEcho(options, kind_of_port(options), interrupts).run();
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,218 @@
+// What a tap tells, event by event.
+#include <poll.h>
+
+#include <exception>
+#include <iostream>
+#include <map>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/echo.hpp"
+#include "cli/live.hpp"
+#include "rules/text/names.hpp"
+#include "shm/clock.hpp"
+#include "shm/limits.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+const char* name_of(TapEventKind kind) {
+  switch (kind) {
+    case TapEventKind::sample:
+      return "sample";
+    case TapEventKind::signal:
+      return "signal";
+    case TapEventKind::deactivation:
+      return "deactivation";
+    case TapEventKind::closed:
+      return "closed";
+    case TapEventKind::destinations:
+      return "destinations";
+    case TapEventKind::state:
+      break;
+  }
+  return "state";
+}
+
+const char* name_of(Fate fate) {
+  switch (fate) {
+    case Fate::accepted:
+      return "accepted";
+    case Fate::discarded:
+      return "discarded";
+    case Fate::refused:
+      return "refused";
+    case Fate::blind:
+      return "blind";
+    case Fate::none:
+      break;
+  }
+  return "none";
+}
+
+class TapEcho {
+ public:
+  TapEcho(const EchoOptions& options, TapOf of, const shm::FileDescriptor& interrupts)
+      : options_(options),
+        is_input_(of == TapOf::input),
+        interrupts_(interrupts),
+        node_("arbiter-echo", live_options(options.instance)),
+        tap_(node_.tap(options.port, tap_options(of))),
+        started_(shm::monotonic_now()) {}
+
+  int run() {
+    const shm::Nanoseconds end =
+        options_.duration == shm::kForever ? shm::kForever : started_ + options_.duration;
+    pollfd ready[] = {{tap_.fd(), POLLIN, 0}, {interrupts_.get(), POLLIN, 0}};
+    for (;;) {
+      while (const auto event = tap_.take()) {
+        lost_ += event->lost();
+        if (is_shown(*event)) print(*event);
+        if ((options_.count != 0 && printed_ == options_.count) || !std::cout) return finish();
+      }
+      std::cout.flush();
+      const shm::Nanoseconds left = end - shm::monotonic_now();
+      if (left <= 0) return finish();
+      const timespec span{left / 1'000'000'000, left % 1'000'000'000};
+      ppoll(ready, 2, end == shm::kForever ? nullptr : &span, nullptr);
+      if (ready[1].revents != 0) return finish();
+    }
+  }
+
+ private:
+  static TapOptions tap_options(TapOf of) {
+    TapOptions options;
+    options.of = of;
+    return options;
+  }
+
+  // Of an input port: what it accepts, unless losers are asked for.
+  [[nodiscard]] bool is_shown(const TapEvent<>& event) const {
+    switch (event.kind()) {
+      case TapEventKind::sample:
+        return !is_input_ || options_.losers || event.at(options_.port) == Fate::accepted;
+      case TapEventKind::signal:
+      case TapEventKind::deactivation:
+        return !is_input_ || options_.losers;
+      default:
+        return false;
+    }
+  }
+
+  void print(const TapEvent<>& event) {
+    ++printed_;
+    ++by_source_[event.source()];
+    options_.json ? print_json(event) : print_text(event);
+  }
+
+  void print_json(const TapEvent<>& event) const {
+    nlohmann::json fates = nlohmann::json::object();
+    for (const TapDestination& met : event.destinations()) {
+      if (met.fate != Fate::none) fates[std::string(met.port)] = name_of(met.fate);
+    }
+    nlohmann::json line{{"port", options_.port},
+                        {"source", event.source()},
+                        {"kind", name_of(event.kind())},
+                        {"sequence", event.sequence()},
+                        {"stamp_ns", event.time().time_since_epoch().count()},
+                        {"size", event.size()},
+                        {"generation", event.generation()},
+                        {"fates", fates}};
+    if (options_.hex && event.sample()) {
+      line["data"] = hex_of(*event.sample(), event.sample()->size());
+    }
+    std::cout << line.dump() << '\n';
+  }
+
+  void print_text(const TapEvent<>& event) const {
+    std::cout << seconds_text(event.time().time_since_epoch().count() - started_) << "  "
+              << event.source();
+    if (event.kind() != TapEventKind::sample) {
+      std::cout << "  " << name_of(event.kind()) << fates_text(event) << '\n';
+      return;
+    }
+    std::cout << "  #" << event.sequence() << "  " << event.size() << " bytes";
+    if (!event.sample()) {
+      std::cout << "  (overwritten)" << fates_text(event) << '\n';
+    } else if (options_.hex) {
+      std::cout << fates_text(event) << '\n' << hex_dump(*event.sample());
+    } else {
+      std::cout << "  " << preview(*event.sample()) << fates_text(event) << '\n';
+    }
+  }
+
+  // "  accepted at /Arm/pos:i". What was accepted at the port in question goes without saying.
+  [[nodiscard]] std::string fates_text(const TapEvent<>& event) const {
+    if (is_input_) {
+      return options_.losers && event.at(options_.port) != Fate::none
+                 ? std::string("  ") + name_of(event.at(options_.port))
+                 : "";
+    }
+    std::string text;
+    for (const TapDestination& met : event.destinations()) {
+      if (met.fate == Fate::none) continue;
+      text += (text.empty() ? "  " : ", ") + std::string(name_of(met.fate)) + " at ";
+      text += met.port;
+    }
+    return text;
+  }
+
+  // On standard error beside JSON, which is for programs.
+  int finish() {
+    std::ostream& out = options_.json ? std::cerr : std::cout;
+    out << printed_ << (is_input_ && !options_.losers ? " samples in " : " events in ")
+        << seconds_text(shm::monotonic_now() - started_);
+    for (const auto& [source, count] : by_source_) out << ", " << count << " from " << source;
+    out << '\n';
+    if (lost_ != 0) {
+      std::cerr << "arbiter: " << lost_ << " more came faster than they could be printed\n";
+    }
+    return 0;
+  }
+
+  const EchoOptions& options_;
+  const bool is_input_;
+  const shm::FileDescriptor& interrupts_;
+  Node node_;
+  Tap<> tap_;
+  const shm::Nanoseconds started_;
+  std::uint64_t printed_ = 0;
+  std::uint64_t lost_ = 0;
+  std::map<std::string, std::uint64_t> by_source_;
+};
+
+}  // namespace
+
+TapOf kind_of_port(const EchoOptions& options) {
+  const auto by_name = [&] {
+    const std::string& port = options.port;
+    const bool is_input = port.size() > 2 && port.compare(port.size() - 2, 2, ":i") == 0;
+    return is_input ? TapOf::input : TapOf::output;
+  };
+  std::shared_ptr<watch::Instance> instance;
+  try {
+    instance = watch_instance("echo", options.instance);
+  } catch (const std::exception&) {
+    return by_name();  // the policy does not let us observe; or the tap will say what is wrong
+  }
+  if (instance->find_source(options.port)) return TapOf::output;
+  if (instance->find_port(options.port)) return TapOf::input;
+  std::vector<std::string_view> known;
+  for (const auto& [id, name] : instance->port_names()) known.emplace_back(name);
+  for (shm::SourceId id = 0; id < shm::kMaxSources; ++id) {
+    const std::string& name = instance->memory()->source_name(id);
+    if (!name.empty()) known.emplace_back(name);
+  }
+  std::cerr << "arbiter: no model and no component has named " << options.port << " yet"
+            << rules::advise(options.port, known, "`arbiter status` shows the ports that there are")
+            << '\n';
+  return by_name();
+}
+
+int echo_tap(const EchoOptions& options, const shm::FileDescriptor& interrupts) {
+  return TapEcho(options, kind_of_port(options), interrupts).run();
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,140 @@
+// Taps that this node opens, and taps of its output ports.
+//
+// A tap is no port: nothing of it is handed back to a daemon that takes over. The node asks again,
+// and whoever has been told of the tap before knows it by its segment.
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "client/node/node_core.hpp"
+
+namespace arbiter::detail {
+
+void NodeCore::handle_about_tap(wire::Received& received) {
+  const wire::Message& message = received.message;
+  if (message.kind == wire::MessageKind::kTapAway) {
+    const std::lock_guard lock(mutex_);
+    const auto output = outputs_.find(message.port);
+    if (output != outputs_.end()) output->second->doubt_tap(message.peer);
+    return;
+  }
+  try {
+    message.kind == wire::MessageKind::kTap ? add_tap(received) : add_tap_source(received);
+  } catch (const std::exception& error) {
+    refuse_tap(message, error.what());
+  }
+}
+
+void NodeCore::add_tap(const wire::Received& received) {
+  const wire::Message& message = received.message;
+  auto tap = map_tap_peer(received, residence());
+  const std::lock_guard lock(mutex_);
+  const auto output = outputs_.find(message.port);
+  if (output == outputs_.end()) return;  // closed meanwhile
+  const OutputCore::TapEntry entry = output->second->add_tap(std::move(tap));
+  wire::Message answer;
+  answer.kind = wire::MessageKind::kTapped;
+  answer.port = message.port;
+  answer.peer = message.peer;
+  answer.link = entry.link;
+  answer.value = entry.place;
+  if (socket_ == nullptr) return;
+  static_cast<void>(
+      wire::send_message(socket_->get(), answer, {entry.memory->readable().get(), -1}));
+}
+
+void NodeCore::add_tap_source(const wire::Received& received) {
+  const wire::Message& message = received.message;
+  std::optional<shm::TypeInfo> type;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto tap = taps_.find(message.port);
+    if (tap != taps_.end()) type = tap->second->type();
+  }
+  if (!type) return;
+  auto source = map_tap_source(received, *type, residence());
+  const std::lock_guard lock(mutex_);
+  const auto tap = taps_.find(message.port);
+  if (tap != taps_.end()) tap->second->add_source(std::move(source));
+}
+
+// The publisher tells the daemon, which tells the tap; a tap tells its program.
+void NodeCore::refuse_tap(const wire::Message& announced, const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  if (announced.kind == wire::MessageKind::kTap) {
+    say_refused(announced.port, announced.peer, why);
+    return;
+  }
+  wire::Message refusal = announced;
+  refusal.set_text(why);
+  static_cast<void>(note_tap_refusal(refusal));
+}
+
+// Where the only source refuses a tap that is being opened, that fails.
+bool NodeCore::note_tap_refusal(const wire::Message& refusal) {
+  const auto tap = taps_.find(refusal.port);
+  if (tap == taps_.end()) return false;
+  const std::string source(refusal.name_view());
+  const std::string text = source + " cannot be watched: " + std::string(refusal.text_view());
+  for (auto& [request, reply] : replies_) {
+    if (reply.opened != refusal.port || tap->second->options().of == TapOf::input) continue;
+    reply.refusal = text;
+    return true;
+  }
+  note(NoticeKind::refused, refusal.port, source, text);
+  return true;
+}
+
+void NodeCore::tidy_taps(
+    std::vector<std::pair<shm::PortInstance, std::shared_ptr<const OutputPeer>>>& copied_from) {
+  for (auto& [instance, tap] : taps_) {
+    tap->tidy();
+    for (const std::string& source : tap->misbehaving()) {
+      note(NoticeKind::refused, instance, source,
+           source + " cannot be watched: it tells an event that no honest publisher does");
+    }
+    for (auto& peer : tap->copied_from()) copied_from.emplace_back(instance, std::move(peer));
+  }
+}
+
+// Those whose opening is under way are asked for again by who waits for it.
+void NodeCore::reopen_taps() {
+  reopened_.clear();
+  for (const auto& [instance, tap] : taps_) {
+    if (!tap->is_open) continue;
+    wire::Message question;
+    question.kind = wire::MessageKind::kOpenTap;
+    question.request = next_request_++;
+    question.flags = tap->options().of == TapOf::input ? wire::kTapsInput : 0u;
+    question.set_name(tap->name());
+    reopened_[question.request] = tap;
+    static_cast<void>(
+        wire::send_message(socket_->get(), question,
+                           {tap->segment_descriptor().get(), tap->bell().for_publishers().get()}));
+  }
+}
+
+bool NodeCore::handle_tap_reopened(const wire::Message& message) {
+  const auto found = reopened_.find(message.request);
+  if (found == reopened_.end()) return false;
+  const std::shared_ptr<TapCore> tap = found->second.lock();
+  const bool is_known = tap != nullptr && taps_.count(tap->instance()) != 0;
+  if (message.kind == wire::MessageKind::kOpened) {
+    if (!is_known) {  // closed meanwhile
+      say_closed(message.port);
+      return true;
+    }
+    taps_.erase(tap->instance());
+    tap->bind(message.port);
+    taps_[message.port] = tap;
+    return true;
+  }
+  if (message.kind == wire::MessageKind::kRefused && is_known) {
+    note(NoticeKind::refused, tap->instance(), tap->name(),
+         tap->name() + " is not watched any more: " + std::string(message.text_view()));
+  }
+  reopened_.erase(found);
+  return true;
+}
+
+}  // namespace arbiter::detail

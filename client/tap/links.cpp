@@ -1,0 +1,123 @@
+// The service thread's side of a tap: its segment, its sources, and the views that it offers.
+#include <fcntl.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <system_error>
+
+#include "client/tap/tap_core.hpp"
+#include "client/types.hpp"
+
+namespace arbiter::detail {
+
+std::shared_ptr<const TapSource> map_tap_source(const wire::Received& announced,
+                                                const shm::TypeInfo& own,
+                                                shm::Residence residence) {
+  auto source = std::make_shared<TapSource>();
+  source->name = announced.message.name_view();
+  source->output = map_output_peer(announced, own, residence);
+  const shm::FileDescriptor& events = announced.descriptors[1];
+  if (shm::checked_size(events, shm::Seals::kOneWriter) != sizeof(shm::EventSegment)) {
+    throw std::runtime_error("the segment of events has another size");
+  }
+  if (shm::allocated_size(events) < sizeof(shm::EventSegment)) {
+    throw std::runtime_error("the memory of events is not allocated");
+  }
+  source->identity = shm::identity_of(events);
+  source->mapping = shm::Mapping(events, sizeof(shm::EventSegment), shm::Access::kReadOnly);
+  source->events = source->mapping.as<const shm::EventSegment>();
+  source->shape = source->events->checked_shape();
+  source->place = announced.message.value;
+  source->link = announced.message.link;
+  if (!source->shape.is_sane() || source->place >= shm::kMaxTaps || source->link == 0) {
+    throw std::runtime_error("the segment of events is not one of this version");
+  }
+  shm::make_resident(source->mapping, 0, sizeof(shm::EventSegment), residence);
+  source->bequest.emplace(source->mapping.data(), source->mapping.size(),
+                          shm::Bequest::Kind::kNothing);
+  return source;
+}
+
+TapCore::TapCore(std::string name, const Type& type, const TapOptions& options,
+                 std::shared_ptr<const ServiceBell> service_bell, shm::Residence residence)
+    : name_(std::move(name)),
+      options_(options),
+      type_(as_info(type)),
+      service_bell_(std::move(service_bell)),
+      descriptor_(shm::make_segment("arbiter-tap", sizeof(shm::TapSegment))),
+      mapping_(descriptor_, sizeof(shm::TapSegment), shm::Access::kReadWrite),
+      segment_(mapping_.as<shm::TapSegment>()) {
+  if (const auto error = shm::allocate(descriptor_, 0, sizeof(shm::TapSegment))) {
+    throw std::system_error(error, "allocating a tap");
+  }
+  shm::make_resident(mapping_, 0, sizeof(shm::TapSegment), residence);
+  segment_->magic = shm::TapSegment::kMagic;
+  segment_->version = shm::TapSegment::kVersion;
+  segment_->max_held = options.max_held;
+  segment_->sleeps = options.may_wait ? 1 : 0;
+  shm::seal(descriptor_, shm::Seals::kOneWriter);
+  descriptor_ = shm::reopen(descriptor_, O_RDONLY);
+  bequest_.emplace(mapping_.data(), mapping_.size(), shm::Bequest::Kind::kPrivateZeros);
+  shm::close_in_children(descriptor_);
+}
+
+// A source that is known already goes on as it is: a daemon that has taken over tells of it again.
+void TapCore::add_source(std::shared_ptr<const TapSource> source) {
+  const auto instance = source->output->instance;
+  const auto known = links_.find(instance);
+  if (known != links_.end() && known->second.source->link == source->link &&
+      known->second.source->identity == source->identity && !known->second.gone) {
+    return;
+  }
+  links_[instance] = {std::move(source)};
+  offer_view();
+}
+
+void TapCore::lose_source(shm::PortInstance output) {
+  const auto found = links_.find(output);
+  if (found == links_.end()) return;
+  found->second.gone = true;
+  offer_view();
+}
+
+std::vector<std::shared_ptr<const OutputPeer>> TapCore::copied_from() {
+  std::vector<std::shared_ptr<const OutputPeer>> found;
+  for (auto& [instance, link] : links_) {
+    const auto& output = link.source->output;
+    const std::uint32_t copied = output->copied.load(std::memory_order_relaxed);
+    if (std::exchange(link.copied, copied) != copied) found.push_back(output);
+  }
+  return found;
+}
+
+std::vector<std::string> TapCore::misbehaving() {
+  std::vector<std::string> found;
+  for (auto& [instance, link] : links_) {
+    if (link.reported || !link.source->misbehaved.load(std::memory_order_relaxed)) continue;
+    link.reported = true;
+    found.push_back(link.source->name);
+  }
+  return found;
+}
+
+void TapCore::tidy() {
+  handover_.collect();
+  const auto is_drained = [](const auto& link) {
+    return link.second.source->drained.load(std::memory_order_relaxed);
+  };
+  if (std::any_of(links_.begin(), links_.end(), is_drained)) {
+    std::erase_if(links_, is_drained);
+    offer_view();
+  }
+}
+
+void TapCore::offer_view() {
+  auto view = std::make_unique<TapSourceView>();
+  for (const auto& [instance, link] : links_) view->links.push_back(link);
+  handover_.offer(std::move(view));
+  // SYNC POINT: view-announced. As InputCore::offer_view().
+  shm::full_fence();
+  shm::ring_bell(bell_.write_end().get());
+}
+
+}  // namespace arbiter::detail

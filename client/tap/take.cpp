@@ -1,0 +1,259 @@
+// The tap's thread: take() and waiting.
+//
+// Events of one source come in its order. Of several sources that have told something, the one
+// whose next event is the oldest comes first.
+#include <algorithm>
+
+#include "client/tap/tap_core.hpp"
+
+namespace arbiter::detail {
+namespace {
+
+// How many events that are not for us are passed over in one look.
+constexpr int kMaxPassedOver = 64;
+
+constexpr auto kEnd = static_cast<std::uint8_t>(shm::kLastEventKind + 1);  // TapEventKind::closed
+
+}  // namespace
+
+void TapCore::accept_view() {
+  std::unique_ptr<TapSourceView> view = handover_.accept();
+  if (view == nullptr) return;
+  std::erase_if(streams_, [&](const Stream& stream) {
+    return std::none_of(view->links.begin(), view->links.end(),
+                        [&](const TapSourceLink& link) { return link.source == stream.source; });
+  });
+  for (const TapSourceLink& link : view->links) {
+    const auto known = std::find_if(streams_.begin(), streams_.end(), [&](const Stream& stream) {
+      return stream.source == link.source;
+    });
+    if (known != streams_.end()) {
+      known->gone = link.gone;
+      continue;
+    }
+    Stream stream;
+    stream.source = link.source;
+    stream.gone = link.gone;
+    stream.reader =
+        shm::EventReader(*link.source->events, link.source->shape, link.source->output->instance,
+                         link.source->place, link.source->link);
+    streams_.push_back(std::move(stream));
+  }
+  handover_.retire(std::exchange(view_, std::move(view)));
+  service_bell_->ring();  // to dispose of the old one
+}
+
+// Whatever a publisher writes must not be believed before it is looked at.
+bool TapCore::is_honest(const Stream& stream) const noexcept {
+  const shm::EventRecord& head = stream.head;
+  const auto kind = static_cast<std::uint8_t>(head.kind);
+  if (kind == 0 || kind > shm::kLastEventKind) return false;
+  return head.kind != shm::EventKind::kSample ||
+         shm::slot_of(head.sample) < stream.source->output->segment.layout().slot_count;
+}
+
+// True: the stream has a next event.
+bool TapCore::look_at(Stream& stream) noexcept {
+  using Found = shm::EventReader::Found;
+  if (stream.has_head) return true;
+  if (stream.ended || stream.source->misbehaved.load(std::memory_order_relaxed)) return false;
+  const bool gone = stream.gone;  // before the look: what it has told comes before its end
+  for (int passed = 0; stream.reader.join() && passed < kMaxPassedOver; ++passed) {
+    std::uint64_t lost = 0;
+    const Found found = stream.reader.read(stream.head, lost);
+    if (found == Found::kNothing) break;
+    stream.head_lost = lost;
+    if (!is_honest(stream)) {
+      stream.source->misbehaved.store(true, std::memory_order_relaxed);
+      service_bell_->ring();
+      return false;
+    }
+    const bool is_anothers = found == Found::kEvent && stream.head.kind == shm::EventKind::kState &&
+                             stream.head.joined != stream.source->link;
+    if (is_anothers) continue;
+    if (found == Found::kGap) {  // what the source is like where it goes on
+      stream.head.kind = shm::EventKind::kState;
+      stream.head.masks = {};
+    }
+    return stream.has_head = true;
+  }
+  if (!gone) return false;
+  stream.head = stream.last;
+  stream.head.masks = {};
+  stream.head_lost = 0;
+  stream.head_is_end = true;
+  return stream.has_head = true;
+}
+
+TapCore::Stream* TapCore::oldest() noexcept {
+  Stream* oldest = nullptr;
+  for (Stream& stream : streams_) {
+    if (!look_at(stream)) continue;
+    if (oldest == nullptr || stream.head.time < oldest->head.time) oldest = &stream;
+  }
+  return oldest;
+}
+
+bool TapCore::take_once(TapEventData& event) {
+  if (handover_.has_offer()) accept_view();
+  Stream* const stream = oldest();
+  if (stream == nullptr) return false;
+  if (stream->head.kind == shm::EventKind::kSample && options_.max_held != 0 &&
+      held_ == options_.max_held) {
+    throw Error(name_ + ": " + std::to_string(options_.max_held) +
+                " events with samples are held already; let one go first, or raise max_held");
+  }
+  fill(*stream, event);
+  return true;
+}
+
+void TapCore::fill(Stream& stream, TapEventData& event) {
+  give_context(stream);
+  const shm::EventRecord& head = stream.head;
+  event.kind = stream.head_is_end ? kEnd : static_cast<std::uint8_t>(head.kind);
+  event.time_ns = head.time;
+  event.sequence = shm::sequence_of(head.sample);
+  event.generation = head.generation;
+  event.activity = head.activity;
+  event.lost = stream.head_lost;
+  event.accepted = head.masks.accepted;
+  event.discarded = head.masks.discarded;
+  event.refused = head.masks.refused;
+  event.blind = head.masks.blind;
+  event.size = std::min<std::uint64_t>(head.size, stream.source->output->segment.layout().stride);
+  event.data = nullptr;
+  event.context = stream.context;
+  if (!stream.head_is_end && head.kind == shm::EventKind::kSample && options_.max_held != 0 &&
+      !hold(stream, event)) {
+    ++lost_samples_;
+  }
+  lost_events_ += stream.head_lost;
+  stream.last = head;
+  stream.has_head = false;
+  if (stream.head_is_end) {
+    stream.ended = true;
+    stream.source->drained.store(true, std::memory_order_relaxed);
+    service_bell_->ring();
+  }
+}
+
+// A list that is gone leaves the names unknown.
+void TapCore::give_context(Stream& stream) {
+  if (stream.context != nullptr && stream.revision == stream.head.revision) return;
+  auto context = std::make_shared<TapContext>();
+  context->source = stream.source->name;
+  context->type = stream.source->output->type;
+  shm::Destinations destinations;
+  if (shm::read_destinations(*stream.source->events, stream.source->shape, stream.head.revision,
+                             destinations)) {
+    for (shm::Destination& destination : destinations) {
+      context->destinations.push_back(std::move(destination.name));
+    }
+  }
+  stream.context = std::move(context);
+  stream.revision = stream.head.revision;
+}
+
+bool TapCore::hold(Stream& stream, TapEventData& event) noexcept {
+  std::uint32_t index = 0;
+  while (index < options_.max_held && held_from_[index] != nullptr) ++index;
+  if (index == options_.max_held) return false;  // held_ < max_held says that this is never so
+  shm::Atomic<shm::Hold>& word = segment_->holds[index];
+  if (!stream.reader.hold(stream.head.sample, word)) return false;
+  const OutputPeer& output = *stream.source->output;
+  const std::uint32_t slot = shm::slot_of(stream.head.sample);
+  event.hold = index;
+  if (slot < output.allocated_slots.load(std::memory_order_relaxed)) {
+    event.data = output.segment.payload(slot);
+  } else if (!copy(stream, slot, event)) {
+    shm::ChannelReader::release(word);
+    return false;
+  }
+  if (type_.is_typed()) event.size = type_.size;
+  held_from_[index] = stream.source;
+  ++output.held;
+  ++held_;
+  return true;
+}
+
+// As InputCore::copy().
+bool TapCore::copy(const Stream& stream, std::uint32_t slot, TapEventData& event) noexcept {
+  const OutputPeer& output = *stream.source->output;
+  output.copied.store(output.copied.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  service_bell_->ring();
+  for (std::uint32_t i = 0; i < options_.max_held; ++i) {
+    if (held_from_[i] == nullptr) copies_.forget(i);
+  }
+  CopiedSample copied;
+  if (!copies_.copy(output, slot, type_.is_typed(), event.hold, copied)) return false;
+  event.data = copied.data;
+  return true;
+}
+
+void TapCore::give_back(std::uint32_t hold) noexcept {
+  shm::ChannelReader::release(segment_->holds[hold]);
+  --held_from_[hold]->output->held;
+  held_from_[hold].reset();
+  --held_;
+}
+
+bool TapCore::take(TapEventData& event) {
+  if (take_once(event)) return true;
+  if (!has_descriptor_) return false;
+  disarm();
+  arm();
+  return take_once(event);
+}
+
+// Says that we wait. SYNC POINT: tap-waiting. Fence (g), between our wait word and our last look.
+// Pairs with fence (f) of publishers, and with the offer of a view.
+void TapCore::arm() noexcept {
+  // Relaxed is enough for what we alone write.
+  segment_->wait.store((segment_->wait.load(std::memory_order_relaxed) + 1) | 1,
+                       std::memory_order_relaxed);
+  shm::full_fence();  // (g)
+}
+
+// The next wait has another number. What rang for this one is forgotten before the next begins.
+void TapCore::disarm() noexcept {
+  const std::uint64_t wait = segment_->wait.load(std::memory_order_relaxed);
+  if ((wait & 1) != 0) segment_->wait.store(wait + 1, std::memory_order_relaxed);
+  bell_.silence();
+}
+
+void TapCore::require_may_wait() const {
+  if (!options_.may_wait) {
+    throw Error(name_ + ": a tap without may_wait polls; open it with TapOptions::may_wait");
+  }
+}
+
+bool TapCore::wait(shm::Nanoseconds timeout, TapEventData& event) {
+  require_may_wait();
+  bool found = take_once(event);
+  if (!found) {
+    const shm::Nanoseconds now = shm::monotonic_now();
+    const shm::Nanoseconds deadline = timeout > shm::kMaxTime - now ? shm::kForever : now + timeout;
+    for (;;) {
+      arm();
+      found = take_once(event);
+      if (found || shm::monotonic_now() >= deadline) break;
+      bell_.wait(deadline);
+      disarm();
+    }
+    disarm();
+  }
+  // A descriptor in use was disarmed by this; let its owner's loop arm it again.
+  if (has_descriptor_) shm::ring_bell(bell_.write_end().get());
+  return found;
+}
+
+int TapCore::wait_descriptor() {
+  require_may_wait();
+  if (!has_descriptor_) {
+    has_descriptor_ = true;
+    shm::ring_bell(bell_.write_end().get());  // what waits already is there to be taken
+  }
+  return bell_.read_end();
+}
+
+}  // namespace arbiter::detail

@@ -1,0 +1,172 @@
+// A tap: take(), wait(), and what they need.
+//
+// Two threads meet here. The tap's thread takes and waits; the service thread learns of output
+// ports, maps what they tell, and offers the result as a view.
+#pragma once
+
+#include <sys/types.h>
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <arbiter/detail/cores.hpp>
+
+#include "client/handover.hpp"
+#include "client/input/copies.hpp"
+#include "client/peers.hpp"
+#include "client/service_bell.hpp"
+#include "shm/bell.hpp"
+#include "shm/clock.hpp"
+#include "shm/descendants.hpp"
+#include "shm/destination_list.hpp"
+#include "shm/event_ring.hpp"
+#include "shm/tap_segment.hpp"
+
+namespace arbiter::detail {
+
+// An output port that tells a tap its events. What the foreign segment says of itself is read once,
+// when it is mapped.
+struct TapSource {
+  std::string name;
+  std::shared_ptr<const OutputPeer> output;
+  shm::Mapping mapping;  // of the events
+  std::optional<shm::Bequest> bequest;
+  const shm::EventSegment* events = nullptr;
+  shm::EventShape shape;
+  shm::SegmentIdentity identity;  // of the events
+  std::uint32_t place = 0;
+  std::uint64_t link = 0;
+  // Set by the tap's thread once a publisher that is gone has told all that it had to tell.
+  mutable shm::Atomic<bool> drained{false};
+  // And once it has told what no honest publisher does: nothing is read from it any more.
+  mutable shm::Atomic<bool> misbehaved{false};
+};
+
+// Maps what the daemon has announced, and checks it; `own`: what the tap takes. Throws
+// std::runtime_error saying what is wrong, std::system_error.
+std::shared_ptr<const TapSource> map_tap_source(const wire::Received& announced,
+                                                const shm::TypeInfo& own, shm::Residence residence);
+
+struct TapSourceLink {
+  std::shared_ptr<const TapSource> source;
+  bool gone = false;         // closed or dead: drain it
+  bool reported = false;     // that it misbehaves
+  std::uint32_t copied = 0;  // of the output peer's, when it was surveyed last
+};
+
+struct TapSourceView {
+  std::vector<TapSourceLink> links;
+  TapSourceView* next_retired = nullptr;
+};
+
+class TapCore {
+ public:
+  // Makes and seals the segment, and the bell. Throws std::system_error.
+  TapCore(std::string name, const Type& type, const TapOptions& options,
+          std::shared_ptr<const ServiceBell> service_bell, shm::Residence residence);
+
+  // Service thread.
+
+  void bind(shm::PortInstance instance) noexcept { instance_ = instance; }
+  void add_source(std::shared_ptr<const TapSource> source);
+  // It has closed or died; what it has told can still be taken.
+  void lose_source(shm::PortInstance output);
+  [[nodiscard]] std::vector<std::shared_ptr<const OutputPeer>> copied_from();
+  // The names of those that have begun to misbehave, once each.
+  std::vector<std::string> misbehaving();
+  // Unmaps what the tap's thread has let go of.
+  void tidy();
+
+  // Tap's thread.
+
+  // The next event; false: there is none. Throws Error where more samples are held than may be.
+  bool take(TapEventData& event);
+  bool wait(shm::Nanoseconds timeout, TapEventData& event);
+  void give_back(std::uint32_t hold) noexcept;
+  // Throws Error.
+  int wait_descriptor();
+  [[nodiscard]] std::uint32_t held() const noexcept { return held_; }
+  [[nodiscard]] std::uint64_t lost_events() const noexcept { return lost_events_; }
+  [[nodiscard]] std::uint64_t lost_samples() const noexcept { return lost_samples_; }
+
+  // Either.
+
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] const TapOptions& options() const noexcept { return options_; }
+  [[nodiscard]] shm::PortInstance instance() const noexcept { return instance_; }
+  [[nodiscard]] const shm::TypeInfo& type() const noexcept { return type_; }
+  [[nodiscard]] const shm::FileDescriptor& segment_descriptor() const noexcept {
+    return descriptor_;
+  }
+  [[nodiscard]] const shm::Bell& bell() const noexcept { return bell_; }
+
+  shm::ProcessMark process;                 // the node's
+  mutable pid_t warned_about = 0;           // the child that was told that the tap is not its own
+  std::shared_ptr<NodeCore> node;           // kept for as long as the tap is
+  std::shared_ptr<TapCore> kept_by_events;  // tap's thread: the tap is gone, they are not
+  bool is_open = false;  // service thread, under the node's lock: its opening is over
+
+ private:
+  // A source as the tap's thread reads it.
+  struct Stream {
+    std::shared_ptr<const TapSource> source;
+    bool gone = false;
+    bool ended = false;  // all has been told, its end too
+    shm::EventReader reader;
+    bool has_head = false;
+    bool head_is_end = false;
+    shm::EventRecord head;
+    std::uint64_t head_lost = 0;
+    shm::EventRecord last;       // that was taken
+    std::uint64_t revision = 0;  // of the list that context_ has
+    std::shared_ptr<const TapContext> context;
+  };
+
+  void offer_view();
+  void accept_view();
+  bool look_at(Stream& stream) noexcept;
+  [[nodiscard]] bool is_honest(const Stream& stream) const noexcept;
+  Stream* oldest() noexcept;
+  void fill(Stream& stream, TapEventData& event);
+  void give_context(Stream& stream);
+  [[nodiscard]] bool hold(Stream& stream, TapEventData& event) noexcept;
+  [[nodiscard]] bool copy(const Stream& stream, std::uint32_t slot, TapEventData& event) noexcept;
+  bool take_once(TapEventData& event);
+  void arm() noexcept;
+  void disarm() noexcept;
+  void require_may_wait() const;
+
+  const std::string name_;
+  const TapOptions options_;
+  const shm::TypeInfo type_;
+  const std::shared_ptr<const ServiceBell> service_bell_;
+  shm::FileDescriptor descriptor_;
+  shm::Mapping mapping_;
+  std::optional<shm::Bequest> bequest_;
+  shm::TapSegment* const segment_;
+  const shm::Bell bell_;
+  shm::PortInstance instance_ = 0;
+
+  // Service thread.
+  std::map<shm::PortInstance, TapSourceLink> links_;
+
+  Handover<TapSourceView> handover_;
+
+  // Tap's thread.
+  std::unique_ptr<TapSourceView> view_;
+  std::vector<Stream> streams_;
+  std::array<std::shared_ptr<const TapSource>, shm::kMaxTapHeld> held_from_;
+  std::uint32_t held_ = 0;
+  Copies copies_;
+  std::uint64_t lost_events_ = 0;
+  std::uint64_t lost_samples_ = 0;
+  bool has_descriptor_ = false;
+};
+
+}  // namespace arbiter::detail

@@ -1,0 +1,151 @@
+#include "service/ports/taps.hpp"
+
+#include <algorithm>
+
+#include "service/clients/errands.hpp"
+#include "service/ports/foreign_parts.hpp"
+#include "service/ports/switchboard.hpp"
+#include "shm/event_segment.hpp"
+#include "shm/tap_segment.hpp"
+
+namespace arbiter::service {
+
+// The last who closes a segment frees its memory, which takes its time.
+Tap::~Tap() { Errands::of_the_process().close(user, std::move(segment)); }
+
+std::unique_ptr<Tap> adopt_tap(const wire::Received& open, uid_t user) {
+  require_descriptors(open, 2);
+  auto tap = std::make_unique<Tap>();
+  if (own_segment(open.descriptors[0], user, sizeof(shm::TapSegment)) != sizeof(shm::TapSegment)) {
+    throw std::runtime_error("the segment is not a tap's of this version");
+  }
+  tap->bell = own_bell(open.descriptors[1], user);
+  tap->segment = kept(open.descriptors[0]);
+  tap->user = user;
+  tap->is_input = (open.message.flags & wire::kTapsInput) != 0;
+  return tap;
+}
+
+Tap& Taps::add(std::unique_ptr<Tap> tap, Client& client) {
+  tap->instance = registry_.next_instance();
+  tap->client = &client;
+  return *(taps_[tap->instance] = std::move(tap));
+}
+
+bool Taps::is_of(const Client& client, shm::PortInstance tap) const {
+  const auto found = taps_.find(tap);
+  return found != taps_.end() && found->second->client == &client;
+}
+
+void Taps::remove(shm::PortInstance tap, const Outputs& outputs) {
+  std::erase_if(links_, [&](const auto& each) {
+    const auto& [key, link] = each;
+    if (key.second != tap) return false;
+    const auto output = outputs.find(key.first);
+    if (output != outputs.end()) {
+      output->second->client->send(message_to(wire::MessageKind::kPeerGone, key.first, tap));
+    }
+    return true;
+  });
+  taps_.erase(tap);
+}
+
+void Taps::lose(const Client& client, bool lives, const Outputs& outputs) {
+  for (auto tap = taps_.begin(); tap != taps_.end();) {
+    const auto next = std::next(tap);
+    if (tap->second->client == &client) {
+      for (const auto& [key, link] : links_) {
+        const auto output = outputs.find(key.first);
+        if (!lives || key.second != tap->first || output == outputs.end()) continue;
+        output->second->client->send(
+            message_to(wire::MessageKind::kTapAway, key.first, key.second));
+      }
+      if (lives) std::erase_if(links_, [&](const auto& l) { return l.first.second == tap->first; });
+      remove(tap->first, outputs);
+    }
+    tap = next;
+  }
+}
+
+bool Taps::wants(const Tap& tap, const OutputPort& output, const shm::TableView& table) const {
+  if (!tap.is_input) return output.source->name == tap.name;
+  const auto connections = table.connections_of_source(output.source->id);
+  for (shm::Word i = 0; i < connections.count; ++i) {
+    const InputName* const input = names_.input_by_id(table.rule(connections[i]).port);
+    if (input != nullptr && input->name == tap.name) return true;
+  }
+  return false;
+}
+
+bool Taps::ask(const Tap& tap, const OutputPort& output) {
+  const auto [link, is_new] = links_.try_emplace({output.instance, tap.instance});
+  if (!is_new && !link->second.is_away) return false;
+  link->second.is_away = false;
+  output.client->send(message_to(wire::MessageKind::kTap, output.instance, tap.instance),
+                      {tap.segment.get(), tap.bell->descriptor()});
+  return true;
+}
+
+void Taps::unlink(const shm::TableView& table, const Outputs& outputs) {
+  std::erase_if(links_, [&](const auto& each) {
+    const auto& [key, link] = each;
+    const auto output = outputs.find(key.first);
+    const Tap& tap = *taps_.at(key.second);
+    if (output == outputs.end() || wants(tap, *output->second, table)) return false;
+    if (link.is_told) {
+      tap.client->send(message_to(wire::MessageKind::kDisconnected, key.second, key.first));
+    }
+    // Which heeds what the tap holds for as long as that lives.
+    output->second->client->send(
+        message_to(wire::MessageKind::kDisconnected, key.first, key.second));
+    return true;
+  });
+}
+
+void Taps::tell(const OutputPort& output, const wire::Received& answer) {
+  const auto link = links_.find({output.instance, answer.message.peer});
+  if (link == links_.end()) return;  // it has closed meanwhile
+  require_descriptors(answer, 1);
+  if (own_segment(answer.descriptors[0], output.user, sizeof(shm::EventSegment)) !=
+      sizeof(shm::EventSegment)) {
+    throw std::runtime_error("the segment is not one of events of this version");
+  }
+  const Tap& tap = *taps_.at(answer.message.peer);
+  auto message =
+      message_to(wire::MessageKind::kTapSource, tap.instance, output.instance, output.source->id);
+  message.link = answer.message.link;
+  message.value = answer.message.value;
+  message.set_name(output.source->name);
+  link->second.is_told = true;
+  tap.client->send(message, {output.segment.get(), answer.descriptors[0].get()});
+}
+
+void Taps::refuse(const OutputPort& output, shm::PortInstance tap, const std::string& why) {
+  if (links_.count({output.instance, tap}) == 0) return;
+  auto message =
+      message_to(wire::MessageKind::kConnectionRefused, tap, output.instance, output.source->id);
+  message.set_name(output.source->name);
+  message.set_text(why);
+  taps_.at(tap)->client->send(message);
+}
+
+void Taps::set_away(shm::PortInstance output) {
+  for (auto& [key, link] : links_) {
+    if (key.first == output) link.is_away = true;
+  }
+}
+
+void Taps::end(shm::PortInstance output) {
+  std::erase_if(links_, [&](const auto& each) {
+    const auto& [key, link] = each;
+    if (key.first != output) return false;
+    if (link.is_told) {
+      const Tap& tap = *taps_.at(key.second);
+      tap.client->send(message_to(wire::MessageKind::kPeerGone, tap.instance, output));
+      tap.bell->ring();  // it may have died between telling and ringing
+    }
+    return true;
+  });
+}
+
+}  // namespace arbiter::service

@@ -1,0 +1,146 @@
+// arbiter echo: what arrives at a port that others have open, or nobody.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <sstream>
+#include <vector>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/support/child_process.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using nlohmann::json;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+// /high overrides /low at /p. Publishes both, again and again, until the program has ended.
+class Publishing {
+ public:
+  ProgramResult during(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), std::string(ARBITER_PROGRAMS) + "/arbiter");
+    const std::string out = directory_.path() + "/out";
+    const std::string err = directory_.path() + "/err";
+    const shm::FileDescriptor out_file(::open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600));
+    const shm::FileDescriptor err_file(::open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600));
+    ChildProcess program(arguments, {}, {-1, out_file.get(), err_file.get()});
+    pollfd end{program.descriptor(), POLLIN, 0};
+    while (::poll(&end, 1, 1) == 0) {  // slowly enough for samples to be kept
+      low_.publish(std::uint32_t{0x04030201});
+      high_.publish(std::uint32_t{0xffffffff});
+      low_.publish(std::uint32_t{0x08070605});
+      high_.deactivate();
+    }
+    ProgramResult result;
+    result.exit_code = program.wait();
+    result.out = content_of(out);
+    result.err = content_of(err);
+    return result;
+  }
+
+ private:
+  static std::string content_of(const std::string& path) {
+    std::ifstream file(path);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  TemporaryDirectory directory_;
+  Node node_{"test"};
+  InputPort<std::uint32_t> in_ = node_.input_port<std::uint32_t>("/p");
+  OutputPort<std::uint32_t> low_ = node_.output_port<std::uint32_t>("/low");
+  OutputPort<std::uint32_t> high_ = node_.output_port<std::uint32_t>("/high");
+};
+
+std::vector<json> objects(const std::string& text) {
+  std::vector<json> all;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) all.push_back(json::parse(line));
+  return all;
+}
+
+TEST(Echo, OfAnInputPortShowsWhatItAcceptsThoughAComponentHasItOpen) {
+  Daemon daemon(kOverrideModel);
+  Publishing publishing;
+  const auto result = publishing.during({"echo", "/p", "--count", "50", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto all = objects(result.out);
+  ASSERT_EQ(all.size(), 50u);
+  for (const json& each : all) {
+    EXPECT_EQ(each["port"], "/p");
+    EXPECT_EQ(each["kind"], "sample");
+    EXPECT_EQ(each["size"], 4);
+    EXPECT_EQ(each["fates"], (json{{"/p", "accepted"}}));
+  }
+}
+
+TEST(Echo, WithLosersShowsWhatBecameOfEach) {
+  Daemon daemon(kOverrideModel);
+  Publishing publishing;
+  const auto result = publishing.during({"echo", "/p", "--losers", "--count", "200", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  std::set<std::string> met;
+  for (const json& each : objects(result.out)) {
+    met.insert(each["source"].get<std::string>() + " " + each["kind"].get<std::string>() + " " +
+               each["fates"].value("/p", "-"));
+  }
+  EXPECT_THAT(met, testing::IsSupersetOf({"/low sample accepted", "/low sample discarded",
+                                          "/high sample accepted", "/high deactivation -"}));
+}
+
+TEST(Echo, OfAnOutputPortShowsEachArrivalWithItsBytes) {
+  Daemon daemon(kOverrideModel);
+  Publishing publishing;
+  const auto result = publishing.during({"echo", "/low", "--count", "40", "--hex"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, AllOf(HasSubstr("  /low  #"), HasSubstr("  4 bytes  accepted at /p\n"),
+                                HasSubstr("  4 bytes  discarded at /p\n"),
+                                HasSubstr("    00000000  05 06 07 08\n"), Not(HasSubstr("/high")),
+                                HasSubstr("40 events in ")));
+}
+
+TEST(Echo, TellsTheRate) {
+  Daemon daemon(kOverrideModel);
+  Publishing publishing;
+  const auto result =
+      publishing.during({"echo", "/p", "--losers", "--rate", "--for", "30ms", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto all = objects(result.out);
+  ASSERT_EQ(all.size(), 2u);
+  for (const json& each : all) {
+    EXPECT_GT(each["samples"], 0);
+    EXPECT_GT(each["hz"], 0);
+    EXPECT_GE(each["jitter_ns"], 0);
+    const double bytes = each["bytes_per_second"];
+    EXPECT_NEAR(bytes, 4 * each["hz"].get<double>(), bytes / 1000);
+  }
+  EXPECT_THAT(publishing.during({"echo", "/low", "--rate", "--for", "30ms"}).out,
+              AllOf(HasSubstr("/low  "), HasSubstr(" Hz  jitter "), HasSubstr("B/s\n")));
+}
+
+TEST(Echo, AsAComponentTakesThePort) {
+  Daemon daemon(kOverrideModel);
+  Node node("test");
+  auto in = node.input_port("/p");
+  const auto result = arbiter({"echo", "/p", "--as-component", "--for", "1ms"});
+  EXPECT_NE(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("the input port /p is held by"));
+  EXPECT_EQ(arbiter({"echo", "/p", "--as-component", "--rate"}).exit_code, 2);
+}
+
+TEST(Echo, SaysThatThePolicyForbidsIt) {
+  const TemporaryDirectory files;
+  const std::string policy = files.write("policy", "deny everyone tap /p\nallow everyone all\n");
+  Daemon daemon(kOverrideModel, {.arguments = {"--policy", policy}});
+  const auto result = arbiter({"echo", "/p", "--for", "1ms"});
+  EXPECT_NE(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("may not tap the port /p"));
+}
+
+}  // namespace
+}  // namespace arbiter::test

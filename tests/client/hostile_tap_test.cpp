@@ -1,0 +1,207 @@
+// A tap whose memory lies to publishers, and a publisher whose memory lies to a tap.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <random>
+
+#include <arbiter/arbiter.hpp>
+
+#include "client/tap/tap_core.hpp"
+#include "shm/event_ring.hpp"
+#include "tests/client/models.hpp"
+#include "tests/client/samples.hpp"
+#include "tests/support/daemon.hpp"
+#include "tests/support/error_of.hpp"
+#include "tests/support/raw_port.hpp"
+
+namespace arbiter::test {
+namespace {
+
+// A segment that its maker can still write after it is sealed.
+template <class Layout>
+struct Written {
+  Written()
+      : descriptor(shm::make_segment("test", sizeof(Layout))),
+        mapping(descriptor, sizeof(Layout), shm::Access::kReadWrite) {
+    if (shm::allocate(descriptor, 0, sizeof(Layout))) throw std::runtime_error("no memory");
+  }
+  Layout& operator*() const { return *mapping.as<Layout>(); }
+  Layout* operator->() const { return mapping.as<Layout>(); }
+
+  shm::FileDescriptor descriptor;
+  shm::Mapping mapping;
+};
+
+Written<shm::TapSegment> tap_segment(std::uint32_t max_held) {
+  Written<shm::TapSegment> segment;
+  segment->magic = shm::TapSegment::kMagic;
+  segment->version = shm::TapSegment::kVersion;
+  segment->max_held = max_held;
+  segment->sleeps = 1;
+  shm::seal(segment.descriptor, shm::Seals::kOneWriter);
+  return segment;
+}
+
+TEST(AHostileTap, HoldsUpNobodyAndTakesNoSlotThatIsNotItsOwn) {
+  Daemon daemon(single_model());
+  Node node("test");
+  OutputPortOptions options;
+  options.max_memory = 64 * 8;  // two loans, a copy; 5 for the receiver
+  auto out = node.output_port<Number>("/out", options);
+  auto in = node.input_port<Number>("/in", {.depth = 4, .max_held = 1});
+  RawClient client(daemon.instance());
+  client.hello("hostile");
+  const auto segment = tap_segment(shm::kMaxTapHeld);
+  const shm::Bell bell;
+  client.send(RawClient::message(wire::MessageKind::kOpenTap, "/out"),
+              {segment.descriptor.get(), bell.for_publishers().get()});
+  const auto publisher = client.expect(wire::MessageKind::kTapSource).message.peer;
+  std::mt19937_64 random(7);
+  for (std::int64_t i = 0; i < 20'000; ++i) {
+    for (auto& hold : segment->holds) {
+      const auto slot = static_cast<std::uint32_t>(random() % 256);
+      hold.store(random() % 8 == 0 ? random() : shm::make_hold(publisher, slot));
+    }
+    segment->wait.store(random());
+    segment->max_held = static_cast<std::uint32_t>(random());
+    ASSERT_EQ(out.publish(Number{i}).delivered, 1u);
+    ASSERT_EQ(take_from(in), i);
+  }
+  EXPECT_EQ(daemon.source("/out")["no_slot"], 0);
+}
+
+TEST(AHostileTap, WhoseSegmentIsNoneIsRefused) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  const shm::Bell bell;
+  const auto refusal = [&](const shm::FileDescriptor& segment) {
+    RawClient client(daemon.instance());
+    client.hello("hostile");
+    client.send(RawClient::message(wire::MessageKind::kOpenTap, "/out"),
+                {segment.get(), bell.for_publishers().get()});
+    return error_of([&] { client.expect(wire::MessageKind::kOpened); });
+  };
+  EXPECT_NE(refusal(raw_input_segment()).find("not a tap's of this version"), std::string::npos);
+  const Written<shm::TapSegment> unsealed;
+  EXPECT_NE(refusal(unsealed.descriptor), "no error");
+  // What the daemon does not look into, the publisher does.
+  for (const std::uint32_t max_held : {shm::kMaxTapHeld + 1, UINT32_MAX}) {
+    RawClient client(daemon.instance());
+    client.hello("hostile");
+    const auto segment = tap_segment(max_held);
+    client.send(RawClient::message(wire::MessageKind::kOpenTap, "/out"),
+                {segment.descriptor.get(), bell.for_publishers().get()});
+    const auto refused = client.expect(wire::MessageKind::kConnectionRefused);
+    EXPECT_EQ(refused.message.text_view(), "the tap's segment is not one of this version");
+  }
+}
+
+// A publisher that is put together by hand, and its tap.
+class HostilePublisher {
+ public:
+  HostilePublisher() : output_(raw_output_segment()) {
+    events_->initialize({4, 2, 2});
+    shm::seal(events_.descriptor, shm::Seals::kOneWriter);
+    events_->places[0].first.store(1);
+    events_->places[0].link.store(9);
+  }
+
+  std::unique_ptr<detail::TapCore> tap(std::uint32_t max_held) {
+    TapOptions options;
+    options.max_held = max_held;
+    auto core = std::make_unique<detail::TapCore>("tap", Type::untyped(0), options,
+                                                  std::make_shared<const detail::ServiceBell>(),
+                                                  shm::Residence::kMapped);
+    core->add_source(map());
+    return core;
+  }
+  std::shared_ptr<const detail::TapSource> map(std::uint32_t place = 0) {
+    wire::Received announced;
+    announced.message.peer = 5;
+    announced.message.link = 9;
+    announced.message.value = place;
+    announced.message.set_name("/hostile");
+    announced.descriptors[0] = shm::reopen(output_, O_RDONLY);
+    announced.descriptors[1] = shm::reopen(events_.descriptor, O_RDONLY);
+    return detail::map_tap_source(announced, {}, shm::Residence::kMapped);
+  }
+  shm::EventSegment& events() { return *events_; }
+
+ private:
+  shm::FileDescriptor output_;
+  Written<shm::EventSegment> events_;
+};
+
+TEST(AHostilePublisher, WhateverItTellsATapEndsEachLookAndGivesNothingOutsideOfItsMemory) {
+  HostilePublisher publisher;
+  auto tap = publisher.tap(2);
+  std::mt19937_64 random(3);
+  std::uint64_t number = 1;
+  std::uint64_t taken = 0;
+  std::uint64_t read = 0;  // so that samples are read
+  const auto pick = [&](std::uint64_t honest) { return random() % 16 == 0 ? random() : honest; };
+  for (int round = 0; round < 200'000; ++round) {
+    shm::Event& event = publisher.events().events[number % 4];
+    const shm::Entry sample = shm::make_entry(number, static_cast<std::uint32_t>(random() % 5));
+    event.time.store(static_cast<std::int64_t>(pick(number)));
+    event.sample.store(pick(sample));
+    event.activity.store(static_cast<std::int64_t>(random()));
+    event.generation.store(random());
+    event.revision_and_kind.store(pick((random() % 3) << 8 | (1 + random() % 5)));
+    event.accepted.store(pick(9));
+    event.discarded.store(random());
+    event.size.store(pick(8));
+    publisher.events().kept[number % 2].store(pick(sample));
+    publisher.events().lists[random() % 2].revision.store(2 * (random() % 3));
+    publisher.events().lists[random() % 2].count.store(pick(1));
+    event.number.store(pick(2 * number));
+    ++number;
+    detail::TapEventData data;
+    if (!tap->take(data)) {
+      if (round % 8 == 0) tap = publisher.tap(2);  // the last one may have given it up
+      publisher.events().places[0].first.store(pick(number));
+      continue;
+    }
+    ++taken;
+    ASSERT_LE(data.context->destinations.size(), std::size_t{shm::kMaxDestinations});
+    if (data.data == nullptr) continue;
+    ASSERT_LE(data.size, 64u);
+    if (data.size != 0) read += std::to_integer<std::uint64_t>(data.data[data.size - 1]);
+    tap->give_back(data.hold);
+  }
+  EXPECT_GT(taken, 10'000u);
+  EXPECT_EQ(read, 0u) << "nobody has written there";
+}
+
+TEST(AHostilePublisher, IsGivenUpOnceItTellsWhatNoHonestOneDoes) {
+  HostilePublisher publisher;
+  const auto tap = publisher.tap(1);
+  shm::EventWriter writer(publisher.events());
+  shm::EventRecord record;
+  record.kind = static_cast<shm::EventKind>(99);
+  writer.write(record);
+  detail::TapEventData data;
+  EXPECT_FALSE(tap->take(data));
+  EXPECT_EQ(tap->misbehaving().size(), 1u);
+  EXPECT_TRUE(tap->misbehaving().empty()) << "it is told once";
+  record.kind = shm::EventKind::kSignal;
+  writer.write(record);
+  EXPECT_FALSE(tap->take(data));
+}
+
+TEST(AHostilePublisher, WhoseSegmentOfEventsIsNoneIsNotRead) {
+  HostilePublisher publisher;
+  EXPECT_EQ(error_of([&] { publisher.map(); }), "no error");
+  EXPECT_NE(error_of([&] { publisher.map(shm::kMaxTaps); }), "no error");
+  publisher.events().header.shape.events = 2048;
+  EXPECT_NE(error_of([&] { publisher.map(); }), "no error");
+  publisher.events().initialize({4, 2, 2});
+  publisher.events().header.version = 7;
+  EXPECT_NE(error_of([&] { publisher.map(); }), "no error");
+}
+
+}  // namespace
+}  // namespace arbiter::test
