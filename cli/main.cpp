@@ -77,6 +77,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_status(app, exit_code);
   arbiter::cli::add_why(app, exit_code);
   arbiter::cli::add_wait(app, exit_code);
+  arbiter::cli::add_winners(app, exit_code);
   arbiter::cli::add_metrics(app, exit_code);
   arbiter::cli::add_doctor(app, exit_code);
   arbiter::cli::add_deactivate(app, exit_code);

@@ -27,6 +27,7 @@ void add_history(CLI::App& app, int& exit_code);
 void add_stop(CLI::App& app, int& exit_code);
 void add_why(CLI::App& app, int& exit_code);
 void add_wait(CLI::App& app, int& exit_code);
+void add_winners(CLI::App& app, int& exit_code);
 void add_metrics(CLI::App& app, int& exit_code);
 void add_doctor(CLI::App& app, int& exit_code);
 

@@ -42,3 +42,4 @@
 #include <arbiter/result.hpp>
 #include <arbiter/tap.hpp>
 #include <arbiter/type.hpp>
+#include <arbiter/winner_change.hpp>

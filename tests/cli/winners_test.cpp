@@ -1,0 +1,133 @@
+// arbiter winners: changes of winner as a component takes them.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/cli/why_program.hpp"
+#include "tests/support/child_process.hpp"
+#include "tests/support/daemon.hpp"
+#include "tests/support/text_files.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+const std::string kBehaviours = R"(
+<behavior name="Look"><config at="/gaze:i">/random</config></behavior>
+<behavior name="Follow"><config at="/gaze:i">/face</config><inhibition>Look</inhibition></behavior>
+<behavior name="Tell"><config at="/news">/arbiter/winner/gaze:i:o</config></behavior>
+</behaviors>)";
+const std::string kModel = R"(<behaviors timeout="forever">)" + kBehaviours;
+
+class Winners : public testing::Test {
+ protected:
+  void start(std::vector<std::string> more = {}) {
+    more.insert(more.begin(),
+                {std::string(ARBITER_PROGRAMS) + "/arbiter", "winners", "--every", "10ms"});
+    const shm::FileDescriptor err(
+        ::open(err_path().c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+    program_ = ChildProcess(more, {}, {-1, -1, err.get()});
+  }
+  // The next sample that is not a repetition.
+  WinnerChange next() {
+    for (;;) {
+      const auto sample = in_.wait_for(1h);
+      if (sample && (*sample)->news != WinnerNews::unchanged) return **sample;
+    }
+  }
+  WinnerChange repetition() {
+    for (;;) {
+      const auto sample = in_.wait_for(1h);
+      if (sample && (*sample)->news == WinnerNews::unchanged) return **sample;
+    }
+  }
+  [[nodiscard]] std::string err_path() const { return daemon_.directory() + "/winners.err"; }
+
+  Daemon daemon_{kModel};
+  Node node_{"test"};
+  OutputPort<int> random_ = node_.output_port<int>("/random");
+  OutputPort<int> face_ = node_.output_port<int>("/face");
+  InputPort<WinnerChange> in_ = node_.input_port<WinnerChange>("/news");
+  ChildProcess program_;
+};
+
+TEST_F(Winners, AreToldToAComponent) {
+  random_.signal();
+  start({"--port", "/gaze*"});
+  // What was published before this port was connected is not for it: the repetitions are.
+  WinnerChange seen = repetition();
+  EXPECT_STREQ(seen.port, "/gaze:i");
+  EXPECT_STREQ(seen.winner, "/random");
+  EXPECT_EQ(seen.is_arbitrated, 1U);
+  EXPECT_EQ(seen.generation, 1U);
+
+  const Time before = std::chrono::steady_clock::now();
+  face_.signal();
+  seen = next();
+  EXPECT_EQ(seen.news, WinnerNews::change);
+  EXPECT_STREQ(seen.winner, "/face");
+  EXPECT_STREQ(seen.before, "/random");
+  EXPECT_EQ(seen.changes, 1U);
+  EXPECT_GE(seen.time_ns, before.time_since_epoch().count());
+  EXPECT_GE(seen.seen_ns, seen.time_ns);
+
+  face_.deactivate();
+  seen = next();
+  EXPECT_STREQ(seen.winner, "/random");
+  EXPECT_EQ(seen.changes, 2U);
+
+  random_.deactivate();
+  seen = next();
+  EXPECT_STREQ(seen.winner, "");
+  EXPECT_STREQ(seen.before, "/random");
+
+  program_.signal(SIGTERM);
+  EXPECT_EQ(program_.wait(), 0);
+}
+
+TEST_F(Winners, AreThoseOfTheModelInForce) {
+  random_.signal();
+  start();
+  repetition();
+  daemon_.write_model(R"(<behaviors timeout="forever">
+<behavior name="Tell"><config at="/news">/arbiter/winner/gaze:i:o</config></behavior>
+</behaviors>)");
+  ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  WinnerChange seen = next();
+  EXPECT_STREQ(seen.winner, "");
+  EXPECT_STREQ(seen.before, "/random");
+  EXPECT_EQ(seen.is_arbitrated, 0U);
+  EXPECT_EQ(seen.generation, 2U);
+  daemon_.write_model(kModel);
+  ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  seen = next();
+  EXPECT_STREQ(seen.winner, "/random");
+  EXPECT_EQ(seen.is_arbitrated, 1U);
+  program_.signal(SIGINT);
+  EXPECT_EQ(program_.wait(), 0);
+}
+
+TEST_F(Winners, AreAnnouncedByOneProgramOnly) {
+  start();
+  repetition();
+  const auto second = arbiter({"winners"});
+  EXPECT_EQ(second.exit_code, 1);
+  EXPECT_NE(second.err.find("/arbiter/winner/gaze:i:o"), std::string::npos) << second.err;
+}
+
+TEST(WinnersWithoutADaemon, AreNone) {
+  const auto result = arbiter({"winners", "--instance", "nobody-has-this"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_NE(result.err.find("nobody-has-this"), std::string::npos) << result.err;
+}
+
+TEST(WinnersOptions, AreChecked) { EXPECT_EQ(arbiter({"winners", "--every", "1ms"}).exit_code, 2); }
+
+}  // namespace
+}  // namespace arbiter::test

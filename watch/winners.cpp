@@ -1,0 +1,102 @@
+#include "watch/winners.hpp"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "rules/explain/change.hpp"
+#include "rules/explain/tenure.hpp"
+
+namespace arbiter::watch {
+namespace {
+
+// When what happened to a source last did happen: its deactivation, its last arrival while it is
+// active, its end.
+shm::Nanoseconds event_time(shm::ActivityWord word, shm::Nanoseconds timeout,
+                            shm::Nanoseconds now) {
+  if (shm::is_deactivation(word)) return word & ~shm::kDeactivatedFlag;
+  if (shm::is_active(word, now)) return shm::arrival_of(word, timeout);
+  return word;
+}
+
+}  // namespace
+
+Winners::Winners(std::shared_ptr<Instance> instance, Wanted wanted)
+    : instance_(std::move(instance)), wanted_(std::move(wanted)) {}
+
+// Those that the model in force mentions, and those that were there at the last look.
+std::map<std::string, shm::PortId> Winners::ports(const shm::TableView& table) const {
+  std::map<std::string, shm::PortId> ports;
+  for (const auto& [id, name] : instance_->port_names()) {
+    if (!table.is_arbitrated(id) && now_.count(name) == 0) continue;
+    if (wanted_(name)) ports[name] = id;
+  }
+  return ports;
+}
+
+Picture Winners::take(const shm::DecisionMemory& memory) const {
+  return take_picture(memory, [&](const shm::TableView& table) {
+    std::set<shm::SourceId> sources;
+    for (const auto& [name, id] : ports(table)) {
+      if (!table.is_arbitrated(id)) continue;
+      const auto heeded = rules::sources_heeded(table, id);
+      sources.insert(heeded.begin(), heeded.end());
+    }
+    return std::vector<shm::SourceId>(sources.begin(), sources.end());
+  });
+}
+
+std::vector<WinnerAt> Winners::look() {
+  const auto memory = instance_->memory();
+  Picture picture = take(*memory);
+  const shm::TableView& table = picture.snapshot.table;
+  std::vector<WinnerAt> news;
+  std::map<std::string, WinnerAt> all;
+  for (const auto& [name, id] : ports(table)) {
+    WinnerAt at{name, {}, {}};
+    at.is_arbitrated = table.is_arbitrated(id);
+    at.generation = picture.snapshot.generation;
+    at.time = at.seen = picture.now;
+    const shm::SourceId winner = picture.winner_at(id);
+    if (winner != shm::kNone) at.winner = memory->source_name(winner);
+    const auto last = now_.find(name);
+    at.is_first = last == now_.end();
+    if (!at.is_first) at.before = last->second.winner;
+    const bool is_news =
+        at.is_first || at.winner != at.before || at.is_arbitrated != last->second.is_arbitrated;
+    if (!is_news) {
+      at.time = last->second.time;
+    } else if (memory == memory_) {
+      at.time = time_of(at, id, picture);
+    }
+    all[name] = at;
+    if (is_news) news.push_back(std::move(at));
+  }
+  // What the memory no longer says as it was read may be of two models: look again.
+  if (!picture.is_settled || !memory->tables().is_whole(picture.snapshot)) return {};
+  memory_ = memory;
+  picture_ = std::move(picture);
+  now_ = std::move(all);
+  return news;
+}
+
+shm::Nanoseconds Winners::time_of(const WinnerAt& change, shm::PortId port,
+                                  const Picture& picture) const {
+  if (change.is_first || picture.snapshot.generation != picture_.snapshot.generation) {
+    return picture.now;
+  }
+  const shm::TableView& table = picture.snapshot.table;
+  const auto causes = rules::causes_of_change(
+      table, port, [this](shm::SourceId source) { return picture_.is_active(source); },
+      [&](shm::SourceId source) { return picture.is_active(source); });
+  shm::Nanoseconds time = picture.now;
+  for (const shm::SourceId source : causes) {
+    const auto word = picture.words.find(source);
+    if (word == picture.words.end()) continue;
+    time = std::min(time, event_time(word->second, table.timeout(source), picture.now));
+  }
+  // One that has been renewed since tells of its last arrival only: it was after the last look.
+  return std::max(time, picture_.now);
+}
+
+}  // namespace arbiter::watch
