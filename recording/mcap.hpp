@@ -146,6 +146,7 @@ McapEnd read_mcap(const std::string& path, const McapVisitor& visitor,
 // Writes to `to`, a new file, what is whole of `from`: its chunks as they are, with indexes, a
 // summary, and a metadata record "repaired" that says what was lost, and by which `library` it was
 // repaired. Returns how `from` ends.
-McapEnd repair_mcap(const std::string& from, const std::string& to, std::string_view library);
+McapEnd repair_mcap(const std::string& from, const std::string& to, std::string_view library,
+                    std::size_t max_chunk_bytes = kMaxChunkBytes);
 
 }  // namespace arbiter::recording

@@ -107,12 +107,13 @@ McapMap account_of(const McapEnd& end, std::string_view library) {
 
 }  // namespace
 
-McapEnd repair_mcap(const std::string& from, const std::string& to, std::string_view library) {
+McapEnd repair_mcap(const std::string& from, const std::string& to, std::string_view library,
+                    std::size_t max_chunk_bytes) {
   std::optional<OutputFile> out;
   std::optional<Copy> copy;
   try {
     const McapEnd end =
-        walk_mcap(from, kMaxChunkBytes, [&](const Record& record, std::string_view records) {
+        walk_mcap(from, max_chunk_bytes, [&](const Record& record, std::string_view records) {
           if (!copy) copy.emplace(out.emplace(to));
           copy->add(record, records);
         });

@@ -1,8 +1,12 @@
 // What a file has, as lines that can be compared, and files to have it.
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <array>
 #include <fstream>
 #include <iterator>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,6 +29,10 @@ inline std::string text_of(const recording::McapMap& map) {
   std::string text;
   for (const auto& [key, value] : map) text.append(" ").append(key).append("=").append(value);
   return text;
+}
+
+inline std::string name_of(const testing::TestParamInfo<Compression>& info) {
+  return std::array{"none", "lz4", "zstd"}[static_cast<std::size_t>(info.param)];
 }
 
 struct Contents {

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "recording/compression.hpp"
 #include "recording/crc32.hpp"
 #include "recording/records.hpp"

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "recording/records.hpp"
 #include "tests/recording/contents.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -37,7 +37,8 @@ TEST_P(EachCompression, ReadsWhatWasWritten) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Mcap, EachCompression,
-                         testing::Values(Compression::none, Compression::lz4, Compression::zstd));
+                         testing::Values(Compression::none, Compression::lz4, Compression::zstd),
+                         name_of);
 
 class Writer : public testing::Test {
  protected:
