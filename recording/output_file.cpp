@@ -42,7 +42,8 @@ const char* advice_for(int error) {
 
 }  // namespace
 
-OutputFile::OutputFile(const std::string& path) : path_(path) {
+OutputFile::OutputFile(const std::string& path, Unfinished unfinished)
+    : path_(path), unfinished_(unfinished) {
   // Samples are for whom the policy lets watch them: here, for who records.
   fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (fd_ < 0) {
@@ -70,10 +71,16 @@ void OutputFile::require_open(const std::string& what) const {
 }
 
 void OutputFile::fail(const char* what, int error) {
-  // What could be written of a record would end the reading all the same, with a worse message.
-  [[maybe_unused]] const int truncated = ::ftruncate(fd_, static_cast<off_t>(bytes_));
-  ended_ = std::string(std::strerror(error)) + ". It ends after the last whole record, at byte " +
-           std::to_string(bytes_) + advice_for(error);
+  ended_ = std::strerror(error);
+  if (unfinished_ == Unfinished::keep) {
+    // What could be written of a record would end the reading all the same, with a worse message.
+    [[maybe_unused]] const int truncated = ::ftruncate(fd_, static_cast<off_t>(bytes_));
+    ended_ += ". It ends after the last whole record, at byte " + std::to_string(bytes_);
+  } else {
+    discard();
+    ended_ += "; it was deleted";
+  }
+  ended_ += advice_for(error);
   refuse(what, ended_);
 }
 
@@ -101,10 +108,9 @@ void OutputFile::close() {
   require_open("write");
   const int fd = std::exchange(fd_, -1);
   // Where the file is another machine's, this is when a quota may be exceeded.
-  if (::close(fd) != 0 && errno != EINTR) {
-    ended_ = std::strerror(errno);
-    refuse("write", ended_);
-  }
+  if (::close(fd) == 0 || errno == EINTR) return;
+  ended_ = std::strerror(errno);
+  refuse("write", ended_);
 }
 
 }  // namespace arbiter::recording

@@ -7,10 +7,13 @@
 
 namespace arbiter::recording {
 
+// What becomes of a file that cannot be written to its end.
+enum class Unfinished { keep, discard };
+
 class OutputFile {
  public:
   // Makes it; throws McapError, also where there is one already.
-  explicit OutputFile(const std::string& path);
+  OutputFile(const std::string& path, Unfinished unfinished);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
@@ -35,6 +38,7 @@ class OutputFile {
   [[noreturn]] void fail(const char* what, int error);
 
   std::string path_;
+  Unfinished unfinished_;
   int fd_ = -1;
   std::uint64_t bytes_ = 0;
   std::uint32_t crc_ = 0;

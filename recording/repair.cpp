@@ -111,20 +111,16 @@ McapEnd repair_mcap(const std::string& from, const std::string& to, std::string_
                     std::size_t max_chunk_bytes) {
   std::optional<OutputFile> out;
   std::optional<Copy> copy;
-  try {
-    const McapEnd end =
-        walk_mcap(from, max_chunk_bytes, [&](const Record& record, std::string_view records) {
-          if (!copy) copy.emplace(out.emplace(to));
-          copy->add(record, records);
-        });
-    if (!copy) throw McapError("cannot repair " + from + ": " + end.problem + "; it has nothing");
-    copy->add_metadata("repaired", account_of(end, library));
-    copy->close();
-    return end;
-  } catch (const McapError&) {
-    if (out) out->discard();  // all that it has is in `from` as well
-    throw;
-  }
+  const McapEnd end =
+      walk_mcap(from, max_chunk_bytes, [&](const Record& record, std::string_view records) {
+        // All that it has is in `from` as well.
+        if (!copy) copy.emplace(out.emplace(to, Unfinished::discard));
+        copy->add(record, records);
+      });
+  if (!copy) throw McapError("cannot repair " + from + ": nothing of it is whole. " + end.problem);
+  copy->add_metadata("repaired", account_of(end, library));
+  copy->close();
+  return end;
 }
 
 }  // namespace arbiter::recording

@@ -64,9 +64,9 @@ void Walk::read_magic() {
 }
 
 Record Walk::read_record() {
-  reading_ = "what should be a record";
   const std::uint64_t left = file_.size() - offset_;
-  if (left == 0) throw Damage{"the file ends without a footer: its writer was interrupted"};
+  reading_ = left == 0 ? "the end of the file" : "what should be a record";
+  if (left == 0) throw Damage{"there is no footer: its writer was stopped, or still writes"};
   if (left < kHeadBytes) throw Damage{"the file ends within it"};
   ByteReader head(file_.read(offset_, kHeadBytes));
   const auto opcode = static_cast<Opcode>(head.number<std::uint8_t>());
@@ -209,7 +209,7 @@ void Walk::read_footer(const Record& record, std::uint64_t summary_at, std::uint
   crc = crc32(record.bytes.substr(0, record.bytes.size() - sizeof says_crc), crc);
   if (says_crc != 0 && says_crc != crc) throw Damage{"the summary does not have the CRC it says"};
   pass(record);
-  reading_ = "the end of the file";
+  reading_ = "what should end the file";
   const std::uint64_t left = file_.size() - offset_;
   if (left < kMagic.size() || file_.read(offset_, kMagic.size()) != kMagic) {
     throw Damage{"the eight bytes that end an MCAP file are not there"};

@@ -12,7 +12,7 @@ namespace arbiter::recording {
 
 struct McapWriter::File {
   File(const std::string& path, const McapOptions& chosen)
-      : options(chosen), chunk(chosen.compression), out(path) {}
+      : options(chosen), chunk(chosen.compression), out(path, Unfinished::keep) {}
 
   template <typename Id>
   static Id next_id(std::size_t count, const OutputFile& out, const char* what) {

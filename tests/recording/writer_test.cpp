@@ -71,7 +71,7 @@ TEST_F(Writer, LeavesTheClosedChunksIfItNeverEnds) {
   const Contents found = contents_of(path_);
   EXPECT_THAT(found.lines, ElementsAreArray({"channel 1 0 /a raw", "message 1 1 1001 901 closed"}));
   EXPECT_FALSE(found.end.is_whole);
-  EXPECT_THAT(found.end.problem, HasSubstr("without a footer"));
+  EXPECT_THAT(found.end.problem, HasSubstr("no footer"));
 }
 
 TEST_F(Writer, ClosesAChunkThatHasItsSize) {
@@ -170,7 +170,7 @@ TEST_F(Writer, EndsAfterTheLastChunkForWhichThereIsRoom) {
                                       HasSubstr("whole record"), HasSubstr("ulimit")));
   EXPECT_THAT(later, HasSubstr("File too large"));
   const Contents found = contents_of(path_);
-  EXPECT_THAT(found.end.problem, HasSubstr("the file ends without a footer"));
+  EXPECT_THAT(found.end.problem, HasSubstr("no footer"));
   EXPECT_EQ(found.end.whole_bytes, std::filesystem::file_size(path_));
   EXPECT_EQ(found.chunks.size(), 6U);
   EXPECT_EQ(found.lines.size(), 1 + 6 * 3U);
