@@ -111,7 +111,7 @@ McapEnd repair_mcap(const std::string& from, const std::string& to, std::string_
                     std::size_t max_chunk_bytes) {
   std::optional<OutputFile> out;
   std::optional<Copy> copy;
-  const McapEnd end =
+  McapEnd end =
       walk_mcap(from, max_chunk_bytes, [&](const Record& record, std::string_view records) {
         // All that it has is in `from` as well.
         if (!copy) copy.emplace(out.emplace(to, Unfinished::discard));
