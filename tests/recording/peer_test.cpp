@@ -1,9 +1,11 @@
-// What Arbiter writes, another's library reads: @mcap/core, with which the field's tools are made.
+// What Arbiter writes, another's library reads, and the other way round: @mcap/core, with which the
+// field's tools are made.
 // `./run test` installs it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <random>
 
@@ -65,14 +67,17 @@ Found read_by_ourselves(const std::string& path) {
   return found;
 }
 
+constexpr const char* kNeeds = "\nThe peer needs node, and in " ARBITER_PEER
+                               " what `npm ci` installs: `./run test` sees to both.";
+
 ProgramResult run_peer(const std::string& path) {
-  return run_program({"/usr/bin/env", "node", ARBITER_PEER, path});
+  return run_program({"/usr/bin/env", "node", ARBITER_PEER "/read_with_peer.mjs", path});
 }
 
 json read_by_peer(const std::string& path) {
   const ProgramResult result = run_peer(path);
   if (result.exit_code == 0) return json::parse(result.out);
-  ADD_FAILURE() << result.err << "\nThe reader needs node, and in " ARBITER_PEER_DIRECTORY
+  ADD_FAILURE() << result.err << "\nThe reader needs node, and in " ARBITER_PEER
                 << " what `npm ci` installs: `./run test` sees to both.";
   return {};
 }
@@ -85,16 +90,19 @@ json sorted_by_time(json messages) {
   return messages;
 }
 
-void expect_peer_agrees(const std::string& path) {
-  const Found ours = read_by_ourselves(path);
-  const json peer = read_by_peer(path);
-  ASSERT_TRUE(peer.is_object());
-  const json& stream = peer["from_beginning"];
+void expect_peer_agrees(const Found& ours, const json& stream) {
   EXPECT_EQ(stream["schemas"], ours.schemas);
   EXPECT_EQ(stream["channels"], ours.channels);
   EXPECT_EQ(stream["messages"], ours.messages);
   EXPECT_EQ(stream["metadata"], ours.metadata);
   EXPECT_EQ(stream["attachments"], ours.attachments);
+}
+
+void expect_peer_agrees(const std::string& path) {
+  const Found ours = read_by_ourselves(path);
+  const json peer = read_by_peer(path);
+  ASSERT_TRUE(peer.is_object());
+  expect_peer_agrees(ours, peer["from_beginning"]);
   const json& index = peer["by_index"];
   EXPECT_EQ(index["schemas"], ours.schemas);
   EXPECT_EQ(index["channels"], ours.channels);
@@ -179,6 +187,40 @@ TEST_F(Peer, ReadsWhatWasRepaired) {
     std::filesystem::remove(path_);
     recording::repair_mcap(directory_.write("from.mcap", content.substr(0, size)), path_, "test");
     expect_peer_agrees(path_);
+  }
+}
+
+// Files of the peer: with and without chunks, indexes, CRCs and compression; in chunks, and again
+// at the end, schemas and channels, of which the first has the number 0.
+TEST_F(Peer, WritesWhatWeRead) {
+  for (const char* options :
+       {"{}", R"({"useChunks": false})", R"({"zstd": true, "chunkSize": 1000})",
+        R"({"useMessageIndex": false, "useChunkIndex": false, "useSummaryOffsets": false})",
+        R"({"useStatistics": false, "repeatSchemas": false, "repeatChannels": false,
+            "useMetadataIndex": false, "useAttachmentIndex": false, "useChunkIndex": false})"}) {
+    SCOPED_TRACE(options);
+    const ProgramResult written =
+        run_program({"/usr/bin/env", "node", ARBITER_PEER "/write_with_peer.mjs", path_, options});
+    ASSERT_EQ(written.exit_code, 0) << written.err << kNeeds;
+    const Found ours = read_by_ourselves(path_);
+    EXPECT_EQ(ours.messages.size(), 100U);
+    EXPECT_EQ(ours.messages[99]["data"], std::string(99, 'x'));
+    EXPECT_EQ(ours.channels[0]["id"], 0);
+    EXPECT_EQ(ours.attachments[0]["data"], "attached");
+    // Cut off and repaired, it has an index that the peer reads; what the peer left out is there.
+    const std::string content = content_of_file(path_);
+    const std::size_t data_end = content.rfind(std::string("\x0F\x04\0\0\0\0\0\0\0", 9));
+    ASSERT_NE(data_end, std::string::npos);
+    const std::string to = directory_.file("repaired.mcap");
+    std::filesystem::remove(to);
+    recording::repair_mcap(directory_.write("cut.mcap", content.substr(0, data_end)), to, "test");
+    const json repaired = read_by_peer(to);
+    ASSERT_TRUE(repaired.is_object());
+    expect_peer_agrees(read_by_ourselves(to), repaired["from_beginning"]);
+    EXPECT_EQ(repaired["by_index"]["statistics"]["messages"], 100);
+    EXPECT_EQ(repaired["by_index"]["statistics"]["schemas"], 1);
+    const bool is_indexed = !repaired["by_index"]["compressions"].empty();
+    EXPECT_EQ(repaired["by_index"]["messages"].size(), is_indexed ? 100U : 0U);
   }
 }
 
