@@ -1,7 +1,4 @@
-#include <algorithm>
-#include <limits>
-#include <utility>
-#include <vector>
+#include <string>
 
 #include "recording/compression.hpp"
 #include "recording/crc32.hpp"

@@ -57,6 +57,9 @@ struct McapAttachment {
   std::string data;
 };
 
+// What one record of a file may have, for a reader need not have more memory.
+inline constexpr std::size_t kMaxChunkBytes = std::size_t{256} << 20;
+
 // A chunk that is made apart from the file: recording/mcap_chunk.hpp.
 struct McapChunk;
 
@@ -71,6 +74,8 @@ struct McapOptions {
 // If the file cannot be written (no space is left, or its disk fails), the function throws
 // McapError, and so does each later one. The file then ends with the last chunk that was written
 // whole, as after a kill. A program that may meet a limit to the size of files must ignore SIGXFSZ.
+// What read_mcap() would not read is refused without such consequences: a message, an attachment,
+// or all schemas and channels together with nearly kMaxChunkBytes.
 class McapWriter {
  public:
   // Makes the file, for its user alone; one that is there already is an error.
@@ -139,7 +144,6 @@ struct McapEnd {
 // file that ends early, even within its first bytes, is damaged; one that is being written is read
 // as far as it is. Throws for a file that cannot be opened, or begins as no MCAP file of this
 // version does.
-inline constexpr std::size_t kMaxChunkBytes = std::size_t{256} << 20;
 McapEnd read_mcap(const std::string& path, const McapVisitor& visitor,
                   std::size_t max_chunk_bytes = kMaxChunkBytes);
 

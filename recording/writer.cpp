@@ -1,5 +1,5 @@
 #include <limits>
-#include <map>
+#include <string>
 #include <utility>
 
 #include "recording/mcap.hpp"
@@ -9,24 +9,45 @@
 #include "recording/summary.hpp"
 
 namespace arbiter::recording {
+namespace {
+
+// There is room for the head of the chunk that it may be in.
+constexpr std::size_t kMostBytes = kMaxChunkBytes - 4'096;
+
+}  // namespace
 
 struct McapWriter::File {
   File(const std::string& path, const McapOptions& chosen)
       : options(chosen), chunk(chosen.compression), out(path, Unfinished::keep) {}
 
-  template <typename Id>
-  static Id next_id(std::size_t count, const OutputFile& out, const char* what) {
-    if (count >= std::numeric_limits<Id>::max()) {
+  std::uint16_t id_after(std::size_t count, const char* what) const {
+    if (count >= std::numeric_limits<std::uint16_t>::max()) {
       out.refuse(std::string("add a ") + what, "it has 65535, and there can be no more");
     }
-    return static_cast<Id>(count + 1);
+    return static_cast<std::uint16_t>(count + 1);
+  }
+
+  void require_readable(std::size_t bytes, const char* what) const {
+    if (bytes <= kMostBytes) return;
+    out.refuse(std::string("write ") + what, std::to_string(bytes) + " bytes are more than the " +
+                                                 std::to_string(kMostBytes) +
+                                                 " that readers are ready for");
+  }
+
+  void declare(const std::string& record) {
+    require_readable(declared_bytes + record.size(), "more schemas and channels");
+    declared_bytes += record.size();
+    declared += record;
   }
 
   // Schemas and channels stand outside of chunks, before the first chunk that needs them; they are
   // written together with it.
-  void write_declared(std::string_view what) {
-    const std::string bytes = std::exchange(declared, {}) + std::string(what);
-    if (!bytes.empty()) out.write(bytes);
+  void write_after_declared(std::string_view bytes) {
+    if (declared.empty()) {
+      out.write(bytes);
+    } else {
+      out.write(std::exchange(declared, {}).append(bytes));
+    }
   }
 
   void end_chunk() {
@@ -35,7 +56,7 @@ struct McapWriter::File {
 
   void append(const McapChunk& closed) {
     const std::uint64_t offset = out.bytes() + declared.size();
-    write_declared(closed.bytes);
+    write_after_declared(closed.bytes);
     summary.add_chunk(offset, closed);
   }
 
@@ -43,7 +64,8 @@ struct McapWriter::File {
   McapChunkBuilder chunk;
   OutputFile out;
   Summary summary;
-  std::string declared;
+  std::string declared;            // and not written yet
+  std::size_t declared_bytes = 0;  // written or not
   std::size_t schemas = 0;
   std::size_t channels = 0;
 };
@@ -66,11 +88,11 @@ McapWriter& McapWriter::operator=(McapWriter&&) noexcept = default;
 McapWriter::~McapWriter() = default;
 
 std::uint16_t McapWriter::add_schema(const McapSchema& schema) {
-  const auto id = File::next_id<std::uint16_t>(file_->schemas, file_->out, "schema");
+  const auto id = file_->id_after(file_->schemas, "schema");
   std::string record;
   append_schema(record, id, schema);
+  file_->declare(record);
   file_->summary.add_schema(id, record);
-  file_->declared += record;
   ++file_->schemas;
   return id;
 }
@@ -79,11 +101,11 @@ std::uint16_t McapWriter::add_channel(const McapChannel& channel) {
   if (channel.schema > file_->schemas) {
     file_->out.refuse("add a channel", "there is no schema " + std::to_string(channel.schema));
   }
-  const auto id = File::next_id<std::uint16_t>(file_->channels, file_->out, "channel");
+  const auto id = file_->id_after(file_->channels, "channel");
   std::string record;
   append_channel(record, id, channel);
+  file_->declare(record);
   file_->summary.add_channel(id, record);
-  file_->declared += record;
   ++file_->channels;
   return id;
 }
@@ -92,6 +114,8 @@ void McapWriter::write(const McapMessage& message) {
   if (message.channel == 0 || message.channel > file_->channels) {
     file_->out.refuse("write", "there is no channel " + std::to_string(message.channel));
   }
+  file_->require_readable(message.data.size(), "a message");
+  if (file_->chunk.bytes() + message.data.size() > kMostBytes) file_->end_chunk();
   file_->chunk.write(message);
   if (file_->chunk.bytes() >= file_->options.chunk_bytes) file_->end_chunk();
 }
@@ -108,6 +132,7 @@ void McapWriter::append(const McapChunk& chunk) {
 void McapWriter::write_metadata(const std::string& name, const McapMap& metadata) {
   std::string record;
   append_metadata(record, name, metadata);
+  file_->require_readable(record.size(), "metadata");
   end_chunk();
   const std::uint64_t offset = file_->out.bytes();
   file_->out.write(record);
@@ -115,6 +140,7 @@ void McapWriter::write_metadata(const std::string& name, const McapMap& metadata
 }
 
 void McapWriter::write_attachment(const McapAttachment& attachment) {
+  file_->require_readable(attachment.data.size(), "an attachment");
   std::string record;
   append_attachment(record, attachment);
   end_chunk();
@@ -125,7 +151,7 @@ void McapWriter::write_attachment(const McapAttachment& attachment) {
 
 void McapWriter::end_chunk() {
   file_->end_chunk();
-  file_->write_declared({});
+  file_->write_after_declared({});
 }
 
 void McapWriter::sync() { file_->out.sync(); }

@@ -40,6 +40,15 @@ INSTANTIATE_TEST_SUITE_P(Mcap, EachCompression,
                          testing::Values(Compression::none, Compression::lz4, Compression::zstd),
                          name_of);
 
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const McapError& error) {
+    return error.what();
+  }
+  return "";
+}
+
 class Writer : public testing::Test {
  protected:
   TemporaryDirectory directory_;
@@ -93,6 +102,20 @@ TEST_F(Writer, SaysWhatItHasNot) {
   EXPECT_TRUE(contents_of(path_).end.is_whole);
 }
 
+// Or it would be a file that our own reader takes for damaged.
+TEST_F(Writer, RefusesWhatNobodyWouldReadAndGoesOn) {
+  McapWriter writer(path_, "test", {});
+  const auto channel = writer.add_channel({0, "/a", "raw", {}});
+  const std::unique_ptr<std::byte[]> large(new std::byte[recording::kMaxChunkBytes]);
+  EXPECT_THAT(message_of([&] {
+                writer.write({channel, 1, 1, 1, {large.get(), recording::kMaxChunkBytes}});
+              }),
+              HasSubstr("268435456 bytes are more than"));
+  writer.write(message(channel, 2, "small"));
+  writer.close();
+  EXPECT_EQ(contents_of(path_).lines.back(), "message 1 2 1002 902 small");
+}
+
 // Chunks of a flight recorder: closed long before the file exists, the oldest dropped.
 TEST_F(Writer, AppendsChunksThatWereKept) {
   recording::McapChunkBuilder builder(Compression::lz4);
@@ -141,15 +164,6 @@ class SizeLimit {
   void (*before_)(int);
   rlimit limit_{};
 };
-
-std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const McapError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 TEST_F(Writer, EndsAfterTheLastChunkForWhichThereIsRoom) {
   std::string problem;
