@@ -23,7 +23,7 @@ void include(std::optional<RecordingInfo::Times>& times, McapTime time) {
   times->end = std::max(times->end, time);
 }
 
-void count(RecordingInfo& info, const recording::McapMessage& message) {
+void count_message(RecordingInfo& info, const recording::McapMessage& message) {
   ++info.messages;
   include(info.times, message.log_time);
   auto& channel = info.channels[message.channel];
@@ -44,7 +44,9 @@ recording::McapVisitor visitor_for(RecordingInfo& info) {
   visitor.channel = [&info](std::uint16_t id, const recording::McapChannel& channel) {
     info.channels.try_emplace(id, RecordingInfo::Channel{id, channel, 0, 0, {}});
   };
-  visitor.message = [&info](const recording::McapMessage& message) { count(info, message); };
+  visitor.message = [&info](const recording::McapMessage& message) {
+    count_message(info, message);
+  };
   visitor.metadata = [&info](const std::string& name, const recording::McapMap& map) {
     if (info.metadata.size() == kMostListed) {
       ++info.unlisted;

@@ -98,7 +98,7 @@ class McapWriter {
 
   void end_chunk();
   void sync();
-  // Summary, indexes, statistics, footer.
+  // Summary, indexes, statistics, footer; returns when a power cut cannot take the file.
   void close();
   // Of the file, with the chunk that is not written yet, uncompressed.
   [[nodiscard]] std::uint64_t bytes() const noexcept;

@@ -159,6 +159,7 @@ void McapWriter::sync() { file_->out.sync(); }
 void McapWriter::close() {
   end_chunk();
   file_->out.write(file_->summary.ending(file_->out.bytes(), file_->out.crc()));
+  file_->out.sync();
   file_->out.close();
 }
 
