@@ -17,7 +17,7 @@
 namespace arbiter::cli {
 namespace {
 
-std::string date_text(std::int64_t ms) {
+std::string time_text(std::int64_t ms) {
   const auto seconds = static_cast<std::time_t>(ms / 1000);
   std::tm local{};
   char text[64];
@@ -40,7 +40,7 @@ int history(const HistoryOptions& options) {
     return 0;
   }
   for (const auto& model : models) {
-    std::cout << std::setw(4) << model.generation << "  " << date_text(model.since_ms) << "  "
+    std::cout << std::setw(4) << model.generation << "  " << time_text(model.since_ms) << "  "
               << model.name << "  " << model.how;
     if (model.by) std::cout << ", by " << *model.by;
     std::cout << (model.is_kept ? "\n" : "  (not kept)\n");
