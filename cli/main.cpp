@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/verbs.hpp"
+#include "recording/mcap.hpp"
 #include "rules/model/load.hpp"
 #include "rules/text/names.hpp"
 #include "shm/utf8.hpp"
@@ -74,6 +75,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_play(app, exit_code);
   arbiter::cli::add_echo(app, exit_code);
   arbiter::cli::add_pub(app, exit_code);
+  arbiter::cli::add_recording(app, exit_code);
   arbiter::cli::add_status(app, exit_code);
   arbiter::cli::add_why(app, exit_code);
   arbiter::cli::add_wait(app, exit_code);
@@ -98,6 +100,9 @@ int run(int argc, char** argv) {
   } catch (const arbiter::rules::FileError& error) {
     say(error.what());
     return kWrongUse;
+  } catch (const arbiter::recording::McapError& error) {
+    say(error.what());
+    return kWrongUse;
   }
   return exit_code;
 }
@@ -106,6 +111,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);  // a reader that has gone is told as any other failure to write
+  std::signal(SIGXFSZ, SIG_IGN);  // and so is a limit to the size of files
   std::ios::sync_with_stdio(false);
   int exit_code = kFailed;
   try {

@@ -1,0 +1,73 @@
+// What a recording's file has, and a whole file from one that is not.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "recording/mcap.hpp"
+
+namespace arbiter::cli {
+
+struct RecordingInfo {
+  struct Times {
+    recording::McapTime begin = 0;
+    recording::McapTime end = 0;
+  };
+  struct Channel {
+    std::uint16_t id = 0;
+    recording::McapChannel channel;
+    std::uint64_t messages = 0;
+    std::uint64_t bytes = 0;     // of the messages
+    std::optional<Times> times;  // of the messages
+
+    // Messages per second; none of fewer than two, or where all bear the same time.
+    [[nodiscard]] std::optional<double> rate() const;
+  };
+  struct Chunks {
+    std::uint64_t count = 0;
+    std::uint64_t compressed = 0;
+    std::uint64_t uncompressed = 0;
+  };
+  struct Attachment {
+    std::string name;
+    std::string media_type;
+    recording::McapTime log_time = 0;
+    std::uint64_t bytes = 0;
+  };
+
+  std::string path;
+  recording::McapEnd end;
+  std::string profile;
+  std::string library;
+  std::uint64_t messages = 0;
+  std::optional<Times> times;
+  std::map<std::string, Chunks> chunks;  // by compression
+  std::map<std::uint16_t, recording::McapSchema> schemas;
+  std::map<std::uint16_t, Channel> channels;
+  std::vector<std::pair<std::string, recording::McapMap>> metadata;
+  std::vector<Attachment> attachments;
+  std::uint64_t unlisted = 0;  // metadata and attachments for which there was no room
+  std::size_t listed_bytes = 0;
+};
+
+// Reads all of it, so that each CRC is checked; says how far it is on standard error. Throws
+// McapError.
+[[nodiscard]] RecordingInfo inspect_recording(const std::string& path);
+
+// For 80 columns.
+void write_text(std::ostream& out, const RecordingInfo& info);
+[[nodiscard]] nlohmann::json to_json(const RecordingInfo& info);
+
+// `arbiter recording info`: the exit code is 1 if the file is not whole.
+int show_recording(const std::string& path, bool json);
+
+// `arbiter recording repair`. `output`: empty for a name made from the path's.
+int repair_recording(const std::string& path, const std::string& output);
+
+}  // namespace arbiter::cli

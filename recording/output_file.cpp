@@ -1,0 +1,116 @@
+#include "recording/output_file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "recording/crc32.hpp"
+#include "recording/mcap.hpp"
+
+namespace arbiter::recording {
+namespace {
+
+// A new file is lost with its directory's entry.
+int sync_directory_of(const std::string& path) {
+  const std::size_t slash = path.find_last_of('/');
+  std::string directory = ".";
+  if (slash != std::string::npos) directory = slash == 0 ? "/" : path.substr(0, slash);
+  const int fd = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return errno == EACCES ? 0 : errno;  // who may not list it can do no more
+  // Some file systems cannot do it, and need not.
+  const int error = ::fsync(fd) == 0 || errno == EINVAL ? 0 : errno;
+  ::close(fd);
+  return error;
+}
+
+const char* advice_for(int error) {
+  switch (error) {
+    case ENOSPC:
+    case EDQUOT:
+      return "; make room, or choose another file system";
+    case EFBIG:
+      return "; raise the limit to the size of files (ulimit -f), or choose another file system";
+    case EEXIST:
+      return "; choose another name, or delete it";
+    default:
+      return "";
+  }
+}
+
+}  // namespace
+
+OutputFile::OutputFile(const std::string& path, Unfinished unfinished)
+    : path_(path), unfinished_(unfinished) {
+  // Samples are for whom the policy lets watch them: here, for who records.
+  fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (fd_ < 0) {
+    const int error = errno;
+    throw McapError("cannot make " + path + ": " + std::strerror(error) + advice_for(error));
+  }
+}
+
+OutputFile::~OutputFile() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+void OutputFile::discard() noexcept {
+  if (fd_ >= 0) ::close(std::exchange(fd_, -1));
+  ::unlink(path_.c_str());
+}
+
+void OutputFile::refuse(const std::string& what, const std::string& reason) const {
+  throw McapError("cannot " + what + " to " + path_ + ": " + reason);
+}
+
+void OutputFile::require_open(const std::string& what) const {
+  if (!ended_.empty()) refuse(what, ended_);
+  if (fd_ < 0) refuse(what, "it is closed");
+}
+
+void OutputFile::fail(const char* what, int error) {
+  ended_ = std::strerror(error);
+  if (unfinished_ == Unfinished::keep) {
+    // What could be written of a record would end the reading all the same, with a worse message.
+    [[maybe_unused]] const int truncated = ::ftruncate(fd_, static_cast<off_t>(bytes_));
+    ended_ += ". It ends after the last whole record, at byte " + std::to_string(bytes_);
+  } else {
+    discard();
+    ended_ += "; it was deleted";
+  }
+  ended_ += advice_for(error);
+  refuse(what, ended_);
+}
+
+void OutputFile::write(std::string_view bytes) {
+  require_open("write");
+  std::string_view left = bytes;
+  while (!left.empty()) {
+    const ssize_t count = ::write(fd_, left.data(), left.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) fail("write", count < 0 ? errno : ENOSPC);
+    left.remove_prefix(static_cast<std::size_t>(count));
+  }
+  crc_ = crc32(bytes, crc_);
+  bytes_ += bytes.size();
+}
+
+void OutputFile::sync() {
+  require_open("write");
+  if (::fdatasync(fd_) != 0) fail("write", errno);
+  if (std::exchange(is_synced_before_, true)) return;
+  if (const int error = sync_directory_of(path_); error != 0) fail("write", error);
+}
+
+void OutputFile::close() {
+  require_open("write");
+  const int fd = std::exchange(fd_, -1);
+  // Where the file is another machine's, this is when a quota may be exceeded.
+  if (::close(fd) == 0 || errno == EINTR) return;
+  ended_ = std::strerror(errno);
+  refuse("write", ended_);
+}
+
+}  // namespace arbiter::recording
