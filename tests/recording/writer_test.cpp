@@ -207,6 +207,7 @@ TEST(Crc32, IsTheOneOfZlib) {
     EXPECT_EQ(recording::crc32(text.substr(cut), recording::crc32(text.substr(0, cut))),
               0x414FA339U);
   }
+  EXPECT_EQ(recording::crc32({}, 0x414FA339U), 0x414FA339U);
 }
 
 }  // namespace
