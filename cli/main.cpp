@@ -75,6 +75,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_echo(app, exit_code);
   arbiter::cli::add_pub(app, exit_code);
   arbiter::cli::add_status(app, exit_code);
+  arbiter::cli::add_top(app, exit_code);
   arbiter::cli::add_why(app, exit_code);
   arbiter::cli::add_wait(app, exit_code);
   arbiter::cli::add_metrics(app, exit_code);

@@ -1,0 +1,205 @@
+#include "top/sampler.hpp"
+
+#include <algorithm>
+
+#include "rules/explain/change.hpp"
+#include "rules/explain/tenure.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::top {
+namespace {
+
+std::chrono::system_clock::time_point earlier(std::chrono::system_clock::time_point wall,
+                                              shm::Nanoseconds by) {
+  return wall - std::chrono::duration_cast<std::chrono::system_clock::duration>(
+                    std::chrono::nanoseconds(by));
+}
+
+}  // namespace
+
+Sampler::Sampler(std::shared_ptr<watch::Instance> instance)
+    : instance_(std::move(instance)), started_(shm::monotonic_now()) {}
+
+void Sampler::set_census(std::shared_ptr<const Census> census) {
+  census_ = std::move(census);
+  is_bound_ = false;
+}
+
+// Ids of names. A daemon with memory of its own has numbered them anew.
+void Sampler::bind() {
+  if (memory_ != instance_->memory()) {
+    memory_ = instance_->memory();
+    is_bound_ = false;
+    seats_.clear();
+    last_ = {};
+  }
+  const shm::TableSnapshot snapshot = memory_->tables().snapshot();
+  if (is_bound_ && generation_ == snapshot.generation) return;
+  sources_.clear();
+  if (snapshot.generation != 0) sources_ = watch::all_sources(snapshot.table);
+  port_ids_.clear();
+  source_ids_.clear();
+  places_.clear();
+  if (census_ != nullptr) {
+    for (const PortFact& each : census_->ports) {
+      port_ids_.push_back(instance_->find_port(each.name).value_or(shm::kNone));
+    }
+    for (const SourceFact& each : census_->sources) {
+      const shm::SourceId id = instance_->find_source(each.name).value_or(shm::kNone);
+      if (id != shm::kNone) {
+        places_[id] = static_cast<std::int32_t>(source_ids_.size());
+        sources_.push_back(id);
+      }
+      source_ids_.push_back(id);
+    }
+  }
+  std::sort(sources_.begin(), sources_.end());
+  sources_.erase(std::unique(sources_.begin(), sources_.end()), sources_.end());
+  // If another model has come meanwhile, the next look binds again.
+  generation_ = snapshot.generation;
+  is_bound_ = memory_->tables().is_whole(snapshot);
+}
+
+shm::Nanoseconds Sampler::look() {
+  instance_->update();
+  bind();
+  const auto these = [this](const shm::TableView&) { return sources_; };
+  watch::Picture picture = watch::take_picture(*memory_, these);
+  const bool is_of_binding = picture.snapshot.generation == generation_;
+  before_ = std::exchange(last_, std::move(picture));
+  wall_ = std::chrono::system_clock::now();
+  // Else who wins is told by the next look.
+  if (is_of_binding && last_.is_settled) take_seats();
+  return std::clamp(last_.next_end(), last_.now + kLeastInterval, last_.now + kLookInterval);
+}
+
+void Sampler::take_seats() {
+  if (census_ == nullptr) return;
+  std::map<std::string, Seat> seats;
+  std::vector<Takeover> noted = takeovers_;
+  const std::uint64_t so_far = takeovers_so_far_;
+  for (std::size_t i = 0; i < port_ids_.size(); ++i) {
+    if (port_ids_[i] == shm::kNone) continue;
+    const std::string& name = census_->ports[i].name;
+    const auto known = seats_.find(name);
+    if (known == seats_.end()) {
+      seats[name] = first_seat(port_ids_[i]);
+      continue;
+    }
+    Seat now = seat_at(port_ids_[i]);
+    if (now.winner != known->second.winner) {
+      note_takeover(name, port_ids_[i], known->second, now);
+    } else {
+      now.since = known->second.since;
+      now.is_exact = known->second.is_exact;
+    }
+    seats[name] = now;
+  }
+  if (memory_->tables().is_whole(last_.snapshot)) {
+    seats_ = std::move(seats);
+  } else {  // what was read of the table may have been another's
+    takeovers_ = std::move(noted);
+    takeovers_so_far_ = so_far;
+  }
+}
+
+Sampler::Seat Sampler::seat_at(shm::PortId port) const {
+  Seat seat;
+  if (last_.snapshot.generation == 0) return seat;
+  seat.is_arbitrated = last_.snapshot.table.is_arbitrated(port);
+  seat.winner = last_.winner_at(port);
+  return seat;
+}
+
+// Of the past, what the activity words tell: exact only while the first model is in force, for they
+// were written under its T.
+Sampler::Seat Sampler::first_seat(shm::PortId port) const {
+  Seat seat = seat_at(port);
+  seat.since = started_;
+  if (!seat.is_arbitrated || census_->first_model_since == 0) return seat;
+  const auto word = [this](shm::SourceId source) {
+    const auto found = last_.words.find(source);
+    return found == last_.words.end() ? shm::kNeverActive : found->second;
+  };
+  const rules::Tenure tenure = rules::tenure_of(last_.snapshot.table, port, seat.winner,
+                                                {last_.now, census_->first_model_since, word});
+  seat.since = std::max(tenure.at_least, census_->first_model_since);
+  seat.is_exact = tenure.is_exact();
+  return seat;
+}
+
+void Sampler::note_takeover(const std::string& port, shm::PortId id, const Seat& before,
+                            Seat& now) {
+  Takeover takeover;
+  takeover.number = ++takeovers_so_far_;
+  now.since = last_.now;
+  now.is_exact = true;
+  takeover.because = cause_of(id, now.since);
+  takeover.at = now.since;
+  takeover.wall = earlier(wall_, last_.now - now.since);
+  takeover.port = port;
+  takeover.before = name_of(before.winner);
+  takeover.winner = name_of(now.winner);
+  takeovers_.push_back(std::move(takeover));
+}
+
+// `at`: when it happened, which was before it was seen.
+std::string Sampler::cause_of(shm::PortId port, shm::Nanoseconds& at) const {
+  if (before_.snapshot.generation != last_.snapshot.generation) {
+    return "model " + std::to_string(last_.snapshot.generation) + " came into force";
+  }
+  const shm::TableView& table = last_.snapshot.table;
+  const auto was = [this](shm::SourceId source) { return before_.is_active(source); };
+  const auto is = [this](shm::SourceId source) { return last_.is_active(source); };
+  std::string text;
+  for (const shm::SourceId source : rules::causes_of_change(table, port, was, is)) {
+    const shm::ActivityWord word = last_.words.at(source);
+    const bool has_expired = shm::is_finite(word) && !is(source);
+    const shm::Nanoseconds time = has_expired ? word : shm::time_of(word, table.timeout(source));
+    at = std::min(at, std::max(time, before_.now));
+    text += (text.empty() ? "" : ", ") + name_of(source) +
+            (is(source)    ? " began"
+             : has_expired ? " fell silent"
+                           : " was deactivated");
+  }
+  return text;
+}
+
+std::string Sampler::name_of(shm::SourceId source) const {
+  return source == shm::kNone ? "" : memory_->source_name(source);
+}
+
+std::shared_ptr<const Frame> Sampler::frame() const {
+  if (census_ == nullptr || memory_ == nullptr) return nullptr;
+  const auto frame = std::make_shared<Frame>();
+  frame->now = last_.now;
+  frame->wall = wall_;
+  frame->census = census_;
+  frame->generation = last_.snapshot.generation;
+  frame->takeovers = takeovers_so_far_;
+  frame->has_daemon = instance_->has_daemon();
+  frame->is_settled = last_.is_settled;
+  for (const PortFact& each : census_->ports) {
+    PortState& state = frame->ports.emplace_back();
+    const auto seat = seats_.find(each.name);
+    if (seat == seats_.end()) continue;
+    state.since = seat->second.since;
+    state.is_exact = seat->second.is_exact;
+    const auto place = places_.find(seat->second.winner);
+    if (!seat->second.is_arbitrated) {
+      state.winner = kNotArbitrated;
+    } else if (seat->second.winner == shm::kNone) {
+      state.winner = kNobody;
+    } else if (place != places_.end()) {
+      state.winner = place->second;
+    }
+  }
+  for (std::size_t i = 0; i < census_->sources.size(); ++i) {
+    const bool is_bound = i < source_ids_.size() && source_ids_[i] != shm::kNone;
+    const auto word = is_bound ? last_.words.find(source_ids_[i]) : last_.words.end();
+    frame->words.push_back(word == last_.words.end() ? shm::kNeverActive : word->second);
+  }
+  return frame;
+}
+
+}  // namespace arbiter::top

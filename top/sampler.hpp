@@ -1,0 +1,75 @@
+// Looks at what decides, in memory: who wins where, which sources are active, and each change of a
+// winner.
+//
+// It asks nobody. A look costs the components nothing but that lines of memory which they write are
+// read, as their receivers read them. A winner that comes and goes between two looks is missed.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "top/frame.hpp"
+#include "watch/instance.hpp"
+#include "watch/picture.hpp"
+
+namespace arbiter::top {
+
+// How long between two looks at most.
+inline constexpr shm::Nanoseconds kLookInterval = 10'000'000;
+// And at least, however soon an activity ends.
+inline constexpr shm::Nanoseconds kLeastInterval = 1'000'000;
+
+// Thread safety: none; it belongs to the thread of its instance.
+class Sampler {
+ public:
+  explicit Sampler(std::shared_ptr<watch::Instance> instance);
+
+  // Which ports and sources there are.
+  void set_census(std::shared_ptr<const Census> census);
+  // Takes up the daemon's news and looks. Returns when to look again, at the latest.
+  shm::Nanoseconds look();
+  // Of the last look; null before the first census.
+  [[nodiscard]] std::shared_ptr<const Frame> frame() const;
+  // Since the last call, the oldest first.
+  [[nodiscard]] std::vector<Takeover> new_takeovers() { return std::exchange(takeovers_, {}); }
+
+ private:
+  // What is known of a port's winner.
+  struct Seat {
+    shm::SourceId winner = shm::kNone;
+    bool is_arbitrated = false;
+    shm::Nanoseconds since = 0;
+    bool is_exact = false;
+  };
+
+  void bind();
+  void take_seats();
+  [[nodiscard]] Seat seat_at(shm::PortId port) const;
+  [[nodiscard]] Seat first_seat(shm::PortId port) const;
+  void note_takeover(const std::string& port, shm::PortId id, const Seat& before, Seat& now);
+  [[nodiscard]] std::string cause_of(shm::PortId port, shm::Nanoseconds& at) const;
+  [[nodiscard]] std::string name_of(shm::SourceId source) const;
+
+  const std::shared_ptr<watch::Instance> instance_;
+  const shm::Nanoseconds started_;
+  std::shared_ptr<const shm::DecisionMemory> memory_;
+  std::shared_ptr<const Census> census_;
+  std::uint64_t generation_ = 0;  // that sources_ are of
+  bool is_bound_ = false;
+  std::vector<shm::SourceId> sources_;  // to look at, ascending
+  std::vector<shm::PortId> port_ids_;   // of the census; kNone: no name has come
+  std::vector<shm::SourceId> source_ids_;
+  std::map<shm::SourceId, std::int32_t> places_;  // in the census
+  watch::Picture last_;
+  watch::Picture before_;
+  std::chrono::system_clock::time_point wall_;  // of last_
+  std::map<std::string, Seat> seats_;           // by port
+  std::uint64_t takeovers_so_far_ = 0;
+  std::vector<Takeover> takeovers_;
+};
+
+}  // namespace arbiter::top

@@ -1,0 +1,54 @@
+// The terminal, by ncurses.
+//
+// It is taken when the screen is made and given back when that is destroyed, however that comes
+// about; SIGTSTP and SIGCONT in between are ncurses's. There can be one at a time.
+#pragma once
+
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "shm/file_descriptor.hpp"
+#include "top/keys.hpp"
+#include "top/line.hpp"
+#include "top/view.hpp"
+
+namespace arbiter::top {
+
+// There is no terminal, or none that can show a screen: the message says so, and what to do.
+class ScreenError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// Throws ScreenError unless standard input and output are a terminal that a screen can be drawn on.
+// Writes nothing.
+void require_terminal();
+
+// What the user's locale (LC_CTYPE) can show, which the program takes over by this.
+[[nodiscard]] Charset charset_of_locale();
+
+class Screen {
+ public:
+  // Throws ScreenError.
+  Screen();
+  Screen(const Screen&) = delete;
+  Screen& operator=(const Screen&) = delete;
+  ~Screen();
+
+  [[nodiscard]] Size size() const;
+  // Readable when the terminal has another size; read_key() takes it up.
+  [[nodiscard]] int resized() const noexcept { return resized_.get(); }
+  void show(const std::vector<Line>& lines) const;
+  // Nothing: none is waiting. Does not block.
+  std::optional<KeyPress> read_key();
+
+ private:
+  void take_up_size() const;
+
+  const Charset charset_;
+  const shm::FileDescriptor resized_;
+  bool has_colours_ = false;
+};
+
+}  // namespace arbiter::top
