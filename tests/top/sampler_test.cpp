@@ -1,0 +1,151 @@
+// What is seen of a real instance: a daemon in a process of its own, ports in this one.
+#include "top/sampler.hpp"
+
+#include <gtest/gtest.h>
+
+#include <arbiter/arbiter.hpp>
+
+#include "shm/clock.hpp"
+#include "tests/watch/watched.hpp"
+
+namespace arbiter::top {
+namespace {
+
+// Activity ends only by deactivate(), so that no test depends on time.
+const std::string kModel = R"(<behaviors timeout="forever">
+  <behavior name="Low"><config at="/p:i">/low:o</config></behavior>
+  <behavior name="High"><config at="/p:i">/high:o</config><inhibition>Low</inhibition></behavior>
+</behaviors>)";
+
+class TopSampler : public testing::Test {
+ protected:
+  void take_census() {
+    StampedStatus now;
+    now.status = instance_->status();
+    now.at = shm::monotonic_now();
+    now.wall = std::chrono::system_clock::now();
+    sampler_.set_census(std::make_shared<const Census>(census_of(now, nullptr)));
+  }
+  std::shared_ptr<const Frame> look() {
+    sampler_.look();
+    return sampler_.frame();
+  }
+  static std::string winner_of(const Frame& frame, const std::string& port) {
+    const auto place = static_cast<std::size_t>(frame.census->find_port(port));
+    const std::int32_t winner = frame.ports.at(place).winner;
+    if (winner == kNobody) return "nobody";
+    if (winner < 0) return std::to_string(winner);
+    return frame.census->sources.at(static_cast<std::size_t>(winner)).name;
+  }
+
+  test::Daemon daemon_{kModel};
+  std::shared_ptr<watch::Instance> instance_ = test::watched(daemon_);
+  Sampler sampler_{instance_};
+};
+
+TEST_F(TopSampler, HasNoPictureBeforeItKnowsThePorts) {
+  EXPECT_EQ(look(), nullptr);
+  take_census();
+  ASSERT_NE(look(), nullptr);
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "nobody");
+  EXPECT_TRUE(sampler_.new_takeovers().empty());
+}
+
+TEST_F(TopSampler, TellsEachChangeOfAWinnerAndWhatMadeIt) {
+  Node node("test");
+  auto low = node.output_port<int>("/low:o");
+  auto high = node.output_port<int>("/high:o");
+  take_census();
+  look();
+  const shm::Nanoseconds before = shm::monotonic_now();
+  low.publish(1);
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "/low:o");
+  high.publish(1);
+  const auto frame = look();
+  EXPECT_EQ(winner_of(*frame, "/p:i"), "/high:o");
+  EXPECT_EQ(frame->takeovers, 2u);
+  high.deactivate();
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "/low:o");
+  low.deactivate();
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "nobody");
+
+  const auto takeovers = sampler_.new_takeovers();
+  ASSERT_EQ(takeovers.size(), 4u);
+  EXPECT_EQ(takeovers[0].before, "");
+  EXPECT_EQ(takeovers[0].winner, "/low:o");
+  EXPECT_EQ(takeovers[0].because, "/low:o began");
+  EXPECT_EQ(takeovers[1].before, "/low:o");
+  EXPECT_EQ(takeovers[1].winner, "/high:o");
+  EXPECT_EQ(takeovers[1].because, "/high:o began");
+  EXPECT_EQ(takeovers[2].because, "/high:o was deactivated");
+  EXPECT_EQ(takeovers[3].winner, "");
+  shm::Nanoseconds last = before;
+  for (const Takeover& each : takeovers) {
+    EXPECT_EQ(each.port, "/p:i");
+    EXPECT_GE(each.at, last);  // the arrival itself, not when it was seen
+    last = each.at;
+  }
+  EXPECT_TRUE(sampler_.new_takeovers().empty());
+}
+
+TEST_F(TopSampler, SinceIsWhenTheWinnerBegan) {
+  Node node("test");
+  auto low = node.output_port<int>("/low:o");
+  take_census();
+  look();
+  const shm::Nanoseconds before = shm::monotonic_now();
+  low.publish(1);
+  const shm::Nanoseconds after = shm::monotonic_now();
+  const PortState state = look()->ports.at(0);
+  EXPECT_TRUE(state.is_exact);
+  EXPECT_GE(state.since, before);
+  EXPECT_LE(state.since, after);
+  low.publish(2);
+  EXPECT_EQ(look()->ports.at(0).since, state.since);  // it has gone on
+}
+
+TEST_F(TopSampler, AnotherModelMayChangeTheWinner) {
+  Node node("test");
+  auto low = node.output_port<int>("/low:o");
+  auto high = node.output_port<int>("/high:o");
+  low.publish(1);
+  high.publish(1);
+  take_census();
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "/high:o");
+  daemon_.load(R"(<behaviors timeout="forever">
+    <behavior name="Low"><config at="/p:i">/low:o</config></behavior></behaviors>)");
+  instance_->catch_up();
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "/low:o");
+  const auto takeovers = sampler_.new_takeovers();
+  ASSERT_EQ(takeovers.size(), 1u);
+  EXPECT_EQ(takeovers[0].because, "model 2 came into force");
+}
+
+TEST_F(TopSampler, GoesOnWithoutADaemonAndWithTheNext) {
+  Node node("test");
+  auto low = node.output_port<int>("/low:o");
+  take_census();
+  look();
+  daemon_.kill();
+  test::update_until(*instance_, [this] { return !instance_->has_daemon(); });
+  low.publish(1);
+  const auto alone = look();
+  EXPECT_FALSE(alone->has_daemon);
+  EXPECT_EQ(winner_of(*alone, "/p:i"), "/low:o");
+  daemon_.restart();
+  test::update_until(*instance_, [this] { return instance_->has_daemon(); });
+  take_census();
+  EXPECT_TRUE(look()->has_daemon);
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "/low:o");
+}
+
+TEST_F(TopSampler, APortThatNoRuleMentionsIsNotArbitrated) {
+  Node node("test");
+  auto in = node.input_port<int>("/other:i");
+  instance_->catch_up();
+  take_census();
+  EXPECT_EQ(winner_of(*look(), "/other:i"), std::to_string(kNotArbitrated));
+}
+
+}  // namespace
+}  // namespace arbiter::top
