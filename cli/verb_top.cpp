@@ -74,7 +74,7 @@ class Top {
         next_picture = shm::monotonic_now() + interval_;
       }
       bool must_draw = false;
-      if (!sleep_until_something(std::min(next_look, next_picture), screen.resized(), must_draw)) {
+      if (!sleep_until_something(std::min(next_look, next_picture), screen.signals(), must_draw)) {
         return 0;
       }
       while (const auto press = screen.read_key()) {
@@ -114,17 +114,17 @@ class Top {
   }
 
   // False: it is to end, or the terminal has gone.
-  [[nodiscard]] bool sleep_until_something(shm::Nanoseconds time, int resized,
-                                           bool& is_resized) const {
+  [[nodiscard]] bool sleep_until_something(shm::Nanoseconds time, int signals,
+                                           bool& has_signal) const {
     pollfd ready[] = {{STDIN_FILENO, POLLIN, 0},
                       {interrupts_.get(), POLLIN, 0},
                       {inquirer_.descriptor(), POLLIN, 0},
                       {instance_->descriptor(), POLLIN, 0},
-                      {resized, POLLIN, 0}};
+                      {signals, POLLIN, 0}};
     const shm::Nanoseconds left = std::max<shm::Nanoseconds>(time - shm::monotonic_now(), 0);
     const timespec span{left / kSecond, left % kSecond};
     if (::ppoll(ready, std::size(ready), &span, nullptr) <= 0) return true;
-    is_resized = ready[4].revents != 0;
+    has_signal = ready[4].revents != 0;
     return ready[1].revents == 0 && (ready[0].revents & (POLLHUP | POLLERR | POLLNVAL)) == 0;
   }
 

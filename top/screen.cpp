@@ -88,18 +88,28 @@ std::optional<KeyPress> press_of(wint_t character) {
   return KeyPress{Key::kCharacter, shm::encode_utf8(static_cast<std::uint32_t>(character))};
 }
 
-// SIGWINCH as a descriptor, so that none is missed between two looks.
-shm::FileDescriptor catch_resizes() {
+void set_handler(int signal, void (*handler)(int)) {
+  struct sigaction action {};
+  action.sa_handler = handler;
+  ::sigaction(signal, &action, nullptr);
+}
+
+// As a descriptor, so that none is missed between two looks. ncurses ignores SIGTSTP while it
+// writes, and a Ctrl-Z of that moment would be lost; it leaves those alone that are ignored before
+// it comes, and blocked signals are kept, ignored or not.
+shm::FileDescriptor catch_signals() {
   sigset_t caught;
   sigemptyset(&caught);
   sigaddset(&caught, SIGWINCH);
-  sigprocmask(SIG_BLOCK, &caught, nullptr);
-  return shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
+  sigaddset(&caught, SIGTSTP);
+  ::sigprocmask(SIG_BLOCK, &caught, nullptr);
+  set_handler(SIGTSTP, SIG_IGN);
+  return shm::FileDescriptor(::signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
 }
 
 }  // namespace
 
-Screen::Screen() : charset_(charset_of_locale()), resized_(catch_resizes()) {
+Screen::Screen() : charset_(charset_of_locale()), signals_(catch_signals()) {
   if (::newterm(nullptr, stdout, stdin) == nullptr) {
     throw ScreenError("this terminal cannot be used; see `arbiter top --once`");
   }
@@ -145,19 +155,38 @@ void Screen::show(const std::vector<Line>& lines) const {
   ::refresh();
 }
 
-// What is on the terminal now is the terminal's guess, even if it has its old size again.
-void Screen::take_up_size() const {
+void Screen::take_up_signals() const {
   signalfd_siginfo signal{};
-  bool is_resized = false;
-  while (::read(resized_.get(), &signal, sizeof signal) > 0) is_resized = true;
+  while (::read(signals_.get(), &signal, sizeof signal) > 0) {
+    if (signal.ssi_signo == SIGTSTP) stop();
+    take_up_size();
+  }
+}
+
+// What is on the terminal now is the terminal's guess, even if it has its old size again.
+void Screen::take_up_size() {
   winsize size{};
-  if (!is_resized || ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0) return;
-  if (size.ws_row != 0 && size.ws_col != 0) ::resizeterm(size.ws_row, size.ws_col);
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row != 0 && size.ws_col != 0) {
+    ::resizeterm(size.ws_row, size.ws_col);
+  }
   ::clearok(curscr, TRUE);
 }
 
+// Returns when it goes on.
+void Screen::stop() {
+  ::endwin();
+  set_handler(SIGTSTP, SIG_DFL);
+  sigset_t caught;
+  sigemptyset(&caught);
+  sigaddset(&caught, SIGTSTP);
+  ::raise(SIGTSTP);
+  ::sigprocmask(SIG_UNBLOCK, &caught, nullptr);  // here
+  ::sigprocmask(SIG_BLOCK, &caught, nullptr);
+  set_handler(SIGTSTP, SIG_IGN);
+}
+
 std::optional<KeyPress> Screen::read_key() {
-  take_up_size();
+  take_up_signals();
   for (;;) {
     wint_t code = 0;
     const int kind = ::get_wch(&code);

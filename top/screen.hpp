@@ -1,7 +1,8 @@
 // The terminal, by ncurses.
 //
 // It is taken when the screen is made and given back when that is destroyed, however that comes
-// about; SIGTSTP and SIGCONT in between are ncurses's. There can be one at a time.
+// about, and while the program is stopped by SIGTSTP (Ctrl-Z). There can be one at a time, in the
+// one thread that does not block these signals.
 #pragma once
 
 #include <optional>
@@ -37,17 +38,20 @@ class Screen {
   ~Screen();
 
   [[nodiscard]] Size size() const;
-  // Readable when the terminal has another size; read_key() takes it up.
-  [[nodiscard]] int resized() const noexcept { return resized_.get(); }
+  // Readable when the terminal has another size, or the program is to stop; read_key() takes it
+  // up, and the screen must be shown again.
+  [[nodiscard]] int signals() const noexcept { return signals_.get(); }
   void show(const std::vector<Line>& lines) const;
   // Nothing: none is waiting. Does not block.
   std::optional<KeyPress> read_key();
 
  private:
-  void take_up_size() const;
+  void take_up_signals() const;
+  static void take_up_size();
+  static void stop();
 
   const Charset charset_;
-  const shm::FileDescriptor resized_;
+  const shm::FileDescriptor signals_;
   bool has_colours_ = false;
 };
 
