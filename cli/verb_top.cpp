@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <iostream>
 #include <memory>
+#include <set>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -23,6 +24,7 @@
 #include "top/inquirer.hpp"
 #include "top/sampler.hpp"
 #include "top/screen.hpp"
+#include "top/tapper.hpp"
 #include "top/view.hpp"
 
 namespace arbiter::cli {
@@ -58,7 +60,8 @@ class Top {
       : interval_(options.interval),
         interrupts_(catch_interrupts()),
         instance_(follow_instance("top", options.instance)),
-        sampler_(instance_),
+        tapper_(options.instance),
+        sampler_(instance_, [this] { return tapper_.collect(); }),
         inquirer_(follow_instance("top", options.instance), explain),
         view_(charset, static_cast<std::size_t>(
                            std::clamp<shm::Nanoseconds>(kKept / options.interval, 1, kMostKept))) {}
@@ -69,7 +72,7 @@ class Top {
       take_news();  // first, so that what is new is in the picture
       const shm::Nanoseconds next_look = sampler_.look();
       if (shm::monotonic_now() >= next_picture) {
-        view_.add(sampler_.frame(), sampler_.new_takeovers());
+        view_.add(sampler_.frame(tapper_.tapped()), sampler_.new_takeovers());
         screen.show(view_.draw(screen.size()));
         next_picture = shm::monotonic_now() + interval_;
       }
@@ -80,6 +83,7 @@ class Top {
       while (const auto press = screen.read_key()) {
         must_draw = true;
         if (auto question = view_.press(*press)) inquirer_.ask(std::move(*question));
+        if (asked_to_tap_ != view_.tapped()) tapper_.watch(asked_to_tap_ = view_.tapped());
       }
       if (must_draw) screen.show(view_.draw(screen.size()));
     }
@@ -109,7 +113,7 @@ class Top {
     }
     if (news.why) view_.set_answer(*news.why);
     problem_ = news.problem;
-    view_.set_problem(std::move(news.problem));
+    view_.set_problem(news.problem.empty() ? tapper_.problem() : std::move(news.problem));
     return problem_;
   }
 
@@ -131,10 +135,12 @@ class Top {
   const shm::Nanoseconds interval_;
   const shm::FileDescriptor interrupts_;
   const std::shared_ptr<watch::Instance> instance_;
+  top::Tapper tapper_;
   top::Sampler sampler_;
   top::Inquirer inquirer_;
   top::View view_;
   std::string problem_;
+  std::set<std::string> asked_to_tap_;
   int censuses_ = 0;
 };
 

@@ -102,7 +102,8 @@ shm::Nanoseconds first_model_since(const StampedStatus& now) {
   const auto since =
       std::chrono::system_clock::time_point(std::chrono::milliseconds(history.front().since_ms));
   const auto ago = std::chrono::duration_cast<std::chrono::nanoseconds>(now.wall - since);
-  return std::max<shm::Nanoseconds>(now.at - ago.count(), 1);
+  // The calendar clock may have been set in between.
+  return std::clamp<shm::Nanoseconds>(now.at - ago.count(), 1, now.at);
 }
 
 template <class Fact>

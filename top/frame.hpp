@@ -77,6 +77,7 @@ struct PortState {
   std::int32_t winner = kNotKnown;
   shm::Nanoseconds since = 0;  // 0: not known
   bool is_exact = false;       // else: at the latest
+  bool is_tapped = false;
 };
 
 struct Frame {
@@ -92,6 +93,13 @@ struct Frame {
 
   // When the source last arrived, or was deactivated; 0: never.
   [[nodiscard]] shm::Nanoseconds last_event(std::size_t source) const;
+};
+
+// An arrival that was accepted: its source won then.
+struct Accepted {
+  std::string port;
+  std::string source;
+  shm::Nanoseconds at = 0;
 };
 
 // A change of the winner.

@@ -1,7 +1,5 @@
 #include "top/inquirer.hpp"
 
-#include <pthread.h>
-#include <signal.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -13,27 +11,12 @@
 #include <utility>
 
 #include "shm/clock.hpp"
+#include "top/signals_blocked.hpp"
 
 namespace arbiter::top {
 namespace {
 
 constexpr std::chrono::seconds kCensusInterval{1};
-
-// Signals are for the thread that has the terminal.
-class SignalsBlocked {
- public:
-  SignalsBlocked() {
-    sigset_t all;
-    sigfillset(&all);
-    pthread_sigmask(SIG_BLOCK, &all, &before_);
-  }
-  ~SignalsBlocked() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  SignalsBlocked(const SignalsBlocked&) = delete;
-  SignalsBlocked& operator=(const SignalsBlocked&) = delete;
-
- private:
-  sigset_t before_{};
-};
 
 std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines;

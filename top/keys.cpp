@@ -19,7 +19,7 @@ Command command_of(const KeyPress& press) {
       {"r", Command::kReverse}, {"/", Command::kFilter},     {" ", Command::kPause},
       {"p", Command::kPause},   {"h", Command::kBack},       {"l", Command::kForward},
       {"[", Command::kBackFar}, {"]", Command::kForwardFar}, {"w", Command::kWhy},
-      {"?", Command::kHelp},
+      {"t", Command::kTap},     {"?", Command::kHelp},
   };
   if (press.key != Key::kCharacter) {
     const auto found = kKeys.find(press.key);
@@ -35,6 +35,8 @@ const std::vector<std::string>& help_lines() {
       "up down j k      move the cursor; Page Up, Page Down, g and G: further",
       "Tab              the next pane",
       "Enter w          why: who wins where the cursor is, and what keeps the others out",
+      "t                tap the port, (t), or stop: no change of its winner is missed then, not",
+      "                 even one that lasts for less than 10 ms; its publishers pay for it",
       "/                filter: rows that contain a text; Esc shows all again",
       "s  r             sort by the next column; the other way round",
       "Space p          pause, and go on",

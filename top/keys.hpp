@@ -47,6 +47,7 @@ enum class Command {
   kBackFar,
   kForwardFar,
   kWhy,
+  kTap,
   kHelp,
   kEscape,
 };

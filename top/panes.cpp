@@ -93,7 +93,8 @@ Row port_row(const Frame& frame, std::size_t i) {
       state.winner >= 0
           ? age_cell(frame.now, frame.last_event(static_cast<std::size_t>(state.winner)))
           : unknown();
-  Row row{port.name, {{port.name}, winner_cell(frame, i), since_cell(frame, state), last}};
+  const std::string mark = frame.ports[i].is_tapped ? " (t)" : "";
+  Row row{port.name, {{port.name + mark}, winner_cell(frame, i), since_cell(frame, state), last}};
   if (port.rates) {
     row.cells.push_back(rate_cell(port.rates->taken));
     row.cells.push_back(rate_cell(port.rates->lost, Style::kWarning));

@@ -17,8 +17,11 @@ std::chrono::system_clock::time_point earlier(std::chrono::system_clock::time_po
 
 }  // namespace
 
-Sampler::Sampler(std::shared_ptr<watch::Instance> instance)
-    : instance_(std::move(instance)), started_(shm::monotonic_now()) {}
+Sampler::Sampler(std::shared_ptr<watch::Instance> instance,
+                 std::function<std::vector<Accepted>()> collect)
+    : instance_(std::move(instance)),
+      collect_(std::move(collect)),
+      started_(shm::monotonic_now()) {}
 
 void Sampler::set_census(std::shared_ptr<const Census> census) {
   census_ = std::move(census);
@@ -68,6 +71,9 @@ shm::Nanoseconds Sampler::look() {
   const bool is_of_binding = picture.snapshot.generation == generation_;
   before_ = std::exchange(last_, std::move(picture));
   wall_ = std::chrono::system_clock::now();
+  if (collect_) {
+    for (Accepted& each : collect_()) accepted_.push_back(std::move(each));
+  }
   // Else who wins is told by the next look.
   if (is_of_binding && last_.is_settled) take_seats();
   return std::clamp(last_.next_end(), last_.now + kLeastInterval, last_.now + kLookInterval);
@@ -87,16 +93,22 @@ void Sampler::take_seats() {
       continue;
     }
     Seat now = seat_at(port_ids_[i]);
-    if (now.winner != known->second.winner) {
-      note_takeover(name, port_ids_[i], known->second, now);
+    Seat before = known->second;
+    for (const Accepted& each : accepted_) {
+      if (each.port == name && now.is_arbitrated && each.at <= last_.now)
+        follow(name, before, each);
+    }
+    if (now.winner != before.winner) {
+      note_takeover(name, port_ids_[i], before, now);
     } else {
-      now.since = known->second.since;
-      now.is_exact = known->second.is_exact;
+      now.since = before.since;
+      now.is_exact = before.is_exact;
     }
     seats[name] = now;
   }
   if (memory_->tables().is_whole(last_.snapshot)) {
     seats_ = std::move(seats);
+    std::erase_if(accepted_, [this](const Accepted& each) { return each.at <= last_.now; });
   } else {  // what was read of the table may have been another's
     takeovers_ = std::move(noted);
     takeovers_so_far_ = so_far;
@@ -128,18 +140,32 @@ Sampler::Seat Sampler::first_seat(shm::PortId port) const {
   return seat;
 }
 
+// One that came before what is known already tells nothing new.
+void Sampler::follow(const std::string& port, Seat& seat, const Accepted& accepted) {
+  const auto source = instance_->find_source(accepted.source);
+  if (!source || *source == seat.winner || accepted.at < seat.since) return;
+  add_takeover(port, seat.winner, *source, accepted.at, accepted.source + " arrived");
+  seat = {*source, true, accepted.at, true};
+}
+
 void Sampler::note_takeover(const std::string& port, shm::PortId id, const Seat& before,
                             Seat& now) {
-  Takeover takeover;
-  takeover.number = ++takeovers_so_far_;
   now.since = last_.now;
   now.is_exact = true;
-  takeover.because = cause_of(id, now.since);
-  takeover.at = now.since;
-  takeover.wall = earlier(wall_, last_.now - now.since);
+  std::string because = cause_of(id, now.since);
+  add_takeover(port, before.winner, now.winner, now.since, std::move(because));
+}
+
+void Sampler::add_takeover(const std::string& port, shm::SourceId before, shm::SourceId winner,
+                           shm::Nanoseconds at, std::string because) {
+  Takeover takeover;
+  takeover.number = ++takeovers_so_far_;
+  takeover.at = at;
+  takeover.wall = earlier(wall_, last_.now - at);
   takeover.port = port;
-  takeover.before = name_of(before.winner);
-  takeover.winner = name_of(now.winner);
+  takeover.before = name_of(before);
+  takeover.winner = name_of(winner);
+  takeover.because = std::move(because);
   takeovers_.push_back(std::move(takeover));
 }
 
@@ -169,7 +195,7 @@ std::string Sampler::name_of(shm::SourceId source) const {
   return source == shm::kNone ? "" : memory_->source_name(source);
 }
 
-std::shared_ptr<const Frame> Sampler::frame() const {
+std::shared_ptr<const Frame> Sampler::frame(const std::set<std::string>& tapped) const {
   if (census_ == nullptr || memory_ == nullptr) return nullptr;
   const auto frame = std::make_shared<Frame>();
   frame->now = last_.now;
@@ -181,6 +207,7 @@ std::shared_ptr<const Frame> Sampler::frame() const {
   frame->is_settled = last_.is_settled;
   for (const PortFact& each : census_->ports) {
     PortState& state = frame->ports.emplace_back();
+    state.is_tapped = tapped.count(each.name) != 0;
     const auto seat = seats_.find(each.name);
     if (seat == seats_.end()) continue;
     state.since = seat->second.since;

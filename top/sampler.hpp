@@ -2,12 +2,15 @@
 // winner.
 //
 // It asks nobody. A look costs the components nothing but that lines of memory which they write are
-// read, as their receivers read them. A winner that comes and goes between two looks is missed.
+// read, as their receivers read them. A winner that comes and goes between two looks is missed,
+// unless a tap of the port tells of it.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,14 +29,17 @@ inline constexpr shm::Nanoseconds kLeastInterval = 1'000'000;
 // Thread safety: none; it belongs to the thread of its instance.
 class Sampler {
  public:
-  explicit Sampler(std::shared_ptr<watch::Instance> instance);
+  // `collect`: what taps have told since it was last called, by time; called at each look, behind
+  // the picture.
+  explicit Sampler(std::shared_ptr<watch::Instance> instance,
+                   std::function<std::vector<Accepted>()> collect = {});
 
   // Which ports and sources there are.
   void set_census(std::shared_ptr<const Census> census);
   // Takes up the daemon's news and looks. Returns when to look again, at the latest.
   shm::Nanoseconds look();
-  // Of the last look; null before the first census.
-  [[nodiscard]] std::shared_ptr<const Frame> frame() const;
+  // Of the last look; null before the first census. `tapped`: these ports are marked.
+  [[nodiscard]] std::shared_ptr<const Frame> frame(const std::set<std::string>& tapped = {}) const;
   // Since the last call, the oldest first.
   [[nodiscard]] std::vector<Takeover> new_takeovers() { return std::exchange(takeovers_, {}); }
 
@@ -50,11 +56,15 @@ class Sampler {
   void take_seats();
   [[nodiscard]] Seat seat_at(shm::PortId port) const;
   [[nodiscard]] Seat first_seat(shm::PortId port) const;
+  void follow(const std::string& port, Seat& seat, const Accepted& accepted);
+  void add_takeover(const std::string& port, shm::SourceId before, shm::SourceId winner,
+                    shm::Nanoseconds at, std::string because);
   void note_takeover(const std::string& port, shm::PortId id, const Seat& before, Seat& now);
   [[nodiscard]] std::string cause_of(shm::PortId port, shm::Nanoseconds& at) const;
   [[nodiscard]] std::string name_of(shm::SourceId source) const;
 
   const std::shared_ptr<watch::Instance> instance_;
+  const std::function<std::vector<Accepted>()> collect_;
   const shm::Nanoseconds started_;
   std::shared_ptr<const shm::DecisionMemory> memory_;
   std::shared_ptr<const Census> census_;
@@ -68,6 +78,7 @@ class Sampler {
   watch::Picture before_;
   std::chrono::system_clock::time_point wall_;  // of last_
   std::map<std::string, Seat> seats_;           // by port
+  std::vector<Accepted> accepted_;              // that no picture has come after yet
   std::uint64_t takeovers_so_far_ = 0;
   std::vector<Takeover> takeovers_;
 };

@@ -101,6 +101,9 @@ std::optional<WhyQuestion> View::obey(Command command) {
       break;
     case Command::kWhy:
       return ask_why();
+    case Command::kTap:
+      toggle_tap();
+      break;
     case Command::kHelp:
       overlay_.emplace("Keys and columns   (Esc closes)", help_lines());
       break;
@@ -184,6 +187,15 @@ void View::sort_by_next() {
   PaneState& state = this->state();
   state.sorted = (state.sorted + 1) % table.columns.size();
   state.is_descending = table.columns[state.sorted].is_number;
+}
+
+void View::toggle_tap() {
+  const Table table = this->table(focus_);
+  if (focus_ == Pane::kSources || table.rows.empty()) return;
+  find_selected(focus_, table);
+  const Row& row = table.rows[state().index];
+  const std::string& port = focus_ == Pane::kPorts ? row.name : row.cells[1].text;
+  if (tapped_.erase(port) == 0) tapped_.insert(port);
 }
 
 std::optional<WhyQuestion> View::ask_why() {

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,8 @@ class View {
 
   // What to ask, if anything.
   std::optional<WhyQuestion> press(const KeyPress& press);
+  // The ports that are to be tapped.
+  [[nodiscard]] const std::set<std::string>& tapped() const { return tapped_; }
   [[nodiscard]] bool is_over() const { return is_over_; }
 
   // At most size.rows lines, each exactly size.columns wide.
@@ -61,6 +64,7 @@ class View {
   void type(const KeyPress& press);
   std::optional<WhyQuestion> obey(Command command);
   void obey_in_overlay(Command command);
+  void toggle_tap();
   void move(std::ptrdiff_t by);
   void move_focus(int by);
   void sort_by_next();
@@ -77,6 +81,7 @@ class View {
   Pane focus_ = Pane::kPorts;
   std::string filter_;
   bool is_typing_ = false;  // the filter
+  std::set<std::string> tapped_;
   std::string problem_;
   std::optional<Overlay> overlay_;
   std::optional<WhyQuestion> asked_;

@@ -95,6 +95,8 @@ TEST(TopCensus, KnowsSinceWhenOnlyOfTheFirstModel) {
   model.how = "start";
   now.status.history = {model};
   EXPECT_EQ(census_of(now, nullptr).first_model_since, 90 * kSecond);
+  now.wall = {};  // the clock has been set
+  EXPECT_EQ(census_of(now, nullptr).first_model_since, 100 * kSecond);
   model.how = "reload";
   now.status.history.insert(now.status.history.begin(), model);
   EXPECT_EQ(census_of(now, nullptr).first_model_since, 0);

@@ -104,6 +104,36 @@ TEST_F(TopSampler, SinceIsWhenTheWinnerBegan) {
   EXPECT_EQ(look()->ports.at(0).since, state.since);  // it has gone on
 }
 
+TEST_F(TopSampler, ATapTellsOfWinnersThatComeAndGoBetweenTwoLooks) {
+  Node node("test");
+  auto low = node.output_port<int>("/low:o");
+  auto high = node.output_port<int>("/high:o");
+  std::vector<Accepted> told;
+  Sampler tapping(instance_, [&told] { return std::exchange(told, {}); });
+  StampedStatus now;
+  now.status = instance_->status();
+  now.at = shm::monotonic_now();
+  tapping.set_census(std::make_shared<const Census>(census_of(now, nullptr)));
+  low.publish(1);
+  tapping.look();
+  const shm::Nanoseconds first = shm::monotonic_now();
+  const shm::Nanoseconds later = first + 3600 * kSecond;  // of what has not been seen yet
+  told = {{"/p:i", "/low:o", first - kSecond},            // of what is known already
+          {"/p:i", "/high:o", first},          {"/p:i", "/low:o", first + 1},
+          {"/p:i", "/high:o", first + 2},      {"/other:i", "/high:o", first + 2},
+          {"/p:i", "/high:o", later}};
+  tapping.look();
+  const auto takeovers = tapping.new_takeovers();
+  ASSERT_EQ(takeovers.size(), 4u);
+  EXPECT_EQ(takeovers[0].winner, "/high:o");
+  EXPECT_EQ(takeovers[0].at, first);
+  EXPECT_EQ(takeovers[0].because, "/high:o arrived");
+  EXPECT_EQ(takeovers[1].winner, "/low:o");
+  EXPECT_EQ(takeovers[2].winner, "/high:o");
+  EXPECT_EQ(takeovers[3].before, "/high:o");
+  EXPECT_EQ(takeovers[3].winner, "/low:o");  // as the picture has it
+}
+
 TEST_F(TopSampler, AnotherModelMayChangeTheWinner) {
   Node node("test");
   auto low = node.output_port<int>("/low:o");

@@ -142,6 +142,31 @@ TEST_F(TopScreen, TellsWhyAtThePortOfTheCursor) {
   EXPECT_TRUE(top_.wait_for_none("/high:o wins\n")) << top_.text();
 }
 
+TEST_F(TopScreen, ATapMissesNoWinnerHoweverShort) {
+  press("t");
+  ASSERT_TRUE(top_.wait_for("(t)")) << top_.text();
+  high_.publish(1);
+  high_.deactivate();
+  ASSERT_TRUE(top_.wait_until([&] {
+    return top_.shows("/low:o → /high:o") && top_.shows("/high:o → /low:o");
+  })) << top_.text();
+  press("t");
+  ASSERT_TRUE(top_.wait_for_none("(t)")) << top_.text();
+}
+
+TEST(TopScreenOf, SaysThatThePolicyForbidsATap) {
+  TemporaryDirectory files;
+  const std::string policy = files.write("policy", "deny everyone tap /p:i\nallow everyone all\n");
+  Daemon daemon(kTopModel, {.arguments = {"--policy", policy}});
+  EmulatedTerminal top({kArbiter, "top"}, top_environment(), {24, 120});
+  ASSERT_TRUE(top.wait_for("/p:i")) << top.text();
+  top.type("t");
+  ASSERT_TRUE(top.wait_for("not tapped: ")) << top.text();
+  EXPECT_TRUE(top.wait_for("may not tap the port /p:i")) << top.text();
+  top.type("t");
+  EXPECT_TRUE(top.wait_for("q quit")) << top.text();
+}
+
 TEST_F(TopScreen, SortsByTheNextColumn) {
   press("\tr");
   ASSERT_TRUE(top_.wait_until([&] {

@@ -181,6 +181,20 @@ TEST_F(TopView, AsksWhyOfWhatTheCursorIsOn) {
   EXPECT_EQ(question->ports, std::vector<std::string>{"/arm:i"});
 }
 
+TEST_F(TopView, TapsThePortOfTheCursorUntilItIsAskedAgain) {
+  press("t");
+  EXPECT_EQ(view_.tapped(), std::set<std::string>{"/arm:i"});
+  press(Key::kDown);
+  press("t");
+  EXPECT_EQ(view_.tapped(), (std::set<std::string>{"/arm:i", "/gaze:i"}));
+  press("t");
+  EXPECT_EQ(view_.tapped(), std::set<std::string>{"/arm:i"});
+  Frame frame = frame_at(11);
+  frame.ports[0].is_tapped = true;
+  view_.add(shared(frame), {});
+  EXPECT_THAT(screen(), HasSubstr("/arm:i (t)"));
+}
+
 TEST_F(TopView, ALongExplanationScrolls) {
   const auto question = press(Key::kEnter);
   std::vector<std::string> lines;
