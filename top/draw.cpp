@@ -34,10 +34,12 @@ std::vector<Line> View::draw(Size size) {
   } else if (history_.frame() == nullptr) {
     lines.push_back(line_of("asking the daemon ...", size.columns, Style::kDim, charset_));
   } else {
-    const auto heights = this->heights(body);
-    for (int i = 0; i < kPanes; ++i) {
-      const std::size_t height = heights[static_cast<std::size_t>(i)];
-      for (Line& line : draw_pane(static_cast<Pane>(i), {size.columns, height})) {
+    std::array<Table, kPanes> tables = {table(Pane::kPorts), table(Pane::kSources),
+                                        table(Pane::kTakeovers)};
+    const auto heights = this->heights(tables, body);
+    for (std::size_t i = 0; i < tables.size(); ++i) {
+      const Size room{size.columns, heights[i]};
+      for (Line& line : draw_pane(static_cast<Pane>(i), std::move(tables[i]), room)) {
         lines.push_back(std::move(line));
       }
     }
@@ -52,14 +54,15 @@ std::vector<Line> View::draw(Size size) {
 
 // A header each. Changes get a quarter; ports and sources what they need, and where that is too
 // much, ports at least half of it.
-std::array<std::size_t, kPanes> View::heights(std::size_t rows) const {
+std::array<std::size_t, kPanes> View::heights(const std::array<Table, kPanes>& tables,
+                                              std::size_t rows) const {
   std::array<std::size_t, kPanes> result{};
   if (rows < kRowsForAll) {
     result[static_cast<std::size_t>(focus_)] = rows;
     return result;
   }
-  const std::size_t ports = table(Pane::kPorts).rows.size() + 1;
-  const std::size_t sources = table(Pane::kSources).rows.size() + 1;
+  const std::size_t ports = tables[0].rows.size() + 1;
+  const std::size_t sources = tables[1].rows.size() + 1;
   const std::size_t changes = std::max<std::size_t>(rows / 4, 4);
   const std::size_t room = rows - changes;
   result[0] = std::min(ports, std::max(room / 2, room - std::min(sources, room)));
@@ -68,11 +71,9 @@ std::array<std::size_t, kPanes> View::heights(std::size_t rows) const {
   return result;
 }
 
-std::vector<Line> View::draw_pane(Pane pane, Size size) {
+std::vector<Line> View::draw_pane(Pane pane, Table table, Size size) {
   std::vector<Line> lines;
-  if (size.rows == 0) return lines;
-  Table table = this->table(pane);
-  if (table.columns.empty()) return lines;
+  if (size.rows == 0 || table.columns.empty()) return lines;
   find_selected(pane, table);
   PaneState& state = panes_[static_cast<std::size_t>(pane)];
   state.page = std::max<std::size_t>(size.rows - 1, 1);

@@ -4,6 +4,16 @@
 #include <utility>
 
 namespace arbiter::top {
+namespace {
+
+constexpr std::size_t kMostBytes = std::size_t{32} << 20;
+
+std::size_t bytes_of(const Frame& frame) {
+  return sizeof frame + frame.ports.size() * sizeof(PortState) +
+         frame.words.size() * sizeof(shm::ActivityWord);
+}
+
+}  // namespace
 
 History::History(std::size_t max_frames, std::size_t max_takeovers)
     : max_frames_(std::max<std::size_t>(max_frames, 1)), max_takeovers_(max_takeovers) {}
@@ -15,7 +25,9 @@ void History::add(std::shared_ptr<const Frame> frame, std::vector<Takeover> take
   }
   if (frame == nullptr) return;
   live_.frames.push_back(std::move(frame));
-  if (live_.frames.size() > max_frames_) live_.frames.pop_front();
+  const std::size_t most =
+      std::clamp<std::size_t>(kMostBytes / bytes_of(*live_.frames.back()), 1, max_frames_);
+  while (live_.frames.size() > most) live_.frames.pop_front();
 }
 
 void History::pause() {
@@ -40,9 +52,10 @@ std::vector<const Takeover*> History::takeovers() const {
   const auto now = frame();
   std::vector<const Takeover*> result;
   const auto& all = shown().takeovers;
-  for (auto each = all.rbegin(); each != all.rend(); ++each) {
-    if (now != nullptr && (*each)->number <= now->takeovers) result.push_back(each->get());
+  for (const auto& each : all) {
+    if (now != nullptr && each->number <= now->takeovers) result.push_back(each.get());
   }
+  std::reverse(result.begin(), result.end());
   return result;
 }
 

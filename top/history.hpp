@@ -12,7 +12,8 @@ namespace arbiter::top {
 
 class History {
  public:
-  // How many pictures are kept, at least 1, and how many changes.
+  // How many pictures are kept, at least 1, and how many changes. Fewer of large instances: all of
+  // them together take at most some 32 MiB, and as much again during a pause.
   explicit History(std::size_t max_frames, std::size_t max_takeovers = 1000);
 
   void add(std::shared_ptr<const Frame> frame, std::vector<Takeover> takeovers);

@@ -5,7 +5,7 @@
 namespace arbiter::top {
 
 Command command_of(const KeyPress& press) {
-  static const std::map<Key, Command> kKeys = {
+  static const std::map<Key, Command> keys = {
       {Key::kUp, Command::kUp},         {Key::kDown, Command::kDown},
       {Key::kPageUp, Command::kPageUp}, {Key::kPageDown, Command::kPageDown},
       {Key::kHome, Command::kTop},      {Key::kEnd, Command::kBottom},
@@ -13,7 +13,7 @@ Command command_of(const KeyPress& press) {
       {Key::kTab, Command::kNextPane},  {Key::kBackTab, Command::kPreviousPane},
       {Key::kEnter, Command::kWhy},     {Key::kEscape, Command::kEscape},
   };
-  static const std::map<std::string, Command> kCharacters = {
+  static const std::map<std::string, Command> characters = {
       {"q", Command::kQuit},    {"k", Command::kUp},         {"j", Command::kDown},
       {"g", Command::kTop},     {"G", Command::kBottom},     {"s", Command::kSort},
       {"r", Command::kReverse}, {"/", Command::kFilter},     {" ", Command::kPause},
@@ -22,15 +22,15 @@ Command command_of(const KeyPress& press) {
       {"t", Command::kTap},     {"?", Command::kHelp},
   };
   if (press.key != Key::kCharacter) {
-    const auto found = kKeys.find(press.key);
-    return found == kKeys.end() ? Command::kNone : found->second;
+    const auto found = keys.find(press.key);
+    return found == keys.end() ? Command::kNone : found->second;
   }
-  const auto found = kCharacters.find(press.character);
-  return found == kCharacters.end() ? Command::kNone : found->second;
+  const auto found = characters.find(press.character);
+  return found == characters.end() ? Command::kNone : found->second;
 }
 
 const std::vector<std::string>& help_lines() {
-  static const std::vector<std::string> kLines = {
+  static const std::vector<std::string> lines = {
       "q                leave",
       "up down j k      move the cursor; Page Up, Page Down, g and G: further",
       "Tab              the next pane",
@@ -55,7 +55,7 @@ const std::vector<std::string>& help_lines() {
       "",
       "Rates and queues are read once a second; all else is what decisions see.",
   };
-  return kLines;
+  return lines;
 }
 
 }  // namespace arbiter::top

@@ -157,14 +157,15 @@ Table sources_table(const Frame& frame, const std::string& filter, Charset chars
   return table;
 }
 
-Table takeovers_table(const std::vector<const Takeover*>& takeovers, const std::string& filter,
-                      Charset charset) {
+Table takeovers_table(const std::vector<const Takeover*>& takeovers, bool is_tapped,
+                      const std::string& filter, Charset charset) {
   Table table;
   const std::string arrow = charset == Charset::kUtf8 ? " → " : " -> ";
-  table.columns = {{"CHANGE", 12, Align::kLeft, 0, false},
-                   {"AT", 0, Align::kLeft, 0, false},
-                   {"WINNER", 0, Align::kLeft, 0, false},
-                   {"BECAUSE", 0, Align::kLeft, 1, false}};
+  table.columns = {
+      {"CHANGE", 12, Align::kLeft, 0, false},
+      {"AT", 0, Align::kLeft, 0, false},
+      {"WINNER", 0, Align::kLeft, 0, false},
+      {is_tapped ? "BECAUSE" : "BECAUSE (looks every 10 ms)", 0, Align::kLeft, 1, false}};
   for (const Takeover* each : takeovers) {
     if (!matches(filter, {each->port, each->before, each->winner})) continue;
     const auto name = [](const std::string& source) { return source.empty() ? "idle" : source; };

@@ -15,7 +15,8 @@ inline constexpr int kPanes = 3;
 // `filter`: only rows with that text in a name; case does not matter. "": all.
 [[nodiscard]] Table ports_table(const Frame& frame, const std::string& filter, Charset charset);
 [[nodiscard]] Table sources_table(const Frame& frame, const std::string& filter, Charset charset);
-[[nodiscard]] Table takeovers_table(const std::vector<const Takeover*>& takeovers,
+// `is_tapped`: no change of some ports is missed, and they say so themselves.
+[[nodiscard]] Table takeovers_table(const std::vector<const Takeover*>& takeovers, bool is_tapped,
                                     const std::string& filter, Charset charset);
 
 // "14:03:07.123", in the local time zone.

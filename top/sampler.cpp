@@ -64,6 +64,7 @@ void Sampler::bind() {
 }
 
 shm::Nanoseconds Sampler::look() {
+  const shm::Nanoseconds began = shm::monotonic_now();
   instance_->update();
   bind();
   const auto these = [this](const shm::TableView&) { return sources_; };
@@ -76,7 +77,10 @@ shm::Nanoseconds Sampler::look() {
   }
   // Else who wins is told by the next look.
   if (is_of_binding && last_.is_settled) take_seats();
-  return std::clamp(last_.next_end(), last_.now + kLeastInterval, last_.now + kLookInterval);
+  const shm::Nanoseconds over = shm::monotonic_now();
+  const shm::Nanoseconds next =
+      std::clamp(last_.next_end(), over + kLeastInterval, over + kLookInterval);
+  return std::max(next, over + (over - began) * (kLookShare - 1));
 }
 
 void Sampler::take_seats() {

@@ -23,6 +23,8 @@ namespace arbiter::top {
 
 // How long between two looks at most.
 inline constexpr shm::Nanoseconds kLookInterval = 10'000'000;
+// Of its thread's time, looks take one part in so many, however large the model.
+inline constexpr shm::Nanoseconds kLookShare = 10;
 // And at least, however soon an activity ends.
 inline constexpr shm::Nanoseconds kLeastInterval = 1'000'000;
 

@@ -60,13 +60,13 @@ chtype attributes(Style style, bool has_colours) {
 }
 
 std::optional<Key> key_of(wint_t code) {
-  static const std::map<wint_t, Key> kKeys = {
+  static const std::map<wint_t, Key> keys = {
       {KEY_UP, Key::kUp},          {KEY_DOWN, Key::kDown},          {KEY_PPAGE, Key::kPageUp},
       {KEY_NPAGE, Key::kPageDown}, {KEY_HOME, Key::kHome},          {KEY_END, Key::kEnd},
       {KEY_LEFT, Key::kLeft},      {KEY_RIGHT, Key::kRight},        {KEY_BTAB, Key::kBackTab},
       {KEY_ENTER, Key::kEnter},    {KEY_BACKSPACE, Key::kBackspace}};
-  const auto found = kKeys.find(code);
-  return found == kKeys.end() ? std::nullopt : std::optional(found->second);
+  const auto found = keys.find(code);
+  return found == keys.end() ? std::nullopt : std::optional(found->second);
 }
 
 std::optional<KeyPress> press_of(wint_t character) {

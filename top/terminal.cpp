@@ -9,6 +9,7 @@
 #undef lines
 
 #include <clocale>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <string>
@@ -37,7 +38,8 @@ void require_terminal() {
     throw ScreenError(what + "of which there is no description" + kOnce);
   }
   char* const move = ::tigetstr("cup");
-  const bool can_move = move != nullptr && move != reinterpret_cast<char*>(-1);
+  // It is -1 where the terminal's description says that it is no string.
+  const bool can_move = move != nullptr && reinterpret_cast<std::intptr_t>(move) != -1;
   ::del_curterm(::set_curterm(nullptr));
   if (!can_move) throw ScreenError(what + "a terminal that cannot move its cursor" + kOnce);
 }

@@ -21,7 +21,11 @@ Table View::table(Pane pane) const {
   const auto frame = history_.frame();
   if (frame == nullptr) return {};
   Table table;
-  if (pane == Pane::kTakeovers) return takeovers_table(history_.takeovers(), filter_, charset_);
+  if (pane == Pane::kTakeovers) {
+    const bool is_tapped = std::any_of(frame->ports.begin(), frame->ports.end(),
+                                       [](const PortState& port) { return port.is_tapped; });
+    return takeovers_table(history_.takeovers(), is_tapped, filter_, charset_);
+  }
   table = pane == Pane::kPorts ? ports_table(*frame, filter_, charset_)
                                : sources_table(*frame, filter_, charset_);
   const PaneState& state = panes_[static_cast<std::size_t>(pane)];

@@ -70,8 +70,9 @@ class View {
   void sort_by_next();
   std::optional<WhyQuestion> ask_why();
   void find_selected(Pane pane, const Table& table);
-  [[nodiscard]] std::vector<Line> draw_pane(Pane pane, Size size);
-  [[nodiscard]] std::array<std::size_t, kPanes> heights(std::size_t rows) const;
+  [[nodiscard]] std::vector<Line> draw_pane(Pane pane, Table table, Size size);
+  [[nodiscard]] std::array<std::size_t, kPanes> heights(const std::array<Table, kPanes>& tables,
+                                                        std::size_t rows) const;
   [[nodiscard]] Line title(std::size_t columns) const;
   [[nodiscard]] Line footer(std::size_t columns) const;
 

@@ -65,6 +65,18 @@ TEST(TopHistory, ShowsTheChangesUpToThePicture) {
   EXPECT_EQ(history.takeovers()[0]->winner, "/face:o");
 }
 
+TEST(TopHistory, KeepsFewerPicturesOfALargeInstance) {
+  History history(1000);
+  Frame frame = frame_at(1);
+  frame.words.resize(1'000'000);  // 8 MB
+  for (int i = 1; i <= 9; ++i) {
+    frame.now = i * kSecond;
+    history.add(shared(frame), {});
+  }
+  history.step(-1000);
+  EXPECT_EQ(second_of(history), 6);
+}
+
 TEST(TopHistory, KeepsSoManyChanges) {
   History history(10, 2);
   Frame frame = frame_at(1);

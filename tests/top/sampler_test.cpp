@@ -6,6 +6,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "shm/clock.hpp"
+#include "tests/top/pictures.hpp"
 #include "tests/watch/watched.hpp"
 
 namespace arbiter::top {

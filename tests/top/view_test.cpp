@@ -6,6 +6,7 @@
 
 #include <clocale>
 
+#include "tests/support/text_files.hpp"
 #include "tests/top/pictures.hpp"
 
 namespace arbiter::top {
@@ -216,6 +217,18 @@ TEST_F(TopView, TheHelpNamesEachKey) {
   }
   press(Key::kEscape);
   EXPECT_THAT(screen(), HasSubstr("INPUT PORT"));
+}
+
+TEST_F(TopView, ThePageNamesEachColumn) {
+  const std::string page = test::content_of(std::string(ARBITER_TEST_DATA) + "/../../docs/top.md");
+  const Frame frame = frame_at(10);
+  for (const Table& table :
+       {ports_table(frame, "", Charset::kUtf8), sources_table(frame, "", Charset::kUtf8)}) {
+    for (std::size_t i = 1; i < table.columns.size(); ++i) {
+      const std::string& title = table.columns[i].title;
+      EXPECT_TRUE(title.empty() || page.find("`" + title + "`") != std::string::npos) << title;
+    }
+  }
 }
 
 TEST_F(TopView, SaysThatThereIsNoDaemonAndThatItCannotAsk) {
