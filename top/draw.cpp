@@ -98,7 +98,7 @@ std::vector<Line> View::draw_pane(Pane pane, Table table, Size size) {
     lines.push_back(std::move(line));
   };
   const bool has_focus = pane == focus_;
-  const std::size_t sorted = pane == Pane::kTakeovers ? none : state.sorted;
+  const std::size_t sorted = pane == Pane::kTakeovers ? none : std::min(state.sorted, none - 1);
   Line header = table.header(widths, sorted, state.is_descending, charset_);
   for (Span& span : header.spans) span.style = has_focus ? Style::kTitle : Style::kHeader;
   add(std::move(header), has_focus, false);

@@ -70,6 +70,7 @@ PortFact fact_of(const wire::InputStatus& input) {
   fact.is_arbitrated = input.arbitrated;
   for (const wire::ConnectionStatus& each : input.connections) {
     fact.waiting += each.waiting;
+    if (each.waiting != 0) fact.queues.emplace_back(each.source, each.waiting);
     fact.depth = std::max<std::uint64_t>(fact.depth, each.depth.value_or(0));
   }
   if (input.cannot_deliver) {
@@ -120,6 +121,7 @@ std::ptrdiff_t Census::find_source(const std::string& name) const { return find(
 Census census_of(const StampedStatus& now, const StampedStatus* before) {
   Census census;
   census.at = now.at;
+  census.asked = now.asked;
   census.instance = now.status.instance;
   census.model = model_text(now.status.model);
   census.first_model_since = first_model_since(now);

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "shm/activity.hpp"
@@ -32,9 +33,10 @@ struct PortFact {
   bool is_open = false;
   bool is_arbitrated = false;
   std::optional<PortRates> rates;
-  std::uint64_t waiting = 0;  // samples, on all its connections
-  std::uint64_t depth = 0;    // of the deepest queue
-  std::string useless;        // a source that is selected, and cannot deliver
+  std::uint64_t waiting = 0;                                  // samples, on all its connections
+  std::vector<std::pair<std::string, std::uint64_t>> queues;  // by source, those with samples
+  std::uint64_t depth = 0;                                    // of the deepest queue
+  std::string useless;  // a source that is selected, and cannot deliver
   std::string why_useless;
 };
 
@@ -49,6 +51,7 @@ struct SourceFact {
 
 struct Census {
   shm::Nanoseconds at = 0;  // CLOCK_MONOTONIC, when it came
+  shm::Nanoseconds asked = 0;
   std::string instance;
   std::string model;  // `model 2 "work"`
   // Since when the model in force has been so, if no other one was before it; else 0.
@@ -62,6 +65,7 @@ struct Census {
 
 struct StampedStatus {
   wire::Status status;
+  shm::Nanoseconds asked = 0;
   shm::Nanoseconds at = 0;
   std::chrono::system_clock::time_point wall;
 };
@@ -78,6 +82,9 @@ struct PortState {
   shm::Nanoseconds since = 0;  // 0: not known
   bool is_exact = false;       // else: at the latest
   bool is_tapped = false;
+  // Of a tapped port: how long at most the oldest sample in its queues had waited when the census
+  // was taken; 0: none waited. Nothing where the tap is too young to know.
+  std::optional<shm::Nanoseconds> oldest{};
 };
 
 struct Frame {
@@ -100,6 +107,7 @@ struct Accepted {
   std::string port;
   std::string source;
   shm::Nanoseconds at = 0;
+  bool is_sample = true;  // else a signal, which no queue has
 };
 
 // A change of the winner.

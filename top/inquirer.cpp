@@ -77,6 +77,7 @@ void Inquirer::run(const std::stop_token& stop) {
 
 void Inquirer::take_census() {
   StampedStatus now;
+  now.asked = shm::monotonic_now();
   try {
     now.status = instance_->status();
   } catch (const std::exception& error) {

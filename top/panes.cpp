@@ -63,6 +63,12 @@ Cell queue_cell(const PortFact& port) {
                 static_cast<double>(port.waiting), is_full ? Style::kWarning : Style::kPlain);
 }
 
+Cell oldest_cell(const PortState& state) {
+  if (!state.oldest) return unknown();
+  if (*state.oldest == 0) return number("none", 0);
+  return number("<" + span(*state.oldest), static_cast<double>(*state.oldest));
+}
+
 struct ActivityCells {
   Cell bar;
   Cell state;
@@ -104,6 +110,7 @@ Row port_row(const Frame& frame, std::size_t i) {
   }
   row.cells.push_back(queue_cell(port));
   row.cells.push_back({port.component, port.is_open ? Style::kPlain : Style::kDim});
+  row.cells.push_back(oldest_cell(state));
   return row;
 }
 
@@ -128,6 +135,11 @@ Row source_row(const Frame& frame, std::size_t i, Charset charset) {
 
 }  // namespace
 
+bool is_any_tapped(const Frame& frame) {
+  return std::any_of(frame.ports.begin(), frame.ports.end(),
+                     [](const PortState& port) { return port.is_tapped; });
+}
+
 Table ports_table(const Frame& frame, const std::string& filter, Charset charset) {
   static_cast<void>(charset);
   Table table;
@@ -136,8 +148,10 @@ Table ports_table(const Frame& frame, const std::string& filter, Charset charset
                    {"TAKEN", 6, Align::kRight, 3, true},      {"LOST", 5, Align::kRight, 5, true},
                    {"LOSERS", 7, Align::kRight, 6, true},     {"QUEUE", 7, Align::kRight, 4, true},
                    {"COMPONENT", 0, Align::kLeft, 7, false}};
+  if (is_any_tapped(frame)) table.columns.push_back({"OLDEST", 7, Align::kRight, 2, true});
   for (std::size_t i = 0; i < frame.ports.size(); ++i) {
     Row row = port_row(frame, i);
+    row.cells.resize(table.columns.size());
     if (matches(filter, {row.name, row.cells[1].text})) table.rows.push_back(std::move(row));
   }
   return table;

@@ -12,6 +12,8 @@ namespace arbiter::top {
 enum class Pane { kPorts, kSources, kTakeovers };
 inline constexpr int kPanes = 3;
 
+[[nodiscard]] bool is_any_tapped(const Frame& frame);
+
 // `filter`: only rows with that text in a name; case does not matter. "": all.
 [[nodiscard]] Table ports_table(const Frame& frame, const std::string& filter, Charset charset);
 [[nodiscard]] Table sources_table(const Frame& frame, const std::string& filter, Charset charset);

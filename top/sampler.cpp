@@ -73,7 +73,10 @@ shm::Nanoseconds Sampler::look() {
   before_ = std::exchange(last_, std::move(picture));
   wall_ = std::chrono::system_clock::now();
   if (collect_) {
-    for (Accepted& each : collect_()) accepted_.push_back(std::move(each));
+    for (Accepted& each : collect_()) {
+      if (each.is_sample) note_arrival(each);
+      accepted_.push_back(std::move(each));
+    }
   }
   // Else who wins is told by the next look.
   if (is_of_binding && last_.is_settled) take_seats();
@@ -144,6 +147,29 @@ Sampler::Seat Sampler::first_seat(shm::PortId port) const {
   return seat;
 }
 
+void Sampler::note_arrival(const Accepted& accepted) {
+  auto& times = arrivals_[{accepted.port, accepted.source}];
+  times.push_back(accepted.at);
+  // Twice, for some come between the question and the answer of a census.
+  if (times.size() > std::size_t{2} * shm::kMaxDepth) times.pop_front();
+}
+
+// Of what waits, a queue has the latest that it accepted. The daemon looked at it after it was
+// asked: the oldest one had arrived no earlier than what would have been the oldest one then. Where
+// a tap has lost events, or was closed for a while, the bound is not as good, but it is one.
+std::optional<shm::Nanoseconds> Sampler::oldest_at(const PortFact& port) const {
+  shm::Nanoseconds oldest = 0;
+  for (const auto& [source, waiting] : port.queues) {
+    const auto found = arrivals_.find({port.name, source});
+    if (found == arrivals_.end()) return std::nullopt;
+    const auto& times = found->second;
+    const auto by_then = std::upper_bound(times.begin(), times.end(), census_->asked);
+    if (static_cast<std::uint64_t>(by_then - times.begin()) < waiting) return std::nullopt;
+    oldest = std::max(oldest, census_->at - *(by_then - static_cast<std::ptrdiff_t>(waiting)));
+  }
+  return oldest;
+}
+
 // One that came before what is known already tells nothing new.
 void Sampler::follow(const std::string& port, Seat& seat, const Accepted& accepted) {
   const auto source = instance_->find_source(accepted.source);
@@ -212,6 +238,7 @@ std::shared_ptr<const Frame> Sampler::frame(const std::set<std::string>& tapped)
   for (const PortFact& each : census_->ports) {
     PortState& state = frame->ports.emplace_back();
     state.is_tapped = tapped.count(each.name) != 0;
+    if (state.is_tapped) state.oldest = oldest_at(each);
     const auto seat = seats_.find(each.name);
     if (seat == seats_.end()) continue;
     state.since = seat->second.since;

@@ -7,9 +7,11 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -58,6 +60,8 @@ class Sampler {
   void take_seats();
   [[nodiscard]] Seat seat_at(shm::PortId port) const;
   [[nodiscard]] Seat first_seat(shm::PortId port) const;
+  void note_arrival(const Accepted& accepted);
+  [[nodiscard]] std::optional<shm::Nanoseconds> oldest_at(const PortFact& port) const;
   void follow(const std::string& port, Seat& seat, const Accepted& accepted);
   void add_takeover(const std::string& port, shm::SourceId before, shm::SourceId winner,
                     shm::Nanoseconds at, std::string because);
@@ -81,6 +85,8 @@ class Sampler {
   std::chrono::system_clock::time_point wall_;  // of last_
   std::map<std::string, Seat> seats_;           // by port
   std::vector<Accepted> accepted_;              // that no picture has come after yet
+  // Of samples that taps told of, by port and source, the latest last: as many as can wait.
+  std::map<std::pair<std::string, std::string>, std::deque<shm::Nanoseconds>> arrivals_;
   std::uint64_t takeovers_so_far_ = 0;
   std::vector<Takeover> takeovers_;
 };

@@ -95,7 +95,8 @@ std::vector<Accepted> Tapper::collect() {
   for (auto& [port, tap] : taps_) {
     while (const auto event = tap.take()) {
       if (event->at(port) != Fate::accepted) continue;
-      result.push_back({port, event->source(), event->time().time_since_epoch().count()});
+      result.push_back({port, event->source(), event->time().time_since_epoch().count(),
+                        event->kind() == TapEventKind::sample});
     }
     if (tap.lost() != 0) {
       problem_ = "of " + port + ", " + std::to_string(tap.lost()) +

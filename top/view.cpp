@@ -22,14 +22,12 @@ Table View::table(Pane pane) const {
   if (frame == nullptr) return {};
   Table table;
   if (pane == Pane::kTakeovers) {
-    const bool is_tapped = std::any_of(frame->ports.begin(), frame->ports.end(),
-                                       [](const PortState& port) { return port.is_tapped; });
-    return takeovers_table(history_.takeovers(), is_tapped, filter_, charset_);
+    return takeovers_table(history_.takeovers(), is_any_tapped(*frame), filter_, charset_);
   }
   table = pane == Pane::kPorts ? ports_table(*frame, filter_, charset_)
                                : sources_table(*frame, filter_, charset_);
   const PaneState& state = panes_[static_cast<std::size_t>(pane)];
-  table.sort(state.sorted, state.is_descending);
+  table.sort(std::min(state.sorted, table.columns.size() - 1), state.is_descending);
   return table;
 }
 

@@ -135,6 +135,33 @@ TEST_F(TopSampler, ATapTellsOfWinnersThatComeAndGoBetweenTwoLooks) {
   EXPECT_EQ(takeovers[3].winner, "/low:o");  // as the picture has it
 }
 
+TEST_F(TopSampler, ATapTellsHowLongTheOldestSampleHasWaitedAtMost) {
+  std::vector<Accepted> told;
+  Sampler tapping(instance_, [&told] { return std::exchange(told, {}); });
+  Census census;
+  census.asked = 100 * kSecond;
+  census.at = 101 * kSecond;
+  census.ports.resize(1);
+  census.ports[0].name = "/p:i";
+  const auto oldest_of = [&](std::vector<std::pair<std::string, std::uint64_t>> queues) {
+    census.ports[0].queues = std::move(queues);
+    tapping.set_census(std::make_shared<const Census>(census));
+    tapping.look();
+    return tapping.frame({"/p:i"})->ports.at(0).oldest;
+  };
+  EXPECT_EQ(oldest_of({{"/low:o", 1}}), std::nullopt);  // accepted before it was tapped
+  told = {{"/p:i", "/low:o", 90 * kSecond},      {"/p:i", "/low:o", 95 * kSecond, false},
+          {"/p:i", "/low:o", 97 * kSecond},      {"/other:i", "/low:o", 99 * kSecond},
+          {"/p:i", "/low:o", 100 * kSecond + 1},  // perhaps after the daemon has looked
+          {"/p:i", "/high:o", 98 * kSecond}};
+  tapping.look();
+  EXPECT_EQ(oldest_of({}), 0);
+  EXPECT_EQ(oldest_of({{"/low:o", 1}}), 4 * kSecond);
+  EXPECT_EQ(oldest_of({{"/low:o", 2}}), 11 * kSecond);  // the signal was not queued
+  EXPECT_EQ(oldest_of({{"/low:o", 1}, {"/high:o", 1}}), 4 * kSecond);
+  EXPECT_EQ(oldest_of({{"/low:o", 3}}), std::nullopt);
+}
+
 TEST_F(TopSampler, AnotherModelMayChangeTheWinner) {
   Node node("test");
   auto low = node.output_port<int>("/low:o");

@@ -154,6 +154,19 @@ TEST_F(TopScreen, ATapMissesNoWinnerHoweverShort) {
   ASSERT_TRUE(top_.wait_for_none("(t)")) << top_.text();
 }
 
+TEST_F(TopScreen, ATapTellsHowLongTheOldestSampleHasWaited) {
+  top_.resize({24, 120});
+  press("t");
+  ASSERT_TRUE(top_.wait_for("OLDEST")) << top_.text();
+  ASSERT_TRUE(in_.take());  // it was accepted before there was a tap
+  ASSERT_TRUE(top_.wait_until([&] { return top_.row(2).find(" none") != std::string::npos; }))
+      << top_.text();
+  low_.publish(1);
+  ASSERT_TRUE(top_.wait_until([&] {
+    return std::regex_search(top_.row(2), std::regex("1/8 .* <[0-9.]+ m?s$"));
+  })) << top_.text();
+}
+
 TEST(TopScreenOf, SaysThatThePolicyForbidsATap) {
   TemporaryDirectory files;
   const std::string policy = files.write("policy", "deny everyone tap /p:i\nallow everyone all\n");

@@ -194,6 +194,15 @@ TEST_F(TopView, TapsThePortOfTheCursorUntilItIsAskedAgain) {
   frame.ports[0].is_tapped = true;
   view_.add(shared(frame), {});
   EXPECT_THAT(screen(), HasSubstr("/arm:i (t)"));
+  EXPECT_THAT(screen(), HasSubstr("OLDEST"));
+  EXPECT_EQ(line_with("/arm:i").back(), '-');
+  frame.ports[0].oldest = kSecond / 25;
+  view_.add(shared(frame), {});
+  EXPECT_THAT(line_with("/arm:i"), testing::EndsWith("<40 ms"));
+  for (int i = 0; i < 9; ++i) press("s");
+  EXPECT_THAT(screen({120, 24}), HasSubstr("OLDEST▾"));
+  view_.add(shared(frame_at(12)), {});
+  EXPECT_THAT(screen({120, 24}), HasSubstr("COMPONENT▾"));  // that column has gone
 }
 
 TEST_F(TopView, ALongExplanationScrolls) {
