@@ -30,14 +30,14 @@
 namespace arbiter::cli {
 namespace {
 
-constexpr shm::Nanoseconds kSecond = 1'000'000'000;
+constexpr shm::Nanoseconds kOneSecond = 1'000'000'000;
 // How far one can step back, in time and in pictures.
-constexpr shm::Nanoseconds kKept = 60 * kSecond;
+constexpr shm::Nanoseconds kKept = 60 * kOneSecond;
 constexpr shm::Nanoseconds kMostKept = 3000;
 
 struct TopOptions {
   std::string instance;
-  shm::Nanoseconds interval = kSecond / 10;
+  shm::Nanoseconds interval = kOneSecond / 10;
   bool once = false;
 };
 
@@ -126,7 +126,7 @@ class Top {
                       {instance_->descriptor(), POLLIN, 0},
                       {signals, POLLIN, 0}};
     const shm::Nanoseconds left = std::max<shm::Nanoseconds>(time - shm::monotonic_now(), 0);
-    const timespec span{left / kSecond, left % kSecond};
+    const timespec span{left / kOneSecond, left % kOneSecond};
     if (::ppoll(ready, std::size(ready), &span, nullptr) <= 0) return true;
     has_signal = ready[4].revents != 0;
     return ready[1].revents == 0 && (ready[0].revents & (POLLHUP | POLLERR | POLLNVAL)) == 0;
@@ -163,7 +163,7 @@ void add_top(CLI::App& app, int& exit_code) {
           "--interval",
           [options](const std::string& text) {
             options->interval = read_time("--interval", text);
-            if (options->interval < kSecond / 50 || options->interval > 10 * kSecond) {
+            if (options->interval < kOneSecond / 50 || options->interval > 10 * kOneSecond) {
               throw CLI::ValidationError("--interval", "must be between 20ms and 10s");
             }
           },
