@@ -77,6 +77,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_pub(app, exit_code);
   arbiter::cli::add_recording(app, exit_code);
   arbiter::cli::add_status(app, exit_code);
+  arbiter::cli::add_top(app, exit_code);
   arbiter::cli::add_why(app, exit_code);
   arbiter::cli::add_wait(app, exit_code);
   arbiter::cli::add_winners(app, exit_code);

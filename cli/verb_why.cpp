@@ -5,45 +5,22 @@
 #include <iostream>
 #include <memory>
 #include <string>
-#include <utility>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/live.hpp"
-#include "cli/name_warnings.hpp"
 #include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
 #include "cli/why_answer.hpp"
 #include "cli/why_follow.hpp"
-#include "watch/port.hpp"
 
 namespace arbiter::cli {
 namespace {
 
-int answer(const WhyOptions& options) {
-  const auto instance = watch_instance("why", options.instance);
-  watch::Port port(instance, options.port);
-  for (;;) {
-    watch::Look look = port.look();
-    auto explanation = port.explain(look);
-    if (!explanation) continue;  // another model has come into force: that is rare
-    port.add_timeouts(look);
-    const wire::Status status = instance->status();
-    const WhyAnswer answer(options, port, std::move(look), std::move(*explanation), status);
-    answer.check_source();
-    if (options.json) {
-      answer.write_json();
-    } else {
-      answer.write_text();
-      write_text(std::cout, name_warnings(port.diagnostics()));
-    }
-    return 0;
-  }
-}
-
 int why(const WhyOptions& options) {
-  if (!options.follow) return answer(options);
-  return follow_winners(options);
+  if (options.follow) return follow_winners(options);
+  write_why(std::cout, options, watch_instance("why", options.instance));
+  return 0;
 }
 
 }  // namespace

@@ -26,6 +26,7 @@ void add_switch(CLI::App& app, int& exit_code);
 void add_rollback(CLI::App& app, int& exit_code);
 void add_history(CLI::App& app, int& exit_code);
 void add_stop(CLI::App& app, int& exit_code);
+void add_top(CLI::App& app, int& exit_code);
 void add_why(CLI::App& app, int& exit_code);
 void add_wait(CLI::App& app, int& exit_code);
 void add_winners(CLI::App& app, int& exit_code);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <iostream>
+#include <ostream>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -42,8 +42,9 @@ std::vector<std::string> sources_that_matter(const ConnectionExplanation& connec
   return {names.begin(), names.end()};
 }
 
-void write_obstacles(const std::vector<Obstacle>& obstacles, const std::string& of = {}) {
-  for (const auto& each : obstacles) std::cout << "  ! " << of << each.text << '\n';
+void write_obstacles(std::ostream& out, const std::vector<Obstacle>& obstacles,
+                     const std::string& of = {}) {
+  for (const auto& each : obstacles) out << "  ! " << of << each.text << '\n';
 }
 
 // The winner first, then who would like to win.
@@ -54,8 +55,10 @@ int rank(const ConnectionExplanation& connection) {
 }  // namespace
 
 WhyAnswer::WhyAnswer(const WhyOptions& options, const watch::Port& port, Look look,
-                     rules::PortExplanation explanation, const wire::Status& status)
-    : options_(options),
+                     rules::PortExplanation explanation, const wire::Status& status,
+                     std::ostream& out)
+    : out_(out),
+      options_(options),
       port_(port),
       look_(std::move(look)),
       explanation_(std::move(explanation)),
@@ -133,15 +136,15 @@ void WhyAnswer::write_text() const {
 }
 
 void WhyAnswer::write_rest(const std::vector<const ConnectionExplanation*>& rest) const {
-  write_summary(std::cout, rest);
+  write_summary(out_, rest);
   std::vector<std::string> obstructed;
   for (const auto* each : rest) {
     if (!obstacles_.of_connection(each->source).empty()) obstructed.push_back(each->source);
   }
   if (!obstructed.empty()) {
-    std::cout << "  ! there is more to say about " << rules::enumerate(obstructed) << '\n';
+    out_ << "  ! there is more to say about " << rules::enumerate(obstructed) << '\n';
   }
-  std::cout << "\narbiter why " << port_.name() << " SOURCE shows one of them, --all shows all\n";
+  out_ << "\narbiter why " << port_.name() << " SOURCE shows one of them, --all shows all\n";
 }
 
 void WhyAnswer::write_senses() const {
@@ -157,12 +160,12 @@ void WhyAnswer::write_senses() const {
   for (const auto& source : told) {
     (look_.sources.is_active(source) ? active : inactive).push_back(source);
   }
-  std::cout << "\nSensed, without a connection here:\n";
+  out_ << "\nSensed, without a connection here:\n";
   if (!active.empty()) {
-    std::cout << "  " << active.size() << " active: " << rules::enumerate(active) << '\n';
+    out_ << "  " << active.size() << " active: " << rules::enumerate(active) << '\n';
   }
   if (!inactive.empty()) {
-    std::cout << "  " << inactive.size() << " inactive: " << rules::enumerate(inactive) << '\n';
+    out_ << "  " << inactive.size() << " inactive: " << rules::enumerate(inactive) << '\n';
   }
 }
 
@@ -174,60 +177,60 @@ void WhyAnswer::write_only_named() const {
   names.insert(names.end(), explanation_.senses.begin(), explanation_.senses.end());
   std::erase_if(names, [this](const std::string& source) { return !is_only_named(source); });
   if (names.empty()) return;
-  std::cout << "\nNever started (no component has opened them): " << rules::enumerate(names)
-            << (names.size() > rules::kMaxNamesInWords ? " (--all shows all)" : "") << '\n';
+  out_ << "\nNever started (no component has opened them): " << rules::enumerate(names)
+       << (names.size() > rules::kMaxNamesInWords ? " (--all shows all)" : "") << '\n';
 }
 
 void WhyAnswer::write_port() const {
   const ModelInForce& model = port_.model();
-  std::cout << port_.name();
+  out_ << port_.name();
   if (model.is_none()) {
-    std::cout << ": no model is in force, so no connection leads to it\n";
+    out_ << ": no model is in force, so no connection leads to it\n";
   } else if (!look_.is_mentioned) {
-    std::cout << ": the model in force does not mention it, so no connection leads to it\n";
+    out_ << ": the model in force does not mention it, so no connection leads to it\n";
   } else if (!look_.is_arbitrated) {
-    std::cout << ": not arbitrated, because no rule mentions it; everything that its connections "
-                 "bring is delivered\n";
+    out_ << ": not arbitrated, because no rule mentions it; everything that its connections "
+            "bring is delivered\n";
   } else {
     const std::string useless =
         explanation_.winner ? obstacles_.why_it_cannot_deliver(*explanation_.winner) : "";
-    std::cout << ": "
-              << (!useless.empty()      ? "idle, though " + *explanation_.winner + " is selected"
-                  : explanation_.winner ? *explanation_.winner + " wins"
-                                        : std::string("idle, nobody wins"))
-              << since_text();
+    out_ << ": "
+         << (!useless.empty()      ? "idle, though " + *explanation_.winner + " is selected"
+             : explanation_.winner ? *explanation_.winner + " wins"
+                                   : std::string("idle, nobody wins"))
+         << since_text();
     if (!useless.empty()) {
-      std::cout << "; it cannot deliver: " << useless;
+      out_ << "; it cannot deliver: " << useless;
     } else if (explanation_.winner) {
       const std::string why = obstacles_.why_nothing_comes_of(*explanation_.winner);
-      if (!why.empty()) std::cout << "; but nothing of it reaches the port: " << why;
+      if (!why.empty()) out_ << "; but nothing of it reaches the port: " << why;
     }
-    std::cout << '\n';
+    out_ << '\n';
   }
   write_model();
-  write_obstacles(obstacles_.of_port());
+  write_obstacles(out_, obstacles_.of_port());
   if (!look_.picture.is_settled) {
-    std::cout
+    out_
         << "  ! sources change faster than they can be read: this answer may mix several moments\n";
   }
   if (look_.is_arbitrated && !model.has_texts()) {
-    std::cout << "  ! the daemon took this model over from its predecessor (it was started without "
-                 "--model): it knows the decisions, but not the behaviours behind them\n";
+    out_ << "  ! the daemon took this model over from its predecessor (it was started without "
+            "--model): it knows the decisions, but not the behaviours behind them\n";
   }
 }
 
 void WhyAnswer::write_model() const {
   const ModelInForce& model = port_.model();
   if (!model.is_none()) {
-    std::cout << "  by " << model.text() << origin_text(model, look_.sources.now()) << '\n';
+    out_ << "  by " << model.text() << origin_text(model, look_.sources.now()) << '\n';
   }
   for (const auto& file : model.files_now()) {
     const std::string advice = file_advice(file.state, model.is_older());
-    if (!advice.empty()) std::cout << "  ! " << file.path << advice << '\n';
+    if (!advice.empty()) out_ << "  ! " << file.path << advice << '\n';
   }
   if (look_.is_mentioned) return;
   if (const auto other = model.other_that_mentions(port_.name())) {
-    std::cout << "  ! model \"" << *other << "\" mentions it: arbiter switch " << *other << '\n';
+    out_ << "  ! model \"" << *other << "\" mentions it: arbiter switch " << *other << '\n';
   }
 }
 
@@ -281,18 +284,18 @@ std::string WhyAnswer::state_text(const std::string& source) const {
 }
 
 void WhyAnswer::write_connection(const ConnectionExplanation& connection) const {
-  std::cout << '\n' << connection.source;
+  out_ << '\n' << connection.source;
   if (!look_.is_arbitrated) {
-    std::cout << " is delivered\n  it is " << state_text(connection.source) << '\n';
+    out_ << " is delivered\n  it is " << state_text(connection.source) << '\n';
   } else if (connection.wins) {
     const bool can = obstacles_.why_it_cannot_deliver(connection.source).empty();
-    std::cout << (can ? " wins\n  " : " is selected, but cannot deliver\n  ")
-              << state_text(connection.source) << '\n';
+    out_ << (can ? " wins\n  " : " is selected, but cannot deliver\n  ")
+         << state_text(connection.source) << '\n';
     write_selected(connection);
   } else {
     write_kept_out(connection);
   }
-  write_obstacles(obstacles_.of_connection(connection.source));
+  write_obstacles(out_, obstacles_.of_connection(connection.source));
   if (!options_.source.empty()) write_reasons(connection);
 }
 
@@ -301,33 +304,32 @@ void WhyAnswer::write_selected(const ConnectionExplanation& connection) const {
   for (const auto& part : connection.parts) {
     if (!part.causes.empty()) continue;
     if (told++ == kMaxCauses && is_large()) {
-      std::cout << "  and by other behaviours\n";
+      out_ << "  and by other behaviours\n";
       return;
     }
-    std::cout << "  selected by "
-              << (part.behaviour ? describe(*part.behaviour) : std::string("its rule"));
+    out_ << "  selected by "
+         << (part.behaviour ? describe(*part.behaviour) : std::string("its rule"));
     if (!part.where.file.empty()) {
-      std::cout << " (" << part.where.file << ':' << part.where.line << ')';
+      out_ << " (" << part.where.file << ':' << part.where.line << ')';
     }
-    std::cout << '\n';
+    out_ << '\n';
   }
 }
 
 void WhyAnswer::write_kept_out(const ConnectionExplanation& connection) const {
-  std::cout << " is kept out\n";
+  out_ << " is kept out\n";
   if (connection.has_rule && !connection.is_active) {
-    std::cout << "  " << state_text(connection.source) << '\n';
+    out_ << "  " << state_text(connection.source) << '\n';
   }
   if (!is_short(connection)) {
-    write_causes(std::cout, connection, look_.sources, is_large() ? kMaxCauses : SIZE_MAX);
-    if (!connection.has_rule) std::cout << "  " << state_text(connection.source) << '\n';
+    write_causes(out_, connection, look_.sources, is_large() ? kMaxCauses : SIZE_MAX);
+    if (!connection.has_rule) out_ << "  " << state_text(connection.source) << '\n';
     return;
   }
   const auto has_cause = [](const auto& part) { return !part.causes.empty(); };
   if (connection.earlier ||
       std::all_of(connection.parts.begin(), connection.parts.end(), has_cause)) {
-    std::cout << "  and by the rules: arbiter why " << port_.name() << ' ' << connection.source
-              << '\n';
+    out_ << "  and by the rules: arbiter why " << port_.name() << ' ' << connection.source << '\n';
   }
 }
 
@@ -335,15 +337,15 @@ void WhyAnswer::write_kept_out(const ConnectionExplanation& connection) const {
 void WhyAnswer::write_reasons(const ConnectionExplanation& connection) const {
   if (connection.wins) return;
   for (const auto& source : sources_that_matter(connection)) {
-    write_obstacles(obstacles_.of_source(source), source + ": ");
+    write_obstacles(out_, obstacles_.of_source(source), source + ": ");
   }
 }
 
 void WhyAnswer::write_sensed(const std::string& source) const {
-  std::cout << '\n'
-            << source << " is sensed: the rules read it, but it has no connection here\n  "
-            << state_text(source) << '\n';
-  write_obstacles(obstacles_.of_source(source));
+  out_ << '\n'
+       << source << " is sensed: the rules read it, but it has no connection here\n  "
+       << state_text(source) << '\n';
+  write_obstacles(out_, obstacles_.of_source(source));
 }
 
 json WhyAnswer::component_json(const std::string& source) const {
@@ -388,7 +390,28 @@ void WhyAnswer::write_json() const {
     sensed["obstacles"] = obstacles_json(obstacles_.of_source(source));
     document["senses"].push_back(std::move(sensed));
   }
-  std::cout << document.dump(2, ' ', false, json::error_handler_t::replace) << '\n';
+  out_ << document.dump(2, ' ', false, json::error_handler_t::replace) << '\n';
+}
+
+void write_why(std::ostream& out, const WhyOptions& options,
+               const std::shared_ptr<watch::Instance>& instance) {
+  watch::Port port(instance, options.port);
+  for (;;) {
+    Look look = port.look();
+    auto explanation = port.explain(look);
+    if (!explanation) continue;  // another model has come into force: that is rare
+    port.add_timeouts(look);
+    const wire::Status status = instance->status();
+    const WhyAnswer answer(options, port, std::move(look), std::move(*explanation), status, out);
+    answer.check_source();
+    if (options.json) {
+      answer.write_json();
+    } else {
+      answer.write_text();
+      write_text(out, name_warnings(port.diagnostics()));
+    }
+    return;
+  }
 }
 
 }  // namespace arbiter::cli

@@ -1,6 +1,8 @@
 // The answer of `arbiter why`: of one port, at one moment.
 #pragma once
 
+#include <memory>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -19,7 +21,7 @@ class WhyAnswer {
  public:
   // Keeps references.
   WhyAnswer(const WhyOptions& options, const watch::Port& port, watch::Look look,
-            rules::PortExplanation explanation, const wire::Status& status);
+            rules::PortExplanation explanation, const wire::Status& status, std::ostream& out);
 
   // Throws Error where the source is none of this port's.
   void check_source() const;
@@ -50,6 +52,7 @@ class WhyAnswer {
   // "active (arrived …)", and who has it open.
   [[nodiscard]] std::string state_text(const std::string& source) const;
 
+  std::ostream& out_;
   const WhyOptions& options_;
   const watch::Port& port_;
   const watch::Look look_;
@@ -59,5 +62,9 @@ class WhyAnswer {
   std::vector<rules::ConnectionExplanation> shown_;  // as the model has them
   std::vector<std::string> reasons_;                 // sources that keep active connections out
 };
+
+// The whole answer to `options`. Throws as watch::Port does, and Error.
+void write_why(std::ostream& out, const WhyOptions& options,
+               const std::shared_ptr<watch::Instance>& instance);
 
 }  // namespace arbiter::cli

@@ -1,0 +1,209 @@
+// What is seen of a real instance: a daemon in a process of its own, ports in this one.
+#include "top/sampler.hpp"
+
+#include <gtest/gtest.h>
+
+#include <arbiter/arbiter.hpp>
+
+#include "shm/clock.hpp"
+#include "tests/top/pictures.hpp"
+#include "tests/watch/watched.hpp"
+
+namespace arbiter::top {
+namespace {
+
+// Activity ends only by deactivate(), so that no test depends on time.
+const std::string kModel = R"(<behaviors timeout="forever">
+  <behavior name="Low"><config at="/p:i">/low:o</config></behavior>
+  <behavior name="High"><config at="/p:i">/high:o</config><inhibition>Low</inhibition></behavior>
+</behaviors>)";
+
+class TopSampler : public testing::Test {
+ protected:
+  void take_census() {
+    StampedStatus now;
+    now.status = instance_->status();
+    now.at = shm::monotonic_now();
+    now.wall = std::chrono::system_clock::now();
+    sampler_.set_census(std::make_shared<const Census>(census_of(now, nullptr)));
+  }
+  std::shared_ptr<const Frame> look() {
+    sampler_.look();
+    return sampler_.frame();
+  }
+  static std::string winner_of(const Frame& frame, const std::string& port) {
+    const auto place = static_cast<std::size_t>(frame.census->find_port(port));
+    const std::int32_t winner = frame.ports.at(place).winner;
+    if (winner == kNobody) return "nobody";
+    if (winner < 0) return std::to_string(winner);
+    return frame.census->sources.at(static_cast<std::size_t>(winner)).name;
+  }
+
+  test::Daemon daemon_{kModel};
+  std::shared_ptr<watch::Instance> instance_ = test::watched(daemon_);
+  Sampler sampler_{instance_};
+};
+
+TEST_F(TopSampler, HasNoPictureBeforeItKnowsThePorts) {
+  EXPECT_EQ(look(), nullptr);
+  take_census();
+  ASSERT_NE(look(), nullptr);
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "nobody");
+  EXPECT_TRUE(sampler_.new_takeovers().empty());
+}
+
+TEST_F(TopSampler, TellsEachChangeOfAWinnerAndWhatMadeIt) {
+  Node node("test");
+  auto low = node.output_port<int>("/low:o");
+  auto high = node.output_port<int>("/high:o");
+  take_census();
+  look();
+  const shm::Nanoseconds before = shm::monotonic_now();
+  low.publish(1);
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "/low:o");
+  high.publish(1);
+  const auto frame = look();
+  EXPECT_EQ(winner_of(*frame, "/p:i"), "/high:o");
+  EXPECT_EQ(frame->takeovers, 2u);
+  high.deactivate();
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "/low:o");
+  low.deactivate();
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "nobody");
+
+  const auto takeovers = sampler_.new_takeovers();
+  ASSERT_EQ(takeovers.size(), 4u);
+  EXPECT_EQ(takeovers[0].before, "");
+  EXPECT_EQ(takeovers[0].winner, "/low:o");
+  EXPECT_EQ(takeovers[0].because, "/low:o began");
+  EXPECT_EQ(takeovers[1].before, "/low:o");
+  EXPECT_EQ(takeovers[1].winner, "/high:o");
+  EXPECT_EQ(takeovers[1].because, "/high:o began");
+  EXPECT_EQ(takeovers[2].because, "/high:o was deactivated");
+  EXPECT_EQ(takeovers[3].winner, "");
+  shm::Nanoseconds last = before;
+  for (const Takeover& each : takeovers) {
+    EXPECT_EQ(each.port, "/p:i");
+    EXPECT_GE(each.at, last);  // the arrival itself, not when it was seen
+    last = each.at;
+  }
+  EXPECT_TRUE(sampler_.new_takeovers().empty());
+}
+
+TEST_F(TopSampler, SinceIsWhenTheWinnerBegan) {
+  Node node("test");
+  auto low = node.output_port<int>("/low:o");
+  take_census();
+  look();
+  const shm::Nanoseconds before = shm::monotonic_now();
+  low.publish(1);
+  const shm::Nanoseconds after = shm::monotonic_now();
+  const PortState state = look()->ports.at(0);
+  EXPECT_TRUE(state.is_exact);
+  EXPECT_GE(state.since, before);
+  EXPECT_LE(state.since, after);
+  low.publish(2);
+  EXPECT_EQ(look()->ports.at(0).since, state.since);  // it has gone on
+}
+
+TEST_F(TopSampler, ATapTellsOfWinnersThatComeAndGoBetweenTwoLooks) {
+  Node node("test");
+  auto low = node.output_port<int>("/low:o");
+  auto high = node.output_port<int>("/high:o");
+  std::vector<Accepted> told;
+  Sampler tapping(instance_, [&told] { return std::exchange(told, {}); });
+  StampedStatus now;
+  now.status = instance_->status();
+  now.at = shm::monotonic_now();
+  tapping.set_census(std::make_shared<const Census>(census_of(now, nullptr)));
+  low.publish(1);
+  tapping.look();
+  const shm::Nanoseconds first = shm::monotonic_now();
+  const shm::Nanoseconds later = first + 3600 * kSecond;  // of what has not been seen yet
+  told = {{"/p:i", "/low:o", first - kSecond},            // of what is known already
+          {"/p:i", "/high:o", first},          {"/p:i", "/low:o", first + 1},
+          {"/p:i", "/high:o", first + 2},      {"/other:i", "/high:o", first + 2},
+          {"/p:i", "/high:o", later}};
+  tapping.look();
+  const auto takeovers = tapping.new_takeovers();
+  ASSERT_EQ(takeovers.size(), 4u);
+  EXPECT_EQ(takeovers[0].winner, "/high:o");
+  EXPECT_EQ(takeovers[0].at, first);
+  EXPECT_EQ(takeovers[0].because, "/high:o arrived");
+  EXPECT_EQ(takeovers[1].winner, "/low:o");
+  EXPECT_EQ(takeovers[2].winner, "/high:o");
+  EXPECT_EQ(takeovers[3].before, "/high:o");
+  EXPECT_EQ(takeovers[3].winner, "/low:o");  // as the picture has it
+}
+
+TEST_F(TopSampler, ATapTellsHowLongTheOldestSampleHasWaitedAtMost) {
+  std::vector<Accepted> told;
+  Sampler tapping(instance_, [&told] { return std::exchange(told, {}); });
+  Census census;
+  census.asked = 100 * kSecond;
+  census.at = 101 * kSecond;
+  census.ports.resize(1);
+  census.ports[0].name = "/p:i";
+  const auto oldest_of = [&](std::vector<std::pair<std::string, std::uint64_t>> queues) {
+    census.ports[0].queues = std::move(queues);
+    tapping.set_census(std::make_shared<const Census>(census));
+    tapping.look();
+    return tapping.frame({"/p:i"})->ports.at(0).oldest;
+  };
+  EXPECT_EQ(oldest_of({{"/low:o", 1}}), std::nullopt);  // accepted before it was tapped
+  told = {{"/p:i", "/low:o", 90 * kSecond},      {"/p:i", "/low:o", 95 * kSecond, false},
+          {"/p:i", "/low:o", 97 * kSecond},      {"/other:i", "/low:o", 99 * kSecond},
+          {"/p:i", "/low:o", 100 * kSecond + 1},  // perhaps after the daemon has looked
+          {"/p:i", "/high:o", 98 * kSecond}};
+  tapping.look();
+  EXPECT_EQ(oldest_of({}), 0);
+  EXPECT_EQ(oldest_of({{"/low:o", 1}}), 4 * kSecond);
+  EXPECT_EQ(oldest_of({{"/low:o", 2}}), 11 * kSecond);  // the signal was not queued
+  EXPECT_EQ(oldest_of({{"/low:o", 1}, {"/high:o", 1}}), 4 * kSecond);
+  EXPECT_EQ(oldest_of({{"/low:o", 3}}), std::nullopt);
+}
+
+TEST_F(TopSampler, AnotherModelMayChangeTheWinner) {
+  Node node("test");
+  auto low = node.output_port<int>("/low:o");
+  auto high = node.output_port<int>("/high:o");
+  low.publish(1);
+  high.publish(1);
+  take_census();
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "/high:o");
+  daemon_.load(R"(<behaviors timeout="forever">
+    <behavior name="Low"><config at="/p:i">/low:o</config></behavior></behaviors>)");
+  instance_->catch_up();
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "/low:o");
+  const auto takeovers = sampler_.new_takeovers();
+  ASSERT_EQ(takeovers.size(), 1u);
+  EXPECT_EQ(takeovers[0].because, "model 2 came into force");
+}
+
+TEST_F(TopSampler, GoesOnWithoutADaemonAndWithTheNext) {
+  Node node("test");
+  auto low = node.output_port<int>("/low:o");
+  take_census();
+  look();
+  daemon_.kill();
+  test::update_until(*instance_, [this] { return !instance_->has_daemon(); });
+  low.publish(1);
+  const auto alone = look();
+  EXPECT_FALSE(alone->has_daemon);
+  EXPECT_EQ(winner_of(*alone, "/p:i"), "/low:o");
+  daemon_.restart();
+  test::update_until(*instance_, [this] { return instance_->has_daemon(); });
+  take_census();
+  EXPECT_TRUE(look()->has_daemon);
+  EXPECT_EQ(winner_of(*look(), "/p:i"), "/low:o");
+}
+
+TEST_F(TopSampler, APortThatNoRuleMentionsIsNotArbitrated) {
+  Node node("test");
+  auto in = node.input_port<int>("/other:i");
+  instance_->catch_up();
+  take_census();
+  EXPECT_EQ(winner_of(*look(), "/other:i"), std::to_string(kNotArbitrated));
+}
+
+}  // namespace
+}  // namespace arbiter::top

@@ -1,0 +1,216 @@
+// arbiter top in an emulated terminal, beside a real daemon and real ports: what is on the screen.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <regex>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/support/daemon.hpp"
+#include "tests/top/top_program.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+const std::string kUp = "\x1bOA";
+const std::string kDown = "\x1bOB";
+const std::string kRight = "\x1bOC";
+const std::string kLeft = "\x1bOD";
+
+class TopScreen : public testing::Test {
+ protected:
+  // The first picture that has rates: the daemon was asked twice.
+  void SetUp() override {
+    low_.publish(1);
+    ASSERT_TRUE(top_.wait_for("/low:o")) << top_.text();
+  }
+  void press(const std::string& keys) const { top_.type(keys); }
+
+  Daemon daemon_{kTopModel};
+  Node node_{"robot"};
+  InputPort<int> in_ = node_.input_port<int>("/p:i");
+  OutputPort<int> low_ = node_.output_port<int>("/low:o");
+  OutputPort<int> high_ = node_.output_port<int>("/high:o");
+  EmulatedTerminal top_{{kArbiter, "top"}, top_environment(), {24, 80}};
+};
+
+TEST_F(TopScreen, FillsEightyColumnsAndTwentyFourRows) {
+  // All of it comes in pieces.
+  ASSERT_TRUE(top_.wait_until([&] {
+    return top_.row(2).find("1/8") != std::string::npos && top_.shows("   none");
+  })) << top_.text();
+  EXPECT_THAT(top_.row(0), StartsWith("arbiter top  test  model 1"));
+  EXPECT_THAT(top_.row(0), EndsWith("live"));
+  EXPECT_THAT(top_.row(1), StartsWith(">INPUT PORT"));
+  EXPECT_THAT(top_.row(2), StartsWith(">/p:i"));
+  EXPECT_THAT(top_.row(2), HasSubstr("/low:o"));
+  EXPECT_GT(top_.row_with(" /high:o"), top_.row_with("SOURCE"));
+  EXPECT_GT(top_.row_with("CHANGE"), top_.row_with(" /high:o"));
+  EXPECT_TRUE(top_.wait_until([&] { return top_.row(23).substr(0, 6) == "q quit"; }));
+  EXPECT_TRUE(top_.is_alternate());
+  EXPECT_FALSE(top_.has_cursor());
+}
+
+TEST_F(TopScreen, ShowsARateOnceTheDaemonHasCounted) {
+  ASSERT_TRUE(top_.wait_until([&] {
+    low_.publish(1);
+    static_cast<void>(in_.take());
+    const int port = top_.row_with(">/p:i");
+    const int source = top_.row_with("█ active");  // …, what it publishes, what it signals
+    return port != -1 &&
+           std::regex_search(top_.row(port), std::regex("ms +[0-9.]+ +- +- +[01]/8")) &&
+           source != -1 && std::regex_search(top_.row(source), std::regex("ms +[0-9.]+ +- robot"));
+  })) << top_.text();
+}
+
+TEST_F(TopScreen, EachChangeOfAWinnerScrollsBy) {
+  high_.publish(1);
+  ASSERT_TRUE(top_.wait_for("/low:o → /high:o")) << top_.text();
+  EXPECT_THAT(top_.row(top_.row_with("/low:o → /high:o")), HasSubstr("/high:o began"));
+  ASSERT_TRUE(top_.wait_until([&] { return top_.row_with("/high:o") == 2; })) << top_.text();
+  high_.deactivate();
+  low_.deactivate();
+  ASSERT_TRUE(top_.wait_for("→ idle")) << top_.text();
+  EXPECT_LT(top_.row_with("→ idle"), top_.row_with("/low:o → /high:o"));
+}
+
+TEST_F(TopScreen, FollowsAResizeToFortyByTenAndBack) {
+  top_.resize({10, 40});
+  ASSERT_TRUE(top_.wait_until([&] {
+    return top_.row(9).substr(0, 6) == "q quit" && top_.row(1).substr(0, 6) == ">INPUT";
+  })) << top_.text();
+  EXPECT_THAT(top_.row(2), HasSubstr("/low:o"));
+  EXPECT_FALSE(top_.shows("SOURCE"));
+  press("\t");
+  EXPECT_TRUE(top_.wait_for("SOURCE")) << top_.text();
+  top_.resize({24, 80});
+  ASSERT_TRUE(top_.wait_until([&] { return top_.row(23).substr(0, 6) == "q quit"; }))
+      << top_.text();
+  EXPECT_TRUE(top_.wait_for("CHANGE"));
+  for (const auto size : {EmulatedTerminal::Size{1, 1}, {2, 300}, {60, 7}, {24, 80}}) {
+    top_.resize(size);  // none of them ends it
+  }
+  ASSERT_TRUE(top_.wait_until([&] { return top_.row(23).substr(0, 6) == "q quit"; }))
+      << top_.text();
+}
+
+TEST_F(TopScreen, Filters) {
+  press("/high");
+  ASSERT_TRUE(top_.wait_for("filter: high_")) << top_.text();
+  press("\r");
+  ASSERT_TRUE(top_.wait_for("filter \"high\"")) << top_.text();
+  EXPECT_TRUE(top_.wait_for_none("/p:i")) << top_.text();
+  EXPECT_TRUE(top_.wait_for(" /high:o")) << top_.text();
+  press("\x1b");
+  ASSERT_TRUE(top_.wait_for("/p:i")) << top_.text();
+}
+
+TEST_F(TopScreen, PausesAndStepsBack) {
+  high_.publish(1);
+  ASSERT_TRUE(top_.wait_for("/low:o → /high:o"));
+  press(" ");
+  ASSERT_TRUE(top_.wait_for("PAUSED, 0 ms before"));
+  high_.deactivate();  // is not seen during the pause
+  ASSERT_TRUE(top_.wait_until([&] {
+    press(kLeft);
+    return top_.row(2).find("/low:o") != std::string::npos;
+  })) << top_.text();
+  EXPECT_TRUE(top_.wait_for_none("→ /high:o")) << top_.text();
+  ASSERT_TRUE(top_.wait_until([&] {
+    press(kRight);
+    return top_.row(2).find("/high:o") != std::string::npos;
+  })) << top_.text();
+  press(" ");
+  ASSERT_TRUE(top_.wait_for("/high:o → /low:o")) << top_.text();
+  EXPECT_TRUE(top_.wait_for("live"));
+}
+
+TEST_F(TopScreen, TellsWhyAtThePortOfTheCursor) {
+  high_.publish(1);
+  ASSERT_TRUE(top_.wait_for("/low:o → /high:o"));
+  press("\r");
+  ASSERT_TRUE(top_.wait_for("/p:i: /high:o wins")) << top_.text();
+  EXPECT_TRUE(top_.wait_for("inhibited by behaviour \"High\"")) << top_.text();
+  press("q");
+  ASSERT_TRUE(top_.wait_for("INPUT PORT")) << top_.text();
+  press("\t" + kDown + "w");  // of a source: its connections alone
+  ASSERT_TRUE(top_.wait_for("/low:o is kept out")) << top_.text();
+  EXPECT_TRUE(top_.wait_for_none("/high:o wins\n")) << top_.text();
+}
+
+TEST_F(TopScreen, ATapMissesNoWinnerHoweverShort) {
+  press("t");
+  ASSERT_TRUE(top_.wait_for("(t)")) << top_.text();
+  high_.publish(1);
+  high_.deactivate();
+  ASSERT_TRUE(top_.wait_until([&] {
+    return top_.shows("/low:o → /high:o") && top_.shows("/high:o → /low:o");
+  })) << top_.text();
+  press("t");
+  ASSERT_TRUE(top_.wait_for_none("(t)")) << top_.text();
+}
+
+TEST_F(TopScreen, ATapTellsHowLongTheOldestSampleHasWaited) {
+  top_.resize({24, 120});
+  press("t");
+  ASSERT_TRUE(top_.wait_for("OLDEST")) << top_.text();
+  ASSERT_TRUE(in_.take());  // it was accepted before there was a tap
+  ASSERT_TRUE(top_.wait_until([&] { return top_.row(2).find(" none") != std::string::npos; }))
+      << top_.text();
+  low_.publish(1);
+  ASSERT_TRUE(top_.wait_until([&] {
+    return std::regex_search(top_.row(2), std::regex("1/8 .* <[0-9.]+ m?s$"));
+  })) << top_.text();
+}
+
+TEST(TopScreenOf, SaysThatThePolicyForbidsATap) {
+  TemporaryDirectory files;
+  const std::string policy = files.write("policy", "deny everyone tap /p:i\nallow everyone all\n");
+  Daemon daemon(kTopModel, {.arguments = {"--policy", policy}});
+  EmulatedTerminal top({kArbiter, "top"}, top_environment(), {24, 120});
+  ASSERT_TRUE(top.wait_for("/p:i")) << top.text();
+  top.type("t");
+  ASSERT_TRUE(top.wait_for("not tapped: ")) << top.text();
+  EXPECT_TRUE(top.wait_for("may not tap the port /p:i")) << top.text();
+  top.type("t");
+  EXPECT_TRUE(top.wait_for("q quit")) << top.text();
+}
+
+TEST_F(TopScreen, SortsByTheNextColumn) {
+  press("\tr");
+  ASSERT_TRUE(top_.wait_until([&] {
+    return top_.row_with(">/low:o") != -1 && top_.row_with(">/low:o") < top_.row_with(" /high:o");
+  })) << top_.text();
+  press("s");
+  ASSERT_TRUE(top_.wait_for("ACTIVITY▾")) << top_.text();
+}
+
+TEST_F(TopScreen, GoesOnWithoutADaemonAndWithTheNext) {
+  daemon_.kill();
+  ASSERT_TRUE(top_.wait_for("NO DAEMON")) << top_.text();
+  high_.publish(1);  // decisions go on
+  ASSERT_TRUE(top_.wait_for("/low:o → /high:o")) << top_.text();
+  daemon_.restart();
+  ASSERT_TRUE(top_.wait_until([&] { return top_.row(0).find("live") != std::string::npos; }))
+      << top_.text();
+  OutputPort<int> late = node_.output_port<int>("/late:o");
+  ASSERT_TRUE(top_.wait_for("/late:o")) << top_.text();  // what the new one counts
+}
+
+TEST_F(TopScreen, AStoppedDaemonStopsNeitherTheScreenNorTheKeys) {
+  daemon_.process().stop();
+  high_.publish(1);
+  ASSERT_TRUE(top_.wait_for("/low:o → /high:o")) << top_.text();
+  press("?");
+  ASSERT_TRUE(top_.wait_for("Keys and columns")) << top_.text();
+  press("qq");
+  EXPECT_EQ(top_.wait_for_end(), 0);
+  daemon_.process().resume();
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,171 @@
+// The view as lines.
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "top/view.hpp"
+
+namespace arbiter::top {
+namespace {
+
+// Below this the tables would be too short to be of use: one is shown at a time.
+constexpr std::size_t kRowsForAll = 13;
+
+// Left and right in one line; where both do not fit, the right one stays.
+Line two_sided(const std::string& left, const std::string& right, std::size_t columns, Style style,
+               Style right_style, Charset charset) {
+  const std::size_t wanted = std::min(columns_of(safe(right, charset)), columns);
+  Line line;
+  line.spans = {{fit(left, columns - wanted, Align::kLeft, charset), style},
+                {fit(right, wanted, Align::kLeft, charset), right_style}};
+  return line;
+}
+
+}  // namespace
+
+std::vector<Line> View::draw(Size size) {
+  std::vector<Line> lines;
+  if (size.rows == 0 || size.columns == 0) return lines;
+  lines.push_back(title(size.columns));
+  const std::size_t body = size.rows > 2 ? size.rows - 2 : 0;
+  if (overlay_) {
+    for (Line& line : overlay_->draw(size.columns, body, charset_))
+      lines.push_back(std::move(line));
+  } else if (history_.frame() == nullptr) {
+    lines.push_back(line_of("asking the daemon ...", size.columns, Style::kDim, charset_));
+  } else {
+    std::array<Table, kPanes> tables = {table(Pane::kPorts), table(Pane::kSources),
+                                        table(Pane::kTakeovers)};
+    const auto heights = this->heights(tables, body);
+    for (std::size_t i = 0; i < tables.size(); ++i) {
+      const Size room{size.columns, heights[i]};
+      for (Line& line : draw_pane(static_cast<Pane>(i), std::move(tables[i]), room)) {
+        lines.push_back(std::move(line));
+      }
+    }
+  }
+  lines.resize(std::min(lines.size(), size.rows - 1));
+  while (lines.size() + 1 < size.rows) {
+    lines.push_back(line_of("", size.columns, Style::kPlain, charset_));
+  }
+  lines.push_back(footer(size.columns));
+  return lines;
+}
+
+// A header each. Changes get a quarter; ports and sources what they need, and where that is too
+// much, ports at least half of it.
+std::array<std::size_t, kPanes> View::heights(const std::array<Table, kPanes>& tables,
+                                              std::size_t rows) const {
+  std::array<std::size_t, kPanes> result{};
+  if (rows < kRowsForAll) {
+    result[static_cast<std::size_t>(focus_)] = rows;
+    return result;
+  }
+  const std::size_t ports = tables[0].rows.size() + 1;
+  const std::size_t sources = tables[1].rows.size() + 1;
+  const std::size_t changes = std::max<std::size_t>(rows / 4, 4);
+  const std::size_t room = rows - changes;
+  result[0] = std::min(ports, std::max(room / 2, room - std::min(sources, room)));
+  result[1] = std::min(sources, room - result[0]);
+  result[2] = rows - result[0] - result[1];
+  return result;
+}
+
+std::vector<Line> View::draw_pane(Pane pane, Table table, Size size) {
+  std::vector<Line> lines;
+  if (size.rows == 0 || table.columns.empty()) return lines;
+  find_selected(pane, table);
+  PaneState& state = panes_[static_cast<std::size_t>(pane)];
+  state.page = std::max<std::size_t>(size.rows - 1, 1);
+  const std::size_t most = table.rows.size() > state.page ? table.rows.size() - state.page : 0;
+  state.offset = std::min(state.offset, std::min(state.index, most));
+  if (state.index >= state.offset + state.page) state.offset = state.index - state.page + 1;
+  const std::size_t end = std::min(state.offset + state.page, table.rows.size());
+  if (most != 0) {
+    table.columns[pane == Pane::kTakeovers ? 1 : 0].title +=
+        " " + std::to_string(state.offset + 1) + "-" + std::to_string(end) + "/" +
+        std::to_string(table.rows.size());
+  }
+  const std::size_t room = size.columns > 2 ? size.columns - 1 : 1;
+  const auto widths = table.widths(room, charset_);
+  const std::size_t none = table.columns.size();
+  const auto add = [&](Line line, bool is_marked, bool is_selected) {
+    line.spans.insert(line.spans.begin(), {is_marked ? ">" : " ", Style::kPlain});
+    line.is_selected = is_selected;
+    std::size_t width = 0;
+    for (const Span& span : line.spans) width += columns_of(span.text);
+    if (width < size.columns) line.spans.push_back({std::string(size.columns - width, ' ')});
+    lines.push_back(std::move(line));
+  };
+  const bool has_focus = pane == focus_;
+  const std::size_t sorted = pane == Pane::kTakeovers ? none : std::min(state.sorted, none - 1);
+  Line header = table.header(widths, sorted, state.is_descending, charset_);
+  for (Span& span : header.spans) span.style = has_focus ? Style::kTitle : Style::kHeader;
+  add(std::move(header), has_focus, false);
+  for (std::size_t i = state.offset; i < end; ++i) {
+    const bool is_selected = has_focus && i == state.index;
+    add(table.line(table.rows[i], widths, is_selected, charset_), is_selected, is_selected);
+  }
+  if (table.rows.empty() && size.rows > 1) {
+    lines.push_back(line_of(filter_.empty() ? "   none" : "   none that the filter shows",
+                            size.columns, Style::kDim, charset_));
+  }
+  while (lines.size() < size.rows) {
+    lines.push_back(line_of("", size.columns, Style::kPlain, charset_));
+  }
+  return lines;
+}
+
+Line View::title(std::size_t columns) const {
+  const auto frame = history_.frame();
+  if (frame == nullptr) return line_of("arbiter top", columns, Style::kTitle, charset_);
+  const std::string left = "arbiter top  " + frame->census->instance + "  " + frame->census->model +
+                           "  " + clock_text(frame->wall);
+  if (history_.is_paused()) {
+    return two_sided(left, "  PAUSED, " + span(history_.age()) + " before", columns, Style::kTitle,
+                     Style::kWarning, charset_);
+  }
+  if (!frame->has_daemon) {
+    return two_sided(left, "  NO DAEMON: the last model decides", columns, Style::kTitle,
+                     Style::kWarning, charset_);
+  }
+  return two_sided(left, "  live", columns, Style::kTitle, Style::kTitle, charset_);
+}
+
+Line View::footer(std::size_t columns) const {
+  if (is_typing_) return line_of("filter: " + filter_ + "_", columns, Style::kTitle, charset_);
+  const auto frame = history_.frame();
+  if (frame != nullptr && frame->has_daemon && !problem_.empty() && !history_.is_paused()) {
+    return line_of(problem_, columns, Style::kWarning, charset_);
+  }
+  if (frame != nullptr && !frame->is_settled) {
+    return line_of("sources change too fast for one picture: who wins may be late", columns,
+                   Style::kWarning, charset_);
+  }
+  std::string keys = overlay_ ? "Esc close  arrows scroll"
+                              : "q quit  ? help  Enter why  Tab pane  / filter  s sort  Space "
+                                "pause  arrows step, move";
+  if (!filter_.empty()) keys = "filter \"" + filter_ + "\": Esc shows all   " + keys;
+  return line_of(keys, columns, Style::kDim, charset_);
+}
+
+std::string View::text() const {
+  const auto frame = history_.frame();
+  if (frame == nullptr) return "";
+  std::string text = "instance " + frame->census->instance + ", " + frame->census->model + ", " +
+                     clock_text(frame->wall) + "\n";
+  for (const Pane pane : {Pane::kPorts, Pane::kSources, Pane::kTakeovers}) {
+    const Table table = this->table(pane);
+    if (pane == Pane::kTakeovers && table.rows.empty()) continue;
+    const auto widths = table.widths(100'000, charset_);
+    text += "\n" +
+            safe(table.header(widths, table.columns.size(), false, charset_).text(), charset_) +
+            "\n";
+    for (const Row& row : table.rows) {
+      text += table.line(row, widths, false, charset_).text() + "\n";
+    }
+  }
+  return text;
+}
+
+}  // namespace arbiter::top

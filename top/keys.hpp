@@ -1,0 +1,59 @@
+// What is typed, and what it does.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace arbiter::top {
+
+enum class Key {
+  kCharacter,
+  kUp,
+  kDown,
+  kPageUp,
+  kPageDown,
+  kHome,
+  kEnd,
+  kLeft,
+  kRight,
+  kTab,
+  kBackTab,
+  kEnter,
+  kEscape,
+  kBackspace,
+};
+struct KeyPress {
+  Key key = Key::kCharacter;
+  std::string character;  // in UTF-8, of kCharacter
+};
+
+enum class Command {
+  kNone,
+  kQuit,
+  kUp,
+  kDown,
+  kPageUp,
+  kPageDown,
+  kTop,
+  kBottom,
+  kNextPane,
+  kPreviousPane,
+  kSort,
+  kReverse,
+  kFilter,
+  kPause,
+  kBack,
+  kForward,
+  kBackFar,
+  kForwardFar,
+  kWhy,
+  kTap,
+  kHelp,
+  kEscape,
+};
+[[nodiscard]] Command command_of(const KeyPress& press);
+
+// What `?` shows.
+[[nodiscard]] const std::vector<std::string>& help_lines();
+
+}  // namespace arbiter::top

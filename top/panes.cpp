@@ -1,0 +1,207 @@
+#include "top/panes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdio>
+#include <ctime>
+#include <initializer_list>
+#include <limits>
+
+namespace arbiter::top {
+namespace {
+
+constexpr std::size_t kBarWidth = 10;
+constexpr double kLast = std::numeric_limits<double>::max();  // in an ascending order
+
+std::string lower(std::string text) {
+  for (char& each : text) each = static_cast<char>(std::tolower(static_cast<unsigned char>(each)));
+  return text;
+}
+
+bool matches(const std::string& filter, std::initializer_list<std::string> texts) {
+  return filter.empty() || std::any_of(texts.begin(), texts.end(), [&](const std::string& text) {
+           return lower(text).find(lower(filter)) != std::string::npos;
+         });
+}
+
+Cell number(const std::string& text, double order, Style style = Style::kPlain) {
+  return {text, style, order};
+}
+Cell rate_cell(double per_second, Style style = Style::kPlain) {
+  return {rate(per_second), per_second > 0 ? style : Style::kDim, per_second};
+}
+Cell unknown(const char* text = "-") { return {text, Style::kDim, kLast}; }
+
+Cell age_cell(shm::Nanoseconds now, shm::Nanoseconds then) {
+  if (then <= 0) return unknown();
+  return number(span(now - then), static_cast<double>(now - then));
+}
+
+Cell winner_cell(const Frame& frame, std::size_t port) {
+  const std::int32_t winner = frame.ports[port].winner;
+  if (winner == kNobody) return {"idle", Style::kIdle};
+  if (winner == kNotArbitrated) return {"(all: not arbitrated)", Style::kDim};
+  if (winner < 0) return unknown("?");
+  const std::string& name = frame.census->sources[static_cast<std::size_t>(winner)].name;
+  if (frame.census->ports[port].useless == name) return {"! " + name, Style::kWarning};
+  return {name, Style::kWinner};
+}
+
+Cell since_cell(const Frame& frame, const PortState& state) {
+  if (state.since == 0 || state.winner == kNotArbitrated || state.winner == kNotKnown) {
+    return unknown();
+  }
+  const shm::Nanoseconds time = frame.now - state.since;
+  return number((state.is_exact ? "" : ">") + span(time), static_cast<double>(time));
+}
+
+Cell queue_cell(const PortFact& port) {
+  if (!port.is_open) return unknown();
+  const bool is_full = port.depth != 0 && port.waiting >= port.depth;
+  return number(std::to_string(port.waiting) + "/" + std::to_string(port.depth),
+                static_cast<double>(port.waiting), is_full ? Style::kWarning : Style::kPlain);
+}
+
+Cell oldest_cell(const PortState& state) {
+  if (!state.oldest) return unknown();
+  if (*state.oldest == 0) return number("none", 0);
+  return number("<" + span(*state.oldest), static_cast<double>(*state.oldest));
+}
+
+struct ActivityCells {
+  Cell bar;
+  Cell state;
+};
+ActivityCells activity_cells(const Frame& frame, std::size_t source, Charset charset) {
+  const shm::ActivityWord word = frame.words[source];
+  const shm::Nanoseconds timeout = frame.census->sources[source].timeout;
+  if (shm::is_deactivation(word)) return {{"", Style::kDim, 0}, {"ended", Style::kDim}};
+  if (!shm::is_active(word, frame.now)) {
+    return {{"", Style::kDim, 0}, {word == shm::kNeverActive ? "never" : "silent", Style::kDim}};
+  }
+  const bool is_finite = shm::is_finite(word) && timeout != shm::kForever && timeout > 0;
+  const double left =
+      is_finite ? static_cast<double>(word - frame.now) / static_cast<double>(timeout) : 1;
+  return {number(bar(left, kBarWidth, charset), left, Style::kBar), {"active", Style::kWinner}};
+}
+
+std::string timeout_text(shm::Nanoseconds timeout) {
+  if (timeout == shm::kForever) return "forever";
+  if (timeout < 1'000'000) return std::to_string(timeout / 1'000) + " us";
+  return span(timeout);
+}
+
+Row port_row(const Frame& frame, std::size_t i) {
+  const PortFact& port = frame.census->ports[i];
+  const PortState& state = frame.ports[i];
+  const Cell last =
+      state.winner >= 0
+          ? age_cell(frame.now, frame.last_event(static_cast<std::size_t>(state.winner)))
+          : unknown();
+  const std::string mark = frame.ports[i].is_tapped ? " (t)" : "";
+  Row row{port.name, {{port.name + mark}, winner_cell(frame, i), since_cell(frame, state), last}};
+  if (port.rates) {
+    row.cells.push_back(rate_cell(port.rates->taken));
+    row.cells.push_back(rate_cell(port.rates->lost, Style::kWarning));
+    row.cells.push_back(rate_cell(port.rates->discarded));
+  } else {
+    row.cells.insert(row.cells.end(), 3, unknown(port.is_open ? "..." : "-"));
+  }
+  row.cells.push_back(queue_cell(port));
+  row.cells.push_back({port.component, port.is_open ? Style::kPlain : Style::kDim});
+  row.cells.push_back(oldest_cell(state));
+  return row;
+}
+
+Row source_row(const Frame& frame, std::size_t i, Charset charset) {
+  const SourceFact& source = frame.census->sources[i];
+  const ActivityCells activity = activity_cells(frame, i, charset);
+  Row row{source.name,
+          {{source.name},
+           activity.bar,
+           activity.state,
+           number(timeout_text(source.timeout), static_cast<double>(source.timeout)),
+           age_cell(frame.now, frame.last_event(i))}};
+  if (source.rates) {
+    row.cells.push_back(rate_cell(source.rates->published));
+    row.cells.push_back(rate_cell(source.rates->signals));
+  } else {
+    row.cells.insert(row.cells.end(), 2, unknown(source.is_open ? "..." : "-"));
+  }
+  row.cells.push_back({source.component, source.is_open ? Style::kPlain : Style::kDim});
+  return row;
+}
+
+}  // namespace
+
+bool is_any_tapped(const Frame& frame) {
+  return std::any_of(frame.ports.begin(), frame.ports.end(),
+                     [](const PortState& port) { return port.is_tapped; });
+}
+
+Table ports_table(const Frame& frame, const std::string& filter, Charset charset) {
+  static_cast<void>(charset);
+  Table table;
+  table.columns = {{"INPUT PORT", 0, Align::kLeft, 0, false}, {"WINNER", 0, Align::kLeft, 0, false},
+                   {"SINCE", 7, Align::kRight, 1, true},      {"LAST", 6, Align::kRight, 2, true},
+                   {"TAKEN", 6, Align::kRight, 3, true},      {"LOST", 5, Align::kRight, 5, true},
+                   {"LOSERS", 7, Align::kRight, 6, true},     {"QUEUE", 7, Align::kRight, 4, true},
+                   {"COMPONENT", 0, Align::kLeft, 7, false}};
+  if (is_any_tapped(frame)) table.columns.push_back({"OLDEST", 7, Align::kRight, 2, true});
+  for (std::size_t i = 0; i < frame.ports.size(); ++i) {
+    Row row = port_row(frame, i);
+    row.cells.resize(table.columns.size());
+    if (matches(filter, {row.name, row.cells[1].text})) table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+Table sources_table(const Frame& frame, const std::string& filter, Charset charset) {
+  Table table;
+  table.columns = {
+      {"SOURCE", 0, Align::kLeft, 0, false},  {"ACTIVITY", kBarWidth, Align::kLeft, 3, true},
+      {"", 6, Align::kLeft, 0, false},        {"T", 7, Align::kRight, 4, true},
+      {"LAST", 6, Align::kRight, 1, true},    {"RATE", 6, Align::kRight, 2, true},
+      {"SIGNALS", 8, Align::kRight, 5, true}, {"COMPONENT", 0, Align::kLeft, 6, false}};
+  for (std::size_t i = 0; i < frame.words.size(); ++i) {
+    Row row = source_row(frame, i, charset);
+    if (matches(filter, {row.name})) table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+Table takeovers_table(const std::vector<const Takeover*>& takeovers, bool is_tapped,
+                      const std::string& filter, Charset charset) {
+  Table table;
+  const std::string arrow = charset == Charset::kUtf8 ? " → " : " -> ";
+  table.columns = {
+      {"CHANGE", 12, Align::kLeft, 0, false},
+      {"AT", 0, Align::kLeft, 0, false},
+      {"WINNER", 0, Align::kLeft, 0, false},
+      {is_tapped ? "BECAUSE" : "BECAUSE (looks every 10 ms)", 0, Align::kLeft, 1, false}};
+  for (const Takeover* each : takeovers) {
+    if (!matches(filter, {each->port, each->before, each->winner})) continue;
+    const auto name = [](const std::string& source) { return source.empty() ? "idle" : source; };
+    table.rows.push_back({std::to_string(each->number),
+                          {{clock_text(each->wall)},
+                           {each->port},
+                           {name(each->before) + arrow + name(each->winner),
+                            each->winner.empty() ? Style::kIdle : Style::kWinner},
+                           {each->because}}});
+  }
+  return table;
+}
+
+std::string clock_text(std::chrono::system_clock::time_point time) {
+  const std::time_t seconds = std::chrono::system_clock::to_time_t(time);
+  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(time.time_since_epoch());
+  std::tm local{};
+  ::localtime_r(&seconds, &local);
+  char text[64];
+  std::snprintf(text, sizeof text, "%02d:%02d:%02d.%03d", local.tm_hour, local.tm_min, local.tm_sec,
+                static_cast<int>(ms.count() % 1000));
+  return text;
+}
+
+}  // namespace arbiter::top

@@ -1,0 +1,263 @@
+#include "top/sampler.hpp"
+
+#include <algorithm>
+
+#include "rules/explain/change.hpp"
+#include "rules/explain/tenure.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::top {
+namespace {
+
+std::chrono::system_clock::time_point earlier(std::chrono::system_clock::time_point wall,
+                                              shm::Nanoseconds by) {
+  return wall - std::chrono::duration_cast<std::chrono::system_clock::duration>(
+                    std::chrono::nanoseconds(by));
+}
+
+}  // namespace
+
+Sampler::Sampler(std::shared_ptr<watch::Instance> instance,
+                 std::function<std::vector<Accepted>()> collect)
+    : instance_(std::move(instance)),
+      collect_(std::move(collect)),
+      started_(shm::monotonic_now()) {}
+
+void Sampler::set_census(std::shared_ptr<const Census> census) {
+  census_ = std::move(census);
+  is_bound_ = false;
+}
+
+// Ids of names. A daemon with memory of its own has numbered them anew.
+void Sampler::bind() {
+  if (memory_ != instance_->memory()) {
+    memory_ = instance_->memory();
+    is_bound_ = false;
+    seats_.clear();
+    last_ = {};
+  }
+  const shm::TableSnapshot snapshot = memory_->tables().snapshot();
+  if (is_bound_ && generation_ == snapshot.generation) return;
+  sources_.clear();
+  if (snapshot.generation != 0) sources_ = watch::all_sources(snapshot.table);
+  port_ids_.clear();
+  source_ids_.clear();
+  places_.clear();
+  if (census_ != nullptr) {
+    for (const PortFact& each : census_->ports) {
+      port_ids_.push_back(instance_->find_port(each.name).value_or(shm::kNone));
+    }
+    for (const SourceFact& each : census_->sources) {
+      const shm::SourceId id = instance_->find_source(each.name).value_or(shm::kNone);
+      if (id != shm::kNone) {
+        places_[id] = static_cast<std::int32_t>(source_ids_.size());
+        sources_.push_back(id);
+      }
+      source_ids_.push_back(id);
+    }
+  }
+  std::sort(sources_.begin(), sources_.end());
+  sources_.erase(std::unique(sources_.begin(), sources_.end()), sources_.end());
+  // If another model has come meanwhile, the next look binds again.
+  generation_ = snapshot.generation;
+  is_bound_ = memory_->tables().is_whole(snapshot);
+}
+
+shm::Nanoseconds Sampler::look() {
+  const shm::Nanoseconds began = shm::monotonic_now();
+  instance_->update();
+  bind();
+  const auto these = [this](const shm::TableView&) { return sources_; };
+  watch::Picture picture = watch::take_picture(*memory_, these);
+  const bool is_of_binding = picture.snapshot.generation == generation_;
+  before_ = std::exchange(last_, std::move(picture));
+  wall_ = std::chrono::system_clock::now();
+  if (collect_) {
+    for (Accepted& each : collect_()) {
+      if (each.is_sample) note_arrival(each);
+      accepted_.push_back(std::move(each));
+    }
+  }
+  // Else who wins is told by the next look.
+  if (is_of_binding && last_.is_settled) take_seats();
+  const shm::Nanoseconds over = shm::monotonic_now();
+  const shm::Nanoseconds next =
+      std::clamp(last_.next_end(), over + kLeastInterval, over + kLookInterval);
+  return std::max(next, over + (over - began) * (kLookShare - 1));
+}
+
+void Sampler::take_seats() {
+  if (census_ == nullptr) return;
+  std::map<std::string, Seat> seats;
+  std::vector<Takeover> noted = takeovers_;
+  const std::uint64_t so_far = takeovers_so_far_;
+  for (std::size_t i = 0; i < port_ids_.size(); ++i) {
+    if (port_ids_[i] == shm::kNone) continue;
+    const std::string& name = census_->ports[i].name;
+    const auto known = seats_.find(name);
+    if (known == seats_.end()) {
+      seats[name] = first_seat(port_ids_[i]);
+      continue;
+    }
+    Seat now = seat_at(port_ids_[i]);
+    Seat before = known->second;
+    for (const Accepted& each : accepted_) {
+      if (each.port == name && now.is_arbitrated && each.at <= last_.now)
+        follow(name, before, each);
+    }
+    if (now.winner != before.winner) {
+      note_takeover(name, port_ids_[i], before, now);
+    } else {
+      now.since = before.since;
+      now.is_exact = before.is_exact;
+    }
+    seats[name] = now;
+  }
+  if (memory_->tables().is_whole(last_.snapshot)) {
+    seats_ = std::move(seats);
+    std::erase_if(accepted_, [this](const Accepted& each) { return each.at <= last_.now; });
+  } else {  // what was read of the table may have been another's
+    takeovers_ = std::move(noted);
+    takeovers_so_far_ = so_far;
+  }
+}
+
+Sampler::Seat Sampler::seat_at(shm::PortId port) const {
+  Seat seat;
+  if (last_.snapshot.generation == 0) return seat;
+  seat.is_arbitrated = last_.snapshot.table.is_arbitrated(port);
+  seat.winner = last_.winner_at(port);
+  return seat;
+}
+
+// Of the past, what the activity words tell: exact only while the first model is in force, for they
+// were written under its T.
+Sampler::Seat Sampler::first_seat(shm::PortId port) const {
+  Seat seat = seat_at(port);
+  seat.since = started_;
+  if (!seat.is_arbitrated || census_->first_model_since == 0) return seat;
+  const auto word = [this](shm::SourceId source) {
+    const auto found = last_.words.find(source);
+    return found == last_.words.end() ? shm::kNeverActive : found->second;
+  };
+  const rules::Tenure tenure = rules::tenure_of(last_.snapshot.table, port, seat.winner,
+                                                {last_.now, census_->first_model_since, word});
+  seat.since = std::max(tenure.at_least, census_->first_model_since);
+  seat.is_exact = tenure.is_exact();
+  return seat;
+}
+
+void Sampler::note_arrival(const Accepted& accepted) {
+  auto& times = arrivals_[{accepted.port, accepted.source}];
+  times.push_back(accepted.at);
+  // Twice, for some come between the question and the answer of a census.
+  if (times.size() > std::size_t{2} * shm::kMaxDepth) times.pop_front();
+}
+
+// Of what waits, a queue has the latest that it accepted. The daemon looked at it after it was
+// asked: the oldest one had arrived no earlier than what would have been the oldest one then. Where
+// a tap has lost events, or was closed for a while, the bound is not as good, but it is one.
+std::optional<shm::Nanoseconds> Sampler::oldest_at(const PortFact& port) const {
+  shm::Nanoseconds oldest = 0;
+  for (const auto& [source, waiting] : port.queues) {
+    const auto found = arrivals_.find({port.name, source});
+    if (found == arrivals_.end()) return std::nullopt;
+    const auto& times = found->second;
+    const auto by_then = std::upper_bound(times.begin(), times.end(), census_->asked);
+    if (static_cast<std::uint64_t>(by_then - times.begin()) < waiting) return std::nullopt;
+    oldest = std::max(oldest, census_->at - *(by_then - static_cast<std::ptrdiff_t>(waiting)));
+  }
+  return oldest;
+}
+
+// One that came before what is known already tells nothing new.
+void Sampler::follow(const std::string& port, Seat& seat, const Accepted& accepted) {
+  const auto source = instance_->find_source(accepted.source);
+  if (!source || *source == seat.winner || accepted.at < seat.since) return;
+  add_takeover(port, seat.winner, *source, accepted.at, accepted.source + " arrived");
+  seat = {*source, true, accepted.at, true};
+}
+
+void Sampler::note_takeover(const std::string& port, shm::PortId id, const Seat& before,
+                            Seat& now) {
+  now.since = last_.now;
+  now.is_exact = true;
+  std::string because = cause_of(id, now.since);
+  add_takeover(port, before.winner, now.winner, now.since, std::move(because));
+}
+
+void Sampler::add_takeover(const std::string& port, shm::SourceId before, shm::SourceId winner,
+                           shm::Nanoseconds at, std::string because) {
+  Takeover takeover;
+  takeover.number = ++takeovers_so_far_;
+  takeover.at = at;
+  takeover.wall = earlier(wall_, last_.now - at);
+  takeover.port = port;
+  takeover.before = name_of(before);
+  takeover.winner = name_of(winner);
+  takeover.because = std::move(because);
+  takeovers_.push_back(std::move(takeover));
+}
+
+// `at`: when it happened, which was before it was seen.
+std::string Sampler::cause_of(shm::PortId port, shm::Nanoseconds& at) const {
+  if (before_.snapshot.generation != last_.snapshot.generation) {
+    return "model " + std::to_string(last_.snapshot.generation) + " came into force";
+  }
+  const shm::TableView& table = last_.snapshot.table;
+  const auto was = [this](shm::SourceId source) { return before_.is_active(source); };
+  const auto is = [this](shm::SourceId source) { return last_.is_active(source); };
+  std::string text;
+  for (const shm::SourceId source : rules::causes_of_change(table, port, was, is)) {
+    const shm::ActivityWord word = last_.words.at(source);
+    const bool has_expired = shm::is_finite(word) && !is(source);
+    const shm::Nanoseconds time = has_expired ? word : shm::time_of(word, table.timeout(source));
+    at = std::min(at, std::max(time, before_.now));
+    text += (text.empty() ? "" : ", ") + name_of(source) +
+            (is(source)    ? " began"
+             : has_expired ? " fell silent"
+                           : " was deactivated");
+  }
+  return text;
+}
+
+std::string Sampler::name_of(shm::SourceId source) const {
+  return source == shm::kNone ? "" : memory_->source_name(source);
+}
+
+std::shared_ptr<const Frame> Sampler::frame(const std::set<std::string>& tapped) const {
+  if (census_ == nullptr || memory_ == nullptr) return nullptr;
+  const auto frame = std::make_shared<Frame>();
+  frame->now = last_.now;
+  frame->wall = wall_;
+  frame->census = census_;
+  frame->generation = last_.snapshot.generation;
+  frame->takeovers = takeovers_so_far_;
+  frame->has_daemon = instance_->has_daemon();
+  frame->is_settled = last_.is_settled;
+  for (const PortFact& each : census_->ports) {
+    PortState& state = frame->ports.emplace_back();
+    state.is_tapped = tapped.count(each.name) != 0;
+    if (state.is_tapped) state.oldest = oldest_at(each);
+    const auto seat = seats_.find(each.name);
+    if (seat == seats_.end()) continue;
+    state.since = seat->second.since;
+    state.is_exact = seat->second.is_exact;
+    const auto place = places_.find(seat->second.winner);
+    if (!seat->second.is_arbitrated) {
+      state.winner = kNotArbitrated;
+    } else if (seat->second.winner == shm::kNone) {
+      state.winner = kNobody;
+    } else if (place != places_.end()) {
+      state.winner = place->second;
+    }
+  }
+  for (std::size_t i = 0; i < census_->sources.size(); ++i) {
+    const bool is_bound = i < source_ids_.size() && source_ids_[i] != shm::kNone;
+    const auto word = is_bound ? last_.words.find(source_ids_[i]) : last_.words.end();
+    frame->words.push_back(word == last_.words.end() ? shm::kNeverActive : word->second);
+  }
+  return frame;
+}
+
+}  // namespace arbiter::top
