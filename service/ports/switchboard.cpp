@@ -59,6 +59,7 @@ void Switchboard::insert(std::unique_ptr<InputPort> port, Client& client, InputN
   name.open = port->instance;
   name.away = 0;
   client.ports.insert(port->instance);
+  taps_.show(*port);
   inputs_[port->instance] = std::move(port);
 }
 
@@ -85,6 +86,7 @@ void Switchboard::remove(shm::PortInstance port) {
     at_step("output-owner-cleared");
   }
   if (const auto found = inputs_.find(port); found != inputs_.end()) {
+    taps_.end(port, found->second->name->name);
     registry_.input(found->second->name->id).clear_owner();
     at_step("input-owner-cleared");
   }
@@ -176,8 +178,9 @@ Switchboard::Told Switchboard::add_tap(std::unique_ptr<Tap> tap, Client& client,
                                        const shm::TableView& table,
                                        const std::function<void()>& opened) {
   Told told;
-  taps_.add(std::move(tap), client);
+  const Tap& added = taps_.add(std::move(tap), client);
   opened();
+  for (const auto& [instance, input] : inputs_) taps_.show(added, *input);
   taps_.link(table, outputs_, [&](Client* publisher) { told.insert(publisher); });
   return told;
 }

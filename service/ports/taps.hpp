@@ -14,6 +14,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "service/clients/client.hpp"
 #include "service/kept/registry.hpp"
@@ -28,9 +29,10 @@ namespace arbiter::service {
 struct Tap {
   shm::PortInstance instance = 0;
   Client* client = nullptr;
-  std::string name;       // of the port that is tapped
-  bool is_input = false;  // it is an input port
-  uid_t user = 0;         // whose the segment is
+  std::string name;            // of the port that is tapped
+  bool is_input = false;       // it is an input port
+  uid_t user = 0;              // whose the segment is
+  bool is_privileged = false;  // root, or the daemon's own user
   shm::FileDescriptor segment;
   std::shared_ptr<const PortBell> bell;
   Charge charge;
@@ -80,6 +82,13 @@ class Taps {
   void set_away(shm::PortInstance output);
   // It has closed, or died.
   void end(shm::PortInstance output);
+  // The same of input ports: taps of that name read what the port counts.
+  void show(const Tap& tap, const InputPort& input) const;
+  void show(const InputPort& input) const;
+  void end(shm::PortInstance input, const std::string& name) const;
+
+  // Those that an output port's component has taken in.
+  [[nodiscard]] std::vector<const Tap*> of(shm::PortInstance output) const;
 
  private:
   // A tap and an output port whose component has been asked.

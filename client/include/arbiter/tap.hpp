@@ -54,6 +54,9 @@ enum class TapEventKind : std::uint8_t {
   deactivation,  // the source's activity was ended
   destinations,  // the source's list of destinations has changed
   closed,        // its output port was closed, or its component died: this was all
+  dropped,       // at the input port that is tapped: samples that were accepted had lost when they
+                 // were to be taken
+  overtaken,     // there, too: samples gave way to newer ones in a full queue
 };
 
 // What became of an arrival at one input port.
@@ -75,23 +78,29 @@ struct TapDestination {
 class TapEventBase {
  public:
   [[nodiscard]] TapEventKind kind() const noexcept { return static_cast<TapEventKind>(data_.kind); }
-  // The name of the output port; valid while the event is.
+  // The name of the output port; valid while the event is. Empty: of samples that were dropped or
+  // overtaken, whose they were is not known.
   [[nodiscard]] const std::string& source() const noexcept { return data_.context->source; }
   // The type of the output port, even if the tap is untyped.
   [[nodiscard]] const Type& type() const noexcept { return data_.context->type; }
   // When it happened: the arrival time, or the time of the deactivation, as the publisher has
-  // written it. Of other kinds: of the last of these before, or 0.
+  // written it. When it was seen: `dropped` and `overtaken`, which happened some milliseconds
+  // before. Of other kinds: of the last arrival or deactivation before, or 0.
   [[nodiscard]] Time time() const noexcept { return Time(std::chrono::nanoseconds(data_.time_ns)); }
   // Of the source's samples, as Sample::sequence(); of other events than samples, that of the last
-  // sample before.
+  // sample before. Of `dropped` and `overtaken`: the input port has done with the source's samples
+  // up to this one; 0: not known.
   [[nodiscard]] std::uint64_t sequence() const noexcept { return data_.sequence; }
   // Of the model by which it was decided (`arbiter status`); 0: there was none.
   [[nodiscard]] std::uint64_t generation() const noexcept { return data_.generation; }
   // Bytes of the sample as it was published, be it held or not.
   [[nodiscard]] std::size_t size() const noexcept { return data_.size; }
   // How many events of this source were lost immediately before this one, which is of kind `state`
-  // then.
+  // then; or `closed`, where a component was killed during an arrival or deactivation that others
+  // may have seen, before it told of it.
   [[nodiscard]] std::uint64_t lost() const noexcept { return data_.lost; }
+  // How many samples were dropped or overtaken; of other kinds 0.
+  [[nodiscard]] std::uint64_t count() const noexcept { return data_.count; }
   // Whether the source was active at that time, by all that had happened up to this event.
   [[nodiscard]] bool was_active_at(Time time) const noexcept {
     return data_.activity > time.time_since_epoch().count();

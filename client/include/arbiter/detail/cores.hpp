@@ -65,6 +65,7 @@ struct TapEventData {
   std::int64_t activity = 0;  // as shm/activity.hpp has it
   std::uint64_t lost = 0;
   std::uint64_t accepted = 0, discarded = 0, refused = 0, blind = 0;
+  std::uint64_t count = 0;  // of samples that were dropped or overtaken
   std::size_t size = 0;
   const std::byte* data = nullptr;  // null: no sample is held
   std::uint32_t hold = 0;
