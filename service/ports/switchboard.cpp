@@ -187,7 +187,16 @@ Switchboard::Told Switchboard::add_tap(std::unique_ptr<Tap> tap, Client& client,
 
 void Switchboard::tell_tap(const wire::Received& answer) {
   const auto output = outputs_.find(answer.message.port);
-  if (output != outputs_.end()) taps_.tell(*output->second, answer);
+  if (output == outputs_.end()) return;
+  taps_.tell(*output->second, answer);
+  // The publisher uses more of its segment from now on. One that does not read is passed over.
+  const shm::PortInstance grown = output->first;
+  for (auto link = links_.lower_bound({grown, 0});
+       link != links_.end() && link->first.first == grown; ++link) {
+    Client& receiver = client_of(link->first.second);
+    if (!link->second.is_mutual() || receiver.has_queue()) continue;
+    receiver.send(message_to(wire::MessageKind::kOutputGrown, link->first.second, grown));
+  }
 }
 
 void Switchboard::make_links(const Wanted& wanted, Told& told) {
