@@ -26,8 +26,8 @@ struct TapPeer {
   const shm::TapSegment* segment = nullptr;
   std::uint32_t max_held = 0;
   bool sleeps = true;
-  uid_t user = 0;
-  bool is_privileged = false;  // root, or the daemon's own user
+  bool is_privileged = false;  // root's, or of the daemon's own user
+  uid_t user = 0;              // else whose it is
   shm::Ringer ringer;
 };
 

@@ -94,8 +94,8 @@ enum class MessageKind : std::uint32_t {
   kConnectionRefused,  // `port` is not connected to `peer`, though the model says so, and is not to
                        // be; id = source, or port id; name: the peer's; text: why
   kUnmentioned,        // port, text: the model in force does not mention it
-  kTap,        // to output `port`: tap `peer` watches it; value: its user, flags (kIsPrivileged);
-               // descriptors: the tap's segment, its bell
+  kTap,        // to output `port`: tap `peer` watches it; flags (kIsPrivileged), else value: its
+               // user; descriptors: the tap's segment, its bell
   kTapAway,    // to output `port`: the conversation with tap `peer` is lost, its process lives
   kTapSource,  // to tap `port`: peer, id = source, name; link, value: of kTapped; descriptors: the
                // segment of the output port, its events

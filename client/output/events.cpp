@@ -23,13 +23,16 @@ constexpr std::uint32_t kReserve = 8;
 // Of something that taps have: how much all have together, one user, and the privileged.
 struct Taken {
   std::uint32_t all = 0;
-  std::uint32_t users = 0;
+  std::uint32_t users = 0;  // of one who is not privileged
   std::uint32_t privileged = 0;
 
   void add(const TapPeer& tap, uid_t user, std::uint32_t amount) noexcept {
     all += amount;
-    if (tap.user == user) users += amount;
-    if (tap.is_privileged) privileged += amount;
+    if (tap.is_privileged) {
+      privileged += amount;
+    } else if (tap.user == user) {
+      users += amount;
+    }
   }
   // Whether the tap may have `amount` more, of a `total`.
   [[nodiscard]] bool allows(const TapPeer& tap, std::uint32_t total,
@@ -82,18 +85,20 @@ void TapSeats::require_room(const TapPeer& peer, const std::string& port,
     taps.add(*seat.peer, peer.user, 1);
     holds.add(*seat.peer, peer.user, seat.peer->max_held);
   }
-  const std::string mine = "; user " + std::to_string(peer.user) + " has ";
-  const std::string share = " of them, and may have no more than is left for others";
+  const auto share = [&](const Taken& taken) {
+    if (peer.is_privileged) return std::string();
+    return "; user " + std::to_string(peer.user) + " has " + std::to_string(taken.users) +
+           " of them, and may have no more than is left for others";
+  };
   if (!taps.allows(peer, shm::kMaxTaps, 1)) {
     throw std::runtime_error(port + " has " + std::to_string(taps.all) + " taps already, of " +
-                             std::to_string(shm::kMaxTaps) + " (kMaxTaps)" + mine +
-                             std::to_string(taps.users) + share);
+                             std::to_string(shm::kMaxTaps) + " (kMaxTaps)" + share(taps));
   }
   if (!holds.allows(peer, may_be_held, peer.max_held)) {
     throw std::runtime_error("the taps of " + port + " may hold " + std::to_string(may_be_held) +
                              " samples together, and hold " + std::to_string(holds.all) +
-                             " already; this one wants " + std::to_string(peer.max_held) + mine +
-                             std::to_string(holds.users) + share);
+                             " already; this one wants " + std::to_string(peer.max_held) +
+                             share(holds));
   }
 }
 

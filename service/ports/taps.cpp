@@ -82,7 +82,7 @@ bool Taps::ask(const Tap& tap, const OutputPort& output) {
   if (!is_new && !link->second.is_away) return false;
   link->second.is_away = false;
   auto message = message_to(wire::MessageKind::kTap, output.instance, tap.instance);
-  message.value = tap.user;
+  message.value = tap.is_privileged ? 0 : tap.user;
   message.flags = tap.is_privileged ? wire::kIsPrivileged : 0u;
   output.client->send(message, {tap.segment.get(), tap.bell->descriptor()});
   return true;
