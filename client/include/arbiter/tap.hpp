@@ -212,7 +212,7 @@ class Tap {
   template <class Rep, class Period>
   [[nodiscard]] std::optional<TapEvent<T>> wait_for(std::chrono::duration<Rep, Period> timeout) {
     detail::TapEventData data;
-    if (!detail::wait(*core_, nanoseconds(timeout), data)) return std::nullopt;
+    if (!detail::wait(*core_, detail::saturated(timeout), data)) return std::nullopt;
     return TapEvent<T>(*core_, std::move(data));
   }
   // For poll() and epoll: readable when there may be an event. Then call take() until it returns
@@ -229,15 +229,6 @@ class Tap {
  private:
   friend class Node;
   explicit Tap(std::shared_ptr<detail::TapCore> core) noexcept : core_(std::move(core)) {}
-
-  // Saturating, as InputPort has it.
-  template <class Rep, class Period>
-  static std::int64_t nanoseconds(std::chrono::duration<Rep, Period> timeout) noexcept {
-    using Seconds = std::chrono::duration<double>;
-    if (Seconds(timeout) > Seconds(std::chrono::hours(24 * 365))) return INT64_MAX;
-    if (timeout <= timeout.zero()) return 0;
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(timeout).count();
-  }
 
   std::shared_ptr<detail::TapCore> core_;
 };
