@@ -232,7 +232,7 @@ std::map<std::string, Heard> hear_all() {
   client.open_tap("/out");
   client.open_tap("/in-a", wire::kTapsInput);
   out->signal();
-  auto tap = node.tap("/in-c", {.of = TapOf::input});     // which the last model does not mention
+  auto tap = node.tap("/in-c", {.of = TapOf::input});  // which the last model does not mention
   client.ask(MessageKind::kObserve);
   client.ask(MessageKind::kStatus);
   client.ask(MessageKind::kModel);

@@ -308,7 +308,8 @@ class Watcher : public virtual Worker {
       if (!look(before)) sched_yield();
       if (random_.one_in(4000)) usleep(5000);  // and is overtaken
     }
-    // All that there is: one empty look does not prove that nothing comes, while others come and go.
+    // All that there is: one empty look does not prove that nothing comes, while others come and
+    // go.
     for (int empty = 0; empty < 20;) empty = look(read_clock()) ? 0 : empty + 1;
     finish(kReceiversStop);
   }

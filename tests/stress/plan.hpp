@@ -44,8 +44,8 @@ struct RulePlan {
   SourceSet need_inactive = 0;
 };
 
-// A component has an input port, an output port, or both: then it is a relay, as a gateway is. Or it
-// has a tap.
+// A component has an input port, an output port, or both: then it is a relay, as a gateway is. Or
+// it has a tap.
 struct ComponentPlan {
   std::uint32_t source = kNobody;
   std::uint32_t port = kNobody;

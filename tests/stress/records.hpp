@@ -71,7 +71,7 @@ struct Seen {
   std::uint32_t publisher;    // the incarnation, likewise
   std::uint32_t incarnation;  // of the tap's component
   What what;
-  Act act;  // of an arrival
+  Act act;           // of an arrival
   bool knows_fates;  // else the list of destinations has changed too often since
   std::uint8_t accepted;
   std::uint8_t discarded;

@@ -1,8 +1,8 @@
 // Components and a daemon in processes of their own, in tiny queues, overriding each other at
 // random; killed, stopped, their model swapped: and what they did, checked (history.hpp,
-// accounts.hpp, tap_accounts.hpp). A run is a series of rounds, each with another plan that follows from the seed.
-// The seed gives back the same decisions of all generators; how the processes interleave it cannot
-// give back.
+// accounts.hpp, tap_accounts.hpp). A run is a series of rounds, each with another plan that follows
+// from the seed. The seed gives back the same decisions of all generators; how the processes
+// interleave it cannot give back.
 #include <algorithm>
 #include <cstdio>
 #include <stdexcept>

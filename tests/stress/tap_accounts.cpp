@@ -98,8 +98,8 @@ class TapCheck {
   void require_all_is_told(bool one_is_lost) {
     const std::uint64_t next = last_ + 1;
     if (!has_begun_) return;
-    const bool is_there = next < arrivals_.size() &&
-                          arrivals_.records[next].incarnation == arrivals_.records[last_].incarnation;
+    const bool is_there = next < arrivals_.size() && arrivals_.records[next].incarnation ==
+                                                         arrivals_.records[last_].incarnation;
     if (is_there && is_over(next) && lost_ == 0) fail("has not seen the last");
     if (one_is_lost && (!is_there || is_over(next))) fail("was told of a loss that was none");
     lost_ = 0;
