@@ -22,10 +22,11 @@
 //
 // Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC. Threads: use a tap, and its
 // events, from one thread at a time. Blocking: only wait_for() blocks. Cost: take() needs no lock
-// and no system call, and allocates only where a source's destinations have changed. A publish of a
-// source that is tapped takes some 210 to 240 instructions more, however many taps there are; if
-// one of them sleeps, a ring more. Errors: take() and wait_for() throw arbiter::Error for more than
-// max_held events with samples. The paper has nothing of it.
+// and no system call, and allocates only where a source's destinations have changed, or an input
+// port has not given out what it had accepted. A publish of a source that is tapped takes some 210
+// to 240 instructions more, however many taps there are; if one of them sleeps, a ring more.
+// Errors: take() and wait_for() throw arbiter::Error for more than max_held events with samples.
+// The paper has nothing of it.
 #pragma once
 
 #include <chrono>
