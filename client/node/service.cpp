@@ -370,8 +370,12 @@ void NodeCore::end_peer(const wire::Message& message) {
   if (const auto tap = taps_.find(message.port); tap != taps_.end()) {
     const bool is_told = (message.flags & wire::kTellsActivity) != 0;
     const auto word = static_cast<shm::ActivityWord>(message.link);
-    tap->second->lose_source(message.peer, is_told ? std::optional(word) : std::nullopt);
-    tap->second->lose_input(message.peer);
+    if (message.peer == 0) {
+      tap->second->lose_all_of(message.id);
+    } else {
+      tap->second->lose_source(message.peer, is_told ? std::optional(word) : std::nullopt);
+      tap->second->lose_input(message.peer);
+    }
   }
 }
 

@@ -121,7 +121,7 @@ void NodeCore::reopen_taps() {
     wire::Message question;
     question.kind = wire::MessageKind::kOpenTap;
     question.request = next_request_++;
-    question.flags = tap->options().of == TapOf::input ? wire::kTapsInput : 0u;
+    question.flags = wire::kRejoins | (tap->options().of == TapOf::input ? wire::kTapsInput : 0u);
     question.set_name(tap->name());
     reopened_[question.request] = tap;
     static_cast<void>(

@@ -98,6 +98,14 @@ void TapCore::lose_source(shm::PortInstance output, std::optional<shm::ActivityW
   offer_view();
 }
 
+void TapCore::lose_all_of(shm::SourceId source) {
+  std::vector<shm::PortInstance> outputs;
+  for (const auto& [output, link] : links_) {
+    if (link.source->output->source == source && !link.gone) outputs.push_back(output);
+  }
+  for (const shm::PortInstance output : outputs) lose_source(output, {});
+}
+
 void TapCore::add_input(std::shared_ptr<const TapInput> input) {
   const auto instance = input->instance;
   if (inputs_.count(instance) != 0) return;

@@ -101,6 +101,8 @@ class TapCore {
   // It has closed or died, or is not connected any more; what it has told can still be taken.
   // `activity`: of a source whose port is gone, what its page says.
   void lose_source(shm::PortInstance output, std::optional<shm::ActivityWord> activity);
+  // The same of whoever had the source open.
+  void lose_all_of(shm::SourceId source);
   // The same for the input port that is tapped.
   void add_input(std::shared_ptr<const TapInput> input);
   void lose_input(shm::PortInstance input);

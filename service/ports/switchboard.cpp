@@ -181,6 +181,7 @@ Switchboard::Told Switchboard::add_tap(std::unique_ptr<Tap> tap, Client& client,
   const Tap& added = taps_.add(std::move(tap), client);
   opened();
   for (const auto& [instance, input] : inputs_) taps_.show(added, *input);
+  taps_.tell_ends(added, table);
   taps_.link(table, outputs_, [&](Client* publisher) { told.insert(publisher); });
   return told;
 }

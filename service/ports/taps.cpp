@@ -23,6 +23,7 @@ std::unique_ptr<Tap> adopt_tap(const wire::Received& open, uid_t user) {
   tap->segment = kept(open.descriptors[0]);
   tap->user = user;
   tap->is_input = (open.message.flags & wire::kTapsInput) != 0;
+  tap->is_back = (open.message.flags & wire::kRejoins) != 0;
   return tap;
 }
 
@@ -134,6 +135,33 @@ void Taps::refuse(const OutputPort& output, shm::PortInstance tap, const std::st
 void Taps::set_away(shm::PortInstance output) {
   for (auto& [key, link] : links_) {
     if (key.first == output) link.is_away = true;
+  }
+}
+
+// Its page may be another by now, where nobody had the last one: so nothing is said of its
+// activity.
+void Taps::tell_end(const Tap& tap, const Source& source) {
+  if (source.open != 0) return;
+  if (source.away != 0) {
+    links_[{source.away, tap.instance}] = {true, true};
+    return;
+  }
+  tap.client->send(message_to(wire::MessageKind::kPeerGone, tap.instance, 0, source.id));
+}
+
+void Taps::tell_ends(const Tap& tap, const shm::TableView& table) {
+  if (!tap.is_back) return;
+  if (!tap.is_input) {
+    if (const Source* const source = names_.find_source(tap.name)) tell_end(tap, *source);
+    return;
+  }
+  for (const auto& input : names_.inputs()) {
+    if (input->name != tap.name) continue;
+    const auto range = table.connections_to(input->id);
+    for (auto index = range.first; index != range.first + range.count; ++index) {
+      const Source* const source = names_.source_by_id(table.rule(index).source);
+      if (source != nullptr) tell_end(tap, *source);
+    }
   }
 }
 

@@ -33,6 +33,7 @@ struct Tap {
   bool is_input = false;       // it is an input port
   uid_t user = 0;              // whose the segment is
   bool is_privileged = false;  // root, or the daemon's own user
+  bool is_back = false;        // another daemon has opened it
   shm::FileDescriptor segment;
   std::shared_ptr<const PortBell> bell;
   Charge charge;
@@ -73,6 +74,9 @@ class Taps {
       if (wants(*tap, output, table) && ask(*tap, output)) told(output.client);
     }
   }
+  // A tap that another daemon has opened knows sources of whom this one may not have heard: it is
+  // told of those that nobody has open, and will be of those that are away.
+  void tell_ends(const Tap& tap, const shm::TableView& table);
   // Taps of an input port give up what a table does not connect to it any more.
   void unlink(const shm::TableView& table, const Outputs& outputs);
   // A component answers.
@@ -98,6 +102,7 @@ class Taps {
   };
   using LinkKey = std::pair<shm::PortInstance, shm::PortInstance>;  // output, tap
 
+  void tell_end(const Tap& tap, const Source& source);
   [[nodiscard]] bool wants(const Tap& tap, const OutputPort& output,
                            const shm::TableView& table) const;
   bool ask(const Tap& tap, const OutputPort& output);

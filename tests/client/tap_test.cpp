@@ -396,6 +396,27 @@ TEST(Tap, HearsThatASourceHasEndedThoughNoDaemonWasThere) {
   EXPECT_EQ(wait_for_kind(tap, TapEventKind::closed).sequence(), 1u);
 }
 
+TEST(Tap, HearsOfTheEndFromADaemonThatNeverKnewTheSource) {
+  for (const TapOf of : {TapOf::output, TapOf::input}) {
+    Daemon daemon(single_model());
+    Node node("test");
+    auto tap = node.tap<Number>(of == TapOf::output ? "/out" : "/in", {.of = of});
+    Component sender("sender");
+    ASSERT_EQ(sender.tell("output /out"), "open");
+    sender.tell("publish /out 1");
+    EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 1);
+    daemon.kill();
+    sender.tell("publish /out 2");
+    sender.tell("deactivate /out");
+    sender.kill();
+    daemon.restart();
+    const auto closed = wait_for_kind(tap, TapEventKind::closed);
+    EXPECT_EQ(closed.sequence(), 2u);
+    EXPECT_TRUE(closed.is_deactivated());
+    EXPECT_EQ(tap.lost(), 0u);
+  }
+}
+
 TEST(Tap, SeesAllThatAPublisherToldBeforeItWasKilled) {
   Daemon daemon(single_model());
   Node node("test");
