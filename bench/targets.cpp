@@ -68,6 +68,8 @@ struct Excess {
 
 const std::vector<Excess> kExcesses{
     {"a loser's publish() at 64 ports, p50", "publish", kMany, kLoser, {}, 150},
+    {"a tapped publish(), p50, over one that is not", "publish", kOne, kWinner + ", tapped",
+     kWinner, 15},
     {"take(), nothing waits, 1 source, p50", "take", "1 source", "nothing waits", {}, 5},
     {"take(), nothing waits, 64 sources, p50", "take", "64 sources", "nothing waits", {}, 50},
     {"take() of a sample, p50, over its cache lines", "hit", "8 samples wait", kArbiter,

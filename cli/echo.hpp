@@ -1,12 +1,14 @@
 // arbiter echo: watching a port, or opening it.
 //
 //   verb_echo.cpp       its options
+//   echo_loop.cpp       when it looks, and until when
 //   echo_tap.cpp        prints what a tap tells
 //   echo_rate.cpp       prints how often, how regularly and how much
 //   echo_component.cpp  opens an input port itself, and prints what it takes
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include <arbiter/arbiter.hpp>
@@ -33,6 +35,12 @@ struct EchoOptions {
 int echo_tap(const EchoOptions& options, const shm::FileDescriptor& interrupts);
 int echo_rate(const EchoOptions& options, const shm::FileDescriptor& interrupts);
 int echo_component(const EchoOptions& options, const shm::FileDescriptor& interrupts);
+
+shm::Nanoseconds end_of_echo(const EchoOptions& options, shm::Nanoseconds started);
+// Calls look() when `fd` is readable, and at least once in an interval, until that returns false,
+// the time is over, or `interrupts` is readable.
+void echo_while(const EchoOptions& options, int fd, const shm::FileDescriptor& interrupts,
+                shm::Nanoseconds interval, const std::function<bool()>& look);
 
 // Whether PORT is an output port or an input port, as far as the daemon knows; else by the end of
 // its name. Says on standard error if nobody has named it.

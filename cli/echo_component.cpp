@@ -1,6 +1,4 @@
 // An input port that is opened: what its arbiter lets through.
-#include <poll.h>
-
 #include <cstdint>
 #include <exception>
 #include <iostream>
@@ -28,24 +26,20 @@ class Echo {
         started_(shm::monotonic_now()) {}
 
   int run() {
-    const shm::Nanoseconds end =
-        options_.duration == shm::kForever ? shm::kForever : started_ + options_.duration;
-    pollfd ready[] = {{in_.fd(), POLLIN, 0}, {interrupts_.get(), POLLIN, 0}};
-    for (;;) {
-      while (auto sample = in_.take()) {
-        print(*sample);
-        if (++samples_ == options_.count || !std::cout) return finish();
-      }
-      std::cout.flush();
-      const shm::Nanoseconds left = end - shm::monotonic_now();
-      if (left <= 0) return finish();
-      const timespec span{left / 1'000'000'000, left % 1'000'000'000};
-      ppoll(ready, 2, end == shm::kForever ? nullptr : &span, nullptr);
-      if (ready[1].revents != 0) return finish();
-    }
+    echo_while(options_, in_.fd(), interrupts_, shm::kForever, [this] { return print_all(); });
+    return finish();
   }
 
  private:
+  // False: that was enough.
+  bool print_all() {
+    while (auto sample = in_.take()) {
+      print(*sample);
+      if (++samples_ == options_.count || !std::cout) return false;
+    }
+    return true;
+  }
+
   static InputPort<void> open(Node& node, const std::string& port) {
     InputPortOptions options;
     options.keep = true;

@@ -87,8 +87,7 @@ class RateEcho {
 
   int run() {
     const shm::Nanoseconds started = shm::monotonic_now();
-    const shm::Nanoseconds end =
-        options_.duration == shm::kForever ? shm::kForever : started + options_.duration;
+    const shm::Nanoseconds end = end_of_echo(options_, started);
     shm::Nanoseconds line = started;
     while (std::cout) {
       const shm::Nanoseconds next = std::min(line + kSecond, end);
@@ -118,6 +117,7 @@ class RateEcho {
 
   void look() {
     while (const auto event = tap_.take()) {
+      if (event->count() != 0) continue;  // of what has been counted already
       Rate& rate = rates_[event->source()];
       if (event->lost() != 0) rate.forget_last();
       if (event->kind() != TapEventKind::sample) continue;

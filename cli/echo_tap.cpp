@@ -1,6 +1,4 @@
 // What a tap tells, event by event.
-#include <poll.h>
-
 #include <exception>
 #include <iostream>
 #include <map>
@@ -30,6 +28,10 @@ const char* name_of(TapEventKind kind) {
       return "closed";
     case TapEventKind::destinations:
       return "destinations";
+    case TapEventKind::dropped:
+      return "dropped";
+    case TapEventKind::overtaken:
+      return "overtaken";
     case TapEventKind::state:
       break;
   }
@@ -63,25 +65,24 @@ class TapEcho {
         started_(shm::monotonic_now()) {}
 
   int run() {
-    const shm::Nanoseconds end =
-        options_.duration == shm::kForever ? shm::kForever : started_ + options_.duration;
-    pollfd ready[] = {{tap_.fd(), POLLIN, 0}, {interrupts_.get(), POLLIN, 0}};
-    for (;;) {
-      while (const auto event = tap_.take()) {
-        lost_ += event->lost();
-        if (is_shown(*event)) print(*event);
-        if ((options_.count != 0 && printed_ == options_.count) || !std::cout) return finish();
-      }
-      std::cout.flush();
-      const shm::Nanoseconds left = end - shm::monotonic_now();
-      if (left <= 0) return finish();
-      const timespec span{left / 1'000'000'000, left % 1'000'000'000};
-      ppoll(ready, 2, end == shm::kForever ? nullptr : &span, nullptr);
-      if (ready[1].revents != 0) return finish();
-    }
+    echo_while(options_, tap_.fd(), interrupts_, kLookInterval, [this] { return print_all(); });
+    return finish();
   }
 
  private:
+  // What has become of samples at the take, nobody rings for.
+  static constexpr shm::Nanoseconds kLookInterval = 100'000'000;
+
+  // False: that was enough.
+  bool print_all() {
+    while (const auto event = tap_.take()) {
+      lost_ += event->lost();
+      if (is_shown(*event)) print(*event);
+      if ((options_.count != 0 && printed_ == options_.count) || !std::cout) return false;
+    }
+    return true;
+  }
+
   static TapOptions tap_options(TapOf of) {
     TapOptions options;
     options.of = of;
@@ -95,6 +96,8 @@ class TapEcho {
         return !is_input_ || options_.losers || event.at(options_.port) == Fate::accepted;
       case TapEventKind::signal:
       case TapEventKind::deactivation:
+      case TapEventKind::dropped:
+      case TapEventKind::overtaken:
         return !is_input_ || options_.losers;
       default:
         return false;
@@ -120,6 +123,9 @@ class TapEcho {
                         {"size", event.size()},
                         {"generation", event.generation()},
                         {"fates", fates}};
+    line["type"] =
+        event.type().is_untyped() ? nlohmann::json() : nlohmann::json(event.type().name());
+    if (event.count() != 0) line["count"] = event.count();
     if (options_.hex && event.sample()) {
       line["data"] = hex_of(*event.sample(), event.sample()->size());
     }
@@ -128,7 +134,12 @@ class TapEcho {
 
   void print_text(const TapEvent<>& event) const {
     std::cout << seconds_text(event.time().time_since_epoch().count() - started_) << "  "
-              << event.source();
+              << (event.source().empty() ? "(source not known)" : event.source());
+    if (event.count() != 0) {
+      std::cout << "  " << event.count() << (event.count() == 1 ? " sample " : " samples ")
+                << name_of(event.kind()) << '\n';
+      return;
+    }
     if (event.kind() != TapEventKind::sample) {
       std::cout << "  " << name_of(event.kind()) << fates_text(event) << '\n';
       return;

@@ -44,7 +44,7 @@ void add_echo(CLI::App& app, int& exit_code) {
   auto* losers = verb->add_flag(
       "--losers", options->losers,
       "Of an input port: also what was discarded, refused or not decided, signals and "
-      "deactivations");
+      "deactivations, and how many samples were dropped at the take or overtaken in a full queue");
   verb->add_flag("--hex", options->hex, "Print all bytes of each sample");
   auto* rate = verb->add_flag("--rate", options->rate,
                               "Once a second, by source: samples per second, their jitter (the "
@@ -54,8 +54,9 @@ void add_echo(CLI::App& app, int& exit_code) {
       "Open the input port PORT, which no component may have open, and take from it");
   as_component->excludes(losers)->excludes(rate);
   verb->add_flag("--json", options->json,
-                 "One object a line: {port, source, kind, sequence, stamp_ns, size, generation, "
-                 "fates}; with --hex also data; with --rate {port, source, samples, hz, jitter_ns, "
+                 "One object a line: {port, source, type, kind, sequence, stamp_ns, size, "
+                 "generation, fates}; also count, of what was dropped or overtaken; with --hex "
+                 "also data; with --rate {port, source, samples, hz, jitter_ns, "
                  "longest_ns, bytes_per_second}; with --as-component {port, source, sequence, "
                  "stamp_ns, size}");
   add_instance_option(*verb, options->instance);

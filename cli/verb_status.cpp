@@ -103,6 +103,10 @@ void print_source(const wire::SourceStatus& source, bool has_model) {
   }
   const std::string mark = unmentioned(source, has_model);
   std::cout << (mark.empty() ? "" : " " + mark) << '\n';
+  if (!source.open) return;
+  for (const auto& tap : source.open->taps) {
+    std::cout << "           tapped by " << process_text(tap) << ", user " << tap.user << '\n';
+  }
 }
 
 // `is_useless`: it is selected, and cannot deliver.

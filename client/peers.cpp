@@ -24,6 +24,20 @@ std::uint32_t allocated_slots(const OutputPeer& peer) {
 
 }  // namespace
 
+shm::Mapping map_input_segment(const shm::FileDescriptor& segment) {
+  if (shm::checked_size(segment, shm::Seals::kOneWriter) != sizeof(shm::InputSegment)) {
+    throw std::runtime_error("the input port's segment has another size");
+  }
+  if (shm::allocated_size(segment) < sizeof(shm::InputSegment)) {
+    throw std::runtime_error("the input port's memory is not allocated");
+  }
+  shm::Mapping mapping(segment, sizeof(shm::InputSegment), shm::Access::kReadOnly);
+  if (!mapping.as<shm::InputSegment>()->is_consistent()) {
+    throw std::runtime_error("the input port's segment is not one of this version");
+  }
+  return mapping;
+}
+
 std::shared_ptr<const InputPeer> map_input_peer(const wire::Received& announced,
                                                 const shm::TypeInfo& own,
                                                 shm::Residence residence) {
@@ -31,21 +45,15 @@ std::shared_ptr<const InputPeer> map_input_peer(const wire::Received& announced,
   peer->instance = announced.message.peer;
   peer->port = announced.message.id;
   peer->name = announced.message.name_view();
-  const shm::FileDescriptor& segment = announced.descriptors[0];
-  if (shm::checked_size(segment, shm::Seals::kOneWriter) != sizeof(shm::InputSegment)) {
-    throw std::runtime_error("the input port's segment has another size");
-  }
-  if (shm::allocated_size(segment) < sizeof(shm::InputSegment)) {
-    throw std::runtime_error("the input port's memory is not allocated");
-  }
-  peer->mapping = shm::Mapping(segment, sizeof(shm::InputSegment), shm::Access::kReadOnly);
+  peer->mapping = map_input_segment(announced.descriptors[0]);
   peer->segment = peer->mapping.as<const shm::InputSegment>();
   const shm::InputHeader& header = peer->segment->header;
   peer->depth = header.depth;
   peer->max_held = header.max_held;
   peer->refuse_new = header.refuse_new != 0;
-  if (!peer->segment->is_consistent() || peer->depth < 1 || peer->depth > shm::kMaxDepth ||
-      peer->max_held < 1 || peer->max_held > shm::kMaxHeld) {
+  // What is used is judged, whatever it was when it was mapped.
+  if (peer->depth < 1 || peer->depth > shm::kMaxDepth || peer->max_held < 1 ||
+      peer->max_held > shm::kMaxHeld) {
     throw std::runtime_error("the input port's segment is not one of this version");
   }
   const bool connected = (announced.message.flags & wire::kIsConnected) != 0;

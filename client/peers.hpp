@@ -106,6 +106,10 @@ struct HeldLink {
   std::uint64_t number = 0;
 };
 
+// The segment of an input port, whole and of this version; what it says of itself may be another
+// thing a moment later. Throws as those below.
+shm::Mapping map_input_segment(const shm::FileDescriptor& segment);
+
 // Map what the daemon has announced, and check it: the segment must be whole, and carry a type that
 // `own` can take or give. Throw std::runtime_error saying what is wrong, std::system_error where it
 // cannot be locked.

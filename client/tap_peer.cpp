@@ -20,6 +20,8 @@ std::shared_ptr<const TapPeer> map_tap_peer(const wire::Received& announced,
   peer->segment = peer->mapping.as<const shm::TapSegment>();
   peer->max_held = peer->segment->max_held;
   peer->sleeps = peer->segment->sleeps != 0;
+  peer->user = announced.message.value;
+  peer->is_privileged = (announced.message.flags & wire::kIsPrivileged) != 0;
   if (!peer->segment->is_consistent() || peer->max_held > shm::kMaxTapHeld) {
     throw std::runtime_error("the tap's segment is not one of this version");
   }

@@ -1,6 +1,8 @@
 // A tap, as an output port sees it.
 #pragma once
 
+#include <sys/types.h>
+
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -24,6 +26,8 @@ struct TapPeer {
   const shm::TapSegment* segment = nullptr;
   std::uint32_t max_held = 0;
   bool sleeps = true;
+  bool is_privileged = false;  // root's, or of the daemon's own user
+  uid_t user = 0;              // else whose it is
   shm::Ringer ringer;
 };
 

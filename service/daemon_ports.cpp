@@ -122,6 +122,7 @@ void Daemon::open_tap(Client& client, wire::Received& received) {
   gate_.require(client, Action::kTap, name);
   auto tap = adopt_tap(received, client.user());
   tap->name = name;
+  tap->is_privileged = shares_.is_privileged(client.user());
   tap->charge = shares_.take(client.user(), Share::kDescriptors, kDescriptorsOfTap);
   const bool is_input = tap->is_input;
   const Tap& opened = *tap;

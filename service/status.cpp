@@ -160,12 +160,16 @@ class Document {
     return result;
   }
 
-  static wire::OpenOutput open_output(const OutputPort& output) {
+  [[nodiscard]] wire::OpenOutput open_output(const OutputPort& output) const {
     const auto& counters = output.header().counters;
-    return {component_of(*output.client), type_of(output.type),     read(counters.published),
-            read(counters.signals),       read(counters.delivered), read(counters.discarded),
-            read(counters.refused),       read(counters.blind),     read(counters.unsettled),
-            read(counters.no_slot),       read(counters.late)};
+    std::vector<wire::Component> taps;
+    for (const Tap* tap : of_.switchboard.taps_of(output.instance)) {
+      taps.push_back(component_of(*tap->client));
+    }
+    return {component_of(*output.client), std::move(taps),        type_of(output.type),
+            read(counters.published),     read(counters.signals), read(counters.delivered),
+            read(counters.discarded),     read(counters.refused), read(counters.blind),
+            read(counters.unsettled),     read(counters.no_slot), read(counters.late)};
   }
 
   wire::InputStatus input(const InputName& name) {

@@ -7,7 +7,7 @@
 //   EventHeader                 what it is
 //   TapPlace[kMaxTaps]          from which event on a tap may read
 //   Entry[kMaxKept]             the samples that are kept for the taps
-//   DestinationList[kMaxLists]  which bit of an event's masks is which input port
+//   DestinationList[kMaxDestinationLists]  which bit of an event's masks is which input port
 //   Event[kMaxEvents]           a ring
 //
 // A tap that is too slow is overtaken: it notices by the events' numbers (event_ring.hpp).
@@ -23,12 +23,6 @@
 #include "shm/output_segment.hpp"
 
 namespace arbiter::shm {
-
-inline constexpr std::uint32_t kMaxTaps = 16;      // of one output port
-inline constexpr std::uint32_t kMaxTapHeld = 16;   // samples that a tap holds at once
-inline constexpr std::uint32_t kMaxKept = 64;      // samples that are kept for the taps of a port
-inline constexpr std::uint32_t kMaxEvents = 1024;  // in a ring
-inline constexpr std::uint32_t kMaxLists = 8;      // of destinations, the last ones
 
 enum class EventKind : std::uint8_t {
   kState = 1,     // what the source is like, when a tap joins: nothing has happened
@@ -103,11 +97,12 @@ struct DestinationList {
 struct EventShape {
   std::uint32_t events = kMaxEvents;  // a power of two, as the next
   std::uint32_t kept = kMaxKept;
-  std::uint32_t lists = kMaxLists;
+  std::uint32_t lists = kMaxDestinationLists;
 
   [[nodiscard]] bool is_sane() const noexcept {
     return events >= 4 && events <= kMaxEvents && (events & (events - 1)) == 0 && kept >= 1 &&
-           kept <= kMaxKept && (kept & (kept - 1)) == 0 && lists >= 1 && lists <= kMaxLists;
+           kept <= kMaxKept && (kept & (kept - 1)) == 0 && lists >= 1 &&
+           lists <= kMaxDestinationLists;
   }
 };
 
@@ -124,7 +119,7 @@ struct alignas(kPageSize) EventSegment {
   EventHeader header;
   TapPlace places[kMaxTaps];
   alignas(kCacheLine) Atomic<Entry> kept[kMaxKept];
-  DestinationList lists[kMaxLists];
+  DestinationList lists[kMaxDestinationLists];
   Event events[kMaxEvents];
 
   // By its writer, before anybody else has it.

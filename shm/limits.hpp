@@ -23,8 +23,13 @@ inline constexpr std::uint32_t kMaxDepth = 1024;                // samples queue
 inline constexpr std::uint32_t kMaxHeld = 64;                   // samples a component holds at once
 inline constexpr std::uint32_t kMaxLoans = 64;                  // samples being written at once
 inline constexpr std::uint32_t kMaxSlots = 65535;               // payload slots of one output port
-inline constexpr std::uint32_t kMaxClients = 4096;              // of one daemon
-inline constexpr std::uint32_t kMaxPostponed = 64;              // requests of one client
-inline constexpr std::uint32_t kMaxSilentClients = 256;         // that have not said who they are
+inline constexpr std::uint32_t kMaxTaps = 16;                   // of one output port
+inline constexpr std::uint32_t kMaxTapHeld = 16;                // samples that a tap holds at once
+inline constexpr std::uint32_t kMaxKept = 64;                   // samples kept for a port's taps
+inline constexpr std::uint32_t kMaxEvents = 1024;         // told to a port's taps, the last ones
+inline constexpr std::uint32_t kMaxDestinationLists = 8;  // likewise
+inline constexpr std::uint32_t kMaxClients = 4096;        // of one daemon
+inline constexpr std::uint32_t kMaxPostponed = 64;        // requests of one client
+inline constexpr std::uint32_t kMaxSilentClients = 256;   // that have not said who they are
 
 }  // namespace arbiter::shm

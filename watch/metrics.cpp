@@ -117,7 +117,9 @@ constexpr std::array kOutputNumbers{
                        [](const OpenOutput& o) { return o.late; }},
     Number<OpenOutput>{"source_sample_bytes", Kind::kGauge,
                        "Size of a sample by its type; 0 for an untyped port.",
-                       [](const OpenOutput& o) { return o.type ? o.type->size : 0; }}};
+                       [](const OpenOutput& o) { return o.type ? o.type->size : 0; }},
+    Number<OpenOutput>{"source_taps", Kind::kGauge, "Taps that watch the output port.",
+                       [](const OpenOutput& o) { return std::uint64_t{o.taps.size()}; }}};
 
 constexpr std::array kInputNumbers{
     Number<OpenInput>{"port_samples_taken_total", Kind::kCounter,

@@ -65,9 +65,10 @@ enum class MessageKind : std::uint32_t {
              // missing
   kModel,    // ask for the texts of the model in force
   kBlind,    // port, text: it cannot see a source that its rules read, for the log
-  kOpenTap,  // name, flags (kTapsInput); descriptors: its segment, its bell. kOpened and kConnected
-             // as for a port; it is closed as one. One that another daemon has opened asks again
-  kTapped,   // answers kTap. port, peer; link, value: where the tap reads; descriptor: the events
+  kOpenTap,  // name, flags (kTapsInput, kRejoins); descriptors: its segment, its bell. kOpened and
+  // kConnected as for a port; it is closed as one. One that another daemon has opened asks
+  // again
+  kTapped,  // answers kTap. port, peer; link, value: where the tap reads; descriptor: the events
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; peer: the daemon's clock, 0 if it does not say;
@@ -82,7 +83,9 @@ enum class MessageKind : std::uint32_t {
   kOutputPeer,    // to input `port`: peer, id = source, link; descriptor: its segment
   kInputPeer,     // to output `port`: peer, id = port id, flags (kIsConnected), link; descriptors:
                   // segment, bell
-  kPeerGone,      // `port` has lost `peer`: closed or dead
+  kPeerGone,      // `port` has lost `peer`: closed or dead. To a tap, of an output port: flags
+                  // (kTellsActivity), link: the word of its source's activity; peer is 0 where this
+                  // daemon never knew it, id: the source
   kDisconnected,  // `port` is no longer connected to `peer`, which lives: the model has changed
   kSync,
   kStatusReply,  // descriptor: a memfd with JSON
@@ -93,21 +96,25 @@ enum class MessageKind : std::uint32_t {
   kConnectionRefused,  // `port` is not connected to `peer`, though the model says so, and is not to
                        // be; id = source, or port id; name: the peer's; text: why
   kUnmentioned,        // port, text: the model in force does not mention it
-  kTap,        // to output `port`: tap `peer` watches it; descriptors: the tap's segment, its bell
+  kTap,        // to output `port`: tap `peer` watches it; flags (kIsPrivileged), else value: its
+               // user; descriptors: the tap's segment, its bell
   kTapAway,    // to output `port`: the conversation with tap `peer` is lost, its process lives
   kTapSource,  // to tap `port`: peer, id = source, name; link, value: of kTapped; descriptors: the
                // segment of the output port, its events
+  kTapInput,   // to tap `port` of an input port: peer has that open, name; descriptor: its segment
 };
 
 enum MessageFlag : std::uint32_t {
   kHasServiceThread = 1,
-  kIsConnected = 2,   // else the input port only senses the output port
-  kComesBack = 4,     // the client will rejoin if the conversation is lost
-  kRejoins = 8,       // it does so now
-  kWantsReport = 16,  // of a change of the model: kReport is the answer, whatever comes of it
-  kDryRun = 32,       // of a reload: only say what it would do
-  kMayReplay = 64,    // the output port may be given times of arrival (Action::kReplay)
-  kTapsInput = 128,   // the tap is of an input port: of all sources that are connected to it
+  kIsConnected = 2,      // else the input port only senses the output port
+  kComesBack = 4,        // the client will rejoin if the conversation is lost
+  kRejoins = 8,          // it does so now; or the tap was opened by another daemon
+  kWantsReport = 16,     // of a change of the model: kReport is the answer, whatever comes of it
+  kDryRun = 32,          // of a reload: only say what it would do
+  kMayReplay = 64,       // the output port may be given times of arrival (Action::kReplay)
+  kTapsInput = 128,      // the tap is of an input port: of all sources that are connected to it
+  kIsPrivileged = 256,   // the tap is root's, or of the daemon's own user
+  kTellsActivity = 512,  // else the daemon does not know it
 };
 
 struct Message {

@@ -101,6 +101,7 @@ void describe(auto& field, Is<StrangerStatus> auto& of) {
 
 void describe(auto& field, Is<OpenOutput> auto& of) {
   field("component", of.component);
+  field("taps", of.taps);
   field("type", of.type);
   field.counter("published", of.published);
   field.counter("signals", of.signals);

@@ -76,6 +76,7 @@ struct StrangerStatus {
 // An output port that a component has open.
 struct OpenOutput {
   Component component;
+  std::vector<Component> taps;     // who watches it
   std::optional<SampleType> type;  // none: untyped
   std::uint64_t published = 0;
   std::uint64_t signals = 0;

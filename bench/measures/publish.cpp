@@ -22,7 +22,8 @@ std::string port(int number) { return "/in" + std::to_string(number) + ":i"; }
 struct Set {
   int ports;
   int sensed;
-  bool loses;  // the last of the activities is there, and says no
+  bool loses;           // the last of the activities is there, and says no
+  bool tapped = false;  // by the receivers' process, which does not look
 };
 
 std::string model_of(const Set& set) {
@@ -59,6 +60,10 @@ Contender publisher(const std::string& system, const Set& set) {
     Node node = robot->node("receivers");
     std::vector<InputPort<Payload>> inputs;
     for (int i = 0; i < set.ports; ++i) inputs.push_back(node.input_port<Payload>(port(i)));
+    TapOptions polls;
+    polls.may_wait = false;
+    std::optional<Tap<Payload>> tap;
+    if (set.tapped) tap.emplace(node.tap<Payload>("/out:o", polls));
     with.say(1);
     for (std::uint64_t word = 0; with.hear_or_end(word);) {
     }
@@ -94,6 +99,10 @@ Measure measure_publish(const Effort& effort) {
     }
     contenders.push_back(publisher("loses, 8 activities", {ports, 8, true}));
     contenders.push_back(publisher("wins, 8 activities", {ports, 8, false}));
+    if (ports == 1) {
+      contenders.push_back(publisher("loses, 8 activities, tapped", {ports, 8, true, true}));
+      contenders.push_back(publisher("wins, 8 activities, tapped", {ports, 8, false, true}));
+    }
     std::vector<Result> absent_ones;
     try {
       contenders.push_back(iceoryx_fan_out(ports, kBatch));

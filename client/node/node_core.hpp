@@ -126,6 +126,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void handle_about_tap(wire::Received& received);
   void add_tap(const wire::Received& received);
   void add_tap_source(const wire::Received& received);
+  void add_tap_input(const wire::Received& received);
   void refuse_tap(const wire::Message& announced, const std::string& why);
   [[nodiscard]] bool note_tap_refusal(const wire::Message& refusal);
   void reopen_taps();

@@ -172,6 +172,7 @@ void NodeCore::handle_without_descriptors(const wire::Message& message) {
       return;
     case wire::MessageKind::kTap:
     case wire::MessageKind::kTapSource:
+    case wire::MessageKind::kTapInput:
       refuse_tap(message, why);
       return;
     case wire::MessageKind::kSourcePage:
@@ -225,6 +226,7 @@ void NodeCore::handle(wire::Received& received) {
     case wire::MessageKind::kTap:
     case wire::MessageKind::kTapAway:
     case wire::MessageKind::kTapSource:
+    case wire::MessageKind::kTapInput:
       handle_about_tap(received);
       break;
     case wire::MessageKind::kConnectionRefused:
@@ -366,7 +368,14 @@ void NodeCore::end_peer(const wire::Message& message) {
     is_gone ? core.lose_peer(message.peer) : core.disconnect_peer(message.peer);
   }
   if (const auto tap = taps_.find(message.port); tap != taps_.end()) {
-    tap->second->lose_source(message.peer);
+    const bool is_told = (message.flags & wire::kTellsActivity) != 0;
+    const auto word = static_cast<shm::ActivityWord>(message.link);
+    if (message.peer == 0) {
+      tap->second->lose_all_of(message.id);
+    } else {
+      tap->second->lose_source(message.peer, is_told ? std::optional(word) : std::nullopt);
+      tap->second->lose_input(message.peer);
+    }
   }
 }
 

@@ -19,7 +19,16 @@ void NodeCore::handle_about_tap(wire::Received& received) {
     return;
   }
   try {
-    message.kind == wire::MessageKind::kTap ? add_tap(received) : add_tap_source(received);
+    switch (message.kind) {
+      case wire::MessageKind::kTap:
+        add_tap(received);
+        break;
+      case wire::MessageKind::kTapInput:
+        add_tap_input(received);
+        break;
+      default:
+        add_tap_source(received);
+    }
   } catch (const std::exception& error) {
     refuse_tap(message, error.what());
   }
@@ -56,6 +65,13 @@ void NodeCore::add_tap_source(const wire::Received& received) {
   const std::lock_guard lock(mutex_);
   const auto tap = taps_.find(message.port);
   if (tap != taps_.end()) tap->second->add_source(std::move(source));
+}
+
+void NodeCore::add_tap_input(const wire::Received& received) {
+  auto input = map_tap_input(received, residence());
+  const std::lock_guard lock(mutex_);
+  const auto tap = taps_.find(received.message.port);
+  if (tap != taps_.end()) tap->second->add_input(std::move(input));
 }
 
 // The publisher tells the daemon, which tells the tap; a tap tells its program.
@@ -105,7 +121,7 @@ void NodeCore::reopen_taps() {
     wire::Message question;
     question.kind = wire::MessageKind::kOpenTap;
     question.request = next_request_++;
-    question.flags = tap->options().of == TapOf::input ? wire::kTapsInput : 0u;
+    question.flags = wire::kRejoins | (tap->options().of == TapOf::input ? wire::kTapsInput : 0u);
     question.set_name(tap->name());
     reopened_[question.request] = tap;
     static_cast<void>(

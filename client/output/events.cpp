@@ -17,6 +17,34 @@ constexpr std::uint64_t kMaxTapMemory = std::uint64_t{64} << 20;
 // One that is kept and one that is held: with fewer there is nothing to be read.
 constexpr std::uint32_t kMinTapSlots = 2;
 
+// What is kept for root and the daemon's own user: one in so many.
+constexpr std::uint32_t kReserve = 8;
+
+// Of something that taps have: how much all have together, one user, and the privileged.
+struct Taken {
+  std::uint32_t all = 0;
+  std::uint32_t users = 0;  // of one who is not privileged
+  std::uint32_t privileged = 0;
+
+  void add(const TapPeer& tap, uid_t user, std::uint32_t amount) noexcept {
+    all += amount;
+    if (tap.is_privileged) {
+      privileged += amount;
+    } else if (tap.user == user) {
+      users += amount;
+    }
+  }
+  // Whether the tap may have `amount` more, of a `total`.
+  [[nodiscard]] bool allows(const TapPeer& tap, std::uint32_t total,
+                            std::uint32_t amount) const noexcept {
+    if (amount == 0) return true;
+    const std::uint32_t reserve = total / kReserve;
+    const std::uint32_t kept = tap.is_privileged ? 0 : reserve - std::min(reserve, privileged);
+    const std::uint32_t gone = all + kept + amount;
+    return gone <= total && (tap.is_privileged || users + amount <= total - gone);
+  }
+};
+
 // In what a layout has beside the samples.
 constexpr std::uint64_t kOverhead = std::uint64_t{16} << 20;
 
@@ -46,6 +74,34 @@ EventMemory::EventMemory(const shm::EventShape& shape, shm::Residence residence)
   shm::close_in_children(readable_);
 }
 
+// Taps and holds are for all users: nobody may have more of them than is left for the others, as of
+// what the daemon has (service/policy/shares.hpp), and an eighth is kept for root and the daemon's
+// own user. Those two are bound by what there is alone.
+void TapSeats::require_room(const TapPeer& peer, const std::string& port,
+                            std::uint32_t may_be_held) const {
+  Taken taps;
+  Taken holds;
+  for (const auto& [instance, seat] : seats_) {
+    taps.add(*seat.peer, peer.user, 1);
+    holds.add(*seat.peer, peer.user, seat.peer->max_held);
+  }
+  const auto share = [&](const Taken& taken) {
+    if (peer.is_privileged) return std::string();
+    return "; user " + std::to_string(peer.user) + " has " + std::to_string(taken.users) +
+           " of them, and may have no more than is left for others";
+  };
+  if (!taps.allows(peer, shm::kMaxTaps, 1)) {
+    throw std::runtime_error(port + " has " + std::to_string(taps.all) + " taps already, of " +
+                             std::to_string(shm::kMaxTaps) + " (kMaxTaps)" + share(taps));
+  }
+  if (!holds.allows(peer, may_be_held, peer.max_held)) {
+    throw std::runtime_error("the taps of " + port + " may hold " + std::to_string(may_be_held) +
+                             " samples together, and hold " + std::to_string(holds.all) +
+                             " already; this one wants " + std::to_string(peer.max_held) +
+                             share(holds));
+  }
+}
+
 const TapSeat& TapSeats::add(std::shared_ptr<const TapPeer> peer, const std::string& port,
                              std::uint32_t slots_reserved, shm::Residence residence) {
   const auto known = std::find_if(seats_.begin(), seats_.end(), [&](const auto& seat) {
@@ -61,23 +117,9 @@ const TapSeat& TapSeats::add(std::shared_ptr<const TapPeer> peer, const std::str
   if (slots_reserved < kMinTapSlots) {
     throw std::runtime_error("the samples of " + port + " are too large to be kept for a tap");
   }
+  require_room(*peer, port, slots_reserved - slots_reserved / 2);
   std::uint32_t used = 0;
-  std::uint32_t held = 0;
-  for (const auto& [instance, seat] : seats_) {
-    used |= 1u << seat.place;
-    held += seat.peer->max_held;
-  }
-  const std::uint32_t all = (1u << shm::kMaxTaps) - 1;
-  if (used == all) {
-    throw std::runtime_error(port + " has " + std::to_string(shm::kMaxTaps) +
-                             " taps already (kMaxTaps)");
-  }
-  const std::uint32_t may_be_held = slots_reserved - slots_reserved / 2;
-  if (held + peer->max_held > may_be_held) {
-    throw std::runtime_error("the taps of " + port + " may hold " + std::to_string(may_be_held) +
-                             " samples together, and hold " + std::to_string(held) +
-                             " already; this one wants " + std::to_string(peer->max_held));
-  }
+  for (const auto& [instance, seat] : seats_) used |= 1u << seat.place;
   if (memory_ == nullptr) {
     shm::EventShape shape;
     shape.kept = std::min(std::bit_floor(slots_reserved / 2), shm::kMaxKept);

@@ -82,6 +82,7 @@ class TapSeats {
   [[nodiscard]] TapView view(const shm::Destinations& destinations);
 
  private:
+  void require_room(const TapPeer& peer, const std::string& port, std::uint32_t may_be_held) const;
   std::map<shm::PortInstance, TapSeat> seats_;
   std::shared_ptr<const EventMemory> memory_;  // stays, once there has been a tap
   shm::Destinations listed_;

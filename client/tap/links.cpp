@@ -38,6 +38,18 @@ std::shared_ptr<const TapSource> map_tap_source(const wire::Received& announced,
   return source;
 }
 
+std::shared_ptr<const TapInput> map_tap_input(const wire::Received& announced,
+                                              shm::Residence residence) {
+  auto input = std::make_shared<TapInput>();
+  input->instance = announced.message.peer;
+  input->mapping = map_input_segment(announced.descriptors[0]);
+  shm::make_resident(input->mapping, 0, sizeof(shm::InputSegment), residence);
+  input->watch.emplace(*input->mapping.as<const shm::InputSegment>());
+  input->bequest.emplace(input->mapping.data(), input->mapping.size(),
+                         shm::Bequest::Kind::kNothing);
+  return input;
+}
+
 TapCore::TapCore(std::string name, const Type& type, const TapOptions& options,
                  std::shared_ptr<const ServiceBell> service_bell, shm::Residence residence)
     : name_(std::move(name)),
@@ -62,6 +74,7 @@ TapCore::TapCore(std::string name, const Type& type, const TapOptions& options,
 }
 
 // A source that is known already goes on as it is: a daemon that has taken over tells of it again.
+// An output port that another has in its place has ended, though no daemon was there to tell.
 void TapCore::add_source(std::shared_ptr<const TapSource> source) {
   const auto instance = source->output->instance;
   const auto known = links_.find(instance);
@@ -69,13 +82,41 @@ void TapCore::add_source(std::shared_ptr<const TapSource> source) {
       known->second.source->identity == source->identity && !known->second.gone) {
     return;
   }
-  links_[instance] = {std::move(source)};
+  for (auto& [other, link] : links_) {
+    if (other != instance && link.source->name == source->name) link.gone = true;
+  }
+  links_[instance] = {};
+  links_[instance].source = std::move(source);
   offer_view();
 }
 
-void TapCore::lose_source(shm::PortInstance output) {
+void TapCore::lose_source(shm::PortInstance output, std::optional<shm::ActivityWord> activity) {
   const auto found = links_.find(output);
   if (found == links_.end()) return;
+  found->second.gone = true;
+  found->second.end = activity;
+  offer_view();
+}
+
+void TapCore::lose_all_of(shm::SourceId source) {
+  std::vector<shm::PortInstance> outputs;
+  for (const auto& [output, link] : links_) {
+    if (link.source->output->source == source && !link.gone) outputs.push_back(output);
+  }
+  for (const shm::PortInstance output : outputs) lose_source(output, {});
+}
+
+void TapCore::add_input(std::shared_ptr<const TapInput> input) {
+  const auto instance = input->instance;
+  if (inputs_.count(instance) != 0) return;
+  for (auto& [other, link] : inputs_) link.gone = true;  // a port has one at a time
+  inputs_[instance] = {std::move(input), false};
+  offer_view();
+}
+
+void TapCore::lose_input(shm::PortInstance input) {
+  const auto found = inputs_.find(input);
+  if (found == inputs_.end()) return;
   found->second.gone = true;
   offer_view();
 }
@@ -102,18 +143,19 @@ std::vector<std::string> TapCore::misbehaving() {
 
 void TapCore::tidy() {
   handover_.collect();
-  const auto is_drained = [](const auto& link) {
+  const auto sources = std::erase_if(links_, [](const auto& link) {
     return link.second.source->drained.load(std::memory_order_relaxed);
-  };
-  if (std::any_of(links_.begin(), links_.end(), is_drained)) {
-    std::erase_if(links_, is_drained);
-    offer_view();
-  }
+  });
+  const auto inputs = std::erase_if(inputs_, [](const auto& link) {
+    return link.second.input->drained.load(std::memory_order_relaxed);
+  });
+  if (sources + inputs != 0) offer_view();
 }
 
 void TapCore::offer_view() {
   auto view = std::make_unique<TapSourceView>();
   for (const auto& [instance, link] : links_) view->links.push_back(link);
+  for (const auto& [instance, link] : inputs_) view->inputs.push_back(link);
   handover_.offer(std::move(view));
   // SYNC POINT: view-announced. As InputCore::offer_view().
   shm::full_fence();

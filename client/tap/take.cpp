@@ -1,7 +1,8 @@
 // The tap's thread: take() and waiting.
 //
 // Events of one source come in its order. Of several sources that have told something, the one
-// whose next event is the oldest comes first.
+// whose next event is the oldest comes first. What an input port has dropped comes when that was
+// seen.
 #include <algorithm>
 
 #include "client/tap/tap_core.hpp"
@@ -13,6 +14,16 @@ namespace {
 constexpr int kMaxPassedOver = 64;
 
 constexpr auto kEnd = static_cast<std::uint8_t>(shm::kLastEventKind + 1);  // TapEventKind::closed
+constexpr std::uint8_t kDropped = kEnd + 1;
+constexpr std::uint8_t kOvertaken = kEnd + 2;
+
+// How often an input port's counters are looked at: each look takes the line in which they lie out
+// of the cache of its component, which has to fetch it back.
+constexpr shm::Nanoseconds kLookInterval = 1'000'000;
+// The same where the tap waits: nobody rings for them.
+constexpr shm::Nanoseconds kLookIntervalAsleep = 100'000'000;
+// So many are kept until they are taken; then nothing is looked at.
+constexpr std::size_t kMaxTakes = 1024;
 
 }  // namespace
 
@@ -29,15 +40,20 @@ void TapCore::accept_view() {
     });
     if (known != streams_.end()) {
       known->gone = link.gone;
+      known->end = link.end;
       continue;
     }
     Stream stream;
     stream.source = link.source;
     stream.gone = link.gone;
+    stream.end = link.end;
     stream.reader =
         shm::EventReader(*link.source->events, link.source->shape, link.source->output->instance,
                          link.source->place, link.source->link);
     streams_.push_back(std::move(stream));
+    auto& context = known_[link.source->output->source];
+    context =
+        std::make_shared<TapContext>(TapContext{link.source->name, link.source->output->type, {}});
   }
   handover_.retire(std::exchange(view_, std::move(view)));
   service_bell_->ring();  // to dispose of the old one
@@ -58,7 +74,8 @@ bool TapCore::look_at(Stream& stream) noexcept {
   if (stream.has_head) return true;
   if (stream.ended || stream.source->misbehaved.load(std::memory_order_relaxed)) return false;
   const bool gone = stream.gone;  // before the look: what it has told comes before its end
-  for (int passed = 0; stream.reader.join() && passed < kMaxPassedOver; ++passed) {
+  for (int passed = 0; stream.reader.join(); ++passed) {
+    if (passed == kMaxPassedOver) return false;
     std::uint64_t lost = 0;
     const Found found = stream.reader.read(stream.head, lost);
     if (found == Found::kNothing) break;
@@ -78,11 +95,44 @@ bool TapCore::look_at(Stream& stream) noexcept {
     return stream.has_head = true;
   }
   if (!gone) return false;
+  end(stream);
+  return stream.has_head = true;
+}
+
+// Where the source's page does not say what the last event says, the publisher was killed after it
+// had stamped an arrival or a deactivation, and before it told of it.
+void TapCore::end(Stream& stream) noexcept {
   stream.head = stream.last;
   stream.head.masks = {};
-  stream.head_lost = 0;
+  stream.head_lost = stream.has_begun && stream.end && *stream.end != stream.last.activity ? 1 : 0;
+  if (stream.end) stream.head.activity = *stream.end;
   stream.head_is_end = true;
-  return stream.has_head = true;
+}
+
+void TapCore::look_at_inputs() {
+  const shm::Nanoseconds now = shm::monotonic_now();
+  if (now - looked_ < kLookInterval || takes_.size() >= kMaxTakes) return;
+  looked_ = now;
+  for (const TapInputLink& link : view_->inputs) {
+    if (link.input->drained.load(std::memory_order_relaxed)) continue;
+    news_.clear();
+    link.input->watch->look(link.gone, news_);
+    for (const TakeWatch::News& news : news_) takes_.push_back({now, news});
+    if (!link.gone) continue;
+    link.input->drained.store(true, std::memory_order_relaxed);
+    service_bell_->ring();
+  }
+}
+
+void TapCore::fill(const Take& take, TapEventData& event) {
+  static const auto nobody = std::make_shared<const TapContext>();
+  event = {};
+  event.kind = take.news.is_overtaken ? kOvertaken : kDropped;
+  event.time_ns = take.seen;
+  event.count = take.news.count;
+  event.sequence = take.news.sequence;
+  const auto source = known_.find(take.news.source);
+  event.context = source == known_.end() ? nobody : source->second;
 }
 
 TapCore::Stream* TapCore::oldest() noexcept {
@@ -96,7 +146,13 @@ TapCore::Stream* TapCore::oldest() noexcept {
 
 bool TapCore::take_once(TapEventData& event) {
   if (handover_.has_offer()) accept_view();
+  if (view_ != nullptr && !view_->inputs.empty()) look_at_inputs();
   Stream* const stream = oldest();
+  if (!takes_.empty() && (stream == nullptr || stream->head.time > takes_.front().seen)) {
+    fill(takes_.front(), event);
+    takes_.pop_front();
+    return true;
+  }
   if (stream == nullptr) return false;
   if (stream->head.kind == shm::EventKind::kSample && options_.max_held != 0 &&
       held_ == options_.max_held) {
@@ -120,6 +176,7 @@ void TapCore::fill(Stream& stream, TapEventData& event) {
   event.discarded = head.masks.discarded;
   event.refused = head.masks.refused;
   event.blind = head.masks.blind;
+  event.count = 0;
   event.size = std::min<std::uint64_t>(head.size, stream.source->output->segment.layout().stride);
   event.data = nullptr;
   event.context = stream.context;
@@ -128,6 +185,7 @@ void TapCore::fill(Stream& stream, TapEventData& event) {
     ++lost_samples_;
   }
   lost_events_ += stream.head_lost;
+  stream.has_begun = true;
   stream.last = head;
   stream.has_head = false;
   if (stream.head_is_end) {
@@ -236,8 +294,10 @@ bool TapCore::wait(shm::Nanoseconds timeout, TapEventData& event) {
     for (;;) {
       arm();
       found = take_once(event);
-      if (found || shm::monotonic_now() >= deadline) break;
-      bell_.wait(deadline);
+      const shm::Nanoseconds time = shm::monotonic_now();
+      if (found || time >= deadline) break;
+      const bool looks = view_ != nullptr && !view_->inputs.empty();
+      bell_.wait(looks ? std::min(deadline, time + kLookIntervalAsleep) : deadline);
       disarm();
     }
     disarm();

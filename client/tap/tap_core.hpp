@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -21,6 +22,7 @@
 #include "client/input/copies.hpp"
 #include "client/peers.hpp"
 #include "client/service_bell.hpp"
+#include "client/tap/takes.hpp"
 #include "shm/bell.hpp"
 #include "shm/clock.hpp"
 #include "shm/descendants.hpp"
@@ -55,13 +57,34 @@ std::shared_ptr<const TapSource> map_tap_source(const wire::Received& announced,
 
 struct TapSourceLink {
   std::shared_ptr<const TapSource> source;
-  bool gone = false;         // closed or dead: drain it
-  bool reported = false;     // that it misbehaves
-  std::uint32_t copied = 0;  // of the output peer's, when it was surveyed last
+  bool gone = false;                     // closed or dead: drain it
+  bool reported = false;                 // that it misbehaves
+  std::uint32_t copied = 0;              // of the output peer's, when it was surveyed last
+  std::optional<shm::ActivityWord> end;  // of one that is gone: its activity, by its page
+};
+
+// The input port that is tapped, while a component has it open.
+struct TapInput {
+  shm::PortInstance instance = 0;
+  shm::Mapping mapping;
+  std::optional<shm::Bequest> bequest;
+  mutable std::optional<TakeWatch> watch;  // tap's thread, once it is told
+  // Set by the tap's thread once all has been told of a port that is gone.
+  mutable shm::Atomic<bool> drained{false};
+};
+
+// Maps what the daemon has announced, and checks it. Throws as map_tap_source().
+std::shared_ptr<const TapInput> map_tap_input(const wire::Received& announced,
+                                              shm::Residence residence);
+
+struct TapInputLink {
+  std::shared_ptr<const TapInput> input;
+  bool gone = false;
 };
 
 struct TapSourceView {
   std::vector<TapSourceLink> links;
+  std::vector<TapInputLink> inputs;
   TapSourceView* next_retired = nullptr;
 };
 
@@ -75,8 +98,14 @@ class TapCore {
 
   void bind(shm::PortInstance instance) noexcept { instance_ = instance; }
   void add_source(std::shared_ptr<const TapSource> source);
-  // It has closed or died; what it has told can still be taken.
-  void lose_source(shm::PortInstance output);
+  // It has closed or died, or is not connected any more; what it has told can still be taken.
+  // `activity`: of a source whose port is gone, what its page says.
+  void lose_source(shm::PortInstance output, std::optional<shm::ActivityWord> activity);
+  // The same of whoever had the source open.
+  void lose_all_of(shm::SourceId source);
+  // The same for the input port that is tapped.
+  void add_input(std::shared_ptr<const TapInput> input);
+  void lose_input(shm::PortInstance input);
   [[nodiscard]] std::vector<std::shared_ptr<const OutputPeer>> copied_from();
   // The names of those that have begun to misbehave, once each.
   std::vector<std::string> misbehaving();
@@ -117,7 +146,9 @@ class TapCore {
   struct Stream {
     std::shared_ptr<const TapSource> source;
     bool gone = false;
-    bool ended = false;  // all has been told, its end too
+    bool ended = false;      // all has been told, its end too
+    bool has_begun = false;  // something of it has been taken
+    std::optional<shm::ActivityWord> end;
     shm::EventReader reader;
     bool has_head = false;
     bool head_is_end = false;
@@ -128,9 +159,18 @@ class TapCore {
     std::shared_ptr<const TapContext> context;
   };
 
+  // What has become of samples at the input port that is tapped, not taken yet.
+  struct Take {
+    shm::Nanoseconds seen = 0;
+    TakeWatch::News news;
+  };
+
   void offer_view();
   void accept_view();
   bool look_at(Stream& stream) noexcept;
+  void end(Stream& stream) noexcept;
+  void look_at_inputs();
+  void fill(const Take& take, TapEventData& event);
   [[nodiscard]] bool is_honest(const Stream& stream) const noexcept;
   Stream* oldest() noexcept;
   void fill(Stream& stream, TapEventData& event);
@@ -155,12 +195,17 @@ class TapCore {
 
   // Service thread.
   std::map<shm::PortInstance, TapSourceLink> links_;
+  std::map<shm::PortInstance, TapInputLink> inputs_;
 
   Handover<TapSourceView> handover_;
 
   // Tap's thread.
   std::unique_ptr<TapSourceView> view_;
   std::vector<Stream> streams_;
+  shm::Nanoseconds looked_ = 0;        // at the input port, the last time
+  std::vector<TakeWatch::News> news_;  // of one look
+  std::deque<Take> takes_;
+  std::map<shm::SourceId, std::shared_ptr<const TapContext>> known_;  // sources that were streams
   std::array<std::shared_ptr<const TapSource>, shm::kMaxTapHeld> held_from_;
   std::uint32_t held_ = 0;
   Copies copies_;

@@ -99,6 +99,7 @@ class Shares {
 
   [[nodiscard]] bool allows(uid_t user, Share what, std::uint64_t amount) const;
   [[nodiscard]] std::uint64_t taken(uid_t user, Share what) const;
+  [[nodiscard]] bool is_privileged(uid_t user) const { return user == 0 || user == owner_; }
 
  private:
   friend class Charge;
@@ -107,7 +108,6 @@ class Shares {
   };
   void add(Account& account, Share what, std::uint64_t amount);
   void give_back(const Charge& charge) noexcept;
-  [[nodiscard]] bool is_privileged(uid_t user) const { return user == 0 || user == owner_; }
   [[nodiscard]] std::uint64_t taken_by_privileged(Share what) const;
   [[nodiscard]] std::string refusal(uid_t user, Share what) const;
 

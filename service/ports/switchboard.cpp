@@ -59,6 +59,7 @@ void Switchboard::insert(std::unique_ptr<InputPort> port, Client& client, InputN
   name.open = port->instance;
   name.away = 0;
   client.ports.insert(port->instance);
+  taps_.show(*port);
   inputs_[port->instance] = std::move(port);
 }
 
@@ -85,6 +86,7 @@ void Switchboard::remove(shm::PortInstance port) {
     at_step("output-owner-cleared");
   }
   if (const auto found = inputs_.find(port); found != inputs_.end()) {
+    taps_.end(port, found->second->name->name);
     registry_.input(found->second->name->id).clear_owner();
     at_step("input-owner-cleared");
   }
@@ -176,15 +178,26 @@ Switchboard::Told Switchboard::add_tap(std::unique_ptr<Tap> tap, Client& client,
                                        const shm::TableView& table,
                                        const std::function<void()>& opened) {
   Told told;
-  taps_.add(std::move(tap), client);
+  const Tap& added = taps_.add(std::move(tap), client);
   opened();
+  for (const auto& [instance, input] : inputs_) taps_.show(added, *input);
+  taps_.tell_ends(added, table);
   taps_.link(table, outputs_, [&](Client* publisher) { told.insert(publisher); });
   return told;
 }
 
 void Switchboard::tell_tap(const wire::Received& answer) {
   const auto output = outputs_.find(answer.message.port);
-  if (output != outputs_.end()) taps_.tell(*output->second, answer);
+  if (output == outputs_.end()) return;
+  taps_.tell(*output->second, answer);
+  // The publisher uses more of its segment from now on. One that does not read is passed over.
+  const shm::PortInstance grown = output->first;
+  for (auto link = links_.lower_bound({grown, 0});
+       link != links_.end() && link->first.first == grown; ++link) {
+    Client& receiver = client_of(link->first.second);
+    if (!link->second.is_mutual() || receiver.has_queue()) continue;
+    receiver.send(message_to(wire::MessageKind::kOutputGrown, link->first.second, grown));
+  }
 }
 
 void Switchboard::make_links(const Wanted& wanted, Told& told) {

@@ -44,6 +44,9 @@ class Switchboard {
   [[nodiscard]] bool has_tap(const Client& client, shm::PortInstance tap) const {
     return taps_.is_of(client, tap);
   }
+  [[nodiscard]] std::vector<const Tap*> taps_of(shm::PortInstance output) const {
+    return taps_.of(output);
+  }
   void remove_tap(shm::PortInstance tap) { taps_.remove(tap, outputs_); }
   void lose_taps(const Client& client, bool lives) { taps_.lose(client, lives, outputs_); }
   // What the component of an output port has answered to a tap.

@@ -130,6 +130,7 @@ void Switchboard::forget_away(shm::PortInstance port) {
     registry_.source(source->id).clear_owner();
   }
   if (InputName* name = names_.input_of(port)) {
+    taps_.end(port, name->name);
     name->away = 0;
     names_.let_go(*name);
     registry_.input(name->id).clear_owner();

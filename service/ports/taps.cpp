@@ -23,6 +23,7 @@ std::unique_ptr<Tap> adopt_tap(const wire::Received& open, uid_t user) {
   tap->segment = kept(open.descriptors[0]);
   tap->user = user;
   tap->is_input = (open.message.flags & wire::kTapsInput) != 0;
+  tap->is_back = (open.message.flags & wire::kRejoins) != 0;
   return tap;
 }
 
@@ -81,8 +82,10 @@ bool Taps::ask(const Tap& tap, const OutputPort& output) {
   const auto [link, is_new] = links_.try_emplace({output.instance, tap.instance});
   if (!is_new && !link->second.is_away) return false;
   link->second.is_away = false;
-  output.client->send(message_to(wire::MessageKind::kTap, output.instance, tap.instance),
-                      {tap.segment.get(), tap.bell->descriptor()});
+  auto message = message_to(wire::MessageKind::kTap, output.instance, tap.instance);
+  message.value = tap.is_privileged ? 0 : tap.user;
+  message.flags = tap.is_privileged ? wire::kIsPrivileged : 0u;
+  output.client->send(message, {tap.segment.get(), tap.bell->descriptor()});
   return true;
 }
 
@@ -135,17 +138,81 @@ void Taps::set_away(shm::PortInstance output) {
   }
 }
 
+// Its page may be another by now, where nobody had the last one: so nothing is said of its
+// activity.
+void Taps::tell_end(const Tap& tap, const Source& source) {
+  if (source.open != 0) return;
+  if (source.away != 0) {
+    links_[{source.away, tap.instance}] = {true, true};
+    return;
+  }
+  tap.client->send(message_to(wire::MessageKind::kPeerGone, tap.instance, 0, source.id));
+}
+
+void Taps::tell_ends(const Tap& tap, const shm::TableView& table) {
+  if (!tap.is_back) return;
+  if (!tap.is_input) {
+    if (const Source* const source = names_.find_source(tap.name)) tell_end(tap, *source);
+    return;
+  }
+  for (const auto& input : names_.inputs()) {
+    if (input->name != tap.name) continue;
+    const auto range = table.connections_to(input->id);
+    for (auto index = range.first; index != range.first + range.count; ++index) {
+      const Source* const source = names_.source_by_id(table.rule(index).source);
+      if (source != nullptr) tell_end(tap, *source);
+    }
+  }
+}
+
+// Nobody writes the activity any more: what the publisher may have stamped and not told of, the
+// page has.
 void Taps::end(shm::PortInstance output) {
+  if (links_.lower_bound({output, 0}) == links_.lower_bound({output + 1, 0})) return;
+  auto message = message_to(wire::MessageKind::kPeerGone, 0, output);
+  const Source* const source = names_.source_of(output);
+  if (source != nullptr && source->has_page()) {
+    message.flags = wire::kTellsActivity;
+    message.link =
+        static_cast<std::uint64_t>(source->activity().word.load(std::memory_order_relaxed));
+  }
   std::erase_if(links_, [&](const auto& each) {
     const auto& [key, link] = each;
     if (key.first != output) return false;
     if (link.is_told) {
       const Tap& tap = *taps_.at(key.second);
-      tap.client->send(message_to(wire::MessageKind::kPeerGone, tap.instance, output));
+      message.port = tap.instance;
+      tap.client->send(message);
       tap.bell->ring();  // it may have died between telling and ringing
     }
     return true;
   });
+}
+
+void Taps::show(const Tap& tap, const InputPort& input) const {
+  if (!tap.is_input || tap.name != input.name->name) return;
+  auto message = message_to(wire::MessageKind::kTapInput, tap.instance, input.instance);
+  message.set_name(tap.name);
+  tap.client->send(message, {input.segment.get(), -1});
+}
+
+void Taps::show(const InputPort& input) const {
+  for (const auto& [instance, tap] : taps_) show(*tap, input);
+}
+
+void Taps::end(shm::PortInstance input, const std::string& name) const {
+  for (const auto& [instance, tap] : taps_) {
+    if (!tap->is_input || tap->name != name) continue;
+    tap->client->send(message_to(wire::MessageKind::kPeerGone, instance, input));
+  }
+}
+
+std::vector<const Tap*> Taps::of(shm::PortInstance output) const {
+  std::vector<const Tap*> found;
+  for (const auto& [key, link] : links_) {
+    if (key.first == output && link.is_told) found.push_back(taps_.at(key.second).get());
+  }
+  return found;
 }
 
 }  // namespace arbiter::service

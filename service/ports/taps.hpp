@@ -14,6 +14,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "service/clients/client.hpp"
 #include "service/kept/registry.hpp"
@@ -28,9 +29,11 @@ namespace arbiter::service {
 struct Tap {
   shm::PortInstance instance = 0;
   Client* client = nullptr;
-  std::string name;       // of the port that is tapped
-  bool is_input = false;  // it is an input port
-  uid_t user = 0;         // whose the segment is
+  std::string name;            // of the port that is tapped
+  bool is_input = false;       // it is an input port
+  uid_t user = 0;              // whose the segment is
+  bool is_privileged = false;  // root, or the daemon's own user
+  bool is_back = false;        // another daemon has opened it
   shm::FileDescriptor segment;
   std::shared_ptr<const PortBell> bell;
   Charge charge;
@@ -71,6 +74,9 @@ class Taps {
       if (wants(*tap, output, table) && ask(*tap, output)) told(output.client);
     }
   }
+  // A tap that another daemon has opened knows sources of whom this one may not have heard: it is
+  // told of those that nobody has open, and will be of those that are away.
+  void tell_ends(const Tap& tap, const shm::TableView& table);
   // Taps of an input port give up what a table does not connect to it any more.
   void unlink(const shm::TableView& table, const Outputs& outputs);
   // A component answers.
@@ -80,6 +86,13 @@ class Taps {
   void set_away(shm::PortInstance output);
   // It has closed, or died.
   void end(shm::PortInstance output);
+  // The same of input ports: taps of that name read what the port counts.
+  void show(const Tap& tap, const InputPort& input) const;
+  void show(const InputPort& input) const;
+  void end(shm::PortInstance input, const std::string& name) const;
+
+  // Those that an output port's component has taken in.
+  [[nodiscard]] std::vector<const Tap*> of(shm::PortInstance output) const;
 
  private:
   // A tap and an output port whose component has been asked.
@@ -89,6 +102,7 @@ class Taps {
   };
   using LinkKey = std::pair<shm::PortInstance, shm::PortInstance>;  // output, tap
 
+  void tell_end(const Tap& tap, const Source& source);
   [[nodiscard]] bool wants(const Tap& tap, const OutputPort& output,
                            const shm::TableView& table) const;
   bool ask(const Tap& tap, const OutputPort& output);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 
+#include <map>
 #include <sstream>
 #include <vector>
 
@@ -36,6 +37,7 @@ class Publishing {
       high_.publish(std::uint32_t{0xffffffff});
       low_.publish(std::uint32_t{0x08070605});
       high_.deactivate();
+      if (takes) static_cast<void>(in_.take());
     }
     ProgramResult result;
     result.exit_code = program.wait();
@@ -43,6 +45,8 @@ class Publishing {
     result.err = content_of(err);
     return result;
   }
+
+  bool takes = false;
 
  private:
   static std::string content_of(const std::string& path) {
@@ -75,6 +79,7 @@ TEST(Echo, OfAnInputPortShowsWhatItAcceptsThoughAComponentHasItOpen) {
     EXPECT_EQ(each["port"], "/p");
     EXPECT_EQ(each["kind"], "sample");
     EXPECT_EQ(each["size"], 4);
+    EXPECT_EQ(each["type"], type_of<std::uint32_t>().name());
     EXPECT_EQ(each["fates"], (json{{"/p", "accepted"}}));
   }
 }
@@ -91,6 +96,20 @@ TEST(Echo, WithLosersShowsWhatBecameOfEach) {
   }
   EXPECT_THAT(met, testing::IsSupersetOf({"/low sample accepted", "/low sample discarded",
                                           "/high sample accepted", "/high deactivation -"}));
+}
+
+// The component takes one sample where two are accepted.
+TEST(Echo, WithLosersShowsWhatIsOvertaken) {
+  Daemon daemon(kOverrideModel);
+  Publishing publishing;
+  publishing.takes = true;
+  const auto result = publishing.during({"echo", "/p", "--losers", "--for", "300ms", "--json"});
+  std::map<std::string, std::uint64_t> counts;
+  for (const json& each : objects(result.out)) {
+    counts[each["kind"].get<std::string>()] += each.value("count", std::uint64_t{0});
+  }
+  EXPECT_GT(counts["overtaken"], 0u);
+  EXPECT_EQ(counts["sample"], 0u);
 }
 
 TEST(Echo, OfAnOutputPortShowsEachArrivalWithItsBytes) {

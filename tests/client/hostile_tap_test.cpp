@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <random>
+#include <vector>
 
 #include <arbiter/arbiter.hpp>
 
@@ -102,8 +103,9 @@ TEST(AHostileTap, WhoseSegmentIsNoneIsRefused) {
 // A publisher that is put together by hand, and its tap.
 class HostilePublisher {
  public:
-  HostilePublisher() : output_(raw_output_segment()) {
-    events_->initialize({4, 2, 2});
+  explicit HostilePublisher(const shm::EventShape& shape = {4, 2, 2})
+      : output_(raw_output_segment()) {
+    events_->initialize(shape);
     shm::seal(events_.descriptor, shm::Seals::kOneWriter);
     events_->places[0].first.store(1);
     events_->places[0].link.store(9);
@@ -190,6 +192,97 @@ TEST(AHostilePublisher, IsGivenUpOnceItTellsWhatNoHonestOneDoes) {
   record.kind = shm::EventKind::kSignal;
   writer.write(record);
   EXPECT_FALSE(tap->take(data));
+}
+
+// Killed between stamping and telling: others may have seen the arrival.
+TEST(AKilledPublisher, WhoHasStampedWhatItDidNotTellHasLostAnEvent) {
+  for (const shm::ActivityWord word : {shm::ActivityWord{70}, shm::ActivityWord{80}}) {
+    HostilePublisher publisher;
+    const auto tap = publisher.tap(1);
+    shm::EventWriter writer(publisher.events());
+    shm::EventRecord record;
+    record.kind = shm::EventKind::kSignal;
+    record.activity = 70;
+    writer.write(record);
+    tap->lose_source(5, word);
+    detail::TapEventData data;
+    ASSERT_TRUE(tap->take(data));
+    EXPECT_EQ(data.activity, 70);
+    ASSERT_TRUE(tap->take(data));
+    EXPECT_EQ(data.kind, static_cast<std::uint8_t>(TapEventKind::closed));
+    EXPECT_EQ(data.activity, word);
+    EXPECT_EQ(data.lost, word == 70 ? 0u : 1u);
+    EXPECT_EQ(tap->lost_events(), data.lost);
+  }
+}
+
+// The end comes after all that was told, however much of it is not for this tap.
+TEST(AKilledPublisher, IsReadToItsEnd) {
+  HostilePublisher publisher({1024, 2, 2});
+  const auto tap = publisher.tap(0);
+  shm::EventWriter writer(publisher.events());
+  shm::EventRecord record;
+  for (int i = 0; i < 200; ++i) writer.write(record);  // states, of other taps
+  record.kind = shm::EventKind::kSignal;
+  writer.write(record);
+  tap->lose_source(5, {});
+  std::vector<int> kinds;
+  for (int looks = 0; looks < 10; ++looks) {
+    detail::TapEventData data;
+    if (tap->take(data)) kinds.push_back(data.kind);
+  }
+  EXPECT_EQ(kinds, (std::vector<int>{static_cast<int>(TapEventKind::signal),
+                                     static_cast<int>(TapEventKind::closed)}));
+}
+
+std::shared_ptr<const detail::TapPeer> tap_of(shm::PortInstance number, uid_t user,
+                                              std::uint32_t max_held, bool is_privileged = false) {
+  auto peer = std::make_shared<detail::TapPeer>();
+  peer->instance = number;
+  peer->identity.inode = number;
+  peer->user = user;
+  peer->is_privileged = is_privileged;
+  peer->max_held = max_held;
+  return peer;
+}
+
+// How many taps a user gets, each of which may hold so much.
+int taps_for(detail::TapSeats& seats, uid_t user, std::uint32_t max_held,
+             bool is_privileged = false) {
+  static shm::PortInstance last = 0;
+  int count = 0;
+  while (error_of([&] {
+           seats.add(tap_of(++last, user, max_held, is_privileged), "/out", 128,
+                     shm::Residence::kMapped);
+         }) == "no error") {
+    ++count;
+  }
+  return count;
+}
+
+TEST(TapsOfSeveralUsers, LeaveSomethingForEachOther) {
+  detail::TapSeats seats;
+  EXPECT_EQ(taps_for(seats, 1001, 0), 7) << "two of sixteen are kept, and half of the rest";
+  EXPECT_EQ(taps_for(seats, 1002, 0), 3);
+  EXPECT_EQ(taps_for(seats, 1003, 0), 2);
+  EXPECT_EQ(taps_for(seats, 1004, 0), 1);
+  EXPECT_EQ(taps_for(seats, 0, 0, true), 3) << "all that are left";
+  EXPECT_EQ(taps_for(seats, 1005, 0), 0);
+}
+
+TEST(TapsOfSeveralUsers, ShareWhatMayBeHeld) {
+  detail::TapSeats seats;
+  EXPECT_EQ(taps_for(seats, 1001, 14), 2) << "28 of 64, of which eight are kept";
+  EXPECT_EQ(taps_for(seats, 1002, 14), 1);
+  EXPECT_EQ(taps_for(seats, 0, 14, true), 1);
+}
+
+TEST(TapsOfSeveralUsers, SayWhoseShareIsUsedUp) {
+  detail::TapSeats seats;
+  EXPECT_EQ(taps_for(seats, 1001, 0), 7);
+  EXPECT_EQ(error_of([&] { seats.add(tap_of(99, 1001, 0), "/out", 128, shm::Residence::kMapped); }),
+            "/out has 7 taps already, of 16 (kMaxTaps); user 1001 has 7 of them, and may have no "
+            "more than is left for others");
 }
 
 TEST(AHostilePublisher, WhoseSegmentOfEventsIsNoneIsNotRead) {

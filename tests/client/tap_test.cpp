@@ -1,7 +1,9 @@
 // Watching sources without being a destination.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 #include <vector>
@@ -11,8 +13,11 @@
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
+#include "tests/support/child_process.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/error_of.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/text_files.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -37,6 +42,17 @@ TapEvent<T> wait_for_kind(Tap<T>& tap, TapEventKind kind) {
   for (;;) {
     auto event = tap.wait_for(kForever);
     if (event && event->kind() == kind) return std::move(*event);
+  }
+}
+
+// Publishes signals until the tap sees its source. A component has 0.2 s to take a tap in, and may
+// need more for large samples on a machine that is busy.
+template <class Port, class T>
+void wait_until_watched(Port& out, Tap<T>& tap) {
+  do {
+    out.signal();
+  } while (!tap.take());
+  while (tap.take()) {
   }
 }
 
@@ -135,14 +151,14 @@ TEST(Tap, ReadsInPlaceWhatThePublisherHasWritten) {
   Node node("test");
   auto out = node.output_port<Image>("/out");
   auto tap = node.tap<Image>("/out");
-  // On a machine that is busy the first may be copied: nobody has looked yet what is allocated.
-  for (int in_a_row = 0; in_a_row < 20;) {
+  wait_until_watched(out, tap);
+  for (int i = 0; i < 20; ++i) {
     auto loan = out.loan();
     const std::string written = where(loan->get());
     out.publish(std::move(*loan));
     const auto event = next_of(tap);
     ASSERT_TRUE(event && event->sample() != nullptr);
-    in_a_row = where(event->sample()) == written ? in_a_row + 1 : 0;
+    EXPECT_EQ(where(event->sample()), written);
   }
 }
 
@@ -330,6 +346,77 @@ TEST(Tap, FollowsASourceThatClosesAndComesAgain) {
   EXPECT_EQ(tap.lost(), 0u);
 }
 
+TEST(Tap, IsToldTheActivityThatASourceHasOnceItsPortIsGone) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto tap = node.tap<Number>("/out");
+  for (const bool is_deactivated : {false, true}) {
+    Component sender("sender");
+    ASSERT_EQ(sender.tell("output /out"), "open");
+    sender.tell("publish /out 1");
+    if (is_deactivated) sender.tell("deactivate /out");
+    sender.kill();
+    const auto closed = wait_for_kind(tap, TapEventKind::closed);
+    EXPECT_EQ(closed.is_deactivated(), is_deactivated);
+    EXPECT_EQ(closed.was_active_at(std::chrono::steady_clock::now()), !is_deactivated);
+    EXPECT_EQ(closed.lost(), 0u);
+  }
+}
+
+// One that has published nothing since it was tapped has told nothing of its activity.
+TEST(Tap, IsToldTheActivityOfASourceThatHasToldNothing) {
+  Daemon daemon(single_model());
+  Node node("test");
+  Component sender("sender");
+  ASSERT_EQ(sender.tell("output /out"), "open");
+  sender.tell("publish /out 1");
+  auto tap = node.tap<Number>("/out");
+  sender.kill();
+  const auto closed = wait_for_kind(tap, TapEventKind::closed);
+  EXPECT_TRUE(closed.was_active_at(std::chrono::steady_clock::now()));
+  EXPECT_EQ(closed.lost(), 0u) << "nothing was told that could be lost";
+}
+
+TEST(Tap, HearsThatASourceHasEndedThoughNoDaemonWasThere) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto tap = node.tap<Number>("/out");
+  {
+    Component sender("sender");
+    ASSERT_EQ(sender.tell("output /out"), "open");
+    sender.tell("publish /out 1");
+    EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 1);
+    daemon.kill();
+    sender.kill();
+  }
+  daemon.restart();
+  Component successor("successor");
+  ASSERT_EQ(successor.tell("output /out"), "open");
+  successor.tell("publish /out 2");
+  EXPECT_EQ(wait_for_kind(tap, TapEventKind::closed).sequence(), 1u);
+}
+
+TEST(Tap, HearsOfTheEndFromADaemonThatNeverKnewTheSource) {
+  for (const TapOf of : {TapOf::output, TapOf::input}) {
+    Daemon daemon(single_model());
+    Node node("test");
+    auto tap = node.tap<Number>(of == TapOf::output ? "/out" : "/in", {.of = of});
+    Component sender("sender");
+    ASSERT_EQ(sender.tell("output /out"), "open");
+    sender.tell("publish /out 1");
+    EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 1);
+    daemon.kill();
+    sender.tell("publish /out 2");
+    sender.tell("deactivate /out");
+    sender.kill();
+    daemon.restart();
+    const auto closed = wait_for_kind(tap, TapEventKind::closed);
+    EXPECT_EQ(closed.sequence(), 2u);
+    EXPECT_TRUE(closed.is_deactivated());
+    EXPECT_EQ(tap.lost(), 0u);
+  }
+}
+
 TEST(Tap, SeesAllThatAPublisherToldBeforeItWasKilled) {
   Daemon daemon(single_model());
   Node node("test");
@@ -430,6 +517,58 @@ TEST(Tap, OfAnInputPortSeesAllSourcesThatTheModelConnectsToIt) {
   EXPECT_FALSE(next_of(tap)) << "/stop is only sensed";
 }
 
+// What became of accepted samples after they were accepted. `in` is /in.
+struct AtTheTake {
+  Daemon daemon{override_model()};
+  Node node{"test"};
+  OutputPort<Number> low = node.output_port<Number>("/low");
+  OutputPort<Number> high = node.output_port<Number>("/high");
+  Tap<Number> tap = node.tap<Number>("/in", {.of = TapOf::input});
+};
+
+TEST(Tap, OfAnInputPortIsToldWhatWasOvertakenAndWhatWasDroppedAtTheTake) {
+  AtTheTake scene;
+  for (int opened = 0; opened < 3; ++opened) {
+    auto in = scene.node.input_port<Number>("/in", {.depth = 2});
+    for (int i = 1; i <= 5; ++i) scene.low.publish(Number{i});
+    EXPECT_EQ(take_from(in), 4);
+    const auto overtaken = wait_for_kind(scene.tap, TapEventKind::overtaken);
+    EXPECT_EQ(overtaken.source(), "/low");
+    EXPECT_EQ(overtaken.count(), 3u);
+    EXPECT_EQ(overtaken.sample(), nullptr);
+    EXPECT_TRUE(overtaken.destinations().empty());
+    scene.high.signal();
+    EXPECT_FALSE(in.take());
+    const auto dropped = wait_for_kind(scene.tap, TapEventKind::dropped);
+    EXPECT_EQ(dropped.source(), "/low");
+    EXPECT_EQ(dropped.count(), 1u);
+    EXPECT_EQ(dropped.sequence() % 5, 0u) << "the port has done with all";
+    scene.high.deactivate();
+  }
+  EXPECT_EQ(scene.tap.lost(), 0u);
+}
+
+TEST(Tap, OfAnInputPortIsToldToTheLastSampleOfAPortThatHasGone) {
+  AtTheTake scene;
+  Component receiver("receiver");
+  ASSERT_EQ(receiver.tell("input /in 2 1 0"), "open");
+  for (int i = 1; i <= 100; ++i) scene.low.publish(Number{i});
+  receiver.tell("take /in");
+  receiver.kill();
+  EXPECT_EQ(wait_for_kind(scene.tap, TapEventKind::overtaken).count(), 98u);
+}
+
+TEST(Tap, OfAnOutputPortIsToldNothingOfTakes) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in", {.depth = 1});
+  auto tap = node.tap<Number>("/out", {.may_wait = false});
+  for (int i = 0; i < 5; ++i) out.publish(Number{i});
+  EXPECT_EQ(take_from(in), 4);
+  while (const auto event = tap.take()) EXPECT_EQ(event->count(), 0u);
+}
+
 TEST(Tap, OfAnInputPortSeesNothingOfASourceWhileTheModelDoesNotConnectIt) {
   Daemon daemon(only("a"));
   Node node("test");
@@ -445,6 +584,25 @@ TEST(Tap, OfAnInputPortSeesNothingOfASourceWhileTheModelDoesNotConnectIt) {
     daemon.load(only("a"));
   }
   EXPECT_EQ(tap.lost(), 0u);
+}
+
+// The program of docs/taps.md.
+TEST(Tap, OfThePageShowsWhatArrives) {
+  Daemon daemon(rules(arbiter_at("/Arm/pos:i", select("/Object/pos:o"))));
+  Node node("test");
+  auto out = node.output_port<Number>("/Object/pos:o");
+  auto in = node.input_port<Number>("/Arm/pos:i");
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/out";
+  const shm::FileDescriptor to(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600));
+  ChildProcess program({ARBITER_TAPS_PAGE}, {}, {-1, to.get(), -1});
+  pollfd end{program.descriptor(), POLLIN, 0};
+  while (::poll(&end, 1, 1) == 0) out.publish(Number{1});
+  EXPECT_EQ(program.wait(), 0);
+  const std::string shown = content_of(file);
+  EXPECT_EQ(std::count(shown.begin(), shown.end(), '\n'), 10);
+  EXPECT_EQ(shown.rfind("/Object/pos:o #", 0), 0u) << shown;
+  EXPECT_NE(shown.find(", 8 bytes, accepted at /Arm/pos:i\n"), std::string::npos) << shown;
 }
 
 // To the last: what is seen, and what is said to be lost, is what was published; and the fates are

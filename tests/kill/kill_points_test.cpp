@@ -41,6 +41,7 @@ void silence(Scene& scene) {
   deliver(scene);
   static_cast<void>(scene.second().signal());
 }
+void watch(Scene& scene) { scene.watch(); }
 void wake(Scene& scene, Victim& victim) {
   victim.wait_until_it_polls_or_ends();
   static_cast<void>(scene.first().publish(make_number(10)));
@@ -120,7 +121,16 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"Waiting", "wait", nothing, wake, 30},
                     Case{"WaitingInVain", "wait-in-vain", nothing, just_wait, 20},
                     Case{"UsingADescriptor", "descriptor", deliver, just_wait, 30},
-                    Case{"Relaying", "relay", deliver, just_wait, 40}),
+                    Case{"Relaying", "relay", deliver, just_wait, 40},
+                    Case{"PublishingWhatIsTapped", "publish", watch, just_wait, 60},
+                    Case{"OvertakingWhatIsTapped", "publish-overtaking", watch, just_wait, 100},
+                    Case{"SignallingWhatIsTapped", "signal", watch, just_wait, 40},
+                    Case{"DeactivatingWhatIsTapped", "deactivate", watch, just_wait, 30},
+                    Case{"ClosingWhatIsTapped", "close-output", watch, just_wait, 10},
+                    Case{"OpeningATap", "open-tap", nothing, just_wait, 20},
+                    Case{"ClosingATap", "close-tap", deliver, just_wait, 10},
+                    Case{"TakingEvents", "take-events", deliver, just_wait, 60},
+                    Case{"WaitingForEvents", "wait-for-events", nothing, wake, 30}),
     [](const auto& its) { return its.param.name; });
 
 // Wakes a waiting survivor, or not quite.

@@ -108,6 +108,7 @@ void Scene::open_survivors() {
 }
 
 void Scene::close_survivors() {
+  tap_.reset();
   in_.reset();
   first_.reset();
   second_.reset();
@@ -117,13 +118,61 @@ void Scene::require_all_is_well(const OwnSegments& dead, const shm::Activity& be
   died_at_ = std::chrono::steady_clock::now();
   require_survivors_go_on();
   require_page_is_sane(before);
+  if (tap_) require_tap_was_told();
   {
     Successor successor;
     succeed(successor);
     require_successor_works(successor);
+    require_taps_fit();
     require_no_slot_is_lost(successor);
     require_accounts_balance(dead);
     successor.out->deactivate();
+  }
+}
+
+// Each event once and in order, to the last; then the end, with the activity that the source has.
+// What was stamped and not told of counts as lost.
+void Scene::require_tap_was_told() {
+  const shm::ActivityWord word = page().word.load();
+  const auto now = std::chrono::steady_clock::now();
+  bool was_active = false;
+  std::uint64_t last = 0;
+  for (bool has_begun = false;;) {
+    const auto event = tap_->wait_for(std::chrono::seconds(10));
+    ASSERT_TRUE(event) << "the tap does not hear of the end";
+    if (event->kind() == TapEventKind::closed) {
+      EXPECT_EQ(event->was_active_at(now), shm::is_active(word, now.time_since_epoch().count()));
+      EXPECT_EQ(event->is_deactivated(), shm::is_deactivation(word));
+      if (has_begun && event->lost() == 0) {
+        EXPECT_EQ(event->was_active_at(now), was_active);
+      }
+      EXPECT_LE(event->lost(), 1u);
+      return;
+    }
+    EXPECT_EQ(event->lost(), 0u);
+    was_active = event->was_active_at(now);
+    if (event->kind() == TapEventKind::sample) {
+      EXPECT_EQ(event->sequence(), last + 1);
+      EXPECT_NE(event->at("/survivor:i"), Fate::none);
+      if (event->sample() != nullptr) {
+        EXPECT_TRUE(event->sample()->is_whole());
+      }
+    }
+    last = event->sequence();
+    has_begun = true;
+  }
+}
+
+// As many as there may be at all: the dead one's place, and what it held, are free again once its
+// death is known.
+void Scene::require_taps_fit() {
+  std::vector<Tap<Number>> taps;
+  for (int tries = 0; taps.size() < shm::kMaxTaps; ++tries) {
+    try {
+      taps.push_back(node_->tap<Number>("/first:o", {.max_held = 4}));
+    } catch (const Error& error) {
+      ASSERT_LT(tries, 1000) << error.what();
+    }
   }
 }
 

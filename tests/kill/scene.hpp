@@ -48,6 +48,9 @@ class Scene {
   void open_survivors();
   void close_survivors();
 
+  // Taps the victim's output port: from here on what it does is seen, to its end.
+  void watch() { tap_.emplace(node_->tap<Number>("/victim:o")); }
+
   // The victim is dead: everything that must be so.
   void require_all_is_well(const OwnSegments& dead, const shm::Activity& before);
 
@@ -66,6 +69,8 @@ class Scene {
   };
   void meet_daemon();
   void require_survivors_go_on();
+  void require_tap_was_told();
+  void require_taps_fit();
   void require_page_is_sane(const shm::Activity& before);
   void succeed(Successor& successor);
   void require_successor_works(Successor& successor);
@@ -83,6 +88,7 @@ class Scene {
   std::optional<OutputPort<Number>> first_;
   std::optional<OutputPort<Number>> second_;
   std::optional<InputPort<Number>> in_;
+  std::optional<Tap<Number>> tap_;
   std::chrono::steady_clock::time_point died_at_;
   std::chrono::microseconds slowest_{0};
 };

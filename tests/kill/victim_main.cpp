@@ -3,7 +3,8 @@
 //   kill_victim PHASE N     prints "ready", reads a line, does it, dies at point N of it
 //
 // If it comes through it prints "unharmed", and stays until its input ends. It has the output port
-// /victim:o and the input port /victim:i, where the phase does not open them itself.
+// /victim:o and the input port /victim:i, where the phase does not open them itself; and in some
+// phases a tap of /first:o.
 #include <unistd.h>
 
 #include <chrono>
@@ -66,6 +67,7 @@ class Victim {
   using Phase = std::function<void(Victim&)>;
 
   void open_output() { out_.emplace(node_->output_port<Number>("/victim:o", {.max_loans = 1})); }
+  void open_tap() { tap_.emplace(node_->tap<Number>("/first:o", {.max_held = 2})); }
   void open_input() {
     in_.emplace(node_->input_port<Number>("/victim:i", {.depth = 2, .max_held = 2}));
   }
@@ -142,6 +144,31 @@ class Victim {
            while (v.in_->take()) {
            }
          }},
+        {"open-tap", [](Victim& v) { v.begin(true), v.open_tap(); }},
+        {"close-tap",
+         [](Victim& v) {
+           v.open_tap();
+           v.begin(true);
+           static_cast<void>(v.tap_->take());
+           v.tap_.reset();
+         }},
+        {"take-events",
+         [](Victim& v) {
+           v.open_tap();
+           v.begin();
+           static_cast<void>(v.tap_->take());  // the state
+           auto one = v.tap_->take();
+           auto two = v.tap_->take();
+           one.reset();
+           auto three = v.tap_->take();
+         }},
+        {"wait-for-events",
+         [](Victim& v) {
+           v.open_tap();
+           static_cast<void>(v.tap_->take());
+           v.begin();
+           static_cast<void>(v.tap_->wait_for(10s));
+         }},
         {"relay",
          [](Victim& v) {
            v.begin();
@@ -158,6 +185,7 @@ class Victim {
   std::optional<arbiter::Node> node_;
   std::optional<arbiter::OutputPort<Number>> out_;
   std::optional<arbiter::InputPort<Number>> in_;
+  std::optional<arbiter::Tap<Number>> tap_;
 };
 
 }  // namespace

@@ -124,6 +124,27 @@ TEST(Locking, AllThatANodeUsesIsLocked) {
   EXPECT_GE(resident_kib["arbiter-output"], 2 * 2 * (4 + 4 + 8 + 4 + 4));
 }
 
+TEST(Locking, WhatTapsUseIsLockedToo) {
+  Daemon daemon(single_model());
+  Node sender("sender", locked());
+  Node watcher("watcher", locked());
+  auto out = sender.output_port<Number>("/out");
+  auto in = sender.input_port<Number>("/in");
+  auto tap = watcher.tap<Number>("/out");
+  auto tap_of_input = watcher.tap<Number>("/in", {.of = TapOf::input});
+  for (int i = 0; i < 100; ++i) out.publish(Number{i});
+  EXPECT_TRUE(tap.take());
+  EXPECT_TRUE(tap_of_input.take());
+  std::map<std::string, int> mappings;
+  for (const Mapped& each : mapped()) {
+    EXPECT_EQ(each.is_locked, each.resident_kib != 0) << each.name;
+    ++mappings[each.name.substr(0, each.name.find(' '))];
+  }
+  EXPECT_EQ(mappings["arbiter-events"], 3) << "the port's, and for each tap one";
+  EXPECT_EQ(mappings["arbiter-tap"], 4);
+  EXPECT_EQ(mappings["arbiter-input"], 3);
+}
+
 // An output port reserves what it may ever need: of that nothing is taken up before it is needed.
 TEST(Locking, WhatIsOnlyReservedIsNotLocked) {
   Daemon daemon(single_model());

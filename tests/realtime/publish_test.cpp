@@ -221,6 +221,50 @@ TEST_F(RealTimePublish, AReceiverThatWaitsCostsItsWakeUpOnce) {
   EXPECT_EQ(thread.costs_of([&] { scene.low.publish(Number{2}); }), kNone);
 }
 
+// From the first event on, and round the ring of events: that has 1024.
+TEST_F(RealTimePublish, WhatIsTappedCostsNothing) {
+  Override scene;
+  auto tap = scene.node.tap<Number>("/low", {.may_wait = false});
+  thread.run([&] { scene.low.signal(); });
+  std::uint32_t delivered = 0;
+  EXPECT_EQ(thread.costs_of([&] {
+    for (int i = 0; i < 6; ++i) delivered += publish_many(scene.low);
+  }),
+            kNone);
+  EXPECT_EQ(delivered, 6 * kManySamples);
+  EXPECT_TRUE(tap.take());
+}
+
+TEST_F(RealTimePublish, ATapThatWaitsCostsItsWakeUpOnce) {
+  Override scene;
+  auto tap = scene.node.tap<Number>("/low");
+  thread.run([&] { scene.low.signal(); });
+  while (tap.take()) {
+  }
+  Watched waiter([&] { EXPECT_TRUE(tap.wait_for(std::chrono::hours(1))); });
+  waiter.wait_until_asleep();
+  EXPECT_EQ(thread.costs_of([&] { scene.low.publish(Number{1}); }), (Costs{kWakeUp, 0, 0}));
+  waiter.join();
+  EXPECT_EQ(thread.costs_of([&] { scene.low.publish(Number{2}); }), kNone);
+}
+
+TEST_F(RealTimePublish, WhoTapsPaysNothingForEachEvent) {
+  Override scene;
+  auto tap = scene.node.tap<Number>("/low");
+  thread.run([&] {
+    scene.low.signal();
+    while (tap.take()) {
+    }
+  });
+  for (int i = 0; i < 60; ++i) scene.low.publish(Number{i});
+  int taken = 0;
+  EXPECT_EQ(thread.costs_of([&] {
+    while (taken < 60 && tap.take()) ++taken;
+  }),
+            kNone);
+  EXPECT_EQ(taken, 60);
+}
+
 // The tables are there before they count, and so is what a new rule reads.
 TEST_F(RealTimePublish, AModelThatComesIntoForceFaultsNowhere) {
   Override scene;

@@ -229,7 +229,10 @@ std::map<std::string, Heard> hear_all() {
   client.open_output("/may-be-replayed");
   client.open_input("/unmentioned");
   for (int i = 0; i < 2; ++i) client.open_tap("/other");  // the second one's place is not 0
-  auto tap = node.tap("/in-c", {.of = TapOf::input});     // which the last model does not mention
+  client.open_tap("/out");
+  client.open_tap("/in-a", wire::kTapsInput);
+  out->signal();
+  auto tap = node.tap("/in-c", {.of = TapOf::input});  // which the last model does not mention
   client.ask(MessageKind::kObserve);
   client.ask(MessageKind::kStatus);
   client.ask(MessageKind::kModel);

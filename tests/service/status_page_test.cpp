@@ -73,10 +73,12 @@ void see_ports(ObservedFields& observed) {
   auto typed = node.output_port<double>("/typed");
   auto in_here = node.input_port("/in-here", {.when_full = refuse_new});
   auto in_typed = node.input_port<int>("/in-typed");
+  auto tap = node.tap("/here");
   daemon.kill();
   stopped.process().stop();
   daemon.restart();
-  while (daemon.connection("/here", "/in-here")["state"] != "connected") {
+  while (daemon.connection("/here", "/in-here")["state"] != "connected" ||
+         daemon.source("/here")["taps"].empty()) {
   }
   here.signal();
   typed.publish(1.0);

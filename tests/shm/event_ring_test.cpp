@@ -148,7 +148,7 @@ TEST_F(EventRing, AShapeThatIsNotSaneIsNone) {
   for (const EventShape shape :
        {EventShape{0, 2, 2}, EventShape{6, 2, 2}, EventShape{2048, 2, 2}, EventShape{8, 0, 2},
         EventShape{8, 3, 2}, EventShape{8, kMaxKept + 1, 2}, EventShape{8, 2, 0},
-        EventShape{8, 2, kMaxLists + 1}}) {
+        EventShape{8, 2, kMaxDestinationLists + 1}}) {
     segment_->header.shape = shape;
     EXPECT_FALSE(segment_->checked_shape().is_sane());
   }

@@ -292,6 +292,83 @@ class Receiver : public Sink {
   }
 };
 
+// Writes down what its tap tells.
+class Watcher : public virtual Worker {
+ public:
+  Watcher(const Plan& plan, Records& records, std::uint32_t component, std::uint32_t incarnation)
+      : Worker(plan, records, component, incarnation),
+        source_(plan.components[component].watches),
+        log_(records.seen[plan.components[component].log]),
+        tap_(node_.tap(source_name(source_), {.max_held = 2, .may_wait = random_.one_in(2)})) {}
+
+  void run() {
+    say_open();
+    while (phase() < kReceiversStop) {
+      const std::int64_t before = read_clock();
+      if (!look(before)) sched_yield();
+      if (random_.one_in(4000)) usleep(5000);  // and is overtaken
+    }
+    // All that there is: one empty look does not prove that nothing comes, while others come and
+    // go.
+    for (int empty = 0; empty < 20;) empty = look(read_clock()) ? 0 : empty + 1;
+    finish(kReceiversStop);
+  }
+
+ private:
+  bool look(std::int64_t now) {
+    auto event = tap_.take();
+    step(now);
+    if (!event || log_.is_full()) return false;
+    Seen& seen = log_.next();
+    seen = {};
+    seen.time = event->time().time_since_epoch().count();
+    seen.lost = event->lost();
+    seen.incarnation = incarnation_;
+    switch (event->kind()) {
+      case TapEventKind::state:
+        seen.what = Seen::kState;
+        break;
+      case TapEventKind::closed:
+        seen.what = Seen::kClosed;
+        break;
+      case TapEventKind::sample:
+      case TapEventKind::signal:
+      case TapEventKind::deactivation:
+        note(*event, seen);
+        break;
+      default:
+        return true;
+    }
+    log_.commit();
+    return true;
+  }
+
+  void note(const TapEvent<>& event, Seen& seen) {
+    seen.what = Seen::kArrival;
+    seen.act = event.kind() == TapEventKind::sample   ? Act::kSample
+               : event.kind() == TapEventKind::signal ? Act::kSignal
+                                                      : Act::kDeactivate;
+    for (const TapDestination& met : event.destinations()) {
+      seen.knows_fates = true;
+      if (met.fate == Fate::accepted) ++seen.accepted;
+      if (met.fate == Fate::refused) ++seen.refused;
+      if (met.fate == Fate::discarded || met.fate == Fate::blind) ++seen.discarded;
+    }
+    if (!event.sample()) return;
+    SampleHead head{};
+    if (!read_sample(event.sample()->data(), event.sample()->size(), head)) {
+      records_.fail("a tap of " + source_name(source_) + " read a torn sample");
+      return;
+    }
+    seen.number = head.number;
+    seen.publisher = head.incarnation;
+  }
+
+  const std::uint32_t source_;
+  Log<Seen>& log_;
+  Tap<> tap_;
+};
+
 // Publishes what it takes.
 class Relay : public Source, public Sink {
  public:
@@ -325,7 +402,9 @@ class Relay : public Source, public Sink {
 void run_component(const Plan& plan, Records& records, std::uint32_t component,
                    std::uint32_t incarnation) {
   const ComponentPlan& what = plan.components[component];
-  if (what.port == kNobody) {
+  if (what.watches != kNobody) {
+    Watcher(plan, records, component, incarnation).run();
+  } else if (what.port == kNobody) {
     Publisher(plan, records, component, incarnation).run();
   } else if (what.source == kNobody) {
     Receiver(plan, records, component, incarnation).run();

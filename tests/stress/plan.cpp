@@ -88,10 +88,13 @@ Plan make_plan(const Options& options, std::uint64_t seed) {
   for (std::uint32_t i = 0; i < publishers + relays; ++i) {
     plan.sources.push_back(make_source(options, random));
   }
-  for (std::uint32_t i = 0; i < receivers; ++i) plan.components.push_back({kNobody, i});
-  for (std::uint32_t i = 0; i < publishers; ++i) plan.components.push_back({i, kNobody});
+  for (std::uint32_t i = 0; i < receivers; ++i) plan.components.push_back({.port = i});
+  for (std::uint32_t i = 0; i < publishers; ++i) plan.components.push_back({.source = i});
   for (std::uint32_t i = 0; i < relays; ++i) {
-    plan.components.push_back({publishers + i, receivers + i});
+    plan.components.push_back({.source = publishers + i, .port = receivers + i});
+  }
+  for (std::uint32_t i = 0, taps = random.below(kMaxTaps + 1); i < taps; ++i) {
+    plan.components.push_back({.watches = random.below(publishers + relays), .log = i});
   }
   for (auto& model : plan.rules) model.resize(plan.ports.size());
   for (std::uint32_t port = 0; port < plan.ports.size(); ++port) {

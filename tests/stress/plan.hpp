@@ -11,9 +11,10 @@
 
 namespace arbiter::stress {
 
-inline constexpr std::uint32_t kMaxComponents = 18;
+inline constexpr std::uint32_t kMaxComponents = 20;
 inline constexpr std::uint32_t kMaxSources = 10;  // 8 publishers, 2 relays
 inline constexpr std::uint32_t kMaxPorts = 10;
+inline constexpr std::uint32_t kMaxTaps = 2;
 inline constexpr std::uint32_t kModels = 2;
 inline constexpr std::uint32_t kNobody = 0xffffffff;
 
@@ -43,10 +44,13 @@ struct RulePlan {
   SourceSet need_inactive = 0;
 };
 
-// A component has an input port, an output port, or both: then it is a relay, as a gateway is.
+// A component has an input port, an output port, or both: then it is a relay, as a gateway is. Or
+// it has a tap.
 struct ComponentPlan {
   std::uint32_t source = kNobody;
   std::uint32_t port = kNobody;
+  std::uint32_t watches = kNobody;  // a source
+  std::uint32_t log = 0;            // of taps
 };
 
 struct Plan {

@@ -61,6 +61,23 @@ struct Taking {
   std::uint32_t incarnation;  // of the receiver
 };
 
+// An event of a tap.
+struct Seen {
+  enum What : std::uint8_t { kState, kArrival, kClosed };
+
+  std::int64_t time;
+  std::uint64_t number;  // as the sample itself says; 0: there is none, or it could not be read
+  std::uint64_t lost;
+  std::uint32_t publisher;    // the incarnation, likewise
+  std::uint32_t incarnation;  // of the tap's component
+  What what;
+  Act act;           // of an arrival
+  bool knows_fates;  // else the list of destinations has changed too often since
+  std::uint8_t accepted;
+  std::uint8_t discarded;
+  std::uint8_t refused;
+};
+
 template <class Record>
 struct Log {
   static constexpr std::uint64_t kCapacity = std::uint64_t{1} << 18;
@@ -133,6 +150,7 @@ struct Records {
   ComponentState components[kMaxComponents];
   Log<Arrival> arrivals[kMaxSources];
   Log<Taking> takings[kMaxPorts];
+  Log<Seen> seen[kMaxTaps];
 
   // Once for all rounds.
   static Records& make() {
@@ -160,6 +178,7 @@ struct Records {
     for (auto& component : components) new (&component) ComponentState{};
     for (auto& log : arrivals) log.count.store(0), log.samples = 0;
     for (auto& log : takings) log.count.store(0), log.samples = 0;
+    for (auto& log : seen) log.count.store(0), log.samples = 0;
   }
   void fail(const std::string& what) noexcept {
     // The first few tell enough.

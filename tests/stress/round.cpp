@@ -149,6 +149,7 @@ void Round::wait_until_open(std::uint32_t component) {
 bool Round::is_full() const {
   const auto full = [](const auto& log) { return log.size() > log.kEnough; };
   return std::any_of(std::begin(records_.arrivals), std::end(records_.arrivals), full) ||
+         std::any_of(std::begin(records_.seen), std::end(records_.seen), full) ||
          std::any_of(std::begin(records_.takings), std::end(records_.takings), full);
 }
 
@@ -218,7 +219,8 @@ bool Round::kill_one() {
   troubled_[victim] = true;
   ++totals_.kills;
   const ComponentPlan& what = plan_.components[victim];
-  ++(what.port == kNobody     ? totals_.killed_publishers
+  ++(what.watches != kNobody  ? totals_.killed_taps
+     : what.port == kNobody   ? totals_.killed_publishers
      : what.source == kNobody ? totals_.killed_receivers
                               : totals_.killed_relays);
   start(victim);
@@ -307,7 +309,8 @@ void Round::wait_for_all_done(Phase phase) {
   const Deadline deadline("everybody should come to the end of phase " + std::to_string(phase));
   for (std::uint32_t i = 0; i < plan_.components.size(); ++i) {
     const ComponentPlan& what = plan_.components[i];
-    const Phase its = what.port == kNobody     ? kPublishersStop
+    const Phase its = what.watches != kNobody  ? kReceiversStop
+                      : what.port == kNobody   ? kPublishersStop
                       : what.source == kNobody ? kReceiversStop
                                                : kRelaysStop;
     while (its == phase && records_.components[i].done.load() != phase) {
@@ -327,6 +330,9 @@ void Round::check() {
                   " arrivals were discarded where they surely won; " +
                   std::to_string(accounts_.undecided()) + " decisions could not be taken");
   }
+  const TapsChecked taps = check_taps(plan_, records_);
+  totals_.taps.events += taps.events;
+  totals_.taps.lost += taps.lost;
   totals_.checked.arrivals += checked.arrivals;
   totals_.checked.takes += checked.takes;
   totals_.checked.hard_takes += checked.hard_takes;

@@ -17,6 +17,7 @@
 #include "tests/stress/options.hpp"
 #include "tests/stress/plan.hpp"
 #include "tests/stress/records.hpp"
+#include "tests/stress/tap_accounts.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::stress {
@@ -37,12 +38,14 @@ struct Distribution {
 struct Totals {
   std::uint64_t rounds = 0;
   Checked checked;
+  TapsChecked taps;
   std::uint64_t steps = 0;
   std::uint64_t swaps = 0;
   std::uint64_t kills = 0;
   std::uint64_t killed_publishers = 0;
   std::uint64_t killed_receivers = 0;
   std::uint64_t killed_relays = 0;
+  std::uint64_t killed_taps = 0;
   std::uint64_t stops = 0;
   std::uint64_t daemon_kills = 0;
   Distribution readoptions;        // from a new daemon's start until it knew all ports

@@ -1,8 +1,8 @@
 // Components and a daemon in processes of their own, in tiny queues, overriding each other at
 // random; killed, stopped, their model swapped: and what they did, checked (history.hpp,
-// accounts.hpp). A run is a series of rounds, each with another plan that follows from the seed.
-// The seed gives back the same decisions of all generators; how the processes interleave it cannot
-// give back.
+// accounts.hpp, tap_accounts.hpp). A run is a series of rounds, each with another plan that follows
+// from the seed. The seed gives back the same decisions of all generators; how the processes
+// interleave it cannot give back.
 #include <algorithm>
 #include <cstdio>
 #include <stdexcept>
@@ -33,10 +33,13 @@ void report(const Totals& totals, const Records& records, double seconds) {
       number(totals.operations()), number(totals.checked.arrivals), number(totals.checked.takes),
       number(totals.checked.hard_takes), number(totals.steps), number(totals.swaps),
       number(totals.rounds), seconds);
+  std::printf("%llu events seen through taps, and %llu that they were told to have lost\n",
+              number(totals.taps.events), number(totals.taps.lost));
   if (totals.kills != 0) {
-    std::printf("%llu killed: %llu publishers, %llu receivers, %llu relays\n", number(totals.kills),
-                number(totals.killed_publishers), number(totals.killed_receivers),
-                number(totals.killed_relays));
+    std::printf("%llu killed: %llu publishers, %llu receivers, %llu relays, %llu taps\n",
+                number(totals.kills), number(totals.killed_publishers),
+                number(totals.killed_receivers), number(totals.killed_relays),
+                number(totals.killed_taps));
     print("from a kill until a new process had opened the name", totals.takeovers);
   }
   if (totals.stops != 0) std::printf("%llu stopped and continued\n", number(totals.stops));

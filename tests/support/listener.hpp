@@ -91,11 +91,12 @@ class Listener {
     return ask(RawClient::message(wire::MessageKind::kOpenInput, name),
                {segment.get(), bell.for_publishers().get()});
   }
-  Words open_tap(const std::string& name) {
+  Words open_tap(const std::string& name, std::uint32_t flags = 0) {
     const auto segment = raw_tap_segment();
     const shm::Bell bell;
-    return ask(RawClient::message(wire::MessageKind::kOpenTap, name),
-               {segment.get(), bell.for_publishers().get()});
+    auto open = RawClient::message(wire::MessageKind::kOpenTap, name);
+    open.flags = flags;
+    return ask(open, {segment.get(), bell.for_publishers().get()});
   }
   void hear(wire::MessageKind kind) {
     while (hear_next().kind != kind) {

@@ -22,6 +22,7 @@ inline wire::Status full_status() {
   source.mentioned = true;
   source.timeout = 500'000'000;
   source.open = {{"face", 44, 4'294'967'294},
+                 {{"recorder", 48, 1002}},
                  wire::SampleType{"Pose", 24, 8},
                  101,
                  102,

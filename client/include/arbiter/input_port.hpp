@@ -149,7 +149,7 @@ class InputPort {
   template <class Rep, class Period>
   [[nodiscard]] WaitResult<T> wait_for(std::chrono::duration<Rep, Period> timeout) {
     detail::HeldSample held;
-    switch (detail::wait(*core_, nanoseconds(timeout), held)) {
+    switch (detail::wait(*core_, detail::saturated(timeout), held)) {
       case detail::Waited::kSample:
         return WaitResult<T>(Sample<T>(*core_, held));
       case detail::Waited::kIdle:
@@ -180,15 +180,6 @@ class InputPort {
  private:
   friend class Node;
   explicit InputPort(std::shared_ptr<detail::InputCore> core) noexcept : core_(std::move(core)) {}
-
-  // Saturating, so that wait_for(hours::max()) waits for ever rather than not at all.
-  template <class Rep, class Period>
-  static std::int64_t nanoseconds(std::chrono::duration<Rep, Period> timeout) noexcept {
-    using Seconds = std::chrono::duration<double>;
-    if (Seconds(timeout) > Seconds(std::chrono::hours(24 * 365))) return INT64_MAX;
-    if (timeout <= timeout.zero()) return 0;
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(timeout).count();
-  }
 
   std::shared_ptr<detail::InputCore> core_;
 };

@@ -12,16 +12,21 @@
 // on over closing and opening, over the death of the port's component, and over another daemon.
 // The daemon's policy must allow this user to `tap` the port (docs/policy.md).
 //
+// The first event of a source is its `state`: from there on nothing is missed. A component takes a
+// tap in before Node::tap() returns, unless it needs more than 0.2 s for that: it is stopped, or
+// makes memory for large samples.
+//
 // A publisher keeps its last 1024 events and its last 64 samples for its taps (fewer samples where
 // they are large: 32 MiB of them). A tap that is slower loses its own oldest events, which are
 // counted; then it is told, first of all, what the source is like where it goes on.
 //
 // Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC. Threads: use a tap, and its
 // events, from one thread at a time. Blocking: only wait_for() blocks. Cost: take() needs no lock
-// and no system call, and allocates only where a source's destinations have changed. A publish of a
-// source that is tapped takes some 210 to 240 instructions more, however many taps there are; if
-// one of them sleeps, a ring more. Errors: take() and wait_for() throw arbiter::Error for more than
-// max_held events with samples. The paper has nothing of it.
+// and no system call, and allocates only where a source's destinations have changed, or an input
+// port has not given out what it had accepted. A publish of a source that is tapped takes some 210
+// to 240 instructions more, however many taps there are; if one of them sleeps, a ring more.
+// Errors: take() and wait_for() throw arbiter::Error for more than max_held events with samples.
+// The paper has nothing of it.
 #pragma once
 
 #include <chrono>
@@ -50,6 +55,9 @@ enum class TapEventKind : std::uint8_t {
   deactivation,  // the source's activity was ended
   destinations,  // the source's list of destinations has changed
   closed,        // its output port was closed, or its component died: this was all
+  dropped,       // at the input port that is tapped: samples that were accepted had lost when they
+                 // were to be taken
+  overtaken,     // there, too: samples gave way to newer ones in a full queue
 };
 
 // What became of an arrival at one input port.
@@ -71,23 +79,29 @@ struct TapDestination {
 class TapEventBase {
  public:
   [[nodiscard]] TapEventKind kind() const noexcept { return static_cast<TapEventKind>(data_.kind); }
-  // The name of the output port; valid while the event is.
+  // The name of the output port; valid while the event is. Empty: of samples that were dropped or
+  // overtaken, whose they were is not known.
   [[nodiscard]] const std::string& source() const noexcept { return data_.context->source; }
   // The type of the output port, even if the tap is untyped.
   [[nodiscard]] const Type& type() const noexcept { return data_.context->type; }
   // When it happened: the arrival time, or the time of the deactivation, as the publisher has
-  // written it. Of other kinds: of the last of these before, or 0.
+  // written it. When it was seen: `dropped` and `overtaken`, which happened some milliseconds
+  // before. Of other kinds: of the last arrival or deactivation before, or 0.
   [[nodiscard]] Time time() const noexcept { return Time(std::chrono::nanoseconds(data_.time_ns)); }
   // Of the source's samples, as Sample::sequence(); of other events than samples, that of the last
-  // sample before.
+  // sample before. Of `dropped` and `overtaken`: the input port has done with the source's samples
+  // up to this one; 0: not known.
   [[nodiscard]] std::uint64_t sequence() const noexcept { return data_.sequence; }
   // Of the model by which it was decided (`arbiter status`); 0: there was none.
   [[nodiscard]] std::uint64_t generation() const noexcept { return data_.generation; }
   // Bytes of the sample as it was published, be it held or not.
   [[nodiscard]] std::size_t size() const noexcept { return data_.size; }
   // How many events of this source were lost immediately before this one, which is of kind `state`
-  // then.
+  // then; or `closed`, where a component was killed during an arrival or deactivation that others
+  // may have seen, before it told of it.
   [[nodiscard]] std::uint64_t lost() const noexcept { return data_.lost; }
+  // How many samples were dropped or overtaken; of other kinds 0.
+  [[nodiscard]] std::uint64_t count() const noexcept { return data_.count; }
   // Whether the source was active at that time, by all that had happened up to this event.
   [[nodiscard]] bool was_active_at(Time time) const noexcept {
     return data_.activity > time.time_since_epoch().count();
@@ -199,7 +213,7 @@ class Tap {
   template <class Rep, class Period>
   [[nodiscard]] std::optional<TapEvent<T>> wait_for(std::chrono::duration<Rep, Period> timeout) {
     detail::TapEventData data;
-    if (!detail::wait(*core_, nanoseconds(timeout), data)) return std::nullopt;
+    if (!detail::wait(*core_, detail::saturated(timeout), data)) return std::nullopt;
     return TapEvent<T>(*core_, std::move(data));
   }
   // For poll() and epoll: readable when there may be an event. Then call take() until it returns
@@ -216,15 +230,6 @@ class Tap {
  private:
   friend class Node;
   explicit Tap(std::shared_ptr<detail::TapCore> core) noexcept : core_(std::move(core)) {}
-
-  // Saturating, as InputPort has it.
-  template <class Rep, class Period>
-  static std::int64_t nanoseconds(std::chrono::duration<Rep, Period> timeout) noexcept {
-    using Seconds = std::chrono::duration<double>;
-    if (Seconds(timeout) > Seconds(std::chrono::hours(24 * 365))) return INT64_MAX;
-    if (timeout <= timeout.zero()) return 0;
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(timeout).count();
-  }
 
   std::shared_ptr<detail::TapCore> core_;
 };

@@ -13,6 +13,7 @@
 #include <deque>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "tests/fuzz/script.hpp"
@@ -136,7 +137,9 @@ class Run {
   };
 
   void step() {
-    switch (steps_.byte() % 24) {
+    const std::uint8_t which = steps_.byte();
+    if (which >= 224) return step_of_taps(which % 16);
+    switch (which % 24) {
       case 0:
       case 1:
         world_.publish(world_.p, false, steps_.byte());
@@ -206,6 +209,77 @@ class Run {
       default:
         break;
     }
+  }
+
+  void step_of_taps(std::uint32_t which) {
+    if (!std::exchange(is_watched_, true)) world_.watch();
+    switch (which) {
+      case 0:
+        if (!events_.empty()) give_event_back();
+        break;
+      case 1:
+        tap_waits();
+        break;
+      case 2:
+        y_takes();
+        break;
+      case 3:
+        y_gives_back();
+        world_.p.remove_tap(world_.y.instance());
+        world_.watch(world_.p, world_.y);
+        break;
+      case 4:
+        world_.h.remove_tap(world_.t.instance());
+        world_.t.lose_source(world_.h.instance(), shm::ActivityWord{1});
+        break;
+      case 5:
+        world_.introduce_tap(patches());
+        break;
+      case 6:
+        world_.introduce_events(patches());
+        break;
+      case 7:
+        world_.t.lose_input(world_.x.instance());
+        break;
+      case 8:
+        world_.t.tidy();
+        static_cast<void>(world_.t.misbehaving());
+        break;
+      default:
+        tap_takes();
+        break;
+    }
+  }
+
+  void tap_takes() {
+    if (world_.t.held() == 2) give_event_back();
+    detail::TapEventData event;
+    if (world_.t.take(event)) keep(std::move(event));
+  }
+  void tap_waits() {
+    if (world_.t.held() == 2) give_event_back();
+    detail::TapEventData event;
+    if (world_.t.wait(0, event)) keep(std::move(event));
+  }
+  void keep(detail::TapEventData event) {
+    const std::uint64_t number = world_.require_whole(event);
+    if (event.context->destinations.size() > shm::kMaxDestinations) die("too many destinations");
+    if (number != 0 && number <= last_event_) die("an event of /p came twice, or out of order");
+    last_event_ = std::max(last_event_, number);
+    if (event.data != nullptr) events_.push_back(std::move(event));
+  }
+  void give_event_back() {
+    static_cast<void>(world_.require_whole(events_.front()));
+    world_.t.give_back(events_.front().hold);
+    events_.pop_front();
+  }
+  void y_takes() {
+    if (world_.y.held() == 2) y_gives_back();
+    detail::TapEventData event;
+    if (world_.y.take(event) && event.data != nullptr) y_events_.push_back(event.hold);
+  }
+  void y_gives_back() {
+    for (; !y_events_.empty(); y_events_.pop_back()) world_.y.give_back(y_events_.back());
   }
 
   // What the service thread does.
@@ -285,7 +359,9 @@ class Run {
   void finish() {
     Seam::current = nullptr;
     while (!held_.empty()) give_back();
+    while (!events_.empty()) give_event_back();
     x_gives_back();
+    y_gives_back();
     world_.require_accounts();
   }
 
@@ -297,6 +373,10 @@ class Run {
   std::uint64_t last_r2_ = 0;
   std::deque<Held> held_;
   std::vector<std::uint32_t> x_holds_;
+  bool is_watched_ = false;
+  std::uint64_t last_event_ = 0;
+  std::deque<detail::TapEventData> events_;  // that have samples
+  std::vector<std::uint32_t> y_events_;
 };
 
 }  // namespace

@@ -45,6 +45,14 @@ OutputPortOptions output_options() {
   return options;
 }
 
+std::unique_ptr<detail::ServiceBell> bell() { return std::make_unique<detail::ServiceBell>(); }
+
+TapOptions tap_options() {
+  TapOptions options;
+  options.max_held = 2;
+  return options;
+}
+
 InputPortOptions input_options(const Choices& choices, bool refuse) {
   InputPortOptions options;
   options.depth = choices.depth;
@@ -113,9 +121,12 @@ World::World(const Choices& choices)
       h("/h", detail::as_type(type()), output_options(), hostile_),
       r("/r", detail::as_type(type()), input_options(choices, false), honest_),
       r2("/r2", detail::as_type(type()), input_options(choices, choices.refuse_new), honest_),
-      x("/x", detail::as_type(type()), input_options(choices, choices.refuse_new), hostile_) {
+      x("/x", detail::as_type(type()), input_options(choices, choices.refuse_new), hostile_),
+      t("/p", detail::as_type(type()), tap_options(), bell(), shm::Residence::kMapped),
+      y("/p", detail::as_type(type()), tap_options(), bell(), shm::Residence::kMapped) {
   declare_hostile(h.segment_descriptor().get());
   declare_hostile(x.segment_descriptor().get());
+  declare_hostile(y.segment_descriptor().get());
   p.bind(++last_instance_, kP, copy_of(pages_[kP].get()));
   s.bind(++last_instance_, kS, copy_of(pages_[kS].get()));
   h.bind(++last_instance_, kH, copy_of(pages_[kH].get()));
@@ -148,8 +159,12 @@ void World::connect(detail::OutputCore& from, detail::InputCore& to) {
   to_input.message.link = link;
   to_input.descriptors[0] = copy_of(from.segment_descriptor().get());
   to.add_peer(detail::map_output_peer(to_input, type()));
+  show_growth(from);
+}
+
+void World::show_growth(const detail::OutputCore& of) const {
   for (const detail::InputCore* const each : {&r, &r2, &x}) {
-    if (const auto grown = each->peer(from.instance())) {
+    if (const auto grown = each->peer(of.instance())) {
       detail::survey(*grown);
     }
   }
@@ -162,8 +177,10 @@ void World::disconnect(detail::OutputCore& from, detail::InputCore& to) {
 
 shm::FileDescriptor World::make_hostile(std::size_t size, const void* header,
                                         std::size_t header_size, const std::vector<Patch>& patches,
-                                        const std::map<std::size_t, std::uint64_t>& words) {
+                                        const std::map<std::size_t, std::uint64_t>& words,
+                                        bool is_allocated) {
   auto segment = shm::make_segment("hostile", size);
+  if (is_allocated && shm::allocate(segment, 0, size)) die("no memory");
   std::vector<char> bytes(header_size);
   std::memcpy(bytes.data(), header, header_size);
   for (const Patch& patch : patches) {
@@ -233,6 +250,84 @@ void World::introduce_input(const std::vector<Patch>& patches) {
   }
 }
 
+void World::watch() {
+  t.bind(++last_instance_);
+  y.bind(++last_instance_);
+  watch(p, t);
+  watch(h, t);
+  watch(p, y);
+  wire::Received to_tap;
+  to_tap.message.peer = x.instance();
+  to_tap.descriptors[0] = copy_of(x.segment_descriptor().get());
+  t.add_input(detail::map_tap_input(to_tap, shm::Residence::kMapped));
+}
+
+void World::watch(detail::OutputCore& from, detail::TapCore& by) {
+  wire::Received to_output;
+  to_output.message.peer = by.instance();
+  to_output.descriptors[0] = copy_of(by.segment_descriptor().get());
+  to_output.descriptors[1] = copy_of(by.bell().write_end().get());
+  const auto entry = from.add_tap(detail::map_tap_peer(to_output, shm::Residence::kMapped));
+  if (&from == &h) declare_hostile(entry.memory->readable().get());
+  show_growth(from);
+  wire::Received to_tap;
+  to_tap.message.peer = from.instance();
+  to_tap.message.id = from.source();
+  to_tap.message.link = entry.link;
+  to_tap.message.value = entry.place;
+  to_tap.message.set_name(from.name());
+  to_tap.descriptors[0] = copy_of(from.segment_descriptor().get());
+  to_tap.descriptors[1] = copy_of(entry.memory->readable().get());
+  by.add_source(detail::map_tap_source(to_tap, type(), shm::Residence::kMapped));
+}
+
+void World::introduce_tap(const std::vector<Patch>& patches) {
+  shm::TapSegment segment{};
+  segment.magic = shm::TapSegment::kMagic;
+  segment.version = shm::TapSegment::kVersion;
+  segment.max_held = 1;
+  segment.sleeps = 1;
+  wire::Received received;
+  received.message.peer = ++last_instance_;
+  received.descriptors[0] =
+      make_hostile(sizeof segment, &segment, offsetof(shm::TapSegment, wait), patches, {}, true);
+  received.descriptors[1] = copy_of(y.bell().write_end().get());
+  try {
+    p.add_tap(detail::map_tap_peer(received, shm::Residence::kMapped));
+  } catch (const std::runtime_error&) {
+  }
+  show_growth(p);
+}
+
+void World::introduce_events(const std::vector<Patch>& patches) {
+  shm::EventHeader header{};
+  header.magic = shm::EventHeader::kMagic;
+  header.version = shm::EventHeader::kVersion;
+  header.shape = {4, 2, 2};
+  wire::Received received;
+  received.message.peer = ++last_instance_;
+  received.message.id = kH;
+  received.message.link = ++last_link_;
+  received.message.set_name("/h");
+  // Joined, and a sample that is kept.
+  const std::size_t event = offsetof(shm::EventSegment, events) + sizeof(shm::Event);
+  const std::map<std::size_t, std::uint64_t> words{
+      {offsetof(shm::EventSegment, places) + offsetof(shm::TapPlace, link), last_link_},
+      {offsetof(shm::EventSegment, places) + offsetof(shm::TapPlace, first), 1},
+      {offsetof(shm::EventSegment, kept) + sizeof(shm::Entry), shm::make_entry(1, 0)},
+      {event + offsetof(shm::Event, sample), shm::make_entry(1, 0)},
+      {event + offsetof(shm::Event, revision_and_kind),
+       static_cast<std::uint64_t>(shm::EventKind::kSample)},
+      {event + offsetof(shm::Event, number), 2}};
+  received.descriptors[0] = copy_of(h.segment_descriptor().get());
+  received.descriptors[1] =
+      make_hostile(sizeof(shm::EventSegment), &header, sizeof header, patches, words, true);
+  try {
+    t.add_source(detail::map_tap_source(received, type(), shm::Residence::kMapped));
+  } catch (const std::runtime_error&) {
+  }
+}
+
 Outcome World::publish(detail::OutputCore& from, bool loan, std::uint32_t words) {
   Sample sample{};
   sample.number = &from == &p ? ++published_ : 0;
@@ -282,14 +377,30 @@ void World::require_accounts() {
   if (output.as<shm::OutputHeader>()->counters.no_slot.load() != 0) die("/p lacked a slot");
 }
 
+std::uint64_t World::require_whole(const detail::TapEventData& event) const {
+  if (event.data == nullptr) return 0;
+  detail::HeldSample sample;
+  sample.source = event.context->source == "/p" ? kP : kH;
+  sample.data = event.data;
+  sample.size = event.size;
+  // It may be a copy: nobody tells t that /p uses more of its segment.
+  return require_content(sample);
+}
+
 std::uint64_t World::require_whole(const detail::HeldSample& held) const {
+  if (held.source == kP && !is_mapped(held.data, held.size)) {
+    die("a sample lies outside of any segment");
+  }
+  return require_content(held);
+}
+
+std::uint64_t World::require_content(const detail::HeldSample& held) const {
   if (held.source != kP && held.source != kH) die("a sample of nobody");
   // One of a hostile publisher may be a copy (client/input/copies.hpp): all of it can be read.
   if (held.source == kH) {
     read_ += static_cast<std::size_t>(std::count(held.data, held.data + held.size, std::byte{1}));
     return 0;  // says what it likes
   }
-  if (!is_mapped(held.data, held.size)) die("a sample lies outside of any segment");
   Sample sample{};
   // A port with a type gives samples of its size, be it that less was written.
   if (held.size != sizeof sample) die("a sample of /p has another size");

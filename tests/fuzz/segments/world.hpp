@@ -5,7 +5,12 @@
 //   /r2  takes from /p while /h is not active, else from /h
 //   /x   takes from /p
 //
-// /h and /x are hostile. They run the honest code too, so that they get far; what others see of
+// and taps, once watch() has been called:
+//
+//   t    watches /p, /h, and what /x takes
+//   y    watches /p
+//
+// /h, /x and y are hostile. They run the honest code too, so that they get far; what others see of
 // their memory is the fuzzer's.
 #pragma once
 
@@ -17,6 +22,7 @@
 
 #include "client/input/input_core.hpp"
 #include "client/output/output_core.hpp"
+#include "client/tap/tap_core.hpp"
 #include "shm/table_ring.hpp"
 
 namespace arbiter::fuzz {
@@ -48,7 +54,8 @@ class World {
   static shm::FileDescriptor make_hostile(std::size_t size, const void* header,
                                           std::size_t header_size,
                                           const std::vector<Patch>& patches,
-                                          const std::map<std::size_t, std::uint64_t>& words = {});
+                                          const std::map<std::size_t, std::uint64_t>& words = {},
+                                          bool is_allocated = false);
   std::shared_ptr<detail::SharedMemory> make_memory();
 
   const shm::FileDescriptor& board_;
@@ -65,6 +72,8 @@ class World {
   detail::InputCore r;
   detail::InputCore r2;
   detail::InputCore x;
+  detail::TapCore t;
+  detail::TapCore y;
 
   // As the daemon does it; each time under another number.
   void connect(detail::OutputCore& from, detail::InputCore& to);
@@ -73,17 +82,28 @@ class World {
   // words of its header; and an output's has as many bytes more or less as it says.
   void introduce_output(std::uint32_t slots, int more, const std::vector<Patch>& patches);
   void introduce_input(const std::vector<Patch>& patches);
+  // The same of taps, as often as it is called; and of one tap, to /p, or a publisher's events, to
+  // t, that are as they should be, but for some words of the header.
+  void watch();
+  void watch(detail::OutputCore& from, detail::TapCore& by);
+  void introduce_tap(const std::vector<Patch>& patches);
+  void introduce_events(const std::vector<Patch>& patches);
 
   // Publishes a sample that tells whether it is whole; says what became of it.
   Outcome publish(detail::OutputCore& from, bool loan, std::uint32_t words);
   // Requires that the sample is one that /p published, if it says that it comes from there, and
   // anyhow that it lies in memory; returns its number.
   std::uint64_t require_whole(const detail::HeldSample& sample) const;
+  // The same of an event; 0: it has no sample of /p.
+  std::uint64_t require_whole(const detail::TapEventData& event) const;
   // What /p has delivered to honest ports is taken, or counted where it went; and it has all its
   // slots.
   void require_accounts();
 
  private:
+  std::uint64_t require_content(const detail::HeldSample& held) const;
+  void show_growth(const detail::OutputCore& of) const;
+
   std::uint64_t published_ = 0;
   std::uint64_t last_link_ = 0;
   mutable std::size_t read_ = 0;  // of hostile samples: so that they are read

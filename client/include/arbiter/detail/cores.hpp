@@ -1,6 +1,7 @@
 // What the templates call: the compiled library behind them. Not for use by programs.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -19,6 +20,15 @@ class InputCore;
 class NodeCore;
 class OutputCore;
 class TapCore;
+
+// In nanoseconds; saturating, so that wait_for(hours::max()) waits for ever rather than not at all.
+template <class Rep, class Period>
+std::int64_t saturated(std::chrono::duration<Rep, Period> timeout) noexcept {
+  using Seconds = std::chrono::duration<double>;
+  if (Seconds(timeout) > Seconds(std::chrono::hours(24 * 365))) return INT64_MAX;
+  if (timeout <= timeout.zero()) return 0;
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(timeout).count();
+}
 
 struct LoanedSlot {
   std::byte* data = nullptr;  // null: none to be had
@@ -65,6 +75,7 @@ struct TapEventData {
   std::int64_t activity = 0;  // as shm/activity.hpp has it
   std::uint64_t lost = 0;
   std::uint64_t accepted = 0, discarded = 0, refused = 0, blind = 0;
+  std::uint64_t count = 0;  // of samples that were dropped or overtaken
   std::size_t size = 0;
   const std::byte* data = nullptr;  // null: no sample is held
   std::uint32_t hold = 0;

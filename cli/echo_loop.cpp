@@ -1,0 +1,30 @@
+// How long arbiter echo runs, and when it looks.
+#include <poll.h>
+
+#include <algorithm>
+#include <iostream>
+
+#include "cli/echo.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::cli {
+
+shm::Nanoseconds end_of_echo(const EchoOptions& options, shm::Nanoseconds started) {
+  return options.duration == shm::kForever ? shm::kForever : started + options.duration;
+}
+
+void echo_while(const EchoOptions& options, int fd, const shm::FileDescriptor& interrupts,
+                shm::Nanoseconds interval, const std::function<bool()>& look) {
+  const shm::Nanoseconds end = end_of_echo(options, shm::monotonic_now());
+  pollfd ready[] = {{fd, POLLIN, 0}, {interrupts.get(), POLLIN, 0}};
+  while (look()) {
+    std::cout.flush();
+    const shm::Nanoseconds left = std::min(end - shm::monotonic_now(), interval);
+    if (left <= 0) return;
+    const timespec span{left / 1'000'000'000, left % 1'000'000'000};
+    ppoll(ready, 2, left > shm::kMaxTime ? nullptr : &span, nullptr);
+    if (ready[1].revents != 0) return;
+  }
+}
+
+}  // namespace arbiter::cli
