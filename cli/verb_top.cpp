@@ -72,7 +72,7 @@ class Top {
       take_news();  // first, so that what is new is in the picture
       const shm::Nanoseconds next_look = sampler_.look();
       if (shm::monotonic_now() >= next_picture) {
-        view_.add(sampler_.frame(tapper_.tapped()), sampler_.new_takeovers());
+        view_.add(sampler_.frame(tapper_.tapped(shm::monotonic_now())), sampler_.new_takeovers());
         screen.show(view_.draw(screen.size()));
         next_picture = shm::monotonic_now() + interval_;
       }

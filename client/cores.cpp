@@ -194,6 +194,7 @@ int wait_descriptor(TapCore& core) {
 const std::string& name(const TapCore& core) noexcept { return core.name(); }
 std::uint64_t lost_events(const TapCore& core) noexcept { return core.lost_events(); }
 std::uint64_t lost_samples(const TapCore& core) noexcept { return core.lost_samples(); }
+Latencies latencies(TapCore& core) { return core.latencies(); }
 
 // A publisher that lies, or whose memory is damaged, must not keep a motor from stopping, nor make
 // an age overflow.

@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "shm/atomic.hpp"
+#include "shm/latency.hpp"
 #include "shm/limits.hpp"
 #include "shm/output_segment.hpp"
 #include "shm/type_info.hpp"
@@ -71,6 +72,8 @@ struct InputHeader {
 
   alignas(kCacheLine) Atomic<Hold> holds[kMaxHeld];
   alignas(kCacheLine) InputCounters counters;
+  // Of the samples that were taken while the port was tapped: how long they had waited.
+  alignas(kCacheLine) Atomic<std::uint64_t> latencies[kLatencyBuckets];
 };
 
 struct InputSegment {

@@ -77,6 +77,12 @@ inline constexpr std::int32_t kNobody = -1;
 inline constexpr std::int32_t kNotArbitrated = -2;
 inline constexpr std::int32_t kNotKnown = -3;  // its sources have not all come yet
 
+// How long samples waited at a tapped port, from publish to take.
+struct Waits {
+  shm::Nanoseconds half = 0;    // of them waited less than this
+  shm::Nanoseconds almost = 0;  // 99 of 100 did
+};
+
 struct PortState {
   std::int32_t winner = kNotKnown;
   shm::Nanoseconds since = 0;  // 0: not known
@@ -85,6 +91,7 @@ struct PortState {
   // Of a tapped port: how long at most the oldest sample in its queues had waited when the census
   // was taken; 0: none waited. Nothing where the tap is too young to know.
   std::optional<shm::Nanoseconds> oldest{};
+  std::optional<Waits> waits{};  // the same; nothing where none was taken lately
 };
 
 struct Frame {

@@ -50,6 +50,7 @@ const std::vector<std::string>& help_lines() {
       "                 were accepted but never taken, and that lost the decision",
       "                 QUEUE: samples that wait, of how many that one queue can hold",
       "                 OLDEST: of a tapped port, how long the oldest of these has waited at most",
+      "                 P50, P99: there, what half and 99 % of those taken had waited less than",
       "SOURCE           a bar shrinks until the activity ends, T after the last arrival",
       "                 RATE, SIGNALS: samples and signals per second",
       "CHANGE           each change of a winner that was seen, and what made it",

@@ -69,6 +69,12 @@ Cell oldest_cell(const PortState& state) {
   return number("<" + span(*state.oldest), static_cast<double>(*state.oldest));
 }
 
+Cell wait_cell(const PortState& state, shm::Nanoseconds Waits::*of) {
+  if (!state.waits) return unknown();
+  const shm::Nanoseconds wait = (*state.waits).*of;
+  return number(short_span(wait), static_cast<double>(wait));
+}
+
 struct ActivityCells {
   Cell bar;
   Cell state;
@@ -110,6 +116,8 @@ Row port_row(const Frame& frame, std::size_t i) {
   }
   row.cells.push_back(queue_cell(port));
   row.cells.push_back({port.component, port.is_open ? Style::kPlain : Style::kDim});
+  row.cells.push_back(wait_cell(state, &Waits::half));
+  row.cells.push_back(wait_cell(state, &Waits::almost));
   row.cells.push_back(oldest_cell(state));
   return row;
 }
@@ -148,7 +156,11 @@ Table ports_table(const Frame& frame, const std::string& filter, Charset charset
                    {"TAKEN", 6, Align::kRight, 3, true},      {"LOST", 5, Align::kRight, 5, true},
                    {"LOSERS", 7, Align::kRight, 6, true},     {"QUEUE", 7, Align::kRight, 4, true},
                    {"COMPONENT", 0, Align::kLeft, 7, false}};
-  if (is_any_tapped(frame)) table.columns.push_back({"OLDEST", 7, Align::kRight, 2, true});
+  if (is_any_tapped(frame)) {
+    table.columns.push_back({"P50", 6, Align::kRight, 2, true});
+    table.columns.push_back({"P99", 6, Align::kRight, 2, true});
+    table.columns.push_back({"OLDEST", 7, Align::kRight, 3, true});
+  }
   for (std::size_t i = 0; i < frame.ports.size(); ++i) {
     Row row = port_row(frame, i);
     row.cells.resize(table.columns.size());

@@ -225,7 +225,8 @@ std::string Sampler::name_of(shm::SourceId source) const {
   return source == shm::kNone ? "" : memory_->source_name(source);
 }
 
-std::shared_ptr<const Frame> Sampler::frame(const std::set<std::string>& tapped) const {
+std::shared_ptr<const Frame> Sampler::frame(
+    const std::map<std::string, std::optional<Waits>>& tapped) const {
   if (census_ == nullptr || memory_ == nullptr) return nullptr;
   const auto frame = std::make_shared<Frame>();
   frame->now = last_.now;
@@ -237,8 +238,11 @@ std::shared_ptr<const Frame> Sampler::frame(const std::set<std::string>& tapped)
   frame->is_settled = last_.is_settled;
   for (const PortFact& each : census_->ports) {
     PortState& state = frame->ports.emplace_back();
-    state.is_tapped = tapped.count(each.name) != 0;
-    if (state.is_tapped) state.oldest = oldest_at(each);
+    if (const auto found = tapped.find(each.name); found != tapped.end()) {
+      state.is_tapped = true;
+      state.oldest = oldest_at(each);
+      state.waits = found->second;
+    }
     const auto seat = seats_.find(each.name);
     if (seat == seats_.end()) continue;
     state.since = seat->second.since;

@@ -43,7 +43,8 @@ class Sampler {
   // Takes up the daemon's news and looks. Returns when to look again, at the latest.
   shm::Nanoseconds look();
   // Of the last look; null before the first census. `tapped`: these ports are marked.
-  [[nodiscard]] std::shared_ptr<const Frame> frame(const std::set<std::string>& tapped = {}) const;
+  [[nodiscard]] std::shared_ptr<const Frame> frame(
+      const std::map<std::string, std::optional<Waits>>& tapped = {}) const;
   // Since the last call, the oldest first.
   [[nodiscard]] std::vector<Takeover> new_takeovers() { return std::exchange(takeovers_, {}); }
 

@@ -20,6 +20,9 @@ NodeOptions node_options(const std::string& instance) {
   return options;
 }
 
+constexpr shm::Nanoseconds kCountEvery = 1'000'000'000;
+constexpr std::size_t kCounts = 10;
+
 TapOptions tap_options() {
   TapOptions options;
   options.of = TapOf::input;
@@ -85,14 +88,15 @@ void Tapper::take_up_opened() {
     if (refused_) problem_ = "not tapped: " + *std::exchange(refused_, std::nullopt);
   }
   for (auto& [port, tap] : opened) {
-    if (wanted_.count(port) != 0) taps_.insert_or_assign(port, std::move(tap));
+    if (wanted_.count(port) != 0) taps_.insert_or_assign(port, Tapped{std::move(tap)});
   }
 }
 
 std::vector<Accepted> Tapper::collect() {
   take_up_opened();
   std::vector<Accepted> result;
-  for (auto& [port, tap] : taps_) {
+  for (auto& [port, tapped] : taps_) {
+    Tap<>& tap = tapped.tap;
     while (const auto event = tap.take()) {
       if (event->at(port) != Fate::accepted) continue;
       result.push_back({port, event->source(), event->time().time_since_epoch().count(),
@@ -108,9 +112,20 @@ std::vector<Accepted> Tapper::collect() {
   return result;
 }
 
-std::set<std::string> Tapper::tapped() const {
-  std::set<std::string> ports;
-  for (const auto& [port, tap] : taps_) ports.insert(port);
+std::map<std::string, std::optional<Waits>> Tapper::tapped(shm::Nanoseconds now) {
+  std::map<std::string, std::optional<Waits>> ports;
+  for (auto& [port, tapped] : taps_) {
+    auto& counted = tapped.counted;
+    const Latencies counts = tapped.tap.latencies();
+    const Latencies lately = counted.empty() ? counts : counts.since(counted.front().second);
+    if (counted.empty() || now - counted.back().first >= kCountEvery) {
+      counted.emplace_back(now, counts);
+      if (counted.size() > kCounts) counted.pop_front();
+    }
+    auto& waits = ports[port];
+    if (lately.samples() == 0) continue;
+    waits = Waits{lately.percentile(0.5).count(), lately.percentile(0.99).count()};
+  }
   return ports;
 }
 

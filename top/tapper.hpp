@@ -6,6 +6,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -37,7 +38,9 @@ class Tapper {
   void watch(const std::set<std::string>& ports);
   // What the taps have told since the last time, by time.
   std::vector<Accepted> collect();
-  [[nodiscard]] std::set<std::string> tapped() const;
+  // The ports that are tapped, and how long what was taken there during the last ten seconds had
+  // waited; nothing: nothing was taken. Once for each frame.
+  [[nodiscard]] std::map<std::string, std::optional<Waits>> tapped(shm::Nanoseconds now);
   // Of the port that was asked for last, why it is not tapped; or how much was lost; else "".
   [[nodiscard]] std::string problem() const { return problem_; }
 
@@ -45,9 +48,14 @@ class Tapper {
   void run(const std::stop_token& stop);
   void take_up_opened();
 
+  struct Tapped {
+    Tap<> tap;
+    std::deque<std::pair<shm::Nanoseconds, Latencies>> counted{};  // a second apart, ten of them
+  };
+
   const std::string instance_;
   std::set<std::string> wanted_;
-  std::map<std::string, Tap<>> taps_;
+  std::map<std::string, Tapped> taps_;
   std::string problem_;
   std::mutex mutex_;  // guards what follows
   std::condition_variable_any asked_;

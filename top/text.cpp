@@ -95,6 +95,15 @@ std::string span(shm::Nanoseconds time) {
   return with_unit(std::min(seconds / 86'400, 9999.0), 0, " d");
 }
 
+std::string short_span(shm::Nanoseconds time) {
+  const auto value = static_cast<double>(std::max<shm::Nanoseconds>(time, 0));
+  if (value < 999.5) return with_unit(value, 0, " ns");
+  if (value < 9'950) return with_unit(value / 1e3, 1, " us");
+  if (value < 999'500) return with_unit(value / 1e3, 0, " us");
+  if (value < 9.95e6) return with_unit(value / 1e6, 1, " ms");
+  return span(time);
+}
+
 std::string rate(double per_second) {
   if (per_second <= 0) return "-";
   if (per_second < 99.95) return with_unit(per_second, 1, "");

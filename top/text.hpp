@@ -30,6 +30,8 @@ enum class Align { kLeft, kRight };
 
 // "40 ms", "3.2 s", "12 min", "5 h", "9 d": at most 6 columns.
 [[nodiscard]] std::string span(shm::Nanoseconds time);
+// The same of times that may be far below a millisecond: "640 ns", "1.6 us".
+[[nodiscard]] std::string short_span(shm::Nanoseconds time);
 // 0 -> "-", 0.31 -> "0.3", 123 456 -> "123k": at most 5 columns.
 [[nodiscard]] std::string rate(double per_second);
 

@@ -102,6 +102,7 @@ enum class MessageKind : std::uint32_t {
   kTapSource,  // to tap `port`: peer, id = source, name; link, value: of kTapped; descriptors: the
                // segment of the output port, its events
   kTapInput,   // to tap `port` of an input port: peer has that open, name; descriptor: its segment
+  kMeasure,    // to input `port`, which is tapped: value 1: count how long samples wait; 0: no more
 };
 
 enum MessageFlag : std::uint32_t {

@@ -61,6 +61,11 @@ class InputCore {
   // Whether a take has missed a source that it could not see, for the first time.
   [[nodiscard]] bool has_become_blind() noexcept { return blindness_.is_news(); }
 
+  // Whether takes count how long their samples have waited. Relaxed: it orders nothing.
+  void set_measured(bool measured) noexcept {
+    is_measured_.store(measured, std::memory_order_relaxed);
+  }
+
   // Port's thread.
 
   HeldSample take();
@@ -154,6 +159,7 @@ class InputCore {
   void disarm() noexcept;
   void arm_descriptor(HeldSample& sample);
   HeldSample take_once();
+  void measure(shm::Nanoseconds stamp) const noexcept;
 
   // Constant once bound.
   const std::string name_;
@@ -177,6 +183,9 @@ class InputCore {
 
   Handover<InputView> handover_;
   Blindness blindness_;
+
+  // By the service thread, read by the port's.
+  shm::Atomic<bool> is_measured_{false};
 
   // Port's thread.
   std::unique_ptr<InputView> view_;

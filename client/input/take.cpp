@@ -14,6 +14,7 @@
 #include "client/count.hpp"
 #include "client/input/input_core.hpp"
 #include "shm/assertion.hpp"
+#include "shm/clock.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -52,11 +53,17 @@ HeldSample InputCore::take_once() {
     if (choice == Choice::kNothing) return sample;
     if (choice == Choice::kTake && hold(*oldest, sample)) {
       commanded_ = true;
+      if (is_measured_.load(std::memory_order_relaxed)) measure(sample.stamp_ns);
       return sample;
     }
   }
   count(segment_->header.counters.unsettled);
   return sample;
+}
+
+// Kept out of the take: it is for ports that are tapped.
+[[gnu::noinline, gnu::cold]] void InputCore::measure(shm::Nanoseconds stamp) const noexcept {
+  count(segment_->header.latencies[shm::latency_bucket(shm::monotonic_now() - stamp)]);
 }
 
 // Since the last take has found nothing.

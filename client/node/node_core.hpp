@@ -124,6 +124,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void add_publisher(const wire::Received& received);
   // Taps (taps.cpp).
   void handle_about_tap(wire::Received& received);
+  void set_measured(const wire::Message& message);
   void add_tap(const wire::Received& received);
   void add_tap_source(const wire::Received& received);
   void add_tap_input(const wire::Received& received);

@@ -126,6 +126,7 @@ void NodeCore::rejoin() {
                                    core->page_descriptor()));
     }
     for (const auto& [instance, core] : inputs_) {
+      core->set_measured(false);  // unless the next daemon says so
       ports.push_back(port_at_hand(wire::MessageKind::kHandBackInput, *core, core->port(),
                                    core->bell().for_publishers()));
     }

@@ -229,6 +229,9 @@ void NodeCore::handle(wire::Received& received) {
     case wire::MessageKind::kTapInput:
       handle_about_tap(received);
       break;
+    case wire::MessageKind::kMeasure:
+      set_measured(message);
+      break;
     case wire::MessageKind::kConnectionRefused:
       handle_refusal(message);
       break;
@@ -320,6 +323,12 @@ void NodeCore::hear_of_growth(const wire::Message& message) {
     if (input != inputs_.end()) grown = input->second->peer(message.peer);
   }
   if (grown != nullptr) look_at_growth(message.port, *grown);
+}
+
+void NodeCore::set_measured(const wire::Message& message) {
+  const std::lock_guard lock(mutex_);
+  const auto input = inputs_.find(message.port);
+  if (input != inputs_.end()) input->second->set_measured(message.value != 0);
 }
 
 void NodeCore::add_receiver(const wire::Received& received) {

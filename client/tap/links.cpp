@@ -44,7 +44,11 @@ std::shared_ptr<const TapInput> map_tap_input(const wire::Received& announced,
   input->instance = announced.message.peer;
   input->mapping = map_input_segment(announced.descriptors[0]);
   shm::make_resident(input->mapping, 0, sizeof(shm::InputSegment), residence);
-  input->watch.emplace(*input->mapping.as<const shm::InputSegment>());
+  const auto& segment = *input->mapping.as<const shm::InputSegment>();
+  input->watch.emplace(segment);
+  for (std::size_t i = 0; i < shm::kLatencyBuckets; ++i) {
+    input->latencies[i] = segment.header.latencies[i].load(std::memory_order_relaxed);
+  }
   input->bequest.emplace(input->mapping.data(), input->mapping.size(),
                          shm::Bequest::Kind::kNothing);
   return input;

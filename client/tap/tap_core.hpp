@@ -69,6 +69,7 @@ struct TapInput {
   shm::Mapping mapping;
   std::optional<shm::Bequest> bequest;
   mutable std::optional<TakeWatch> watch;  // tap's thread, once it is told
+  std::array<std::uint64_t, shm::kLatencyBuckets> latencies{};  // what the port had counted before
   // Set by the tap's thread once all has been told of a port that is gone.
   mutable shm::Atomic<bool> drained{false};
 };
@@ -120,6 +121,7 @@ class TapCore {
   void give_back(std::uint32_t hold) noexcept;
   // Throws Error.
   int wait_descriptor();
+  [[nodiscard]] Latencies latencies();
   [[nodiscard]] std::uint32_t held() const noexcept { return held_; }
   [[nodiscard]] std::uint64_t lost_events() const noexcept { return lost_events_; }
   [[nodiscard]] std::uint64_t lost_samples() const noexcept { return lost_samples_; }

@@ -47,8 +47,8 @@ class Switchboard {
   [[nodiscard]] std::vector<const Tap*> taps_of(shm::PortInstance output) const {
     return taps_.of(output);
   }
-  void remove_tap(shm::PortInstance tap) { taps_.remove(tap, outputs_); }
-  void lose_taps(const Client& client, bool lives) { taps_.lose(client, lives, outputs_); }
+  void remove_tap(shm::PortInstance tap) { taps_.remove(tap, outputs_, inputs_); }
+  void lose_taps(const Client& client, bool lives) { taps_.lose(client, lives, outputs_, inputs_); }
   // What the component of an output port has answered to a tap.
   void tell_tap(const wire::Received& answer);
 

@@ -38,7 +38,7 @@ bool Taps::is_of(const Client& client, shm::PortInstance tap) const {
   return found != taps_.end() && found->second->client == &client;
 }
 
-void Taps::remove(shm::PortInstance tap, const Outputs& outputs) {
+void Taps::remove(shm::PortInstance tap, const Outputs& outputs, const Inputs& inputs) {
   std::erase_if(links_, [&](const auto& each) {
     const auto& [key, link] = each;
     if (key.second != tap) return false;
@@ -48,10 +48,20 @@ void Taps::remove(shm::PortInstance tap, const Outputs& outputs) {
     }
     return true;
   });
-  taps_.erase(tap);
+  const auto found = taps_.find(tap);
+  if (found == taps_.end()) return;
+  const std::string name = found->second->is_input ? found->second->name : "";
+  taps_.erase(found);
+  const bool is_tapped = std::any_of(taps_.begin(), taps_.end(), [&](const auto& other) {
+    return other.second->is_input && other.second->name == name;
+  });
+  if (name.empty() || is_tapped) return;
+  for (const auto& [instance, input] : inputs) {
+    if (input->name->name == name) measure(*input, false);
+  }
 }
 
-void Taps::lose(const Client& client, bool lives, const Outputs& outputs) {
+void Taps::lose(const Client& client, bool lives, const Outputs& outputs, const Inputs& inputs) {
   for (auto tap = taps_.begin(); tap != taps_.end();) {
     const auto next = std::next(tap);
     if (tap->second->client == &client) {
@@ -62,7 +72,7 @@ void Taps::lose(const Client& client, bool lives, const Outputs& outputs) {
             message_to(wire::MessageKind::kTapAway, key.first, key.second));
       }
       if (lives) std::erase_if(links_, [&](const auto& l) { return l.first.second == tap->first; });
-      remove(tap->first, outputs);
+      remove(tap->first, outputs, inputs);
     }
     tap = next;
   }
@@ -194,6 +204,13 @@ void Taps::show(const Tap& tap, const InputPort& input) const {
   auto message = message_to(wire::MessageKind::kTapInput, tap.instance, input.instance);
   message.set_name(tap.name);
   tap.client->send(message, {input.segment.get(), -1});
+  measure(input, true);
+}
+
+void Taps::measure(const InputPort& input, bool is_tapped) {
+  auto message = message_to(wire::MessageKind::kMeasure, input.instance, 0);
+  message.value = is_tapped ? 1 : 0;
+  input.client->send(message);
 }
 
 void Taps::show(const InputPort& input) const {

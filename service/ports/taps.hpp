@@ -50,16 +50,17 @@ std::unique_ptr<Tap> adopt_tap(const wire::Received& open, uid_t user);
 class Taps {
  public:
   using Outputs = std::map<shm::PortInstance, std::unique_ptr<OutputPort>>;
+  using Inputs = std::map<shm::PortInstance, std::unique_ptr<InputPort>>;
 
   Taps(PortNames& names, Registry& registry) : names_(names), registry_(registry) {}
 
   Tap& add(std::unique_ptr<Tap> tap, Client& client);
   [[nodiscard]] bool is_of(const Client& client, shm::PortInstance tap) const;
   // It closes: publishers are told that it has gone.
-  void remove(shm::PortInstance tap, const Outputs& outputs);
+  void remove(shm::PortInstance tap, const Outputs& outputs, const Inputs& inputs);
   // The same of all that a client has. If its process lives, it may still be reading samples:
   // publishers are told to look after that.
-  void lose(const Client& client, bool lives, const Outputs& outputs);
+  void lose(const Client& client, bool lives, const Outputs& outputs, const Inputs& inputs);
 
   // Asks the components of the output ports that are to be tapped under a table, and have not been
   // asked yet: of all output ports, or of one. Calls `told(client)` for each that is asked.
@@ -86,7 +87,7 @@ class Taps {
   void set_away(shm::PortInstance output);
   // It has closed, or died.
   void end(shm::PortInstance output);
-  // The same of input ports: taps of that name read what the port counts.
+  // The same of input ports: taps of that name read what the port counts, which then counts more.
   void show(const Tap& tap, const InputPort& input) const;
   void show(const InputPort& input) const;
   void end(shm::PortInstance input, const std::string& name) const;
@@ -95,6 +96,7 @@ class Taps {
   [[nodiscard]] std::vector<const Tap*> of(shm::PortInstance output) const;
 
  private:
+  static void measure(const InputPort& input, bool is_tapped);
   // A tap and an output port whose component has been asked.
   struct Link {
     bool is_told = false;  // the tap has been told what it answered

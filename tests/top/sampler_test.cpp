@@ -147,7 +147,7 @@ TEST_F(TopSampler, ATapTellsHowLongTheOldestSampleHasWaitedAtMost) {
     census.ports[0].queues = std::move(queues);
     tapping.set_census(std::make_shared<const Census>(census));
     tapping.look();
-    return tapping.frame({"/p:i"})->ports.at(0).oldest;
+    return tapping.frame({{"/p:i", std::nullopt}})->ports.at(0).oldest;
   };
   EXPECT_EQ(oldest_of({{"/low:o", 1}}), std::nullopt);  // accepted before it was tapped
   told = {{"/p:i", "/low:o", 90 * kSecond},      {"/p:i", "/low:o", 95 * kSecond, false},

@@ -199,7 +199,11 @@ TEST_F(TopView, TapsThePortOfTheCursorUntilItIsAskedAgain) {
   frame.ports[0].oldest = kSecond / 25;
   view_.add(shared(frame), {});
   EXPECT_THAT(line_with("/arm:i"), testing::EndsWith("<40 ms"));
-  for (int i = 0; i < 9; ++i) press("s");
+  frame.ports[0].waits = top::Waits{640, 1'600};
+  view_.add(shared(frame), {});
+  EXPECT_THAT(screen({120, 24}), HasSubstr("640 ns"));
+  EXPECT_THAT(screen({120, 24}), HasSubstr("1.6 us"));
+  for (int i = 0; i < 11; ++i) press("s");
   EXPECT_THAT(screen({120, 24}), HasSubstr("OLDEST▾"));
   view_.add(shared(frame_at(12)), {});
   EXPECT_THAT(screen({120, 24}), HasSubstr("COMPONENT▾"));  // that column has gone

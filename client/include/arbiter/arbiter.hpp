@@ -35,6 +35,7 @@
 
 #include <arbiter/bytes.hpp>
 #include <arbiter/input_port.hpp>
+#include <arbiter/latencies.hpp>
 #include <arbiter/node.hpp>
 #include <arbiter/notice.hpp>
 #include <arbiter/options.hpp>

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include <arbiter/latencies.hpp>
 #include <arbiter/options.hpp>
 #include <arbiter/result.hpp>
 #include <arbiter/type.hpp>
@@ -136,6 +137,7 @@ int wait_descriptor(TapCore& core);
 const std::string& name(const TapCore& core) noexcept;
 std::uint64_t lost_events(const TapCore& core) noexcept;
 std::uint64_t lost_samples(const TapCore& core) noexcept;
+Latencies latencies(TapCore& core);
 
 // A sample, and a loan, keep the port's core in being without counting references to it: samples
 // and loans are counted anyway, by their port's thread, where an atomic count would hold up each
