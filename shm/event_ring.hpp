@@ -137,7 +137,7 @@ class EventReader {
         return Found::kNothing;
       }
       // Overtaken: we go on far enough behind the newest that we know of to be left in peace.
-      next = std::max(number / 2 - shape_.events / 4 * 3, next + 1);
+      next = std::max(number / 2 - std::uint64_t{shape_.events} / 4 * 3, next + 1);
     }
     return Found::kNothing;
   }

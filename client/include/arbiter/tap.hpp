@@ -55,7 +55,8 @@ enum class TapEventKind : std::uint8_t {
   signal,        // an arrival without one
   deactivation,  // the source's activity was ended
   destinations,  // the source's list of destinations has changed
-  closed,        // its output port was closed, or its component died: this was all
+  closed,        // its output port was closed, its component died, or the model does not connect it
+                 // any more to the input port that is tapped: this was all
   dropped,       // at the input port that is tapped: samples that were accepted had lost when they
                  // were to be taken
   overtaken,     // there, too: samples gave way to newer ones in a full queue
@@ -221,7 +222,7 @@ class Tap {
   // nothing; that arms the descriptor again. The tap owns it. Throws as wait_for().
   [[nodiscard]] int fd() { return detail::wait_descriptor(*core_); }
 
-  // Events that were overtaken, of all sources; and samples that were overwritten before their
+  // Events that were lost, of all sources; and samples that were overwritten before their
   // events were taken. Since the tap was opened.
   [[nodiscard]] std::uint64_t lost() const noexcept { return detail::lost_events(*core_); }
   [[nodiscard]] std::uint64_t lost_samples() const noexcept { return detail::lost_samples(*core_); }
