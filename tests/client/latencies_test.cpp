@@ -2,12 +2,15 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <optional>
 #include <thread>
 
 #include <arbiter/arbiter.hpp>
 
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/raw_client.hpp"
+#include "tests/support/raw_port.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -29,7 +32,7 @@ class LatencyOfAPort : public testing::Test {
     out_.publish(Number{1});
     EXPECT_TRUE(in_.take());
   }
-  // Until the port's service thread has heard that it is (not) tapped.
+  // Until the port's service thread has heard that it is tapped.
   void see_measured(Tap<>& tap) {
     while (tap.latencies().samples() == 0) publish_and_take();
   }
@@ -80,16 +83,37 @@ TEST_F(LatencyOfAPort, IsEachTapsOwnCount) {
   EXPECT_EQ(first.latencies().samples(), seen + 1);
 }
 
-TEST_F(LatencyOfAPort, IsNotMeasuredAnyMoreWhenNobodyTapsIt) {
-  auto first = std::make_optional(tap());
-  see_measured(*first);
-  first.reset();
-  auto other = tap();  // the daemon has said: no more, and: again
-  see_measured(other);
-  other = watcher_.tap("/out", {});  // an output port's
+TEST_F(LatencyOfAPort, IsNotThatOfAnOutputPort) {
+  auto other = watcher_.tap("/out");
   EXPECT_TRUE(other.latencies().buckets().empty());
-  // A port that nobody taps counts nothing: what a tap counts from begins where the last one ended.
-  EXPECT_TRUE(other.latencies().percentile(0.5) == 0ns);
+}
+
+// What a component hears whose input port is tapped by two.
+TEST(LatencyOfAnInputPort, IsAskedForAsLongAsThereIsATap) {
+  const Daemon daemon(kModel);
+  RawClient component(daemon.instance());
+  component.hello("component");
+  const auto segment = raw_input_segment();
+  const shm::Bell bell;
+  component.send(RawClient::message(wire::MessageKind::kOpenInput, "/in"),
+                 {segment.get(), bell.for_publishers().get()});
+  const auto port = component.expect(wire::MessageKind::kOpened).message.port;
+  Node watcher("watcher");
+  TapOptions options;
+  options.of = TapOf::input;
+  std::optional first(watcher.tap("/in", options));
+  auto heard = component.expect(wire::MessageKind::kMeasure).message;
+  EXPECT_EQ(heard.port, port);
+  EXPECT_EQ(heard.value, 1u);
+  std::optional second(watcher.tap("/in", options));
+  EXPECT_EQ(component.expect(wire::MessageKind::kMeasure).message.value, 1u);
+  first.reset();
+  second.reset();
+  EXPECT_EQ(component.expect(wire::MessageKind::kMeasure).message.value, 0u);
+  component.send(RawClient::message(wire::MessageKind::kStatus));
+  wire::Received next;
+  ASSERT_TRUE(component.receive(next));
+  EXPECT_EQ(next.message.kind, wire::MessageKind::kStatusReply);  // and said once
 }
 
 TEST_F(LatencyOfAPort, GoesOnUnderAnotherDaemon) {

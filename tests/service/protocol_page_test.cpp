@@ -231,6 +231,7 @@ std::map<std::string, Heard> hear_all() {
   for (int i = 0; i < 2; ++i) client.open_tap("/other");  // the second one's place is not 0
   client.open_tap("/out");
   client.open_tap("/in-a", wire::kTapsInput);
+  client.open_tap("/in", wire::kTapsInput);
   out->signal();
   auto tap = node.tap("/in-c", {.of = TapOf::input});  // which the last model does not mention
   client.ask(MessageKind::kObserve);
