@@ -16,6 +16,24 @@ using recording::McapTime;
 
 // Of a file that has nothing else, memory would be full of them.
 constexpr std::size_t kMostListed = 1'000;
+constexpr std::size_t kMostListedBytes = std::size_t{64} << 20;
+
+// Whether one more is listed, which takes so much.
+bool has_room(RecordingInfo& info, std::size_t listed, std::size_t bytes) {
+  if (listed >= kMostListed || bytes > kMostListedBytes - info.listed_bytes) {
+    ++info.unlisted;
+    return false;
+  }
+  info.listed_bytes += bytes;
+  return true;
+}
+
+std::size_t bytes_of(const recording::McapMap& map) {
+  constexpr std::size_t kEntry = 128;  // for what the map itself takes
+  std::size_t bytes = 0;
+  for (const auto& [key, value] : map) bytes += kEntry + key.size() + value.size();
+  return bytes;
+}
 
 void include(std::optional<RecordingInfo::Times>& times, McapTime time) {
   if (!times) times = {time, time};
@@ -23,7 +41,7 @@ void include(std::optional<RecordingInfo::Times>& times, McapTime time) {
   times->end = std::max(times->end, time);
 }
 
-void count(RecordingInfo& info, const recording::McapMessage& message) {
+void count_message(RecordingInfo& info, const recording::McapMessage& message) {
   ++info.messages;
   include(info.times, message.log_time);
   auto& channel = info.channels[message.channel];
@@ -44,21 +62,18 @@ recording::McapVisitor visitor_for(RecordingInfo& info) {
   visitor.channel = [&info](std::uint16_t id, const recording::McapChannel& channel) {
     info.channels.try_emplace(id, RecordingInfo::Channel{id, channel, 0, 0, {}});
   };
-  visitor.message = [&info](const recording::McapMessage& message) { count(info, message); };
+  visitor.message = [&info](const recording::McapMessage& message) {
+    count_message(info, message);
+  };
   visitor.metadata = [&info](const std::string& name, const recording::McapMap& map) {
-    if (info.metadata.size() == kMostListed) {
-      ++info.unlisted;
-    } else {
-      info.metadata.emplace_back(name, map);
-    }
+    if (!has_room(info, info.metadata.size(), name.size() + bytes_of(map))) return;
+    info.metadata.emplace_back(name, map);
   };
   visitor.attachment = [&info](const recording::McapAttachment& attachment) {
-    if (info.attachments.size() == kMostListed) {
-      ++info.unlisted;
-    } else {
-      info.attachments.push_back(
-          {attachment.name, attachment.media_type, attachment.log_time, attachment.data.size()});
-    }
+    const std::size_t bytes = attachment.name.size() + attachment.media_type.size();
+    if (!has_room(info, info.attachments.size(), bytes)) return;
+    info.attachments.push_back(
+        {attachment.name, attachment.media_type, attachment.log_time, attachment.data.size()});
   };
   return visitor;
 }

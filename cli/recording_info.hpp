@@ -52,7 +52,8 @@ struct RecordingInfo {
   std::map<std::uint16_t, Channel> channels;
   std::vector<std::pair<std::string, recording::McapMap>> metadata;
   std::vector<Attachment> attachments;
-  std::uint64_t unlisted = 0;  // metadata and attachments behind the first 1000
+  std::uint64_t unlisted = 0;  // metadata and attachments for which there was no room
+  std::size_t listed_bytes = 0;
 };
 
 // Reads all of it, so that each CRC is checked; says how far it is on standard error. Throws

@@ -17,9 +17,9 @@ using recording::McapTime;
 
 constexpr std::size_t kColumns = 80;
 constexpr std::size_t kMargin = 14;  // of what stands behind a heading
-constexpr McapTime kSecond = 1'000'000'000;
+constexpr McapTime kLogSecond = 1'000'000'000;
 // A time before 1973 is not the time of day, but of a clock that began with the machine.
-constexpr McapTime kFirstTimeOfDay = 100'000'000 * kSecond;
+constexpr McapTime kFirstTimeOfDay = 100'000'000 * kLogSecond;
 
 std::string formatted(const char* format, double number) {
   std::array<char, 64> text{};
@@ -39,25 +39,25 @@ std::string size_text(std::uint64_t bytes) {
   return formatted("%.1f ", size) + std::string(unit);
 }
 
-std::string milliseconds(McapTime time) {
+std::string fraction_text(McapTime time) {
   const std::string digits = std::to_string(1'000 + time / 1'000'000 % 1'000);
   return "." + digits.substr(1);
 }
 
-std::string time_text(McapTime time) {
-  const auto seconds = static_cast<std::time_t>(time / kSecond);
+std::string log_time_text(McapTime time) {
+  const auto seconds = static_cast<std::time_t>(time / kLogSecond);
   std::tm local{};
   std::array<char, 64> text{};
   if (time < kFirstTimeOfDay || localtime_r(&seconds, &local) == nullptr ||
       std::strftime(text.data(), text.size(), "%F %T", &local) == 0) {
-    return std::to_string(time / kSecond) + milliseconds(time) + " s of its clock";
+    return std::to_string(time / kLogSecond) + fraction_text(time) + " s of its clock";
   }
-  return text.data() + milliseconds(time);
+  return text.data() + fraction_text(time);
 }
 
 std::string length_text(McapTime length) {
-  const McapTime seconds = length / kSecond;
-  std::string text = std::to_string(seconds) + milliseconds(length) + " s";
+  const McapTime seconds = length / kLogSecond;
+  std::string text = std::to_string(seconds) + fraction_text(length) + " s";
   if (seconds < 60) return text;
   std::array<char, 64> clock{};
   std::snprintf(clock.data(), clock.size(), " (%llu:%02u:%02u)",
@@ -68,19 +68,19 @@ std::string length_text(McapTime length) {
 
 std::string rate_text(double rate) { return formatted(rate < 1e6 ? "%.1f" : "%.2e", rate); }
 
-std::string padded(std::string text, std::size_t columns) {
+std::string padded_to(std::string text, std::size_t columns) {
   if (text.size() < columns) text.append(columns - text.size(), ' ');
   return text;
 }
 
-std::string right(const std::string& text, std::size_t columns) {
+std::string aligned_right(const std::string& text, std::size_t columns) {
   return std::string(columns - std::min(columns, text.size()), ' ') + text;
 }
 
 // Behind a heading, in as many lines as it takes.
 void write_wrapped(std::ostream& out, const std::string& heading, const std::string& text) {
   std::istringstream words(text);
-  std::string line = padded(heading, kMargin - 1);
+  std::string line = padded_to(heading, kMargin - 1);
   bool is_empty = true;
   for (std::string word; words >> word;) {
     if (!is_empty && line.size() + 1 + word.size() > kColumns) {
@@ -115,8 +115,8 @@ void write_state(std::ostream& out, const RecordingInfo& info) {
 
 void write_times(std::ostream& out, const RecordingInfo& info) {
   if (!info.times) return;
-  write_wrapped(out, "begin", time_text(info.times->begin));
-  write_wrapped(out, "end", time_text(info.times->end));
+  write_wrapped(out, "begin", log_time_text(info.times->begin));
+  write_wrapped(out, "end", log_time_text(info.times->end));
   write_wrapped(out, "length", length_text(info.times->end - info.times->begin));
 }
 
@@ -147,12 +147,13 @@ void write_channels(std::ostream& out, const RecordingInfo& info) {
   std::stable_sort(channels.begin(), channels.end(), [](const auto* a, const auto* b) {
     return a->channel.topic < b->channel.topic;
   });
-  out << "\n  messages        Hz  " << padded("schema", columns) << "  topic\n";
+  out << "\n  messages        Hz  " << padded_to("schema", columns) << "  topic\n";
   for (const auto* channel : channels) {
     const auto rate = channel->rate();
-    out << right(std::to_string(channel->messages), 10) << right(rate ? rate_text(*rate) : "-", 10)
-        << "  " << padded(schema_of(*channel), columns) << "  "
-        << shm::printable(channel->channel.topic) << '\n';
+    out << aligned_right(std::to_string(channel->messages), 10)
+        << aligned_right(rate ? rate_text(*rate) : "-", 10) << "  "
+        << padded_to(schema_of(*channel), columns) << "  " << shm::printable(channel->channel.topic)
+        << '\n';
   }
 }
 
@@ -169,8 +170,9 @@ void write_metadata(std::ostream& out, const RecordingInfo& info) {
 void write_attachments(std::ostream& out, const RecordingInfo& info) {
   if (!info.attachments.empty()) out << "\nattachments\n";
   for (const auto& each : info.attachments) {
-    out << right(size_text(each.bytes), 12) << "  " << padded(shortened(each.media_type, 20), 20)
-        << "  " << shortened(each.name, 44) << '\n';
+    out << aligned_right(size_text(each.bytes), 12) << "  "
+        << padded_to(shortened(each.media_type, 20), 20) << "  " << shortened(each.name, 44)
+        << '\n';
   }
   if (info.unlisted > 0) {
     out << "\nand " << info.unlisted << " more attachments and metadata records\n";

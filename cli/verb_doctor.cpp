@@ -48,7 +48,7 @@ std::string problem_of_root(std::string& root) {
 }
 
 // Names come from processes and files of others.
-void write_text(const Findings& findings, std::size_t silenced) {
+void write_findings(const Findings& findings, std::size_t silenced) {
   for (const auto& finding : findings) {
     std::cout << shm::printable(finding.what) << "  [" << finding.code
               << "]\n  why:  " << shm::printable(finding.why)
@@ -94,7 +94,7 @@ int examine(const DoctorOptions& options) {
   if (options.json) {
     write_json(who.instance, findings);
   } else {
-    write_text(findings, before - findings.size());
+    write_findings(findings, before - findings.size());
   }
   return findings.empty() ? 0 : 1;
 }

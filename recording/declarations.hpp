@@ -1,6 +1,7 @@
 // The schemas and channels that a file has declared so far.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -14,7 +15,11 @@ namespace arbiter::recording {
 // of them together would be more than a reader of the file may have to keep.
 class Declarations {
  public:
-  explicit Declarations(std::size_t max_bytes) noexcept : max_bytes_(max_bytes) {}
+  explicit Declarations(std::size_t max_bytes) noexcept
+      : max_bytes_(std::min(max_bytes, kMaxDeclaredBytes)) {}
+
+  // The memory that a schema or a channel takes, or somewhat more.
+  [[nodiscard]] static std::size_t cost_of(std::size_t record_bytes, const McapMap& metadata);
 
   void judge(const Record& record);
 
@@ -27,7 +32,7 @@ class Declarations {
   };
   using Known = std::map<std::uint16_t, Content>;
 
-  void declare(Known& known, std::uint16_t id, const Record& record);
+  void declare(Known& known, std::uint16_t id, const Record& record, const McapMap& metadata);
 
   std::size_t max_bytes_;
   std::size_t bytes_ = 0;

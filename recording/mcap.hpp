@@ -59,6 +59,8 @@ struct McapAttachment {
 
 // What one record of a file may have, for a reader need not have more memory.
 inline constexpr std::size_t kMaxChunkBytes = std::size_t{256} << 20;
+// What all schemas and channels of a file may take of its memory: it keeps them.
+inline constexpr std::size_t kMaxDeclaredBytes = std::size_t{64} << 20;
 
 // A chunk that is made apart from the file: recording/mcap_chunk.hpp.
 struct McapChunk;
@@ -98,7 +100,7 @@ class McapWriter {
 
   void end_chunk();
   void sync();
-  // Summary, indexes, statistics, footer.
+  // Summary, indexes, statistics, footer; returns when a power cut cannot take the file.
   void close();
   // Of the file, with the chunk that is not written yet, uncompressed.
   [[nodiscard]] std::uint64_t bytes() const noexcept;
@@ -138,12 +140,12 @@ struct McapEnd {
 };
 
 // Reads the data section, one record in memory at a time, and judges each before the visitor sees
-// it: its lengths, its CRC, its references to channels and schemas. A record, a chunk's content, or
-// all schemas and channels together with more bytes than max_chunk_bytes count as damage, whatever
-// they claim; memory stays below a small multiple of that. Damage ends the reading: see McapEnd. A
-// file that ends early, even within its first bytes, is damaged; one that is being written is read
-// as far as it is. Throws for a file that cannot be opened, or begins as no MCAP file of this
-// version does.
+// it: its lengths, its CRC, its references to channels and schemas. Damage ends the reading (see
+// McapEnd), and so does a record, or a chunk's content, of more than max_chunk_bytes, whatever it
+// claims, and schemas and channels of more than kMaxDeclaredBytes: memory stays below a small
+// multiple of these. A file that ends early, even within its first bytes, is damaged; one that is
+// being written is read as far as it is. Throws for a file that cannot be opened, or begins as no
+// MCAP file of this version does.
 McapEnd read_mcap(const std::string& path, const McapVisitor& visitor,
                   std::size_t max_chunk_bytes = kMaxChunkBytes);
 

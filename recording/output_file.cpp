@@ -19,7 +19,7 @@ int sync_directory_of(const std::string& path) {
   std::string directory = ".";
   if (slash != std::string::npos) directory = slash == 0 ? "/" : path.substr(0, slash);
   const int fd = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return errno;
+  if (fd < 0) return errno == EACCES ? 0 : errno;  // who may not list it can do no more
   // Some file systems cannot do it, and need not.
   const int error = ::fsync(fd) == 0 || errno == EINVAL ? 0 : errno;
   ::close(fd);
@@ -90,7 +90,7 @@ void OutputFile::write(std::string_view bytes) {
   while (!left.empty()) {
     const ssize_t count = ::write(fd_, left.data(), left.size());
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail("write", errno);
+    if (count <= 0) fail("write", count < 0 ? errno : ENOSPC);
     left.remove_prefix(static_cast<std::size_t>(count));
   }
   crc_ = crc32(bytes, crc_);

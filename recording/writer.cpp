@@ -2,6 +2,7 @@
 #include <string>
 #include <utility>
 
+#include "recording/declarations.hpp"
 #include "recording/mcap.hpp"
 #include "recording/mcap_chunk.hpp"
 #include "recording/output_file.hpp"
@@ -27,16 +28,17 @@ struct McapWriter::File {
     return static_cast<std::uint16_t>(count + 1);
   }
 
-  void require_readable(std::size_t bytes, const char* what) const {
-    if (bytes <= kMostBytes) return;
+  void require_readable(std::size_t bytes, const char* what, std::size_t most = kMostBytes) const {
+    if (bytes <= most) return;
     out.refuse(std::string("write ") + what, std::to_string(bytes) + " bytes are more than the " +
-                                                 std::to_string(kMostBytes) +
+                                                 std::to_string(most) +
                                                  " that readers are ready for");
   }
 
-  void declare(const std::string& record) {
-    require_readable(declared_bytes + record.size(), "more schemas and channels");
-    declared_bytes += record.size();
+  void declare(const std::string& record, const McapMap& metadata) {
+    const std::size_t bytes = declared_bytes + Declarations::cost_of(record.size(), metadata);
+    require_readable(bytes, "more schemas and channels", kMaxDeclaredBytes);
+    declared_bytes = bytes;
     declared += record;
   }
 
@@ -91,7 +93,7 @@ std::uint16_t McapWriter::add_schema(const McapSchema& schema) {
   const auto id = file_->id_after(file_->schemas, "schema");
   std::string record;
   append_schema(record, id, schema);
-  file_->declare(record);
+  file_->declare(record, {});
   file_->summary.add_schema(id, record);
   ++file_->schemas;
   return id;
@@ -104,7 +106,7 @@ std::uint16_t McapWriter::add_channel(const McapChannel& channel) {
   const auto id = file_->id_after(file_->channels, "channel");
   std::string record;
   append_channel(record, id, channel);
-  file_->declare(record);
+  file_->declare(record, channel.metadata);
   file_->summary.add_channel(id, record);
   ++file_->channels;
   return id;
@@ -159,6 +161,7 @@ void McapWriter::sync() { file_->out.sync(); }
 void McapWriter::close() {
   end_chunk();
   file_->out.write(file_->summary.ending(file_->out.bytes(), file_->out.crc()));
+  file_->out.sync();
   file_->out.close();
 }
 

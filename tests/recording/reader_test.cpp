@@ -190,14 +190,22 @@ TEST_F(Reader, BoundsWhatAFileDeclares) {
   }
   const Contents found = read(file, 1'000);
   EXPECT_EQ(found.lines.size(), 2U);
-  EXPECT_THAT(found.end.problem, HasSubstr("the schemas and channels have more than 1000 bytes"));
+  EXPECT_THAT(found.end.problem, HasSubstr("the schemas and channels take more than 1000 bytes"));
   std::string map;
-  for (int i = 0; i < 70'000; ++i) recording::append_string(map, std::to_string(i));
+  for (int i = 0; i < 2 * 70'000; ++i) recording::append_string(map, std::to_string(i));
   std::string content(4, '\0');
   recording::append_string(content, map);
   file = beginning();
   recording::append_record(file, Opcode::metadata, content);
-  EXPECT_TRUE(read(file).end.is_whole == false);
+  EXPECT_THAT(read(file).end.problem, HasSubstr("more than 65536 entries"));
+  // Maps take far more memory than their bytes.
+  file = beginning();
+  for (std::uint16_t id = 1; id <= 50; ++id) {
+    recording::McapChannel channel;
+    for (int i = 0; i < 20'000; ++i) channel.metadata[std::to_string(i)] = "";
+    recording::append_channel(file, id, channel);
+  }
+  EXPECT_THAT(read(file).end.problem, HasSubstr("take more than 67108864 bytes"));
 }
 
 TEST_F(Reader, WantsEachReferenceToBeKnown) {

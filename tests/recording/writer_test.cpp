@@ -111,6 +111,8 @@ TEST_F(Writer, RefusesWhatNobodyWouldReadAndGoesOn) {
                 writer.write({channel, 1, 1, 1, {large.get(), recording::kMaxChunkBytes}});
               }),
               HasSubstr("268435456 bytes are more than"));
+  const recording::McapSchema schema{"s", "x", std::string(recording::kMaxDeclaredBytes, 'x')};
+  EXPECT_THAT(message_of([&] { writer.add_schema(schema); }), HasSubstr("than the 67108864"));
   writer.write(message(channel, 2, "small"));
   writer.close();
   EXPECT_EQ(contents_of(path_).lines.back(), "message 1 2 1002 902 small");
