@@ -89,6 +89,7 @@ void write_summary(const recorder::Recorded& recorded, const std::string& file,
 
 evidence::RecordingInfo info_of(const RecordOptions& options, const std::string& instance) {
   evidence::RecordingInfo info;
+  info.program = "arbiter " ARBITER_VERSION;
   info.instance = instance;
   info.host = host_name();
   info.command = command_of(options);

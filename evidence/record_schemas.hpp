@@ -33,7 +33,6 @@ extern const std::array<RecordSchema, kRecordKinds> record_schemas;  // by kind
 
 // Payloads have channels of their own: the topic is the source, the schema's name its type.
 inline constexpr std::string_view kPayloadEncoding = "x-arbiter-bytes";
-inline constexpr std::string_view kLibrary = "arbiter";
 // Of the metadata record that each recording begins with.
 inline constexpr std::string_view kMetadataName = "arbiter.recording";
 inline constexpr std::string_view kFormat = "1";

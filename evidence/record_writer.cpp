@@ -202,7 +202,7 @@ std::int64_t wall_offset_now() {
 
 RecordWriter::RecordWriter(const std::string& path, const recording::McapOptions& options,
                            const RecordingInfo& info)
-    : file_(path, kLibrary, options), wall_offset_(info.wall_offset) {
+    : file_(path, info.program, options), wall_offset_(info.wall_offset) {
   file_.write_metadata(std::string(kMetadataName),
                        {{"format", std::string(kFormat)},
                         {"instance", info.instance},

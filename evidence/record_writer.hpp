@@ -14,6 +14,7 @@ namespace arbiter::evidence {
 
 // What the whole file is about.
 struct RecordingInfo {
+  std::string program = "arbiter";  // that writes it
   std::string instance;
   std::string host;
   std::string command;

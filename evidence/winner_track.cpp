@@ -78,8 +78,8 @@ void WinnerTrack::note_end(const std::string& source, ActivityWord word) {
 }
 
 void WinnerTrack::look_at_all(Nanoseconds time, WinnerChange::Why why) {
-  static const std::map<shm::PortId, std::string> kNoPorts;
-  const auto& ports = rules_ == nullptr ? kNoPorts : rules_->ports;
+  static const std::map<shm::PortId, std::string> no_ports;
+  const auto& ports = rules_ == nullptr ? no_ports : rules_->ports;
   std::vector<std::string> gone;
   for (const auto& [port, winner] : winners_) {
     const bool is_known =
@@ -122,9 +122,9 @@ void WinnerTrack::look_at(shm::PortId port, Nanoseconds time, WinnerChange::Why 
 }
 
 const std::string& WinnerTrack::name_of_source(shm::SourceId source) const {
-  static const std::string kNobody;
+  static const std::string nobody;
   const auto found = names_.find(source);
-  return found == names_.end() ? kNobody : found->second;
+  return found == names_.end() ? nobody : found->second;
 }
 
 }  // namespace arbiter::evidence

@@ -14,10 +14,10 @@ constexpr std::chrono::milliseconds kLookEvery{2};
 
 }  // namespace
 
-StatementWatch::StatementWatch(const wire::Caller& caller, const rules::Statement& statement,
+StatementWatch::StatementWatch(const wire::Caller& caller, rules::Statement statement,
                                std::function<void()> came_true,
                                std::function<void(const std::string&)> say)
-    : statement_(statement),
+    : statement_(std::move(statement)),
       came_true_(std::move(came_true)),
       say_(std::move(say)),
       instance_(std::make_shared<watch::Instance>(caller)),

@@ -16,7 +16,7 @@ class StatementWatch {
  public:
   // `came_true` is called on a thread of this, each time that the statement becomes true after it
   // was not; `say`, with why it cannot be judged, once for each reason.
-  StatementWatch(const wire::Caller& caller, const rules::Statement& statement,
+  StatementWatch(const wire::Caller& caller, rules::Statement statement,
                  std::function<void()> came_true, std::function<void(const std::string&)> say);
   StatementWatch(const StatementWatch&) = delete;
   StatementWatch& operator=(const StatementWatch&) = delete;

@@ -27,6 +27,7 @@ constexpr int kTries = 100;
 
 std::vector<evidence::ModelFile> files_of(const std::vector<rules::FileText>& texts) {
   std::vector<evidence::ModelFile> files;
+  files.reserve(texts.size());
   for (const rules::FileText& text : texts) files.push_back({text.path, text.content});
   return files;
 }

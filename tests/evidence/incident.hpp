@@ -100,7 +100,7 @@ class Incident {
   // Written and read.
   [[nodiscard]] std::string file() {
     const std::string path = directory_.path() + "/" + std::to_string(++files_) + ".mcap";
-    evidence::RecordWriter writer(path, {}, {"test", "host", "command", 5'000'000});
+    evidence::RecordWriter writer(path, {}, {"program", "test", "host", "command", 5'000'000});
     for (const auto& record : records_) writer.write(record);
     writer.close();
     return path;

@@ -72,7 +72,7 @@ TEST(SimulateRecording, SaysAtTheFirstThatDiffers) {
   low.publish(3);
   EXPECT_EQ(recording.end(), 0);
   const std::string forged = daemon.directory() + "/forged.mcap";
-  evidence::RecordWriter writer(forged, {}, {"test", "", "", 0});
+  evidence::RecordWriter writer(forged, {}, {"program", "test", "", "", 0});
   evidence::read_recording(recording.file(), evidence::Payloads::read,
                            [&](evidence::Record&& record) {
                              auto* arrival = std::get_if<evidence::Arrival>(&record);
