@@ -75,6 +75,8 @@ int run(int argc, char** argv) {
   arbiter::cli::add_play(app, exit_code);
   arbiter::cli::add_echo(app, exit_code);
   arbiter::cli::add_pub(app, exit_code);
+  arbiter::cli::add_record(app, exit_code);
+  arbiter::cli::add_replay(app, exit_code);
   arbiter::cli::add_recording(app, exit_code);
   arbiter::cli::add_status(app, exit_code);
   arbiter::cli::add_top(app, exit_code);

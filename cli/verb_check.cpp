@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/model_files.hpp"
+#include "cli/numbers.hpp"
 #include "cli/progress.hpp"
 #include "cli/verbs.hpp"
 #include "rules/ask/findings.hpp"
@@ -67,10 +68,6 @@ std::string problem_of_code(std::string& code) {
   return "no warning and no note has the code " + rules::quote(code) +
          (similar ? "; did you mean " + rules::quote(*similar) + "?" : ".") +
          " Errors cannot be silenced; what can be: " + all;
-}
-
-std::string counted(std::size_t count, const std::string& thing) {
-  return std::to_string(count) + ' ' + thing + (count == 1 ? "" : "s");
 }
 
 std::string summary_of(const rules::CompiledModel& model) {

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/recording_export.hpp"
 #include "cli/recording_info.hpp"
 #include "cli/verbs.hpp"
 
@@ -51,14 +52,16 @@ void add_repair(CLI::App& parent, int& exit_code) {
 
 void add_recording(CLI::App& app, int& exit_code) {
   CLI::App* verb =
-      app.add_subcommand("recording", "Show what a recording's file has, or repair one");
+      app.add_subcommand("recording", "Show what a recording's file has, repair one, or export it");
   verb->require_subcommand(1);
   add_info(*verb, exit_code);
   add_repair(*verb, exit_code);
+  add_export(*verb, exit_code);
   verb->footer(
       "Examples:\n"
       "  arbiter recording info incident.mcap\n"
-      "  arbiter recording repair incident.mcap -o whole.mcap\n\n"
+      "  arbiter recording repair incident.mcap -o whole.mcap\n"
+      "  arbiter recording export incident.mcap --trace trace.csv\n\n"
       "Exit codes: 0 done; 1 the file is not whole (info); 2 wrong use, or a file that cannot be "
       "opened\nor written");
 }

@@ -12,6 +12,7 @@
 
 #include "cli/model_files.hpp"
 #include "cli/progress.hpp"
+#include "cli/simulate_recording.hpp"
 #include "cli/verbs.hpp"
 #include "cli/why_simulated.hpp"
 #include "rules/ask/report.hpp"
@@ -25,6 +26,7 @@ namespace {
 struct SimulateOptions {
   rules::ModelFiles files;
   std::string trace;
+  std::string recording;
   std::string why;  // all_ports, or the port; empty: no
   double effort = 1;
   bool json = false;
@@ -83,6 +85,12 @@ void replay(const std::vector<rules::TraceEvent>& events, const Use& use) {
   }
 }
 
+void require_model_and_trace(const SimulateOptions& options) {
+  if (options.files.models.empty()) throw CLI::RequiredError("MODEL");
+  if (options.trace.empty()) throw CLI::RequiredError("--trace");
+  if (options.json && options.why.empty()) throw CLI::RequiresError("--json", "--why");
+}
+
 // All problems, those of the trace as well as those of the model, come before the first result.
 int simulate(const SimulateOptions& options) {
   require_no_port_among_files(options);
@@ -117,21 +125,41 @@ void add_simulate(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<SimulateOptions>();
   CLI::App* verb =
       app.add_subcommand("simulate", "Replay a trace, and show what would have been delivered");
-  add_model_options(*verb, options->files);
-  verb->add_option("--trace", options->trace, "CSV: t_ns,source or t_ns,source,event")
-      ->type_name("FILE")
-      ->required();
+  add_model_options(*verb, options->files).required(false);
+  auto* trace = verb->add_option("--trace", options->trace, "CSV: t_ns,source or t_ns,source,event")
+                    ->type_name("FILE");
+  auto* recording =
+      verb->add_option("--recording", options->recording,
+                       "In place of a trace: take each decision of a recording again, and compare "
+                       "it with the live one. With a model: what would be different under that")
+          ->type_name("FILE")
+          ->excludes(trace);
+  verb->add_option("--model", options->files.models, "The same as MODEL")->type_name("FILE");
   // A flag takes a value only behind '=': what follows it may be the model.
   auto* why = verb->add_flag("--why", options->why,
                              "Instead of the CSV, show each change of a winner and each discarded "
                              "arrival, with its cause; --why=PORT: for this port only");
   add_effort_option(*verb, options->effort);
-  verb->add_flag("--json", options->json, "With --why: one object a line")->needs(why);
+  why->excludes(recording);
+  verb->add_flag("--json", options->json,
+                 "With --why: one object a line. With --recording: one object");
   verb->footer(
       "Example:\n"
       "  arbiter simulate search_and_track.xml --trace trace.csv\n"
-      "  arbiter simulate search_and_track.xml --trace trace.csv --why=/Gaze/pos:i");
-  verb->callback([options, &exit_code] { exit_code = simulate(*options); });
+      "  arbiter simulate search_and_track.xml --trace trace.csv --why=/Gaze/pos:i\n"
+      "  arbiter simulate --recording incident.mcap\n"
+      "  arbiter simulate --recording incident.mcap --model corrected.xml\n\n"
+      "Exit codes: 0 done; with --recording: all is as it was; 1 an error in the model or trace; "
+      "with\n--recording: something differs; 2 wrong use, or a file that cannot be opened");
+  verb->callback([options, &exit_code] {
+    if (!options->recording.empty()) {
+      exit_code =
+          simulate_recording({options->recording, options->files, options->effort, options->json});
+      return;
+    }
+    require_model_and_trace(*options);
+    exit_code = simulate(*options);
+  });
 }
 
 }  // namespace arbiter::cli

@@ -15,6 +15,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/condition.hpp"
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
@@ -41,27 +42,11 @@ struct WaitOptions {
   bool json = false;
 };
 
-// Throws CLI::ValidationError, so that it is wrong use.
-rules::Statement read_condition(const std::string& text) {
-  const rules::TextFile file(kArgument, text);
-  rules::Diagnostics diagnostics;
-  rules::Text condition(file, 0);
-  condition.append(file.content(), 0);
-  if (condition.is_blank()) throw CLI::ValidationError(kArgument, "the condition is empty");
-  if (rules::check_characters(file, diagnostics)) {
-    if (auto parsed = rules::parse_statement(condition, diagnostics)) {
-      return {rules::collapse_blanks(condition.bytes()), condition.where(), std::move(*parsed)};
-    }
-  }
-  rules::write_text(std::cerr, diagnostics);
-  throw CLI::ValidationError(kArgument, "the condition cannot be read");
-}
-
 class Waiting {
  public:
   explicit Waiting(const WaitOptions& options)
       : options_(options),
-        condition_(read_condition(options.condition)),
+        condition_(read_condition(kArgument, options.condition)),
         started_(shm::monotonic_now()),
         instance_(follow_instance("wait", options.instance)),
         statement_(instance_, condition_) {}

@@ -18,6 +18,8 @@ void add_simulate(CLI::App& app, int& exit_code);
 void add_play(CLI::App& app, int& exit_code);
 void add_echo(CLI::App& app, int& exit_code);
 void add_pub(CLI::App& app, int& exit_code);
+void add_record(CLI::App& app, int& exit_code);
+void add_replay(CLI::App& app, int& exit_code);
 void add_recording(CLI::App& app, int& exit_code);
 void add_status(CLI::App& app, int& exit_code);
 void add_deactivate(CLI::App& app, int& exit_code);

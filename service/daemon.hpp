@@ -102,7 +102,7 @@ class Daemon final : private Takeover::Host {
   void admit_clients();
   void turn_away_client();
   void drop(ClientId id) override;
-  void log_end_of(const Client& client, bool is_away) const;
+  void log_end_of(const Client& client, bool is_away);
   void drop_oldest_silent_client();
   void look_in_flight(shm::Nanoseconds now);
   void plan_to_look_in_flight();

@@ -108,7 +108,7 @@ void Daemon::admit_clients() {
 }
 
 // Whoever ends in good order has closed its ports before.
-void Daemon::log_end_of(const Client& client, bool is_away) const {
+void Daemon::log_end_of(const Client& client, bool is_away) {
   Event event{EventKind::kLeft, {client.name}};
   if (!client.ports.empty()) event.kind = is_away ? EventKind::kAway : EventKind::kDied;
   for (const shm::PortInstance port : client.ports) {
@@ -117,6 +117,9 @@ void Daemon::log_end_of(const Client& client, bool is_away) const {
     } else if (const InputPort* const input = switchboard_.input(port)) {
       event.ports.push_back(input->name->name);
     }
+  }
+  if (event.kind == EventKind::kDied) {
+    takeover_.deaths().note(event, client.pid(), client.user());
   }
   log_event(event, log::level::info, "{} left, {} ports with it", client.description(),
             client.ports.size());

@@ -210,7 +210,7 @@ void Daemon::answer_status(shm::Nanoseconds now) {
     document = make_document(
         status_document({instance_, board_, changes_.library(), changes_.in_force(),
                          changes_.history(), names_, registry_, switchboard_, takeover_.strangers(),
-                         clients_.size(), changes_.reloads_refused()},
+                         takeover_.deaths(), clients_.size(), changes_.reloads_refused()},
                         now));
   } catch (const std::exception& error) {  // no descriptors are left
     why_not = error.what();

@@ -109,6 +109,7 @@ class Document {
     for (const Stranger* each : of_.strangers.living()) {
       status.strangers.push_back(status_of(*each));
     }
+    status.deaths.assign(of_.deaths.all().begin(), of_.deaths.all().end());
     for (const auto& each : of_.directory.sources()) {
       if (is_worth_showing(*each)) status.sources.push_back(source(*each));
     }

@@ -7,6 +7,7 @@
 #include "service/models/board.hpp"
 #include "service/models/history.hpp"
 #include "service/ports/switchboard.hpp"
+#include "service/takeover/deaths.hpp"
 #include "service/takeover/strangers.hpp"
 
 namespace arbiter::service {
@@ -21,6 +22,7 @@ struct StatusOf {
   const Registry& registry;
   const Switchboard& switchboard;
   const Strangers& strangers;
+  const Deaths& deaths;
   std::size_t clients = 0;
   std::uint64_t reloads_refused = 0;
 };

@@ -57,7 +57,9 @@ class ModelInForce {
   // The files were read again after it: it has been rolled back to.
   [[nodiscard]] bool is_older() const { return document_.as_loaded == false; }
 
-  // Of the models that could be switched to, the first that connects something to the port, or that
+  // The models that could be switched to.
+  [[nodiscard]] const std::vector<wire::OtherModel>& others() const { return document_.others; }
+  // Of these, the first that connects something to the port, or that
   // source if one is given.
   [[nodiscard]] std::optional<std::string> other_that_mentions(
       const std::string& port, const std::optional<std::string>& source = {}) const;

@@ -99,6 +99,15 @@ void describe(auto& field, Is<StrangerStatus> auto& of) {
   field("inputs", of.inputs);
 }
 
+void describe(auto& field, Is<DeathStatus> auto& of) {
+  field("node", of.node);
+  field("pid", of.pid);
+  field("user", of.user);
+  field("at_ns", of.at);
+  field("outputs", of.outputs);
+  field("inputs", of.inputs);
+}
+
 void describe(auto& field, Is<OpenOutput> auto& of) {
   field("component", of.component);
   field("taps", of.taps);
@@ -189,6 +198,7 @@ void describe(auto& field, Is<Status> auto& of) {
   field("history", of.history);
   field("clients", of.clients);
   field("strangers", of.strangers);
+  field("deaths", of.deaths);
   field("sources", of.sources);
   field("inputs", of.inputs);
 }

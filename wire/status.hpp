@@ -73,6 +73,16 @@ struct StrangerStatus {
   std::vector<std::string> inputs;
 };
 
+// A component that ended without closing its ports.
+struct DeathStatus {
+  std::string node;
+  std::int32_t pid = 0;
+  std::uint32_t user = 0;
+  shm::Nanoseconds at = 0;  // CLOCK_MONOTONIC: when the daemon learned of it
+  std::vector<std::string> outputs;
+  std::vector<std::string> inputs;
+};
+
 // An output port that a component has open.
 struct OpenOutput {
   Component component;
@@ -176,6 +186,7 @@ struct Status {
   std::vector<PastModelStatus> history;  // the latest first
   std::uint64_t clients = 0;
   std::vector<StrangerStatus> strangers;
+  std::vector<DeathStatus> deaths;  // the latest first
   std::vector<SourceStatus> sources;
   std::vector<InputStatus> inputs;
 

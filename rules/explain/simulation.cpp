@@ -1,5 +1,6 @@
 #include "rules/explain/simulation.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "rules/text/csv.hpp"
@@ -78,13 +79,22 @@ PortOutcome Simulation::outcome_at(shm::PortId port, const TraceEvent& event) {
   PortOutcome outcome;
   if (event.kind == TraceKind::kArrival) {
     const shm::ConnectionIndex connection = table_.find(ids_.at(event.source), port);
-    shm::Decider decider(table_, *pages_, clock_);
-    outcome.delivered =
-        connection != shm::kNone && decider.decide(table_.rule(connection)) == shm::Verdict::kWins;
+    outcome.delivered = connection != shm::kNone && is_delivered(table_.rule(connection));
   }
   const shm::SourceId winner = winner_at(port);
   if (winner != shm::kNone) outcome.winner = sources_[winner];
   return outcome;
+}
+
+bool Simulation::is_delivered(const shm::Rule& rule) {
+  shm::Decider decider(table_, *pages_, clock_);
+  return decider.decide(rule) == shm::Verdict::kWins;
+}
+
+std::optional<shm::PortId> Simulation::find_port(const std::string& port) const {
+  const auto found = std::lower_bound(ports_.begin(), ports_.end(), port);
+  if (found == ports_.end() || *found != port) return std::nullopt;
+  return static_cast<shm::PortId>(found - ports_.begin());
 }
 
 shm::SourceId Simulation::winner_at(shm::PortId port) const {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <unordered_map>
@@ -37,6 +38,8 @@ class Simulation {
   [[nodiscard]] bool knows(const std::string& source) const { return ids_.contains(source); }
 
   [[nodiscard]] shm::SourceId source_id(const std::string& source) const { return ids_.at(source); }
+  // Nothing: the model does not have it.
+  [[nodiscard]] std::optional<shm::PortId> find_port(const std::string& port) const;
 
   // The ports that an event has a row for, in byte order: those that an arrival's source is
   // connected to or that read it, for anything else each arbitrated port.
@@ -45,6 +48,13 @@ class Simulation {
 
   // Takes an event, the time of which must not fall, and says what came of it at each of its ports.
   std::vector<OutcomeRow> step(const TraceEvent& event);
+
+  // For recordings: what a source is like, and what would become of an arrival at this moment. The
+  // connection must be one that find() of the table gives.
+  void set_activity(shm::SourceId source, shm::ActivityWord word) {
+    activity_[source].word.store(word, std::memory_order_relaxed);
+  }
+  [[nodiscard]] bool is_delivered(const shm::Rule& rule);
 
   // Lets time pass without an event; it must not fall.
   void advance_to(shm::Nanoseconds time) { clock_.now = time; }

@@ -171,7 +171,7 @@ void Takeover::set_away(Client& client) {
   host_.watch_absentee(absentee.process, client.node);
 }
 
-void Takeover::log_end_of(const Absentee& absentee) const {
+void Takeover::log_end_of(const Absentee& absentee) {
   std::optional<LogAccount> account;
   if (absentee.user) account.emplace(*absentee.user);
   Event event{EventKind::kDied};
@@ -182,6 +182,7 @@ void Takeover::log_end_of(const Absentee& absentee) const {
   for (const auto& input : names_.inputs()) {
     if (absentee.ports.contains(input->away)) event.ports.push_back(input->name);
   }
+  deaths_.note(event, absentee.pid, absentee.user.value_or(0));
   log_event(event, log::level::info, "process {} has ended, {} ports with it", absentee.pid,
             absentee.ports.size());
 }

@@ -29,6 +29,7 @@
 #include "service/policy/shares.hpp"
 #include "service/ports/port_names.hpp"
 #include "service/ports/switchboard.hpp"
+#include "service/takeover/deaths.hpp"
 #include "service/takeover/strangers.hpp"
 #include "shm/activity.hpp"
 #include "shm/file_descriptor.hpp"
@@ -95,6 +96,7 @@ class Takeover {
   // One that is not taken back says what it has, all the same.
   void hear_stranger(const Client& client, const wire::Message& message) noexcept;
   [[nodiscard]] const Strangers& strangers() const { return strangers_; }
+  [[nodiscard]] Deaths& deaths() { return deaths_; }
   // That component is no stranger from now on.
   void know(const Client& client);
 
@@ -128,7 +130,7 @@ class Takeover {
   void find_absentees();
   void add_absentee(const Owner& owner);
   void take_back(Client& client, const wire::Received& hello);
-  void log_end_of(const Absentee& absentee) const;
+  void log_end_of(const Absentee& absentee);
   void end_conversation_of(const Client& client, NodeId node);
   [[nodiscard]] static bool is_that(const Client& client, const Absentee& absentee);
   // Nothing is kept for the node that a client was and has nothing left of: what it closed without
@@ -153,6 +155,7 @@ class Takeover {
   shm::Nanoseconds started_ = 0;
   std::map<NodeId, Absentee> absentees_;
   Strangers strangers_;
+  Deaths deaths_;
   std::vector<ClientId> waiting_;  // have said hello, and are not welcomed yet
 };
 

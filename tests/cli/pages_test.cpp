@@ -19,6 +19,8 @@
 #include <map>
 #include <sstream>
 
+#include <arbiter/arbiter.hpp>
+
 #include "tests/support/daemon.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -203,6 +205,23 @@ TEST(Pages, OnWatchingARunningInstanceRun) {
   const TemporaryDirectory directory;
   Counts counts = run_listings(page, directory.path());
   EXPECT_GE(counts["console"], 1);
+}
+
+// The same, and with a motor that takes what is delivered.
+TEST(Pages, OnAnIncidentRun) {
+  const std::string page = ARBITER_SOURCE "/docs/incident.md";
+  const Listing model = listings_of(page).at(0);
+  ASSERT_EQ(model.file, "base.xml");
+  const TemporaryDirectory directory;
+  const std::string file = directory.write("base.xml", model.content);
+  Daemon::Options options;
+  options.without_model = true;
+  options.arguments = {"--model", file};
+  const Daemon daemon("", options);
+  Node node("motor");
+  const auto motor = node.input_port("/Base/cmd:i");
+  Counts counts = run_listings(page, directory.path());
+  EXPECT_GE(counts["console"], 6);
 }
 
 // What the tests above rest upon.

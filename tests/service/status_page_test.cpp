@@ -102,12 +102,26 @@ void see_strangers(ObservedFields& observed) {
   observed.see(status);
 }
 
+void see_deaths(ObservedFields& observed) {
+  Daemon daemon(single_model());
+  Component arm("arm");
+  ASSERT_EQ(arm.tell("input /in 8 1 0"), "open");
+  ASSERT_EQ(arm.tell("output /out"), "open");
+  arm.kill();
+  json status = daemon.status();
+  while (status["deaths"].empty()) status = daemon.status();
+  EXPECT_EQ(status["deaths"][0]["outputs"], json::array({"/out"}));
+  EXPECT_EQ(status["deaths"][0]["inputs"], json::array({"/in"}));
+  observed.see(status);
+}
+
 TEST(StatusPage, NamesEachFieldOfTheDocumentAndNoOther) {
   ObservedFields observed;
   see_models(observed);
   see_no_model(observed);
   see_ports(observed);
   see_strangers(observed);
+  see_deaths(observed);
   EXPECT_THAT(disagreements(status_page(), observed), IsEmpty());
 }
 

@@ -1,0 +1,64 @@
+#include "cli/recording_export.hpp"
+
+#include <functional>
+#include <iostream>
+#include <memory>
+#include <sstream>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/output_file.hpp"
+#include "cli/recording_compile.hpp"
+#include "evidence/export.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+struct ExportOptions {
+  std::string file;
+  std::string trace;
+  std::string csv;
+};
+
+int export_recording(const ExportOptions& options) {
+  if (options.trace.empty() && options.csv.empty()) {
+    throw CLI::ValidationError("export", "say what to write: --trace FILE, --csv FILE, or both");
+  }
+  const auto recorded = evidence::load_recording(options.file);
+  if (!recorded.about.end.is_whole) {
+    std::cerr << "arbiter: " << options.file << ": " << recorded.about.end.problem
+              << "; what comes before is exported\n";
+  }
+  evidence::Models models(recording_compiler(1));
+  const auto write = [&](const std::string& path, const auto& writer) {
+    if (path.empty()) return;
+    std::ostringstream text;
+    writer(recorded, models, text);
+    write_output(path, text.str());
+  };
+  write(options.trace, evidence::write_trace);
+  write(options.csv, evidence::write_decisions);
+  return 0;
+}
+
+}  // namespace
+
+void add_export(CLI::App& parent, int& exit_code) {
+  const auto options = std::make_shared<ExportOptions>();
+  CLI::App* verb = parent.add_subcommand("export", "Write a recording as CSV");
+  verb->add_option("FILE", options->file, "A recording that `arbiter record` has made")->required();
+  verb->add_option("--trace", options->trace,
+                   "What arrived and was deactivated, as `arbiter simulate --trace` reads it")
+      ->type_name("FILE");
+  verb->add_option("--csv", options->csv,
+                   "What was decided live, in the form that `arbiter simulate` prints")
+      ->type_name("FILE");
+  verb->footer(
+      "Exit codes: 0 written; 1 a model of the recording cannot be loaded; 2 wrong use, or a file "
+      "that\ncannot be opened or written\n\n"
+      "Example:\n  arbiter recording export incident.mcap --trace trace.csv --csv decisions.csv");
+  verb->callback([options, &exit_code] { exit_code = export_recording(*options); });
+}
+
+}  // namespace arbiter::cli

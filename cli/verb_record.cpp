@@ -1,0 +1,245 @@
+// arbiter record: writes down what happens in a running instance.
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/flight_recorder.hpp"
+#include "cli/live.hpp"
+#include "cli/numbers.hpp"
+#include "cli/verbs.hpp"
+#include "recorder/recorder.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+struct RecordOptions {
+  std::string out;
+  std::vector<std::string> ports;
+  bool all = false;
+  std::string payloads = "none";
+  std::string compression = "zstd";
+  shm::Nanoseconds duration = shm::kForever;
+  shm::Nanoseconds period = 1'000'000;
+  FlightOptions flight;
+  bool is_dump = false;
+  std::string instance;
+};
+
+recording::Compression compression_of(const std::string& name) {
+  if (name == "none") return recording::Compression::none;
+  return name == "lz4" ? recording::Compression::lz4 : recording::Compression::zstd;
+}
+
+std::string host_name() {
+  char name[256] = {};
+  return gethostname(name, sizeof name - 1) == 0 ? name : "";
+}
+
+std::string command_of(const RecordOptions& options) {
+  std::string text = "arbiter record -o " + options.out;
+  for (const std::string& port : options.ports) text += " --port " + port;
+  return text + " --payloads " + options.payloads;
+}
+
+recorder::RecorderOptions recorder_options(const RecordOptions& options) {
+  recorder::RecorderOptions result;
+  result.caller = caller("record", options.instance);
+  result.caller.answer_time = std::chrono::milliseconds(1000);
+  result.node = live_options(options.instance);
+  result.ports = options.ports;
+  result.payloads = options.payloads;
+  result.period = options.period;
+  result.say = [](const std::string& text) { std::cerr << "arbiter: " + text + '\n'; };
+  return result;
+}
+
+std::string size_text(std::uint64_t bytes) {
+  char text[64];
+  const auto kib = static_cast<double>(bytes) / 1024;
+  std::snprintf(text, sizeof text, kib < 1024 ? "%.1f KiB" : "%.1f MiB",
+                kib < 1024 ? kib : kib / 1024);
+  return text;
+}
+
+void write_summary(const recorder::Recorded& recorded, const std::string& file,
+                   std::uint64_t bytes) {
+  std::ostringstream out;
+  out << counted(recorded.arrivals, "arrival") << " of " << counted(recorded.sources, "source")
+      << " and " << counted(recorded.winner_changes, "change") << " of winner in "
+      << seconds_text(recorded.time) << ": " << file << ", " << size_text(bytes) << '\n';
+  if (recorded.lost_events != 0 || recorded.lost_samples != 0) {
+    out << "missed " << counted(recorded.lost_events, "event") << ", and the payloads of "
+        << counted(recorded.lost_samples, "sample") << "; the file says where\n";
+  }
+  std::cout << out.str();
+}
+
+evidence::RecordingInfo info_of(const RecordOptions& options, const std::string& instance) {
+  evidence::RecordingInfo info;
+  info.program = "arbiter " ARBITER_VERSION;
+  info.instance = instance;
+  info.host = host_name();
+  info.command = command_of(options);
+  info.wall_offset = evidence::wall_offset_now();
+  return info;
+}
+
+int record_into_file(const RecordOptions& options, const recorder::RecorderOptions& settings,
+                     shm::Nanoseconds end) {
+  const auto interrupts = catch_interrupts();
+  recorder::FileSink sink(options.out, {compression_of(options.compression)},
+                          info_of(options, settings.caller.instance));
+  try {
+    recorder::Recorder recorder(settings, sink);
+    std::cerr << "arbiter: recording " + counted(recorder.taps(), "source") + " into " +
+                     options.out + '\n';
+    recorder.run(end, interrupts.get(), [] { return false; });
+    const auto recorded = recorder.finish();
+    write_summary(recorded, options.out, sink.writer().bytes());
+  } catch (const recording::McapError&) {
+    throw;  // what was written stays
+  } catch (...) {
+    if (sink.writer().count_of(evidence::RecordKind::kStart) == 0) ::unlink(options.out.c_str());
+    throw;
+  }
+  return 0;
+}
+
+int record(RecordOptions& options) {
+  if (options.is_dump) return dump(options.out);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that has become too large is an error as any other
+  const auto settings = recorder_options(options);
+  const shm::Nanoseconds started = shm::monotonic_now();
+  const shm::Nanoseconds end =
+      options.duration >= shm::kForever - started ? shm::kForever : started + options.duration;
+  if (options.flight.span == 0) return record_into_file(options, settings, end);
+  options.flight.prefix = options.out;
+  options.flight.end = end;
+  return fly(options.flight, settings, {compression_of(options.compression)},
+             info_of(options, settings.caller.instance));
+}
+
+// A time, which may be in minutes: 5min.
+shm::Nanoseconds read_span(const std::string& option, const std::string& text) {
+  constexpr std::string_view kMinutes = "min";
+  if (!std::string_view(text).ends_with(kMinutes)) return read_time(option, text);
+  const std::string number = text.substr(0, text.size() - kMinutes.size());
+  const shm::Nanoseconds seconds = read_time(option, number + "s");
+  if (seconds > shm::kMaxTime / 60) throw CLI::ValidationError(option, "is too long");
+  return seconds * 60;
+}
+
+// 64MiB, 500KiB, 1GiB.
+std::size_t read_size(const std::string& text) {
+  std::size_t used = 0;
+  std::uint64_t number = 0;
+  try {
+    number = std::stoull(text, &used);
+  } catch (const std::exception&) {
+    used = 0;
+  }
+  const std::string unit = text.substr(std::min(used, text.size()));
+  const int shift = unit == "KiB" ? 10 : unit == "MiB" ? 20 : unit == "GiB" ? 30 : -1;
+  if (used == 0 || text.front() == '-' || shift < 0 || number == 0 || number > 4096) {
+    throw CLI::ValidationError("--memory", '"' + text +
+                                               "\" is no size, such as 64MiB: 1 to 4096, "
+                                               "and KiB, MiB or GiB");
+  }
+  return static_cast<std::size_t>(number) << shift;
+}
+
+void add_flight_options(CLI::App& verb, const std::shared_ptr<RecordOptions>& options) {
+  auto* ring = verb.add_option_function<std::string>(
+                       "--ring",
+                       [options](const std::string& text) {
+                         options->flight.span = read_span("--ring", text);
+                         if (options->flight.span < 1) {
+                           throw CLI::ValidationError("--ring", "must be more than 0s");
+                         }
+                       },
+                       "Flight recorder: keep the last minutes in memory, and write them to "
+                       "FILE-TIME-WHY.mcap at SIGUSR1, at --dump, when --when becomes true, and "
+                       "when a component dies")
+                   ->type_name("DURATION");
+  verb.add_option_function<std::string>(
+          "--memory",
+          [options](const std::string& text) { options->flight.memory = read_size(text); },
+          "What --ring may take up (default 64MiB): older records give way")
+      ->type_name("SIZE")
+      ->needs(ring);
+  verb.add_option(
+          "--when", options->flight.when,
+          "With --ring: write when this becomes true, a statement as `arbiter wait --until` "
+          "reads it")
+      ->type_name("STATEMENT")
+      ->needs(ring);
+  verb.add_flag("--dump", options->is_dump,
+                "Ask the flight recorder that was started with this -o to write, and wait for it")
+      ->excludes(ring);
+}
+
+}  // namespace
+
+void add_record(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<RecordOptions>();
+  CLI::App* verb =
+      app.add_subcommand("record", "Write down what happens: arrivals, decisions, winners");
+  verb->add_option(
+          "-o,--output", options->out,
+          "The recording, a new file: .mcap; with --ring, what the files' names begin with")
+      ->type_name("FILE")
+      ->required();
+  auto* all = verb->add_flag("--all", options->all, "All sources that there are; the default");
+  verb->add_option("--port", options->ports,
+                   "Input ports whose sources are recorded: those they are connected to, and those "
+                   "their rules read; a pattern such as '/Arm/*'; repeatable")
+      ->type_name("PATTERN")
+      ->excludes(all);
+  verb->add_option("--payloads", options->payloads,
+                   "Whose samples are kept: all, none (default), or a pattern of output ports")
+      ->type_name("all|none|PATTERN");
+  verb->add_option("--compression", options->compression, "zstd (default), lz4 or none")
+      ->check(CLI::IsMember({"zstd", "lz4", "none"}));
+  verb->add_option_function<std::string>(
+          "--duration",
+          [options](const std::string& text) { options->duration = read_span("--duration", text); },
+          "End after this time, such as 30s; by default, when interrupted")
+      ->type_name("DURATION");
+  verb->add_option_function<std::string>(
+          "--period",
+          [options](const std::string& text) {
+            options->period = read_time("--period", text);
+            if (options->period < 100'000 || options->period > 1'000'000'000) {
+              throw CLI::ValidationError("--period", "must be 100us to 1s");
+            }
+          },
+          "How often taps are read (default 1ms): what happened closer together than this may be "
+          "of unknown order")
+      ->type_name("DURATION");
+  add_flight_options(*verb, options);
+  add_instance_option(*verb, options->instance);
+  verb->footer(
+      "Example:\n"
+      "  arbiter record -o incident.mcap\n"
+      "  arbiter record -o arm.mcap --port '/Arm/*' --payloads all --duration 30s\n"
+      "  arbiter record --ring 5min -o /var/lib/robot/flight "
+      "--when 'winner(/Arm/pos:i) = /Teleop/pos:o and not /Deadman:o'\n"
+      "  arbiter record --dump -o /var/lib/robot/flight\n\n"
+      "Ends at Ctrl-C, or SIGTERM, with a whole file. Whoever records needs the policy's `tap`.");
+  verb->callback([options, &exit_code] { exit_code = record(*options); });
+}
+
+}  // namespace arbiter::cli

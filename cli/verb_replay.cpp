@@ -1,0 +1,76 @@
+// arbiter replay: publishes a recording into a running instance.
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/live.hpp"
+#include "cli/numbers.hpp"
+#include "cli/verbs.hpp"
+#include "recorder/replayer.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+struct ReplayVerb {
+  std::string file;
+  double rate = 1;
+  bool is_fast = false;
+  std::vector<std::string> sources;
+  std::vector<std::string> ports;
+  std::string instance;
+};
+
+int replay(const ReplayVerb& verb) {
+  const auto interrupts = catch_interrupts();
+  recorder::ReplayOptions options;
+  options.file = verb.file;
+  options.node = live_options(verb.instance);
+  options.rate = verb.is_fast ? 0 : verb.rate;
+  options.sources = verb.sources;
+  options.ports = verb.ports;
+  options.say = [](const std::string& text) { std::cerr << "arbiter: " + text + '\n'; };
+  recorder::Replayer replayer(options);
+  const auto replayed = replayer.run(interrupts);
+  std::cout << counted(replayed.samples, "sample") << ", " << counted(replayed.signals, "signal")
+            << " and " << counted(replayed.deactivations, "deactivation") << " of "
+            << counted(replayed.sources, "source") << " in " << seconds_text(replayed.time) << '\n';
+  if (replayed.without_payload != 0) {
+    std::cout << counted(replayed.without_payload, "sample")
+              << " whose payload is not in the recording became signals\n";
+  }
+  return replayed.was_interrupted ? 1 : 0;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<ReplayVerb>();
+  CLI::App* verb = app.add_subcommand("replay", "Publish a recording into a running instance");
+  verb->add_option("FILE", options->file, "A recording with payloads")->required();
+  auto* fast = verb->add_flag("--as-fast-as-possible", options->is_fast,
+                              "Without waiting; arrivals bear the times of now");
+  verb->add_option("--rate", options->rate,
+                   "How many times faster than it was recorded (default 1); T stays what it is")
+      ->type_name("X")
+      ->check(CLI::Range(1e-3, 1e6))
+      ->excludes(fast);
+  verb->add_option("--source", options->sources,
+                   "Only output ports of this pattern, such as '/Arm/*'; repeatable")
+      ->type_name("PATTERN");
+  verb->add_option("--port", options->ports,
+                   "Only sources that input ports of this pattern are connected to, or read; "
+                   "repeatable")
+      ->type_name("PATTERN");
+  add_instance_option(*verb, options->instance);
+  verb->footer(
+      "Example:\n"
+      "  arbiter replay incident.mcap --instance desk\n"
+      "  arbiter replay incident.mcap --port /Arm/pos:i --rate 2\n\n"
+      "The ports must be free: stop their components, or use an instance of its own.");
+  verb->callback([options, &exit_code] { exit_code = replay(*options); });
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,37 @@
+// Reads records from a container file. What a file says is judged before it is used: anybody may
+// have made it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "evidence/records.hpp"
+#include "recording/mcap.hpp"
+
+namespace arbiter::evidence {
+
+// The file is no recording, or one of a later version: says what and where.
+class RecordError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+struct ReadRecording {
+  std::string instance;
+  std::string host;
+  std::int64_t wall_offset = 0;
+  std::uint64_t records = 0;
+  recording::McapEnd end;  // a file that was cut short is read up to its last whole chunk
+};
+
+enum class Payloads : std::uint8_t { pass_over, read };
+
+// Calls `use` for each record, in the file's order, which for those of one source is the order in
+// which they happened. Throws McapError, RecordError.
+ReadRecording read_recording(const std::string& path, Payloads payloads,
+                             const std::function<void(Record&&)>& use);
+
+}  // namespace arbiter::evidence

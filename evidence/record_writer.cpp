@@ -1,0 +1,263 @@
+#include "evidence/record_writer.hpp"
+
+#include <time.h>
+
+#include <charconv>
+#include <span>
+#include <string_view>
+#include <type_traits>
+
+#include "evidence/activity_json.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::evidence {
+namespace {
+
+// One object. Arrivals come by the ten thousand: each is put together in memory that is there.
+class JsonLine {
+ public:
+  explicit JsonLine(std::string& out) : out_(out) { out_.assign(1, '{'); }
+
+  JsonLine& add(std::string_view name, std::string_view text) {
+    key(name);
+    quote(text);
+    return *this;
+  }
+  template <class Number>
+  requires std::is_integral_v<Number> &&
+      (!std::is_same_v<Number, bool>)JsonLine& add(std::string_view name, Number number) {
+    key(name);
+    char digits[24];
+    const auto end = std::to_chars(digits, digits + sizeof digits, number).ptr;
+    out_.append(digits, end);
+    return *this;
+  }
+  JsonLine& add_flag(std::string_view name, bool value) {
+    key(name);
+    out_ += value ? "true" : "false";
+    return *this;
+  }
+  JsonLine& add(std::string_view name, const std::vector<std::string>& texts,
+                std::uint64_t mask = ~std::uint64_t{0}) {
+    key(name);
+    out_ += '[';
+    for (std::size_t i = 0; i < texts.size() && (i < 64 || mask == ~std::uint64_t{0}); ++i) {
+      if (i < 64 && (mask >> i & 1) == 0) continue;
+      if (out_.back() != '[') out_ += ',';
+      quote(texts[i]);
+    }
+    out_ += ']';
+    return *this;
+  }
+  JsonLine& add(std::string_view name, const std::vector<ModelFile>& files) {
+    key(name);
+    out_ += '[';
+    for (const ModelFile& file : files) {
+      if (out_.back() != '[') out_ += ',';
+      out_ += "{\"path\":";
+      quote(file.path);
+      out_ += ",\"text\":";
+      quote(file.text);
+      out_ += '}';
+    }
+    out_ += ']';
+    return *this;
+  }
+  JsonLine& add_activity(ActivityWord word) {
+    const WrittenActivity activity = written(word);
+    return add("activity", activity.kind).add("activity_ns", activity.time);
+  }
+  void end() { out_ += '}'; }
+
+ private:
+  void key(std::string_view name) {
+    if (out_.size() != 1) out_ += ',';
+    out_ += '"';
+    out_ += name;
+    out_ += "\":";
+  }
+  // The daemon lets only UTF-8 pass.
+  void quote(std::string_view text) {
+    constexpr std::string_view kHex = "0123456789abcdef";
+    out_ += '"';
+    for (const char byte : text) {
+      const auto code = static_cast<unsigned char>(byte);
+      if (byte == '"' || byte == '\\') {
+        out_ += '\\';
+        out_ += byte;
+      } else if (code < 0x20) {
+        out_ += "\\u00";
+        out_ += kHex[code >> 4];
+        out_ += kHex[code & 15];
+      } else {
+        out_ += byte;
+      }
+    }
+    out_ += '"';
+  }
+
+  std::string& out_;
+};
+
+struct Written {
+  RecordKind kind;
+  Nanoseconds time;
+};
+
+Written put(JsonLine& out, const Start& each) {
+  out.add("time_ns", each.time).add("instance", each.instance).add("ports", each.ports);
+  out.add("payloads", each.payloads);
+  return {RecordKind::kStart, each.time};
+}
+
+Written put(JsonLine& out, const Arrival& each) {
+  const auto& ports = each.context->destinations;
+  out.add("source", each.context->source)
+      .add("kind", each.is_sample ? "sample" : "signal")
+      .add("time_ns", each.time)
+      .add("seen_ns", each.seen)
+      .add("sequence", each.sequence)
+      .add("size", each.size)
+      .add("generation", each.generation)
+      .add_activity(each.word)
+      .add_flag("has_payload", each.payload.has_value())
+      .add("accepted", ports, each.masks.accepted)
+      .add("discarded", ports, each.masks.discarded)
+      .add("refused", ports, each.masks.refused)
+      .add("blind", ports, each.masks.blind);
+  return {RecordKind::kArrival, each.time};
+}
+
+Written put(JsonLine& out, const Deactivation& each) {
+  out.add("source", each.context->source).add("time_ns", each.time).add("seen_ns", each.seen);
+  out.add("sequence", each.sequence).add("generation", each.generation);
+  return {RecordKind::kDeactivation, each.time};
+}
+
+Written put(JsonLine& out, const SourceState& each) {
+  out.add("source", each.context->source)
+      .add("why", name_of(each.why))
+      .add("time_ns", each.time)
+      .add("seen_ns", each.seen)
+      .add("sequence", each.sequence)
+      .add("generation", each.generation)
+      .add("lost", each.lost)
+      .add_activity(each.word)
+      .add("type", each.context->type)
+      .add("type_size", each.context->size)
+      .add("type_alignment", each.context->alignment)
+      .add("destinations", each.context->destinations);
+  return {RecordKind::kState, each.seen};
+}
+
+Written put(JsonLine& out, const DestinationsChange& each) {
+  out.add("source", each.context->source).add("time_ns", each.time).add("seen_ns", each.seen);
+  out.add("destinations", each.context->destinations);
+  return {RecordKind::kDestinations, each.seen};
+}
+
+Written put(JsonLine& out, const PortChange& each) {
+  out.add("what", name_of(each.what)).add("direction", each.is_input ? "input" : "output");
+  out.add("port", each.port).add("node", each.node).add("pid", each.pid);
+  out.add("type", each.type).add("seen_ns", each.seen);
+  return {RecordKind::kPort, each.seen};
+}
+
+Written put(JsonLine& out, const ModelChange& each) {
+  std::vector<ModelFile> application;
+  if (each.application) application.push_back(*each.application);
+  out.add("time_ns", each.time).add("seen_ns", each.seen).add("generation", each.generation);
+  out.add("name", each.name).add("how", each.how).add("by", each.by);
+  out.add_flag("has_texts", each.has_texts).add("files", each.files);
+  out.add("application", application);
+  return {RecordKind::kModel, each.time == 0 ? each.seen : each.time};
+}
+
+Written put(JsonLine& out, const WinnerChange& each) {
+  out.add("port", each.port).add("winner", each.winner).add("before", each.before);
+  out.add("time_ns", each.time).add("why", name_of(each.why)).add("by", each.by);
+  out.add("generation", each.generation);
+  return {RecordKind::kWinner, each.time};
+}
+
+Written put(JsonLine& out, const Missed& each) {
+  out.add("source", each.source).add("from_ns", each.from).add("to_ns", each.to);
+  out.add("events", each.events).add("samples", each.samples).add("why", name_of(each.why));
+  out.add("text", each.text);
+  return {RecordKind::kMissed, each.to};
+}
+
+recording::McapTime as_wall(Nanoseconds time, std::int64_t offset) {
+  const std::int64_t wall = time + offset;
+  return wall < 0 ? 0 : static_cast<recording::McapTime>(wall);
+}
+
+}  // namespace
+
+std::int64_t wall_offset_now() {
+  timespec wall{};
+  clock_gettime(CLOCK_REALTIME, &wall);
+  return std::int64_t{wall.tv_sec} * 1'000'000'000 + wall.tv_nsec - shm::monotonic_now();
+}
+
+RecordWriter::RecordWriter(const std::string& path, const recording::McapOptions& options,
+                           const RecordingInfo& info)
+    : file_(path, info.program, options), wall_offset_(info.wall_offset) {
+  file_.write_metadata(std::string(kMetadataName),
+                       {{"format", std::string(kFormat)},
+                        {"instance", info.instance},
+                        {"host", info.host},
+                        {"command", info.command},
+                        {"clock", "CLOCK_MONOTONIC"},
+                        {"wall_offset_ns", std::to_string(info.wall_offset)}});
+  for (std::size_t kind = 0; kind < kRecordKinds; ++kind) {
+    const RecordSchema& schema = record_schemas[kind];
+    const auto id = file_.add_schema({std::string(schema.name), "jsonschema", schema.json()});
+    channels_[kind] = file_.add_channel({id, std::string(schema.topic), "json", {}});
+  }
+}
+
+void RecordWriter::write(const Record& record) {
+  JsonLine line(json_);
+  const Written written = std::visit([&](const auto& each) { return put(line, each); }, record);
+  line.end();
+  write_json(written.kind, written.time, json_);
+  const auto* arrival = std::get_if<Arrival>(&record);
+  if (arrival != nullptr && arrival->payload) write_payload(*arrival);
+}
+
+void RecordWriter::write_json(RecordKind kind, Nanoseconds time, const std::string& json) {
+  const auto index = static_cast<std::size_t>(kind);
+  const recording::McapTime wall = as_wall(time, wall_offset_);
+  const auto number = static_cast<std::uint32_t>(counts_[index]++);
+  file_.write({channels_[index], number, wall, wall, std::as_bytes(std::span(json))});
+}
+
+// Directly behind its arrival.
+void RecordWriter::write_payload(const Arrival& arrival) {
+  const recording::McapTime wall = as_wall(arrival.time, wall_offset_);
+  file_.write({channel_of(*arrival.context), static_cast<std::uint32_t>(arrival.sequence), wall,
+               wall, std::span(*arrival.payload)});
+}
+
+std::uint16_t RecordWriter::channel_of(const SourceContext& context) {
+  const std::string size = std::to_string(context.size);
+  const std::string alignment = std::to_string(context.alignment);
+  const std::string key = context.source + '\n' + context.type + '\n' + size + '\n' + alignment;
+  const auto [known, is_new] = payload_channels_.try_emplace(key, 0);
+  if (!is_new) return known->second;
+  std::uint16_t schema = 0;
+  if (!context.type.empty()) {
+    const auto [type, is_new_type] = types_.try_emplace(context.type, 0);
+    if (is_new_type) type->second = file_.add_schema({context.type, "", ""});
+    schema = type->second;
+  }
+  known->second =
+      file_.add_channel({schema,
+                         context.source,
+                         std::string(kPayloadEncoding),
+                         {{"type", context.type}, {"size", size}, {"alignment", alignment}}});
+  return known->second;
+}
+
+}  // namespace arbiter::evidence

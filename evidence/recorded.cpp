@@ -1,0 +1,109 @@
+#include "evidence/recorded.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace arbiter::evidence {
+namespace {
+
+class Loader {
+ public:
+  void take(Record&& record) {
+    if (const auto* start = std::get_if<Start>(&record)) {
+      runs_.emplace_back();
+      runs_.back().start = runs_.back().end = start->time;
+      runs_.back().ports = start->ports;
+      return;
+    }
+    if (runs_.empty()) throw RecordError("it does not begin with arbiter/start");
+    std::visit([this](auto&& each) { add(std::forward<decltype(each)>(each)); }, std::move(record));
+  }
+
+  std::vector<Run> finish() {
+    for (Run& run : runs_) {
+      std::stable_sort(run.decisions.begin(), run.decisions.end(),
+                       [](const Decision& one, const Decision& other) {
+                         return one.arrival().time < other.arrival().time;
+                       });
+    }
+    return std::move(runs_);
+  }
+
+ private:
+  Run& run() { return runs_.back(); }
+
+  // Each takes effect after the one before.
+  SourceHistory& add_step(const SourceContext& context, Step step) {
+    SourceHistory& history = run().sources[context.source];
+    if (!history.steps.empty()) {
+      step.seen = std::max(step.seen, history.steps.back().seen);
+    }
+    run().end = std::max(run().end, step.seen);
+    history.steps.push_back(step);
+    return history;
+  }
+
+  void add(Arrival&& each) {
+    SourceHistory& history = add_step(*each.context, {each.time, each.seen, each.word,
+                                                      Step::Kind::arrival, false, each.generation});
+    const auto step = static_cast<std::uint32_t>(history.steps.size() - 1);
+    run().decisions.push_back(
+        {&history, step, std::move(each.context), each.sequence, each.is_sample, each.masks});
+  }
+
+  void add(Deactivation&& each) {
+    add_step(*each.context, {each.time, each.seen, shm::deactivation(each.time),
+                             Step::Kind::deactivation, false, each.generation});
+  }
+
+  // Where a state says what was known already, nothing has happened in between: a value stands for
+  // one write (shm/activity.hpp).
+  void add(SourceState&& each) {
+    SourceHistory& history = run().sources[each.context->source];
+    run().lost += each.lost;
+    run().end = std::max(run().end, each.seen);
+    const bool is_known = !history.steps.empty() && history.steps.back().word == each.word;
+    if (is_known && each.lost == 0) return;
+    Step step{each.time, each.seen, each.word, Step::Kind::state, false, each.generation};
+    if (each.why == SourceState::Why::page) {
+      // One write at most, and no publisher there to tell of it.
+      const bool tells_time = shm::is_deactivation(each.word) || !shm::is_finite(each.word);
+      step.time = tells_time              ? shm::time_of(each.word, shm::kForever)
+                  : history.steps.empty() ? 0
+                                          : history.steps.back().time;
+    } else {
+      step.is_behind_gap = true;
+    }
+    add_step(*each.context, step);
+  }
+
+  void add(ModelChange&& each) {
+    run().end = std::max(run().end, each.time);
+    run().models.insert_or_assign(each.generation, std::move(each));
+  }
+  void add(WinnerChange&& each) { run().winners.push_back(std::move(each)); }
+  void add(Start&& /*taken*/) {}
+  void add(DestinationsChange&& /*contexts have it*/) {}
+  void add(PortChange&& /*decides nothing*/) {}
+  // Of what was overtaken a state says where it goes on.
+  void add(Missed&& each) {
+    if (each.why != Missed::Why::refused) return;
+    Nanoseconds& from = run().sources[each.source].unknown_from;
+    from = std::min(from, each.from);
+  }
+
+  std::vector<Run> runs_;
+};
+
+}  // namespace
+
+Recorded load_recording(const std::string& path) {
+  Recorded recorded;
+  Loader loader;
+  recorded.about = read_recording(path, Payloads::pass_over,
+                                  [&](Record&& record) { loader.take(std::move(record)); });
+  recorded.runs = loader.finish();
+  return recorded;
+}
+
+}  // namespace arbiter::evidence

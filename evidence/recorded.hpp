@@ -1,0 +1,65 @@
+// A recording in memory: what each source did, what was decided, and by which models.
+//
+// It takes some 200 bytes for each arrival; payloads are not read.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "evidence/record_reader.hpp"
+#include "evidence/records.hpp"
+
+namespace arbiter::evidence {
+
+// One step of a source. What it wrote into the activity, it wrote between `time` and `seen`.
+struct Step {
+  enum class Kind : std::uint8_t { arrival, deactivation, state };
+  Nanoseconds time = 0;
+  Nanoseconds seen = 0;
+  ActivityWord word = shm::kNeverActive;
+  Kind kind = Kind::arrival;
+  bool is_behind_gap = false;  // between the step before and this one anything may have happened
+  std::uint64_t generation = 0;
+};
+
+struct SourceHistory {
+  std::vector<Step> steps;  // in the source's order
+  // From then on it could not be watched.
+  Nanoseconds unknown_from = shm::kForever;
+};
+
+// An arrival, with what was decided.
+struct Decision {
+  const SourceHistory* source = nullptr;
+  std::uint32_t step = 0;  // of it
+  ContextPtr context;
+  std::uint64_t sequence = 0;
+  bool is_sample = false;
+  shm::Masks masks{};
+
+  [[nodiscard]] const Step& arrival() const { return source->steps[step]; }
+};
+
+// From a start to the next, or to the end of the file.
+struct Run {
+  Nanoseconds start = 0;
+  Nanoseconds end = 0;
+  std::vector<std::string> ports;  // patterns of those that were chosen; empty: all
+  std::map<std::string, SourceHistory> sources;
+  std::vector<Decision> decisions;              // by time
+  std::map<std::uint64_t, ModelChange> models;  // by generation
+  std::vector<WinnerChange> winners;            // as they were recorded
+  std::uint64_t lost = 0;                       // events
+};
+
+struct Recorded {
+  ReadRecording about;
+  std::vector<Run> runs;
+};
+
+// Throws McapError, RecordError.
+[[nodiscard]] Recorded load_recording(const std::string& path);
+
+}  // namespace arbiter::evidence

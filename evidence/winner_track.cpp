@@ -1,0 +1,130 @@
+#include "evidence/winner_track.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "shm/picture.hpp"
+
+namespace arbiter::evidence {
+
+void WinnerTrack::start(Nanoseconds time) {
+  now_ = time;
+  is_first_ = true;
+  rules_.reset();
+  words_.clear();
+  by_id_.clear();
+  names_.clear();
+  winners_.clear();
+  ends_ = {};
+  noted_.clear();
+}
+
+void WinnerTrack::set_rules(std::shared_ptr<const RuleTable> rules, std::uint64_t generation,
+                            Nanoseconds time) {
+  advance(time);
+  const auto before = std::exchange(rules_, std::move(rules));
+  generation_ = generation;
+  names_.clear();
+  by_id_.clear();
+  if (rules_ != nullptr) {
+    for (const auto& [name, id] : rules_->sources) {
+      names_[id] = name;
+      if (id >= by_id_.size()) by_id_.resize(id + 1);
+      const auto word = words_.find(name);
+      by_id_[id] = word == words_.end() ? shm::kNeverActive : word->second;
+    }
+  }
+  look_at_all(
+      now_, std::exchange(is_first_, false) ? WinnerChange::Why::start : WinnerChange::Why::model);
+}
+
+void WinnerTrack::apply(const std::string& source, ActivityWord word, Nanoseconds time,
+                        WinnerChange::Why why) {
+  advance(time);
+  words_[source] = word;
+  note_end(source, word);
+  const shm::SourceId id = rules_ == nullptr ? shm::kNone : rules_->source(source);
+  if (id == shm::kNone) return;
+  const bool was_active = shm::is_active(by_id_[id], now_);
+  by_id_[id] = word;
+  if (was_active != shm::is_active(word, now_)) look_where(id, now_, why, source);
+}
+
+// At the moment of its end an activity is over.
+void WinnerTrack::advance(Nanoseconds time) {
+  while (!ends_.empty() && ends_.top().first <= time) {
+    const auto [end, source] = ends_.top();
+    ends_.pop();
+    const auto noted = noted_.find(source);
+    if (noted == noted_.end() || noted->second != end) continue;
+    noted_.erase(noted);
+    now_ = std::max(now_, end);
+    const ActivityWord word = words_[source];
+    note_end(source, word);
+    const shm::SourceId id = rules_ == nullptr ? shm::kNone : rules_->source(source);
+    if (id != shm::kNone && word == end) look_where(id, now_, WinnerChange::Why::expiry, source);
+  }
+  now_ = std::max(now_, time);
+}
+
+// A source has one end to be looked at: the first that there may be. When that comes, it may have
+// been renewed.
+void WinnerTrack::note_end(const std::string& source, ActivityWord word) {
+  if (!shm::is_finite(word) || word <= now_) return;
+  const auto [noted, is_new] = noted_.try_emplace(source, word);
+  if (!is_new && noted->second <= word) return;
+  noted->second = word;
+  ends_.emplace(word, source);
+}
+
+void WinnerTrack::look_at_all(Nanoseconds time, WinnerChange::Why why) {
+  static const std::map<shm::PortId, std::string> no_ports;
+  const auto& ports = rules_ == nullptr ? no_ports : rules_->ports;
+  std::vector<std::string> gone;
+  for (const auto& [port, winner] : winners_) {
+    const bool is_known =
+        std::any_of(ports.begin(), ports.end(),
+                    [&, &name = port](const auto& each) { return each.second == name; });
+    if (!is_known) gone.push_back(port);
+  }
+  for (const std::string& port : gone) {
+    tell_({port, "", std::exchange(winners_[port], ""), time, why, "", generation_});
+    winners_.erase(port);
+  }
+  for (const auto& [id, name] : ports) look_at(id, time, why, "");
+}
+
+void WinnerTrack::look_where(shm::SourceId source, Nanoseconds time, WinnerChange::Why why,
+                             const std::string& by) {
+  const shm::WordList ports = rules_->table.ports_concerned(source);
+  for (shm::Word i = 0; i < ports.count; ++i) look_at(ports[i], time, why, by);
+}
+
+// A port that is not arbitrated has no winner.
+void WinnerTrack::look_at(shm::PortId port, Nanoseconds time, WinnerChange::Why why,
+                          const std::string& by) {
+  const auto name = rules_->ports.find(port);
+  if (name == rules_->ports.end() || !rules_->table.is_arbitrated(port)) return;
+  const auto is_active = [this](shm::SourceId source) {
+    return source < by_id_.size() && shm::is_active(by_id_[source], now_);
+  };
+  const shm::SourceId selected = shm::selected_at(rules_->table, port, is_active).source;
+  const std::string& winner = name_of_source(selected);
+  const auto known = winners_.find(name->second);
+  const std::string before = known == winners_.end() ? "" : known->second;
+  if (winner == before) return;
+  if (winner.empty()) {
+    winners_.erase(known);
+  } else {
+    winners_[name->second] = winner;
+  }
+  tell_({name->second, winner, before, time, why, by, generation_});
+}
+
+const std::string& WinnerTrack::name_of_source(shm::SourceId source) const {
+  static const std::string nobody;
+  const auto found = names_.find(source);
+  return found == names_.end() ? nobody : found->second;
+}
+
+}  // namespace arbiter::evidence

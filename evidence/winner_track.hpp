@@ -1,0 +1,65 @@
+// Who wins at each input port, from event to event: told by the rules and by what arrives, is
+// deactivated, and ends.
+//
+// Events come in the order of their times. One that comes late counts from then on; the changes of
+// winner that it makes are told for the time that the track had reached.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <queue>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "evidence/records.hpp"
+#include "evidence/rule_table.hpp"
+
+namespace arbiter::evidence {
+
+class WinnerTrack {
+ public:
+  explicit WinnerTrack(std::function<void(WinnerChange&&)> tell) : tell_(std::move(tell)) {}
+
+  // Nothing before it counts.
+  void start(Nanoseconds time);
+  // These rules decide from now on; null: none do. Tells the winners of all ports that are others
+  // than before.
+  void set_rules(std::shared_ptr<const RuleTable> rules, std::uint64_t generation,
+                 Nanoseconds time);
+  // An event at a source, after which its activity is `word`.
+  void apply(const std::string& source, ActivityWord word, Nanoseconds time, WinnerChange::Why why);
+  // Time has passed.
+  void advance(Nanoseconds time);
+
+  [[nodiscard]] Nanoseconds now() const { return now_; }
+  // Of the ports that somebody wins at.
+  [[nodiscard]] const std::map<std::string, std::string>& winners() const { return winners_; }
+
+ private:
+  void look_at(shm::PortId port, Nanoseconds time, WinnerChange::Why why, const std::string& by);
+  void look_at_all(Nanoseconds time, WinnerChange::Why why);
+  void look_where(shm::SourceId source, Nanoseconds time, WinnerChange::Why why,
+                  const std::string& by);
+  void note_end(const std::string& source, ActivityWord word);
+  [[nodiscard]] const std::string& name_of_source(shm::SourceId source) const;
+
+  const std::function<void(WinnerChange&&)> tell_;
+  std::shared_ptr<const RuleTable> rules_;
+  std::uint64_t generation_ = 0;
+  bool is_first_ = true;  // no rules have been set since the start
+  Nanoseconds now_ = 0;
+  std::unordered_map<std::string, ActivityWord> words_;
+  std::vector<ActivityWord> by_id_;
+  std::unordered_map<shm::SourceId, std::string> names_;
+  std::map<std::string, std::string> winners_;
+  // When activities may end. Those in noted_ count, one for each source.
+  using End = std::pair<Nanoseconds, std::string>;
+  std::priority_queue<End, std::vector<End>, std::greater<>> ends_;
+  std::unordered_map<std::string, Nanoseconds> noted_;
+};
+
+}  // namespace arbiter::evidence

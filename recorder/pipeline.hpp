@@ -1,0 +1,85 @@
+// From the queue to where records go: brings them into the order of time, works out who wins, and
+// hands both on. A thread of its own, which may wait for a disk.
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <queue>
+#include <string>
+#include <thread>
+#include <unordered_map>
+#include <vector>
+
+#include "evidence/winner_track.hpp"
+#include "recorder/record_queue.hpp"
+#include "recorder/sink.hpp"
+
+namespace arbiter::recorder {
+
+// Each source's records stay in their order; across sources they are ordered by time, as far as
+// they have come before the horizon.
+class TimeOrder {
+ public:
+  void add(RecordPtr record);
+  // Those before `horizon`, one by one.
+  template <class Use>
+  void take_before(Nanoseconds horizon, const Use& use) {
+    while (!waiting_.empty() && waiting_.top().key < horizon) {
+      const RecordPtr record = waiting_.top().record;
+      waiting_.pop();
+      use(record);
+    }
+  }
+
+ private:
+  struct Waiting {
+    Nanoseconds key = 0;
+    std::uint64_t number = 0;
+    RecordPtr record{};
+    friend bool operator<(const Waiting& one, const Waiting& other) {
+      return one.key != other.key ? one.key > other.key : one.number > other.number;
+    }
+  };
+  std::priority_queue<Waiting> waiting_;
+  std::unordered_map<std::string, Nanoseconds> last_;  // key of each source
+  std::uint64_t number_ = 0;
+};
+
+class Pipeline {
+ public:
+  // Keeps both. `failed` is called, once, on the pipeline's thread.
+  Pipeline(RecordQueue& queue, Sink& sink, std::function<void()> failed);
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+  // Waits until the queue has been closed and is empty.
+  ~Pipeline() { join(); }
+
+  // The same. Throws what has gone wrong.
+  void finish();
+  // Of the input ports' winners. After finish().
+  [[nodiscard]] std::uint64_t winner_changes() const { return winner_changes_; }
+
+ private:
+  void run();
+  void work();
+  void join();
+  void take(Batch&& batch);
+  void pass_on(const RecordPtr& record);
+  void follow(const Record& record);
+
+  RecordQueue& queue_;
+  Sink& sink_;
+  const std::function<void()> failed_;
+  TimeOrder order_;
+  Nanoseconds horizon_ = 0;
+  evidence::WinnerTrack winners_;
+  std::vector<RecordPtr> changes_;  // of winners, by the record that is being followed
+  std::uint64_t winner_changes_ = 0;
+  std::exception_ptr error_;  // of the thread, read after it has ended
+  std::thread thread_;
+};
+
+}  // namespace arbiter::recorder

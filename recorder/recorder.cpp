@@ -1,0 +1,101 @@
+#include "recorder/recorder.hpp"
+
+#include <sys/eventfd.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "recorder/sleep.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::recorder {
+namespace {
+
+// How long the writer may go without being told the time.
+constexpr Nanoseconds kPushEvery = 20'000'000;
+
+}  // namespace
+
+Recorder::Recorder(const RecorderOptions& options, Sink& sink)
+    : options_(options),
+      watcher_(options, queue_),
+      failed_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      pipeline_(queue_, sink, [this] { eventfd_write(failed_.get(), 1); }),
+      started_(shm::monotonic_now()) {
+  take_new_taps();
+  watcher_.start();
+}
+
+Recorder::~Recorder() {
+  watcher_.stop();
+  queue_.close();
+}
+
+// By absolute times: a round that takes long is not made up for.
+void Recorder::run(Nanoseconds end, int events, const std::function<bool()>& goes_on) {
+  Nanoseconds next = shm::monotonic_now();
+  while (next < end) {
+    poll_taps();
+    next = std::max(next + options_.period, shm::monotonic_now() + options_.period / 10);
+    if (!sleep_until(std::min(next, end), {events, failed_.get()})) continue;
+    eventfd_t failed = 0;
+    if (eventfd_read(failed_.get(), &failed) == 0 || !goes_on()) break;
+  }
+  poll_taps();
+}
+
+void Recorder::take_new_taps() {
+  Watcher::NewTaps fresh = watcher_.take_taps();
+  if (fresh.is_start) forget_taps();
+  for (auto& tap : fresh.taps) taps_.push_back(std::move(tap));
+}
+
+// What happened before the last round began has come with this one, but for publishers that were
+// stopped in between.
+void Recorder::poll_taps() {
+  take_new_taps();
+  const Nanoseconds now = shm::monotonic_now();
+  const Room room = waiting_bytes_ > options_.queue_bytes           ? Room::none
+                    : waiting_bytes_ > options_.queue_bytes / 4 * 3 ? Room::no_payloads
+                                                                    : Room::all;
+  Batch batch;
+  bool ports_changed = false;
+  for (const auto& tap : taps_) {
+    ports_changed = tap->poll(room, batch.records) || ports_changed;
+  }
+  if (ports_changed) watcher_.note_ports_changed();
+  batch.horizon = std::exchange(last_poll_, now);
+  if (batch.records.empty() && now - last_push_ < kPushEvery) return;
+  last_push_ = now;
+  waiting_bytes_ = queue_.push(std::move(batch));
+}
+
+void Recorder::count(const TapReader& tap) {
+  recorded_.arrivals += tap.counts().arrivals;
+  recorded_.lost_events += tap.counts().lost_events;
+  recorded_.lost_samples += tap.counts().lost_samples;
+  if (tap.counts().arrivals != 0) heard_.insert(tap.name());
+}
+
+void Recorder::forget_taps() {
+  Batch batch;
+  for (const auto& tap : taps_) {
+    tap->finish(batch.records);
+    count(*tap);
+  }
+  taps_.clear();
+  queue_.push(std::move(batch));
+}
+
+Recorded Recorder::finish() {
+  watcher_.stop();
+  forget_taps();
+  queue_.close();
+  pipeline_.finish();
+  recorded_.sources = heard_.size();
+  recorded_.winner_changes = pipeline_.winner_changes();
+  recorded_.time = shm::monotonic_now() - started_;
+  return recorded_;
+}
+
+}  // namespace arbiter::recorder

@@ -1,0 +1,259 @@
+#include "recorder/replayer.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "evidence/models.hpp"
+#include "evidence/record_reader.hpp"
+#include "recorder/sleep.hpp"
+#include "rules/model/load.hpp"
+#include "rules/model/quantifiers.hpp"
+#include "rules/prove/compile.hpp"
+#include "shm/clock.hpp"
+#include "shm/picture.hpp"
+
+namespace arbiter::recorder {
+namespace {
+
+using evidence::Arrival;
+using evidence::Nanoseconds;
+using evidence::Record;
+
+// The first arrival comes this long after the ports are open.
+constexpr Nanoseconds kLead = 20'000'000;
+
+struct Interrupted {};
+
+Time time_at(Nanoseconds time) { return Time(std::chrono::nanoseconds(time)); }
+
+bool fits(const std::vector<std::string>& patterns, const std::string& name) {
+  return patterns.empty() ||
+         std::any_of(patterns.begin(), patterns.end(),
+                     [&](const std::string& pattern) { return rules::matches(pattern, name); });
+}
+
+std::optional<rules::CompiledModel> compiled(const evidence::ModelChange& model) {
+  if (!model.has_texts) return std::nullopt;
+  rules::Diagnostics diagnostics;
+  auto result = rules::compile(rules::load(evidence::texts_of(model), diagnostics), diagnostics);
+  if (diagnostics.has_errors()) return std::nullopt;
+  return result;
+}
+
+}  // namespace
+
+Replayer::Replayer(const ReplayOptions& options) : options_(options) {
+  survey();
+  choose();
+  if (sources_.empty()) {
+    throw ReplayError(options_.file + " has no arrival of what you have chosen");
+  }
+  refuse_without_payloads();
+  open_ports();
+}
+
+void Replayer::survey() {
+  const auto about = evidence::read_recording(options_.file, evidence::Payloads::pass_over,
+                                              [this](Record&& record) { survey(record); });
+  if (!about.end.is_whole) {
+    options_.say(options_.file + ": " + about.end.problem + "; what comes before is published");
+  }
+  const auto model = model_ ? compiled(*model_) : std::nullopt;
+  if (!model) return;
+  const rules::Simulation simulation(*model);
+  for (auto& [name, source] : sources_) {
+    if (simulation.knows(name)) {
+      source.timeout = simulation.table().timeout(simulation.source_id(name));
+    }
+  }
+  for (shm::PortId port = 0; port < simulation.port_names().size(); ++port) {
+    shm::for_each_heeded(simulation.table(), port, [&](shm::SourceId id) {
+      sources_of_ports_[simulation.port_name(port)].push_back(simulation.source_name(id));
+    });
+  }
+}
+
+void Replayer::survey(const Record& record) {
+  if (const auto* start = std::get_if<evidence::Start>(&record)) {
+    if (first_ == 0) first_ = start->time;
+  } else if (const auto* model = std::get_if<evidence::ModelChange>(&record)) {
+    if (!model_) model_ = *model;
+  }
+  const auto* context = evidence::context_of(record);
+  if (context == nullptr) return;
+  Source& source = sources_[context->source];
+  if (context->size != 0) {
+    source.type = context->type;
+    source.size = context->size;
+    source.alignment = context->alignment;
+  }
+  for (const std::string& port : context->destinations) {
+    auto& all = sources_of_ports_[port];
+    if (std::find(all.begin(), all.end(), context->source) == all.end()) {
+      all.push_back(context->source);
+    }
+  }
+  if (const auto* arrival = std::get_if<Arrival>(&record)) {
+    source.has_events = true;
+    source.samples += arrival->is_sample ? 1 : 0;
+    source.payloads += arrival->has_payload ? 1 : 0;
+    source.largest = std::max(source.largest, arrival->size);
+  } else if (std::holds_alternative<evidence::Deactivation>(record)) {
+    source.has_events = true;
+  } else if (const auto* state = std::get_if<evidence::SourceState>(&record)) {
+    if (!source.has_events && state->seen <= first_) source.at_start = state->word;
+  }
+}
+
+void Replayer::choose() {
+  std::erase_if(sources_, [this](const auto& each) {
+    const Source& source = each.second;
+    const bool was_active = shm::is_active(source.at_start, first_);
+    return (!source.has_events && !was_active) || !fits(options_.sources, each.first) ||
+           !is_at_chosen_port(each.first);
+  });
+}
+
+bool Replayer::is_at_chosen_port(const std::string& source) const {
+  if (options_.ports.empty()) return true;
+  for (const auto& [port, sources] : sources_of_ports_) {
+    const bool is_there = std::find(sources.begin(), sources.end(), source) != sources.end();
+    if (is_there && fits(options_.ports, port)) return true;
+  }
+  return false;
+}
+
+void Replayer::refuse_without_payloads() const {
+  std::string without;
+  for (const auto& [name, source] : sources_) {
+    if (source.samples == 0 || source.payloads != 0) continue;
+    without += (without.empty() ? "" : ", ") + name;
+  }
+  if (without.empty()) return;
+  throw ReplayError(options_.file + " does not have what was in the samples of " + without +
+                    ", so they cannot be published: choose other sources with --source, or record "
+                    "with --payloads all");
+}
+
+void Replayer::open_ports() {
+  node_.emplace("arbiter-replay", options_.node);
+  keeps_times_ = options_.rate > 0;
+  for (auto& [name, source] : sources_) {
+    OutputPortOptions options;
+    if (source.type.empty()) {
+      options.max_size = std::max(source.largest, source.size);
+      source.port.emplace(node_->output_port(name, options));
+    } else {
+      source.port.emplace(
+          node_->output_port(name, Type(source.type, source.size, source.alignment), options));
+    }
+    if (!keeps_times_) continue;
+    try {
+      source.port->require_replay();
+    } catch (const Error& error) {
+      keeps_times_ = false;
+      options_.say(std::string(error.what()) +
+                   "; arrivals bear the times at which they are published");
+    }
+  }
+}
+
+Replayed Replayer::run(const shm::FileDescriptor& interrupts) {
+  Replayed replayed;
+  replayed.sources = sources_.size();
+  start_ = last_ = shm::monotonic_now() + kLead;
+  try {
+    if (sleep_until(start_, {interrupts.get()})) throw Interrupted();
+    signal_active_ones();
+    evidence::read_recording(options_.file, evidence::Payloads::read, [&](Record&& record) {
+      const auto* context = evidence::context_of(record);
+      const bool is_event = std::holds_alternative<Arrival>(record) ||
+                            std::holds_alternative<evidence::Deactivation>(record);
+      if (!is_event || sources_.count(context->source) == 0) return;
+      last_ = due(evidence::time_of(record));
+      if (options_.rate > 0 && sleep_until(last_, {interrupts.get()})) throw Interrupted();
+      publish(record, replayed);
+    });
+  } catch (const Interrupted&) {
+    replayed.was_interrupted = true;
+  }
+  replayed.time = shm::monotonic_now() - start_;
+  return replayed;
+}
+
+// Never backwards, and never at the moment of the source's deactivation, at which it cannot arrive.
+Nanoseconds Replayer::due(Nanoseconds recorded) {
+  if (options_.rate <= 0) return last_;
+  const auto since_first = static_cast<double>(recorded - first_);
+  const Nanoseconds span =
+      options_.rate == 1 ? recorded - first_ : std::llround(since_first / options_.rate);
+  return std::max(last_, start_ + span);
+}
+
+// A recording begins in the middle of activities. Those that end by themselves end when they did.
+void Replayer::signal_active_ones() {
+  for (auto& [name, source] : sources_) {
+    if (!shm::is_active(source.at_start, first_)) continue;
+    const bool is_forever = !shm::is_finite(source.at_start);
+    const Nanoseconds arrived =
+        is_forever ? first_ : shm::arrival_of(source.at_start, source.timeout);
+    const bool is_known = is_forever || (source.timeout != shm::kForever && arrived <= first_);
+    if (!is_known) continue;
+    try {
+      if (keeps_times_ && options_.rate == 1) {
+        source.port->signal_at(time_at(start_ - (first_ - arrived)));
+      } else {
+        source.port->signal();
+      }
+    } catch (const Error&) {
+      source.port->signal();  // somebody had the source meanwhile
+    }
+  }
+}
+
+void Replayer::publish(const Record& record, Replayed& replayed) {
+  Source& source = sources_.at(evidence::context_of(record)->source);
+  Nanoseconds at = last_;
+  if (source.deactivated == at) at = ++last_;
+  Nanoseconds now = shm::monotonic_now();
+  while (now < at && options_.rate > 0) now = shm::monotonic_now();  // a nanosecond
+  if (options_.rate > 0) replayed.latest = std::max(replayed.latest, now - at);
+  if (const auto* arrival = std::get_if<Arrival>(&record)) {
+    arrive(source, *arrival, at, replayed);
+    return;
+  }
+  ++replayed.deactivations;
+  if (keeps_times_) {
+    source.port->deactivate_at(time_at(at));
+    source.deactivated = at;
+  } else {
+    source.port->deactivate();
+  }
+}
+
+void Replayer::arrive(Source& source, const Arrival& arrival, Nanoseconds at, Replayed& replayed) {
+  OutputPort<void>& port = *source.port;
+  const bool fits_port =
+      arrival.payload && (source.type.empty() ? arrival.payload->size() <= port.max_size()
+                                              : arrival.payload->size() == port.max_size());
+  if (!fits_port) {
+    ++(arrival.is_sample ? replayed.without_payload : replayed.signals);
+    if (keeps_times_) {
+      port.signal_at(time_at(at));
+    } else {
+      port.signal();
+    }
+    return;
+  }
+  ++replayed.samples;
+  const Bytes bytes(arrival.payload->data(), arrival.payload->size());
+  if (keeps_times_) {
+    port.publish_at(time_at(at), bytes);
+  } else {
+    port.publish(bytes);
+  }
+}
+
+}  // namespace arbiter::recorder

@@ -1,0 +1,98 @@
+// Publishes a recording into a running instance: what arrived then arrives again, with what was in
+// it, under the same names and types, in the same order and at the same distances.
+//
+// A component as others are: it has the output ports open that the recording tells of, and the
+// instance decides by its own model. Where the policy allows `replay`, each arrival bears the time
+// that it should have, whenever the scheduler lets us run (OutputPort::publish_at()).
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <arbiter/arbiter.hpp>
+
+#include "evidence/records.hpp"
+#include "shm/file_descriptor.hpp"
+
+namespace arbiter::recorder {
+
+struct ReplayOptions {
+  std::string file;
+  NodeOptions node;
+  double rate = 1;                   // of time; 0: as fast as possible
+  std::vector<std::string> sources;  // patterns; empty: all
+  std::vector<std::string> ports;    // patterns of input ports; empty: all
+  std::function<void(const std::string&)> say;
+};
+
+struct Replayed {
+  std::uint64_t samples = 0;
+  std::uint64_t signals = 0;
+  std::uint64_t deactivations = 0;
+  std::uint64_t without_payload = 0;  // samples that became signals
+  std::size_t sources = 0;
+  evidence::Nanoseconds time = 0;
+  evidence::Nanoseconds latest = 0;  // how late a call came, at most
+  bool was_interrupted = false;
+};
+
+// What cannot be published: says which sources, and why.
+class ReplayError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class Replayer {
+ public:
+  // Reads the file once, to know its sources, and opens their ports. Throws ReplayError, Error,
+  // McapError, RecordError.
+  explicit Replayer(const ReplayOptions& options);
+
+  [[nodiscard]] std::size_t sources() const { return sources_.size(); }
+  // Reads the file again. Ends early where `interrupts` is readable.
+  Replayed run(const shm::FileDescriptor& interrupts);
+
+ private:
+  using Nanoseconds = evidence::Nanoseconds;
+
+  struct Source {
+    std::string type;
+    std::uint64_t size = 0;
+    std::uint64_t alignment = 1;
+    std::uint64_t largest = 1;  // sample
+    std::uint64_t samples = 0;
+    std::uint64_t payloads = 0;
+    bool has_events = false;
+    evidence::ActivityWord at_start = shm::kNeverActive;
+    Nanoseconds timeout = shm::kForever;  // T when it was recorded
+    std::optional<OutputPort<void>> port{};
+    Nanoseconds deactivated = 0;
+  };
+
+  void survey();
+  void survey(const evidence::Record& record);
+  void choose();
+  [[nodiscard]] bool is_at_chosen_port(const std::string& source) const;
+  void refuse_without_payloads() const;
+  void open_ports();
+  void signal_active_ones();
+  void publish(const evidence::Record& record, Replayed& replayed);
+  void arrive(Source& source, const evidence::Arrival& arrival, Nanoseconds at, Replayed& replayed);
+  [[nodiscard]] Nanoseconds due(Nanoseconds recorded);
+
+  const ReplayOptions& options_;
+  std::map<std::string, Source> sources_;
+  std::map<std::string, std::vector<std::string>> sources_of_ports_;
+  std::optional<evidence::ModelChange> model_;  // the first
+  Nanoseconds first_ = 0;                       // of the recording
+  std::optional<Node> node_;
+  bool keeps_times_ = false;
+  Nanoseconds start_ = 0;  // of the replay
+  Nanoseconds last_ = 0;   // due time
+};
+
+}  // namespace arbiter::recorder

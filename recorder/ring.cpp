@@ -1,0 +1,160 @@
+#include "recorder/ring.hpp"
+
+#include <time.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <exception>
+
+#include "shm/clock.hpp"
+
+namespace arbiter::recorder {
+namespace {
+
+using evidence::PortChange;
+using evidence::SourceState;
+
+SourceState state_of(const evidence::ContextPtr& context, Nanoseconds time, Nanoseconds seen,
+                     std::uint64_t sequence, std::uint64_t generation,
+                     evidence::ActivityWord word) {
+  SourceState state;
+  state.context = context;
+  state.time = time;
+  state.seen = seen;
+  state.sequence = sequence;
+  state.generation = generation;
+  state.word = word;
+  return state;
+}
+
+}  // namespace
+
+void Ring::request(const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  const bool is_known = std::any_of(requests_.begin(), requests_.end(),
+                                    [&](const Request& request) { return request.why == why; });
+  if (!is_known) requests_.push_back({why, shm::monotonic_now()});
+}
+
+void Ring::write(const RecordPtr& record) {
+  records_.push_back(record);
+  bytes_ += evidence::size_of(*record);
+  const Nanoseconds newest = evidence::time_of(*record);
+  while (!records_.empty() && (bytes_ > options_.memory ||
+                               evidence::time_of(*records_.front()) < newest - options_.span)) {
+    forget_oldest();
+  }
+  const auto* port = std::get_if<PortChange>(&*record);
+  if (options_.on_death && port != nullptr && port->what == PortChange::What::died) {
+    request("death");
+  }
+}
+
+void Ring::forget_oldest() {
+  const RecordPtr record = std::move(records_.front());
+  records_.pop_front();
+  bytes_ -= evidence::size_of(*record);
+  sum_up(*record);
+}
+
+void Ring::sum_up(const Record& record) {
+  const auto note = [this](SourceState state) {
+    base_time_ = std::max(base_time_, state.seen);
+    sources_.insert_or_assign(state.context->source, std::move(state));
+  };
+  if (const auto* start = std::get_if<evidence::Start>(&record)) {
+    start_ = *start;
+    base_time_ = start->time;
+    sources_.clear();
+    untapped_.clear();
+    winners_.clear();
+    model_.reset();
+  } else if (const auto* arrival = std::get_if<evidence::Arrival>(&record)) {
+    note(state_of(arrival->context, arrival->time, arrival->seen, arrival->sequence,
+                  arrival->generation, arrival->word));
+  } else if (const auto* over = std::get_if<evidence::Deactivation>(&record)) {
+    note(state_of(over->context, over->time, over->seen, over->sequence, over->generation,
+                  shm::deactivation(over->time)));
+  } else if (const auto* state = std::get_if<SourceState>(&record)) {
+    note(state_of(state->context, state->time, state->seen, state->sequence, state->generation,
+                  state->word));
+  } else if (const auto* change = std::get_if<evidence::DestinationsChange>(&record)) {
+    const auto known = sources_.find(change->context->source);
+    if (known != sources_.end()) known->second.context = change->context;
+  } else if (const auto* model = std::get_if<evidence::ModelChange>(&record)) {
+    model_ = *model;
+    base_time_ = std::max(base_time_, model->time);
+  } else if (const auto* port = std::get_if<PortChange>(&record)) {
+    const std::pair key(port->is_input, port->port);
+    const bool is_open =
+        port->what == PortChange::What::open || port->what == PortChange::What::opened;
+    if (is_open) {
+      ports_.insert_or_assign(key, *port).first->second.what = PortChange::What::open;
+    } else {
+      ports_.erase(key);
+    }
+  } else if (const auto* winner = std::get_if<evidence::WinnerChange>(&record)) {
+    winners_.insert_or_assign(winner->port, *winner).first->second.why =
+        evidence::WinnerChange::Why::start;
+    if (winner->winner.empty()) winners_.erase(winner->port);
+  } else if (const auto* missed = std::get_if<evidence::Missed>(&record)) {
+    if (missed->why == evidence::Missed::Why::refused) untapped_[missed->source] = *missed;
+  }
+}
+
+void Ring::tick(Nanoseconds /*now*/, Nanoseconds horizon) {
+  std::vector<std::string> due;
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(requests_, [&](const Request& request) {
+      if (request.time > horizon) return false;
+      due.push_back(request.why);
+      return true;
+    });
+  }
+  for (const std::string& why : due) dump(why);
+}
+
+// What goes wrong with one file, such as a full disk, must not end the recording.
+void Ring::dump(const std::string& why) {
+  const std::string path = path_for(why);
+  try {
+    evidence::RecordWriter writer(path, options_.file, options_.info);
+    write_base(writer);
+    for (const RecordPtr& record : records_) writer.write(*record);
+    writer.close();
+    ++dumps_;
+    options_.told(path, "");
+  } catch (const std::exception& error) {
+    options_.told(path, error.what());
+  }
+}
+
+// As a recording begins: its start, the states, the model.
+void Ring::write_base(evidence::RecordWriter& writer) const {
+  if (!start_) return;  // it is among the records
+  evidence::Start start = *start_;
+  start.time = base_time_;
+  writer.write(start);
+  for (const auto& [source, state] : sources_) writer.write(state);
+  for (const auto& [source, missed] : untapped_) writer.write(missed);
+  if (model_) writer.write(*model_);
+  for (const auto& [key, port] : ports_) writer.write(port);
+  for (const auto& [port, winner] : winners_) writer.write(winner);
+}
+
+std::string Ring::path_for(const std::string& why) {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  gmtime_r(&now, &parts);
+  char stamp[32];
+  std::strftime(stamp, sizeof stamp, "-%Y%m%dT%H%M%SZ-", &parts);
+  const std::string path = options_.prefix + stamp + why;
+  std::string free = path + ".mcap";
+  for (int i = 2; ::access(free.c_str(), F_OK) == 0; ++i) {
+    free = path + "-" + std::to_string(i) + ".mcap";
+  }
+  return free;
+}
+
+}  // namespace arbiter::recorder

@@ -1,0 +1,58 @@
+#include "recorder/statement_watch.hpp"
+
+#include <chrono>
+#include <exception>
+#include <string>
+#include <utility>
+
+#include "watch/live_statement.hpp"
+
+namespace arbiter::recorder {
+namespace {
+
+constexpr std::chrono::milliseconds kLookEvery{2};
+
+}  // namespace
+
+StatementWatch::StatementWatch(const wire::Caller& caller, rules::Statement statement,
+                               std::function<void()> came_true,
+                               std::function<void(const std::string&)> say)
+    : statement_(std::move(statement)),
+      came_true_(std::move(came_true)),
+      say_(std::move(say)),
+      instance_(std::make_shared<watch::Instance>(caller)),
+      thread_([this] { run(); }) {}
+
+StatementWatch::~StatementWatch() {
+  {
+    const std::lock_guard lock(mutex_);
+    is_stopping_ = true;
+    stopping_.notify_one();
+  }
+  thread_.join();
+}
+
+// What is not known is not true; nor does it count as having become false.
+void StatementWatch::run() {
+  watch::LiveStatement statement(instance_, statement_);
+  bool was_true = false;
+  std::string reason;
+  for (;;) {
+    {
+      std::unique_lock lock(mutex_);
+      if (stopping_.wait_for(lock, kLookEvery, [this] { return is_stopping_; })) return;
+    }
+    try {
+      instance_->update();
+      const rules::Truth truth = statement.look().truth;
+      if (truth == rules::Truth::kUnknown) continue;
+      const bool is_true = truth == rules::Truth::kTrue;
+      if (is_true && !was_true) came_true_();
+      was_true = is_true;
+    } catch (const std::exception& error) {  // this model lacks a name of it, or there is no daemon
+      if (std::exchange(reason, error.what()) != error.what()) say_(reason);
+    }
+  }
+}
+
+}  // namespace arbiter::recorder

@@ -1,0 +1,216 @@
+#include "recorder/tap_reader.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "shm/clock.hpp"
+#include "shm/limits.hpp"
+
+namespace arbiter::recorder {
+namespace {
+
+using evidence::ActivityWord;
+using evidence::Arrival;
+using evidence::ContextPtr;
+using evidence::Missed;
+using evidence::SourceContext;
+using evidence::SourceState;
+
+// A source that publishes flat out leaves the others their turn.
+constexpr int kMostEvents = 2048;
+
+Nanoseconds ns(Time time) { return time.time_since_epoch().count(); }
+
+ActivityWord word_of(const TapEvent<>& event) {
+  if (event.is_deactivated()) return shm::deactivation(ns(event.time()));
+  if (const auto until = event.active_until()) return ns(*until);
+  const bool is_forever = event.was_active_at(Time(std::chrono::nanoseconds(shm::kMaxTime)));
+  return is_forever ? shm::kForeverFlag | ns(event.time()) : shm::kNeverActive;
+}
+
+bool is_same(const SourceContext& context, const TapEvent<>& event,
+             const std::vector<TapDestination>& destinations) {
+  return context.type == event.type().name() && context.size == event.type().size() &&
+         std::equal(context.destinations.begin(), context.destinations.end(), destinations.begin(),
+                    destinations.end(), [](const std::string& name, const TapDestination& each) {
+                      return name == each.port;
+                    });
+}
+
+shm::Masks masks_of(const std::vector<TapDestination>& destinations) {
+  shm::Masks masks;
+  for (std::size_t i = 0; i < destinations.size() && i < shm::kMaxDestinations; ++i) {
+    const std::uint64_t bit = std::uint64_t{1} << i;
+    switch (destinations[i].fate) {
+      case Fate::accepted:
+        masks.accepted |= bit;
+        break;
+      case Fate::discarded:
+        masks.discarded |= bit;
+        break;
+      case Fate::refused:
+        masks.refused |= bit;
+        break;
+      case Fate::blind:
+        masks.blind |= bit;
+        break;
+      case Fate::none:
+        break;
+    }
+  }
+  return masks;
+}
+
+template <class T>
+void add(std::vector<RecordPtr>& records, T record) {
+  records.push_back(std::make_shared<const Record>(std::move(record)));
+}
+
+}  // namespace
+
+bool TapReader::poll(Room room, std::vector<RecordPtr>& records) {
+  bool ports_changed = false;
+  if (room != Room::none) tell_left_out(records);
+  for (int i = 0; i < kMostEvents; ++i) {
+    const auto event = tap_.take();
+    if (!event) break;
+    const TapEventKind kind = event->kind();
+    ports_changed = ports_changed || kind == TapEventKind::state || kind == TapEventKind::closed ||
+                    kind == TapEventKind::destinations;
+    take(*event, room, records);
+    is_live_.store(kind != TapEventKind::closed, std::memory_order_relaxed);
+    told_.store(word_of(*event), std::memory_order_relaxed);
+  }
+  return ports_changed;
+}
+
+// The clock is read once the event has come: what it tells has happened by then.
+void TapReader::take(const TapEvent<>& event, Room room, std::vector<RecordPtr>& records) {
+  const Nanoseconds seen = shm::monotonic_now();
+  if (room == Room::none) {
+    leave_out(event, seen);
+    return;
+  }
+  switch (event.kind()) {
+    case TapEventKind::sample:
+    case TapEventKind::signal:
+      add_arrival(event, seen, room, records);
+      break;
+    case TapEventKind::deactivation:
+      add(records, evidence::Deactivation{context_of(event), ns(event.time()), seen,
+                                          event.sequence(), event.generation()});
+      break;
+    case TapEventKind::destinations:
+      add(records, evidence::DestinationsChange{context_of(event), ns(event.time()), seen});
+      break;
+    case TapEventKind::state:
+    case TapEventKind::closed:
+      add_state(event, seen, records);
+      break;
+  }
+}
+
+void TapReader::add_state(const TapEvent<>& event, Nanoseconds seen,
+                          std::vector<RecordPtr>& records) {
+  SourceState state;
+  state.context = context_of(event);
+  state.time = ns(event.time());
+  state.seen = seen;
+  state.why = event.kind() == TapEventKind::closed ? SourceState::Why::closed
+              : event.lost() != 0                  ? SourceState::Why::gap
+                                                   : SourceState::Why::joined;
+  state.sequence = event.sequence();
+  state.generation = event.generation();
+  state.lost = event.lost();
+  state.word = word_of(event);
+  if (state.lost != 0) {
+    counts_.lost_events += state.lost;
+    add(records,
+        Missed{state.context->source, 0, state.time, state.lost, 0, Missed::Why::overtaken, ""});
+  }
+  add(records, std::move(state));
+}
+
+void TapReader::add_arrival(const TapEvent<>& event, Nanoseconds seen, Room room,
+                            std::vector<RecordPtr>& records) {
+  Arrival arrival;
+  const auto destinations = event.destinations();
+  arrival.context = context_of(event);
+  arrival.time = ns(event.time());
+  arrival.seen = std::max(seen, arrival.time);
+  arrival.is_sample = event.kind() == TapEventKind::sample;
+  arrival.sequence = event.sequence();
+  arrival.size = arrival.is_sample ? event.size() : 0;
+  arrival.generation = event.generation();
+  arrival.word = word_of(event);
+  arrival.masks = masks_of(destinations);
+  ++counts_.arrivals;
+  if (with_payloads_ && arrival.is_sample) {
+    const auto bytes = event.sample();
+    if (bytes && room == Room::all) {
+      arrival.payload.emplace(bytes->begin(), bytes->end());
+    } else {
+      ++counts_.lost_samples;
+      add(records, Missed{arrival.context->source, arrival.time, arrival.time, 0, 1,
+                          bytes ? Missed::Why::queue : Missed::Why::overtaken, ""});
+    }
+  }
+  add(records, std::move(arrival));
+}
+
+void TapReader::leave_out(const TapEvent<>& event, Nanoseconds seen) {
+  if (!left_out_) {
+    left_out_.emplace();
+    left_out_->from = ns(event.time());
+  }
+  LeftOut& out = *left_out_;
+  out.to = ns(event.time());
+  out.events += event.lost();
+  counts_.lost_events += event.lost();
+  const bool is_event = event.kind() == TapEventKind::sample ||
+                        event.kind() == TapEventKind::signal ||
+                        event.kind() == TapEventKind::deactivation;
+  if (is_event) {
+    ++out.events;
+    ++counts_.lost_events;
+  }
+  out.last.context = context_of(event);
+  out.last.time = ns(event.time());
+  out.last.seen = seen;
+  out.last.why =
+      event.kind() == TapEventKind::closed ? SourceState::Why::closed : SourceState::Why::gap;
+  out.last.sequence = event.sequence();
+  out.last.generation = event.generation();
+  out.last.word = word_of(event);
+}
+
+void TapReader::tell_left_out(std::vector<RecordPtr>& records) {
+  if (!left_out_) return;
+  LeftOut out = std::move(*left_out_);
+  left_out_.reset();
+  out.last.lost = out.events;
+  add(records,
+      Missed{out.last.context->source, out.from, out.to, out.events, 0, Missed::Why::queue, ""});
+  add(records, std::move(out.last));
+}
+
+void TapReader::finish(std::vector<RecordPtr>& records) { tell_left_out(records); }
+
+const ContextPtr& TapReader::context_of(const TapEvent<>& event) {
+  const auto destinations = event.destinations();
+  if (context_ != nullptr && is_same(*context_, event, destinations)) return context_;
+  auto context = std::make_shared<SourceContext>();
+  context->source = event.source();
+  context->type = event.type().name();
+  context->size = event.type().size();
+  context->alignment = event.type().alignment();
+  for (const TapDestination& each : destinations) {
+    if (context->destinations.size() < shm::kMaxDestinations) {
+      context->destinations.emplace_back(each.port);
+    }
+  }
+  context_ = std::move(context);
+  return context_;
+}
+
+}  // namespace arbiter::recorder

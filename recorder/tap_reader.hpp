@@ -1,0 +1,80 @@
+// One source, read through a tap: its events as records.
+//
+// Where the queue to the writer is nearly full, payloads are left out; where it is full, events
+// are. Either is counted and told as soon as there is room; behind events that are missing comes a
+// state, so that who reads the recording knows where he stands.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <arbiter/tap.hpp>
+
+#include "recorder/record_queue.hpp"
+
+namespace arbiter::recorder {
+
+// What there is room for.
+enum class Room : std::uint8_t { all, no_payloads, none };
+
+struct TapCounts {
+  std::uint64_t arrivals = 0;
+  std::uint64_t lost_events = 0;
+  std::uint64_t lost_samples = 0;
+};
+
+// What was left out since the last record.
+struct LeftOut {
+  std::uint64_t events = 0;
+  Nanoseconds from = 0;
+  Nanoseconds to = 0;
+  evidence::SourceState last{};
+};
+
+class TapReader {
+ public:
+  // `before`: what its page said.
+  TapReader(Tap<> tap, bool with_payloads, evidence::ActivityWord before)
+      : tap_(std::move(tap)), with_payloads_(with_payloads), told_(before) {}
+
+  // The thread that polls.
+
+  // Appends what has happened since; returns true if ports have been opened or closed.
+  bool poll(Room room, std::vector<RecordPtr>& records);
+  [[nodiscard]] const TapCounts& counts() const { return counts_; }
+  // Nothing more will be read: says what was left out last.
+  void finish(std::vector<RecordPtr>& records);
+
+  // Any thread. Hints for who looks at the page of a source that nobody tells of; one writer, the
+  // thread that polls. Relaxed is enough: who looks too early looks again.
+
+  [[nodiscard]] bool is_live() const { return is_live_.load(std::memory_order_relaxed); }
+  [[nodiscard]] evidence::ActivityWord told() const {
+    return told_.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] const std::string& name() const { return tap_.name(); }
+
+ private:
+  void take(const TapEvent<>& event, Room room, std::vector<RecordPtr>& records);
+  void add_state(const TapEvent<>& event, Nanoseconds seen, std::vector<RecordPtr>& records);
+  void add_arrival(const TapEvent<>& event, Nanoseconds seen, Room room,
+                   std::vector<RecordPtr>& records);
+  void leave_out(const TapEvent<>& event, Nanoseconds seen);
+  void tell_left_out(std::vector<RecordPtr>& records);
+  const evidence::ContextPtr& context_of(const TapEvent<>& event);
+
+  Tap<> tap_;
+  const bool with_payloads_;
+  evidence::ContextPtr context_;
+  std::optional<LeftOut> left_out_;
+  TapCounts counts_;
+  std::atomic<bool> is_live_{false};
+  std::atomic<evidence::ActivityWord> told_;
+};
+
+}  // namespace arbiter::recorder

@@ -1,0 +1,392 @@
+#include "recorder/watcher.hpp"
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include "rules/model/quantifiers.hpp"
+#include "shm/clock.hpp"
+#include "shm/picture.hpp"
+
+namespace arbiter::recorder {
+namespace {
+
+using evidence::ActivityWord;
+using evidence::ModelChange;
+using evidence::PortChange;
+using evidence::SourceContext;
+using evidence::SourceState;
+
+constexpr std::chrono::milliseconds kLookEvery{10};
+// How often the daemon is asked for its ports: where a tap has told that they have changed, and
+// otherwise, for input ports that no tap tells of.
+constexpr Nanoseconds kPortsAtMostEvery = 200'000'000;
+constexpr Nanoseconds kPortsAtLeastEvery = 2'000'000'000;
+// A model that is replaced while it is asked for is asked for again.
+constexpr int kTries = 100;
+
+std::vector<evidence::ModelFile> files_of(const std::vector<rules::FileText>& texts) {
+  std::vector<evidence::ModelFile> files;
+  files.reserve(texts.size());
+  for (const rules::FileText& text : texts) files.push_back({text.path, text.content});
+  return files;
+}
+
+template <class T>
+void add(Batch& batch, T record) {
+  batch.records.push_back(std::make_shared<const Record>(std::move(record)));
+}
+
+}  // namespace
+
+Watcher::Watcher(const RecorderOptions& options, RecordQueue& queue)
+    : options_(options), queue_(queue) {
+  instance_ = std::make_unique<watch::Instance>(options_.caller);
+  begin();
+}
+
+void Watcher::start() {
+  thread_ = std::thread([this] { run(); });
+}
+
+void Watcher::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    is_stopping_ = true;
+    stopping_.notify_one();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+Watcher::NewTaps Watcher::take_taps() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(new_taps_, {});
+}
+
+void Watcher::run() {
+  for (;;) {
+    {
+      std::unique_lock lock(mutex_);
+      if (stopping_.wait_for(lock, kLookEvery, [this] { return is_stopping_; })) return;
+    }
+    try {
+      look();
+    } catch (const std::exception&) {  // the daemon has gone, or refuses for now: another time
+    }
+  }
+}
+
+void Watcher::look() {
+  instance_->update();
+  if (instance_->memory() != memory_) {
+    begin_again();
+    return;
+  }
+  if (memory_->tables().generation() != generation_) take_up_model();
+  if (options_.ports.empty()) look_for_newcomers();
+  look_at_pages();
+  look_at_ports();
+}
+
+// Where that fails, because the new daemon is busy with others, it is tried at the next look.
+void Watcher::begin_again() {
+  if (memory_ != nullptr) {
+    options_.say("a daemon has come that does not know what was before: recording starts again");
+  }
+  try {
+    begin();
+  } catch (...) {
+    memory_.reset();
+    throw;
+  }
+}
+
+// Taps first, then pages: what a source does after its page was read, its tap tells.
+void Watcher::begin() {
+  memory_ = instance_->memory();
+  node_.reset();
+  node_.emplace(options_.caller.name, options_.node);
+  sources_.clear();
+  ports_.clear();
+  knows_ports_ = false;
+  last_death_ = shm::monotonic_now();
+  first_refusal_.clear();
+  instance_->catch_up();
+  const auto model = watch::ModelInForce::fetch(*instance_);
+  generation_ = model.generation();
+  opened_.clear();
+  Batch taps;
+  for (const std::string& source : chosen_sources(model)) open_tap(source, taps);
+  const bool has_tap = std::any_of(sources_.begin(), sources_.end(),
+                                   [](const auto& each) { return each.second.tap != nullptr; });
+  if (!has_tap && !first_refusal_.empty()) throw Error(first_refusal_);
+  Batch states;
+  for (auto& [source, watched] : sources_) {
+    if (instance_->find_source(source)) add_page_state(source, page_word(source), states);
+  }
+  Batch start;
+  start.is_start = true;
+  add(start,
+      evidence::Start{shm::monotonic_now(), instance_->name(), options_.ports, options_.payloads});
+  for (RecordPtr& record : states.records) start.records.push_back(std::move(record));
+  for (RecordPtr& record : taps.records) start.records.push_back(std::move(record));
+  add(start, model_change(model));
+  queue_.push(std::move(start));
+  hand_over_taps(true);
+  try {
+    look_at_ports();
+  } catch (const std::exception&) {  // the daemon is busy: at the next look
+  }
+}
+
+void Watcher::hand_over_taps(bool is_start) {
+  const std::lock_guard lock(mutex_);
+  if (is_start) new_taps_ = {true, {}};
+  for (auto& tap : opened_) new_taps_.taps.push_back(std::move(tap));
+  opened_.clear();
+}
+
+// With its sources: what arrives at them from here on is recorded. The model's own record comes
+// first, so that decisions under it find it.
+void Watcher::take_up_model() {
+  for (int i = 0; i < kTries; ++i) {
+    instance_->catch_up();
+    const auto model = watch::ModelInForce::fetch(*instance_);
+    if (model.generation() != memory_->tables().generation()) continue;
+    generation_ = model.generation();
+    Batch batch;
+    add(batch, model_change(model));
+    tap_newcomers(chosen_sources(model), batch);
+    queue_.push(std::move(batch));
+    hand_over_taps(false);
+    return;
+  }
+}
+
+bool Watcher::is_chosen(const std::string& port) const {
+  return options_.ports.empty() ||
+         std::any_of(options_.ports.begin(), options_.ports.end(),
+                     [&](const std::string& pattern) { return rules::matches(pattern, port); });
+}
+
+// All that the chosen ports are connected to or read: under the model in force, and under those
+// that may be switched to.
+std::set<std::string> Watcher::chosen_sources(const watch::ModelInForce& model) const {
+  std::set<std::string> chosen;
+  const auto snapshot = memory_->tables().snapshot();
+  const auto add_source = [&](shm::SourceId id) {
+    if (memory_->pages().knows(id)) chosen.insert(memory_->source_name(id));
+  };
+  if (options_.ports.empty()) {
+    for (shm::SourceId id = 0; id < shm::kMaxSources; ++id) add_source(id);
+  }
+  for (const auto& [id, name] : instance_->port_names()) {
+    if (is_chosen(name)) shm::for_each_heeded(snapshot.table, id, add_source);
+  }
+  for (const auto& other : model.others()) {
+    for (const auto& [port, sources] : other.ports) {
+      if (is_chosen(port)) chosen.insert(sources.begin(), sources.end());
+    }
+  }
+  return chosen;
+}
+
+ModelChange Watcher::model_change(const watch::ModelInForce& model) const {
+  ModelChange change;
+  change.time = model.since();
+  change.seen = shm::monotonic_now();
+  change.generation = model.generation();
+  change.name = model.name().value_or("");
+  change.how = model.how().value_or("");
+  change.by = model.by().value_or("");
+  change.has_texts = model.has_texts();
+  change.files = files_of(model.texts().models);
+  if (const auto& application = model.texts().application) {
+    change.application = {application->path, application->content};
+  }
+  if (!model.is_none()) change.table = rule_table();
+  return change;
+}
+
+std::shared_ptr<const evidence::RuleTable> Watcher::rule_table() const {
+  auto rules = std::make_shared<evidence::RuleTable>();
+  rules->owner = memory_;
+  rules->table = memory_->tables().snapshot().table;
+  for (shm::SourceId id = 0; id < rules->table.source_count(); ++id) {
+    if (!rules->table.knows_source(id) || !memory_->pages().knows(id)) continue;
+    rules->sources[memory_->source_name(id)] = id;
+  }
+  for (const auto& [id, name] : instance_->port_names()) {
+    if (rules->table.knows_port(id) && is_chosen(name)) rules->ports[id] = name;
+  }
+  return rules;
+}
+
+// The page is read once the tap is there.
+void Watcher::open_tap(const std::string& source, Batch& batch) {
+  Watched& watched = sources_[source];
+  const bool with_payloads =
+      options_.payloads == "all" ||
+      (options_.payloads != "none" && rules::matches(options_.payloads, source));
+  TapOptions options;
+  options.may_wait = false;
+  options.max_held = with_payloads ? 1 : 0;
+  try {
+    Tap<> tap = node_->tap(source, options);
+    const ActivityWord word = page_word(source);
+    watched.seen = watched.reported = word;
+    watched.tap = std::make_shared<TapReader>(std::move(tap), with_payloads, word);
+    opened_.push_back(watched.tap);
+  } catch (const Error& error) {
+    if (first_refusal_.empty()) first_refusal_ = error.what();
+    options_.say("cannot record " + source + ": " + error.what());
+    const Nanoseconds now = shm::monotonic_now();
+    add(batch,
+        evidence::Missed{source, now, now, 0, 0, evidence::Missed::Why::refused, error.what()});
+  }
+}
+
+void Watcher::tap_newcomers(const std::set<std::string>& sources, Batch& batch) {
+  for (const std::string& source : sources) {
+    if (sources_.count(source) != 0) continue;
+    open_tap(source, batch);
+    if (instance_->find_source(source)) add_page_state(source, page_word(source), batch);
+  }
+}
+
+// Sources that no model knew when watching began.
+void Watcher::look_for_newcomers() {
+  std::set<std::string> all;
+  for (shm::SourceId id = 0; id < shm::kMaxSources; ++id) {
+    if (memory_->pages().knows(id)) all.insert(memory_->source_name(id));
+  }
+  Batch batch;
+  tap_newcomers(all, batch);
+  if (batch.records.empty()) return;
+  queue_.push(std::move(batch));
+  hand_over_taps(false);
+}
+
+ActivityWord Watcher::page_word(const std::string& source) const {
+  const auto id = instance_->find_source(source);
+  const shm::Activity* activity = id ? memory_->pages().find(*id) : nullptr;
+  return activity == nullptr ? shm::kNeverActive : shm::SeenActivity::of(*activity).word;
+}
+
+void Watcher::add_page_state(const std::string& source, ActivityWord word, Batch& batch) const {
+  auto context = std::make_shared<SourceContext>();
+  context->source = source;
+  SourceState state;
+  state.context = std::move(context);
+  state.seen = shm::monotonic_now();
+  state.generation = generation_;
+  state.word = word;
+  add(batch, std::move(state));
+}
+
+// What nobody tells: an operator deactivates a source whose port is closed; a publisher dies
+// between its arrival and telling of it. Where somebody has only just begun to tell, the second
+// look finds it told.
+void Watcher::look_at_pages() {
+  Batch batch;
+  for (auto& [source, watched] : sources_) {
+    if (watched.tap == nullptr || watched.tap->is_live()) continue;
+    const ActivityWord word = page_word(source);
+    const bool is_new = word != watched.reported && word != watched.tap->told();
+    if (is_new && word == watched.seen && !watched.tap->is_live()) {
+      add_page_state(source, word, batch);
+      watched.reported = word;
+    }
+    watched.seen = word;
+  }
+  if (!batch.records.empty()) queue_.push(std::move(batch));
+}
+
+Watcher::Ports Watcher::ports_of(const wire::Status& status) {
+  Ports ports;
+  const auto note = [&](bool is_input, const std::string& name, const auto& open) {
+    PortChange& port = ports[{is_input, name}];
+    port.is_input = is_input;
+    port.port = name;
+    port.node = open.component.node;
+    port.pid = open.component.pid;
+    if (open.type) port.type = open.type->name;
+  };
+  for (const auto& source : status.sources) {
+    if (source.open) note(false, source.name, *source.open);
+  }
+  for (const auto& input : status.inputs) {
+    if (input.open) note(true, input.name, *input.open);
+  }
+  return ports;
+}
+
+void Watcher::look_at_ports() {
+  const Nanoseconds now = shm::monotonic_now();
+  const bool is_due =
+      !knows_ports_ || now - last_ports_ >= kPortsAtLeastEvery ||
+      (now - last_ports_ >= kPortsAtMostEvery && ports_changed_.load(std::memory_order_relaxed));
+  if (!is_due || !instance_->has_daemon()) return;
+  ports_changed_.store(false, std::memory_order_relaxed);
+  last_ports_ = now;
+  try {
+    const wire::Status status = instance_->status();
+    note_ports(ports_of(status), status.deaths);
+  } catch (const wire::RefusedError&) {  // the policy does not let this user ask
+  }
+}
+
+void Watcher::note_ports(Ports ports, const std::vector<wire::DeathStatus>& deaths) {
+  Batch batch;
+  const Nanoseconds seen = shm::monotonic_now();
+  const auto tell = [&](PortChange change, PortChange::What what, Nanoseconds when) {
+    change.what = what;
+    change.seen = when;
+    add(batch, std::move(change));
+  };
+  const auto is_same = [](const PortChange& one, const PortChange& other) {
+    return one.pid == other.pid && one.node == other.node && one.type == other.type;
+  };
+  note_deaths(deaths, batch);
+  for (const auto& [key, before] : ports_) {
+    const auto now = ports.find(key);
+    if (now != ports.end() && is_same(now->second, before)) continue;
+    tell(before, PortChange::What::closed, seen);
+  }
+  for (const auto& [key, now] : ports) {
+    const auto before = ports_.find(key);
+    if (before != ports_.end() && is_same(before->second, now)) continue;
+    tell(now, knows_ports_ ? PortChange::What::opened : PortChange::What::open, seen);
+  }
+  knows_ports_ = true;
+  ports_ = std::move(ports);
+  if (!batch.records.empty()) queue_.push(std::move(batch));
+}
+
+// Also of ports that were opened since the last look.
+void Watcher::note_deaths(const std::vector<wire::DeathStatus>& deaths, Batch& batch) {
+  const Nanoseconds before = last_death_;
+  for (const wire::DeathStatus& death : deaths) {
+    if (death.at <= before) continue;
+    last_death_ = std::max(last_death_, death.at);
+    for (const bool is_input : {false, true}) {
+      for (const std::string& name : is_input ? death.inputs : death.outputs) {
+        PortChange change;
+        const auto known = ports_.find({is_input, name});
+        if (known != ports_.end() && known->second.pid == death.pid) {
+          change = known->second;
+          ports_.erase(known);  // and is not closed besides
+        }
+        change.what = PortChange::What::died;
+        change.is_input = is_input;
+        change.port = name;
+        change.node = death.node;
+        change.pid = death.pid;
+        change.seen = death.at;
+        add(batch, std::move(change));
+      }
+    }
+  }
+}
+
+}  // namespace arbiter::recorder

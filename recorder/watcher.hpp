@@ -1,0 +1,108 @@
+// What a recorder must know beside the events of taps: which sources there are, which model is in
+// force, what the pages of sources say that nobody tells of, and which ports are open.
+//
+// A thread of its own, because it asks the daemon and opens taps, either of which may wait. It puts
+// what it finds into the queue, and hands taps to the thread that polls them.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <arbiter/arbiter.hpp>
+
+#include "evidence/rule_table.hpp"
+#include "recorder/options.hpp"
+#include "recorder/record_queue.hpp"
+#include "recorder/tap_reader.hpp"
+#include "watch/instance.hpp"
+#include "watch/model_in_force.hpp"
+
+namespace arbiter::recorder {
+
+class Watcher {
+ public:
+  // Taps all sources that are to be recorded and puts the start into the queue. Keeps both. Throws
+  // wire::CallError, arbiter::Error.
+  Watcher(const RecorderOptions& options, RecordQueue& queue);
+  Watcher(const Watcher&) = delete;
+  Watcher& operator=(const Watcher&) = delete;
+  ~Watcher() { stop(); }
+
+  // Goes on by itself.
+  void start();
+  void stop();
+
+  // The thread that polls.
+
+  // Taps that were opened since; `is_start`: those before are to be forgotten.
+  struct NewTaps {
+    bool is_start = false;
+    std::vector<std::shared_ptr<TapReader>> taps;
+  };
+  [[nodiscard]] NewTaps take_taps();
+  // A tap has told of it. Relaxed is enough: it is a hint, and one that is missed comes again.
+  void note_ports_changed() { ports_changed_.store(true, std::memory_order_relaxed); }
+
+ private:
+  using Ports = std::map<std::pair<bool, std::string>, evidence::PortChange>;
+
+  void run();
+  void look();
+  void begin();
+  void begin_again();
+  void take_up_model();
+  [[nodiscard]] std::set<std::string> chosen_sources(const watch::ModelInForce& model) const;
+  [[nodiscard]] bool is_chosen(const std::string& port) const;
+  [[nodiscard]] evidence::ModelChange model_change(const watch::ModelInForce& model) const;
+  [[nodiscard]] std::shared_ptr<const evidence::RuleTable> rule_table() const;
+  void open_tap(const std::string& source, Batch& batch);
+  void tap_newcomers(const std::set<std::string>& sources, Batch& batch);
+  void look_for_newcomers();
+  void hand_over_taps(bool is_start);
+  void add_page_state(const std::string& source, evidence::ActivityWord word, Batch& batch) const;
+  [[nodiscard]] evidence::ActivityWord page_word(const std::string& source) const;
+  void look_at_pages();
+  void look_at_ports();
+  void note_deaths(const std::vector<wire::DeathStatus>& deaths, Batch& batch);
+  [[nodiscard]] static Ports ports_of(const wire::Status& status);
+  void note_ports(Ports ports, const std::vector<wire::DeathStatus>& deaths);
+
+  const RecorderOptions& options_;
+  RecordQueue& queue_;
+  std::unique_ptr<watch::Instance> instance_;
+  std::shared_ptr<const shm::DecisionMemory> memory_;  // of this run
+  std::optional<Node> node_;
+  std::uint64_t generation_ = 0;
+  std::string first_refusal_;
+  struct Watched {
+    std::shared_ptr<TapReader> tap;  // null: it cannot be tapped
+    // Of the page: what it said last, and what was put into the queue.
+    evidence::ActivityWord seen = shm::kNeverActive;
+    evidence::ActivityWord reported = shm::kNeverActive;
+  };
+  std::map<std::string, Watched> sources_;
+  Ports ports_;
+  bool knows_ports_ = false;
+  Nanoseconds last_ports_ = 0;
+  Nanoseconds last_death_ = 0;
+  std::vector<std::shared_ptr<TapReader>> opened_;  // and not handed over yet
+
+  std::mutex mutex_;
+  NewTaps new_taps_;  // under it
+  std::atomic<bool> ports_changed_{false};
+  std::condition_variable stopping_;
+  bool is_stopping_ = false;  // under the mutex
+  std::thread thread_;
+};
+
+}  // namespace arbiter::recorder

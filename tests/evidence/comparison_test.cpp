@@ -1,0 +1,84 @@
+// What would have happened under another model.
+#include "evidence/comparison.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/evidence/incident.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using Fate = Incident::Fate;
+
+evidence::Comparison compare_with(Incident& incident, const std::string& model,
+                                  evidence::Recorded& recorded) {
+  recorded = incident.read();
+  evidence::Models models(compile_texts);
+  evidence::Judge other(compile_text(model), true);
+  return compare(recorded, models, other);
+}
+
+// To and fro: /high from 1100 to 1600, /low from 1050 to 1800.
+void override_for_a_while(Incident& incident) {
+  incident.arrive("/low", 1050, 1051, Fate::accepted);
+  incident.arrive("/high", 1100, 1101, Fate::accepted);
+  incident.arrive("/low", 1300, 1301, Fate::discarded);
+}
+
+TEST(Comparison, FindsNoDifferenceFromTheSameModel) {
+  Incident incident;
+  override_for_a_while(incident);
+  evidence::Recorded recorded;
+  const auto result = compare_with(incident, kOverride, recorded);
+  EXPECT_EQ(result.decisions, 3u);
+  EXPECT_EQ(result.same, 3u);
+  EXPECT_TRUE(result.changed.empty());
+  EXPECT_TRUE(result.intervals.empty());
+}
+
+TEST(Comparison, ListsDecisionsAndIntervalsThatDiffer) {
+  Incident incident;
+  override_for_a_while(incident);
+  incident.deactivate("/low", 1900, 1901);  // so that the recording goes on until then
+  evidence::Recorded recorded;
+  const auto result = compare_with(incident, kReversed, recorded);
+  ASSERT_EQ(result.changed.size(), 2u);
+  EXPECT_EQ(result.changed[0].live.decision->context->source, "/high");
+  EXPECT_EQ(result.changed[1].live.decision->context->source, "/low");
+  ASSERT_EQ(result.intervals.size(), 1u);
+  EXPECT_EQ(result.intervals[0].port, "/p");
+  EXPECT_EQ(result.intervals[0].from, 1100);
+  EXPECT_EQ(result.intervals[0].to, 1600);
+  EXPECT_EQ(result.intervals[0].recorded, "/high");
+  EXPECT_EQ(result.intervals[0].other, "/low");
+}
+
+TEST(Comparison, ActivitiesLastAsTheOtherModelSays) {
+  Incident incident;
+  override_for_a_while(incident);
+  incident.arrive("/low", 1560, 1561, Fate::discarded);
+  std::string quicker = kOverride;
+  quicker.replace(quicker.find("500ns"), 5, "450ns");
+  evidence::Recorded recorded;
+  const auto result = compare_with(incident, quicker, recorded);
+  ASSERT_EQ(result.changed.size(), 1u);
+  EXPECT_EQ(result.changed[0].live.decision->arrival().time, 1560);
+  ASSERT_EQ(result.intervals.size(), 1u);
+  EXPECT_EQ(result.intervals[0].from, 1550);
+  EXPECT_EQ(result.intervals[0].recorded, "/high");
+  EXPECT_EQ(result.intervals[0].other, "/low");
+}
+
+TEST(Comparison, SaysWhereTheOtherModelDoesNotConnect) {
+  Incident incident;
+  incident.arrive("/low", 1050, 1051, Fate::accepted);
+  evidence::Recorded recorded;
+  const auto result = compare_with(
+      incident, R"(<behaviors><arbiter at="/p"><select from="/high"/></arbiter></behaviors>)",
+      recorded);
+  ASSERT_EQ(result.changed.size(), 1u);
+  EXPECT_FALSE(result.changed[0].is_connected);
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,218 @@
+// Records, written and read.
+#include "evidence/records.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "evidence/record_schemas.hpp"
+#include "tests/evidence/incident.hpp"
+#include "tests/support/text_files.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using evidence::Record;
+using nlohmann::json;
+
+// One of each kind, with all that a record may have.
+void add_everything(Incident& incident) {
+  incident.arrive("/low", 1010, 1011, Incident::Fate::accepted);
+  Record payload = incident.records().back();
+  auto& arrival = std::get<evidence::Arrival>(payload);
+  arrival.sequence = 2;
+  arrival.time = arrival.seen = 1012;
+  arrival.payload = std::vector<std::byte>{std::byte{1}, std::byte{0}, std::byte{255}};
+  arrival.word = shm::kForeverFlag | 1012;
+  incident.add(payload);
+  incident.deactivate("/low", 1020, 1021);
+  incident.state("/high", 1030, 1031, shm::deactivation(1030), evidence::SourceState::Why::gap, 4);
+  auto context = std::make_shared<evidence::SourceContext>();
+  context->source = "/\"odd\"\n/\xC3\xA9";
+  context->destinations = {"/p", "/q"};
+  incident.add(evidence::DestinationsChange{context, 1040, 1041});
+  incident.add(
+      evidence::PortChange{evidence::PortChange::What::died, true, "/p", "node", 42, "Type", 1050});
+  incident.add(evidence::WinnerChange{"/p", "/low", "", 1010, evidence::WinnerChange::Why::arrival,
+                                      "/low", 1});
+  incident.add(evidence::Missed{"/low", 1, 2, 3, 4, evidence::Missed::Why::queue, "why"});
+}
+
+struct Kept {
+  std::vector<Record> records;
+  evidence::ReadRecording about;
+};
+
+Kept read_all(const std::string& file) {
+  Kept kept;
+  kept.about = evidence::read_recording(file, evidence::Payloads::read, [&](Record&& record) {
+    kept.records.push_back(std::move(record));
+  });
+  return kept;
+}
+
+TEST(Records, AreReadAsTheyWereWritten) {
+  Incident incident;
+  add_everything(incident);
+  const Kept kept = read_all(incident.file());
+  EXPECT_EQ(kept.about.instance, "test");
+  EXPECT_EQ(kept.about.host, "host");
+  EXPECT_EQ(kept.about.wall_offset, 5'000'000);
+  ASSERT_EQ(kept.records.size(), incident.records().size());
+  // What is written of each is what was written before.
+  TemporaryDirectory directory;
+  const std::string again = directory.path() + "/again.mcap";
+  evidence::RecordWriter writer(again, {}, {});
+  for (const Record& record : kept.records) writer.write(record);
+  writer.close();
+  std::vector<std::string> texts[2];
+  const std::string files[2] = {incident.file(), again};
+  for (int i = 0; i < 2; ++i) {
+    recording::McapVisitor visitor;
+    visitor.message = [&](const recording::McapMessage& message) {
+      texts[i].emplace_back(reinterpret_cast<const char*>(message.data.data()),
+                            message.data.size());
+    };
+    read_mcap(files[i], visitor);
+  }
+  EXPECT_EQ(texts[0], texts[1]);
+  bool has_payload = false;
+  for (const Record& record : kept.records) {
+    const auto* arrival = std::get_if<evidence::Arrival>(&record);
+    if (arrival == nullptr || !arrival->payload) continue;
+    has_payload = true;
+    EXPECT_EQ(*arrival->payload,
+              (std::vector<std::byte>{std::byte{1}, std::byte{0}, std::byte{255}}));
+  }
+  EXPECT_TRUE(has_payload);
+}
+
+TEST(Records, AreOrderedByWallTimeThroughTheOffset) {
+  Incident incident;
+  add_everything(incident);
+  std::set<std::uint64_t> times;
+  recording::McapVisitor visitor;
+  visitor.message = [&](const recording::McapMessage& message) { times.insert(message.log_time); };
+  read_mcap(incident.file(), visitor);
+  EXPECT_TRUE(times.count(5'001'010) != 0);
+}
+
+// As far as our schemas go.
+void expect_fits(const json& value, const json& schema, const std::string& where) {
+  const std::string type = schema["type"];
+  if (type == "object") {
+    ASSERT_TRUE(value.is_object()) << where;
+    EXPECT_EQ(schema["additionalProperties"], false) << where;
+    EXPECT_EQ(schema["required"].size(), schema["properties"].size()) << where;
+    EXPECT_EQ(value.size(), schema["properties"].size()) << where;
+    for (const auto& [name, each] : value.items()) {
+      ASSERT_TRUE(schema["properties"].contains(name)) << where << '.' << name;
+      expect_fits(each, schema["properties"][name], where + '.' + name);
+    }
+  } else if (type == "array") {
+    ASSERT_TRUE(value.is_array()) << where;
+    for (const auto& each : value) expect_fits(each, schema["items"], where + "[]");
+  } else if (type == "integer") {
+    EXPECT_TRUE(value.is_number_integer() && value >= schema["minimum"]) << where;
+  } else if (type == "boolean") {
+    EXPECT_TRUE(value.is_boolean()) << where;
+  } else {
+    ASSERT_EQ(type, "string") << where;
+    EXPECT_TRUE(value.is_string()) << where;
+    if (!schema.contains("enum")) return;
+    const json& words = schema["enum"];
+    EXPECT_TRUE(std::find(words.begin(), words.end(), value) != words.end()) << where << value;
+  }
+}
+
+TEST(Records, FitTheSchemasInTheFile) {
+  Incident incident;
+  add_everything(incident);
+  std::map<std::uint16_t, json> schemas;
+  std::map<std::uint16_t, std::pair<std::string, std::uint16_t>> channels;
+  std::set<std::string> seen;
+  recording::McapVisitor visitor;
+  visitor.schema = [&](std::uint16_t id, const recording::McapSchema& schema) {
+    if (schema.encoding == "jsonschema") schemas[id] = json::parse(schema.data);
+  };
+  visitor.channel = [&](std::uint16_t id, const recording::McapChannel& channel) {
+    channels[id] = {channel.topic, channel.message_encoding == "json" ? channel.schema : 0};
+  };
+  visitor.message = [&](const recording::McapMessage& message) {
+    const auto& [topic, schema] = channels.at(message.channel);
+    if (schema == 0) return;
+    const auto* text = reinterpret_cast<const char*>(message.data.data());
+    expect_fits(json::parse(text, text + message.data.size()), schemas.at(schema), topic);
+    seen.insert(topic);
+  };
+  read_mcap(incident.file(), visitor);
+  EXPECT_EQ(seen.size(), evidence::kRecordKinds);
+}
+
+TEST(Records, HaveEachFieldOnTheirPage) {
+  const std::string page = content_of(std::string(ARBITER_TEST_DATA) + "/../../docs/recording.md");
+  for (const auto& schema : evidence::record_schemas) {
+    const auto row = page.find("| `" + std::string(schema.topic) + "` |");
+    ASSERT_NE(row, std::string::npos) << schema.topic;
+    const std::string text = page.substr(row, page.find('\n', row) - row);
+    const json properties = json::parse(schema.json())["properties"];
+    for (const auto& [name, type] : properties.items()) {
+      EXPECT_NE(text.find('`' + name + '`'), std::string::npos) << schema.topic << ": " << name;
+    }
+  }
+}
+
+// A file with one record, as somebody else might make it.
+std::string file_with(const TemporaryDirectory& directory, const std::string& topic,
+                      const std::string& text) {
+  static int number = 0;
+  const std::string path = directory.path() + "/" + std::to_string(++number) + ".mcap";
+  recording::McapWriter file(path, "test", {});
+  file.write_metadata("arbiter.recording", {{"format", "1"}});
+  const auto schema = file.add_schema({"x", "jsonschema", "{}"});
+  const auto channel = file.add_channel({schema, topic, "json", {}});
+  file.write({channel, 0, 0, 0, std::as_bytes(std::span(text))});
+  file.close();
+  return path;
+}
+
+std::string error_of_reading(const std::string& file) {
+  try {
+    static_cast<void>(evidence::load_recording(file));
+  } catch (const evidence::RecordError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(Records, ThatNobodyCouldHaveWrittenAreRefused) {
+  const TemporaryDirectory directory;
+  const auto error = [&](const std::string& topic, const std::string& text) {
+    const std::string file = file_with(directory, topic, text);
+    const std::string what = error_of_reading(file);
+    return what.substr(std::min(what.size(), file.size()));
+  };
+  EXPECT_EQ(error("arbiter/missed", "{"),
+            ": record 1, of topic arbiter/missed: it is no JSON object");
+  EXPECT_EQ(error("arbiter/start", R"({"time_ns":-1})"),
+            ": record 1, of topic arbiter/start: its field \"time_ns\" is no whole number of at "
+            "least 0");
+  EXPECT_EQ(error("arbiter/start", R"({"time_ns":9223372036854775807})"),
+            ": record 1, of topic arbiter/start: its field \"time_ns\" is no time");
+  EXPECT_EQ(error("arbiter/deactivation", R"({"source":7})"),
+            ": record 1, of topic arbiter/deactivation: its field \"source\" is no text");
+}
+
+TEST(Records, AreThoseOfARecording) {
+  const TemporaryDirectory directory;
+  const std::string path = directory.path() + "/other.mcap";
+  recording::McapWriter file(path, "test", {});
+  file.close();
+  EXPECT_EQ(error_of_reading(path), path + " is no recording that arbiter has made");
+}
+
+}  // namespace
+}  // namespace arbiter::test

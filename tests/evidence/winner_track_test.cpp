@@ -1,0 +1,88 @@
+// Who wins, from event to event.
+#include "evidence/winner_track.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/evidence/incident.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using evidence::WinnerChange;
+using Why = WinnerChange::Why;
+
+class TrackedWinners : public testing::Test {
+ protected:
+  TrackedWinners() {
+    track_.start(0);
+    track_.set_rules(evidence::rule_table_of(simulation_), 1, 0);
+  }
+  // "TIME PORT WINNER WHY BY", since this was asked last.
+  std::vector<std::string> told() {
+    std::vector<std::string> lines;
+    for (const WinnerChange& each : std::exchange(changes_, {})) {
+      lines.push_back(std::to_string(each.time) + ' ' + (each.winner.empty() ? "-" : each.winner) +
+                      ' ' + std::string(name_of(each.why)) + ' ' + each.by);
+    }
+    return lines;
+  }
+  void arrive(const std::string& source, shm::Nanoseconds time) {
+    track_.apply(source, shm::arrival(time, 500), time, Why::arrival);
+  }
+  using Lines = std::vector<std::string>;
+
+  const rules::CompiledModel model_ = compile_text(kOverride);
+  const rules::Simulation simulation_{model_};
+  std::vector<WinnerChange> changes_;
+  evidence::WinnerTrack track_{
+      [this](WinnerChange&& each) { changes_.push_back(std::move(each)); }};
+};
+
+TEST_F(TrackedWinners, ChangeByArrivalsAndByEnds) {
+  arrive("/low", 100);
+  arrive("/high", 200);
+  arrive("/low", 300);
+  arrive("/low", 650);
+  track_.advance(2000);
+  EXPECT_EQ(told(), (Lines{"100 /low arrival /low", "200 /high arrival /high",
+                           "700 /low expiry /high", "1150 - expiry /low"}));
+}
+
+TEST_F(TrackedWinners, ChangeByDeactivation) {
+  arrive("/low", 100);
+  arrive("/high", 200);
+  track_.apply("/high", shm::deactivation(250), 250, Why::deactivation);
+  EXPECT_EQ(told().back(), "250 /low deactivation /high");
+}
+
+TEST_F(TrackedWinners, ChangeByTheModel) {
+  arrive("/low", 100);
+  arrive("/high", 200);
+  told();
+  const auto reversed = compile_text(kReversed);
+  const rules::Simulation simulation(reversed);
+  track_.set_rules(evidence::rule_table_of(simulation), 2, 300);
+  EXPECT_EQ(told(), (Lines{"300 /low model "}));
+  track_.set_rules(nullptr, 0, 400);
+  EXPECT_EQ(told(), (Lines{"400 - model "}));
+}
+
+TEST_F(TrackedWinners, AnActivityMayEndEarlierThanItWasSaidTo) {
+  track_.apply("/low", 5000, 100, Why::arrival);
+  track_.apply("/low", 700, 200, Why::arrival);
+  track_.advance(1000);
+  EXPECT_EQ(told().back(), "700 - expiry /low");
+}
+
+TEST_F(TrackedWinners, WhatComesLateCountsFromThenOn) {
+  arrive("/low", 300);
+  track_.advance(350);
+  arrive("/high", 200);
+  EXPECT_EQ(told().back(), "350 /high arrival /high");
+}
+
+}  // namespace
+}  // namespace arbiter::test

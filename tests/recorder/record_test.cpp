@@ -1,0 +1,285 @@
+// What `arbiter record` writes down.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/client/component.hpp"
+#include "tests/recorder/recording.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using evidence::Arrival;
+using evidence::WinnerChange;
+using nlohmann::json;
+using testing::HasSubstr;
+
+const std::string kReversedModel = R"(<behaviors>
+  <behavior name="Low"><config at="/p">/low</config><inhibition>High</inhibition></behavior>
+  <behavior name="High"><config at="/p">/high</config></behavior>
+</behaviors>
+)";
+
+std::set<std::string> tapped(const Recording& recording) {
+  std::set<std::string> sources;
+  for (const auto& state : recording.records<evidence::SourceState>()) {
+    sources.insert(state.context->source);
+  }
+  return sources;
+}
+
+TEST(Record, HasEachArrivalWithItsPayloadAndItsFates) {
+  Daemon daemon(kOverrideModel);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  auto in = node.input_port<int>("/p");
+  Recording recording(daemon, {"--payloads", "/low*"});
+  low.publish(7);
+  high.publish(8);
+  low.publish(9);
+  high.signal();
+  high.deactivate();
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  EXPECT_THAT(recording.output(), HasSubstr("4 arrivals of 2 sources and 3 changes of winner in "));
+  auto arrivals = recording.records<Arrival>();
+  ASSERT_EQ(arrivals.size(), 4u);
+  EXPECT_EQ(arrivals[0].context->source, "/low");
+  EXPECT_EQ(arrivals[0].masks.accepted, 1u);
+  EXPECT_EQ(arrivals[0].context->destinations, (std::vector<std::string>{"/p"}));
+  int value = 0;
+  ASSERT_TRUE(arrivals[2].payload && arrivals[2].payload->size() == sizeof value);
+  std::memcpy(&value, arrivals[2].payload->data(), sizeof value);
+  EXPECT_EQ(value, 9);
+  EXPECT_EQ(arrivals[2].masks.discarded, 1u);
+  EXPECT_EQ(arrivals[2].sequence, 2u);
+  EXPECT_FALSE(arrivals[1].payload);
+  EXPECT_FALSE(arrivals[3].is_sample);
+  EXPECT_EQ(recording.records<evidence::Deactivation>().size(), 1u);
+  std::vector<std::string> winners;
+  for (const auto& each : recording.records<WinnerChange>()) {
+    winners.push_back(each.winner + ' ' + std::string(name_of(each.why)));
+  }
+  EXPECT_EQ(winners,
+            (std::vector<std::string>{"/low arrival", "/high arrival", "/low deactivation"}));
+}
+
+TEST(Record, BeginsWithTheStateOfAllActivitiesAndTheModel) {
+  Daemon daemon(kLasting);
+  Node node("test");
+  auto high = node.output_port<int>("/high");
+  auto low = node.output_port<int>("/low");
+  auto in = node.input_port<int>("/p");
+  high.signal();
+  Recording recording(daemon);
+  low.publish(1);
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  const auto models = recording.records<evidence::ModelChange>();
+  ASSERT_EQ(models.size(), 1u);
+  EXPECT_EQ(models[0].files.at(0).text, kLasting);
+  const auto winners = recording.records<WinnerChange>();
+  ASSERT_FALSE(winners.empty());
+  EXPECT_EQ(winners[0].winner, "/high");
+  EXPECT_EQ(winners[0].why, WinnerChange::Why::start);
+  const json result = recording.simulate();
+  EXPECT_EQ(result["equal"], 1) << result.dump(2);
+  EXPECT_EQ(result["different"], 0);
+}
+
+TEST(Record, OfAPortHasEverySourceThatItsRulesRead) {
+  Daemon daemon(R"(<behaviors>
+    <arbiter at="/p"><select from="/a">not /read</select></arbiter>
+    <arbiter at="/q"><select from="/b"/></arbiter></behaviors>)");
+  Node node("test");
+  auto other = node.output_port<int>("/unrelated");
+  Recording recording(daemon, {"--port", "/p*"});
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  EXPECT_EQ(tapped(recording), (std::set<std::string>{"/a", "/read"}));
+}
+
+TEST(Record, TakesUpSourcesOfANewModelAndNewPorts) {
+  Daemon daemon(kOverrideModel);
+  Recording recording(daemon, {"--port", "/p"});
+  daemon.load(R"(<behaviors><arbiter at="/p"><select from="/new">not /low</select></arbiter>
+                 </behaviors>)");
+  recording.wait_for<evidence::SourceState>(
+      [](const auto& state) { return state.context->source == "/new"; });
+  Node node("test");
+  auto fresh = node.output_port<int>("/new");
+  auto in = node.input_port<int>("/p");
+  fresh.publish(1);
+  EXPECT_EQ(recording.end(SIGTERM), 0) << recording.error();
+  EXPECT_EQ(recording.records<evidence::ModelChange>().size(), 2u);
+  EXPECT_EQ(recording.records<Arrival>().size(), 1u);
+  EXPECT_EQ(recording.simulate()["equal"], 1);
+}
+
+TEST(Record, SeesPortsComeAndGo) {
+  Daemon daemon(kOverrideModel);
+  Recording recording(daemon);
+  {
+    Node node("test");
+    auto low = node.output_port<int>("/low");
+    low.publish(1);
+    recording.wait_for<evidence::PortChange>([](const auto& port) {
+      return port.port == "/low" && port.what == evidence::PortChange::What::opened &&
+             port.pid == getpid();
+    });
+  }
+  recording.wait_for<evidence::PortChange>([](const auto& port) {
+    return port.port == "/low" && port.what == evidence::PortChange::What::closed;
+  });
+  EXPECT_EQ(recording.end(), 0);
+}
+
+TEST(Record, SeesWhatAnOperatorDeactivates) {
+  Daemon daemon(R"(<behaviors timeout="forever">
+    <arbiter at="/p"><select from="/a"/></arbiter></behaviors>)");
+  {
+    Node node("test");
+    node.output_port<int>("/a").signal();
+  }
+  Recording recording(daemon);
+  EXPECT_EQ(arbiter({"deactivate", "/a"}).exit_code, 0);
+  recording.wait_for<evidence::SourceState>(
+      [](const auto& state) { return shm::is_deactivation(state.word); });
+  EXPECT_EQ(recording.end(), 0);
+  EXPECT_EQ(recording.records<WinnerChange>().back().winner, "");
+}
+
+TEST(Record, SaysWhatItMissed) {
+  Daemon daemon(kOverrideModel);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto in = node.input_port<int>("/p");
+  Recording recording(daemon, {"--payloads", "all"});
+  low.publish(0);
+  recording.wait_for<Arrival>([](const auto&) { return true; });
+  recording.process().stop();
+  constexpr int kMany = 5000;  // a publisher keeps 1024 events
+  for (int i = 0; i < kMany; ++i) low.publish(i);
+  recording.process().resume();
+  recording.wait_for<evidence::Missed>([](const auto& missed) { return missed.events != 0; });
+  low.publish(1);
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  std::uint64_t lost = 0;
+  std::uint64_t lost_samples = 0;
+  for (const auto& missed : recording.records<evidence::Missed>()) {
+    lost += missed.events;
+    lost_samples += missed.samples;
+  }
+  const auto arrivals = recording.records<Arrival>();
+  EXPECT_EQ(lost + arrivals.size(), kMany + 2u);
+  const auto with = std::count_if(arrivals.begin(), arrivals.end(),
+                                  [](const auto& each) { return each.payload.has_value(); });
+  EXPECT_EQ(lost_samples + static_cast<std::size_t>(with), arrivals.size());
+  EXPECT_THAT(recording.output(), HasSubstr("missed " + std::to_string(lost) + " events"));
+  EXPECT_EQ(recording.simulate()["different"], 0);
+}
+
+TEST(Record, IsReadUpToTheLastChunkAfterAKill) {
+  Daemon daemon(kOverrideModel);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto in = node.input_port<int>("/p");
+  Recording recording(daemon);
+  for (int i = 0; i < 10; ++i) low.publish(i);
+  recording.wait_for<Arrival>([](const auto& each) { return each.sequence == 10; });
+  recording.process().kill();
+  const auto result = arbiter({"simulate", "--recording", recording.file()});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("what comes before is used"));
+  EXPECT_THAT(result.out, HasSubstr("10 decisions: 10 equal"));
+}
+
+TEST(Record, GoesOnWhereADaemonTakesOver) {
+  Daemon daemon(kOverrideModel);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto in = node.input_port<int>("/p");
+  Recording recording(daemon);
+  low.publish(1);
+  daemon.kill();
+  low.publish(2);
+  daemon.restart();
+  low.publish(3);
+  recording.wait_for<evidence::ModelChange>(
+      [](const auto& model) { return model.generation == 2; });
+  low.publish(4);
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  EXPECT_EQ(recording.records<Arrival>().size(), 4u);
+  const json result = recording.simulate();
+  EXPECT_EQ(result["equal"], 4) << result;
+}
+
+TEST(Record, BeginsAgainWhereADaemonKnowsNothing) {
+  Daemon daemon(kOverrideModel);
+  Recording recording(daemon);
+  daemon.kill();
+  daemon.lose_state();
+  daemon.restart();
+  recording.see("recording starts again");
+  while (recording.records<evidence::Start>().size() < 2) {
+  }
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto in = node.input_port<int>("/p");
+  low.publish(1);
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  const json result = recording.simulate();
+  EXPECT_EQ(result["equal"], 1) << result.dump(2);
+}
+
+TEST(Record, SaysThatTheDiskIsFullAndLeavesWhatIsWhole) {
+  Daemon daemon(kLasting);
+  Node node("test");
+  auto low = node.output_port("/low", OutputPortOptions{.max_size = 4096});
+  auto in = node.input_port("/p");
+  const std::string file = daemon.directory() + "/full.mcap";
+  const std::string err = daemon.directory() + "/full.err";
+  const shm::FileDescriptor errors(
+      ::open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+  const std::string command = std::string("ulimit -f 4000 && exec ") + ARBITER_PROGRAMS +
+                              "/arbiter record --payloads all --compression none -o " + file;
+  ChildProcess recorder({"/bin/bash", "-c", command}, {}, {-1, -1, errors.get()});
+  pollfd ended{recorder.descriptor(), POLLIN, 0};
+  const std::vector<std::byte> sample(4096);
+  while (::poll(&ended, 1, 0) == 0) {
+    low.publish(Bytes(sample.data(), sample.size()));
+    ::usleep(100);
+  }
+  EXPECT_EQ(recorder.wait(), 2);
+  EXPECT_THAT(content_of(err), HasSubstr(file));
+  const auto result = arbiter({"simulate", "--recording", file});
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_THAT(result.out, HasSubstr("every decision is reproduced"));
+}
+
+TEST(Record, EndsByItselfAfterADuration) {
+  Daemon daemon(kOverrideModel);
+  const std::string file = daemon.directory() + "/short.mcap";
+  const auto result = arbiter({"record", "-o", file, "--duration", "20ms"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("0 arrivals of 0 sources and 0 changes of winner"));
+}
+
+TEST(Record, SaysWhatIsWrong) {
+  Daemon daemon(kOverrideModel);
+  const std::string file = daemon.directory() + "/there.mcap";
+  std::ofstream(file) << "x";
+  auto result = arbiter({"record", "-o", file});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr(file));
+  EXPECT_EQ(content_of(file), "x");
+  const std::string other = daemon.directory() + "/other.mcap";
+  result = arbiter({"record", "-o", other, "--instance", "no-such"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_FALSE(std::filesystem::exists(other));
+}
+
+}  // namespace
+}  // namespace arbiter::test

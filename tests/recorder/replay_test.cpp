@@ -1,0 +1,140 @@
+// `arbiter replay`: what arrived once arrives again.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <map>
+#include <optional>
+
+#include <arbiter/arbiter.hpp>
+
+#include "evidence/recorded.hpp"
+#include "tests/client/samples.hpp"
+#include "tests/recorder/recording.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::HasSubstr;
+
+class Replay : public testing::Test {
+ protected:
+  // /low 1, /high 2, /low 3 (loses), /high gives up, /low 4; /text "abc".
+  std::string record(const std::vector<std::string>& more = {"--payloads", "all"}) {
+    Node node("test");
+    auto in = node.input_port<Number>("/p", {.depth = 16});
+    auto low = node.output_port<Number>("/low");
+    auto high = node.output_port<Number>("/high");
+    auto text = node.output_port("/text");
+    Recording recording(daemon_, more);
+    low.publish(Number{1});
+    high.publish(Number{2});
+    low.publish(Number{3});
+    high.deactivate();
+    low.publish(Number{4});
+    const char abc[] = {'a', 'b', 'c'};
+    text.publish(Bytes(reinterpret_cast<const std::byte*>(abc), sizeof abc));
+    high.signal();
+    high.deactivate();
+    EXPECT_EQ(recording.end(), 0) << recording.error();
+    const std::string kept = daemon_.directory() + "/kept.mcap";
+    std::filesystem::rename(recording.file(), kept);
+    return kept;
+  }
+
+  Daemon daemon_{kLasting};
+};
+
+TEST_F(Replay, PublishesSamplesSignalsAndDeactivationsAgain) {
+  const std::string file = record();
+  EXPECT_EQ(arbiter({"deactivate", "/low"}).exit_code, 0);
+  Node node("test");
+  auto in = node.input_port<Number>("/p", {.depth = 16, .keep = true});
+  auto text = node.input_port("/text-in");
+  auto tap = node.tap("/text");
+  const auto result = arbiter({"replay", file});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("5 samples, 1 signal and 2 deactivations of 3 sources in "));
+  EXPECT_EQ(take_all(in), (std::vector<std::int64_t>{1, 2, 4}));
+  std::optional<std::string> told;
+  while (const auto event = tap.take()) {
+    if (const auto bytes = event->sample()) {
+      told.emplace(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    }
+  }
+  EXPECT_EQ(told, "abc");
+}
+
+// Recorded again, the replay is decided as the original was.
+TEST_F(Replay, IsDecidedAsTheOriginalWas) {
+  const std::string file = record();
+  const auto fates = [](const std::string& path) {
+    std::vector<std::string> all;
+    const auto recorded = evidence::load_recording(path);
+    for (const auto& decision : recorded.runs.at(0).decisions) {
+      all.push_back(decision.context->source + ' ' + std::to_string(decision.masks.accepted) + ' ' +
+                    std::to_string(decision.masks.discarded));
+    }
+    return all;
+  };
+  EXPECT_EQ(arbiter({"deactivate", "/low"}).exit_code, 0);
+  Node node("test");
+  auto in = node.input_port<Number>("/p", {.depth = 16});
+  Recording again(daemon_);
+  EXPECT_EQ(arbiter({"replay", file, "--rate", "10"}).exit_code, 0);
+  EXPECT_EQ(again.end(), 0) << again.error();
+  EXPECT_EQ(fates(again.file()), fates(file));
+  EXPECT_EQ(again.simulate()["different"], 0);
+}
+
+// By the times that arrivals bear: these do not depend on when we are let run.
+TEST_F(Replay, KeepsTheDistancesOfArrivals) {
+  const std::string file = record();
+  const auto times = [](const std::string& path) {
+    std::vector<shm::Nanoseconds> all;
+    const auto recorded = evidence::load_recording(path);
+    for (const auto& decision : recorded.runs.at(0).decisions) {
+      all.push_back(decision.arrival().time);
+    }
+    for (std::size_t i = all.size(); i-- > 1;) all[i] -= all[0];
+    return all;
+  };
+  Recording again(daemon_);
+  EXPECT_EQ(arbiter({"replay", file, "--source", "/low", "--source", "/text"}).exit_code, 0);
+  EXPECT_EQ(again.end(), 0) << again.error();
+  auto original = times(file);
+  auto replayed = times(again.file());
+  ASSERT_EQ(replayed.size(), 4u);
+  EXPECT_EQ(replayed[1], original[2]);
+  EXPECT_EQ(replayed[2], original[3]);
+}
+
+TEST_F(Replay, ChoosesSourcesOfInputPorts) {
+  const std::string file = record();
+  auto result = arbiter({"replay", file, "--port", "/p", "--as-fast-as-possible"});
+  EXPECT_THAT(result.out, HasSubstr("4 samples, 1 signal and 2 deactivations of 2 sources"));
+  result = arbiter({"replay", file, "--port", "/no-such"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("has no arrival of what you have chosen"));
+}
+
+TEST_F(Replay, RefusesWhatHasNoPayload) {
+  const std::string file = record({"--payloads", "/high"});
+  auto result = arbiter({"replay", file});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("does not have what was in the samples of /low, /text"));
+  result = arbiter({"replay", file, "--source", "/high", "--as-fast-as-possible"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
+TEST_F(Replay, NeedsItsPorts) {
+  const std::string file = record();
+  Node node("test");
+  auto low = node.output_port<Number>("/low");
+  const auto result = arbiter({"replay", file});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("/low"));
+}
+
+}  // namespace
+}  // namespace arbiter::test
