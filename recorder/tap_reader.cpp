@@ -107,6 +107,9 @@ void TapReader::take(const TapEvent<>& event, Room room, std::vector<RecordPtr>&
     case TapEventKind::closed:
       add_state(event, seen, records);
       break;
+    case TapEventKind::dropped:
+    case TapEventKind::overtaken:
+      break;  // these are told to taps of input ports only
   }
 }
 
