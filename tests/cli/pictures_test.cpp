@@ -32,7 +32,10 @@ TEST(Pictures, OfTheDocumentationAreWhatArbiterDraws) {
   for (const auto& entry : std::filesystem::directory_iterator(kPictures)) {
     const auto& path = entry.path();
     if (path.extension() != ".svg") continue;
-    EXPECT_NE(content_of(kPictures + "list").find(path.stem().string() + " "), std::string::npos)
+    const std::string name = path.stem().string();
+    const bool is_listed = content_of(kPictures + "list").find(name + " ") != std::string::npos;
+    // Pictures of a terminal are not of DOT: each has a script of its own.
+    EXPECT_TRUE(is_listed || std::filesystem::exists(kPictures + "draw-" + name))
         << path << " is drawn by nobody";
   }
 }
