@@ -60,6 +60,9 @@ struct RecordingInfo {
 // McapError.
 [[nodiscard]] RecordingInfo inspect_recording(const std::string& path);
 
+// "9999 bytes", "1.5 MiB".
+[[nodiscard]] std::string size_text(std::uint64_t bytes);
+
 // For 80 columns.
 void write_text(std::ostream& out, const RecordingInfo& info);
 [[nodiscard]] nlohmann::json to_json(const RecordingInfo& info);

@@ -27,18 +27,6 @@ std::string formatted(const char* format, double number) {
   return text.data();
 }
 
-std::string size_text(std::uint64_t bytes) {
-  if (bytes < 10'000) return std::to_string(bytes) + " bytes";
-  double size = static_cast<double>(bytes) / 1024;
-  std::string_view unit = "KiB";
-  for (const std::string_view larger : {"MiB", "GiB", "TiB"}) {
-    if (size < 1000) break;
-    size /= 1024;
-    unit = larger;
-  }
-  return formatted("%.1f ", size) + std::string(unit);
-}
-
 std::string fraction_text(McapTime time) {
   const std::string digits = std::to_string(1'000 + time / 1'000'000 % 1'000);
   return "." + digits.substr(1);
@@ -180,6 +168,18 @@ void write_attachments(std::ostream& out, const RecordingInfo& info) {
 }
 
 }  // namespace
+
+std::string size_text(std::uint64_t bytes) {
+  if (bytes < 10'000) return std::to_string(bytes) + " bytes";
+  double size = static_cast<double>(bytes) / 1024;
+  std::string_view unit = "KiB";
+  for (const std::string_view larger : {"MiB", "GiB", "TiB"}) {
+    if (size < 1000) break;
+    size /= 1024;
+    unit = larger;
+  }
+  return formatted("%.1f ", size) + std::string(unit);
+}
 
 void write_text(std::ostream& out, const RecordingInfo& info) {
   write_wrapped(out, "file", shm::printable(info.path));

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdint>
-#include <cstdio>
 #include <iostream>
 #include <memory>
 #include <sstream>
@@ -18,6 +17,7 @@
 #include "cli/flight_recorder.hpp"
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
+#include "cli/recording_info.hpp"
 #include "cli/verbs.hpp"
 #include "recorder/recorder.hpp"
 #include "shm/clock.hpp"
@@ -64,14 +64,6 @@ recorder::RecorderOptions recorder_options(const RecordOptions& options) {
   result.period = options.period;
   result.say = [](const std::string& text) { std::cerr << "arbiter: " + text + '\n'; };
   return result;
-}
-
-std::string size_text(std::uint64_t bytes) {
-  char text[64];
-  const auto kib = static_cast<double>(bytes) / 1024;
-  std::snprintf(text, sizeof text, kib < 1024 ? "%.1f KiB" : "%.1f MiB",
-                kib < 1024 ? kib : kib / 1024);
-  return text;
 }
 
 void write_summary(const recorder::Recorded& recorded, const std::string& file,

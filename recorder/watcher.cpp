@@ -17,7 +17,7 @@ using evidence::PortChange;
 using evidence::SourceContext;
 using evidence::SourceState;
 
-constexpr std::chrono::milliseconds kLookEvery{10};
+constexpr std::chrono::milliseconds kLookAtPagesEvery{10};
 // How often the daemon is asked for its ports: where a tap has told that they have changed, and
 // otherwise, for input ports that no tap tells of.
 constexpr Nanoseconds kPortsAtMostEvery = 200'000'000;
@@ -67,7 +67,7 @@ void Watcher::run() {
   for (;;) {
     {
       std::unique_lock lock(mutex_);
-      if (stopping_.wait_for(lock, kLookEvery, [this] { return is_stopping_; })) return;
+      if (stopping_.wait_for(lock, kLookAtPagesEvery, [this] { return is_stopping_; })) return;
     }
     try {
       look();

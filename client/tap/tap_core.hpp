@@ -68,7 +68,7 @@ struct TapInput {
   shm::PortInstance instance = 0;
   shm::Mapping mapping;
   std::optional<shm::Bequest> bequest;
-  mutable std::optional<TakeWatch> watch;  // tap's thread, once it is told
+  mutable std::optional<TakeWatch> watch;                       // tap's thread, once it is told
   std::array<std::uint64_t, shm::kLatencyBuckets> latencies{};  // what the port had counted before
   // Set by the tap's thread once all has been told of a port that is gone.
   mutable shm::Atomic<bool> drained{false};
