@@ -95,8 +95,9 @@ ordered_json to_json(const Recorded& recorded, const evidence::LiveDecision& liv
           {"generation", arrival.generation}};
 }
 
-int write_verification(const Recorded& recorded, const evidence::Verification& result, bool json) {
-  if (json) {
+int write_verification(const Recorded& recorded, const evidence::Verification& result,
+                       bool as_json) {
+  if (as_json) {
     ordered_json answer{{"decisions", result.all()},       {"equal", result.equal},
                         {"overlapped", result.overlapped}, {"blind", result.blind},
                         {"behind_gap", result.behind_gap}, {"without_model", result.without_model},
@@ -156,9 +157,9 @@ void write_json(const Recorded& recorded, const evidence::Comparison& result) {
             << '\n';
 }
 
-int write_comparison(const Recorded& recorded, const evidence::Comparison& result, bool json) {
+int write_comparison(const Recorded& recorded, const evidence::Comparison& result, bool as_json) {
   const bool is_same = result.changed.empty() && result.intervals.empty();
-  if (json) {
+  if (as_json) {
     write_json(recorded, result);
     return is_same ? 0 : 1;
   }
