@@ -2,6 +2,7 @@
 
 #include <time.h>
 
+#include <algorithm>
 #include <charconv>
 #include <span>
 #include <string_view>
@@ -221,6 +222,7 @@ void RecordWriter::write(const Record& record) {
   JsonLine line(json_);
   const Written written = std::visit([&](const auto& each) { return put(line, each); }, record);
   line.end();
+  if (const auto* start = std::get_if<Start>(&record)) start_ = start->time;
   write_json(written.kind, written.time, json_);
   const auto* arrival = std::get_if<Arrival>(&record);
   if (arrival != nullptr && arrival->payload) write_payload(*arrival);
@@ -228,7 +230,8 @@ void RecordWriter::write(const Record& record) {
 
 void RecordWriter::write_json(RecordKind kind, Nanoseconds time, const std::string& json) {
   const auto index = static_cast<std::size_t>(kind);
-  const recording::McapTime wall = as_wall(time, wall_offset_);
+  // What was so before, such as the model, is in the recording from its start.
+  const recording::McapTime wall = as_wall(std::max(time, start_), wall_offset_);
   const auto number = static_cast<std::uint32_t>(counts_[index]++);
   file_.write({channels_[index], number, wall, wall, std::as_bytes(std::span(json))});
 }

@@ -49,6 +49,7 @@ class RecordWriter {
 
   recording::McapWriter file_;
   std::int64_t wall_offset_;
+  Nanoseconds start_ = 0;  // of the recording
   std::uint16_t channels_[kRecordKinds]{};
   std::uint64_t counts_[kRecordKinds]{};
   std::map<std::string, std::uint16_t> types_;  // schemas of payloads

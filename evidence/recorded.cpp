@@ -63,9 +63,13 @@ class Loader {
     run().lost += each.lost;
     run().end = std::max(run().end, each.seen);
     const bool is_known = !history.steps.empty() && history.steps.back().word == each.word;
+    // It is tapped now; the step below stands behind the gap.
+    if (each.why != SourceState::Why::page) history.unknown_from = shm::kForever;
     if (is_known && each.lost == 0) return;
     Step step{each.time, each.seen, each.word, Step::Kind::state, false, each.generation};
     if (each.why == SourceState::Why::page) {
+      // Of one that cannot be tapped, pages tell some of its steps.
+      step.is_behind_gap = history.unknown_from != shm::kForever;
       // One write at most, and no publisher there to tell of it.
       const bool tells_time = shm::is_deactivation(each.word) || !shm::is_finite(each.word);
       step.time = tells_time              ? shm::time_of(each.word, shm::kForever)

@@ -26,7 +26,7 @@ struct Step {
 
 struct SourceHistory {
   std::vector<Step> steps;  // in the source's order
-  // From then on it could not be watched.
+  // From then on it could not be tapped, and still cannot.
   Nanoseconds unknown_from = shm::kForever;
 };
 

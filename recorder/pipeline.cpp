@@ -26,8 +26,8 @@ Nanoseconds key_of(const Record& record) {
 
 }  // namespace
 
-void TimeOrder::add(RecordPtr record) {
-  Nanoseconds key = key_of(*record);
+void TimeOrder::add(RecordPtr record, Nanoseconds now) {
+  Nanoseconds key = std::min(key_of(*record), now);
   if (const auto* context = evidence::context_of(*record)) {
     Nanoseconds& last = last_[context->source];
     key = last = std::max(last, key);
@@ -70,7 +70,8 @@ void Pipeline::take(Batch&& batch) {
     for (const RecordPtr& record : batch.records) pass_on(record);
     return;
   }
-  for (RecordPtr& record : batch.records) order_.add(std::move(record));
+  const Nanoseconds now = shm::monotonic_now();
+  for (RecordPtr& record : batch.records) order_.add(std::move(record), now);
   order_.take_before(batch.horizon, [this](const RecordPtr& record) { pass_on(record); });
   if (batch.horizon == 0) return;
   horizon_ = batch.horizon;
@@ -80,7 +81,8 @@ void Pipeline::take(Batch&& batch) {
 
 // Winners change behind what has changed them.
 void Pipeline::pass_on(const RecordPtr& record) {
-  if (const Nanoseconds time = key_of(*record); time != 0) winners_.advance(time - 1);
+  const Nanoseconds time = std::min(key_of(*record), shm::monotonic_now());
+  if (time != 0) winners_.advance(time - 1);
   for (const RecordPtr& change : std::exchange(changes_, {})) sink_.write(change);
   sink_.write(record);
   follow(*record);

@@ -23,7 +23,8 @@ namespace arbiter::recorder {
 // they have come before the horizon.
 class TimeOrder {
  public:
-  void add(RecordPtr record);
+  // `now`: what bears a later time, whatever its publisher's clock may be, is not held back for it.
+  void add(RecordPtr record, Nanoseconds now);
   // Those before `horizon`, one by one.
   template <class Use>
   void take_before(Nanoseconds horizon, const Use& use) {

@@ -204,12 +204,12 @@ void Replayer::signal_active_ones() {
     try {
       if (keeps_times_ && options_.rate == 1) {
         source.port->signal_at(time_at(start_ - (first_ - arrived)));
-      } else {
-        source.port->signal();
+        continue;
       }
-    } catch (const Error&) {
-      source.port->signal();  // somebody had the source meanwhile
+    } catch (const Error&) {  // somebody had the source meanwhile
     }
+    source.port->signal();
+    last_ = shm::monotonic_now() + 1;  // what follows comes later
   }
 }
 

@@ -39,7 +39,8 @@ void Ring::request(const std::string& why) {
 void Ring::write(const RecordPtr& record) {
   records_.push_back(record);
   bytes_ += evidence::size_of(*record);
-  const Nanoseconds newest = evidence::time_of(*record);
+  // A time in the future is no reason to forget what is kept.
+  const Nanoseconds newest = std::min(evidence::time_of(*record), shm::monotonic_now());
   while (!records_.empty() && (bytes_ > options_.memory ||
                                evidence::time_of(*records_.front()) < newest - options_.span)) {
     forget_oldest();
@@ -68,6 +69,7 @@ void Ring::sum_up(const Record& record) {
     sources_.clear();
     untapped_.clear();
     winners_.clear();
+    ports_.clear();
     model_.reset();
   } else if (const auto* arrival = std::get_if<evidence::Arrival>(&record)) {
     note(state_of(arrival->context, arrival->time, arrival->seen, arrival->sequence,

@@ -22,6 +22,8 @@ constexpr std::chrono::milliseconds kLookAtPagesEvery{10};
 // otherwise, for input ports that no tap tells of.
 constexpr Nanoseconds kPortsAtMostEvery = 200'000'000;
 constexpr Nanoseconds kPortsAtLeastEvery = 2'000'000'000;
+// A source that could not be tapped is tried again: there may be room now, or a daemon.
+constexpr Nanoseconds kTryAgainAfter = 1'000'000'000;
 // A model that is replaced while it is asked for is asked for again.
 constexpr int kTries = 100;
 
@@ -85,6 +87,7 @@ void Watcher::look() {
   if (memory_->tables().generation() != generation_) take_up_model();
   if (options_.ports.empty()) look_for_newcomers();
   look_at_pages();
+  try_refused();
   look_at_ports();
 }
 
@@ -238,6 +241,10 @@ void Watcher::open_tap(const std::string& source, Batch& batch) {
     watched.tap = std::make_shared<TapReader>(std::move(tap), with_payloads, word);
     opened_.push_back(watched.tap);
   } catch (const Error& error) {
+    const bool is_known = watched.next_try != 0;
+    watched.next_try = shm::monotonic_now() + kTryAgainAfter;
+    if (is_known) return;
+    watched.seen = watched.reported = page_word(source);
     if (first_refusal_.empty()) first_refusal_ = error.what();
     options_.say("cannot record " + source + ": " + error.what());
     const Nanoseconds now = shm::monotonic_now();
@@ -252,6 +259,22 @@ void Watcher::tap_newcomers(const std::set<std::string>& sources, Batch& batch) 
     open_tap(source, batch);
     if (instance_->find_source(source)) add_page_state(source, page_word(source), batch);
   }
+}
+
+// One at a time, for each may take its while. What its tap tells first is its state.
+void Watcher::try_refused() {
+  if (!instance_->has_daemon()) return;
+  const Nanoseconds now = shm::monotonic_now();
+  const auto due = std::find_if(sources_.begin(), sources_.end(), [&](const auto& each) {
+    return each.second.tap == nullptr && each.second.next_try <= now;
+  });
+  if (due == sources_.end()) return;
+  Batch batch;
+  open_tap(due->first, batch);
+  if (!batch.records.empty()) queue_.push(std::move(batch));
+  if (due->second.tap == nullptr) return;
+  options_.say("recording " + due->first + " from here on");
+  hand_over_taps(false);
 }
 
 // Sources that no model knew when watching began.
@@ -290,10 +313,13 @@ void Watcher::add_page_state(const std::string& source, ActivityWord word, Batch
 void Watcher::look_at_pages() {
   Batch batch;
   for (auto& [source, watched] : sources_) {
-    if (watched.tap == nullptr || watched.tap->is_live()) continue;
+    const TapReader* const tap = watched.tap.get();
+    if (tap != nullptr && tap->is_live()) continue;
     const ActivityWord word = page_word(source);
-    const bool is_new = word != watched.reported && word != watched.tap->told();
-    if (is_new && word == watched.seen && !watched.tap->is_live()) {
+    const bool is_new = word != watched.reported && (tap == nullptr || word != tap->told());
+    // Of one that cannot be tapped nobody else tells.
+    const bool is_sure = tap == nullptr || (word == watched.seen && !tap->is_live());
+    if (is_new && is_sure) {
       add_page_state(source, word, batch);
       watched.reported = word;
     }

@@ -72,6 +72,7 @@ class Watcher {
   void add_page_state(const std::string& source, evidence::ActivityWord word, Batch& batch) const;
   [[nodiscard]] evidence::ActivityWord page_word(const std::string& source) const;
   void look_at_pages();
+  void try_refused();
   void look_at_ports();
   void note_deaths(const std::vector<wire::DeathStatus>& deaths, Batch& batch);
   [[nodiscard]] static Ports ports_of(const wire::Status& status);
@@ -85,7 +86,8 @@ class Watcher {
   std::uint64_t generation_ = 0;
   std::string first_refusal_;
   struct Watched {
-    std::shared_ptr<TapReader> tap;  // null: it cannot be tapped
+    std::shared_ptr<TapReader> tap;  // null: it cannot be tapped, and is tried again
+    Nanoseconds next_try = 0;
     // Of the page: what it said last, and what was put into the queue.
     evidence::ActivityWord seen = shm::kNeverActive;
     evidence::ActivityWord reported = shm::kNeverActive;

@@ -8,7 +8,9 @@
 #include <arbiter/arbiter.hpp>
 
 #include "evidence/verification.hpp"
+#include "recorder/pipeline.hpp"
 #include "recorder/ring.hpp"
+#include "shm/clock.hpp"
 #include "tests/client/component.hpp"
 #include "tests/evidence/incident.hpp"
 #include "tests/recorder/recording.hpp"
@@ -83,6 +85,51 @@ TEST_F(RingTest, BeginsWithTheStateOfAllThatHasLeft) {
   evidence::Models models(compile_texts);
   const auto result = verify(recorded, models);
   EXPECT_EQ(result.equal, run.decisions.size());
+}
+
+TEST_F(RingTest, ATimeInTheFutureForgetsNothing) {
+  recorder::Ring ring(options(1'000'000'000, 1 << 20));
+  const evidence::Nanoseconds now = shm::monotonic_now();
+  Incident incident;
+  incident.arrive("/low", now - 1'000'000, now - 999'999, Incident::Fate::accepted);
+  incident.arrive("/high", now + 3600'000'000'000, now + 3600'000'000'000,
+                  Incident::Fate::accepted);
+  EXPECT_THAT(dump(ring, incident).runs.at(0).decisions, SizeIs(2));
+}
+
+TEST_F(RingTest, PortsOfAnEarlierDaemonAreForgotten) {
+  recorder::Ring ring(options(10, 1 << 20));
+  Incident incident;
+  evidence::PortChange port;
+  port.port = "/gone";
+  port.seen = 1001;
+  incident.add(port);
+  incident.add(evidence::Start{5000, "", {}, "none"});
+  incident.arrive("/low", 6000, 6001, Incident::Fate::accepted);
+  incident.arrive("/low", 7000, 7001, Incident::Fate::accepted);
+  dump(ring, incident);
+  evidence::read_recording(written_.back(), evidence::Payloads::pass_over,
+                           [](const evidence::Record& record) {
+                             EXPECT_FALSE(std::holds_alternative<evidence::PortChange>(record));
+                           });
+}
+
+// Each source's records keep their order; what bears a later time than now waits for now only.
+TEST(TimeOrder, HoldsNothingBackForAClockThatIsWrong) {
+  recorder::TimeOrder order;
+  const auto context = std::make_shared<evidence::SourceContext>();
+  const auto add = [&](evidence::Nanoseconds time) {
+    evidence::Arrival arrival;
+    arrival.context = context;
+    arrival.time = time;
+    order.add(std::make_shared<const evidence::Record>(arrival), 100);
+  };
+  add(1'000'000);
+  add(50);
+  std::vector<evidence::Nanoseconds> times;
+  order.take_before(
+      101, [&](const evidence::RecordPtr& record) { times.push_back(evidence::time_of(*record)); });
+  EXPECT_EQ(times, (std::vector<evidence::Nanoseconds>{1'000'000, 50}));
 }
 
 TEST_F(RingTest, IsBoundedByBytes) {

@@ -216,6 +216,58 @@ TEST(Record, GoesOnWhereADaemonTakesOver) {
   EXPECT_EQ(result["equal"], 4) << result;
 }
 
+// Its page tells what its tap may not.
+TEST(Record, KnowsWhoWinsWhereASourceMayNotBeTapped) {
+  const TemporaryDirectory files;
+  const std::string policy = files.write("policy", "deny everyone tap /high\nallow everyone all\n");
+  Daemon daemon(kLasting, {.arguments = {"--policy", policy}});
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  auto in = node.input_port<int>("/p");
+  Recording recording(daemon, {"--compression", "none"});
+  recording.see("cannot record /high");
+  low.publish(1);
+  high.publish(2);
+  const auto wins = [](const char* source) {
+    return [source](const WinnerChange& each) { return each.winner == source; };
+  };
+  recording.wait_for<WinnerChange>(wins("/high"));
+  low.publish(3);
+  high.deactivate();
+  recording.wait_for<WinnerChange>(
+      [](const WinnerChange& each) { return each.winner == "/low" && each.before == "/high"; });
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  const json result = recording.simulate();
+  EXPECT_EQ(result["different"], 0) << result.dump(2);
+  EXPECT_GE(result["behind_gap"], 1) << result.dump(2);
+}
+
+TEST(Record, TakesUpASourceOnceItCanBeTapped) {
+  Daemon daemon(kLasting);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  auto in = node.input_port<int>("/p");
+  std::vector<Tap<>> taps;
+  TapOptions options;
+  options.max_held = 0;
+  for (int i = 0; i < 16; ++i) taps.push_back(node.tap("/high", options));
+  Recording recording(daemon);
+  recording.see("cannot record /high");
+  high.publish(1);
+  taps.clear();
+  recording.see("recording /high from here on");
+  high.publish(2);
+  low.publish(3);
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  const auto arrivals = recording.records<Arrival>();
+  ASSERT_EQ(arrivals.size(), 2u);
+  EXPECT_EQ(arrivals[0].sequence, 2u);
+  const json result = recording.simulate();
+  EXPECT_EQ(result["equal"], 2) << result.dump(2);
+}
+
 TEST(Record, BeginsAgainWhereADaemonKnowsNothing) {
   Daemon daemon(kOverrideModel);
   Recording recording(daemon);

@@ -87,6 +87,19 @@ TEST_F(Replay, IsDecidedAsTheOriginalWas) {
   EXPECT_EQ(again.simulate()["different"], 0);
 }
 
+// What was active at the start arrives first, and what follows does so later, however fast.
+TEST_F(Replay, GoesAsFastAsItIsAsked) {
+  Node node("test");
+  auto low = node.output_port<Number>("/low");
+  low.publish(Number{1});
+  Recording recording(daemon_, {"--payloads", "all"});
+  for (int i = 0; i < 20; ++i) low.publish(Number{i});
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  { const auto closed = std::move(low); }
+  const auto result = arbiter({"replay", recording.file(), "--rate", "10000"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
 // By the times that arrivals bear: these do not depend on when we are let run.
 TEST_F(Replay, KeepsTheDistancesOfArrivals) {
   const std::string file = record();
