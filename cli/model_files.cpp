@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/numbers.hpp"
 #include "cli/progress.hpp"
 
 namespace arbiter::cli {
@@ -24,7 +25,7 @@ void add_effort_option(CLI::App& verb, double& effort) {
   verb.add_option("--effort", effort,
                   "Allow proofs this many times the usual number of steps, such as 10 or 0.1")
       ->type_name("FACTOR")
-      ->check(CLI::Range(rules::Budget::kLeastEffort, rules::Budget::kMostEffort));
+      ->check(number_between(rules::Budget::kLeastEffort, rules::Budget::kMostEffort));
 }
 
 namespace {

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <charconv>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <sstream>
 #include <string>
 #include <system_error>
 
@@ -21,6 +23,22 @@ inline CLI::Validator at_least_one() {
             const auto read = std::from_chars(text.data(), end, value);
             if (read.ec == std::errc() && read.ptr == end && value >= 1) return "";
             return '"' + text + "\" is no whole number of at least 1";
+          },
+          ""};
+}
+
+// CLI::Range lets NaN pass, which is neither below nor above.
+inline CLI::Validator number_between(double least, double most) {
+  return {[least, most](std::string& text) -> std::string {
+            double value = 0;
+            const char* const end = text.data() + text.size();
+            const auto read = std::from_chars(text.data(), end, value);
+            const bool is_number = read.ec == std::errc() && read.ptr == end;
+            if (is_number && std::isfinite(value) && value >= least && value <= most) return "";
+            std::ostringstream problem;
+            problem.precision(10);
+            problem << '"' << text << "\" is no number from " << least << " to " << most;
+            return problem.str();
           },
           ""};
 }

@@ -26,22 +26,42 @@ void write_to(const std::string& path, const std::string& content) {
   }
 }
 
+// A terminal may well be read and written.
+bool is_one_regular_file(const std::string& path, const std::string& other) {
+  struct stat one {};
+  struct stat two {};
+  return stat(path.c_str(), &one) == 0 && S_ISREG(one.st_mode) && stat(other.c_str(), &two) == 0 &&
+         one.st_dev == two.st_dev && one.st_ino == two.st_ino;
+}
+
 }  // namespace
 
+void require_no_input(const std::string& option, const std::string& output,
+                      const std::string& input) {
+  if (!is_one_regular_file(output, input)) return;
+  throw rules::FileError(option + ' ' + output + " would overwrite " +
+                         (input == output ? "the input" : input + ", an input") +
+                         "; nothing was written: give another file");
+}
+
 void require_no_input(const std::string& output, const rules::ModelTexts& inputs) {
-  struct stat written {};
-  // A terminal may well be read and written.
-  if (stat(output.c_str(), &written) != 0 || !S_ISREG(written.st_mode)) return;
-  const auto require_other = [&](const std::string& input) {
-    struct stat read {};
-    if (stat(input.c_str(), &read) != 0) return;
-    if (read.st_dev != written.st_dev || read.st_ino != written.st_ino) return;
-    throw rules::FileError("--output " + output + " would overwrite " +
-                           (input == output ? "the input" : input + ", an input") +
-                           "; nothing was written: give another file");
-  };
-  for (const rules::FileText& input : inputs.models) require_other(input.path);
-  if (inputs.application) require_other(inputs.application->path);
+  for (const rules::FileText& input : inputs.models) {
+    require_no_input("--output", output, input.path);
+  }
+  if (inputs.application) require_no_input("--output", output, inputs.application->path);
+}
+
+void require_two_files(const std::string& option, const std::string& output,
+                       const std::string& other_option, const std::string& other) {
+  namespace fs = std::filesystem;
+  std::error_code unknown;
+  // Neither need be there yet.
+  const bool is_one = is_one_regular_file(output, other) ||
+                      (!fs::exists(output, unknown) && fs::weakly_canonical(output, unknown) ==
+                                                           fs::weakly_canonical(other, unknown));
+  if (!is_one) return;
+  throw rules::FileError(option + ' ' + output + " and " + other_option + ' ' + other +
+                         " are one file; nothing was written: give another file");
 }
 
 void write_output(const std::string& path, const std::string& content) {

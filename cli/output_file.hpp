@@ -10,6 +10,13 @@ namespace arbiter::cli {
 // Throws rules::FileError where `output` is one of the files that were read, under whatever name.
 void require_no_input(const std::string& output, const rules::ModelTexts& inputs);
 
+// The same for any input; `option` is what the user named the output with.
+void require_no_input(const std::string& option, const std::string& output,
+                      const std::string& input);
+// Throws rules::FileError where the outputs of two options would be one file.
+void require_two_files(const std::string& option, const std::string& output,
+                       const std::string& other_option, const std::string& other);
+
 // Whoever reads the file sees the old content or the new one, never a part. What is no regular file
 // is written as it is. Throws rules::FileError.
 void write_output(const std::string& path, const std::string& content);

@@ -1,23 +1,13 @@
 #include "cli/pub_takers.hpp"
 
 #include <algorithm>
-#include <string_view>
 
 #include "cli/pub_type.hpp"
+#include "cli/shell_word.hpp"
 #include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {
-
-// As a shell reads it: bare where nothing in it has a meaning to any shell.
-std::string shell_word(const std::string& text) {
-  constexpr std::string_view kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./:@%+=,-";
-  if (!text.empty() && text.find_first_not_of(kPlain) == std::string::npos) return text;
-  std::string word = "'";
-  for (const char each : text) word += each == '\'' ? std::string(R"('\'')") : std::string(1, each);
-  return word + "'";
-}
 
 bool is_payload(const std::string& option) {
   return option == "--hex" || option == "--file" || option == "--text" || option == "--size";

@@ -25,6 +25,11 @@ int export_recording(const ExportOptions& options) {
   if (options.trace.empty() && options.csv.empty()) {
     throw CLI::ValidationError("export", "say what to write: --trace FILE, --csv FILE, or both");
   }
+  require_no_input("--trace", options.trace, options.file);
+  require_no_input("--csv", options.csv, options.file);
+  if (!options.trace.empty() && !options.csv.empty()) {
+    require_two_files("--trace", options.trace, "--csv", options.csv);
+  }
   const auto recorded = evidence::load_recording(options.file);
   if (!recorded.about.end.is_whole) {
     std::cerr << "arbiter: " << options.file << ": " << recorded.about.end.problem

@@ -22,6 +22,7 @@
 #include "evidence/recorded.hpp"
 #include "evidence/verification.hpp"
 #include "rules/ask/report.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -59,27 +60,35 @@ std::string wall_text(const Recorded& recorded, shm::Nanoseconds time) {
   return text;
 }
 
-std::string who(const std::string& winner) { return winner.empty() ? "nobody" : winner; }
+std::string who(const std::string& winner) {
+  return winner.empty() ? "nobody" : shm::printable(winner);
+}
 
 std::string about(const evidence::LiveDecision& live) {
   const auto& decision = *live.decision;
-  return decision.context->source + (decision.is_sample ? " #" : " (a signal after #") +
-         std::to_string(decision.sequence) + (decision.is_sample ? "" : ")") + " at " + *live.port;
+  return shm::printable(decision.context->source) +
+         (decision.is_sample ? " #" : " (a signal after #") + std::to_string(decision.sequence) +
+         (decision.is_sample ? "" : ")") + " at " + shm::printable(*live.port);
+}
+
+std::size_t arrivals_of(const Recorded& recorded) {
+  std::size_t arrivals = 0;
+  for (const auto& run : recorded.runs) arrivals += run.decisions.size();
+  return arrivals;
 }
 
 void write_head(const Recorded& recorded) {
-  std::size_t arrivals = 0;
   std::size_t sources = 0;
   std::uint64_t lost = 0;
   for (const auto& run : recorded.runs) {
-    arrivals += run.decisions.size();
     sources = std::max(sources, run.sources.size());
     lost += run.lost;
   }
   const shm::Nanoseconds start = recorded.runs.front().start;
-  std::cout << "recording of instance \"" << recorded.about.instance << "\", from "
+  std::cout << "recording of instance \"" << shm::printable(recorded.about.instance) << "\", from "
             << wall_text(recorded, start) << ", " << seconds_text(recorded.runs.back().end - start)
-            << ": " << counted(sources, "source") << ", " << counted(arrivals, "arrival") << '\n';
+            << ": " << counted(sources, "source") << ", "
+            << counted(arrivals_of(recorded), "arrival") << '\n';
   if (lost != 0) std::cout << "the recorder missed " << counted(lost, "event") << '\n';
 }
 
@@ -95,8 +104,23 @@ ordered_json to_json(const Recorded& recorded, const evidence::LiveDecision& liv
           {"generation", arrival.generation}};
 }
 
+// Where there is no decision.
+std::string nothing_to_compare(const Recorded& recorded) {
+  return arrivals_of(recorded) == 0
+             ? "nothing to compare: nothing arrived while it was recorded\n"
+             : "nothing to compare: no input port was open while it was recorded\n";
+}
+
+// Where none is different.
+std::string verdict_line(const Recorded& recorded, const evidence::Verification& result) {
+  if (result.all() == 0) return nothing_to_compare(recorded);
+  const bool are_all_judged = result.blind + result.behind_gap + result.without_model == 0;
+  return are_all_judged ? "every decision is reproduced\n" : "no decision is contradicted\n";
+}
+
 int write_verification(const Recorded& recorded, const evidence::Verification& result,
                        bool as_json) {
+  const int exit_code = result.different == 0 && result.all() != 0 ? 0 : 1;
   if (as_json) {
     ordered_json answer{{"decisions", result.all()},       {"equal", result.equal},
                         {"overlapped", result.overlapped}, {"blind", result.blind},
@@ -107,7 +131,7 @@ int write_verification(const Recorded& recorded, const evidence::Verification& r
       answer["first"]["text"] = result.first->text;
     }
     std::cout << answer.dump(2, ' ', false, ordered_json::error_handler_t::replace) << '\n';
-    return result.different == 0 ? 0 : 1;
+    return exit_code;
   }
   write_head(recorded);
   std::ostringstream out;
@@ -121,12 +145,13 @@ int write_verification(const Recorded& recorded, const evidence::Verification& r
     const auto& live = result.first->live;
     out << "the first that differs, " << since_first(recorded, live.decision->arrival().time)
         << " (generation " << live.decision->arrival().generation << "):\n  " << about(live)
-        << " was " << (live.won ? "delivered" : "discarded") << "; " << result.first->text << '\n';
+        << " was " << (live.won ? "delivered" : "discarded") << "; "
+        << shm::printable(result.first->text) << '\n';
   } else {
-    out << "every decision is reproduced\n";
+    out << verdict_line(recorded, result);
   }
   std::cout << out.str();
-  return result.different == 0 ? 0 : 1;
+  return exit_code;
 }
 
 const char* outcome(bool delivered) { return delivered ? "delivered" : "discarded"; }
@@ -158,7 +183,7 @@ void write_json(const Recorded& recorded, const evidence::Comparison& result) {
 }
 
 int write_comparison(const Recorded& recorded, const evidence::Comparison& result, bool as_json) {
-  const bool is_same = result.changed.empty() && result.intervals.empty();
+  const bool is_same = result.decisions != 0 && result.changed.empty() && result.intervals.empty();
   if (as_json) {
     write_json(recorded, result);
     return is_same ? 0 : 1;
@@ -166,6 +191,7 @@ int write_comparison(const Recorded& recorded, const evidence::Comparison& resul
   write_head(recorded);
   std::cout << counted(result.decisions, "decision") << ": " << result.same << " the same, "
             << result.changed.size() << " changed, " << result.uncertain << " uncertain\n";
+  if (result.decisions == 0) std::cout << nothing_to_compare(recorded);
   for (const auto& each : result.changed) {
     std::cout << "  " << since_first(recorded, each.live.decision->arrival().time) << "  "
               << about(each.live) << ": " << outcome(!each.live.won) << " instead of "
@@ -175,8 +201,8 @@ int write_comparison(const Recorded& recorded, const evidence::Comparison& resul
                                          : "the winner differs:\n");
   for (const auto& each : result.intervals) {
     std::cout << "  " << since_first(recorded, each.from) << " to "
-              << since_first(recorded, each.to) << "  " << each.port << ": " << who(each.other)
-              << " instead of " << who(each.recorded) << '\n';
+              << since_first(recorded, each.to) << "  " << shm::printable(each.port) << ": "
+              << who(each.other) << " instead of " << who(each.recorded) << '\n';
   }
   return is_same ? 0 : 1;
 }
@@ -186,8 +212,8 @@ int write_comparison(const Recorded& recorded, const evidence::Comparison& resul
 int simulate_recording(const SimulateRecordingOptions& options) {
   const Recorded recorded = evidence::load_recording(options.recording);
   if (!recorded.about.end.is_whole) {
-    std::cerr << "arbiter: " << options.recording << ": " << recorded.about.end.problem
-              << "; what comes before is used\n";
+    std::cerr << "arbiter: " << shm::printable(options.recording) << ": "
+              << shm::printable(recorded.about.end.problem) << "; what comes before is used\n";
   }
   if (recorded.runs.empty()) throw evidence::RecordError(options.recording + " is empty");
   evidence::Models models(recording_compiler(options.effort));

@@ -14,7 +14,7 @@ struct SimulateRecordingOptions {
   bool json = false;
 };
 
-// 0: all is as it was; 1: something differs.
+// 0: all is as it was; 1: something differs, or there is no decision to compare.
 int simulate_recording(const SimulateRecordingOptions& options);
 
 }  // namespace arbiter::cli

@@ -18,6 +18,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/live.hpp"
+#include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
 #include "rules/ask/report.hpp"
 #include "rules/explain/simulation.hpp"
@@ -176,7 +177,7 @@ void add_play(CLI::App& app, int& exit_code) {
   verb->add_option("TRACE", options->trace, "CSV: t_ns,source or t_ns,source,event")->required();
   verb->add_option("--speed", options->speed, "How many times faster than the trace (default 1)")
       ->type_name("X")
-      ->check(CLI::Range(1e-3, 1e6));
+      ->check(number_between(1e-3, 1e6));
   add_instance_option(*verb, options->instance);
   verb->footer("Example:\n  arbiter play trace.csv --speed 2");
   verb->callback([options, &exit_code] { exit_code = play(*options); });

@@ -155,7 +155,7 @@ void add_pub(CLI::App& app, int& exit_code) {
   verb->add_option("PORT", options->port, "The output port's name")->required();
   verb->add_option("--rate", options->rate_hz, "Samples in a second (default 1)")
       ->type_name("HZ")
-      ->check(CLI::Range(1e-3, 1e6));
+      ->check(number_between(1e-3, 1e6));
   verb->add_option("--count", options->count, "How many samples (default: until interrupted)")
       ->type_name("N")
       ->check(at_least_one());

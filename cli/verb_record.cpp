@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdint>
+#include <fstream>
 #include <iostream>
 #include <memory>
 #include <sstream>
@@ -18,9 +19,12 @@
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
 #include "cli/recording_info.hpp"
+#include "cli/shell_word.hpp"
 #include "cli/verbs.hpp"
 #include "recorder/recorder.hpp"
+#include "rules/model/quantifiers.hpp"
 #include "shm/clock.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -48,10 +52,33 @@ std::string host_name() {
   return gethostname(name, sizeof name - 1) == 0 ? name : "";
 }
 
-std::string command_of(const RecordOptions& options) {
-  std::string text = "arbiter record -o " + options.out;
-  for (const std::string& port : options.ports) text += " --port " + port;
-  return text + " --payloads " + options.payloads;
+// What was typed, as far as a shell hands it on.
+std::string typed_command() {
+  std::ifstream words("/proc/self/cmdline", std::ios::binary);
+  std::string text;
+  for (std::string word; std::getline(words, word, '\0');) {
+    text += (text.empty() ? "" : " ") + shell_word(word);
+  }
+  return text;
+}
+
+// A pattern that matches nothing may be meant for what is yet to come, or be misspelt.
+void warn_of_patterns_without_port(const RecordOptions& options) {
+  if (options.ports.empty()) return;
+  std::vector<wire::InputStatus> inputs;
+  try {
+    inputs = fetch_status("record", options.instance).inputs;
+  } catch (const wire::CallError&) {
+    return;  // what is wrong, recording will say
+  }
+  for (const std::string& pattern : options.ports) {
+    const bool has_port = std::any_of(inputs.begin(), inputs.end(), [&](const auto& input) {
+      return rules::matches(pattern, input.name);
+    });
+    if (has_port) continue;
+    std::cerr << "arbiter: warning: --port " + shm::printable(shell_word(pattern)) +
+                     " matches no input port that is open or in the model in force\n";
+  }
 }
 
 recorder::RecorderOptions recorder_options(const RecordOptions& options) {
@@ -79,12 +106,12 @@ void write_summary(const recorder::Recorded& recorded, const std::string& file,
   std::cout << out.str();
 }
 
-evidence::RecordingInfo info_of(const RecordOptions& options, const std::string& instance) {
+evidence::RecordingInfo info_of(const std::string& instance) {
   evidence::RecordingInfo info;
   info.program = "arbiter " ARBITER_VERSION;
   info.instance = instance;
   info.host = host_name();
-  info.command = command_of(options);
+  info.command = typed_command();
   info.wall_offset = evidence::wall_offset_now();
   return info;
 }
@@ -93,7 +120,7 @@ int record_into_file(const RecordOptions& options, const recorder::RecorderOptio
                      shm::Nanoseconds end) {
   const auto interrupts = catch_interrupts();
   recorder::FileSink sink(options.out, {compression_of(options.compression)},
-                          info_of(options, settings.caller.instance));
+                          info_of(settings.caller.instance));
   try {
     recorder::Recorder recorder(settings, sink);
     std::cerr << "arbiter: recording " + counted(recorder.taps(), "source") + " into " +
@@ -114,6 +141,7 @@ int record(RecordOptions& options) {
   if (options.is_dump) return dump(options.out);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that has become too large is an error as any other
   const auto settings = recorder_options(options);
+  warn_of_patterns_without_port(options);
   const shm::Nanoseconds started = shm::monotonic_now();
   const shm::Nanoseconds end =
       options.duration >= shm::kForever - started ? shm::kForever : started + options.duration;
@@ -121,7 +149,7 @@ int record(RecordOptions& options) {
   options.flight.prefix = options.out;
   options.flight.end = end;
   return fly(options.flight, settings, {compression_of(options.compression)},
-             info_of(options, settings.caller.instance));
+             info_of(settings.caller.instance));
 }
 
 // A time, which may be in minutes: 5min.

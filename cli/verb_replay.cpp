@@ -55,7 +55,7 @@ void add_replay(CLI::App& app, int& exit_code) {
   verb->add_option("--rate", options->rate,
                    "How many times faster than it was recorded (default 1); T stays what it is")
       ->type_name("X")
-      ->check(CLI::Range(1e-3, 1e6))
+      ->check(number_between(1e-3, 1e6))
       ->excludes(fast);
   verb->add_option("--source", options->sources,
                    "Only output ports of this pattern, such as '/Arm/*'; repeatable")

@@ -124,7 +124,9 @@ int simulate(const SimulateOptions& options) {
 void add_simulate(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<SimulateOptions>();
   CLI::App* verb =
-      app.add_subcommand("simulate", "Replay a trace, and show what would have been delivered");
+      app.add_subcommand("simulate",
+                         "Decide a trace or a recording again, and show what would have been "
+                         "delivered");
   add_model_options(*verb, options->files).required(false);
   auto* trace = verb->add_option("--trace", options->trace, "CSV: t_ns,source or t_ns,source,event")
                     ->type_name("FILE");
@@ -150,7 +152,8 @@ void add_simulate(CLI::App& app, int& exit_code) {
       "  arbiter simulate --recording incident.mcap\n"
       "  arbiter simulate --recording incident.mcap --model corrected.xml\n\n"
       "Exit codes: 0 done; with --recording: all is as it was; 1 an error in the model or trace; "
-      "with\n--recording: something differs; 2 wrong use, or a file that cannot be opened");
+      "with\n--recording: something differs, or it has no decision; 2 wrong use, or a file that "
+      "cannot be opened");
   verb->callback([options, &exit_code] {
     if (!options->recording.empty()) {
       exit_code =

@@ -41,6 +41,9 @@ void copy(char (&to)[Size], const std::string& from) {
   std::memcpy(to, from.data(), std::min(from.size(), Size - 1));
 }
 
+// How often ports that could not be opened are tried again.
+constexpr shm::Nanoseconds kOpenEvery = 1'000'000'000;
+
 class Announcer {
  public:
   Announcer(const WinnersOptions& options, shm::FileDescriptor interrupts)
@@ -57,7 +60,12 @@ class Announcer {
       news_.tell(*instance_);
       const auto changes = winners_.look();
       for (const watch::WinnerAt& change : changes) tell(change);
+      if (!goes_on()) return 1;
       const shm::Nanoseconds now = shm::monotonic_now();
+      if (now >= open_again_ && instance_->has_daemon()) {
+        open_again_ = now + kOpenEvery;
+        open_waiting();
+      }
       if (now >= repeat) {
         repeat = now + options_.every;
         tell_again();
@@ -79,7 +87,7 @@ class Announcer {
   }
 
   void tell(const watch::WinnerAt& change) {
-    Watched* watched = find(change);
+    Watched* watched = find(change.port);
     if (watched == nullptr) return;
     WinnerChange& sample = watched->last;
     const bool is_start = sample.seen_ns == 0;
@@ -109,21 +117,53 @@ class Announcer {
   }
 
   // Opens it where it is new. Null: it cannot be opened.
-  Watched* find(const watch::WinnerAt& change) {
-    const auto found = ports_.find(change.port);
+  Watched* find(const std::string& port) {
+    const auto found = ports_.find(port);
     if (found != ports_.end()) return &found->second;
-    const std::string source = source_of(change.port);
+    return waiting_.count(port) != 0 ? nullptr : open(port);
+  }
+
+  Watched* open(const std::string& port) {
+    const std::string source = source_of(port);
     if (source.size() > shm::kMaxNameLength) {
-      if (too_long_.insert(change.port).second) {
-        std::cerr << "arbiter: " << rules::quote(change.port)
+      if (too_long_.insert(port).second) {
+        std::cerr << "arbiter: " << rules::quote(port)
                   << " cannot be announced: with what goes around it, its name has more than "
                   << shm::kMaxNameLength << " bytes\n";
       }
       return nullptr;
     }
-    std::cerr << "arbiter: announcing " << change.port << " as " << source << '\n';
-    return &ports_.emplace(change.port, Watched{node_.output_port<WinnerChange>(source)})
-                .first->second;
+    try {
+      Watched watched{node_.output_port<WinnerChange>(source)};
+      std::cerr << "arbiter: announcing " << port << " as " << source << '\n';
+      waiting_.erase(port);
+      return &ports_.emplace(port, std::move(watched)).first->second;
+    } catch (const Error& error) {
+      if (waiting_.insert(port).second) problems_.emplace_back(error.what());
+      return nullptr;
+    }
+  }
+
+  // What could not be opened in the last look, said once. False: there is nothing to go on for,
+  // for at the start nothing could be opened.
+  bool goes_on() {
+    const bool is_start = !has_started_ && !winners_.now().empty();
+    const bool may_go_on = !is_start || !ports_.empty() || waiting_.empty();
+    has_started_ = has_started_ || is_start;
+    for (const std::string& problem : std::exchange(problems_, {})) {
+      std::cerr << "arbiter: " << problem << (may_go_on ? "; trying again every second" : "")
+                << '\n';
+    }
+    return may_go_on;
+  }
+
+  // Somebody else may have had them, or the policy may have changed since.
+  void open_waiting() {
+    const auto waiting = waiting_;
+    for (const std::string& port : waiting) {
+      const auto now = winners_.now().find(port);
+      if (now != winners_.now().end() && open(port) != nullptr) tell(now->second);
+    }
   }
 
   const WinnersOptions& options_;
@@ -133,6 +173,10 @@ class Announcer {
   watch::Winners winners_;
   std::map<std::string, Watched> ports_;
   std::set<std::string> too_long_;
+  std::set<std::string> waiting_;      // input ports whose output port could not be opened
+  std::vector<std::string> problems_;  // why, of the last look
+  shm::Nanoseconds open_again_ = shm::monotonic_now() + kOpenEvery;
+  bool has_started_ = false;
   DaemonNews news_{"announcing"};
 };
 
@@ -165,8 +209,8 @@ void add_winners(CLI::App& app, int& exit_code) {
       "samples "
       "of\ntype arbiter/WinnerChange (arbiter/winner_change.hpp). Connect it in the model as any "
       "source.\nOne that lasts for less than about 2 ms may be missed.\n\n"
-      "Exit codes: 0 interrupted; 1 no daemon, or the policy does not let you observe, or open "
-      "these\nports; 2 wrong use");
+      "Exit codes: 0 interrupted; 1 no daemon, or the policy does not let you observe, or none of "
+      "these\nports can be opened at the start; 2 wrong use");
   verb->callback([options, &exit_code] { exit_code = winners(*options); });
 }
 

@@ -48,7 +48,7 @@ OutputFile::OutputFile(const std::string& path, Unfinished unfinished)
   fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (fd_ < 0) {
     const int error = errno;
-    throw McapError("cannot make " + path + ": " + std::strerror(error) + advice_for(error));
+    throw McapError("cannot create " + path + ": " + std::strerror(error) + advice_for(error));
   }
 }
 

@@ -213,5 +213,22 @@ TEST(Program, NotesAreToldByCheckAndNoOtherVerb) {
   }
 }
 
+// NaN is neither below a least value nor above a most one.
+TEST(Program, TakesNoNumberThatIsNone) {
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"pub", "/a", "--count", "1", "--rate"},
+                                             {"replay", "a.mcap", "--rate"},
+                                             {"play", "a.csv", "--speed"},
+                                             {"check", "a.xml", "--effort"}}) {
+    for (const char* number : {"nan", "-nan", "inf", "0", "1e9", "2x", "x", ""}) {
+      auto typed = arguments;
+      typed.emplace_back(number);
+      const auto result = arbiter(typed);
+      EXPECT_EQ(result.exit_code, 2) << arguments.front() << ' ' << number;
+      EXPECT_THAT(result.err, HasSubstr("is no number from 0.001 to 1000"));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace arbiter::test

@@ -157,6 +157,26 @@ TEST_F(RecordingVerb, LeavesNothingOfARepairForWhichThereIsNoRoom) {
   EXPECT_FALSE(std::filesystem::exists(to));
 }
 
+TEST_F(RecordingVerb, ExportsNeitherOverTheRecordingNorTwiceIntoOneFile) {
+  const std::string before = content_of(whole_);
+  const std::string link = directory_.file("link.csv");
+  std::filesystem::create_symlink(whole_, link);
+  for (const auto* option : {"--trace", "--csv"}) {
+    for (const std::string& output : {whole_, link}) {
+      const auto result = arbiter({"recording", "export", whole_, option, output});
+      EXPECT_EQ(result.exit_code, 2);
+      EXPECT_THAT(result.err, HasSubstr(option + (" " + output) + " would overwrite "));
+    }
+  }
+  const std::string out = directory_.file("new.csv");
+  const std::string same = directory_.file("./new.csv");
+  const auto result = arbiter({"recording", "export", whole_, "--trace", out, "--csv", same});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("are one file; nothing was written"));
+  EXPECT_FALSE(std::filesystem::exists(out));
+  EXPECT_EQ(content_of(whole_), before);
+}
+
 // In both directions.
 TEST_F(RecordingVerb, WritesTheDocumentThatThePageDescribes) {
   ObservedFields observed({"metadata[].values", "channels[].metadata"});

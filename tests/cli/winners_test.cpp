@@ -1,5 +1,6 @@
 // arbiter winners: changes of winner as a component takes them.
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <signal.h>
 
 #include <chrono>
@@ -119,6 +120,30 @@ TEST_F(Winners, AreAnnouncedByOneProgramOnly) {
   const auto second = arbiter({"winners"});
   EXPECT_EQ(second.exit_code, 1);
   EXPECT_NE(second.err.find("/arbiter/winner/gaze:i:o"), std::string::npos) << second.err;
+}
+
+TEST_F(Winners, AreAnnouncedWhereOnePortCannotBeOpened) {
+  daemon_.write_model(R"(<behaviors timeout="forever">
+<behavior name="Arm"><config at="/arm:i">/random</config></behavior>)" +
+                      kBehaviours);
+  ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  auto held = std::make_optional(node_.output_port<int>("/arbiter/winner/arm:i:o"));
+  random_.signal();
+  start();
+  EXPECT_STREQ(repetition().port, "/gaze:i");
+  face_.signal();
+  EXPECT_STREQ(next().winner, "/face");
+  std::string err = content_of(err_path());
+  EXPECT_NE(err.find("trying again every second"), std::string::npos) << err;
+  held.reset();
+  while (err.find("announcing /arm:i as") == std::string::npos) {
+    pollfd ended{program_.descriptor(), POLLIN, 0};
+    ASSERT_EQ(::poll(&ended, 1, 10), 0) << err;
+    err = content_of(err_path());
+  }
+  EXPECT_EQ(err.find("trying again"), err.rfind("trying again")) << err;
+  program_.signal(SIGINT);
+  EXPECT_EQ(program_.wait(), 0);
 }
 
 TEST(WinnersWithoutADaemon, AreNone) {
