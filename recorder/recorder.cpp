@@ -89,6 +89,7 @@ void Recorder::forget_taps() {
 
 Recorded Recorder::finish() {
   watcher_.stop();
+  poll_taps();  // those too that it has opened since
   forget_taps();
   queue_.close();
   pipeline_.finish();

@@ -280,6 +280,8 @@ TEST(Record, BeginsAgainWhereADaemonKnowsNothing) {
   Node node("test");
   auto low = node.output_port<int>("/low");
   auto in = node.input_port<int>("/p");
+  while (daemon.source("/low")["taps"].empty()) {  // opening waits for it, but not for ever
+  }
   low.publish(1);
   EXPECT_EQ(recording.end(), 0) << recording.error();
   const json result = recording.simulate();
