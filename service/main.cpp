@@ -149,8 +149,10 @@ int run(int argc, char** argv) {
   app.add_option("--effort", effort,
                  "Allow the proof of a model this many times the usual number of steps")
       ->type_name("FACTOR")
-      ->check(
-          CLI::Range(arbiter::rules::Budget::kLeastEffort, arbiter::rules::Budget::kMostEffort));
+      ->check(CLI::Range(arbiter::rules::Budget::kLeastEffort, arbiter::rules::Budget::kMostEffort))
+      ->check([](const std::string& text) {  // which the range lets pass
+        return text.find_first_of("nN") == std::string::npos ? "" : "it is no number";
+      });
   app.add_option("--log-level", level, "trace, debug, info, warn or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error"}));
   try {
