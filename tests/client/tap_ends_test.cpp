@@ -1,0 +1,184 @@
+// Taps over the ends of ports, components, programs that watch, and daemons.
+#include <gtest/gtest.h>
+
+#include <chrono>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/client/component.hpp"
+#include "tests/client/models.hpp"
+#include "tests/client/samples.hpp"
+#include "tests/client/tapping.hpp"
+#include "tests/support/daemon.hpp"
+#include "tests/support/error_of.hpp"
+
+namespace arbiter::test {
+namespace {
+
+TEST(Tap, FollowsASourceThatClosesAndComesAgain) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto tap = node.tap<Number>("/out");
+  for (int i = 0; i < 5; ++i) {
+    {
+      auto out = node.output_port<Number>("/out");
+      out.publish(Number{i});
+      out.publish(Number{i + 100});
+    }
+    EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, i);
+    EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, i + 100);
+    EXPECT_EQ(wait_for_kind(tap, TapEventKind::closed).sequence(), 2u);
+  }
+  EXPECT_EQ(tap.lost(), 0u);
+}
+
+TEST(Tap, IsToldTheActivityThatASourceHasOnceItsPortIsGone) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto tap = node.tap<Number>("/out");
+  for (const bool is_deactivated : {false, true}) {
+    Component sender("sender");
+    ASSERT_EQ(sender.tell("output /out"), "open");
+    sender.tell("publish /out 1");
+    if (is_deactivated) sender.tell("deactivate /out");
+    sender.kill();
+    const auto closed = wait_for_kind(tap, TapEventKind::closed);
+    EXPECT_EQ(closed.is_deactivated(), is_deactivated);
+    EXPECT_EQ(closed.was_active_at(std::chrono::steady_clock::now()), !is_deactivated);
+    EXPECT_EQ(closed.lost(), 0u);
+  }
+}
+
+// One that has published nothing since it was tapped has told nothing of its activity.
+TEST(Tap, IsToldTheActivityOfASourceThatHasToldNothing) {
+  Daemon daemon(single_model());
+  Node node("test");
+  Component sender("sender");
+  ASSERT_EQ(sender.tell("output /out"), "open");
+  sender.tell("publish /out 1");
+  auto tap = node.tap<Number>("/out");
+  sender.kill();
+  const auto closed = wait_for_kind(tap, TapEventKind::closed);
+  EXPECT_TRUE(closed.was_active_at(std::chrono::steady_clock::now()));
+  EXPECT_EQ(closed.lost(), 0u) << "nothing was told that could be lost";
+}
+
+TEST(Tap, HearsThatASourceHasEndedThoughNoDaemonWasThere) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto tap = node.tap<Number>("/out");
+  {
+    Component sender("sender");
+    ASSERT_EQ(sender.tell("output /out"), "open");
+    sender.tell("publish /out 1");
+    EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 1);
+    daemon.kill();
+    sender.kill();
+  }
+  daemon.restart();
+  Component successor("successor");
+  ASSERT_EQ(successor.tell("output /out"), "open");
+  successor.tell("publish /out 2");
+  EXPECT_EQ(wait_for_kind(tap, TapEventKind::closed).sequence(), 1u);
+}
+
+TEST(Tap, HearsOfTheEndFromADaemonThatNeverKnewTheSource) {
+  for (const TapOf of : {TapOf::output, TapOf::input}) {
+    Daemon daemon(single_model());
+    Node node("test");
+    auto tap = node.tap<Number>(of == TapOf::output ? "/out" : "/in", {.of = of});
+    Component sender("sender");
+    ASSERT_EQ(sender.tell("output /out"), "open");
+    sender.tell("publish /out 1");
+    EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 1);
+    daemon.kill();
+    sender.tell("publish /out 2");
+    sender.tell("deactivate /out");
+    sender.kill();
+    daemon.restart();
+    const auto closed = wait_for_kind(tap, TapEventKind::closed);
+    EXPECT_EQ(closed.sequence(), 2u);
+    EXPECT_TRUE(closed.is_deactivated());
+    EXPECT_EQ(tap.lost(), 0u);
+  }
+}
+
+TEST(Tap, SeesAllThatAPublisherToldBeforeItWasKilled) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto tap = node.tap<Number>("/out");
+  for (int round = 0; round < 5; ++round) {
+    Component sender("sender");
+    ASSERT_EQ(sender.tell("output /out"), "open");
+    EXPECT_EQ(sender.tell("publish /out 3"), "0 0 0");
+    EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 3);
+    sender.begin("publish /out 0 1000000000");
+    static_cast<void>(wait_for_kind(tap, TapEventKind::sample));
+    sender.kill();
+    static_cast<void>(wait_for_kind(tap, TapEventKind::closed));
+  }
+}
+
+TEST(Tap, ItsDeathHoldsUpNobodyAndGivesItsPlaceBack) {
+  Daemon daemon(single_model());
+  Node node("test", {.service_thread = false});
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  for (int i = 0; i < 40; ++i) {
+    Component watcher("watcher");
+    ASSERT_EQ(watcher.tell("tap /out 16"), "open");
+    node.service();
+    out.publish(Number{i});
+    ASSERT_EQ(watcher.tell("hold-event /out"), std::to_string(i));
+    watcher.begin("watch /out");
+    for (int n = 0; n < 100; ++n) EXPECT_EQ(out.publish(Number{n}).delivered, 1u);
+    watcher.kill();
+    for (int n = 0; n < 100; ++n) EXPECT_EQ(out.publish(Number{n}).delivered, 1u);
+    node.service();
+  }
+  EXPECT_EQ(daemon.source("/out")["no_slot"], 0);
+}
+
+TEST(Tap, AStoppedOneHoldsUpNobodyAndFindsItsSampleAsItWas) {
+  Daemon daemon(single_model());
+  Component watcher("watcher");
+  ASSERT_EQ(watcher.tell("tap /out 2"), "open");
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  EXPECT_EQ(out.publish(Number{-1}).delivered, 1u);
+  ASSERT_EQ(watcher.tell("hold-event /out"), "-1");
+  watcher.process().stop();
+  for (int i = 0; i < 5000; ++i) EXPECT_EQ(out.publish(Number{i}).delivered, 1u);
+  watcher.process().signal(SIGCONT);
+  EXPECT_EQ(watcher.tell("held-event"), "-1");
+}
+
+TEST(Tap, GoesOnUnderAnotherDaemon) {
+  Daemon daemon(single_model());
+  Component sender("sender");
+  ASSERT_EQ(sender.tell("output /out"), "open");
+  Node node("test");
+  auto tap = node.tap<Number>("/out");
+  sender.tell("publish /out 1");
+  EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 1);
+  daemon.kill();
+  sender.tell("publish /out 2");
+  EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 2) << "without a daemon";
+  daemon.restart();
+  auto other = node.tap<Number>("/out");  // both are back by now
+  for (int i = 3; i < 10; ++i) {
+    sender.tell("publish /out " + std::to_string(i));
+    EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, i);
+    EXPECT_EQ(wait_for_kind(other, TapEventKind::sample).sample()->value, i);
+  }
+  EXPECT_EQ(sender.tell("close /out"), "closed");
+  static_cast<void>(wait_for_kind(tap, TapEventKind::closed));
+  ASSERT_EQ(sender.tell("output /out"), "open");
+  sender.tell("publish /out 11");
+  EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 11);
+  EXPECT_EQ(tap.lost(), 0u);
+}
+
+}  // namespace
+}  // namespace arbiter::test
