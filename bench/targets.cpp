@@ -52,6 +52,8 @@ const std::vector<Ratio> kRatios{
      kSpinning},
     {"a loser's publish(), p50, to a clock read", "publish", kOne, kLoser, kClockRead, kP50, 2},
     {"publish() to 64 ports, p50, to iceoryx", "publish", kMany, kWinner, kIceoryx, kP50, 0.05},
+    {"a publish() beside arbiter top, p99, to alone", "watched", "16 ports", kWatched, kUnwatched,
+     kP99, 1.1},
 };
 
 // `ours` is at most `limit` more than `theirs`, or than nothing.

@@ -11,7 +11,7 @@ namespace arbiter::bench {
 
 Robot::Robot(const std::string& model) {
   write_model(model);
-  daemon_ = Program({program_directory() + "/arbiterd", "--instance", "bench", "--model",
+  daemon_ = Program({program_directory() + "/arbiterd", "--instance", kInstance, "--model",
                      file("model.xml"), "--log-level", "warn"},
                     {{"XDG_RUNTIME_DIR", directory_.path()}}, file("log"));
 }
@@ -19,7 +19,7 @@ Robot::Robot(const std::string& model) {
 Node Robot::node(const std::string& name) const {
   ::setenv("XDG_RUNTIME_DIR", directory_.path().c_str(), 1);
   NodeOptions options;
-  options.instance = "bench";
+  options.instance = kInstance;
   options.on_waiting = [](const std::string&) {};  // it has just been started
   try {
     return Node(name, options);

@@ -11,6 +11,8 @@ namespace arbiter::bench {
 
 class Robot {
  public:
+  static constexpr const char* kInstance = "bench";
+
   // Starts arbiterd; `model` is the text of a model file.
   explicit Robot(const std::string& model);
 
@@ -18,6 +20,8 @@ class Robot {
   [[nodiscard]] Node node(const std::string& name) const;
   // Puts another model in force; returns at once.
   void load(const std::string& model) const;
+  // Where its socket is, for a program that is no worker: $XDG_RUNTIME_DIR.
+  [[nodiscard]] const std::string& runtime_directory() const { return directory_.path(); }
   [[nodiscard]] pid_t daemon() const { return daemon_.pid(); }
   // What arbiterd has said, for an error message.
   [[nodiscard]] std::string log() const;

@@ -22,6 +22,8 @@ struct MeasureEntry {
 };
 
 inline const char* const kClockRead = "clock read";
+inline const char* const kUnwatched = "alone";
+inline const char* const kWatched = "beside arbiter top";
 
 Measure measure_compile(const Effort& effort);
 Measure measure_decide(const Effort& effort);
@@ -35,6 +37,7 @@ Measure measure_swap(const Effort& effort);
 Measure measure_take(const Effort& effort);
 Measure measure_takeover(const Effort& effort);
 Measure measure_throughput(const Effort& effort);
+Measure measure_watched(const Effort& effort);
 
 inline std::vector<MeasureEntry> all_measures() {
   return {
@@ -44,6 +47,7 @@ inline std::vector<MeasureEntry> all_measures() {
       {"failover", measure_failover}, {"swap", measure_swap},
       {"load", measure_load},         {"throughput", measure_throughput},
       {"scale", measure_scale},       {"compile", measure_compile},
+      {"watched", measure_watched},
   };
 }
 
