@@ -167,6 +167,34 @@ TEST_F(TopScreen, ATapTellsHowLongTheOldestSampleHasWaited) {
   })) << top_.text();
 }
 
+TEST_F(TopScreen, DrawsABoundedPartOfAHugeTerminal) {
+  top_.resize({320, 620});
+  ASSERT_TRUE(top_.wait_until([&] { return top_.row(299).substr(0, 6) == "q quit"; }));
+  top_.claim({5000, 5000});
+  press("?");
+  ASSERT_TRUE(top_.wait_until([&] { return top_.row(299).substr(0, 3) == "Esc"; }));
+  EXPECT_EQ(top_.row(319), "");
+  press("q");
+  ASSERT_TRUE(top_.wait_until([&] { return top_.row(2).substr(0, 5) == ">/p:i"; }));
+  top_.resize({24, 80});
+  ASSERT_TRUE(top_.wait_until([&] { return top_.row(23).substr(0, 6) == "q quit"; }))
+      << top_.text();
+  press("q");
+  EXPECT_EQ(top_.wait_for_end(), 0);
+}
+
+TEST(TopScreenOf, BeginsInATerminalOfAnySize) {
+  Daemon daemon(kTopModel);
+  for (const auto size : {EmulatedTerminal::Size{1, 1}, {1, 80}, {24, 1}, {2, 2}, {3, 20}}) {
+    EmulatedTerminal top({kArbiter, "top"}, top_environment(), size);
+    ASSERT_TRUE(top.wait_until([&] { return top.is_alternate() && !top.has_cursor(); }));
+    top.type("?j\x1b\t\tt/x\rs wq");
+    top.type("qq");
+    EXPECT_EQ(top.wait_for_end(), 0) << size.rows << "x" << size.columns;
+    EXPECT_TRUE(top.is_restored());
+  }
+}
+
 TEST(TopScreenOf, SaysThatThePolicyForbidsATap) {
   TemporaryDirectory files;
   const std::string policy = files.write("policy", "deny everyone tap /p:i\nallow everyone all\n");
