@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <clocale>
+#include <iterator>
+#include <set>
+#include <sstream>
 
 #include "tests/support/text_files.hpp"
 #include "tests/top/pictures.hpp"
@@ -53,9 +56,9 @@ class TopView : public testing::Test {
 
 TEST_F(TopView, ShowsWhoWinsSinceWhenAndHowMuchComes) {
   EXPECT_EQ(line_with("/arm:i"),
-            ">/arm:i      /object:o   3.0 s 100 ms   30.0     -    60.0     1/4 arm (pid 7)");
+            ">/arm:i      /object:o   3.0 s 100 ms   30.0     0    60.0     1/4 arm (pid 7)");
   EXPECT_EQ(line_with("/gaze:i"),
-            " /gaze:i     idle       >1.0 s      -   10.0   2.0       -     1/4 arm (pid 7)");
+            " /gaze:i     idle       >1.0 s          10.0   2.0       0     1/4 arm (pid 7)");
 }
 
 TEST_F(TopView, ShowsABarThatFadesUntilTheActivityEnds) {
@@ -63,7 +66,30 @@ TEST_F(TopView, ShowsABarThatFadesUntilTheActivityEnds) {
   press(Key::kTab);
   EXPECT_THAT(line_with("/object:o ████"), HasSubstr("████████   active  500 ms 100 ms"));
   EXPECT_THAT(line_with("/face:o"), HasSubstr("silent  500 ms  1.5 s"));
-  EXPECT_THAT(line_with("/rest:o"), HasSubstr("never   500 ms      -"));
+  EXPECT_THAT(line_with("/rest:o"), HasSubstr("never   500 ms          20.0"));
+}
+
+// 0 is 0; "?" is not known; nothing stands where there is nothing to tell.
+TEST_F(TopView, TellsNoneFromNotKnownFromNothingToTell) {
+  Census census = census_of_robot();
+  census.ports[0].rates = PortRates{0, 0, 0};
+  census.ports[1].rates.reset();  // open, and not counted yet
+  PortFact closed;
+  closed.name = "/closed:i";
+  closed.component = "not open";
+  census.ports.insert(census.ports.begin() + 1, closed);
+  census.sources[0].rates.reset();
+  census.sources[1].is_open = false;
+  census.sources[1].rates.reset();
+  Frame frame = frame_at(11, std::make_shared<const Census>(census));
+  frame.ports.insert(frame.ports.begin() + 1, PortState{});
+  view_.add(shared(frame), {});
+  EXPECT_THAT(line_with("/arm:i"), HasSubstr(" 0     0       0     1/4 arm"));
+  EXPECT_THAT(line_with("/gaze:i"), HasSubstr(" ?     ?       ?     1/4 arm"));
+  EXPECT_THAT(line_with("/closed:i"),
+              testing::ContainsRegex("/closed:i +\\? +\\? +\\? +not open$"));
+  EXPECT_THAT(line_with("/face:o"), testing::ContainsRegex(" s +\\? +\\? source .pid 8.$"));
+  EXPECT_THAT(line_with("/object:o █"), testing::ContainsRegex(" ms +100 ms +source .pid 8.$"));
 }
 
 TEST_F(TopView, EachLineIsAsWideAsTheScreen) {
@@ -132,14 +158,17 @@ TEST_F(TopView, PausesAndStepsBackAndForward) {
   view_.add(shared(frame_at(12)), {});
   view_.add(shared(frame_at(15)), {});
   press(" ");
-  EXPECT_THAT(screen(), HasSubstr("PAUSED, 0 ms before"));
+  EXPECT_THAT(screen(), HasSubstr("PAUSED\n"));
   view_.add(shared(frame_at(16)), {});
   press(Key::kLeft);
-  EXPECT_THAT(screen(), HasSubstr("PAUSED, 3.0 s before"));
+  EXPECT_THAT(screen(), HasSubstr("PAUSED, 3.0 s back"));
   press("[");
-  EXPECT_THAT(screen(), HasSubstr("PAUSED, 5.0 s before"));
+  EXPECT_THAT(screen(), HasSubstr("PAUSED, 5.0 s back"));
+  press("[");
+  EXPECT_THAT(screen(), HasSubstr("no older picture is kept"));
   press(Key::kRight);
-  EXPECT_THAT(screen(), HasSubstr("PAUSED, 3.0 s before"));
+  EXPECT_THAT(screen(), Not(HasSubstr("no older")));
+  EXPECT_THAT(screen(), HasSubstr("PAUSED, 3.0 s back"));
   press(" ");
   EXPECT_THAT(screen(), Not(HasSubstr("PAUSED")));
 }
@@ -169,6 +198,8 @@ TEST_F(TopView, AsksWhyOfWhatTheCursorIsOn) {
   EXPECT_THAT(screen(), HasSubstr("asking"));
   view_.set_answer({*question, {"/arm:i: /object:o wins"}});
   EXPECT_THAT(screen(), HasSubstr("/arm:i: /object:o wins"));
+  // Which may be more than the rules can tell.
+  EXPECT_THAT(screen(), HasSubstr("\n  /arm:i: /object:o has won for 3.0 s\n"));
   press("q");  // closes it, and leaves only then
   EXPECT_FALSE(view_.is_over());
   EXPECT_THAT(screen(), HasSubstr("INPUT PORT"));
@@ -193,9 +224,11 @@ TEST_F(TopView, TapsThePortOfTheCursorUntilItIsAskedAgain) {
   Frame frame = frame_at(11);
   frame.ports[0].is_tapped = true;
   view_.add(shared(frame), {});
-  EXPECT_THAT(screen(), HasSubstr("/arm:i (t)"));
+  EXPECT_THAT(screen(), HasSubstr("\n t /arm:i"));
+  EXPECT_THAT(screen(), HasSubstr("\n>  /gaze:i"));
   EXPECT_THAT(screen(), HasSubstr("OLDEST"));
-  EXPECT_EQ(line_with("/arm:i").back(), '-');
+  EXPECT_THAT(line_with("/arm:i"), testing::EndsWith("none       ?"));
+  EXPECT_THAT(line_with("/gaze:i"), testing::EndsWith(" 1/4"));
   frame.ports[0].oldest = kSecond / 25;
   view_.add(shared(frame), {});
   EXPECT_THAT(line_with("/arm:i"), testing::EndsWith("<40 ms"));
@@ -222,14 +255,212 @@ TEST_F(TopView, ALongExplanationScrolls) {
   EXPECT_THAT(screen({80, 12}), HasSubstr("line 50\n"));
 }
 
-TEST_F(TopView, TheHelpNamesEachKey) {
-  press("?");
-  const std::string help = screen({80, 40});
-  for (const char* key : {"q ", "j k", "Tab", "Enter w", "/ ", "s  r", "Space p", "[ ]"}) {
-    EXPECT_THAT(help, HasSubstr(key));
+std::set<std::string> words_of(const std::string& text) {
+  std::istringstream in(text);
+  return {std::istream_iterator<std::string>(in), std::istream_iterator<std::string>()};
+}
+
+std::set<std::string> helped_keys() {
+  std::set<std::string> keys;
+  for (const std::string& line : key_lines()) keys.merge(words_of(line.substr(0, line.find("  "))));
+  return keys;
+}
+
+TEST_F(TopView, WhatADaemonThatIsGoneHadCountedIsNotToldAsIfItWereNow) {
+  Frame frame = frame_at(11);
+  frame.is_counted = false;
+  view_.add(shared(frame), {});
+  EXPECT_THAT(line_with("/arm:i"), testing::ContainsRegex("100 ms +\\? +\\? +\\? +\\? arm"));
+  EXPECT_THAT(line_with("/face:o"), testing::ContainsRegex(" s +\\? +\\? source"));
+}
+
+// Nor may columns come and go while winners change.
+TEST_F(TopView, ColumnsDoNotDependOnWhoWins) {
+  Census census = census_of_robot();
+  census.sources[1].name = "/object/of/some/interest/nearby:o";
+  Frame frame = frame_at(11, std::make_shared<const Census>(census));
+  view_.add(shared(frame), {});
+  const std::string header = line_with("INPUT PORT");
+  frame.ports[0].winner = kNobody;
+  view_.add(shared(frame), {});
+  EXPECT_EQ(line_with("INPUT PORT"), header);
+}
+
+TEST_F(TopView, TheHelpNamesEachKeyThatDoesSomething) {
+  const std::set<std::string> keys = helped_keys();
+  for (const Binding& each : bindings()) {
+    EXPECT_EQ(keys.count(each.label), 1u) << each.label;
+    EXPECT_EQ(command_of(each.press), each.command) << each.label;
   }
+  // What is not bound is the terminal's.
+  EXPECT_EQ(keys.size(), bindings().size() + 2);  // Ctrl-C, Ctrl-L
+  press("?");
+  const std::string help = screen({80, 60});
+  for (const std::string& key : keys) EXPECT_THAT(help, HasSubstr(key));
   press(Key::kEscape);
   EXPECT_THAT(screen(), HasSubstr("INPUT PORT"));
+}
+
+TEST_F(TopView, ThePageNamesTheKeysThatTheHelpNames) {
+  const std::string page = test::content_of(std::string(ARBITER_TEST_DATA) + "/../../docs/top.md");
+  std::istringstream section(page.substr(page.find("## Keys")));
+  std::set<std::string> keys;
+  for (std::string line; std::getline(section, line) && line.rfind("## What", 0) != 0;) {
+    if (line.rfind("| `", 0) != 0) continue;
+    std::string cell = line.substr(2, line.find(" |") - 2);
+    for (char& each : cell) each = each == '`' || each == ',' ? ' ' : each;
+    keys.merge(words_of(cell));
+  }
+  EXPECT_EQ(keys, helped_keys());
+}
+
+// A term in front, and below each other what it means, also where the screen is narrow.
+TEST_F(TopView, TheHelpStandsInTwoColumnsHoweverWideTheScreen) {
+  press("?");
+  for (const std::size_t columns : {60u, 80u, 120u}) {
+    const auto lines = view_.draw({columns, 80});
+    for (std::size_t i = 2; i + 1 < lines.size(); ++i) {
+      const std::string line = lines[i].text();
+      if (line.rfind("Rates", 0) == 0) break;
+      if (line.empty()) continue;
+      ASSERT_GT(line.size(), 17u) << columns << ": " << line;
+      EXPECT_EQ(line[16], ' ') << columns << ": " << line;
+      EXPECT_NE(line[17], ' ') << columns << ": " << line;
+    }
+  }
+}
+
+TEST_F(TopView, SaysWhyAKeyDoesNothing) {
+  press("x");
+  EXPECT_THAT(screen(), HasSubstr("does nothing here; ? shows the keys"));
+  press(Key::kTab);
+  EXPECT_THAT(screen(), Not(HasSubstr("does nothing")));
+  press("t");
+  EXPECT_THAT(screen(), HasSubstr("a source cannot be tapped, input ports can: Tab goes to them"));
+  EXPECT_TRUE(view_.tapped().empty());
+  press(Key::kTab);
+  press("t");
+  EXPECT_THAT(screen(), HasSubstr("no port here to tap"));
+  press(Key::kEnter);
+  EXPECT_THAT(screen(), HasSubstr("nothing here to ask about"));
+  press("s");
+  EXPECT_THAT(screen(), HasSubstr("newest first"));
+  press("r");
+  EXPECT_THAT(screen(), HasSubstr("newest first"));
+  press(Key::kTab);
+  press(" ");
+  press("t");
+  EXPECT_THAT(screen(), HasSubstr("from now on tapped: /arm:i; to be seen once you go on"));
+  // What is new is more important.
+  view_.set_problem("arbiterd does not let you observe");
+  press(" ");
+  EXPECT_THAT(screen(), HasSubstr("does not let you observe"));
+}
+
+TEST_F(TopView, WhySpeaksOfTheMomentShown) {
+  auto question = press(Key::kEnter);
+  EXPECT_EQ(question->moment, nullptr);
+  EXPECT_THAT(screen(), HasSubstr("Why /arm:i, now"));
+  press(Key::kEscape);
+  Frame eleven = frame_at(11);
+  eleven.takeovers = 1;
+  const auto then = shared(eleven);
+  view_.add(then, {takeover(1, "/object:o")});
+  view_.add(shared(frame_at(12)), {});
+  press(Key::kLeft);
+  question = press(Key::kEnter);
+  EXPECT_EQ(question->moment, then);
+  EXPECT_EQ(question->seen,
+            (std::vector<std::string>{"  /arm:i: /object:o has won for 3.0 s, since " +
+                                      clock_text({}) + ": /object:o began"}));
+  EXPECT_THAT(screen(), HasSubstr("Why /arm:i, at " + clock_text(then->wall)));
+  view_.set_answer({{question->ports, "", nullptr}, {"of now"}});
+  EXPECT_THAT(screen(), Not(HasSubstr("of now")));  // that was another question
+  view_.set_answer({*question, {"of then"}});
+  EXPECT_THAT(screen(), HasSubstr("of then"));
+  press(Key::kEscape);
+  // By another model, nobody can say any more why it was so.
+  Frame frame = frame_at(13);
+  ++frame.generation;
+  view_.add(shared(frame), {});
+  question = press(Key::kEnter);
+  EXPECT_EQ(question->moment, nullptr);
+  EXPECT_THAT(screen(), HasSubstr("Why /arm:i, now"));
+  EXPECT_THAT(screen(), HasSubstr("the answer is of now: another model is in force"));
+}
+
+// As a robot's ports are called: longer than their columns.
+TEST_F(TopView, LongNamesCanBeToldApartInEightyColumns) {
+  const std::vector<std::string> names = {
+      "/Navigation/global_planner/cmd_vel:o", "/Navigation/global_planner/path:o",
+      "/Navigation/local_planner/cmd_vel:o",  "/Navigation/local_planner/path:o",
+      "/Perception/camera_left/image:o",      "/Perception/camera_right/image:o"};
+  Census census = census_of_robot();
+  Frame frame = frame_at(11);
+  const SourceFact source = census.sources[0];
+  const PortFact port = census.ports[0];
+  census.sources.clear();
+  census.ports.clear();
+  frame.ports.clear();
+  frame.words.clear();
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    census.sources.push_back(source);
+    census.sources.back().name = names[i];
+    frame.words.push_back(frame.now + kSecond);
+    census.ports.push_back(port);
+    census.ports.back().name = names[i].substr(0, names[i].size() - 1) + "i";
+    frame.ports.push_back({static_cast<std::int32_t>(i), frame.now - kSecond, true, true});
+  }
+  frame.census = std::make_shared<const Census>(census);
+  frame.takeovers = 1;
+  Takeover change = takeover(1, names[2]);
+  change.before = names[0];
+  change.port = census.ports[2].name;
+  view_.add(shared(frame), {change});
+  std::set<std::string> ports;
+  std::set<std::string> winners;
+  std::set<std::string> sources;
+  for (const Line& line : view_.draw({80, 30})) {
+    const std::string text = line.text();
+    if (text.substr(0, 4) == " t /" || text.substr(0, 4) == ">t /") {
+      std::istringstream in(text.substr(2));
+      std::string name, winner;
+      in >> name >> winner;
+      ports.insert(name);
+      winners.insert(winner);
+    } else if (text.find(" active ") != std::string::npos) {
+      sources.insert(text.substr(1, text.find(' ', 1) - 1));
+    }
+  }
+  EXPECT_EQ(ports.size(), names.size()) << screen({80, 30});
+  EXPECT_EQ(winners.size(), names.size()) << screen({80, 30});
+  EXPECT_EQ(sources.size(), names.size()) << screen({80, 30});
+  const std::string text = line_with(" → ", {80, 30});
+  EXPECT_THAT(text, testing::EndsWith("began"));
+  EXPECT_THAT(text, HasSubstr("…"));
+  EXPECT_THAT(screen({200, 30}), HasSubstr(names[2] + " began"));
+}
+
+// The mark of a tapped port is not part of what is sorted by.
+TEST_F(TopView, ATapChangesNoOrder) {
+  Census census = census_of_robot();
+  census.ports[1].name = "/arm:i !";  // "/arm:i (t)" would stand behind it
+  Frame frame = frame_at(11, std::make_shared<const Census>(census));
+  frame.ports[0].is_tapped = true;
+  view_.add(shared(frame), {});
+  EXPECT_LT(screen().find("t /arm:i "), screen().find("   /arm:i !"));
+  frame.ports[0].is_tapped = false;
+  frame.ports[1].is_tapped = true;
+  view_.add(shared(frame), {});
+  EXPECT_LT(screen().find("/arm:i "), screen().find("t /arm:i !"));
+}
+
+TEST_F(TopView, SortsByNoColumnThatIsNotShown) {
+  screen({40, 24});
+  for (int i = 0; i < 4; ++i) {
+    press("s");
+    EXPECT_THAT(line_with("INPUT PORT", {40, 24}), testing::ContainsRegex("▴|▾")) << i;
+  }
 }
 
 TEST_F(TopView, ThePageNamesEachColumn) {
