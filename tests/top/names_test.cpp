@@ -63,6 +63,7 @@ TEST_F(TopNames, CanBeToldApartWhereverTheyDiffer) {
   // Short ones count: nothing may look like one of them.
   EXPECT_EQ(alike({"/N…/l…/p:o", "/Nav/local/p:o"}, 10), 0u);
   std::vector<std::string> numbered;
+  numbered.reserve(100);
   for (int i = 0; i < 100; ++i) {
     numbered.push_back("/Perception/segmentation/object_" + std::to_string(i) + "/pose:o");
   }
