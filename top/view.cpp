@@ -245,6 +245,10 @@ void View::toggle_tap() {
   find_selected(focus_, table);
   const Row& row = table.rows[state().index];
   const std::string& port = focus_ == Pane::kPorts ? row.name : row.cells[1].text;
+  if (tapped_.count(port) == 0 && !history_.latest()->has_daemon) {
+    notice_ = "a port can be tapped while a daemon runs, and none does now";
+    return;
+  }
   if (tapped_.erase(port) == 0) tapped_.insert(port);
   if (history_.is_paused()) {
     notice_ = (tapped_.count(port) != 0 ? "from now on tapped: " : "not tapped any more: ") + port +
@@ -302,8 +306,12 @@ std::vector<std::string> View::seen_at(const std::vector<std::string>& ports) co
         state.winner == kNobody
             ? "nobody"
             : frame.census->sources[static_cast<std::size_t>(state.winner)].name;
-    std::string line = "  " + port + ": " + who + " has won for " +
-                       (state.is_exact ? "" : "at least ") + span(frame.now - state.since);
+    std::string line = "  ";
+    line += port;
+    line += ": ";
+    line += who;
+    line += state.is_exact ? " has won for " : " has won for at least ";
+    line += span(frame.now - state.since);
     for (const Takeover* each : history_.takeovers()) {
       if (each->port != port) continue;
       line += ", since " + clock_text(each->wall) + ": " + each->because;

@@ -84,6 +84,16 @@ TEST_F(TopKeys, SaysWhyAKeyDoesNothing) {
   press(" ");
   press("t");
   EXPECT_THAT(screen(), HasSubstr("from now on tapped: /arm:i; to be seen once you go on"));
+  press("t");
+  Frame alone = frame_at(11);
+  alone.has_daemon = false;
+  view_.add(shared(alone), {});
+  press(" ");
+  press("t");
+  EXPECT_THAT(screen(), HasSubstr("tapped while a daemon runs, and none does now"));
+  EXPECT_TRUE(view_.tapped().empty());
+  view_.add(shared(frame_at(12)), {});
+  press(" ");
   // What is new is more important.
   view_.set_problem("arbiterd does not let you observe");
   press(" ");
