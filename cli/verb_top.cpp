@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
@@ -22,6 +23,8 @@
 #include "cli/why_answer.hpp"
 #include "shm/clock.hpp"
 #include "top/inquirer.hpp"
+#include "top/keys.hpp"
+#include "top/overlay.hpp"
 #include "top/sampler.hpp"
 #include "top/screen.hpp"
 #include "top/tapper.hpp"
@@ -41,15 +44,32 @@ struct TopOptions {
   bool once = false;
 };
 
+watch::KeptPicture picture_of(const top::Frame& frame) {
+  watch::KeptPicture picture;
+  picture.generation = frame.generation;
+  picture.now = frame.now;
+  picture.is_settled = frame.is_settled;
+  for (std::size_t i = 0; i < frame.words.size(); ++i) {
+    picture.words[frame.census->sources[i].name] = frame.words[i];
+  }
+  return picture;
+}
+
 std::string explain(const std::shared_ptr<watch::Instance>& instance,
                     const top::WhyQuestion& question) {
+  std::optional<watch::KeptPicture> kept;
+  if (question.moment != nullptr) kept = picture_of(*question.moment);
   std::ostringstream text;
   for (const std::string& port : question.ports) {
     if (text.tellp() > 0) text << '\n';
     WhyOptions options;
     options.port = port;
     options.source = question.source;
-    write_why(text, options, instance);
+    write_why(text, options, instance, kept ? &*kept : nullptr);
+  }
+  if (kept) {
+    text << "\nWho wins, and what is active, is of the moment shown, and \"ago\" counts from it. "
+            "Which components have what open, and lines with \"!\", are of now.\n";
   }
   return text.str();
 }
@@ -153,6 +173,17 @@ int top_verb(const TopOptions& options) {
   return top.watch(screen);
 }
 
+// As ? shows them.
+std::string keys_text() {
+  std::string text;
+  for (const std::string& line : top::key_lines()) {
+    for (const std::string& part : top::broken("  " + line, 80, top::Charset::kAscii)) {
+      text += part + "\n";
+    }
+  }
+  return text;
+}
+
 }  // namespace
 
 void add_top(CLI::App& app, int& exit_code) {
@@ -173,7 +204,8 @@ void add_top(CLI::App& app, int& exit_code) {
                  "Print one picture as text, after a second, in which rates are counted");
   add_instance_option(*verb, options->instance);
   verb->footer(
-      "Keys: q leaves, ? shows the others. It changes nothing, and no component notices it.\n"
+      "Keys:\n" + keys_text() +
+      "\nIt changes nothing, and no component notices it unless you tap a port (t).\n"
       "NO_COLOR, TERM and the locale are heeded.\n\n"
       "Example:\n"
       "  arbiter top\n"

@@ -394,10 +394,10 @@ void WhyAnswer::write_json() const {
 }
 
 void write_why(std::ostream& out, const WhyOptions& options,
-               const std::shared_ptr<watch::Instance>& instance) {
+               const std::shared_ptr<watch::Instance>& instance, const watch::KeptPicture* kept) {
   watch::Port port(instance, options.port);
   for (;;) {
-    Look look = port.look();
+    Look look = kept == nullptr ? port.look() : port.look_back(*kept);
     auto explanation = port.explain(look);
     if (!explanation) continue;  // another model has come into force: that is rare
     port.add_timeouts(look);

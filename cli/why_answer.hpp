@@ -63,8 +63,11 @@ class WhyAnswer {
   std::vector<std::string> reasons_;                 // sources that keep active connections out
 };
 
-// The whole answer to `options`. Throws as watch::Port does, and Error.
+// The whole answer to `options`. Of activities, and of who wins, it says what the kept picture has,
+// if one is given; what the daemon's status knows is always of now. Throws as watch::Port does, and
+// Error.
 void write_why(std::ostream& out, const WhyOptions& options,
-               const std::shared_ptr<watch::Instance>& instance);
+               const std::shared_ptr<watch::Instance>& instance,
+               const watch::KeptPicture* kept = nullptr);
 
 }  // namespace arbiter::cli

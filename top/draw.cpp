@@ -34,6 +34,7 @@ std::vector<Line> View::draw(Size size) {
   } else if (history_.frame() == nullptr) {
     lines.push_back(line_of("asking the daemon ...", size.columns, Style::kDim, charset_));
   } else {
+    take_up_names(history_.frame()->census);
     std::array<Table, kPanes> tables = {table(Pane::kPorts), table(Pane::kSources),
                                         table(Pane::kTakeovers)};
     const auto heights = this->heights(tables, body);
@@ -50,6 +51,15 @@ std::vector<Line> View::draw(Size size) {
   }
   lines.push_back(footer(size.columns));
   return lines;
+}
+
+void View::take_up_names(const std::shared_ptr<const Census>& census) {
+  if (named_ == census) return;
+  named_ = census;
+  std::vector<std::string> names;
+  for (const PortFact& each : census->ports) names.push_back(each.name);
+  for (const SourceFact& each : census->sources) names.push_back(each.name);
+  names_.set(std::move(names));
 }
 
 // A header each. Changes get a quarter; ports and sources what they need, and where that is too
@@ -86,11 +96,18 @@ std::vector<Line> View::draw_pane(Pane pane, Table table, Size size) {
         " " + std::to_string(state.offset + 1) + "-" + std::to_string(end) + "/" +
         std::to_string(table.rows.size());
   }
-  const std::size_t room = size.columns > 2 ? size.columns - 1 : 1;
-  const auto widths = table.widths(room, charset_);
+  // Before the columns, so that no name is so long that it hides them.
+  const bool has_marks =
+      size.columns > 16 && std::any_of(table.rows.begin(), table.rows.end(),
+                                       [](const Row& row) { return row.is_marked; });
+  const std::size_t gutter = has_marks ? 3 : 1;
+  const std::size_t room = size.columns > gutter + 1 ? size.columns - gutter : 1;
+  state.widths = table.widths(room, charset_);
+  const auto& widths = state.widths;
   const std::size_t none = table.columns.size();
-  const auto add = [&](Line line, bool is_marked, bool is_selected) {
-    line.spans.insert(line.spans.begin(), {is_marked ? ">" : " ", Style::kPlain});
+  const auto add = [&](Line line, bool has_cursor, bool is_tapped, bool is_selected) {
+    const std::string marks = has_marks ? (is_tapped ? "t " : "  ") : "";
+    line.spans.insert(line.spans.begin(), {(has_cursor ? ">" : " ") + marks, Style::kPlain});
     line.is_selected = is_selected;
     std::size_t width = 0;
     for (const Span& span : line.spans) width += columns_of(span.text);
@@ -101,10 +118,12 @@ std::vector<Line> View::draw_pane(Pane pane, Table table, Size size) {
   const std::size_t sorted = pane == Pane::kTakeovers ? none : std::min(state.sorted, none - 1);
   Line header = table.header(widths, sorted, state.is_descending, charset_);
   for (Span& span : header.spans) span.style = has_focus ? Style::kTitle : Style::kHeader;
-  add(std::move(header), has_focus, false);
+  add(std::move(header), has_focus, false, false);
   for (std::size_t i = state.offset; i < end; ++i) {
     const bool is_selected = has_focus && i == state.index;
-    add(table.line(table.rows[i], widths, is_selected, charset_), is_selected, is_selected);
+    const Row& row = table.rows[i];
+    add(table.line(row, widths, is_selected, charset_, &names_), is_selected, row.is_marked,
+        is_selected);
   }
   if (table.rows.empty() && size.rows > 1) {
     lines.push_back(line_of(filter_.empty() ? "   none" : "   none that the filter shows",
@@ -122,8 +141,9 @@ Line View::title(std::size_t columns) const {
   const std::string left = "arbiter top  " + frame->census->instance + "  " + frame->census->model +
                            "  " + clock_text(frame->wall);
   if (history_.is_paused()) {
-    return two_sided(left, "  PAUSED, " + span(history_.age()) + " before", columns, Style::kTitle,
-                     Style::kWarning, charset_);
+    const shm::Nanoseconds age = history_.age();
+    return two_sided(left, age == 0 ? "  PAUSED" : "  PAUSED, " + span(age) + " back", columns,
+                     Style::kTitle, Style::kWarning, charset_);
   }
   if (!frame->has_daemon) {
     return two_sided(left, "  NO DAEMON: the last model decides", columns, Style::kTitle,
@@ -134,6 +154,7 @@ Line View::title(std::size_t columns) const {
 
 Line View::footer(std::size_t columns) const {
   if (is_typing_) return line_of("filter: " + filter_ + "_", columns, Style::kTitle, charset_);
+  if (!notice_.empty()) return line_of(notice_, columns, Style::kTitle, charset_);
   const auto frame = history_.frame();
   if (frame != nullptr && frame->has_daemon && !problem_.empty() && !history_.is_paused()) {
     return line_of(problem_, columns, Style::kWarning, charset_);
@@ -143,8 +164,8 @@ Line View::footer(std::size_t columns) const {
                    Style::kWarning, charset_);
   }
   std::string keys = overlay_ ? "Esc close  arrows scroll"
-                              : "q quit  ? help  Enter why  Tab pane  / filter  s sort  Space "
-                                "pause  arrows step, move";
+                              : "q quit  ? help  Enter why  t tap  Tab pane  / filter  s sort  "
+                                "Space pause";
   if (!filter_.empty()) keys = "filter \"" + filter_ + "\": Esc shows all   " + keys;
   return line_of(keys, columns, Style::kDim, charset_);
 }

@@ -101,8 +101,10 @@ struct Frame {
   std::vector<PortState> ports;          // as in the census
   std::vector<shm::ActivityWord> words;  // as Census::sources
   std::uint64_t generation = 0;          // of the model in force
+  std::uint64_t memories = 0;            // of daemons that had been seen: each numbers its models
   std::uint64_t takeovers = 0;           // that there had been
   bool has_daemon = true;
+  bool is_counted = true;  // lately; else what the daemon counts is not known any more
   bool is_settled = true;
 
   // When the source last arrived, or was deactivated; 0: never.
@@ -131,7 +133,9 @@ struct Takeover {
 // Why somebody wins, or does not.
 struct WhyQuestion {
   std::vector<std::string> ports;
-  std::string source;  // only of its connection; "": of all
+  std::string source;                     // only of its connection; "": of all
+  std::shared_ptr<const Frame> moment{};  // that the answer is to be of; null: now
+  std::vector<std::string> seen{};        // what the asker knows already, a line for each port
 };
 struct WhyAnswer {
   WhyQuestion question;

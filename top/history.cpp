@@ -44,7 +44,10 @@ void History::step(std::ptrdiff_t by) {
 }
 
 std::shared_ptr<const Frame> History::frame() const {
-  if (paused_) return paused_->kept.frames[paused_->at];
+  return paused_ ? paused_->kept.frames[paused_->at] : latest();
+}
+
+std::shared_ptr<const Frame> History::latest() const {
   return live_.frames.empty() ? nullptr : live_.frames.back();
 }
 

@@ -26,8 +26,10 @@ class History {
   // Pauses if need be. Negative: back. Stops at the ends.
   void step(std::ptrdiff_t by);
 
-  // Null: nothing was added yet.
+  // The one that is looked at. Null: nothing was added yet.
   [[nodiscard]] std::shared_ptr<const Frame> frame() const;
+  // The last one, pause or not.
+  [[nodiscard]] std::shared_ptr<const Frame> latest() const;
   // That had come about by then, the latest first.
   [[nodiscard]] std::vector<const Takeover*> takeovers() const;
   // From the picture to the last that can be stepped to.

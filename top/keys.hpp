@@ -53,7 +53,17 @@ enum class Command {
 };
 [[nodiscard]] Command command_of(const KeyPress& press);
 
-// What `?` shows.
-[[nodiscard]] const std::vector<std::string>& help_lines();
+struct Binding {
+  std::string label;  // one word: "q", "PgUp"
+  KeyPress press;
+  Command command = Command::kNone;
+};
+// All that command_of() knows. Ctrl-C, Ctrl-L and Ctrl-Z are the terminal's.
+[[nodiscard]] const std::vector<Binding>& bindings();
+
+// The keys, and behind two blanks or more what they do: of any length. For `?` and --help.
+[[nodiscard]] const std::vector<std::string>& key_lines();
+// What `?` shows: these, and what the columns mean.
+[[nodiscard]] std::vector<std::string> help_lines();
 
 }  // namespace arbiter::top

@@ -6,10 +6,12 @@
 namespace arbiter::top {
 namespace {
 
-constexpr std::size_t kLeastFlexible = 10;
+// A name of fewer columns says nothing.
+constexpr std::size_t kLeastName = 4;
 
 std::size_t natural_width(const Table& table, std::size_t column, Charset charset) {
   std::size_t width = columns_of(table.columns[column].title) + 1;  // and a mark
+  width = std::max(width, table.columns[column].wanted);
   for (const Row& row : table.rows) {
     width = std::max(width, columns_of(safe(row.cells[column].text, charset)));
   }
@@ -27,6 +29,51 @@ void share_out(std::vector<std::size_t>& widths, std::vector<std::size_t> flexib
     widths[column] = std::min(widths[column], room / left--);
     room -= widths[column];
   }
+}
+
+// First each gets its least, then the rest is shared out.
+void give(std::vector<std::size_t>& widths, const std::vector<Column>& columns,
+          const std::vector<std::size_t>& flexible, std::size_t& room) {
+  std::vector<std::size_t> least(widths.size(), 0);
+  std::size_t sum = 0;
+  for (const std::size_t column : flexible) {
+    least[column] = std::min(widths[column], columns[column].least);
+    sum += least[column];
+  }
+  if (sum > room) {
+    share_out(widths, flexible, room);
+    return;
+  }
+  room -= sum;
+  for (const std::size_t column : flexible) widths[column] -= least[column];
+  share_out(widths, flexible, room);
+  for (const std::size_t column : flexible) widths[column] += least[column];
+}
+
+// The cell's text with its names cut, so that it is no wider than that.
+std::string with_short_names(const Cell& cell, std::size_t columns, Charset charset,
+                             ShortNames& names) {
+  std::vector<std::size_t> widths;
+  std::vector<std::size_t> order;
+  std::size_t others = columns_of(safe(cell.text, charset));
+  if (others <= columns) return cell.text;
+  for (const NamePlace& each : cell.names) {
+    order.push_back(widths.size());
+    widths.push_back(columns_of(safe(cell.text.substr(each.begin, each.length), charset)));
+    others -= widths.back();
+  }
+  if (columns < others + kLeastName * widths.size()) return cell.text;
+  std::size_t room = columns - others;
+  share_out(widths, order, room);
+  std::string result;
+  std::size_t end = 0;
+  for (std::size_t i = 0; i < cell.names.size(); ++i) {
+    const NamePlace& each = cell.names[i];
+    result += safe(cell.text.substr(end, each.begin - end), charset);
+    result += names.cut(cell.text.substr(each.begin, each.length), widths[i]);
+    end = each.begin + each.length;
+  }
+  return result + safe(cell.text.substr(end), charset);
 }
 
 }  // namespace
@@ -55,52 +102,58 @@ void Table::sort(std::size_t column, bool descending) {
 }
 
 std::vector<std::size_t> Table::widths(std::size_t room, Charset charset) const {
-  std::vector<bool> is_shown(columns.size(), true);
+  std::vector<std::size_t> widths(columns.size(), 0);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    widths[i] = columns[i].width != 0 ? columns[i].width : natural_width(*this, i, charset);
+  }
   const auto least = [&] {  // each but the first begins with a blank
     std::size_t sum = 0;
     for (std::size_t i = 0; i < columns.size(); ++i) {
-      if (is_shown[i]) sum += 1 + (columns[i].width != 0 ? columns[i].width : kLeastFlexible);
+      if (widths[i] == 0) continue;
+      sum += 1 + (columns[i].width != 0 ? widths[i] : std::min(widths[i], columns[i].least));
     }
     return sum - 1;
   };
   while (least() > room) {
     std::size_t worst = 0;
     for (std::size_t i = 0; i < columns.size(); ++i) {
-      if (is_shown[i] && (!is_shown[worst] || columns[i].rank >= columns[worst].rank)) worst = i;
+      if (widths[i] != 0 && columns[i].rank >= columns[worst].rank) worst = i;
     }
     if (columns[worst].rank == 0) break;
-    is_shown[worst] = false;
+    widths[worst] = 0;
   }
-  std::vector<std::size_t> widths(columns.size(), 0);
   std::vector<std::size_t> first;  // of rank 0
   std::vector<std::size_t> others;
   std::size_t fixed = 0;
+  std::size_t kept = 0;
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    if (!is_shown[i]) continue;
-    widths[i] = columns[i].width;
-    fixed += 1 + widths[i];
-    if (widths[i] != 0) continue;
-    widths[i] = natural_width(*this, i, charset);
+    if (widths[i] == 0) continue;
+    fixed += 1 + columns[i].width;
+    if (columns[i].width != 0) continue;
     (columns[i].rank == 0 ? first : others).push_back(i);
+    if (columns[i].rank != 0) kept += std::min(widths[i], columns[i].least);
   }
   const std::size_t left = room + 1 > fixed ? room + 1 - fixed : 0;
-  const std::size_t kept = std::min(left, others.size() * kLeastFlexible);
+  kept = std::min(left, kept);
   std::size_t of_first = left - kept;
-  share_out(widths, first, of_first);
+  give(widths, columns, first, of_first);
   std::size_t of_others = of_first + kept;
-  share_out(widths, others, of_others);
+  give(widths, columns, others, of_others);
   return widths;
 }
 
 Line Table::line(const Row& row, const std::vector<std::size_t>& widths, bool is_selected,
-                 Charset charset) const {
+                 Charset charset, ShortNames* names) const {
   Line line;
   line.is_selected = is_selected;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     if (widths[i] == 0) continue;
     if (!line.spans.empty()) line.spans.push_back({" ", Style::kPlain});
-    line.spans.push_back(
-        {fit(row.cells[i].text, widths[i], columns[i].align, charset), row.cells[i].style});
+    const Cell& cell = row.cells[i];
+    const std::string text = names == nullptr || cell.names.empty()
+                                 ? cell.text
+                                 : with_short_names(cell, widths[i], charset, *names);
+    line.spans.push_back({fit(text, widths[i], columns[i].align, charset), cell.style});
   }
   return line;
 }

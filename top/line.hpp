@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "top/names.hpp"
 #include "top/text.hpp"
 
 namespace arbiter::top {
@@ -35,14 +36,21 @@ struct Line {
 [[nodiscard]] Line line_of(std::string_view text, std::size_t columns, Style style,
                            Charset charset);
 
+// A name of a port within a text: where room is short, names are cut and the other words stay.
+struct NamePlace {
+  std::size_t begin = 0;
+  std::size_t length = 0;
+};
 struct Cell {
   std::string text;
   Style style = Style::kPlain;
   double order = 0;  // what a column of numbers is sorted by
+  std::vector<NamePlace> names{};
 };
 struct Row {
   std::string name;  // by which it is found again in the next picture
   std::vector<Cell> cells;
+  bool is_marked = false;
 };
 struct Column {
   std::string title;
@@ -50,6 +58,11 @@ struct Column {
   Align align = Align::kLeft;
   int rank = 0;  // where room is short, those of the highest rank go first; 0 stays
   bool is_number = false;
+  // Of one as wide as its texts: before it gets less than this, columns of a rank go.
+  std::size_t least = 10;
+  // And it is as wide as this even if its texts are not, so that columns do not come and go with
+  // what happens to stand in it.
+  std::size_t wanted = 0;
 };
 struct Table {
   std::vector<Column> columns;
@@ -59,8 +72,9 @@ struct Table {
   void sort(std::size_t column, bool descending);
   // 0 for a column that is left out. `room`: columns of the terminal.
   [[nodiscard]] std::vector<std::size_t> widths(std::size_t room, Charset charset) const;
+  // `names`: cuts names; null: they are cut at the end, like other texts.
   [[nodiscard]] Line line(const Row& row, const std::vector<std::size_t>& widths, bool is_selected,
-                          Charset charset) const;
+                          Charset charset, ShortNames* names = nullptr) const;
   // `sorted`: which column has a mark.
   [[nodiscard]] Line header(const std::vector<std::size_t>& widths, std::size_t sorted,
                             bool descending, Charset charset) const;

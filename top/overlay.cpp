@@ -19,20 +19,35 @@ std::size_t bytes_of(std::string_view text, std::size_t columns) {
   return bytes;
 }
 
+struct Indent {
+  std::size_t begin = 0;    // of the words that may be broken, in bytes
+  std::size_t columns = 0;  // of what continues them
+};
+Indent indent_of(const std::string& line, std::size_t columns) {
+  const std::size_t begin = std::min(line.find_first_not_of(' '), line.size());
+  const std::size_t gap = line.find("  ", begin);
+  const std::size_t meaning = gap == std::string::npos ? gap : line.find_first_not_of(' ', gap);
+  if (meaning != std::string::npos) {
+    const std::size_t place = columns_of(std::string_view(line).substr(0, meaning));
+    if (place <= columns / 2) return {meaning, place};
+  }
+  return {begin, std::min(begin + 2, columns / 2)};
+}
+
 }  // namespace
 
 std::vector<std::string> broken(const std::string& line, std::size_t columns, Charset charset) {
   std::string rest = safe(line, charset);
-  std::size_t indent = std::min(rest.find_first_not_of(' '), rest.size());
-  indent = std::min(indent + 2, columns / 2);
+  auto [begin, indent] = indent_of(rest, columns);
   std::vector<std::string> result;
   while (columns_of(rest) > columns) {
     std::size_t end = bytes_of(rest, columns);
     const std::size_t blank = rest.rfind(' ', end);
-    const bool has_words = blank != std::string::npos && blank > rest.find_first_not_of(' ');
+    const bool has_words = blank != std::string::npos && blank > begin;
     if (has_words) end = blank;
     result.push_back(rest.substr(0, end));
     rest = std::string(indent, ' ') + rest.substr(has_words ? end + 1 : end);
+    begin = indent;
     if (columns <= indent + 1) break;
   }
   result.push_back(fit(rest, std::min(columns_of(rest), columns), Align::kLeft, charset));

@@ -28,7 +28,8 @@ class Overlay {
 };
 
 // Each at most so many columns wide, broken at blanks where there are any. What continues a line is
-// indented as that was, and by two more.
+// indented as that was, and by two more; of a line "term   what it means" it stands below the
+// meaning.
 [[nodiscard]] std::vector<std::string> broken(const std::string& line, std::size_t columns,
                                               Charset charset);
 

@@ -32,6 +32,7 @@ void Sampler::set_census(std::shared_ptr<const Census> census) {
 void Sampler::bind() {
   if (memory_ != instance_->memory()) {
     memory_ = instance_->memory();
+    ++memories_;
     is_bound_ = false;
     seats_.clear();
     last_ = {};
@@ -233,8 +234,10 @@ std::shared_ptr<const Frame> Sampler::frame(
   frame->wall = wall_;
   frame->census = census_;
   frame->generation = last_.snapshot.generation;
+  frame->memories = memories_;
   frame->takeovers = takeovers_so_far_;
   frame->has_daemon = instance_->has_daemon();
+  frame->is_counted = last_.now - census_->at < kCensusHolds;
   frame->is_settled = last_.is_settled;
   for (const PortFact& each : census_->ports) {
     PortState& state = frame->ports.emplace_back();

@@ -27,6 +27,8 @@ namespace arbiter::top {
 inline constexpr shm::Nanoseconds kLookInterval = 10'000'000;
 // Of its thread's time, looks take one part in so many, however large the model.
 inline constexpr shm::Nanoseconds kLookShare = 10;
+// How old a census may be and still be told: some three are missing then.
+inline constexpr shm::Nanoseconds kCensusHolds = 3'500'000'000;
 // And at least, however soon an activity ends.
 inline constexpr shm::Nanoseconds kLeastInterval = 1'000'000;
 
@@ -75,6 +77,7 @@ class Sampler {
   const shm::Nanoseconds started_;
   std::shared_ptr<const shm::DecisionMemory> memory_;
   std::shared_ptr<const Census> census_;
+  std::uint64_t memories_ = 0;    // counts them
   std::uint64_t generation_ = 0;  // that sources_ are of
   bool is_bound_ = false;
   std::vector<shm::SourceId> sources_;  // to look at, ascending

@@ -22,9 +22,18 @@ namespace {
 // How long an escape may be the beginning of a key's sequence.
 constexpr int kEscapeMs = 50;
 
+// A terminal may say that it has millions of cells. What is kept, drawn and compared ten times a
+// second is bounded: of a larger one, the rest stays empty.
+constexpr int kMostRows = 300;
+constexpr int kMostColumns = 600;
+
 bool wants_colours() {
   const char* const no = std::getenv("NO_COLOR");  // https://no-color.org
   return no == nullptr || *no == '\0';
+}
+int number_in(const char* variable) {
+  const char* const text = std::getenv(variable);
+  return text == nullptr ? 0 : std::atoi(text);
 }
 constexpr wint_t kRedraw = 'L' & 0x1f;  // Ctrl-L
 
@@ -110,9 +119,11 @@ shm::FileDescriptor catch_signals() {
 }  // namespace
 
 Screen::Screen() : charset_(charset_of_locale()), signals_(catch_signals()) {
+  ::use_env(FALSE);  // curses would make room for all that the terminal says that it has
   if (::newterm(nullptr, stdout, stdin) == nullptr) {
     throw ScreenError("this terminal cannot be used; see `arbiter top --once`");
   }
+  take_up_size();
   ::cbreak();
   ::noecho();
   ::nonl();
@@ -166,9 +177,12 @@ void Screen::take_up_signals() const {
 // What is on the terminal now is the terminal's guess, even if it has its old size again.
 void Screen::take_up_size() {
   winsize size{};
-  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row != 0 && size.ws_col != 0) {
-    ::resizeterm(size.ws_row, size.ws_col);
-  }
+  const bool is_known = ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0;
+  const int rows = is_known && size.ws_row != 0 ? size.ws_row : number_in("LINES");
+  const int columns = is_known && size.ws_col != 0 ? size.ws_col : number_in("COLUMNS");
+  // What nobody knows is as the description of the terminal has it.
+  ::resizeterm(rows > 0 ? std::min(rows, kMostRows) : ::getmaxy(stdscr),
+               columns > 0 ? std::min(columns, kMostColumns) : ::getmaxx(stdscr));
   ::clearok(curscr, TRUE);
 }
 

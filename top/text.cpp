@@ -105,7 +105,8 @@ std::string short_span(shm::Nanoseconds time) {
 }
 
 std::string rate(double per_second) {
-  if (per_second <= 0) return "-";
+  if (per_second <= 0) return "0";
+  if (per_second < 0.05) return "<0.1";
   if (per_second < 99.95) return with_unit(per_second, 1, "");
   if (per_second < 9'999.5) return with_unit(per_second, 0, "");
   if (per_second < 999'500) return with_unit(per_second / 1e3, 0, "k");

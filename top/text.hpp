@@ -32,7 +32,7 @@ enum class Align { kLeft, kRight };
 [[nodiscard]] std::string span(shm::Nanoseconds time);
 // The same of times that may be far below a millisecond: "640 ns", "1.6 us".
 [[nodiscard]] std::string short_span(shm::Nanoseconds time);
-// 0 -> "-", 0.31 -> "0.3", 123 456 -> "123k": at most 5 columns.
+// 0 -> "0", 0.31 -> "0.3", 0.01 -> "<0.1", 123 456 -> "123k": at most 5 columns.
 [[nodiscard]] std::string rate(double per_second);
 
 // A bar of `columns`, of which this part (0 to 1) is left.

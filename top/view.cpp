@@ -7,12 +7,19 @@ namespace arbiter::top {
 namespace {
 
 constexpr std::ptrdiff_t kFar = 10;  // pictures
+constexpr const char* kChangesAreSorted = "changes are always shown with the newest first";
 
 std::string title_of(const WhyQuestion& question) {
   std::string title = "Why";
   if (question.ports.size() == 1) title += " " + question.ports.front();
   if (!question.source.empty()) title += " " + question.source;
-  return title + ", now   (Esc closes)";
+  title += question.moment == nullptr ? ", now" : ", at " + clock_text(question.moment->wall);
+  return title + "   (Esc closes)";
+}
+
+// The models of two memories may have the same number.
+bool has_model_of(const Frame& one, const Frame& other) {
+  return one.memories == other.memories && one.generation == other.generation;
 }
 
 }  // namespace
@@ -31,7 +38,14 @@ Table View::table(Pane pane) const {
   return table;
 }
 
+// What is new is more important than what the last key did.
+void View::set_problem(std::string problem) {
+  if (problem != problem_) notice_.clear();
+  problem_ = std::move(problem);
+}
+
 std::optional<WhyQuestion> View::press(const KeyPress& press) {
+  notice_.clear();
   if (is_typing_) {
     type(press);
     return std::nullopt;
@@ -85,7 +99,7 @@ std::optional<WhyQuestion> View::obey(Command command) {
       sort_by_next();
       break;
     case Command::kReverse:
-      state().is_descending = !state().is_descending;
+      reverse();
       break;
     case Command::kFilter:
       is_typing_ = true;
@@ -95,11 +109,11 @@ std::optional<WhyQuestion> View::obey(Command command) {
       break;
     case Command::kBack:
     case Command::kForward:
-      history_.step(command == Command::kBack ? -1 : 1);
+      step(command == Command::kBack ? -1 : 1);
       break;
     case Command::kBackFar:
     case Command::kForwardFar:
-      history_.step(command == Command::kBackFar ? -kFar : kFar);
+      step(command == Command::kBackFar ? -kFar : kFar);
       break;
     case Command::kWhy:
       return ask_why();
@@ -113,6 +127,7 @@ std::optional<WhyQuestion> View::obey(Command command) {
       filter_.clear();
       break;
     case Command::kNone:
+      notice_ = "this key does nothing here; ? shows the keys";
       break;
   }
   return std::nullopt;
@@ -182,28 +197,72 @@ void View::move_focus(int by) {
   focus_ = static_cast<Pane>((static_cast<int>(focus_) + by) % kPanes);
 }
 
-// Numbers begin with the largest. Changes have an order of their own.
+void View::step(std::ptrdiff_t by) {
+  const auto before = history_.frame();
+  history_.step(by);
+  if (history_.frame() != before) return;
+  notice_ = by < 0 ? "no older picture is kept"
+                   : "no newer picture before the pause; Space goes on from now";
+}
+
+// Numbers begin with the largest. A column that the screen has no room for is passed over, for
+// nobody would see what the rows are sorted by.
 void View::sort_by_next() {
+  if (focus_ == Pane::kTakeovers) {
+    notice_ = kChangesAreSorted;
+    return;
+  }
   const Table table = this->table(focus_);
-  if (focus_ == Pane::kTakeovers || table.columns.empty()) return;
+  if (table.columns.empty()) return;
   PaneState& state = this->state();
-  state.sorted = (state.sorted + 1) % table.columns.size();
+  const auto is_shown = [&](std::size_t column) {
+    return state.widths.size() != table.columns.size() || state.widths[column] != 0;
+  };
+  do {
+    state.sorted = (state.sorted + 1) % table.columns.size();
+  } while (state.sorted != 0 && !is_shown(state.sorted));
   state.is_descending = table.columns[state.sorted].is_number;
+}
+
+void View::reverse() {
+  if (focus_ == Pane::kTakeovers) {
+    notice_ = kChangesAreSorted;
+  } else {
+    state().is_descending = !state().is_descending;
+  }
 }
 
 void View::toggle_tap() {
   const Table table = this->table(focus_);
-  if (focus_ == Pane::kSources || table.rows.empty()) return;
+  if (focus_ == Pane::kSources) {
+    notice_ = "a source cannot be tapped, input ports can: Tab goes to them";
+    return;
+  }
+  if (table.rows.empty()) {
+    notice_ = "there is no port here to tap";
+    return;
+  }
   find_selected(focus_, table);
   const Row& row = table.rows[state().index];
   const std::string& port = focus_ == Pane::kPorts ? row.name : row.cells[1].text;
+  if (tapped_.count(port) == 0 && !history_.latest()->has_daemon) {
+    notice_ = "a port can be tapped while a daemon runs, and none does now";
+    return;
+  }
   if (tapped_.erase(port) == 0) tapped_.insert(port);
+  if (history_.is_paused()) {
+    notice_ = (tapped_.count(port) != 0 ? "from now on tapped: " : "not tapped any more: ") + port +
+              "; to be seen once you go on (Space)";
+  }
 }
 
 std::optional<WhyQuestion> View::ask_why() {
   const Table table = this->table(focus_);
   const auto frame = history_.frame();
-  if (table.rows.empty() || frame == nullptr) return std::nullopt;
+  if (table.rows.empty() || frame == nullptr) {
+    notice_ = "there is nothing here to ask about";
+    return std::nullopt;
+  }
   find_selected(focus_, table);
   const Row& row = table.rows[state().index];
   WhyQuestion question;
@@ -216,6 +275,14 @@ std::optional<WhyQuestion> View::ask_why() {
     const auto place = frame->census->find_source(row.name);
     if (place >= 0) question.ports = frame->census->sources[static_cast<std::size_t>(place)].ports;
   }
+  if (history_.is_paused()) {
+    if (has_model_of(*frame, *history_.latest())) {
+      question.moment = frame;
+    } else {
+      notice_ = "the answer is of now: another model is in force than in the picture shown";
+    }
+  }
+  question.seen = seen_at(question.ports);
   asked_ = question;
   if (question.ports.empty()) {
     set_answer({question, {"No port is connected to " + row.name + ", and no rule reads it."}});
@@ -225,10 +292,47 @@ std::optional<WhyQuestion> View::ask_why() {
   return question;
 }
 
+// The rules know a winner's past only from the last arrivals; this screen may have watched it for
+// longer.
+std::vector<std::string> View::seen_at(const std::vector<std::string>& ports) const {
+  const Frame& frame = *history_.frame();
+  std::vector<std::string> lines;
+  for (const std::string& port : ports) {
+    const auto place = frame.census->find_port(port);
+    if (place < 0) continue;
+    const PortState& state = frame.ports[static_cast<std::size_t>(place)];
+    if (state.winner < kNobody || state.since == 0) continue;
+    const std::string who =
+        state.winner == kNobody
+            ? "nobody"
+            : frame.census->sources[static_cast<std::size_t>(state.winner)].name;
+    std::string line = "  ";
+    line += port;
+    line += ": ";
+    line += who;
+    line += state.is_exact ? " has won for " : " has won for at least ";
+    line += span(frame.now - state.since);
+    for (const Takeover* each : history_.takeovers()) {
+      if (each->port != port) continue;
+      line += ", since " + clock_text(each->wall) + ": " + each->because;
+      break;
+    }
+    lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
 void View::set_answer(const WhyAnswer& answer) {
-  const bool is_wanted =
-      asked_ && asked_->ports == answer.question.ports && asked_->source == answer.question.source;
-  if (is_wanted) overlay_.emplace(title_of(answer.question), answer.lines);
+  const bool is_wanted = asked_ && asked_->ports == answer.question.ports &&
+                         asked_->source == answer.question.source &&
+                         asked_->moment == answer.question.moment;
+  if (!is_wanted) return;
+  std::vector<std::string> lines = answer.lines;
+  if (!asked_->seen.empty()) {
+    lines.insert(lines.end(), {"", "What this screen has seen:"});
+    lines.insert(lines.end(), asked_->seen.begin(), asked_->seen.end());
+  }
+  overlay_.emplace(title_of(answer.question), std::move(lines));
 }
 
 }  // namespace arbiter::top

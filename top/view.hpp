@@ -28,13 +28,14 @@ struct Size {
 
 class View {
  public:
-  View(Charset charset, std::size_t max_frames) : charset_(charset), history_(max_frames) {}
+  View(Charset charset, std::size_t max_frames)
+      : charset_(charset), names_(charset), history_(max_frames) {}
 
   void add(std::shared_ptr<const Frame> frame, std::vector<Takeover> takeovers) {
     history_.add(std::move(frame), std::move(takeovers));
   }
   // Why there is nothing new of what is asked of the daemon; "": there is.
-  void set_problem(std::string problem) { problem_ = std::move(problem); }
+  void set_problem(std::string problem);
   // Shown if it is what was asked for last and nobody has closed it.
   void set_answer(const WhyAnswer& answer);
 
@@ -57,6 +58,7 @@ class View {
     std::size_t page = 1;
     std::size_t sorted = 0;
     bool is_descending = false;
+    std::vector<std::size_t> widths;  // of the columns when they were drawn last
   };
 
   [[nodiscard]] PaneState& state() { return panes_[static_cast<std::size_t>(focus_)]; }
@@ -67,9 +69,13 @@ class View {
   void toggle_tap();
   void move(std::ptrdiff_t by);
   void move_focus(int by);
+  void step(std::ptrdiff_t by);
   void sort_by_next();
+  void reverse();
   std::optional<WhyQuestion> ask_why();
+  [[nodiscard]] std::vector<std::string> seen_at(const std::vector<std::string>& ports) const;
   void find_selected(Pane pane, const Table& table);
+  void take_up_names(const std::shared_ptr<const Census>& census);
   [[nodiscard]] std::vector<Line> draw_pane(Pane pane, Table table, Size size);
   [[nodiscard]] std::array<std::size_t, kPanes> heights(const std::array<Table, kPanes>& tables,
                                                         std::size_t rows) const;
@@ -77,6 +83,8 @@ class View {
   [[nodiscard]] Line footer(std::size_t columns) const;
 
   const Charset charset_;
+  ShortNames names_;
+  std::shared_ptr<const Census> named_;  // that names_ has the names of
   History history_;
   std::array<PaneState, kPanes> panes_;
   Pane focus_ = Pane::kPorts;
@@ -84,6 +92,7 @@ class View {
   bool is_typing_ = false;  // the filter
   std::set<std::string> tapped_;
   std::string problem_;
+  std::string notice_;  // why the last key did nothing, or not what it seems to
   std::optional<Overlay> overlay_;
   std::optional<WhyQuestion> asked_;
   bool is_over_ = false;

@@ -33,22 +33,54 @@ Port::Port(std::shared_ptr<Instance> instance, std::string name)
       name_(std::move(name)),
       id_(require_port(*instance_, name_)) {}
 
-Look Port::look() const {
+void Port::require_memory() const {
   if (instance_->memory() != memory_) {
     throw WatchError("another daemon has started without the memory of the last one; ask again");
   }
+}
+
+// What the table says of the picture.
+void Port::read_table(Look& look) const {
+  look.is_arbitrated = look.table().is_arbitrated(id_);
+  look.is_mentioned = look.table().knows_port(id_);
+  look.winner = look.picture.winner_at(id_);
+  look.sources.set_time(look.picture.now);
+  for (const auto& [source, word] : look.picture.words) {
+    look.sources.set(source_name(source),
+                     {word, look.table().timeout(source), !look.picture.is_unseen(source)});
+  }
+}
+
+Look Port::look() const {
+  require_memory();
   Look look;
   do {
     look = {};
     look.picture = take_picture(*memory_, sources_at(id_));
-    look.is_arbitrated = look.table().is_arbitrated(id_);
-    look.is_mentioned = look.table().knows_port(id_);
-    look.winner = look.picture.winner_at(id_);
-    look.sources.set_time(look.picture.now);
-    for (const auto& [source, word] : look.picture.words) {
-      look.sources.set(source_name(source),
-                       {word, look.table().timeout(source), !look.picture.is_unseen(source)});
+    read_table(look);
+  } while (!memory_->tables().is_whole(look.picture.snapshot));
+  return look;
+}
+
+Look Port::look_back(const KeptPicture& kept) const {
+  require_memory();
+  Look look;
+  do {
+    look = {};
+    look.picture.snapshot = memory_->tables().snapshot();
+    if (look.generation() != kept.generation) {
+      throw WatchError("another model has come into force since; ask about now");
     }
+    look.picture.now = kept.now;
+    look.picture.is_settled = kept.is_settled;
+    std::vector<shm::SourceId> sources;
+    if (kept.generation != 0) sources = sources_at(id_)(look.table());
+    for (const shm::SourceId source : sources) {
+      const auto word = kept.words.find(source_name(source));
+      look.picture.words[source] = word == kept.words.end() ? shm::kNeverActive : word->second;
+      if (word == kept.words.end()) look.picture.unseen.push_back(source);
+    }
+    read_table(look);
   } while (!memory_->tables().is_whole(look.picture.snapshot));
   return look;
 }

@@ -2,6 +2,8 @@
 // to the port, at one moment, who wins, and why.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -10,6 +12,7 @@
 
 #include "rules/explain/explain.hpp"
 #include "rules/text/diagnostic.hpp"
+#include "shm/activity.hpp"
 #include "shm/ids.hpp"
 #include "watch/instance.hpp"
 #include "watch/model_in_force.hpp"
@@ -36,6 +39,14 @@ struct Look {
   [[nodiscard]] const shm::TableView& table() const { return picture.snapshot.table; }
 };
 
+// A picture that somebody has kept, by name.
+struct KeptPicture {
+  std::uint64_t generation = 0;  // of the model that was in force
+  shm::Nanoseconds now = 0;
+  std::map<std::string, shm::ActivityWord> words;
+  bool is_settled = true;
+};
+
 class Port {
  public:
   // Keeps the instance. Throws WatchError where nobody has named such an input port.
@@ -44,6 +55,9 @@ class Port {
   // Asks nobody. Throws WatchError where a daemon has come that does not have the memory of the one
   // in which the port was found.
   [[nodiscard]] Look look() const;
+  // What look() would have said then; of a source that the picture lacks, as of one that has no
+  // page. Throws WatchError also where another model has come into force since.
+  [[nodiscard]] Look look_back(const KeptPicture& kept) const;
   // By the texts of the model that the look was taken under; nothing if another one has come into
   // force since: look again. Asks the daemon where it is a model that was not explained before.
   // Throws as Instance::ask(), and WatchError.
@@ -68,6 +82,8 @@ class Port {
   void add_timeouts(Look& look) const;
 
  private:
+  void require_memory() const;
+  void read_table(Look& look) const;
   void fetch_model();
 
   const std::shared_ptr<Instance> instance_;

@@ -78,6 +78,14 @@ class EmulatedTerminal {
     ::ioctl(terminal_.get(), TIOCSWINSZ, &window);
   }
 
+  // Tells the program that the terminal has another size than it has.
+  void claim(Size size) const {
+    winsize window{};
+    window.ws_row = static_cast<unsigned short>(size.rows);
+    window.ws_col = static_cast<unsigned short>(size.columns);
+    ::ioctl(terminal_.get(), TIOCSWINSZ, &window);
+  }
+
   // True once it holds of the screen; false if it does not in time, or the program has ended.
   bool wait_until(const std::function<bool()>& holds) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);

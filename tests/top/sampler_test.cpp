@@ -197,6 +197,29 @@ TEST_F(TopSampler, GoesOnWithoutADaemonAndWithTheNext) {
   EXPECT_EQ(winner_of(*look(), "/p:i"), "/low:o");
 }
 
+TEST_F(TopSampler, TellsModelsOfOneNumberApartByTheMemoryOfTheirDaemon) {
+  take_census();
+  const auto before = look();
+  const auto memory = instance_->memory();
+  daemon_.kill();
+  daemon_.lose_state();
+  daemon_.restart();
+  test::update_until(*instance_, [&] { return instance_->memory() != memory; });
+  take_census();
+  const auto after = look();
+  EXPECT_EQ(after->generation, before->generation);
+  EXPECT_NE(after->memories, before->memories);
+}
+
+TEST_F(TopSampler, KnowsWhenWhatTheDaemonCountedIsOld) {
+  take_census();
+  EXPECT_TRUE(look()->is_counted);
+  Census old = *look()->census;
+  old.at -= kCensusHolds;
+  sampler_.set_census(std::make_shared<const Census>(old));
+  EXPECT_FALSE(look()->is_counted);
+}
+
 TEST_F(TopSampler, APortThatNoRuleMentionsIsNotArbitrated) {
   Node node("test");
   auto in = node.input_port<int>("/other:i");

@@ -64,7 +64,9 @@ TEST_F(TopText, TellsSpansInSixColumns) {
 }
 
 TEST_F(TopText, TellsRatesInFiveColumns) {
-  EXPECT_EQ(rate(0), "-");
+  EXPECT_EQ(rate(0), "0");
+  EXPECT_EQ(rate(0.01), "<0.1");  // not none
+  EXPECT_EQ(rate(0.05), "0.1");
   EXPECT_EQ(rate(0.31), "0.3");
   EXPECT_EQ(rate(30), "30.0");
   EXPECT_EQ(rate(1'234), "1234");
@@ -88,9 +90,14 @@ TEST_F(TopText, BreaksLinesAtBlanks) {
   EXPECT_EQ(broken("  one two three", 10, Charset::kUtf8), (Lines{"  one two", "    three"}));
   EXPECT_EQ(broken("abcdefghijkl", 8, Charset::kUtf8), (Lines{"abcdefgh", "  ijkl"}));
   EXPECT_EQ(broken("", 8, Charset::kUtf8), Lines{""});
+  EXPECT_EQ(broken("s r   sort by it", 13, Charset::kUtf8), (Lines{"s r   sort by", "      it"}));
+  EXPECT_EQ(broken("s r   abcdefghi", 13, Charset::kUtf8), (Lines{"s r   abcdefg", "      hi"}));
+  EXPECT_EQ(broken("s r   sort by it", 9, Charset::kUtf8), (Lines{"s r  ", "  sort by", "  it"}));
   for (std::size_t columns = 1; columns < 20; ++columns) {
-    for (const auto& line : broken("  some words and a-very-long-one", columns, Charset::kUtf8)) {
-      EXPECT_LE(columns_of(line), columns);
+    for (const auto* text : {"  some words and a-very-long-one", "term   what it means here"}) {
+      for (const auto& line : broken(text, columns, Charset::kUtf8)) {
+        EXPECT_LE(columns_of(line), columns);
+      }
     }
   }
 }

@@ -65,6 +65,33 @@ TEST(WatchedPort, IsExplainedByTheModelOfTheLook) {
   EXPECT_THAT(port.known_sources(), ElementsAre("/high"));
 }
 
+TEST(WatchedPort, IsExplainedAsItWasInAPictureThatWasKept) {
+  Daemon daemon(kGazeModel);
+  Node node("component");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  watch::Port port(watched(daemon), "/p");
+  low.signal();
+  const watch::Look then = port.look();
+  watch::KeptPicture kept{then.generation(), then.picture.now, {}};
+  for (const char* name : {"/low", "/high"}) kept.words[name] = then.sources.state(name).word;
+  high.signal();
+  EXPECT_EQ(port.source_name(port.look().winner), "/high");
+  const watch::Look back = port.look_back(kept);
+  EXPECT_EQ(port.source_name(back.winner), "/low");
+  EXPECT_EQ(back.sources.now(), then.sources.now());
+  const auto explanation = port.explain(back);
+  ASSERT_TRUE(explanation);
+  EXPECT_EQ(explanation->winner, "/low");
+  kept.words.erase("/low");
+  const watch::Look without = port.look_back(kept);
+  EXPECT_EQ(without.winner, shm::kNone);
+  EXPECT_FALSE(without.sources.state("/low").is_visible);
+  daemon.load(kGazeModel);
+  EXPECT_THAT(error_of([&] { static_cast<void>(port.look_back(kept)); }),
+              HasSubstr("another model has come into force since"));
+}
+
 TEST(WatchedPort, ThatNobodyHasNamedIsRefusedWithAdvice) {
   Daemon daemon(kGazeModel);
   const auto instance = watched(daemon);
