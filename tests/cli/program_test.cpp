@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "tests/cli/arbiter_program.hpp"
+#include "tests/support/child_process.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/text_files.hpp"
 
@@ -148,6 +149,36 @@ TEST(Program, NoticesThatItsOutputCannotBeWritten) {
     const auto result = arbiter(arguments, "/dev/full");
     EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(arguments);
     EXPECT_THAT(result.err, EndsWith("arbiter: cannot write to standard output\n"));
+  }
+}
+
+// As in `arbiter rules m.xml | head -1`.
+TEST(Program, EndsWithoutAWordWhereItsReaderHasGone) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const auto trace = directory.write("t.csv", "t_ns,source\n0,/low\n");
+  const std::vector<std::vector<std::string>> verbs = {
+      {"check", model},
+      {"check", model, "--json"},
+      {"diff", model, directory.write("other.xml", "<behaviors/>")},
+      {"rules", model},
+      {"compile", model},
+      {"compile", model, "-o", "/dev/stdout"},
+      {"graph", model, "--format", "dot"},
+      {"simulate", model, "--trace", trace},
+      {"simulate", model, "--trace", trace, "--why"},
+      {"--help"}};
+  for (auto arguments : verbs) {
+    int ends[2];
+    ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+    ::close(ends[0]);
+    const shm::FileDescriptor out(ends[1]);
+    const std::string err = directory.write("err", "");
+    const shm::FileDescriptor file(::open(err.c_str(), O_WRONLY | O_CLOEXEC));
+    arguments.insert(arguments.begin(), ARBITER_PROGRAMS "/arbiter");
+    ChildProcess program(arguments, {}, {-1, out.get(), file.get()});
+    EXPECT_EQ(program.wait(), 128 + SIGPIPE) << testing::PrintToString(arguments);
+    EXPECT_EQ(content_of(err), "") << testing::PrintToString(arguments);
   }
 }
 
