@@ -1,8 +1,7 @@
 #include "cli/recording_times.hpp"
 
-#include <time.h>
-
 #include <cstdio>
+#include <ctime>
 
 namespace arbiter::cli {
 namespace {

@@ -198,8 +198,8 @@ TEST(OwnFiles, ForgetsWhatAListSaysOfOthers) {
   std::filesystem::create_directory(directory.file("below"));
   std::string list;
   std::vector<std::string> others;
-  for (const char* name : {"other-1.mcap", "flight-1.csv", "below/../flight-2.mcap",
-                           "below/flight-3.mcap"}) {
+  for (const char* name :
+       {"other-1.mcap", "flight-1.csv", "below/../flight-2.mcap", "below/flight-3.mcap"}) {
     const std::string path = directory.write(name, "x");
     struct stat there {};
     if (::lstat(path.c_str(), &there) != 0) continue;
