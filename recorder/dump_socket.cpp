@@ -39,6 +39,11 @@ sockaddr_un address_of(const std::string& path) {
                            "file may still come; --timeout waits longer");
 }
 
+[[noreturn]] void say_that_none_writes(const std::string& prefix) {
+  throw std::runtime_error("no flight recorder writes to " + prefix +
+                           "; start one with: arbiter record --ring 5min -o " + prefix);
+}
+
 // A recorder that is stopped lets only so many stand at its door: then connecting waits, too.
 shm::FileDescriptor connected_to(const std::string& prefix, shm::Nanoseconds end) {
   const sockaddr_un address = address_of(prefix + ".sock");
@@ -52,8 +57,7 @@ shm::FileDescriptor connected_to(const std::string& prefix, shm::Nanoseconds end
          0) {
     if (errno == EINTR) continue;
     if (errno == EAGAIN) give_up(prefix);
-    throw std::runtime_error("no flight recorder writes to " + prefix +
-                             "; start one with: arbiter record --ring 5min -o " + prefix);
+    say_that_none_writes(prefix);
   }
   return socket;
 }
