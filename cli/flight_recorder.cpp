@@ -57,7 +57,9 @@ class Flight {
   }
 
   int run() {
-    std::cerr << "arbiter: keeping the last " + seconds_text(options_.span) + " of " +
+    const std::string span = options_.span == shm::kForever ? "records that fit into the memory"
+                                                            : seconds_text(options_.span);
+    std::cerr << "arbiter: keeping the last " + span + " of " +
                      counted(recorder_.taps(), "source") + '\n';
     recorder_.run(options_.end, events_.get(), [this] { return take_up_events(); });
     statement_.reset();

@@ -115,6 +115,20 @@ TEST_F(Flight, WritesWhereAComponentDies) {
   EXPECT_EQ(recorder.wait(), 0);
 }
 
+// A name may be misspelt; or the model that has it is yet to come.
+TEST_F(Flight, SaysWhichNameOfAStatementTheModelLacks) {
+  ChildProcess recorder = fly({"--when", "/hihg"});
+  const std::string file = daemon_.directory() + "/flight.err";
+  std::string said;
+  while (said.find("; --when waits for a model that has it\n") == std::string::npos) {
+    said = content_of(file);
+  }
+  EXPECT_THAT(said, HasSubstr("gives this condition no meaning: "));
+  EXPECT_THAT(said, HasSubstr("/hihg"));
+  recorder.signal(SIGINT);
+  EXPECT_EQ(recorder.wait(), 0);
+}
+
 TEST_F(Flight, RefusesAStatementThatCannotBeRead) {
   const auto result = arbiter({"record", "--ring", "10s", "-o", prefix_, "--when", "and"});
   EXPECT_EQ(result.exit_code, 2);
