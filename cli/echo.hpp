@@ -43,7 +43,7 @@ void echo_while(const EchoOptions& options, int fd, const shm::FileDescriptor& i
                 shm::Nanoseconds interval, const std::function<bool()>& look);
 
 // Whether PORT is an output port or an input port, as far as the daemon knows; else by the end of
-// its name. Says on standard error if nobody has named it.
+// its name. Says on standard error if nobody has named it, or has it open.
 TapOf kind_of_port(const EchoOptions& options);
 
 // "01 02 … ", all bytes or the first few.

@@ -70,6 +70,7 @@ class Echo {
 
   // On standard error beside JSON, which is for programs.
   int finish() {
+    if (!std::cout) return 0;  // nobody reads it
     std::ostream& out = options_.json ? std::cerr : std::cout;
     out << samples_ << " samples in " << seconds_text(shm::monotonic_now() - started_);
     for (const auto& [source, count] : by_source_) out << ", " << count << " from " << source;

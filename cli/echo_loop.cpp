@@ -1,5 +1,6 @@
 // How long arbiter echo runs, and when it looks.
 #include <poll.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <iostream>
@@ -16,14 +17,17 @@ shm::Nanoseconds end_of_echo(const EchoOptions& options, shm::Nanoseconds starte
 void echo_while(const EchoOptions& options, int fd, const shm::FileDescriptor& interrupts,
                 shm::Nanoseconds interval, const std::function<bool()>& look) {
   const shm::Nanoseconds end = end_of_echo(options, shm::monotonic_now());
-  pollfd ready[] = {{fd, POLLIN, 0}, {interrupts.get(), POLLIN, 0}};
+  // Whoever reads this may go while nothing arrives.
+  pollfd ready[] = {{fd, POLLIN, 0}, {interrupts.get(), POLLIN, 0}, {STDOUT_FILENO, 0, 0}};
   while (look()) {
     std::cout.flush();
     const shm::Nanoseconds left = std::min(end - shm::monotonic_now(), interval);
     if (left <= 0) return;
     const timespec span{left / 1'000'000'000, left % 1'000'000'000};
-    ppoll(ready, 2, left > shm::kMaxTime ? nullptr : &span, nullptr);
+    ppoll(ready, 3, left > shm::kMaxTime ? nullptr : &span, nullptr);
     if (ready[1].revents != 0) return;
+    if ((ready[2].revents & (POLLERR | POLLHUP)) != 0) std::cout.setstate(std::ios::badbit);
+    if (!std::cout) return;
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/broken_pipe.hpp"
 #include "cli/echo.hpp"
 #include "cli/live.hpp"
 #include "shm/clock.hpp"
@@ -89,7 +90,7 @@ class RateEcho {
     const shm::Nanoseconds started = shm::monotonic_now();
     const shm::Nanoseconds end = end_of_echo(options_, started);
     shm::Nanoseconds line = started;
-    while (std::cout) {
+    while (std::cout && !has_reader_gone()) {
       const shm::Nanoseconds next = std::min(line + kSecond, end);
       const bool is_interrupted =
           sleep_until(std::min(shm::monotonic_now() + kLookInterval, next), interrupts_);

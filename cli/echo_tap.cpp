@@ -1,7 +1,9 @@
 // What a tap tells, event by event.
+#include <algorithm>
 #include <exception>
 #include <iostream>
 #include <map>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -172,6 +174,7 @@ class TapEcho {
 
   // On standard error beside JSON, which is for programs.
   int finish() {
+    if (!std::cout) return 0;  // nobody reads it
     std::ostream& out = options_.json ? std::cerr : std::cout;
     out << printed_ << (is_input_ && !options_.losers ? " samples in " : " events in ")
         << seconds_text(shm::monotonic_now() - started_);
@@ -196,6 +199,32 @@ class TapEcho {
 
 }  // namespace
 
+namespace {
+
+// Nothing comes then until somebody opens it. A name that only a watcher has given may be misspelt.
+void say_if_nobody_has_it(const std::string& port, watch::Instance& instance, bool is_in_model) {
+  wire::Status status;
+  try {
+    status = instance.status();
+  } catch (const std::exception&) {
+    return;  // the policy does not let us ask, or the daemon has just gone
+  }
+  std::vector<std::string_view> open;
+  for (const auto& each : status.sources) {
+    if (each.open) open.emplace_back(each.name);
+  }
+  for (const auto& each : status.inputs) {
+    if (each.open) open.emplace_back(each.name);
+  }
+  if (std::find(open.begin(), open.end(), port) != open.end()) return;
+  const auto similar = is_in_model ? std::nullopt : rules::find_similar(port, open);
+  std::cerr << "arbiter: no component has " << port << " open"
+            << (similar ? "; did you mean " + rules::quote(*similar) + "?" : "; waiting for one")
+            << '\n';
+}
+
+}  // namespace
+
 TapOf kind_of_port(const EchoOptions& options) {
   const auto by_name = [&] {
     const std::string& port = options.port;
@@ -208,8 +237,14 @@ TapOf kind_of_port(const EchoOptions& options) {
   } catch (const std::exception&) {
     return by_name();  // the policy does not let us observe; or the tap will say what is wrong
   }
-  if (instance->find_source(options.port)) return TapOf::output;
-  if (instance->find_port(options.port)) return TapOf::input;
+  const auto source = instance->find_source(options.port);
+  const auto port = instance->find_port(options.port);
+  if (source || port) {
+    const auto table = instance->memory()->tables().snapshot().table;
+    const bool is_in_model = source ? table.knows_source(*source) : table.knows_port(*port);
+    say_if_nobody_has_it(options.port, *instance, is_in_model);
+    return source ? TapOf::output : TapOf::input;
+  }
   std::vector<std::string_view> known;
   for (const auto& [id, name] : instance->port_names()) known.emplace_back(name);
   for (shm::SourceId id = 0; id < shm::kMaxSources; ++id) {

@@ -9,9 +9,11 @@
 #include <mutex>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "cli/condition.hpp"
 #include "cli/live.hpp"
+#include "cli/numbers.hpp"
 #include "recorder/dump_socket.hpp"
 #include "recorder/recorder.hpp"
 #include "recorder/ring.hpp"
@@ -42,21 +44,23 @@ class Flight {
         socket_(options.prefix),
         ring_(ring_options(file, info)),
         recorder_(settings, ring_) {
-    for (const int each :
-         {interrupts_.get(), signal_.get(), written_.get(), socket_.descriptor()}) {
-      epoll_event event{};
-      event.events = EPOLLIN;
-      epoll_ctl(events_.get(), EPOLL_CTL_ADD, each, &event);
+    for (const int each : {interrupts_.get(), signal_.get(), written_.get()}) {
+      watch(each, EPOLLIN);
     }
+    // Whoever has to wait at the door must not keep the loop awake.
+    watch(socket_.descriptor(), EPOLLIN | EPOLLET);
     if (condition_) {
       statement_.emplace(
-          settings.caller, *condition_, [this] { ring_.request("when"); }, settings.say);
+          settings.caller, *condition_, [this] { ring_.request(recorder::Cause::when); },
+          settings.say);
     }
   }
 
   int run() {
-    std::cerr << "arbiter: keeping the last " + seconds_text(options_.span) + " of " +
-                     std::to_string(recorder_.taps()) + " sources\n";
+    const std::string span = options_.span == shm::kForever ? "records that fit into the memory"
+                                                            : seconds_text(options_.span);
+    std::cerr << "arbiter: keeping the last " + span + " of " +
+                     counted(recorder_.taps(), "source") + '\n';
     recorder_.run(options_.end, events_.get(), [this] { return take_up_events(); });
     statement_.reset();
     recorder_.finish();
@@ -78,9 +82,10 @@ class Flight {
     options.prefix = options_.prefix;
     options.file = file;
     options.info = info;
-    options.told = [this](const std::string& path, const std::string& error) {
+    options.keep = options_.keep;
+    options.told = [this](const recorder::Dumped& dumped) {
       const std::lock_guard lock(mutex_);
-      answers_.push_back(error.empty() ? "written " + path : "failed " + error);
+      dumped_.push_back(dumped);
       eventfd_write(written_.get(), 1);
     };
     return options;
@@ -90,24 +95,35 @@ class Flight {
   bool take_up_events() {
     signalfd_siginfo signal{};
     if (::read(interrupts_.get(), &signal, sizeof signal) > 0) return false;
-    if (::read(signal_.get(), &signal, sizeof signal) > 0) ring_.request("signal");
-    if (socket_.accept()) ring_.request("asked");
+    if (::read(signal_.get(), &signal, sizeof signal) > 0) {
+      ring_.request(recorder::Cause::signal);
+    }
     take_up_answers();
+    socket_.accept([this] { return ring_.request(recorder::Cause::asked); });
     return true;
   }
 
   void take_up_answers() {
     eventfd_t count = 0;
     static_cast<void>(eventfd_read(written_.get(), &count));
-    std::vector<std::string> answers;
+    std::vector<recorder::Dumped> all;
     {
       const std::lock_guard lock(mutex_);
-      answers.swap(answers_);
+      all.swap(dumped_);
     }
-    for (const std::string& answer : answers) {
+    for (const recorder::Dumped& each : all) {
+      const std::string answer =
+          each.error.empty() ? "written " + each.file : "failed " + each.error;
       std::cout << answer << std::endl;
-      socket_.answer(answer + '\n');
+      for (const std::string& file : each.removed) std::cout << "removed " << file << std::endl;
+      for (const std::uint64_t request : each.requests) socket_.answer(request, answer + '\n');
     }
+  }
+
+  void watch(int descriptor, std::uint32_t events) const {
+    epoll_event event{};
+    event.events = events;
+    epoll_ctl(events_.get(), EPOLL_CTL_ADD, descriptor, &event);
   }
 
   const FlightOptions& options_;
@@ -117,7 +133,7 @@ class Flight {
   const shm::FileDescriptor written_;
   const shm::FileDescriptor events_;
   std::mutex mutex_;
-  std::vector<std::string> answers_;  // under it
+  std::vector<recorder::Dumped> dumped_;  // under it
   recorder::DumpSocket socket_;
   recorder::Ring ring_;
   recorder::Recorder recorder_;
@@ -131,8 +147,8 @@ int fly(const FlightOptions& options, const recorder::RecorderOptions& settings,
   return Flight(options, settings, file, info).run();
 }
 
-int dump(const std::string& prefix) {
-  const std::string answer = recorder::ask_for_dump(prefix);
+int dump(const std::string& prefix, shm::Nanoseconds patience) {
+  const std::string answer = recorder::ask_for_dump(prefix, patience);
   std::cout << answer;
   return answer.starts_with("written ") ? 0 : 1;
 }

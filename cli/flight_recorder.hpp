@@ -15,14 +15,15 @@ struct FlightOptions {
   shm::Nanoseconds span = 0;  // 0: no flight recorder
   std::size_t memory = std::size_t{64} << 20;
   std::string prefix;
-  std::string when;  // a statement; empty: none
+  std::size_t keep = 16;  // files that it writes of its own accord
+  std::string when;       // a statement; empty: none
   shm::Nanoseconds end = shm::kForever;
 };
 
 // Until SIGINT or SIGTERM; SIGUSR1 writes a file.
 int fly(const FlightOptions& options, const recorder::RecorderOptions& settings,
         const recording::McapOptions& file, const evidence::RecordingInfo& info);
-// Asks the one that runs.
-int dump(const std::string& prefix);
+// Asks the one that runs, and waits for so long at most.
+int dump(const std::string& prefix, shm::Nanoseconds patience);
 
 }  // namespace arbiter::cli

@@ -10,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/broken_pipe.hpp"
 #include "cli/verbs.hpp"
 #include "recording/mcap.hpp"
 #include "rules/model/load.hpp"
@@ -113,7 +114,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::signal(SIGPIPE, SIG_IGN);  // a reader that has gone is told as any other failure to write
+  std::signal(SIGPIPE, SIG_IGN);  // bells of receivers that have died (cli/broken_pipe.hpp)
   std::signal(SIGXFSZ, SIG_IGN);  // and so is a limit to the size of files
   std::ios::sync_with_stdio(false);
   int exit_code = kFailed;
@@ -123,6 +124,7 @@ int main(int argc, char** argv) {
     say(error.what());
   }
   if (!std::cout.flush()) {
+    if (arbiter::cli::has_reader_gone()) arbiter::cli::end_by_broken_pipe();
     std::cerr << "arbiter: cannot write to standard output\n";
     return kWrongUse;  // whatever it was: 1 would be an answer, such as diff's
   }

@@ -9,12 +9,14 @@
 #include <fstream>
 #include <iostream>
 
+#include "cli/broken_pipe.hpp"
 #include "rules/model/load.hpp"
 
 namespace arbiter::cli {
 namespace {
 
 [[noreturn]] void fail(const std::string& path) {
+  if (errno == EPIPE) end_by_broken_pipe();  // /dev/stdout, or a pipe with a name
   throw rules::FileError("cannot write " + path + ": " + std::strerror(errno));
 }
 

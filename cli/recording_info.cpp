@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/progress.hpp"
+#include "evidence/record_schemas.hpp"
 #include "wire/document.hpp"
 
 namespace arbiter::cli {
@@ -98,8 +99,16 @@ std::string name_for(const std::string& path) {
 
 }  // namespace
 
+// How often winners change, or ports are opened, is no frequency.
+bool RecordingInfo::Channel::has_samples() const {
+  const auto& records = evidence::record_schemas;
+  return std::none_of(records.begin(), records.end(), [this](const evidence::RecordSchema& record) {
+    return channel.topic == record.topic && channel.message_encoding == "json";
+  });
+}
+
 std::optional<double> RecordingInfo::Channel::rate() const {
-  if (messages < 2 || times->begin == times->end) return std::nullopt;
+  if (!has_samples() || messages < 2 || times->begin == times->end) return std::nullopt;
   return static_cast<double>(messages - 1) * 1e9 / static_cast<double>(times->end - times->begin);
 }
 

@@ -26,7 +26,9 @@ struct RecordingInfo {
     std::uint64_t bytes = 0;     // of the messages
     std::optional<Times> times;  // of the messages
 
-    // Messages per second; none of fewer than two, or where all bear the same time.
+    // Whether its messages are samples, or whatever another program writes; not records of ours.
+    [[nodiscard]] bool has_samples() const;
+    // Messages per second; none of records, of fewer than two, or where all bear the same time.
     [[nodiscard]] std::optional<double> rate() const;
   };
   struct Chunks {

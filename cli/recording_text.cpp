@@ -16,7 +16,8 @@ namespace {
 using recording::McapTime;
 
 constexpr std::size_t kColumns = 80;
-constexpr std::size_t kMargin = 14;  // of what stands behind a heading
+constexpr std::size_t kMargin = 14;           // of what stands behind a heading
+constexpr std::size_t kColumnsOfSchema = 30;  // a longer name stands over into the next column
 constexpr McapTime kLogSecond = 1'000'000'000;
 // A time before 1973 is not the time of day, but of a clock that began with the machine.
 constexpr McapTime kFirstTimeOfDay = 100'000'000 * kLogSecond;
@@ -40,7 +41,9 @@ std::string log_time_text(McapTime time) {
       std::strftime(text.data(), text.size(), "%F %T", &local) == 0) {
     return std::to_string(time / kLogSecond) + fraction_text(time) + " s of its clock";
   }
-  return text.data() + fraction_text(time);
+  std::array<char, 16> zone{};
+  std::strftime(zone.data(), zone.size(), " %z", &local);
+  return text.data() + fraction_text(time) + zone.data();
 }
 
 std::string length_text(McapTime length) {
@@ -126,11 +129,12 @@ void write_channels(std::ostream& out, const RecordingInfo& info) {
   std::size_t columns = std::string_view("schema").size();
   const auto schema_of = [&](const RecordingInfo::Channel& channel) {
     const auto schema = info.schemas.find(channel.channel.schema);
-    return schema == info.schemas.end() ? "-" : shortened(schema->second.name, 20);
+    return schema == info.schemas.end() ? "-" : shm::printable(schema->second.name);
   };
   for (const auto& [id, channel] : info.channels) {
     channels.push_back(&channel);
-    columns = std::max(columns, schema_of(channel).size());
+    const std::size_t size = schema_of(channel).size();
+    if (size <= kColumnsOfSchema) columns = std::max(columns, size);
   }
   std::stable_sort(channels.begin(), channels.end(), [](const auto* a, const auto* b) {
     return a->channel.topic < b->channel.topic;
@@ -138,10 +142,13 @@ void write_channels(std::ostream& out, const RecordingInfo& info) {
   out << "\n  messages        Hz  " << padded_to("schema", columns) << "  topic\n";
   for (const auto* channel : channels) {
     const auto rate = channel->rate();
-    out << aligned_right(std::to_string(channel->messages), 10)
-        << aligned_right(rate ? rate_text(*rate) : "-", 10) << "  "
-        << padded_to(schema_of(*channel), columns) << "  " << shm::printable(channel->channel.topic)
-        << '\n';
+    const std::string line = aligned_right(std::to_string(channel->messages), 10) +
+                             aligned_right(rate ? rate_text(*rate) : "-", 10) + "  " +
+                             padded_to(schema_of(*channel), columns);
+    const std::string topic = shm::printable(channel->channel.topic);
+    // Names are never cut: where both have no room in a line, the topic has one of its own.
+    const bool has_room = line.size() + 2 + topic.size() <= kColumns;
+    out << line << (has_room ? "  " : "\n" + std::string(24 + columns, ' ')) << topic << '\n';
   }
 }
 

@@ -1,15 +1,13 @@
 #include "cli/simulate_recording.hpp"
 
-#include <time.h>
-
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
+#include <cstdint>
 #include <iostream>
-#include <memory>
+#include <map>
 #include <sstream>
-#include <stdexcept>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -17,6 +15,7 @@
 #include "cli/model_files.hpp"
 #include "cli/numbers.hpp"
 #include "cli/recording_compile.hpp"
+#include "cli/recording_times.hpp"
 #include "evidence/comparison.hpp"
 #include "evidence/models.hpp"
 #include "evidence/recorded.hpp"
@@ -30,45 +29,21 @@ namespace {
 using evidence::Recorded;
 using nlohmann::ordered_json;
 
-shm::Nanoseconds first_arrival(const Recorded& recorded) {
-  for (const auto& run : recorded.runs) {
-    if (!run.decisions.empty()) return run.decisions.front().arrival().time;
-  }
-  return recorded.runs.front().start;
-}
-
-// "1.500000000 s", to the nanosecond.
-std::string exact_seconds(shm::Nanoseconds span) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%lld.%09lld s", static_cast<long long>(span / 1'000'000'000),
-                static_cast<long long>(span % 1'000'000'000));
-  return text;
-}
-
-// Of `time` since the first arrival: "+1.500000000 s".
-std::string since_first(const Recorded& recorded, shm::Nanoseconds time) {
-  const shm::Nanoseconds span = time - first_arrival(recorded);
-  return (span < 0 ? "-" : "+") + exact_seconds(std::abs(span));
-}
-
-std::string wall_text(const Recorded& recorded, shm::Nanoseconds time) {
-  const std::time_t seconds = (time + recorded.about.wall_offset) / 1'000'000'000;
-  std::tm parts{};
-  gmtime_r(&seconds, &parts);
-  char text[64];
-  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &parts);
-  return text;
-}
-
 std::string who(const std::string& winner) {
   return winner.empty() ? "nobody" : shm::printable(winner);
 }
 
+// "#7", "a signal after #7".
+std::string arrival_text(const evidence::LiveDecision& live) {
+  return (live.decision->is_sample ? "#" : "a signal after #") +
+         std::to_string(live.decision->sequence);
+}
+
 std::string about(const evidence::LiveDecision& live) {
-  const auto& decision = *live.decision;
-  return shm::printable(decision.context->source) +
-         (decision.is_sample ? " #" : " (a signal after #") + std::to_string(decision.sequence) +
-         (decision.is_sample ? "" : ")") + " at " + shm::printable(*live.port);
+  const std::string arrival = arrival_text(live);
+  return shm::printable(live.decision->context->source) + " " +
+         (live.decision->is_sample ? arrival : "(" + arrival + ")") + " at " +
+         shm::printable(*live.port);
 }
 
 std::size_t arrivals_of(const Recorded& recorded) {
@@ -182,21 +157,56 @@ void write_json(const Recorded& recorded, const evidence::Comparison& result) {
             << '\n';
 }
 
-int write_comparison(const Recorded& recorded, const evidence::Comparison& result, bool as_json) {
-  const bool is_same = result.decisions != 0 && result.changed.empty() && result.intervals.empty();
-  if (as_json) {
-    write_json(recorded, result);
-    return is_same ? 0 : 1;
-  }
-  write_head(recorded);
-  std::cout << counted(result.decisions, "decision") << ": " << result.same << " the same, "
-            << result.changed.size() << " changed, " << result.uncertain << " uncertain\n";
-  if (result.decisions == 0) std::cout << nothing_to_compare(recorded);
+// Decisions of one connection that have changed in the same way, one after the other.
+struct Series {
+  const evidence::ChangedDecision* first = nullptr;
+  const evidence::ChangedDecision* last = nullptr;
+  std::uint64_t count = 0;
+};
+
+// By their first decisions. `folds`: else each stands alone.
+std::vector<Series> series_of(const evidence::Comparison& result, bool folds) {
+  std::vector<Series> all;
+  std::map<std::pair<std::string_view, std::string_view>, std::size_t> last;
   for (const auto& each : result.changed) {
-    std::cout << "  " << since_first(recorded, each.live.decision->arrival().time) << "  "
-              << about(each.live) << ": " << outcome(!each.live.won) << " instead of "
-              << outcome(each.live.won) << (each.is_connected ? "" : " (not connected)") << '\n';
+    const auto& live = each.live;
+    const auto [known, is_new] =
+        last.try_emplace({live.decision->context->source, *live.port}, all.size());
+    if (folds && !is_new && each.goes_on) {
+      Series& series = all[known->second];
+      series.last = &each;
+      ++series.count;
+      continue;
+    }
+    known->second = all.size();
+    all.push_back({&each, &each, 1});
   }
+  return all;
+}
+
+void write_changed(const Recorded& recorded, const evidence::Comparison& result, bool each) {
+  if (result.changed.empty()) return;
+  std::cout << "these decisions change:\n";
+  for (const Series& series : series_of(result, !each)) {
+    const auto& live = series.first->live;
+    const auto time = [&](const evidence::ChangedDecision* one) {
+      return since_first(recorded, one->live.decision->arrival().time);
+    };
+    std::cout << "  " << time(series.first);
+    if (series.count == 1) {
+      std::cout << "  " << about(live) << ": ";
+    } else {
+      std::cout << " to " << time(series.last) << "  "
+                << shm::printable(live.decision->context->source) << ", "
+                << counted(series.count, "arrival") << " (" << arrival_text(live) << " to "
+                << arrival_text(series.last->live) << ") at " << shm::printable(*live.port) << ": ";
+    }
+    std::cout << outcome(!live.won) << " instead of " << outcome(live.won)
+              << (series.first->is_connected ? "" : " (not connected)") << '\n';
+  }
+}
+
+void write_intervals(const Recorded& recorded, const evidence::Comparison& result) {
   std::cout << (result.intervals.empty() ? "the winners are the same throughout\n"
                                          : "the winner differs:\n");
   for (const auto& each : result.intervals) {
@@ -204,18 +214,38 @@ int write_comparison(const Recorded& recorded, const evidence::Comparison& resul
               << since_first(recorded, each.to) << "  " << shm::printable(each.port) << ": "
               << who(each.other) << " instead of " << who(each.recorded) << '\n';
   }
+}
+
+int write_comparison(const Recorded& recorded, const evidence::Comparison& result,
+                     const SimulateRecordingOptions& options) {
+  const bool is_same = result.decisions != 0 && result.changed.empty() && result.intervals.empty();
+  if (options.json) {
+    write_json(recorded, result);
+    return is_same ? 0 : 1;
+  }
+  write_head(recorded);
+  std::cout << counted(result.decisions, "decision") << ": " << result.same << " the same, "
+            << result.changed.size() << " changed, " << result.uncertain << " uncertain\n";
+  if (result.decisions == 0) std::cout << nothing_to_compare(recorded);
+  write_intervals(recorded, result);
+  write_changed(recorded, result, options.each);
   return is_same ? 0 : 1;
 }
 
 }  // namespace
 
-int simulate_recording(const SimulateRecordingOptions& options) {
-  const Recorded recorded = evidence::load_recording(options.recording);
+Recorded load_for_simulation(const std::string& path) {
+  Recorded recorded = evidence::load_recording(path);
   if (!recorded.about.end.is_whole) {
-    std::cerr << "arbiter: " << shm::printable(options.recording) << ": "
+    std::cerr << "arbiter: " << shm::printable(path) << ": "
               << shm::printable(recorded.about.end.problem) << "; what comes before is used\n";
   }
-  if (recorded.runs.empty()) throw evidence::RecordError(options.recording + " is empty");
+  if (recorded.runs.empty()) throw evidence::RecordError(path + " is empty");
+  return recorded;
+}
+
+int simulate_recording(const SimulateRecordingOptions& options) {
+  const Recorded recorded = load_for_simulation(options.recording);
   evidence::Models models(recording_compiler(options.effort));
   if (options.other.models.empty()) {
     return write_verification(recorded, evidence::verify(recorded, models), options.json);
@@ -225,7 +255,7 @@ int simulate_recording(const SimulateRecordingOptions& options) {
   rules::write_text(std::cerr, diagnostics);
   if (!other) return 1;
   evidence::Judge judge(other->compiled, true);
-  return write_comparison(recorded, evidence::compare(recorded, models, judge), options.json);
+  return write_comparison(recorded, evidence::compare(recorded, models, judge), options);
 }
 
 }  // namespace arbiter::cli

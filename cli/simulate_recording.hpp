@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "evidence/recorded.hpp"
 #include "rules/model/load.hpp"
 
 namespace arbiter::cli {
@@ -11,8 +12,12 @@ struct SimulateRecordingOptions {
   std::string recording;
   rules::ModelFiles other;  // without models: those of the recording
   double effort = 1;
+  bool each = false;  // with another model: a line for each changed decision
   bool json = false;
 };
+
+// Says on standard error where it is not whole. Throws McapError, RecordError.
+evidence::Recorded load_for_simulation(const std::string& path);
 
 // 0: all is as it was; 1: something differs, or there is no decision to compare.
 int simulate_recording(const SimulateRecordingOptions& options);

@@ -62,7 +62,8 @@ void add_echo(CLI::App& app, int& exit_code) {
   add_instance_option(*verb, options->instance);
   verb->footer(
       "A port is watched through a tap, which disturbs nobody; the policy must allow you to `tap` "
-      "it.\n\nExample:\n  arbiter echo /Gaze/pos:i --losers --for 10s");
+      "it. If\nno component has it open, `echo` says so, and waits for one.\n\nExample:\n  arbiter "
+      "echo /Gaze/pos:i --losers --for 10s");
   verb->callback([options, &exit_code] { exit_code = echo(*options); });
 }
 

@@ -39,6 +39,7 @@ struct RecordOptions {
   shm::Nanoseconds period = 1'000'000;
   FlightOptions flight;
   bool is_dump = false;
+  shm::Nanoseconds patience = 30'000'000'000;  // of --dump
   std::string instance;
 };
 
@@ -138,7 +139,7 @@ int record_into_file(const RecordOptions& options, const recorder::RecorderOptio
 }
 
 int record(RecordOptions& options) {
-  if (options.is_dump) return dump(options.out);
+  if (options.is_dump) return dump(options.out, options.patience);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that has become too large is an error as any other
   const auto settings = recorder_options(options);
   warn_of_patterns_without_port(options);
@@ -206,9 +207,22 @@ void add_flight_options(CLI::App& verb, const std::shared_ptr<RecordOptions>& op
           "reads it")
       ->type_name("STATEMENT")
       ->needs(ring);
-  verb.add_flag("--dump", options->is_dump,
-                "Ask the flight recorder that was started with this -o to write, and wait for it")
-      ->excludes(ring);
+  verb.add_option("--keep", options->flight.keep,
+                  "With --ring: how many files of --when and of deaths are kept (default 16); for "
+                  "a newer one, the recorder removes its oldest. Files that you ask for stay")
+      ->type_name("N")
+      ->check(at_least_one())
+      ->needs(ring);
+  auto* asks = verb.add_flag("--dump", options->is_dump,
+                             "Ask the flight recorder that was started with this -o to write, and "
+                             "wait for it")
+                   ->excludes(ring);
+  verb.add_option_function<std::string>(
+          "--timeout",
+          [options](const std::string& text) { options->patience = read_time("--timeout", text); },
+          "With --dump: give up after this time (default 30s)")
+      ->type_name("DURATION")
+      ->needs(asks);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "cli/progress.hpp"
 #include "cli/simulate_recording.hpp"
 #include "cli/verbs.hpp"
+#include "cli/why_recorded.hpp"
 #include "cli/why_simulated.hpp"
 #include "rules/ask/report.hpp"
 #include "rules/explain/simulation.hpp"
@@ -29,11 +30,15 @@ struct SimulateOptions {
   std::string recording;
   std::string why;  // all_ports, or the port; empty: no
   double effort = 1;
+  bool each = false;
   bool json = false;
 };
 
 // What CLI11 takes a flag without a value for; no port is called so.
 const std::string all_ports = "true";
+
+// Empty: all.
+std::string port_of(const std::string& why) { return why == all_ports ? "" : why; }
 
 // A blank in place of the '=' makes a file of the port.
 void require_no_port_among_files(const SimulateOptions& options) {
@@ -78,6 +83,7 @@ void replay(const std::vector<rules::TraceEvent>& events, const Use& use) {
   ProgressLine progress;
   for (std::size_t i = 0; i < events.size(); ++i) {
     use(events[i]);
+    if (!std::cout) return;  // nobody reads it
     if (shows_itself || i % 256 != 0) continue;
     progress.show([&] {
       return "replaying: " + std::to_string(i) + " of " + std::to_string(events.size()) + " events";
@@ -93,7 +99,6 @@ void require_model_and_trace(const SimulateOptions& options) {
 
 // All problems, those of the trace as well as those of the model, come before the first result.
 int simulate(const SimulateOptions& options) {
-  require_no_port_among_files(options);
   const bool is_why = !options.why.empty();
   rules::Diagnostics diagnostics;
   const auto keep = is_why ? rules::Keep::kProvenance : rules::Keep::kRules;
@@ -107,8 +112,7 @@ int simulate(const SimulateOptions& options) {
   note_unknown_sources(simulation, options.trace, events, diagnostics);
   rules::write_text(std::cerr, diagnostics);
   if (is_why) {
-    const std::string port = options.why == all_ports ? "" : options.why;
-    WhySimulated why(model->rules, simulation, {port, options.json});
+    WhySimulated why(model->rules, simulation, {port_of(options.why), options.json});
     replay(events, [&](const auto& event) { why.step(event, std::cout); });
     return 0;
   }
@@ -139,25 +143,34 @@ void add_simulate(CLI::App& app, int& exit_code) {
   verb->add_option("--model", options->files.models, "The same as MODEL")->type_name("FILE");
   // A flag takes a value only behind '=': what follows it may be the model.
   auto* why = verb->add_flag("--why", options->why,
-                             "Instead of the CSV, show each change of a winner and each discarded "
-                             "arrival, with its cause; --why=PORT: for this port only");
+                             "Instead of the CSV, or of what is compared, show each change of a "
+                             "winner and each discarded arrival, with its cause; --why=PORT: for "
+                             "this port only");
   add_effort_option(*verb, options->effort);
-  why->excludes(recording);
+  verb->add_flag("--each", options->each,
+                 "With --recording and a model: a line for each decision that changes, also where "
+                 "several of one connection do in a row")
+      ->needs(recording)
+      ->excludes(why);
   verb->add_flag("--json", options->json,
-                 "With --why: one object a line. With --recording: one object");
+                 "With --why: one object a line. With --recording alone: one object");
   verb->footer(
       "Example:\n"
       "  arbiter simulate search_and_track.xml --trace trace.csv\n"
       "  arbiter simulate search_and_track.xml --trace trace.csv --why=/Gaze/pos:i\n"
       "  arbiter simulate --recording incident.mcap\n"
-      "  arbiter simulate --recording incident.mcap --model corrected.xml\n\n"
-      "Exit codes: 0 done; with --recording: all is as it was; 1 an error in the model or trace; "
-      "with\n--recording: something differs, or it has no decision; 2 wrong use, or a file that "
-      "cannot be opened");
+      "  arbiter simulate --recording incident.mcap --model corrected.xml\n"
+      "  arbiter simulate --recording incident.mcap --why=/Gaze/pos:i\n\n"
+      "Exit codes: 0 done; with --recording, unless with --why: all is as it was; 1 an error in "
+      "the model or\ntrace; with --recording: something differs, or it has no decision; 2 wrong "
+      "use, or a file that\ncannot be opened");
   verb->callback([options, &exit_code] {
+    require_no_port_among_files(*options);
     if (!options->recording.empty()) {
-      exit_code =
-          simulate_recording({options->recording, options->files, options->effort, options->json});
+      const SimulateRecordingOptions simulated{options->recording, options->files, options->effort,
+                                               options->each, options->json};
+      exit_code = options->why.empty() ? simulate_recording(simulated)
+                                       : explain_recording(simulated, port_of(options->why));
       return;
     }
     require_model_and_trace(*options);

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/broken_pipe.hpp"
 #include "cli/live.hpp"
 #include "cli/model_report.hpp"
 #include "cli/why_report.hpp"
@@ -32,7 +33,7 @@ class Follower {
   int run() {
     write_start();
     std::uint64_t changes = 0;
-    while (std::cout) {
+    while (std::cout && !has_reader_gone()) {
       const shm::Nanoseconds soon = shm::monotonic_now() + kLookEvery;
       if (sleep_until(std::min(soon, last_.picture.next_end()), interrupts_)) return 0;
       port_.instance().update();

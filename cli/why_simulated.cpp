@@ -49,7 +49,7 @@ WhySimulated::WhySimulated(const rules::RuleSet& rules, rules::Simulation& simul
 void WhySimulated::step(const rules::TraceEvent& event, std::ostream& out) {
   run_out_until(event.at, out);
   const auto rows = simulation_.step(event);
-  schedule(event);
+  if (simulation_.knows(event.source)) schedule(simulation_.source_id(event.source));
   tell_changes(out);
   if (event.kind != rules::TraceKind::kArrival) return;
   for (const auto& row : rows) {
@@ -66,12 +66,48 @@ void WhySimulated::run_out_until(shm::Nanoseconds time, std::ostream& out) {
   }
 }
 
+void WhySimulated::begin(std::ostream& out) {
+  for (shm::SourceId source = 0; source < was_active_.size(); ++source) {
+    was_active_[source] = simulation_.is_active(source);
+    schedule(source);
+  }
+  for (shm::PortId port = 0; port < winners_.size(); ++port) {
+    if (!simulation_.table().is_arbitrated(port)) continue;
+    winners_[port] = simulation_.winner_at(port);
+    const std::string& name = simulation_.port_name(port);
+    const bool is_wanted = options_.port.empty() || options_.port == name;
+    if (winners_[port] == shm::kNone || !is_wanted) continue;
+    if (options_.json) {
+      write_line(out, {{"t_ns", simulation_.now()},
+                       {"port", name},
+                       {"event", "begin"},
+                       {"winner", name_of(winners_[port])}});
+    } else {
+      out << time_of_now() << "  " << name << "  " << name_of(winners_[port])
+          << " wins as this begins\n";
+    }
+  }
+}
+
+void WhySimulated::find(const std::string& source, shm::ActivityWord word, shm::Nanoseconds time,
+                        std::ostream& out) {
+  run_out_until(time, out);
+  simulation_.advance_to(time);
+  if (!simulation_.knows(source)) return;
+  const shm::SourceId id = simulation_.source_id(source);
+  simulation_.set_activity(id, word);
+  schedule(id);
+  tell_changes(out);
+}
+
 // An end that a renewal has put off is looked at in vain.
-void WhySimulated::schedule(const rules::TraceEvent& event) {
-  if (event.kind != rules::TraceKind::kArrival || !simulation_.knows(event.source)) return;
-  const shm::SourceId source = simulation_.source_id(event.source);
+void WhySimulated::schedule(shm::SourceId source) {
   const shm::ActivityWord word = simulation_.activity(source);
-  if (shm::is_finite(word)) ends_.emplace(word, source);
+  if (shm::is_finite(word) && simulation_.is_active(source)) ends_.emplace(word, source);
+}
+
+std::string WhySimulated::time_of_now() const {
+  return options_.time ? options_.time(simulation_.now()) : time_text(simulation_.now());
 }
 
 void WhySimulated::tell_changes(std::ostream& out) {
@@ -134,8 +170,8 @@ void WhySimulated::tell_change(shm::PortId port, shm::SourceId before, shm::Sour
                      {"old_loses", loss.empty() ? json(nullptr) : json(loss)}});
     return;
   }
-  out << time_text(simulation_.now()) << "  " << name << "  " << name_of(before) << " -> "
-      << name_of(now) << "  because ";
+  out << time_of_now() << "  " << name << "  " << name_of(before) << " -> " << name_of(now)
+      << "  because ";
   for (std::size_t i = 0; i < causes.size(); ++i) {
     const std::string& source = simulation_.source_name(causes[i]);
     out << (i == 0 ? "" : " and ") << event_text(source, sources.state(source), simulation_.now());
@@ -159,7 +195,7 @@ void WhySimulated::tell_discarded(const rules::OutcomeRow& row, std::ostream& ou
                        {"event", "discarded"},
                        {"connection", connection_json(connection, sources)}});
     } else {
-      out << time_text(row.event.at) << "  " << row.port << "  " << connection.source
+      out << time_of_now() << "  " << row.port << "  " << connection.source
           << " discarded: " << first_cause(connection, sources) << '\n';
     }
   }

@@ -1,6 +1,8 @@
-// arbiter simulate --why: what changed the winners of a trace, and what kept arrivals out.
+// arbiter simulate --why: what changed the winners of a trace or a recording, and what kept
+// arrivals out.
 #pragma once
 
+#include <functional>
 #include <ostream>
 #include <set>
 #include <string>
@@ -21,6 +23,8 @@ class WhySimulated {
   struct Options {
     std::string port;  // empty: all
     bool json = false;
+    // How a time is told; empty: in seconds.
+    std::function<std::string(shm::Nanoseconds)> time{};
   };
 
   // Keeps references. Throws std::runtime_error where the model does not know the port.
@@ -28,9 +32,19 @@ class WhySimulated {
 
   void step(const rules::TraceEvent& event, std::ostream& out);
 
- private:
+  // For recordings, which begin in the middle, and do not know the cause of everything.
+
+  // Takes the activities that the simulation has by now, and tells who wins.
+  void begin(std::ostream& out);
+  // That is how a source is found at this time.
+  void find(const std::string& source, shm::ActivityWord word, shm::Nanoseconds time,
+            std::ostream& out);
+  // Tells what ends by itself until then.
   void run_out_until(shm::Nanoseconds time, std::ostream& out);
-  void schedule(const rules::TraceEvent& event);
+
+ private:
+  void schedule(shm::SourceId source);
+  [[nodiscard]] std::string time_of_now() const;
   void tell_changes(std::ostream& out);
   void tell_change(shm::PortId port, shm::SourceId before, shm::SourceId now, std::ostream& out);
   void tell_discarded(const rules::OutcomeRow& row, std::ostream& out);

@@ -2,39 +2,15 @@
 
 #include <algorithm>
 #include <map>
+#include <string_view>
 #include <tuple>
 #include <utility>
 
+#include "evidence/cues.hpp"
 #include "evidence/winner_track.hpp"
 
 namespace arbiter::evidence {
 namespace {
-
-// What a track of winners is told, in the order of time.
-struct Cue {
-  Nanoseconds time = 0;
-  const std::string* source = nullptr;  // null: a model
-  const Step* step = nullptr;
-  const ModelChange* model = nullptr;
-};
-
-// The first model comes behind the states with which the run begins.
-std::vector<Cue> cues_of(const Run& run) {
-  std::vector<Cue> cues;
-  for (const auto& [source, history] : run.sources) {
-    Nanoseconds last = run.start;
-    for (const Step& step : history.steps) {
-      last = std::max(last, step.time);
-      cues.push_back({step.seen <= run.start ? run.start : last, &source, &step, nullptr});
-    }
-  }
-  for (const auto& [generation, model] : run.models) {
-    cues.push_back({std::max(run.start, model.time), nullptr, nullptr, &model});
-  }
-  std::stable_sort(cues.begin(), cues.end(),
-                   [](const Cue& one, const Cue& other) { return one.time < other.time; });
-  return cues;
-}
 
 WinnerChange::Why why_of(Step::Kind kind) {
   switch (kind) {
@@ -114,18 +90,40 @@ std::vector<WinnerInterval> differing(const Run& run, const std::vector<WinnerCh
   return all;
 }
 
-void judge(const LiveDecision& live, Judge& other, Comparison& comparison) {
-  ++comparison.decisions;
-  Judge::Connection connection{};
-  const Permitted permitted = other.permitted(*live.run, *live.decision, *live.port, connection);
-  if (live.is_blind || !permitted.is_sure()) {
-    ++comparison.uncertain;
-  } else if (permitted.has(live.won)) {
-    ++comparison.same;
-  } else {
-    comparison.changed.push_back({live, connection == Judge::Connection::there});
+// Of one run of the recording.
+class Decisions {
+ public:
+  Decisions(Judge& other, Comparison& comparison) : other_(other), comparison_(comparison) {}
+
+  void take(const LiveDecision& live) {
+    ++comparison_.decisions;
+    Judge::Connection connection{};
+    const Permitted permitted = other_.permitted(*live.run, *live.decision, *live.port, connection);
+    if (live.is_blind || !permitted.is_sure()) {
+      ++comparison_.uncertain;
+      return;
+    }
+    auto& before = before_[{live.decision->context->source, *live.port}];
+    if (permitted.has(live.won)) {
+      ++comparison_.same;
+      before = Before::same;
+      return;
+    }
+    const Before now = live.won ? Before::lost : Before::won;
+    const bool is_connected = connection == Judge::Connection::there;
+    comparison_.changed.push_back({live, is_connected, before == now});
+    before = now;
   }
-}
+
+ private:
+  // What the other model has made of a connection's decision.
+  enum class Before : std::uint8_t { same, won, lost };
+
+  Judge& other_;
+  Comparison& comparison_;
+  // By source and port. Contexts outlive this.
+  std::map<std::pair<std::string_view, std::string_view>, Before> before_;
+};
 
 }  // namespace
 
@@ -156,7 +154,8 @@ std::vector<WinnerChange> winners_of(const Run& run, const Judge& other) {
 Comparison compare(const Recorded& recorded, Models& models, Judge& other) {
   Comparison comparison;
   for (const Run& run : recorded.runs) {
-    for_each_decision(run, [&](const LiveDecision& live) { judge(live, other, comparison); });
+    Decisions decisions(other, comparison);
+    for_each_decision(run, [&](const LiveDecision& live) { decisions.take(live); });
     auto intervals = differing(run, winners_of(run, models), winners_of(run, other));
     std::move(intervals.begin(), intervals.end(), std::back_inserter(comparison.intervals));
   }

@@ -17,6 +17,9 @@ namespace arbiter::evidence {
 struct ChangedDecision {
   LiveDecision live;
   bool is_connected = true;  // under the other model
+  // The connection's changed decision before has become the same, and none that is surely
+  // unchanged lies between the two.
+  bool goes_on = false;
 };
 
 // From one time to another, the winner at a port is not the recorded one. Empty: nobody.

@@ -21,6 +21,7 @@ class Fields {
  public:
   explicit Fields(const json& object) : object_(object) {}
 
+  [[nodiscard]] bool has(const char* name) const { return object_.contains(name); }
   [[nodiscard]] std::uint64_t number(const char* name) const {
     const json& value = at(name);
     if (!value.is_number_integer() || value < 0) fail(name, "is no whole number of at least 0");
@@ -174,14 +175,18 @@ void check_destinations(const std::vector<std::string>& ports) {
 Record read_state(const Fields& in, Contexts& contexts) {
   using Why = SourceState::Why;
   SourceState each;
-  const auto destinations = in.texts("destinations");
-  check_destinations(destinations);
-  each.context = contexts.change(in.text("source"), [&](SourceContext& context) {
-    context.type = in.text("type");
-    context.size = in.number("type_size");
-    context.alignment = in.number("type_alignment");
-    context.destinations = destinations;
-  });
+  SourceContext told;
+  told.source = in.text("source");
+  told.is_described = in.has("type");
+  if (told.is_described) {
+    told.type = in.text("type");
+    told.size = in.number("type_size");
+    told.alignment = in.number("type_alignment");
+    told.destinations = in.texts("destinations");
+    check_destinations(told.destinations);
+  }
+  each.context =
+      contexts.change(in.text("source"), [&](SourceContext& context) { context = told; });
   each.why = in.word<Why>("why", {Why::page, Why::joined, Why::gap, Why::closed});
   each.time = in.time("time_ns");
   each.seen = std::max(in.time("seen_ns"), each.time);

@@ -13,6 +13,7 @@ using nlohmann::ordered_json;
 // int:   whole number, 0 or more        text:  string
 // bool                                  texts: list of strings
 // files: [{path, text}]                 a|b|c: one of these words
+// A question mark behind it: the field is not there where its value is not known.
 ordered_json schema_of(const std::string& type) {
   if (type == "int") return {{"type", "integer"}, {"minimum", 0}};
   if (type == "bool") return {{"type", "boolean"}};
@@ -46,8 +47,8 @@ const std::array<RecordSchema, kRecordKinds> record_schemas{{
      "source:text time_ns:int seen_ns:int sequence:int generation:int"},
     {"arbiter/state", "arbiter.State",
      "source:text why:page|joined|gap|closed time_ns:int seen_ns:int sequence:int generation:int "
-     "lost:int activity:never|until|forever|deactivated activity_ns:int type:text type_size:int "
-     "type_alignment:int destinations:texts"},
+     "lost:int activity:never|until|forever|deactivated activity_ns:int type:text? type_size:int? "
+     "type_alignment:int? destinations:texts?"},
     {"arbiter/destinations", "arbiter.Destinations",
      "source:text time_ns:int seen_ns:int destinations:texts"},
     {"arbiter/port", "arbiter.Port",
@@ -71,8 +72,10 @@ std::string RecordSchema::json() const {
   for (std::string property; list >> property;) {
     const auto colon = property.find(':');
     const std::string called = property.substr(0, colon);
+    const bool is_optional = property.back() == '?';
+    if (is_optional) property.pop_back();
     all[called] = schema_of(property.substr(colon + 1));
-    required.push_back(called);
+    if (!is_optional) required.push_back(called);
   }
   return ordered_json{{"$schema", "https://json-schema.org/draft/2020-12/schema"},
                       {"title", name},

@@ -143,11 +143,13 @@ Written put(JsonLine& out, const SourceState& each) {
       .add("sequence", each.sequence)
       .add("generation", each.generation)
       .add("lost", each.lost)
-      .add_activity(each.word)
-      .add("type", each.context->type)
-      .add("type_size", each.context->size)
-      .add("type_alignment", each.context->alignment)
-      .add("destinations", each.context->destinations);
+      .add_activity(each.word);
+  if (each.context->is_described) {
+    out.add("type", each.context->type)
+        .add("type_size", each.context->size)
+        .add("type_alignment", each.context->alignment)
+        .add("destinations", each.context->destinations);
+  }
   return {RecordKind::kState, each.seen};
 }
 

@@ -27,6 +27,9 @@ using shm::Nanoseconds;
 // What the records of a source have in common until its destinations change.
 struct SourceContext {
   std::string source;
+  // A publisher has told of what follows. Of a source that nobody has open, or of which only the
+  // page of its activity was read, it is not known.
+  bool is_described = false;
   std::string type;  // empty: untyped
   std::uint64_t size = 0;
   std::uint64_t alignment = 1;

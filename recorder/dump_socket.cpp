@@ -4,12 +4,18 @@
 #include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
+#include <utility>
+
+#include "recorder/sleep.hpp"
+#include "shm/clock.hpp"
 
 namespace arbiter::recorder {
 namespace {
@@ -27,12 +33,33 @@ sockaddr_un address_of(const std::string& path) {
   return address;
 }
 
-shm::FileDescriptor make_socket() {
-  return shm::FileDescriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+[[noreturn]] void give_up(const std::string& prefix) {
+  throw std::runtime_error("the flight recorder that writes to " + prefix +
+                           " has not answered in time: it is stopped, or its disk is slow. The "
+                           "file may still come; --timeout waits longer");
 }
 
-bool connect_to(const shm::FileDescriptor& socket, const sockaddr_un& address) {
-  return ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+[[noreturn]] void say_that_none_writes(const std::string& prefix) {
+  throw std::runtime_error("no flight recorder writes to " + prefix +
+                           "; start one with: arbiter record --ring 5min -o " + prefix);
+}
+
+// A recorder that is stopped lets only so many stand at its door: then connecting waits, too.
+shm::FileDescriptor connected_to(const std::string& prefix, shm::Nanoseconds end) {
+  const sockaddr_un address = address_of(prefix + ".sock");
+  shm::FileDescriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  const shm::Nanoseconds left = std::max<shm::Nanoseconds>(end - shm::monotonic_now(), 1'000);
+  if (end != shm::kForever) {
+    const timeval span{left / 1'000'000'000, left % 1'000'000'000 / 1'000};
+    ::setsockopt(socket.get(), SOL_SOCKET, SO_SNDTIMEO, &span, sizeof span);
+  }
+  while (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) !=
+         0) {
+    if (errno == EINTR) continue;
+    if (errno == EAGAIN) give_up(prefix);
+    say_that_none_writes(prefix);
+  }
+  return socket;
 }
 
 // The socket itself says nothing: one that was left behind by a recorder that was killed is there
@@ -69,35 +96,33 @@ DumpSocket::DumpSocket(const std::string& prefix) : path_(prefix + ".sock"), loc
 
 DumpSocket::~DumpSocket() { ::unlink(path_.c_str()); }
 
-bool DumpSocket::accept() {
-  bool has_come = false;
+void DumpSocket::accept(const std::function<std::uint64_t()>& request) {
   while (asking_.size() < kMostAsking) {
     shm::FileDescriptor one(
         ::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
-    if (!one) break;
-    asking_.push_back(std::move(one));
-    has_come = true;
+    if (!one) return;
+    asking_.push_back({request(), std::move(one)});
   }
-  return has_come;
 }
 
 // One who has gone, or does not read, has no answer.
-void DumpSocket::answer(const std::string& line) {
-  for (const auto& one : asking_) {
-    static_cast<void>(::send(one.get(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
-  }
-  asking_.clear();
+void DumpSocket::answer(std::uint64_t request, const std::string& line) {
+  std::erase_if(asking_, [&](const Asking& one) {
+    if (one.request != request) return false;
+    static_cast<void>(
+        ::send(one.socket.get(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
+    return true;
+  });
 }
 
-std::string ask_for_dump(const std::string& prefix) {
-  const auto socket = make_socket();
-  if (!connect_to(socket, address_of(prefix + ".sock"))) {
-    throw std::runtime_error("no flight recorder writes to " + prefix +
-                             "; start one with: arbiter record --ring 5min -o " + prefix);
-  }
+std::string ask_for_dump(const std::string& prefix, shm::Nanoseconds patience) {
+  const shm::Nanoseconds now = shm::monotonic_now();
+  const shm::Nanoseconds end = patience >= shm::kForever - now ? shm::kForever : now + patience;
+  const auto socket = connected_to(prefix, end);
   std::string answer;
   char buffer[512];
   for (;;) {
+    if (!sleep_until(end, {socket.get()})) give_up(prefix);
     const ssize_t size = ::read(socket.get(), buffer, sizeof buffer);
     if (size < 0 && errno == EINTR) continue;
     if (size <= 0) break;

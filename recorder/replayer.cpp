@@ -34,6 +34,13 @@ bool fits(const std::vector<std::string>& patterns, const std::string& name) {
                      [&](const std::string& pattern) { return rules::matches(pattern, name); });
 }
 
+// The daemon says in words why a port cannot be opened.
+std::string advice_for(const std::string& refusal) {
+  const bool is_taken = refusal.find(" is held by ") != std::string::npos;
+  return std::string(is_taken ? ". Stop that component, choose" : ". Choose") +
+         " other sources with --source, or replay into an instance of its own with --instance";
+}
+
 std::optional<rules::CompiledModel> compiled(const evidence::ModelChange& model) {
   if (!model.has_texts) return std::nullopt;
   rules::Diagnostics diagnostics;
@@ -137,17 +144,25 @@ void Replayer::refuse_without_payloads() const {
                     "with --payloads all");
 }
 
+void Replayer::open_port(const std::string& name, Source& source) {
+  OutputPortOptions options;
+  if (source.type.empty()) {
+    options.max_size = std::max(source.largest, source.size);
+    source.port.emplace(node_->output_port(name, options));
+  } else {
+    source.port.emplace(
+        node_->output_port(name, Type(source.type, source.size, source.alignment), options));
+  }
+}
+
 void Replayer::open_ports() {
   node_.emplace("arbiter-replay", options_.node);
   keeps_times_ = options_.rate > 0;
   for (auto& [name, source] : sources_) {
-    OutputPortOptions options;
-    if (source.type.empty()) {
-      options.max_size = std::max(source.largest, source.size);
-      source.port.emplace(node_->output_port(name, options));
-    } else {
-      source.port.emplace(
-          node_->output_port(name, Type(source.type, source.size, source.alignment), options));
+    try {
+      open_port(name, source);
+    } catch (const Error& error) {
+      throw ReplayError(error.what() + advice_for(error.what()));
     }
     if (!keeps_times_) continue;
     try {

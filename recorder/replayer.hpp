@@ -78,6 +78,7 @@ class Replayer {
   void choose();
   [[nodiscard]] bool is_at_chosen_port(const std::string& source) const;
   void refuse_without_payloads() const;
+  void open_port(const std::string& name, Source& source);
   void open_ports();
   void signal_active_ones();
   void publish(const evidence::Record& record, Replayed& replayed);

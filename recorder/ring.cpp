@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <exception>
+#include <utility>
 
+#include "recording/directory.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::recorder {
@@ -13,6 +15,14 @@ namespace {
 
 using evidence::PortChange;
 using evidence::SourceState;
+
+// Of the requests for one cause.
+constexpr std::size_t kMostWaiting = 64;
+// What is written of its own accord rests for as long, or for half of the span that is kept: so
+// nothing is missed.
+constexpr Nanoseconds kMostRest = 10'000'000'000;
+
+bool is_of_own_accord(Cause cause) { return cause == Cause::when || cause == Cause::death; }
 
 SourceState state_of(const evidence::ContextPtr& context, Nanoseconds time, Nanoseconds seen,
                      std::uint64_t sequence, std::uint64_t generation,
@@ -29,11 +39,37 @@ SourceState state_of(const evidence::ContextPtr& context, Nanoseconds time, Nano
 
 }  // namespace
 
-void Ring::request(const std::string& why) {
+std::string_view name_of(Cause cause) {
+  switch (cause) {
+    case Cause::asked:
+      return "asked";
+    case Cause::signal:
+      return "signal";
+    case Cause::when:
+      return "when";
+    case Cause::death:
+      break;
+  }
+  return "death";
+}
+
+// Each has a number of its own, so that an answer belongs to who has asked; those that are due
+// together share a file. Where very many wait, the last waits for the next as well.
+std::uint64_t Ring::request(Cause cause) {
   const std::lock_guard lock(mutex_);
-  const bool is_known = std::any_of(requests_.begin(), requests_.end(),
-                                    [&](const Request& request) { return request.why == why; });
-  if (!is_known) requests_.push_back({why, shm::monotonic_now()});
+  std::size_t waiting = 0;
+  Request* last = nullptr;
+  for (Request& request : requests_) {
+    if (request.cause != cause) continue;
+    ++waiting;
+    last = &request;
+  }
+  if (waiting == kMostWaiting) {
+    last->time = shm::monotonic_now();
+    return last->number;
+  }
+  requests_.push_back({++requested_, cause, shm::monotonic_now()});
+  return requested_;
 }
 
 void Ring::write(const RecordPtr& record) {
@@ -47,7 +83,7 @@ void Ring::write(const RecordPtr& record) {
   }
   const auto* port = std::get_if<PortChange>(&*record);
   if (options_.on_death && port != nullptr && port->what == PortChange::What::died) {
-    request("death");
+    request(Cause::death);
   }
 }
 
@@ -104,32 +140,58 @@ void Ring::sum_up(const Record& record) {
   }
 }
 
-void Ring::tick(Nanoseconds /*now*/, Nanoseconds horizon) {
-  std::vector<std::string> due;
+void Ring::finish() {
+  is_ending_ = true;
+  tick(shm::monotonic_now(), shm::kForever);
+}
+
+bool Ring::is_resting(Cause cause, Nanoseconds now) const {
+  const auto last = written_at_.find(cause);
+  return last != written_at_.end() && !is_ending_ &&
+         now - last->second < std::min(kMostRest, options_.span / 2);
+}
+
+void Ring::tick(Nanoseconds now, Nanoseconds horizon) {
+  std::map<Cause, std::vector<std::uint64_t>> due;
   {
     const std::lock_guard lock(mutex_);
     std::erase_if(requests_, [&](const Request& request) {
-      if (request.time > horizon) return false;
-      due.push_back(request.why);
+      if (request.time > horizon || is_resting(request.cause, now)) return false;
+      due[request.cause].push_back(request.number);
       return true;
     });
   }
-  for (const std::string& why : due) dump(why);
+  for (auto& [cause, requests] : due) {
+    if (is_of_own_accord(cause)) written_at_[cause] = now;
+    dump(cause, std::move(requests));
+  }
 }
 
 // What goes wrong with one file, such as a full disk, must not end the recording.
-void Ring::dump(const std::string& why) {
-  const std::string path = path_for(why);
+void Ring::dump(Cause cause, std::vector<std::uint64_t> requests) {
+  Dumped dumped;
+  dumped.requests = std::move(requests);
+  const std::string part = options_.prefix + ".part";
   try {
-    evidence::RecordWriter writer(path, options_.file, options_.info);
-    write_base(writer);
-    for (const RecordPtr& record : records_) writer.write(*record);
-    writer.close();
+    ::unlink(part.c_str());  // of a recorder that was killed
+    write_file(part);
+    dumped.file = give_name(part, cause);
     ++dumps_;
-    options_.told(path, "");
+    if (is_of_own_accord(cause)) dumped.removed = own_files_.add(dumped.file);
   } catch (const std::exception& error) {
-    options_.told(path, error.what());
+    ::unlink(part.c_str());
+    dumped.error = error.what();
   }
+  options_.told(dumped);
+}
+
+void Ring::write_file(const std::string& path) const {
+  recording::McapOptions options = options_.file;
+  options.unfinished = recording::Unfinished::discard;
+  evidence::RecordWriter writer(path, options, options_.info);
+  write_base(writer);
+  for (const RecordPtr& record : records_) writer.write(*record);
+  writer.close();
 }
 
 // As a recording begins: its start, the states, the model.
@@ -145,18 +207,19 @@ void Ring::write_base(evidence::RecordWriter& writer) const {
   for (const auto& [port, winner] : winners_) writer.write(winner);
 }
 
-std::string Ring::path_for(const std::string& why) {
+// Under its name there is a whole file, or none.
+std::string Ring::give_name(const std::string& written, Cause cause) const {
   const std::time_t now = std::time(nullptr);
   std::tm parts{};
   gmtime_r(&now, &parts);
   char stamp[32];
   std::strftime(stamp, sizeof stamp, "-%Y%m%dT%H%M%SZ-", &parts);
-  const std::string path = options_.prefix + stamp + why;
-  std::string free = path + ".mcap";
-  for (int i = 2; ::access(free.c_str(), F_OK) == 0; ++i) {
-    free = path + "-" + std::to_string(i) + ".mcap";
+  const std::string path = (options_.prefix + stamp).append(name_of(cause));
+  std::string name = path + ".mcap";
+  for (int i = 2; !recording::move_to_new(written, name); ++i) {
+    name = path + "-" + std::to_string(i) + ".mcap";
   }
-  return free;
+  return name;
 }
 
 }  // namespace arbiter::recorder

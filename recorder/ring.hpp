@@ -1,6 +1,8 @@
 // A flight recorder's memory: the last minutes, written out when somebody asks.
 //
-// Bounded by time and by bytes, whichever comes first. What leaves it has been summed up: the state
+// Its memory is bounded by time and by bytes, whichever comes first; what it writes of its own
+// accord, by the number of files, and by a rest after each (kMostRest), at the end of which one
+// file has all that has come meanwhile. What leaves it has been summed up: the state
 // of each source, the model, the open ports and the winners at the moment where the rest begins. So
 // each file is whole: it begins as any recording does.
 #pragma once
@@ -13,36 +15,54 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "recorder/own_files.hpp"
 #include "recorder/sink.hpp"
 
 namespace arbiter::recorder {
 
+// Why a file is written: somebody asks, or the recorder does it of its own accord.
+enum class Cause : std::uint8_t { asked, signal, when, death };
+[[nodiscard]] std::string_view name_of(Cause cause);
+
+// A file that has been written, or could not be: then `error` says why.
+struct Dumped {
+  std::vector<std::uint64_t> requests;  // all that it answers
+  std::string file;
+  std::string error;
+  std::vector<std::string> removed;  // older files, to make room for it
+};
+
 struct RingOptions {
   Nanoseconds span = 0;
   std::size_t memory = std::size_t{64} << 20;
-  std::string prefix;  // files are called PREFIX-YYYYmmddTHHMMSSZ-WHY.mcap
+  std::string prefix;  // files are called PREFIX-YYYYmmddTHHMMSSZ-CAUSE.mcap
+  // How many files are kept of those that it writes of its own accord.
+  std::size_t keep = 16;
   recording::McapOptions file;
   evidence::RecordingInfo info;
   // Dump where a component has died.
   bool on_death = true;
-  // What has been written, or why it has not; on the pipeline's thread.
-  std::function<void(const std::string& file, const std::string& error)> told;
+  // On the pipeline's thread.
+  std::function<void(const Dumped&)> told;
 };
 
 class Ring : public Sink {
  public:
-  explicit Ring(RingOptions options) : options_(std::move(options)) {}
+  explicit Ring(RingOptions options)
+      : options_(std::move(options)), own_files_(options_.prefix, options_.keep) {}
 
   // Any thread: write a file as soon as all that has happened by now is here, some twentieths of a
-  // second at most. `why` is a word for its name.
-  void request(const std::string& why);
+  // second at most. Returns the number of the request, which may be that of others for the same
+  // cause that wait.
+  std::uint64_t request(Cause cause);
 
   void write(const RecordPtr& record) override;
   void tick(Nanoseconds now, Nanoseconds horizon) override;
-  void finish() override { tick(0, shm::kForever); }
+  void finish() override;
 
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
   [[nodiscard]] std::uint64_t dumps() const { return dumps_; }
@@ -50,11 +70,16 @@ class Ring : public Sink {
  private:
   void forget_oldest();
   void sum_up(const Record& record);
-  void dump(const std::string& why);
+  [[nodiscard]] bool is_resting(Cause cause, Nanoseconds now) const;
+  void dump(Cause cause, std::vector<std::uint64_t> requests);
+  void write_file(const std::string& path) const;
   void write_base(evidence::RecordWriter& writer) const;
-  [[nodiscard]] std::string path_for(const std::string& why);
+  [[nodiscard]] std::string give_name(const std::string& written, Cause cause) const;
 
   const RingOptions options_;
+  OwnFiles own_files_;
+  std::map<Cause, Nanoseconds> written_at_;  // the last file that was written of its own accord
+  bool is_ending_ = false;
   std::deque<RecordPtr> records_;
   std::size_t bytes_ = 0;
   std::uint64_t dumps_ = 0;
@@ -70,10 +95,12 @@ class Ring : public Sink {
 
   std::mutex mutex_;
   struct Request {
-    std::string why;
+    std::uint64_t number = 0;
+    Cause cause = Cause::asked;
     Nanoseconds time = 0;
   };
-  std::vector<Request> requests_;  // under it
+  std::vector<Request> requests_;  // under it, by number
+  std::uint64_t requested_ = 0;    // under it
 };
 
 }  // namespace arbiter::recorder

@@ -12,6 +12,15 @@ namespace {
 
 constexpr std::chrono::milliseconds kLookEvery{2};
 
+// With what is wrong in the statement: which name this model lacks.
+std::string reason_of(const watch::StatementError& error) {
+  std::string reason = error.what();
+  for (const rules::Diagnostic& found : error.diagnostics().items()) {
+    if (found.severity == rules::Severity::kError) reason.append(": ").append(found.message);
+  }
+  return reason;
+}
+
 }  // namespace
 
 StatementWatch::StatementWatch(const wire::Caller& caller, rules::Statement statement,
@@ -37,6 +46,9 @@ void StatementWatch::run() {
   watch::LiveStatement statement(instance_, statement_);
   bool was_true = false;
   std::string reason;
+  const auto say_once = [&](const std::string& why) {
+    if (std::exchange(reason, why) != why) say_(why);
+  };
   for (;;) {
     {
       std::unique_lock lock(mutex_);
@@ -49,8 +61,10 @@ void StatementWatch::run() {
       const bool is_true = truth == rules::Truth::kTrue;
       if (is_true && !was_true) came_true_();
       was_true = is_true;
-    } catch (const std::exception& error) {  // this model lacks a name of it, or there is no daemon
-      if (std::exchange(reason, error.what()) != error.what()) say_(reason);
+    } catch (const watch::StatementError& error) {  // another model may have its names
+      say_once(reason_of(error) + "; --when waits for a model that has it");
+    } catch (const std::exception& error) {  // there is no daemon
+      say_once(error.what());
     }
   }
 }

@@ -204,6 +204,7 @@ const ContextPtr& TapReader::context_of(const TapEvent<>& event) {
   if (context_ != nullptr && is_same(*context_, event, destinations)) return context_;
   auto context = std::make_shared<SourceContext>();
   context->source = event.source();
+  context->is_described = true;
   context->type = event.type().name();
   context->size = event.type().size();
   context->alignment = event.type().alignment();

@@ -65,9 +65,13 @@ inline constexpr std::size_t kMaxDeclaredBytes = std::size_t{64} << 20;
 // A chunk that is made apart from the file: recording/mcap_chunk.hpp.
 struct McapChunk;
 
+// What becomes of a file that cannot be written to its end.
+enum class Unfinished : std::uint8_t { keep, discard };
+
 struct McapOptions {
   Compression compression = Compression::zstd;
   std::size_t chunk_bytes = std::size_t{1} << 20;  // a chunk is closed when it has as many
+  Unfinished unfinished = Unfinished::keep;
 };
 
 // Writes a file from its first byte to its last. What a chunk has that was closed is in the file,
@@ -75,9 +79,10 @@ struct McapOptions {
 //
 // If the file cannot be written (no space is left, or its disk fails), the function throws
 // McapError, and so does each later one. The file then ends with the last chunk that was written
-// whole, as after a kill. A program that may meet a limit to the size of files must ignore SIGXFSZ.
-// What read_mcap() would not read is refused without such consequences: a message, an attachment,
-// or all schemas and channels together with nearly kMaxChunkBytes.
+// whole, as after a kill; or it is deleted (Unfinished::discard). A program that may meet a limit
+// to the size of files must ignore SIGXFSZ. What read_mcap() would not read is refused without such
+// consequences: a message, an attachment, or all schemas and channels together with nearly
+// kMaxChunkBytes.
 class McapWriter {
  public:
   // Makes the file, for its user alone; one that is there already is an error.

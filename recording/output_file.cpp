@@ -8,23 +8,11 @@
 #include <utility>
 
 #include "recording/crc32.hpp"
+#include "recording/directory.hpp"
 #include "recording/mcap.hpp"
 
 namespace arbiter::recording {
 namespace {
-
-// A new file is lost with its directory's entry.
-int sync_directory_of(const std::string& path) {
-  const std::size_t slash = path.find_last_of('/');
-  std::string directory = ".";
-  if (slash != std::string::npos) directory = slash == 0 ? "/" : path.substr(0, slash);
-  const int fd = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return errno == EACCES ? 0 : errno;  // who may not list it can do no more
-  // Some file systems cannot do it, and need not.
-  const int error = ::fsync(fd) == 0 || errno == EINVAL ? 0 : errno;
-  ::close(fd);
-  return error;
-}
 
 const char* advice_for(int error) {
   switch (error) {
@@ -101,6 +89,7 @@ void OutputFile::sync() {
   require_open("write");
   if (::fdatasync(fd_) != 0) fail("write", errno);
   if (std::exchange(is_synced_before_, true)) return;
+  // A new file is lost with its directory's entry.
   if (const int error = sync_directory_of(path_); error != 0) fail("write", error);
 }
 

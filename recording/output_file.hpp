@@ -5,10 +5,9 @@
 #include <string>
 #include <string_view>
 
-namespace arbiter::recording {
+#include "recording/mcap.hpp"
 
-// What becomes of a file that cannot be written to its end.
-enum class Unfinished { keep, discard };
+namespace arbiter::recording {
 
 class OutputFile {
  public:

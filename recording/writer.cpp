@@ -19,7 +19,7 @@ constexpr std::size_t kMostBytes = kMaxChunkBytes - 4'096;
 
 struct McapWriter::File {
   File(const std::string& path, const McapOptions& chosen)
-      : options(chosen), chunk(chosen.compression), out(path, Unfinished::keep) {}
+      : options(chosen), chunk(chosen.compression), out(path, chosen.unfinished) {}
 
   std::uint16_t id_after(std::size_t count, const char* what) const {
     if (count >= std::numeric_limits<std::uint16_t>::max()) {

@@ -121,8 +121,14 @@ void Daemon::log_end_of(const Client& client, bool is_away) {
   if (event.kind == EventKind::kDied) {
     takeover_.deaths().note(event, client.pid(), client.user());
   }
-  log_event(event, log::level::info, "{} left, {} ports with it", client.description(),
-            client.ports.size());
+  if (client.ports.empty()) {
+    // A tool's call is no event that an operator waits for; a monitor makes thousands.
+    log_event(event, client.is_component ? log::level::info : log::level::debug, "{} left",
+              client.description());
+    return;
+  }
+  log_event(event, log::level::info, "{} left, {} {} with it", client.description(),
+            client.ports.size(), client.ports.size() == 1 ? "port" : "ports");
 }
 
 void Daemon::drop(ClientId id) {

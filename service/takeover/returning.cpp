@@ -183,8 +183,8 @@ void Takeover::log_end_of(const Absentee& absentee) {
     if (absentee.ports.contains(input->away)) event.ports.push_back(input->name);
   }
   deaths_.note(event, absentee.pid, absentee.user.value_or(0));
-  log_event(event, log::level::info, "process {} has ended, {} ports with it", absentee.pid,
-            absentee.ports.size());
+  log_event(event, log::level::info, "process {} has ended, {} {} with it", absentee.pid,
+            absentee.ports.size(), absentee.ports.size() == 1 ? "port" : "ports");
 }
 
 void Takeover::forget_absentee(NodeId node) {

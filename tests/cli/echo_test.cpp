@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 
+#include <filesystem>
 #include <map>
 #include <sstream>
 #include <vector>
@@ -99,6 +100,44 @@ TEST(Echo, WithLosersShowsWhatBecameOfEach) {
 }
 
 // The component takes one sample where two are accepted.
+// Also of a name that only an earlier watcher has given.
+TEST(Echo, SaysAtOnceThatNobodyHasThePortOpen) {
+  Daemon daemon(kOverrideModel);
+  const std::vector<std::string> watch{"echo", "/low", "--for", "1ms"};
+  EXPECT_EQ(arbiter(watch).err, "arbiter: no component has /low open; waiting for one\n");
+  EXPECT_EQ(arbiter({"echo", "/p", "--rate", "--for", "1ms"}).err,
+            "arbiter: no component has /p open; waiting for one\n");
+  Node node("test");
+  auto speed = node.output_port<int>("/speed");
+  auto low = node.output_port<int>("/low");
+  EXPECT_EQ(arbiter(watch).err, "");
+  const std::vector<std::string> misspelt{"echo", "/speeed", "--for", "1ms"};
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_THAT(arbiter(misspelt).err, HasSubstr("; did you mean \"/speed\"?\n"));
+  }
+}
+
+// A pipe that nobody reads any more: nothing arrives that could be written.
+TEST(Echo, EndsWhereItsReaderHasGone) {
+  Daemon daemon(kOverrideModel);
+  Node node("test");
+  auto in = node.input_port<int>("/p");
+  for (const char* how : {"--losers", "--rate", "--json"}) {
+    int ends[2];
+    ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+    shm::FileDescriptor reader(ends[0]);
+    const shm::FileDescriptor out(ends[1]);
+    const std::string err = daemon.directory() + "/echo.err";
+    const shm::FileDescriptor file(
+        ::open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+    ChildProcess program({ARBITER_PROGRAMS "/arbiter", "echo", "/p", how}, {},
+                         {-1, out.get(), file.get()});
+    reader.reset();
+    program.wait();
+    EXPECT_EQ(std::filesystem::file_size(err), 0u) << how;
+  }
+}
+
 TEST(Echo, WithLosersShowsWhatIsOvertaken) {
   Daemon daemon(kOverrideModel);
   Publishing publishing;

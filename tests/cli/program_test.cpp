@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "tests/cli/arbiter_program.hpp"
+#include "tests/support/child_process.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/text_files.hpp"
 
@@ -128,26 +129,50 @@ TEST(Program, ExitsWith2WhereAFileCannotBeOpened) {
   }
 }
 
-TEST(Program, NoticesThatItsOutputCannotBeWritten) {
-  TemporaryDirectory directory;
+// Of each verb that prints much, a call that does.
+std::vector<std::vector<std::string>> printing(const TemporaryDirectory& directory) {
   const auto model = directory.write("m.xml", kOverrideModel);
+  const auto other = directory.write("other.xml", "<behaviors/>");
   const auto trace = directory.write("t.csv", "t_ns,source\n0,/low\n");
-  const std::vector<std::vector<std::string>> verbs = {
-      {"check", model},
-      {"check", model, "--json"},
-      {"check", directory.write("bad.xml", "<behaviors>\n</behaviors><x/>"), "--json"},
-      {"diff", model, model},
-      {"diff", model, directory.write("other.xml", "<behaviors/>"), "--json"},
-      {"rules", model},
-      {"compile", model},
-      {"graph", model, "--format", "dot"},
-      {"simulate", model, "--trace", trace},
-      {"--help"},
-      {"--version"}};
-  for (const auto& arguments : verbs) {
+  return {{"check", model},
+          {"check", model, "--json"},
+          {"check", directory.write("bad.xml", "<behaviors>\n</behaviors><x/>"), "--json"},
+          {"diff", model, model},
+          {"diff", model, other, "--json"},
+          {"rules", model},
+          {"compile", model},
+          {"graph", model, "--format", "dot"},
+          {"simulate", model, "--trace", trace},
+          {"simulate", model, "--trace", trace, "--why"},
+          {"--help"},
+          {"--version"}};
+}
+
+TEST(Program, NoticesThatItsOutputCannotBeWritten) {
+  const TemporaryDirectory directory;
+  for (const auto& arguments : printing(directory)) {
     const auto result = arbiter(arguments, "/dev/full");
     EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(arguments);
     EXPECT_THAT(result.err, EndsWith("arbiter: cannot write to standard output\n"));
+  }
+}
+
+// As in `arbiter rules m.xml | head -1`.
+TEST(Program, EndsWithoutAWordWhereItsReaderHasGone) {
+  const TemporaryDirectory directory;
+  auto verbs = printing(directory);
+  verbs.push_back({"compile", directory.file("m.xml"), "-o", "/dev/stdout"});
+  for (auto& arguments : verbs) {
+    int ends[2];
+    ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+    ::close(ends[0]);
+    const shm::FileDescriptor out(ends[1]);
+    const std::string err = directory.write("err", "");
+    const shm::FileDescriptor file(::open(err.c_str(), O_WRONLY | O_CLOEXEC));
+    arguments.insert(arguments.begin(), ARBITER_PROGRAMS "/arbiter");
+    ChildProcess program(arguments, {}, {-1, out.get(), file.get()});
+    EXPECT_EQ(program.wait(), 128 + SIGPIPE) << testing::PrintToString(arguments);
+    EXPECT_EQ(content_of(err), "") << testing::PrintToString(arguments);
   }
 }
 

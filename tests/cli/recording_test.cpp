@@ -63,7 +63,7 @@ TEST_F(RecordingVerb, ShowsWhatAFileHas) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, ContainsRegex("state +whole\n"));
   EXPECT_THAT(result.out, ContainsRegex("written by +arbiter test\n"));
-  EXPECT_THAT(result.out, ContainsRegex("begin +2023-11-1[45] ..:13:20\\.000\n"));
+  EXPECT_THAT(result.out, ContainsRegex("begin +2023-11-1[45] ..:.3:20\\.000 [+-][0-9]{4}\n"));
   EXPECT_THAT(result.out, ContainsRegex("length +90\\.000 s \\(0:01:30\\)\n"));
   EXPECT_THAT(result.out, ContainsRegex("messages +22\n"));
   EXPECT_THAT(result.out, ContainsRegex("chunks +2 of lz4, "));
@@ -74,6 +74,31 @@ TEST_F(RecordingVerb, ShowsWhatAFileHas) {
   EXPECT_THAT(result.out, ContainsRegex("12 bytes  application/xml +model\\.xml\n"));
   EXPECT_THAT(result.out, Not(HasSubstr("\x1b")));
   EXPECT_THAT(result.err, IsEmpty());
+}
+
+// A type is what one looks for, and records are no samples.
+TEST_F(RecordingVerb, CutsNoNameAndTellsTheFrequencyOfSamplesOnly) {
+  const std::string path = directory_.file("types.mcap");
+  const std::string type = "geometry_msgs/msg/TwistWithCovarianceStamped";
+  const std::string topic = "/Base/a/name/that/takes/the/rest/of/the/line:o";
+  {
+    recording::McapWriter writer(path, "arbiter test", {});
+    const auto record = writer.add_channel(
+        {writer.add_schema({"arbiter.Winner", "jsonschema", "{}"}), "arbiter/winner", "json", {}});
+    const auto samples =
+        writer.add_channel({writer.add_schema({type, "", ""}), topic, "x-arbiter-bytes", {}});
+    for (std::uint32_t i = 0; i <= 20; ++i) {
+      const auto time = kNoon + i * kSecond / 10;
+      for (const auto channel : {record, samples}) writer.write({channel, i, time, time, {}});
+    }
+    writer.close();
+  }
+  const auto result = arbiter({"recording", "info", path});
+  EXPECT_THAT(result.out, ContainsRegex("21 +10\\.0  " + type + "\n +" + topic + "\n"));
+  EXPECT_THAT(result.out, ContainsRegex("21 +-  arbiter\\.Winner  arbiter/winner\n"));
+  const json channels = json::parse(arbiter({"recording", "info", "--json", path}).out)["channels"];
+  EXPECT_TRUE(channels[0]["rate"].is_null());
+  EXPECT_NEAR(channels[1]["rate"].get<double>(), 10, 1e-6);
 }
 
 TEST_F(RecordingVerb, KeepsTo80Columns) {

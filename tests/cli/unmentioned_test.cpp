@@ -49,7 +49,6 @@ TEST(Unmentioned, NothingIsSaidOfPortsThatTheModelConnectsOrReads) {
   auto in = node.input_port("/Gaze/pos:i");
   EXPECT_EQ(arbiter({"pub", "/Face/pos:o", "--count", "1"}).err, "");
   EXPECT_EQ(arbiter({"pub", "/stop", "--count", "1"}).err, "");
-  in = node.input_port("/free");
   EXPECT_EQ(arbiter({"echo", "/Gaze/pos:i", "--for", "1ms"}).err, "");
 }
 

@@ -114,6 +114,7 @@ class Incident {
     if (known == nullptr) {
       evidence::SourceContext context;
       context.source = source;
+      context.is_described = true;
       context.destinations = {"/p"};
       known = std::make_shared<const evidence::SourceContext>(context);
     }

@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
@@ -26,6 +27,16 @@ inline const std::string kLasting = R"(<behaviors timeout="1000s">
   <behavior name="High"><config at="/p">/high</config><inhibition>Low</inhibition></behavior>
 </behaviors>
 )";
+
+// The recordings in it.
+inline std::vector<std::string> files_in(const std::string& directory) {
+  std::vector<std::string> files;
+  for (const auto& each : std::filesystem::directory_iterator(directory)) {
+    if (each.path().extension() == ".mcap") files.push_back(each.path().string());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
 
 class Recording {
  public:

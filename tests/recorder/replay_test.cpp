@@ -146,7 +146,9 @@ TEST_F(Replay, NeedsItsPorts) {
   auto low = node.output_port<Number>("/low");
   const auto result = arbiter({"replay", file});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, HasSubstr("/low"));
+  EXPECT_THAT(result.err, HasSubstr("/low is held by node \"test\" (pid "));
+  EXPECT_THAT(result.err, HasSubstr("). Stop that component, choose other sources with --source, "
+                                    "or replay into an instance of its own with --instance\n"));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "evidence/record_writer.hpp"
 #include "tests/client/component.hpp"
 #include "tests/client/samples.hpp"
+#include "tests/evidence/incident.hpp"
 #include "tests/recorder/recording.hpp"
 
 namespace arbiter::test {
@@ -120,6 +121,91 @@ TEST(SimulateRecording, ShowsWhatAnotherModelWouldHaveDone) {
   const json same = recording.simulate({"--model", daemon.directory() + "/model.xml"});
   EXPECT_EQ(same["changed"].size(), 0u);
   EXPECT_EQ(same["winner_intervals"].size(), 0u);
+}
+
+// From 1000 on; the first arrival at 1100.
+std::string overridden_for_a_while(Incident& incident) {
+  incident.state("/high", 900, 995, shm::arrival(900, 150));  // until 1050
+  incident.arrive("/low", 1100, 1101, Incident::Fate::accepted);
+  incident.arrive("/high", 1200, 1201, Incident::Fate::accepted);
+  for (const int time : {1300, 1310, 1320, 1330}) {
+    incident.arrive("/low", time, time + 1, Incident::Fate::discarded);
+  }
+  incident.deactivate("/high", 1400, 1401);
+  incident.arrive("/low", 1410, 1411, Incident::Fate::accepted);
+  return incident.file();
+}
+
+// What matters first; and a thousand arrivals that change alike are one line.
+TEST(SimulateRecording, ShowsIntervalsFirstAndFoldsDecisionsThatChangeAlike) {
+  const TemporaryDirectory directory;
+  const std::string other = directory.write("other.xml", kReversed);
+  Incident incident;
+  const std::string file = overridden_for_a_while(incident);
+  const auto result = arbiter({"simulate", "--recording", file, "--model", other});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  EXPECT_EQ(result.out.substr(result.out.find('\n') + 1),
+            "7 decisions: 2 the same, 5 changed, 0 uncertain\n"
+            "the winner differs:\n"
+            "  +0.000000100 s to +0.000000300 s  /p: /low instead of /high\n"
+            "these decisions change:\n"
+            "  +0.000000100 s  /high #1 at /p: discarded instead of delivered\n"
+            "  +0.000000200 s to +0.000000230 s  /low, 4 arrivals (#2 to #5) at /p: delivered "
+            "instead of discarded\n");
+  const auto each = arbiter({"simulate", "--recording", file, "--model", other, "--each"});
+  EXPECT_THAT(each.out, HasSubstr("  +0.000000210 s  /low #3 at /p: delivered instead of "
+                                  "discarded\n"));
+}
+
+TEST(SimulateRecording, ShowsNoNegativeTimes) {
+  const TemporaryDirectory directory;
+  const std::string other = directory.write(
+      "other.xml", R"(<behaviors timeout="500ns"><arbiter at="/p"><select from="/low"/></arbiter>
+                      </behaviors>)");
+  Incident incident;
+  const std::string file = overridden_for_a_while(incident);
+  const auto result = arbiter({"simulate", "--recording", file, "--model", other});
+  EXPECT_THAT(result.out, HasSubstr("\n  0.000000100 s before the first arrival to 0.000000050 s "
+                                    "before the first arrival  /p: nobody instead of /high\n"));
+  EXPECT_EQ(result.out.find("-0."), std::string::npos) << result.out;
+}
+
+TEST(SimulateRecording, TellsWhyWinnersChangedAndArrivalsWereDiscarded) {
+  const TemporaryDirectory directory;
+  Incident incident;
+  const std::string file = overridden_for_a_while(incident);
+  const auto result = arbiter({"simulate", "--recording", file, "--why=/p"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  for (const char* line :
+       {"0.000000100 s before the first arrival  /p  /high wins as this begins\n",
+        "\n0.000000050 s before the first arrival  /p  /high -> idle  because /high went inactive",
+        "\n+0.000000000 s  /p  idle -> /low  because /low became active\n",
+        "\n+0.000000100 s  /p  /low -> /high  because /high became active; /low is inhibited by "
+        "behaviour \"High\" (model.xml:",
+        "\n+0.000000230 s  /p  /low discarded: inhibited by behaviour \"High\" (model.xml:",
+        "\n+0.000000300 s  /p  /high -> /low  because /high was deactivated"}) {
+    EXPECT_THAT("\n" + result.out, HasSubstr(line));
+  }
+  const std::string other = directory.write("other.xml", kReversed);
+  const auto under = arbiter({"simulate", other, "--recording", file, "--why", "--json"});
+  EXPECT_EQ(under.exit_code, 0) << under.err;
+  EXPECT_THAT(under.out, HasSubstr(R"("event":"discarded")"));
+  EXPECT_THAT(under.out, HasSubstr(R"("inhibitor":{"kind":"behaviour","name":"Low")"));
+  EXPECT_EQ(arbiter({"simulate", "--recording", file, "--why=/q"}).exit_code, 1);
+}
+
+// Each by what it says; what was active stays so.
+TEST(SimulateRecording, TellsWhyByTheModelThatWasInForce) {
+  Incident incident;
+  incident.arrive("/low", 1100, 1101, Incident::Fate::accepted);
+  incident.arrive("/high", 1200, 1201, Incident::Fate::accepted);
+  incident.put_in_force(kReversed, 2, 1300);
+  incident.arrive("/high", 1310, 1311, Incident::Fate::discarded);
+  const auto result = arbiter({"simulate", "--recording", incident.file(), "--why"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("arbiter: +0.000000200 s, model 2 comes into force\n"));
+  EXPECT_THAT(result.out, HasSubstr("\n+0.000000200 s  /p  /low wins as this begins\n"));
+  EXPECT_THAT(result.out, HasSubstr("\n+0.000000210 s  /p  /high discarded: inhibited by "));
 }
 
 TEST(SimulateRecording, NeedsARecording) {

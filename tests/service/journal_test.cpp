@@ -244,7 +244,12 @@ TEST(Journal, HasTheDaemonsEvents) {
   expect("closed", about({{"ARBITER_SOURCE", "/stray"}}));
   expect("closed", about({{"ARBITER_COMPONENT", "nav"}, {"ARBITER_SOURCE", "/out"}}));
   expect("closed", about({{"ARBITER_COMPONENT", "arm"}, {"ARBITER_PORT", "/in"}}));
-  expect("left", about({{"ARBITER_COMPONENT", "arm"}}));
+  expect("left", about({{"ARBITER_COMPONENT", "arm"}, {"PRIORITY", "6"}}));
+  {
+    RawClient asking(daemon.instance());  // a tool, whose calls are no news
+    asking.hello("tool");
+  }
+  expect("left", about({{"ARBITER_COMPONENT", "tool"}, {"PRIORITY", "7"}}));
   daemon.load(rules(arbiter_at("/in", select("/new"))));
   expect("reloaded", about({{"ARBITER_GENERATION", "2"}}));
   daemon.load_bad("<behaviors><wrong/></behaviors>");

@@ -1,0 +1,130 @@
+#include "cli/why_recorded.hpp"
+
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "cli/model_files.hpp"
+#include "cli/recording_compile.hpp"
+#include "cli/recording_times.hpp"
+#include "cli/why_simulated.hpp"
+#include "evidence/cues.hpp"
+#include "evidence/judge.hpp"
+#include "rules/ask/report.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+using evidence::Cue;
+using evidence::Run;
+
+// A model, from when it comes into force.
+struct Tenure {
+  Tenure(std::shared_ptr<const Model> in_force, WhySimulated::Options options)
+      : model(std::move(in_force)),
+        simulation(model->compiled),
+        why(model->rules, simulation, std::move(options)) {}
+
+  const std::shared_ptr<const Model> model;
+  rules::Simulation simulation;
+  WhySimulated why;
+};
+
+class Explaining {
+ public:
+  // `other`: decides in place of the recorded models; null: they do.
+  Explaining(std::shared_ptr<const Model> other, double effort, WhySimulated::Options options)
+      : other_(std::move(other)), effort_(effort), options_(std::move(options)) {
+    if (other_ != nullptr) judge_.emplace(other_->compiled, true);
+  }
+
+  void explain(const Run& run) {
+    words_.clear();
+    tenure_.reset();
+    is_first_ = true;
+    for (const Cue& cue : cues_of(run)) {
+      if (!std::cout) return;  // nobody reads it
+      if (cue.model != nullptr) {
+        put_in_force(*cue.model, cue.time);
+      } else {
+        take(run, cue);
+      }
+    }
+    if (tenure_ != nullptr) tenure_->why.run_out_until(run.end, std::cout);
+  }
+
+ private:
+  void put_in_force(const evidence::ModelChange& change, shm::Nanoseconds time) {
+    if (tenure_ != nullptr) tenure_->why.run_out_until(time, std::cout);
+    if (other_ != nullptr && tenure_ != nullptr) return;
+    tenure_.reset();
+    if (other_ == nullptr && change.generation == 0) return;  // no model
+    if (other_ == nullptr && !change.has_texts) {
+      std::cerr << "arbiter: the texts of model " << change.generation
+                << " are not in the recording: what it decided is left out\n";
+      return;
+    }
+    auto model = other_;
+    if (model == nullptr) {
+      model = std::make_shared<const Model>(
+          compile_recorded(evidence::texts_of(change), effort_, rules::Keep::kProvenance));
+      const bool is_first = std::exchange(is_first_, false);
+      if (!is_first) {
+        std::cerr << "arbiter: " << options_.time(time) << ", model " << change.generation
+                  << " comes into force\n";
+      }
+    }
+    tenure_ = std::make_unique<Tenure>(std::move(model), options_);
+    rules::Simulation& simulation = tenure_->simulation;
+    for (const auto& [source, word] : words_) {
+      if (simulation.knows(source)) simulation.set_activity(simulation.source_id(source), word);
+    }
+    simulation.advance_to(time);
+    tenure_->why.begin(std::cout);
+  }
+
+  void take(const Run& run, const Cue& cue) {
+    const std::string& source = *cue.source;
+    const auto word = judge_ ? judge_->word_of(source, *cue.step, run.start) : cue.step->word;
+    words_[source] = word;
+    if (tenure_ == nullptr) return;
+    if (cue.step->kind != evidence::Step::Kind::arrival) {
+      tenure_->why.find(source, word, cue.time, std::cout);
+      return;
+    }
+    rules::TraceEvent arrival;
+    arrival.at = cue.time;
+    arrival.source = source;
+    tenure_->why.step(arrival, std::cout);
+  }
+
+  const std::shared_ptr<const Model> other_;
+  const double effort_;
+  const WhySimulated::Options options_;
+  std::optional<evidence::Judge> judge_;  // of the other model
+  std::map<std::string, shm::ActivityWord> words_;
+  std::unique_ptr<Tenure> tenure_;
+  bool is_first_ = true;  // no model of this run has come into force
+};
+
+}  // namespace
+
+int explain_recording(const SimulateRecordingOptions& options, const std::string& port) {
+  const auto recorded = load_for_simulation(options.recording);
+  std::shared_ptr<const Model> other;
+  if (!options.other.models.empty()) {
+    rules::Diagnostics diagnostics;
+    auto model = load_model(options.other, diagnostics, options.effort, rules::Keep::kProvenance);
+    rules::write_text(std::cerr, diagnostics);
+    if (!model) return 1;
+    other = std::make_shared<const Model>(std::move(*model));
+  }
+  const auto time = [&](shm::Nanoseconds at) { return since_first(recorded, at); };
+  Explaining explaining(std::move(other), options.effort, {port, options.json, time});
+  for (const Run& run : recorded.runs) explaining.explain(run);
+  return 0;
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,104 @@
+#include "recorder/own_files.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <sstream>
+#include <utility>
+
+#include "shm/file_descriptor.hpp"
+
+namespace arbiter::recorder {
+namespace {
+
+// Of so many files there can be a list; a longer one was not written here.
+constexpr std::size_t kMostBytes = std::size_t{16} << 20;
+
+std::string directory_of(const std::string& path) {
+  const std::size_t slash = path.find_last_of('/');
+  return slash == std::string::npos ? "" : path.substr(0, slash + 1);
+}
+
+// In a directory that others may write to, anything may stand under a name: only a file of this
+// user's counts. Empty: there is none.
+std::string content_of_own(const std::string& path) {
+  const shm::FileDescriptor file(
+      ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  struct stat there {};
+  const bool is_own = file && ::fstat(file.get(), &there) == 0 && S_ISREG(there.st_mode) &&
+                      there.st_uid == ::geteuid();
+  if (!is_own || there.st_size > static_cast<off_t>(kMostBytes)) return "";
+  std::string content(static_cast<std::size_t>(there.st_size), '\0');
+  const ssize_t size = ::read(file.get(), content.data(), content.size());
+  content.resize(size < 0 ? 0 : static_cast<std::size_t>(size));
+  return content;
+}
+
+bool write_new(const std::string& path, const std::string& content) {
+  const shm::FileDescriptor file(
+      ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
+  return file && ::write(file.get(), content.data(), content.size()) ==
+                     static_cast<ssize_t>(content.size());
+}
+
+}  // namespace
+
+OwnFiles::OwnFiles(std::string prefix, std::size_t most) : prefix_(std::move(prefix)), most_(most) {
+  read_list();
+}
+
+bool OwnFiles::is_there(const File& file) {
+  struct stat now {};
+  return ::lstat(file.path.c_str(), &now) == 0 && S_ISREG(now.st_mode) &&
+         now.st_dev == file.device && now.st_ino == file.inode;
+}
+
+std::vector<std::string> OwnFiles::add(const std::string& path) {
+  struct stat made {};
+  if (::lstat(path.c_str(), &made) == 0) files_.push_back({path, made.st_dev, made.st_ino});
+  std::erase_if(files_, [](const File& file) { return !is_there(file); });
+  std::vector<std::string> removed;
+  while (files_.size() > most_) {
+    if (::unlink(files_.front().path.c_str()) == 0) removed.push_back(files_.front().path);
+    files_.pop_front();
+  }
+  write_list();
+  return removed;
+}
+
+// A line for each: its device, its inode, and its name in the directory of the list.
+void OwnFiles::read_list() {
+  const std::string directory = directory_of(prefix_);
+  const std::string beginning = prefix_.substr(directory.size()) + "-";
+  std::istringstream list(content_of_own(prefix_ + ".files"));
+  for (std::string line; std::getline(list, line);) {
+    std::istringstream words(line);
+    File file;
+    std::string name;
+    if (!(words >> file.device >> file.inode) || !std::getline(words >> std::ws, name)) continue;
+    const bool is_name = name.starts_with(beginning) && name.ends_with(".mcap") &&
+                         name.find('/') == std::string::npos;
+    if (!is_name) continue;
+    file.path = directory + name;
+    if (is_there(file)) files_.push_back(std::move(file));
+  }
+}
+
+void OwnFiles::write_list() const {
+  const std::string list = prefix_ + ".files";
+  const std::string next = list + ".new";
+  const std::size_t directory = directory_of(prefix_).size();
+  std::string text;
+  for (const File& file : files_) {
+    text += std::to_string(file.device) + ' ' + std::to_string(file.inode) + ' ' +
+            file.path.substr(directory) + '\n';
+  }
+  ::unlink(next.c_str());  // of a recorder that was killed
+  if (!write_new(next, text) || std::rename(next.c_str(), list.c_str()) != 0) {
+    ::unlink(next.c_str());
+  }
+}
+
+}  // namespace arbiter::recorder

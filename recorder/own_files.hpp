@@ -1,0 +1,43 @@
+// The files that a flight recorder writes of its own accord: it keeps the last few, so that a
+// statement that flips, or a component that dies again and again, cannot fill the disk.
+//
+// It knows its own by a list beside them, PREFIX.files, so that those of an earlier run count too.
+// What is not in the list, or is not the file any more that was listed, it never touches: a file
+// that somebody has moved away is theirs.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstddef>
+#include <deque>
+#include <string>
+#include <vector>
+
+namespace arbiter::recorder {
+
+class OwnFiles {
+ public:
+  // Reads the list. `prefix`: of all names; nobody else has it now (dump_socket.hpp).
+  OwnFiles(std::string prefix, std::size_t most);
+
+  // This one has been written. Returns those that were removed for it, the oldest. A list that
+  // cannot be written, as on a full disk, counts for this run all the same.
+  std::vector<std::string> add(const std::string& path);
+
+ private:
+  struct File {
+    std::string path;
+    dev_t device = 0;
+    ino_t inode = 0;
+  };
+
+  [[nodiscard]] static bool is_there(const File& file);
+  void read_list();
+  void write_list() const;
+
+  const std::string prefix_;
+  const std::size_t most_;
+  std::deque<File> files_;  // the oldest first
+};
+
+}  // namespace arbiter::recorder
