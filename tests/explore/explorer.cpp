@@ -82,7 +82,7 @@ void Explorer::run_once(const Scenario& scenario) {
   for (std::size_t i = 0; i < thread_count_; ++i) add_thread(i, std::move(execution.threads_[i]));
   active_ = choose(static_cast<std::uint32_t>(thread_count_));
   current_ = this;
-  swapcontext(&main_, &threads_[active_]->context);
+  jump(threads_[active_]->context, main_);
   current_ = nullptr;
   if (!abandoned_) {
     const Image::Inside inside;
@@ -104,16 +104,20 @@ void Explorer::add_thread(std::size_t index, Execution::Body body) {
   thread.acquired.clear();
   thread.released.clear();
   thread.view.set(index, 1);
-  getcontext(&thread.context);
-  thread.context.uc_stack.ss_sp = stacks[index].get();
-  thread.context.uc_stack.ss_size = kStackSize;
-  thread.context.uc_link = nullptr;
-  makecontext(&thread.context, reinterpret_cast<void (*)()>(&Explorer::enter), 1,
-              static_cast<unsigned>(index));
+  thread.context = boost::context::detail::make_fcontext(stacks[index].get() + kStackSize,
+                                                         kStackSize, &Explorer::enter);
 }
 
-void Explorer::enter(unsigned index) {
+// Whoever goes on keeps, for the one it comes from, where that is to go on.
+void Explorer::jump(Context to, Context& from) {
+  const auto back = boost::context::detail::jump_fcontext(to, &from);
+  *static_cast<Context*>(back.data) = back.fctx;
+}
+
+void Explorer::enter(boost::context::detail::transfer_t from) {
+  *static_cast<Context*>(from.data) = from.fctx;
   Explorer& explorer = *running_;
+  const std::size_t index = explorer.active_;
   {
     const Image::Inside inside;
     explorer.threads_[index]->body();
@@ -177,14 +181,14 @@ bool Explorer::pass_time() {
 void Explorer::switch_to(std::size_t thread) {
   const std::size_t before = active_;
   active_ = thread;
-  swapcontext(&threads_[before]->context, &threads_[thread]->context);
+  jump(threads_[thread]->context, threads_[before]->context);
 }
 
 void Explorer::leave() {
   Image::leave();
   current_ = nullptr;
-  setcontext(&main_);
-  throw std::logic_error("setcontext");
+  jump(main_, self().context);
+  throw std::logic_error("a thread goes on that was left for good");
 }
 
 void Explorer::fail(const std::string& what) {
@@ -235,27 +239,25 @@ void Explorer::take_turns() {
 
 void Explorer::rehash() {
   const std::size_t size = std::bit_ceil(std::max<std::size_t>(1024, words_.size() * 8));
-  table_.assign(size, 0);
+  table_.assign(size, {});
   for (std::size_t i = 0; i < words_.size(); ++i) {
     std::size_t at = hash(words_[i].address);
-    while (table_[at & (table_.size() - 1)] != 0) ++at;
-    table_[at & (table_.size() - 1)] = static_cast<std::uint32_t>(i + 1);
+    while (table_[at & (size - 1)].address != nullptr) ++at;
+    table_[at & (size - 1)] = {words_[i].address, static_cast<std::uint32_t>(i)};
   }
 }
 
 Explorer::Word& Explorer::find(const void* address) {
+  const std::size_t mask = table_.size() - 1;
   std::size_t at = hash(address);
   for (;; ++at) {
-    const std::uint32_t entry = table_[at & (table_.size() - 1)];
-    if (entry == 0) break;
-    if (words_[entry - 1].address == address) return words_[entry - 1];
+    const Entry& entry = table_[at & mask];
+    if (entry.address == address) return words_[entry.word];
+    if (entry.address == nullptr) break;
   }
+  table_[at & mask] = {address, static_cast<std::uint32_t>(words_.size())};
   words_.emplace_back().address = address;
-  if (words_.size() * 4 > table_.size()) {
-    rehash();
-  } else {
-    table_[at & (table_.size() - 1)] = static_cast<std::uint32_t>(words_.size());
-  }
+  if (words_.size() * 4 > table_.size()) rehash();
   return words_.back();
 }
 

@@ -18,8 +18,6 @@
 // an error.
 #pragma once
 
-#include <ucontext.h>
-
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -29,6 +27,8 @@
 #include <source_location>
 #include <string>
 #include <vector>
+
+#include <boost/context/detail/fcontext.hpp>
 
 #include "tests/explore/view.hpp"
 
@@ -122,6 +122,8 @@ class Explorer {
   int uninterrupted = 0;
 
  private:
+  // Boost.Context's own: its public classes unwind the stack of a thread that is left for good.
+  using Context = boost::context::detail::fcontext_t;
   struct Store {
     std::uint64_t bits = 0;
     View view;
@@ -140,7 +142,7 @@ class Explorer {
     std::uint32_t write = 0;
   };
   struct Thread {
-    ucontext_t context;
+    Context context = nullptr;  // while it does not run
     std::function<void()> body;
     std::function<bool()> ready;
     std::int64_t deadline = INT64_MAX;
@@ -156,7 +158,9 @@ class Explorer {
 
   void run_once(const Scenario& scenario);
   void add_thread(std::size_t index, Execution::Body body);
-  static void enter(unsigned index);
+  static void enter(boost::context::detail::transfer_t from);
+  // Goes on at `to`; what runs now goes on from `from` when somebody jumps there.
+  static void jump(Context to, Context& from);
   bool next_path();
   std::uint32_t choose(std::uint32_t count);
   void take_turns();
@@ -188,7 +192,11 @@ class Explorer {
 
   // Of the search.
   std::vector<Choice> path_;
-  std::vector<std::uint32_t> table_;  // words_ by hash of address, plus 1
+  struct Entry {
+    const void* address = nullptr;
+    std::uint32_t word = 0;  // in words_
+  };
+  std::vector<Entry> table_;  // by hash of the address; its size is a power of two
   std::vector<Word> words_;
   bool learned_ = false;  // that another word is shared
   std::uint64_t execution_ = 0;
@@ -202,7 +210,7 @@ class Explorer {
   std::vector<std::unique_ptr<Thread>> threads_;
   std::size_t thread_count_ = 0;
   std::size_t active_ = 0;
-  ucontext_t main_;
+  Context main_ = nullptr;
   std::vector<Store> stores_;
   std::uint32_t store_count_ = 0;
   std::uint32_t shared_count_ = 0;
