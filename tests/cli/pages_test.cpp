@@ -200,7 +200,7 @@ TEST(Pages, OfTheLibraryOfModelsRun) {
     EXPECT_GE(counts["console"], 1) << entry.path() << " shows nothing to try";
     ++pages;
   }
-  EXPECT_GE(pages, 7);
+  EXPECT_GE(pages, 8);
 }
 
 // Beside a daemon with the first model on the page.
