@@ -7,6 +7,7 @@
 
 #include "importing/numbers.hpp"
 #include "rules/text/names.hpp"
+#include "shm/limits.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::importing {
@@ -181,6 +182,14 @@ std::vector<MuxEntry> read_entries(const Parameter& parameter, const EntryRules&
   if (value.is_scalar()) {
     diagnostics.error("wrong-type", value.where,
                       "`" + parameter.entry->key.text + "` has the entries in it; write these");
+    return entries;
+  }
+  const std::size_t count = value.items.size() + value.entries.size();
+  if (count > shm::kMaxSourcesPerPort) {
+    diagnostics.error("limit-exceeded", value.where,
+                      "`" + parameter.entry->key.text + "` has " + std::to_string(count) +
+                          " entries, and a port takes at most " +
+                          std::to_string(shm::kMaxSourcesPerPort) + " sources; remove some");
     return entries;
   }
   EntryReader reader(rules, value.is_sequence(), diagnostics);

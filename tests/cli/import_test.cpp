@@ -77,18 +77,30 @@ TEST(Import, IsRefusedWhereItIsUsedWrongly) {
   EXPECT_EQ(content_of(yaml), kMux);
 }
 
-TEST(Import, AMuxThatIsTooLargeIsRefusedWithItsReason) {
-  TemporaryDirectory directory;
-  std::string text = "topics:\n";
-  for (int i = 1; i <= 300; ++i) {
-    const std::string n = std::to_string(i);
-    text += "- {name: n" + n + ", topic: t" + n +
+std::string entries(const std::string& name, int count) {
+  std::string text;
+  for (int i = 1; i <= count; ++i) {
+    const std::string n = name + std::to_string(i);
+    text += "- {name: " + n + ", topic: " + n +
             ", timeout: 0.5, priority: " + std::to_string(1 + i % 255) + "}\n";
   }
-  const auto result = arbiter({"import", "twist_mux", directory.write("mux.yaml", text)});
+  return text;
+}
+
+TEST(Import, AMuxThatIsTooLargeIsRefusedWithItsReason) {
+  TemporaryDirectory directory;
+  // More than one list may have, and more than a port may have of both.
+  const auto many = directory.write("many.yaml", "topics:\n" + entries("t", 4'000));
+  auto result = arbiter({"import", "twist_mux", many});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, HasSubstr("`topics` has 4000 entries"));
+  const auto both = directory.write(
+      "both.yaml", "topics:\n" + entries("t", 200) + "locks:\n" + entries("l", 200));
+  result = arbiter({"import", "twist_mux", both, "-o", directory.path() + "/m.xml"});
+  EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("arbiter: the model would be refused, nothing was written: "));
+  EXPECT_FALSE(std::filesystem::exists(directory.path() + "/m.xml"));
 }
 
 TEST(Import, EachCodeIsOnThePage) {
