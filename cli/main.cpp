@@ -72,6 +72,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_rules(app, exit_code);
   arbiter::cli::add_graph(app, exit_code);
   arbiter::cli::add_compile(app, exit_code);
+  arbiter::cli::add_import(app, exit_code);
   arbiter::cli::add_simulate(app, exit_code);
   arbiter::cli::add_play(app, exit_code);
   arbiter::cli::add_echo(app, exit_code);

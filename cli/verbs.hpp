@@ -14,6 +14,7 @@ void add_diff(CLI::App& app, int& exit_code);
 void add_rules(CLI::App& app, int& exit_code);
 void add_compile(CLI::App& app, int& exit_code);
 void add_graph(CLI::App& app, int& exit_code);
+void add_import(CLI::App& app, int& exit_code);
 void add_simulate(CLI::App& app, int& exit_code);
 void add_play(CLI::App& app, int& exit_code);
 void add_echo(CLI::App& app, int& exit_code);

@@ -53,7 +53,7 @@ TEST(Models, AreWhatIsPromised) {
     }
   }
   for (const char* name : {"emergency_stop", "humanoid", "lease", "search_and_track", "selector",
-                           "subsumption", "velocity_mux"}) {
+                           "subsumption", "twist_mux", "velocity_mux"}) {
     EXPECT_TRUE(names.contains(name)) << name;
   }
 }

@@ -182,6 +182,13 @@ TEST(Pages, OnCheckingRun) {
   EXPECT_GE(counts["console"], 9);
 }
 
+TEST(Pages, OnImportingRun) {
+  const TemporaryDirectory directory;
+  Counts counts = run_listings(ARBITER_SOURCE "/docs/importing.md", directory.path());
+  EXPECT_GE(counts["text"], 5);
+  EXPECT_GE(counts["console"], 7);
+}
+
 TEST(Pages, OfTheLibraryOfModelsRun) {
   int pages = 0;
   for (const auto& entry : fs::directory_iterator(ARBITER_SOURCE "/examples/models")) {
@@ -193,7 +200,7 @@ TEST(Pages, OfTheLibraryOfModelsRun) {
     EXPECT_GE(counts["console"], 1) << entry.path() << " shows nothing to try";
     ++pages;
   }
-  EXPECT_GE(pages, 7);
+  EXPECT_GE(pages, 8);
 }
 
 // Beside a daemon with the first model on the page.

@@ -1,0 +1,205 @@
+// arbiter import: a model and a mapping from the parameters of another multiplexer.
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/numbers.hpp"
+#include "cli/output_file.hpp"
+#include "cli/verbs.hpp"
+#include "importing/import.hpp"
+#include "importing/topic_names.hpp"
+#include "rules/ask/report.hpp"
+#include "rules/model/load.hpp"
+#include "rules/prove/compile.hpp"
+#include "rules/text/text_file.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+constexpr std::uint32_t kMaxDomain = 230;  // DDS has ports for so many
+
+struct ImportVerbOptions {
+  std::string kind;
+  std::vector<std::string> files;
+  std::string output, mapping, directory;
+  std::string idle = "auto";
+  importing::ImportOptions import;
+};
+
+std::vector<importing::InputFile> read_files(const ImportVerbOptions& options) {
+  std::vector<importing::InputFile> files;
+  for (const std::string& path : options.files) {
+    files.push_back({path, rules::read_bytes(path, importing::kMaxYamlBytes)});
+  }
+  return files;
+}
+
+// What was written is read as anybody will read it, before anybody does. A model that breaks a
+// limit of Arbiter's is the user's to mend; any other error is ours.
+void check_by_reading_back(const std::string& name, const std::string& model) {
+  rules::Diagnostics diagnostics;
+  const auto rules = rules::load(rules::ModelTexts{{{name, model}}, {}}, diagnostics);
+  rules::compile(rules, diagnostics);
+  for (const auto& item : diagnostics.items()) {
+    if (item.severity != rules::Severity::kError) continue;
+    throw std::runtime_error("the model would be refused, nothing was written: " + item.message +
+                             " [" + item.code + "]");
+  }
+}
+
+void choose_outputs(ImportVerbOptions& options) {
+  if (options.directory.empty()) return;
+  const std::filesystem::path directory(options.directory);
+  options.output = (directory / "model.xml").string();
+  options.mapping = (directory / "mapping.xml").string();
+}
+
+void require_other_files(const ImportVerbOptions& options) {
+  for (const std::string& input : options.files) {
+    require_no_input("--output", options.output, input);
+    require_no_input("--mapping", options.mapping, input);
+  }
+  if (options.output.empty() || options.mapping.empty()) return;
+  require_two_files("--output", options.output, "--mapping", options.mapping);
+}
+
+void make_directory(const std::string& path) {
+  if (path.empty()) return;
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (!error) return;
+  throw rules::FileError("cannot make the folder " + path + ": " + error.message());
+}
+
+int import(ImportVerbOptions options) {
+  choose_outputs(options);
+  require_other_files(options);
+  rules::Diagnostics diagnostics;
+  const auto files = read_files(options);
+  const auto plan = options.kind == "twist_mux"
+                        ? importing::import_twist_mux(files, options.import, diagnostics)
+                        : importing::import_cmd_vel_mux(files, options.import, diagnostics);
+  rules::write_text(std::cerr, diagnostics);
+  if (!plan) return 1;
+  const std::string name = options.output.empty()
+                               ? "model.xml"
+                               : std::filesystem::path(options.output).filename().string();
+  const std::string model = importing::write_model(*plan);
+  check_by_reading_back(name, model);
+  make_directory(options.directory);
+  if (!options.mapping.empty())
+    write_output(options.mapping, importing::write_mapping(*plan, name));
+  write_output(options.output, model);
+  return 0;
+}
+
+// A value that would make a file that nobody can read.
+CLI::Validator name_of_topic(const char* what) {
+  return {[what](std::string& text) -> std::string {
+            const bool is_good =
+                importing::resolve_topic(text, {"/", "node"}, importing::Relative::kToNamespace)
+                    .has_value();
+            return is_good ? "" : '"' + text + "\" is no " + what + ", such as /robot";
+          },
+          ""};
+}
+
+CLI::Validator name_of_type() {
+  return {[](std::string& text) -> std::string {
+            constexpr std::string_view kAllowed =
+                "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_/";
+            const bool is_good = text.find("/msg/") != std::string::npos &&
+                                 text.find_first_not_of(kAllowed) == std::string::npos;
+            return is_good ? "" : '"' + text + "\" is no type, such as geometry_msgs/msg/Twist";
+          },
+          ""};
+}
+
+importing::IdleChoice idle_of(const std::string& word) {
+  if (word == "zero") return importing::IdleChoice::kZero;
+  return word == "none" ? importing::IdleChoice::kNothing : importing::IdleChoice::kByType;
+}
+
+void add_outputs(CLI::App& verb, ImportVerbOptions& options) {
+  auto* output = verb.add_option("-o,--output", options.output,
+                                 "File for the model; without it, standard output");
+  output->type_name("FILE");
+  auto* mapping = verb.add_option("--mapping", options.mapping,
+                                  "File for the mapping of topics to ports; without it, none");
+  mapping->type_name("FILE");
+  verb.add_option("--out-dir", options.directory,
+                  "Folder for both, model.xml and mapping.xml; made if it is not there")
+      ->type_name("DIRECTORY")
+      ->excludes(output)
+      ->excludes(mapping);
+}
+
+void add_names(CLI::App& verb, ImportVerbOptions& options) {
+  verb.add_option("--node", options.import.node,
+                  "The node to import, if the files have several, such as /robot/twist_mux")
+      ->type_name("NAME");
+  verb.add_option("--namespace", options.import.name_space,
+                  "What topics without a slash in front are relative to; without it, what the "
+                  "files say, or /")
+      ->type_name("NAME")
+      ->check(name_of_topic("namespace"));
+  verb.add_option("--output-topic", options.import.output_topic,
+                  "Topic of the commands that win; without it, the multiplexer's own: cmd_vel_out, "
+                  "cmd_vel, or what the file says")
+      ->type_name("TOPIC")
+      ->check(name_of_topic("topic"));
+  verb.add_option("--type", options.import.type,
+                  "Type of the commands; without it, geometry_msgs/msg/Twist, or TwistStamped if "
+                  "the file says use_stamped")
+      ->type_name("TYPE")
+      ->check(name_of_type());
+  verb.add_option("--idle", options.idle,
+                  "What is sent while nobody commands: zero (stop), none (as the multiplexers "
+                  "do), or auto: zero if the type is geometry_msgs/msg/Twist")
+      ->type_name("WHAT")
+      ->check(CLI::IsMember({"auto", "zero", "none"}));
+  verb.add_option("--domain", options.import.domain, "DDS domain of the topics (default 0)")
+      ->type_name("NUMBER")
+      ->check(number_between(0, kMaxDomain));
+}
+
+}  // namespace
+
+void add_import(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<ImportVerbOptions>();
+  CLI::App* verb = app.add_subcommand(
+      "import", "Make a model and a mapping of a twist_mux's or cmd_vel_mux's parameters");
+  verb->add_option("KIND", options->kind, "twist_mux, or cmd_vel_mux (kobuki's, or yocs')")
+      ->type_name("")
+      ->required()
+      ->check(CLI::IsMember({"twist_mux", "cmd_vel_mux"}));
+  verb->add_option(
+          "YAML", options->files,
+          "Files of parameters, of ROS 2 or ROS 1; together they configure one multiplexer")
+      ->type_name("FILE")
+      ->required();
+  add_outputs(*verb, *options);
+  add_names(*verb, *options);
+  verb->footer(
+      "The model decides as the multiplexer does. What is dangerous in the file, and what cannot "
+      "be kept,\nis reported with its line. Remapping in launch files is not read: correct the "
+      "topics in the mapping.\n\n"
+      "Exit codes: 0 written; 1 an error in the files; 2 wrong use, or a file that cannot be "
+      "opened or\nwritten\n\n"
+      "Examples:\n"
+      "  arbiter import twist_mux twist_mux_topics.yaml twist_mux_locks.yaml --out-dir mux\n"
+      "  arbiter import cmd_vel_mux cmd_vel_mux_params.yaml -o model.xml --mapping mapping.xml\n"
+      "  arbiter check mux/model.xml");
+  verb->callback([options, &exit_code] {
+    options->import.idle = idle_of(options->idle);
+    exit_code = import(*options);
+  });
+}
+
+}  // namespace arbiter::cli

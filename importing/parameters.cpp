@@ -1,0 +1,151 @@
+#include "importing/parameters.hpp"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "rules/text/names.hpp"
+#include "rules/text/text_file.hpp"
+
+namespace arbiter::importing {
+namespace {
+
+// A key of the way down to a node: "/robot/twist_mux", or "robot" and "twist_mux" below it.
+std::string join(const std::string& path, std::string_view key) {
+  while (key.starts_with('/')) key.remove_prefix(1);
+  while (key.ends_with('/')) key.remove_suffix(1);
+  return path + "/" + std::string(key);
+}
+
+// ROS 2 lets a file speak of nodes by a pattern: "/**", "/*/twist_mux".
+bool is_pattern(std::string_view node) { return node.find('*') != std::string_view::npos; }
+
+class Finder {
+ public:
+  Finder(const std::vector<std::string_view>& wanted, std::vector<ParameterSet>& found)
+      : wanted_(wanted), found_(found) {}
+
+  void look_in(const YamlNode& map, const std::string& path) {
+    if (const YamlEntry* parameters = map.find("ros__parameters")) {
+      if (has_wanted(parameters->value)) found_.push_back({path, true, &parameters->value});
+    } else if (has_wanted(map)) {
+      found_.push_back({path, false, &map});
+      return;
+    }
+    for (const YamlEntry& entry : map.entries) {
+      if (entry.key.text != "ros__parameters") look_in(entry.value, join(path, entry.key.text));
+    }
+  }
+
+ private:
+  // A word alone, such as a node's own parameter `topics: 3`, is not what is looked for.
+  [[nodiscard]] bool has_wanted(const YamlNode& map) const {
+    return std::any_of(wanted_.begin(), wanted_.end(), [&](std::string_view name) {
+      const YamlEntry* entry = map.find(name);
+      return entry != nullptr && (!entry->value.is_scalar() || entry->value.is_null());
+    });
+  }
+
+  const std::vector<std::string_view>& wanted_;
+  std::vector<ParameterSet>& found_;
+};
+
+std::string in_words(const std::vector<std::string_view>& names) {
+  std::string text;
+  for (const std::string_view name : names) {
+    text += (text.empty() ? "`" : " or `") + std::string(name) + "`";
+  }
+  return text;
+}
+
+// Whatever a file has for names.
+std::string in_words(const std::set<std::string>& nodes) {
+  std::vector<std::string> quoted;
+  quoted.reserve(nodes.size());
+  for (const std::string& node : nodes) quoted.push_back(rules::quote(node));
+  return rules::enumerate(quoted);
+}
+
+}  // namespace
+
+NodeParameters::NodeParameters(const std::vector<InputFile>& files,
+                               const std::vector<std::string_view>& wanted, const std::string& node,
+                               rules::Diagnostics& diagnostics)
+    : node_(node.empty() ? "" : join("", node)) {
+  documents_.reserve(files.size());  // sets_ points into them
+  for (const InputFile& file : files) {
+    const rules::TextFile text(file.path, file.content);
+    auto document = parse_yaml(text, diagnostics);
+    if (!document) continue;
+    documents_.push_back(std::move(*document));
+    Finder(wanted, sets_).look_in(documents_.back(), "");
+  }
+  if (diagnostics.has_errors()) {
+    sets_.clear();
+  } else {
+    choose(files, wanted, diagnostics);
+  }
+}
+
+void NodeParameters::choose(const std::vector<InputFile>& files,
+                            const std::vector<std::string_view>& wanted,
+                            rules::Diagnostics& diagnostics) {
+  std::set<std::string> names;
+  for (ParameterSet& set : sets_) {
+    if (is_pattern(set.node)) set.node.clear();
+    if (!set.node.empty()) names.insert(set.node);
+  }
+  const rules::Location start{files.empty() ? "" : files.front().path, 1, 1};
+  if (node_.empty() && names.size() > 1) {
+    diagnostics.error("several-nodes", sets_.front().parameters->where,
+                      "several nodes have " + in_words(wanted) + ": " + in_words(names) +
+                          "; choose one with --node");
+    sets_.clear();
+    return;
+  }
+  if (node_.empty() && !names.empty()) node_ = *names.begin();
+  // A node may be called by its last word, too.
+  std::erase_if(sets_, [&](const ParameterSet& set) {
+    return !set.node.empty() && set.node != node_ && !set.node.ends_with(node_);
+  });
+  for (const ParameterSet& set : sets_) {
+    if (set.node.size() > node_.size()) node_ = set.node;
+  }
+  if (sets_.empty()) {
+    diagnostics.error(names.empty() ? "nothing-to-import" : "no-such-node", start,
+                      names.empty()
+                          ? "no node has " + in_words(wanted) +
+                                " here; is this the multiplexer's file of parameters?"
+                          : "the node " + rules::quote(node_) + " has no " + in_words(wanted) +
+                                " here, but " + in_words(names) + " has; choose that with --node");
+    return;
+  }
+  for (const ParameterSet& set : sets_) {
+    if (set.is_ros2 == sets_.front().is_ros2) continue;
+    diagnostics.error("mixed-forms", set.parameters->where,
+                      "one file is of ROS 2 (`ros__parameters`) and one is not; import files of "
+                      "one multiplexer");
+    sets_.clear();
+    return;
+  }
+}
+
+std::optional<Parameter> NodeParameters::find(std::string_view name,
+                                              rules::Diagnostics& diagnostics) const {
+  std::optional<Parameter> found;
+  for (const ParameterSet& set : sets_) {
+    const YamlEntry* entry = set.parameters->find(name);
+    if (entry == nullptr || entry->value.is_null()) continue;
+    if (found) {
+      diagnostics.error("given-twice", entry->key.where,
+                        "`" + std::string(name) + "` is given at " +
+                            rules::describe(found->entry->key.where) +
+                            " as well; import one of them");
+      continue;
+    }
+    found = Parameter{&set, entry};
+  }
+  return found;
+}
+
+}  // namespace arbiter::importing

@@ -1,0 +1,61 @@
+// Where a multiplexer's parameters are in the files of a robot: ROS 2's, of one or more nodes, or a
+// plain file, as ROS 1 loads it.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "importing/yaml.hpp"
+#include "rules/text/diagnostic.hpp"
+
+namespace arbiter::importing {
+
+struct InputFile {
+  std::string path;
+  std::string content;
+};
+
+// The parameters of one node that a file has.
+struct ParameterSet {
+  std::string node;  // "/robot/twist_mux"; empty: the file leaves it open
+  bool is_ros2 = false;
+  const YamlNode* parameters = nullptr;  // a map
+};
+
+// One parameter, and the set that it is in.
+struct Parameter {
+  const ParameterSet* set = nullptr;
+  const YamlEntry* entry = nullptr;
+};
+
+// The parameters of one node, from all files.
+class NodeParameters {
+ public:
+  // What a set must have at least one of to be a multiplexer's: "topics" and "locks", say. `node`
+  // chooses where there are several; empty: there must be one. Reports what is wrong, and then has
+  // no sets.
+  NodeParameters(const std::vector<InputFile>& files, const std::vector<std::string_view>& wanted,
+                 const std::string& node, rules::Diagnostics& diagnostics);
+  NodeParameters(const NodeParameters&) = delete;
+  NodeParameters& operator=(const NodeParameters&) = delete;
+
+  [[nodiscard]] const std::vector<ParameterSet>& sets() const { return sets_; }
+  [[nodiscard]] bool is_ros2() const { return !sets_.empty() && sets_.front().is_ros2; }
+  // As the files or the user say; empty: nobody does.
+  [[nodiscard]] const std::string& node() const { return node_; }
+  // Reports a parameter that several files give.
+  [[nodiscard]] std::optional<Parameter> find(std::string_view name,
+                                              rules::Diagnostics& diagnostics) const;
+
+ private:
+  void choose(const std::vector<InputFile>& files, const std::vector<std::string_view>& wanted,
+              rules::Diagnostics& diagnostics);
+
+  std::vector<YamlNode> documents_;
+  std::vector<ParameterSet> sets_;
+  std::string node_;
+};
+
+}  // namespace arbiter::importing

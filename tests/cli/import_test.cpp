@@ -1,0 +1,125 @@
+// arbiter import, as it is run by hand; what is imported is tested in tests/importing.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <regex>
+#include <set>
+
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/text_files.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+const std::string kMux =
+    "topics:\n- {name: nav, topic: nav_vel, timeout: 0.5, priority: 10}\n"
+    "- {name: joy, topic: joy_vel, timeout: 0.5, priority: 100}\n";
+
+TEST(Import, WritesAModelThatChecksWithoutWarnings) {
+  TemporaryDirectory directory;
+  const auto yaml = directory.write("mux.yaml", kMux);
+  const std::string folder = directory.path() + "/new/mux";
+  const auto result = arbiter({"import", "twist_mux", yaml, "--out-dir", folder});
+  EXPECT_EQ(result.err, "");
+  EXPECT_EQ(result.out, "");
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(content_of(folder + "/mapping.xml"), HasSubstr("topic=\"/nav_vel\""));
+  const auto check = arbiter({"check", folder + "/model.xml", "--strict"});
+  EXPECT_EQ(check.exit_code, 0) << check.err;
+  // Without files, the model alone goes to standard output.
+  const auto printed = arbiter({"import", "twist_mux", yaml});
+  EXPECT_EQ(printed.out, content_of(folder + "/model.xml"));
+}
+
+TEST(Import, ErrorsPointIntoTheFileAndNothingIsWritten) {
+  TemporaryDirectory directory;
+  const auto yaml = directory.write("mux.yaml", kMux + "- {name: x, topic: x, timeout: 0.5}\n");
+  const auto model = directory.path() + "/m.xml";
+  const auto result = arbiter({"import", "twist_mux", yaml, "-o", model});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, StartsWith(yaml + ":4:3: error: \"x\" has no `priority`"));
+  EXPECT_THAT(result.err, HasSubstr("    4 | - {name: x, topic: x, timeout: 0.5}\n"));
+  EXPECT_FALSE(std::filesystem::exists(model));
+}
+
+TEST(Import, IsRefusedWhereItIsUsedWrongly) {
+  TemporaryDirectory directory;
+  const auto yaml = directory.write("mux.yaml", kMux);
+  const auto code = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "import");
+    const auto result = arbiter(arguments);
+    EXPECT_NE(result.err, "");
+    EXPECT_EQ(result.out, "");
+    return result.exit_code;
+  };
+  EXPECT_EQ(code({"topic_tools", yaml}), 2);
+  EXPECT_EQ(code({"twist_mux"}), 2);
+  EXPECT_EQ(code({"twist_mux", directory.path() + "/none.yaml"}), 2);
+  EXPECT_EQ(code({"twist_mux", directory.path()}), 2);
+  EXPECT_EQ(code({"twist_mux", yaml, "--out-dir", directory.path(), "-o", "m.xml"}), 2);
+  EXPECT_EQ(code({"twist_mux", yaml, "-o", yaml}), 2);
+  EXPECT_EQ(code({"twist_mux", yaml, "--mapping", yaml}), 2);
+  EXPECT_EQ(code({"twist_mux", yaml, "-o", directory.path() + "/a", "--mapping",
+                  directory.path() + "/a"}),
+            2);
+  EXPECT_EQ(code({"twist_mux", yaml, "--out-dir", yaml}), 2);
+  EXPECT_EQ(code({"twist_mux", yaml, "--type", "Twist"}), 2);
+  EXPECT_EQ(code({"twist_mux", yaml, "--output-topic", "cmd vel"}), 2);
+  EXPECT_EQ(code({"twist_mux", yaml, "--namespace", "a//b"}), 2);
+  EXPECT_EQ(code({"twist_mux", yaml, "--idle", "stop"}), 2);
+  EXPECT_EQ(code({"twist_mux", yaml, "--domain", "231"}), 2);
+  EXPECT_EQ(code({"twist_mux", yaml, "--domain", "-1"}), 2);
+  EXPECT_EQ(content_of(yaml), kMux);
+}
+
+std::string entries(const std::string& name, int count) {
+  std::string text;
+  for (int i = 1; i <= count; ++i) {
+    const std::string n = name + std::to_string(i);
+    text += "- {name: " + n + ", topic: " + n +
+            ", timeout: 0.5, priority: " + std::to_string(1 + i % 255) + "}\n";
+  }
+  return text;
+}
+
+TEST(Import, AMuxThatIsTooLargeIsRefusedWithItsReason) {
+  TemporaryDirectory directory;
+  // More than one list may have, and more than a port may have of both.
+  const auto many = directory.write("many.yaml", "topics:\n" + entries("t", 4'000));
+  auto result = arbiter({"import", "twist_mux", many});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, HasSubstr("`topics` has 4000 entries"));
+  const auto both = directory.write(
+      "both.yaml", "topics:\n" + entries("t", 200) + "locks:\n" + entries("l", 200));
+  result = arbiter({"import", "twist_mux", both, "-o", directory.path() + "/m.xml"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("arbiter: the model would be refused, nothing was written: "));
+  EXPECT_FALSE(std::filesystem::exists(directory.path() + "/m.xml"));
+}
+
+TEST(Import, EachCodeIsOnThePage) {
+  const std::string source = std::string(ARBITER_TEST_DATA) + "/../..";
+  const std::regex made(R"re("([a-z]+(-[a-z0-9]+)+)")re");
+  std::set<std::string> codes;
+  for (const auto& file : std::filesystem::directory_iterator(source + "/importing")) {
+    if (file.path().extension() != ".cpp") continue;
+    const std::string text = content_of(file.path());
+    for (std::sregex_iterator each(text.begin(), text.end(), made), end; each != end; ++each) {
+      codes.insert((*each)[1]);
+    }
+  }
+  EXPECT_GE(codes.size(), 25u);
+  const std::string page = content_of(source + "/docs/importing.md");
+  for (const std::string& code : codes) {
+    EXPECT_NE(page.find("`" + code + "`"), std::string::npos) << "importing.md lacks " << code;
+  }
+}
+
+}  // namespace
+}  // namespace arbiter::test
