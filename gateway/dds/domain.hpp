@@ -1,0 +1,38 @@
+// A domain of DDS, and our participant in it.
+#pragma once
+
+#include <set>
+#include <string>
+
+#include "gateway/dds/entity.hpp"
+#include "gateway/dds/peers.hpp"
+#include "gateway/mapping/mapping.hpp"
+
+namespace arbiter::gateway::dds {
+
+// The domain that the mapping says, or ROS_DOMAIN_ID, or 0. Throws DdsError where that variable has
+// no number.
+[[nodiscard]] dds_domainid_t domain_of(const Gateway& gateway);
+
+// Cyclone's configuration for it: what CYCLONEDDS_URI or the mapping's own file says, and after
+// that, so that it counts, what the mapping says.
+[[nodiscard]] std::string configuration_of(const Gateway& gateway);
+
+class Domain {
+ public:
+  // Throws DdsError: there is no such network interface now, for example.
+  Domain(const Gateway& gateway, std::set<std::string> topics, const Bell& bell);
+
+  [[nodiscard]] dds_entity_t participant() const { return participant_.get(); }
+  [[nodiscard]] Peers& peers() { return peers_; }
+
+ private:
+  Entity domain_;
+  Entity participant_;
+  Peers peers_;
+};
+
+// Lets Cyclone's messages go to say() (gateway/core/say.hpp), at most so many a second.
+void hear_cyclone();
+
+}  // namespace arbiter::gateway::dds

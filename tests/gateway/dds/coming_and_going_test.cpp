@@ -1,0 +1,120 @@
+// Strangers that come late, go, and are killed; a gateway that is stopped or killed.
+#include <gtest/gtest.h>
+
+#include "tests/gateway/dds/scene.hpp"
+
+namespace arbiter::test {
+namespace {
+
+class DdsComingAndGoing : public ::testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(Vendors, DdsComingAndGoing, ::testing::Values("cyclone", "fast"),
+                         [](const auto& each) { return std::string(each.param); });
+
+const std::string kStopping = kBaseOut + R"( idle="zero"/>)";
+
+TEST_P(DdsComingAndGoing, ASubscriberIsToldToStopWhileNobodyCommands) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("200ms"));
+  const DdsGateway gateway(daemon, domain, kNavIn + kStopping);
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  base.await("matched 1");
+  EXPECT_EQ(base.next_line(), "sample 0 0");  // it has come while nobody commands
+  EXPECT_EQ(base.next_line(), "sample 0 0");  // and again, should one get lost
+}
+
+TEST_P(DdsComingAndGoing, ARobotStopsWhenItsCommanderIsKilledAndObeysTheNextOne) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("200ms"));
+  const DdsGateway gateway(daemon, domain, kNavIn + kStopping);
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  base.await("matched 1");
+  {
+    Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
+    navigation.await("matched 1");
+    gateway.see("1 publisher matched");
+    navigation.publish("1 0");
+    base.await("sample 1 0");
+    navigation.process().kill();
+    base.await("sample 0 0");
+  }
+  Stranger next(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
+  next.await("matched 1");
+  next.publish("2 0");
+  base.await("sample 2 0");
+  EXPECT_EQ(next.end(), 0);
+  base.await("sample 0 0");
+}
+
+TEST_P(DdsComingAndGoing, ASubscriberThatIsKilledHoldsNobodyUp) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1000s"));
+  const DdsGateway gateway(daemon, domain, kNavIn + kBaseOut + "/>");
+  Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  Stranger other(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  navigation.await("matched 1");
+  base.await("matched 1");
+  other.await("matched 1");
+  gateway.see("1 publisher matched");
+  navigation.publish("1 0");
+  EXPECT_EQ(other.next_line(), "sample 1 0");
+  base.process().kill();
+  for (int i = 2; i < 200; ++i) {
+    const std::string numbers = std::to_string(i) + " 0";
+    navigation.publish(numbers);
+    EXPECT_EQ(other.next_line(), "sample " + numbers);
+  }
+}
+
+TEST_P(DdsComingAndGoing, AGatewayThatIsKilledIsSilenceAndTheNextOneGoesOn) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("200ms"));
+  DdsGateway gateway(daemon, domain, kNavIn + kStopping);
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
+  base.await("matched 1");
+  navigation.await("matched 1");
+  gateway.see("1 publisher matched");
+  navigation.publish("1 0");
+  base.await("sample 1 0");
+  gateway.process().kill();
+  gateway.start();
+  navigation.await("matched 2");
+  base.await("matched 2");
+  navigation.publish("2 0");
+  base.await("sample 2 0");
+}
+
+// What waited for it meanwhile is older than T: it must not move the robot.
+TEST_P(DdsComingAndGoing, WhatWaitedWhileTheGatewayWasStoppedIsNotObeyed) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("200ms"));
+  DdsGateway gateway(daemon, domain, kNavIn + kStopping);
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
+  base.await("matched 1");
+  navigation.await("matched 1");
+  gateway.see("1 publisher matched");
+  navigation.publish("1 0");
+  base.await("sample 1 0");
+  gateway.process().stop();
+  navigation.publish("13 0");
+  ::poll(nullptr, 0, 1000);  // what is tested: that time passes while it is stopped
+  gateway.process().resume();
+  gateway.see("1 late");
+  for (;;) {
+    const std::string line = base.next_line();
+    ASSERT_NE(line, "sample 13 0");
+    if (line == "sample 0 0") break;
+  }
+  // From now on it passes on what is fresh.
+  while (base.line_within(0)) {
+  }
+  for (std::optional<std::string> line; line != "sample 2 0"; line = base.line_within(50)) {
+    navigation.publish("2 0");
+  }
+}
+
+}  // namespace
+}  // namespace arbiter::test
