@@ -15,6 +15,8 @@
 
 namespace arbiter::gateway {
 
+inline constexpr std::size_t kMaxDescription = 480;  // bytes of Account::text()
+
 // A count of samples with one writer.
 class Count {
  public:
@@ -55,9 +57,13 @@ class Account {
   // "DDS topic rt/cmd_vel_nav, no publisher matched; 3 late, 1 too large (70000 bytes)". Control
   // characters are escaped; at most kMaxDescription bytes.
   [[nodiscard]] std::string text() const;
+  // The same without counts: what is worth a line in the log when it changes.
+  [[nodiscard]] std::string state() const;
   [[nodiscard]] const std::string& outside() const noexcept { return outside_; }
 
  private:
+  [[nodiscard]] std::string state_of_topic() const;  // under mutex_
+
   const std::string outside_;
   const std::string other_;
   mutable std::mutex mutex_;

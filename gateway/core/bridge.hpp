@@ -4,9 +4,11 @@
 // A gateway is open as a whole or not at all: where a port cannot be opened, because it is taken or
 // the policy does not allow it, it says so and tries again once a second. A daemon that goes and
 // comes again is the node's business (arbiter/node.hpp); samples pass meanwhile.
+//
+// Thread safety: all of it runs on the thread that calls run(), but for wake().
 #pragma once
 
-#include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,34 +29,71 @@ namespace arbiter::gateway {
 struct BridgeOptions {
   std::string name;      // of the node, and in the log
   std::string instance;  // as NodeOptions has it
+  // Called by the loop ten times a second, so that somebody can see that it goes round.
+  std::function<void()> on_round{};
+};
+
+// Lets a bridge's loop look at everything now. Any thread; also a signal handler.
+class Bell {
+ public:
+  Bell();
+  void ring() const noexcept;
+  void silence() const noexcept;
+  [[nodiscard]] int descriptor() const noexcept { return descriptor_.get(); }
+
+ private:
+  shm::FileDescriptor descriptor_;
 };
 
 class Bridge {
  public:
-  // Of the gateways of that kind in `mapping`, which it keeps references to.
-  Bridge(BridgeOptions options, const std::vector<Mapping>& mappings, Kind kind,
+  // Of the gateways of that kind in `mappings`. Keeps references.
+  Bridge(BridgeOptions options, const std::vector<Mapping>& mappings, Kind kind, const Bell& bell,
          Middleware& middleware);
   Bridge(const Bridge&) = delete;
   Bridge& operator=(const Bridge&) = delete;
   ~Bridge();
 
-  // Returns when `stop` has become readable.
+  // Returns when `stop` has become readable. Throws what Middleware::sender() throws.
   void run(int stop);
-  // Any thread, also a signal handler: lets the loop look at everything now.
-  void wake() noexcept;
 
  private:
-  struct Part;  // an entry with all that belongs to it
+  // An entry with all that belongs to it.
+  struct Part {
+    Part(const Gateway& in, const Entry& of);
+    const Gateway& gateway;
+    const Entry& entry;
+    Account account;
+    Sender* sender = nullptr;
+    std::unique_ptr<Incoming> incoming;
+    std::unique_ptr<Outgoing> outgoing;
+    std::string said;  // in the log
+    shm::Nanoseconds say_again = 0;
+    std::string described;
+    [[nodiscard]] bool is_open() const { return incoming != nullptr || outgoing != nullptr; }
+  };
 
-  bool open_all(int stop);
+  void make_node(int stop);
+  void open_all(int stop);
+  void open(Part& part);
+  void watch(int descriptor, Part* part) const;
+  void start();
   void loop(int stop);
+  void serve(shm::Nanoseconds now, bool all);
+  void look_after_all();
+  void say_once(const std::string& text);
+  // Sleeps; true: `stop` is readable.
+  static bool waits(int stop, int milliseconds);
 
   const BridgeOptions options_;
+  const Bell& bell_;
   Middleware& middleware_;
   MaxAges max_ages_;
-  shm::FileDescriptor bell_;
+  shm::FileDescriptor epoll_;
   std::optional<Node> node_;
-  std::deque<Part> parts_;
+  std::vector<std::unique_ptr<Part>> parts_;
+  std::string said_;
+  bool stops_ = false;
 };
 
 }  // namespace arbiter::gateway

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <string_view>
 #include <vector>
 
 #include "shm/activity.hpp"
@@ -30,6 +31,16 @@ class MaxAge {
 
  private:
   std::atomic<shm::Nanoseconds> age_{shm::kDefaultTimeout};
+};
+
+// How old samples of a source may be, by its name: the same as MaxAge says, of any source.
+class AgesOfSources {
+ public:
+  AgesOfSources() = default;
+  AgesOfSources(const AgesOfSources&) = delete;
+  AgesOfSources& operator=(const AgesOfSources&) = delete;
+  virtual ~AgesOfSources() = default;
+  [[nodiscard]] virtual shm::Nanoseconds of(std::string_view source) const = 0;
 };
 
 // For a queue that the gateway empties itself (iceoryx). One thread.
@@ -72,6 +83,12 @@ class StallGuard {
     const MaxAge* max_age_;
     std::atomic<shm::Nanoseconds> late_until_{0};
   };
+
+  // A deadline that has passed.
+  static constexpr shm::Nanoseconds kLate = -1;
+  // Between two ticks, however short a T is: more often would cost more than it is worth. A T
+  // below four times this may call a fresh sample late.
+  static constexpr shm::Nanoseconds kShortestPeriod = 1'000'000;
 
   // Nothing is in time before the first tick.
   StallGuard() = default;

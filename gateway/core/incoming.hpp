@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <string_view>
 
 #include <arbiter/node.hpp>
 #include <arbiter/output_port.hpp>
@@ -60,8 +61,8 @@ class Incoming {
   [[nodiscard]] const MaxAge& max_age() const noexcept { return max_age_; }
 
   [[nodiscard]] const Entry& entry() const noexcept { return entry_; }
-  // Tells the daemon how things stand, if it has changed. The gateway's loop.
-  void describe();
+  // Tells the daemon how things stand. The gateway's loop.
+  void describe(std::string_view text);
 
  private:
   Fate pass_to(OutputPort<void>& port, const ForeignSample& sample, Time deadline) noexcept;

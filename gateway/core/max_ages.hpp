@@ -6,7 +6,9 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "gateway/core/freshness.hpp"
@@ -20,7 +22,7 @@ namespace arbiter::gateway {
 [[nodiscard]] shm::Nanoseconds max_age_of(shm::Nanoseconds timeout, shm::Nanoseconds of_model,
                                           const std::optional<shm::Nanoseconds>& max_age);
 
-class MaxAges {
+class MaxAges final : public AgesOfSources {
  public:
   // `instance`: as NodeOptions has it. Joins it as a watcher once there is a daemon that lets it;
   // until then each age is as without a model.
@@ -30,6 +32,7 @@ class MaxAges {
   void add(const Entry& entry, MaxAge& age);
   // Reads memory, and the daemon's news; does not wait. Call it ten times a second.
   void update();
+  [[nodiscard]] shm::Nanoseconds of(std::string_view source) const override;
   // What keeps it from knowing T, such as a policy that does not allow this user to `observe`;
   // empty: nothing.
   [[nodiscard]] const std::string& obstacle() const noexcept { return obstacle_; }
@@ -41,7 +44,8 @@ class MaxAges {
   };
 
   void join();
-  void set(const Watched& watched) const;
+  [[nodiscard]] shm::Nanoseconds age_of(std::string_view source,
+                                        const std::optional<shm::Nanoseconds>& max_age) const;
 
   const std::string instance_name_;
   std::unique_ptr<watch::Instance> instance_;

@@ -6,11 +6,13 @@
 
 #include <atomic>
 #include <optional>
+#include <string_view>
 
 #include <arbiter/input_port.hpp>
 #include <arbiter/node.hpp>
 
 #include "gateway/core/account.hpp"
+#include "gateway/core/freshness.hpp"
 #include "gateway/mapping/mapping.hpp"
 #include "shm/activity.hpp"
 
@@ -43,14 +45,18 @@ class Outgoing {
  public:
   // While a port is idle: one lost datagram must not leave a robot driving.
   static constexpr shm::Nanoseconds kIdlePeriod = 100'000'000;
+  // Samples that run() sends before others have their turn.
+  static constexpr std::uint32_t kMostAtOnce = 64;
 
   // Opens the port. Keeps references. Throws arbiter::Error.
-  Outgoing(Node& node, const Entry& entry, Sender& sender, Account& account);
+  Outgoing(Node& node, const Entry& entry, Sender& sender, Account& account,
+           const AgesOfSources& ages);
 
   // Readable when run() has something to do.
   [[nodiscard]] int descriptor() { return port_.fd(); }
-  // Sends all that waits, and the idle sample where it is due: when the port has become idle, at
-  // the start, after peer_matched(), and every kIdlePeriod while it is idle.
+  // Sends what waits, unless it has waited for longer than its source's T: a gateway that was
+  // stopped must not bring old commands to life. And the idle sample where it is due: when the port
+  // has become idle, at the start, after peer_matched(), and every kIdlePeriod while it is idle.
   void run(shm::Nanoseconds now);
   // When run() is to be called again even if the descriptor is not readable; shm::kForever: never.
   [[nodiscard]] shm::Nanoseconds next() const noexcept;
@@ -58,8 +64,8 @@ class Outgoing {
   void peer_matched() noexcept { matched_.store(true, std::memory_order_relaxed); }
 
   [[nodiscard]] const Entry& entry() const noexcept { return entry_; }
-  // Tells the daemon how things stand, if it has changed.
-  void describe();
+  // Tells the daemon how things stand.
+  void describe(std::string_view text) { port_.describe(text); }
 
  private:
   void send(Bytes sample) noexcept;
@@ -67,8 +73,10 @@ class Outgoing {
   const Entry& entry_;
   Sender& sender_;
   Account& account_;
+  const AgesOfSources& ages_;
   InputPort<void> port_;
   std::atomic<bool> matched_{false};
+  bool has_more_ = false;                       // run() has left samples to the next one
   std::optional<shm::Nanoseconds> idle_again_;  // when; empty: the port was not idle
 };
 

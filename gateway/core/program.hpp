@@ -1,8 +1,9 @@
 // What all gateway programs have in common: options, the mapping, signals, messages, exit codes.
 //
 //   int main(int argc, char** argv) {
-//     return gateway::run_program(argc, argv, {gateway::Kind::kDds, "arbiter-gateway-dds", "…"},
-//                                 [](const gateway::Settings& settings) { … });
+//     using namespace arbiter::gateway;
+//     return run_program(argc, argv, {Kind::kDds, "arbiter-gateway-dds", "…", "…"},
+//                        [](const Settings& settings, const Bell& bell) { … });
 //   }
 //
 // Exit codes: 0 ended by SIGINT or SIGTERM, or the mapping is fine (--check); 1 what went wrong has
@@ -12,7 +13,6 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "gateway/core/bridge.hpp"
@@ -26,6 +26,9 @@ struct ProgramKind {
   std::string name;   // "arbiter-gateway-dds"
   std::string about;  // a line of --help
   std::string more;   // the end of --help: an example, what the middleware needs
+  // Whether what talks to the middleware is a process of its own, which a supervisor starts again
+  // when it ends or hangs (supervisor.hpp): for a library that ends its process.
+  bool is_supervised = false;
 };
 
 // What the command line and the mappings say.
@@ -34,15 +37,11 @@ struct Settings {
   BridgeOptions bridge;
 };
 
-using MakeMiddleware = std::function<std::unique_ptr<Middleware>(
-    const Settings& settings, const std::function<void()>& wake)>;
+// The bell rings the loop; it outlives the middleware.
+using MakeMiddleware =
+    std::function<std::unique_ptr<Middleware>(const Settings& settings, const Bell& bell)>;
 
-// `run_with` has the default; a program that needs more around the loop gives its own.
+// The whole of main().
 int run_program(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& make);
-
-enum class Level { kError, kWarning, kInfo };
-// A line on standard error, for people or for the journal (which is told the level); control
-// characters are escaped. Any thread.
-void say(Level level, std::string_view text);
 
 }  // namespace arbiter::gateway

@@ -96,6 +96,11 @@ struct IceoryxTopic {
   // Samples that a late subscriber is given. `out` offers, `in` asks for them.
   std::uint32_t history = 0;
   std::uint32_t queue = 8;  // of `in`: samples that may wait for the gateway
+
+  // Where the payload stands in Arbiter's samples: behind the user header, aligned.
+  [[nodiscard]] std::size_t padded_header() const {
+    return (std::size_t{user_header} + alignment - 1) / alignment * alignment;
+  }
 };
 
 // What is sent while an input port is idle.
