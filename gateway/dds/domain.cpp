@@ -60,12 +60,11 @@ dds_domainid_t domain_of(const Gateway& gateway) {
 
 std::string configuration_of(const Gateway& gateway) {
   std::string result;
-  if (!gateway.configuration.empty()) {
-    result = "file://" + gateway.configuration;
-  } else if (const char* const uri = std::getenv("CYCLONEDDS_URI"); uri != nullptr) {
-    result = uri;
+  if (!gateway.configuration.empty()) result = "file://" + gateway.configuration;
+  if (gateway.interfaces.empty() && gateway.peers.empty()) {
+    const char* const uri = std::getenv("CYCLONEDDS_URI");
+    return result.empty() && uri != nullptr ? uri : result;
   }
-  if (gateway.interfaces.empty() && gateway.peers.empty()) return result;
   bool only_loopback = !gateway.interfaces.empty();
   std::string interfaces;
   for (const std::string& interface : gateway.interfaces) {

@@ -24,9 +24,11 @@ TEST(DdsConfiguration, AFileOfTheMappingTakesThePlaceOfTheEnvironments) {
   EXPECT_EQ(configuration_of(gateway), "file:///etc/arbiter/dds.xml");
 }
 
-TEST(DdsConfiguration, InterfacesAndPeersStandBehindItSoThatTheyCount) {
-  const ScopedVariable uri("CYCLONEDDS_URI", "file:///etc/robot.xml");
+// Cyclone would listen on those of the environment, too.
+TEST(DdsConfiguration, InterfacesAndPeersTakeThePlaceOfTheEnvironmentsAndStandBehindTheFiles) {
+  const ScopedVariable uri("CYCLONEDDS_URI", "file:///etc/other.xml");
   Gateway gateway;
+  gateway.configuration = "/etc/robot.xml";
   gateway.interfaces = {"eth0", "10.0.0.2"};
   gateway.peers = {"10.0.0.7"};
   EXPECT_EQ(configuration_of(gateway),
