@@ -42,17 +42,19 @@ class Guarded : public testing::Test {
 
   // Ticks in time until `until`.
   void run_until(shm::Nanoseconds until) {
-    while (now_ + period_ <= until) {
-      now_ += period_;
-      period_ = guard_.tick(now_);
-    }
+    while (ticked_ + period_ <= until) tick(ticked_ + period_);
     now_ = until;
   }
-  void start() { period_ = guard_.tick(now_); }
+  void tick(shm::Nanoseconds at) {
+    now_ = ticked_ = at;
+    period_ = guard_.tick(at);
+  }
+  void start() { tick(now_); }
   [[nodiscard]] bool is_late() const { return guard_.deadline(*watch_, now_) < now_; }
 
   static constexpr shm::Nanoseconds kT = 200 * kMs;
   shm::Nanoseconds now_ = 1'000'000 * kMs;
+  shm::Nanoseconds ticked_ = 0;
   shm::Nanoseconds period_ = 0;
   MaxAge age_;
   StallGuard guard_;
@@ -90,8 +92,7 @@ TEST_F(Guarded, ACallbackThatRunsBeforeTheTickSeesTheStallItself) {
 TEST_F(Guarded, AfterAStallEverythingIsLateUntilItHasRunInTimeForT) {
   start();
   run_until(now_ + 3 * kT);
-  now_ += 5 * kT;
-  period_ = guard_.tick(now_);
+  tick(now_ + 5 * kT);
   const shm::Nanoseconds resumed = now_;
   EXPECT_TRUE(is_late());
   run_until(resumed + kT - 1);
@@ -103,10 +104,8 @@ TEST_F(Guarded, AfterAStallEverythingIsLateUntilItHasRunInTimeForT) {
 TEST_F(Guarded, AStallBehindAStallExtendsIt) {
   start();
   run_until(now_ + 3 * kT);
-  now_ += kT;
-  guard_.tick(now_);
-  now_ += kT;
-  guard_.tick(now_);
+  tick(now_ + kT);
+  tick(now_ + kT);
   const shm::Nanoseconds resumed = now_;
   run_until(resumed + kT - 1);
   EXPECT_TRUE(is_late());
@@ -115,9 +114,9 @@ TEST_F(Guarded, AStallBehindAStallExtendsIt) {
 TEST_F(Guarded, ADelayOfHalfOfTIsForgiven) {
   start();
   run_until(now_ + 3 * kT);
-  now_ += period_ + kT / 2;
+  now_ = ticked_ + period_ + kT / 2;
   EXPECT_FALSE(is_late());
-  guard_.tick(now_);
+  tick(now_);
   EXPECT_FALSE(is_late());
 }
 
@@ -126,12 +125,9 @@ TEST_F(Guarded, AStallIsOneForShortTAndNotForLongT) {
   long_age.set(100 * kT);
   const StallGuard::Watch& other = guard_.add(long_age);
   start();
-  now_ += period_;
-  guard_.tick(now_);
   run_until(now_ + 200 * kT);
   ASSERT_GT(guard_.deadline(other, now_), now_);
-  now_ += 3 * kT;
-  guard_.tick(now_);
+  tick(now_ + 3 * kT);
   EXPECT_TRUE(is_late());
   EXPECT_GT(guard_.deadline(other, now_), now_);
 }
@@ -139,8 +135,8 @@ TEST_F(Guarded, AStallIsOneForShortTAndNotForLongT) {
 TEST_F(Guarded, AShorterTTicksFasterFromTheNextTickOn) {
   start();
   age_.set(40 * kMs);
-  now_ += period_;
-  EXPECT_EQ(guard_.tick(now_), 10 * kMs);
+  tick(now_ + period_);
+  EXPECT_EQ(period_, 10 * kMs);
 }
 
 TEST(MaxAgeOf, IsTOrLessAndForEverHasABoundOfItsOwn) {

@@ -17,7 +17,7 @@ using Fate = Incoming::Fate;
 constexpr Time kPassed{};
 constexpr Time kNever = Time::max();
 
-constexpr const char* kModel =
+constexpr const char* kArrivals =
     "<behaviors timeout='10s'>"
     "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config></behavior>"
     "<behavior name='Stop'><config at='/Brake:i'>/pressed:o</config>"
@@ -35,7 +35,7 @@ class Arriving : public testing::Test {
     return daemon_.source(source)["active"];
   }
 
-  test::Daemon daemon_{kModel};
+  test::Daemon daemon_{kArrivals};
   Read read_;
   const Entry& entry_;
   Account account_;
@@ -173,6 +173,7 @@ TEST(Choose, ComparesEachKindOfNumber) {
   EXPECT_EQ(side(Field::kF32, bytes_of<float>(0.5F), 0.25L), Side::kYes);
   EXPECT_EQ(side(Field::kF64, bytes_of<double>(-INFINITY), 0), Side::kNo);
   EXPECT_EQ(side(Field::kF64, bytes_of<double>(1e300), 1e300L), Side::kNo);
+  EXPECT_EQ(side(Field::kF32, bytes_of<float>(0.1F), 0.1L), Side::kNo);
 }
 
 TEST(Choose, NothingIsChosenByNaNOrAShortSample) {

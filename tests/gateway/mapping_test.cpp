@@ -135,14 +135,14 @@ TEST(Mapping, AllProblemsOfAFileAreReportedInOneGo) {
       "  <inn/>\n"
       "  text\n"
       "</gateway>\n");
-  EXPECT_THAT(
-      read.findings(),
-      ElementsAre("1:40 error unknown-attribute", "1:30 error invalid-value",
-                  "8:3 error stray-text", "2:49 error unknown-attribute",
-                  "2:3 error missing-attribute", "3:14 error invalid-topic",
-                  "3:58 error invalid-name", "4:24 error invalid-type", "4:52 error invalid-value",
-                  "5:13 error invalid-topic", "5:75 error invalid-value", "6:40 error invalid-type",
-                  "6:53 error idle-size", "7:3 error unknown-element"));
+  EXPECT_THAT(read.findings(),
+              ElementsAre("1:35 error unknown-attribute", "1:29 error invalid-value",
+                          "8:3 error stray-text", "2:49 error unknown-attribute",
+                          "2:3 error missing-attribute", "3:14 error invalid-topic",
+                          "3:57 error invalid-port-name", "4:24 error invalid-type",
+                          "4:53 error invalid-value", "5:14 error invalid-topic",
+                          "5:73 error invalid-value", "6:37 error invalid-type",
+                          "6:50 error idle-size", "7:3 error unknown-element"));
   EXPECT_THAT(read.message(3), HasSubstr("did you mean port?"));
   EXPECT_THAT(read.message(10), HasSubstr("did you mean \"reliable\"?"));
 }

@@ -16,7 +16,7 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-constexpr const char* kModel =
+constexpr const char* kDepartures =
     "<behaviors timeout='10s'>"
     "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config></behavior>"
     "</behaviors>";
@@ -36,7 +36,7 @@ class Leaving : public testing::Test {
     port.publish(Bytes(reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()));
   }
 
-  test::Daemon daemon_{kModel};
+  test::Daemon daemon_{kDepartures};
   Read read_;
   const Entry& entry_;
   Account account_;
