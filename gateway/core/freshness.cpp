@@ -13,13 +13,15 @@ StallGuard::Watch& StallGuard::add(const MaxAge& max_age) {
 shm::Nanoseconds StallGuard::tick(shm::Nanoseconds now) {
   const shm::Nanoseconds last = last_tick_.load(std::memory_order_relaxed);
   const shm::Nanoseconds expected = period_.load(std::memory_order_relaxed);
+  // Before the first tick nothing is in time, and nothing can have waited since before that.
+  const bool is_first = last == -shm::kMaxTime;
   shm::Nanoseconds shortest = shm::kDefaultTimeout;
   {
     const std::lock_guard lock(mutex_);
     for (const auto& watch : watches_) {
       const shm::Nanoseconds max_age = watch->max_age_->get();
       shortest = std::min(shortest, max_age);
-      if (now - last <= expected + max_age / 2) continue;
+      if (is_first || now - last <= expected + max_age / 2) continue;
       // Relaxed is enough: the release below makes it seen by whoever sees this tick.
       watch->late_until_.store(now + max_age, std::memory_order_relaxed);
     }

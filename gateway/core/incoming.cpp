@@ -16,6 +16,8 @@ std::optional<Side> compare(const Choice& choice, const std::byte* bytes) noexce
   std::memcpy(&number, bytes, sizeof number);
   if constexpr (std::is_floating_point_v<Number>) {
     if (std::isnan(number)) return {};
+    // The threshold as the sample would have it: a float of 0.1 is not above 0.1.
+    return number > static_cast<Number>(choice.threshold) ? Side::kYes : Side::kNo;
   }
   return static_cast<long double>(number) > choice.threshold ? Side::kYes : Side::kNo;
 }

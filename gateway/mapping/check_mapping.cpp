@@ -50,8 +50,6 @@ bool are_one_topic(const Placed& one, const Placed& other) {
   return false;
 }
 
-std::string topic_key(const Entry& entry) { return entry.outside(); }
-
 // Whether some activity of sources makes the expression true only with this source active: it
 // stands somewhere where being active can help. `positive`: what surrounds it is not negated.
 class Polarity {
@@ -129,18 +127,23 @@ class MappingCheck {
   }
 
   void check_topics() {
-    std::map<std::string, std::vector<Placed>> by_topic;
-    for (const Placed& each : entries_) by_topic[topic_key(*each.entry)].push_back(each);
-    for (const Placed& each : entries_) {
-      if (each.entry->is_in()) continue;
-      for (const Placed& other : by_topic[topic_key(*each.entry)]) {
-        if (other.entry == each.entry || !are_one_topic(each, other)) continue;
-        if (other.entry->is_in()) {
-          report_circle(*each.entry, *other.entry);
-        } else if (other.entry < each.entry) {  // each pair once
-          report_two_outs(*each.entry, *other.entry);
-        }
+    std::map<std::string, std::vector<Placed>> by_topic;  // in document order
+    for (const Placed& each : entries_) by_topic[each.entry->outside()].push_back(each);
+    for (const auto& [topic, all] : by_topic) {
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        for (std::size_t j = 0; j < i; ++j) check_pair(all[j], all[i]);
       }
+    }
+  }
+
+  void check_pair(const Placed& first, const Placed& second) {
+    const Entry& one = *first.entry;
+    const Entry& other = *second.entry;
+    if ((one.is_in() && other.is_in()) || !are_one_topic(first, second)) return;
+    if (!one.is_in() && !other.is_in()) {
+      report_two_outs(one, other);
+    } else {
+      report_circle(one.is_in() ? other : one, one.is_in() ? one : other);
     }
   }
 
@@ -155,9 +158,7 @@ class MappingCheck {
         {.ports = {out.port->name}});
   }
 
-  void report_two_outs(const Entry& one, const Entry& other) {
-    const Entry& first = one.where.line <= other.where.line ? one : other;
-    const Entry& second = &first == &one ? other : one;
+  void report_two_outs(const Entry& first, const Entry& second) {
     diagnostics_.warning("two-outs", second.where,
                          second.outside() + " has an entry already, at " +
                              rules::describe(first.where) +
