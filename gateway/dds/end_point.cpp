@@ -12,7 +12,7 @@
 namespace arbiter::gateway::dds {
 namespace {
 
-constexpr std::size_t kMaxListed = 3;  // peers that a description names
+constexpr std::size_t kMaxListed = 4;  // parts of a description
 
 void set_type_hash(dds_qos_t* qos, const std::string& hash) {
   const std::string data = "typehash=" + hash + ";";
@@ -123,6 +123,13 @@ void EndPoint::say_who_does_not_match(const PeerMap& peers) {
       obstacles.push_back(sentence);
       warn(guid, sentence);
     }
+  }
+  // An obstacle takes the place of the number of peers.
+  const std::uint32_t others = obstacles.empty() ? 0 : matched();
+  if (others > 0) {
+    obstacles.insert(obstacles.begin(), std::to_string(others) + " " +
+                                            (which_ == End::kReader ? "publisher" : "subscriber") +
+                                            (others == 1 ? "" : "s") + " matched");
   }
   account_.set_obstacle(joined(obstacles));
   std::erase_if(warned_, [&](const auto& one) { return !peers.contains(one.first); });

@@ -184,8 +184,8 @@ std::vector<std::string> mismatches(const OurEnd& ours, const Peer& peer) {
     pair.add_plain("type: it has " + peer.type + ", this entry has " + ours.topic.type);
   }
   if (peer.keyed != ours.keyed) {
-    pair.add_plain(peer.keyed ? "key: its type has a key, this entry's has none; write keyed=\"yes\""
-                              : "key: its type has no key, this entry's has one; write keyed=\"no\"");
+    pair.add_plain(peer.keyed ? "key: its type has a key, this entry's has none; write keyed=\"true\""
+                              : "key: its type has no key, this entry's has one; write keyed=\"false\"");
   }
   compare_attributes(pair);
   compare_others(pair);

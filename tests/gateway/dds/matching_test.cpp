@@ -72,9 +72,9 @@ TEST_P(DdsMatching, AKeyThatTheMappingDeniesIsNamed) {
   const Daemon daemon(base_model("1s"));
   const DdsGateway gateway(
       daemon, domain,
-      R"(<in topic="robots" type="strangers::Robot" port="/Fleet/robot:o" keyed="no"/>)");
+      R"(<in topic="robots" type="strangers::Robot" port="/Fleet/robot:o" keyed="false"/>)");
   const Stranger robot(GetParam(), domain, {"pub", "robot", "robots"});
-  gateway.see("key: its type has a key, this entry's has none; write keyed=\"yes\"");
+  gateway.see("key: its type has a key, this entry's has none; write keyed=\"true\"");
 }
 
 TEST_P(DdsMatching, PartitionsKeepTopicsApartAndJoinThem) {

@@ -94,7 +94,7 @@ TEST(Mismatch, TypesAndKeysAreCompared) {
   writer.type = "U";
   writer.keyed = true;
   EXPECT_THAT(mismatches({End::kReader, topic(), false}, writer),
-              ElementsAre("type: it has U, this entry has T", HasSubstr("write keyed=\"yes\"")));
+              ElementsAre("type: it has U, this entry has T", HasSubstr("write keyed=\"true\"")));
 }
 
 TEST(Partition, NamesPatternsAndTheDefaultOne) {

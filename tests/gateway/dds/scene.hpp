@@ -157,6 +157,29 @@ class DdsGateway {
   ChildProcess process_;
 };
 
+// Publishes that until it has come through. A volatile reader of DDS begins wherever it has learnt
+// of its writer, so of what is published before that any part may be missing.
+inline void publish_until_heard(const Stranger& from, Stranger& to, const std::string& numbers) {
+  const std::string wanted = "sample " + numbers;
+  for (std::optional<std::string> line; line != wanted;) {
+    if (!line) from.publish(numbers);
+    line = to.line_within(50);
+  }
+  while (to.line_within(50) == wanted) {  // those that were still on their way
+  }
+}
+
+// Returns once the status says that of what stands behind the port.
+inline void await_described(Daemon& daemon, const std::string& port, const std::string& text) {
+  for (;;) {
+    for (const auto& end : {daemon.source(port), daemon.input(port)}) {
+      if (end.is_null() || !end.contains("described") || end["described"].is_null()) continue;
+      if (end["described"].get<std::string>().find(text) != std::string::npos) return;
+    }
+    ::poll(nullptr, 0, 1);
+  }
+}
+
 // Navigation, and teleoperation that overrides it.
 inline const std::string kBaseModel = R"(<behaviors timeout="TIMEOUT">
   <behavior name="Navigate"><config at="/Base/cmd_vel:i">/Nav/cmd_vel:o</config></behavior>

@@ -71,6 +71,7 @@ inline bool read_numbers(double& first, double& second) {
 
 inline void write_numbers(double first, double second) {
   std::ostringstream line;
+  line.precision(15);
   line << "sample " << first << " " << second;
   write_line(line.str());
 }

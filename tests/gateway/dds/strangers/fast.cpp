@@ -166,7 +166,7 @@ void run(const CommandLine& line) {
     while (strangers::read_numbers(first, second)) {
       Sample sample;
       Type<Sample>::fill(sample, first, second);
-      writer->write(&sample);
+      if (!writer->write(&sample)) strangers::write_line("not written");
     }
     writer->wait_for_acknowledgments(Duration(5, 0));
     writer->set_listener(nullptr);
