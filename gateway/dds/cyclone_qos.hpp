@@ -1,11 +1,11 @@
 // QoS as Cyclone has it: of our ends, from the mapping; and of others' ends, as they announce it.
 #pragma once
 
+#include <dds/dds.h>
+
 #include <cstdint>
 #include <string>
 #include <vector>
-
-#include <dds/dds.h>
 
 #include "gateway/dds/entity.hpp"
 #include "gateway/mapping/mapping.hpp"

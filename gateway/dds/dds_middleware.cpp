@@ -12,8 +12,7 @@ constexpr shm::Nanoseconds kOpenAgain = 1'000'000'000;
 
 }  // namespace
 
-DdsMiddleware::DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& bell)
-    : bell_(bell) {
+DdsMiddleware::DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& bell) : bell_(bell) {
   hear_cyclone();
   for (const Mapping& mapping : mappings) {
     for (const Gateway& gateway : mapping.gateways) {

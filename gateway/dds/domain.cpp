@@ -1,12 +1,12 @@
 #include "gateway/dds/domain.hpp"
 
+#include <dds/ddsrt/log.h>
+
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
 #include <string_view>
 #include <utility>
-
-#include <dds/ddsrt/log.h>
 
 #include "gateway/core/say.hpp"
 #include "gateway/dds/quota.hpp"
@@ -22,12 +22,23 @@ std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
     switch (c) {
-      case '&': result += "&amp;"; break;
-      case '<': result += "&lt;"; break;
-      case '>': result += "&gt;"; break;
-      case '"': result += "&quot;"; break;
-      case '$': result += "&#36;"; break;  // Cyclone puts variables of the environment there
-      default: result += c;
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      case '$':
+        result += "&#36;";
+        break;  // Cyclone puts variables of the environment there
+      default:
+        result += c;
     }
   }
   return result;
@@ -52,8 +63,8 @@ dds_domainid_t domain_of(const Gateway& gateway) {
   const char* const end = text + std::strlen(text);
   const auto [rest, error] = std::from_chars(text, end, domain);
   if (error != std::errc() || rest != end || domain > kMaxDomain) {
-    throw DdsError("ROS_DOMAIN_ID is \"" + std::string(text) + "\": it must be a number from 0 to " +
-                   std::to_string(kMaxDomain));
+    throw DdsError("ROS_DOMAIN_ID is \"" + std::string(text) +
+                   "\": it must be a number from 0 to " + std::to_string(kMaxDomain));
   }
   return domain;
 }

@@ -1,10 +1,10 @@
 #include "gateway/dds/end_point.hpp"
 
+#include <dds/ddsi/ddsi_sertype.h>
+
 #include <algorithm>
 #include <iterator>
 #include <utility>
-
-#include <dds/ddsi/ddsi_sertype.h>
 
 #include "gateway/core/say.hpp"
 #include "gateway/dds/opaque_type.hpp"
@@ -95,8 +95,8 @@ void EndPoint::adopt_type_hash(const PeerMap& peers) {
     set_type_hash(qos.get(), type_hash_);
     const dds_return_t set = dds_set_qos(end_.get(), qos.get());
     if (set < 0) {
-      say(Level::kWarning, account_.outside() + ": ROS 2's type hash cannot be set: " +
-                               dds_strretcode(-set));
+      say(Level::kWarning,
+          account_.outside() + ": ROS 2's type hash cannot be set: " + dds_strretcode(-set));
     }
     return;
   }
@@ -109,9 +109,9 @@ void EndPoint::say_who_does_not_match(const PeerMap& peers) {
     if (peer.end != which_) {
       const std::vector<std::string> reasons = mismatches({which_, topic_, keyed_}, peer);
       if (reasons.empty()) continue;
-      const std::string sentence = "the " +
-                                   std::string(which_ == End::kReader ? "publisher" : "subscriber") +
-                                   " of " + peer.owner + " does not match: " + joined(reasons);
+      const std::string sentence =
+          "the " + std::string(which_ == End::kReader ? "publisher" : "subscriber") + " of " +
+          peer.owner + " does not match: " + joined(reasons);
       obstacles.push_back(sentence);
       // Whoever is in another partition is probably meant to be.
       if (share_partition(topic_.qos.partitions, peer.qos.partitions)) warn(guid, sentence);

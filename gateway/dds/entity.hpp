@@ -1,12 +1,12 @@
 // Cyclone's handles, deleted with their owner; and its errors as exceptions.
 #pragma once
 
+#include <dds/dds.h>
+
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
-
-#include <dds/dds.h>
 
 namespace arbiter::gateway::dds {
 

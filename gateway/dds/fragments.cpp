@@ -1,9 +1,9 @@
 #include "gateway/dds/fragments.hpp"
 
-#include <cstring>
-
 #include <dds/dds.h>
 #include <dds/ddsi/q_radmin.h>
+
+#include <cstring>
 
 namespace arbiter::gateway::dds {
 

@@ -13,8 +13,7 @@ int main(int argc, char** argv) {
       "Example:\n"
       "  arbiter-gateway-dds /etc/arbiter/ros2.xml"};
   return gateway::run_program(
-      argc, argv, kind,
-      [](const gateway::Settings& settings, const gateway::Bell& bell) {
+      argc, argv, kind, [](const gateway::Settings& settings, const gateway::Bell& bell) {
         return std::make_unique<gateway::dds::DdsMiddleware>(settings.mappings, bell);
       });
 }

@@ -43,7 +43,7 @@ bool fits_either(const std::string& a, const std::string& b) {
 template <std::size_t N>
 const char* word(const std::array<const char*, N>& words, int kind) {
   return kind >= 0 && static_cast<std::size_t>(kind) < N ? words[static_cast<std::size_t>(kind)]
-                                                          : "something unknown";
+                                                         : "something unknown";
 }
 
 constexpr std::array kReliabilities = {"best_effort", "reliable"};
@@ -184,8 +184,9 @@ std::vector<std::string> mismatches(const OurEnd& ours, const Peer& peer) {
     pair.add_plain("type: it has " + peer.type + ", this entry has " + ours.topic.type);
   }
   if (peer.keyed != ours.keyed) {
-    pair.add_plain(peer.keyed ? "key: its type has a key, this entry's has none; write keyed=\"true\""
-                              : "key: its type has no key, this entry's has one; write keyed=\"false\"");
+    pair.add_plain(peer.keyed
+                       ? "key: its type has a key, this entry's has none; write keyed=\"true\""
+                       : "key: its type has no key, this entry's has one; write keyed=\"false\"");
   }
   compare_attributes(pair);
   compare_others(pair);

@@ -1,13 +1,13 @@
 #include "gateway/dds/opaque_type.hpp"
 
+#include <dds/ddsi/ddsi_sertype.h>
+#include <dds/ddsi/q_radmin.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <memory>
 #include <new>
-
-#include <dds/ddsi/ddsi_sertype.h>
-#include <dds/ddsi/q_radmin.h>
 
 #include "gateway/dds/fragments.hpp"
 
@@ -43,8 +43,7 @@ ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind,
 
 // From a writer in this process whose topic has this name and another type.
 ddsi_serdata* from_pieces(const ddsi_sertype* type, ddsi_serdata_kind kind,
-                          ddsrt_msg_iovlen_t pieces, const ddsrt_iovec_t* piece,
-                          std::size_t size) {
+                          ddsrt_msg_iovlen_t pieces, const ddsrt_iovec_t* piece, std::size_t size) {
   Payload* const payload = new_payload(type, kind, padded(size));
   if (payload == nullptr) return nullptr;
   std::size_t at = 0;
@@ -160,8 +159,8 @@ void free_type(ddsi_sertype* type) {
   delete type;
 }
 void zero_samples(const ddsi_sertype* /*type*/, void* /*samples*/, std::size_t /*count*/) {}
-void resize_samples(void** /*to*/, const ddsi_sertype* /*type*/, void* /*old*/,
-                    std::size_t /*had*/, std::size_t /*count*/) {}
+void resize_samples(void** /*to*/, const ddsi_sertype* /*type*/, void* /*old*/, std::size_t /*had*/,
+                    std::size_t /*count*/) {}
 void free_samples(const ddsi_sertype* /*type*/, void** /*samples*/, std::size_t /*count*/,
                   dds_free_op_t /*how*/) {}
 // Cyclone has compared the names and the kinds.

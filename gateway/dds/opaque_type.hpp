@@ -6,10 +6,11 @@
 // keys together (docs/dds.md).
 #pragma once
 
+#include <dds/dds.h>
+
 #include <string>
 
 #include <arbiter/bytes.hpp>
-#include <dds/dds.h>
 
 #include "gateway/dds/payload.hpp"
 

@@ -15,10 +15,8 @@ Entity OutTopic::make(dds_entity_t participant, dds_entity_t topic, const ddsi_s
   type_ = type;
   const Listener listener(dds_create_listener(this));
   dds_lset_publication_matched(
-      listener.get(),
-      [](dds_entity_t /*writer*/, const dds_publication_matched_status_t status, void* self) {
-        static_cast<OutTopic*>(self)->on_matched(status);
-      });
+      listener.get(), [](dds_entity_t /*writer*/, const dds_publication_matched_status_t status,
+                         void* self) { static_cast<OutTopic*>(self)->on_matched(status); });
   return {dds_create_writer(participant, topic, qos, listener.get()),
           "a writer of " + this->topic().name};
 }

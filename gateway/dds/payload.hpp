@@ -12,13 +12,13 @@
 // Cyclone has it.
 #pragma once
 
+#include <dds/dds.h>
+#include <dds/ddsi/ddsi_serdata.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <mutex>
-
-#include <dds/dds.h>
-#include <dds/ddsi/ddsi_serdata.h>
 
 struct nn_rdata;
 
@@ -27,10 +27,10 @@ namespace arbiter::gateway::dds {
 inline constexpr std::size_t kEncapsulationBytes = 4;
 
 struct Payload {
-  ddsi_serdata cyclone;       // first: Cyclone knows a payload by this
-  std::uint32_t size = 0;     // with the encapsulation header
-  std::uint8_t shelf = 0;     // of the pool
-  Payload* next = nullptr;    // in the pool
+  ddsi_serdata cyclone;     // first: Cyclone knows a payload by this
+  std::uint32_t size = 0;   // with the encapsulation header
+  std::uint8_t shelf = 0;   // of the pool
+  Payload* next = nullptr;  // in the pool
   // Of what arrives: valid while Cyclone delivers it. Null: the bytes stand behind this.
   const nn_rdata* fragments = nullptr;
 

@@ -94,8 +94,7 @@ bool Peers::update(const Entity& reader, End end) {
   for (;;) {
     std::array<void*, kBatch> samples{};
     std::array<dds_sample_info_t, kBatch> infos{};
-    const dds_return_t taken =
-        dds_take(reader.get(), samples.data(), infos.data(), kBatch, kBatch);
+    const dds_return_t taken = dds_take(reader.get(), samples.data(), infos.data(), kBatch, kBatch);
     if (taken <= 0) return changed;
     for (std::size_t i = 0; i < static_cast<std::size_t>(taken); ++i) {
       if (infos[i].instance_state != DDS_IST_ALIVE) {

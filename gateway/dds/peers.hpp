@@ -3,13 +3,13 @@
 // Thread safety: one thread, the gateway's loop. The bell rings on Cyclone's threads.
 #pragma once
 
+#include <dds/dds.h>
+
 #include <array>
 #include <cstdint>
 #include <map>
 #include <set>
 #include <string>
-
-#include <dds/dds.h>
 
 #include "gateway/core/bridge.hpp"
 #include "gateway/dds/cyclone_qos.hpp"
@@ -17,7 +17,8 @@
 
 namespace arbiter::gateway::dds {
 
-// A reader or writer of somebody else's. What it says of itself is a stranger's: it may be anything.
+// A reader or writer of somebody else's. What it says of itself is a stranger's: it may be
+// anything.
 struct Peer {
   End end = End::kReader;
   std::string topic;

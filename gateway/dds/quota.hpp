@@ -19,9 +19,7 @@ class Quota {
       : most_(most), period_(period) {}
 
   // Empty: not now. Otherwise how many were not let through since the last one that was.
-  [[nodiscard]] std::optional<std::uint64_t> take() noexcept {
-    return take(shm::monotonic_now());
-  }
+  [[nodiscard]] std::optional<std::uint64_t> take() noexcept { return take(shm::monotonic_now()); }
   [[nodiscard]] std::optional<std::uint64_t> take(shm::Nanoseconds now) noexcept {
     const std::lock_guard lock(mutex_);
     if (taken_ == 0 || now - begin_ >= period_) {

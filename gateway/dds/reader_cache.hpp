@@ -12,10 +12,10 @@
 // Thread safety: the taker is called by one thread at a time, which may be another each time.
 #pragma once
 
-#include <mutex>
-
 #include <dds/dds.h>
 #include <dds/ddsc/dds_rhc.h>
+
+#include <mutex>
 
 #include "gateway/dds/payload.hpp"
 

@@ -56,10 +56,9 @@ TEST_P(DdsChoosing, ABatteryChoosesBetweenTwoSources) {
   Daemon daemon(
       "<behaviors timeout=\"1000s\"><source port=\"/Battery/full:o\"/>"
       "<source port=\"/Battery/low:o\"/></behaviors>");
-  const DdsGateway gateway(
-      daemon, domain,
-      R"(<in topic="robots" type="strangers::Robot" above="/Battery/full:o" )"
-      R"(below="/Battery/low:o" threshold="0.2" field="f64" offset="8"/>)");
+  const DdsGateway gateway(daemon, domain,
+                           R"(<in topic="robots" type="strangers::Robot" above="/Battery/full:o" )"
+                           R"(below="/Battery/low:o" threshold="0.2" field="f64" offset="8"/>)");
   Stranger robot(GetParam(), domain, {"pub", "robot", "robots"});
   robot.await("matched 1");
   gateway.see("1 publisher matched");

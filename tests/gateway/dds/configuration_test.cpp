@@ -51,8 +51,7 @@ TEST(DdsConfiguration, NoNameBreaksOutOfItsPlace) {
   const ScopedVariable uri("CYCLONEDDS_URI", std::nullopt);
   Gateway gateway;
   gateway.interfaces = {R"(x"/><a b="${HOME})"};
-  EXPECT_NE(configuration_of(gateway).find(
-                R"(name="x&quot;/&gt;&lt;a b=&quot;&#36;{HOME}")"),
+  EXPECT_NE(configuration_of(gateway).find(R"(name="x&quot;/&gt;&lt;a b=&quot;&#36;{HOME}")"),
             std::string::npos);
 }
 

@@ -1,4 +1,8 @@
 // Samples in receive buffers, in all the shapes that somebody on the network can give them.
+#include "gateway/dds/fragments.hpp"
+
+#include <dds/dds.h>
+#include <dds/ddsi/q_radmin.h>
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -6,11 +10,7 @@
 #include <string>
 #include <vector>
 
-#include <dds/dds.h>
-#include <dds/ddsi/q_radmin.h>
-
 #include "gateway/dds/arrived_sample.hpp"
-#include "gateway/dds/fragments.hpp"
 
 namespace arbiter::gateway::dds {
 namespace {

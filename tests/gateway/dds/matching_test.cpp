@@ -49,11 +49,10 @@ TEST_P(DdsMatching, ALateJoinerThatAsksForWhatWasThereBeforeIsNamed) {
 TEST_P(DdsMatching, ADeadlineThatIsTooLongIsNamed) {
   const OwnDomain domain;
   const Daemon daemon(base_model("1s"));
-  const DdsGateway gateway(daemon, domain,
-                           R"(<in topic="/cmd_vel_nav" )" + kTwist +
-                               R"( port="/Nav/cmd_vel:o" deadline="100ms"/>)");
-  const Stranger navigation(GetParam(), domain,
-                            {"pub", "twist", "rt/cmd_vel_nav", "deadline=200"});
+  const DdsGateway gateway(
+      daemon, domain,
+      R"(<in topic="/cmd_vel_nav" )" + kTwist + R"( port="/Nav/cmd_vel:o" deadline="100ms"/>)");
+  const Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav", "deadline=200"});
   gateway.see("does not match: deadline: the writer offers 200 ms, this entry asks for 100 ms");
 }
 
@@ -90,7 +89,8 @@ TEST_P(DdsMatching, PartitionsKeepTopicsApartAndJoinThem) {
   gateway.see("1 publisher matched");
   navigation.publish("4 2");
   EXPECT_EQ(base.next_line(), "sample 4 2");
-  // Neither end warns of the other's partition, nor is the publisher a foreign one of the topic out.
+  // Neither end warns of the other's partition, nor is the publisher a foreign one of the topic
+  // out.
   EXPECT_THAT(gateway.log(), ::testing::Not(::testing::HasSubstr("past Arbiter")));
 }
 

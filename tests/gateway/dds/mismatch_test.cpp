@@ -1,8 +1,9 @@
 // Why ends do not match: each policy, from both sides.
+#include "gateway/dds/mismatch.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "gateway/dds/mismatch.hpp"
 #include "gateway/dds/quota.hpp"
 
 namespace arbiter::gateway::dds {
@@ -51,8 +52,9 @@ TEST(Mismatch, WhoAsksForMoreThanIsOfferedDoesNotMatchAndWhoAsksForLessDoes) {
 TEST(Mismatch, ADurabilityThatTheMappingDoesNotHaveHasNoRemedy) {
   Peer reader = peer(End::kReader);
   reader.qos.durability = 3;
-  EXPECT_THAT(mismatches({End::kWriter, topic(), false}, reader),
-              ElementsAre("durability: this entry offers volatile, the reader asks for persistent"));
+  EXPECT_THAT(
+      mismatches({End::kWriter, topic(), false}, reader),
+      ElementsAre("durability: this entry offers volatile, the reader asks for persistent"));
 }
 
 TEST(Mismatch, PoliciesThatNoAttributeChangesAreNamedToo) {

@@ -157,8 +157,8 @@ class DdsGateway {
   ChildProcess process_;
 };
 
-// Publishes that until it has come through. A volatile reader of DDS begins wherever it has learnt
-// of its writer, so of what is published before that any part may be missing.
+// Publishes that until it has come through. A volatile reader of DDS begins where it has learnt of
+// its writer: Cyclone drops what Fast DDS has sent by halves when its first heartbeat comes.
 inline void publish_until_heard(const Stranger& from, Stranger& to, const std::string& numbers) {
   const std::string wanted = "sample " + numbers;
   for (std::optional<std::string> line; line != wanted;) {

@@ -39,15 +39,24 @@ inline CommandLine parse(int argc, char** argv) {
     const auto is = option.find('=');
     const std::string name = option.substr(0, is);
     const std::string value = option.substr(is + 1);
-    if (name == "domain") result.domain = static_cast<unsigned>(std::stoul(value));
-    else if (name == "reliability") result.reliable = value == "reliable";
-    else if (name == "durability") result.transient_local = value == "transient_local";
-    else if (name == "depth") result.depth = std::stoi(value);
-    else if (name == "deadline") result.deadline_ms = std::stoi(value);
-    else if (name == "partition") result.partition = value;
-    else if (name == "name") result.type_name = value;
-    else if (name == "data") result.user_data = value;
-    else std::exit(2);
+    if (name == "domain")
+      result.domain = static_cast<unsigned>(std::stoul(value));
+    else if (name == "reliability")
+      result.reliable = value == "reliable";
+    else if (name == "durability")
+      result.transient_local = value == "transient_local";
+    else if (name == "depth")
+      result.depth = std::stoi(value);
+    else if (name == "deadline")
+      result.deadline_ms = std::stoi(value);
+    else if (name == "partition")
+      result.partition = value;
+    else if (name == "name")
+      result.type_name = value;
+    else if (name == "data")
+      result.user_data = value;
+    else
+      std::exit(2);
   }
   return result;
 }

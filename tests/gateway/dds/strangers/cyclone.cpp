@@ -1,10 +1,9 @@
 // A stranger by Cyclone DDS, with types made by idlc. Listens as CYCLONEDDS_URI says.
+#include <dds/dds.h>
 #include <unistd.h>
 
 #include <cstring>
 #include <vector>
-
-#include <dds/dds.h>
 
 #include "command_line.hpp"
 #include "strangers.h"
@@ -83,8 +82,8 @@ dds_qos_t* make_qos(const CommandLine& line) {
   dds_qos_t* const qos = dds_create_qos();
   dds_qset_reliability(qos, line.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
                        DDS_SECS(10));
-  dds_qset_durability(qos, line.transient_local ? DDS_DURABILITY_TRANSIENT_LOCAL
-                                                : DDS_DURABILITY_VOLATILE);
+  dds_qset_durability(
+      qos, line.transient_local ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, line.depth);
   dds_qset_durability_service(qos, 0, DDS_HISTORY_KEEP_LAST, line.depth, -1, -1, -1);
   if (line.deadline_ms > 0) dds_qset_deadline(qos, DDS_MSECS(line.deadline_ms));

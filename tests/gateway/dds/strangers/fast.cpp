@@ -1,4 +1,7 @@
 // A stranger by Fast DDS, with types made by fastddsgen. Uses the loopback interface alone.
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
+
 #include <memory>
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -11,8 +14,6 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/utils/IPLocator.h>
 
 #include "command_line.hpp"
 #include "strangersPubSubTypes.h"
@@ -118,14 +119,15 @@ DomainParticipantQos loopback() {
 template <class EndQos>
 void set(EndQos& qos, const CommandLine& line) {
   qos.reliability().kind = line.reliable ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
-  qos.durability().kind = line.transient_local ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
+  qos.durability().kind =
+      line.transient_local ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
   qos.history().kind = KEEP_LAST_HISTORY_QOS;
   qos.history().depth = line.depth;
   qos.endpoint().history_memory_policy =
       eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   if (line.deadline_ms > 0) {
-    qos.deadline().period =
-        Duration(line.deadline_ms / 1000, static_cast<std::uint32_t>(line.deadline_ms % 1000) * 1'000'000);
+    qos.deadline().period = Duration(
+        line.deadline_ms / 1000, static_cast<std::uint32_t>(line.deadline_ms % 1000) * 1'000'000);
   }
   if (!line.user_data.empty()) {
     qos.user_data().setValue({line.user_data.begin(), line.user_data.end()});
@@ -140,7 +142,8 @@ void run(const CommandLine& line) {
   if (!line.type_name.empty()) support->setName(line.type_name.c_str());
   TypeSupport type(support);
   type.register_type(participant);
-  Topic* const topic = participant->create_topic(line.topic, type.get_type_name(), TOPIC_QOS_DEFAULT);
+  Topic* const topic =
+      participant->create_topic(line.topic, type.get_type_name(), TOPIC_QOS_DEFAULT);
   double first = 0;
   double second = 0;
   if (!line.publishes) {
