@@ -24,9 +24,10 @@ std::string fitting(std::string_view text, std::size_t most) {
 Account::Account(std::string outside, std::string other)
     : outside_(std::move(outside)), other_(std::move(other)) {}
 
-void Account::set_peers(std::uint32_t peers) noexcept {
+void Account::set_peers(std::uint32_t peers, bool at_least) noexcept {
   const std::lock_guard lock(mutex_);
   peers_ = peers;
+  at_least_ = at_least;
 }
 
 void Account::set_obstacle(std::string_view text) {
@@ -46,7 +47,8 @@ std::string Account::state_of_topic() const {
   } else if (peers_ == 0) {
     text += ", no " + other_ + " matched";
   } else if (peers_ > 0) {
-    text += ", " + std::to_string(peers_) + " " + other_ + (peers_ == 1 ? "" : "s") + " matched";
+    text += (at_least_ ? ", at least " : ", ") + std::to_string(peers_) + " " + other_ +
+            (peers_ == 1 ? "" : "s") + " matched";
   }
   return text;
 }

@@ -47,7 +47,8 @@ class Account {
   Count idle;        // idle samples sent
 
   // How many at the other end are matched. Nothing is said of them where nobody has called this.
-  void set_peers(std::uint32_t peers) noexcept;
+  // `at_least`: there may be more.
+  void set_peers(std::uint32_t peers, bool at_least = false) noexcept;
   // What keeps the topic from working as a whole, such as "RouDi does not run"; empty: nothing.
   void set_obstacle(std::string_view text);
   // Why a sample was passed over, or an end refused, last: "QoS: the publisher is best effort, this
@@ -70,6 +71,7 @@ class Account {
   std::string obstacle_;
   std::string last_reason_;
   std::int64_t peers_ = -1;  // not known
+  bool at_least_ = false;
 };
 
 }  // namespace arbiter::gateway

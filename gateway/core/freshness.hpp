@@ -45,23 +45,43 @@ class AgesOfSources {
 
 // For a queue that the gateway empties itself (iceoryx). One thread.
 //
-// Invariant: whatever is taken was put in after note_empty(). So look at the queue at least every
-// T/4 (period()), and a sample that is taken at once has three quarters of T left.
+// Invariant: whatever is taken was put in after `since_`. So look at the queue at least every T/4
+// (period()), and a sample that is taken at once has three quarters of T left. A queue that is
+// never seen empty, because its publisher is fast, holds no more than its capacity: what is taken
+// behind as many samples came after the first of them was taken.
 class QueueFreshness {
  public:
+  explicit QueueFreshness(std::uint32_t capacity) noexcept : capacity_(capacity) {}
+
   // Nothing waits in the queue: called with a reading of the clock from before the look at it.
-  void note_empty(shm::Nanoseconds before_the_look) noexcept { empty_at_ = before_the_look; }
+  void note_empty(shm::Nanoseconds before_the_look) noexcept {
+    since_ = before_the_look;
+    taken_ = 0;
+  }
+  // A sample was taken, at a look before which the clock was read. Before deadline() is asked of
+  // it.
+  void note_taken(shm::Nanoseconds before_the_look) noexcept {
+    if (taken_ > capacity_) {
+      since_ = round_;
+      taken_ = 0;
+    }
+    if (taken_ == 0) round_ = before_the_look;
+    ++taken_;
+  }
   // Of whatever is taken now. Before the first note_empty() nothing is in time.
   [[nodiscard]] shm::Nanoseconds deadline(shm::Nanoseconds max_age) const noexcept {
-    return empty_at_ + max_age;
+    return since_ + max_age;
   }
   [[nodiscard]] static constexpr shm::Nanoseconds period(shm::Nanoseconds max_age) noexcept {
     return max_age / 4;
   }
 
  private:
+  const std::uint32_t capacity_;
   // Far enough in the past for any T, and not so far that adding one overflows.
-  shm::Nanoseconds empty_at_ = -shm::kMaxTime;
+  shm::Nanoseconds since_ = -shm::kMaxTime;
+  shm::Nanoseconds round_ = 0;  // before the first of `taken_` samples was taken
+  std::uint32_t taken_ = 0;
 };
 
 // For a middleware that calls back, of whose queues nothing is known (DDS). A thread of the

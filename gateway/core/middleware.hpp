@@ -1,7 +1,7 @@
 // What a gateway's middleware half gives the common one.
 #pragma once
 
-#include <string>
+#include <stdexcept>
 #include <vector>
 
 #include "gateway/core/account.hpp"
@@ -10,6 +10,12 @@
 #include "gateway/mapping/mapping.hpp"
 
 namespace arbiter::gateway {
+
+// The middleware cannot go on in this process: the supervisor starts another one.
+class NeedsNewProcess : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 // All calls come from the bridge's thread.
 class Middleware {
@@ -40,7 +46,8 @@ class Middleware {
   // When it returns, deliver() is not called any more. Also called where start() was not.
   virtual void stop() noexcept = 0;
 
-  // Ten times a second, and at Bridge::wake(): to look after what is out there, to count peers.
+  // Ten times a second, and at Bell::ring(): to look after what is out there, to count peers.
+  // Throws NeedsNewProcess.
   virtual void tend() {}
 };
 

@@ -75,8 +75,14 @@ int serve(const Arguments& arguments, const ProgramKind& kind, std::vector<Mappi
   if (auto beat = heartbeat()) settings.bridge.on_round = std::move(*beat);
   const Bell bell;
   const auto middleware = make(settings, bell);
-  Bridge bridge(settings.bridge, settings.mappings, kind.kind, bell, *middleware);
-  bridge.run(stop);
+  try {
+    Bridge bridge(settings.bridge, settings.mappings, kind.kind, bell, *middleware);
+    bridge.run(stop);
+  } catch (const NeedsNewProcess& why) {
+    // Its ports are closed by now. What the middleware would do at the end may never return.
+    say(Level::kWarning, std::string(why.what()) + "; the gateway begins anew");
+    std::_Exit(kBeginsAnew);
+  }
   return 0;
 }
 

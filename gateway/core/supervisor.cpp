@@ -147,7 +147,10 @@ int supervise(const std::vector<std::string>& arguments, int stop) {
         end(worker);
         return 0;
       }
-      say(Level::kWarning, "the worker " + describe(*status) + "; another one is started");
+      const bool has_said = WIFEXITED(*status) && WEXITSTATUS(*status) == kBeginsAnew;
+      if (!has_said) {
+        say(Level::kWarning, "the worker " + describe(*status) + "; another one is started");
+      }
     }
     const bool lived_long = shm::monotonic_now() - worker.started > kLongLife;
     pause = lived_long ? kFirstPause : std::min(2 * pause, kLongestPause);

@@ -16,6 +16,9 @@ namespace arbiter::gateway {
 
 inline constexpr std::chrono::milliseconds kPatience{5000};
 
+// How a worker ends that asks for another one.
+inline constexpr int kBeginsAnew = 75;
+
 // Runs until `stop` is readable, and the worker has ended, which is asked to by SIGTERM and killed
 // after three seconds. `arguments`: of the worker, which is this program; it finds its pipe in
 // the environment. Returns the exit code.

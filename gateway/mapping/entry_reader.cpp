@@ -63,7 +63,7 @@ class EntryReader {
       reader_.check_attributes(
           element_, {"service", "instance", "event", "port", "true", "false", "above", "below",
                      "threshold", "field", "offset", "type", "size", "alignment", "user_header",
-                     "history", "queue", "max_size", "max_age"});
+                     "queue", "max_size", "max_age"});
     } else {
       reader_.check_attributes(
           element_, {"port", "service", "instance", "event", "idle", "type", "size", "alignment",

@@ -93,7 +93,7 @@ struct IceoryxTopic {
   std::uint32_t user_header = 0;
   // The payload begins at a multiple of this, in chunks as in samples.
   std::uint32_t alignment = 8;
-  // Samples that a late subscriber is given. `out` offers, `in` asks for them.
+  // Of `out`: samples that a subscriber is given that comes later.
   std::uint32_t history = 0;
   std::uint32_t queue = 8;  // of `in`: samples that may wait for the gateway
 

@@ -47,6 +47,13 @@ Qos read_qos(Attributes& attributes, bool is_in, bool is_ros) {
                          {"transient_local", Durability::kTransientLocal}})) {
     qos.durability = *durability;
   }
+  if (is_in && qos.durability != Durability::kVolatile) {
+    attributes.error(
+        "late-history", attributes.has("durability") ? "durability" : "qos",
+        "a topic that keeps samples for those who come later would bring old ones, and "
+        "nothing old becomes an arrival; write durability=\"volatile\", which such "
+        "publishers serve, too");
+  }
   if (const auto history = attributes.word<History>(
           "history", {{"keep_last", History::kKeepLast}, {"keep_all", History::kKeepAll}})) {
     qos.history = *history;
@@ -127,7 +134,7 @@ IceoryxTopic read_iceoryx_topic(Attributes& attributes, bool is_in) {
     if (from) to = static_cast<std::uint32_t>(*from);
   };
   set(topic.user_header, attributes.bytes("user_header", 0, 4096));
-  set(topic.history, attributes.number("history", 0, kMaxHistory));
+  if (!is_in) set(topic.history, attributes.number("history", 0, kMaxHistory));
   if (is_in) set(topic.queue, attributes.number("queue", 1, kMaxQueue));
   if (const auto alignment = attributes.bytes("alignment", 1, 4096)) {
     if ((*alignment & (*alignment - 1)) == 0) {

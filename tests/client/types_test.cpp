@@ -320,7 +320,7 @@ TEST(Types, WhatCannotBeATypeIsRefusedWithTheReason) {
   EXPECT_NE(why_not("a\u202eb", 8, 8).find("invisible"), std::string::npos);
   EXPECT_NE(why_not("a\xff", 8, 8).find("not UTF-8"), std::string::npos);
   EXPECT_NE(why_not("a", 0, 8).find("no bytes"), std::string::npos);
-  EXPECT_NE(why_not("a", 8, 0).find("power of two"), std::string::npos);
+  EXPECT_EQ(why_not("a", 8, 0), "no error") << "it is variable";
   EXPECT_NE(why_not("a", 8, 3).find("power of two"), std::string::npos);
   EXPECT_NE(why_not("a", 8, 8192).find("at most 4096"), std::string::npos);
   EXPECT_NE(why_not("a", (std::size_t{1} << 40) + 1, 8).find("more than"), std::string::npos);

@@ -13,24 +13,39 @@ using shm::kForever;
 constexpr shm::Nanoseconds kMs = 1'000'000;
 
 TEST(QueueFreshness, NothingIsInTimeBeforeTheQueueWasSeenEmpty) {
-  const QueueFreshness freshness;
+  const QueueFreshness freshness(8);
   EXPECT_LT(freshness.deadline(shm::kMaxTime), 1);
 }
 
 TEST(QueueFreshness, WhatIsTakenIsNoOlderThanTheQueueWasSeenEmpty) {
-  QueueFreshness freshness;
+  QueueFreshness freshness(8);
   freshness.note_empty(1000 * kMs);
   EXPECT_EQ(freshness.deadline(500 * kMs), 1500 * kMs);
 }
 
 TEST(QueueFreshness, LookedAtEveryQuarterOfTAFreshSampleIsInTime) {
-  QueueFreshness freshness;
+  QueueFreshness freshness(8);
   const shm::Nanoseconds t = 100 * kMs;
   for (shm::Nanoseconds look = 0; look < 10 * t; look += QueueFreshness::period(t)) {
     freshness.note_empty(look);
     const shm::Nanoseconds taken = look + QueueFreshness::period(t) - 1;
     EXPECT_GE(freshness.deadline(t) - taken, 3 * t / 4);
   }
+}
+
+// Of a queue of two that always has something in it, ever more of what is taken is known to be new.
+TEST(QueueFreshness, AQueueThatIsNeverEmptyHoldsNoMoreThanItsCapacity) {
+  QueueFreshness freshness(2);
+  freshness.note_empty(0);
+  for (shm::Nanoseconds look = 1; look <= 3; ++look) {
+    freshness.note_taken(look * kMs);
+    EXPECT_EQ(freshness.deadline(100 * kMs), 100 * kMs) << look;
+  }
+  freshness.note_taken(4 * kMs);  // the third behind the first was put in after that was taken
+  EXPECT_EQ(freshness.deadline(100 * kMs), 101 * kMs);
+  freshness.note_empty(5 * kMs);
+  freshness.note_taken(6 * kMs);
+  EXPECT_EQ(freshness.deadline(100 * kMs), 105 * kMs);
 }
 
 class Guarded : public testing::Test {

@@ -47,7 +47,7 @@ TEST(Mapping, ReadsRos2NamesAsDdsHasThem) {
 TEST(Mapping, ReadsPlainDdsNamesAsTheyAre) {
   const Read read = read_dds(
       "<in topic='Square' type='Shapes::ShapeType' port='/s:o' "
-      "reliability='best_effort' durability='transient_local' "
+      "reliability='best_effort' durability='volatile' "
       "history='keep_last' depth='3' deadline='100ms' partition='a,b*' "
       "keyed='true' max_size='1MiB' max_age='50ms'/>");
   ASSERT_THAT(read.findings(), IsEmpty());
@@ -56,7 +56,7 @@ TEST(Mapping, ReadsPlainDdsNamesAsTheyAre) {
   EXPECT_EQ(entry.dds->name, "Square");
   EXPECT_EQ(entry.type->name, "Shapes::ShapeType");
   EXPECT_EQ(entry.dds->qos.reliability, Reliability::kBestEffort);
-  EXPECT_EQ(entry.dds->qos.durability, Durability::kTransientLocal);
+  EXPECT_EQ(entry.dds->qos.durability, Durability::kVolatile);
   EXPECT_EQ(entry.dds->qos.depth, 3u);
   EXPECT_EQ(entry.dds->qos.deadline, 100'000'000);
   EXPECT_THAT(entry.dds->qos.partitions, ElementsAre("a", "b*"));
@@ -72,6 +72,14 @@ TEST(Mapping, APresetIsTakenAndCanBeChanged) {
   ASSERT_THAT(read.findings(), IsEmpty());
   EXPECT_EQ(read.entry().dds->qos.reliability, Reliability::kBestEffort);
   EXPECT_EQ(read.entry().dds->qos.depth, 2u);
+}
+
+TEST(Mapping, NothingOldIsAskedFor) {
+  const std::string topic = "topic='/a' type='std_msgs/msg/Bool' port='/a' ";
+  EXPECT_THAT(read_dds("<in " + topic + "durability='transient_local'/>").findings(),
+              ElementsAre("1:83 error late-history"));
+  EXPECT_THAT(read_dds("<in " + topic + "qos='rosout'/>").message(), HasSubstr("nothing old"));
+  EXPECT_THAT(read_dds("<out " + topic + "durability='transient_local'/>").findings(), IsEmpty());
 }
 
 TEST(Mapping, ABooleanTopicIsTwoSources) {
@@ -102,20 +110,20 @@ TEST(Mapping, AnIceoryxTopicHasThreeNamesAndMayHaveAHeader) {
   const Read read = read_iceoryx(
       "<in service='Radar' instance='Front' event='Objects' "
       "port='/Radar/objects:o' type='Objects' size='40' alignment='16' "
-      "user_header='8' history='2' queue='4'/>"
+      "user_header='8' queue='4'/>"
       "<out port='/p:i' service='A' instance='B' event='C' size='24' "
-      "idle='zero' queue='3'/>");
+      "idle='zero' queue='3' history='2'/>");
   ASSERT_THAT(read.findings(), IsEmpty());
   const Entry& in = read.entry(0);
   EXPECT_EQ(in.outside(), "iceoryx Radar/Front/Objects");
   EXPECT_EQ(in.iceoryx->padded_header(), 16u);
   EXPECT_EQ(in.type->size, 56u);
   EXPECT_EQ(in.type->alignment, 16u);
-  EXPECT_EQ(in.iceoryx->history, 2u);
   EXPECT_EQ(in.iceoryx->queue, 4u);
   EXPECT_FALSE(read.entry(1).type);
   EXPECT_EQ(read.entry(1).idle.sample.size(), 24u);
   EXPECT_EQ(read.entry(1).queue, 3u);
+  EXPECT_EQ(read.entry(1).iceoryx->history, 2u);
 }
 
 TEST(Mapping, SeveralGatewaysMayStandInOneFile) {
