@@ -13,6 +13,7 @@
 #include <CLI/CLI.hpp>
 
 #include "gateway/core/say.hpp"
+#include "gateway/core/send_idle.hpp"
 #include "gateway/core/supervisor.hpp"
 #include "gateway/mapping/check_mapping.hpp"
 #include "gateway/mapping/read_mapping.hpp"
@@ -28,10 +29,13 @@ constexpr const char* kExitCodes =
     "which "
     "was said;\n2 wrong use, or a mapping that cannot be read or has errors";
 
+constexpr shm::Nanoseconds kSendIdle = 1'000'000'000;
+
 struct Arguments {
   std::vector<std::string> mappings;
   std::string instance;
   bool check = false;
+  bool send_idle = false;
   bool is_worker = false;  // of a supervised program
 };
 
@@ -75,6 +79,10 @@ int serve(const Arguments& arguments, const ProgramKind& kind, std::vector<Mappi
   if (auto beat = heartbeat()) settings.bridge.on_round = std::move(*beat);
   const Bell bell;
   const auto middleware = make(settings, bell);
+  if (arguments.send_idle) {
+    send_idle(settings.mappings, kind.kind, *middleware, kSendIdle);
+    return 0;
+  }
   try {
     Bridge bridge(settings.bridge, settings.mappings, kind.kind, bell, *middleware);
     bridge.run(stop);
@@ -101,6 +109,9 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
   app.add_flag("--check", arguments.check,
                "Only say what is wrong with the mappings; `arbiter check MODEL --gateway MAPPING` "
                "also looks at the model");
+  app.add_flag("--send-idle", arguments.send_idle,
+               "Only send, for a second, what is sent while nobody commands (idle=): for a gateway "
+               "that has died. Needs no daemon");
   app.add_flag("--worker", arguments.is_worker)->group("");
   app.footer(kind.more + kExitCodes);
   try {
@@ -112,8 +123,8 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
   if (!mappings) return 2;
   if (arguments.check) return 0;
   const shm::FileDescriptor stop = catch_signals();
-  if (!kind.is_supervised || arguments.is_worker) {
-    if (!arguments.is_worker) sd_notify(0, "READY=1");
+  if (!kind.is_supervised || arguments.is_worker || arguments.send_idle) {
+    if (!arguments.is_worker && !arguments.send_idle) sd_notify(0, "READY=1");
     return serve(arguments, kind, std::move(*mappings), make, stop.get());
   }
   std::vector<std::string> worker(argv, argv + argc);

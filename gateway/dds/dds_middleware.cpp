@@ -41,18 +41,15 @@ void DdsMiddleware::add(Site& site, EndPoint& end, Account& account) {
   site.accounts.push_back(&account);
 }
 
-Sender& DdsMiddleware::sender(const Gateway& /*gateway*/, const Entry& entry, Account& account) {
+Sender& DdsMiddleware::sender(const Gateway& gateway, const Entry& entry, Account& account) {
   OutTopic& out = outs_.emplace_back(entry, account, bell_);
   out_of_[&entry] = &out;
+  add(site_of(gateway), out, account);
   return out;
 }
 
 void DdsMiddleware::start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& outs) {
-  for (const OpenOut& out : outs) {
-    OutTopic& topic = *out_of_.at(&out.outgoing.entry());
-    topic.tell(&out.outgoing);
-    add(site_of(out.gateway), topic, out.account);
-  }
+  for (const OpenOut& out : outs) out_of_.at(&out.outgoing.entry())->tell(&out.outgoing);
   for (const OpenIn& in : ins) {
     add(site_of(in.gateway), ins_.emplace_back(in.incoming, in.account, guard_), in.account);
   }

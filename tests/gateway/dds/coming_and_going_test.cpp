@@ -84,6 +84,23 @@ TEST_P(DdsComingAndGoing, AGatewayThatIsKilledIsSilenceAndTheNextOneGoesOn) {
   publish_until_heard(navigation, base, "2 0");
 }
 
+// ExecStopPost= of its unit. Not even a daemon is needed.
+TEST_P(DdsComingAndGoing, ForAGatewayThatIsKilledTheRobotIsStoppedByAnother) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1000s"));
+  DdsGateway gateway(daemon, domain, kNavIn + kStopping);
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
+  base.await("matched 1");
+  navigation.await("matched 1");
+  gateway.see("1 publisher matched");
+  publish_until_heard(navigation, base, "1 0");
+  gateway.process().kill();
+  EXPECT_EQ(gateway.send_idle(), 0);
+  base.await("sample 0 0");
+  EXPECT_NE(gateway.log().find("DDS topic rt/cmd_vel, 1 subscriber matched"), std::string::npos);
+}
+
 // What waited for it meanwhile is older than T: it must not move the robot.
 TEST_P(DdsComingAndGoing, WhatWaitedWhileTheGatewayWasStoppedIsNotObeyed) {
   const OwnDomain domain;

@@ -129,13 +129,9 @@ class DdsGateway {
                             << entries << "</gateway>\n";
     start();
   }
-  void start() {
-    const shm::FileDescriptor log(
-        ::open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600));
-    process_ = ChildProcess({std::string(ARBITER_PROGRAMS) + "/arbiter-gateway-dds", mapping_},
-                            {{"CYCLONEDDS_URI", std::nullopt}, {"ROS_DOMAIN_ID", std::nullopt}},
-                            {-1, -1, log.get()});
-  }
+  void start() { process_ = program({mapping_}); }
+  // For one that has died: its exit code.
+  int send_idle() { return program({"--send-idle", mapping_}).wait(); }
   // Returns once it has said so.
   void see(const std::string& text) const {
     pollfd ended{process_.descriptor(), POLLIN, 0};
@@ -152,6 +148,15 @@ class DdsGateway {
   }
 
  private:
+  [[nodiscard]] ChildProcess program(std::vector<std::string> arguments) const {
+    const shm::FileDescriptor log(
+        ::open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600));
+    arguments.insert(arguments.begin(), std::string(ARBITER_PROGRAMS) + "/arbiter-gateway-dds");
+    return {arguments,
+            {{"CYCLONEDDS_URI", std::nullopt}, {"ROS_DOMAIN_ID", std::nullopt}},
+            {-1, -1, log.get()}};
+  }
+
   const std::string mapping_;
   const std::string log_;
   ChildProcess process_;
