@@ -18,6 +18,7 @@ namespace {
 constexpr shm::Nanoseconds kMillisecond = 1'000'000;
 // Rounds without anything to take: so that the loop sees that the thread goes round.
 constexpr shm::Nanoseconds kLongestWait = 250 * kMillisecond;
+constexpr shm::Nanoseconds kDiscoveryPeriod = 500 * kMillisecond;
 // RouDi gives up a process that has not been heard of for 1.5 s, whose ends are dead from then on
 // although nothing tells it so. What keeps its keep-alive from running keeps this thread, too.
 constexpr shm::Nanoseconds kGivenUp = 1200 * kMillisecond;
@@ -111,6 +112,7 @@ void Session::run() {
   ready_.store(true, std::memory_order_release);
   take_for_ever();
   wait_set_.reset();
+  discovery_.reset();
   inlets_.clear();
   publishers_.clear();
   ended_.store(true, std::memory_order_release);
@@ -126,6 +128,7 @@ void Session::make_ends() {
         std::make_unique<iox::popo::UntypedPublisher>(service_of(topic), options));
     out->use(*publishers_.back());
   }
+  discovery_ = std::make_unique<iox::runtime::ServiceDiscovery>();
   wait_set_ = std::make_unique<iox::popo::WaitSet<>>();
   for (const Middleware::OpenIn& in : ins_) {
     iox::popo::SubscriberOptions options;
@@ -154,6 +157,7 @@ void Session::take_for_ever() {
     const shm::Nanoseconds before = last_round_.exchange(now, std::memory_order_relaxed);
     if (now - before > kGivenUp) stalled_.store(true, std::memory_order_relaxed);
     for (const auto& inlet : inlets_) take_all(*inlet);
+    look_for_publishers(now);
   }
 }
 
@@ -188,8 +192,22 @@ void Session::take_all(Inlet& inlet) {
     }
     inlet.subscriber.release(payload);
   }
-  inlet.in.account.set_peers(
-      inlet.subscriber.getSubscriptionState() == iox::SubscribeState::SUBSCRIBED ? 1 : 0, true);
+}
+
+// A subscriber does not know whether there is a publisher; RouDi's registry does, which names each
+// topic once however many offer it.
+void Session::look_for_publishers(shm::Nanoseconds now) {
+  if (now - looked_for_publishers_ < kDiscoveryPeriod) return;
+  looked_for_publishers_ = now;
+  for (const auto& inlet : inlets_) {
+    std::uint32_t found = 0;
+    const auto service = service_of(inlet->topic);
+    discovery_->findService(
+        service.getServiceIDString(), service.getInstanceIDString(), service.getEventIDString(),
+        [&](const iox::capro::ServiceDescription&) { found = 1; },
+        iox::popo::MessagingPattern::PUB_SUB);
+    inlet->in.account.set_peers(found, true);
+  }
 }
 
 }  // namespace arbiter::gateway

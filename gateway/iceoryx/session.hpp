@@ -16,6 +16,7 @@
 #include <iceoryx_posh/popo/untyped_publisher.hpp>
 #include <iceoryx_posh/popo/untyped_subscriber.hpp>
 #include <iceoryx_posh/popo/wait_set.hpp>
+#include <iceoryx_posh/runtime/service_discovery.hpp>
 
 #include "gateway/core/middleware.hpp"
 #include "gateway/iceoryx/roudi.hpp"
@@ -74,6 +75,7 @@ class Session {
   void make_ends();
   void take_all(Inlet& inlet);
   void take_for_ever();
+  void look_for_publishers(shm::Nanoseconds now);
 
   const std::string name_;
   const RoudiIdentity roudi_;
@@ -82,6 +84,8 @@ class Session {
   std::vector<std::unique_ptr<iox::popo::UntypedPublisher>> publishers_;
   std::vector<std::unique_ptr<Inlet>> inlets_;
   std::unique_ptr<iox::popo::WaitSet<>> wait_set_;
+  std::unique_ptr<iox::runtime::ServiceDiscovery> discovery_;  // it is large
+  shm::Nanoseconds looked_for_publishers_ = 0;
   std::atomic<bool> ready_{false};
   std::atomic<bool> ends_{false};
   std::atomic<bool> ended_{false};
