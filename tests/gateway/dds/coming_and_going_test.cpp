@@ -33,8 +33,7 @@ TEST_P(DdsComingAndGoing, ARobotStopsWhenItsCommanderIsKilledAndObeysTheNextOne)
     Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
     navigation.await("matched 1");
     gateway.see("1 publisher matched");
-    navigation.publish("1 0");
-    base.await("sample 1 0");
+    publish_until_heard(navigation, base, "1 0");
     navigation.process().kill();
     base.await("sample 0 0");
   }
@@ -75,8 +74,7 @@ TEST_P(DdsComingAndGoing, AGatewayThatIsKilledIsSilenceAndTheNextOneGoesOn) {
   base.await("matched 1");
   navigation.await("matched 1");
   gateway.see("1 publisher matched");
-  navigation.publish("1 0");
-  base.await("sample 1 0");
+  publish_until_heard(navigation, base, "1 0");
   gateway.process().kill();
   gateway.start();
   navigation.await("matched 2");
@@ -111,8 +109,7 @@ TEST_P(DdsComingAndGoing, WhatWaitedWhileTheGatewayWasStoppedIsNotObeyed) {
   base.await("matched 1");
   navigation.await("matched 1");
   gateway.see("1 publisher matched");
-  navigation.publish("1 0");
-  base.await("sample 1 0");
+  publish_until_heard(navigation, base, "1 0");
   gateway.process().stop();
   navigation.publish("13 0");
   ::poll(nullptr, 0, 1000);  // what is tested: that time passes while it is stopped

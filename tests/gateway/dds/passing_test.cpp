@@ -11,6 +11,11 @@ struct Vendors {
   const char* to;
 };
 
+// Without it tests would be named by addresses.
+void PrintTo(const Vendors& vendors, std::ostream* out) {
+  *out << vendors.from << " to " << vendors.to;
+}
+
 class DdsPassing : public ::testing::TestWithParam<Vendors> {};
 
 INSTANTIATE_TEST_SUITE_P(Vendors, DdsPassing,
