@@ -49,7 +49,8 @@ inline constexpr const char* kLoopback =
     R"(<AllowMulticast>false</AllowMulticast></General><Discovery>)"
     R"(<ParticipantIndex>auto</ParticipantIndex>)"
     R"(<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>)"
-    R"(<Peers><Peer address="127.0.0.1"/></Peers></Discovery>)";
+    R"(<Peers><Peer address="127.0.0.1"/></Peers></Discovery>)"
+    R"(<Tracing><Verbosity>none</Verbosity></Tracing>)";
 
 // A program of DDS that knows nothing of Arbiter (strangers/command_line.hpp).
 class Stranger {
