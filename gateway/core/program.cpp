@@ -130,7 +130,7 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
   std::vector<std::string> worker(argv, argv + argc);
   worker.emplace_back("--worker");
   sd_notify(0, "READY=1");
-  return supervise(worker, stop.get());
+  return supervise(worker, stop.get(), kind.clean_up);
 }
 
 }  // namespace

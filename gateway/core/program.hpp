@@ -29,6 +29,8 @@ struct ProgramKind {
   // Whether what talks to the middleware is a process of its own, which a supervisor starts again
   // when it ends or hangs (supervisor.hpp): for a library that ends its process.
   bool is_supervised = false;
+  // What a worker that has ended may have left behind; called with its process's id.
+  std::function<void(int)> clean_up = [](int) {};
 };
 
 // What the command line and the mappings say.

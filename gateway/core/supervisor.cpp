@@ -135,7 +135,8 @@ std::optional<int> watch_over(Worker& worker, int stop) {
 
 }  // namespace
 
-int supervise(const std::vector<std::string>& arguments, int stop) {
+int supervise(const std::vector<std::string>& arguments, int stop,
+              const std::function<void(int)>& clean_up) {
   shm::Nanoseconds pause = kFirstPause;
   for (;;) {
     Worker worker = start(arguments);
@@ -145,8 +146,10 @@ int supervise(const std::vector<std::string>& arguments, int stop) {
       const auto status = watch_over(worker, stop);
       if (!status) {
         end(worker);
+        clean_up(worker.pid);
         return 0;
       }
+      clean_up(worker.pid);
       const bool has_said = WIFEXITED(*status) && WEXITSTATUS(*status) == kBeginsAnew;
       if (!has_said) {
         say(Level::kWarning, "the worker " + describe(*status) + "; another one is started");

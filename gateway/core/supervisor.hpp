@@ -22,7 +22,9 @@ inline constexpr int kBeginsAnew = 75;
 // Runs until `stop` is readable, and the worker has ended, which is asked to by SIGTERM and killed
 // after three seconds. `arguments`: of the worker, which is this program; it finds its pipe in
 // the environment. Returns the exit code.
-int supervise(const std::vector<std::string>& arguments, int stop);
+// `clean_up`: what a worker that has ended may have left behind; called with its process's id.
+int supervise(const std::vector<std::string>& arguments, int stop,
+              const std::function<void(int)>& clean_up);
 
 // In a worker: says that it runs. None where nobody supervises. Throttled to ten a second.
 std::optional<std::function<void()>> heartbeat();

@@ -169,9 +169,9 @@ void compare_others(Comparison& pair) {
 }  // namespace
 
 bool share_partition(const std::vector<std::string>& a, const std::vector<std::string>& b) {
-  static const std::vector<std::string> kDefault = {""};
-  const auto& ours = a.empty() ? kDefault : a;
-  const auto& theirs = b.empty() ? kDefault : b;
+  static const std::vector<std::string> default_partition = {""};
+  const auto& ours = a.empty() ? default_partition : a;
+  const auto& theirs = b.empty() ? default_partition : b;
   return std::any_of(ours.begin(), ours.end(), [&](const std::string& one) {
     return std::any_of(theirs.begin(), theirs.end(),
                        [&](const std::string& other) { return fits_either(one, other); });
@@ -185,8 +185,8 @@ std::vector<std::string> mismatches(const OurEnd& ours, const Peer& peer) {
   }
   if (peer.keyed != ours.keyed) {
     pair.add_plain(peer.keyed
-                       ? "key: its type has a key, this entry's has none; write keyed=\"true\""
-                       : "key: its type has no key, this entry's has one; write keyed=\"false\"");
+                       ? R"(key: its type has a key, this entry's has none; write keyed="true")"
+                       : R"(key: its type has no key, this entry's has one; write keyed="false")");
   }
   compare_attributes(pair);
   compare_others(pair);

@@ -125,24 +125,24 @@ void key_hash(const ddsi_serdata* /*data*/, ddsi_keyhash* hash, bool /*force_md5
 }
 
 // All members are set by name below, so that a release that adds one finds it null.
-const ddsi_serdata_ops kDataOperations = [] {
-  ddsi_serdata_ops operations{};
-  operations.eqkey = is_same_key;
-  operations.get_size = size;
-  operations.from_ser = from_fragments;
-  operations.from_ser_iov = from_pieces;
-  operations.from_keyhash = from_key_hash;
-  operations.from_sample = from_sample;
-  operations.to_ser = copy_out;
-  operations.to_ser_ref = lend;
-  operations.to_ser_unref = take_lent_back;
-  operations.to_sample = to_sample;
-  operations.to_untyped = to_key;
-  operations.untyped_to_sample = key_to_sample;
-  operations.free = release;
-  operations.print = print;
-  operations.get_keyhash = key_hash;
-  return operations;
+const ddsi_serdata_ops data_operations = [] {
+  ddsi_serdata_ops result{};
+  result.eqkey = is_same_key;
+  result.get_size = size;
+  result.from_ser = from_fragments;
+  result.from_ser_iov = from_pieces;
+  result.from_keyhash = from_key_hash;
+  result.from_sample = from_sample;
+  result.to_ser = copy_out;
+  result.to_ser_ref = lend;
+  result.to_ser_unref = take_lent_back;
+  result.to_sample = to_sample;
+  result.to_untyped = to_key;
+  result.untyped_to_sample = key_to_sample;
+  result.free = release;
+  result.print = print;
+  result.get_keyhash = key_hash;
+  return result;
 }();
 
 ddsi_serdata* to_key(const ddsi_serdata* data) {
@@ -169,23 +169,23 @@ std::uint32_t hash(const ddsi_sertype* /*type*/) { return 0; }
 
 // Without get_serialized_size and serialize_into, Cyclone does not let these topics pass by
 // iceoryx, where a sample is a structure of C that nobody here could read.
-const ddsi_sertype_ops kTypeOperations = [] {
-  ddsi_sertype_ops operations{};
-  operations.version = ddsi_sertype_v0;
-  operations.free = free_type;
-  operations.zero_samples = zero_samples;
-  operations.realloc_samples = resize_samples;
-  operations.free_samples = free_samples;
-  operations.equal = is_equal;
-  operations.hash = hash;
-  return operations;
+const ddsi_sertype_ops type_operations = [] {
+  ddsi_sertype_ops result{};
+  result.version = ddsi_sertype_v0;
+  result.free = free_type;
+  result.zero_samples = zero_samples;
+  result.realloc_samples = resize_samples;
+  result.free_samples = free_samples;
+  result.equal = is_equal;
+  result.hash = hash;
+  return result;
 }();
 
 }  // namespace
 
 ddsi_sertype* make_opaque_type(const std::string& name, bool keyed) {
   auto type = std::make_unique<ddsi_sertype>();
-  ddsi_sertype_init_flags(type.get(), name.c_str(), &kTypeOperations, &kDataOperations,
+  ddsi_sertype_init_flags(type.get(), name.c_str(), &type_operations, &data_operations,
                           keyed ? 0 : DDSI_SERTYPE_FLAG_TOPICKIND_NO_KEY);
   type->allowed_data_representation =
       DDS_DATA_REPRESENTATION_FLAG_XCDR1 | DDS_DATA_REPRESENTATION_FLAG_XCDR2;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iterator>
+#include <string_view>
 #include <utility>
 
 namespace arbiter::gateway::dds {
@@ -23,7 +24,7 @@ Guid guid_of(const dds_guid_t& guid) {
 std::string property(const dds_qos_t& qos, const char* name) {
   char* value = nullptr;
   if (!dds_qget_prop(&qos, name, &value)) return {};
-  const std::string result = bounded(value);
+  std::string result = bounded(value);
   dds_free(value);
   return result;
 }
@@ -57,7 +58,7 @@ bool has_key(const Guid& guid) {
 }
 
 std::string type_hash_in(const std::string& user_data) {
-  static const std::string kKey = "typehash=";
+  constexpr std::string_view kKey = "typehash=";
   std::size_t at = 0;
   while (at < user_data.size()) {
     const std::size_t end = std::min(user_data.find(';', at), user_data.size());

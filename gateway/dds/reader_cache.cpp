@@ -41,10 +41,10 @@ struct ReaderCache::Calls {
   static void remove_condition(dds_rhc* /*cache*/, dds_readcond* /*condition*/) {}
   static std::uint32_t lock_samples(dds_rhc* /*cache*/) { return 0; }
 
-  static const dds_rhc_ops kOperations;
+  static const dds_rhc_ops operations;
 };
 
-const dds_rhc_ops ReaderCache::Calls::kOperations = {
+const dds_rhc_ops ReaderCache::Calls::operations = {
     {store, unregister_writer, relinquish_ownership, set_qos, free},
     read,
     read,
@@ -57,7 +57,7 @@ const dds_rhc_ops ReaderCache::Calls::kOperations = {
 };
 
 ReaderCache::ReaderCache(SampleTaker& taker) : hook_{}, taker_(taker) {
-  hook_.cyclone.common.ops = &Calls::kOperations;
+  hook_.cyclone.common.ops = &Calls::operations;
   hook_.self = this;
 }
 

@@ -6,6 +6,7 @@
 
 #include <iceoryx_hoofs/error_handling/error_handling.hpp>
 #include <iceoryx_hoofs/log/logmanager.hpp>
+#include <iceoryx_hoofs/platform/platform_settings.hpp>
 
 #include "gateway/core/say.hpp"
 #include "shm/clock.hpp"
@@ -26,6 +27,17 @@ void handle_error(iox::Error error, const std::function<void()>&, iox::ErrorLeve
 }
 
 }  // namespace
+
+std::string runtime_name(const std::string& gateway, int pid) {
+  return gateway + "-" + std::to_string(pid);
+}
+
+void remove_traces(const std::string& runtime) {
+  const std::string socket = iox::platform::IOX_UDS_SOCKET_PATH_PREFIX + runtime;
+  const std::string lock = iox::platform::IOX_LOCK_FILE_PATH_PREFIX + runtime + ".lock";
+  ::unlink(socket.c_str());
+  ::unlink(lock.c_str());
+}
 
 Iceoryx::Iceoryx(std::string name) : name_(std::move(name)) {
   iox::log::LogManager::GetLogManager().SetDefaultLogLevel(iox::log::LogLevel::kError,
@@ -69,7 +81,7 @@ void Iceoryx::tend() {
     std::vector<ChunkSender*> senders;
     for (const auto& each : senders_) senders.push_back(each.get());
     joined_ = now;
-    session_ = std::make_unique<Session>(name_ + "-" + std::to_string(::getpid()), *roudi, ins_,
+    session_ = std::make_unique<Session>(runtime_name(name_, ::getpid()), *roudi, ins_,
                                          std::move(senders));
     return;
   }

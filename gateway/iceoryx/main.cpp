@@ -24,9 +24,10 @@ constexpr const char* kMore =
 
 int main(int argc, char** argv) {
   using namespace arbiter::gateway;
-  const ProgramKind kind{Kind::kIceoryx, "arbiter-gateway-iceoryx",
-                         "arbiter-gateway-iceoryx: passes topics of iceoryx in and out of Arbiter",
-                         kMore, true};
+  const std::string name = "arbiter-gateway-iceoryx";
+  const ProgramKind kind{
+      Kind::kIceoryx, name, name + ": passes topics of iceoryx in and out of Arbiter",
+      kMore,          true, [&](int pid) { remove_traces(runtime_name(name, pid)); }};
   return run_program(argc, argv, kind, [](const Settings& settings, const Bell&) {
     return std::make_unique<Iceoryx>(settings.bridge.name);
   });

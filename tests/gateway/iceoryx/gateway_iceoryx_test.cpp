@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <csignal>
+#include <filesystem>
 
 #include "shm/clock.hpp"
 #include "tests/gateway/iceoryx/private_machine.hpp"
@@ -42,6 +43,7 @@ class Iceoryx : public testing::Test {
   void wait_for_description(const std::string& source, const std::string& text) {
     wait_until([&] { return described(source).find(text) != std::string::npos; });
   }
+  EmptyMachine empty_;
   TemporaryDirectory directory_;
   Daemon daemon_{kModel};
 };
@@ -174,8 +176,11 @@ TEST_F(Iceoryx, AWorkerThatDiesIsReplaced) {
   wait_for_description("/Low:o", "no publisher matched");
   const pid_t worker = worker_of("/Low:o", daemon_);
   EXPECT_NE(worker, gate.process.pid());
+  const std::string trace = "/tmp/arbiter-gateway-iceoryx-" + std::to_string(worker);
+  EXPECT_TRUE(std::filesystem::exists(trace));
   ::kill(worker, SIGKILL);
   ASSERT_TRUE(gate.hear("the worker was ended by signal 9 (Killed); another one is started"));
+  EXPECT_FALSE(std::filesystem::exists(trace));
   wait_until([&] {
     const auto source = daemon_.source("/Low:o");
     return source["open"] == true && source["component"]["pid"] != worker;

@@ -14,6 +14,17 @@
 
 namespace arbiter::test {
 
+// What the test before has left behind is not seen any more.
+inline std::string empty_machine() {
+  for (const char* directory : {"/tmp", "/dev/shm"}) {
+    ::umount2(directory, MNT_DETACH);
+    if (::mount("tmpfs", directory, "tmpfs", 0, "mode=1777") != 0) {
+      return std::string(directory) + ": " + std::strerror(errno);
+    }
+  }
+  return {};
+}
+
 // Enters namespaces of this process's own; those that it starts inherit them. Empty, or why not.
 inline std::string enter_private_machine() {
   const auto failed = [](const char* what) {
@@ -28,11 +39,13 @@ inline std::string enter_private_machine() {
     std::ofstream("/proc/self/gid_map") << group << ' ' << group << " 1";
   }
   if (::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) return failed("mount /");
-  for (const char* directory : {"/tmp", "/dev/shm"}) {
-    if (::mount("tmpfs", directory, "tmpfs", 0, "mode=1777") != 0) return failed(directory);
-  }
-  return {};
+  return empty_machine();
 }
+
+// A member that is made first.
+struct EmptyMachine {
+  EmptyMachine() { EXPECT_EQ(empty_machine(), ""); }
+};
 
 // Before the first test of the program runs: while it has one thread.
 class PrivateMachine : public testing::Environment {
