@@ -217,8 +217,8 @@ TEST(Check, EachCodeOfAWarningOrANoteIsOnThePageAndCanBeSilenced) {
   const std::regex made(R"re((warning|note)\(\s*"([a-z-]+)")re");
   std::set<std::string> codes;
   for (const char* folder : {"/../../rules", "/../../gateway/mapping"}) {
-    for (const auto& file : std::filesystem::recursive_directory_iterator(
-             std::string(ARBITER_TEST_DATA) + folder)) {
+    for (const auto& file :
+         std::filesystem::recursive_directory_iterator(std::string(ARBITER_TEST_DATA) + folder)) {
       if (file.path().extension() != ".cpp") continue;
       const std::string text = content_of(file.path());
       for (std::sregex_iterator each(text.begin(), text.end(), made), end; each != end; ++each) {
@@ -239,9 +239,10 @@ TEST(Check, AGatewaysMappingIsLookedAtBesideTheModel) {
   const auto model = directory.write("m.xml", kTrackModel);
   const auto good = directory.write(
       "good.xml", "<gateway kind='dds'><in topic='/o' type='a/msg/B' port='/object'/></gateway>");
-  const auto bad = directory.write(
-      "bad.xml", "<gateway kind='dds'>\n<in topic='/o' type='a/msg/B' port='/objekt'/>\n"
-                 "<in topic='/o' type='a/msg/B' port='/object'/></gateway>");
+  const auto bad =
+      directory.write("bad.xml",
+                      "<gateway kind='dds'>\n<in topic='/o' type='a/msg/B' port='/objekt'/>\n"
+                      "<in topic='/o' type='a/msg/B' port='/object'/></gateway>");
   EXPECT_EQ(arbiter({"check", model, "--gateway", good}).exit_code, 0);
   const auto both = arbiter({"check", model, "--gateway", good, "--gateway", bad});
   EXPECT_EQ(both.exit_code, 1);
