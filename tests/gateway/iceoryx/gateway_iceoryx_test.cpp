@@ -2,8 +2,12 @@
 // stopped.
 #include <gmock/gmock.h>
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
+
+#include <arbiter/arbiter.hpp>
 
 #include "shm/clock.hpp"
 #include "tests/gateway/iceoryx/private_machine.hpp"
@@ -196,28 +200,49 @@ TEST_F(Iceoryx, AWorkerEndsWithItsSupervisor) {
   wait_until([&] { return daemon_.source("/Low:o")["open"] == false; });
 }
 
-// A gateway that was stopped for longer than T discards what has waited meanwhile.
+// Returns when no thread of it runs any more.
+void stop(pid_t process) {
+  ::kill(process, SIGSTOP);
+  wait_until([&] {
+    for (const auto& task :
+         std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task")) {
+      std::string line;
+      std::getline(std::ifstream(task.path() / "stat") >> std::ws, line);
+      if (line.find(") T ") == std::string::npos) return false;
+    }
+    return true;
+  });
+}
+
+// A gateway that was stopped for longer than T discards what has waited meanwhile. On a machine
+// that is so slow that other samples are late, too, they are said again.
 TEST_F(Iceoryx, WhatHasWaitedForLongerThanTNeverArrives) {
   daemon_.load(
-      "<behaviors timeout='200ms'><behavior name='Low'><config at='/Base:i'>/Low:o</config>"
+      "<behaviors timeout='400ms'><behavior name='Low'><config at='/Base:i'>/Low:o</config>"
       "</behavior></behaviors>");
   const Roudi roudi(directory_);
   Spoken gate = gateway(directory_, in("low", "/Low:o"));
   Spoken publisher = plain_publisher("low");
-  wait_for_description("/Low:o", "at least 1 publisher matched");
-  const auto published = [&] { return daemon_.source("/Low:o")["published"].get<int>(); };
-  publisher.say("now");
-  wait_until([&] { return published() >= 1; });
+  Node node("base");
+  auto base = node.input_port("/Base:i");
+  std::vector<std::string> taken;
+  const auto say_until_it_arrives = [&](const std::string& text) {
+    while (taken.empty() || taken.back() != text) {
+      publisher.say(text);
+      while (auto sample = base.wait_for(std::chrono::milliseconds(100))) {
+        taken.emplace_back(reinterpret_cast<const char*>(sample->data()), sample->size());
+      }
+    }
+  };
+  say_until_it_arrives("before");
   const pid_t worker = worker_of("/Low:o", daemon_);
-  ::kill(worker, SIGSTOP);
+  stop(worker);
   const auto stopped = shm::monotonic_now();
   publisher.say("then");
-  wait_until([&] { return shm::monotonic_now() - stopped > 500'000'000; });
+  wait_until([&] { return shm::monotonic_now() - stopped > 800'000'000; });
   ::kill(worker, SIGCONT);
-  wait_until([&] { return daemon_.source("/Low:o")["late"] == 1; });
-  EXPECT_EQ(published(), 1);
-  publisher.say("now");
-  wait_until([&] { return published() == 2; });
+  say_until_it_arrives("after");
+  EXPECT_THAT(taken, testing::Not(testing::Contains("then")));
 }
 
 }  // namespace
