@@ -110,7 +110,8 @@ class StallGuard {
   // below four times this may call a fresh sample late.
   static constexpr shm::Nanoseconds kShortestPeriod = 1'000'000;
 
-  // Nothing is in time before the first tick.
+  // Nothing is in time before the first tick. Tick before the middleware can receive anything: what
+  // it receives from then on has not waited.
   StallGuard() = default;
   // The watch lives as long as the guard.
   Watch& add(const MaxAge& max_age);

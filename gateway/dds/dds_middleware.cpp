@@ -53,6 +53,8 @@ void DdsMiddleware::start(const std::vector<OpenIn>& ins, const std::vector<Open
   for (const OpenIn& in : ins) {
     add(site_of(in.gateway), ins_.emplace_back(in.incoming, in.account, guard_), in.account);
   }
+  // One tick before there is a reader: see StallGuard.
+  guard_.tick(shm::monotonic_now());
   stall_thread_.emplace(guard_);
   started_ = true;
   tend();
