@@ -11,12 +11,10 @@ class DdsComingAndGoing : public ::testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Vendors, DdsComingAndGoing, ::testing::Values("cyclone", "fast"),
                          [](const auto& each) { return std::string(each.param); });
 
-const std::string kStopping = kBaseOut + R"( idle="zero"/>)";
-
 TEST_P(DdsComingAndGoing, ASubscriberIsToldToStopWhileNobodyCommands) {
   const OwnDomain domain;
   const Daemon daemon(base_model("200ms"));
-  const DdsGateway gateway(daemon, domain, kNavIn + kStopping);
+  const DdsGateway gateway(daemon, domain, kNavIn + kBaseOut + R"( idle="zero"/>)");
   Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
   base.await("matched 1");
   EXPECT_EQ(base.next_line(), "sample 0 0");  // it has come while nobody commands
@@ -24,19 +22,11 @@ TEST_P(DdsComingAndGoing, ASubscriberIsToldToStopWhileNobodyCommands) {
 }
 
 TEST_P(DdsComingAndGoing, ARobotStopsWhenItsCommanderIsKilledAndObeysTheNextOne) {
-  const OwnDomain domain;
-  const Daemon daemon(base_model("200ms"));
-  const DdsGateway gateway(daemon, domain, kNavIn + kStopping);
-  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
-  base.await("matched 1");
-  {
-    Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
-    navigation.await("matched 1");
-    gateway.see("1 publisher matched");
-    publish_until_heard(navigation, base, "1 0");
-    navigation.process().kill();
-    base.await("sample 0 0");
-  }
+  Drive drive("200ms", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
+  publish_until_heard(navigation, base, "1 0");
+  navigation.process().kill();
+  base.await("sample 0 0");
   Stranger next(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
   next.await("matched 1");
   publish_until_heard(next, base, "2 0");
@@ -45,16 +35,10 @@ TEST_P(DdsComingAndGoing, ARobotStopsWhenItsCommanderIsKilledAndObeysTheNextOne)
 }
 
 TEST_P(DdsComingAndGoing, ASubscriberThatIsKilledHoldsNobodyUp) {
-  const OwnDomain domain;
-  const Daemon daemon(base_model("1000s"));
-  const DdsGateway gateway(daemon, domain, kNavIn + kBaseOut + "/>");
-  Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
-  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  Drive drive("1000s", GetParam(), GetParam(), "");
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
   Stranger other(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
-  navigation.await("matched 1");
-  base.await("matched 1");
   other.await("matched 1");
-  gateway.see("1 publisher matched");
   navigation.publish("1 0");
   EXPECT_EQ(other.next_line(), "sample 1 0");
   base.process().kill();
@@ -66,14 +50,8 @@ TEST_P(DdsComingAndGoing, ASubscriberThatIsKilledHoldsNobodyUp) {
 }
 
 TEST_P(DdsComingAndGoing, AGatewayThatIsKilledIsSilenceAndTheNextOneGoesOn) {
-  const OwnDomain domain;
-  const Daemon daemon(base_model("200ms"));
-  DdsGateway gateway(daemon, domain, kNavIn + kStopping);
-  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
-  Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
-  base.await("matched 1");
-  navigation.await("matched 1");
-  gateway.see("1 publisher matched");
+  Drive drive("200ms", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
   publish_until_heard(navigation, base, "1 0");
   gateway.process().kill();
   gateway.start();
@@ -84,14 +62,8 @@ TEST_P(DdsComingAndGoing, AGatewayThatIsKilledIsSilenceAndTheNextOneGoesOn) {
 
 // ExecStopPost= of its unit. Not even a daemon is needed.
 TEST_P(DdsComingAndGoing, ForAGatewayThatIsKilledTheRobotIsStoppedByAnother) {
-  const OwnDomain domain;
-  const Daemon daemon(base_model("1000s"));
-  DdsGateway gateway(daemon, domain, kNavIn + kStopping);
-  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
-  Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
-  base.await("matched 1");
-  navigation.await("matched 1");
-  gateway.see("1 publisher matched");
+  Drive drive("1000s", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
   publish_until_heard(navigation, base, "1 0");
   gateway.process().kill();
   EXPECT_EQ(gateway.send_idle(), 0);
@@ -101,14 +73,8 @@ TEST_P(DdsComingAndGoing, ForAGatewayThatIsKilledTheRobotIsStoppedByAnother) {
 
 // What waited for it meanwhile is older than T: it must not move the robot.
 TEST_P(DdsComingAndGoing, WhatWaitedWhileTheGatewayWasStoppedIsNotObeyed) {
-  const OwnDomain domain;
-  Daemon daemon(base_model("200ms"));
-  DdsGateway gateway(daemon, domain, kNavIn + kStopping);
-  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
-  Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
-  base.await("matched 1");
-  navigation.await("matched 1");
-  gateway.see("1 publisher matched");
+  Drive drive("200ms", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
   publish_until_heard(navigation, base, "1 0");
   gateway.process().stop();
   navigation.publish("13 0");

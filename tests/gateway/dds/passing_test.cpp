@@ -27,18 +27,11 @@ INSTANTIATE_TEST_SUITE_P(Vendors, DdsPassing,
                          });
 
 TEST_P(DdsPassing, ATwistOfRos2PassesWithAllItsNumbers) {
-  const OwnDomain domain;
-  const Daemon daemon(base_model("1000s"));
-  const DdsGateway gateway(daemon, domain, kNavIn + kBaseOut + "/>");
-  Stranger base(GetParam().to, domain, {"sub", "twist", "rt/cmd_vel"});
-  Stranger navigation(GetParam().from, domain, {"pub", "twist", "rt/cmd_vel_nav"});
-  base.await("matched 1");
-  navigation.await("matched 1");
-  gateway.see("1 publisher matched");
-  navigation.publish("0.25 -1.5");
-  base.await("sample 0.25 -1.5");
-  navigation.publish("0.5 0.125");
-  base.await("sample 0.5 0.125");
+  Drive drive("1000s", GetParam().from, GetParam().to, "");
+  for (const char* const numbers : {"0.25 -1.5", "0.5 0.125"}) {
+    drive.from.publish(numbers);
+    EXPECT_EQ(drive.to.next_line(), std::string("sample ") + numbers);
+  }
 }
 
 TEST_P(DdsPassing, TheOneWhoOverridesIsObeyed) {
@@ -69,64 +62,40 @@ std::string model_of(const std::string& source, const std::string& port) {
          source + "</config></behavior></behaviors>";
 }
 
+std::string entries(const std::string& type, const std::string& max_size) {
+  return R"(<in topic="incoming" type=")" + type + R"(" port="/From:o" max_size=")" + max_size +
+         R"("/><out topic="outgoing" type=")" + type + R"(" port="/To:i" max_size="2MiB"/>)";
+}
+
 // Larger than a datagram: it arrives in fragments, which are put together in Arbiter's memory.
 TEST_P(DdsPassing, ALargeSamplePassesWhole) {
-  const OwnDomain domain;
-  const Daemon daemon(model_of("/Camera/blob:o", "/Screen/blob:i"));
-  const DdsGateway gateway(
-      daemon, domain,
-      R"(<in topic="blobs" type="strangers::Blob" port="/Camera/blob:o" max_size="2MiB"/>)"
-      R"(<out topic="passed" type="strangers::Blob" port="/Screen/blob:i" max_size="2MiB"/>)");
-  Stranger camera(GetParam().from, domain, {"pub", "blob", "blobs"});
-  Stranger screen(GetParam().to, domain, {"sub", "blob", "passed"});
-  camera.await("matched 1");
-  screen.await("matched 1");
-  gateway.see("1 publisher matched");
-  publish_until_heard(camera, screen, "6 200000");
+  Passage blobs(model_of("/From:o", "/To:i"), entries("strangers::Blob", "2MiB"), GetParam().from,
+                {"blob", "incoming"}, GetParam().to, {"blob", "outgoing"});
+  publish_until_heard(blobs.from, blobs.to, "6 200000");
   for (const char* const blob : {"7 1000000", "8 3", "9 70001"}) {
-    camera.publish(blob);
-    EXPECT_EQ(screen.next_line(), std::string("sample ") + blob);
+    blobs.from.publish(blob);
+    EXPECT_EQ(blobs.to.next_line(), std::string("sample ") + blob);
   }
 }
 
 // Without keyed="true" in the mapping: whoever is there says that the type has a key.
 TEST_P(DdsPassing, ATypeWithAKeyPassesThoughTheMappingDoesNotSayThatItHasOne) {
-  const OwnDomain domain;
-  const Daemon daemon(model_of("/Fleet/robot:o", "/Screen/robot:i"));
-  const DdsGateway gateway(
-      daemon, domain,
-      R"(<in topic="robots" type="strangers::Robot" port="/Fleet/robot:o"/>)"
-      R"(<out topic="shown" type="strangers::Robot" port="/Screen/robot:i"/>)");
-  Stranger robot(GetParam().from, domain, {"pub", "robot", "robots"});
-  Stranger screen(GetParam().to, domain, {"sub", "robot", "shown"});
-  robot.await("matched 1");
-  screen.await("matched 1");
-  gateway.see("1 publisher matched");
-  robot.publish("1 0.5");
-  EXPECT_EQ(screen.next_line(), "sample 1 0.5");
-  robot.publish("2 0.25");
-  EXPECT_EQ(screen.next_line(), "sample 2 0.25");
+  Passage robots(model_of("/From:o", "/To:i"), entries("strangers::Robot", "1KiB"), GetParam().from,
+                 {"robot", "incoming"}, GetParam().to, {"robot", "outgoing"});
+  for (const char* const robot : {"1 0.5", "2 0.25"}) {
+    robots.from.publish(robot);
+    EXPECT_EQ(robots.to.next_line(), std::string("sample ") + robot);
+  }
 }
 
 // The next one is passed on as if it had not been.
 TEST_P(DdsPassing, WhatDoesNotFitIsCountedAndPassedOver) {
-  const OwnDomain domain;
-  Daemon daemon(model_of("/Camera/blob:o", "/Screen/blob:i"));
-  const DdsGateway gateway(
-      daemon, domain,
-      R"(<in topic="blobs" type="strangers::Blob" port="/Camera/blob:o" max_size="1KiB"/>)"
-      R"(<out topic="passed" type="strangers::Blob" port="/Screen/blob:i" max_size="2MiB"/>)");
-  Stranger camera(GetParam().from, domain, {"pub", "blob", "blobs"});
-  Stranger screen(GetParam().to, domain, {"sub", "blob", "passed"});
-  camera.await("matched 1");
-  screen.await("matched 1");
-  gateway.see("1 publisher matched");
-  publish_until_heard(camera, screen, "0 3");
-  camera.publish("1 5000");
-  camera.publish("2 8000");
-  camera.publish("3 100");
-  EXPECT_EQ(screen.next_line(), "sample 3 100");
-  await_described(daemon, "/Camera/blob:o", "2 of a size that does not fit");
+  Passage blobs(model_of("/From:o", "/To:i"), entries("strangers::Blob", "1KiB"), GetParam().from,
+                {"blob", "incoming"}, GetParam().to, {"blob", "outgoing"});
+  publish_until_heard(blobs.from, blobs.to, "0 3");
+  for (const char* const blob : {"1 5000", "2 8000", "3 100"}) blobs.from.publish(blob);
+  EXPECT_EQ(blobs.to.next_line(), "sample 3 100");
+  await_described(blobs.daemon, "/From:o", "2 of a size that does not fit");
 }
 
 }  // namespace

@@ -205,4 +205,40 @@ inline const std::string kTeleopIn =
     R"(<in topic="/cmd_vel_teleop" )" + kTwist + R"( port="/Teleop/cmd_vel:o"/>)";
 inline const std::string kBaseOut = R"(<out port="/Base/cmd_vel:i" topic="/cmd_vel" )" + kTwist;
 
+// A stranger whose samples pass a gateway to another, once they all have found each other.
+struct Passage {
+  // `entries` has one topic in, and one out.
+  Passage(const std::string& model, const std::string& entries, const std::string& in_vendor,
+          const std::vector<std::string>& in_topic, const std::string& out_vendor,
+          const std::vector<std::string>& out_topic)
+      : daemon(model),
+        gateway(daemon, domain, entries),
+        to(out_vendor, domain, with("sub", out_topic)),
+        from(in_vendor, domain, with("pub", in_topic)) {
+    to.await("matched 1");
+    from.await("matched 1");
+    gateway.see("1 publisher matched");
+  }
+
+  OwnDomain domain;
+  Daemon daemon;
+  DdsGateway gateway;
+  Stranger to;
+  Stranger from;
+
+ private:
+  static std::vector<std::string> with(const std::string& role, std::vector<std::string> topic) {
+    topic.insert(topic.begin(), role);
+    return topic;
+  }
+};
+
+// Navigation drives a base, which is told to stop while nobody does.
+struct Drive : Passage {
+  Drive(const std::string& timeout, const std::string& in_vendor, const std::string& out_vendor,
+        const std::string& idle = R"( idle="zero")")
+      : Passage(base_model(timeout), kNavIn + kBaseOut + idle + "/>", in_vendor,
+                {"twist", "rt/cmd_vel_nav"}, out_vendor, {"twist", "rt/cmd_vel"}) {}
+};
+
 }  // namespace arbiter::test
