@@ -89,14 +89,19 @@ void DdsMiddleware::tend() {
 
 bool DdsMiddleware::open(Site& site) {
   if (shm::monotonic_now() < site.open_again) return false;
+  const CycloneWords words;
   try {
     site.domain.emplace(*site.gateway, site.topics, bell_);
     for (EndPoint* const end : site.ends) end->open(*site.domain);
+    site.problem.clear();
     return true;
   } catch (const DdsError& error) {
+    const std::string problem =
+        words.last().empty() ? error.what() : "DDS cannot be joined: " + words.last();
     close(site);
-    if (site.open_again == 0) say(Level::kError, std::string(error.what()) + "; trying again");
-    for (Account* const account : site.accounts) account->set_obstacle(error.what());
+    if (problem != site.problem) say(Level::kError, problem + "; trying again");
+    site.problem = problem;
+    for (Account* const account : site.accounts) account->set_obstacle(problem);
     site.open_again = shm::monotonic_now() + kOpenAgain;
     return false;
   }

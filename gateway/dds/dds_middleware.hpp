@@ -39,6 +39,7 @@ class DdsMiddleware : public Middleware {
     std::set<std::string> topics;
     std::optional<Domain> domain;
     shm::Nanoseconds open_again = 0;
+    std::string problem;          // why it could not be opened last, which has been said
     std::vector<EndPoint*> ends;  // each with its account
     std::vector<Account*> accounts;
   };

@@ -49,6 +49,9 @@ bool is_address(const std::string& interface) {
          interface.find(':') != std::string::npos;
 }
 
+// Of this thread: where CycloneWords keeps them; null: nowhere.
+thread_local std::string* kept_words = nullptr;
+
 bool is_loopback(const std::string& interface) {
   return interface == "lo" || interface.starts_with("127.") || interface == "::1";
 }
@@ -111,6 +114,9 @@ Domain::Domain(const Gateway& gateway, std::set<std::string> topics, const Bell&
                    "a participant in domain " + std::to_string(domain_of(gateway))),
       peers_(participant_.get(), std::move(topics), bell) {}
 
+CycloneWords::CycloneWords() { kept_words = &last_; }
+CycloneWords::~CycloneWords() { kept_words = nullptr; }
+
 void hear_cyclone() {
   // What strangers send may make it write: their number must not fill a disk.
   static Quota& quota = *new Quota(20, 10'000'000'000);
@@ -118,7 +124,11 @@ void hear_cyclone() {
   dds_set_log_sink(
       [](void* /*argument*/, const dds_log_data_t* line) {
         std::string_view text(line->message, line->size);
-        while (!text.empty() && text.back() == '\n') text.remove_suffix(1);
+        while (text.ends_with('\n') || text.ends_with('.')) text.remove_suffix(1);
+        if (kept_words != nullptr) {
+          *kept_words = text;
+          return;
+        }
         if (const auto passed = quota.take(); passed) {
           const bool error = (line->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0;
           std::string said = "Cyclone DDS: " + std::string(text);

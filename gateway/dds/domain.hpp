@@ -35,4 +35,20 @@ class Domain {
 // Lets Cyclone's messages go to say() (gateway/core/say.hpp), at most so many a second.
 void hear_cyclone();
 
+// Keeps what Cyclone says on this thread while it lives, in place of that: a call that fails says
+// why, while its result is "Error".
+class CycloneWords {
+ public:
+  CycloneWords();
+  CycloneWords(const CycloneWords&) = delete;
+  CycloneWords& operator=(const CycloneWords&) = delete;
+  ~CycloneWords();
+
+  // The last one; empty: it has said nothing.
+  [[nodiscard]] const std::string& last() const { return last_; }
+
+ private:
+  std::string last_;
+};
+
 }  // namespace arbiter::gateway::dds

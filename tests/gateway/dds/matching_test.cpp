@@ -117,5 +117,17 @@ TEST_P(DdsMatching, TheTypeHashOfRos2IsTakenOver) {
   watcher.await("reader typehash=RIHS01_00ff;");
 }
 
+// It may come later: a network that is slow to start.
+TEST(DdsInterface, ThatIsNotThereIsWaitedForAndNamed) {
+  const OwnDomain domain;
+  Daemon daemon(base_model("1s"));
+  DdsGateway gateway(daemon, domain, kNavIn, "nosuch0");
+  await_described(daemon, "/Nav/cmd_vel:o", "nosuch0");
+  gateway.see("nosuch0: does not match an available interface; trying again");
+  ::poll(nullptr, 0, 2500);  // it does try again, and says nothing more
+  EXPECT_EQ(gateway.log().find("trying again"), gateway.log().rfind("trying again"));
+  EXPECT_EQ(gateway.end(), 0);
+}
+
 }  // namespace
 }  // namespace arbiter::test

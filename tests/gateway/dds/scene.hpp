@@ -49,8 +49,7 @@ inline constexpr const char* kLoopback =
     R"(<AllowMulticast>false</AllowMulticast></General><Discovery>)"
     R"(<ParticipantIndex>auto</ParticipantIndex>)"
     R"(<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>)"
-    R"(<Peers><Peer address="127.0.0.1"/></Peers></Discovery>)"
-    R"(<Tracing><Verbosity>none</Verbosity></Tracing>)";
+    R"(<Peers><Peer address="127.0.0.1"/></Peers></Discovery>)";
 
 // A program of DDS that knows nothing of Arbiter (strangers/command_line.hpp).
 class Stranger {
@@ -123,10 +122,11 @@ class Stranger {
 class DdsGateway {
  public:
   // `entries`: the elements of the mapping's <gateway>.
-  DdsGateway(const Daemon& daemon, const OwnDomain& domain, const std::string& entries)
+  DdsGateway(const Daemon& daemon, const OwnDomain& domain, const std::string& entries,
+             const std::string& interface = "lo")
       : mapping_(daemon.directory() + "/gateway.xml"), log_(daemon.directory() + "/gateway.log") {
     std::ofstream(mapping_) << "<gateway kind=\"dds\" domain=\"" << domain.number()
-                            << "\" interface=\"lo\">\n"
+                            << "\" interface=\"" << interface << "\">\n"
                             << entries << "</gateway>\n";
     start();
   }

@@ -1,5 +1,6 @@
 // A stranger by Cyclone DDS, with types made by idlc. Listens as CYCLONEDDS_URI says.
 #include <dds/dds.h>
+#include <dds/ddsrt/log.h>
 #include <unistd.h>
 
 #include <cstring>
@@ -177,6 +178,7 @@ void watch(const CommandLine& line) {
 
 int main(int argc, char** argv) {
   const CommandLine line = strangers::parse(argc, argv);
+  dds_set_log_mask(DDS_LC_FATAL);  // not of what the tests send to it
   if (std::strcmp(argv[1], "watch") == 0) {
     watch(line);
     return 0;
