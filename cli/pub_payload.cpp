@@ -103,9 +103,9 @@ std::optional<std::vector<std::byte>> read_payload(const PayloadOptions& options
 std::vector<std::byte> payload_of(std::optional<std::vector<std::byte>> payload,
                                   const PayloadOptions& options, const Type& type) {
   if (!payload && type.is_variable()) {
-    throw CLI::ValidationError(
-        "--file", "a sample of " + describe(type) + " is written by somebody who knows the type; "
-                  "give one with --file, --hex or --text");
+    throw CLI::ValidationError("--file", "a sample of " + describe(type) +
+                                             " is written by somebody who knows the type; "
+                                             "give one with --file, --hex or --text");
   }
   if (!payload && type.size() <= kMaxPayload) return std::vector<std::byte>(type.size());
   if (!payload) {

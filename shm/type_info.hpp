@@ -18,8 +18,8 @@ inline constexpr std::uint64_t kMaxAlignment = kPageSize;
 // Plain data: lies in segments and travels in messages.
 struct TypeInfo {
   char name[kMaxTypeName + 1] = {};  // terminated; empty where the port is untyped
-  std::uint64_t size = 0;            // bytes of a sample; untyped or variable: the most there can be
-  std::uint64_t alignment = 1;       // 0: the type is variable
+  std::uint64_t size = 0;       // bytes of a sample; untyped or variable: the most there can be
+  std::uint64_t alignment = 1;  // 0: the type is variable
 
   [[nodiscard]] bool is_typed() const noexcept { return name[0] != '\0'; }
   // It has a name, and samples of any size.

@@ -68,7 +68,7 @@ enum class MessageKind : std::uint32_t {
   kOpenTap,  // name, flags (kTapsInput, kRejoins); descriptors: its segment, its bell. kOpened and
   // kConnected as for a port; it is closed as one. One that another daemon has opened asks
   // again
-  kTapped,  // answers kTap. port, peer; link, value: where the tap reads; descriptor: the events
+  kTapped,    // answers kTap. port, peer; link, value: where the tap reads; descriptor: the events
   kDescribe,  // port, text: what stands behind it, for the status; empty: nothing
 
   // From the daemon.

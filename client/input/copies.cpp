@@ -17,8 +17,8 @@ static_assert(offsetof(shm::SlotHeader, size) == offsetof(HeaderInFile, size));
 
 }  // namespace
 
-bool Copies::copy(const OutputPeer& from, std::uint32_t slot, bool has_one_size, std::uint32_t number,
-                  CopiedSample& sample) noexcept {
+bool Copies::copy(const OutputPeer& from, std::uint32_t slot, bool has_one_size,
+                  std::uint32_t number, CopiedSample& sample) noexcept {
   const shm::OutputLayout& layout = from.segment.layout();
   HeaderInFile header{};
   if (!shm::copy_out(from.file, layout.headers_offset + sizeof(shm::SlotHeader) * slot, &header,

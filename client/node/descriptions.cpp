@@ -44,8 +44,7 @@ void NodeCore::say_descriptions() noexcept {
     message.port = port;
     message.set_text(description.text);
     description.said_at = now;
-    description.is_said =
-        wire::send_message(socket_->get(), message) == wire::SendResult::kSent;
+    description.is_said = wire::send_message(socket_->get(), message) == wire::SendResult::kSent;
   }
 }
 

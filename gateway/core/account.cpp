@@ -63,6 +63,10 @@ std::string Account::state() const {
 std::string Account::text() const {
   const std::lock_guard lock(mutex_);
   std::string text = state_of_topic();
+  const std::size_t size = last_size_.load(std::memory_order_relaxed);
+  if (passed.value() != 0) {
+    text += ", the last sample has " + std::to_string(size) + (size == 1 ? " byte" : " bytes");
+  }
   std::string counts;
   const auto add = [&](const Count& count, const char* what) {
     if (count.value() == 0) return;

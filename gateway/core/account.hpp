@@ -46,6 +46,11 @@ class Account {
   Count refused;     // by the middleware, when it was sent
   Count idle;        // idle samples sent
 
+  // Of the last sample that passed, in bytes. The thread that delivers or sends.
+  void set_last_size(std::size_t size) noexcept {
+    last_size_.store(size, std::memory_order_relaxed);
+  }
+
   // How many at the other end are matched. Nothing is said of them where nobody has called this.
   // `at_least`: there may be more.
   void set_peers(std::uint32_t peers, bool at_least = false) noexcept;
@@ -70,6 +75,7 @@ class Account {
   mutable std::mutex mutex_;
   std::string obstacle_;
   std::string last_reason_;
+  std::atomic<std::size_t> last_size_{0};
   std::int64_t peers_ = -1;  // not known
   bool at_least_ = false;
 };

@@ -123,6 +123,7 @@ Incoming::Fate Incoming::pass_to(OutputPort<void>& port, const ForeignSample& sa
     return Fate::kLate;
   }
   account_.passed.add();
+  account_.set_last_size(size);
   return Fate::kPassed;
 }
 

@@ -63,6 +63,7 @@ void Outgoing::send(Bytes sample) noexcept {
   switch (sender_.send(sample)) {
     case Sender::Result::kSent:
       account_.passed.add();
+      account_.set_last_size(sample.size());
       return;
     case Sender::Result::kNotReady:
     case Sender::Result::kRefused:

@@ -144,6 +144,7 @@ void Session::make_ends() {
 }
 
 void Session::take_for_ever() {
+  for (const auto& inlet : inlets_) take_all(*inlet);  // from here on they are known to be empty
   while (!ends_.load(std::memory_order_relaxed)) {
     shm::Nanoseconds wait = kLongestWait;
     for (const auto& inlet : inlets_) {

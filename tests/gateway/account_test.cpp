@@ -32,6 +32,16 @@ TEST(Account, SaysWhatWentWrongAndWhyLast) {
   EXPECT_EQ(account.state(), "iceoryx a/b/c, 1 subscriber matched; a sample of 70000 bytes");
 }
 
+TEST(Account, SaysHowLargeTheLastSampleWas) {
+  Account account("DDS topic rt/image", "publisher");
+  account.set_peers(1);
+  account.passed.add();
+  account.set_last_size(921'632);
+  EXPECT_EQ(account.text(),
+            "DDS topic rt/image, 1 publisher matched, the last sample has 921632 bytes");
+  EXPECT_EQ(account.state(), "DDS topic rt/image, 1 publisher matched");
+}
+
 TEST(Account, AnObstacleStandsInThePlaceOfPeers) {
   Account account("iceoryx a/b/c", "subscriber");
   account.set_peers(3);

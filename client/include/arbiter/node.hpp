@@ -81,8 +81,8 @@ class Node {
       return InputPort<T>(detail::open_input(*core_, name, type_of<T>(), options));
     }
   }
-  // One that takes samples of this type alone, and gives them as bytes, type.size() of them each, or,
-  // of a variable type, as many as each has.
+  // One that takes samples of this type alone, and gives them as bytes, type.size() of them each,
+  // or, of a variable type, as many as each has.
   [[nodiscard]] InputPort<void> input_port(std::string_view name, const Type& type,
                                            const InputPortOptions& options = {}) {
     return InputPort<void>(detail::open_input(*core_, name, type, options));

@@ -47,6 +47,16 @@ class Iceoryx : public testing::Test {
   void wait_for_description(const std::string& source, const std::string& text) {
     wait_until([&] { return described(source).find(text) != std::string::npos; });
   }
+  // From a new publisher to a new subscriber.
+  void expect_that_samples_pass() {
+    Spoken publisher = plain_publisher("low");
+    Spoken subscriber = plain_subscriber("base");
+    ASSERT_TRUE(subscriber.hear("ready"));
+    wait_for_description("/Low:o", "at least 1 publisher matched");
+    publisher.say("x");
+    EXPECT_EQ(subscriber.line(), "|x");
+  }
+
   EmptyMachine empty_;
   TemporaryDirectory directory_;
   Daemon daemon_{kModel};
@@ -109,12 +119,7 @@ TEST_F(Iceoryx, WithoutRouDiTheGatewaySaysSoAndGoesOnLooking) {
       << gate.heard;
   wait_for_description("/Low:o", "RouDi does not run");
   const Roudi roudi(directory_);
-  Spoken publisher = plain_publisher("low");
-  Spoken subscriber = plain_subscriber("base");
-  ASSERT_TRUE(subscriber.hear("ready"));
-  wait_for_description("/Low:o", "at least 1 publisher matched");
-  publisher.say("x");
-  EXPECT_EQ(subscriber.line(), "|x");
+  expect_that_samples_pass();
 }
 
 TEST_F(Iceoryx, ARouDiThatIsKilledAndComesAgainIsFoundAgain) {
@@ -126,12 +131,7 @@ TEST_F(Iceoryx, ARouDiThatIsKilledAndComesAgainIsFoundAgain) {
     ASSERT_TRUE(gate.hear("RouDi has gone; the gateway begins anew")) << gate.heard;
     wait_for_description("/Low:o", "RouDi does not run");
     roudi.emplace(directory_);
-    Spoken publisher = plain_publisher("low");
-    Spoken subscriber = plain_subscriber("base");
-    ASSERT_TRUE(subscriber.hear("ready"));
-    wait_for_description("/Low:o", "at least 1 publisher matched");
-    publisher.say("x");
-    EXPECT_EQ(subscriber.line(), "|x");
+    expect_that_samples_pass();
   }
 }
 
