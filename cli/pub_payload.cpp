@@ -102,13 +102,19 @@ std::optional<std::vector<std::byte>> read_payload(const PayloadOptions& options
 
 std::vector<std::byte> payload_of(std::optional<std::vector<std::byte>> payload,
                                   const PayloadOptions& options, const Type& type) {
+  if (!payload && type.is_variable()) {
+    throw CLI::ValidationError("--file", "a sample of " + describe(type) +
+                                             " is written by somebody who knows the type; "
+                                             "give one with --file, --hex or --text");
+  }
   if (!payload && type.size() <= kMaxPayload) return std::vector<std::byte>(type.size());
   if (!payload) {
     throw CLI::ValidationError("--size", "a sample of " + describe(type) + " is larger than " +
                                              std::to_string(kMaxPayload >> 20) +
                                              " MiB, the most that pub sends");
   }
-  if (type.is_untyped() || type.size() == payload->size()) return std::move(*payload);
+  const bool may_differ = !type.has_one_size() && payload->size() <= type.size();
+  if (type.is_untyped() || may_differ || type.size() == payload->size()) return std::move(*payload);
   throw CLI::ValidationError(options.name(), "the payload has " + count_of(payload->size()) +
                                                  ", but a sample of " + describe(type) + " has " +
                                                  count_of(type.size()) + "; nothing was published");

@@ -183,7 +183,8 @@ std::string describe(const wire::SampleType& type) {
 }
 
 bool is_same(const wire::SampleType& one, const Type& other) {
-  return one.name == other.name() && one.size == other.size() && one.alignment == other.alignment();
+  return one.name == other.name() && one.alignment == other.alignment() &&
+         (one.size == other.size() || other.is_variable());
 }
 
 }  // namespace arbiter::cli

@@ -12,6 +12,8 @@
 #include "cli/numbers.hpp"
 #include "cli/progress.hpp"
 #include "cli/verbs.hpp"
+#include "gateway/mapping/check_mapping.hpp"
+#include "gateway/mapping/read_mapping.hpp"
 #include "rules/ask/findings.hpp"
 #include "rules/ask/report.hpp"
 #include "rules/ask/verdict.hpp"
@@ -23,6 +25,7 @@ namespace {
 struct CheckOptions {
   rules::ModelFiles files;
   std::vector<std::string> statements;  // files
+  std::vector<std::string> gateways;    // files: mappings
   std::vector<std::string> silenced;    // codes
   double effort = 1;
   bool strict = false;
@@ -49,6 +52,7 @@ const std::vector<std::string_view> silenceable{"decided-in-order",
                                                 "never-runs",
                                                 "never-selected",
                                                 "never-wins",
+                                                "no-idle",
                                                 "no-children",
                                                 "no-config",
                                                 "no-rule-at-port",
@@ -57,6 +61,8 @@ const std::vector<std::string_view> silenceable{"decided-in-order",
                                                 "proved",
                                                 "similar-name",
                                                 "starved",
+                                                "two-outs",
+                                                "unmentioned-port",
                                                 "unreachable-children",
                                                 "wrong-end"};
 
@@ -105,6 +111,18 @@ Statements judge_statements(const CheckOptions& options, const rules::CompiledMo
   return result;
 }
 
+// As statements: they are read in any case, and judged by a model that can be run.
+void check_gateways(const CheckOptions& options, const rules::RuleSet* model,
+                    rules::Diagnostics& diagnostics) {
+  rules::Diagnostics of_mappings;
+  std::vector<gateway::Mapping> mappings;
+  for (const auto& path : options.gateways) {
+    mappings.push_back(gateway::read_mapping_file(path, of_mappings));
+  }
+  if (!of_mappings.has_errors()) gateway::check_mappings(mappings, model, of_mappings);
+  diagnostics.add(std::move(of_mappings));
+}
+
 void write_summary(std::ostream& out, const Statements& statements) {
   const std::size_t judged = statements.proved + statements.refuted + statements.open;
   out << counted(judged + statements.not_judged, "statement") << ": " << statements.proved
@@ -124,6 +142,7 @@ int check(const CheckOptions& options) {
   if (model) {
     rules::find_more(model->rules, model->compiled, diagnostics, budget, statements.facts);
   }
+  check_gateways(options, model ? &model->rules : nullptr, diagnostics);
   if (!model && !options.statements.empty()) {
     diagnostics.note("left-open", {options.statements.front(), 1, 1},
                      "the statements were not checked, because the model has errors");
@@ -160,6 +179,10 @@ void add_check(CLI::App& app, int& exit_code) {
                    "File of statements that must be true in every state, one on each line")
       ->type_name("FILE")
       ->allow_extra_args(false);
+  verb->add_option("--gateway", options->gateways,
+                   "Mapping of a gateway, to be looked at beside the model (docs/gateways.md)")
+      ->type_name("FILE")
+      ->allow_extra_args(false);
   verb->add_option("--silence", options->silenced,
                    "Hide warnings and notes with this code, such as nobody-wins")
       ->type_name("CODE")
@@ -173,6 +196,7 @@ void add_check(CLI::App& app, int& exit_code) {
       "Example:\n"
       "  arbiter check search_and_track.xml --application application.xml\n"
       "  arbiter check search_and_track.xml --assert safety.txt --silence nobody-wins,starved\n"
+      "  arbiter check robot.xml --gateway ros2.xml --gateway radar.xml\n"
       "\nStatements are about sources and winners:\n"
       "  /collision:o -> idle(/Arm/pos:i)\n"
       "  winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o\n"

@@ -12,6 +12,7 @@
 #include "cli/live.hpp"
 #include "cli/verbs.hpp"
 #include "shm/clock.hpp"
+#include "shm/utf8.hpp"
 #include "watch/process.hpp"
 #include "wire/document.hpp"
 #include "wire/status.hpp"
@@ -37,6 +38,12 @@ std::string holder(const auto& port) {
            ", has not come back yet: its connections keep working";
   }
   return port.open ? process_text(port.open->component) : "not open";
+}
+
+// What its component says of it.
+void print_outside(const auto& port, const char* how) {
+  if (!port.open || !port.open->described) return;
+  std::cout << "           " << how << shm::printable(*port.open->described) << '\n';
 }
 
 std::string type_of(const auto& port) {
@@ -104,6 +111,7 @@ void print_source(const wire::SourceStatus& source, bool has_model) {
   const std::string mark = unmentioned(source, has_model);
   std::cout << (mark.empty() ? "" : " " + mark) << '\n';
   if (!source.open) return;
+  print_outside(source, "comes from ");
   for (const auto& tap : source.open->taps) {
     std::cout << "           tapped by " << process_text(tap) << ", user " << tap.user << '\n';
   }
@@ -154,6 +162,7 @@ void print_input(const wire::InputStatus& input, bool has_model) {
         false);
   }
   std::cout << '\n';
+  print_outside(input, "goes to ");
   for (const auto& connection : input.connections) {
     print_connection(connection, useless && useless->source == connection.source);
   }

@@ -44,7 +44,11 @@ std::vector<std::string> sources_that_matter(const ConnectionExplanation& connec
 
 void write_obstacles(std::ostream& out, const std::vector<Obstacle>& obstacles,
                      const std::string& of = {}) {
-  for (const auto& each : obstacles) out << "  ! " << of << each.text << '\n';
+  for (const auto& each : obstacles) {
+    // Some name what they are of themselves.
+    const bool is_named = !of.empty() && each.text.starts_with(of + ' ');
+    out << "  ! " << (of.empty() || is_named ? "" : of + ": ") << each.text << '\n';
+  }
 }
 
 // The winner first, then who would like to win.
@@ -337,7 +341,7 @@ void WhyAnswer::write_kept_out(const ConnectionExplanation& connection) const {
 void WhyAnswer::write_reasons(const ConnectionExplanation& connection) const {
   if (connection.wins) return;
   for (const auto& source : sources_that_matter(connection)) {
-    write_obstacles(out_, obstacles_.of_source(source), source + ": ");
+    write_obstacles(out_, obstacles_.of_source(source), source);
   }
 }
 

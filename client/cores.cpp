@@ -105,6 +105,9 @@ void deactivate_at(OutputCore& core, Time at) {
   begin_replay(core, at);
   core.deactivate(nanoseconds(at));
 }
+void describe(OutputCore& core, std::string_view text) noexcept {
+  if (is_own(core)) core.node->describe(core.instance(), text);
+}
 std::size_t max_size(const OutputCore& core) noexcept { return core.type().size; }
 const std::string& name(const OutputCore& core) noexcept { return core.name(); }
 const Type& type(const OutputCore& core) noexcept { return core.declared_type(); }
@@ -142,6 +145,9 @@ void give_back(InputCore& core, std::uint32_t hold) noexcept {
 int wait_descriptor(InputCore& core) {
   require_own(core);
   return core.wait_descriptor();
+}
+void describe(InputCore& core, std::string_view text) noexcept {
+  if (is_own(core)) core.node->describe(core.instance(), text);
 }
 std::optional<std::string_view> winner(InputCore& core) noexcept {
   if (!is_own(core)) return {};

@@ -101,6 +101,11 @@ void Daemon::handle(Client& client, wire::Received& received) {
         switchboard_.note_blind(message.port, std::string(message.text_view()));
       }
       break;
+    case wire::MessageKind::kDescribe:
+      if (client.ports.count(message.port) != 0) {
+        switchboard_.describe(message.port, shm::printable(message.text_view()));
+      }
+      break;
     case wire::MessageKind::kConnect:
       if (client.ports.count(message.port) == 0) throw std::runtime_error("the port is not open");
       connect(client, message.request, message.port);

@@ -29,6 +29,10 @@ std::optional<wire::SampleType> type_of(const shm::TypeInfo& type) {
   return wire::SampleType{shm::printable(type.type_name()), type.size, type.alignment};
 }
 
+std::optional<std::string> text_of(const std::string& text) {
+  return text.empty() ? std::nullopt : std::optional(text);
+}
+
 wire::Component component_of(const Client& client) {
   return {client.name, client.pid(), client.user()};
 }
@@ -170,7 +174,8 @@ class Document {
     return {component_of(*output.client), std::move(taps),        type_of(output.type),
             read(counters.published),     read(counters.signals), read(counters.delivered),
             read(counters.discarded),     read(counters.refused), read(counters.blind),
-            read(counters.unsettled),     read(counters.no_slot), read(counters.late)};
+            read(counters.unsettled),     read(counters.no_slot), read(counters.late),
+            text_of(output.described)};
   }
 
   wire::InputStatus input(const InputName& name) {
@@ -208,7 +213,8 @@ class Document {
             read(header.counters.blind),
             read(header.counters.unsettled),
             read(header.counters.misbehaved),
-            read(header.counters.idles)};
+            read(header.counters.idles),
+            text_of(input.described)};
   }
 
   void add_connections(const InputName& name, const InputPort* input, wire::InputStatus& result) {

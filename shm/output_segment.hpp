@@ -132,7 +132,7 @@ struct OutputLayout {
     const std::uint32_t slots = header.slot_count;
     const bool sane = header.magic == OutputHeader::kMagic &&
                       header.version == OutputHeader::kVersion && slots != 0 &&
-                      slots <= kMaxSlots && type.alignment != 0 &&
+                      slots <= kMaxSlots && (type.alignment != 0 || type.is_variable()) &&
                       type.alignment <= kMaxAlignment &&
                       (type.alignment & (type.alignment - 1)) == 0 && type.size <= size;
     if (!sane) return {};

@@ -39,6 +39,7 @@ std::optional<std::string> fault_of(const TypeInfo& type) {
   if (type.is_typed() && type.size == 0) return "it has no bytes";
   if (type.size > kMaxTypeSize)
     return "it has more than " + std::to_string(kMaxTypeSize) + " bytes";
+  if (type.is_variable()) return {};
   const bool is_power = type.alignment != 0 && (type.alignment & (type.alignment - 1)) == 0;
   if (!is_power || type.alignment > kMaxAlignment) {
     return "its alignment is " + std::to_string(type.alignment) +
@@ -50,6 +51,7 @@ std::optional<std::string> fault_of(const TypeInfo& type) {
 std::string describe(const TypeInfo& type) {
   const std::string size = std::to_string(type.size) + (type.size == 1 ? " byte" : " bytes");
   if (!type.is_typed()) return "untyped samples (up to " + size + ")";
+  if (type.is_variable()) return printable(type.type_name()) + " (of any size)";
   return printable(type.type_name()) + " (" + size + ", aligned to " +
          std::to_string(type.alignment) + ")";
 }

@@ -18,10 +18,16 @@ inline constexpr std::uint64_t kMaxAlignment = kPageSize;
 // Plain data: lies in segments and travels in messages.
 struct TypeInfo {
   char name[kMaxTypeName + 1] = {};  // terminated; empty where the port is untyped
-  std::uint64_t size = 0;            // bytes of a sample; untyped: the most there can be
-  std::uint64_t alignment = 1;
+  std::uint64_t size = 0;       // bytes of a sample; untyped or variable: the most there can be
+  std::uint64_t alignment = 1;  // 0: the type is variable
 
   [[nodiscard]] bool is_typed() const noexcept { return name[0] != '\0'; }
+  // It has a name, and samples of any size.
+  [[nodiscard]] bool is_variable() const noexcept { return is_typed() && alignment == 0; }
+  // Bytes of each sample; 0: they may have any size.
+  [[nodiscard]] std::uint64_t one_size() const noexcept {
+    return is_typed() && alignment != 0 ? size : 0;
+  }
   [[nodiscard]] std::string_view type_name() const noexcept {
     return {name, strnlen(name, kMaxTypeName)};
   }
@@ -32,10 +38,10 @@ struct TypeInfo {
   }
 
   // The rule: two types are equal if their names are, byte for byte, and their sizes, and their
-  // alignments. Nothing else is known of them.
+  // alignments; of variable ones the names alone. Nothing else is known of them.
   friend bool operator==(const TypeInfo& one, const TypeInfo& other) noexcept {
-    return one.type_name() == other.type_name() && one.size == other.size &&
-           one.alignment == other.alignment;
+    return one.type_name() == other.type_name() && one.alignment == other.alignment &&
+           (one.size == other.size || one.is_variable());
   }
 };
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "rules/text/names.hpp"
+#include "shm/utf8.hpp"
 #include "watch/process.hpp"
 
 namespace arbiter::watch {
@@ -41,6 +42,13 @@ void add_unknown(const StrangerStatus& stranger, std::vector<Obstacle>& result) 
        who + " lives and has it open, but this daemon does not know it, because the state of the "
              "last daemon is lost: it continues under the last decisions it knew; restart it"});
   add_stopped(stranger.pid, who, result);
+}
+
+// What the component says of its port: how things stand outside is what keeps samples out, or
+// nothing.
+void add_outside(const std::string& name, const char* how, const auto& open,
+                 std::vector<Obstacle>& result) {
+  if (open.described) result.push_back({"outside", name + how + shm::printable(*open.described)});
 }
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
@@ -83,6 +91,7 @@ std::vector<Obstacle> Obstacles::of_port() const {
   const StrangerStatus* stranger = stranger_with(&StrangerStatus::inputs, port_);
   if (is_open()) {
     add_stopped(input_->open->component.pid, "its component " + component_text(*input_), result);
+    add_outside(port_, " goes to ", *input_->open, result);
   } else if (is_away()) {
     add_away(*input_->away_pid, result);
   } else if (stranger == nullptr) {
@@ -192,6 +201,7 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
       sources_.is_active(source) && sources_.state(source).timeout == shm::kForever;
   if (output->open) {
     add_stopped(output->open->component.pid, "its component " + component_text(*output), result);
+    add_outside(source, " comes from ", *output->open, result);
     return;
   }
   if (output->away_pid) {

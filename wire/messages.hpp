@@ -68,7 +68,8 @@ enum class MessageKind : std::uint32_t {
   kOpenTap,  // name, flags (kTapsInput, kRejoins); descriptors: its segment, its bell. kOpened and
   // kConnected as for a port; it is closed as one. One that another daemon has opened asks
   // again
-  kTapped,  // answers kTap. port, peer; link, value: where the tap reads; descriptor: the events
+  kTapped,    // answers kTap. port, peer; link, value: where the tap reads; descriptor: the events
+  kDescribe,  // port, text: what stands behind it, for the status; empty: nothing
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; peer: the daemon's clock, 0 if it does not say;

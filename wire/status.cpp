@@ -121,6 +121,7 @@ void describe(auto& field, Is<OpenOutput> auto& of) {
   field.counter("unsettled", of.unsettled);
   field.counter("no_slot", of.no_slot);
   field.counter("late", of.late);
+  field.maybe("described", of.described);
 }
 
 void describe(auto& field, Is<SourceStatus> auto& of) {
@@ -167,6 +168,7 @@ void describe(auto& field, Is<OpenInput> auto& of) {
   field.counter("unsettled", of.unsettled);
   field.counter("misbehaved", of.misbehaved);
   field.counter("idles", of.idles);
+  field.maybe("described", of.described);
 }
 
 void describe(auto& field, Is<UselessWinner> auto& of) {

@@ -97,6 +97,7 @@ struct OpenOutput {
   std::uint64_t unsettled = 0;
   std::uint64_t no_slot = 0;
   std::uint64_t late = 0;
+  std::optional<std::string> described;  // by its component: what stands behind it
 };
 
 struct SourceStatus {
@@ -155,6 +156,7 @@ struct OpenInput {
   std::uint64_t unsettled = 0;   // takes
   std::uint64_t misbehaved = 0;  // entries of queues
   std::uint64_t idles = 0;       // times that the component was told
+  std::optional<std::string> described;
 };
 
 // A connection that is selected, and cannot deliver.

@@ -17,8 +17,8 @@ static_assert(offsetof(shm::SlotHeader, size) == offsetof(HeaderInFile, size));
 
 }  // namespace
 
-bool Copies::copy(const OutputPeer& from, std::uint32_t slot, bool is_typed, std::uint32_t number,
-                  CopiedSample& sample) noexcept {
+bool Copies::copy(const OutputPeer& from, std::uint32_t slot, bool has_one_size,
+                  std::uint32_t number, CopiedSample& sample) noexcept {
   const shm::OutputLayout& layout = from.segment.layout();
   HeaderInFile header{};
   if (!shm::copy_out(from.file, layout.headers_offset + sizeof(shm::SlotHeader) * slot, &header,
@@ -26,9 +26,9 @@ bool Copies::copy(const OutputPeer& from, std::uint32_t slot, bool is_typed, std
     return false;
   }
   const std::uint64_t size = std::min(header.size, layout.stride);
-  if (!is_typed && size > kMostCopied) return false;
-  // As aligned as it is where it lies; a typed one is read whole, whatever its size is said to be.
-  const std::uint64_t bytes = is_typed ? layout.stride : size;
+  if (!has_one_size && size > kMostCopied) return false;
+  // As aligned as it is where it lies; one of a type of one size is read whole, whatever is said.
+  const std::uint64_t bytes = has_one_size ? layout.stride : size;
   const std::size_t room = std::max<std::size_t>(1, (bytes + shm::kPageSize - 1) / shm::kPageSize);
   data_[number].reset(
       static_cast<std::byte*>(std::aligned_alloc(shm::kPageSize, room * shm::kPageSize)));

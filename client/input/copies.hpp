@@ -32,7 +32,7 @@ class Copies {
 
   // Copies what lies in a slot, to stay until that number is used again. False: there is no memory
   // for it, or it is too large. Two system calls.
-  [[nodiscard]] bool copy(const OutputPeer& from, std::uint32_t slot, bool is_typed,
+  [[nodiscard]] bool copy(const OutputPeer& from, std::uint32_t slot, bool has_one_size,
                           std::uint32_t number, CopiedSample& sample) noexcept;
   // Frees what is not in use.
   void forget(std::uint32_t number) noexcept { data_[number].reset(); }

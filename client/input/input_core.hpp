@@ -164,7 +164,8 @@ class InputCore {
   // Constant once bound.
   const std::string name_;
   const Type declared_type_;
-  const shm::TypeInfo type_;  // the same, as it lies in memory
+  const shm::TypeInfo type_;      // the same, as it lies in memory
+  const std::uint64_t one_size_;  // of all samples; 0: each has its own
   const std::uint32_t max_held_;
   const bool keep_;
   const std::shared_ptr<SharedMemory> memory_;

@@ -16,6 +16,7 @@ InputCore::InputCore(std::string name, const Type& type, const InputPortOptions&
     : name_(std::move(name)),
       declared_type_(type),
       type_(as_info(type)),
+      one_size_(type_.one_size()),
       max_held_(options.max_held),
       keep_(options.keep),
       memory_(std::move(memory)),

@@ -291,9 +291,9 @@ bool InputCore::hold(Queue& queue, HeldSample& sample) noexcept {
     const shm::OutputSegment& from = queue.reader.segment();
     const shm::SlotHeader& header = from.slot_header(slot);
     sample.data = from.payload(slot);
-    // Of a type all samples have one size, whatever the publisher says.
-    sample.size = type_.is_typed()
-                      ? type_.size
+    // Of such a type all samples have one size, whatever the publisher says.
+    sample.size = one_size_ != 0
+                      ? one_size_
                       : std::min<std::uint64_t>(header.size.load(std::memory_order_relaxed),
                                                 from.layout().stride);
     sample.sequence = header.sequence.load(std::memory_order_relaxed);
@@ -327,9 +327,9 @@ bool InputCore::copy(const Queue& queue, std::uint32_t slot, HeldSample& sample)
     if (held_from_[i] == nullptr) copies_.forget(i);
   }
   CopiedSample copied;
-  if (!copies_.copy(*queue.peer, slot, type_.is_typed(), sample.hold, copied)) return false;
+  if (!copies_.copy(*queue.peer, slot, one_size_ != 0, sample.hold, copied)) return false;
   sample.data = copied.data;
-  sample.size = type_.is_typed() ? type_.size : copied.size;
+  sample.size = one_size_ != 0 ? one_size_ : copied.size;
   sample.sequence = copied.sequence;
   sample.stamp_ns = copied.stamp;
   return true;

@@ -174,6 +174,7 @@ void NodeCore::forget_port(shm::PortInstance port) {
   inputs_.erase(port);
   taps_.erase(port);
   given_.erase(port);
+  descriptions_.erase(port);
   say_closed(port);
 }
 
@@ -376,6 +377,7 @@ void NodeCore::close(shm::PortInstance port) noexcept {
     taps_.erase(found);
   }
   given_.erase(port);
+  descriptions_.erase(port);
   say_closed(port);
 }
 

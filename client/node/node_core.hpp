@@ -4,6 +4,7 @@
 //   node_notices.cpp  what the component should know
 //   node_service.cpp  what the daemon says, and the thread that hears it
 //   node_rejoin.cpp   losing the daemon, and coming back to another
+//   descriptions.cpp  what components say of their ports
 //   taps.cpp          taps that this node opens, and taps of its output ports
 //
 // Thread safety: opening and closing ports may come from any thread; what the daemon says is
@@ -55,6 +56,8 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::shared_ptr<TapCore> open_tap(std::string_view name, const Type& type,
                                     const TapOptions& options);
   void close(shm::PortInstance port) noexcept;
+  // What stands behind a port, for the status.
+  void describe(shm::PortInstance port, std::string_view text) noexcept;
 
   // Without a service thread: takes up what the daemon has said so far, without blocking.
   void service();
@@ -114,8 +117,12 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
       std::vector<std::pair<shm::PortInstance, std::shared_ptr<const OutputPeer>>>& copied_from);
   void tidy_taps(
       std::vector<std::pair<shm::PortInstance, std::shared_ptr<const OutputPeer>>>& copied_from);
-  // Whether there is something that nobody will ring for.
-  [[nodiscard]] bool has_to_look_again();
+  // When to look for what nobody will ring for, in milliseconds from now; -1: never.
+  [[nodiscard]] int look_again_in();
+  // Descriptions (descriptions.cpp). Under mutex_: those that are due; when the next one is.
+  void say_descriptions() noexcept;
+  [[nodiscard]] shm::Nanoseconds next_description() const noexcept;
+  void describe_again() noexcept;
   void handle(wire::Received& received);
   void handle_without_descriptors(const wire::Message& message);
   void handle_reply(wire::Received& received);
@@ -215,6 +222,12 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::map<std::uint64_t, std::weak_ptr<TapCore>> reopened_;  // by request
   std::vector<Notice> notices_;                               // to be given
   bool is_giving_ = false;
+  struct Description {
+    std::string text;
+    bool is_said = true;
+    shm::Nanoseconds said_at = 0;
+  };
+  std::map<shm::PortInstance, Description> descriptions_;
   std::map<shm::PortInstance, std::set<std::string>> given_;  // texts, by port
 
   std::thread service_thread_;  // last: it uses all of the above

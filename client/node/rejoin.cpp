@@ -202,6 +202,7 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
   node_ = welcome.message.link;
   turned_away_.clear();
   for (const auto& [instance, output] : outputs_) output->doubt_taps();
+  describe_again();
   reopen_taps();
   news_.notify_all();
 }

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "client/node/node_core.hpp"
+#include "shm/clock.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -72,17 +73,24 @@ void NodeCore::run_service_thread() {
       const std::lock_guard lock(mutex_);
       if (stopping_) return;
     }
-    pump(has_to_look_again() ? kTidyInterval : -1);
+    pump(look_again_in());
     give_notices();
   }
 }
 
-bool NodeCore::has_to_look_again() {
+int NodeCore::look_again_in() {
   const std::lock_guard lock(mutex_);
-  return std::any_of(inputs_.begin(), inputs_.end(),
-                     [](const auto& input) { return input.second->has_predecessors(); }) ||
-         std::any_of(outputs_.begin(), outputs_.end(),
-                     [](const auto& output) { return output.second->has_doubtful_taps(); });
+  const bool has_to_tidy =
+      std::any_of(inputs_.begin(), inputs_.end(),
+                  [](const auto& input) { return input.second->has_predecessors(); }) ||
+      std::any_of(outputs_.begin(), outputs_.end(),
+                  [](const auto& output) { return output.second->has_doubtful_taps(); });
+  const int tidy = has_to_tidy ? kTidyInterval : -1;
+  const shm::Nanoseconds due = next_description();
+  if (due == shm::kForever) return tidy;
+  const shm::Nanoseconds left = std::max<shm::Nanoseconds>(0, due - shm::monotonic_now());
+  const int description = static_cast<int>(left / 1'000'000) + 1;
+  return tidy < 0 ? description : std::min(tidy, description);
 }
 
 // Where there is a service thread, it does this.
@@ -101,6 +109,10 @@ void NodeCore::pump(int timeout_ms) {
   epoll_event event{};
   static_cast<void>(epoll_wait(epoll_.get(), &event, 1, timeout_ms));
   tidy();
+  {
+    const std::lock_guard lock(mutex_);
+    say_descriptions();
+  }
   const Socket socket = this->socket();
   if (socket == nullptr) {
     std::uint64_t rings = 0;

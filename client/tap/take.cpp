@@ -227,7 +227,7 @@ bool TapCore::hold(Stream& stream, TapEventData& event) noexcept {
     shm::ChannelReader::release(word);
     return false;
   }
-  if (type_.is_typed()) event.size = type_.size;
+  if (type_.one_size() != 0) event.size = type_.one_size();
   held_from_[index] = stream.source;
   ++output.held;
   ++held_;
@@ -243,7 +243,7 @@ bool TapCore::copy(const Stream& stream, std::uint32_t slot, TapEventData& event
     if (held_from_[i] == nullptr) copies_.forget(i);
   }
   CopiedSample copied;
-  if (!copies_.copy(output, slot, type_.is_typed(), event.hold, copied)) return false;
+  if (!copies_.copy(output, slot, type_.one_size() != 0, event.hold, copied)) return false;
   event.data = copied.data;
   return true;
 }

@@ -62,6 +62,7 @@ struct OutputPort {
   Claims claims;
   bool is_told_unmentioned = false;  // that the model in force does not mention it
   bool is_known_blind = false;       // the log has it
+  std::string described;             // by its component; printable
   Charge charge;
 
   ~OutputPort();
@@ -82,6 +83,7 @@ struct InputPort {
   Claims claims;
   bool is_told_unmentioned = false;
   bool is_known_blind = false;
+  std::string described;
   Charge charge;
 
   ~InputPort();

@@ -89,6 +89,8 @@ class Switchboard {
   void tell_unmentioned(const shm::TableSnapshot& in_force, shm::PortInstance port);
   // A component says that its port cannot see all that its rules read: for the log, once.
   void note_blind(shm::PortInstance port, const std::string& text);
+  // What its component says of it.
+  void describe(shm::PortInstance port, std::string text);
   // Wakes every component that waits, to look anew.
   void ring_all() const;
   // Wakes those that a source concerns.

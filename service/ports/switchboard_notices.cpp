@@ -121,4 +121,12 @@ void Switchboard::note_blind(shm::PortInstance port, const std::string& text) {
             log::level::warn, "{}: {}", client_of(port).description(), text);
 }
 
+void Switchboard::describe(shm::PortInstance port, std::string text) {
+  if (const auto output = outputs_.find(port); output != outputs_.end()) {
+    output->second->described = std::move(text);
+  } else if (const auto input = inputs_.find(port); input != inputs_.end()) {
+    input->second->described = std::move(text);
+  }
+}
+
 }  // namespace arbiter::service

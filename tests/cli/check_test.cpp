@@ -216,12 +216,14 @@ TEST(Check, EachCodeOfAWarningOrANoteIsOnThePageAndCanBeSilenced) {
   const auto model = directory.write("m.xml", kTrackModel);
   const std::regex made(R"re((warning|note)\(\s*"([a-z-]+)")re");
   std::set<std::string> codes;
-  for (const auto& file : std::filesystem::recursive_directory_iterator(
-           std::string(ARBITER_TEST_DATA) + "/../../rules")) {
-    if (file.path().extension() != ".cpp") continue;
-    const std::string text = content_of(file.path());
-    for (std::sregex_iterator each(text.begin(), text.end(), made), end; each != end; ++each) {
-      codes.insert((*each)[2]);
+  for (const char* folder : {"/../../rules", "/../../gateway/mapping"}) {
+    for (const auto& file :
+         std::filesystem::recursive_directory_iterator(std::string(ARBITER_TEST_DATA) + folder)) {
+      if (file.path().extension() != ".cpp") continue;
+      const std::string text = content_of(file.path());
+      for (std::sregex_iterator each(text.begin(), text.end(), made), end; each != end; ++each) {
+        codes.insert((*each)[2]);
+      }
     }
   }
   EXPECT_GE(codes.size(), 15u);
@@ -230,6 +232,28 @@ TEST(Check, EachCodeOfAWarningOrANoteIsOnThePageAndCanBeSilenced) {
     EXPECT_EQ(arbiter({"check", model, "--silence", code}).exit_code, 0) << code;
     EXPECT_NE(page.find("`" + code + "`"), std::string::npos) << "checking.md lacks " << code;
   }
+}
+
+TEST(Check, AGatewaysMappingIsLookedAtBesideTheModel) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  const auto good = directory.write(
+      "good.xml", "<gateway kind='dds'><in topic='/o' type='a/msg/B' port='/object'/></gateway>");
+  const auto bad =
+      directory.write("bad.xml",
+                      "<gateway kind='dds'>\n<in topic='/o' type='a/msg/B' port='/objekt'/>\n"
+                      "<in topic='/o' type='a/msg/B' port='/object'/></gateway>");
+  EXPECT_EQ(arbiter({"check", model, "--gateway", good}).exit_code, 0);
+  const auto both = arbiter({"check", model, "--gateway", good, "--gateway", bad});
+  EXPECT_EQ(both.exit_code, 1);
+  EXPECT_NE(both.err.find("bad.xml:2:37: warning: the model does not mention \"/objekt\""),
+            std::string::npos)
+      << both.err;
+  EXPECT_NE(both.err.find("bad.xml:3:37: error: the port \"/object\" has an entry already, at "),
+            std::string::npos)
+      << both.err;
+  EXPECT_NE(both.out.find("failed: "), std::string::npos) << both.out;
+  EXPECT_EQ(arbiter({"check", model, "--gateway", directory.file("none.xml")}).exit_code, 2);
 }
 
 TEST(Check, StatementsThatAreTrueAreProved) {

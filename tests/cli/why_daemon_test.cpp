@@ -60,6 +60,33 @@ TEST(WhyDaemon, OfAComponentThatHasNotComeBackSaysThatWhatIsConnectedGoesOn) {
   EXPECT_THAT(texts(why_json({"/arm"})["obstacles"]), IsEmpty());
 }
 
+// As a gateway does.
+TEST(WhyDaemon, SaysWhatComponentsSayOfTheirPorts) {
+  Daemon daemon(kOneDefault);
+  Node node("gateway");
+  auto rest = node.output_port<int>("/rest");
+  auto track = node.output_port<int>("/track");
+  auto arm = node.input_port<int>("/arm");
+  rest.describe("DDS topic rt/rest, no publisher matched");
+  track.describe("iceoryx a/b/c, RouDi does not run\x1b[2J");
+  arm.describe("DDS topic rt/arm, 1 subscriber matched");
+  while (!daemon.source("/rest").contains("described") ||
+         !daemon.source("/track").contains("described") ||
+         !daemon.input("/arm").contains("described")) {
+  }
+  EXPECT_THAT(why({"/arm"}),
+              AllOf(HasSubstr("! /arm goes to DDS topic rt/arm, 1 subscriber matched\n"),
+                    HasSubstr("! /rest comes from DDS topic rt/rest, no publisher matched\n"),
+                    HasSubstr("! /track comes from iceoryx a/b/c, RouDi does not run\\x1b[2J\n")));
+  EXPECT_THAT(codes(why_json({"/arm"})["obstacles"]), ElementsAre("outside"));
+  EXPECT_THAT(status_text(),
+              AllOf(HasSubstr("  comes from DDS topic rt/rest, no publisher matched\n"),
+                    HasSubstr("  goes to DDS topic rt/arm, 1 subscriber matched\n")));
+  rest.describe("");
+  while (daemon.source("/rest").contains("described")) {
+  }
+}
+
 TEST(WhyDaemon, ThatHasLostItsStateSaysWhoRunsThatItDoesNotKnow) {
   Daemon daemon(kOneDefault);
   Node node("robot");

@@ -158,7 +158,7 @@ TEST(ProtocolPage, SaysWhatAnswersWhat) {
   for (const MessageKind kind :
        {MessageKind::kClosePort, MessageKind::kSynced, MessageKind::kPeerRefused,
         MessageKind::kHandBackLink, MessageKind::kHandedBack, MessageKind::kBlind,
-        MessageKind::kTapped}) {
+        MessageKind::kTapped, MessageKind::kDescribe}) {
     note(kind, client.say(kind));
   }
   // To nobody who has lost no daemon.

@@ -74,11 +74,14 @@ void see_ports(ObservedFields& observed) {
   auto in_here = node.input_port("/in-here", {.when_full = refuse_new});
   auto in_typed = node.input_port<int>("/in-typed");
   auto tap = node.tap("/here");
+  here.describe("a topic");
+  in_here.describe("a topic");
   daemon.kill();
   stopped.process().stop();
   daemon.restart();
   while (daemon.connection("/here", "/in-here")["state"] != "connected" ||
-         daemon.source("/here")["taps"].empty()) {
+         daemon.source("/here")["taps"].empty() || !daemon.source("/here").contains("described") ||
+         !daemon.input("/in-here").contains("described")) {
   }
   here.signal();
   typed.publish(1.0);

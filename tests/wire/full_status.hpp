@@ -33,7 +33,8 @@ inline wire::Status full_status() {
                  106,
                  107,
                  108,
-                 109};
+                 109,
+                 "a topic"};
   wire::SourceStatus latched;
   latched.name = "/stop";
   latched.active = true;
@@ -58,7 +59,8 @@ inline wire::Status full_status() {
                 204,
                 205,
                 206,
-                207};
+                207,
+                "another topic"};
   wire::ConnectionStatus connection{
       "/face", true, true, wire::End::kOpen, wire::End::kOpen, {}, 4, 301, 302, 303, 304,
       305,     306,  307};

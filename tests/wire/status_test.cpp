@@ -123,7 +123,7 @@ TEST(StatusFields, WithoutACounterHasNoneCountedAndWithoutAnythingElseIsRefused)
     if (kCounters.contains(leaf.back())) {
       const json read = there_and_back(document);
       EXPECT_EQ(read[leaf], 0) << leaf;
-    } else if (leaf.back() == "away" ||
+    } else if (leaf.back() == "away" || leaf.back() == "described" ||
                (leaf.back() == "depth" &&
                 leaf.to_string().find("connections") != std::string::npos)) {
       EXPECT_EQ(refusal_of(document.dump()), "read") << leaf;

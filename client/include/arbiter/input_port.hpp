@@ -173,6 +173,9 @@ class InputPort {
   // its source stays active for ever, or for longer than T, no component has it open, and none of
   // its samples waits. What it inhibits stays inhibited. Wait-free.
   [[nodiscard]] bool idle() noexcept { return detail::is_idle(*core_); }
+  // Says where what is taken goes, for people: "/Base/cmd:i goes to …". As
+  // OutputPort::describe().
+  void describe(std::string_view text) noexcept { detail::describe(*core_, text); }
   [[nodiscard]] const std::string& name() const noexcept { return detail::name(*core_); }
   // What it takes; untyped: anything.
   [[nodiscard]] const Type& type() const noexcept { return detail::type(*core_); }

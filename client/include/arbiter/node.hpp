@@ -56,8 +56,9 @@ class Node {
       return OutputPort<T>(detail::open_output(*core_, name, type_of<T>(), options));
     }
   }
-  // One of a type that is known only now: its samples are bytes, type.size() of them each. To those
-  // at the other end it is as if a program had opened it with the C++ type of that name.
+  // One of a type that is known only now: its samples are bytes, type.size() of them each, or, of a
+  // variable type, at most as many. To those at the other end it is as if a program had opened it
+  // with the C++ type of that name.
   [[nodiscard]] OutputPort<void> output_port(std::string_view name, const Type& type,
                                              const OutputPortOptions& options = {}) {
     // Its constructor is explicit. NOLINTNEXTLINE(modernize-return-braced-init-list)
@@ -80,7 +81,8 @@ class Node {
       return InputPort<T>(detail::open_input(*core_, name, type_of<T>(), options));
     }
   }
-  // One that takes samples of this type alone, and gives them as bytes, type.size() of them each.
+  // One that takes samples of this type alone, and gives them as bytes, type.size() of them each,
+  // or, of a variable type, as many as each has.
   [[nodiscard]] InputPort<void> input_port(std::string_view name, const Type& type,
                                            const InputPortOptions& options = {}) {
     return InputPort<void>(detail::open_input(*core_, name, type, options));

@@ -14,6 +14,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
@@ -96,6 +97,13 @@ class OutputPortBase {
   void deactivate_at(Time at) { detail::deactivate_at(*core_, at); }
   // Throws arbiter::Error where the policy does not allow it: to ask before the first arrival.
   void require_replay() const { detail::require_replay(*core_); }
+
+  // Says what stands behind the port, for people: `arbiter status` shows it, and `arbiter why` says
+  // "/Nav/cmd:o comes from …". A phrase such as "DDS topic rt/cmd, no publisher matched", at most
+  // 511 bytes, what is longer is cut; empty: nothing. The daemon hears it at most four times a
+  // second, the last word always; so does the next daemon. Takes a lock and allocates: call it when
+  // something has changed, off the data path.
+  void describe(std::string_view text) noexcept { detail::describe(*core_, text); }
 
   // The port's name, which is also its source's.
   [[nodiscard]] const std::string& name() const noexcept { return detail::name(*core_); }
@@ -188,7 +196,7 @@ template <>
 class OutputPort<void> : public OutputPortBase {
  public:
   // Memory for `size` bytes; empty if max_loans are out, or `size` is not what a sample may have:
-  // that of its type, or for an untyped port, up to max_size. Wait-free.
+  // that of its type, or for an untyped port or a variable type, up to max_size. Wait-free.
   [[nodiscard]] std::optional<Loan<void>> loan(std::size_t size) noexcept {
     if (!may_have(size)) return std::nullopt;
     const detail::LoanedSlot slot = detail::loan(*core_, size);
@@ -221,7 +229,7 @@ class OutputPort<void> : public OutputPortBase {
     require_size(bytes.size());
     return detail::publish_copy_at(*core_, at, bytes.data(), bytes.size());
   }
-  // The largest sample, in bytes; where the port has a type, that of each.
+  // The largest sample, in bytes; where the port has a type of one size, that of each.
   [[nodiscard]] std::size_t max_size() const noexcept { return detail::max_size(*core_); }
 
  private:
@@ -229,7 +237,7 @@ class OutputPort<void> : public OutputPortBase {
   using OutputPortBase::OutputPortBase;
 
   [[nodiscard]] bool may_have(std::size_t size) const noexcept {
-    return size == max_size() || (size < max_size() && type().is_untyped());
+    return size == max_size() || (size < max_size() && !type().has_one_size());
   }
   [[nodiscard]] std::size_t size_of(const Loan<void>& loan) const {
     require_own(loan);

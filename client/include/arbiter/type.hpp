@@ -10,6 +10,9 @@
 // alignments are, too. Nothing else is compared: two programs that give one name to two layouts of
 // the same size misunderstand each other. Put a version into the name when the layout changes.
 //
+// A type may also have samples of any size, such as serialised messages: Type::variable(). Two such
+// types are equal if their names are; none of them is equal to a type of one size.
+//
 // Samples go from an output port to an input port if the two ports' types are equal, or the input
 // port is untyped. Otherwise the two are not connected; a notice to both (NoticeKind::refused), the
 // daemon's log, `arbiter status` and `arbiter why` name both types and both components.
@@ -34,25 +37,37 @@ namespace arbiter {
 
 class Type {
  public:
-  // `size` of a sample and `alignment` are in bytes: 1 to 2^40, and a power of two up to 4096.
+  // `size` of a sample and `alignment` are in bytes: 1 to 2^40, and a power of two up to 4096, or 0
+  // (variable()).
   // Throws arbiter::Error if one of the three is out of bounds.
   Type(std::string_view name, std::size_t size, std::size_t alignment);
   // Samples of any size up to `max_size`: plain bytes, whose meaning the programs agree upon.
   [[nodiscard]] static Type untyped(std::size_t max_size) noexcept;
+  // The same with a name: "geometry_msgs/msg/Twist", serialised. `max_size` is the largest that an
+  // output port sends, at least 1; an input port takes larger ones, too. An alignment of 0 says it,
+  // here and in the constructor above. Throws arbiter::Error as that.
+  [[nodiscard]] static Type variable(std::string_view name, std::size_t max_size) {
+    return {name, max_size, 0};
+  }
 
   // Empty: untyped.
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
-  // Bytes of a sample. Untyped: the most that a sample may have; 0 at an input port, which takes
-  // any.
+  // Bytes of a sample. Untyped or variable: the most that a sample may have; 0 at an untyped input
+  // port, which takes any.
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  // In bytes. Untyped: the alignment of a sample in memory; 1 at an input port.
+  // In bytes. Untyped: the alignment of a sample in memory; 1 at an input port. Variable: 0, though
+  // in memory each sample is aligned to 64.
   [[nodiscard]] std::size_t alignment() const noexcept { return alignment_; }
   [[nodiscard]] bool is_untyped() const noexcept { return name_.empty(); }
+  // It has a name, and samples of any size.
+  [[nodiscard]] bool is_variable() const noexcept { return alignment_ == 0; }
+  // All samples have size() bytes.
+  [[nodiscard]] bool has_one_size() const noexcept { return !is_untyped() && !is_variable(); }
 
   // By the rule above.
   friend bool operator==(const Type& one, const Type& other) noexcept {
-    return one.name_ == other.name_ && one.size_ == other.size_ &&
-           one.alignment_ == other.alignment_;
+    return one.name_ == other.name_ && one.alignment_ == other.alignment_ &&
+           (one.size_ == other.size_ || one.is_variable());
   }
   friend bool operator!=(const Type& one, const Type& other) noexcept { return !(one == other); }
 

@@ -1,8 +1,4 @@
 // search-and-track-demo: the paper's Search and Track with real processes, and who wins.
-#include <signal.h>
-#include <sys/signalfd.h>
-#include <unistd.h>
-
 #include <chrono>
 #include <cmath>
 #include <iostream>
@@ -14,6 +10,7 @@
 #include "places.hpp"
 #include "processes.hpp"
 #include "scene.hpp"
+#include "signals.hpp"
 #include "summary.hpp"
 #include "terminal.hpp"
 #include "view.hpp"
@@ -30,32 +27,6 @@ struct Options {
   double seconds = kUsualSeconds;
   std::string model;  // empty: the paper's
   bool lines = false;
-};
-
-// What ends the demo early, as a descriptor.
-class Signals {
- public:
-  Signals() {
-    sigset_t caught;
-    sigemptyset(&caught);
-    for (const int number : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&caught, number);
-    sigprocmask(SIG_BLOCK, &caught, nullptr);
-    descriptor_ = signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK);
-    signal(SIGPIPE, SIG_IGN);
-  }
-  ~Signals() { close(descriptor_); }
-  Signals(const Signals&) = delete;
-  Signals& operator=(const Signals&) = delete;
-
-  [[nodiscard]] int descriptor() const { return descriptor_; }
-  [[nodiscard]] std::optional<int> caught() const {
-    signalfd_siginfo info{};
-    if (read(descriptor_, &info, sizeof info) != static_cast<ssize_t>(sizeof info)) return {};
-    return static_cast<int>(info.ssi_signo);
-  }
-
- private:
-  int descriptor_;
 };
 
 class Demo {

@@ -51,7 +51,7 @@ constexpr MessageKind kKinds[] = {
 
 // Those that came later have bytes of their own, so that the corpus still means what it did.
 constexpr MessageKind kLaterKinds[] = {MessageKind::kSwitch, MessageKind::kRollback,
-                                       MessageKind::kReport};
+                                       MessageKind::kReport, MessageKind::kDescribe};
 
 // What a hostile process has been sent and said.
 struct Hostile {

@@ -1,0 +1,69 @@
+// What components say of their ports, for people: told to the daemon now and then, and to the next.
+#include <algorithm>
+#include <new>
+
+#include "client/node/node_core.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::detail {
+namespace {
+
+// Of one port, between two descriptions.
+constexpr shm::Nanoseconds kDescriptionInterval = 250'000'000;
+constexpr std::size_t kMaxDescription = 511;
+
+}  // namespace
+
+// The service thread tells it, or service(): a component that describes its port a thousand times a
+// second sends no more than one that does so now and then.
+void NodeCore::describe(shm::PortInstance port, std::string_view text) noexcept try {
+  std::size_t length = std::min(text.size(), kMaxDescription);
+  while (length != 0 && length < text.size() &&
+         (static_cast<unsigned char>(text[length]) & 0xc0) == 0x80) {
+    --length;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    if (outputs_.count(port) + inputs_.count(port) == 0) return;
+    Description& description = descriptions_[port];
+    if (description.text == text.substr(0, length)) return;
+    description.text = text.substr(0, length);
+    description.is_said = false;
+  }
+  service_bell_->ring();
+} catch (const std::bad_alloc&) {  // then it stays as it was
+}
+
+void NodeCore::say_descriptions() noexcept {
+  if (standing_ != Standing::kMember || socket_ == nullptr) return;
+  const shm::Nanoseconds now = shm::monotonic_now();
+  for (auto& [port, description] : descriptions_) {
+    if (description.is_said || now - description.said_at < kDescriptionInterval) continue;
+    wire::Message message;
+    message.kind = wire::MessageKind::kDescribe;
+    message.port = port;
+    message.set_text(description.text);
+    description.said_at = now;
+    description.is_said = wire::send_message(socket_->get(), message) == wire::SendResult::kSent;
+  }
+}
+
+shm::Nanoseconds NodeCore::next_description() const noexcept {
+  shm::Nanoseconds next = shm::kForever;
+  if (standing_ != Standing::kMember) return next;
+  for (const auto& [port, description] : descriptions_) {
+    if (description.is_said) continue;
+    next = std::min(next, description.said_at + kDescriptionInterval);
+  }
+  return next;
+}
+
+// Another daemon knows nothing of them.
+void NodeCore::describe_again() noexcept {
+  for (auto& [port, description] : descriptions_) {
+    description.is_said = description.text.empty();
+    description.said_at = 0;
+  }
+}
+
+}  // namespace arbiter::detail

@@ -1,0 +1,99 @@
+// A gateway's loop: opens the ports of a mapping, sends what they take, looks after ages, idle
+// samples and descriptions, until it is told to end.
+//
+// A gateway is open as a whole or not at all: where a port cannot be opened, because it is taken or
+// the policy does not allow it, it says so and tries again once a second. A daemon that goes and
+// comes again is the node's business (arbiter/node.hpp); samples pass meanwhile.
+//
+// Thread safety: all of it runs on the thread that calls run(), but for wake().
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <arbiter/node.hpp>
+
+#include "gateway/core/account.hpp"
+#include "gateway/core/incoming.hpp"
+#include "gateway/core/max_ages.hpp"
+#include "gateway/core/middleware.hpp"
+#include "gateway/core/outgoing.hpp"
+#include "gateway/mapping/mapping.hpp"
+#include "shm/file_descriptor.hpp"
+
+namespace arbiter::gateway {
+
+struct BridgeOptions {
+  std::string name;      // of the node, and in the log
+  std::string instance;  // as NodeOptions has it
+  // Called by the loop ten times a second, so that somebody can see that it goes round.
+  std::function<void()> on_round{};
+};
+
+// Lets a bridge's loop look at everything now. Any thread; also a signal handler.
+class Bell {
+ public:
+  Bell();
+  void ring() const noexcept;
+  void silence() const noexcept;
+  [[nodiscard]] int descriptor() const noexcept { return descriptor_.get(); }
+
+ private:
+  shm::FileDescriptor descriptor_;
+};
+
+class Bridge {
+ public:
+  // Of the gateways of that kind in `mappings`. Keeps references.
+  Bridge(BridgeOptions options, const std::vector<Mapping>& mappings, Kind kind, const Bell& bell,
+         Middleware& middleware);
+  Bridge(const Bridge&) = delete;
+  Bridge& operator=(const Bridge&) = delete;
+  ~Bridge();
+
+  // Returns when `stop` has become readable. Throws what Middleware::sender() throws.
+  void run(int stop);
+
+ private:
+  // An entry with all that belongs to it.
+  struct Part {
+    Part(const Gateway& in, const Entry& of);
+    const Gateway& gateway;
+    const Entry& entry;
+    Account account;
+    Sender* sender = nullptr;
+    std::unique_ptr<Incoming> incoming;
+    std::unique_ptr<Outgoing> outgoing;
+    std::string said;  // in the log
+    shm::Nanoseconds say_again = 0;
+    std::string described;
+    [[nodiscard]] bool is_open() const { return incoming != nullptr || outgoing != nullptr; }
+  };
+
+  void make_node(int stop);
+  void open_all(int stop);
+  void open(Part& part);
+  void watch(int descriptor, Part* part) const;
+  void start();
+  void loop(int stop);
+  void serve(shm::Nanoseconds now, bool all);
+  void look_after_all();
+  void say_once(const std::string& text);
+  // Sleeps; true: `stop` is readable.
+  static bool waits(int stop, int milliseconds);
+
+  const BridgeOptions options_;
+  const Bell& bell_;
+  Middleware& middleware_;
+  MaxAges max_ages_;
+  shm::FileDescriptor epoll_;
+  std::optional<Node> node_;
+  std::vector<std::unique_ptr<Part>> parts_;
+  std::string said_;
+  bool stops_ = false;
+};
+
+}  // namespace arbiter::gateway

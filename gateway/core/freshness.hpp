@@ -1,0 +1,134 @@
+// Never late: until when a sample that has come from outside may become an arrival.
+//
+// A middleware says when a sample was sent only by a clock that is not ours, or not at all. What
+// can be known is for how long it can have waited in this host: no longer than since the gateway
+// last found that nothing waited, or last ran. A gateway that was stopped or starved for longer
+// than T discards what has waited meanwhile (docs/gateways.md).
+//
+// Units: nanoseconds of CLOCK_MONOTONIC, given by the caller, so that tests say what time it is.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string_view>
+#include <vector>
+
+#include "shm/activity.hpp"
+
+namespace arbiter::gateway {
+
+// The longest that a sample of a source may have waited: its T, or less (MaxAges). One writer, the
+// gateway's loop; any thread reads.
+class MaxAge {
+ public:
+  void set(shm::Nanoseconds age) noexcept { age_.store(age, std::memory_order_relaxed); }
+  // Relaxed is enough: a sample may be judged by the T that held when it came or by the next one.
+  [[nodiscard]] shm::Nanoseconds get() const noexcept {
+    return age_.load(std::memory_order_relaxed);
+  }
+
+ private:
+  std::atomic<shm::Nanoseconds> age_{shm::kDefaultTimeout};
+};
+
+// How old samples of a source may be, by its name: the same as MaxAge says, of any source.
+class AgesOfSources {
+ public:
+  AgesOfSources() = default;
+  AgesOfSources(const AgesOfSources&) = delete;
+  AgesOfSources& operator=(const AgesOfSources&) = delete;
+  virtual ~AgesOfSources() = default;
+  [[nodiscard]] virtual shm::Nanoseconds of(std::string_view source) const = 0;
+};
+
+// For a queue that the gateway empties itself (iceoryx). One thread.
+//
+// Invariant: whatever is taken was put in after `since_`. So look at the queue at least every T/4
+// (period()), and a sample that is taken at once has three quarters of T left. A queue that is
+// never seen empty, because its publisher is fast, holds no more than its capacity: what is taken
+// behind as many samples came after the first of them was taken.
+class QueueFreshness {
+ public:
+  explicit QueueFreshness(std::uint32_t capacity) noexcept : capacity_(capacity) {}
+
+  // Nothing waits in the queue: called with a reading of the clock from before the look at it.
+  void note_empty(shm::Nanoseconds before_the_look) noexcept {
+    since_ = before_the_look;
+    taken_ = 0;
+  }
+  // A sample was taken, at a look before which the clock was read. Before deadline() is asked of
+  // it.
+  void note_taken(shm::Nanoseconds before_the_look) noexcept {
+    if (taken_ > capacity_) {
+      since_ = round_;
+      taken_ = 0;
+    }
+    if (taken_ == 0) round_ = before_the_look;
+    ++taken_;
+  }
+  // Of whatever is taken now. Before the first note_empty() nothing is in time.
+  [[nodiscard]] shm::Nanoseconds deadline(shm::Nanoseconds max_age) const noexcept {
+    return since_ + max_age;
+  }
+  [[nodiscard]] static constexpr shm::Nanoseconds period(shm::Nanoseconds max_age) noexcept {
+    return max_age / 4;
+  }
+
+ private:
+  const std::uint32_t capacity_;
+  // Far enough in the past for any T, and not so far that adding one overflows.
+  shm::Nanoseconds since_ = -shm::kMaxTime;
+  shm::Nanoseconds round_ = 0;  // before the first of `taken_` samples was taken
+  std::uint32_t taken_ = 0;
+};
+
+// For a middleware that calls back, of whose queues nothing is known (DDS). A thread of the
+// gateway's ticks; a tick that comes late says that the process did not run, and that what is
+// delivered now may have waited as long.
+//
+// Invariant: for a source of T, after a gap of more than period() + T/2 between two ticks
+// everything is late until ticks have come in time for T. And a callback that runs before the first
+// tick after such a gap sees the gap itself.
+class StallGuard {
+ public:
+  // One for each entry. Made before the first tick, or while ticks are made; any thread.
+  class Watch {
+   public:
+    explicit Watch(const MaxAge& max_age) noexcept : max_age_(&max_age) {}
+
+   private:
+    friend class StallGuard;
+    const MaxAge* max_age_;
+    std::atomic<shm::Nanoseconds> late_until_{0};
+  };
+
+  // A deadline that has passed.
+  static constexpr shm::Nanoseconds kLate = -1;
+  // Between two ticks, however short a T is: more often would cost more than it is worth. A T
+  // below four times this may call a fresh sample late.
+  static constexpr shm::Nanoseconds kShortestPeriod = 1'000'000;
+
+  // Nothing is in time before the first tick. Tick before the middleware can receive anything: what
+  // it receives from then on has not waited.
+  StallGuard() = default;
+  // The watch lives as long as the guard.
+  Watch& add(const MaxAge& max_age);
+
+  // One thread: tick(now), then sleep for what it returns. That is a quarter of the shortest T, so
+  // that a sample that comes between two ticks is always in time.
+  shm::Nanoseconds tick(shm::Nanoseconds now);
+
+  // Any thread, wait-free: until when a sample that was delivered at `now` may arrive. Late: a time
+  // that has passed.
+  [[nodiscard]] shm::Nanoseconds deadline(const Watch& watch, shm::Nanoseconds now) const noexcept;
+
+ private:
+  mutable std::mutex mutex_;  // of watches_
+  std::vector<std::unique_ptr<Watch>> watches_;
+  std::atomic<shm::Nanoseconds> last_tick_{-shm::kMaxTime};
+  std::atomic<shm::Nanoseconds> period_{0};
+};
+
+}  // namespace arbiter::gateway

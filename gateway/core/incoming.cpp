@@ -1,0 +1,145 @@
+#include "gateway/core/incoming.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "gateway/core/outgoing.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+template <class Number>
+std::optional<Side> compare(const Choice& choice, const std::byte* bytes) noexcept {
+  Number number;
+  std::memcpy(&number, bytes, sizeof number);
+  if constexpr (std::is_floating_point_v<Number>) {
+    if (std::isnan(number)) return {};
+    // The threshold as the sample would have it: a float of 0.1 is not above 0.1.
+    return number > static_cast<Number>(choice.threshold) ? Side::kYes : Side::kNo;
+  }
+  return static_cast<long double>(number) > choice.threshold ? Side::kYes : Side::kNo;
+}
+
+OutputPort<void> open(Node& node, const std::string& name, const Entry& entry) {
+  OutputPortOptions options;
+  options.max_size = entry.max_size;
+  options.max_loans = 1;
+  const Type type = type_of(entry);
+  return type.is_untyped() ? node.output_port(name, options)
+                           : node.output_port(name, type, options);
+}
+
+}  // namespace
+
+std::optional<Side> choose(const Choice& choice, const ForeignSample& sample) noexcept {
+  std::byte bytes[8];
+  const std::size_t size = size_of(choice.field);
+  const std::size_t begin = sample.data_begin();
+  const std::size_t whole = sample.size();
+  if (begin > whole || choice.offset > whole - begin || size > whole - begin - choice.offset) {
+    return {};
+  }
+  if (!sample.copy(begin + choice.offset, {bytes, size})) return {};
+  if (sample.is_big_endian() == (std::endian::native == std::endian::little)) {
+    std::reverse(bytes, bytes + size);
+  }
+  switch (choice.field) {
+    case Field::kBoolean:
+      if (bytes[0] > std::byte{1}) return {};
+      return bytes[0] == std::byte{1} ? Side::kYes : Side::kNo;
+    case Field::kI8:
+      return compare<std::int8_t>(choice, bytes);
+    case Field::kU8:
+      return compare<std::uint8_t>(choice, bytes);
+    case Field::kI16:
+      return compare<std::int16_t>(choice, bytes);
+    case Field::kU16:
+      return compare<std::uint16_t>(choice, bytes);
+    case Field::kI32:
+      return compare<std::int32_t>(choice, bytes);
+    case Field::kU32:
+      return compare<std::uint32_t>(choice, bytes);
+    case Field::kI64:
+      return compare<std::int64_t>(choice, bytes);
+    case Field::kU64:
+      return compare<std::uint64_t>(choice, bytes);
+    case Field::kF32:
+      return compare<float>(choice, bytes);
+    case Field::kF64:
+      break;
+  }
+  return compare<double>(choice, bytes);
+}
+
+Incoming::Incoming(Node& node, const Entry& entry, Account& account)
+    : entry_(entry), account_(account) {
+  const auto ports = entry.ports();
+  yes_.emplace(open(node, ports.at(0)->name, entry));
+  if (ports.size() > 1) no_.emplace(open(node, ports.at(1)->name, entry));
+}
+
+Incoming::Fate Incoming::deliver(const ForeignSample& sample, Time deadline) noexcept {
+  if (!entry_.choice) return pass_to(*yes_, sample, deadline);
+  const auto side = choose(*entry_.choice, sample);
+  if (!side) {
+    fail();
+    return Fate::kUnreadable;
+  }
+  OutputPort<void>& chosen = *side == Side::kYes ? *yes_ : *no_;
+  OutputPort<void>& other = *side == Side::kYes ? *no_ : *yes_;
+  const Fate fate = pass_to(chosen, sample, deadline);
+  // Whatever has become of it: the topic's last word is not the other side. A late one makes
+  // nothing active, but deactivations are never late.
+  other.deactivate();
+  if (fate == Fate::kUnreadable) chosen.deactivate();
+  return fate;
+}
+
+Incoming::Fate Incoming::pass_to(OutputPort<void>& port, const ForeignSample& sample,
+                                 Time deadline) noexcept {
+  const std::size_t size = sample.size();
+  const bool fits = port.type().has_one_size() ? size == port.max_size() : size <= port.max_size();
+  if (!fits) {
+    account_.too_large.add();
+    return Fate::kTooLarge;
+  }
+  auto loan = port.loan(size);
+  if (!loan) {  // it did arrive, as when publish() has no memory for a copy
+    if (port.signal(deadline).late) {
+      account_.late.add();
+      return Fate::kLate;
+    }
+    account_.no_slot.add();
+    return Fate::kNoSlot;
+  }
+  if (!sample.copy(0, {loan->data(), size})) {
+    account_.unreadable.add();
+    return Fate::kUnreadable;
+  }
+  if (port.publish(std::move(*loan), deadline).late) {
+    account_.late.add();
+    return Fate::kLate;
+  }
+  account_.passed.add();
+  account_.set_last_size(size);
+  return Fate::kPassed;
+}
+
+void Incoming::fail() noexcept {
+  account_.unreadable.add();
+  if (entry_.choice) deactivate_all();
+}
+
+void Incoming::deactivate_all() noexcept {
+  yes_->deactivate();
+  if (no_) no_->deactivate();
+}
+
+void Incoming::describe(std::string_view text) {
+  yes_->describe(text);
+  if (no_) no_->describe(text);
+}
+
+}  // namespace arbiter::gateway

@@ -1,0 +1,78 @@
+// An `in` entry: samples from outside become arrivals at output ports of Arbiter.
+//
+// Thread safety: deliver() and fail() from one thread at a time, which may be a middleware's. After
+// the constructor neither allocates, nor waits, nor throws.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string_view>
+
+#include <arbiter/node.hpp>
+#include <arbiter/output_port.hpp>
+
+#include "gateway/core/account.hpp"
+#include "gateway/core/freshness.hpp"
+#include "gateway/mapping/mapping.hpp"
+
+namespace arbiter::gateway {
+
+// A sample as the middleware has it. The bytes are those that Arbiter's components get: for DDS
+// the serialised sample with its encapsulation header, for iceoryx user header and payload.
+class ForeignSample {
+ public:
+  ForeignSample() = default;
+  ForeignSample(const ForeignSample&) = delete;
+  ForeignSample& operator=(const ForeignSample&) = delete;
+  virtual ~ForeignSample() = default;
+
+  [[nodiscard]] virtual std::size_t size() const noexcept = 0;
+  // Copies the bytes from `from` on, to.size() of them, which lie within size(). False: it cannot
+  // be read.
+  [[nodiscard]] virtual bool copy(std::size_t from, WritableBytes to) const noexcept = 0;
+  // Where its data begin: behind headers. Offsets of fields count from there.
+  [[nodiscard]] virtual std::size_t data_begin() const noexcept { return 0; }
+  [[nodiscard]] virtual bool is_big_endian() const noexcept { return false; }
+};
+
+// Which source a sample's field chooses; empty: it has none, or it is NaN, or no Boolean.
+enum class Side { kYes, kNo };
+[[nodiscard]] std::optional<Side> choose(const Choice& choice,
+                                         const ForeignSample& sample) noexcept;
+
+class Incoming {
+ public:
+  // What became of a sample.
+  enum class Fate { kPassed, kLate, kTooLarge, kUnreadable, kNoSlot };
+
+  // Opens the entry's port, or both. Keeps references. Throws arbiter::Error.
+  Incoming(Node& node, const Entry& entry, Account& account);
+
+  // One copy into Arbiter's memory, and an arrival, unless `deadline` has passed by then. With a
+  // choice: an arrival at the source that the field chooses, and then the end of the other's
+  // activity; where nothing can be chosen, of both.
+  Fate deliver(const ForeignSample& sample, Time deadline) noexcept;
+  // A sample came that cannot be read at all. With a choice both sources end.
+  void fail() noexcept;
+
+  // How old a sample may be when it arrives. Written by MaxAges.
+  [[nodiscard]] MaxAge& max_age() noexcept { return max_age_; }
+  [[nodiscard]] const MaxAge& max_age() const noexcept { return max_age_; }
+
+  [[nodiscard]] const Entry& entry() const noexcept { return entry_; }
+  // Tells the daemon how things stand. The gateway's loop.
+  void describe(std::string_view text);
+
+ private:
+  Fate pass_to(OutputPort<void>& port, const ForeignSample& sample, Time deadline) noexcept;
+  void deactivate_all() noexcept;
+
+  const Entry& entry_;
+  Account& account_;
+  MaxAge max_age_;
+  std::optional<OutputPort<void>> yes_;  // or the only one
+  std::optional<OutputPort<void>> no_;
+};
+
+}  // namespace arbiter::gateway

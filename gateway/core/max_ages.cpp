@@ -1,0 +1,100 @@
+#include "gateway/core/max_ages.hpp"
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include "shm/clock.hpp"
+#include "wire/call.hpp"
+#include "wire/rendezvous.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+// After a daemon did not let us in.
+constexpr shm::Nanoseconds kJoinInterval = 1'000'000'000;
+// Torn tables are read again; seven models in one reading are nobody's.
+constexpr int kMaxTries = 4;
+
+wire::Caller caller_of(const std::string& instance) {
+  wire::Caller caller;
+  caller.name = "arbiter-gateway-watch";
+  caller.instance = wire::instance_name(instance);
+  // It is asked for from the loop, which must not wait for long.
+  caller.patience = std::chrono::milliseconds(1);
+  caller.answer_time = std::chrono::milliseconds(1000);
+  return caller;
+}
+
+}  // namespace
+
+shm::Nanoseconds max_age_of(shm::Nanoseconds timeout, shm::Nanoseconds of_model,
+                            const std::optional<shm::Nanoseconds>& max_age) {
+  if (timeout != shm::kForever) return max_age ? std::min(timeout, *max_age) : timeout;
+  if (max_age) return *max_age;
+  return of_model != shm::kForever ? of_model : shm::kDefaultTimeout;
+}
+
+MaxAges::MaxAges(std::string instance) : instance_name_(std::move(instance)) {}
+
+void MaxAges::add(const Entry& entry, MaxAge& age) {
+  watched_.push_back({&entry, &age});
+  update();
+}
+
+void MaxAges::update() {
+  if (instance_ == nullptr) {
+    join();
+  } else {
+    try {
+      instance_->update();
+    } catch (const std::exception& error) {  // memory or descriptors are short
+      obstacle_ = error.what();
+    }
+  }
+  for (const Watched& each : watched_) {
+    // Both sources of a choice come from one topic: the shorter T holds for its samples.
+    shm::Nanoseconds age = shm::kForever;
+    for (const Port* port : each.entry->ports()) {
+      age = std::min(age, age_of(port->name, each.entry->max_age));
+    }
+    each.age->set(age);
+  }
+}
+
+void MaxAges::join() {
+  const shm::Nanoseconds now = shm::monotonic_now();
+  if (now < join_again_) return;
+  join_again_ = now + kJoinInterval;
+  try {
+    instance_ = std::make_unique<watch::Instance>(caller_of(instance_name_));
+    obstacle_.clear();
+  } catch (const std::exception& error) {
+    obstacle_ = error.what();
+  }
+}
+
+shm::Nanoseconds MaxAges::of(std::string_view source) const { return age_of(source, {}); }
+
+shm::Nanoseconds MaxAges::age_of(std::string_view source,
+                                 const std::optional<shm::Nanoseconds>& max_age) const {
+  shm::Nanoseconds timeout = shm::kDefaultTimeout;
+  shm::Nanoseconds of_model = shm::kDefaultTimeout;
+  if (instance_ != nullptr) {
+    const auto id = instance_->find_source(source);
+    const shm::TableReader& tables = instance_->memory()->tables();
+    for (int tries = 0; tries < kMaxTries; ++tries) {
+      const shm::TableSnapshot snapshot = tables.snapshot();
+      if (snapshot.generation == 0) break;
+      const shm::Nanoseconds own = snapshot.table.timeout(id.value_or(shm::kNone));
+      const shm::Nanoseconds all = snapshot.table.timeout(shm::kNone);
+      if (!tables.is_whole(snapshot)) continue;
+      timeout = own;
+      of_model = all;
+      break;
+    }
+  }
+  return max_age_of(timeout, of_model, max_age);
+}
+
+}  // namespace arbiter::gateway

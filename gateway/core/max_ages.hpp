@@ -1,0 +1,57 @@
+// How old samples of each source may be: T of the model in force, which changes with reloads and
+// switches, bounded by the entry's max_age=.
+//
+// For T = forever it is the entry's max_age, else the model's own timeout, else (where that is
+// forever, too) 500 ms. Thread: the gateway's loop.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "gateway/core/freshness.hpp"
+#include "gateway/mapping/mapping.hpp"
+#include "shm/activity.hpp"
+#include "watch/instance.hpp"
+
+namespace arbiter::gateway {
+
+// Of a source by its T, the model's timeout and the entry's max_age.
+[[nodiscard]] shm::Nanoseconds max_age_of(shm::Nanoseconds timeout, shm::Nanoseconds of_model,
+                                          const std::optional<shm::Nanoseconds>& max_age);
+
+class MaxAges final : public AgesOfSources {
+ public:
+  // `instance`: as NodeOptions has it. Joins it as a watcher once there is a daemon that lets it;
+  // until then each age is as without a model.
+  explicit MaxAges(std::string instance);
+
+  // `age` belongs to the caller and is written by update(), also by this call.
+  void add(const Entry& entry, MaxAge& age);
+  // Reads memory, and the daemon's news; does not wait. Call it ten times a second.
+  void update();
+  [[nodiscard]] shm::Nanoseconds of(std::string_view source) const override;
+  // What keeps it from knowing T, such as a policy that does not allow this user to `observe`;
+  // empty: nothing.
+  [[nodiscard]] const std::string& obstacle() const noexcept { return obstacle_; }
+
+ private:
+  struct Watched {
+    const Entry* entry;
+    MaxAge* age;
+  };
+
+  void join();
+  [[nodiscard]] shm::Nanoseconds age_of(std::string_view source,
+                                        const std::optional<shm::Nanoseconds>& max_age) const;
+
+  const std::string instance_name_;
+  std::unique_ptr<watch::Instance> instance_;
+  std::string obstacle_;
+  shm::Nanoseconds join_again_ = 0;
+  std::vector<Watched> watched_;
+};
+
+}  // namespace arbiter::gateway

@@ -1,0 +1,54 @@
+// What a gateway's middleware half gives the common one.
+#pragma once
+
+#include <stdexcept>
+#include <vector>
+
+#include "gateway/core/account.hpp"
+#include "gateway/core/incoming.hpp"
+#include "gateway/core/outgoing.hpp"
+#include "gateway/mapping/mapping.hpp"
+
+namespace arbiter::gateway {
+
+// The middleware cannot go on in this process: the supervisor starts another one.
+class NeedsNewProcess : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// All calls come from the bridge's thread.
+class Middleware {
+ public:
+  Middleware() = default;
+  Middleware(const Middleware&) = delete;
+  Middleware& operator=(const Middleware&) = delete;
+  virtual ~Middleware() = default;
+
+  // Of an `out` entry, for as long as this lives; send() may be called from then on, and answers
+  // kNotReady where nothing can be sent yet. Throws what is wrong with the entry for good.
+  virtual Sender& sender(const Gateway& gateway, const Entry& entry, Account& account) = 0;
+
+  // An entry's ports are open.
+  struct OpenIn {
+    const Gateway& gateway;
+    Incoming& incoming;
+    Account& account;
+  };
+  struct OpenOut {
+    const Gateway& gateway;
+    Outgoing& outgoing;
+    Account& account;
+  };
+  // All ports are open: from here on samples may be delivered, on threads of its own. What it
+  // refers to outlives stop().
+  virtual void start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& outs) = 0;
+  // When it returns, deliver() is not called any more. Also called where start() was not.
+  virtual void stop() noexcept = 0;
+
+  // Ten times a second, and at Bell::ring(): to look after what is out there, to count peers.
+  // Throws NeedsNewProcess.
+  virtual void tend() {}
+};
+
+}  // namespace arbiter::gateway

@@ -1,0 +1,48 @@
+// A sample that Cyclone delivers, as the common half of a gateway reads it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <arbiter/bytes.hpp>
+
+#include "gateway/core/incoming.hpp"
+#include "gateway/dds/payload.hpp"
+
+namespace arbiter::gateway::dds {
+
+// How the data behind an encapsulation header are encoded (RTPS 2.5, 10.2). Only those are known
+// in which a field of a final type has a fixed place.
+enum class Encoding { kUnknown, kXcdr1, kXcdr2 };
+struct Encapsulation {
+  Encoding encoding = Encoding::kUnknown;
+  bool is_big_endian = false;
+};
+[[nodiscard]] Encapsulation read_encapsulation(Bytes header) noexcept;
+
+class ArrivedSample : public ForeignSample {
+ public:
+  // Keeps a reference.
+  explicit ArrivedSample(const Payload& payload) noexcept;
+
+  // False: it is too short for a header, or the header is none that is known.
+  [[nodiscard]] bool is_readable() const noexcept {
+    return encapsulation_.encoding != Encoding::kUnknown;
+  }
+  // "00 0b"
+  [[nodiscard]] std::array<char, 6> header_text() const noexcept;
+
+  [[nodiscard]] std::size_t size() const noexcept override { return payload_.size; }
+  [[nodiscard]] bool copy(std::size_t from, WritableBytes to) const noexcept override;
+  [[nodiscard]] std::size_t data_begin() const noexcept override { return kEncapsulationBytes; }
+  [[nodiscard]] bool is_big_endian() const noexcept override {
+    return encapsulation_.is_big_endian;
+  }
+
+ private:
+  const Payload& payload_;
+  std::array<std::byte, kEncapsulationBytes> header_{};
+  Encapsulation encapsulation_;
+};
+
+}  // namespace arbiter::gateway::dds

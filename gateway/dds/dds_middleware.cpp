@@ -1,0 +1,115 @@
+#include "gateway/dds/dds_middleware.hpp"
+
+#include <utility>
+
+#include "gateway/core/say.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::gateway::dds {
+namespace {
+
+constexpr shm::Nanoseconds kOpenAgain = 1'000'000'000;
+
+}  // namespace
+
+DdsMiddleware::DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& bell) : bell_(bell) {
+  hear_cyclone();
+  for (const Mapping& mapping : mappings) {
+    for (const Gateway& gateway : mapping.gateways) {
+      if (gateway.kind != Kind::kDds) continue;
+      Site& site = sites_[domain_of(gateway)];
+      if (site.gateway == nullptr) {
+        site.gateway = &gateway;
+      } else if (configuration_of(*site.gateway) != configuration_of(gateway)) {
+        throw DdsError("two gateways of DDS domain " + std::to_string(domain_of(gateway)) +
+                       " name different interfaces, peers or configurations; a program has one "
+                       "configuration for each domain: give both the same");
+      }
+      for (const Entry& entry : gateway.entries) site.topics.insert(entry.dds->name);
+    }
+  }
+}
+
+DdsMiddleware::~DdsMiddleware() { DdsMiddleware::stop(); }
+
+DdsMiddleware::Site& DdsMiddleware::site_of(const Gateway& gateway) {
+  return sites_.at(domain_of(gateway));
+}
+
+void DdsMiddleware::add(Site& site, EndPoint& end, Account& account) {
+  site.ends.push_back(&end);
+  site.accounts.push_back(&account);
+}
+
+Sender& DdsMiddleware::sender(const Gateway& gateway, const Entry& entry, Account& account) {
+  OutTopic& out = outs_.emplace_back(entry, account, bell_);
+  out_of_[&entry] = &out;
+  add(site_of(gateway), out, account);
+  return out;
+}
+
+void DdsMiddleware::start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& outs) {
+  for (const OpenOut& out : outs) out_of_.at(&out.outgoing.entry())->tell(&out.outgoing);
+  for (const OpenIn& in : ins) {
+    add(site_of(in.gateway), ins_.emplace_back(in.incoming, in.account, guard_), in.account);
+  }
+  // One tick before there is a reader: see StallGuard.
+  guard_.tick(shm::monotonic_now());
+  stall_thread_.emplace(guard_);
+  started_ = true;
+  tend();
+}
+
+void DdsMiddleware::stop() noexcept {
+  started_ = false;
+  for (auto& [id, site] : sites_) close(site);
+  for (auto& [id, site] : sites_) {
+    site.ends.clear();
+    site.accounts.clear();
+  }
+  stall_thread_.reset();
+  ins_.clear();
+  for (OutTopic& out : outs_) out.tell(nullptr);
+}
+
+void DdsMiddleware::tend() {
+  if (!started_) return;
+  for (auto& [id, site] : sites_) {
+    if (!site.domain && !open(site)) continue;
+    site.domain->peers().update();
+    try {
+      for (EndPoint* const end : site.ends) end->look_at(site.domain->peers().all());
+    } catch (const DdsError& error) {  // an end that was opened again could not be
+      say(Level::kError, error.what());
+      close(site);
+      site.open_again = shm::monotonic_now() + kOpenAgain;
+    }
+  }
+}
+
+bool DdsMiddleware::open(Site& site) {
+  if (shm::monotonic_now() < site.open_again) return false;
+  const CycloneWords words;
+  try {
+    site.domain.emplace(*site.gateway, site.topics, bell_);
+    for (EndPoint* const end : site.ends) end->open(*site.domain);
+    site.problem.clear();
+    return true;
+  } catch (const DdsError& error) {
+    const std::string problem =
+        words.last().empty() ? error.what() : "DDS cannot be joined: " + words.last();
+    close(site);
+    if (problem != site.problem) say(Level::kError, problem + "; trying again");
+    site.problem = problem;
+    for (Account* const account : site.accounts) account->set_obstacle(problem);
+    site.open_again = shm::monotonic_now() + kOpenAgain;
+    return false;
+  }
+}
+
+void DdsMiddleware::close(Site& site) noexcept {
+  for (EndPoint* const end : site.ends) end->close();
+  site.domain.reset();
+}
+
+}  // namespace arbiter::gateway::dds

@@ -1,0 +1,63 @@
+// DDS as a gateway's middleware, by Cyclone.
+#pragma once
+
+#include <list>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gateway/core/bridge.hpp"
+#include "gateway/core/freshness.hpp"
+#include "gateway/core/middleware.hpp"
+#include "gateway/core/stall_thread.hpp"
+#include "gateway/dds/domain.hpp"
+#include "gateway/dds/in_topic.hpp"
+#include "gateway/dds/out_topic.hpp"
+#include "gateway/mapping/mapping.hpp"
+
+namespace arbiter::gateway::dds {
+
+class DdsMiddleware : public Middleware {
+ public:
+  // Keeps references into the mappings. `bell`: rings where tend() has
+  // something to do. Throws DdsError: two
+  // gateways of one domain are configured differently, ROS_DOMAIN_ID is no number.
+  DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& bell);
+  ~DdsMiddleware() override;
+
+  Sender& sender(const Gateway& gateway, const Entry& entry, Account& account) override;
+  void start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& outs) override;
+  void stop() noexcept override;
+  void tend() override;
+
+ private:
+  // One domain, which may not be there yet: a network interface that comes later, for example.
+  struct Site {
+    const Gateway* gateway = nullptr;
+    std::set<std::string> topics;
+    std::optional<Domain> domain;
+    shm::Nanoseconds open_again = 0;
+    std::string problem;          // why it could not be opened last, which has been said
+    std::vector<EndPoint*> ends;  // each with its account
+    std::vector<Account*> accounts;
+  };
+
+  [[nodiscard]] Site& site_of(const Gateway& gateway);
+  void add(Site& site, EndPoint& end, Account& account);
+  // False: not now, and each account says why.
+  bool open(Site& site);
+  void close(Site& site) noexcept;
+
+  const Bell& bell_;
+  StallGuard guard_;
+  std::optional<StallThread> stall_thread_;
+  std::map<dds_domainid_t, Site> sites_;
+  std::list<OutTopic> outs_;
+  std::map<const Entry*, OutTopic*> out_of_;
+  std::list<InTopic> ins_;
+  bool started_ = false;
+};
+
+}  // namespace arbiter::gateway::dds

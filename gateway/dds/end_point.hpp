@@ -1,0 +1,73 @@
+// One end of a topic of DDS that is ours: what the readers and the writers of a gateway share.
+//
+// Thread safety: one thread, the gateway's loop.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "gateway/core/account.hpp"
+#include "gateway/dds/domain.hpp"
+#include "gateway/dds/entity.hpp"
+#include "gateway/dds/mismatch.hpp"
+#include "gateway/dds/peers.hpp"
+#include "gateway/mapping/mapping.hpp"
+
+namespace arbiter::gateway::dds {
+
+class EndPoint {
+ public:
+  EndPoint(const EndPoint&) = delete;
+  EndPoint& operator=(const EndPoint&) = delete;
+  virtual ~EndPoint() = default;
+
+  // Opens it in the domain, which outlives it or close(). Throws DdsError.
+  void open(Domain& domain);
+  void close() noexcept;
+  [[nodiscard]] bool is_open() const { return static_cast<bool>(end_); }
+
+  // Takes account of who is out there: opens it again with or without a key where nothing else
+  // would match, takes on ROS 2's type hash, and says who does not match, and why.
+  void look_at(const PeerMap& peers);
+
+  [[nodiscard]] const DdsTopic& topic() const { return topic_; }
+  [[nodiscard]] bool keyed() const { return keyed_; }
+
+ protected:
+  // Keeps references.
+  EndPoint(End end, const Entry& entry, Account& account);
+
+  // Makes the reader or the writer. `type`: what Cyclone knows the topic's samples by.
+  [[nodiscard]] virtual Entity make(dds_entity_t participant, dds_entity_t topic,
+                                    const ddsi_sertype* type, const dds_qos_t* qos) = 0;
+  // How many peers Cyclone has matched.
+  [[nodiscard]] virtual std::uint32_t matched() const = 0;
+
+  [[nodiscard]] const Entity& end() const { return end_; }
+  [[nodiscard]] const Entry& entry() const { return entry_; }
+  [[nodiscard]] Account& account() const { return account_; }
+
+ private:
+  void open();
+  void choose_kind(const PeerMap& peers);
+  void adopt_type_hash(const PeerMap& peers);
+  void say_who_does_not_match(const PeerMap& peers);
+  // Once for each peer and sentence.
+  void warn(const Guid& guid, const std::string& sentence);
+
+  const End which_;
+  const Entry& entry_;
+  const DdsTopic& topic_;
+  Account& account_;
+  Domain* domain_ = nullptr;
+  bool keyed_;
+  std::string type_hash_;
+  std::map<Guid, std::set<std::string>> warned_;
+  Entity topic_entity_;
+  Entity end_;
+};
+
+}  // namespace arbiter::gateway::dds

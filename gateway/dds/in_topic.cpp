@@ -1,0 +1,42 @@
+#include "gateway/dds/in_topic.hpp"
+
+#include <chrono>
+#include <string>
+
+#include "gateway/dds/arrived_sample.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::gateway::dds {
+
+InTopic::InTopic(Incoming& incoming, Account& account, StallGuard& guard)
+    : EndPoint(End::kReader, incoming.entry(), account),
+      incoming_(incoming),
+      guard_(guard),
+      watch_(guard.add(incoming.max_age())),
+      cache_(*this) {}
+
+Entity InTopic::make(dds_entity_t participant, dds_entity_t topic, const ddsi_sertype* /*type*/,
+                     const dds_qos_t* qos) {
+  return {dds_create_reader_rhc(participant, topic, qos, nullptr, cache_.cache()),
+          "a reader of " + this->topic().name};
+}
+
+std::uint32_t InTopic::matched() const {
+  dds_subscription_matched_status_t status{};
+  if (dds_get_subscription_matched_status(end().get(), &status) < 0) return 0;
+  return status.current_count;
+}
+
+// Whatever waited for Cyclone's thread, such as datagrams in the socket while the process was
+// stopped, comes through here: the guard knows how long that can have been.
+void InTopic::take(const Payload& payload) noexcept {
+  const ArrivedSample sample(payload);
+  if (!sample.is_readable()) {
+    incoming_.fail();
+    return;
+  }
+  const shm::Nanoseconds deadline = guard_.deadline(watch_, shm::monotonic_now());
+  incoming_.deliver(sample, Time(std::chrono::nanoseconds(deadline)));
+}
+
+}  // namespace arbiter::gateway::dds

@@ -1,0 +1,200 @@
+#include "gateway/dds/mismatch.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <string_view>
+
+namespace arbiter::gateway::dds {
+namespace {
+
+bool is_pattern(std::string_view name) { return name.find_first_of("*?") != name.npos; }
+
+// `*`: any characters; `?`: any one. Without recursion: the pattern is a stranger's.
+bool fits(std::string_view pattern, std::string_view name) {
+  std::size_t p = 0;
+  std::size_t n = 0;
+  std::size_t star = pattern.npos;
+  std::size_t resume = 0;
+  while (n < name.size()) {
+    if (p < pattern.size() && (pattern[p] == '?' || pattern[p] == name[n]) && pattern[p] != '*') {
+      ++p;
+      ++n;
+    } else if (p < pattern.size() && pattern[p] == '*') {
+      star = p++;
+      resume = n;
+    } else if (star != pattern.npos) {
+      p = star + 1;
+      n = ++resume;
+    } else {
+      return false;
+    }
+  }
+  while (p < pattern.size() && pattern[p] == '*') ++p;
+  return p == pattern.size();
+}
+
+// Two patterns never fit each other.
+bool fits_either(const std::string& a, const std::string& b) {
+  if (is_pattern(a)) return !is_pattern(b) && fits(a, b);
+  return is_pattern(b) ? fits(b, a) : a == b;
+}
+
+template <std::size_t N>
+const char* word(const std::array<const char*, N>& words, int kind) {
+  return kind >= 0 && static_cast<std::size_t>(kind) < N ? words[static_cast<std::size_t>(kind)]
+                                                         : "something unknown";
+}
+
+constexpr std::array kReliabilities = {"best_effort", "reliable"};
+constexpr std::array kDurabilities = {"volatile", "transient_local", "transient", "persistent"};
+constexpr std::array kOwnerships = {"shared", "exclusive"};
+constexpr std::array kLivelinesses = {"automatic", "manual_by_participant", "manual_by_topic"};
+constexpr std::array kOrders = {"by reception", "by source time"};
+constexpr std::array kRepresentations = {"XCDR1", "XML", "XCDR2"};
+
+std::string duration(shm::Nanoseconds nanoseconds) {
+  if (nanoseconds == shm::kForever) return "none";
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%g ms", static_cast<double>(nanoseconds) / 1e6);
+  return text.data();
+}
+
+std::string list(const std::vector<std::string>& names) {
+  if (names.empty()) return "the default one";
+  std::string result;
+  for (const std::string& name : names) {
+    result += (result.empty() ? "\"" : ", \"") + name + "\"";
+  }
+  return result;
+}
+
+std::string list(const std::vector<int>& representations) {
+  std::string result;
+  for (const int kind : representations) {
+    result += (result.empty() ? "" : " or ") + std::string(word(kRepresentations, kind));
+  }
+  return result;
+}
+
+// Collects, for one pair of ends, what the writer offers and the reader asks for.
+class Comparison {
+ public:
+  Comparison(const OurEnd& ours, const Peer& peer)
+      : reads_(ours.end == End::kReader),
+        mine_(announced_by(ours.topic.qos, ours.end)),
+        reader_(reads_ ? mine_ : peer.qos),
+        writer_(reads_ ? peer.qos : mine_) {}
+
+  [[nodiscard]] const AnnouncedQos& reader() const { return reader_; }
+  [[nodiscard]] const AnnouncedQos& writer() const { return writer_; }
+
+  // `remedy`: what to write in the mapping, given what the other end has; empty: nothing helps.
+  void add(const std::string& policy, const std::string& offered, const std::string& asked,
+           const std::string& remedy) {
+    std::string text = policy + ": ";
+    text += reads_ ? "the writer offers " + offered + ", this entry asks for " + asked
+                   : "this entry offers " + offered + ", the reader asks for " + asked;
+    if (!remedy.empty()) text += "; write " + remedy;
+    found_.push_back(std::move(text));
+  }
+  // In terms of an attribute that takes the other end's word.
+  void add_attribute(const std::string& name, const std::string& offered,
+                     const std::string& asked) {
+    add(name, offered, asked, name + "=\"" + (reads_ ? offered : asked) + "\"");
+  }
+  void add_plain(std::string text) { found_.push_back(std::move(text)); }
+  [[nodiscard]] std::vector<std::string> found() && { return std::move(found_); }
+
+ private:
+  const bool reads_;
+  const AnnouncedQos mine_;
+  const AnnouncedQos& reader_;
+  const AnnouncedQos& writer_;
+  std::vector<std::string> found_;
+};
+
+void compare_attributes(Comparison& pair) {
+  const AnnouncedQos& asked = pair.reader();
+  const AnnouncedQos& offered = pair.writer();
+  if (asked.reliability > offered.reliability) {
+    pair.add_attribute("reliability", word(kReliabilities, offered.reliability),
+                       word(kReliabilities, asked.reliability));
+  }
+  if (asked.durability > offered.durability) {
+    const std::string name = word(kDurabilities, asked.durability);
+    const bool known = asked.durability <= 1;  // stronger ones the mapping does not have
+    if (known) {
+      pair.add_attribute("durability", word(kDurabilities, offered.durability), name);
+    } else {
+      pair.add("durability", word(kDurabilities, offered.durability), name, "");
+    }
+  }
+  if (asked.deadline < offered.deadline) {
+    pair.add("deadline", duration(offered.deadline), duration(asked.deadline),
+             "a deadline= that fits, or none where the entry reads");
+  }
+  if (std::find(asked.representations.begin(), asked.representations.end(),
+                offered.representations.front()) == asked.representations.end()) {
+    pair.add("representation", word(kRepresentations, offered.representations.front()),
+             list(asked.representations), "representation=\"xcdr1\" or \"xcdr2\"");
+  }
+}
+
+// Those that no attribute changes.
+void compare_others(Comparison& pair) {
+  const AnnouncedQos& asked = pair.reader();
+  const AnnouncedQos& offered = pair.writer();
+  if (asked.ownership != offered.ownership) {
+    pair.add("ownership", word(kOwnerships, offered.ownership), word(kOwnerships, asked.ownership),
+             "");
+  }
+  if (asked.liveliness > offered.liveliness) {
+    pair.add("liveliness", word(kLivelinesses, offered.liveliness),
+             word(kLivelinesses, asked.liveliness), "");
+  }
+  if (asked.lease < offered.lease) {
+    pair.add("liveliness lease", duration(offered.lease), duration(asked.lease), "");
+  }
+  if (asked.latency_budget < offered.latency_budget) {
+    pair.add("latency budget", duration(offered.latency_budget), duration(asked.latency_budget),
+             "");
+  }
+  if (asked.destination_order > offered.destination_order) {
+    pair.add("destination order", word(kOrders, offered.destination_order),
+             word(kOrders, asked.destination_order), "");
+  }
+}
+
+}  // namespace
+
+bool share_partition(const std::vector<std::string>& a, const std::vector<std::string>& b) {
+  static const std::vector<std::string> default_partition = {""};
+  const auto& ours = a.empty() ? default_partition : a;
+  const auto& theirs = b.empty() ? default_partition : b;
+  return std::any_of(ours.begin(), ours.end(), [&](const std::string& one) {
+    return std::any_of(theirs.begin(), theirs.end(),
+                       [&](const std::string& other) { return fits_either(one, other); });
+  });
+}
+
+std::vector<std::string> mismatches(const OurEnd& ours, const Peer& peer) {
+  Comparison pair(ours, peer);
+  if (peer.type != ours.topic.type) {
+    pair.add_plain("type: it has " + peer.type + ", this entry has " + ours.topic.type);
+  }
+  if (peer.keyed != ours.keyed) {
+    pair.add_plain(peer.keyed
+                       ? R"(key: its type has a key, this entry's has none; write keyed="true")"
+                       : R"(key: its type has no key, this entry's has one; write keyed="false")");
+  }
+  compare_attributes(pair);
+  compare_others(pair);
+  if (!share_partition(ours.topic.qos.partitions, peer.qos.partitions)) {
+    pair.add_plain("partition: it is in " + list(peer.qos.partitions) + ", this entry is in " +
+                   list(ours.topic.qos.partitions));
+  }
+  return std::move(pair).found();
+}
+
+}  // namespace arbiter::gateway::dds

@@ -1,0 +1,63 @@
+#include "gateway/dds/out_topic.hpp"
+
+#include "gateway/dds/arrived_sample.hpp"
+#include "gateway/dds/opaque_type.hpp"
+
+namespace arbiter::gateway::dds {
+
+OutTopic::OutTopic(const Entry& entry, Account& account, const Bell& bell)
+    : EndPoint(End::kWriter, entry, account),
+      bell_(bell),
+      representation_(offered_representation(entry.dds->qos)) {}
+
+Entity OutTopic::make(dds_entity_t participant, dds_entity_t topic, const ddsi_sertype* type,
+                      const dds_qos_t* qos) {
+  type_ = type;
+  const Listener listener(dds_create_listener(this));
+  dds_lset_publication_matched(
+      listener.get(), [](dds_entity_t /*writer*/, const dds_publication_matched_status_t status,
+                         void* self) { static_cast<OutTopic*>(self)->on_matched(status); });
+  return {dds_create_writer(participant, topic, qos, listener.get()),
+          "a writer of " + this->topic().name};
+}
+
+std::uint32_t OutTopic::matched() const {
+  dds_publication_matched_status_t status{};
+  if (dds_get_publication_matched_status(end().get(), &status) < 0) return 0;
+  return status.current_count;
+}
+
+// A reader that comes while nobody commands is to be told so at once.
+void OutTopic::on_matched(const dds_publication_matched_status_t& status) noexcept {
+  if (status.current_count_change <= 0) return;
+  if (Outgoing* const outgoing = outgoing_.load(); outgoing != nullptr) {
+    outgoing->peer_matched();
+    bell_.ring();
+  }
+}
+
+Sender::Result OutTopic::send(Bytes sample) noexcept {
+  if (!is_open()) return Result::kNotReady;
+  const Encoding encoding = read_encapsulation(sample).encoding;
+  const bool is_xcdr2 = representation_ == Representation::kXcdr2;
+  if (encoding != (is_xcdr2 ? Encoding::kXcdr2 : Encoding::kXcdr1)) {
+    return refuse(std::string("a sample does not begin with the encapsulation header of ") +
+                  (is_xcdr2 ? "XCDR2" : "XCDR1") +
+                  ": who publishes it must send what DDS would (docs/dds.md)");
+  }
+  Payload* const payload = make_payload(type_, sample);
+  if (payload == nullptr) return Result::kNoMemory;
+  const dds_return_t written = dds_writecdr(end().get(), &payload->cyclone);
+  if (written == DDS_RETCODE_OK) return Result::kSent;
+  if (written == DDS_RETCODE_TIMEOUT) {
+    return refuse("a subscriber does not keep up: a sample was not sent, the writer was full");
+  }
+  return refuse(std::string("Cyclone DDS did not send a sample: ") + dds_strretcode(-written));
+}
+
+Sender::Result OutTopic::refuse(const std::string& why) noexcept {
+  account().set_last_reason(why);
+  return Result::kRefused;
+}
+
+}  // namespace arbiter::gateway::dds

@@ -1,0 +1,38 @@
+// An `out` entry: what an input port takes is published on a topic of DDS.
+#pragma once
+
+#include <atomic>
+
+#include "gateway/core/bridge.hpp"
+#include "gateway/core/outgoing.hpp"
+#include "gateway/dds/end_point.hpp"
+#include "gateway/dds/payload.hpp"
+
+namespace arbiter::gateway::dds {
+
+class OutTopic : public EndPoint, public Sender {
+ public:
+  // Keeps references.
+  OutTopic(const Entry& entry, Account& account, const Bell& bell);
+  ~OutTopic() override { close(); }
+
+  // Who is told of each reader that comes; null: nobody any more.
+  void tell(Outgoing* outgoing) noexcept { outgoing_.store(outgoing); }
+
+  [[nodiscard]] Result send(Bytes sample) noexcept override;
+
+ private:
+  Entity make(dds_entity_t participant, dds_entity_t topic, const ddsi_sertype* type,
+              const dds_qos_t* qos) override;
+  [[nodiscard]] std::uint32_t matched() const override;
+  // On Cyclone's threads.
+  void on_matched(const dds_publication_matched_status_t& status) noexcept;
+  Result refuse(const std::string& why) noexcept;
+
+  const Bell& bell_;
+  const Representation representation_;
+  const ddsi_sertype* type_ = nullptr;
+  std::atomic<Outgoing*> outgoing_{nullptr};
+};
+
+}  // namespace arbiter::gateway::dds

@@ -1,0 +1,155 @@
+#include "gateway/dds/peers.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <iterator>
+#include <string_view>
+#include <utility>
+
+namespace arbiter::gateway::dds {
+namespace {
+
+constexpr std::size_t kMaxName = 256;  // of what strangers say
+
+std::string bounded(const char* text) {
+  return text == nullptr ? std::string() : std::string(text).substr(0, kMaxName);
+}
+
+Guid guid_of(const dds_guid_t& guid) {
+  Guid result;
+  std::copy(std::begin(guid.v), std::end(guid.v), result.begin());
+  return result;
+}
+
+std::string property(const dds_qos_t& qos, const char* name) {
+  char* value = nullptr;
+  if (!dds_qget_prop(&qos, name, &value)) return {};
+  std::string result = bounded(value);
+  dds_free(value);
+  return result;
+}
+
+// Of a participant that does not say who it is: who made its DDS, and its number.
+std::string number_of(const Guid& participant) {
+  std::string vendor = "DDS participant";
+  if (participant[0] == 0x01 && participant[1] == 0x0f) vendor = "Fast DDS participant";
+  if (participant[0] == 0x01 && participant[1] == 0x10) vendor = "Cyclone DDS participant";
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), " %02x%02x%02x%02x.%02x%02x%02x%02x.%02x%02x%02x%02x",
+                participant[0], participant[1], participant[2], participant[3], participant[4],
+                participant[5], participant[6], participant[7], participant[8], participant[9],
+                participant[10], participant[11]);
+  return vendor + text.data();
+}
+
+Listener on_data(const Bell& bell) {
+  Listener listener(dds_create_listener(const_cast<Bell*>(&bell)));
+  dds_lset_data_available(listener.get(), [](dds_entity_t /*reader*/, void* argument) {
+    static_cast<const Bell*>(argument)->ring();
+  });
+  return listener;
+}
+
+}  // namespace
+
+bool has_key(const Guid& guid) {
+  const unsigned kind = guid[15] & 0x0fU;
+  return kind == 0x02 || kind == 0x07;
+}
+
+std::string type_hash_in(const std::string& user_data) {
+  constexpr std::string_view kKey = "typehash=";
+  std::size_t at = 0;
+  while (at < user_data.size()) {
+    const std::size_t end = std::min(user_data.find(';', at), user_data.size());
+    if (user_data.compare(at, kKey.size(), kKey) == 0) {
+      return user_data.substr(at + kKey.size(), std::min(end - at - kKey.size(), kMaxName));
+    }
+    at = end + 1;
+  }
+  return {};
+}
+
+Peers::Peers(dds_entity_t participant, std::set<std::string> topics, const Bell& bell)
+    : topics_(std::move(topics)) {
+  dds_guid_t own{};
+  if (dds_get_guid(participant, &own) == DDS_RETCODE_OK) own_ = guid_of(own);
+  const Listener listener = on_data(bell);
+  const auto reader = [&](dds_entity_t topic, const dds_listener_t* calls, const char* what) {
+    return Entity(dds_create_reader(participant, topic, nullptr, calls), what);
+  };
+  participants_ = reader(DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, "the reader of participants");
+  readers_ = reader(DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, listener.get(), "the reader of readers");
+  writers_ = reader(DDS_BUILTIN_TOPIC_DCPSPUBLICATION, listener.get(), "the reader of writers");
+}
+
+bool Peers::update() {
+  const bool readers = update(readers_, End::kReader);
+  const bool writers = update(writers_, End::kWriter);
+  return readers || writers;
+}
+
+bool Peers::update(const Entity& reader, End end) {
+  constexpr std::size_t kBatch = 32;
+  bool changed = false;
+  for (;;) {
+    std::array<void*, kBatch> samples{};
+    std::array<dds_sample_info_t, kBatch> infos{};
+    const dds_return_t taken = dds_take(reader.get(), samples.data(), infos.data(), kBatch, kBatch);
+    if (taken <= 0) return changed;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(taken); ++i) {
+      if (infos[i].instance_state != DDS_IST_ALIVE) {
+        if (const auto gone = handles_.find(infos[i].instance_handle); gone != handles_.end()) {
+          peers_.erase(gone->second);
+          handles_.erase(gone);
+          changed = true;
+        }
+      } else if (infos[i].valid_data) {
+        add(*static_cast<const dds_builtintopic_endpoint_t*>(samples[i]), end,
+            infos[i].instance_handle);
+        changed = true;
+      }
+    }
+    dds_return_loan(reader.get(), samples.data(), taken);
+  }
+}
+
+void Peers::add(const dds_builtintopic_endpoint_t& endpoint, End end,
+                dds_instance_handle_t handle) {
+  if (guid_of(endpoint.participant_key) == own_) return;
+  if (endpoint.topic_name == nullptr || !topics_.contains(endpoint.topic_name)) return;
+  if (endpoint.qos == nullptr || peers_.size() >= kMaxPeers) return;
+  const Guid guid = guid_of(endpoint.key);
+  Peer peer;
+  peer.end = end;
+  peer.topic = endpoint.topic_name;
+  peer.type = bounded(endpoint.type_name);
+  peer.keyed = has_key(guid);
+  peer.qos = read_announced(*endpoint.qos);
+  peer.type_hash = type_hash_in(user_data(*endpoint.qos));
+  peer.owner = owner_of(endpoint);
+  peers_.insert_or_assign(guid, std::move(peer));
+  handles_.insert_or_assign(handle, guid);
+}
+
+std::string Peers::owner_of(const dds_builtintopic_endpoint_t& endpoint) const {
+  void* sample = nullptr;
+  dds_sample_info_t info{};
+  std::string result;
+  const dds_return_t read = dds_read_instance(participants_.get(), &sample, &info, 1, 1,
+                                              endpoint.participant_instance_handle);
+  if (read == 1 && info.valid_data) {
+    const auto& participant = *static_cast<const dds_builtintopic_participant_t*>(sample);
+    const std::string name = property(*participant.qos, "__ProcessName");
+    const std::string pid = property(*participant.qos, "__Pid");
+    const std::string host = property(*participant.qos, "__Hostname");
+    if (!name.empty()) {
+      result = name;
+      if (!pid.empty()) result += " (pid " + pid + (host.empty() ? "" : " on " + host) + ")";
+    }
+  }
+  if (read > 0) dds_return_loan(participants_.get(), &sample, read);
+  return result.empty() ? number_of(guid_of(endpoint.participant_key)) : result;
+}
+
+}  // namespace arbiter::gateway::dds

@@ -1,0 +1,71 @@
+// Who else reads and writes our topics in a domain, as Cyclone has discovered it.
+//
+// Thread safety: one thread, the gateway's loop. The bell rings on Cyclone's threads.
+#pragma once
+
+#include <dds/dds.h>
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+
+#include "gateway/core/bridge.hpp"
+#include "gateway/dds/cyclone_qos.hpp"
+#include "gateway/dds/entity.hpp"
+
+namespace arbiter::gateway::dds {
+
+// A reader or writer of somebody else's. What it says of itself is a stranger's: it may be
+// anything.
+struct Peer {
+  End end = End::kReader;
+  std::string topic;
+  std::string type;
+  // Whether its type has a key. An end with and one without never match, and Cyclone says nothing.
+  bool keyed = false;
+  AnnouncedQos qos;
+  std::string type_hash;  // "RIHS01_…", as ROS 2 has it since Iron
+  std::string owner;      // "nav (pid 12)", or a participant's number
+};
+
+// By GUID: in an order that does not change.
+using Guid = std::array<std::uint8_t, 16>;
+using PeerMap = std::map<Guid, Peer>;
+
+class Peers {
+ public:
+  // Looks for those of `topics` alone: others are none of our business, however many there are.
+  // `bell` rings where there is something to take in, and outlives this.
+  Peers(dds_entity_t participant, std::set<std::string> topics, const Bell& bell);
+  Peers(const Peers&) = delete;
+  Peers& operator=(const Peers&) = delete;
+  ~Peers() = default;
+
+  // Takes in what has come; true: something has. Does not wait.
+  bool update();
+  [[nodiscard]] const PeerMap& all() const { return peers_; }
+
+ private:
+  bool update(const Entity& reader, End end);
+  void add(const dds_builtintopic_endpoint_t& endpoint, End end, dds_instance_handle_t handle);
+  [[nodiscard]] std::string owner_of(const dds_builtintopic_endpoint_t& endpoint) const;
+
+  static constexpr std::size_t kMaxPeers = 4096;
+
+  const std::set<std::string> topics_;
+  Guid own_{};  // our participant
+  PeerMap peers_;
+  std::map<dds_instance_handle_t, Guid> handles_;
+  Entity participants_;
+  Entity readers_;
+  Entity writers_;
+};
+
+// The kind of an end by the last byte of its GUID (RTPS 2.5, table 9.1).
+[[nodiscard]] bool has_key(const Guid& guid);
+// "typehash=RIHS01_…;" in what ROS 2 writes into the user data; empty: there is none.
+[[nodiscard]] std::string type_hash_in(const std::string& user_data);
+
+}  // namespace arbiter::gateway::dds

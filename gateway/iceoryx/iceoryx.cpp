@@ -1,0 +1,112 @@
+#include "gateway/iceoryx/iceoryx.hpp"
+
+#include <unistd.h>
+
+#include <utility>
+
+#include <iceoryx_hoofs/error_handling/error_handling.hpp>
+#include <iceoryx_hoofs/log/logmanager.hpp>
+#include <iceoryx_hoofs/platform/platform_settings.hpp>
+
+#include "gateway/core/say.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+constexpr shm::Nanoseconds kSecond = 1'000'000'000;
+constexpr shm::Nanoseconds kHangs = 2 * kSecond;        // RouDi does not answer
+constexpr shm::Nanoseconds kHangsInside = 5 * kSecond;  // the thread does not come out of a call
+
+// iceoryx ends the process at what it holds for fatal, and, where it was built with assertions, at
+// less. What is less is answered by the call that found it.
+void handle_error(iox::Error error, const std::function<void()>&, iox::ErrorLevel level) {
+  if (level != iox::ErrorLevel::FATAL) return;
+  say(Level::kError, std::string("iceoryx gives up: ") + iox::ErrorHandler::toString(error));
+  std::_Exit(1);
+}
+
+}  // namespace
+
+std::string runtime_name(const std::string& gateway, int pid) {
+  return gateway + "-" + std::to_string(pid);
+}
+
+void remove_traces(const std::string& runtime) {
+  const std::string socket = iox::platform::IOX_UDS_SOCKET_PATH_PREFIX + runtime;
+  const std::string lock = iox::platform::IOX_LOCK_FILE_PATH_PREFIX + runtime + ".lock";
+  ::unlink(socket.c_str());
+  ::unlink(lock.c_str());
+}
+
+Iceoryx::Iceoryx(std::string name) : name_(std::move(name)) {
+  iox::log::LogManager::GetLogManager().SetDefaultLogLevel(iox::log::LogLevel::kError,
+                                                           iox::log::LogLevelOutput::kHideLogLevel);
+  static const auto handler = iox::ErrorHandler::setTemporaryErrorHandler(handle_error);
+}
+
+Iceoryx::~Iceoryx() { stop(); }
+
+Sender& Iceoryx::sender(const Gateway&, const Entry& entry, Account& account) {
+  return *senders_.emplace_back(std::make_unique<ChunkSender>(entry, account));
+}
+
+void Iceoryx::start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& outs) {
+  std::vector<OpenIn>(ins).swap(ins_);
+  std::vector<OpenOut>(outs).swap(outs_);
+  had_readers_.assign(senders_.size(), false);
+  has_started_ = true;
+  tend();
+}
+
+void Iceoryx::stop() noexcept {
+  session_.reset();
+  has_started_ = false;
+}
+
+void Iceoryx::set_obstacle(const std::string& text) {
+  if (text == obstacle_) return;
+  obstacle_ = text;
+  for (const OpenIn& in : ins_) in.account.set_obstacle(text);
+  for (const OpenOut& out : outs_) out.account.set_obstacle(text);
+}
+
+void Iceoryx::tend() {
+  if (!has_started_) return;
+  const auto roudi = find_roudi(roudi_socket_path());
+  const shm::Nanoseconds now = shm::monotonic_now();
+  if (session_ == nullptr) {
+    set_obstacle(roudi ? "RouDi has just come" : "RouDi does not run");
+    if (!roudi) return;
+    std::vector<ChunkSender*> senders;
+    for (const auto& each : senders_) senders.push_back(each.get());
+    joined_ = now;
+    session_ = std::make_unique<Session>(runtime_name(name_, ::getpid()), *roudi, ins_,
+                                         std::move(senders));
+    return;
+  }
+  if (roudi != session_->roudi()) throw NeedsNewProcess("RouDi has gone");
+  if (session_->has_stalled()) {
+    throw NeedsNewProcess("the gateway was held up, so that RouDi may have given it up");
+  }
+  if (!session_->is_ready()) {
+    if (now - joined_ > kHangs) set_obstacle("RouDi does not answer");
+    return;
+  }
+  if (now - session_->last_round() > kHangsInside) {
+    throw NeedsNewProcess("a call of iceoryx does not return");
+  }
+  set_obstacle("");
+  look_after_senders();
+}
+
+void Iceoryx::look_after_senders() {
+  for (std::size_t i = 0; i < senders_.size(); ++i) {
+    const bool has_readers = senders_[i]->publisher()->hasSubscribers();
+    senders_[i]->account().set_peers(has_readers ? 1 : 0, true);
+    if (has_readers && !had_readers_[i]) outs_[i].outgoing.peer_matched();
+    had_readers_[i] = has_readers;
+  }
+}
+
+}  // namespace arbiter::gateway

@@ -1,0 +1,49 @@
+// iceoryx behind a gateway: finds RouDi, stays with it, and ends the process when it is gone, for
+// another process to begin anew (core/supervisor.hpp): iceoryx cannot leave a RouDi and join
+// another.
+#pragma once
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "gateway/core/middleware.hpp"
+#include "gateway/iceoryx/session.hpp"
+
+namespace arbiter::gateway {
+
+// Of the runtime of a gateway whose process has that id: no other's, also where one is started
+// again before RouDi has noticed that its predecessor has died.
+[[nodiscard]] std::string runtime_name(const std::string& gateway, int pid);
+// Removes what iceoryx leaves in /tmp of a process that was killed.
+void remove_traces(const std::string& runtime);
+
+class Iceoryx final : public Middleware {
+ public:
+  // `name`: what the runtime's name begins with.
+  explicit Iceoryx(std::string name);
+  ~Iceoryx() override;
+
+  Sender& sender(const Gateway& gateway, const Entry& entry, Account& account) override;
+  void start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& outs) override;
+  void stop() noexcept override;
+  // Throws NeedsNewProcess.
+  void tend() override;
+
+ private:
+  void set_obstacle(const std::string& text);
+  void look_after_senders();
+
+  const std::string name_;
+  std::vector<std::unique_ptr<ChunkSender>> senders_;
+  std::vector<OpenIn> ins_;
+  std::vector<OpenOut> outs_;
+  std::vector<bool> had_readers_;
+  std::unique_ptr<Session> session_;
+  shm::Nanoseconds joined_ = 0;  // when the session began
+  std::string obstacle_;
+  bool has_started_ = false;
+};
+
+}  // namespace arbiter::gateway

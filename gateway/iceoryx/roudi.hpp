@@ -1,0 +1,28 @@
+// Whether RouDi, iceoryx's daemon, runs: found out without iceoryx, which ends the process that
+// asks.
+#pragma once
+
+#include <sys/types.h>
+
+#include <compare>
+#include <optional>
+#include <string>
+
+namespace arbiter::gateway {
+
+// One run of RouDi. Each makes its socket anew.
+struct RoudiIdentity {
+  dev_t device = 0;
+  ino_t inode = 0;
+  std::int64_t changed_ns = 0;  // an inode may be another file's by now
+
+  friend bool operator==(const RoudiIdentity&, const RoudiIdentity&) = default;
+};
+
+// The socket that runtimes find it by.
+[[nodiscard]] std::string roudi_socket_path();
+
+// Nothing: none runs. A stopped one does. Sends it nothing.
+[[nodiscard]] std::optional<RoudiIdentity> find_roudi(const std::string& socket_path);
+
+}  // namespace arbiter::gateway

@@ -1,0 +1,214 @@
+#include "gateway/iceoryx/session.hpp"
+
+#include <pthread.h>
+
+#include <chrono>
+#include <utility>
+
+#include <iceoryx_posh/runtime/posh_runtime.hpp>
+
+#include "gateway/core/freshness.hpp"
+#include "gateway/core/say.hpp"
+#include "gateway/iceoryx/chunk.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+constexpr shm::Nanoseconds kMillisecond = 1'000'000;
+// Rounds without anything to take: so that the loop sees that the thread goes round.
+constexpr shm::Nanoseconds kLongestWait = 250 * kMillisecond;
+constexpr shm::Nanoseconds kDiscoveryPeriod = 500 * kMillisecond;
+// RouDi gives up a process that has not been heard of for 1.5 s, whose ends are dead from then on
+// although nothing tells it so. What keeps its keep-alive from running keeps this thread, too.
+constexpr shm::Nanoseconds kGivenUp = 1200 * kMillisecond;
+
+iox::capro::ServiceDescription service_of(const IceoryxTopic& topic) {
+  const auto id = [](const std::string& text) {
+    return iox::capro::IdString_t(iox::cxx::TruncateToCapacity, text);
+  };
+  return {id(topic.service), id(topic.instance), id(topic.event)};
+}
+
+// The largest alignment that a header of that size may have: iceoryx wants the size to be a
+// multiple, and no more than its own header's alignment.
+std::uint32_t alignment_of_header(std::uint32_t size) {
+  std::uint32_t alignment = 1;
+  while (alignment < alignof(iox::mepoo::ChunkHeader) && size % (2 * alignment) == 0) {
+    alignment *= 2;
+  }
+  return alignment;
+}
+
+}  // namespace
+
+// An `in` entry, and what is known of its queue. The session's thread.
+struct Session::Inlet {
+  Inlet(const Middleware::OpenIn& open, const iox::popo::SubscriberOptions& options)
+      : in(open),
+        topic(*open.incoming.entry().iceoryx),
+        subscriber(service_of(topic), options),
+        freshness(topic.queue) {}
+
+  const Middleware::OpenIn in;
+  const IceoryxTopic& topic;
+  iox::popo::UntypedSubscriber subscriber;
+  QueueFreshness freshness;
+  std::uint32_t last_header = 0;  // of a chunk that was passed over
+  std::size_t last_size = 0;
+};
+
+Sender::Result ChunkSender::send(Bytes sample) noexcept {
+  iox::popo::UntypedPublisher* const to = publisher();
+  if (to == nullptr) return Result::kNotReady;
+  const IceoryxTopic& topic = *entry_.iceoryx;
+  const std::size_t header = topic.padded_header();
+  if (sample.size() < header || sample.size() - header > UINT32_MAX) return Result::kTooLarge;
+  auto loan = to->loan(static_cast<std::uint32_t>(sample.size() - header), topic.alignment,
+                       topic.user_header, alignment_of_header(topic.user_header));
+  if (loan.has_error()) {
+    const bool is_none = loan.get_error() == iox::popo::AllocationError::NO_MEMPOOLS_AVAILABLE;
+    account_.set_last_reason(is_none ? "RouDi has no memory pool for chunks of that size"
+                                     : "RouDi's memory pool is exhausted");
+    return is_none ? Result::kTooLarge : Result::kNoMemory;
+  }
+  void* const payload = loan.value();
+  if (topic.user_header != 0) {
+    std::memcpy(iox::mepoo::ChunkHeader::fromUserPayload(payload)->userHeader(), sample.data(),
+                topic.user_header);
+  }
+  std::memcpy(payload, sample.data() + header, sample.size() - header);
+  to->publish(payload);
+  return Result::kSent;
+}
+
+Session::Session(std::string name, RoudiIdentity roudi, std::vector<Middleware::OpenIn> ins,
+                 std::vector<ChunkSender*> outs)
+    : name_(std::move(name)),
+      roudi_(roudi),
+      ins_(std::move(ins)),
+      outs_(std::move(outs)),
+      thread_([this] { run(); }) {}
+
+Session::~Session() {
+  ends_.store(true, std::memory_order_relaxed);
+  for (int i = 0; i < 100 && !ended_.load(std::memory_order_acquire); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  if (ended_.load(std::memory_order_acquire)) {
+    thread_.join();
+    return;
+  }
+  // It hangs in a call on RouDi, and uses what is destroyed here.
+  say(Level::kWarning, "RouDi does not answer: the gateway ends without taking leave of it");
+  std::_Exit(1);
+}
+
+void Session::run() {
+  pthread_setname_np(pthread_self(), "iceoryx");
+  last_round_.store(shm::monotonic_now(), std::memory_order_relaxed);
+  make_ends();
+  last_round_.store(shm::monotonic_now(), std::memory_order_relaxed);
+  ready_.store(true, std::memory_order_release);
+  take_for_ever();
+  wait_set_.reset();
+  discovery_.reset();
+  inlets_.clear();
+  publishers_.clear();
+  ended_.store(true, std::memory_order_release);
+}
+
+void Session::make_ends() {
+  iox::runtime::PoshRuntime::initRuntime(iox::RuntimeName_t(iox::cxx::TruncateToCapacity, name_));
+  for (ChunkSender* out : outs_) {
+    const IceoryxTopic& topic = *out->entry().iceoryx;
+    iox::popo::PublisherOptions options;
+    options.historyCapacity = topic.history;
+    publishers_.push_back(
+        std::make_unique<iox::popo::UntypedPublisher>(service_of(topic), options));
+    out->use(*publishers_.back());
+  }
+  discovery_ = std::make_unique<iox::runtime::ServiceDiscovery>();
+  wait_set_ = std::make_unique<iox::popo::WaitSet<>>();
+  for (const Middleware::OpenIn& in : ins_) {
+    iox::popo::SubscriberOptions options;
+    options.queueCapacity = in.incoming.entry().iceoryx->queue;
+    options.historyRequest = 0;  // nothing old
+    inlets_.push_back(std::make_unique<Inlet>(in, options));
+    Inlet& inlet = *inlets_.back();
+    wait_set_->attachState(inlet.subscriber, iox::popo::SubscriberState::HAS_DATA)
+        .or_else([&](auto&) {
+          inlet.in.account.set_last_reason("it is only looked at now and then: too many topics");
+        });
+  }
+}
+
+void Session::take_for_ever() {
+  for (const auto& inlet : inlets_) take_all(*inlet);  // from here on they are known to be empty
+  while (!ends_.load(std::memory_order_relaxed)) {
+    shm::Nanoseconds wait = kLongestWait;
+    for (const auto& inlet : inlets_) {
+      const shm::Nanoseconds age = inlet->in.incoming.max_age().get();
+      wait = std::min(wait, std::max(kMillisecond, QueueFreshness::period(age)));
+    }
+    const auto woken = wait_set_->timedWait(
+        iox::units::Duration::fromNanoseconds(static_cast<std::uint64_t>(wait)));
+    static_cast<void>(woken);  // whoever it is, all are looked at: it costs a load for each
+    const shm::Nanoseconds now = shm::monotonic_now();
+    const shm::Nanoseconds before = last_round_.exchange(now, std::memory_order_relaxed);
+    if (now - before > kGivenUp) stalled_.store(true, std::memory_order_relaxed);
+    for (const auto& inlet : inlets_) take_all(*inlet);
+    look_for_publishers(now);
+  }
+}
+
+void Session::take_all(Inlet& inlet) {
+  // A publisher that never rests must not keep others waiting.
+  for (std::uint32_t i = 0; i <= inlet.topic.queue; ++i) {
+    const shm::Nanoseconds before = shm::monotonic_now();
+    auto taken = inlet.subscriber.take();
+    if (taken.has_error()) {
+      inlet.freshness.note_empty(before);
+      break;
+    }
+    inlet.freshness.note_taken(before);
+    const void* const payload = taken.value();
+    const Chunk chunk(payload, inlet.topic);
+    Account& account = inlet.in.account;
+    if (!chunk.has_right_header()) {
+      inlet.in.incoming.fail();
+      if (std::exchange(inlet.last_header, chunk.header_size() + 1) != chunk.header_size() + 1) {
+        account.set_last_reason(
+            "chunks have a user header of " + std::to_string(chunk.header_size()) +
+            " bytes; write user_header=\"" + std::to_string(chunk.header_size()) + "\"");
+      }
+    } else {
+      const auto age = inlet.in.incoming.max_age().get();
+      const Time deadline{std::chrono::nanoseconds(inlet.freshness.deadline(age))};
+      const auto fate = inlet.in.incoming.deliver(chunk, deadline);
+      if (fate == Incoming::Fate::kTooLarge &&
+          std::exchange(inlet.last_size, chunk.size()) != chunk.size()) {
+        account.set_last_reason("the last of " + std::to_string(chunk.size()) + " bytes");
+      }
+    }
+    inlet.subscriber.release(payload);
+  }
+}
+
+// A subscriber does not know whether there is a publisher; RouDi's registry does, which names each
+// topic once however many offer it.
+void Session::look_for_publishers(shm::Nanoseconds now) {
+  if (now - looked_for_publishers_ < kDiscoveryPeriod) return;
+  looked_for_publishers_ = now;
+  for (const auto& inlet : inlets_) {
+    std::uint32_t found = 0;
+    const auto service = service_of(inlet->topic);
+    discovery_->findService(
+        service.getServiceIDString(), service.getInstanceIDString(), service.getEventIDString(),
+        [&](const iox::capro::ServiceDescription&) { found = 1; },
+        iox::popo::MessagingPattern::PUB_SUB);
+    inlet->in.account.set_peers(found, true);
+  }
+}
+
+}  // namespace arbiter::gateway

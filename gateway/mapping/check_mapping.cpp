@@ -1,0 +1,308 @@
+#include "gateway/mapping/check_mapping.hpp"
+
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "rules/model/expression.hpp"
+#include "rules/text/names.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+struct Placed {
+  const Gateway* gateway;
+  const Entry* entry;
+};
+
+// Partitions may be patterns; no partition is the one without a name.
+bool share_a_partition(const std::vector<std::string>& one, const std::vector<std::string>& other) {
+  static const std::vector<std::string> kDefault{""};
+  const auto matches = [](const std::string& a, const std::string& b) {
+    return fnmatch(a.c_str(), b.c_str(), 0) == 0 || fnmatch(b.c_str(), a.c_str(), 0) == 0;
+  };
+  for (const std::string& a : one.empty() ? kDefault : one) {
+    for (const std::string& b : other.empty() ? kDefault : other) {
+      if (matches(a, b)) return true;
+    }
+  }
+  return false;
+}
+
+// A domain that is not named is the environment's, and most often 0.
+bool are_one_topic(const Placed& one, const Placed& other) {
+  const Entry& a = *one.entry;
+  const Entry& b = *other.entry;
+  if (a.dds && b.dds) {
+    const bool is_one_domain = one.gateway->domain.value_or(0) == other.gateway->domain.value_or(0);
+    return is_one_domain && a.dds->name == b.dds->name &&
+           share_a_partition(a.dds->qos.partitions, b.dds->qos.partitions);
+  }
+  if (a.iceoryx && b.iceoryx) {
+    return a.iceoryx->service == b.iceoryx->service && a.iceoryx->instance == b.iceoryx->instance &&
+           a.iceoryx->event == b.iceoryx->event;
+  }
+  return false;
+}
+
+// Whether some activity of sources makes the expression true only with this source active: it
+// stands somewhere where being active can help. `positive`: what surrounds it is not negated.
+class Polarity {
+ public:
+  void visit(const rules::Expression& expression, bool positive) {
+    if (!seen_.insert({&expression, positive}).second) return;
+    using rules::Operator;
+    const auto& operands = expression.operands;
+    switch (expression.op) {
+      case Operator::kSource:
+        if (positive) required_.insert(expression.name);
+        return;
+      case Operator::kNot:
+        visit(*operands[0], !positive);
+        return;
+      case Operator::kImplies:
+        visit(*operands[0], !positive);
+        visit(*operands[1], positive);
+        return;
+      case Operator::kXor:
+      case Operator::kIff:
+        for (const auto& operand : operands) {
+          visit(*operand, positive);
+          visit(*operand, !positive);
+        }
+        return;
+      default:
+        for (const auto& operand : operands) visit(*operand, positive);
+    }
+  }
+  [[nodiscard]] const std::set<std::string>& required() const { return required_; }
+
+ private:
+  std::set<std::pair<const rules::Expression*, bool>> seen_;
+  std::set<std::string> required_;
+};
+
+class MappingCheck {
+ public:
+  MappingCheck(const std::vector<Mapping>& mappings, const rules::RuleSet* model,
+               rules::Diagnostics& diagnostics)
+      : model_(model), diagnostics_(diagnostics) {
+    for (const Mapping& mapping : mappings) {
+      for (const Gateway& gateway : mapping.gateways) {
+        for (const Entry& entry : gateway.entries) entries_.push_back({&gateway, &entry});
+      }
+    }
+  }
+
+  void check() {
+    check_ports();
+    check_topics();
+    for (const Placed& each : entries_) check_idle(*each.entry);
+    if (model_ == nullptr) return;
+    list_model();
+    for (const Placed& each : entries_) check_names(*each.entry);
+    check_choices();
+    check_types();
+  }
+
+ private:
+  void check_ports() {
+    std::map<std::pair<bool, std::string>, const Port*> known;
+    for (const Placed& each : entries_) {
+      for (const Port* port : each.entry->ports()) {
+        const auto [first, is_new] = known.try_emplace({each.entry->is_in(), port->name}, port);
+        if (is_new) continue;
+        diagnostics_.error("duplicate-port", port->where,
+                           "the port " + rules::quote(port->name) + " has an entry already, at " +
+                               rules::describe(first->second->where) +
+                               "; a port is opened once: remove one of the two, or rename it",
+                           {.ports = {port->name}});
+      }
+    }
+  }
+
+  void check_topics() {
+    std::map<std::string, std::vector<Placed>> by_topic;  // in document order
+    for (const Placed& each : entries_) by_topic[each.entry->outside()].push_back(each);
+    for (const auto& [topic, all] : by_topic) {
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        for (std::size_t j = 0; j < i; ++j) check_pair(all[j], all[i]);
+      }
+    }
+  }
+
+  void check_pair(const Placed& first, const Placed& second) {
+    const Entry& one = *first.entry;
+    const Entry& other = *second.entry;
+    if ((one.is_in() && other.is_in()) || !are_one_topic(first, second)) return;
+    if (!one.is_in() && !other.is_in()) {
+      report_two_outs(one, other);
+    } else {
+      report_circle(one.is_in() ? other : one, one.is_in() ? one : other);
+    }
+  }
+
+  void report_circle(const Entry& out, const Entry& in) {
+    diagnostics_.error(
+        "circle", out.where,
+        "what is sent to " + out.outside() + " comes in again by the entry at " +
+            rules::describe(in.where) +
+            "; publishers and subscribers must not meet past the gateway: remap one of them to "
+            "another topic" +
+            (out.dds ? ", partition or domain" : ""),
+        {.ports = {out.port->name}});
+  }
+
+  void report_two_outs(const Entry& first, const Entry& second) {
+    diagnostics_.warning("two-outs", second.where,
+                         second.outside() + " has an entry already, at " +
+                             rules::describe(first.where) +
+                             ": its subscribers obey two input ports, which are arbitrated each "
+                             "for itself; send one of them elsewhere",
+                         {.ports = {second.port->name}});
+  }
+
+  void check_idle(const Entry& entry) {
+    if (entry.is_in() || entry.idle.kind != Idle::Kind::kNothing) return;
+    diagnostics_.note("no-idle", entry.where,
+                      "while " + entry.port->name + " is idle nothing is sent to " +
+                          entry.outside() +
+                          ", so that whoever obeys it must stop by itself; add idle=\"zero\", or "
+                          "a sample that says stop: idle=\"file:…\"",
+                      {.ports = {entry.port->name}});
+  }
+
+  void list_model() {
+    sources_.insert(model_->sources.begin(), model_->sources.end());
+    for (const auto& [source, timeout] : model_->timeouts) sources_.insert(source);
+    for (const rules::PortRules& port : model_->ports) {
+      ports_.insert(port.port);
+      for (const rules::ConnectionRule& rule : port.rules) {
+        sources_.insert(rule.source);
+        connections_.emplace_back(rule.source, port.port);
+      }
+    }
+    for (const rules::Connection& connection : model_->other_connections) {
+      ports_.insert(connection.port);
+      sources_.insert(connection.source);
+      connections_.emplace_back(connection.source, connection.port);
+    }
+  }
+
+  void check_names(const Entry& entry) {
+    const std::set<std::string>& right = entry.is_in() ? sources_ : ports_;
+    const std::set<std::string>& wrong = entry.is_in() ? ports_ : sources_;
+    for (const Port* port : entry.ports()) {
+      if (right.contains(port->name)) continue;
+      if (wrong.contains(port->name)) {
+        diagnostics_.error("wrong-direction", port->where,
+                           rules::quote(port->name) +
+                               (entry.is_in() ? " is an input port in the model, and <in> feeds an "
+                                                "output port; write <out>, or another port"
+                                              : " is an output port in the model, and <out> sends "
+                                                "what an input port takes; write <in>, or another "
+                                                "port"),
+                           {.ports = {port->name}});
+        continue;
+      }
+      std::vector<std::string_view> candidates;
+      if (suggestions_++ < rules::kMaxSuggestions) candidates.assign(right.begin(), right.end());
+      diagnostics_.warning(
+          "unmentioned-port", port->where,
+          "the model does not mention " + rules::quote(port->name) + ", so that " +
+              (entry.is_in() ? "nothing of it is delivered" : "nothing comes of it") +
+              rules::advise(port->name, candidates, "correct the name, or connect it in the model"),
+          {.ports = {port->name}});
+    }
+  }
+
+  // A Boolean that nobody repeats must not stay true for ever: where a condition asks for it, its
+  // sender's silence would be taken for consent.
+  void check_choices() {
+    std::map<std::string, const Port*> forever;
+    for (const Placed& each : entries_) {
+      if (!each.entry->choice) continue;
+      for (const Port* port : each.entry->ports()) {
+        const auto own = model_->timeouts.find(port->name);
+        const auto timeout = own == model_->timeouts.end() ? model_->timeout : own->second;
+        if (timeout == shm::kForever) forever.emplace(port->name, port);
+      }
+    }
+    if (forever.empty()) return;
+    Polarity polarity;
+    std::set<std::string> required;
+    for (const rules::PortRules& port : model_->ports) {
+      for (const rules::ConnectionRule& rule : port.rules) {
+        polarity.visit(*rule.condition, true);
+        required.insert(rule.source);
+      }
+    }
+    required.insert(polarity.required().begin(), polarity.required().end());
+    for (const auto& [name, port] : forever) {
+      if (!required.contains(name)) continue;
+      diagnostics_.error(
+          "forever-choice", port->where,
+          "a condition requires " + rules::quote(name) +
+              " to be active, and its T is forever: a publisher that dies would be taken for one "
+              "that still says so; give the source a timeout in the model, a little longer than "
+              "the period of its topic",
+          {.ports = {}, .source = name});
+    }
+  }
+
+  void check_types() {
+    std::map<std::string, const Entry*> ins;
+    std::map<std::string, const Entry*> outs;
+    for (const Placed& each : entries_) {
+      for (const Port* port : each.entry->ports()) {
+        (each.entry->is_in() ? ins : outs).emplace(port->name, each.entry);
+      }
+    }
+    for (const auto& [source, port] : connections_) {
+      const auto in = ins.find(source);
+      const auto out = outs.find(port);
+      if (in == ins.end() || out == outs.end()) continue;
+      check_type(*in->second, source, *out->second, port);
+    }
+  }
+
+  void check_type(const Entry& in, const std::string& source, const Entry& out,
+                  const std::string& port) {
+    if (!out.type) return;  // takes anything
+    const auto describe = [](const std::optional<PortType>& type) {
+      if (!type) return std::string("samples without a type");
+      return type->name + (type->size == 0 ? "" : " of " + std::to_string(type->size) + " bytes");
+    };
+    const bool are_equal = in.type && in.type->name == out.type->name &&
+                           in.type->size == out.type->size &&
+                           (in.type->size == 0 || in.type->alignment == out.type->alignment);
+    if (are_equal) return;
+    diagnostics_.error("types-differ", out.where,
+                       "the model connects " + source + " to " + port + ", but " + in.outside() +
+                           " (" + rules::describe(in.where) + ") brings " + describe(in.type) +
+                           ", and " + out.outside() + " takes " + describe(out.type) +
+                           "; such ports are not connected: correct one of the types",
+                       {.ports = {port}, .source = source});
+  }
+
+  const rules::RuleSet* const model_;
+  rules::Diagnostics& diagnostics_;
+  std::vector<Placed> entries_;
+  std::set<std::string> sources_, ports_;  // of the model
+  std::vector<std::pair<std::string, std::string>> connections_;
+  std::size_t suggestions_ = 0;
+};
+
+}  // namespace
+
+void check_mappings(const std::vector<Mapping>& mappings, const rules::RuleSet* model,
+                    rules::Diagnostics& diagnostics) {
+  MappingCheck(mappings, model, diagnostics).check();
+}
+
+}  // namespace arbiter::gateway

@@ -1,0 +1,299 @@
+#include "gateway/mapping/entry_reader.hpp"
+
+#include <filesystem>
+
+#include "gateway/mapping/attributes.hpp"
+#include "gateway/mapping/ros_names.hpp"
+#include "gateway/mapping/topic_reader.hpp"
+#include "rules/text/names.hpp"
+#include "rules/text/text_file.hpp"
+#include "shm/limits.hpp"
+#include "shm/type_info.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+constexpr std::size_t kEncapsulation = 4;  // bytes of DDS's header
+
+// An attribute that another one needs, or excludes, means a mistake; to pass it over would hide it.
+class EntryReader {
+ public:
+  EntryReader(rules::ElementReader& reader, const rules::XmlNode& element,
+              const EntryContext& context)
+      : reader_(reader), element_(element), context_(context), attributes_(reader, element) {}
+
+  std::optional<Entry> read() {
+    entry_.where = reader_.where(element_);
+    entry_.direction = element_.text == "in" ? Entry::Direction::kIn : Entry::Direction::kOut;
+    check_shape();
+    read_topic();
+    if (const auto max_size = attributes_.bytes("max_size", 1, kMaxSampleBytes)) {
+      entry_.max_size = *max_size;
+    }
+    read_type();
+    if (entry_.is_in()) {
+      read_sources();
+      entry_.max_age = attributes_.duration("max_age");
+    } else {
+      if (auto port = attributes_.port("port")) entry_.port = std::move(*port);
+      if (const auto queue = attributes_.number("queue", 1, shm::kMaxDepth)) {
+        entry_.queue = static_cast<std::uint32_t>(*queue);
+      }
+      read_idle();
+    }
+    if (!entry_.port && !entry_.choice) return {};
+    return std::move(entry_);
+  }
+
+ private:
+  void check_shape() {
+    const bool is_dds = context_.kind == Kind::kDds;
+    if (is_dds && entry_.is_in()) {
+      reader_.check_attributes(
+          element_,
+          {"topic",      "type",    "port",   "true",     "false",     "above", "below",
+           "threshold",  "field",   "offset", "max_size", "max_age",   "qos",   "reliability",
+           "durability", "history", "depth",  "deadline", "partition", "keyed"});
+    } else if (is_dds) {
+      reader_.check_attributes(
+          element_,
+          {"port", "topic", "type", "idle", "size", "queue", "max_size", "qos", "reliability",
+           "durability", "history", "depth", "deadline", "partition", "keyed", "representation"});
+    } else if (entry_.is_in()) {
+      reader_.check_attributes(
+          element_, {"service", "instance", "event", "port", "true", "false", "above", "below",
+                     "threshold", "field", "offset", "type", "size", "alignment", "user_header",
+                     "queue", "max_size", "max_age"});
+    } else {
+      reader_.check_attributes(
+          element_, {"port", "service", "instance", "event", "idle", "type", "size", "alignment",
+                     "user_header", "history", "queue", "max_size"});
+    }
+    reader_.check_no_text(element_.first_child);
+    for (const rules::XmlNode& child : rules::Elements(element_.first_child)) {
+      reader_.report_unknown_element(child, {});
+    }
+  }
+
+  void read_topic() {
+    if (context_.kind == Kind::kDds) {
+      entry_.dds = read_dds_topic(attributes_, entry_.is_in());
+    } else {
+      entry_.iceoryx = read_iceoryx_topic(attributes_, entry_.is_in());
+    }
+  }
+
+  // How many bytes stand before a sample's own data.
+  [[nodiscard]] std::size_t header() const {
+    return entry_.dds ? kEncapsulation : entry_.iceoryx->padded_header();
+  }
+
+  void read_type() {
+    if (entry_.dds) {
+      entry_.type = PortType{readable_type(entry_.dds->type), 0, 1};
+      return;
+    }
+    const auto size = attributes_.bytes("size", 1, kMaxSampleBytes);
+    if (size) size_ = *size;
+    const auto name = attributes_.text("type", shm::kMaxTypeName);
+    if (size && header() + *size > entry_.max_size) entry_.max_size = header() + *size;
+    if (!name) return;
+    entry_.type = PortType{*name, size ? header() + *size : 0, entry_.iceoryx->alignment};
+    shm::TypeInfo info;
+    info.set_name(*name);
+    info.size = size ? header() + *size : 1;
+    if (const auto fault = shm::fault_of(info)) {
+      attributes_.error(
+          "invalid-type", "type",
+          rules::quote(*name) + " cannot be a type: " + *fault + "; write another name");
+    }
+  }
+
+  // One source, or two that a field chooses between.
+  void read_sources() {
+    const bool is_boolean = attributes_.has("true") || attributes_.has("false");
+    const bool is_number = attributes_.has("above") || attributes_.has("below");
+    const int ways = (attributes_.has("port") ? 1 : 0) + (is_boolean ? 1 : 0) + (is_number ? 1 : 0);
+    if (ways > 1) {
+      reader_.error("several-ports", reader_.where(element_),
+                    "an entry has one port, or true and false, or above and below; remove the "
+                    "others, or write an entry for each");
+      return;
+    }
+    if (!is_boolean && !is_number) {
+      refuse_without("threshold", "above");
+      refuse_without("field", "above");
+      refuse_without("offset", "true");
+      if (auto port = attributes_.port("port")) entry_.port = std::move(*port);
+      return;
+    }
+    auto yes = attributes_.port(is_boolean ? "true" : "above");
+    auto no = attributes_.port(is_boolean ? "false" : "below");
+    Choice choice;
+    if (const auto offset = attributes_.bytes("offset", 0, kMaxSampleBytes)) {
+      choice.offset = *offset;
+    }
+    if (is_boolean) {
+      refuse_without("threshold", "above");
+      refuse_without("field", "above");
+    } else {
+      read_number(choice);
+    }
+    if (header() + choice.offset + size_of(choice.field) > entry_.max_size) {
+      attributes_.error("invalid-value", "offset",
+                        "the field lies beyond max_size, " + std::to_string(entry_.max_size) +
+                            " bytes; correct one of the two");
+    }
+    if (!yes || !no) return;
+    if (yes->name == no->name) {
+      reader_.error("duplicate-port", no->where,
+                    "both sources are " + rules::quote(no->name) + "; name two");
+      return;
+    }
+    choice.yes = std::move(*yes);
+    choice.no = std::move(*no);
+    entry_.choice = std::move(choice);
+  }
+
+  void read_number(Choice& choice) {
+    attributes_.required("threshold", 100);
+    if (const auto threshold = attributes_.real("threshold")) choice.threshold = *threshold;
+    attributes_.required("field", 100);
+    using enum Field;
+    if (const auto field = attributes_.word<Field>("field", {{"f32", kF32},
+                                                             {"f64", kF64},
+                                                             {"i8", kI8},
+                                                             {"u8", kU8},
+                                                             {"i16", kI16},
+                                                             {"u16", kU16},
+                                                             {"i32", kI32},
+                                                             {"u32", kU32},
+                                                             {"i64", kI64},
+                                                             {"u64", kU64}})) {
+      choice.field = *field;
+    }
+  }
+
+  void refuse_without(std::string_view name, std::string_view other) {
+    if (!attributes_.has(name)) return;
+    attributes_.error("misplaced-attribute", name,
+                      std::string(name) + "=\"…\" belongs to an entry with two sources; add " +
+                          std::string(other) + "=\"…\", or remove it");
+  }
+
+  void read_idle() {
+    const auto text = attributes_.text("idle", 4096);
+    if (!text || *text == "none") {
+      if (entry_.dds && attributes_.has("size")) {
+        attributes_.error("misplaced-attribute", "size",
+                          "size=\"…\" says how large a zero sample is; add idle=\"zero\", or "
+                          "remove it");
+      }
+      return;
+    }
+    if (*text == "zero") {
+      read_zero();
+    } else if (text->starts_with("file:")) {
+      read_idle_file(text->substr(5));
+    } else {
+      attributes_.error("invalid-value", "idle",
+                        "idle=" + rules::quote(*text) +
+                            " is not known; write none, zero, or file: with a file's name");
+    }
+    if (entry_.idle.sample.size() > entry_.max_size) entry_.max_size = entry_.idle.sample.size();
+  }
+
+  void read_zero() {
+    if (entry_.dds) {
+      const auto size = size_of_zero();
+      if (!size) return;
+      entry_.idle.sample.resize(kEncapsulation + *size);
+      const bool is_xcdr2 = entry_.dds->qos.representation == Representation::kXcdr2;
+      entry_.idle.sample[1] = is_xcdr2 ? std::byte{7} : std::byte{1};  // little-endian
+    } else if (size_ == 0) {
+      attributes_.error("idle-size", "idle",
+                        "how large a zero sample is cannot be known; add size=\"BYTES\", or give "
+                        "a sample: idle=\"file:…\"");
+      return;
+    } else {
+      entry_.idle.sample.resize(header() + size_);
+    }
+    entry_.idle.kind = Idle::Kind::kZero;
+  }
+
+  // Of a type that has strings or sequences zero bytes are no sample: even an empty string has a
+  // length of 1, its final zero.
+  std::optional<std::size_t> size_of_zero() {
+    const std::string& type = entry_.type->name;
+    const auto said = attributes_.bytes("size", 1, kMaxIdleBytes);
+    const auto known = fixed_size_of(type);
+    if (has_strings(type)) {
+      attributes_.error("idle-size", "idle",
+                        rules::quote(type) +
+                            " has a string in it, of which zero bytes are no sample; give a "
+                            "sample: idle=\"file:…\"");
+      return {};
+    }
+    if (said && known && *said != *known) {
+      attributes_.error("idle-size", "size",
+                        "a " + type + " has " + std::to_string(*known) +
+                            " bytes; correct the size, or leave it out");
+      return {};
+    }
+    if (!said && !known) {
+      attributes_.error("idle-size", "idle",
+                        "how large a zero " + rules::quote(type) +
+                            " is cannot be known; if it has no string and no sequence, add "
+                            "size=\"BYTES\" (of its CDR, without the header), else give a sample: "
+                            "idle=\"file:…\"");
+      return {};
+    }
+    return said ? said : known;
+  }
+
+  void read_idle_file(std::string_view written) {
+    entry_.idle.kind = Idle::Kind::kFile;
+    const std::filesystem::path name = rules::trim(written);
+    if (name.empty()) {
+      attributes_.error("invalid-value", "idle", "file: lacks a file's name; write file:stop.bin");
+      return;
+    }
+    entry_.idle.path = name.string();
+    if (context_.directory == nullptr) return;
+    if (name.is_relative()) entry_.idle.path = (*context_.directory / name).string();
+    try {
+      const std::string bytes =
+          rules::read_bytes(entry_.idle.path, kMaxIdleBytes, rules::Accept::kRegularFile);
+      if (bytes.size() > kMaxIdleBytes || bytes.size() < header()) {
+        attributes_.error("idle-size", "idle",
+                          rules::quote(entry_.idle.path) + " has " + std::to_string(bytes.size()) +
+                              " bytes; a sample to be sent while the port is idle has " +
+                              std::to_string(header()) + " to " + std::to_string(kMaxIdleBytes));
+        return;
+      }
+      const auto* const data = reinterpret_cast<const std::byte*>(bytes.data());
+      entry_.idle.sample.assign(data, data + bytes.size());
+    } catch (const rules::FileError& error) {
+      attributes_.error("idle-file", "idle",
+                        std::string(error.what()) +
+                            "; write the name of a file that holds a "
+                            "sample, as seen from the mapping");
+    }
+  }
+
+  rules::ElementReader& reader_;
+  const rules::XmlNode& element_;
+  const EntryContext& context_;
+  Attributes attributes_;
+  Entry entry_;
+  std::size_t size_ = 0;  // of iceoryx: of a sample's payload; 0: any
+};
+
+}  // namespace
+
+std::optional<Entry> read_entry(rules::ElementReader& reader, const rules::XmlNode& element,
+                                const EntryContext& context) {
+  return EntryReader(reader, element, context).read();
+}
+
+}  // namespace arbiter::gateway

@@ -1,0 +1,41 @@
+#include "gateway/mapping/mapping.hpp"
+
+namespace arbiter::gateway {
+
+const char* name_of(Kind kind) { return kind == Kind::kDds ? "dds" : "iceoryx"; }
+
+std::size_t size_of(Field field) {
+  switch (field) {
+    case Field::kBoolean:
+    case Field::kI8:
+    case Field::kU8:
+      return 1;
+    case Field::kI16:
+    case Field::kU16:
+      return 2;
+    case Field::kI32:
+    case Field::kU32:
+    case Field::kF32:
+      return 4;
+    case Field::kI64:
+    case Field::kU64:
+    case Field::kF64:
+      break;
+  }
+  return 8;
+}
+
+std::vector<const Port*> Entry::ports() const {
+  if (choice) return {&choice->yes, &choice->no};
+  if (port) return {&*port};
+  return {};
+}
+
+std::string Entry::outside() const {
+  if (dds) return "DDS topic " + dds->name;
+  if (iceoryx)
+    return "iceoryx " + iceoryx->service + "/" + iceoryx->instance + "/" + iceoryx->event;
+  return {};
+}
+
+}  // namespace arbiter::gateway

@@ -1,0 +1,142 @@
+#include "gateway/mapping/read_mapping.hpp"
+
+#include <filesystem>
+#include <utility>
+
+#include "gateway/mapping/attributes.hpp"
+#include "gateway/mapping/entry_reader.hpp"
+#include "rules/model/element_reader.hpp"
+#include "rules/text/defines.hpp"
+#include "rules/text/names.hpp"
+#include "rules/text/xml.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+using rules::Elements;
+using rules::XmlNode;
+
+class MappingReader {
+ public:
+  MappingReader(const rules::TextFile& file, rules::Diagnostics& diagnostics,
+                const std::string* directory)
+      : file_(file),
+        diagnostics_(diagnostics),
+        directory_(directory),
+        reader_(file, defines_, diagnostics) {
+    mapping_.path = file.path();
+  }
+
+  Mapping read() {
+    if (!rules::check_characters(file_, diagnostics_)) return std::move(mapping_);
+    const auto document = rules::parse_xml(file_, diagnostics_);
+    if (!document) return std::move(mapping_);
+    const Elements top(document->first());
+    if (top.begin() == top.end()) {
+      reader_.error("empty-file", file_.locate(0),
+                    "the file has no <gateway>; write <gateway kind=\"dds\"> or "
+                    "<gateway kind=\"iceoryx\">, with <in …/> and <out …/> in it");
+      return std::move(mapping_);
+    }
+    reader_.check_no_text(document->first());
+    const XmlNode& root = *top.begin();
+    if (root.text == "gateways") {
+      reader_.check_attributes(root, {});
+      reader_.check_no_text(root.first_child);
+      read_gateways(root.first_child);
+      Elements::Iterator behind = top.begin();
+      if (++behind != top.end()) {
+        reader_.error("unknown-element", reader_.where(*behind),
+                      "<" + std::string((*behind).text.substr(0, 80)) +
+                          "> stands behind the root; move it into <gateways>");
+      }
+    } else {
+      read_gateways(document->first());
+    }
+    return std::move(mapping_);
+  }
+
+ private:
+  void read_gateways(const XmlNode* first) {
+    for (const XmlNode& element : Elements(first)) {
+      if (element.text == "gateway") {
+        read_gateway(element);
+      } else {
+        reader_.report_unknown_element(element, {"gateway"});
+      }
+    }
+  }
+
+  void read_gateway(const XmlNode& element) {
+    Attributes attributes(reader_, element);
+    Gateway gateway;
+    gateway.where = reader_.where(element);
+    attributes.required("kind", 100);
+    const auto kind =
+        attributes.word<Kind>("kind", {{"dds", Kind::kDds}, {"iceoryx", Kind::kIceoryx}});
+    if (!kind) return;  // what the others mean depends on it
+    gateway.kind = *kind;
+    if (*kind == Kind::kDds) {
+      reader_.check_attributes(element, {"kind", "domain", "interface", "peers", "configuration"});
+      if (const auto domain = attributes.number("domain", 0, kMaxDomain)) {
+        gateway.domain = static_cast<std::uint32_t>(*domain);
+      }
+      gateway.interfaces = attributes.list("interface", 255);
+      gateway.peers = attributes.list("peers", 255);
+      if (const auto file = attributes.text("configuration", 4096)) {
+        gateway.configuration = path_of(*file);
+      }
+    } else {
+      reader_.check_attributes(element, {"kind"});
+    }
+    reader_.check_no_text(element.first_child);
+    const EntryContext context{*kind, directory_};
+    for (const XmlNode& child : Elements(element.first_child)) {
+      if (child.text != "in" && child.text != "out") {
+        reader_.report_unknown_element(child, {"in", "out"});
+        continue;
+      }
+      if (++entries_ > kMaxEntries) {
+        if (entries_ == kMaxEntries + 1) {
+          reader_.error("too-many-entries", reader_.where(child),
+                        "a mapping has at most " + std::to_string(kMaxEntries) +
+                            " entries; split it over several gateways");
+        }
+        continue;
+      }
+      if (auto entry = read_entry(reader_, child, context)) {
+        gateway.entries.push_back(std::move(*entry));
+      }
+    }
+    mapping_.gateways.push_back(std::move(gateway));
+  }
+
+  [[nodiscard]] std::string path_of(const std::string& written) const {
+    const std::filesystem::path path = written;
+    if (directory_ == nullptr || path.is_absolute()) return written;
+    return (*directory_ / path).string();
+  }
+
+  const rules::TextFile& file_;
+  rules::Diagnostics& diagnostics_;
+  const std::string* const directory_;
+  rules::Defines defines_;  // none: a mapping has no defines
+  rules::ElementReader reader_;
+  Mapping mapping_;
+  std::size_t entries_ = 0;
+};
+
+}  // namespace
+
+Mapping read_mapping(const rules::TextFile& file, rules::Diagnostics& diagnostics,
+                     const std::string* directory) {
+  return MappingReader(file, diagnostics, directory).read();
+}
+
+Mapping read_mapping_file(const std::string& path, rules::Diagnostics& diagnostics) {
+  const rules::TextFile file(path, rules::read_bytes(path));
+  const std::string directory = std::filesystem::path(path).parent_path().string();
+  return read_mapping(file, diagnostics, &directory);
+}
+
+}  // namespace arbiter::gateway

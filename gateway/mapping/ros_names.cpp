@@ -1,0 +1,125 @@
+#include "gateway/mapping/ros_names.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace arbiter::gateway {
+namespace {
+
+constexpr std::string_view kMangled = "::dds_::";
+
+bool is_lower(char c) { return c >= 'a' && c <= 'z'; }
+bool is_upper(char c) { return c >= 'A' && c <= 'Z'; }
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+// Of CDR as ROS 2 sends it (XCDR1: each number aligned to its own size, up to 8).
+constexpr std::array<std::pair<std::string_view, std::size_t>, 27> kFixedSizes{{
+    {"geometry_msgs/msg/Accel", 48},
+    {"geometry_msgs/msg/Point", 24},
+    {"geometry_msgs/msg/Point32", 12},
+    {"geometry_msgs/msg/Pose", 56},
+    {"geometry_msgs/msg/Pose2D", 24},
+    {"geometry_msgs/msg/PoseWithCovariance", 344},
+    {"geometry_msgs/msg/Quaternion", 32},
+    {"geometry_msgs/msg/Transform", 56},
+    {"geometry_msgs/msg/Twist", 48},
+    {"geometry_msgs/msg/TwistWithCovariance", 336},
+    {"geometry_msgs/msg/Vector3", 24},
+    {"geometry_msgs/msg/Wrench", 48},
+    {"std_msgs/msg/Bool", 1},
+    {"std_msgs/msg/Byte", 1},
+    {"std_msgs/msg/Char", 1},
+    {"std_msgs/msg/ColorRGBA", 16},
+    {"std_msgs/msg/Empty", 1},
+    {"std_msgs/msg/Float32", 4},
+    {"std_msgs/msg/Float64", 8},
+    {"std_msgs/msg/Int16", 2},
+    {"std_msgs/msg/Int32", 4},
+    {"std_msgs/msg/Int64", 8},
+    {"std_msgs/msg/Int8", 1},
+    {"std_msgs/msg/UInt16", 2},
+    {"std_msgs/msg/UInt32", 4},
+    {"std_msgs/msg/UInt64", 8},
+    {"std_msgs/msg/UInt8", 1},
+}};
+
+constexpr std::array<std::string_view, 12> kWithStrings{{
+    "ackermann_msgs/msg/AckermannDriveStamped",
+    "geometry_msgs/msg/AccelStamped",
+    "geometry_msgs/msg/PointStamped",
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/TransformStamped",
+    "geometry_msgs/msg/TwistStamped",
+    "geometry_msgs/msg/Vector3Stamped",
+    "geometry_msgs/msg/WrenchStamped",
+    "nav_msgs/msg/Odometry",
+    "sensor_msgs/msg/JointState",
+    "std_msgs/msg/String",
+    "trajectory_msgs/msg/JointTrajectory",
+}};
+
+}  // namespace
+
+bool is_ros_topic(std::string_view name) {
+  if (name.size() < 2) return false;
+  char before = 0;
+  for (const char c : name) {
+    const bool begins = before == '/';
+    if (before == 0 && c != '/') return false;
+    if (before != 0 && c == '/' && begins) return false;
+    if (is_digit(c) && begins) return false;
+    if (c != '/' && c != '_' && !is_lower(c) && !is_upper(c) && !is_digit(c)) return false;
+    before = c;
+  }
+  return before != '/';
+}
+
+bool is_ros_type(std::string_view name) {
+  const std::size_t first = name.find('/');
+  const std::size_t second = first == name.npos ? first : name.find('/', first + 1);
+  if (second == name.npos) return false;
+  const std::string_view package = name.substr(0, first);
+  const std::string_view kind = name.substr(first + 1, second - first - 1);
+  const std::string_view type = name.substr(second + 1);
+  if (package.empty() || !(is_lower(package[0]) || is_upper(package[0])) || type.empty())
+    return false;
+  if (kind != "msg" && kind != "srv" && kind != "action") return false;
+  const auto is_word = [](char c) { return c == '_' || is_lower(c) || is_upper(c) || is_digit(c); };
+  return is_upper(type[0]) && std::all_of(package.begin(), package.end(), is_word) &&
+         std::all_of(type.begin(), type.end(), is_word);
+}
+
+std::string dds_topic_of(std::string_view ros_topic) { return "rt" + std::string(ros_topic); }
+
+std::string dds_type_of(std::string_view ros_type) {
+  const std::size_t last = ros_type.rfind('/');
+  std::string result;
+  for (const char c : ros_type.substr(0, last)) result += c == '/' ? "::" : std::string(1, c);
+  return result + std::string(kMangled) + std::string(ros_type.substr(last + 1)) + "_";
+}
+
+std::string readable_type(std::string_view dds_type) {
+  const std::size_t at = dds_type.find(kMangled);
+  if (at == dds_type.npos || !dds_type.ends_with('_')) return std::string(dds_type);
+  std::string package(dds_type.substr(0, at));
+  const std::size_t colons = package.find("::");
+  if (colons == std::string::npos) return std::string(dds_type);
+  package.replace(colons, 2, "/");
+  const std::string_view type = dds_type.substr(at + kMangled.size());
+  std::string result = package + "/" + std::string(type.substr(0, type.size() - 1));
+  return is_ros_type(result) ? result : std::string(dds_type);
+}
+
+std::optional<std::size_t> fixed_size_of(std::string_view ros_type) {
+  for (const auto& [name, size] : kFixedSizes) {
+    if (name == ros_type) return size;
+  }
+  return {};
+}
+
+bool has_strings(std::string_view ros_type) {
+  return std::find(kWithStrings.begin(), kWithStrings.end(), ros_type) != kWithStrings.end();
+}
+
+}  // namespace arbiter::gateway

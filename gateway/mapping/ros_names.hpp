@@ -1,0 +1,32 @@
+// Names of ROS 2, as people write them and as DDS has them.
+//
+//   topic  /cmd_vel                  rt/cmd_vel
+//   type   geometry_msgs/msg/Twist   geometry_msgs::msg::dds_::Twist_
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace arbiter::gateway {
+
+// "/a/b_c": tokens of letters, digits and underscores, each behind a '/'.
+[[nodiscard]] bool is_ros_topic(std::string_view name);
+// "package/msg/Name"; also srv and action, whose parts are types too.
+[[nodiscard]] bool is_ros_type(std::string_view name);
+
+// Of names for which these are true.
+[[nodiscard]] std::string dds_topic_of(std::string_view ros_topic);
+[[nodiscard]] std::string dds_type_of(std::string_view ros_type);
+
+// "geometry_msgs/msg/Twist" for its name in DDS; any other name as it is.
+[[nodiscard]] std::string readable_type(std::string_view dds_type);
+
+// How many bytes of CDR a sample has behind its encapsulation header, for those of ROS 2's common
+// types that have the same number always: they contain no string, no sequence. By their ROS name.
+[[nodiscard]] std::optional<std::size_t> fixed_size_of(std::string_view ros_type);
+// Common ones of which zero bytes are no sample, since they contain a string.
+[[nodiscard]] bool has_strings(std::string_view ros_type);
+
+}  // namespace arbiter::gateway

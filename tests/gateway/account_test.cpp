@@ -1,0 +1,64 @@
+// What a gateway says of an entry.
+#include "gateway/core/account.hpp"
+
+#include <gmock/gmock.h>
+
+namespace arbiter::gateway {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Account, SaysWhatItIsAndWhoIsMatched) {
+  Account account("DDS topic rt/cmd_vel", "publisher");
+  EXPECT_EQ(account.text(), "DDS topic rt/cmd_vel");
+  account.set_peers(0);
+  EXPECT_EQ(account.text(), "DDS topic rt/cmd_vel, no publisher matched");
+  account.set_peers(1);
+  EXPECT_EQ(account.text(), "DDS topic rt/cmd_vel, 1 publisher matched");
+  account.set_peers(2);
+  EXPECT_EQ(account.text(), "DDS topic rt/cmd_vel, 2 publishers matched");
+}
+
+TEST(Account, SaysWhatWentWrongAndWhyLast) {
+  Account account("iceoryx a/b/c", "subscriber");
+  account.set_peers(1);
+  account.late.add();
+  account.late.add();
+  account.too_large.add();
+  account.set_last_reason("a sample of 70000 bytes");
+  EXPECT_EQ(account.text(),
+            "iceoryx a/b/c, 1 subscriber matched; 2 late, 1 of a size that does not fit; a sample "
+            "of 70000 bytes");
+  EXPECT_EQ(account.state(), "iceoryx a/b/c, 1 subscriber matched; a sample of 70000 bytes");
+}
+
+TEST(Account, SaysHowLargeTheLastSampleWas) {
+  Account account("DDS topic rt/image", "publisher");
+  account.set_peers(1);
+  account.passed.add();
+  account.set_last_size(921'632);
+  EXPECT_EQ(account.text(),
+            "DDS topic rt/image, 1 publisher matched, the last sample has 921632 bytes");
+  EXPECT_EQ(account.state(), "DDS topic rt/image, 1 publisher matched");
+}
+
+TEST(Account, AnObstacleStandsInThePlaceOfPeers) {
+  Account account("iceoryx a/b/c", "subscriber");
+  account.set_peers(3);
+  account.set_obstacle("RouDi does not run");
+  EXPECT_EQ(account.text(), "iceoryx a/b/c, RouDi does not run");
+  account.set_obstacle("");
+  EXPECT_EQ(account.text(), "iceoryx a/b/c, 3 subscribers matched");
+}
+
+TEST(Account, WhatStrangersSayIsEscapedAndBounded) {
+  Account account("iceoryx \x1b[2J/b/c", "publisher");
+  account.set_last_reason(std::string(10'000, 'x') + "\n");
+  const std::string text = account.text();
+  EXPECT_LE(text.size(), kMaxDescription);
+  EXPECT_THAT(text, HasSubstr("\\x1b[2J"));
+  EXPECT_THAT(text, testing::EndsWith("..."));
+}
+
+}  // namespace
+}  // namespace arbiter::gateway

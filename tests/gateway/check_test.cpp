@@ -1,0 +1,162 @@
+// Mappings beside each other and beside a model.
+#include <gmock/gmock.h>
+
+#include "rules/model/load.hpp"
+#include "tests/gateway/mapping_text.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr const char* kModel =
+    "<behaviors timeout='500ms'>"
+    "<source port='/EStop/pressed:o' timeout='forever'/>"
+    "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config>"
+    "<condition>not /EStop/pressed:o</condition></behavior>"
+    "</behaviors>";
+
+// What is found of the entries of a gateway (its line 1), in that model; empty: without one.
+Read check(const std::string& mapping, const std::string& model = kModel) {
+  Read read = read_text(mapping);
+  EXPECT_THAT(read.findings(), IsEmpty());
+  if (model.empty()) {
+    check_mappings({read.mapping}, nullptr, read.diagnostics);
+    return read;
+  }
+  rules::Diagnostics of_model;
+  rules::ModelTexts texts;
+  texts.models.push_back({"model.xml", model});
+  const rules::RuleSet rules = rules::load(std::move(texts), of_model);
+  EXPECT_FALSE(of_model.has_errors());
+  check_mappings({read.mapping}, &rules, read.diagnostics);
+  return read;
+}
+
+std::string dds(const std::string& entries, const std::string& more = "") {
+  return "<gateway kind='dds' " + more + ">" + entries + "</gateway>";
+}
+
+std::string in(const std::string& topic, const std::string& port, const std::string& more = "") {
+  return "<in topic='" + topic + "' type='geometry_msgs/msg/Twist' port='" + port + "' " + more +
+         "/>";
+}
+std::string out(const std::string& topic, const std::string& port, const std::string& more = "") {
+  return "<out topic='" + topic + "' type='geometry_msgs/msg/Twist' port='" + port +
+         "' idle='zero' " + more + "/>";
+}
+
+TEST(CheckMapping, AGoodMappingHasNoFindings) {
+  EXPECT_THAT(check(dds(in("/nav", "/Nav/cmd:o") + out("/cmd", "/Base/cmd:i"))).findings(),
+              IsEmpty());
+}
+
+TEST(CheckMapping, APortHasOneEntry) {
+  const Read read = check(dds(in("/a", "/Nav/cmd:o") + in("/b", "/Nav/cmd:o")));
+  ASSERT_EQ(read.findings().size(), 1u);
+  EXPECT_THAT(read.message(), HasSubstr("has an entry already, at mapping.xml:1:74"));
+}
+
+TEST(CheckMapping, ATopicThatComesInAgainIsACircle) {
+  const auto codes = [](const std::string& mapping) {
+    std::vector<std::string> result;
+    const Read read = check(mapping, "");
+    for (const auto& item : read.diagnostics.items()) result.push_back(item.code);
+    return result;
+  };
+  const std::string both = in("/cmd", "/Nav/cmd:o") + out("/cmd", "/Base/cmd:i");
+  EXPECT_THAT(codes(dds(both)), ElementsAre("circle"));
+  EXPECT_THAT(codes(dds(in("/cmd", "/Nav/cmd:o"), "domain='1'") +
+                    dds(out("/cmd", "/Base/cmd:i"), "domain='2'")),
+              IsEmpty());
+  EXPECT_THAT(codes(dds(in("/cmd", "/Nav/cmd:o")) + dds(out("/cmd", "/Base/cmd:i"), "domain='0'")),
+              ElementsAre("circle"));
+  const auto parted = [&](const std::string& one, const std::string& other) {
+    return codes(dds(in("/cmd", "/Nav/cmd:o", "partition='" + one + "'") +
+                     out("/cmd", "/Base/cmd:i", "partition='" + other + "'")));
+  };
+  EXPECT_THAT(parted("a", "b"), IsEmpty());
+  EXPECT_THAT(parted("a", "b,a"), ElementsAre("circle"));
+  EXPECT_THAT(parted("a*", "abc"), ElementsAre("circle"));
+  const std::string end = " service='a' instance='b' event='c' ";
+  EXPECT_THAT(codes("<gateway kind='iceoryx'><in" + end + "port='/a:o'/><out" + end +
+                    "port='/b:i' size='1' idle='zero'/></gateway>"),
+              ElementsAre("circle"));
+}
+
+TEST(CheckMapping, TwoPortsThatCommandOneTopicAreNotArbitratedAgainstEachOther) {
+  const Read read = check(dds(out("/cmd", "/a:i") + out("/cmd", "/b:i")), "");
+  ASSERT_EQ(read.diagnostics.items().size(), 1u);
+  EXPECT_EQ(read.diagnostics.items()[0].code, "two-outs");
+  EXPECT_EQ(read.diagnostics.items()[0].about.ports, std::vector<std::string>{"/b:i"});
+}
+
+TEST(CheckMapping, APortThatTheModelDoesNotMentionIsFound) {
+  const Read read = check(dds(in("/nav", "/Nav/cmmd:o") + out("/cmd", "/Bas/cmd:i")));
+  ASSERT_EQ(read.findings().size(), 2u);
+  EXPECT_EQ(read.diagnostics.items()[0].code, "unmentioned-port");
+  EXPECT_THAT(read.message(0), HasSubstr("did you mean \"/Nav/cmd:o\"?"));
+  EXPECT_THAT(read.message(1), HasSubstr("did you mean \"/Base/cmd:i\"?"));
+}
+
+TEST(CheckMapping, AnEntryIsAtTheRightEnd) {
+  const Read read = check(dds(in("/nav", "/Base/cmd:i") + out("/cmd", "/Nav/cmd:o")));
+  ASSERT_EQ(read.findings().size(), 2u);
+  EXPECT_THAT(read.message(0), HasSubstr("is an input port in the model"));
+  EXPECT_THAT(read.message(1), HasSubstr("is an output port in the model"));
+}
+
+TEST(CheckMapping, NothingIsSentToWhoeverMustStopByItself) {
+  const Read read = check(dds("<out topic='/c' type='a/msg/B' port='/Base/cmd:i'/>"));
+  ASSERT_EQ(read.findings().size(), 1u);
+  EXPECT_THAT(read.findings()[0], HasSubstr("note no-idle"));
+}
+
+std::string with_estop(const std::string& condition, const std::string& released) {
+  return "<behaviors><source port='/pressed:o' timeout='forever'/>"
+         "<source port='/released:o' timeout='" +
+         released +
+         "'/>"
+         "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config><condition>" +
+         condition + "</condition></behavior></behaviors>";
+}
+
+TEST(CheckMapping, ABooleanThatAConditionAsksForMustNotLastForEver) {
+  const std::string mapping =
+      dds("<in topic='/estop' type='std_msgs/msg/Bool' true='/pressed:o' false='/released:o'/>");
+  const auto codes = [&](const std::string& condition, const std::string& timeout) {
+    std::vector<std::string> result;
+    const Read read = check(mapping, with_estop(condition, timeout));
+    for (const auto& item : read.diagnostics.items()) {
+      result.push_back(item.code + " " + item.about.source);
+    }
+    return result;
+  };
+  const std::string found = "forever-choice /released:o";
+  EXPECT_THAT(codes("/released:o and not /pressed:o", "200ms"), IsEmpty());
+  EXPECT_THAT(codes("/released:o and not /pressed:o", "forever"), ElementsAre(found));
+  EXPECT_THAT(codes("not (/pressed:o or not /released:o)", "forever"), ElementsAre(found));
+  EXPECT_THAT(codes("/pressed:o implies /released:o", "forever"), ElementsAre(found));
+  EXPECT_THAT(codes("/pressed:o iff /released:o", "200ms"),
+              ElementsAre("forever-choice /pressed:o"));
+  EXPECT_THAT(codes("all(/released*)", "forever"), ElementsAre(found));
+}
+
+TEST(CheckMapping, TypesOfConnectedEndsAgree) {
+  const Read read =
+      check(dds("<in topic='/nav' type='geometry_msgs/msg/TwistStamped' port='/Nav/cmd:o'/>" +
+                out("/cmd", "/Base/cmd:i")));
+  ASSERT_EQ(read.findings().size(), 1u);
+  EXPECT_THAT(read.message(), HasSubstr("brings geometry_msgs/msg/TwistStamped, and DDS topic "
+                                        "rt/cmd takes geometry_msgs/msg/Twist;"));
+  const std::string untyped =
+      "<gateway kind='iceoryx'><in service='a' instance='b' event='c' "
+      "port='/Nav/cmd:o'/></gateway>";
+  EXPECT_THAT(check(untyped + dds(out("/cmd", "/Base/cmd:i"))).message(),
+              HasSubstr("brings samples without a type"));
+}
+
+}  // namespace
+}  // namespace arbiter::gateway

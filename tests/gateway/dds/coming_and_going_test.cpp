@@ -1,0 +1,92 @@
+// Strangers that come late, go, and are killed; a gateway that is stopped or killed.
+#include <gtest/gtest.h>
+
+#include "tests/gateway/dds/scene.hpp"
+
+namespace arbiter::test {
+namespace {
+
+class DdsComingAndGoing : public ::testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(Vendors, DdsComingAndGoing, ::testing::Values("cyclone", "fast"),
+                         [](const auto& each) { return std::string(each.param); });
+
+TEST_P(DdsComingAndGoing, ASubscriberIsToldToStopWhileNobodyCommands) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("200ms"));
+  const DdsGateway gateway(daemon, domain, kNavIn + kBaseOut + R"( idle="zero"/>)");
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  base.await("matched 1");
+  EXPECT_EQ(base.next_line(), "sample 0 0");  // it has come while nobody commands
+  EXPECT_EQ(base.next_line(), "sample 0 0");  // and again, should one get lost
+}
+
+TEST_P(DdsComingAndGoing, ARobotStopsWhenItsCommanderIsKilledAndObeysTheNextOne) {
+  Drive drive("200ms", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
+  publish_until_heard(navigation, base, "1 0");
+  navigation.process().kill();
+  base.await("sample 0 0");
+  Stranger next(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
+  next.await("matched 1");
+  publish_until_heard(next, base, "2 0");
+  EXPECT_EQ(next.end(), 0);
+  base.await("sample 0 0");
+}
+
+TEST_P(DdsComingAndGoing, ASubscriberThatIsKilledHoldsNobodyUp) {
+  Drive drive("1000s", GetParam(), GetParam(), "");
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
+  Stranger other(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  other.await("matched 1");
+  navigation.publish("1 0");
+  EXPECT_EQ(other.next_line(), "sample 1 0");
+  base.process().kill();
+  for (int i = 2; i < 200; ++i) {
+    const std::string numbers = std::to_string(i) + " 0";
+    navigation.publish(numbers);
+    EXPECT_EQ(other.next_line(), "sample " + numbers);
+  }
+}
+
+TEST_P(DdsComingAndGoing, AGatewayThatIsKilledIsSilenceAndTheNextOneGoesOn) {
+  Drive drive("200ms", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
+  publish_until_heard(navigation, base, "1 0");
+  gateway.process().kill();
+  gateway.start();
+  navigation.await("matched 2");
+  base.await("matched 2");
+  publish_until_heard(navigation, base, "2 0");
+}
+
+// ExecStopPost= of its unit. Not even a daemon is needed.
+TEST_P(DdsComingAndGoing, ForAGatewayThatIsKilledTheRobotIsStoppedByAnother) {
+  Drive drive("1000s", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
+  publish_until_heard(navigation, base, "1 0");
+  gateway.process().kill();
+  EXPECT_EQ(gateway.send_idle(), 0);
+  base.await("sample 0 0");
+  EXPECT_NE(gateway.log().find("DDS topic rt/cmd_vel, 1 subscriber matched"), std::string::npos);
+}
+
+// What waited for it meanwhile is older than T: it must not move the robot.
+TEST_P(DdsComingAndGoing, WhatWaitedWhileTheGatewayWasStoppedIsNotObeyed) {
+  Drive drive("200ms", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
+  publish_until_heard(navigation, base, "1 0");
+  gateway.process().stop();
+  navigation.publish("13 0");
+  ::poll(nullptr, 0, 1000);  // what is tested: that time passes while it is stopped
+  gateway.process().resume();
+  await_described(daemon, "/Nav/cmd_vel:o", "1 late");
+  // From now on it passes on what is fresh.
+  for (std::optional<std::string> line; line != "sample 2 0"; line = base.line_within(20)) {
+    ASSERT_NE(line, "sample 13 0");
+    navigation.publish("2 0");
+  }
+}
+
+}  // namespace
+}  // namespace arbiter::test

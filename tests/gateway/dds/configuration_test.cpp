@@ -1,0 +1,73 @@
+// What Cyclone is configured with.
+#include <gtest/gtest.h>
+
+#include "gateway/dds/domain.hpp"
+#include "tests/support/daemon.hpp"
+#include "tests/support/error_of.hpp"
+
+namespace arbiter::gateway::dds {
+namespace {
+
+using test::ScopedVariable;
+
+TEST(DdsConfiguration, IsCyclonesOwnWhereTheMappingSaysNothing) {
+  const ScopedVariable uri("CYCLONEDDS_URI", "file:///etc/robot.xml");
+  EXPECT_EQ(configuration_of({}), "file:///etc/robot.xml");
+  const ScopedVariable none("CYCLONEDDS_URI", std::nullopt);
+  EXPECT_EQ(configuration_of({}), "");
+}
+
+TEST(DdsConfiguration, AFileOfTheMappingTakesThePlaceOfTheEnvironments) {
+  const ScopedVariable uri("CYCLONEDDS_URI", "file:///etc/robot.xml");
+  Gateway gateway;
+  gateway.configuration = "/etc/arbiter/dds.xml";
+  EXPECT_EQ(configuration_of(gateway), "file:///etc/arbiter/dds.xml");
+}
+
+// Cyclone would listen on those of the environment, too.
+TEST(DdsConfiguration, InterfacesAndPeersTakeThePlaceOfTheEnvironmentsAndStandBehindTheFiles) {
+  const ScopedVariable uri("CYCLONEDDS_URI", "file:///etc/other.xml");
+  Gateway gateway;
+  gateway.configuration = "/etc/robot.xml";
+  gateway.interfaces = {"eth0", "10.0.0.2"};
+  gateway.peers = {"10.0.0.7"};
+  EXPECT_EQ(configuration_of(gateway),
+            "file:///etc/robot.xml,<General><Interfaces><NetworkInterface name=\"eth0\"/>"
+            "<NetworkInterface address=\"10.0.0.2\"/></Interfaces></General><Discovery>"
+            "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32"
+            "</MaxAutoParticipantIndex><Peers><Peer address=\"10.0.0.7\"/></Peers></Discovery>");
+}
+
+TEST(DdsConfiguration, OnTheLoopbackInterfaceParticipantsAreLookedForAtItsAddress) {
+  const ScopedVariable uri("CYCLONEDDS_URI", std::nullopt);
+  Gateway gateway;
+  gateway.interfaces = {"lo"};
+  const std::string text = configuration_of(gateway);
+  EXPECT_NE(text.find("<AllowMulticast>false</AllowMulticast>"), std::string::npos);
+  EXPECT_NE(text.find("<Peer address=\"127.0.0.1\"/>"), std::string::npos);
+}
+
+TEST(DdsConfiguration, NoNameBreaksOutOfItsPlace) {
+  const ScopedVariable uri("CYCLONEDDS_URI", std::nullopt);
+  Gateway gateway;
+  gateway.interfaces = {R"(x"/><a b="${HOME})"};
+  EXPECT_NE(configuration_of(gateway).find(R"(name="x&quot;/&gt;&lt;a b=&quot;&#36;{HOME}")"),
+            std::string::npos);
+}
+
+TEST(DdsDomain, IsTheMappingsOrThatOfRos2) {
+  const ScopedVariable ros("ROS_DOMAIN_ID", "42");
+  Gateway gateway;
+  EXPECT_EQ(domain_of(gateway), 42U);
+  gateway.domain = 7;
+  EXPECT_EQ(domain_of(gateway), 7U);
+  const ScopedVariable none("ROS_DOMAIN_ID", std::nullopt);
+  EXPECT_EQ(domain_of({}), 0U);
+  for (const char* const wrong : {"x", "7x", "-1", "231", "99999999999"}) {
+    const ScopedVariable bad("ROS_DOMAIN_ID", wrong);
+    EXPECT_THROW(static_cast<void>(domain_of({})), DdsError) << wrong;
+  }
+}
+
+}  // namespace
+}  // namespace arbiter::gateway::dds

@@ -1,0 +1,152 @@
+// Strangers that send what no honest program would: the gateway counts it, and passes on what the
+// honest ones send.
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <cstdlib>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "gateway/dds/entity.hpp"
+#include "gateway/dds/opaque_type.hpp"
+#include "tests/gateway/dds/scene.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using gateway::dds::CycloneQos;
+using gateway::dds::Entity;
+
+// A publisher of any bytes at all.
+class Liar {
+ public:
+  Liar(const OwnDomain& domain, const std::string& topic, const std::string& type,
+       bool reliable = true)
+      : domain_(dds_create_domain(domain.number(), kLoopback), "domain"),
+        participant_(dds_create_participant(domain.number(), nullptr, nullptr), "participant") {
+    type_ = gateway::dds::make_opaque_type(type, false);
+    topic_ = Entity(dds_create_topic_sertype(participant_.get(), topic.c_str(), &type_, nullptr,
+                                             nullptr, nullptr),
+                    "topic");
+    const CycloneQos qos(dds_create_qos());
+    dds_qset_reliability(
+        qos.get(), reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, DDS_SECS(1));
+    dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, 1);
+    writer_ =
+        Entity(dds_create_writer(participant_.get(), topic_.get(), qos.get(), nullptr), "writer");
+  }
+  void await_reader() const {
+    dds_publication_matched_status_t status{};
+    while (status.current_count == 0) {
+      dds_get_publication_matched_status(writer_.get(), &status);
+      ::poll(nullptr, 0, 1);
+    }
+  }
+  void publish(const std::string& bytes) const {
+    gateway::dds::Payload* const payload = gateway::dds::make_payload(
+        type_, Bytes(reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()));
+    ASSERT_EQ(dds_writecdr(writer_.get(), &payload->cyclone), DDS_RETCODE_OK);
+  }
+
+ private:
+  Entity domain_;
+  Entity participant_;
+  ddsi_sertype* type_ = nullptr;
+  Entity topic_;
+  Entity writer_;
+};
+
+const std::string kLittle("\0\1\0\0", 4);
+
+// Cyclone drops them by itself, with the datagram that they stand in.
+TEST(DdsHostile, WhatIsNotEncodedAsDdsEncodesIsPassedOver) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1000s"));
+  const DdsGateway gateway(daemon, domain,
+                           R"(<in topic="/cmd_vel_nav" reliability="best_effort" )" + kTwist +
+                               R"( port="/Nav/cmd_vel:o"/>)" + kBaseOut + "/>");
+  Stranger base("fast", domain, {"sub", "twist", "rt/cmd_vel"});
+  const Liar liar(domain, "rt/cmd_vel_nav", "geometry_msgs::msg::dds_::Twist_", false);
+  base.await("matched 1");
+  liar.await_reader();
+  gateway.see("1 publisher matched");
+  for (const std::string& bytes :
+       {std::string("\xff\xff\0\0", 4), std::string("\0\4\0\0", 4) + std::string(48, 'x'),
+        std::string("\1\1\0\0", 4) + std::string(48, 'x'), std::string(200, '\x7f')}) {
+    liar.publish(bytes);
+  }
+  liar.publish(kLittle + std::string(48, '\0'));
+  EXPECT_EQ(base.next_line(), "sample 0 0");
+  gateway.see("malformed packet");
+}
+
+// A lock that says neither that it is pressed nor that it is released is not released.
+TEST(DdsHostile, ABooleanThatIsNoneEndsBothSources) {
+  const OwnDomain domain;
+  Daemon daemon(
+      "<behaviors timeout=\"1000s\"><source port=\"/EStop/pressed:o\"/>"
+      "<source port=\"/EStop/released:o\"/></behaviors>");
+  const DdsGateway gateway(daemon, domain,
+                           R"(<in topic="/e_stop" type="std_msgs/msg/Bool" )"
+                           R"(true="/EStop/pressed:o" false="/EStop/released:o"/>)");
+  const Liar button(domain, "rt/e_stop", "std_msgs::msg::dds_::Bool_");
+  button.await_reader();
+  gateway.see("1 publisher matched");
+  const auto await_active = [&](const std::string& source, bool active) {
+    while (daemon.source(source).value("active", !active) != active) {
+    }
+  };
+  for (const std::string& none : {std::string("\2"), std::string("\xff"), std::string()}) {
+    button.publish(kLittle + std::string(1, '\0'));
+    await_active("/EStop/released:o", true);
+    button.publish(kLittle + none);
+    await_active("/EStop/released:o", false);
+    await_active("/EStop/pressed:o", false);
+  }
+}
+
+// Datagrams to all ports on which the gateway may listen: noise, and RTPS with bytes changed.
+TEST(DdsHostile, ItLivesThroughDatagramsThatAreNoneOfRtps) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1000s"));
+  DdsGateway gateway(daemon, domain, kNavIn + kBaseOut + "/>");
+  Stranger base("cyclone", domain, {"sub", "twist", "rt/cmd_vel"});
+  Stranger navigation("fast", domain, {"pub", "twist", "rt/cmd_vel_nav"});
+  base.await("matched 1");
+  navigation.await("matched 1");
+  gateway.see("1 publisher matched");
+  publish_until_heard(navigation, base, "1 0");
+  std::mt19937 random(1);
+  const shm::FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  for (int i = 0; i < 20'000; ++i) {
+    std::string datagram(random() % 200 + 4, '\0');
+    for (char& byte : datagram) byte = static_cast<char>(random());
+    if (i % 2 == 0) {  // a header, and submessages of known kinds
+      datagram.replace(0, 4, "RTPS");
+      datagram.resize(std::max<std::size_t>(datagram.size(), 24));
+      datagram.replace(4, 4, std::string("\2\1\1\x10", 4));
+      constexpr const char kKinds[] = {0x01, 0x06, 0x07, 0x08, 0x09, 0x0e, 0x12, 0x13, 0x15, 0x16};
+      datagram[20] = kKinds[random() % sizeof kKinds];
+      datagram[21] = static_cast<char>(random() % 8);
+      datagram[22] = static_cast<char>(random() % 2 == 0 ? datagram.size() - 24 : random());
+      datagram[23] = '\0';
+    }
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    // Of participants 0 to 2: discovery, then data (RTPS 2.5, 9.6.2).
+    to.sin_port =
+        htons(static_cast<std::uint16_t>(7400 + 250 * domain.number() + 10 + random() % 6));
+    ::sendto(socket.get(), datagram.data(), datagram.size(), 0,
+             reinterpret_cast<const sockaddr*>(&to), sizeof to);
+  }
+  publish_until_heard(navigation, base, "2 0");
+  EXPECT_EQ(gateway.end(), 0) << gateway.log();
+  EXPECT_LT(gateway.log().size(), 100'000U);
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,133 @@
+// Who does not match is named, with the reason; who would bypass Arbiter, too.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/gateway/dds/scene.hpp"
+
+namespace arbiter::test {
+namespace {
+
+class DdsMatching : public ::testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(Vendors, DdsMatching, ::testing::Values("cyclone", "fast"),
+                         [](const auto& each) { return std::string(each.param); });
+
+TEST_P(DdsMatching, ABestEffortPublisherDoesNotMatchAReliableEntryAndIsNamedWithBothValues) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(daemon, domain, kNavIn);
+  const Stranger navigation(GetParam(), domain,
+                            {"pub", "twist", "rt/cmd_vel_nav", "reliability=best_effort"});
+  gateway.see(
+      "does not match: reliability: the writer offers best_effort, this entry asks for reliable; "
+      "write reliability=\"best_effort\"");
+}
+
+TEST_P(DdsMatching, ItMatchesOnceTheEntrySaysWhatTheMessageSays) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(daemon, domain,
+                           R"(<in topic="/cmd_vel_nav" )" + kTwist +
+                               R"( port="/Nav/cmd_vel:o" reliability="best_effort"/>)");
+  Stranger navigation(GetParam(), domain,
+                      {"pub", "twist", "rt/cmd_vel_nav", "reliability=best_effort"});
+  navigation.await("matched 1");
+  gateway.see("1 publisher matched");
+}
+
+TEST_P(DdsMatching, ALateJoinerThatAsksForWhatWasThereBeforeIsNamed) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(daemon, domain, kBaseOut + "/>");
+  const Stranger base(GetParam(), domain,
+                      {"sub", "twist", "rt/cmd_vel", "durability=transient_local"});
+  gateway.see(
+      "does not match: durability: this entry offers volatile, the reader asks for "
+      "transient_local; write durability=\"transient_local\"");
+}
+
+TEST_P(DdsMatching, ADeadlineThatIsTooLongIsNamed) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(
+      daemon, domain,
+      R"(<in topic="/cmd_vel_nav" )" + kTwist + R"( port="/Nav/cmd_vel:o" deadline="100ms"/>)");
+  const Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav", "deadline=200"});
+  gateway.see("does not match: deadline: the writer offers 200 ms, this entry asks for 100 ms");
+}
+
+TEST_P(DdsMatching, AnotherTypeIsNamedWithBothNames) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(daemon, domain, kNavIn);
+  const Stranger navigation(GetParam(), domain, {"pub", "bool", "rt/cmd_vel_nav"});
+  gateway.see(
+      "does not match: type: it has std_msgs::msg::dds_::Bool_, this entry has "
+      "geometry_msgs::msg::dds_::Twist_");
+}
+
+TEST_P(DdsMatching, AKeyThatTheMappingDeniesIsNamed) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(
+      daemon, domain,
+      R"(<in topic="robots" type="strangers::Robot" port="/Fleet/robot:o" keyed="false"/>)");
+  const Stranger robot(GetParam(), domain, {"pub", "robot", "robots"});
+  gateway.see("key: its type has a key, this entry's has none; write keyed=\"true\"");
+}
+
+TEST_P(DdsMatching, PartitionsKeepTopicsApartAndJoinThem) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1000s"));
+  const DdsGateway gateway(daemon, domain,
+                           R"(<in topic="/cmd_vel" )" + kTwist +
+                               R"( port="/Nav/cmd_vel:o" partition="raw"/>)" + kBaseOut + "/>");
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel", "partition=raw"});
+  base.await("matched 1");
+  navigation.await("matched 1");
+  gateway.see("1 publisher matched");
+  navigation.publish("4 2");
+  EXPECT_EQ(base.next_line(), "sample 4 2");
+  // Neither end warns of the other's partition, nor is the publisher a foreign one of the topic
+  // out.
+  EXPECT_THAT(gateway.log(), ::testing::Not(::testing::HasSubstr("past Arbiter")));
+}
+
+TEST_P(DdsMatching, WhoeverPublishesPastArbiterIsWarnedOfAtOnce) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(daemon, domain, kNavIn + kBaseOut + "/>");
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  base.await("matched 1");
+  EXPECT_THAT(gateway.log(), ::testing::Not(::testing::HasSubstr("past Arbiter")));
+  Stranger intruder(GetParam(), domain, {"pub", "twist", "rt/cmd_vel"});
+  gateway.see("publishes there, too: what it sends reaches the subscribers past Arbiter");
+}
+
+// A node of ROS 2 from Iron on warns of ends without one.
+TEST_P(DdsMatching, TheTypeHashOfRos2IsTakenOver) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(daemon, domain, kNavIn);
+  Stranger navigation(GetParam(), domain,
+                      {"pub", "twist", "rt/cmd_vel_nav", "data=typehash=RIHS01_00ff;"});
+  navigation.await("matched 1");
+  Stranger watcher("cyclone", domain, {"watch", "twist", "rt/cmd_vel_nav"});
+  watcher.await("reader typehash=RIHS01_00ff;");
+}
+
+// It may come later: a network that is slow to start.
+TEST(DdsInterface, ThatIsNotThereIsWaitedForAndNamed) {
+  const OwnDomain domain;
+  Daemon daemon(base_model("1s"));
+  DdsGateway gateway(daemon, domain, kNavIn, "nosuch0");
+  await_described(daemon, "/Nav/cmd_vel:o", "nosuch0");
+  gateway.see("nosuch0: does not match an available interface; trying again");
+  ::poll(nullptr, 0, 2500);  // it does try again, and says nothing more
+  EXPECT_EQ(gateway.log().find("trying again"), gateway.log().rfind("trying again"));
+  EXPECT_EQ(gateway.end(), 0);
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,156 @@
+// Why ends do not match: each policy, from both sides.
+#include "gateway/dds/mismatch.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "gateway/dds/quota.hpp"
+
+namespace arbiter::gateway::dds {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+DdsTopic topic() {
+  DdsTopic result;
+  result.name = "rt/t";
+  result.type = "T";
+  return result;
+}
+
+// One that matches an entry of default QoS.
+Peer peer(End end) {
+  Peer result;
+  result.end = end;
+  result.topic = "rt/t";
+  result.type = "T";
+  result.qos = announced_by(Qos{}, end);
+  return result;
+}
+
+TEST(Mismatch, EqualEndsMatch) {
+  EXPECT_THAT(mismatches({End::kReader, topic(), false}, peer(End::kWriter)), IsEmpty());
+  EXPECT_THAT(mismatches({End::kWriter, topic(), false}, peer(End::kReader)), IsEmpty());
+}
+
+TEST(Mismatch, WhoAsksForMoreThanIsOfferedDoesNotMatchAndWhoAsksForLessDoes) {
+  DdsTopic weak = topic();
+  weak.qos.reliability = Reliability::kBestEffort;
+  EXPECT_THAT(mismatches({End::kReader, weak, false}, peer(End::kWriter)), IsEmpty());
+  EXPECT_THAT(mismatches({End::kWriter, weak, false}, peer(End::kReader)),
+              ElementsAre("reliability: this entry offers best_effort, the reader asks for "
+                          "reliable; write reliability=\"reliable\""));
+  Peer writer = peer(End::kWriter);
+  writer.qos.reliability = 0;
+  EXPECT_THAT(mismatches({End::kReader, topic(), false}, writer),
+              ElementsAre("reliability: the writer offers best_effort, this entry asks for "
+                          "reliable; write reliability=\"best_effort\""));
+}
+
+TEST(Mismatch, ADurabilityThatTheMappingDoesNotHaveHasNoRemedy) {
+  Peer reader = peer(End::kReader);
+  reader.qos.durability = 3;
+  EXPECT_THAT(
+      mismatches({End::kWriter, topic(), false}, reader),
+      ElementsAre("durability: this entry offers volatile, the reader asks for persistent"));
+}
+
+TEST(Mismatch, PoliciesThatNoAttributeChangesAreNamedToo) {
+  Peer reader = peer(End::kReader);
+  reader.qos.ownership = 1;
+  reader.qos.liveliness = 2;
+  reader.qos.lease = 1'000'000'000;
+  reader.qos.destination_order = 1;
+  EXPECT_THAT(
+      mismatches({End::kWriter, topic(), false}, reader),
+      ElementsAre("ownership: this entry offers shared, the reader asks for exclusive",
+                  "liveliness: this entry offers automatic, the reader asks for manual_by_topic",
+                  "liveliness lease: this entry offers none, the reader asks for 1000 ms",
+                  "destination order: this entry offers by reception, the reader asks for by "
+                  "source time"));
+}
+
+// Numbers of a kind that no release knows are a stranger's, too.
+TEST(Mismatch, ValuesThatNobodyKnowsAreSaidToBeUnknown) {
+  Peer reader = peer(End::kReader);
+  reader.qos.reliability = 77;
+  EXPECT_THAT(mismatches({End::kWriter, topic(), false}, reader),
+              ElementsAre(HasSubstr("something unknown")));
+}
+
+TEST(Mismatch, ARepresentationIsTheWritersToOffer) {
+  Peer reader = peer(End::kReader);
+  reader.qos.representations = {2};
+  EXPECT_THAT(mismatches({End::kWriter, topic(), false}, reader),
+              ElementsAre(HasSubstr("representation: this entry offers XCDR1, the reader asks for "
+                                    "XCDR2")));
+  Peer writer = peer(End::kWriter);
+  writer.qos.representations = {2, 0};
+  EXPECT_THAT(mismatches({End::kReader, topic(), false}, writer), IsEmpty());
+}
+
+TEST(Mismatch, TypesAndKeysAreCompared) {
+  Peer writer = peer(End::kWriter);
+  writer.type = "U";
+  writer.keyed = true;
+  EXPECT_THAT(mismatches({End::kReader, topic(), false}, writer),
+              ElementsAre("type: it has U, this entry has T", HasSubstr("write keyed=\"true\"")));
+}
+
+TEST(Partition, NamesPatternsAndTheDefaultOne) {
+  using Names = std::vector<std::string>;
+  EXPECT_TRUE(share_partition({}, {}));
+  EXPECT_TRUE(share_partition({}, Names{""}));
+  EXPECT_TRUE(share_partition({}, Names{"*"}));
+  EXPECT_FALSE(share_partition({}, Names{"a"}));
+  EXPECT_TRUE(share_partition(Names{"a", "b"}, Names{"b", "c"}));
+  EXPECT_FALSE(share_partition(Names{"a"}, Names{"A"}));
+  EXPECT_TRUE(share_partition(Names{"robot?"}, Names{"robot1"}));
+  EXPECT_FALSE(share_partition(Names{"robot?"}, Names{"robot"}));
+  EXPECT_TRUE(share_partition(Names{"front/left"}, Names{"f*/*t"}));
+  EXPECT_FALSE(share_partition(Names{"a*"}, Names{"*a"}));  // two patterns
+}
+
+TEST(Partition, APatternThatIsMadeToBeSlowIsNot) {
+  std::string pattern;
+  for (int i = 0; i < 60; ++i) pattern += "a*";
+  EXPECT_FALSE(share_partition({pattern + "b"}, {std::string(200, 'a')}));
+}
+
+TEST(Peers, TheLastByteOfAGuidSaysWhetherThereIsAKey) {
+  Guid guid{};
+  const auto with = [&](std::uint8_t kind) {
+    guid[15] = kind;
+    return has_key(guid);
+  };
+  EXPECT_TRUE(with(0x02));
+  EXPECT_TRUE(with(0x07));
+  EXPECT_FALSE(with(0x03));
+  EXPECT_FALSE(with(0x04));
+}
+
+TEST(Peers, ATypeHashStandsInTheUserData) {
+  EXPECT_EQ(type_hash_in("typehash=RIHS01_ab;"), "RIHS01_ab");
+  EXPECT_EQ(type_hash_in("enclave=/;typehash=RIHS01_ab;"), "RIHS01_ab");
+  EXPECT_EQ(type_hash_in("typehash=RIHS01_ab"), "RIHS01_ab");
+  EXPECT_EQ(type_hash_in("atypehash=RIHS01_ab;"), "");
+  EXPECT_EQ(type_hash_in(""), "");
+  EXPECT_EQ(type_hash_in(";;=;"), "");
+  EXPECT_LE(type_hash_in("typehash=" + std::string(10'000, 'x')).size(), 256U);
+}
+
+TEST(Quota, LetsSoManyThroughAndCountsTheOthers) {
+  Quota quota(2, 100);
+  EXPECT_EQ(quota.take(1000), 0U);
+  EXPECT_EQ(quota.take(1001), 0U);
+  EXPECT_FALSE(quota.take(1002));
+  EXPECT_FALSE(quota.take(1099));
+  EXPECT_EQ(quota.take(1100), 2U);
+  EXPECT_EQ(quota.take(1101), 0U);
+  EXPECT_FALSE(quota.take(1102));
+}
+
+}  // namespace
+}  // namespace arbiter::gateway::dds

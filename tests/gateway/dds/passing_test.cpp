@@ -1,0 +1,102 @@
+// Samples of strangers, through the gateway and Arbiter, to other strangers.
+#include <gtest/gtest.h>
+
+#include "tests/gateway/dds/scene.hpp"
+
+namespace arbiter::test {
+namespace {
+
+struct Vendors {
+  const char* from;
+  const char* to;
+};
+
+// Without it tests would be named by addresses.
+void PrintTo(const Vendors& vendors, std::ostream* out) {
+  *out << vendors.from << " to " << vendors.to;
+}
+
+class DdsPassing : public ::testing::TestWithParam<Vendors> {};
+
+INSTANTIATE_TEST_SUITE_P(Vendors, DdsPassing,
+                         ::testing::Values(Vendors{"cyclone", "cyclone"},
+                                           Vendors{"cyclone", "fast"}, Vendors{"fast", "cyclone"},
+                                           Vendors{"fast", "fast"}),
+                         [](const auto& each) {
+                           return std::string(each.param.from) + "_to_" + each.param.to;
+                         });
+
+TEST_P(DdsPassing, ATwistOfRos2PassesWithAllItsNumbers) {
+  Drive drive("1000s", GetParam().from, GetParam().to, "");
+  for (const char* const numbers : {"0.25 -1.5", "0.5 0.125"}) {
+    drive.from.publish(numbers);
+    EXPECT_EQ(drive.to.next_line(), std::string("sample ") + numbers);
+  }
+}
+
+TEST_P(DdsPassing, TheOneWhoOverridesIsObeyed) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1000s"));
+  const DdsGateway gateway(daemon, domain, kNavIn + kTeleopIn + kBaseOut + "/>");
+  Stranger base(GetParam().to, domain, {"sub", "twist", "rt/cmd_vel"});
+  Stranger navigation(GetParam().from, domain, {"pub", "twist", "rt/cmd_vel_nav"});
+  Stranger teleop(GetParam().from, domain, {"pub", "twist", "rt/cmd_vel_teleop"});
+  base.await("matched 1");
+  navigation.await("matched 1");
+  teleop.await("matched 1");
+  gateway.see("/Nav/cmd_vel:o comes from DDS topic rt/cmd_vel_nav, 1 publisher matched");
+  gateway.see("/Teleop/cmd_vel:o comes from DDS topic rt/cmd_vel_teleop, 1 publisher matched");
+  navigation.publish("1 1");
+  EXPECT_EQ(base.next_line(), "sample 1 1");
+  teleop.publish("2 2");
+  EXPECT_EQ(base.next_line(), "sample 2 2");
+  navigation.publish("1 1");  // loses
+  EXPECT_EQ(navigation.end(), 0);
+  teleop.publish("3 3");
+  EXPECT_EQ(base.next_line(), "sample 3 3");
+}
+
+// One source, one port.
+std::string model_of(const std::string& source, const std::string& port) {
+  return "<behaviors timeout=\"1000s\"><behavior name=\"Show\"><config at=\"" + port + "\">" +
+         source + "</config></behavior></behaviors>";
+}
+
+std::string entries(const std::string& type, const std::string& max_size) {
+  return R"(<in topic="incoming" type=")" + type + R"(" port="/From:o" max_size=")" + max_size +
+         R"("/><out topic="outgoing" type=")" + type + R"(" port="/To:i" max_size="2MiB"/>)";
+}
+
+// Larger than a datagram: it arrives in fragments, which are put together in Arbiter's memory.
+TEST_P(DdsPassing, ALargeSamplePassesWhole) {
+  Passage blobs(model_of("/From:o", "/To:i"), entries("strangers::Blob", "2MiB"), GetParam().from,
+                {"blob", "incoming"}, GetParam().to, {"blob", "outgoing"});
+  publish_until_heard(blobs.from, blobs.to, "6 200000");
+  for (const char* const blob : {"7 1000000", "8 3", "9 70001"}) {
+    blobs.from.publish(blob);
+    EXPECT_EQ(blobs.to.next_line(), std::string("sample ") + blob);
+  }
+}
+
+// Without keyed="true" in the mapping: whoever is there says that the type has a key.
+TEST_P(DdsPassing, ATypeWithAKeyPassesThoughTheMappingDoesNotSayThatItHasOne) {
+  Passage robots(model_of("/From:o", "/To:i"), entries("strangers::Robot", "1KiB"), GetParam().from,
+                 {"robot", "incoming"}, GetParam().to, {"robot", "outgoing"});
+  for (const char* const robot : {"1 0.5", "2 0.25"}) {
+    robots.from.publish(robot);
+    EXPECT_EQ(robots.to.next_line(), std::string("sample ") + robot);
+  }
+}
+
+// The next one is passed on as if it had not been.
+TEST_P(DdsPassing, WhatDoesNotFitIsCountedAndPassedOver) {
+  Passage blobs(model_of("/From:o", "/To:i"), entries("strangers::Blob", "1KiB"), GetParam().from,
+                {"blob", "incoming"}, GetParam().to, {"blob", "outgoing"});
+  publish_until_heard(blobs.from, blobs.to, "0 3");
+  for (const char* const blob : {"1 5000", "2 8000", "3 100"}) blobs.from.publish(blob);
+  EXPECT_EQ(blobs.to.next_line(), "sample 3 100");
+  await_described(blobs.daemon, "/From:o", "2 of a size that does not fit");
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,68 @@
+// A middleware that a test plays itself.
+#pragma once
+
+#include <cstring>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gateway/core/incoming.hpp"
+#include "gateway/core/outgoing.hpp"
+
+namespace arbiter::gateway {
+
+// A sample of given bytes.
+class BytesSample : public ForeignSample {
+ public:
+  explicit BytesSample(std::string bytes, std::size_t begin = 0, bool big_endian = false)
+      : bytes_(std::move(bytes)), begin_(begin), big_endian_(big_endian) {}
+
+  [[nodiscard]] std::size_t size() const noexcept override { return bytes_.size(); }
+  [[nodiscard]] bool copy(std::size_t from, WritableBytes to) const noexcept override {
+    if (is_broken) return false;
+    std::memcpy(to.data(), bytes_.data() + from, to.size());
+    ++copies;
+    copied += to.size();
+    return true;
+  }
+  [[nodiscard]] std::size_t data_begin() const noexcept override { return begin_; }
+  [[nodiscard]] bool is_big_endian() const noexcept override { return big_endian_; }
+
+  bool is_broken = false;
+  mutable int copies = 0;
+  mutable std::size_t copied = 0;
+
+ private:
+  const std::string bytes_;
+  const std::size_t begin_;
+  const bool big_endian_;
+};
+
+template <class Number>
+std::string bytes_of(Number number) {
+  std::string bytes(sizeof number, '\0');
+  std::memcpy(bytes.data(), &number, sizeof number);
+  return bytes;
+}
+
+// Keeps what is sent.
+class KeepingSender : public Sender {
+ public:
+  [[nodiscard]] Result send(Bytes sample) noexcept override {
+    if (answer == Result::kSent) {
+      sent.emplace_back(reinterpret_cast<const char*>(sample.data()), sample.size());
+    }
+    return answer;
+  }
+  std::vector<std::string> sent;
+  Result answer = Result::kSent;
+};
+
+// All sources may have waited as long.
+class OneAge : public AgesOfSources {
+ public:
+  [[nodiscard]] shm::Nanoseconds of(std::string_view) const override { return age; }
+  shm::Nanoseconds age = 3'600'000'000'000;
+};
+
+}  // namespace arbiter::gateway

@@ -1,0 +1,167 @@
+// Never late: what a gateway that has not run for a while may still pass on. The tests say what
+// time it is.
+#include "gateway/core/freshness.hpp"
+
+#include <gmock/gmock.h>
+
+#include "gateway/core/max_ages.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+using shm::kForever;
+constexpr shm::Nanoseconds kMs = 1'000'000;
+
+TEST(QueueFreshness, NothingIsInTimeBeforeTheQueueWasSeenEmpty) {
+  const QueueFreshness freshness(8);
+  EXPECT_LT(freshness.deadline(shm::kMaxTime), 1);
+}
+
+TEST(QueueFreshness, WhatIsTakenIsNoOlderThanTheQueueWasSeenEmpty) {
+  QueueFreshness freshness(8);
+  freshness.note_empty(1000 * kMs);
+  EXPECT_EQ(freshness.deadline(500 * kMs), 1500 * kMs);
+}
+
+TEST(QueueFreshness, LookedAtEveryQuarterOfTAFreshSampleIsInTime) {
+  QueueFreshness freshness(8);
+  const shm::Nanoseconds t = 100 * kMs;
+  for (shm::Nanoseconds look = 0; look < 10 * t; look += QueueFreshness::period(t)) {
+    freshness.note_empty(look);
+    const shm::Nanoseconds taken = look + QueueFreshness::period(t) - 1;
+    EXPECT_GE(freshness.deadline(t) - taken, 3 * t / 4);
+  }
+}
+
+// Of a queue of two that always has something in it, ever more of what is taken is known to be new.
+TEST(QueueFreshness, AQueueThatIsNeverEmptyHoldsNoMoreThanItsCapacity) {
+  QueueFreshness freshness(2);
+  freshness.note_empty(0);
+  for (shm::Nanoseconds look = 1; look <= 3; ++look) {
+    freshness.note_taken(look * kMs);
+    EXPECT_EQ(freshness.deadline(100 * kMs), 100 * kMs) << look;
+  }
+  freshness.note_taken(4 * kMs);  // the third behind the first was put in after that was taken
+  EXPECT_EQ(freshness.deadline(100 * kMs), 101 * kMs);
+  freshness.note_empty(5 * kMs);
+  freshness.note_taken(6 * kMs);
+  EXPECT_EQ(freshness.deadline(100 * kMs), 105 * kMs);
+}
+
+class Guarded : public testing::Test {
+ protected:
+  Guarded() {
+    age_.set(kT);
+    watch_ = &guard_.add(age_);
+  }
+
+  // Ticks in time until `until`.
+  void run_until(shm::Nanoseconds until) {
+    while (ticked_ + period_ <= until) tick(ticked_ + period_);
+    now_ = until;
+  }
+  void tick(shm::Nanoseconds at) {
+    now_ = ticked_ = at;
+    period_ = guard_.tick(at);
+  }
+  void start() { tick(now_); }
+  [[nodiscard]] bool is_late() const { return guard_.deadline(*watch_, now_) < now_; }
+
+  static constexpr shm::Nanoseconds kT = 200 * kMs;
+  shm::Nanoseconds now_ = 1'000'000 * kMs;
+  shm::Nanoseconds ticked_ = 0;
+  shm::Nanoseconds period_ = 0;
+  MaxAge age_;
+  StallGuard guard_;
+  StallGuard::Watch* watch_ = nullptr;
+};
+
+// Where it ticks before anything can be received, nothing has waited: a robot need not wait for T,
+// which may be long.
+TEST_F(Guarded, NothingIsInTimeBeforeTheFirstTickAndEverythingFromItOn) {
+  EXPECT_TRUE(is_late());
+  start();
+  EXPECT_FALSE(is_late());
+  run_until(now_ + kT - 1);
+  EXPECT_FALSE(is_late());
+}
+
+TEST_F(Guarded, WhileItRunsEverythingIsInTimeWithAtLeastHalfOfTLeft) {
+  start();
+  EXPECT_EQ(period_, kT / 4);
+  run_until(now_ + kT);
+  for (int i = 0; i < 100; ++i) {
+    run_until(now_ + 7 * kMs);
+    ASSERT_FALSE(is_late());
+    ASSERT_GE(guard_.deadline(*watch_, now_) - now_, kT / 2);
+  }
+}
+
+TEST_F(Guarded, ACallbackThatRunsBeforeTheTickSeesTheStallItself) {
+  start();
+  run_until(now_ + 3 * kT);
+  now_ += kT;  // stopped; the middleware's thread is the first to run
+  EXPECT_TRUE(is_late());
+}
+
+TEST_F(Guarded, AfterAStallEverythingIsLateUntilItHasRunInTimeForT) {
+  start();
+  run_until(now_ + 3 * kT);
+  tick(now_ + 5 * kT);
+  const shm::Nanoseconds resumed = now_;
+  EXPECT_TRUE(is_late());
+  run_until(resumed + kT - 1);
+  EXPECT_TRUE(is_late());
+  run_until(resumed + kT);
+  EXPECT_FALSE(is_late());
+}
+
+TEST_F(Guarded, AStallBehindAStallExtendsIt) {
+  start();
+  run_until(now_ + 3 * kT);
+  tick(now_ + kT);
+  tick(now_ + kT);
+  const shm::Nanoseconds resumed = now_;
+  run_until(resumed + kT - 1);
+  EXPECT_TRUE(is_late());
+}
+
+TEST_F(Guarded, ADelayOfHalfOfTIsForgiven) {
+  start();
+  run_until(now_ + 3 * kT);
+  now_ = ticked_ + period_ + kT / 2;
+  EXPECT_FALSE(is_late());
+  tick(now_);
+  EXPECT_FALSE(is_late());
+}
+
+TEST_F(Guarded, AStallIsOneForShortTAndNotForLongT) {
+  MaxAge long_age;
+  long_age.set(100 * kT);
+  const StallGuard::Watch& other = guard_.add(long_age);
+  start();
+  run_until(now_ + 200 * kT);
+  ASSERT_GT(guard_.deadline(other, now_), now_);
+  tick(now_ + 3 * kT);
+  EXPECT_TRUE(is_late());
+  EXPECT_GT(guard_.deadline(other, now_), now_);
+}
+
+TEST_F(Guarded, AShorterTTicksFasterFromTheNextTickOn) {
+  start();
+  age_.set(40 * kMs);
+  tick(now_ + period_);
+  EXPECT_EQ(period_, 10 * kMs);
+}
+
+TEST(MaxAgeOf, IsTOrLessAndForEverHasABoundOfItsOwn) {
+  EXPECT_EQ(max_age_of(200, 500, {}), 200);
+  EXPECT_EQ(max_age_of(200, 500, 100), 100);
+  EXPECT_EQ(max_age_of(200, 500, 300), 200);
+  EXPECT_EQ(max_age_of(kForever, 500, {}), 500);
+  EXPECT_EQ(max_age_of(kForever, 500, 900), 900);
+  EXPECT_EQ(max_age_of(kForever, kForever, {}), shm::kDefaultTimeout);
+}
+
+}  // namespace
+}  // namespace arbiter::gateway

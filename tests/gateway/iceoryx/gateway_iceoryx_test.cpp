@@ -1,0 +1,249 @@
+// Real iceoryx: publishers and subscribers that know nothing of Arbiter, RouDi alive, dead and
+// stopped.
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+
+#include <arbiter/arbiter.hpp>
+
+#include "shm/clock.hpp"
+#include "tests/gateway/iceoryx/private_machine.hpp"
+#include "tests/gateway/iceoryx/scene.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::HasSubstr;
+
+const auto* const machine = testing::AddGlobalTestEnvironment(new PrivateMachine);
+
+// "High" overrides "Low"; both T are long enough for a slow machine.
+constexpr const char* kModel =
+    "<behaviors timeout='60s'>"
+    "<behavior name='Low'><config at='/Base:i'>/Low:o</config></behavior>"
+    "<behavior name='High'><config at='/Base:i'>/High:o</config><inhibition>Low</inhibition>"
+    "</behavior></behaviors>";
+
+std::string in(const std::string& event, const std::string& port, const std::string& more = "") {
+  return "<in service='Test' instance='One' event='" + event + "' port='" + port + "' " + more +
+         "/>";
+}
+std::string out(const std::string& port, const std::string& event, const std::string& more = "") {
+  return "<out port='" + port + "' service='Test' instance='One' event='" + event + "' " + more +
+         "/>";
+}
+
+class Iceoryx : public testing::Test {
+ protected:
+  void SetUp() override { ::signal(SIGPIPE, SIG_IGN); }
+
+  std::string described(const std::string& source) {
+    const auto status = daemon_.source(source);
+    return status.contains("described") ? status["described"].get<std::string>() : "";
+  }
+  void wait_for_description(const std::string& source, const std::string& text) {
+    wait_until([&] { return described(source).find(text) != std::string::npos; });
+  }
+  // From a new publisher to a new subscriber.
+  void expect_that_samples_pass() {
+    Spoken publisher = plain_publisher("low");
+    Spoken subscriber = plain_subscriber("base");
+    ASSERT_TRUE(subscriber.hear("ready"));
+    wait_for_description("/Low:o", "at least 1 publisher matched");
+    publisher.say("x");
+    EXPECT_EQ(subscriber.line(), "|x");
+  }
+
+  EmptyMachine empty_;
+  TemporaryDirectory directory_;
+  Daemon daemon_{kModel};
+};
+
+TEST_F(Iceoryx, SamplesOfAnySizeGoThroughWithTheirHeaders) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o", "max_size='2MiB' user_header='12'") +
+                                        out("/Base:i", "base", "user_header='12'"));
+  Spoken publisher = plain_publisher("low", 12);
+  Spoken subscriber = plain_subscriber("base");
+  ASSERT_TRUE(subscriber.hear("ready"));
+  wait_for_description("/Low:o", "at least 1 publisher matched");
+  for (const char* text : {"a", "twelve bytes"}) {
+    publisher.say(text);
+    EXPECT_EQ(subscriber.line(), std::string("hhhhhhhhhhhh|") + text);
+  }
+  for (const int size : {1000, 65536, 1 << 20}) {
+    publisher.say("#" + std::to_string(size));
+    EXPECT_EQ(subscriber.line(), "hhhhhhhhhhhh|" + std::to_string(size) + " bytes x");
+  }
+}
+
+TEST_F(Iceoryx, TwoPublishersAreArbitratedIntoOneSubscriber) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + in("high", "/High:o") +
+                                        out("/Base:i", "base", "size='4' idle='zero'"));
+  Spoken low = plain_publisher("low");
+  Spoken high = plain_publisher("high");
+  Spoken subscriber = plain_subscriber("base");
+  ASSERT_TRUE(subscriber.hear("|zeros 4")) << "nobody commands: stop";
+  wait_for_description("/Low:o", "at least 1 publisher matched");
+  wait_for_description("/High:o", "at least 1 publisher matched");
+  low.say("low");
+  ASSERT_TRUE(subscriber.hear("|low"));
+  high.say("high");
+  ASSERT_TRUE(subscriber.hear("|high"));
+  low.say("overridden");
+  ASSERT_TRUE(low.hear("published"));
+  wait_until([&] { return daemon_.source("/Low:o")["discarded"] == 1; });
+  high.say("again");
+  EXPECT_EQ(subscriber.line(), "|again");
+}
+
+TEST_F(Iceoryx, AHeaderThatTheMappingDoesNotNameIsTold) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o"));
+  Spoken publisher = plain_publisher("low", 8);
+  wait_for_description("/Low:o", "at least 1 publisher matched");
+  publisher.say("x");
+  wait_for_description("/Low:o",
+                       "1 unreadable; chunks have a user header of 8 bytes; write "
+                       "user_header=\"8\"");
+  EXPECT_EQ(daemon_.source("/Low:o")["published"], 0);
+}
+
+TEST_F(Iceoryx, WithoutRouDiTheGatewaySaysSoAndGoesOnLooking) {
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
+  ASSERT_TRUE(gate.hear("/Low:o comes from iceoryx Test/One/low, RouDi does not run"))
+      << gate.heard;
+  wait_for_description("/Low:o", "RouDi does not run");
+  const Roudi roudi(directory_);
+  expect_that_samples_pass();
+}
+
+TEST_F(Iceoryx, ARouDiThatIsKilledAndComesAgainIsFoundAgain) {
+  std::optional<Roudi> roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
+  wait_for_description("/Low:o", "no publisher matched");
+  for (int i = 0; i < 2; ++i) {
+    roudi->process.kill();
+    ASSERT_TRUE(gate.hear("RouDi has gone; the gateway begins anew")) << gate.heard;
+    wait_for_description("/Low:o", "RouDi does not run");
+    roudi.emplace(directory_);
+    expect_that_samples_pass();
+  }
+}
+
+// RouDi ends all that it knows when it is ended itself.
+TEST_F(Iceoryx, ARouDiThatIsEndedEndsTheWorkerAndNotTheGateway) {
+  std::optional<Roudi> roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o"));
+  wait_for_description("/Low:o", "no publisher matched");
+  roudi->process.signal(SIGTERM);
+  wait_for_description("/Low:o", "RouDi does not run");
+  roudi->process.wait();
+  roudi.emplace(directory_);
+  wait_for_description("/Low:o", "no publisher matched");
+  EXPECT_TRUE(gate.process.runs());
+}
+
+TEST_F(Iceoryx, ARouDiThatHangsIsToldAndHoldsUpNobodyElse) {
+  Roudi roudi(directory_);
+  roudi.process.stop();
+  Spoken gate = gateway(directory_, in("low", "/Low:o"));
+  wait_for_description("/Low:o", "RouDi does not answer");
+  roudi.process.resume();
+  wait_for_description("/Low:o", "no publisher matched");
+}
+
+TEST_F(Iceoryx, AGatewayIsEndedWhetherRouDiRunsOrNot) {
+  Spoken without = gateway(directory_, in("low", "/Low:o"));
+  ASSERT_TRUE(without.hear("RouDi does not run"));
+  without.process.signal(SIGTERM);
+  EXPECT_EQ(without.process.wait(), 0);
+  Roudi roudi(directory_);
+  Spoken with = gateway(directory_, in("low", "/Low:o"));
+  wait_for_description("/Low:o", "no publisher matched");
+  with.process.signal(SIGTERM);
+  EXPECT_EQ(with.process.wait(), 0);
+  EXPECT_FALSE(daemon_.source("/Low:o")["open"]);
+}
+
+pid_t worker_of(const std::string& source, Daemon& daemon) {
+  return daemon.source(source)["component"]["pid"].get<pid_t>();
+}
+
+TEST_F(Iceoryx, AWorkerThatDiesIsReplaced) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o"));
+  wait_for_description("/Low:o", "no publisher matched");
+  const pid_t worker = worker_of("/Low:o", daemon_);
+  EXPECT_NE(worker, gate.process.pid());
+  const std::string trace = "/tmp/arbiter-gateway-iceoryx-" + std::to_string(worker);
+  EXPECT_TRUE(std::filesystem::exists(trace));
+  ::kill(worker, SIGKILL);
+  ASSERT_TRUE(gate.hear("the worker was ended by signal 9 (Killed); another one is started"));
+  EXPECT_FALSE(std::filesystem::exists(trace));
+  wait_until([&] {
+    const auto source = daemon_.source("/Low:o");
+    return source["open"] == true && source["component"]["pid"] != worker;
+  });
+  wait_for_description("/Low:o", "no publisher matched");
+}
+
+TEST_F(Iceoryx, AWorkerEndsWithItsSupervisor) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o"));
+  wait_for_description("/Low:o", "no publisher matched");
+  gate.process.kill();
+  wait_until([&] { return daemon_.source("/Low:o")["open"] == false; });
+}
+
+// Returns when no thread of it runs any more.
+void stop(pid_t process) {
+  ::kill(process, SIGSTOP);
+  wait_until([&] {
+    for (const auto& task :
+         std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task")) {
+      std::string line;
+      std::getline(std::ifstream(task.path() / "stat") >> std::ws, line);
+      if (line.find(") T ") == std::string::npos) return false;
+    }
+    return true;
+  });
+}
+
+// A gateway that was stopped for longer than T discards what has waited meanwhile. On a machine
+// that is so slow that other samples are late, too, they are said again.
+TEST_F(Iceoryx, WhatHasWaitedForLongerThanTNeverArrives) {
+  daemon_.load(
+      "<behaviors timeout='400ms'><behavior name='Low'><config at='/Base:i'>/Low:o</config>"
+      "</behavior></behaviors>");
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o"));
+  Spoken publisher = plain_publisher("low");
+  Node node("base");
+  auto base = node.input_port("/Base:i");
+  std::vector<std::string> taken;
+  const auto say_until_it_arrives = [&](const std::string& text) {
+    while (taken.empty() || taken.back() != text) {
+      publisher.say(text);
+      while (auto sample = base.wait_for(std::chrono::milliseconds(100))) {
+        taken.emplace_back(reinterpret_cast<const char*>(sample->data()), sample->size());
+      }
+    }
+  };
+  say_until_it_arrives("before");
+  const pid_t worker = worker_of("/Low:o", daemon_);
+  stop(worker);
+  const auto stopped = shm::monotonic_now();
+  publisher.say("then");
+  wait_until([&] { return shm::monotonic_now() - stopped > 800'000'000; });
+  ::kill(worker, SIGCONT);
+  say_until_it_arrives("after");
+  EXPECT_THAT(taken, testing::Not(testing::Contains("then")));
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,62 @@
+// The program around a gateway: options, mappings that are wrong, exit codes. Without RouDi.
+#include <gmock/gmock.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::HasSubstr;
+
+ProgramResult run_gateway(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), ARBITER_PROGRAMS "/arbiter-gateway-iceoryx");
+  return run_program(arguments, {});
+}
+
+constexpr const char* kGood =
+    "<gateway kind='iceoryx'><in service='a' instance='b' event='c' port='/p:o'/></gateway>";
+
+TEST(GatewayProgram, ChecksItsMappingAndEnds) {
+  const TemporaryDirectory directory;
+  const auto good = run_gateway({directory.write("good.xml", kGood), "--check"});
+  EXPECT_EQ(good.exit_code, 0) << good.err;
+  EXPECT_EQ(good.out, "ok: 1 entry\n");
+}
+
+TEST(GatewayProgram, RefusesAMappingWithErrorsAndSaysWhere) {
+  const TemporaryDirectory directory;
+  const auto wrong = run_gateway({directory.write(
+      "wrong.xml",
+      "<gateway kind='iceoryx'>\n<in service='a' instance='b' port='/p:o'/></gateway>")});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("wrong.xml:2:1: error: <in> lacks the attribute event"));
+  const std::string good = directory.write("good.xml", kGood);
+  const auto twice = run_gateway({good, good});
+  EXPECT_EQ(twice.exit_code, 2);
+  EXPECT_THAT(twice.err, HasSubstr("has an entry already"));
+}
+
+TEST(GatewayProgram, RefusesAMappingThatHasNothingForIt) {
+  const TemporaryDirectory directory;
+  const auto none = run_gateway({directory.write("dds.xml", "<gateway kind='dds'/>"), "--check"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("there is no <in> and no <out> of a <gateway kind=\"iceoryx\">"));
+}
+
+TEST(GatewayProgram, SaysWhatIsWrongWithItsArguments) {
+  EXPECT_EQ(run_gateway({}).exit_code, 2);
+  EXPECT_EQ(run_gateway({"--no-such-option"}).exit_code, 2);
+  const auto none = run_gateway({"/no/such/file.xml"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("/no/such/file.xml"));
+  const auto help = run_gateway({"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_THAT(help.out, HasSubstr("Exit codes: 0"));
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,197 @@
+// Samples from outside become arrivals: at one source, or at the one of two that a field chooses.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/gateway/foreign.hpp"
+#include "tests/gateway/mapping_text.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+using Fate = Incoming::Fate;
+constexpr Time kPassed{};
+constexpr Time kNever = Time::max();
+
+constexpr const char* kArrivals =
+    "<behaviors timeout='10s'>"
+    "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config></behavior>"
+    "<behavior name='Stop'><config at='/Brake:i'>/pressed:o</config>"
+    "<condition>not /released:o and not /other/released:o and not /other/pressed:o</condition>"
+    "</behavior></behaviors>";
+
+class Arriving : public testing::Test {
+ protected:
+  explicit Arriving(const std::string& entries =
+                        "<in topic='/nav' type='a/msg/B' "
+                        "port='/Nav/cmd:o' max_size='64'/>")
+      : read_(read_dds(entries)), entry_(read_.entry()), account_(entry_.outside(), "publisher") {}
+
+  [[nodiscard]] bool is_active(const std::string& source) {
+    return daemon_.source(source)["active"];
+  }
+
+  test::Daemon daemon_{kArrivals};
+  Read read_;
+  const Entry& entry_;
+  Account account_;
+  Node node_{"gateway"};
+  Incoming incoming_{node_, entry_, account_};
+};
+
+TEST_F(Arriving, ASampleIsDeliveredByOneCopyAsTheTypeThatTheMappingNames) {
+  auto in = node_.input_port("/Base/cmd:i", Type::variable("a/msg/B", 1));
+  const BytesSample sample("hello");
+  EXPECT_EQ(incoming_.deliver(sample, kNever), Fate::kPassed);
+  EXPECT_EQ(sample.copied, 5u);
+  auto taken = in.take();
+  ASSERT_TRUE(taken);
+  EXPECT_EQ(std::string(reinterpret_cast<const char*>(taken->data()), taken->size()), "hello");
+  EXPECT_EQ(account_.passed.value(), 1u);
+}
+
+TEST_F(Arriving, AComponentOfAnotherTypeIsRefused) {
+  const auto in = node_.input_port("/Base/cmd:i", Type::variable("a/msg/C", 64));
+  incoming_.deliver(BytesSample("hello"), kNever);
+  EXPECT_THAT(daemon_.connection("/Nav/cmd:o", "/Base/cmd:i")["mismatch"].get<std::string>(),
+              testing::HasSubstr("sends a/msg/B (of any size), the input port of \"gateway\" takes "
+                                 "a/msg/C (of any size)"));
+}
+
+TEST_F(Arriving, ALateSampleIsNoArrival) {
+  EXPECT_EQ(incoming_.deliver(BytesSample("hello"), kPassed), Fate::kLate);
+  EXPECT_FALSE(is_active("/Nav/cmd:o"));
+  EXPECT_EQ(account_.late.value(), 1u);
+  EXPECT_EQ(daemon_.source("/Nav/cmd:o")["late"], 1);
+}
+
+TEST_F(Arriving, WhatDoesNotFitIsCountedAndPassedOver) {
+  EXPECT_EQ(incoming_.deliver(BytesSample(std::string(65, 'x')), kNever), Fate::kTooLarge);
+  EXPECT_EQ(incoming_.deliver(BytesSample(std::string(64, 'x')), kNever), Fate::kPassed);
+  EXPECT_EQ(incoming_.deliver(BytesSample(""), kNever), Fate::kPassed);
+  EXPECT_EQ(account_.too_large.value(), 1u);
+}
+
+TEST_F(Arriving, WhatCannotBeReadIsCountedAndPassedOver) {
+  BytesSample broken("hello");
+  broken.is_broken = true;
+  EXPECT_EQ(incoming_.deliver(broken, kNever), Fate::kUnreadable);
+  EXPECT_FALSE(is_active("/Nav/cmd:o"));
+  EXPECT_EQ(account_.unreadable.value(), 1u);
+  EXPECT_EQ(incoming_.deliver(BytesSample("hello"), kNever), Fate::kPassed);
+}
+
+class ArrivingBoolean : public Arriving {
+ protected:
+  ArrivingBoolean()
+      : Arriving(
+            "<in topic='/estop' type='std_msgs/msg/Bool' true='/pressed:o' "
+            "false='/released:o'/>") {}
+  Fate say(bool value, Time deadline = kNever) {
+    return incoming_.deliver(BytesSample(std::string("\0\1\0\0", 4) + (value ? '\1' : '\0'), 4),
+                             deadline);
+  }
+};
+
+TEST_F(ArrivingBoolean, EachSampleIsPublishedAtItsOwnSourceAndEndsTheOther) {
+  EXPECT_EQ(say(false), Fate::kPassed);
+  EXPECT_TRUE(is_active("/released:o"));
+  EXPECT_FALSE(is_active("/pressed:o"));
+  EXPECT_EQ(say(true), Fate::kPassed);
+  EXPECT_FALSE(is_active("/released:o"));
+  EXPECT_TRUE(is_active("/pressed:o"));
+  EXPECT_EQ(daemon_.source("/pressed:o")["published"], 1);
+}
+
+// What a gateway believed that was killed is not trusted.
+TEST_F(ArrivingBoolean, TheFirstSampleEndsWhatAPredecessorBelieved) {
+  {
+    const Read others = read_dds(
+        "<in topic='/e' type='std_msgs/msg/Bool' true='/other/pressed:o' "
+        "false='/other/released:o'/>");
+    Incoming predecessor(node_, others.entry(), account_);
+    predecessor.deliver(BytesSample(std::string("\0\1\0\0\0", 5), 4), kNever);
+  }
+  ASSERT_TRUE(is_active("/other/released:o"));
+  const Read same = read_dds(
+      "<in topic='/e' type='std_msgs/msg/Bool' true='/other/pressed:o' "
+      "false='/other/released:o'/>");
+  Incoming successor(node_, same.entry(), account_);
+  successor.deliver(BytesSample(std::string("\0\1\0\0\1", 5), 4), kNever);
+  EXPECT_FALSE(is_active("/other/released:o"));
+  EXPECT_TRUE(is_active("/other/pressed:o"));
+}
+
+TEST_F(ArrivingBoolean, WhatIsNoBooleanEndsBoth) {
+  for (const std::string& bytes : {std::string("\0\1\0\0\2", 5), std::string("\0\1\0\0", 4),
+                                   std::string("\0\1", 2), std::string()}) {
+    say(true);
+    EXPECT_EQ(incoming_.deliver(BytesSample(bytes, 4), kNever), Fate::kUnreadable);
+    EXPECT_FALSE(is_active("/pressed:o")) << bytes.size();
+    EXPECT_FALSE(is_active("/released:o")) << bytes.size();
+  }
+}
+
+TEST_F(ArrivingBoolean, ASampleThatNobodyCanReadEndsBoth) {
+  say(false);
+  incoming_.fail();
+  EXPECT_FALSE(is_active("/released:o"));
+  EXPECT_EQ(account_.unreadable.value(), 1u);
+}
+
+TEST_F(ArrivingBoolean, ALateSampleMakesNothingActiveAndEndsTheOther) {
+  say(false);
+  EXPECT_EQ(say(true, kPassed), Fate::kLate);
+  EXPECT_FALSE(is_active("/pressed:o"));
+  EXPECT_FALSE(is_active("/released:o"));
+}
+
+Choice choice_of(Field field, long double threshold, std::size_t offset = 0) {
+  Choice choice;
+  choice.field = field;
+  choice.threshold = threshold;
+  choice.offset = offset;
+  return choice;
+}
+
+TEST(Choose, ComparesEachKindOfNumber) {
+  const auto side = [](Field field, const std::string& bytes, long double threshold) {
+    return choose(choice_of(field, threshold), BytesSample(bytes));
+  };
+  EXPECT_EQ(side(Field::kI8, bytes_of<std::int8_t>(-3), -4), Side::kYes);
+  EXPECT_EQ(side(Field::kU8, bytes_of<std::uint8_t>(253), 252), Side::kYes);
+  EXPECT_EQ(side(Field::kI16, bytes_of<std::int16_t>(-300), -300), Side::kNo);
+  EXPECT_EQ(side(Field::kU16, bytes_of<std::uint16_t>(65535), 65534.5L), Side::kYes);
+  EXPECT_EQ(side(Field::kI32, bytes_of<std::int32_t>(INT32_MIN), 0), Side::kNo);
+  EXPECT_EQ(side(Field::kU32, bytes_of<std::uint32_t>(UINT32_MAX), 0), Side::kYes);
+  EXPECT_EQ(side(Field::kI64, bytes_of<std::int64_t>(INT64_MAX), INT64_MAX - 1), Side::kYes);
+  EXPECT_EQ(side(Field::kU64, bytes_of<std::uint64_t>(UINT64_MAX), UINT64_MAX), Side::kNo);
+  EXPECT_EQ(side(Field::kF32, bytes_of<float>(0.5F), 0.25L), Side::kYes);
+  EXPECT_EQ(side(Field::kF64, bytes_of<double>(-INFINITY), 0), Side::kNo);
+  EXPECT_EQ(side(Field::kF64, bytes_of<double>(1e300), 1e300L), Side::kNo);
+  EXPECT_EQ(side(Field::kF32, bytes_of<float>(0.1F), 0.1L), Side::kNo);
+}
+
+TEST(Choose, NothingIsChosenByNaNOrAShortSample) {
+  EXPECT_FALSE(choose(choice_of(Field::kF32, 0), BytesSample(bytes_of<float>(NAN))));
+  EXPECT_FALSE(choose(choice_of(Field::kF64, 0), BytesSample(bytes_of<double>(-NAN))));
+  EXPECT_FALSE(choose(choice_of(Field::kF64, 0), BytesSample("1234567")));
+  EXPECT_FALSE(choose(choice_of(Field::kF64, 0, 1), BytesSample("12345678")));
+  EXPECT_FALSE(choose(choice_of(Field::kU8, 0, SIZE_MAX), BytesSample("12345678")));
+  EXPECT_FALSE(choose(choice_of(Field::kU8, 0), BytesSample("1234", 5)));
+}
+
+TEST(Choose, FieldsAreReadInTheSamplesByteOrder) {
+  const std::string number("\0\0\1\0", 4);
+  EXPECT_EQ(choose(choice_of(Field::kU32, 256), BytesSample(number, 0, true)), Side::kNo);
+  EXPECT_EQ(choose(choice_of(Field::kU32, 255), BytesSample(number, 0, true)), Side::kYes);
+  EXPECT_EQ(choose(choice_of(Field::kU32, 65535), BytesSample(number)), Side::kYes);
+  EXPECT_EQ(choose(choice_of(Field::kU32, 65536), BytesSample(number)), Side::kNo);
+}
+
+}  // namespace
+}  // namespace arbiter::gateway

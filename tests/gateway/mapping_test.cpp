@@ -1,0 +1,256 @@
+// Mapping files: what is read, and what is said of one that is wrong.
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "gateway/mapping/ros_names.hpp"
+#include "tests/gateway/mapping_text.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+TEST(Mapping, ReadsRos2NamesAsDdsHasThem) {
+  const Read read = read_text(
+      "<gateway kind='dds' domain='7' interface='lo, eth0' peers='10.0.0.2'>\n"
+      "  <in topic='/cmd_vel_nav' type='geometry_msgs/msg/Twist' port='/Nav/cmd_vel:o'/>\n"
+      "  <out port='/Base/cmd_vel:i' topic='/cmd_vel' type='geometry_msgs/msg/Twist' "
+      "idle='zero'/>\n"
+      "</gateway>\n");
+  ASSERT_THAT(read.findings(), IsEmpty());
+  const Gateway& gateway = read.mapping.gateways.at(0);
+  EXPECT_EQ(gateway.kind, Kind::kDds);
+  EXPECT_EQ(gateway.domain, 7u);
+  EXPECT_THAT(gateway.interfaces, ElementsAre("lo", "eth0"));
+  EXPECT_THAT(gateway.peers, ElementsAre("10.0.0.2"));
+  ASSERT_EQ(gateway.entries.size(), 2u);
+  const Entry& in = gateway.entries[0];
+  EXPECT_TRUE(in.is_in());
+  EXPECT_EQ(in.dds->name, "rt/cmd_vel_nav");
+  EXPECT_EQ(in.dds->type, "geometry_msgs::msg::dds_::Twist_");
+  EXPECT_TRUE(in.dds->is_ros);
+  EXPECT_EQ(in.dds->qos.depth, 10u);
+  EXPECT_EQ(in.port->name, "/Nav/cmd_vel:o");
+  EXPECT_EQ(in.type->name, "geometry_msgs/msg/Twist");
+  EXPECT_EQ(in.type->size, 0u);
+  EXPECT_EQ(in.outside(), "DDS topic rt/cmd_vel_nav");
+  const Entry& out = gateway.entries[1];
+  EXPECT_FALSE(out.is_in());
+  ASSERT_EQ(out.idle.sample.size(), 52u);
+  EXPECT_EQ(out.idle.sample[1], std::byte{1});
+}
+
+TEST(Mapping, ReadsPlainDdsNamesAsTheyAre) {
+  const Read read = read_dds(
+      "<in topic='Square' type='Shapes::ShapeType' port='/s:o' "
+      "reliability='best_effort' durability='volatile' "
+      "history='keep_last' depth='3' deadline='100ms' partition='a,b*' "
+      "keyed='true' max_size='1MiB' max_age='50ms'/>");
+  ASSERT_THAT(read.findings(), IsEmpty());
+  const Entry& entry = read.entry();
+  EXPECT_FALSE(entry.dds->is_ros);
+  EXPECT_EQ(entry.dds->name, "Square");
+  EXPECT_EQ(entry.type->name, "Shapes::ShapeType");
+  EXPECT_EQ(entry.dds->qos.reliability, Reliability::kBestEffort);
+  EXPECT_EQ(entry.dds->qos.durability, Durability::kVolatile);
+  EXPECT_EQ(entry.dds->qos.depth, 3u);
+  EXPECT_EQ(entry.dds->qos.deadline, 100'000'000);
+  EXPECT_THAT(entry.dds->qos.partitions, ElementsAre("a", "b*"));
+  EXPECT_EQ(entry.dds->qos.keyed, true);
+  EXPECT_EQ(entry.max_size, std::size_t{1} << 20);
+  EXPECT_EQ(entry.max_age, 50'000'000);
+}
+
+TEST(Mapping, APresetIsTakenAndCanBeChanged) {
+  const Read read = read_dds(
+      "<in topic='/scan' type='sensor_msgs/msg/LaserScan' port='/s:o' "
+      "qos='sensor_data' depth='2'/>");
+  ASSERT_THAT(read.findings(), IsEmpty());
+  EXPECT_EQ(read.entry().dds->qos.reliability, Reliability::kBestEffort);
+  EXPECT_EQ(read.entry().dds->qos.depth, 2u);
+}
+
+TEST(Mapping, NothingOldIsAskedFor) {
+  const std::string topic = "topic='/a' type='std_msgs/msg/Bool' port='/a' ";
+  EXPECT_THAT(read_dds("<in " + topic + "durability='transient_local'/>").findings(),
+              ElementsAre("1:83 error late-history"));
+  EXPECT_THAT(read_dds("<in " + topic + "qos='rosout'/>").message(), HasSubstr("nothing old"));
+  EXPECT_THAT(read_dds("<out " + topic + "durability='transient_local'/>").findings(), IsEmpty());
+}
+
+TEST(Mapping, ABooleanTopicIsTwoSources) {
+  const Read read = read_dds(
+      "<in topic='/estop' type='std_msgs/msg/Bool' true='/EStop/pressed:o' "
+      "false='/EStop/released:o'/>");
+  ASSERT_THAT(read.findings(), IsEmpty());
+  ASSERT_TRUE(read.entry().choice);
+  EXPECT_FALSE(read.entry().port);
+  EXPECT_EQ(read.entry().choice->yes.name, "/EStop/pressed:o");
+  EXPECT_EQ(read.entry().choice->no.name, "/EStop/released:o");
+  EXPECT_EQ(read.entry().choice->field, Field::kBoolean);
+}
+
+TEST(Mapping, ANumberOnTwoSidesOfAThresholdIsTwoSources) {
+  const Read read = read_iceoryx(
+      "<in service='a' instance='b' event='c' above='/full:o' "
+      "below='/empty:o' field='i64' offset='16' "
+      "threshold='9007199254740993'/>");
+  ASSERT_THAT(read.findings(), IsEmpty());
+  const Choice& choice = *read.entry().choice;
+  EXPECT_EQ(choice.field, Field::kI64);
+  EXPECT_EQ(choice.offset, 16u);
+  EXPECT_EQ(choice.threshold, 9007199254740993.0L);
+}
+
+TEST(Mapping, AnIceoryxTopicHasThreeNamesAndMayHaveAHeader) {
+  const Read read = read_iceoryx(
+      "<in service='Radar' instance='Front' event='Objects' "
+      "port='/Radar/objects:o' type='Objects' size='40' alignment='16' "
+      "user_header='8' queue='4'/>"
+      "<out port='/p:i' service='A' instance='B' event='C' size='24' "
+      "idle='zero' queue='3' history='2'/>");
+  ASSERT_THAT(read.findings(), IsEmpty());
+  const Entry& in = read.entry(0);
+  EXPECT_EQ(in.outside(), "iceoryx Radar/Front/Objects");
+  EXPECT_EQ(in.iceoryx->padded_header(), 16u);
+  EXPECT_EQ(in.type->size, 56u);
+  EXPECT_EQ(in.type->alignment, 16u);
+  EXPECT_EQ(in.iceoryx->queue, 4u);
+  EXPECT_FALSE(read.entry(1).type);
+  EXPECT_EQ(read.entry(1).idle.sample.size(), 24u);
+  EXPECT_EQ(read.entry(1).queue, 3u);
+  EXPECT_EQ(read.entry(1).iceoryx->history, 2u);
+}
+
+TEST(Mapping, SeveralGatewaysMayStandInOneFile) {
+  const std::string two = "<gateway kind='dds' domain='0'/><gateway kind='iceoryx'/>";
+  EXPECT_EQ(read_text(two).mapping.gateways.size(), 2u);
+  EXPECT_EQ(read_text("<gateways>" + two + "</gateways>").mapping.gateways.size(), 2u);
+}
+
+TEST(Mapping, AllProblemsOfAFileAreReportedInOneGo) {
+  const Read read = read_text(
+      "<gateway kind='dds' domain='1000' colour='red'>\n"
+      "  <in topic='/a' type='geometry_msgs/msg/Twist' prot='/a:o'/>\n"
+      "  <in topic='/a b' type='geometry_msgs/msg/Twist' port='a:o'/>\n"
+      "  <in topic='/a' type='Twist' port='/b:o' max_size='0'/>\n"
+      "  <in topic='a' type='geometry_msgs/msg/Twist' port='/c:o' reliability='reliabel'/>\n"
+      "  <out port='/b:i' topic='/b' type='x/y/z' idle='zero'/>\n"
+      "  <inn/>\n"
+      "  text\n"
+      "</gateway>\n");
+  EXPECT_THAT(read.findings(),
+              ElementsAre("1:35 error unknown-attribute", "1:29 error invalid-value",
+                          "8:3 error stray-text", "2:49 error unknown-attribute",
+                          "2:3 error missing-attribute", "3:14 error invalid-topic",
+                          "3:57 error invalid-port-name", "4:24 error invalid-type",
+                          "4:53 error invalid-value", "5:14 error invalid-topic",
+                          "5:73 error invalid-value", "6:37 error invalid-type",
+                          "6:50 error idle-size", "7:3 error unknown-element"));
+  EXPECT_THAT(read.message(3), HasSubstr("did you mean port?"));
+  EXPECT_THAT(read.message(10), HasSubstr("did you mean \"reliable\"?"));
+}
+
+TEST(Mapping, AFileWithoutAGatewaySaysWhatToWrite) {
+  EXPECT_THAT(read_text("").findings(), ElementsAre("1:1 error empty-file"));
+  EXPECT_THAT(read_text("<gateway/>").findings(), ElementsAre("1:1 error missing-attribute"));
+  EXPECT_THAT(read_text("<gateway kind='ros'/>").findings(),
+              ElementsAre("1:16 error invalid-value"));
+  EXPECT_THAT(read_text("<behaviors/>").message(), HasSubstr("it takes <gateway>"));
+  EXPECT_THAT(read_text("<gateways/><gateway kind='dds'/>").findings(),
+              ElementsAre("1:12 error unknown-element"));
+}
+
+TEST(Mapping, AnEntryHasOnePortOrTwoThatAFieldChooses) {
+  const std::string topic = "<in topic='/a' type='std_msgs/msg/Bool' ";
+  EXPECT_THAT(read_dds(topic + "port='/a:o' true='/b:o'/>").findings(),
+              ElementsAre("1:21 error several-ports"));
+  EXPECT_THAT(read_dds(topic + "true='/b:o'/>").findings(),
+              ElementsAre("1:21 error missing-attribute"));
+  EXPECT_THAT(read_dds(topic + "true='/b:o' false='/b:o'/>").findings(),
+              ElementsAre("1:80 error duplicate-port"));
+  EXPECT_THAT(read_dds(topic + "above='/a:o' below='/b:o'/>").findings(),
+              ElementsAre("1:21 error missing-attribute", "1:21 error missing-attribute"));
+  EXPECT_THAT(
+      read_dds(topic + "above='/a:o' below='/b:o' threshold='nan' field='f32'/>").findings(),
+      ElementsAre("1:98 error invalid-value"));
+  EXPECT_THAT(read_dds(topic + "port='/a:o' offset='3'/>").findings(),
+              ElementsAre("1:81 error misplaced-attribute"));
+  EXPECT_THAT(read_dds(topic + "true='/a:o' false='/b:o' offset='65536'/>").findings(),
+              ElementsAre("1:94 error invalid-value"));
+}
+
+TEST(Mapping, ZerosAreNoSampleOfATypeWithStrings) {
+  const auto out = [](const std::string& type, const std::string& more) {
+    return read_dds("<out port='/a:i' topic='/a' type='" + type + "' idle='zero' " + more + "/>");
+  };
+  EXPECT_THAT(out("geometry_msgs/msg/TwistStamped", "size='80'").message(),
+              HasSubstr("has a string in it"));
+  EXPECT_THAT(out("my_msgs/msg/Drive", "").message(), HasSubstr("add size=\"BYTES\""));
+  EXPECT_THAT(out("my_msgs/msg/Drive", "size='16'").findings(), IsEmpty());
+  EXPECT_EQ(out("my_msgs/msg/Drive", "size='16'").entry().idle.sample.size(), 20u);
+  EXPECT_THAT(out("geometry_msgs/msg/Twist", "size='44'").message(), HasSubstr("has 48 bytes"));
+}
+
+TEST(Mapping, AnIdleSampleComesFromAFileBesideTheMapping) {
+  const test::TemporaryDirectory directory;
+  directory.write("stop.bin", std::string("\0\1\0\0stop", 8));
+  directory.write("short.bin", "x");
+  const std::string path = directory.path();
+  const auto with = [&](const std::string& idle) {
+    return read_text(
+        "<gateway kind='dds'><out port='/a:i' topic='/a' type='my_msgs/msg/Drive' "
+        "idle='" +
+            idle + "'/></gateway>",
+        &path);
+  };
+  EXPECT_EQ(with("file:stop.bin").entry().idle.sample.size(), 8u);
+  EXPECT_THAT(with("file:short.bin").message(), HasSubstr("has 1 bytes"));
+  EXPECT_THAT(with("file:none.bin").message(), HasSubstr("none.bin"));
+  EXPECT_THAT(with("stop.bin").message(), HasSubstr("write none, zero, or file:"));
+}
+
+TEST(Mapping, NamesOfRos2AreToldFromOthers) {
+  for (const char* good : {"/a", "/a/b_c", "/_x/Y9"}) EXPECT_TRUE(is_ros_topic(good)) << good;
+  for (const char* bad : {"", "/", "a", "/a/", "/a//b", "/9a", "/a b", "/a-b"}) {
+    EXPECT_FALSE(is_ros_topic(bad)) << bad;
+  }
+  for (const char* good : {"std_msgs/msg/Bool", "a/srv/B_Request"}) EXPECT_TRUE(is_ros_type(good));
+  for (const char* bad : {"Bool", "std_msgs/Bool", "std_msgs/msg/bool", "/msg/Bool", "a/b/C",
+                          "a/msg/C/D", "a/msg/"}) {
+    EXPECT_FALSE(is_ros_type(bad)) << bad;
+  }
+  EXPECT_EQ(readable_type(dds_type_of("std_msgs/msg/Bool")), "std_msgs/msg/Bool");
+  EXPECT_EQ(readable_type("a::b::C"), "a::b::C");
+  EXPECT_EQ(readable_type("a::dds_::C_"), "a::dds_::C_");
+}
+
+TEST(Mapping, AFileCutAnywhereIsAnError) {
+  const std::string whole =
+      "<gateway kind='dds' domain='0'>\n"
+      "  <in topic='/a' type='geometry_msgs/msg/Twist' port='/a:o'/>\n"
+      "  <out port='/b:i' topic='/b' type='geometry_msgs/msg/Twist' idle='zero'/>\n"
+      "</gateway>";
+  for (std::size_t length = 0; length < whole.size(); ++length) {
+    const Read read = read_text(whole.substr(0, length));
+    ASSERT_TRUE(read.diagnostics.has_errors()) << whole.substr(0, length);
+  }
+}
+
+TEST(Mapping, EntriesAreBounded) {
+  std::string entries;
+  for (std::size_t i = 0; i < kMaxEntries + 3; ++i) {
+    entries += "<in topic='t' type='T' port='/p" + std::to_string(i) + ":o'/>";
+  }
+  const Read read = read_dds(entries);
+  ASSERT_EQ(read.findings().size(), 1u);
+  EXPECT_THAT(read.findings().front(), HasSubstr("too-many-entries"));
+  EXPECT_EQ(read.mapping.gateways.front().entries.size(), kMaxEntries);
+}
+
+}  // namespace
+}  // namespace arbiter::gateway
