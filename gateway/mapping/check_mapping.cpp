@@ -210,6 +210,11 @@ class MappingCheck {
                            {.ports = {port->name}});
         continue;
       }
+      // Of the two sources that a topic chooses between, a model seldom needs both.
+      if (entry.choice && (right.contains(entry.choice->yes.name) ||
+                           right.contains(entry.choice->no.name))) {
+        continue;
+      }
       std::vector<std::string_view> candidates;
       if (suggestions_++ < rules::kMaxSuggestions) candidates.assign(right.begin(), right.end());
       diagnostics_.warning(
