@@ -104,7 +104,8 @@ void Iceoryx::look_after_senders() {
   for (std::size_t i = 0; i < senders_.size(); ++i) {
     const bool has_readers = senders_[i]->publisher()->hasSubscribers();
     senders_[i]->account().set_peers(has_readers ? 1 : 0, true);
-    if (has_readers && !had_readers_[i]) outs_[i].outgoing.peer_matched();
+    // Without a bridge there are senders, and no ports behind them.
+    if (has_readers && !had_readers_[i] && i < outs_.size()) outs_[i].outgoing.peer_matched();
     had_readers_[i] = has_readers;
   }
 }
