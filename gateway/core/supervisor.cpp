@@ -47,6 +47,7 @@ Worker start(const std::vector<std::string>& arguments) {
   worker.heart.reset(ends[0]);
   const shm::FileDescriptor theirs(ends[1]);
   std::vector<char*> argv;
+  argv.reserve(arguments.size() + 1);
   for (const std::string& each : arguments) argv.push_back(const_cast<char*>(each.c_str()));
   argv.push_back(nullptr);
   const std::string pipe = kPipe + ("=" + std::to_string(theirs.get()));

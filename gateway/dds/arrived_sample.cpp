@@ -1,6 +1,5 @@
 #include "gateway/dds/arrived_sample.hpp"
 
-#include <cstdio>
 #include <cstring>
 
 #include "gateway/dds/fragments.hpp"
@@ -21,13 +20,6 @@ ArrivedSample::ArrivedSample(const Payload& payload) noexcept : payload_(payload
       ArrivedSample::copy(0, WritableBytes(header_.data(), header_.size()))) {
     encapsulation_ = read_encapsulation(Bytes(header_.data(), header_.size()));
   }
-}
-
-std::array<char, 6> ArrivedSample::header_text() const noexcept {
-  std::array<char, 6> text{};
-  std::snprintf(text.data(), text.size(), "%02x %02x", std::to_integer<unsigned>(header_[0]),
-                std::to_integer<unsigned>(header_[1]));
-  return text;
 }
 
 bool ArrivedSample::copy(std::size_t from, WritableBytes to) const noexcept {

@@ -29,8 +29,6 @@ class ArrivedSample : public ForeignSample {
   [[nodiscard]] bool is_readable() const noexcept {
     return encapsulation_.encoding != Encoding::kUnknown;
   }
-  // "00 0b"
-  [[nodiscard]] std::array<char, 6> header_text() const noexcept;
 
   [[nodiscard]] std::size_t size() const noexcept override { return payload_.size; }
   [[nodiscard]] bool copy(std::size_t from, WritableBytes to) const noexcept override;

@@ -43,7 +43,8 @@ Payload* PayloadPool::take(std::size_t bytes) noexcept {
 
 void PayloadPool::give_back(Payload* payload) noexcept {
   Shelf& shelf = shelves_.at(payload->shelf);
-  const std::size_t most = std::max(kKeptAtLeast, kKeptBytes / (kSmallest << payload->shelf));
+  const std::size_t size = kSmallest << payload->shelf;
+  const std::size_t most = std::max<std::size_t>(kKeptBytes / size, size < kHuge ? 2 : 0);
   {
     const std::lock_guard lock(shelf.mutex);
     if (shelf.kept < most) {

@@ -66,9 +66,10 @@ class PayloadPool {
   // Payloads with room for 64 bytes, 128, 256 … 2 GiB.
   static constexpr std::size_t kShelves = 26;
   static constexpr std::size_t kSmallest = 64;
-  // What a shelf keeps is bounded, so that a burst does not hold memory for ever.
+  // What a shelf keeps is bounded, so that a burst does not hold memory for ever: so many bytes, or
+  // two payloads that are not huge.
   static constexpr std::size_t kKeptBytes = std::size_t{8} << 20;
-  static constexpr std::size_t kKeptAtLeast = 4;
+  static constexpr std::size_t kHuge = std::size_t{128} << 20;
   struct Shelf {
     std::mutex mutex;
     Payload* first = nullptr;

@@ -22,12 +22,12 @@ struct Placed {
 
 // Partitions may be patterns; no partition is the one without a name.
 bool share_a_partition(const std::vector<std::string>& one, const std::vector<std::string>& other) {
-  static const std::vector<std::string> kDefault{""};
+  static const std::vector<std::string> no_partition{""};
   const auto matches = [](const std::string& a, const std::string& b) {
     return fnmatch(a.c_str(), b.c_str(), 0) == 0 || fnmatch(b.c_str(), a.c_str(), 0) == 0;
   };
-  for (const std::string& a : one.empty() ? kDefault : one) {
-    for (const std::string& b : other.empty() ? kDefault : other) {
+  for (const std::string& a : one.empty() ? no_partition : one) {
+    for (const std::string& b : other.empty() ? no_partition : other) {
       if (matches(a, b)) return true;
     }
   }

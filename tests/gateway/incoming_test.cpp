@@ -8,6 +8,7 @@
 
 #include "tests/gateway/foreign.hpp"
 #include "tests/gateway/mapping_text.hpp"
+#include "tests/realtime/allocations.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::gateway {
@@ -83,6 +84,15 @@ TEST_F(Arriving, WhatCannotBeReadIsCountedAndPassedOver) {
   EXPECT_FALSE(is_active("/Nav/cmd:o"));
   EXPECT_EQ(account_.unreadable.value(), 1u);
   EXPECT_EQ(incoming_.deliver(BytesSample("hello"), kNever), Fate::kPassed);
+}
+
+TEST_F(Arriving, ASampleCostsNoAllocationOnceItsReceiversAreKnown) {
+  const auto in = node_.input_port("/Base/cmd:i", Type::variable("a/msg/B", 1));
+  const BytesSample sample("hello");
+  incoming_.deliver(sample, kNever);
+  const auto before = test::allocations_of_this_thread();
+  for (int i = 0; i < 100; ++i) incoming_.deliver(sample, i % 2 == 0 ? kNever : kPassed);
+  EXPECT_EQ(test::allocations_of_this_thread(), before);
 }
 
 class ArrivingBoolean : public Arriving {

@@ -7,6 +7,7 @@
 #include "shm/clock.hpp"
 #include "tests/gateway/foreign.hpp"
 #include "tests/gateway/mapping_text.hpp"
+#include "tests/realtime/allocations.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::gateway {
@@ -95,6 +96,21 @@ TEST_F(Leaving, WhatHasWaitedForLongerThanTIsNotSent) {
   outgoing_.run(shm::monotonic_now() + 2'000'000'000);
   EXPECT_THAT(sender_.sent, IsEmpty());
   EXPECT_EQ(account_.late.value(), 1u);
+}
+
+TEST_F(Leaving, ASampleCostsNoAllocation) {
+  auto nav = publisher();
+  const auto send = [&] {
+    publish(nav, "x");
+    sender_.sent.clear();
+    outgoing_.run(now_);
+  };
+  sender_.sent.reserve(1);
+  send();
+  const auto before = test::allocations_of_this_thread();
+  for (int i = 0; i < 100; ++i) send();
+  EXPECT_EQ(test::allocations_of_this_thread(), before);
+  EXPECT_EQ(account_.passed.value(), 101u);
 }
 
 TEST_F(Leaving, WhatCannotBeSentIsCounted) {

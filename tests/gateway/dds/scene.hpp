@@ -4,52 +4,21 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <array>
-#include <filesystem>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "shm/file_descriptor.hpp"
+#include "tests/gateway/dds/own_domain.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/text_files.hpp"
 
 namespace arbiter::test {
-
-// The number of a domain of DDS, taken as long as this lives. Its ports lie below those that the
-// kernel gives out by itself.
-class OwnDomain {
- public:
-  OwnDomain() {
-    for (unsigned tried = 0;; ++tried) {
-      number_ = kFirst + (static_cast<unsigned>(::getpid()) + tried) % kCount;
-      const std::string path = std::filesystem::temp_directory_path() /
-                               ("arbiter-test-dds-domain-" + std::to_string(number_));
-      lock_.reset(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
-      if (lock_ && ::flock(lock_.get(), LOCK_EX | LOCK_NB) == 0) return;
-      if (tried % kCount == kCount - 1) ::poll(nullptr, 0, 20);  // all are taken
-    }
-  }
-  [[nodiscard]] unsigned number() const { return number_; }
-
- private:
-  static constexpr unsigned kFirst = 50;
-  static constexpr unsigned kCount = 49;
-  unsigned number_ = 0;
-  shm::FileDescriptor lock_;
-};
-
-inline constexpr const char* kLoopback =
-    R"(<General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>)"
-    R"(<AllowMulticast>false</AllowMulticast></General><Discovery>)"
-    R"(<ParticipantIndex>auto</ParticipantIndex>)"
-    R"(<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>)"
-    R"(<Peers><Peer address="127.0.0.1"/></Peers></Discovery>)";
 
 // A program of DDS that knows nothing of Arbiter (strangers/command_line.hpp).
 class Stranger {

@@ -170,6 +170,44 @@ TEST_F(Iceoryx, AGatewayIsEndedWhetherRouDiRunsOrNot) {
   EXPECT_FALSE(daemon_.source("/Low:o")["open"]);
 }
 
+TEST_F(Iceoryx, APortThatSomebodyElseHasIsWaitedFor) {
+  const Roudi roudi(directory_);
+  std::optional<Node> other("other");
+  std::optional<OutputPort<void>> taken(other->output_port("/Low:o"));
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
+  ASSERT_TRUE(gate.hear("/Low:o")) << gate.heard;
+  wait_until([&] { return daemon_.input("/Base:i").contains("described"); });
+  EXPECT_THAT(daemon_.input("/Base:i")["described"].get<std::string>(),
+              HasSubstr("not served: another port of the gateway is not open, "));
+  taken.reset();
+  expect_that_samples_pass();
+}
+
+TEST_F(Iceoryx, SamplesPassWhileNoDaemonRunsAndTheNextOneKnowsTheGateway) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
+  Spoken publisher = plain_publisher("low");
+  Spoken subscriber = plain_subscriber("base");
+  ASSERT_TRUE(subscriber.hear("ready"));
+  wait_for_description("/Low:o", "at least 1 publisher matched");
+  daemon_.kill();
+  publisher.say("x");
+  EXPECT_EQ(subscriber.line(), "|x");
+  daemon_.restart();
+  wait_for_description("/Low:o", "at least 1 publisher matched");
+  publisher.say("y");
+  EXPECT_EQ(subscriber.line(), "|y");
+}
+
+TEST_F(Iceoryx, AGatewayThatIsStartedFirstWaitsForTheDaemon) {
+  const Roudi roudi(directory_);
+  daemon_.kill();
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
+  ASSERT_TRUE(gate.hear("no arbiterd of instance")) << gate.heard;
+  daemon_.restart();
+  expect_that_samples_pass();
+}
+
 pid_t worker_of(const std::string& source, Daemon& daemon) {
   return daemon.source(source)["component"]["pid"].get<pid_t>();
 }
