@@ -4,6 +4,7 @@
 #include <sys/prctl.h>
 #include <sys/signalfd.h>
 #include <systemd/sd-daemon.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <exception>
@@ -27,6 +28,8 @@ constexpr const char* kExitCodes =
     "\nExit codes: 0 ended by SIGINT or SIGTERM, or the mapping is fine (--check); 1 an error, "
     "which "
     "was said;\n2 wrong use, or a mapping that cannot be read or has errors";
+
+constexpr unsigned kEndsWithin = 2;  // s
 
 struct Arguments {
   std::vector<std::string> mappings;
@@ -83,6 +86,9 @@ int serve(const Arguments& arguments, const ProgramKind& kind, std::vector<Mappi
     say(Level::kWarning, std::string(why.what()) + "; the gateway begins anew");
     std::_Exit(kBeginsAnew);
   }
+  // What the middleware does when the process ends may wait for ever, for a daemon of its own that
+  // has gone; and the supervisor, who would see to it, may be gone as well.
+  if (arguments.is_worker) ::alarm(kEndsWithin);
   return 0;
 }
 
