@@ -29,14 +29,14 @@ constexpr const char* kExitCodes =
     "which "
     "was said;\n2 wrong use, or a mapping that cannot be read or has errors";
 
-constexpr unsigned kEndsWithin = 2;  // s
-
 struct Arguments {
   std::vector<std::string> mappings;
   std::string instance;
   bool check = false;
   bool is_worker = false;  // of a supervised program
 };
+
+constexpr unsigned kEndsWithin = 2;  // s
 
 // Before threads start, so that no other thread takes them.
 shm::FileDescriptor catch_signals() {
