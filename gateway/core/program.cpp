@@ -4,6 +4,7 @@
 #include <sys/prctl.h>
 #include <sys/signalfd.h>
 #include <systemd/sd-daemon.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <exception>
@@ -38,6 +39,8 @@ struct Arguments {
   bool send_idle = false;
   bool is_worker = false;  // of a supervised program
 };
+
+constexpr unsigned kEndsWithin = 2;  // s
 
 // Before threads start, so that no other thread takes them.
 shm::FileDescriptor catch_signals() {
@@ -91,6 +94,9 @@ int serve(const Arguments& arguments, const ProgramKind& kind, std::vector<Mappi
     say(Level::kWarning, std::string(why.what()) + "; the gateway begins anew");
     std::_Exit(kBeginsAnew);
   }
+  // What the middleware does when the process ends may wait for ever, for a daemon of its own that
+  // has gone; and the supervisor, who would see to it, may be gone as well.
+  if (arguments.is_worker) ::alarm(kEndsWithin);
   return 0;
 }
 

@@ -238,6 +238,21 @@ TEST_F(Iceoryx, AWorkerEndsWithItsSupervisor) {
   wait_until([&] { return daemon_.source("/Low:o")["open"] == false; });
 }
 
+// Also where RouDi, of which the library takes leave at the end, does not answer.
+TEST_F(Iceoryx, AWorkerEndsWithoutItsSupervisorAndWithoutRouDi) {
+  Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o"));
+  wait_for_description("/Low:o", "no publisher matched");
+  const pid_t worker = worker_of("/Low:o", daemon_);
+  roudi.process.stop();
+  gate.process.kill();
+  wait_until([&] {
+    std::string line;
+    std::getline(std::ifstream("/proc/" + std::to_string(worker) + "/stat"), line);
+    return line.empty() || line.find(") Z ") != std::string::npos;
+  });
+}
+
 // Returns when no thread of it runs any more.
 void stop(pid_t process) {
   ::kill(process, SIGSTOP);
