@@ -137,7 +137,7 @@ void compare_attributes(Comparison& pair) {
   if (std::find(asked.representations.begin(), asked.representations.end(),
                 offered.representations.front()) == asked.representations.end()) {
     pair.add("representation", word(kRepresentations, offered.representations.front()),
-             list(asked.representations), "representation=\"xcdr1\" or \"xcdr2\"");
+             list(asked.representations), R"(representation="xcdr1" or "xcdr2")");
   }
 }
 

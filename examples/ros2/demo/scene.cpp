@@ -6,9 +6,9 @@
 namespace ros2_demo {
 namespace {
 
-const std::string kNavigation = in_words(0.6, 0.35);
-const std::string kTeleop = in_words(0.3, -0.9);
-const std::string kStands = in_words(0, 0);
+const std::string navigation = in_words(0.6, 0.35);
+const std::string teleop = in_words(0.3, -0.9);
+const std::string stands = in_words(0, 0);
 
 }  // namespace
 
@@ -20,9 +20,9 @@ std::string in_words(double forwards, double turning) {
 }
 
 Commands commands_by_arbiter() {
-  return {kNavigation, kTeleop, kNavigation, kStands, kNavigation, kStands, kNavigation};
+  return {navigation, teleop, navigation, stands, navigation, stands, navigation};
 }
 
-Commands commands_by_mux() { return {kNavigation, kTeleop, kNavigation}; }
+Commands commands_by_mux() { return {navigation, teleop, navigation}; }
 
 }  // namespace ros2_demo

@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
-#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -77,8 +76,9 @@ class Node {
 
  private:
   static dds_entity_t checked(dds_entity_t entity) {
-    if (entity < 0) throw std::runtime_error(dds_strretcode(-entity));
-    return entity;
+    if (entity >= 0) return entity;
+    std::fprintf(stderr, "Cyclone DDS: %s\n", dds_strretcode(-entity));
+    std::exit(1);
   }
   template <class Message>
   dds_entity_t topic(const std::string& name) {
