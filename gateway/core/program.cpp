@@ -83,6 +83,8 @@ int serve(const Arguments& arguments, const ProgramKind& kind, std::vector<Mappi
   const Bell bell;
   const auto middleware = make(settings, bell);
   if (arguments.send_idle) {
+    // What needs a supervisor may also hang, and here nobody looks after it.
+    if (kind.is_supervised) ::alarm(kSendIdle / 1'000'000'000 + kEndsWithin);
     send_idle(settings.mappings, kind.kind, *middleware, kSendIdle);
     return 0;
   }

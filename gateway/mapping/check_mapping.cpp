@@ -211,8 +211,8 @@ class MappingCheck {
         continue;
       }
       // Of the two sources that a topic chooses between, a model seldom needs both.
-      if (entry.choice && (right.contains(entry.choice->yes.name) ||
-                           right.contains(entry.choice->no.name))) {
+      if (entry.choice &&
+          (right.contains(entry.choice->yes.name) || right.contains(entry.choice->no.name))) {
         continue;
       }
       std::vector<std::string_view> candidates;

@@ -170,6 +170,33 @@ TEST_F(Iceoryx, AGatewayIsEndedWhetherRouDiRunsOrNot) {
   EXPECT_FALSE(daemon_.source("/Low:o")["open"]);
 }
 
+Spoken idle_sender(const TemporaryDirectory& directory, const std::string& entries) {
+  const std::string mapping =
+      directory.write("idle.xml", "<gateway kind='iceoryx'>" + entries + "</gateway>");
+  return Spoken({ARBITER_PROGRAMS "/arbiter-gateway-iceoryx", "--send-idle", mapping});
+}
+
+TEST_F(Iceoryx, ForAGatewayThatHasDiedTheIdleSampleIsSent) {
+  const Roudi roudi(directory_);
+  const std::string entries = in("low", "/Low:o") + out("/Base:i", "base", "size='4' idle='zero'");
+  Spoken gate = gateway(directory_, entries);
+  Spoken publisher = plain_publisher("low");
+  Spoken subscriber = plain_subscriber("base");
+  wait_for_description("/Low:o", "at least 1 publisher matched");
+  publisher.say("drive");
+  ASSERT_TRUE(subscriber.hear("|drive"));
+  gate.process.signal(SIGKILL);
+  gate.process.wait();
+  Spoken after = idle_sender(directory_, entries);
+  EXPECT_TRUE(subscriber.hear("|zeros 4"));
+  EXPECT_EQ(after.process.wait(), 0);
+}
+
+TEST_F(Iceoryx, TheIdleSampleIsNotWaitedForWithoutRouDi) {
+  Spoken after = idle_sender(directory_, out("/Base:i", "base", "size='4' idle='zero'"));
+  EXPECT_EQ(after.process.wait(), 0);
+}
+
 TEST_F(Iceoryx, APortThatSomebodyElseHasIsWaitedFor) {
   const Roudi roudi(directory_);
   std::optional<Node> other("other");
