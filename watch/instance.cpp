@@ -171,7 +171,7 @@ void Instance::be_greeted(wire::Received& welcome) {
   }
   standing_ = Standing::kIn;
   ++daemons_;
-  say(message_of(wire::MessageKind::kObserve));
+  static_cast<void>(say(message_of(wire::MessageKind::kObserve)));  // the loss is noticed
 }
 
 void Instance::lose_daemon(Clock::duration look_again_in) {
@@ -220,7 +220,8 @@ wire::Received Instance::ask(const wire::Message& question) {
   while (!answer_) {
     if (has_daemon() && asked_of != daemons_) {
       asked_of = daemons_;
-      say(numbered);  // if it cannot be sent the conversation is over, and the next one is asked
+      static_cast<void>(say(
+          numbered));  // if it cannot be sent the conversation is over, and the next one is asked
     }
     const auto left = std::chrono::ceil<milliseconds>(give_up - Clock::now());
     if (left.count() <= 0) {

@@ -84,9 +84,10 @@ class Instance {
   void look_for_daemon();
   void be_greeted(wire::Received& welcome);
   void lose_daemon(Clock::duration look_again_in);
-  bool watch_socket() const;
+  [[nodiscard]] bool watch_socket() const;
   void ring_timer_every(Clock::duration time) const;
-  bool say(const wire::Message& message) const;
+  // False: the conversation is over.
+  [[nodiscard]] bool say(const wire::Message& message) const;
 
   const wire::Caller caller_;
   shm::FileDescriptor epoll_;
