@@ -163,7 +163,7 @@ Line View::footer(std::size_t columns) const {
     return line_of("sources change too fast for one picture: who wins may be late", columns,
                    Style::kWarning, charset_);
   }
-  std::string keys = overlay_ ? "Esc close  arrows scroll"
+  std::string keys = overlay_ ? "Esc or q close  arrows scroll"
                               : "q quit  ? help  Enter why  t tap  Tab pane  / filter  s sort  "
                                 "Space pause";
   if (!filter_.empty()) keys = "filter \"" + filter_ + "\": Esc shows all   " + keys;
