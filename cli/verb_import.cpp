@@ -12,6 +12,7 @@
 #include "cli/numbers.hpp"
 #include "cli/output_file.hpp"
 #include "cli/verbs.hpp"
+#include "gateway/mapping/read_mapping.hpp"
 #include "importing/import.hpp"
 #include "importing/topic_names.hpp"
 #include "rules/ask/report.hpp"
@@ -50,6 +51,21 @@ void check_by_reading_back(const std::string& name, const std::string& model) {
     if (item.severity != rules::Severity::kError) continue;
     throw std::runtime_error("the model would be refused, nothing was written: " + item.message +
                              " [" + item.code + "]");
+  }
+}
+
+// The same of the mapping.
+void check_by_reading_back(const rules::TextFile& mapping, bool sends_zeros) {
+  rules::Diagnostics diagnostics;
+  gateway::read_mapping(mapping, diagnostics);
+  for (const auto& item : diagnostics.items()) {
+    if (item.severity != rules::Severity::kError) continue;
+    const bool is_by_zeros = sends_zeros && item.code == "idle-size";
+    throw std::runtime_error("the mapping would be refused, nothing was written: " + item.message +
+                             " [" + item.code + "]" +
+                             (is_by_zeros ? "; leave out --idle zero, and name the sample in the "
+                                            "mapping once that is written"
+                                          : ""));
   }
 }
 
@@ -92,9 +108,12 @@ int import(ImportVerbOptions options) {
                                : std::filesystem::path(options.output).filename().string();
   const std::string model = importing::write_model(*plan);
   check_by_reading_back(name, model);
+  const std::string mapping = importing::write_mapping(*plan, name);
+  if (!options.mapping.empty()) {
+    check_by_reading_back(rules::TextFile(options.mapping, mapping), !plan->idle.empty());
+  }
   make_directory(options.directory);
-  if (!options.mapping.empty())
-    write_output(options.mapping, importing::write_mapping(*plan, name));
+  if (!options.mapping.empty()) write_output(options.mapping, mapping);
   write_output(options.output, model);
   return 0;
 }

@@ -77,6 +77,32 @@ TEST(Import, IsRefusedWhereItIsUsedWrongly) {
   EXPECT_EQ(content_of(yaml), kMux);
 }
 
+// A gateway refuses zeros of a type that has strings, or whose size nobody knows.
+TEST(Import, WritesNoMappingThatAGatewayWouldRefuse) {
+  TemporaryDirectory directory;
+  const auto yaml = directory.write("mux.yaml", kMux);
+  const std::string folder = directory.path() + "/mux";
+  for (const std::string type : {"geometry_msgs/msg/TwistStamped", "my_msgs/msg/Command"}) {
+    const auto result = arbiter(
+        {"import", "twist_mux", yaml, "--out-dir", folder, "--type", type, "--idle", "zero"});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, HasSubstr("the mapping would be refused, nothing was written: "));
+    EXPECT_THAT(result.err, HasSubstr("[idle-size]; leave out --idle zero"));
+    EXPECT_FALSE(std::filesystem::exists(folder));
+  }
+  const std::string stamped =
+      "twist_mux: {ros__parameters: {use_stamped: true, topics: {a: "
+      "{topic: a, timeout: 0.5, priority: 1}}}}\n";
+  const auto result =
+      arbiter({"import", "twist_mux", directory.write("s.yaml", stamped), "--out-dir", folder});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("s.yaml:1:31: warning: nothing is sent while nobody commands"));
+  const auto check =
+      arbiter({"check", folder + "/model.xml", "--gateway", folder + "/mapping.xml"});
+  EXPECT_EQ(check.exit_code, 0) << check.err;
+  EXPECT_THAT(check.err, testing::Not(HasSubstr("idle=\"zero\"")));
+}
+
 std::string entries(const std::string& name, int count) {
   std::string text;
   for (int i = 1; i <= count; ++i) {
