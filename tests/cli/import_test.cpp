@@ -77,6 +77,28 @@ TEST(Import, IsRefusedWhereItIsUsedWrongly) {
   EXPECT_EQ(content_of(yaml), kMux);
 }
 
+// Somebody may have changed them by hand.
+TEST(Import, ReplacesNoFileUnlessItIsToldTo) {
+  TemporaryDirectory directory;
+  const auto yaml = directory.write("mux.yaml", kMux);
+  for (const std::string there : {"model.xml", "mapping.xml"}) {
+    const std::string folder = directory.path() + "/" + there + ".d";
+    std::filesystem::create_directory(folder);
+    const auto changed = directory.write(there + ".d/" + there, "<!-- mine -->");
+    auto result = arbiter({"import", "twist_mux", yaml, "--out-dir", folder});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(changed + " is there already; nothing was written: give "
+                                                "another file, or --force to replace it"));
+    EXPECT_EQ(content_of(changed), "<!-- mine -->");
+    EXPECT_FALSE(
+        std::filesystem::exists(folder + (there == "model.xml" ? "/mapping.xml" : "/model.xml")));
+    result = arbiter({"import", "twist_mux", yaml, "--out-dir", folder, "--force"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(content_of(changed), HasSubstr("imported from mux.yaml"));
+  }
+  EXPECT_EQ(arbiter({"import", "twist_mux", yaml, "-o", "/dev/null"}).exit_code, 0);
+}
+
 // A gateway refuses zeros of a type that has strings, or whose size nobody knows.
 TEST(Import, WritesNoMappingThatAGatewayWouldRefuse) {
   TemporaryDirectory directory;
