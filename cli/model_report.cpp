@@ -24,7 +24,7 @@ std::string how_text(const ModelInForce& model) {
 
 std::string origin_text(const ModelInForce& model, shm::Nanoseconds now) {
   if (model.since() == 0) return ", in force since before this daemon came";
-  return ", in force since " + span_text(now - model.since()) + " ago" + how_text(model);
+  return ", in force for " + span_text(now - model.since()) + how_text(model);
 }
 
 std::string file_advice(FileNow::State state, bool is_older) {

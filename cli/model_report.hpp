@@ -12,7 +12,7 @@ namespace arbiter::cli {
 
 // " (switch, by node …)", empty where it is not known.
 std::string how_text(const watch::ModelInForce& model);
-// ", in force since 3.2 s ago (switch, by node …)"
+// ", in force for 3.2 s (switch, by node …)"
 std::string origin_text(const watch::ModelInForce& model, shm::Nanoseconds now);
 // What to say of a file of the model, behind its name; empty where it is as it was read.
 std::string file_advice(watch::FileNow::State state, bool is_older);

@@ -66,6 +66,13 @@ void require_two_files(const std::string& option, const std::string& output,
                          " are one file; nothing was written: give another file");
 }
 
+void require_new_file(const std::string& output, const std::string& how) {
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(output, unknown)) return;
+  throw rules::FileError(output + " is there already; nothing was written: give another file, or " +
+                         how);
+}
+
 void write_output(const std::string& path, const std::string& content) {
   namespace fs = std::filesystem;
   if (path.empty()) {

@@ -17,6 +17,10 @@ void require_no_input(const std::string& option, const std::string& output,
 void require_two_files(const std::string& option, const std::string& output,
                        const std::string& other_option, const std::string& other);
 
+// Throws rules::FileError where a file is there already, which somebody may have changed by hand;
+// `how` says how to write it all the same.
+void require_new_file(const std::string& output, const std::string& how);
+
 // Whoever reads the file sees the old content or the new one, never a part. What is no regular file
 // is written as it is. Throws rules::FileError.
 void write_output(const std::string& path, const std::string& content);

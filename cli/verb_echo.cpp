@@ -8,16 +8,9 @@
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
-#include "rules/text/duration.hpp"
 
 namespace arbiter::cli {
 namespace {
-
-shm::Nanoseconds duration_of(const std::string& text) {
-  const auto duration = rules::parse_duration(text);
-  if (!duration.problem.empty()) throw CLI::ValidationError("--for", duration.problem);
-  return duration.value;
-}
 
 int echo(const EchoOptions& options) {
   const auto interrupts = catch_interrupts();
@@ -38,7 +31,10 @@ void add_echo(CLI::App& app, int& exit_code) {
       ->type_name("N")
       ->check(at_least_one());
   verb->add_option_function<std::string>(
-          "--for", [options](const std::string& text) { options->duration = duration_of(text); },
+          "--for",
+          [options](const std::string& text) {
+            options->duration = read_time_above_zero("--for", text);
+          },
           "End after this time: 500ms, 10s")
       ->type_name("DURATION");
   auto* losers = verb->add_flag(

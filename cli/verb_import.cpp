@@ -12,6 +12,7 @@
 #include "cli/numbers.hpp"
 #include "cli/output_file.hpp"
 #include "cli/verbs.hpp"
+#include "gateway/mapping/read_mapping.hpp"
 #include "importing/import.hpp"
 #include "importing/topic_names.hpp"
 #include "rules/ask/report.hpp"
@@ -29,6 +30,7 @@ struct ImportVerbOptions {
   std::vector<std::string> files;
   std::string output, mapping, directory;
   std::string idle = "auto";
+  bool replaces = false;
   importing::ImportOptions import;
 };
 
@@ -53,6 +55,21 @@ void check_by_reading_back(const std::string& name, const std::string& model) {
   }
 }
 
+// The same of the mapping.
+void check_by_reading_back(const rules::TextFile& mapping, bool sends_zeros) {
+  rules::Diagnostics diagnostics;
+  gateway::read_mapping(mapping, diagnostics);
+  for (const auto& item : diagnostics.items()) {
+    if (item.severity != rules::Severity::kError) continue;
+    const bool is_by_zeros = sends_zeros && item.code == "idle-size";
+    throw std::runtime_error("the mapping would be refused, nothing was written: " + item.message +
+                             " [" + item.code + "]" +
+                             (is_by_zeros ? "; leave out --idle zero, and name the sample in the "
+                                            "mapping once that is written"
+                                          : ""));
+  }
+}
+
 void choose_outputs(ImportVerbOptions& options) {
   if (options.directory.empty()) return;
   const std::filesystem::path directory(options.directory);
@@ -69,6 +86,14 @@ void require_other_files(const ImportVerbOptions& options) {
   require_two_files("--output", options.output, "--mapping", options.mapping);
 }
 
+// Whoever imports goes on by hand from what was written.
+void require_new_files(const ImportVerbOptions& options) {
+  if (options.replaces) return;
+  for (const std::string& output : {options.output, options.mapping}) {
+    require_new_file(output, "--force to replace it");
+  }
+}
+
 void make_directory(const std::string& path) {
   if (path.empty()) return;
   std::error_code error;
@@ -80,6 +105,7 @@ void make_directory(const std::string& path) {
 int import(ImportVerbOptions options) {
   choose_outputs(options);
   require_other_files(options);
+  require_new_files(options);
   rules::Diagnostics diagnostics;
   const auto files = read_files(options);
   const auto plan = options.kind == "twist_mux"
@@ -92,9 +118,12 @@ int import(ImportVerbOptions options) {
                                : std::filesystem::path(options.output).filename().string();
   const std::string model = importing::write_model(*plan);
   check_by_reading_back(name, model);
+  const std::string mapping = importing::write_mapping(*plan, name);
+  if (!options.mapping.empty()) {
+    check_by_reading_back(rules::TextFile(options.mapping, mapping), !plan->idle.empty());
+  }
   make_directory(options.directory);
-  if (!options.mapping.empty())
-    write_output(options.mapping, importing::write_mapping(*plan, name));
+  if (!options.mapping.empty()) write_output(options.mapping, mapping);
   write_output(options.output, model);
   return 0;
 }
@@ -138,6 +167,8 @@ void add_outputs(CLI::App& verb, ImportVerbOptions& options) {
       ->type_name("DIRECTORY")
       ->excludes(output)
       ->excludes(mapping);
+  verb.add_flag("--force", options.replaces,
+                "Replace files that are there already, with what was changed in them by hand");
 }
 
 void add_names(CLI::App& verb, ImportVerbOptions& options) {
@@ -191,7 +222,7 @@ void add_import(CLI::App& app, int& exit_code) {
       "be kept,\nis reported with its line. Remapping in launch files is not read: correct the "
       "topics in the mapping.\n\n"
       "Exit codes: 0 written; 1 an error in the files; 2 wrong use, or a file that cannot be "
-      "opened or\nwritten\n\n"
+      "opened or\nwritten, or is there already\n\n"
       "Examples:\n"
       "  arbiter import twist_mux twist_mux_topics.yaml twist_mux_locks.yaml --out-dir mux\n"
       "  arbiter import cmd_vel_mux cmd_vel_mux_params.yaml -o model.xml --mapping mapping.xml\n"

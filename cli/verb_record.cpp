@@ -156,9 +156,14 @@ int record(RecordOptions& options) {
 // A time, which may be in minutes: 5min.
 shm::Nanoseconds read_span(const std::string& option, const std::string& text) {
   constexpr std::string_view kMinutes = "min";
-  if (!std::string_view(text).ends_with(kMinutes)) return read_time(option, text);
-  const std::string number = text.substr(0, text.size() - kMinutes.size());
-  const shm::Nanoseconds seconds = read_time(option, number + "s");
+  constexpr const char* kAdvice =
+      "write a whole number with a unit (ns, us, ms, s or min), such as 500ms, 30s or 5min";
+  const std::size_t digits = text.find_first_not_of("0123456789");
+  const std::string number = text.substr(0, digits);
+  if (number.empty() || number.size() == text.size() || text.substr(digits) != kMinutes) {
+    return read_time(option, text, kAdvice);
+  }
+  const shm::Nanoseconds seconds = read_time(option, number + "s", kAdvice);
   if (seconds > shm::kMaxTime / 60) throw CLI::ValidationError(option, "is too long");
   return seconds * 60;
 }

@@ -37,6 +37,7 @@ constexpr shm::Nanoseconds kOneSecond = 1'000'000'000;
 // How far one can step back, in time and in pictures.
 constexpr shm::Nanoseconds kKept = 60 * kOneSecond;
 constexpr shm::Nanoseconds kMostKept = 3000;
+constexpr int kCensusesForRates = 2;
 
 struct TopOptions {
   std::string instance;
@@ -87,17 +88,16 @@ class Top {
                            std::clamp<shm::Nanoseconds>(kKept / options.interval, 1, kMostKept))) {}
 
   int watch(top::Screen& screen) {
-    shm::Nanoseconds next_picture = 0;
     while (!view_.is_over()) {
       take_news();  // first, so that what is new is in the picture
       const shm::Nanoseconds next_look = sampler_.look();
-      if (shm::monotonic_now() >= next_picture) {
+      if (shm::monotonic_now() >= next_picture_) {
         view_.add(sampler_.frame(tapper_.tapped(shm::monotonic_now())), sampler_.new_takeovers());
         screen.show(view_.draw(screen.size()));
-        next_picture = shm::monotonic_now() + interval_;
+        next_picture_ = shm::monotonic_now() + interval_;
       }
       bool must_draw = false;
-      if (!sleep_until_something(std::min(next_look, next_picture), screen.signals(), must_draw)) {
+      if (!sleep_until_something(std::min(next_look, next_picture_), screen.signals(), must_draw)) {
         return 0;
       }
       while (const auto press = screen.read_key()) {
@@ -112,7 +112,7 @@ class Top {
 
   // Once the daemon has counted for a second, so that there are rates.
   int print_once() {
-    while (censuses_ < 2) {
+    while (censuses_ < kCensusesForRates) {
       const shm::Nanoseconds next_look = sampler_.look();
       if (!take_news().empty()) throw wire::CallError(problem_);
       if (sleep_until(next_look, interrupts_)) return 0;
@@ -124,16 +124,22 @@ class Top {
   }
 
  private:
-  // Returns why there is none, or "".
+  // Returns why there is none, or "". What somebody waits for is drawn at once, however long the
+  // interval: the first picture, the first rates, an answer, a problem.
   const std::string& take_news() {
     top::Inquirer::News news = inquirer_.take_news();
     if (news.census != nullptr) {
-      ++censuses_;
+      if (++censuses_ <= kCensusesForRates) next_picture_ = 0;
       sampler_.set_census(std::move(news.census));
     }
-    if (news.why) view_.set_answer(*news.why);
-    problem_ = news.problem;
-    view_.set_problem(news.problem.empty() ? tapper_.problem() : std::move(news.problem));
+    if (news.why) {
+      view_.set_answer(*news.why);
+      next_picture_ = 0;
+    }
+    problem_ = std::move(news.problem);
+    const std::string shown = problem_.empty() ? tapper_.problem() : problem_;
+    if (shown != shown_problem_) next_picture_ = 0;
+    view_.set_problem(shown_problem_ = shown);
     return problem_;
   }
 
@@ -159,7 +165,9 @@ class Top {
   top::Sampler sampler_;
   top::Inquirer inquirer_;
   top::View view_;
-  std::string problem_;
+  std::string problem_;        // of the daemon's
+  std::string shown_problem_;  // that, or the taps'
+  shm::Nanoseconds next_picture_ = 0;
   std::set<std::string> asked_to_tap_;
   int censuses_ = 0;
 };

@@ -179,6 +179,14 @@ std::vector<MuxEntry> read_entries(const Parameter& parameter, const EntryRules&
                           "` is a map of entries by name, not a list; write it so");
     return entries;
   }
+  if (value.is_map() && !parameter.set->is_ros2) {
+    diagnostics.error("wrong-type", value.where,
+                      "`" + parameter.entry->key.text +
+                          "` is a map of entries by name here, as in ROS 2, which reads parameters "
+                          "only below `ros__parameters`; put it there, or write a list of entries, "
+                          "as ROS 1 has it");
+    return entries;
+  }
   if (value.is_scalar()) {
     diagnostics.error("wrong-type", value.where,
                       "`" + parameter.entry->key.text + "` has the entries in it; write these");

@@ -10,6 +10,8 @@
 namespace arbiter::importing {
 namespace {
 
+constexpr std::string_view kRosParameters = "ros__parameters";
+
 // A key of the way down to a node: "/robot/twist_mux", or "robot" and "twist_mux" below it.
 std::string join(const std::string& path, std::string_view key) {
   while (key.starts_with('/')) key.remove_prefix(1);
@@ -22,22 +24,36 @@ bool is_pattern(std::string_view node) { return node.find('*') != std::string_vi
 
 class Finder {
  public:
-  Finder(const std::vector<std::string_view>& wanted, std::vector<ParameterSet>& found)
-      : wanted_(wanted), found_(found) {}
+  Finder(const std::vector<std::string_view>& wanted, std::vector<ParameterSet>& found,
+         rules::Diagnostics& diagnostics)
+      : wanted_(wanted), found_(found), diagnostics_(diagnostics) {}
 
   void look_in(const YamlNode& map, const std::string& path) {
-    if (const YamlEntry* parameters = map.find("ros__parameters")) {
+    if (const YamlEntry* parameters = map.find(kRosParameters)) {
       if (has_wanted(parameters->value)) found_.push_back({path, true, &parameters->value});
     } else if (has_wanted(map)) {
       found_.push_back({path, false, &map});
       return;
     }
     for (const YamlEntry& entry : map.entries) {
-      if (entry.key.text != "ros__parameters") look_in(entry.value, join(path, entry.key.text));
+      if (entry.key.text == kRosParameters || is_misspelt(entry)) continue;
+      look_in(entry.value, join(path, entry.key.text));
     }
   }
 
  private:
+  // Taken for a node, it would be a part of each topic's name.
+  bool is_misspelt(const YamlEntry& entry) {
+    if (!has_wanted(entry.value)) return false;
+    const auto meant = rules::find_similar(entry.key.text, {kRosParameters});
+    if (!meant) return false;
+    diagnostics_.error("unknown-key", entry.key.where,
+                       "ROS 2 does not read " + rules::quote(entry.key.text) +
+                           ", so that no node has the parameters in it; did you mean " +
+                           rules::quote(*meant) + "?");
+    return true;
+  }
+
   // A word alone, such as a node's own parameter `topics: 3`, is not what is looked for.
   [[nodiscard]] bool has_wanted(const YamlNode& map) const {
     return std::any_of(wanted_.begin(), wanted_.end(), [&](std::string_view name) {
@@ -48,6 +64,7 @@ class Finder {
 
   const std::vector<std::string_view>& wanted_;
   std::vector<ParameterSet>& found_;
+  rules::Diagnostics& diagnostics_;
 };
 
 std::string in_words(const std::vector<std::string_view>& names) {
@@ -78,7 +95,7 @@ NodeParameters::NodeParameters(const std::vector<InputFile>& files,
     auto document = parse_yaml(text, diagnostics);
     if (!document) continue;
     documents_.push_back(std::move(*document));
-    Finder(wanted, sets_).look_in(documents_.back(), "");
+    Finder(wanted, sets_, diagnostics).look_in(documents_.back(), "");
   }
   if (diagnostics.has_errors()) {
     sets_.clear();

@@ -71,7 +71,7 @@ class TwistMuxImport {
     const rules::Location where = topics_.empty() ? rules::Location{} : topics_.front().topic.where;
     assembly_.set_output(plan_, "cmd_vel_out", where);
     if (diagnostics_.has_errors()) return {};
-    assembly_.set_types(plan_, is_stamped_, where);
+    assembly_.set_types(plan_, stamped_, where);
     plan_.timeout_remark =
         "A message counts until it is older than its timeout, not as old: hence the nanosecond.";
     return std::move(plan_);
@@ -90,7 +90,7 @@ class TwistMuxImport {
         const std::string& key = entry.key.text;
         if (key == "topics" || key == "locks") continue;
         if (key == "use_stamped") {
-          is_stamped_ = read_boolean(entry, diagnostics_).value_or(false);
+          if (read_boolean(entry, diagnostics_).value_or(false)) stamped_ = entry.key.where;
         } else if (key == "use_sim_time") {
           diagnostics_.note("own-clock", entry.key.where,
                             "Arbiter goes by the machine's own clock: a timeout takes as long in a "
@@ -269,9 +269,9 @@ class TwistMuxImport {
   Assembly assembly_;
   Plan plan_;
   std::vector<MuxEntry> topics_, locks_;
-  std::vector<Chosen> chosen_;             // the most important first
-  std::vector<std::size_t> lock_indices_;  // in the plan, of each of locks_
-  bool is_stamped_ = false;
+  std::vector<Chosen> chosen_;              // the most important first
+  std::vector<std::size_t> lock_indices_;   // in the plan, of each of locks_
+  std::optional<rules::Location> stamped_;  // where the file says so
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // The view as lines.
 #include <algorithm>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -21,13 +22,32 @@ Line two_sided(const std::string& left, const std::string& right, std::size_t co
   return line;
 }
 
+// In as many lines as it needs, of which it gets a quarter of the screen: what to do about it comes
+// last.
+std::vector<Line> message(const std::string& text, Size size, Style style, Charset charset) {
+  std::vector<std::string> parts = broken(text, size.columns, charset);
+  const std::size_t most = std::max<std::size_t>(size.rows / 4, 1);
+  if (parts.size() > most) {
+    parts[most - 1] += parts[most];  // is cut, with a mark
+    parts.resize(most);
+  }
+  std::vector<Line> lines;
+  lines.reserve(parts.size());
+  for (const std::string& part : parts) {
+    lines.push_back(line_of(part, size.columns, style, charset));
+  }
+  return lines;
+}
+
 }  // namespace
 
 std::vector<Line> View::draw(Size size) {
   std::vector<Line> lines;
   if (size.rows == 0 || size.columns == 0) return lines;
   lines.push_back(title(size.columns));
-  const std::size_t body = size.rows > 2 ? size.rows - 2 : 0;
+  std::vector<Line> footer = this->footer(size);
+  const std::size_t around = 1 + footer.size();
+  const std::size_t body = size.rows > around ? size.rows - around : 0;
   if (overlay_) {
     for (Line& line : overlay_->draw(size.columns, body, charset_))
       lines.push_back(std::move(line));
@@ -45,11 +65,12 @@ std::vector<Line> View::draw(Size size) {
       }
     }
   }
-  lines.resize(std::min(lines.size(), size.rows - 1));
-  while (lines.size() + 1 < size.rows) {
+  const std::size_t above = size.rows - footer.size();
+  lines.resize(std::min(lines.size(), above));
+  while (lines.size() < above) {
     lines.push_back(line_of("", size.columns, Style::kPlain, charset_));
   }
-  lines.push_back(footer(size.columns));
+  std::move(footer.begin(), footer.end(), std::back_inserter(lines));
   return lines;
 }
 
@@ -152,22 +173,23 @@ Line View::title(std::size_t columns) const {
   return two_sided(left, "  live", columns, Style::kTitle, Style::kTitle, charset_);
 }
 
-Line View::footer(std::size_t columns) const {
-  if (is_typing_) return line_of("filter: " + filter_ + "_", columns, Style::kTitle, charset_);
-  if (!notice_.empty()) return line_of(notice_, columns, Style::kTitle, charset_);
+std::vector<Line> View::footer(Size size) const {
+  const std::size_t columns = size.columns;
+  if (is_typing_) return {line_of("filter: " + filter_ + "_", columns, Style::kTitle, charset_)};
+  if (!notice_.empty()) return message(notice_, size, Style::kTitle, charset_);
   const auto frame = history_.frame();
   if (frame != nullptr && frame->has_daemon && !problem_.empty() && !history_.is_paused()) {
-    return line_of(problem_, columns, Style::kWarning, charset_);
+    return message(problem_, size, Style::kWarning, charset_);
   }
   if (frame != nullptr && !frame->is_settled) {
-    return line_of("sources change too fast for one picture: who wins may be late", columns,
+    return message("sources change too fast for one picture: who wins may be late", size,
                    Style::kWarning, charset_);
   }
-  std::string keys = overlay_ ? "Esc close  arrows scroll"
+  std::string keys = overlay_ ? "Esc or q close  arrows scroll"
                               : "q quit  ? help  Enter why  t tap  Tab pane  / filter  s sort  "
                                 "Space pause";
   if (!filter_.empty()) keys = "filter \"" + filter_ + "\": Esc shows all   " + keys;
-  return line_of(keys, columns, Style::kDim, charset_);
+  return {line_of(keys, columns, Style::kDim, charset_)};
 }
 
 std::string View::text() const {

@@ -80,7 +80,7 @@ Command command_of(const KeyPress& press) {
 
 const std::vector<std::string>& key_lines() {
   static const std::vector<std::string> lines = {
-      "q Ctrl-C         leave",
+      "q Ctrl-C         leave; q closes a window that is open",
       "Up Down k j      move the cursor",
       "PgUp PgDn        move it by a page",
       "Home End g G     move it to the first row, to the last",

@@ -71,6 +71,60 @@ std::size_t first_difference(const std::vector<std::string>& sorted, std::size_t
   return place;
 }
 
+// Of names that look alike and have as many parts each.
+struct Alike {
+  std::vector<std::string> first;      // parts of one of them
+  std::vector<std::size_t> beginning;  // of each part: so many bytes are the same in all of them
+  std::vector<bool> differs;
+
+  void add(std::vector<std::string> parts) {
+    if (first.empty()) {
+      for (const std::string& part : parts) beginning.push_back(part.size());
+      differs.assign(parts.size(), false);
+      first = std::move(parts);
+      return;
+    }
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      beginning[i] = std::min(beginning[i], common_beginning(first[i], parts[i]));
+      if (parts[i] != first[i]) differs[i] = true;
+    }
+  }
+};
+
+// Bytes of a part that may be dropped: whole words, which all have. None behind the slash: 0.
+std::size_t dropped_of(const std::string& part, std::size_t beginning) {
+  const std::size_t word = part.substr(0, beginning).find_last_of("_-.");
+  return word == std::string::npos ? 0 : word + 1;
+}
+
+// Without the parts that all have, and if need be without the words that parts begin with.
+std::string drop_common(const std::vector<std::string>& parts, const Alike& alike, bool drops_words,
+                        Charset charset) {
+  std::string text;
+  bool is_after_mark = false;
+  const auto add_mark = [&] {
+    if (!is_after_mark) text += (text.empty() ? "" : "/") + mark(charset);
+    is_after_mark = true;
+  };
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (!alike.differs[i] && i + 1 < parts.size()) {
+      add_mark();
+      continue;
+    }
+    const std::size_t dropped =
+        alike.differs[i] && drops_words ? dropped_of(parts[i], alike.beginning[i]) : 0;
+    if (dropped != 0) add_mark();
+    text += parts[i].substr(dropped);
+    is_after_mark = false;
+  }
+  return text;
+}
+
+// Names that look like `text`, cut in the first way, have the same parts dropped.
+std::string group_of(const std::string& text, const std::vector<std::string>& parts) {
+  return text + '\0' + std::to_string(parts.size()) + parts.back();
+}
+
 }  // namespace
 
 std::string cut_middle(const std::string& text, std::size_t columns, std::size_t eighths,
@@ -127,11 +181,22 @@ void ShortNames::set(std::vector<std::string> names) {
 }
 
 ShortNames::Cuts ShortNames::cuts_of(std::size_t columns) const {
+  std::unordered_map<std::string, Alike> groups;
+  const auto first_way = [&](std::size_t i) { return cut_parts(names_[i], columns, charset_); };
+  const auto by_difference = [&](std::size_t i) {
+    const std::vector<std::string> parts = parts_of(names_[i]);
+    const Alike& alike = groups.at(group_of(first_way(i), parts));
+    const std::string whole = drop_common(parts, alike, false, charset_);
+    if (columns_of(whole) <= columns) return whole;
+    const std::string least = drop_common(parts, alike, true, charset_);
+    return columns_of(least) <= columns ? least : cut_middle(least, columns, 4, charset_);
+  };
   const std::vector<std::function<std::string(std::size_t)>> ways = {
-      [&](std::size_t i) { return cut_parts(names_[i], columns, charset_); },
+      first_way,
       [&](std::size_t i) { return cut_middle(names_[i], columns, 1, charset_); },
       [&](std::size_t i) { return cut_middle(names_[i], columns, 4, charset_); },
       [&](std::size_t i) { return cut_middle(names_[i], columns, 7, charset_); },
+      by_difference,
       [&](std::size_t i) {
         return cut_around(names_[i], first_difference(names_, i), columns, charset_);
       }};
@@ -141,6 +206,9 @@ ShortNames::Cuts ShortNames::cuts_of(std::size_t columns) const {
   for (std::size_t i = 0; i < names_.size(); ++i) {
     if (columns_of(names_[i]) > columns) {
       open.push_back(i);
+      std::vector<std::string> parts = parts_of(names_[i]);
+      const std::string group = group_of(first_way(i), parts);
+      groups[group].add(std::move(parts));
     } else {
       ++taken[names_[i]];
     }

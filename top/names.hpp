@@ -2,9 +2,11 @@
 //
 // Port names differ at the end (/Navigation/planner/path:o, …/cmd_vel:o), at the beginning
 // (/left/arm:i, /right/arm:i) or in the middle, so there is no one place to cut. Each name is cut
-// in the first of several ways in which it looks like no other one. All names that there are count,
-// not only those on the screen, so a name looks the same wherever it is shown that wide. A name
-// that looks like another in all of these ways is cut in the first, and so is each of very many.
+// in the first of several ways in which it looks like no other one; one drops the parts that
+// all that look like it have ("…/robot_7/…/cmd_vel:o", or "…7/…/cmd_vel:o"). All names that there
+// are count, not only those on the screen, so a name looks the same wherever it is shown that wide.
+// A name that looks like another in all of these ways is cut in the first, and so is each of very
+// many.
 #pragma once
 
 #include <cstddef>

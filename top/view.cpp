@@ -14,7 +14,7 @@ std::string title_of(const WhyQuestion& question) {
   if (question.ports.size() == 1) title += " " + question.ports.front();
   if (!question.source.empty()) title += " " + question.source;
   title += question.moment == nullptr ? ", now" : ", at " + clock_text(question.moment->wall);
-  return title + "   (Esc closes)";
+  return title + "   (Esc or q closes)";
 }
 
 // The models of two memories may have the same number.
@@ -121,7 +121,7 @@ std::optional<WhyQuestion> View::obey(Command command) {
       toggle_tap();
       break;
     case Command::kHelp:
-      overlay_.emplace("Keys and columns   (Esc closes)", help_lines());
+      overlay_.emplace("Keys and columns   (Esc or q closes)", help_lines());
       break;
     case Command::kEscape:
       filter_.clear();

@@ -80,7 +80,7 @@ class View {
   [[nodiscard]] std::array<std::size_t, kPanes> heights(const std::array<Table, kPanes>& tables,
                                                         std::size_t rows) const;
   [[nodiscard]] Line title(std::size_t columns) const;
-  [[nodiscard]] Line footer(std::size_t columns) const;
+  [[nodiscard]] std::vector<Line> footer(Size size) const;
 
   const Charset charset_;
   ShortNames names_;

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "gateway/mapping/ros_names.hpp"
 #include "rules/model/expression.hpp"
 #include "rules/text/names.hpp"
 
@@ -169,10 +170,11 @@ class MappingCheck {
 
   void check_idle(const Entry& entry) {
     if (entry.is_in() || entry.idle.kind != Idle::Kind::kNothing) return;
+    const bool may_be_zero = !entry.type || !has_strings(entry.type->name);
     diagnostics_.note("no-idle", entry.where,
                       "while " + entry.port->name + " is idle nothing is sent to " +
-                          entry.outside() +
-                          ", so that whoever obeys it must stop by itself; add idle=\"zero\", or "
+                          entry.outside() + ", so that whoever obeys it must stop by itself; add " +
+                          (may_be_zero ? "idle=\"zero\", or " : "") +
                           "a sample that says stop: idle=\"file:…\"",
                       {.ports = {entry.port->name}});
   }

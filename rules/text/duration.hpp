@@ -13,7 +13,16 @@ struct ParsedDuration {
   std::string problem;  // what is wrong and what to do; empty if nothing is
 };
 
+// How a refusal speaks of what was written: as a source's timeout, unless the caller has others.
+struct DurationWords {
+  std::string_view subject = "the timeout ";
+  std::string_view zero = "is zero, so that its source would never be active";
+  std::string_view shorten = "shorten it, or write forever";
+  std::string_view advice =
+      "write a whole number with a unit, such as 250ns, 10us, 500ms or 2s, or forever";
+};
+
 // A whole number from 1 on with a unit right behind it, or shm::kForever.
-ParsedDuration parse_duration(std::string_view text);
+ParsedDuration parse_duration(std::string_view text, const DurationWords& words = {});
 
 }  // namespace arbiter::rules

@@ -77,6 +77,54 @@ TEST(Import, IsRefusedWhereItIsUsedWrongly) {
   EXPECT_EQ(content_of(yaml), kMux);
 }
 
+// Somebody may have changed them by hand.
+TEST(Import, ReplacesNoFileUnlessItIsToldTo) {
+  TemporaryDirectory directory;
+  const auto yaml = directory.write("mux.yaml", kMux);
+  for (const std::string there : {"model.xml", "mapping.xml"}) {
+    const std::string folder = directory.path() + "/" + there + ".d";
+    std::filesystem::create_directory(folder);
+    const auto changed = directory.write(there + ".d/" + there, "<!-- mine -->");
+    auto result = arbiter({"import", "twist_mux", yaml, "--out-dir", folder});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(changed + " is there already; nothing was written: give "
+                                                "another file, or --force to replace it"));
+    EXPECT_EQ(content_of(changed), "<!-- mine -->");
+    EXPECT_FALSE(
+        std::filesystem::exists(folder + (there == "model.xml" ? "/mapping.xml" : "/model.xml")));
+    result = arbiter({"import", "twist_mux", yaml, "--out-dir", folder, "--force"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(content_of(changed), HasSubstr("imported from mux.yaml"));
+  }
+  EXPECT_EQ(arbiter({"import", "twist_mux", yaml, "-o", "/dev/null"}).exit_code, 0);
+}
+
+// A gateway refuses zeros of a type that has strings, or whose size nobody knows.
+TEST(Import, WritesNoMappingThatAGatewayWouldRefuse) {
+  TemporaryDirectory directory;
+  const auto yaml = directory.write("mux.yaml", kMux);
+  const std::string folder = directory.path() + "/mux";
+  for (const std::string type : {"geometry_msgs/msg/TwistStamped", "my_msgs/msg/Command"}) {
+    const auto result = arbiter(
+        {"import", "twist_mux", yaml, "--out-dir", folder, "--type", type, "--idle", "zero"});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, HasSubstr("the mapping would be refused, nothing was written: "));
+    EXPECT_THAT(result.err, HasSubstr("[idle-size]; leave out --idle zero"));
+    EXPECT_FALSE(std::filesystem::exists(folder));
+  }
+  const std::string stamped =
+      "twist_mux: {ros__parameters: {use_stamped: true, topics: {a: "
+      "{topic: a, timeout: 0.5, priority: 1}}}}\n";
+  const auto result =
+      arbiter({"import", "twist_mux", directory.write("s.yaml", stamped), "--out-dir", folder});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("s.yaml:1:31: warning: nothing is sent while nobody commands"));
+  const auto check =
+      arbiter({"check", folder + "/model.xml", "--gateway", folder + "/mapping.xml"});
+  EXPECT_EQ(check.exit_code, 0) << check.err;
+  EXPECT_THAT(check.err, testing::Not(HasSubstr("idle=\"zero\"")));
+}
+
 std::string entries(const std::string& name, int count) {
   std::string text;
   for (int i = 1; i <= count; ++i) {

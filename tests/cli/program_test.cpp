@@ -215,6 +215,30 @@ TEST(Program, ProvesAModelWithTheSameEffortWhateverTheVerb) {
   }
 }
 
+// What a source's timeout may be is of no use to whoever writes an option.
+TEST(Program, ATimeIsRefusedInTheWordsOfItsOption) {
+  const auto problem = [](const std::vector<std::string>& arguments) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, testing::Not(HasSubstr("timeout \"")));
+    EXPECT_THAT(result.err, testing::Not(HasSubstr("never be active")));
+    EXPECT_THAT(result.err, testing::Not(HasSubstr("forever")));
+    return result.err;
+  };
+  EXPECT_THAT(problem({"echo", "/p", "--for", "0s"}),
+              HasSubstr("--for: \"0s\" is zero; write at least 1ns"));
+  EXPECT_THAT(problem({"top", "--interval", "1h"}),
+              HasSubstr("--interval: \"1h\" has an unknown unit; write a whole number with a unit "
+                        "(ns, us, ms or s)"));
+  EXPECT_THAT(problem({"wait", "--until", "idle(/p)", "--timeout", "0h"}),
+              HasSubstr("unknown unit"));
+  for (const std::string text : {"1h", "5", "min", "1smin"}) {
+    EXPECT_THAT(problem({"record", "-o", "r.mcap", "--duration", text}),
+                HasSubstr("(ns, us, ms, s or min)"))
+        << text;
+  }
+}
+
 // They are true of many good models: whoever draws or replays one did not ask for them.
 TEST(Program, NotesAreToldByCheckAndNoOtherVerb) {
   TemporaryDirectory directory;

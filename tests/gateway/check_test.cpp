@@ -112,6 +112,12 @@ TEST(CheckMapping, NothingIsSentToWhoeverMustStopByItself) {
   const Read read = check(dds("<out topic='/c' type='a/msg/B' port='/Base/cmd:i'/>"));
   ASSERT_EQ(read.findings().size(), 1u);
   EXPECT_THAT(read.findings()[0], HasSubstr("note no-idle"));
+  EXPECT_THAT(read.message(0), HasSubstr("add idle=\"zero\", or a sample"));
+  // It would be refused.
+  const Read stamped =
+      check(dds("<out topic='/c' type='geometry_msgs/msg/TwistStamped' port='/Base/cmd:i'/>"));
+  ASSERT_EQ(stamped.findings().size(), 1u);
+  EXPECT_THAT(stamped.message(0), HasSubstr("add a sample that says stop: idle=\"file:…\""));
 }
 
 std::string with_estop(const std::string& condition, const std::string& released) {

@@ -72,6 +72,29 @@ TEST(Parameters, SeveralFilesAreOne) {
   EXPECT_THAT(import_files({mux, "locks: []"}).findings(), ElementsAre("1:1 error mixed-forms"));
 }
 
+TEST(Parameters, AMisspeltRosParametersIsNoNode) {
+  for (const std::string key : {"ros__parameter", "ros_parameters", "ros__paramters"}) {
+    const auto imported = import_files({"twist_mux: {" + key + ": {" + kTopics + "}}"});
+    EXPECT_THAT(imported.findings(), ElementsAre("1:13 error unknown-key")) << key;
+    EXPECT_THAT(imported.message("unknown-key"), HasSubstr("did you mean \"ros__parameters\"?"));
+  }
+  // Of another node it is not the import's business.
+  const auto imported =
+      import_files({"other: {ros__parameter: {rate: 10}}\n"
+                    "twist_mux: {ros__parameters: {" +
+                    kTopics + "}}"});
+  EXPECT_TRUE(imported.plan) << testing::PrintToString(imported.findings());
+}
+
+TEST(Parameters, AMapOfEntriesIsBelowRosParametersOnly) {
+  for (const std::string& file : {kTopics, "twist_mux: {" + kTopics + "}"}) {
+    const auto imported = import_files({file});
+    ASSERT_EQ(imported.findings().size(), 1u) << file;
+    EXPECT_THAT(imported.findings().front(), HasSubstr("error wrong-type"));
+    EXPECT_THAT(imported.message("wrong-type"), HasSubstr("only below `ros__parameters`"));
+  }
+}
+
 TEST(Parameters, AFileOfSomethingElseIsAnError) {
   EXPECT_THAT(import_files({"other: {ros__parameters: {rate: 10}}"}).findings(),
               ElementsAre("1:1 error nothing-to-import"));

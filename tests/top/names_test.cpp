@@ -70,6 +70,26 @@ TEST_F(TopNames, CanBeToldApartWhereverTheyDiffer) {
   EXPECT_EQ(alike(numbered, 20), 0u);
 }
 
+// A part in the middle, of many: what all have is dropped, what differs stays.
+TEST_F(TopNames, LoseWhatAllHaveBeforeWhatDiffers) {
+  ShortNames names(Charset::kUtf8);
+  std::vector<std::string> all;
+  for (int i = 0; i < 300; ++i) {
+    const std::string robot = "/very/long/namespace/robot_" + std::to_string(i);
+    all.push_back(robot + "/navigation_stack/controller/cmd_vel:o");
+    all.push_back(robot + "/base/cmd_vel:i");
+  }
+  names.set(all);
+  EXPECT_EQ(names.cut(all[40], 28), "…/robot_20/…/cmd_vel:o");
+  EXPECT_EQ(names.cut(all[40], 20), "…20/…/cmd_vel:o");
+  ShortNames ascii(Charset::kAscii);
+  ascii.set(all);
+  EXPECT_EQ(ascii.cut(all[40], 20), "~20/~/cmd_vel:o");
+  for (std::size_t columns = 16; columns <= 64; ++columns) {
+    EXPECT_EQ(alike(all, columns), 0u) << columns;
+  }
+}
+
 TEST_F(TopNames, AreNeverWiderThanTheyMay) {
   const std::vector<std::string> names = {"/Navigation/local_planner/path:o", "/腕腕腕/腕腕腕腕腕",
                                           "no slash in a name of a terminal", "////////////",

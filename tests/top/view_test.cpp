@@ -268,6 +268,25 @@ TEST_F(TopView, SaysThatThereIsNoDaemonAndThatItCannotAsk) {
   EXPECT_THAT(screen(), HasSubstr("NO DAEMON"));
 }
 
+// What to do about it comes last, so a problem gets the lines that it needs.
+TEST_F(TopView, BreaksAProblemThatIsWiderThanTheScreen) {
+  view_.set_problem("not tapped: user 1000 may not tap the port /" + std::string(50, 'p') +
+                    "; see line 3 of the policy");
+  for (const std::size_t rows : {2u, 8u, 24u}) {
+    EXPECT_EQ(view_.draw({80, rows}).size(), rows);
+    for (const Line& line : view_.draw({80, rows})) EXPECT_LE(columns_of(line.text()), 80u);
+  }
+  auto lines = view_.draw({80, 24});
+  EXPECT_THAT(lines[22].text(), HasSubstr("not tapped: user 1000"));
+  EXPECT_THAT(lines[23].text(), HasSubstr("line 3 of the policy"));
+  view_.set_problem(std::string(10'000, 'x'));
+  lines = view_.draw({80, 24});
+  EXPECT_THAT(lines[17].text(), testing::Not(HasSubstr("xxx")));
+  EXPECT_THAT(lines[18].text(), HasSubstr("xxx"));
+  EXPECT_THAT(lines[23].text(), HasSubstr("xxx…"));
+  EXPECT_THAT(screen(), HasSubstr("CHANGE"));
+}
+
 TEST_F(TopView, SaysThatAWinnerCannotDeliver) {
   Census census = census_of_robot();
   census.ports[0].useless = "/object:o";
