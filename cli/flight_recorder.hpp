@@ -20,7 +20,7 @@ struct FlightOptions {
   shm::Nanoseconds end = shm::kForever;
 };
 
-// Until SIGINT or SIGTERM; SIGUSR1 writes a file.
+// Until SIGINT, SIGTERM or SIGHUP; SIGUSR1 writes a file.
 int fly(const FlightOptions& options, const recorder::RecorderOptions& settings,
         const recording::McapOptions& file, const evidence::RecordingInfo& info);
 // Asks the one that runs, and waits for so long at most.

@@ -272,7 +272,8 @@ void add_record(CLI::App& app, int& exit_code) {
       "  arbiter record --ring 5min -o /var/lib/robot/flight "
       "--when 'winner(/Arm/pos:i) = /Teleop/pos:o and not /Deadman:o'\n"
       "  arbiter record --dump -o /var/lib/robot/flight\n\n"
-      "Ends at Ctrl-C, or SIGTERM, with a whole file. Whoever records needs the policy's `tap`.");
+      "Ends at Ctrl-C, SIGTERM or SIGHUP (the terminal has gone; `nohup` keeps it running), with a "
+      "whole\nfile. Whoever records needs the policy's `tap`.");
   verb->callback([options, &exit_code] { exit_code = record(*options); });
 }
 

@@ -83,6 +83,16 @@ TEST_F(Flight, WritesWhereItIsAsked) {
   EXPECT_EQ(arbiter({"record", "--dump", "-o", prefix_}).exit_code, 1);
 }
 
+// As where the SSH session closes in which it was started.
+TEST_F(Flight, EndsInGoodOrderAtAHangup) {
+  ::signal(SIGHUP, SIG_DFL);  // what a test was started with, the program has too
+  ChildProcess recorder = fly();
+  EXPECT_TRUE(std::filesystem::exists(prefix_ + ".sock"));
+  recorder.signal(SIGHUP);
+  EXPECT_EQ(recorder.wait(), 0);
+  EXPECT_FALSE(std::filesystem::exists(prefix_ + ".sock"));
+}
+
 TEST_F(Flight, WritesWhereAStatementBecomesTrue) {
   Node node("test");
   auto low = node.output_port<int>("/low");
