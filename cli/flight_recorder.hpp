@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 
 #include "evidence/record_writer.hpp"
@@ -16,7 +17,7 @@ struct FlightOptions {
   std::size_t memory = std::size_t{64} << 20;
   std::string prefix;
   std::size_t keep = 16;  // files that it writes of its own accord
-  std::string when;       // a statement; empty: none
+  std::optional<std::string> when;  // a statement
   shm::Nanoseconds end = shm::kForever;
 };
 

@@ -201,8 +201,8 @@ void add_flight_options(CLI::App& verb, const std::shared_ptr<RecordOptions>& op
           "What --ring may take up (default 64MiB): older records give way")
       ->type_name("SIZE")
       ->needs(ring);
-  verb.add_option(
-          "--when", options->flight.when,
+  verb.add_option_function<std::string>(
+          "--when", [options](const std::string& text) { options->flight.when = text; },
           "With --ring: write when this becomes true, a statement as `arbiter wait --until` "
           "reads it")
       ->type_name("STATEMENT")

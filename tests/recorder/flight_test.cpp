@@ -142,6 +142,11 @@ TEST_F(Flight, SaysWhichNameOfAStatementTheModelLacks) {
 TEST_F(Flight, RefusesAStatementThatCannotBeRead) {
   const auto result = arbiter({"record", "--ring", "10s", "-o", prefix_, "--when", "and"});
   EXPECT_EQ(result.exit_code, 2);
+  for (const char* empty : {"", " "}) {
+    const auto refused = arbiter({"record", "--ring", "10s", "-o", prefix_, "--when", empty});
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.err, HasSubstr("the condition is empty"));
+  }
   EXPECT_EQ(arbiter({"record", "--ring", "10s", "-o", prefix_, "--memory", "7"}).exit_code, 2);
 }
 
