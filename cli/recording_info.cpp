@@ -54,6 +54,7 @@ void count_message(RecordingInfo& info, const recording::McapMessage& message) {
 recording::McapVisitor visitor_for(RecordingInfo& info) {
   recording::McapVisitor visitor;
   visitor.header = [&info](const std::string& profile, const std::string& library) {
+    info.has_header = true;
     info.profile = profile;
     info.library = library;
   };

@@ -45,6 +45,7 @@ struct RecordingInfo {
 
   std::string path;
   recording::McapEnd end;
+  bool has_header = false;  // else there is nothing of it to repair
   std::string profile;
   std::string library;
   std::uint64_t messages = 0;

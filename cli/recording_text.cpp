@@ -98,6 +98,10 @@ void write_state(std::ostream& out, const RecordingInfo& info) {
     write_wrapped(out, "state", info.end.has_summary ? "whole" : "whole, without a summary");
     return;
   }
+  if (info.end.file_bytes == 0) {
+    write_wrapped(out, "state", "the file is empty");
+    return;
+  }
   write_wrapped(
       out, "state",
       "not whole; what follows is in the first " + std::to_string(info.end.whole_bytes) + " bytes");
@@ -200,7 +204,7 @@ void write_text(std::ostream& out, const RecordingInfo& info) {
   write_channels(out, info);
   write_metadata(out, info);
   write_attachments(out, info);
-  if (info.end.is_whole) return;
+  if (info.end.is_whole || !info.has_header) return;
   out << "\nTo make a whole file of what is whole:\n  arbiter recording repair "
       << shm::printable(info.path) << '\n';
 }
