@@ -16,7 +16,7 @@ struct FlightOptions {
   shm::Nanoseconds span = 0;  // 0: no flight recorder
   std::size_t memory = std::size_t{64} << 20;
   std::string prefix;
-  std::size_t keep = 16;  // files that it writes of its own accord
+  std::size_t keep = 16;            // files that it writes of its own accord
   std::optional<std::string> when;  // a statement
   shm::Nanoseconds end = shm::kForever;
 };
