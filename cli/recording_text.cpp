@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "cli/recording_info.hpp"
+#include "evidence/recorded.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::cli {
@@ -200,6 +201,12 @@ void write_text(std::ostream& out, const RecordingInfo& info) {
   if (!info.profile.empty()) write_wrapped(out, "profile", shm::printable(info.profile));
   write_times(out, info);
   write_wrapped(out, "messages", std::to_string(info.messages));
+  const std::string missed = evidence::missed_text(info.missed_events, info.missed_samples);
+  if (!missed.empty()) {
+    write_wrapped(out, "missed",
+                  "by the recorder: " + missed +
+                      "; what `simulate` and `export` tell around the gaps may be wrong");
+  }
   write_chunks(out, info);
   write_channels(out, info);
   write_metadata(out, info);
