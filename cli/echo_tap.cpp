@@ -251,7 +251,9 @@ TapOf kind_of_port(const EchoOptions& options) {
     const std::string& name = instance->memory()->source_name(id);
     if (!name.empty()) known.emplace_back(name);
   }
+  const bool is_pattern = options.port.find('*') != std::string::npos;
   std::cerr << "arbiter: no model and no component has named " << options.port << " yet"
+            << (is_pattern ? "; echo takes one port, not a pattern" : "")
             << rules::advise(options.port, known, "`arbiter status` shows the ports that there are")
             << '\n';
   return by_name();

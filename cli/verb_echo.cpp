@@ -9,6 +9,7 @@
 #include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
 #include "rules/text/duration.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -19,7 +20,15 @@ shm::Nanoseconds duration_of(const std::string& text) {
   return duration.value;
 }
 
+// Before anything is said of a port by that name.
+void require_name(const std::string& port) {
+  if (port.empty()) throw CLI::ValidationError("PORT", "the name is empty; echo takes one port");
+  const auto problem = rules::find_problem_in_port(port);
+  if (problem) throw CLI::ValidationError("PORT", problem->message + "; echo takes one port");
+}
+
 int echo(const EchoOptions& options) {
+  require_name(options.port);
   const auto interrupts = catch_interrupts();
   if (options.as_component) return echo_component(options, interrupts);
   return options.rate ? echo_rate(options, interrupts) : echo_tap(options, interrupts);

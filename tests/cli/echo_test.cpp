@@ -205,6 +205,20 @@ TEST(Echo, AsAComponentTakesNoOutputPort) {
   EXPECT_EQ(arbiter({"echo", "/new", "--as-component", "--for", "1ms"}).exit_code, 0);
 }
 
+TEST(Echo, JudgesTheNameBeforeItSaysWhoHasIt) {
+  Daemon daemon(kOverrideModel);
+  for (const char* name : {"", "p", "/p q"}) {
+    for (const char* way : {"--losers", "--rate", "--as-component"}) {
+      const auto result = arbiter({"echo", name, way, "--for", "1ms"});
+      EXPECT_EQ(result.exit_code, 2) << name;
+      EXPECT_THAT(result.err, AllOf(HasSubstr("; echo takes one port"),
+                                    Not(HasSubstr("no model and no component"))));
+    }
+  }
+  EXPECT_THAT(arbiter({"echo", "/p*", "--for", "1ms"}).err,
+              HasSubstr("no component has named /p* yet; echo takes one port, not a pattern"));
+}
+
 TEST(Echo, SaysThatThePolicyForbidsIt) {
   const TemporaryDirectory files;
   const std::string policy = files.write("policy", "deny everyone tap /p\nallow everyone all\n");
