@@ -43,7 +43,8 @@ void add_echo(CLI::App& app, int& exit_code) {
   verb->add_option("PORT", options->port,
                    "An output port: all its arrivals; an input port: what its arbiter accepts")
       ->required();
-  verb->add_option("--count", options->count, "Stop after this many lines")
+  verb->add_option("--count", options->count,
+                   "Stop after this many lines; with --rate, after this many seconds' rates")
       ->type_name("N")
       ->check(at_least_one());
   verb->add_option_function<std::string>(
