@@ -9,6 +9,7 @@
 
 #include "cli/echo.hpp"
 #include "cli/live.hpp"
+#include "cli/numbers.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {
@@ -72,7 +73,7 @@ class Echo {
   int finish() {
     if (!std::cout) return 0;  // nobody reads it
     std::ostream& out = options_.json ? std::cerr : std::cout;
-    out << samples_ << " samples in " << seconds_text(shm::monotonic_now() - started_);
+    out << counted(samples_, "sample") << " in " << seconds_text(shm::monotonic_now() - started_);
     for (const auto& [source, count] : by_source_) out << ", " << count << " from " << source;
     out << '\n';
     if (const auto lost = overtaken(); lost != 0) {

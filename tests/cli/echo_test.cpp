@@ -219,6 +219,13 @@ TEST(Echo, JudgesTheNameBeforeItSaysWhoHasIt) {
               HasSubstr("no component has named /p* yet; echo takes one port, not a pattern"));
 }
 
+TEST(Echo, CountsOneEventInTheSingular) {
+  Daemon daemon(kOverrideModel);
+  Publishing publishing;
+  EXPECT_THAT(publishing.during({"echo", "/low", "--count", "1"}).out, HasSubstr("\n1 event in "));
+  EXPECT_THAT(publishing.during({"echo", "/p", "--count", "1"}).out, HasSubstr("\n1 sample in "));
+}
+
 TEST(Echo, SaysThatThePolicyForbidsIt) {
   const TemporaryDirectory files;
   const std::string policy = files.write("policy", "deny everyone tap /p\nallow everyone all\n");
