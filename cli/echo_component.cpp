@@ -9,6 +9,7 @@
 
 #include "cli/echo.hpp"
 #include "cli/live.hpp"
+#include "cli/numbers.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {
@@ -72,7 +73,7 @@ class Echo {
   int finish() {
     if (!std::cout) return 0;  // nobody reads it
     std::ostream& out = options_.json ? std::cerr : std::cout;
-    out << samples_ << " samples in " << seconds_text(shm::monotonic_now() - started_);
+    out << counted(samples_, "sample") << " in " << seconds_text(shm::monotonic_now() - started_);
     for (const auto& [source, count] : by_source_) out << ", " << count << " from " << source;
     out << '\n';
     if (const auto lost = overtaken(); lost != 0) {
@@ -100,7 +101,28 @@ class Echo {
 
 }  // namespace
 
+namespace {
+
+// Opened as an input port, the name of an output port would be another port, which nobody feeds.
+void refuse_output_port(const EchoOptions& options) {
+  wire::Status status;
+  try {
+    status = fetch_status("echo", options.instance);
+  } catch (const std::exception&) {
+    return;  // the policy does not let us ask; or opening the port will say what is wrong
+  }
+  const auto* source = status.find_source(options.port);
+  if (source == nullptr || status.find_input(options.port) != nullptr) return;
+  if (!source->open && !source->mentioned) return;  // a name of the past
+  throw Error(options.port + " is an output port of " +
+              (source->open ? source->open->component.node : "the model in force") +
+              "; --as-component takes an input port. To watch it, leave out --as-component");
+}
+
+}  // namespace
+
 int echo_component(const EchoOptions& options, const shm::FileDescriptor& interrupts) {
+  refuse_output_port(options);
   return Echo(options, interrupts).run();
 }
 

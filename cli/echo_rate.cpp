@@ -10,6 +10,7 @@
 #include "cli/broken_pipe.hpp"
 #include "cli/echo.hpp"
 #include "cli/live.hpp"
+#include "cli/numbers.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {
@@ -102,7 +103,8 @@ class RateEcho {
       if (is_interrupted || now >= end || ++lines_ == options_.count) break;
     }
     if (tap_.lost() != 0) {
-      std::cerr << "arbiter: " << tap_.lost() << " events came faster than they could be counted\n";
+      std::cerr << "arbiter: " << counted(tap_.lost(), "event")
+                << " came faster than they could be counted\n";
     }
     return 0;
   }

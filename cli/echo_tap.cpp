@@ -11,6 +11,7 @@
 
 #include "cli/echo.hpp"
 #include "cli/live.hpp"
+#include "cli/numbers.hpp"
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "shm/limits.hpp"
@@ -176,7 +177,7 @@ class TapEcho {
   int finish() {
     if (!std::cout) return 0;  // nobody reads it
     std::ostream& out = options_.json ? std::cerr : std::cout;
-    out << printed_ << (is_input_ && !options_.losers ? " samples in " : " events in ")
+    out << counted(printed_, is_input_ && !options_.losers ? "sample" : "event") << " in "
         << seconds_text(shm::monotonic_now() - started_);
     for (const auto& [source, count] : by_source_) out << ", " << count << " from " << source;
     out << '\n';
@@ -251,7 +252,9 @@ TapOf kind_of_port(const EchoOptions& options) {
     const std::string& name = instance->memory()->source_name(id);
     if (!name.empty()) known.emplace_back(name);
   }
+  const bool is_pattern = options.port.find('*') != std::string::npos;
   std::cerr << "arbiter: no model and no component has named " << options.port << " yet"
+            << (is_pattern ? "; echo takes one port, not a pattern" : "")
             << rules::advise(options.port, known, "`arbiter status` shows the ports that there are")
             << '\n';
   return by_name();

@@ -70,8 +70,8 @@ class Flight {
 
  private:
   static std::optional<rules::Statement> condition_of(const FlightOptions& options) {
-    if (options.when.empty()) return std::nullopt;
-    return read_condition("--when", options.when);
+    if (!options.when) return std::nullopt;
+    return read_condition("--when", *options.when);
   }
 
   recorder::RingOptions ring_options(const recording::McapOptions& file,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 
 #include "evidence/record_writer.hpp"
@@ -15,12 +16,12 @@ struct FlightOptions {
   shm::Nanoseconds span = 0;  // 0: no flight recorder
   std::size_t memory = std::size_t{64} << 20;
   std::string prefix;
-  std::size_t keep = 16;  // files that it writes of its own accord
-  std::string when;       // a statement; empty: none
+  std::size_t keep = 16;            // files that it writes of its own accord
+  std::optional<std::string> when;  // a statement
   shm::Nanoseconds end = shm::kForever;
 };
 
-// Until SIGINT or SIGTERM; SIGUSR1 writes a file.
+// Until SIGINT, SIGTERM or SIGHUP; SIGUSR1 writes a file.
 int fly(const FlightOptions& options, const recorder::RecorderOptions& settings,
         const recording::McapOptions& file, const evidence::RecordingInfo& info);
 // Asks the one that runs, and waits for so long at most.

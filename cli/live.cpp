@@ -97,6 +97,11 @@ shm::FileDescriptor catch_interrupts() {
   sigemptyset(&caught);
   sigaddset(&caught, SIGINT);
   sigaddset(&caught, SIGTERM);
+  // nohup has it ignored; but a signal that is blocked is read here all the same.
+  struct sigaction hangup {};
+  if (sigaction(SIGHUP, nullptr, &hangup) != 0 || hangup.sa_handler != SIG_IGN) {
+    sigaddset(&caught, SIGHUP);
+  }
   sigprocmask(SIG_BLOCK, &caught, nullptr);
   return shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
 }

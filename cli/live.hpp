@@ -61,8 +61,8 @@ std::string fetch_status_text(const std::string& verb, const std::string& instan
 wire::Status fetch_status(const std::string& verb, const std::string& instance);
 wire::Status fetch_status(wire::Caller caller, std::chrono::milliseconds answer_time);
 
-// SIGINT and SIGTERM as a descriptor, so that a stream ends with its summary. Call before threads
-// start.
+// SIGINT, SIGTERM and, unless it is ignored, SIGHUP as a descriptor, so that a stream ends with its
+// summary, also where the terminal has gone. Call before threads start.
 shm::FileDescriptor catch_interrupts();
 
 // Sleeps until `time` on CLOCK_MONOTONIC, or until `interrupts` is readable; true: it is.

@@ -10,6 +10,7 @@
 
 #include "cli/output_file.hpp"
 #include "cli/recording_compile.hpp"
+#include "cli/simulate_recording.hpp"
 #include "evidence/export.hpp"
 
 namespace arbiter::cli {
@@ -35,6 +36,7 @@ int export_recording(const ExportOptions& options) {
     std::cerr << "arbiter: " << options.file << ": " << recorded.about.end.problem
               << "; what comes before is exported\n";
   }
+  warn_of_missed(recorded);
   evidence::Models models(recording_compiler(1));
   const auto write = [&](const std::string& path, const auto& writer) {
     if (path.empty()) return;

@@ -42,6 +42,26 @@ void include(std::optional<RecordingInfo::Times>& times, McapTime time) {
   times->end = std::max(times->end, time);
 }
 
+// Of a file that only looks like a recording, nothing; nor is a record read that is too large.
+void count_missed(RecordingInfo& info, const recording::McapChannel& channel,
+                  const recording::McapMessage& message) {
+  constexpr std::size_t kMostBytes = std::size_t{64} << 10;
+  constexpr auto kind = static_cast<std::size_t>(evidence::RecordKind::kMissed);
+  if (channel.topic != evidence::record_schemas[kind].topic || channel.message_encoding != "json" ||
+      message.data.size() > kMostBytes) {
+    return;
+  }
+  const auto record = nlohmann::json::parse(message.data, nullptr, false);
+  const auto number = [&record](const char* name) -> std::uint64_t {
+    if (!record.is_object()) return 0;
+    const auto found = record.find(name);
+    const bool is_number = found != record.end() && found->is_number_unsigned();
+    return is_number ? found->get<std::uint64_t>() : 0;
+  };
+  info.missed_events += number("events");
+  info.missed_samples += number("samples");
+}
+
 void count_message(RecordingInfo& info, const recording::McapMessage& message) {
   ++info.messages;
   include(info.times, message.log_time);
@@ -49,11 +69,13 @@ void count_message(RecordingInfo& info, const recording::McapMessage& message) {
   ++channel.messages;
   channel.bytes += message.data.size();
   include(channel.times, message.log_time);
+  count_missed(info, channel.channel, message);
 }
 
 recording::McapVisitor visitor_for(RecordingInfo& info) {
   recording::McapVisitor visitor;
   visitor.header = [&info](const std::string& profile, const std::string& library) {
+    info.has_header = true;
     info.profile = profile;
     info.library = library;
   };
@@ -179,6 +201,8 @@ nlohmann::json to_json(const RecordingInfo& info) {
           {"profile", info.profile},
           {"library", info.library},
           {"messages", info.messages},
+          {"missed_events", info.missed_events},
+          {"missed_samples", info.missed_samples},
           {"begin", time_json(info.times, true)},
           {"end", time_json(info.times, false)},
           {"chunks", std::move(chunks)},

@@ -45,9 +45,12 @@ struct RecordingInfo {
 
   std::string path;
   recording::McapEnd end;
+  bool has_header = false;  // else there is nothing of it to repair
   std::string profile;
   std::string library;
   std::uint64_t messages = 0;
+  std::uint64_t missed_events = 0;   // by the recorder, as the file says
+  std::uint64_t missed_samples = 0;  // whose payloads it missed
   std::optional<Times> times;
   std::map<std::string, Chunks> chunks;  // by compression
   std::map<std::uint16_t, recording::McapSchema> schemas;

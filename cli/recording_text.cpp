@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "cli/recording_info.hpp"
+#include "evidence/recorded.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::cli {
@@ -96,6 +97,10 @@ std::string shortened(std::string_view value, std::size_t columns) {
 void write_state(std::ostream& out, const RecordingInfo& info) {
   if (info.end.is_whole) {
     write_wrapped(out, "state", info.end.has_summary ? "whole" : "whole, without a summary");
+    return;
+  }
+  if (info.end.file_bytes == 0) {
+    write_wrapped(out, "state", "the file is empty");
     return;
   }
   write_wrapped(
@@ -196,11 +201,17 @@ void write_text(std::ostream& out, const RecordingInfo& info) {
   if (!info.profile.empty()) write_wrapped(out, "profile", shm::printable(info.profile));
   write_times(out, info);
   write_wrapped(out, "messages", std::to_string(info.messages));
+  const std::string missed = evidence::missed_text(info.missed_events, info.missed_samples);
+  if (!missed.empty()) {
+    write_wrapped(out, "missed",
+                  "by the recorder: " + missed +
+                      "; what `simulate` and `export` tell around the gaps may be wrong");
+  }
   write_chunks(out, info);
   write_channels(out, info);
   write_metadata(out, info);
   write_attachments(out, info);
-  if (info.end.is_whole) return;
+  if (info.end.is_whole || !info.has_header) return;
   out << "\nTo make a whole file of what is whole:\n  arbiter recording repair "
       << shm::printable(info.path) << '\n';
 }

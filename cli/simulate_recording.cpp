@@ -54,17 +54,14 @@ std::size_t arrivals_of(const Recorded& recorded) {
 
 void write_head(const Recorded& recorded) {
   std::size_t sources = 0;
-  std::uint64_t lost = 0;
-  for (const auto& run : recorded.runs) {
-    sources = std::max(sources, run.sources.size());
-    lost += run.lost;
-  }
+  for (const auto& run : recorded.runs) sources = std::max(sources, run.sources.size());
   const shm::Nanoseconds start = recorded.runs.front().start;
   std::cout << "recording of instance \"" << shm::printable(recorded.about.instance) << "\", from "
             << wall_text(recorded, start) << ", " << seconds_text(recorded.runs.back().end - start)
             << ": " << counted(sources, "source") << ", "
             << counted(arrivals_of(recorded), "arrival") << '\n';
-  if (lost != 0) std::cout << "the recorder missed " << counted(lost, "event") << '\n';
+  const std::string missed = evidence::missed_text(recorded);
+  if (!missed.empty()) std::cout << "the recorder missed " << missed << '\n';
 }
 
 ordered_json to_json(const Recorded& recorded, const evidence::LiveDecision& live) {
@@ -242,6 +239,13 @@ Recorded load_for_simulation(const std::string& path) {
   }
   if (recorded.runs.empty()) throw evidence::RecordError(path + " is empty");
   return recorded;
+}
+
+void warn_of_missed(const Recorded& recorded) {
+  const std::string missed = evidence::missed_text(recorded);
+  if (missed.empty()) return;
+  std::cerr << "arbiter: the recorder missed " << missed
+            << ": what is told around the gaps may be wrong\n";
 }
 
 int simulate_recording(const SimulateRecordingOptions& options) {

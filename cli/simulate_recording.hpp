@@ -19,6 +19,9 @@ struct SimulateRecordingOptions {
 // Says on standard error where it is not whole. Throws McapError, RecordError.
 evidence::Recorded load_for_simulation(const std::string& path);
 
+// Says on standard error what the recorder missed, if it missed anything.
+void warn_of_missed(const evidence::Recorded& recorded);
+
 // 0: all is as it was; 1: something differs, or there is no decision to compare.
 int simulate_recording(const SimulateRecordingOptions& options);
 

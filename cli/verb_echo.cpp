@@ -8,11 +8,20 @@
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {
 
+// Before anything is said of a port by that name.
+void require_name(const std::string& port) {
+  if (port.empty()) throw CLI::ValidationError("PORT", "the name is empty; echo takes one port");
+  const auto problem = rules::find_problem_in_port(port);
+  if (problem) throw CLI::ValidationError("PORT", problem->message + "; echo takes one port");
+}
+
 int echo(const EchoOptions& options) {
+  require_name(options.port);
   const auto interrupts = catch_interrupts();
   if (options.as_component) return echo_component(options, interrupts);
   return options.rate ? echo_rate(options, interrupts) : echo_tap(options, interrupts);
@@ -27,7 +36,8 @@ void add_echo(CLI::App& app, int& exit_code) {
   verb->add_option("PORT", options->port,
                    "An output port: all its arrivals; an input port: what its arbiter accepts")
       ->required();
-  verb->add_option("--count", options->count, "Stop after this many lines")
+  verb->add_option("--count", options->count,
+                   "Stop after this many lines; with --rate, after this many seconds' rates")
       ->type_name("N")
       ->check(at_least_one());
   verb->add_option_function<std::string>(

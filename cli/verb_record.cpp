@@ -206,8 +206,8 @@ void add_flight_options(CLI::App& verb, const std::shared_ptr<RecordOptions>& op
           "What --ring may take up (default 64MiB): older records give way")
       ->type_name("SIZE")
       ->needs(ring);
-  verb.add_option(
-          "--when", options->flight.when,
+  verb.add_option_function<std::string>(
+          "--when", [options](const std::string& text) { options->flight.when = text; },
           "With --ring: write when this becomes true, a statement as `arbiter wait --until` "
           "reads it")
       ->type_name("STATEMENT")
@@ -277,7 +277,8 @@ void add_record(CLI::App& app, int& exit_code) {
       "  arbiter record --ring 5min -o /var/lib/robot/flight "
       "--when 'winner(/Arm/pos:i) = /Teleop/pos:o and not /Deadman:o'\n"
       "  arbiter record --dump -o /var/lib/robot/flight\n\n"
-      "Ends at Ctrl-C, or SIGTERM, with a whole file. Whoever records needs the policy's `tap`.");
+      "Ends at Ctrl-C, SIGTERM or SIGHUP (the terminal has gone; `nohup` keeps it running), with a "
+      "whole\nfile. Whoever records needs the policy's `tap`.");
   verb->callback([options, &exit_code] { exit_code = record(*options); });
 }
 

@@ -182,7 +182,9 @@ void add_wait(CLI::App& app, int& exit_code) {
           "--for", [options](const std::string& text) { options->hold = read_time("--for", text); },
           "Wait until the condition has been true for this time, at every look")
       ->type_name("DURATION");
-  verb->add_flag("--json", options->json, "Write what was seen at the end as JSON");
+  verb->add_flag("--json", options->json,
+                 "Write what was seen at the end as JSON: {condition, fulfilled, holds, at_ns, "
+                 "waited_ns, model, winners, active}");
   add_instance_option(*verb, options->instance);
   verb->footer(
       "Example:\n"

@@ -1,10 +1,12 @@
 #include "cli/why_recorded.hpp"
 
 #include <iostream>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "cli/model_files.hpp"
 #include "cli/recording_compile.hpp"
@@ -18,6 +20,7 @@ namespace arbiter::cli {
 namespace {
 
 using evidence::Cue;
+using evidence::Gap;
 using evidence::Run;
 
 // A model, from when it comes into force.
@@ -38,14 +41,29 @@ class Explaining {
   Explaining(std::shared_ptr<const Model> other, double effort, WhySimulated::Options options)
       : other_(std::move(other)), effort_(effort), options_(std::move(options)) {
     if (other_ != nullptr) judge_.emplace(other_->compiled, true);
+    options_.is_in_gap = [this](const std::string& source, shm::Nanoseconds time) {
+      const auto of_source = gaps_.find(source);
+      if (of_source == gaps_.end()) return false;
+      // The last one that begins before.
+      const auto next = of_source->second.lower_bound(time);
+      return next != of_source->second.begin() && std::prev(next)->second.has(time);
+    };
   }
 
   void explain(const Run& run) {
     words_.clear();
     tenure_.reset();
     is_first_ = true;
+    gaps_.clear();
+    const std::vector<Gap> gaps = evidence::gaps_of(run);
+    for (const Gap& gap : gaps) gaps_[*gap.source].insert_or_assign(gap.from, gap);
+    auto gap = gaps.begin();
     for (const Cue& cue : cues_of(run)) {
       if (!std::cout) return;  // nobody reads it
+      for (; gap != gaps.end() && gap->from < cue.time; ++gap) {
+        if (tenure_ == nullptr) continue;
+        tenure_->why.lose(*gap->source, gap->events, gap->from, gap->to, std::cout);
+      }
       if (cue.model != nullptr) {
         put_in_force(*cue.model, cue.time);
       } else {
@@ -102,9 +120,11 @@ class Explaining {
 
   const std::shared_ptr<const Model> other_;
   const double effort_;
-  const WhySimulated::Options options_;
+  WhySimulated::Options options_;
   std::optional<evidence::Judge> judge_;  // of the other model
   std::map<std::string, shm::ActivityWord> words_;
+  // What the recorder missed, by source and by when it begins.
+  std::map<std::string, std::map<shm::Nanoseconds, Gap>> gaps_;
   std::unique_ptr<Tenure> tenure_;
   bool is_first_ = true;  // no model of this run has come into force
 };
@@ -113,6 +133,7 @@ class Explaining {
 
 int explain_recording(const SimulateRecordingOptions& options, const std::string& port) {
   const auto recorded = load_for_simulation(options.recording);
+  warn_of_missed(recorded);
   std::shared_ptr<const Model> other;
   if (!options.other.models.empty()) {
     rules::Diagnostics diagnostics;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "cli/numbers.hpp"
 #include "rules/explain/change.hpp"
 #include "rules/explain/tenure.hpp"
 #include "rules/text/names.hpp"
@@ -100,14 +101,50 @@ void WhySimulated::find(const std::string& source, shm::ActivityWord word, shm::
   tell_changes(out);
 }
 
+void WhySimulated::lose(const std::string& source, std::uint64_t events, shm::Nanoseconds from,
+                        shm::Nanoseconds to, std::ostream& out) {
+  run_out_until(from, out);
+  if (!simulation_.knows(source)) return;
+  const auto ports = simulation_.table().ports_concerned(simulation_.source_id(source));
+  bool is_wanted = false;
+  for (shm::Word i = 0; i < ports.count; ++i) {
+    is_wanted |= options_.port.empty() || options_.port == simulation_.port_name(ports[i]);
+  }
+  if (!is_wanted) return;
+  if (options_.json) {
+    write_line(out, {{"t_ns", from},
+                     {"event", "missed"},
+                     {"source", source},
+                     {"events", events},
+                     {"until_ns", to}});
+    return;
+  }
+  out << text_of(from) << "  the recorder missed " << counted(events, "event") << " of " << source
+      << " from here until " << text_of(to) << ": what depends on it is not known\n";
+}
+
 // An end that a renewal has put off is looked at in vain.
 void WhySimulated::schedule(shm::SourceId source) {
   const shm::ActivityWord word = simulation_.activity(source);
   if (shm::is_finite(word) && simulation_.is_active(source)) ends_.emplace(word, source);
 }
 
-std::string WhySimulated::time_of_now() const {
-  return options_.time ? options_.time(simulation_.now()) : time_text(simulation_.now());
+std::string WhySimulated::text_of(shm::Nanoseconds time) const {
+  return options_.time ? options_.time(time) : time_text(time);
+}
+
+bool WhySimulated::is_in_gap(const std::string& source) const {
+  return options_.is_in_gap && options_.is_in_gap(source, simulation_.now());
+}
+
+// Behind what was missed, nobody knows when it became so; an end within may not have been one.
+std::string WhySimulated::cause_text(const std::string& source, const Sources& sources) const {
+  const SourceState state = sources.state(source);
+  if (!is_in_gap(source)) return event_text(source, state, simulation_.now());
+  if (shm::is_deactivation(state.word)) return source + " was deactivated in what was missed";
+  return shm::is_active(state.word, simulation_.now())
+             ? source + " is active behind what was missed"
+             : source + " went inactive, unless it arrived in what was missed";
 }
 
 void WhySimulated::tell_changes(std::ostream& out) {
@@ -159,7 +196,9 @@ void WhySimulated::tell_change(shm::PortId port, shm::SourceId before, shm::Sour
     json because = json::array();
     for (const shm::SourceId cause : causes) {
       const std::string& source = simulation_.source_name(cause);
-      because.push_back(event_json(source, sources.state(source), simulation_.now()));
+      json event = event_json(source, sources.state(source), simulation_.now());
+      if (is_in_gap(source)) event["is_in_gap"] = true;
+      because.push_back(std::move(event));
     }
     write_line(out, {{"t_ns", simulation_.now()},
                      {"port", name},
@@ -174,7 +213,7 @@ void WhySimulated::tell_change(shm::PortId port, shm::SourceId before, shm::Sour
       << "  because ";
   for (std::size_t i = 0; i < causes.size(); ++i) {
     const std::string& source = simulation_.source_name(causes[i]);
-    out << (i == 0 ? "" : " and ") << event_text(source, sources.state(source), simulation_.now());
+    out << (i == 0 ? "" : " and ") << cause_text(source, sources);
   }
   if (!loss.empty()) out << "; " << name_of(before) << " is " << loss;
   out << '\n';

@@ -2,6 +2,7 @@
 // arrivals out.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <ostream>
 #include <set>
@@ -25,6 +26,8 @@ class WhySimulated {
     bool json = false;
     // How a time is told; empty: in seconds.
     std::function<std::string(shm::Nanoseconds)> time{};
+    // Whether what a source did just then is not in the recording; empty: all is known.
+    std::function<bool(const std::string& source, shm::Nanoseconds)> is_in_gap{};
   };
 
   // Keeps references. Throws std::runtime_error where the model does not know the port.
@@ -39,12 +42,18 @@ class WhySimulated {
   // That is how a source is found at this time.
   void find(const std::string& source, shm::ActivityWord word, shm::Nanoseconds time,
             std::ostream& out);
+  // From now on, until `to`, it is not known what the source did.
+  void lose(const std::string& source, std::uint64_t events, shm::Nanoseconds from,
+            shm::Nanoseconds to, std::ostream& out);
   // Tells what ends by itself until then.
   void run_out_until(shm::Nanoseconds time, std::ostream& out);
 
  private:
   void schedule(shm::SourceId source);
-  [[nodiscard]] std::string time_of_now() const;
+  [[nodiscard]] std::string text_of(shm::Nanoseconds time) const;
+  [[nodiscard]] std::string time_of_now() const { return text_of(simulation_.now()); }
+  [[nodiscard]] bool is_in_gap(const std::string& source) const;
+  [[nodiscard]] std::string cause_text(const std::string& source, const Sources& sources) const;
   void tell_changes(std::ostream& out);
   void tell_change(shm::PortId port, shm::SourceId before, shm::SourceId now, std::ostream& out);
   void tell_discarded(const rules::OutcomeRow& row, std::ostream& out);

@@ -21,4 +21,19 @@ std::vector<Cue> cues_of(const Run& run) {
   return cues;
 }
 
+std::vector<Gap> gaps_of(const Run& run) {
+  std::vector<Gap> gaps;
+  for (const auto& [source, history] : run.sources) {
+    Nanoseconds last = run.start;
+    for (const Step& step : history.steps) {
+      const Nanoseconds before = last;
+      last = std::max(last, step.time);
+      if (step.lost != 0) gaps.push_back({&source, before, last, step.lost});
+    }
+  }
+  std::stable_sort(gaps.begin(), gaps.end(),
+                   [](const Gap& one, const Gap& other) { return one.from < other.from; });
+  return gaps;
+}
+
 }  // namespace arbiter::evidence

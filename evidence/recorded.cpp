@@ -1,6 +1,7 @@
 #include "evidence/recorded.hpp"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
 namespace arbiter::evidence {
@@ -66,7 +67,8 @@ class Loader {
     // It is tapped now; the step below stands behind the gap.
     if (each.why != SourceState::Why::page) history.unknown_from = shm::kForever;
     if (is_known && each.lost == 0) return;
-    Step step{each.time, each.seen, each.word, Step::Kind::state, false, each.generation};
+    Step step{each.time, each.seen,       each.word, Step::Kind::state,
+              false,     each.generation, each.lost};
     if (each.why == SourceState::Why::page) {
       // Of one that cannot be tapped, pages tell some of its steps.
       step.is_behind_gap = history.unknown_from != shm::kForever;
@@ -91,6 +93,7 @@ class Loader {
   void add(PortChange&& /*decides nothing*/) {}
   // Of what was overtaken a state says where it goes on.
   void add(Missed&& each) {
+    run().lost_samples += each.samples;
     if (each.why != Missed::Why::refused) return;
     Nanoseconds& from = run().sources[each.source].unknown_from;
     from = std::min(from, each.from);
@@ -99,7 +102,27 @@ class Loader {
   std::vector<Run> runs_;
 };
 
+std::string counted(std::uint64_t count, const std::string& thing) {
+  return std::to_string(count) + ' ' + thing + (count == 1 ? "" : "s");
+}
+
 }  // namespace
+
+std::string missed_text(std::uint64_t events, std::uint64_t samples) {
+  std::string text = events == 0 ? "" : counted(events, "event");
+  if (samples == 0) return text;
+  return text + (text.empty() ? "" : " and ") + "the payloads of " + counted(samples, "sample");
+}
+
+std::string missed_text(const Recorded& recorded) {
+  std::uint64_t events = 0;
+  std::uint64_t samples = 0;
+  for (const Run& run : recorded.runs) {
+    events += run.lost;
+    samples += run.lost_samples;
+  }
+  return missed_text(events, samples);
+}
 
 Recorded load_recording(const std::string& path) {
   Recorded recorded;

@@ -22,6 +22,7 @@ struct Step {
   Kind kind = Kind::arrival;
   bool is_behind_gap = false;  // between the step before and this one anything may have happened
   std::uint64_t generation = 0;
+  std::uint64_t lost = 0;  // events between the step before and this one, which is a state
 };
 
 struct SourceHistory {
@@ -52,12 +53,17 @@ struct Run {
   std::map<std::uint64_t, ModelChange> models;  // by generation
   std::vector<WinnerChange> winners;            // as they were recorded
   std::uint64_t lost = 0;                       // events
+  std::uint64_t lost_samples = 0;               // whose arrival is there, but not what was in them
 };
 
 struct Recorded {
   ReadRecording about;
   std::vector<Run> runs;
 };
+
+// What the recorder says that it missed: "3 events and the payloads of 2 samples"; empty: nothing.
+[[nodiscard]] std::string missed_text(std::uint64_t events, std::uint64_t samples);
+[[nodiscard]] std::string missed_text(const Recorded& recorded);
 
 // Throws McapError, RecordError.
 [[nodiscard]] Recorded load_recording(const std::string& path);

@@ -44,6 +44,14 @@ sockaddr_un address_of(const std::string& path) {
                            "; start one with: arbiter record --ring 5min -o " + prefix);
 }
 
+// The socket is its user's alone, and so may be the directory.
+[[noreturn]] void say_who_may_ask(const std::string& prefix) {
+  throw std::runtime_error(
+      "permission denied: only the user who has started the flight recorder "
+      "that writes to " +
+      prefix + " may ask it; run this as that user, or as root");
+}
+
 // A recorder that is stopped lets only so many stand at its door: then connecting waits, too.
 shm::FileDescriptor connected_to(const std::string& prefix, shm::Nanoseconds end) {
   const sockaddr_un address = address_of(prefix + ".sock");
@@ -57,6 +65,7 @@ shm::FileDescriptor connected_to(const std::string& prefix, shm::Nanoseconds end
          0) {
     if (errno == EINTR) continue;
     if (errno == EAGAIN) give_up(prefix);
+    if (errno == EACCES || errno == EPERM) say_who_may_ask(prefix);
     say_that_none_writes(prefix);
   }
   return socket;

@@ -117,7 +117,7 @@ McapEnd repair_mcap(const std::string& from, const std::string& to, std::string_
         if (!copy) copy.emplace(out.emplace(to, Unfinished::discard));
         copy->add(record, records);
       });
-  if (!copy) throw McapError("cannot repair " + from + ": nothing of it is whole. " + end.problem);
+  if (!copy) throw McapError("cannot repair " + from + ": nothing of it is whole: " + end.problem);
   copy->add_metadata("repaired", account_of(end, library));
   copy->close();
   return end;

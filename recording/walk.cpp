@@ -45,6 +45,7 @@ class Walk {
 };
 
 void Walk::read_magic() {
+  if (file_.size() == 0) throw Damage{"the file is empty"};
   const std::size_t count = std::min<std::uint64_t>(file_.size(), kMagic.size());
   const std::string_view found = file_.read(0, count);
   constexpr std::size_t kVersionAt = 5;

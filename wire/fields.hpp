@@ -193,7 +193,11 @@ class FieldReader {
   static void read(const Json& from, const std::string& path, std::map<std::string, T>& values) {
     if (!from.is_object()) refuse_type(path, from, "an object");
     values.clear();
-    for (const auto& [name, each] : from.items()) read(each, path + '.' + name, values[name]);
+    for (const auto& [name, each] : from.items()) {
+      std::string place = path;
+      place.append(1, '.').append(name);
+      read(each, place, values[name]);
+    }
   }
   template <class T>
   requires std::is_class_v<T>

@@ -317,7 +317,8 @@ std::vector<std::string> other_daemons(const std::string& instance, const std::s
     // What lies in a stranger's is not looked at; and he makes nobody wait for a name service by
     // making a directory: here a daemon has been found.
     if (!is_surely_trusted_ones(other)) continue;
-    const std::string path = other + "/" + instance + ".sock";
+    std::string path = other;
+    path.append("/").append(instance).append(".sock");
     const bool is_known = std::any_of(known.begin(), known.end(), [&](const std::string& each) {
       return are_same_file(each, path);
     });

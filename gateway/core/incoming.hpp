@@ -52,7 +52,9 @@ class Incoming {
   // One copy into Arbiter's memory, and an arrival, unless `deadline` has passed by then. With a
   // choice: an arrival at the source that the field chooses, and then the end of the other's
   // activity; where nothing can be chosen, of both.
-  Fate deliver(const ForeignSample& sample, Time deadline) noexcept;
+  // publish() throws for another port's loan, and this one is its own.
+  Fate deliver(const ForeignSample& sample,  // NOLINT(bugprone-exception-escape)
+               Time deadline) noexcept;
   // A sample came that cannot be read at all. With a choice both sources end.
   void fail() noexcept;
 
@@ -65,7 +67,8 @@ class Incoming {
   void describe(std::string_view text);
 
  private:
-  Fate pass_to(OutputPort<void>& port, const ForeignSample& sample, Time deadline) noexcept;
+  Fate pass_to(OutputPort<void>& port,  // NOLINT(bugprone-exception-escape): as deliver()
+               const ForeignSample& sample, Time deadline) noexcept;
   void deactivate_all() noexcept;
 
   const Entry& entry_;

@@ -191,6 +191,41 @@ TEST(Echo, AsAComponentTakesThePort) {
   EXPECT_EQ(arbiter({"echo", "/p", "--as-component", "--rate"}).exit_code, 2);
 }
 
+TEST(Echo, AsAComponentTakesNoOutputPort) {
+  Daemon daemon(kOverrideModel);
+  auto result = arbiter({"echo", "/low", "--as-component", "--for", "1ms"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.err,
+            "arbiter: /low is an output port of the model in force; --as-component takes an input "
+            "port. To watch it, leave out --as-component\n");
+  Node node("walker");
+  auto low = node.output_port<int>("/low");
+  result = arbiter({"echo", "/low", "--as-component", "--for", "1ms"});
+  EXPECT_THAT(result.err, HasSubstr("/low is an output port of walker; --as-component takes an "));
+  EXPECT_EQ(arbiter({"echo", "/new", "--as-component", "--for", "1ms"}).exit_code, 0);
+}
+
+TEST(Echo, JudgesTheNameBeforeItSaysWhoHasIt) {
+  Daemon daemon(kOverrideModel);
+  for (const char* name : {"", "p", "/p q"}) {
+    for (const char* way : {"--losers", "--rate", "--as-component"}) {
+      const auto result = arbiter({"echo", name, way, "--for", "1ms"});
+      EXPECT_EQ(result.exit_code, 2) << name;
+      EXPECT_THAT(result.err, AllOf(HasSubstr("; echo takes one port"),
+                                    Not(HasSubstr("no model and no component"))));
+    }
+  }
+  EXPECT_THAT(arbiter({"echo", "/p*", "--for", "1ms"}).err,
+              HasSubstr("no component has named /p* yet; echo takes one port, not a pattern"));
+}
+
+TEST(Echo, CountsOneEventInTheSingular) {
+  Daemon daemon(kOverrideModel);
+  Publishing publishing;
+  EXPECT_THAT(publishing.during({"echo", "/low", "--count", "1"}).out, HasSubstr("\n1 event in "));
+  EXPECT_THAT(publishing.during({"echo", "/p", "--count", "1"}).out, HasSubstr("\n1 sample in "));
+}
+
 TEST(Echo, SaysThatThePolicyForbidsIt) {
   const TemporaryDirectory files;
   const std::string policy = files.write("policy", "deny everyone tap /p\nallow everyone all\n");

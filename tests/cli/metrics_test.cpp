@@ -142,6 +142,17 @@ TEST(MetricsServer, FollowsTheDaemonsThatComeAndGo) {
   EXPECT_EQ(served.process().wait(), 0);
 }
 
+TEST(MetricsServer, RemovesItsSocketAtAHangup) {
+  ::signal(SIGHUP, SIG_DFL);  // what a test was started with, the program has too
+  const TemporaryDirectory directory;
+  const std::string socket = directory.file("metrics.sock");
+  Served served(directory.path(), socket);
+  EXPECT_TRUE(std::filesystem::exists(socket));
+  served.process().signal(SIGHUP);
+  EXPECT_EQ(served.process().wait(), 0);
+  EXPECT_FALSE(std::filesystem::exists(socket));
+}
+
 TEST(MetricsServer, AnswersWhatItDoesNotServe) {
   const TemporaryDirectory directory;
   const Served served(directory.path(), "127.0.0.1:0", "nobody-has-this-instance");

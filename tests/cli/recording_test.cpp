@@ -130,6 +130,19 @@ TEST_F(RecordingVerb, SaysWhyAFileIsNotWhole) {
                     HasSubstr("arbiter recording repair " + path)));
 }
 
+TEST_F(RecordingVerb, AdvisesNoRepairWhereNothingIsWhole) {
+  const std::string empty = directory_.write("empty.mcap", "");
+  auto result = arbiter({"recording", "info", empty});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, AllOf(ContainsRegex("state +the file is empty\n"),
+                                Not(HasSubstr("arbiter recording repair"))));
+  EXPECT_THAT(arbiter({"recording", "repair", empty}).err, HasSubstr("the file is empty"));
+  result =
+      arbiter({"recording", "info", directory_.write("b.mcap", content_of(whole_).substr(0, 8))});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, Not(HasSubstr("arbiter recording repair")));
+}
+
 TEST_F(RecordingVerb, RepairsBesideTheFile) {
   const std::string path = cut();
   const std::string before = content_of(path);

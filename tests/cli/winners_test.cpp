@@ -92,6 +92,14 @@ TEST_F(Winners, AreToldToAComponent) {
   EXPECT_EQ(program_.wait(), 0);
 }
 
+TEST_F(Winners, EndAtAHangup) {
+  ::signal(SIGHUP, SIG_DFL);  // what a test was started with, the program has too
+  start();
+  repetition();
+  program_.signal(SIGHUP);
+  EXPECT_EQ(program_.wait(), 0);
+}
+
 TEST_F(Winners, AreThoseOfTheModelInForce) {
   random_.signal();
   start();

@@ -83,6 +83,16 @@ TEST_F(Flight, WritesWhereItIsAsked) {
   EXPECT_EQ(arbiter({"record", "--dump", "-o", prefix_}).exit_code, 1);
 }
 
+// As where the SSH session closes in which it was started.
+TEST_F(Flight, EndsInGoodOrderAtAHangup) {
+  ::signal(SIGHUP, SIG_DFL);  // what a test was started with, the program has too
+  ChildProcess recorder = fly();
+  EXPECT_TRUE(std::filesystem::exists(prefix_ + ".sock"));
+  recorder.signal(SIGHUP);
+  EXPECT_EQ(recorder.wait(), 0);
+  EXPECT_FALSE(std::filesystem::exists(prefix_ + ".sock"));
+}
+
 TEST_F(Flight, WritesWhereAStatementBecomesTrue) {
   Node node("test");
   auto low = node.output_port<int>("/low");
@@ -132,6 +142,11 @@ TEST_F(Flight, SaysWhichNameOfAStatementTheModelLacks) {
 TEST_F(Flight, RefusesAStatementThatCannotBeRead) {
   const auto result = arbiter({"record", "--ring", "10s", "-o", prefix_, "--when", "and"});
   EXPECT_EQ(result.exit_code, 2);
+  for (const char* empty : {"", " "}) {
+    const auto refused = arbiter({"record", "--ring", "10s", "-o", prefix_, "--when", empty});
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.err, HasSubstr("the condition is empty"));
+  }
   EXPECT_EQ(arbiter({"record", "--ring", "10s", "-o", prefix_, "--memory", "7"}).exit_code, 2);
 }
 

@@ -181,6 +181,33 @@ TEST(Record, SaysWhatItMissed) {
   EXPECT_EQ(recording.simulate()["different"], 0);
 }
 
+TEST(Record, HasAWholeFileAfterAHangup) {
+  ::signal(SIGHUP, SIG_DFL);  // what a test was started with, the program has too
+  Daemon daemon(kOverrideModel);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  Recording recording(daemon);
+  low.publish(1);
+  EXPECT_EQ(recording.end(SIGHUP), 0) << recording.error();
+  EXPECT_THAT(recording.output(), HasSubstr("1 arrival of "));
+  const auto read = evidence::read_recording(recording.file(), evidence::Payloads::pass_over,
+                                             [](evidence::Record&& /*any*/) {});
+  EXPECT_TRUE(read.end.is_whole) << read.end.problem;
+}
+
+TEST(Record, GoesOnAfterAHangupThatIsIgnored) {
+  Daemon daemon(kOverrideModel);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  ::signal(SIGHUP, SIG_IGN);  // as nohup does
+  Recording recording(daemon);
+  ::signal(SIGHUP, SIG_DFL);
+  recording.process().signal(SIGHUP);
+  low.publish(1);
+  recording.wait_for<Arrival>([](const auto&) { return true; });
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+}
+
 TEST(Record, IsReadUpToTheLastChunkAfterAKill) {
   Daemon daemon(kOverrideModel);
   Node node("test");

@@ -20,6 +20,7 @@
 #include "shm/clock.hpp"
 #include "tests/evidence/incident.hpp"
 #include "tests/recorder/recording.hpp"
+#include "tests/support/other_user.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -235,6 +236,19 @@ TEST(DumpSocket, AnswersWithTheFileThatWasAskedFor) {
   socket.answer(7, "written it\n");
   asking.join();
   EXPECT_EQ(answer, "written it\n");
+}
+
+TEST(DumpSocket, SaysThatAnotherUserMayNotAsk) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can be another user";
+  const TemporaryDirectory directory;
+  ASSERT_EQ(::chmod(directory.path().c_str(), 0755), 0);
+  const std::string prefix = directory.file("flight");
+  const recorder::DumpSocket socket(prefix);
+  const auto ask = [](const std::string& whom) {
+    return as_user(kStranger, [&] { return recorder::ask_for_dump(whom, shm::kForever); });
+  };
+  EXPECT_THAT(ask(prefix), HasSubstr("permission denied: only the user who has started the "));
+  EXPECT_THAT(ask(directory.file("another")), HasSubstr("no flight recorder writes to "));
 }
 
 TEST_F(RingTest, WritesAllThatItHasIfNothingHasLeft) {

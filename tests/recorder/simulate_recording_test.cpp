@@ -208,6 +208,47 @@ TEST(SimulateRecording, TellsWhyByTheModelThatWasInForce) {
   EXPECT_THAT(result.out, HasSubstr("\n+0.000000210 s  /p  /high discarded: inhibited by "));
 }
 
+// What lies between is not made up: neither by --why, nor silently by an export.
+TEST(SimulateRecording, SaysWhereTheRecorderMissedSomething) {
+  const TemporaryDirectory directory;
+  Incident incident;
+  incident.arrive("/low", 1100, 1101, Incident::Fate::accepted);
+  incident.arrive("/high", 1200, 1201, Incident::Fate::accepted);
+  incident.add(evidence::Missed{"/high", 0, 2400, 3, 2, evidence::Missed::Why::overtaken, ""});
+  incident.state("/high", 2400, 2450, shm::arrival(2400, 500), evidence::SourceState::Why::gap, 3);
+  incident.arrive("/low", 2500, 2501, Incident::Fate::discarded);
+  incident.arrive("/low", 3000, 3001, Incident::Fate::accepted);
+  const std::string file = incident.file();
+  const char* const warning =
+      "arbiter: the recorder missed 3 events and the payloads of 2 samples: what is told around "
+      "the gaps may be wrong\n";
+  const auto why = arbiter({"simulate", "--recording", file, "--why=/p"});
+  EXPECT_EQ(why.exit_code, 0) << why.err;
+  EXPECT_EQ(why.err, warning);
+  for (const char* line :
+       {"\n+0.000000100 s  the recorder missed 3 events of /high from here until +0.000001300 s: "
+        "what depends on it is not known\n",
+        "\n+0.000000600 s  /p  /high -> idle  because /high went inactive, unless it arrived in "
+        "what "
+        "was missed\n",
+        "\n+0.000001300 s  /p  idle -> /high  because /high is active behind what was missed\n",
+        "\n+0.000001800 s  /p  /high -> /low  because /high went inactive, 0 us after its "
+        "last "}) {
+    EXPECT_THAT(why.out, HasSubstr(line));
+  }
+  const auto lines = arbiter({"simulate", "--recording", file, "--why", "--json"});
+  EXPECT_THAT(lines.out, HasSubstr(R"({"event":"missed","events":3,"source":"/high",)"));
+  EXPECT_THAT(lines.out, HasSubstr(R"("is_in_gap":true)"));
+  const auto exported =
+      arbiter({"recording", "export", file, "--trace", directory.file("trace.csv")});
+  EXPECT_EQ(exported.exit_code, 0);
+  EXPECT_EQ(exported.err, warning);
+  EXPECT_THAT(arbiter({"simulate", "--recording", file}).out,
+              HasSubstr("\nthe recorder missed 3 events and the payloads of 2 samples\n"));
+  const auto info = arbiter({"recording", "info", file}).out;
+  EXPECT_THAT(info, HasSubstr("missed        by the recorder: 3 events and the payloads of 2"));
+}
+
 TEST(SimulateRecording, NeedsARecording) {
   Daemon daemon(kOverrideModel);
   auto result = arbiter({"simulate", "--recording", daemon.directory() + "/none.mcap"});
