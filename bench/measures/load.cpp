@@ -30,7 +30,7 @@ class Load {
 
  private:
   void start(const std::vector<std::string>& argv) {
-    programs_.emplace_back(argv, std::map<std::string, std::string>{}, directory_.path() + "/log");
+    programs_.emplace_back(argv, Program::Variables{}, directory_.path() + "/log");
   }
 
   ScratchDirectory directory_;
