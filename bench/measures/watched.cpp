@@ -110,7 +110,7 @@ Contender publisher(const std::string& system, bool watched) {
     return [it = std::make_shared<Publisher>(robot)] { (*it)(); };
   });
   if (!watched) {
-    one.round = [receivers, round = std::move(one.round)](double seconds) {
+    one.round = [robot, receivers, round = std::move(one.round)](double seconds) {
       return round(seconds);
     };
     return one;
@@ -122,7 +122,7 @@ Contender publisher(const std::string& system, bool watched) {
       with.say(watching.drawn());
     }
   });
-  one.round = [receivers, top, round = std::move(one.round)](double seconds) {
+  one.round = [robot, receivers, top, round = std::move(one.round)](double seconds) {
     top->say(1);
     const std::uint64_t before = top->hear();
     Histogram each = round(seconds);
