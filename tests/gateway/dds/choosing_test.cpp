@@ -34,6 +34,7 @@ TEST_P(DdsChoosing, ABooleanOfRos2IsALock) {
   button.await("matched 1");
   gateway.see("/Nav/cmd_vel:o comes from DDS topic rt/cmd_vel_nav, 1 publisher matched");
   gateway.see("comes from DDS topic rt/e_stop, 1 publisher matched");
+  gateway.see("1 subscriber matched");
   button.publish("0");  // false: released
   for (std::optional<std::string> line; line != "sample 1 0"; line = base.line_within(20)) {
     navigation.publish("1 0");

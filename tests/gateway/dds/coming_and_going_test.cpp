@@ -39,6 +39,7 @@ TEST_P(DdsComingAndGoing, ASubscriberThatIsKilledHoldsNobodyUp) {
   auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
   Stranger other(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
   other.await("matched 1");
+  gateway.see("2 subscribers matched");
   navigation.publish("1 0");
   EXPECT_EQ(other.next_line(), "sample 1 0");
   base.process().kill();

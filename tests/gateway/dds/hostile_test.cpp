@@ -73,6 +73,7 @@ TEST(DdsHostile, WhatIsNotEncodedAsDdsEncodesIsPassedOver) {
   base.await("matched 1");
   liar.await_reader();
   gateway.see("1 publisher matched");
+  gateway.see("1 subscriber matched");
   for (const std::string& bytes :
        {std::string("\xff\xff\0\0", 4), std::string("\0\4\0\0", 4) + std::string(48, 'x'),
         std::string("\1\1\0\0", 4) + std::string(48, 'x'), std::string(200, '\x7f')}) {

@@ -87,6 +87,7 @@ TEST_P(DdsMatching, PartitionsKeepTopicsApartAndJoinThem) {
   base.await("matched 1");
   navigation.await("matched 1");
   gateway.see("1 publisher matched");
+  gateway.see("1 subscriber matched");
   navigation.publish("4 2");
   EXPECT_EQ(base.next_line(), "sample 4 2");
   // Neither end warns of the other's partition, nor is the publisher a foreign one of the topic

@@ -46,6 +46,7 @@ TEST_P(DdsPassing, TheOneWhoOverridesIsObeyed) {
   teleop.await("matched 1");
   gateway.see("/Nav/cmd_vel:o comes from DDS topic rt/cmd_vel_nav, 1 publisher matched");
   gateway.see("/Teleop/cmd_vel:o comes from DDS topic rt/cmd_vel_teleop, 1 publisher matched");
+  gateway.see("1 subscriber matched");
   navigation.publish("1 1");
   EXPECT_EQ(base.next_line(), "sample 1 1");
   teleop.publish("2 2");

@@ -187,6 +187,8 @@ struct Passage {
     to.await("matched 1");
     from.await("matched 1");
     gateway.see("1 publisher matched");
+    // A writer sends to those that it has found, which may be later than they have found it.
+    gateway.see("1 subscriber matched");
   }
 
   OwnDomain domain;
