@@ -46,9 +46,9 @@ void include(std::optional<RecordingInfo::Times>& times, McapTime time) {
 void count_missed(RecordingInfo& info, const recording::McapChannel& channel,
                   const recording::McapMessage& message) {
   constexpr std::size_t kMostBytes = std::size_t{64} << 10;
-  constexpr auto kind = static_cast<std::size_t>(evidence::RecordKind::kMissed);
-  if (channel.topic != evidence::record_schemas[kind].topic || channel.message_encoding != "json" ||
-      message.data.size() > kMostBytes) {
+  constexpr auto kMissed = static_cast<std::size_t>(evidence::RecordKind::kMissed);
+  if (channel.topic != evidence::record_schemas[kMissed].topic ||
+      channel.message_encoding != "json" || message.data.size() > kMostBytes) {
     return;
   }
   const auto record = nlohmann::json::parse(message.data, nullptr, false);

@@ -186,7 +186,7 @@ ShortNames::Cuts ShortNames::cuts_of(std::size_t columns) const {
   const auto by_difference = [&](std::size_t i) {
     const std::vector<std::string> parts = parts_of(names_[i]);
     const Alike& alike = groups.at(group_of(first_way(i), parts));
-    const std::string whole = drop_common(parts, alike, false, charset_);
+    std::string whole = drop_common(parts, alike, false, charset_);
     if (columns_of(whole) <= columns) return whole;
     const std::string least = drop_common(parts, alike, true, charset_);
     return columns_of(least) <= columns ? least : cut_middle(least, columns, 4, charset_);
