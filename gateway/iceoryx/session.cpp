@@ -25,7 +25,9 @@ constexpr shm::Nanoseconds kMillisecond = 1'000'000;
 constexpr shm::Nanoseconds kLongestWait = 250 * kMillisecond;
 // Topics that no WaitSet has room for are looked at that often: an emergency stop may be one.
 constexpr shm::Nanoseconds kUnwatchedPeriod = 5 * kMillisecond;
-constexpr shm::Nanoseconds kDiscoveryPeriod = 200 * kMillisecond;
+constexpr shm::Nanoseconds kListPeriod = 200 * kMillisecond;
+// RouDi needs a tenth of a second to connect who is in its list.
+constexpr int kLooksUntilRefused = 10;
 // RouDi gives up a process that has not been heard of for 1.5 s, whose ends are dead from then on
 // although nothing tells it so. What keeps its keep-alive from running keeps this thread, too.
 constexpr shm::Nanoseconds kGivenUp = 1200 * kMillisecond;
@@ -97,7 +99,7 @@ std::string what_is_made() { return made; }
 Session::Session(std::string gateway, RoudiIdentity roudi, std::vector<Middleware::OpenIn> ins,
                  const std::vector<ChunkSender*>& outs)
     : gateway_(std::move(gateway)), roudi_(roudi), ins_(std::move(ins)) {
-  for (ChunkSender* const out : outs) outs_.push_back({out, {}});
+  for (ChunkSender* const out : outs) outs_.push_back({out});
   thread_ = std::thread([this] { run(); });
 }
 
@@ -123,7 +125,7 @@ void Session::run() {
   waits_.announce(*wait_set_);
   take_for_ever();
   wait_set_.reset();
-  registry_.reset();
+  port_list_.reset();
   inlets_.clear();
   publishers_.clear();
   ended_.store(true, std::memory_order_relaxed);
@@ -142,7 +144,7 @@ void Session::make_ends() {
     out.sender->use(*publishers_.back());
   }
   made = "the subscriber of RouDi's list of ports";
-  registry_.emplace();
+  port_list_.emplace();
   wait_set_ = std::make_unique<iox::popo::WaitSet<>>();
   for (const Middleware::OpenIn& in : ins_) {
     const Entry& entry = in.incoming.entry();
@@ -180,7 +182,7 @@ void Session::take_for_ever() {
     const shm::Nanoseconds before = last_round_.exchange(now, std::memory_order_relaxed);
     if (now - before > kGivenUp) stalled_.store(true, std::memory_order_relaxed);
     for (const auto& inlet : inlets_) take_all(*inlet);
-    look_for_publishers(now);
+    look_at_list(now);
   }
 }
 
@@ -217,23 +219,41 @@ void Session::take_all(Inlet& inlet) {
   }
 }
 
-void Session::look_for_publishers(shm::Nanoseconds now) {
-  if (now - looked_for_publishers_ < kDiscoveryPeriod) return;
-  looked_for_publishers_ = now;
-  if (registry_->update()) {
+void Session::look_at_list(shm::Nanoseconds now) {
+  if (now - looked_at_list_ < kListPeriod) return;
+  looked_at_list_ = now;
+  if (port_list_->update()) {
     for (const auto& inlet : inlets_) {
-      inlet->in.account.set_peers(static_cast<std::uint32_t>(registry_->of(inlet->topic).size()));
+      const std::size_t publishers = port_list_->publishers_of(inlet->topic).size();
+      inlet->in.account.set_peers(static_cast<std::uint32_t>(publishers));
     }
   }
   // Also where the list is the same: who has ended stays in it for a while.
-  for (Outlet& out : outs_) look_for_strangers(out);
+  for (Outlet& out : outs_) {
+    look_for_strangers(out);
+    look_for_refused(out);
+  }
+}
+
+// RouDi connects no subscriber that asks for what its publisher does not offer, and tells neither.
+void Session::look_for_refused(Outlet& out) const {
+  const auto subscribers = port_list_->subscribers_of(*out.sender->entry().iceoryx);
+  if (subscribers.empty() || out.sender->publisher()->hasSubscribers()) {
+    out.looks_without_any = 0;
+    return;
+  }
+  if (++out.looks_without_any != kLooksUntilRefused) return;
+  out.sender->account().set_last_reason(
+      subscribers.front() +
+      " subscribes and is not connected: it asks for history=\"…\", or to be waited for when its "
+      "queue is full, which no gateway does");
 }
 
 // What does not pass the gateway can bypass it.
-void Session::look_for_strangers(Outlet& out) {
+void Session::look_for_strangers(Outlet& out) const {
   const std::string own = runtime_name(gateway_, ::getpid());
   std::string strangers;
-  for (const std::string& runtime : registry_->of(*out.sender->entry().iceoryx)) {
+  for (const std::string& runtime : port_list_->publishers_of(*out.sender->entry().iceoryx)) {
     const auto process = process_of(gateway_, runtime);
     const bool has_ended = process && ::kill(*process, 0) != 0 && errno == ESRCH;
     if (runtime != own && !has_ended) strangers += (strangers.empty() ? "" : ", ") + runtime;

@@ -19,7 +19,7 @@
 
 #include "gateway/core/announced.hpp"
 #include "gateway/core/middleware.hpp"
-#include "gateway/iceoryx/publishers.hpp"
+#include "gateway/iceoryx/port_list.hpp"
 #include "gateway/iceoryx/roudi.hpp"
 
 namespace arbiter::gateway {
@@ -70,18 +70,20 @@ class Session {
 
  private:
   struct Inlet;
-  // An `out` entry, and who else writes to its topic.
+  // An `out` entry, who else writes to its topic, and who subscribes to it in vain.
   struct Outlet {
     ChunkSender* sender;
-    std::string strangers;
+    std::string strangers{};
+    int looks_without_any = 0;  // at the list, while it has subscribers and the publisher none
   };
 
   void run();
   void make_ends();
   void take_all(Inlet& inlet);
   void take_for_ever();
-  void look_for_publishers(shm::Nanoseconds now);
-  void look_for_strangers(Outlet& out);
+  void look_at_list(shm::Nanoseconds now);
+  void look_for_strangers(Outlet& out) const;
+  void look_for_refused(Outlet& out) const;
 
   const std::string gateway_;
   const RoudiIdentity roudi_;
@@ -91,8 +93,8 @@ class Session {
   std::vector<std::unique_ptr<Inlet>> inlets_;
   std::unique_ptr<iox::popo::WaitSet<>> wait_set_;
   bool watches_all_ = true;  // no more topics than a WaitSet can watch
-  std::optional<Publishers> registry_;
-  shm::Nanoseconds looked_for_publishers_ = 0;
+  std::optional<PortList> port_list_;
+  shm::Nanoseconds looked_at_list_ = 0;
   Announced<iox::popo::WaitSet<>> waits_;  // the last that is made
   // Relaxed is enough for these: a flag or a reading by itself, of which the last one counts. Who
   // finds that the thread has ended joins it.

@@ -65,12 +65,12 @@ TEST(Supervisor, KillsAWorkerThatDoesNotEndWhenItIsAskedTo) {
 
 // Somebody looks into it, with a debugger or by SIGSTOP.
 TEST(Supervisor, LeavesAWorkerAloneThatIsStopped) {
-  Spoken program = supervised("beat", 500, 100);
+  Spoken program = supervised("beat", 1000, 100);
   const pid_t worker = next_worker(program);
   EXPECT_EQ(program.line(), "beats");
   ::kill(worker, SIGSTOP);
   const auto stopped = shm::monotonic_now();
-  while (shm::monotonic_now() - stopped < 1'500'000'000) ::usleep(5000);
+  while (shm::monotonic_now() - stopped < 2'500'000'000) ::usleep(5000);
   ::kill(worker, SIGCONT);
   program.process.signal(SIGTERM);
   EXPECT_THAT(program.line().value_or(""), HasSubstr("did not end"));
