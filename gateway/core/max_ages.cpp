@@ -22,7 +22,7 @@ wire::Caller caller_of(const std::string& instance) {
   caller.instance = wire::instance_name(instance);
   // It is asked for from the loop, which must not wait for long.
   caller.patience = std::chrono::milliseconds(1);
-  caller.answer_time = std::chrono::milliseconds(1000);
+  caller.answer_time = std::chrono::milliseconds(100);
   return caller;
 }
 

@@ -130,6 +130,12 @@ IceoryxTopic read_iceoryx_topic(Attributes& attributes, bool is_in) {
   topic.service = attributes.required("service", kMaxIceoryxName);
   topic.instance = attributes.required("instance", kMaxIceoryxName);
   topic.event = attributes.required("event", kMaxIceoryxName);
+  if (!is_in && topic.instance == "RouDi_ID" &&
+      (topic.service == "Introspection" || topic.service == "ServiceDiscovery")) {
+    attributes.error("invalid-topic", "service",
+                     "RouDi publishes on its own topics itself, and lets nobody else; write "
+                     "another service or instance");
+  }
   const auto set = [](std::uint32_t& to, std::optional<std::uint64_t> from) {
     if (from) to = static_cast<std::uint32_t>(*from);
   };

@@ -214,6 +214,72 @@ TEST(Mapping, AnIdleSampleComesFromAFileBesideTheMapping) {
   EXPECT_THAT(with("stop.bin").message(), HasSubstr("write none, zero, or file:"));
 }
 
+// A subscriber takes it for a sample of its type, and may read past its end.
+TEST(Mapping, AnIdleSampleOfAFileHasTheSizeOfItsType) {
+  const test::TemporaryDirectory directory;
+  const std::string path = directory.path();
+  const std::string header("\0\1\0\0", 4);
+  directory.write("bool.bin", header + "0");
+  directory.write("padded.bin", header + "0000");
+  directory.write("long.bin", header + "00000");
+  directory.write("plain.bin", "00000000");
+  const auto dds = [&](const std::string& file) {
+    return read_text(
+        "<gateway kind='dds'><out port='/a:i' topic='/a' type='std_msgs/msg/Bool' "
+        "idle='file:" +
+            file + "'/></gateway>",
+        &path);
+  };
+  EXPECT_THAT(dds("bool.bin").findings(), IsEmpty());
+  EXPECT_THAT(dds("padded.bin").findings(), IsEmpty());
+  EXPECT_THAT(dds("long.bin").message(),
+              HasSubstr("has 9 bytes; a sample has 4 of headers and 1 of its own"));
+  EXPECT_THAT(dds("plain.bin").message(), HasSubstr("encapsulation header of DDS"));
+  const auto iceoryx = [&](const std::string& size) {
+    return read_text(
+        "<gateway kind='iceoryx'><out port='/a:i' service='a' instance='b' event='c' "
+        "user_header='4' alignment='4' idle='file:plain.bin' " +
+            size + "/></gateway>",
+        &path);
+  };
+  EXPECT_THAT(iceoryx("").findings(), IsEmpty());
+  EXPECT_THAT(iceoryx("size='4'").findings(), IsEmpty());
+  EXPECT_THAT(iceoryx("size='8'").findings(), ElementsAre("1:113 error idle-size"));
+}
+
+TEST(Mapping, WhatContradictsItselfIsAnError) {
+  const std::string topic = " service='a' instance='b' event='c' ";
+  EXPECT_THAT(read_iceoryx("<in port='/a:o'" + topic + "size='4'/>").findings(),
+              ElementsAre("1:82 error misplaced-attribute"));
+  EXPECT_THAT(read_iceoryx("<out port='/a:i'" + topic + "size='4'/>").findings(),
+              ElementsAre("1:83 error misplaced-attribute"));
+  EXPECT_THAT(
+      read_iceoryx("<in port='/a:o'" + topic + "type='T' size='100' max_size='99'/>").message(),
+      HasSubstr("max_size is 99 bytes, and the sample that size=\"…\" asks for has 100"));
+  EXPECT_THAT(read_dds("<out port='/a:i' topic='/a' type='std_msgs/msg/Bool' idle='zero' "
+                       "max_size='4'/>")
+                  .message(),
+              HasSubstr("the sample that idle=\"…\" asks for has 5"));
+  // Without max_size it is as large as it must be.
+  const Read large = read_iceoryx("<in port='/a:o'" + topic + "type='T' size='1MiB'/>");
+  ASSERT_THAT(large.findings(), IsEmpty());
+  EXPECT_EQ(large.entry().max_size, std::size_t{1} << 20);
+}
+
+TEST(Mapping, RouDisOwnTopicsCanBeReadAndNotWritten) {
+  const std::string topic = " service='Introspection' instance='RouDi_ID' event='Port' ";
+  EXPECT_THAT(read_iceoryx("<in port='/a:o'" + topic + "/>").findings(), IsEmpty());
+  EXPECT_THAT(read_iceoryx("<out port='/a:i'" + topic + "/>").message(),
+              HasSubstr("lets nobody else"));
+}
+
+TEST(Mapping, ListsAreBounded) {
+  std::string many = "a";
+  for (int i = 0; i < 64; ++i) many += ",a";
+  EXPECT_THAT(read_text("<gateway kind='dds' peers='" + many + "'/>").message(),
+              HasSubstr("write at most 64 values"));
+}
+
 TEST(Mapping, NamesOfRos2AreToldFromOthers) {
   for (const char* good : {"/a", "/a/b_c", "/_x/Y9"}) EXPECT_TRUE(is_ros_topic(good)) << good;
   for (const char* bad : {"", "/", "a", "/a/", "/a//b", "/9a", "/a b", "/a-b"}) {
