@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <string_view>
-#include <utility>
 
 #include "gateway/core/say.hpp"
 #include "gateway/dds/quota.hpp"
@@ -107,12 +106,12 @@ std::string configuration_of(const Gateway& gateway) {
   return result + text;
 }
 
-Domain::Domain(const Gateway& gateway, std::set<std::string> topics, const Bell& bell)
+Domain::Domain(const Gateway& gateway, const std::set<std::string>& topics, const Bell& bell)
     : domain_(dds_create_domain(domain_of(gateway), configuration_of(gateway).c_str()),
               "domain " + std::to_string(domain_of(gateway))),
       participant_(dds_create_participant(domain_of(gateway), nullptr, nullptr),
                    "a participant in domain " + std::to_string(domain_of(gateway))),
-      peers_(participant_.get(), std::move(topics), bell) {}
+      peers_(participant_.get(), topics, bell) {}
 
 CycloneWords::CycloneWords() { kept_words = &last_; }
 CycloneWords::~CycloneWords() { kept_words = nullptr; }

@@ -21,7 +21,7 @@ namespace arbiter::gateway::dds {
 class Domain {
  public:
   // Throws DdsError: there is no such network interface now, for example.
-  Domain(const Gateway& gateway, std::set<std::string> topics, const Bell& bell);
+  Domain(const Gateway& gateway, const std::set<std::string>& topics, const Bell& bell);
 
   [[nodiscard]] dds_entity_t participant() const { return participant_.get(); }
   [[nodiscard]] Peers& peers() { return peers_; }

@@ -106,16 +106,28 @@ TEST_P(DdsMatching, WhoeverPublishesPastArbiterIsWarnedOfAtOnce) {
   gateway.see("publishes there, too: what it sends reaches the subscribers past Arbiter");
 }
 
-// A node of ROS 2 from Iron on warns of ends without one.
-TEST_P(DdsMatching, TheTypeHashOfRos2IsTakenOver) {
+// A node of ROS 2 from Iron on warns of an end without user data, and of a hash that it cannot
+// read.
+TEST_P(DdsMatching, TheTypeHashOfRos2IsTakenOverAndUntilThenTheUserDataAreNotEmpty) {
   const OwnDomain domain;
   const Daemon daemon(base_model("1s"));
-  const DdsGateway gateway(daemon, domain, kNavIn);
-  Stranger navigation(GetParam(), domain,
-                      {"pub", "twist", "rt/cmd_vel_nav", "data=typehash=RIHS01_00ff;"});
-  navigation.await("matched 1");
+  const DdsGateway gateway(daemon, domain, kNavIn + kBaseOut + "/>");
   Stranger watcher("cyclone", domain, {"watch", "twist", "rt/cmd_vel_nav"});
-  watcher.await("reader typehash=RIHS01_00ff;");
+  Stranger of_writers("cyclone", domain, {"watch", "twist", "rt/cmd_vel"});
+  EXPECT_EQ(watcher.next_line(), "reader gateway=arbiter;");
+  EXPECT_EQ(of_writers.next_line(), "writer gateway=arbiter;");
+  const std::string hash = "typehash=RIHS01_" + std::string(60, '0') + "00ff;";
+  Stranger liar(GetParam(), domain,
+                {"pub", "twist", "rt/cmd_vel_nav", "data=typehash=RIHS01_00ff;"});
+  liar.await("matched 1");
+  Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav", "data=" + hash});
+  navigation.await("matched 1");
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel", "data=" + hash});
+  base.await("matched 1");
+  while (watcher.next_line() != "reader " + hash) {
+  }
+  while (of_writers.next_line() != "writer " + hash) {
+  }
 }
 
 // It may come later: a network that is slow to start.
