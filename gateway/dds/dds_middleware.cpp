@@ -117,6 +117,7 @@ bool DdsMiddleware::open(Site& site) {
     site.domain.emplace(*site.gateway, site.topics, bell_);
     for (EndPoint* const end : site.ends) end->open(*site.domain);
     site.problem.clear();
+    words.tell();
     return true;
   } catch (const DdsError& error) {
     const std::string problem =
