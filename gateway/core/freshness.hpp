@@ -24,14 +24,22 @@ namespace arbiter::gateway {
 // gateway's loop; any thread reads.
 class MaxAge {
  public:
-  void set(shm::Nanoseconds age) noexcept { age_.store(age, std::memory_order_relaxed); }
+  void set(shm::Nanoseconds age, bool is_forever = false) noexcept {
+    age_.store(age, std::memory_order_relaxed);
+    is_forever_.store(is_forever, std::memory_order_relaxed);
+  }
   // Relaxed is enough: a sample may be judged by the T that held when it came or by the next one.
   [[nodiscard]] shm::Nanoseconds get() const noexcept {
     return age_.load(std::memory_order_relaxed);
   }
+  // Whether the model in force gives it a T of forever: what was said before still holds.
+  [[nodiscard]] bool is_forever() const noexcept {
+    return is_forever_.load(std::memory_order_relaxed);
+  }
 
  private:
   shm::Atomic<shm::Nanoseconds> age_{shm::kDefaultTimeout};
+  shm::Atomic<bool> is_forever_{false};
 };
 
 // How old samples of a source may be, by its name: the same as MaxAge says, of any source.

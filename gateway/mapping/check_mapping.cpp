@@ -14,6 +14,7 @@
 
 #include "gateway/mapping/ros_names.hpp"
 #include "rules/model/expression.hpp"
+#include "rules/model/print_rules.hpp"
 #include "rules/text/names.hpp"
 
 namespace arbiter::gateway {
@@ -121,6 +122,7 @@ class MappingCheck {
     list_model();
     for (const Placed& each : entries_) check_names(*each.entry);
     check_choices();
+    check_latched();
     check_types();
   }
 
@@ -276,9 +278,7 @@ class MappingCheck {
     for (const Placed& each : entries_) {
       if (!each.entry->choice) continue;
       for (const Port* port : each.entry->ports()) {
-        const auto own = model_->timeouts.find(port->name);
-        const auto timeout = own == model_->timeouts.end() ? model_->timeout : own->second;
-        if (timeout == shm::kForever) forever.emplace(port->name, port);
+        if (timeout_of(port->name) == shm::kForever) forever.emplace(port->name, port);
       }
     }
     if (forever.empty()) return;
@@ -301,6 +301,34 @@ class MappingCheck {
               "the period of its topic",
           {.ports = {}, .source = name});
     }
+  }
+
+  // A topic that keeps samples for those who come later brings old ones. That is right where what
+  // was said before still holds, and would otherwise make an old sample an arrival.
+  void check_latched() {
+    for (const Placed& each : entries_) {
+      const Entry& entry = *each.entry;
+      if (!entry.is_in() || !entry.dds) continue;
+      if (entry.dds->qos.durability == Durability::kVolatile) continue;
+      for (const Port* port : entry.ports()) {
+        const shm::Nanoseconds timeout = timeout_of(port->name);
+        if (timeout == shm::kForever) continue;
+        diagnostics_.error(
+            "late-history", port->where,
+            "a topic that keeps samples for those who come later brings old ones, and T of " +
+                rules::quote(port->name) + " is " + rules::to_string(timeout) +
+                ": an old sample must not become an arrival; give the source timeout=\"forever\" "
+                "in "
+                "the model, if what was said before still holds, or write durability=\"volatile\", "
+                "which such publishers serve, too",
+            {.ports = {}, .source = port->name});
+      }
+    }
+  }
+
+  [[nodiscard]] shm::Nanoseconds timeout_of(const std::string& source) const {
+    const auto own = model_->timeouts.find(source);
+    return own == model_->timeouts.end() ? model_->timeout : own->second;
   }
 
   void check_types() {

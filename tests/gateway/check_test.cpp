@@ -55,6 +55,26 @@ TEST(CheckMapping, AGoodMappingHasNoFindings) {
               IsEmpty());
 }
 
+// What was published before the gateway came is old; where T is forever, it still holds.
+TEST(CheckMapping, SamplesFromBeforeItCameAreForSourcesThatStayActive) {
+  const std::string lock =
+      "<in topic='/lock' type='std_msgs/msg/Bool' true='/EStop/pressed:o' "
+      "false='/EStop/released:o' qos='latched'/>";
+  const std::string all_forever =
+      "<behaviors><source port='/EStop/pressed:o' timeout='forever'/>"
+      "<source port='/EStop/released:o' timeout='forever'/>"
+      "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config>"
+      "<condition>not /EStop/pressed:o</condition></behavior></behaviors>";
+  EXPECT_THAT(check(dds(lock), all_forever).findings(), IsEmpty());
+  EXPECT_THAT(check(dds(lock), "").findings(), IsEmpty());  // T is not known
+  const Read read = check(dds(lock));
+  ASSERT_THAT(read.findings(), ElementsAre(HasSubstr("error late-history")));
+  EXPECT_THAT(read.message(), HasSubstr("T of \"/EStop/released:o\" is 500ms"));
+  EXPECT_THAT(check(dds(in("/nav", "/Nav/cmd:o", "durability='transient_local'"))).findings(),
+              ElementsAre(HasSubstr("error late-history")));
+  EXPECT_THAT(check(dds(out("/cmd", "/Base/cmd:i", "qos='latched'"))).findings(), IsEmpty());
+}
+
 TEST(CheckMapping, APortHasOneEntry) {
   const Read read = check(dds(in("/a", "/Nav/cmd:o") + in("/b", "/Nav/cmd:o")));
   ASSERT_EQ(read.findings().size(), 1u);

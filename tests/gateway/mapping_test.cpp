@@ -74,12 +74,38 @@ TEST(Mapping, APresetIsTakenAndCanBeChanged) {
   EXPECT_EQ(read.entry().dds->qos.depth, 2u);
 }
 
-TEST(Mapping, NothingOldIsAskedFor) {
-  const std::string topic = "topic='/a' type='std_msgs/msg/Bool' port='/a' ";
-  EXPECT_THAT(read_dds("<in " + topic + "durability='transient_local'/>").findings(),
-              ElementsAre("1:83 error late-history"));
-  EXPECT_THAT(read_dds("<in " + topic + "qos='rosout'/>").message(), HasSubstr("nothing old"));
-  EXPECT_THAT(read_dds("<out " + topic + "durability='transient_local'/>").findings(), IsEmpty());
+// As rmw/qos_profiles.h has them, and the defaults of DDS where ROS 2 leaves it to DDS.
+TEST(Mapping, ROS2sProfilesHaveTheirNames) {
+  using enum Reliability;
+  using enum Durability;
+  struct Profile {
+    const char* name;
+    Reliability of_in, of_out;
+    Durability durability;
+    std::uint32_t depth;
+  };
+  for (const Profile& each : {Profile{"default", kReliable, kReliable, kVolatile, 10},
+                              Profile{"sensor_data", kBestEffort, kBestEffort, kVolatile, 5},
+                              Profile{"latched", kReliable, kReliable, kTransientLocal, 1},
+                              Profile{"system_default", kBestEffort, kReliable, kVolatile, 1},
+                              Profile{"services_default", kReliable, kReliable, kVolatile, 10},
+                              Profile{"services", kReliable, kReliable, kVolatile, 10},
+                              Profile{"parameters", kReliable, kReliable, kVolatile, 1000},
+                              Profile{"parameter_events", kReliable, kReliable, kVolatile, 1000},
+                              Profile{"clock", kBestEffort, kBestEffort, kVolatile, 1},
+                              Profile{"rosout", kReliable, kReliable, kTransientLocal, 1000}}) {
+    for (const bool is_in : {true, false}) {
+      const Read read =
+          read_dds(std::string(is_in ? "<in" : "<out") +
+                   " topic='/t' type='std_msgs/msg/Bool' port='/p' qos='" + each.name + "'/>");
+      ASSERT_THAT(read.findings(), IsEmpty()) << each.name;
+      const Qos& qos = read.entry().dds->qos;
+      EXPECT_EQ(qos.reliability, is_in ? each.of_in : each.of_out) << each.name << is_in;
+      EXPECT_EQ(qos.durability, each.durability) << each.name;
+      EXPECT_EQ(qos.depth, each.depth) << each.name;
+      EXPECT_EQ(qos.history, History::kKeepLast) << each.name;
+    }
+  }
 }
 
 TEST(Mapping, ABooleanTopicIsTwoSources) {
