@@ -131,6 +131,8 @@ void Exports::open_tap(Export& one, std::uint64_t id) {
       throw Error("no descriptor can be watched");
     }
     one.said.clear();
+    while (send_some(one)) {  // the source's state; from there on the tap rings
+    }
   } catch (const Error& error) {
     one.tap_again = shm::monotonic_now() + kTapAgain;
     if (one.said != error.what()) {
