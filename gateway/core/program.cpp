@@ -145,7 +145,7 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
     return serve(arguments, kind, std::move(*mappings), make, stop.get());
   }
   std::vector<std::string> worker(argv, argv + argc);
-  worker.emplace_back("--worker");
+  worker.insert(worker.begin() + 1, "--worker");  // behind a "--" it would be a mapping
   sd_notify(0, "READY=1");
   return supervise(worker, stop.get(), kind.clean_up);
 }

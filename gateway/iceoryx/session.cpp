@@ -239,7 +239,8 @@ void Session::look_at_list(shm::Nanoseconds now) {
 void Session::look_for_refused(Outlet& out) const {
   const auto subscribers = port_list_->subscribers_of(*out.sender->entry().iceoryx);
   if (subscribers.empty() || out.sender->publisher()->hasSubscribers()) {
-    out.looks_without_any = 0;
+    const bool was_refused = std::exchange(out.looks_without_any, 0) >= kLooksUntilRefused;
+    if (was_refused) out.sender->account().set_last_reason("");
     return;
   }
   if (++out.looks_without_any != kLooksUntilRefused) return;

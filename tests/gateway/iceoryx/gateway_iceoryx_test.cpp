@@ -275,14 +275,15 @@ TEST_F(Iceoryx, WhoElsePublishesWhereTheGatewayDoesIsTold) {
 TEST_F(Iceoryx, ASubscriberThatAsksForWhatTheGatewayDoesNotOfferIsNamed) {
   const Roudi roudi(directory_);
   Spoken gate = gateway(directory_, out("/Base:i", "base"));
-  const Spoken subscriber(
-      {ARBITER_TESTS "/plain_iceoryx_subscriber", "Test", "One", "base", "blocking"});
+  Spoken subscriber({ARBITER_TESTS "/plain_iceoryx_subscriber", "Test", "One", "base", "blocking"});
   const std::string name = "plain-subscriber-" + std::to_string(subscriber.process.pid());
   wait_until([&] {
     return described_input("/Base:i").find("no subscriber matched; " + name +
                                            " subscribes and is not connected: it asks for ") !=
            std::string::npos;
   });
+  subscriber.process.signal(SIGTERM);
+  wait_until([&] { return described_input("/Base:i").find(name) == std::string::npos; });
 }
 
 // What it could watch at once is 256.
