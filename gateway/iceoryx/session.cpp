@@ -122,6 +122,7 @@ void Session::run() {
   last_round_.store(shm::monotonic_now(), std::memory_order_relaxed);
   make_ends();
   last_round_.store(shm::monotonic_now(), std::memory_order_relaxed);
+  heard_roudi_.store(shm::monotonic_now(), std::memory_order_relaxed);
   waits_.announce(*wait_set_);
   take_for_ever();
   wait_set_.reset();
@@ -222,6 +223,7 @@ void Session::take_all(Inlet& inlet) {
 void Session::look_at_list(shm::Nanoseconds now) {
   if (now - looked_at_list_ < kListPeriod) return;
   looked_at_list_ = now;
+  if (port_list_->hears_roudi()) heard_roudi_.store(now, std::memory_order_relaxed);
   if (port_list_->update()) {
     for (const auto& inlet : inlets_) {
       const std::size_t publishers = port_list_->publishers_of(inlet->topic).size();
