@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 
 #include <cstdlib>
+#include <cstring>
 #include <random>
 #include <string>
 #include <vector>
@@ -107,6 +108,66 @@ TEST(DdsHostile, ABooleanThatIsNoneEndsBothSources) {
     await_active("/EStop/released:o", false);
     await_active("/EStop/pressed:o", false);
   }
+}
+
+// An appendable type of XCDR2 begins with its length, which is 1 for a Boolean; a mutable one has
+// headers before its fields. Read as one of a final type, each would be true.
+TEST(DdsHostile, ABooleanThatStandsElsewhereEndsBothSources) {
+  const OwnDomain domain;
+  Daemon daemon(
+      "<behaviors timeout=\"1000s\"><source port=\"/EStop/pressed:o\"/>"
+      "<source port=\"/EStop/released:o\"/></behaviors>");
+  const DdsGateway gateway(daemon, domain,
+                           R"(<in topic="/ready" type="std_msgs/msg/Bool" )"
+                           R"(true="/EStop/released:o" false="/EStop/pressed:o"/>)");
+  const Liar button(domain, "rt/ready", "std_msgs::msg::dds_::Bool_");
+  button.await_reader();
+  gateway.see("1 publisher matched");
+  const auto is_active = [&](const std::string& source) {
+    return daemon.source(source).value("active", false);
+  };
+  const auto published = [&](const std::string& source) {
+    return daemon.source(source).value("published", 0);
+  };
+  const std::string length("\1\0\0\0", 4);
+  int arrivals = 0;
+  for (const char kind : {'\2', '\3', '\x8', '\x9', '\xa', '\xb'}) {
+    button.publish(kLittle + '\1');
+    while (published("/EStop/released:o") != arrivals + 1) {
+    }
+    ++arrivals;
+    button.publish(std::string("\0", 1) + kind + std::string("\0\0", 2) + length + '\0');
+    while (is_active("/EStop/released:o") || is_active("/EStop/pressed:o")) {
+    }
+  }
+  // Of a final one the first field stands where it does in XCDR1.
+  button.publish(std::string("\0\7\0\0", 4) + '\1');
+  while (published("/EStop/released:o") != arrivals + 1) {
+  }
+}
+
+// XCDR2 aligns a double to four bytes: at the place that XCDR1 has for it stand halves of two.
+TEST(DdsHostile, ANumberThatStandsElsewhereEndsBothSources) {
+  const OwnDomain domain;
+  Daemon daemon(
+      "<behaviors timeout=\"1000s\"><source port=\"/Battery/full:o\"/>"
+      "<source port=\"/Battery/low:o\"/></behaviors>");
+  const DdsGateway gateway(daemon, domain,
+                           R"(<in topic="robots" type="strangers::Robot" above="/Battery/full:o" )"
+                           R"(below="/Battery/low:o" threshold="0.2" field="f64" offset="8"/>)");
+  const Liar robot(domain, "robots", "strangers::Robot");
+  robot.await_reader();
+  gateway.see("1 publisher matched");
+  std::string half(8, '\0');
+  const double value = 0.5;
+  std::memcpy(half.data(), &value, sizeof value);
+  robot.publish(kLittle + std::string(8, '\0') + half);
+  while (!daemon.source("/Battery/full:o").value("active", false)) {
+  }
+  robot.publish(std::string("\0\7\0\0", 4) + std::string(4, '\0') + half + half);
+  while (daemon.source("/Battery/full:o").value("active", true)) {
+  }
+  EXPECT_EQ(daemon.source("/Battery/low:o").value("published", 0), 0);
 }
 
 // Datagrams to all ports on which the gateway may listen: noise, and RTPS with bytes changed.
