@@ -104,7 +104,10 @@ class MappingCheck {
   void check() {
     check_ports();
     check_topics();
-    for (const Placed& each : entries_) check_idle(*each.entry);
+    for (const Placed& each : entries_) {
+      check_idle(*each.entry);
+      check_history(*each.entry);
+    }
     if (model_ == nullptr) return;
     list_model();
     for (const Placed& each : entries_) check_names(*each.entry);
@@ -179,6 +182,20 @@ class MappingCheck {
                           (may_be_zero ? "idle=\"zero\", or " : "") +
                           "a sample that says stop: idle=\"file:…\"",
                       {.ports = {entry.port->name}});
+  }
+
+  // A writer that keeps all waits for its slowest reader.
+  void check_history(const Entry& entry) {
+    if (entry.is_in() || !entry.dds || entry.idle.kind == Idle::Kind::kNothing) return;
+    const Qos& qos = entry.dds->qos;
+    if (qos.history != History::kKeepAll || qos.reliability != Reliability::kReliable) return;
+    diagnostics_.warning("held-up-idle", entry.where,
+                         "with history=\"keep_all\" one subscriber that does not keep up, or is "
+                         "stopped, keeps everything from all others until DDS gives it up, and so "
+                         "what " +
+                             entry.outside() + " is sent while " + entry.port->name +
+                             " is idle; write history=\"keep_last\"",
+                         {.ports = {entry.port->name}});
   }
 
   void list_model() {

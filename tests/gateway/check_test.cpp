@@ -53,6 +53,15 @@ TEST(CheckMapping, AGoodMappingHasNoFindings) {
               IsEmpty());
 }
 
+// A base is not told to stop because somebody else who listens there is stopped in a debugger.
+TEST(CheckMapping, WhatSaysStopIsNotHeldUpByAnotherSubscriber) {
+  EXPECT_THAT(check(dds(out("/cmd", "/Base/cmd:i", "history='keep_all'"))).findings(),
+              ElementsAre(HasSubstr("warning held-up-idle")));
+  EXPECT_THAT(check(dds(out("/cmd", "/Base/cmd:i", "history='keep_all' reliability='best_effort'")))
+                  .findings(),
+              IsEmpty());
+}
+
 // What was published before the gateway came is old; where T is forever, it still holds.
 TEST(CheckMapping, SamplesFromBeforeItCameAreForSourcesThatStayActive) {
   const std::string lock =
