@@ -288,15 +288,18 @@ class MappingCheck {
       if (entry.dds->qos.durability == Durability::kVolatile) continue;
       for (const Port* port : entry.ports()) {
         const shm::Nanoseconds timeout = timeout_of(port->name);
-        if (timeout == shm::kForever) continue;
+        if (timeout == shm::kForever && !entry.max_age) continue;
         diagnostics_.error(
             "late-history", port->where,
-            "a topic that keeps samples for those who come later brings old ones, and T of " +
-                rules::quote(port->name) + " is " + rules::to_string(timeout) +
+            "a topic that keeps samples for those who come later brings old ones, and " +
+                (entry.max_age
+                     ? "the entry has a max_age="
+                     : "T of " + rules::quote(port->name) + " is " + rules::to_string(timeout)) +
                 ": an old sample must not become an arrival; give the source timeout=\"forever\" "
                 "in "
-                "the model, if what was said before still holds, or write durability=\"volatile\", "
-                "which such publishers serve, too",
+                "the model and the entry no max_age=, if what was said before still holds, or "
+                "write "
+                "durability=\"volatile\", which such publishers serve, too",
             {.ports = {}, .source = port->name});
       }
     }

@@ -80,6 +80,10 @@ TEST(CheckMapping, SamplesFromBeforeItCameAreForSourcesThatStayActive) {
   EXPECT_THAT(check(dds(in("/nav", "/Nav/cmd:o", "durability='transient_local'"))).findings(),
               ElementsAre(HasSubstr("error late-history")));
   EXPECT_THAT(check(dds(out("/cmd", "/Base/cmd:i", "qos='latched'"))).findings(), IsEmpty());
+  const std::string bounded =
+      "<in topic='/map' type='nav_msgs/msg/OccupancyGrid' "
+      "port='/EStop/pressed:o' qos='latched' max_age='1s'/>";
+  EXPECT_THAT(check(dds(bounded), all_forever).message(), HasSubstr("has a max_age="));
 }
 
 TEST(CheckMapping, APortHasOneEntry) {
