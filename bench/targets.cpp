@@ -56,6 +56,33 @@ const std::vector<Ratio> kRatios{
      kP99, 1.1},
 };
 
+// What a sample through a gateway may cost, of what it costs through a relay of the same
+// middleware.
+struct GatewayTarget {
+  const char* name;
+  const char* measure;
+  double limit;
+};
+constexpr GatewayTarget kGatewayTargets[] = {{"iceoryx", "gateway-iceoryx", 1.5},
+                                             {"DDS", "gateway-dds", 1.15}};
+
+std::vector<Ratio> ratios_of_gateways() {
+  std::vector<Ratio> ratios;
+  for (const GatewayTarget& each : kGatewayTargets) {
+    for (const std::string size : {"64 B", "64 KiB", "1 MiB"}) {
+      const auto add = [&](const char* what, const std::string& of, double quantile) {
+        ratios.push_back({size + " through the " + each.name + " gateway, " + what + ", to a relay",
+                          each.measure, size + of, kThroughGateway, kThroughRelay, quantile,
+                          each.limit});
+      };
+      add("p50", kOneWay, kP50);
+      add("p99", kOneWay, kP99);
+      add("processor", kProcessorTime, kP50);
+    }
+  }
+  return ratios;
+}
+
 // `ours` is at most `limit` more than `theirs`, or than nothing.
 struct Excess {
   std::string name;
@@ -83,6 +110,13 @@ const std::vector<Excess> kExcesses{
      1000, "ns", "time of a publish()"},
     {"attach of 1000 ports", "scale", "attach", "arbiter: 1000 ports", {}, 1e9},
     {"CPU of an idle daemon", "scale", "daemon idle", "arbiterd", {}, 0, "%"},
+    {"twist_mux's job, of a processor",
+     "gateway-mux",
+     kTwoInputs + std::string(kShareOfProcessor),
+     kThroughGateway,
+     {},
+     1,
+     "%"},
     {"10 000 behaviours compiled and proved", "compile", "10000 behaviours", "arbiter", {}, 1e9},
 };
 
@@ -90,7 +124,9 @@ const std::vector<Excess> kExcesses{
 
 std::vector<Verdict> judge(const Report& report) {
   std::vector<Verdict> verdicts;
-  for (const Ratio& each : kRatios) {
+  std::vector<Ratio> ratios = kRatios;
+  for (Ratio& each : ratios_of_gateways()) ratios.push_back(std::move(each));
+  for (const Ratio& each : ratios) {
     if (report.find(each.measure) == nullptr) continue;  // was not asked for
     Verdict verdict{each.name, each.limit, {}, "x"};
     const auto ours = figure(report, each.measure, each.of, each.ours, each.quantile);
