@@ -92,6 +92,7 @@ class Bridge {
   shm::FileDescriptor epoll_;
   std::optional<Node> node_;
   std::vector<std::unique_ptr<Part>> parts_;
+  InBySource ins_;
   std::string said_;
   bool stops_ = false;
 };

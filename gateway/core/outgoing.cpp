@@ -1,5 +1,10 @@
 #include "gateway/core/outgoing.hpp"
 
+#include <utility>
+
+#include "gateway/core/incoming.hpp"
+#include "shm/clock.hpp"
+
 namespace arbiter::gateway {
 namespace {
 
@@ -23,11 +28,37 @@ Outgoing::Outgoing(Node& node, const Entry& entry, Sender& sender, Account& acco
                    const AgesOfSources& ages)
     : entry_(entry), sender_(sender), account_(account), ages_(ages), port_(open(node, entry)) {}
 
+// SYNC POINT: turn. The acquire pairs with the release in give_up(): who has the turn sees what the
+// one before has made of the port.
+bool Outgoing::Turn::try_take() noexcept {
+  return !taken_.exchange(true, std::memory_order_acquire);
+}
+void Outgoing::Turn::take() noexcept {
+  while (!try_take()) taken_.wait(true, std::memory_order_relaxed);
+}
+void Outgoing::Turn::give_up() noexcept {
+  taken_.store(false, std::memory_order_release);
+  taken_.notify_one();
+}
+
+void Outgoing::lead(const InBySource& ins, std::function<void()> call_loop) {
+  ins_ = &ins;
+  call_loop_ = std::move(call_loop);
+}
+
 void Outgoing::run(shm::Nanoseconds now) {
+  turn_.take();
+  send_waiting(now);
+  send_idle(now);
+  next_.store(when_next(), std::memory_order_relaxed);
+  turn_.give_up();
+}
+
+void Outgoing::send_waiting(shm::Nanoseconds now) {
   // Other ports have their turn: a publisher that never rests must not keep the loop here.
   has_more_ = true;
   for (std::uint32_t i = 0; i < kMostAtOnce; ++i) {
-    auto sample = port_.take();
+    auto sample = left_ ? std::exchange(left_, {}) : port_.take();
     if (!sample) {
       has_more_ = false;
       break;
@@ -36,8 +67,13 @@ void Outgoing::run(shm::Nanoseconds now) {
       account_.late.add();
       continue;
     }
-    send(**sample);
+    account_for(sender_.send(**sample), (*sample)->size());
+    if (ins_ == nullptr) continue;
+    if (const auto in = ins_->find(sample->source()); in != ins_->end()) in->second->follow(*this);
   }
+}
+
+void Outgoing::send_idle(shm::Nanoseconds now) {
   // Taken before the look at the port: a reader that comes in between is served the next time.
   const bool has_matched = matched_.exchange(false, std::memory_order_relaxed);
   if (!port_.idle()) {
@@ -53,20 +89,67 @@ void Outgoing::run(shm::Nanoseconds now) {
   }
 }
 
-shm::Nanoseconds Outgoing::next() const noexcept {
+bool Outgoing::begin_turn() noexcept {
+  if (!turn_.try_take()) return false;
+  if (left_ || has_more_) {
+    turn_.give_up();
+    return false;
+  }
+  port_.disarm();
+  return true;
+}
+
+// take() throws only where more samples are held than here ever are.
+// NOLINTNEXTLINE(bugprone-exception-escape)
+bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexcept {
+  bool has_come = false;
+  has_more_ = true;
+  for (std::uint32_t i = 0; i < kMostAtOnce; ++i) {
+    auto sample = port_.take();
+    if (!sample) {
+      has_more_ = false;
+      break;
+    }
+    // How old others' may be the loop knows.
+    if (sample->source() != source) {
+      left_ = std::move(sample);
+      break;
+    }
+    has_come = true;
+    if (shm::monotonic_now() - sample->stamp_ns() > max_age) {
+      account_.late.add();
+      continue;
+    }
+    const Sender::Result result = sender_.send_at_once(**sample);
+    if (result == Sender::Result::kBusy) {
+      left_ = std::move(sample);
+      break;
+    }
+    account_for(result, (*sample)->size());
+  }
+  if (has_come) idle_again_.reset();  // somebody commands
+  next_.store(when_next(), std::memory_order_relaxed);
+  const bool leaves_some = has_more_;
+  turn_.give_up();
+  if (leaves_some) call_loop_();
+  return has_come;
+}
+
+shm::Nanoseconds Outgoing::when_next() const noexcept {
   if (has_more_) return 0;
   if (entry_.idle.kind == Idle::Kind::kNothing) return shm::kForever;
   return idle_again_.value_or(shm::kForever);
 }
 
-void Outgoing::send(Bytes sample) noexcept {
-  switch (sender_.send(sample)) {
+void Outgoing::account_for(Sender::Result result, std::size_t size) noexcept {
+  switch (result) {
     case Sender::Result::kSent:
       account_.passed.add();
-      account_.set_last_size(sample.size());
+      account_.set_last_size(size);
       return;
     case Sender::Result::kNotReady:
     case Sender::Result::kRefused:
+    case Sender::Result::kBusy:
       account_.refused.add();
       return;
     case Sender::Result::kNoMemory:
