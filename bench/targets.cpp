@@ -31,6 +31,7 @@ struct Ratio {
   double quantile;
   double limit;
   std::string their_case{};  // else the same
+  std::string group{};       // Verdict::group
 };
 
 const std::string kSpinning = "64 B, spinning";
@@ -71,9 +72,16 @@ std::vector<Ratio> ratios_of_gateways() {
   for (const GatewayTarget& each : kGatewayTargets) {
     for (const std::string size : {"64 B", "64 KiB", "1 MiB"}) {
       const auto add = [&](const char* what, const std::string& of, double quantile) {
-        ratios.push_back({size + " through the " + each.name + " gateway, " + what + ", to a relay",
-                          each.measure, size + of, kThroughGateway, kThroughRelay, quantile,
-                          each.limit});
+        ratios.push_back(
+            {std::string(each.name) + " gateway, " + size + ", " + what + ", to a relay",
+             each.measure,
+             size + of,
+             kThroughGateway,
+             kThroughRelay,
+             quantile,
+             each.limit,
+             {},
+             kGateways});
       };
       add("p50", kOneWay, kP50);
       add("p99", kOneWay, kP99);
@@ -128,7 +136,7 @@ std::vector<Verdict> judge(const Report& report) {
   for (Ratio& each : ratios_of_gateways()) ratios.push_back(std::move(each));
   for (const Ratio& each : ratios) {
     if (report.find(each.measure) == nullptr) continue;  // was not asked for
-    Verdict verdict{each.name, each.limit, {}, "x"};
+    Verdict verdict{each.name, each.limit, {}, "x", each.group};
     const auto ours = figure(report, each.measure, each.of, each.ours, each.quantile);
     const auto theirs =
         figure(report, each.measure, each.their_case.empty() ? each.of : each.their_case,
@@ -138,7 +146,7 @@ std::vector<Verdict> judge(const Report& report) {
   }
   for (const Excess& each : kExcesses) {
     if (report.find(each.measure) == nullptr) continue;
-    Verdict verdict{each.name, each.limit, {}, each.unit};
+    Verdict verdict{each.name, each.limit, {}, each.unit, {}};
     const auto ours = figure(report, each.measure, each.of, each.ours, kP50);
     const auto theirs =
         each.theirs.empty()
