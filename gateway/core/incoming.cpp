@@ -101,20 +101,15 @@ Incoming::Fate Incoming::deliver(const ForeignSample& sample, Time deadline) noe
 
 // As above. NOLINTNEXTLINE(bugprone-exception-escape)
 Incoming::Fate Incoming::pass_on(const ForeignSample& sample, Time deadline) noexcept {
-  // What is sent may come back at once, on this very thread, where a topic leads to itself in a way
-  // that no check of the mapping sees. It goes round by the loop.
-  static thread_local bool goes_straight = false;
   Outgoing* const outgoing = outgoing_.load(std::memory_order_relaxed);
-  if (outgoing == nullptr || goes_straight || !outgoing->begin_turn()) {
+  if (outgoing == nullptr || !outgoing->begin_turn()) {
     return pass_to(*yes_, sample, deadline);
   }
-  goes_straight = true;
   const Fate fate = pass_to(*yes_, sample, deadline);
   // One that has lost would only hold up the others.
   if (!outgoing->end_turn(yes_->name(), max_age_.get())) {
     outgoing_.store(nullptr, std::memory_order_relaxed);
   }
-  goes_straight = false;
   return fate;
 }
 

@@ -8,6 +8,10 @@
 namespace arbiter::gateway {
 namespace {
 
+// Of this thread, at whatever entry. What it sends may come back to it at once, where a topic leads
+// to itself in a way that no check of the mapping sees; then it goes round by the loop.
+thread_local bool has_turn = false;
+
 InputPort<void> open(Node& node, const Entry& entry) {
   InputPortOptions options;
   options.depth = entry.queue;
@@ -28,30 +32,18 @@ Outgoing::Outgoing(Node& node, const Entry& entry, Sender& sender, Account& acco
                    const AgesOfSources& ages)
     : entry_(entry), sender_(sender), account_(account), ages_(ages), port_(open(node, entry)) {}
 
-// SYNC POINT: turn. The acquire pairs with the release in give_up(): who has the turn sees what the
-// one before has made of the port.
-bool Outgoing::Turn::try_take() noexcept {
-  return !taken_.exchange(true, std::memory_order_acquire);
-}
-void Outgoing::Turn::take() noexcept {
-  while (!try_take()) taken_.wait(true, std::memory_order_relaxed);
-}
-void Outgoing::Turn::give_up() noexcept {
-  taken_.store(false, std::memory_order_release);
-  taken_.notify_one();
-}
-
 void Outgoing::lead(const InBySource& ins, std::function<void()> call_loop) {
   ins_ = &ins;
   call_loop_ = std::move(call_loop);
 }
 
 void Outgoing::run(shm::Nanoseconds now) {
-  turn_.take();
+  const std::lock_guard lock(turn_);
+  has_turn = true;
   send_waiting(now);
   send_idle(now);
   next_.store(when_next(), std::memory_order_relaxed);
-  turn_.give_up();
+  has_turn = false;
 }
 
 void Outgoing::send_waiting(shm::Nanoseconds now) {
@@ -90,11 +82,12 @@ void Outgoing::send_idle(shm::Nanoseconds now) {
 }
 
 bool Outgoing::begin_turn() noexcept {
-  if (!turn_.try_take()) return false;
+  if (has_turn || !turn_.try_lock()) return false;
   if (left_ || has_more_) {
-    turn_.give_up();
+    turn_.unlock();
     return false;
   }
+  has_turn = true;
   port_.disarm();
   return true;
 }
@@ -130,7 +123,8 @@ bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexc
   if (has_come) idle_again_.reset();  // somebody commands
   next_.store(when_next(), std::memory_order_relaxed);
   const bool leaves_some = has_more_;
-  turn_.give_up();
+  has_turn = false;
+  turn_.unlock();
   if (leaves_some) call_loop_();
   return has_come;
 }

@@ -12,6 +12,7 @@
 #include <atomic>
 #include <functional>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -94,17 +95,6 @@ class Outgoing {
   void describe(std::string_view text) { port_.describe(text); }
 
  private:
-  // The port's, the sender's and the idle sample's; given up by whoever has it.
-  class Turn {
-   public:
-    [[nodiscard]] bool try_take() noexcept;
-    void take() noexcept;
-    void give_up() noexcept;
-
-   private:
-    std::atomic<bool> taken_{false};
-  };
-
   void send_waiting(shm::Nanoseconds now);
   void send_idle(shm::Nanoseconds now);
   void account_for(Sender::Result result, std::size_t size) noexcept;
@@ -114,7 +104,7 @@ class Outgoing {
   Sender& sender_;
   Account& account_;
   const AgesOfSources& ages_;
-  Turn turn_;
+  std::mutex turn_;  // of the port, the sender, and all below but for the atomics
   InputPort<void> port_;
   const InBySource* ins_ = nullptr;
   std::function<void()> call_loop_;
