@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <ostream>
-#include <set>
 #include <string_view>
 #include <utility>
 
@@ -21,35 +19,11 @@ using nlohmann::json;
 using rules::ConnectionExplanation;
 using watch::Look;
 using watch::ModelInForce;
-using watch::Obstacle;
 
 // Of ports with more connections than this, inactive ones are told of in short.
 constexpr std::size_t kMaxTold = 8;
 // Where there is something to say of more than kMaxTold: of so many it is said one by one.
 constexpr std::size_t kMaxTakenApart = 3;
-constexpr std::size_t kMaxCauses = 3;  // of each of these
-
-// The sources that an explanation of a connection names as its reasons.
-std::vector<std::string> sources_that_matter(const ConnectionExplanation& connection) {
-  std::set<std::string> names;
-  for (const auto& part : connection.parts) {
-    for (const auto& cause : part.causes) {
-      for (const auto& literal : cause.because) names.insert(literal.source);
-    }
-  }
-  for (const auto& literal : connection.earlier_because) names.insert(literal.source);
-  names.erase(connection.source);
-  return {names.begin(), names.end()};
-}
-
-void write_obstacles(std::ostream& out, const std::vector<Obstacle>& obstacles,
-                     const std::string& of = {}) {
-  for (const auto& each : obstacles) {
-    // Some name what they are of themselves.
-    const bool is_named = !of.empty() && each.text.starts_with(of + ' ');
-    out << "  ! " << (of.empty() || is_named ? "" : of + ": ") << each.text << '\n';
-  }
-}
 
 // The winner first, then who would like to win.
 int rank(const ConnectionExplanation& connection) {
@@ -183,173 +157,6 @@ void WhyAnswer::write_only_named() const {
   if (names.empty()) return;
   out_ << "\nNever started (no component has opened them): " << rules::enumerate(names)
        << (names.size() > rules::kMaxNamesInWords ? " (--all shows all)" : "") << '\n';
-}
-
-void WhyAnswer::write_port() const {
-  const ModelInForce& model = port_.model();
-  out_ << port_.name();
-  if (model.is_none()) {
-    out_ << ": no model is in force, so no connection leads to it\n";
-  } else if (!look_.is_mentioned) {
-    out_ << ": the model in force does not mention it, so no connection leads to it\n";
-  } else if (!look_.is_arbitrated) {
-    out_ << ": not arbitrated, because no rule mentions it; everything that its connections "
-            "bring is delivered\n";
-  } else {
-    const std::string useless =
-        explanation_.winner ? obstacles_.why_it_cannot_deliver(*explanation_.winner) : "";
-    out_ << ": "
-         << (!useless.empty()      ? "idle, though " + *explanation_.winner + " is selected"
-             : explanation_.winner ? *explanation_.winner + " wins"
-                                   : std::string("idle, nobody wins"))
-         << since_text();
-    if (!useless.empty()) {
-      out_ << "; it cannot deliver: " << useless;
-    } else if (explanation_.winner) {
-      const std::string why = obstacles_.why_nothing_comes_of(*explanation_.winner);
-      if (!why.empty()) out_ << "; but nothing of it reaches the port: " << why;
-    }
-    out_ << '\n';
-  }
-  write_model();
-  write_obstacles(out_, obstacles_.of_port());
-  if (!look_.picture.is_settled) {
-    out_
-        << "  ! sources change faster than they can be read: this answer may mix several moments\n";
-  }
-  if (look_.is_arbitrated && !model.has_texts()) {
-    out_ << "  ! the daemon took this model over from its predecessor (it was started without "
-            "--model): it knows the decisions, but not the behaviours behind them\n";
-  }
-}
-
-void WhyAnswer::write_model() const {
-  const ModelInForce& model = port_.model();
-  if (!model.is_none()) {
-    out_ << "  by " << model.text() << origin_text(model, look_.sources.now()) << '\n';
-  }
-  for (const auto& file : model.files_now()) {
-    const std::string advice = file_advice(file.state, model.is_older());
-    if (!advice.empty()) out_ << "  ! " << file.path << advice << '\n';
-  }
-  if (look_.is_mentioned) return;
-  if (const auto other = model.other_that_mentions(port_.name())) {
-    out_ << "  ! model \"" << *other << "\" mentions it: arbiter switch " << *other << '\n';
-  }
-}
-
-std::string WhyAnswer::since_text() const {
-  const shm::Nanoseconds now = look_.sources.now();
-  const ModelInForce& model = port_.model();
-  if (tenure_.is_exact()) {
-    return ", since " + span_text(now - tenure_.at_least) +
-           " ago: " + events_text(port_, tenure_.changed, look_);
-  }
-  const shm::Nanoseconds decided_since = model.since(port_.name());
-  if (tenure_.at_least != 0 && tenure_.at_least == decided_since) {
-    const std::string span = span_text(now - decided_since) + " ago";
-    return decided_since == model.since()
-               ? ", since model " + std::to_string(model.generation()) + " came into force " + span
-               : ", since a model came into force " + span +
-                     " that decides here as the one in force does";
-  }
-  std::string text;
-  if (tenure_.at_least != 0) text += ", for at least " + span_text(now - tenure_.at_least);
-  if (tenure_.not_before) {
-    text += text.empty() ? ", for " : " and ";
-    text += "at most " + span_text(now - *tenure_.not_before) + " (not before " +
-            events_text(port_, tenure_.changed, look_) + ')';
-  } else if (tenure_.at_least == 0) {
-    text += ": nothing has ever happened here";
-  }
-  return text;
-}
-
-json WhyAnswer::since_json() const {
-  json changed = json::array();
-  for (const shm::SourceId source : tenure_.changed) {
-    const std::string name = port_.source_name(source);
-    changed.push_back(event_json(name, look_.sources.state(name), look_.sources.now()));
-  }
-  return {{"exact", tenure_.is_exact()},
-          {"at_least_ns", tenure_.at_least},
-          {"not_before_ns", tenure_.not_before ? json(*tenure_.not_before) : json(nullptr)},
-          {"changed", std::move(changed)}};
-}
-
-std::string WhyAnswer::state_text(const std::string& source) const {
-  std::string text = activity_text(look_.sources, source);
-  const std::string component = obstacles_.component_of(source);
-  if (component.empty()) return text;
-  text += "; component " + component + " has it open";
-  if (look_.sources.is_active(source)) return text;
-  const bool has_arrived = look_.sources.state(source).word != shm::kNeverActive;
-  return text + ", and has sent nothing " + (has_arrived ? "since" : "yet");
-}
-
-void WhyAnswer::write_connection(const ConnectionExplanation& connection) const {
-  out_ << '\n' << connection.source;
-  if (!look_.is_arbitrated) {
-    out_ << " is delivered\n  it is " << state_text(connection.source) << '\n';
-  } else if (connection.wins) {
-    const bool can = obstacles_.why_it_cannot_deliver(connection.source).empty();
-    out_ << (can ? " wins\n  " : " is selected, but cannot deliver\n  ")
-         << state_text(connection.source) << '\n';
-    write_selected(connection);
-  } else {
-    write_kept_out(connection);
-  }
-  write_obstacles(out_, obstacles_.of_connection(connection.source));
-  if (!options_.source.empty()) write_reasons(connection);
-}
-
-void WhyAnswer::write_selected(const ConnectionExplanation& connection) const {
-  std::size_t told = 0;
-  for (const auto& part : connection.parts) {
-    if (!part.causes.empty()) continue;
-    if (told++ == kMaxCauses && is_large()) {
-      out_ << "  and by other behaviours\n";
-      return;
-    }
-    out_ << "  selected by "
-         << (part.behaviour ? describe(*part.behaviour) : std::string("its rule"));
-    if (!part.where.file.empty()) {
-      out_ << " (" << part.where.file << ':' << part.where.line << ')';
-    }
-    out_ << '\n';
-  }
-}
-
-void WhyAnswer::write_kept_out(const ConnectionExplanation& connection) const {
-  out_ << " is kept out\n";
-  if (connection.has_rule && !connection.is_active) {
-    out_ << "  " << state_text(connection.source) << '\n';
-  }
-  if (!is_short(connection)) {
-    write_causes(out_, connection, look_.sources, is_large() ? kMaxCauses : SIZE_MAX);
-    if (!connection.has_rule) out_ << "  " << state_text(connection.source) << '\n';
-    return;
-  }
-  const auto has_cause = [](const auto& part) { return !part.causes.empty(); };
-  if (connection.earlier ||
-      std::all_of(connection.parts.begin(), connection.parts.end(), has_cause)) {
-    out_ << "  and by the rules: arbiter why " << port_.name() << ' ' << connection.source << '\n';
-  }
-}
-
-// Where only one connection is told of, what there is to say of the sources that keep it out.
-void WhyAnswer::write_reasons(const ConnectionExplanation& connection) const {
-  if (connection.wins) return;
-  for (const auto& source : sources_that_matter(connection)) {
-    write_obstacles(out_, obstacles_.of_source(source), source);
-  }
-}
-
-void WhyAnswer::write_sensed(const std::string& source) const {
-  out_ << '\n'
-       << source << " is sensed: the rules read it, but it has no connection here\n  "
-       << state_text(source) << '\n';
-  write_obstacles(out_, obstacles_.of_source(source));
 }
 
 json WhyAnswer::component_json(const std::string& source) const {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <optional>
+#include <set>
 
 #include "rules/model/print_rules.hpp"
 #include "rules/text/names.hpp"
@@ -312,6 +313,27 @@ json obstacles_json(const std::vector<watch::Obstacle>& obstacles) {
   json result = json::array();
   for (const auto& each : obstacles) result.push_back({{"code", each.code}, {"text", each.text}});
   return result;
+}
+
+std::vector<std::string> sources_that_matter(const rules::ConnectionExplanation& connection) {
+  std::set<std::string> names;
+  for (const auto& part : connection.parts) {
+    for (const auto& cause : part.causes) {
+      for (const auto& literal : cause.because) names.insert(literal.source);
+    }
+  }
+  for (const auto& literal : connection.earlier_because) names.insert(literal.source);
+  names.erase(connection.source);
+  return {names.begin(), names.end()};
+}
+
+void write_obstacles(std::ostream& out, const std::vector<watch::Obstacle>& obstacles,
+                     const std::string& of) {
+  for (const auto& each : obstacles) {
+    // Some name what they are of themselves.
+    const bool is_named = !of.empty() && each.text.starts_with(of + ' ');
+    out << "  ! " << (of.empty() || is_named ? "" : of + ": ") << each.text << '\n';
+  }
 }
 
 }  // namespace arbiter::cli

@@ -56,5 +56,11 @@ nlohmann::json event_json(const std::string& source, const SourceState& state,
 shm::Nanoseconds event_time(const SourceState& state, shm::Nanoseconds now);
 
 nlohmann::json obstacles_json(const std::vector<watch::Obstacle>& obstacles);
+// A line each. `of`: whose they are, where that does not go without saying.
+void write_obstacles(std::ostream& out, const std::vector<watch::Obstacle>& obstacles,
+                     const std::string& of = {});
+
+// The sources that an explanation of a connection names as its reasons.
+std::vector<std::string> sources_that_matter(const rules::ConnectionExplanation& connection);
 
 }  // namespace arbiter::cli

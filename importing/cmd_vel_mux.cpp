@@ -72,6 +72,7 @@ class CmdVelMuxImport {
         if (key == "publisher" && !parameters_.is_ros2()) {
           publisher_ = &entry;
         } else if (key == "use_sim_time") {
+          if (!read_boolean(entry, diagnostics_).value_or(false)) continue;
           diagnostics_.note(
               "own-clock", entry.key.where,
               "Arbiter goes by the machine's own clock, as cmd_vel_mux does in ROS 2; "

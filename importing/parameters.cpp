@@ -30,6 +30,7 @@ class Finder {
 
   void look_in(const YamlNode& map, const std::string& path) {
     if (const YamlEntry* parameters = map.find(kRosParameters)) {
+      refuse_dots(parameters->value);
       if (has_wanted(parameters->value)) found_.push_back({path, true, &parameters->value});
     } else if (has_wanted(map)) {
       found_.push_back({path, false, &map});
@@ -42,6 +43,22 @@ class Finder {
   }
 
  private:
+  // ROS 2 takes "topics.joystick.priority" for the priority of "joystick" in `topics`.
+  void refuse_dots(const YamlNode& parameters) {
+    for (const YamlEntry& entry : parameters.entries) {
+      const std::string& key = entry.key.text;
+      const auto dot = key.find('.');
+      if (dot == std::string::npos) continue;
+      const std::string first = key.substr(0, dot);
+      if (std::find(wanted_.begin(), wanted_.end(), first) == wanted_.end()) continue;
+      diagnostics_.error("dotted-name", entry.key.where,
+                         "ROS 2 reads " + rules::quote(key) + " as a part of `" + first +
+                             "`, and the import does not; write it as a map: `" + first +
+                             ": {NAME: {topic: …}}`");
+      return;  // one for all of them
+    }
+  }
+
   // Taken for a node, it would be a part of each topic's name.
   bool is_misspelt(const YamlEntry& entry) {
     if (!has_wanted(entry.value)) return false;

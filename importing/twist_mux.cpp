@@ -92,6 +92,7 @@ class TwistMuxImport {
         if (key == "use_stamped") {
           if (read_boolean(entry, diagnostics_).value_or(false)) stamped_ = entry.key.where;
         } else if (key == "use_sim_time") {
+          if (!read_boolean(entry, diagnostics_).value_or(false)) continue;
           diagnostics_.note("own-clock", entry.key.where,
                             "Arbiter goes by the machine's own clock: a timeout takes as long in a "
                             "simulation that is slower or faster; nothing to do on the robot");

@@ -20,7 +20,7 @@ namespace arbiter::detail {
 namespace {
 
 // How often a take starts again because publishers overtook it, or changed the picture, meanwhile.
-constexpr int kMaxTakes = 64;
+constexpr int kMaxTries = 64;
 
 // How often a take looks for the oldest entry of a queue whose publisher overtakes it.
 constexpr int kMaxPeeks = 64;
@@ -36,7 +36,7 @@ HeldSample InputCore::take() {
 
 HeldSample InputCore::take_once() {
   HeldSample sample;
-  for (int tries = 0; tries < kMaxTakes; ++tries) {
+  for (int tries = 0; tries < kMaxTries; ++tries) {
     refresh();
     Queue* oldest = look();
     if (oldest == nullptr) return sample;
@@ -78,7 +78,7 @@ bool InputCore::nothing_is_new() const noexcept {
 InputCore::Queue* InputCore::look() noexcept {
   Queue* oldest = nullptr;
   bool again = true;
-  for (int tries = 0; again && tries < kMaxTakes; ++tries) oldest = scan(again);
+  for (int tries = 0; again && tries < kMaxTries; ++tries) oldest = scan(again);
   return oldest;
 }
 

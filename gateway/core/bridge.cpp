@@ -81,9 +81,9 @@ bool Bridge::waits(int stop, int milliseconds) {
   return ::poll(&ends, 1, milliseconds) > 0;
 }
 
-void Bridge::say_once(const std::string& text) {
-  if (text == said_) return;
-  said_ = text;
+void Bridge::Saying::say_once(const std::string& text) {
+  if (text == last_) return;
+  last_ = text;
   if (!text.empty()) say(Level::kWarning, text);
 }
 
@@ -98,32 +98,46 @@ void Bridge::make_node(int stop) {
     try {
       node_.emplace(options_.name, options);
     } catch (const Error& error) {
-      say_once(error.what());
+      waiting_.say_once(error.what());
       stops_ = waits(stop, kRetryPeriod / 2);
       if (stops_) return;
     }
   }
-  say_once("");
+  waiting_.say_once("");
+}
+
+// In the order of their names, and none behind the first that cannot be had: of two gateways that
+// have ports in common none must hold what the other one waits for.
+std::string Bridge::open_in_order() {
+  std::vector<Part*> in_order;
+  for (const auto& part : parts_) {
+    if (!part->is_open()) in_order.push_back(part.get());
+  }
+  const auto name_of = [](const Part* part) -> const std::string& {
+    return part->entry.ports().front()->name;
+  };
+  std::sort(in_order.begin(), in_order.end(),
+            [&](const Part* a, const Part* b) { return name_of(a) < name_of(b); });
+  for (Part* const part : in_order) {
+    try {
+      open(*part);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    if (options_.on_round) options_.on_round();
+  }
+  return {};
 }
 
 void Bridge::open_all(int stop) {
   for (;;) {
-    std::string problem;
-    for (const auto& part : parts_) {
-      if (part->is_open()) continue;
-      try {
-        open(*part);
-      } catch (const Error& error) {
-        if (problem.empty()) problem = error.what();
-      }
-      if (options_.on_round) options_.on_round();
-    }
+    const std::string problem = open_in_order();
+    if (options_.on_round) options_.on_round();
+    waiting_.say_once(problem);
     if (problem.empty()) {
       for (const auto& part : parts_) part->account.set_obstacle("");
-      say_once("");
       return;
     }
-    say_once(problem);
     for (const auto& part : parts_) {
       part->account.set_obstacle("not served: another port of the gateway is not open, " + problem);
     }
@@ -140,9 +154,10 @@ void Bridge::open(Part& part) {
     part.incoming = std::move(incoming);
     return;
   }
-  part.outgoing =
+  auto outgoing =
       std::make_unique<Outgoing>(*node_, part.entry, *part.sender, part.account, max_ages_);
-  watch(part.outgoing->descriptor(), &part);
+  watch(outgoing->descriptor(), &part);
+  part.outgoing = std::move(outgoing);
 }
 
 void Bridge::watch(int descriptor, Part* part) const {
@@ -233,11 +248,8 @@ void Bridge::look_after_all() {
                           (part->incoming ? " comes from " : " goes to ") + state);
     part->said = std::move(state);
   }
-  if (!max_ages_.obstacle().empty()) {
-    say_once("T of the sources is not known: " + max_ages_.obstacle());
-  } else {
-    say_once("");
-  }
+  const std::string& obstacle = max_ages_.obstacle();
+  ages_.say_once(obstacle.empty() ? "" : "T of the sources is not known: " + obstacle);
 }
 
 }  // namespace arbiter::gateway

@@ -73,15 +73,25 @@ class Bridge {
     [[nodiscard]] bool is_open() const { return incoming != nullptr || outgoing != nullptr; }
   };
 
+  // Each change of it is said once.
+  class Saying {
+   public:
+    void say_once(const std::string& text);
+
+   private:
+    std::string last_;
+  };
+
   void make_node(int stop);
   void open_all(int stop);
+  // What keeps one from being opened; empty: nothing.
+  std::string open_in_order();
   void open(Part& part);
   void watch(int descriptor, Part* part) const;
   void start();
   void loop(int stop);
   void serve(shm::Nanoseconds now, bool all);
   void look_after_all();
-  void say_once(const std::string& text);
   // Sleeps; true: `stop` is readable.
   static bool waits(int stop, int milliseconds);
 
@@ -93,7 +103,8 @@ class Bridge {
   std::optional<Node> node_;
   std::vector<std::unique_ptr<Part>> parts_;
   InBySource ins_;
-  std::string said_;
+  Saying waiting_;  // for the daemon, for ports
+  Saying ages_;
   bool stops_ = false;
 };
 

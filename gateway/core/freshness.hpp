@@ -8,14 +8,15 @@
 // Units: nanoseconds of CLOCK_MONOTONIC, given by the caller, so that tests say what time it is.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
 #include <string_view>
 #include <vector>
 
+#include "gateway/core/run_record.hpp"
 #include "shm/activity.hpp"
+#include "shm/atomic.hpp"
 
 namespace arbiter::gateway {
 
@@ -23,14 +24,22 @@ namespace arbiter::gateway {
 // gateway's loop; any thread reads.
 class MaxAge {
  public:
-  void set(shm::Nanoseconds age) noexcept { age_.store(age, std::memory_order_relaxed); }
+  void set(shm::Nanoseconds age, bool is_forever = false) noexcept {
+    age_.store(age, std::memory_order_relaxed);
+    is_forever_.store(is_forever, std::memory_order_relaxed);
+  }
   // Relaxed is enough: a sample may be judged by the T that held when it came or by the next one.
   [[nodiscard]] shm::Nanoseconds get() const noexcept {
     return age_.load(std::memory_order_relaxed);
   }
+  // Whether the model in force gives it a T of forever: what was said before still holds.
+  [[nodiscard]] bool is_forever() const noexcept {
+    return is_forever_.load(std::memory_order_relaxed);
+  }
 
  private:
-  std::atomic<shm::Nanoseconds> age_{shm::kDefaultTimeout};
+  shm::Atomic<shm::Nanoseconds> age_{shm::kDefaultTimeout};
+  shm::Atomic<bool> is_forever_{false};
 };
 
 // How old samples of a source may be, by its name: the same as MaxAge says, of any source.
@@ -86,10 +95,7 @@ class QueueFreshness {
 
 // For a middleware that calls back, of whose queues nothing is known (DDS). A thread of the
 // gateway's ticks; a tick that comes late says that the process did not run, and that what is
-// delivered now may have waited as long.
-//
-// Invariant: for a source of T, after a gap of more than period() + T/2 between two ticks
-// everything is late until ticks have come in time for T. And a callback that runs before the first
+// delivered now may have waited as long (run_record.hpp). A callback that runs before the first
 // tick after such a gap sees the gap itself.
 class StallGuard {
  public:
@@ -101,11 +107,8 @@ class StallGuard {
    private:
     friend class StallGuard;
     const MaxAge* max_age_;
-    std::atomic<shm::Nanoseconds> late_until_{0};
   };
 
-  // A deadline that has passed.
-  static constexpr shm::Nanoseconds kLate = -1;
   // Between two ticks, however short a T is: more often would cost more than it is worth. A T
   // below four times this may call a fresh sample late.
   static constexpr shm::Nanoseconds kShortestPeriod = 1'000'000;
@@ -120,15 +123,15 @@ class StallGuard {
   // that a sample that comes between two ticks is always in time.
   shm::Nanoseconds tick(shm::Nanoseconds now);
 
-  // Any thread, wait-free: until when a sample that was delivered at `now` may arrive. Late: a time
-  // that has passed.
-  [[nodiscard]] shm::Nanoseconds deadline(const Watch& watch, shm::Nanoseconds now) const noexcept;
+  // Any thread, wait-free: until when a sample that is delivered at `now` may arrive.
+  [[nodiscard]] shm::Nanoseconds deadline(const Watch& watch, shm::Nanoseconds now) const noexcept {
+    return record_.since(now) + watch.max_age_->get();
+  }
 
  private:
   mutable std::mutex mutex_;  // of watches_
   std::vector<std::unique_ptr<Watch>> watches_;
-  std::atomic<shm::Nanoseconds> last_tick_{-shm::kMaxTime};
-  std::atomic<shm::Nanoseconds> period_{0};
+  RunRecord record_;
 };
 
 }  // namespace arbiter::gateway

@@ -22,7 +22,7 @@ wire::Caller caller_of(const std::string& instance) {
   caller.instance = wire::instance_name(instance);
   // It is asked for from the loop, which must not wait for long.
   caller.patience = std::chrono::milliseconds(1);
-  caller.answer_time = std::chrono::milliseconds(1000);
+  caller.answer_time = std::chrono::milliseconds(100);
   return caller;
 }
 
@@ -55,10 +55,13 @@ void MaxAges::update() {
   for (const Watched& each : watched_) {
     // Both sources of a choice come from one topic: the shorter T holds for its samples.
     shm::Nanoseconds age = shm::kForever;
+    bool is_forever = true;
     for (const Port* port : each.entry->ports()) {
-      age = std::min(age, age_of(port->name, each.entry->max_age));
+      const Timeouts timeouts = timeouts_of(port->name);
+      age = std::min(age, max_age_of(timeouts.own, timeouts.of_model, each.entry->max_age));
+      is_forever = is_forever && timeouts.own == shm::kForever;
     }
-    each.age->set(age);
+    each.age->set(age, is_forever);
   }
 }
 
@@ -74,27 +77,23 @@ void MaxAges::join() {
   }
 }
 
-shm::Nanoseconds MaxAges::of(std::string_view source) const { return age_of(source, {}); }
+shm::Nanoseconds MaxAges::of(std::string_view source) const {
+  const Timeouts timeouts = timeouts_of(source);
+  return max_age_of(timeouts.own, timeouts.of_model, {});
+}
 
-shm::Nanoseconds MaxAges::age_of(std::string_view source,
-                                 const std::optional<shm::Nanoseconds>& max_age) const {
-  shm::Nanoseconds timeout = shm::kDefaultTimeout;
-  shm::Nanoseconds of_model = shm::kDefaultTimeout;
-  if (instance_ != nullptr) {
-    const auto id = instance_->find_source(source);
-    const shm::TableReader& tables = instance_->memory()->tables();
-    for (int tries = 0; tries < kMaxTries; ++tries) {
-      const shm::TableSnapshot snapshot = tables.snapshot();
-      if (snapshot.generation == 0) break;
-      const shm::Nanoseconds own = snapshot.table.timeout(id.value_or(shm::kNone));
-      const shm::Nanoseconds all = snapshot.table.timeout(shm::kNone);
-      if (!tables.is_whole(snapshot)) continue;
-      timeout = own;
-      of_model = all;
-      break;
-    }
+MaxAges::Timeouts MaxAges::timeouts_of(std::string_view source) const {
+  if (instance_ == nullptr) return {};
+  const auto id = instance_->find_source(source);
+  const shm::TableReader& tables = instance_->memory()->tables();
+  for (int tries = 0; tries < kMaxTries; ++tries) {
+    const shm::TableSnapshot snapshot = tables.snapshot();
+    if (snapshot.generation == 0) break;
+    const Timeouts read{snapshot.table.timeout(id.value_or(shm::kNone)),
+                        snapshot.table.timeout(shm::kNone)};
+    if (tables.is_whole(snapshot)) return read;
   }
-  return max_age_of(timeout, of_model, max_age);
+  return {};
 }
 
 }  // namespace arbiter::gateway

@@ -44,8 +44,12 @@ class MaxAges final : public AgesOfSources {
   };
 
   void join();
-  [[nodiscard]] shm::Nanoseconds age_of(std::string_view source,
-                                        const std::optional<shm::Nanoseconds>& max_age) const;
+  // T of a source by the model in force, and that model's own.
+  struct Timeouts {
+    shm::Nanoseconds own = shm::kDefaultTimeout;
+    shm::Nanoseconds of_model = shm::kDefaultTimeout;
+  };
+  [[nodiscard]] Timeouts timeouts_of(std::string_view source) const;
 
   const std::string instance_name_;
   std::unique_ptr<watch::Instance> instance_;

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
+#include <stdexcept>
 #include <utility>
 
 #include <CLI/CLI.hpp>
@@ -21,6 +22,7 @@
 #include "rules/ask/report.hpp"
 #include "rules/text/text_file.hpp"
 #include "shm/file_descriptor.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::gateway {
 namespace {
@@ -127,10 +129,17 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
+  try {
+    arguments.instance = wire::instance_name(arguments.instance);
+  } catch (const std::invalid_argument& error) {
+    say(Level::kError, error.what());
+    return 2;
+  }
   auto mappings = read(arguments, kind);
   if (!mappings) return 2;
   if (arguments.check) return 0;
   const shm::FileDescriptor stop = catch_signals();
+  if (arguments.is_worker) end_with_supervisor(kind.clean_up);
   if (!kind.is_supervised || arguments.is_worker || arguments.send_idle) {
     if (!arguments.is_worker && !arguments.send_idle) sd_notify(0, "READY=1");
     return serve(arguments, kind, std::move(*mappings), make, stop.get());

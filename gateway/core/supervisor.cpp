@@ -14,6 +14,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <string_view>
+#include <thread>
 #include <utility>
 
 #include "gateway/core/say.hpp"
@@ -26,7 +27,6 @@ namespace {
 
 constexpr const char* kPipe = "ARBITER_GATEWAY_HEARTBEAT";
 constexpr shm::Nanoseconds kSecond = 1'000'000'000;
-constexpr shm::Nanoseconds kGrace = 3 * kSecond;
 // Between two starts: at once after a long life, and ever more patiently after short ones.
 constexpr shm::Nanoseconds kLongLife = 10 * kSecond;
 constexpr shm::Nanoseconds kFirstPause = kSecond / 10;
@@ -89,23 +89,25 @@ std::optional<int> status_of(const Worker& worker) {
                                                                : std::nullopt;
 }
 
-int milliseconds_until(shm::Nanoseconds time) {
-  const shm::Nanoseconds left = time - shm::monotonic_now();
-  return static_cast<int>(std::clamp<shm::Nanoseconds>(left / 1'000'000 + 1, 0, 60'000));
-}
-
 bool is_readable(int descriptor, int milliseconds) {
   pollfd one{descriptor, POLLIN, 0};
   return ::poll(&one, 1, milliseconds) > 0 && one.revents != 0;
 }
 
-void end(Worker& worker) {
+std::string in_words(std::chrono::milliseconds time) {
+  const auto count = time.count();
+  return count % 1000 == 0 ? std::to_string(count / 1000) + " s" : std::to_string(count) + " ms";
+}
+
+void end(Worker& worker, const Patience& patience) {
   ::kill(worker.pid, SIGTERM);
   ::kill(worker.pid, SIGCONT);
-  const shm::Nanoseconds give_up = shm::monotonic_now() + kGrace;
+  const shm::Nanoseconds give_up =
+      shm::monotonic_now() + std::chrono::nanoseconds(patience.end).count();
   while (!status_of(worker)) {
     if (shm::monotonic_now() >= give_up) {
-      say(Level::kWarning, "the worker did not end for three seconds, and is killed");
+      say(Level::kWarning,
+          "the worker did not end for " + in_words(patience.end) + ", and is killed");
       ::kill(worker.pid, SIGKILL);
       ::waitpid(worker.pid, nullptr, 0);
       return;
@@ -115,38 +117,53 @@ void end(Worker& worker) {
 }
 
 // Returns what became of it; empty: `stop` is readable.
-std::optional<int> watch_over(Worker& worker, int stop) {
-  for (;;) {
-    const shm::Nanoseconds patience = std::chrono::nanoseconds(kPatience).count();
+std::optional<int> watch_over(Worker& worker, int stop, const Patience& patience) {
+  const shm::Nanoseconds silence = std::chrono::nanoseconds(patience.silence).count();
+  const auto look_again = static_cast<int>(patience.silence.count() / 5);
+  for (shm::Nanoseconds looked = shm::monotonic_now();;) {
     pollfd ends[2] = {{worker.heart.get(), POLLIN, 0}, {stop, POLLIN, 0}};
-    ::poll(ends, 2, std::min(milliseconds_until(worker.beat + patience), 1000));
+    ::poll(ends, 2, look_again);
     if (ends[1].revents != 0) return {};
+    const shm::Nanoseconds now = shm::monotonic_now();
     char beats[64];
-    if (::read(worker.heart.get(), beats, sizeof beats) > 0) worker.beat = shm::monotonic_now();
+    if (::read(worker.heart.get(), beats, sizeof beats) > 0) worker.beat = now;
     if (const auto status = status_of(worker)) return status;
     if ((ends[0].revents & POLLHUP) != 0) ::poll(nullptr, 0, 1);  // it is about to end
-    if (shm::monotonic_now() - worker.beat < patience) continue;
-    worker.beat = shm::monotonic_now();
-    if (watch::is_stopped(worker.pid)) continue;
-    say(Level::kError, "the worker hangs (for " + std::to_string(kPatience.count() / 1000) +
-                           " s nothing has come of it), and is killed");
+    // Time does not count in which one of the two was stopped: who is resumed last has had none.
+    const bool was_stopped = now - std::exchange(looked, now) > silence / 2;
+    const bool is_silent = now - worker.beat > silence / 4;
+    if (was_stopped || (is_silent && watch::is_stopped(worker.pid))) worker.beat = now;
+    if (now - worker.beat < silence) continue;
+    say(Level::kError, "the worker hangs (for " + in_words(patience.silence) +
+                           " nothing has come of it), and is killed");
     ::kill(worker.pid, SIGKILL);
+    worker.beat = now;
   }
+}
+
+// Of the pipe that the supervisor reads; negative: there is none.
+int heart() {
+  const char* const pipe = std::getenv(kPipe);
+  int descriptor = -1;
+  if (pipe != nullptr) std::from_chars(pipe, pipe + std::strlen(pipe), descriptor);
+  if (descriptor < 0 || ::fcntl(descriptor, F_SETFD, FD_CLOEXEC) != 0) return -1;
+  ::fcntl(descriptor, F_SETFL, O_NONBLOCK);
+  return descriptor;
 }
 
 }  // namespace
 
-int supervise(const std::vector<std::string>& arguments, int stop,
-              const std::function<void(int)>& clean_up) {
+int supervise(const std::vector<std::string>& arguments, int stop, const CleanUp& clean_up,
+              const Patience& patience) {
   shm::Nanoseconds pause = kFirstPause;
   for (;;) {
     Worker worker = start(arguments);
     if (worker.pid < 0) {
       say(Level::kError, std::string("no worker can be started: ") + std::strerror(errno));
     } else {
-      const auto status = watch_over(worker, stop);
+      const auto status = watch_over(worker, stop, patience);
       if (!status) {
-        end(worker);
+        end(worker, patience);
         clean_up(worker.pid);
         return 0;
       }
@@ -163,13 +180,24 @@ int supervise(const std::vector<std::string>& arguments, int stop,
 }
 
 std::optional<std::function<void()>> heartbeat() {
-  const char* const pipe = std::getenv(kPipe);
-  if (pipe == nullptr) return {};
-  int descriptor = -1;
-  std::from_chars(pipe, pipe + std::strlen(pipe), descriptor);
-  if (descriptor < 0 || ::fcntl(descriptor, F_SETFD, FD_CLOEXEC) != 0) return {};
-  ::fcntl(descriptor, F_SETFL, O_NONBLOCK);
+  const int descriptor = heart();
+  if (descriptor < 0) return {};
   return [descriptor] { static_cast<void>(!::write(descriptor, ".", 1)); };
+}
+
+void end_with_supervisor(const CleanUp& clean_up, const Patience& patience) {
+  const int descriptor = heart();
+  if (descriptor < 0) return;
+  std::thread([=] {
+    pollfd end{descriptor, 0, 0};
+    // Nothing is waited for but the pipe's fault: that nobody can read it any more.
+    while (::poll(&end, 1, -1) <= 0) continue;
+    ::poll(nullptr, 0, static_cast<int>(patience.end.count()));
+    say(Level::kError, "the supervisor has ended, and the worker has not for " +
+                           in_words(patience.end) + ": it is killed");
+    clean_up(::getpid());
+    ::kill(::getpid(), SIGKILL);
+  }).detach();
 }
 
 }  // namespace arbiter::gateway

@@ -3,7 +3,8 @@
 //
 // Some middleware ends the process that uses it, or never returns from a call, where its own daemon
 // dies. The supervisor does not touch the middleware: it only starts, watches and ends its worker.
-// A worker that does not beat for kPatience is killed, unless somebody has stopped it (SIGSTOP).
+// A worker that does not beat for a while is killed, unless somebody has stopped it (SIGSTOP). One
+// that hangs when its supervisor dies ends itself.
 #pragma once
 
 #include <chrono>
@@ -14,19 +15,29 @@
 
 namespace arbiter::gateway {
 
-inline constexpr std::chrono::milliseconds kPatience{5000};
+struct Patience {
+  std::chrono::milliseconds silence{5000};  // until a worker that does not beat is killed
+  std::chrono::milliseconds end{3000};      // until one is that does not end when it is asked to
+};
 
 // How a worker ends that asks for another one.
 inline constexpr int kBeginsAnew = 75;
 
-// Runs until `stop` is readable, and the worker has ended, which is asked to by SIGTERM and killed
-// after three seconds. `arguments`: of the worker, which is this program; it finds its pipe in
-// the environment. Returns the exit code.
-// `clean_up`: what a worker that has ended may have left behind; called with its process's id.
-int supervise(const std::vector<std::string>& arguments, int stop,
-              const std::function<void(int)>& clean_up);
+// What a worker that has ended may have left behind; called with its process's id.
+using CleanUp = std::function<void(int)>;
 
-// In a worker: says that it runs. None where nobody supervises. Throttled to ten a second.
+// Runs until `stop` is readable, and the worker has ended, which is asked to by SIGTERM. The
+// `arguments` are the worker's, which is this program; it finds its pipe in the environment.
+// Returns the exit code.
+int supervise(const std::vector<std::string>& arguments, int stop, const CleanUp& clean_up,
+              const Patience& patience = {});
+
+// In a worker: says that it runs. None where nobody supervises.
 std::optional<std::function<void()>> heartbeat();
+
+// In a worker: a thread that kills it where its supervisor has ended, however that was, and it has
+// not ended either for patience.end. It is sent SIGTERM then, but may hang, or be ending where the
+// middleware hangs. Nothing, where nobody supervises.
+void end_with_supervisor(const CleanUp& clean_up, const Patience& patience = {});
 
 }  // namespace arbiter::gateway

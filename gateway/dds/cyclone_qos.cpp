@@ -8,6 +8,7 @@ namespace {
 
 // So many names of partitions of one end are looked at: it is a stranger that says them.
 constexpr std::uint32_t kMaxPartitions = 64;
+constexpr std::size_t kMaxPartitionName = 256;
 
 dds_history_kind_t cyclone_history(History history) {
   return history == History::kKeepAll ? DDS_HISTORY_KEEP_ALL : DDS_HISTORY_KEEP_LAST;
@@ -22,7 +23,9 @@ void read_partitions(const dds_qos_t& qos, AnnouncedQos& result) {
   char** names = nullptr;
   if (!dds_qget_partition(&qos, &count, &names)) return;
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (i < kMaxPartitions) result.partitions.emplace_back(names[i]);
+    if (i < kMaxPartitions) {
+      result.partitions.push_back(std::string(names[i]).substr(0, kMaxPartitionName));
+    }
     dds_free(names[i]);
   }
   dds_free(names);

@@ -3,6 +3,8 @@
 #include <utility>
 
 #include "gateway/core/say.hpp"
+#include "gateway/dds/mismatch.hpp"
+#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::gateway::dds {
@@ -25,8 +27,28 @@ DdsMiddleware::DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& b
                        " name different interfaces, peers or configurations; a program has one "
                        "configuration for each domain: give both the same");
       }
-      for (const Entry& entry : gateway.entries) site.topics.insert(entry.dds->name);
+      for (const Entry& entry : gateway.entries) {
+        refuse_circle(site, entry);
+        site.topics.insert(entry.dds->name);
+        site.entries.push_back(&entry);
+      }
     }
+  }
+}
+
+// The check of the mapping does not know which domain the environment says.
+void DdsMiddleware::refuse_circle(const Site& site, const Entry& entry) {
+  for (const Entry* const other : site.entries) {
+    if (other->is_in() == entry.is_in() || other->dds->name != entry.dds->name ||
+        !share_partition(other->dds->qos.partitions, entry.dds->qos.partitions)) {
+      continue;
+    }
+    throw DdsError(rules::describe(entry.where) + ": " + entry.outside() +
+                   " comes in and goes out within DDS domain " +
+                   std::to_string(domain_of(*site.gateway)) + " (the other entry is at " +
+                   rules::describe(other->where) +
+                   "): publishers and subscribers must not meet past the gateway; remap one of "
+                   "them to another topic, partition or domain");
   }
 }
 
@@ -78,7 +100,8 @@ void DdsMiddleware::tend() {
     if (!site.domain && !open(site)) continue;
     site.domain->peers().update();
     try {
-      for (EndPoint* const end : site.ends) end->look_at(site.domain->peers().all());
+      for (EndPoint* const end : site.ends)
+        end->look_at(site.domain->peers().of(end->topic().name));
     } catch (const DdsError& error) {  // an end that was opened again could not be
       say(Level::kError, error.what());
       close(site);
@@ -94,6 +117,7 @@ bool DdsMiddleware::open(Site& site) {
     site.domain.emplace(*site.gateway, site.topics, bell_);
     for (EndPoint* const end : site.ends) end->open(*site.domain);
     site.problem.clear();
+    words.tell();
     return true;
   } catch (const DdsError& error) {
     const std::string problem =

@@ -23,7 +23,8 @@ class DdsMiddleware : public Middleware {
  public:
   // Keeps references into the mappings. `bell`: rings where tend() has
   // something to do. Throws DdsError: two
-  // gateways of one domain are configured differently, ROS_DOMAIN_ID is no number.
+  // gateways of one domain are configured differently, a topic goes out and comes in again within
+  // the domain that the environment names, ROS_DOMAIN_ID is no number.
   DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& bell);
   ~DdsMiddleware() override;
 
@@ -37,6 +38,7 @@ class DdsMiddleware : public Middleware {
   struct Site {
     const Gateway* gateway = nullptr;
     std::set<std::string> topics;
+    std::vector<const Entry*> entries;
     std::optional<Domain> domain;
     shm::Nanoseconds open_again = 0;
     std::string problem;          // why it could not be opened last, which has been said
@@ -44,6 +46,7 @@ class DdsMiddleware : public Middleware {
     std::vector<Account*> accounts;
   };
 
+  static void refuse_circle(const Site& site, const Entry& entry);
   [[nodiscard]] Site& site_of(const Gateway& gateway);
   void add(Site& site, EndPoint& end, Account& account);
   // False: not now, and each account says why.

@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <string_view>
-#include <utility>
 
 #include "gateway/core/say.hpp"
 #include "gateway/dds/quota.hpp"
@@ -50,7 +49,8 @@ bool is_address(const std::string& interface) {
 }
 
 // Of this thread: where CycloneWords keeps them; null: nowhere.
-thread_local std::string* kept_words = nullptr;
+thread_local std::vector<std::string>* kept_words = nullptr;
+constexpr std::size_t kMaxKept = 32;
 
 bool is_loopback(const std::string& interface) {
   return interface == "lo" || interface.starts_with("127.") || interface == "::1";
@@ -107,15 +107,19 @@ std::string configuration_of(const Gateway& gateway) {
   return result + text;
 }
 
-Domain::Domain(const Gateway& gateway, std::set<std::string> topics, const Bell& bell)
+Domain::Domain(const Gateway& gateway, const std::set<std::string>& topics, const Bell& bell)
     : domain_(dds_create_domain(domain_of(gateway), configuration_of(gateway).c_str()),
               "domain " + std::to_string(domain_of(gateway))),
       participant_(dds_create_participant(domain_of(gateway), nullptr, nullptr),
                    "a participant in domain " + std::to_string(domain_of(gateway))),
-      peers_(participant_.get(), std::move(topics), bell) {}
+      peers_(participant_.get(), topics, bell) {}
 
-CycloneWords::CycloneWords() { kept_words = &last_; }
+CycloneWords::CycloneWords() { kept_words = &lines_; }
 CycloneWords::~CycloneWords() { kept_words = nullptr; }
+
+void CycloneWords::tell() const {
+  for (const std::string& line : lines_) say(Level::kWarning, "Cyclone DDS: " + line);
+}
 
 void hear_cyclone() {
   // What strangers send may make it write: their number must not fill a disk.
@@ -126,7 +130,8 @@ void hear_cyclone() {
         std::string_view text(line->message, line->size);
         while (text.ends_with('\n') || text.ends_with('.')) text.remove_suffix(1);
         if (kept_words != nullptr) {
-          *kept_words = text;
+          if (kept_words->size() == kMaxKept) kept_words->erase(kept_words->begin());
+          kept_words->emplace_back(text);
           return;
         }
         if (const auto passed = quota.take(); passed) {

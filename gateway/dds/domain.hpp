@@ -3,6 +3,7 @@
 
 #include <set>
 #include <string>
+#include <vector>
 
 #include "gateway/dds/entity.hpp"
 #include "gateway/dds/peers.hpp"
@@ -21,7 +22,7 @@ namespace arbiter::gateway::dds {
 class Domain {
  public:
   // Throws DdsError: there is no such network interface now, for example.
-  Domain(const Gateway& gateway, std::set<std::string> topics, const Bell& bell);
+  Domain(const Gateway& gateway, const std::set<std::string>& topics, const Bell& bell);
 
   [[nodiscard]] dds_entity_t participant() const { return participant_.get(); }
   [[nodiscard]] Peers& peers() { return peers_; }
@@ -44,11 +45,13 @@ class CycloneWords {
   CycloneWords& operator=(const CycloneWords&) = delete;
   ~CycloneWords();
 
-  // The last one; empty: it has said nothing.
-  [[nodiscard]] const std::string& last() const { return last_; }
+  // Empty: it has said nothing.
+  [[nodiscard]] std::string last() const { return lines_.empty() ? "" : lines_.back(); }
+  // The calls did not fail: what it has said is said as a warning.
+  void tell() const;
 
  private:
-  std::string last_;
+  std::vector<std::string> lines_;
 };
 
 }  // namespace arbiter::gateway::dds

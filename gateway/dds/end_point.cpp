@@ -8,14 +8,17 @@
 
 #include "gateway/core/say.hpp"
 #include "gateway/dds/opaque_type.hpp"
+#include "gateway/dds/quota.hpp"
 
 namespace arbiter::gateway::dds {
 namespace {
 
 constexpr std::size_t kMaxListed = 4;  // parts of a description
 
-void set_type_hash(dds_qos_t* qos, const std::string& hash) {
-  const std::string data = "typehash=" + hash + ";";
+// Of an end of ROS 2, whose type hash may not be known yet. Nodes since Iron warn of an end that
+// has no user data at all, or a hash that they cannot read; but not of data without one.
+void set_user_data(dds_qos_t* qos, const std::string& type_hash) {
+  const std::string data = type_hash.empty() ? "gateway=arbiter;" : "typehash=" + type_hash + ";";
   dds_qset_userdata(qos, data.data(), data.size());
 }
 
@@ -49,9 +52,11 @@ void EndPoint::open() {
                                                       &type, nullptr, nullptr, nullptr);
   if (topic < 0) ddsi_sertype_unref(type);
   topic_entity_ = Entity(topic, "topic " + topic_.name);
+  topic_.qos.durability = durability();
   const CycloneQos qos = cyclone_qos(topic_.qos, which_);
-  if (!type_hash_.empty()) set_type_hash(qos.get(), type_hash_);
+  if (topic_.is_ros || !type_hash_.empty()) set_user_data(qos.get(), type_hash_);
   Entity made = make(domain_->participant(), topic, type, qos.get());
+  seen_.reset();
   const std::lock_guard lock(in_use_);
   end_ = std::move(made);
 }
@@ -66,12 +71,18 @@ void EndPoint::close() noexcept {
   topic_entity_ = Entity();
 }
 
-void EndPoint::look_at(const PeerMap& peers) {
-  choose_kind(peers);
-  if (!is_open()) return;
-  adopt_type_hash(peers);
+void EndPoint::look_at(const PeersOfTopic& peers) {
+  if (is_open()) choose_durability();
+  // Strangers may be many, and come and go: each is looked at when something has changed.
+  if (seen_ != peers.revision) {
+    choose_kind(peers.ends);
+    if (!is_open()) return;
+    adopt_type_hash(peers.ends);
+    find_obstacles(peers);
+    seen_ = peers.revision;
+  }
   account_.set_peers(matched());
-  say_who_does_not_match(peers);
+  tell_obstacles();
 }
 
 // Where the mapping does not say whether the type has a key, who is there says it: without this,
@@ -82,11 +93,17 @@ void EndPoint::choose_kind(const PeerMap& peers) {
   bool like_us = false;
   bool other = false;
   for (const auto& [guid, peer] : peers) {
-    if (peer.end == which_ || peer.topic != topic_.name || peer.type != topic_.type) continue;
+    if (peer.end == which_ || peer.type != topic_.type) continue;
     (peer.keyed == keyed_ ? like_us : other) = true;
   }
   if (like_us || !other) return;
   keyed_ = !keyed_;
+  close();
+  open();
+}
+
+void EndPoint::choose_durability() {
+  if (durability() == topic_.qos.durability) return;
   close();
   open();
 }
@@ -96,10 +113,10 @@ void EndPoint::choose_kind(const PeerMap& peers) {
 void EndPoint::adopt_type_hash(const PeerMap& peers) {
   if (!type_hash_.empty()) return;
   for (const auto& [guid, peer] : peers) {
-    if (peer.topic != topic_.name || peer.type != topic_.type || peer.type_hash.empty()) continue;
+    if (peer.type != topic_.type || peer.type_hash.empty()) continue;
     type_hash_ = peer.type_hash;
     const CycloneQos qos(dds_create_qos());
-    set_type_hash(qos.get(), type_hash_);
+    set_user_data(qos.get(), type_hash_);
     const dds_return_t set = dds_set_qos(end_.get(), qos.get());
     if (set < 0) {
       say(Level::kWarning,
@@ -109,43 +126,61 @@ void EndPoint::adopt_type_hash(const PeerMap& peers) {
   }
 }
 
-void EndPoint::say_who_does_not_match(const PeerMap& peers) {
-  std::vector<std::string> obstacles;
-  for (const auto& [guid, peer] : peers) {
-    if (peer.topic != topic_.name) continue;
+void EndPoint::find_obstacles(const PeersOfTopic& peers) {
+  obstacles_.clear();
+  std::erase_if(warned_, [&](const auto& one) { return !peers.ends.contains(one.first); });
+  // Those that go past Arbiter come first: a status has room for a few sentences alone.
+  std::vector<std::string> others;
+  for (const auto& [guid, peer] : peers.ends) {
+    const bool meet = share_partition(topic_.qos.partitions, peer.qos.partitions);
     if (peer.end != which_) {
       const std::vector<std::string> reasons = mismatches({which_, topic_, keyed_}, peer);
       if (reasons.empty()) continue;
-      const std::string sentence =
-          "the " + std::string(which_ == End::kReader ? "publisher" : "subscriber") + " of " +
-          peer.owner + " does not match: " + joined(reasons);
-      obstacles.push_back(sentence);
+      others.push_back("the " + std::string(which_ == End::kReader ? "publisher" : "subscriber") +
+                       " of " + peer.owner + " does not match: " + joined(reasons));
       // Whoever is in another partition is probably meant to be.
-      if (share_partition(topic_.qos.partitions, peer.qos.partitions)) warn(guid, sentence);
-    } else if (which_ == End::kWriter &&
-               share_partition(topic_.qos.partitions, peer.qos.partitions)) {
-      const std::string sentence = peer.owner +
-                                   " publishes there, too: what it sends reaches the subscribers "
-                                   "past Arbiter";
-      obstacles.push_back(sentence);
-      warn(guid, sentence);
+      if (meet) warn(guid, others.back());
+    } else if (which_ == End::kWriter && meet) {
+      obstacles_.push_back(peer.owner +
+                           " publishes there, too: what it sends reaches the subscribers past "
+                           "Arbiter");
+      warn(guid, obstacles_.back());
     }
   }
-  // An obstacle takes the place of the number of peers.
-  const std::uint32_t others = obstacles.empty() ? 0 : matched();
-  if (others > 0) {
-    obstacles.insert(obstacles.begin(), std::to_string(others) + " " +
-                                            (which_ == End::kReader ? "publisher" : "subscriber") +
-                                            (others == 1 ? "" : "s") + " matched");
+  if (topic_.qos.durability != entry_.dds->qos.durability) {
+    obstacles_.emplace_back("what was published before is not taken, since T is not forever");
   }
-  account_.set_obstacle(joined(obstacles));
-  std::erase_if(warned_, [&](const auto& one) { return !peers.contains(one.first); });
+  if (peers.has_more) obstacles_.emplace_back("there are more ends than are looked at");
+  obstacles_.insert(obstacles_.end(), std::make_move_iterator(others.begin()),
+                    std::make_move_iterator(others.end()));
+}
+
+void EndPoint::tell_obstacles() {
+  if (obstacles_.empty()) {
+    account_.set_obstacle("");
+    return;
+  }
+  // An obstacle takes the place of the number of peers.
+  const std::uint32_t count = matched();
+  std::string text;
+  if (count > 0) {
+    text = std::to_string(count) + (which_ == End::kReader ? " publisher" : " subscriber") +
+           (count == 1 ? "" : "s") + " matched; ";
+  }
+  account_.set_obstacle(text + joined(obstacles_));
 }
 
 void EndPoint::warn(const Guid& guid, const std::string& sentence) {
-  if (warned_[guid].insert(sentence).second) {
-    say(Level::kWarning, account_.outside() + ": " + sentence);
-  }
+  // Ends that come and go make warnings: their number must not fill a disk.
+  static Quota& quota = *new Quota(20, 10'000'000'000);
+  std::set<std::string>& said = warned_[guid];
+  if (said.contains(sentence)) return;
+  const auto passed = quota.take();
+  if (!passed) return;
+  said.insert(sentence);
+  std::string text = account_.outside() + ": " + sentence;
+  if (*passed > 0) text += " (" + std::to_string(*passed) + " warnings were left out before)";
+  say(Level::kWarning, text);
 }
 
 }  // namespace arbiter::gateway::dds

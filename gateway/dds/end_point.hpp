@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -32,7 +33,8 @@ class EndPoint {
 
   // Takes account of who is out there: opens it again with or without a key where nothing else
   // would match, takes on ROS 2's type hash, and says who does not match, and why.
-  void look_at(const PeerMap& peers);
+  // `peers`: of its topic.
+  void look_at(const PeersOfTopic& peers);
 
   [[nodiscard]] const DdsTopic& topic() const { return topic_; }
   [[nodiscard]] bool keyed() const { return keyed_; }
@@ -44,6 +46,8 @@ class EndPoint {
   // Makes the reader or the writer. `type`: what Cyclone knows the topic's samples by.
   [[nodiscard]] virtual Entity make(dds_entity_t participant, dds_entity_t topic,
                                     const ddsi_sertype* type, const dds_qos_t* qos) = 0;
+  // What it asks for now; the mapping's, if it may have that.
+  [[nodiscard]] virtual Durability durability() const { return entry_.dds->qos.durability; }
   // How many peers Cyclone has matched.
   [[nodiscard]] virtual std::uint32_t matched() const = 0;
 
@@ -56,18 +60,22 @@ class EndPoint {
  private:
   void open();
   void choose_kind(const PeerMap& peers);
+  void choose_durability();
   void adopt_type_hash(const PeerMap& peers);
-  void say_who_does_not_match(const PeerMap& peers);
-  // Once for each peer and sentence.
+  void find_obstacles(const PeersOfTopic& peers);
+  void tell_obstacles();
+  // Once for each peer and sentence, and not too often.
   void warn(const Guid& guid, const std::string& sentence);
 
   const End which_;
   const Entry& entry_;
-  const DdsTopic& topic_;
+  DdsTopic topic_;  // the entry's, with the durability that is open
   Account& account_;
   Domain* domain_ = nullptr;
   bool keyed_;
   std::string type_hash_;
+  std::optional<std::uint64_t> seen_;   // the peers' revision; empty: look at them
+  std::vector<std::string> obstacles_;  // who does not match, and who goes past Arbiter
   std::map<Guid, std::set<std::string>> warned_;
   Entity topic_entity_;
   mutable std::mutex in_use_;

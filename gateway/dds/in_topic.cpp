@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <string>
+#include <utility>
 
 #include "gateway/dds/arrived_sample.hpp"
 #include "shm/clock.hpp"
@@ -19,6 +20,11 @@ Entity InTopic::make(dds_entity_t participant, dds_entity_t topic, const ddsi_se
                      const dds_qos_t* qos) {
   return {dds_create_reader_rhc(participant, topic, qos, nullptr, cache_.cache()),
           "a reader of " + this->topic().name};
+}
+
+Durability InTopic::durability() const {
+  return std::as_const(incoming_).max_age().is_forever() ? EndPoint::durability()
+                                                         : Durability::kVolatile;
 }
 
 std::uint32_t InTopic::matched() const {

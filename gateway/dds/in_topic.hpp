@@ -17,6 +17,8 @@ class InTopic : public EndPoint, private SampleTaker {
  private:
   Entity make(dds_entity_t participant, dds_entity_t topic, const ddsi_sertype* type,
               const dds_qos_t* qos) override;
+  // Samples from before it came are old: they may be arrivals only where T is forever.
+  [[nodiscard]] Durability durability() const override;
   [[nodiscard]] std::uint32_t matched() const override;
   // On Cyclone's threads.
   void take(const Payload& payload) noexcept override;

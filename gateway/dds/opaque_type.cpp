@@ -193,12 +193,22 @@ ddsi_sertype* make_opaque_type(const std::string& name, bool keyed) {
 }
 
 Payload* make_payload(const ddsi_sertype* type, Bytes bytes) noexcept {
-  const std::size_t room = padded(bytes.size());
+  return make_payload(type, {bytes});
+}
+
+Payload* make_payload(const ddsi_sertype* type, std::initializer_list<Bytes> parts) noexcept {
+  std::size_t size = 0;
+  for (const Bytes& part : parts) size += part.size();
+  const std::size_t room = padded(size);
   Payload* const payload = new_payload(type, SDK_DATA, room);
   if (payload == nullptr) return nullptr;
-  std::memcpy(payload->bytes(), bytes.data(), bytes.size());
-  std::memset(payload->bytes() + bytes.size(), 0, room - bytes.size());
-  payload->size = static_cast<std::uint32_t>(bytes.size());
+  std::byte* at = payload->bytes();
+  for (const Bytes& part : parts) {
+    if (!part.empty()) std::memcpy(at, part.data(), part.size());
+    at += part.size();
+  }
+  std::memset(at, 0, room - size);
+  payload->size = static_cast<std::uint32_t>(size);
   return payload;
 }
 

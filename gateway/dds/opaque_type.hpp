@@ -8,6 +8,7 @@
 
 #include <dds/dds.h>
 
+#include <initializer_list>
 #include <string>
 
 #include <arbiter/bytes.hpp>
@@ -22,5 +23,8 @@ namespace arbiter::gateway::dds {
 // A copy of `bytes`, encapsulation header included, for dds_writecdr(), which takes it over.
 // `type`: the one that dds_create_topic_sertype() has given back. Null: no memory.
 [[nodiscard]] Payload* make_payload(const ddsi_sertype* type, Bytes bytes) noexcept;
+// The same of parts that lie apart, one behind the other.
+[[nodiscard]] Payload* make_payload(const ddsi_sertype* type,
+                                    std::initializer_list<Bytes> parts) noexcept;
 
 }  // namespace arbiter::gateway::dds

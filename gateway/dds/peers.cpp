@@ -10,6 +10,8 @@ namespace arbiter::gateway::dds {
 namespace {
 
 constexpr std::size_t kMaxName = 256;  // of what strangers say
+// Of who they are: so that what they do is not cut off behind it in a status.
+constexpr std::size_t kMaxOwner = 80;
 
 std::string bounded(const char* text) {
   return text == nullptr ? std::string() : std::string(text).substr(0, kMaxName);
@@ -42,6 +44,14 @@ std::string number_of(const Guid& participant) {
   return vendor + text.data();
 }
 
+// "RIHS", a version, "_", and for version 01 the digits of a SHA-256 (REP 2016).
+bool is_type_hash(std::string_view hash) {
+  constexpr std::string_view kKnown = "RIHS01_";
+  constexpr std::size_t kDigits = 64;
+  return hash.size() == kKnown.size() + kDigits && hash.starts_with(kKnown) &&
+         hash.find_first_not_of("0123456789abcdef", kKnown.size()) == std::string_view::npos;
+}
+
 Listener on_data(const Bell& bell) {
   Listener listener(dds_create_listener(const_cast<Bell*>(&bell)));
   dds_lset_data_available(listener.get(), [](dds_entity_t /*reader*/, void* argument) {
@@ -63,15 +73,16 @@ std::string type_hash_in(const std::string& user_data) {
   while (at < user_data.size()) {
     const std::size_t end = std::min(user_data.find(';', at), user_data.size());
     if (user_data.compare(at, kKey.size(), kKey) == 0) {
-      return user_data.substr(at + kKey.size(), std::min(end - at - kKey.size(), kMaxName));
+      std::string hash = user_data.substr(at + kKey.size(), end - at - kKey.size());
+      return is_type_hash(hash) ? hash : std::string();
     }
     at = end + 1;
   }
   return {};
 }
 
-Peers::Peers(dds_entity_t participant, std::set<std::string> topics, const Bell& bell)
-    : topics_(std::move(topics)) {
+Peers::Peers(dds_entity_t participant, const std::set<std::string>& topics, const Bell& bell) {
+  for (const std::string& topic : topics) topics_.try_emplace(topic);
   dds_guid_t own{};
   if (dds_get_guid(participant, &own) == DDS_RETCODE_OK) own_ = guid_of(own);
   const Listener listener = on_data(bell);
@@ -83,31 +94,29 @@ Peers::Peers(dds_entity_t participant, std::set<std::string> topics, const Bell&
   writers_ = reader(DDS_BUILTIN_TOPIC_DCPSPUBLICATION, listener.get(), "the reader of writers");
 }
 
-bool Peers::update() {
-  const bool readers = update(readers_, End::kReader);
-  const bool writers = update(writers_, End::kWriter);
-  return readers || writers;
+void Peers::update() {
+  update(readers_, End::kReader);
+  update(writers_, End::kWriter);
 }
 
-bool Peers::update(const Entity& reader, End end) {
+void Peers::update(const Entity& reader, End end) {
   constexpr std::size_t kBatch = 32;
-  bool changed = false;
   for (;;) {
     std::array<void*, kBatch> samples{};
     std::array<dds_sample_info_t, kBatch> infos{};
     const dds_return_t taken = dds_take(reader.get(), samples.data(), infos.data(), kBatch, kBatch);
-    if (taken <= 0) return changed;
+    if (taken <= 0) return;
     for (std::size_t i = 0; i < static_cast<std::size_t>(taken); ++i) {
       if (infos[i].instance_state != DDS_IST_ALIVE) {
         if (const auto gone = handles_.find(infos[i].instance_handle); gone != handles_.end()) {
-          peers_.erase(gone->second);
+          auto& [topic, guid] = gone->second;
+          topic->ends.erase(guid);
+          ++topic->revision;
           handles_.erase(gone);
-          changed = true;
         }
       } else if (infos[i].valid_data) {
         add(*static_cast<const dds_builtintopic_endpoint_t*>(samples[i]), end,
             infos[i].instance_handle);
-        changed = true;
       }
     }
     dds_return_loan(reader.get(), samples.data(), taken);
@@ -117,8 +126,16 @@ bool Peers::update(const Entity& reader, End end) {
 void Peers::add(const dds_builtintopic_endpoint_t& endpoint, End end,
                 dds_instance_handle_t handle) {
   if (guid_of(endpoint.participant_key) == own_) return;
-  if (endpoint.topic_name == nullptr || !topics_.contains(endpoint.topic_name)) return;
-  if (endpoint.qos == nullptr || peers_.size() >= kMaxPeers) return;
+  if (endpoint.topic_name == nullptr || endpoint.qos == nullptr) return;
+  const auto found = topics_.find(std::string_view(endpoint.topic_name));
+  if (found == topics_.end()) return;
+  PeersOfTopic& topic = found->second;
+  ++topic.revision;
+  const bool is_full = handles_.size() >= kMaxPeers || topic.ends.size() >= kMaxPeersOfTopic;
+  if (is_full && !handles_.contains(handle)) {
+    topic.has_more = true;
+    return;
+  }
   const Guid guid = guid_of(endpoint.key);
   Peer peer;
   peer.end = end;
@@ -128,8 +145,8 @@ void Peers::add(const dds_builtintopic_endpoint_t& endpoint, End end,
   peer.qos = read_announced(*endpoint.qos);
   peer.type_hash = type_hash_in(user_data(*endpoint.qos));
   peer.owner = owner_of(endpoint);
-  peers_.insert_or_assign(guid, std::move(peer));
-  handles_.insert_or_assign(handle, guid);
+  topic.ends.insert_or_assign(guid, std::move(peer));
+  handles_.insert_or_assign(handle, Place(&topic, guid));
 }
 
 std::string Peers::owner_of(const dds_builtintopic_endpoint_t& endpoint) const {
@@ -146,6 +163,7 @@ std::string Peers::owner_of(const dds_builtintopic_endpoint_t& endpoint) const {
     if (!name.empty()) {
       result = name;
       if (!pid.empty()) result += " (pid " + pid + (host.empty() ? "" : " on " + host) + ")";
+      if (result.size() > kMaxOwner) result = result.substr(0, kMaxOwner - 3) + "...";
     }
   }
   if (read > 0) dds_return_loan(participants_.get(), &sample, read);

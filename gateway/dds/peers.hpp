@@ -7,9 +7,11 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "gateway/core/bridge.hpp"
 #include "gateway/dds/cyclone_qos.hpp"
@@ -34,30 +36,40 @@ struct Peer {
 using Guid = std::array<std::uint8_t, 16>;
 using PeerMap = std::map<Guid, Peer>;
 
+// All that is known of one topic. Strangers may be any number: what does not fit is not looked at.
+struct PeersOfTopic {
+  PeerMap ends;
+  bool has_more = false;       // than are looked at
+  std::uint64_t revision = 0;  // another one: something has changed
+};
+
 class Peers {
  public:
   // Looks for those of `topics` alone: others are none of our business, however many there are.
   // `bell` rings where there is something to take in, and outlives this.
-  Peers(dds_entity_t participant, std::set<std::string> topics, const Bell& bell);
+  Peers(dds_entity_t participant, const std::set<std::string>& topics, const Bell& bell);
   Peers(const Peers&) = delete;
   Peers& operator=(const Peers&) = delete;
   ~Peers() = default;
 
-  // Takes in what has come; true: something has. Does not wait.
-  bool update();
-  [[nodiscard]] const PeerMap& all() const { return peers_; }
+  // Takes in what has come. Does not wait.
+  void update();
+  // Of one of `topics`.
+  [[nodiscard]] const PeersOfTopic& of(const std::string& topic) const { return topics_.at(topic); }
 
  private:
-  bool update(const Entity& reader, End end);
+  using Place = std::pair<PeersOfTopic*, Guid>;
+
+  void update(const Entity& reader, End end);
   void add(const dds_builtintopic_endpoint_t& endpoint, End end, dds_instance_handle_t handle);
   [[nodiscard]] std::string owner_of(const dds_builtintopic_endpoint_t& endpoint) const;
 
   static constexpr std::size_t kMaxPeers = 4096;
+  static constexpr std::size_t kMaxPeersOfTopic = 512;
 
-  const std::set<std::string> topics_;
+  std::map<std::string, PeersOfTopic, std::less<>> topics_;
   Guid own_{};  // our participant
-  PeerMap peers_;
-  std::map<dds_instance_handle_t, Guid> handles_;
+  std::map<dds_instance_handle_t, Place> handles_;
   Entity participants_;
   Entity readers_;
   Entity writers_;
@@ -65,7 +77,8 @@ class Peers {
 
 // The kind of an end by the last byte of its GUID (RTPS 2.5, table 9.1).
 [[nodiscard]] bool has_key(const Guid& guid);
-// "typehash=RIHS01_…;" in what ROS 2 writes into the user data; empty: there is none.
+// "typehash=RIHS01_…;" in what ROS 2 writes into the user data; empty: there is none that a node of
+// ROS 2 could read.
 [[nodiscard]] std::string type_hash_in(const std::string& user_data);
 
 }  // namespace arbiter::gateway::dds

@@ -1,12 +1,10 @@
 #include "gateway/iceoryx/iceoryx.hpp"
 
-#include <unistd.h>
-
+#include <iostream>
 #include <utility>
 
 #include <iceoryx_hoofs/error_handling/error_handling.hpp>
 #include <iceoryx_hoofs/log/logmanager.hpp>
-#include <iceoryx_hoofs/platform/platform_settings.hpp>
 
 #include "gateway/core/say.hpp"
 #include "shm/clock.hpp"
@@ -22,26 +20,20 @@ constexpr shm::Nanoseconds kHangsInside = 5 * kSecond;  // the thread does not c
 // less. What is less is answered by the call that found it.
 void handle_error(iox::Error error, const std::function<void()>&, iox::ErrorLevel level) {
   if (level != iox::ErrorLevel::FATAL) return;
-  say(Level::kError, std::string("iceoryx gives up: ") + iox::ErrorHandler::toString(error));
+  const std::string made = what_is_made();
+  say(Level::kError, std::string("iceoryx gives up: ") + iox::ErrorHandler::toString(error) +
+                         (made.empty() ? "" : ": RouDi does not grant it " + made));
   std::_Exit(1);
 }
 
 }  // namespace
 
-std::string runtime_name(const std::string& gateway, int pid) {
-  return gateway + "-" + std::to_string(pid);
-}
-
-void remove_traces(const std::string& runtime) {
-  const std::string socket = iox::platform::IOX_UDS_SOCKET_PATH_PREFIX + runtime;
-  const std::string lock = iox::platform::IOX_LOCK_FILE_PATH_PREFIX + runtime + ".lock";
-  ::unlink(socket.c_str());
-  ::unlink(lock.c_str());
-}
-
 Iceoryx::Iceoryx(std::string name) : name_(std::move(name)) {
   iox::log::LogManager::GetLogManager().SetDefaultLogLevel(iox::log::LogLevel::kError,
                                                            iox::log::LogLevelOutput::kHideLogLevel);
+  // It writes a line for each sample for which no chunk is left, past its own log and its error
+  // handler: a subscriber that keeps what it gets would fill a disk. The account counts those.
+  std::cerr.setstate(std::ios::badbit);
   static const auto handler = iox::ErrorHandler::setTemporaryErrorHandler(handle_error);
 }
 
@@ -81,8 +73,7 @@ void Iceoryx::tend() {
     std::vector<ChunkSender*> senders;
     for (const auto& each : senders_) senders.push_back(each.get());
     joined_ = now;
-    session_ = std::make_unique<Session>(runtime_name(name_, ::getpid()), *roudi, ins_,
-                                         std::move(senders));
+    session_ = std::make_unique<Session>(name_, *roudi, ins_, senders);
     return;
   }
   if (roudi != session_->roudi()) throw NeedsNewProcess("RouDi has gone");

@@ -13,12 +13,6 @@
 
 namespace arbiter::gateway {
 
-// Of the runtime of a gateway whose process has that id: no other's, also where one is started
-// again before RouDi has noticed that its predecessor has died.
-[[nodiscard]] std::string runtime_name(const std::string& gateway, int pid);
-// Removes what iceoryx leaves in /tmp of a process that was killed.
-void remove_traces(const std::string& runtime);
-
 class Iceoryx final : public Middleware {
  public:
   // `name`: what the runtime's name begins with.

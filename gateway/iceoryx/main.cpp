@@ -1,6 +1,7 @@
 // arbiter-gateway-iceoryx: programs that speak iceoryx, arbitrated unchanged.
 #include "gateway/core/program.hpp"
 #include "gateway/iceoryx/iceoryx.hpp"
+#include "gateway/iceoryx/runtime.hpp"
 
 namespace {
 

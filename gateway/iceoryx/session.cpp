@@ -1,15 +1,20 @@
 #include "gateway/iceoryx/session.hpp"
 
 #include <pthread.h>
+#include <signal.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <utility>
 
+#include <iceoryx_hoofs/log/logmanager.hpp>
 #include <iceoryx_posh/runtime/posh_runtime.hpp>
 
 #include "gateway/core/freshness.hpp"
 #include "gateway/core/say.hpp"
 #include "gateway/iceoryx/chunk.hpp"
+#include "gateway/iceoryx/runtime.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::gateway {
@@ -18,10 +23,16 @@ namespace {
 constexpr shm::Nanoseconds kMillisecond = 1'000'000;
 // Rounds without anything to take: so that the loop sees that the thread goes round.
 constexpr shm::Nanoseconds kLongestWait = 250 * kMillisecond;
-constexpr shm::Nanoseconds kDiscoveryPeriod = 500 * kMillisecond;
+// Topics that no WaitSet has room for are looked at that often: an emergency stop may be one.
+constexpr shm::Nanoseconds kUnwatchedPeriod = 5 * kMillisecond;
+constexpr shm::Nanoseconds kListPeriod = 200 * kMillisecond;
+// RouDi needs a tenth of a second to connect who is in its list.
+constexpr int kLooksUntilRefused = 10;
 // RouDi gives up a process that has not been heard of for 1.5 s, whose ends are dead from then on
 // although nothing tells it so. What keeps its keep-alive from running keeps this thread, too.
 constexpr shm::Nanoseconds kGivenUp = 1200 * kMillisecond;
+
+thread_local std::string made;
 
 iox::capro::ServiceDescription service_of(const IceoryxTopic& topic) {
   const auto id = [](const std::string& text) {
@@ -68,8 +79,9 @@ Sender::Result ChunkSender::send(Bytes sample) noexcept {
                        topic.user_header, alignment_of_header(topic.user_header));
   if (loan.has_error()) {
     const bool is_none = loan.get_error() == iox::popo::AllocationError::NO_MEMPOOLS_AVAILABLE;
-    account_.set_last_reason(is_none ? "RouDi has no memory pool for chunks of that size"
-                                     : "RouDi's memory pool is exhausted");
+    account_.set_last_reason((is_none ? "RouDi has no memory pool for chunks of "
+                                      : "RouDi's memory pool is exhausted, for ") +
+                             std::to_string(sample.size() - header) + " bytes");
     return is_none ? Result::kTooLarge : Result::kNoMemory;
   }
   void* const payload = loan.value();
@@ -82,20 +94,21 @@ Sender::Result ChunkSender::send(Bytes sample) noexcept {
   return Result::kSent;
 }
 
-Session::Session(std::string name, RoudiIdentity roudi, std::vector<Middleware::OpenIn> ins,
-                 std::vector<ChunkSender*> outs)
-    : name_(std::move(name)),
-      roudi_(roudi),
-      ins_(std::move(ins)),
-      outs_(std::move(outs)),
-      thread_([this] { run(); }) {}
+std::string what_is_made() { return made; }
+
+Session::Session(std::string gateway, RoudiIdentity roudi, std::vector<Middleware::OpenIn> ins,
+                 const std::vector<ChunkSender*>& outs)
+    : gateway_(std::move(gateway)), roudi_(roudi), ins_(std::move(ins)) {
+  for (ChunkSender* const out : outs) outs_.push_back({out});
+  thread_ = std::thread([this] { run(); });
+}
 
 Session::~Session() {
   ends_.store(true, std::memory_order_relaxed);
-  for (int i = 0; i < 100 && !ended_.load(std::memory_order_acquire); ++i) {
+  for (int i = 0; i < 100 && !ended_.load(std::memory_order_relaxed); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  if (ended_.load(std::memory_order_acquire)) {
+  if (ended_.load(std::memory_order_relaxed)) {
     thread_.join();
     return;
   }
@@ -109,44 +122,55 @@ void Session::run() {
   last_round_.store(shm::monotonic_now(), std::memory_order_relaxed);
   make_ends();
   last_round_.store(shm::monotonic_now(), std::memory_order_relaxed);
-  ready_.store(true, std::memory_order_release);
+  waits_.announce(*wait_set_);
   take_for_ever();
   wait_set_.reset();
-  discovery_.reset();
+  port_list_.reset();
   inlets_.clear();
   publishers_.clear();
-  ended_.store(true, std::memory_order_release);
+  ended_.store(true, std::memory_order_relaxed);
 }
 
 void Session::make_ends() {
-  iox::runtime::PoshRuntime::initRuntime(iox::RuntimeName_t(iox::cxx::TruncateToCapacity, name_));
-  for (ChunkSender* out : outs_) {
-    const IceoryxTopic& topic = *out->entry().iceoryx;
+  iox::runtime::PoshRuntime::initRuntime(
+      iox::RuntimeName_t(iox::cxx::TruncateToCapacity, runtime_name(gateway_, ::getpid())));
+  for (const Outlet& out : outs_) {
+    const Entry& entry = out.sender->entry();
+    made = "the publisher of " + entry.outside();
     iox::popo::PublisherOptions options;
-    options.historyCapacity = topic.history;
+    options.historyCapacity = entry.iceoryx->history;
     publishers_.push_back(
-        std::make_unique<iox::popo::UntypedPublisher>(service_of(topic), options));
-    out->use(*publishers_.back());
+        std::make_unique<iox::popo::UntypedPublisher>(service_of(*entry.iceoryx), options));
+    out.sender->use(*publishers_.back());
   }
-  discovery_ = std::make_unique<iox::runtime::ServiceDiscovery>();
+  made = "the subscriber of RouDi's list of ports";
+  port_list_.emplace();
   wait_set_ = std::make_unique<iox::popo::WaitSet<>>();
   for (const Middleware::OpenIn& in : ins_) {
+    const Entry& entry = in.incoming.entry();
+    made = "the subscriber of " + entry.outside();
     iox::popo::SubscriberOptions options;
-    options.queueCapacity = in.incoming.entry().iceoryx->queue;
+    options.queueCapacity = entry.iceoryx->queue;
     options.historyRequest = 0;  // nothing old
     inlets_.push_back(std::make_unique<Inlet>(in, options));
-    Inlet& inlet = *inlets_.back();
-    wait_set_->attachState(inlet.subscriber, iox::popo::SubscriberState::HAS_DATA)
-        .or_else([&](auto&) {
-          inlet.in.account.set_last_reason("it is only looked at now and then: too many topics");
-        });
+    watches_all_ =
+        watches_all_ && wait_set_->size() < wait_set_->capacity() &&
+        !wait_set_->attachState(inlets_.back()->subscriber, iox::popo::SubscriberState::HAS_DATA)
+             .has_error();
   }
+  made.clear();
+  // From here on it has a line for each sample that does not fit, and the account counts those.
+  iox::log::LogManager::GetLogManager().SetDefaultLogLevel(iox::log::LogLevel::kOff,
+                                                           iox::log::LogLevelOutput::kHideLogLevel);
+  if (watches_all_) return;
+  say(Level::kInfo, "iceoryx can watch " + std::to_string(wait_set_->size()) +
+                        " topics at once; the others are looked at every 5 ms");
 }
 
 void Session::take_for_ever() {
   for (const auto& inlet : inlets_) take_all(*inlet);  // from here on they are known to be empty
   while (!ends_.load(std::memory_order_relaxed)) {
-    shm::Nanoseconds wait = kLongestWait;
+    shm::Nanoseconds wait = watches_all_ ? kLongestWait : kUnwatchedPeriod;
     for (const auto& inlet : inlets_) {
       const shm::Nanoseconds age = inlet->in.incoming.max_age().get();
       wait = std::min(wait, std::max(kMillisecond, QueueFreshness::period(age)));
@@ -158,7 +182,7 @@ void Session::take_for_ever() {
     const shm::Nanoseconds before = last_round_.exchange(now, std::memory_order_relaxed);
     if (now - before > kGivenUp) stalled_.store(true, std::memory_order_relaxed);
     for (const auto& inlet : inlets_) take_all(*inlet);
-    look_for_publishers(now);
+    look_at_list(now);
   }
 }
 
@@ -195,20 +219,54 @@ void Session::take_all(Inlet& inlet) {
   }
 }
 
-// A subscriber does not know whether there is a publisher; RouDi's registry does, which names each
-// topic once however many offer it.
-void Session::look_for_publishers(shm::Nanoseconds now) {
-  if (now - looked_for_publishers_ < kDiscoveryPeriod) return;
-  looked_for_publishers_ = now;
-  for (const auto& inlet : inlets_) {
-    std::uint32_t found = 0;
-    const auto service = service_of(inlet->topic);
-    discovery_->findService(
-        service.getServiceIDString(), service.getInstanceIDString(), service.getEventIDString(),
-        [&](const iox::capro::ServiceDescription&) { found = 1; },
-        iox::popo::MessagingPattern::PUB_SUB);
-    inlet->in.account.set_peers(found, true);
+void Session::look_at_list(shm::Nanoseconds now) {
+  if (now - looked_at_list_ < kListPeriod) return;
+  looked_at_list_ = now;
+  if (port_list_->update()) {
+    for (const auto& inlet : inlets_) {
+      const std::size_t publishers = port_list_->publishers_of(inlet->topic).size();
+      inlet->in.account.set_peers(static_cast<std::uint32_t>(publishers));
+    }
   }
+  // Also where the list is the same: who has ended stays in it for a while.
+  for (Outlet& out : outs_) {
+    look_for_strangers(out);
+    look_for_refused(out);
+  }
+}
+
+// RouDi connects no subscriber that asks for what its publisher does not offer, and tells neither.
+void Session::look_for_refused(Outlet& out) const {
+  const auto subscribers = port_list_->subscribers_of(*out.sender->entry().iceoryx);
+  if (subscribers.empty() || out.sender->publisher()->hasSubscribers()) {
+    out.looks_without_any = 0;
+    return;
+  }
+  if (++out.looks_without_any != kLooksUntilRefused) return;
+  out.sender->account().set_last_reason(
+      subscribers.front() +
+      " subscribes and is not connected: it asks for history=\"…\", or to be waited for when its "
+      "queue is full, which no gateway does");
+}
+
+// What does not pass the gateway can bypass it.
+void Session::look_for_strangers(Outlet& out) const {
+  const std::string own = runtime_name(gateway_, ::getpid());
+  std::string strangers;
+  for (const std::string& runtime : port_list_->publishers_of(*out.sender->entry().iceoryx)) {
+    const auto process = process_of(gateway_, runtime);
+    const bool has_ended = process && ::kill(*process, 0) != 0 && errno == ESRCH;
+    if (runtime != own && !has_ended) strangers += (strangers.empty() ? "" : ", ") + runtime;
+  }
+  const std::string before = std::exchange(out.strangers, strangers);
+  if (strangers.empty() && before.empty()) return;
+  const std::string text =
+      strangers.empty() ? "" : "others publish there too, past all arbitration: " + strangers;
+  // Each time: the loop takes back what it has said of RouDi, and with it this.
+  out.sender->account().set_obstacle(text);
+  if (strangers.empty() || strangers == before) return;
+  say(Level::kWarning, out.sender->entry().outside() + ": " + text +
+                           "; let them publish to another topic, which comes in");
 }
 
 }  // namespace arbiter::gateway

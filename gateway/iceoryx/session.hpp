@@ -16,9 +16,10 @@
 #include <iceoryx_posh/popo/untyped_publisher.hpp>
 #include <iceoryx_posh/popo/untyped_subscriber.hpp>
 #include <iceoryx_posh/popo/wait_set.hpp>
-#include <iceoryx_posh/runtime/service_discovery.hpp>
 
+#include "gateway/core/announced.hpp"
 #include "gateway/core/middleware.hpp"
+#include "gateway/iceoryx/port_list.hpp"
 #include "gateway/iceoryx/roudi.hpp"
 
 namespace arbiter::gateway {
@@ -31,27 +32,26 @@ class ChunkSender final : public Sender {
 
   [[nodiscard]] Result send(Bytes sample) noexcept override;
   // From the session's thread, once; the loop sees it from then on.
-  void use(iox::popo::UntypedPublisher& publisher) noexcept {
-    // Release; pairs with the acquire in publisher(): who sees the publisher finds it made.
-    publisher_.store(&publisher, std::memory_order_release);
-  }
-  [[nodiscard]] iox::popo::UntypedPublisher* publisher() const noexcept {
-    return publisher_.load(std::memory_order_acquire);
-  }
+  void use(iox::popo::UntypedPublisher& publisher) noexcept { publisher_.announce(publisher); }
+  [[nodiscard]] iox::popo::UntypedPublisher* publisher() const noexcept { return publisher_.get(); }
   [[nodiscard]] const Entry& entry() const noexcept { return entry_; }
   [[nodiscard]] Account& account() const noexcept { return account_; }
 
  private:
   const Entry& entry_;
   Account& account_;
-  std::atomic<iox::popo::UntypedPublisher*> publisher_{nullptr};
+  Announced<iox::popo::UntypedPublisher> publisher_;
 };
+
+// What this process's thread of iceoryx is making, for what is said where that ends the process;
+// empty: nothing.
+[[nodiscard]] std::string what_is_made();
 
 class Session {
  public:
-  // `name`: of the runtime, no other process's. Keeps references. Starts the thread.
-  Session(std::string name, RoudiIdentity roudi, std::vector<Middleware::OpenIn> ins,
-          std::vector<ChunkSender*> outs);
+  // `gateway`: what the name of its runtime begins with. Keeps references. Starts the thread.
+  Session(std::string gateway, RoudiIdentity roudi, std::vector<Middleware::OpenIn> ins,
+          const std::vector<ChunkSender*>& outs);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
   // Waits for the thread, if it comes to an end within a second; else leaves it behind.
@@ -59,7 +59,7 @@ class Session {
 
   [[nodiscard]] const RoudiIdentity& roudi() const noexcept { return roudi_; }
   // All publishers and subscribers are made.
-  [[nodiscard]] bool is_ready() const noexcept { return ready_.load(std::memory_order_acquire); }
+  [[nodiscard]] bool is_ready() const noexcept { return waits_.get() != nullptr; }
   // When its thread last went round, by CLOCK_MONOTONIC.
   [[nodiscard]] shm::Nanoseconds last_round() const noexcept {
     return last_round_.load(std::memory_order_relaxed);
@@ -71,23 +71,34 @@ class Session {
 
  private:
   struct Inlet;
+  // An `out` entry, who else writes to its topic, and who subscribes to it in vain.
+  struct Outlet {
+    ChunkSender* sender;
+    std::string strangers{};
+    int looks_without_any = 0;  // at the list, while it has subscribers and the publisher none
+  };
 
   void run();
   void make_ends();
   void take_all(Inlet& inlet);
   void take_for_ever();
-  void look_for_publishers(shm::Nanoseconds now);
+  void look_at_list(shm::Nanoseconds now);
+  void look_for_strangers(Outlet& out) const;
+  void look_for_refused(Outlet& out) const;
 
-  const std::string name_;
+  const std::string gateway_;
   const RoudiIdentity roudi_;
   const std::vector<Middleware::OpenIn> ins_;
-  const std::vector<ChunkSender*> outs_;
+  std::vector<Outlet> outs_;
   std::vector<std::unique_ptr<iox::popo::UntypedPublisher>> publishers_;
   std::vector<std::unique_ptr<Inlet>> inlets_;
   std::unique_ptr<iox::popo::WaitSet<>> wait_set_;
-  std::unique_ptr<iox::runtime::ServiceDiscovery> discovery_;  // it is large
-  shm::Nanoseconds looked_for_publishers_ = 0;
-  std::atomic<bool> ready_{false};
+  bool watches_all_ = true;  // no more topics than a WaitSet can watch
+  std::optional<PortList> port_list_;
+  shm::Nanoseconds looked_at_list_ = 0;
+  Announced<iox::popo::WaitSet<>> waits_;  // the last that is made
+  // Relaxed is enough for these: a flag or a reading by itself, of which the last one counts. Who
+  // finds that the thread has ended joins it.
   std::atomic<bool> ends_{false};
   std::atomic<bool> ended_{false};
   std::atomic<bool> stalled_{false};

@@ -9,6 +9,8 @@
 namespace arbiter::gateway {
 namespace {
 
+constexpr std::size_t kMaxItems = 64;  // of a list
+
 std::string quoted(std::string_view name) { return std::string(name) + "=\"…\""; }
 
 std::uint64_t unit_of(std::string_view text) {
@@ -142,6 +144,10 @@ std::vector<std::string> Attributes::list(std::string_view name, std::size_t max
       refuse(*found, name,
              "a list; write values of at most " + std::to_string(max_each) +
                  " bytes, with commas between them");
+      return {};
+    }
+    if (items.size() == kMaxItems) {
+      refuse(*found, name, "short enough; write at most " + std::to_string(kMaxItems) + " values");
       return {};
     }
     items.emplace_back(item);

@@ -3,6 +3,9 @@
 #include <fnmatch.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cstdlib>
+#include <cstring>
 #include <map>
 #include <set>
 #include <string>
@@ -11,6 +14,7 @@
 
 #include "gateway/mapping/ros_names.hpp"
 #include "rules/model/expression.hpp"
+#include "rules/model/print_rules.hpp"
 #include "rules/text/names.hpp"
 
 namespace arbiter::gateway {
@@ -35,13 +39,21 @@ bool share_a_partition(const std::vector<std::string>& one, const std::vector<st
   return false;
 }
 
-// A domain that is not named is the environment's, and most often 0.
+// A domain that is not named is the environment's, as it is here. What cannot be read there, the
+// gateway says when it starts.
+std::uint32_t domain_of(const Gateway& gateway) {
+  if (gateway.domain) return *gateway.domain;
+  const char* const text = std::getenv("ROS_DOMAIN_ID");
+  std::uint32_t domain = 0;
+  if (text != nullptr) std::from_chars(text, text + std::strlen(text), domain);
+  return domain;
+}
+
 bool are_one_topic(const Placed& one, const Placed& other) {
   const Entry& a = *one.entry;
   const Entry& b = *other.entry;
   if (a.dds && b.dds) {
-    const bool is_one_domain = one.gateway->domain.value_or(0) == other.gateway->domain.value_or(0);
-    return is_one_domain && a.dds->name == b.dds->name &&
+    return domain_of(*one.gateway) == domain_of(*other.gateway) && a.dds->name == b.dds->name &&
            share_a_partition(a.dds->qos.partitions, b.dds->qos.partitions);
   }
   if (a.iceoryx && b.iceoryx) {
@@ -95,12 +107,14 @@ class MappingCheck {
       : model_(model), diagnostics_(diagnostics) {
     for (const Mapping& mapping : mappings) {
       for (const Gateway& gateway : mapping.gateways) {
+        gateways_.push_back(&gateway);
         for (const Entry& entry : gateway.entries) entries_.push_back({&gateway, &entry});
       }
     }
   }
 
   void check() {
+    check_configurations();
     check_ports();
     check_topics();
     for (const Placed& each : entries_) check_idle(*each.entry);
@@ -108,10 +122,39 @@ class MappingCheck {
     list_model();
     for (const Placed& each : entries_) check_names(*each.entry);
     check_choices();
+    check_latched();
     check_types();
   }
 
  private:
+  // A program has one configuration for each domain, and is given a file as a whole. Whether it is
+  // given several files nobody can see here.
+  void check_configurations() {
+    std::map<std::uint32_t, const Gateway*> known;
+    for (const Gateway* gateway : gateways_) {
+      if (gateway->kind != Kind::kDds) continue;
+      const auto [found, is_new] = known.try_emplace(domain_of(*gateway), gateway);
+      const Gateway& first = *found->second;
+      if (is_new || (first.interfaces == gateway->interfaces && first.peers == gateway->peers &&
+                     first.configuration == gateway->configuration)) {
+        continue;
+      }
+      const bool is_one_file = first.where.file == gateway->where.file;
+      const std::string text =
+          "the gateway at " + rules::describe(first.where) + " joins domain " +
+          std::to_string(found->first) +
+          " with another interface, peers or configuration, and a program has one for each "
+          "domain; give both the same";
+      if (is_one_file) {
+        diagnostics_.error("two-configurations", gateway->where,
+                           text + ", or put them into files of their own, for a program each");
+      } else {
+        diagnostics_.warning("two-configurations", gateway->where,
+                             text + ", or start a program for each of the two files");
+      }
+    }
+  }
+
   void check_ports() {
     std::map<std::pair<bool, std::string>, const Port*> known;
     for (const Placed& each : entries_) {
@@ -235,9 +278,7 @@ class MappingCheck {
     for (const Placed& each : entries_) {
       if (!each.entry->choice) continue;
       for (const Port* port : each.entry->ports()) {
-        const auto own = model_->timeouts.find(port->name);
-        const auto timeout = own == model_->timeouts.end() ? model_->timeout : own->second;
-        if (timeout == shm::kForever) forever.emplace(port->name, port);
+        if (timeout_of(port->name) == shm::kForever) forever.emplace(port->name, port);
       }
     }
     if (forever.empty()) return;
@@ -260,6 +301,34 @@ class MappingCheck {
               "the period of its topic",
           {.ports = {}, .source = name});
     }
+  }
+
+  // A topic that keeps samples for those who come later brings old ones. That is right where what
+  // was said before still holds, and would otherwise make an old sample an arrival.
+  void check_latched() {
+    for (const Placed& each : entries_) {
+      const Entry& entry = *each.entry;
+      if (!entry.is_in() || !entry.dds) continue;
+      if (entry.dds->qos.durability == Durability::kVolatile) continue;
+      for (const Port* port : entry.ports()) {
+        const shm::Nanoseconds timeout = timeout_of(port->name);
+        if (timeout == shm::kForever) continue;
+        diagnostics_.error(
+            "late-history", port->where,
+            "a topic that keeps samples for those who come later brings old ones, and T of " +
+                rules::quote(port->name) + " is " + rules::to_string(timeout) +
+                ": an old sample must not become an arrival; give the source timeout=\"forever\" "
+                "in "
+                "the model, if what was said before still holds, or write durability=\"volatile\", "
+                "which such publishers serve, too",
+            {.ports = {}, .source = port->name});
+      }
+    }
+  }
+
+  [[nodiscard]] shm::Nanoseconds timeout_of(const std::string& source) const {
+    const auto own = model_->timeouts.find(source);
+    return own == model_->timeouts.end() ? model_->timeout : own->second;
   }
 
   void check_types() {
@@ -299,6 +368,7 @@ class MappingCheck {
 
   const rules::RuleSet* const model_;
   rules::Diagnostics& diagnostics_;
+  std::vector<const Gateway*> gateways_;
   std::vector<Placed> entries_;
   std::set<std::string> sources_, ports_;  // of the model
   std::vector<std::pair<std::string, std::string>> connections_;

@@ -13,7 +13,8 @@
 namespace arbiter::gateway {
 namespace {
 
-constexpr std::size_t kEncapsulation = 4;  // bytes of DDS's header
+constexpr std::size_t kEncapsulation = 4;     // bytes of DDS's header
+constexpr unsigned kLastEncapsulation = 0xb;  // of those that DDS-XTypes knows
 
 // An attribute that another one needs, or excludes, means a mistake; to pass it over would hide it.
 class EntryReader {
@@ -96,8 +97,15 @@ class EntryReader {
     const auto size = attributes_.bytes("size", 1, kMaxSampleBytes);
     if (size) size_ = *size;
     const auto name = attributes_.text("type", shm::kMaxTypeName);
-    if (size && header() + *size > entry_.max_size) entry_.max_size = header() + *size;
-    if (!name) return;
+    if (size) make_room_for(header() + *size, "size");
+    if (!name) {
+      if (size && !attributes_.has("idle")) {
+        attributes_.error("misplaced-attribute", "size",
+                          "size=\"…\" says how large each sample of a type is; add type=\"…\", or "
+                          "write max_size=\"…\" for the largest sample");
+      }
+      return;
+    }
     entry_.type = PortType{*name, size ? header() + *size : 0, entry_.iceoryx->alignment};
     shm::TypeInfo info;
     info.set_name(*name);
@@ -200,7 +208,20 @@ class EntryReader {
                         "idle=" + rules::quote(*text) +
                             " is not known; write none, zero, or file: with a file's name");
     }
-    if (entry_.idle.sample.size() > entry_.max_size) entry_.max_size = entry_.idle.sample.size();
+    make_room_for(entry_.idle.sample.size(), "idle");
+  }
+
+  // A sample of `bytes`, headers included, is to fit, as that attribute asks.
+  void make_room_for(std::size_t bytes, std::string_view attribute) {
+    if (bytes <= entry_.max_size) return;
+    if (attributes_.has("max_size")) {
+      attributes_.error("contradiction", "max_size",
+                        "max_size is " + std::to_string(entry_.max_size) +
+                            " bytes, and the sample that " + std::string(attribute) +
+                            "=\"…\" asks for has " + std::to_string(bytes) +
+                            " with its headers; correct one of the two");
+    }
+    entry_.max_size = bytes;
   }
 
   void read_zero() {
@@ -264,11 +285,8 @@ class EntryReader {
     try {
       const std::string bytes =
           rules::read_bytes(entry_.idle.path, kMaxIdleBytes, rules::Accept::kRegularFile);
-      if (bytes.size() > kMaxIdleBytes || bytes.size() < header()) {
-        attributes_.error("idle-size", "idle",
-                          rules::quote(entry_.idle.path) + " has " + std::to_string(bytes.size()) +
-                              " bytes; a sample to be sent while the port is idle has " +
-                              std::to_string(header()) + " to " + std::to_string(kMaxIdleBytes));
+      if (const auto fault = fault_of_idle(bytes); !fault.empty()) {
+        attributes_.error("idle-size", "idle", rules::quote(entry_.idle.path) + " " + fault);
         return;
       }
       const auto* const data = reinterpret_cast<const std::byte*>(bytes.data());
@@ -279,6 +297,33 @@ class EntryReader {
                             "; write the name of a file that holds a "
                             "sample, as seen from the mapping");
     }
+  }
+
+  // What is wrong with a sample of a file; empty: nothing. A subscriber takes what it gets for a
+  // sample of its type, and may read as many bytes as that has.
+  [[nodiscard]] std::string fault_of_idle(const std::string& bytes) const {
+    const std::string has = "has " + std::to_string(bytes.size()) + " bytes; ";
+    if (bytes.size() > kMaxIdleBytes || bytes.size() < header()) {
+      return has + "a sample to be sent while the port is idle has " + std::to_string(header()) +
+             " to " + std::to_string(kMaxIdleBytes);
+    }
+    const auto counted = [&](std::size_t size) {
+      return has + "a sample has " + std::to_string(header()) + " of headers and " +
+             std::to_string(size) + " of its own: write another file";
+    };
+    if (!entry_.dds) {
+      if (size_ == 0 || bytes.size() == header() + size_) return {};
+      return counted(size_) + ", or correct the size";
+    }
+    if (bytes[0] != 0 || static_cast<unsigned char>(bytes[1]) > kLastEncapsulation) {
+      return "does not begin with the encapsulation header of DDS, such as 00 01 00 00 for "
+             "little-endian CDR; write it before the sample";
+    }
+    const auto known = fixed_size_of(entry_.type->name);
+    const std::size_t own = bytes.size() - header();
+    // It may be padded to a multiple of four, as DDS sends it.
+    if (!known || own == *known || own == (*known + 3) / 4 * 4) return {};
+    return counted(*known);
   }
 
   rules::ElementReader& reader_;

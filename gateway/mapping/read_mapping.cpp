@@ -100,7 +100,7 @@ class MappingReader {
         if (entries_ == kMaxEntries + 1) {
           reader_.error("too-many-entries", reader_.where(child),
                         "a mapping has at most " + std::to_string(kMaxEntries) +
-                            " entries; split it over several gateways");
+                            " entries; split it over several files");
         }
         continue;
       }

@@ -17,22 +17,29 @@ struct Preset {
   std::uint32_t depth;
 };
 
-// ROS 2's quality of service profiles.
-std::optional<Preset> read_preset(Attributes& attributes) {
+// ROS 2's profiles (rmw/qos_profiles.h), and what its users call latched. "System default" leaves
+// the choice to DDS, whose own defaults differ for readers and writers.
+std::optional<Preset> read_preset(Attributes& attributes, bool is_in) {
   using enum Reliability;
   using enum Durability;
-  return attributes.word<Preset>("qos", {{"default", {kReliable, kVolatile, 10}},
-                                         {"sensor_data", {kBestEffort, kVolatile, 5}},
-                                         {"services", {kReliable, kVolatile, 10}},
-                                         {"parameters", {kReliable, kVolatile, 1000}},
-                                         {"clock", {kBestEffort, kVolatile, 1}},
-                                         {"rosout", {kReliable, kTransientLocal, 1000}}});
+  const Preset services{kReliable, kVolatile, 10};
+  return attributes.word<Preset>(
+      "qos", {{"default", {kReliable, kVolatile, 10}},
+              {"sensor_data", {kBestEffort, kVolatile, 5}},
+              {"latched", {kReliable, kTransientLocal, 1}},
+              {"system_default", {is_in ? kBestEffort : kReliable, kVolatile, 1}},
+              {"services_default", services},
+              {"services", services},
+              {"parameters", {kReliable, kVolatile, 1000}},
+              {"parameter_events", {kReliable, kVolatile, 1000}},
+              {"clock", {kBestEffort, kVolatile, 1}},
+              {"rosout", {kReliable, kTransientLocal, 1000}}});
 }
 
 Qos read_qos(Attributes& attributes, bool is_in, bool is_ros) {
   Qos qos;
   if (is_ros) qos.depth = 10;
-  if (const auto preset = read_preset(attributes)) {
+  if (const auto preset = read_preset(attributes, is_in)) {
     qos.reliability = preset->reliability;
     qos.durability = preset->durability;
     qos.depth = preset->depth;
@@ -46,13 +53,6 @@ Qos read_qos(Attributes& attributes, bool is_in, bool is_ros) {
           "durability", {{"volatile", Durability::kVolatile},
                          {"transient_local", Durability::kTransientLocal}})) {
     qos.durability = *durability;
-  }
-  if (is_in && qos.durability != Durability::kVolatile) {
-    attributes.error(
-        "late-history", attributes.has("durability") ? "durability" : "qos",
-        "a topic that keeps samples for those who come later would bring old ones, and "
-        "nothing old becomes an arrival; write durability=\"volatile\", which such "
-        "publishers serve, too");
   }
   if (const auto history = attributes.word<History>(
           "history", {{"keep_last", History::kKeepLast}, {"keep_all", History::kKeepAll}})) {
@@ -130,6 +130,12 @@ IceoryxTopic read_iceoryx_topic(Attributes& attributes, bool is_in) {
   topic.service = attributes.required("service", kMaxIceoryxName);
   topic.instance = attributes.required("instance", kMaxIceoryxName);
   topic.event = attributes.required("event", kMaxIceoryxName);
+  if (!is_in && topic.instance == "RouDi_ID" &&
+      (topic.service == "Introspection" || topic.service == "ServiceDiscovery")) {
+    attributes.error("invalid-topic", "service",
+                     "RouDi publishes on its own topics itself, and lets nobody else; write "
+                     "another service or instance");
+  }
   const auto set = [](std::uint32_t& to, std::optional<std::uint64_t> from) {
     if (from) to = static_cast<std::uint32_t>(*from);
   };

@@ -274,7 +274,7 @@ std::vector<std::string> only_in(const CompiledPort& port, const CompiledPort* o
 }
 
 // All but who wins.
-PortDiff outline(const std::string& port, const CompiledPort* before, const CompiledPort* after) {
+PortDiff port_diff(const std::string& port, const CompiledPort* before, const CompiledPort* after) {
   PortDiff result;
   result.port = port;
   result.exists_before = before != nullptr;
@@ -345,7 +345,7 @@ ModelDiff diff(const CompiledModel& before, const CompiledModel& after, Budget& 
   std::vector<std::pair<std::size_t, Sides>>
       questions;  // of which ports who wins is to be compared
   for (const auto& [name, sides] : ports) {
-    compared.push_back(outline(name, sides.first, sides.second));
+    compared.push_back(port_diff(name, sides.first, sides.second));
     if (!compared.back().arbitrated_before || !compared.back().arbitrated_after) continue;
     questions.emplace_back(compared.size() - 1, sides);
   }
@@ -354,7 +354,7 @@ ModelDiff diff(const CompiledModel& before, const CompiledModel& after, Budget& 
       [&](std::size_t i) { return compared[questions[i].first].port; },
       [&](std::size_t i) {
         const auto& [port, sides] = questions[i];
-        compared[port] = outline(compared[port].port, sides.first, sides.second);
+        compared[port] = port_diff(compared[port].port, sides.first, sides.second);
         PortComparison(*sides.first, *sides.second, compared[port]).compare(budget);
       });
   ModelDiff result;

@@ -18,6 +18,7 @@
 namespace arbiter::test {
 
 inline constexpr uid_t kStrangersId = 65534;
+inline constexpr int kFewDescriptors = 400;  // of a daemon that is to run out of them
 
 enum class As { kSameUser, kAnotherUser };
 

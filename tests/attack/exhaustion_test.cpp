@@ -22,8 +22,6 @@ namespace {
 using testing::HasSubstr;
 using wire::MessageKind;
 
-constexpr int kFewDescriptors = 400;
-
 // A child process of another user that does its part when it is told to, in two steps.
 class Accomplice {
  public:

@@ -19,8 +19,6 @@ namespace {
 using testing::HasSubstr;
 using wire::MessageKind;
 
-constexpr int kFewDescriptors = 400;
-
 // Opens ports until that is refused: how many there were, and why there are no more.
 std::string open_all_that_it_can(const std::string& instance, const std::string& prefix) {
   RawClient client(instance);

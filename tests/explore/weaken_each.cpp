@@ -58,8 +58,10 @@ std::string short_name(const std::string& file) {
 
 bool is_product(const Location& location) {
   const std::string file = short_name(location.file);
-  return file.compare(0, 4, "shm/") == 0 || file.compare(0, 7, "client/") == 0 ||
-         file.compare(0, 8, "service/") == 0;
+  for (const char* const room : {"shm/", "client/", "service/", "gateway/"}) {
+    if (file.compare(0, std::strlen(room), room) == 0) return true;
+  }
+  return false;
 }
 
 std::string describe(const Location& location) {
@@ -166,7 +168,7 @@ int weaken_each(unsigned jobs, const char* met_file, const std::string& only) {
   std::erase_if(
       all, [&](const auto& each) { return describe(each.first).find(only) == std::string::npos; });
   if (all.empty()) {
-    std::printf("no order to leave out: no case meets one in shm/, client/ or service/%s\n",
+    std::printf("no order to leave out: no case meets one in shm/, client/, service/ or gateway/%s\n",
                 only.empty() ? "" : (" whose row says " + only).c_str());
     return 1;
   }

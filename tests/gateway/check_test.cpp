@@ -1,6 +1,8 @@
 // Mappings beside each other and beside a model.
 #include <gmock/gmock.h>
 
+#include <cstdlib>
+
 #include "rules/model/load.hpp"
 #include "tests/gateway/mapping_text.hpp"
 
@@ -53,6 +55,26 @@ TEST(CheckMapping, AGoodMappingHasNoFindings) {
               IsEmpty());
 }
 
+// What was published before the gateway came is old; where T is forever, it still holds.
+TEST(CheckMapping, SamplesFromBeforeItCameAreForSourcesThatStayActive) {
+  const std::string lock =
+      "<in topic='/lock' type='std_msgs/msg/Bool' true='/EStop/pressed:o' "
+      "false='/EStop/released:o' qos='latched'/>";
+  const std::string all_forever =
+      "<behaviors><source port='/EStop/pressed:o' timeout='forever'/>"
+      "<source port='/EStop/released:o' timeout='forever'/>"
+      "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config>"
+      "<condition>not /EStop/pressed:o</condition></behavior></behaviors>";
+  EXPECT_THAT(check(dds(lock), all_forever).findings(), IsEmpty());
+  EXPECT_THAT(check(dds(lock), "").findings(), IsEmpty());  // T is not known
+  const Read read = check(dds(lock));
+  ASSERT_THAT(read.findings(), ElementsAre(HasSubstr("error late-history")));
+  EXPECT_THAT(read.message(), HasSubstr("T of \"/EStop/released:o\" is 500ms"));
+  EXPECT_THAT(check(dds(in("/nav", "/Nav/cmd:o", "durability='transient_local'"))).findings(),
+              ElementsAre(HasSubstr("error late-history")));
+  EXPECT_THAT(check(dds(out("/cmd", "/Base/cmd:i", "qos='latched'"))).findings(), IsEmpty());
+}
+
 TEST(CheckMapping, APortHasOneEntry) {
   const Read read = check(dds(in("/a", "/Nav/cmd:o") + in("/b", "/Nav/cmd:o")));
   ASSERT_EQ(read.findings().size(), 1u);
@@ -84,6 +106,39 @@ TEST(CheckMapping, ATopicThatComesInAgainIsACircle) {
   EXPECT_THAT(codes("<gateway kind='iceoryx'><in" + end + "port='/a:o'/><out" + end +
                     "port='/b:i' size='1' idle='zero'/></gateway>"),
               ElementsAre("circle"));
+}
+
+// As at the start of the gateway, whose environment it is.
+TEST(CheckMapping, ADomainThatIsNotNamedIsTheEnvironments) {
+  const std::string mapping =
+      dds(in("/cmd", "/Nav/cmd:o"), "domain='7'") + dds(out("/cmd", "/Base/cmd:i"));
+  EXPECT_THAT(check(mapping).findings(), IsEmpty());
+  ::setenv("ROS_DOMAIN_ID", "7", 1);
+  EXPECT_THAT(check(mapping).findings(), ElementsAre(testing::HasSubstr("error circle")));
+  ::setenv("ROS_DOMAIN_ID", "seven", 1);
+  EXPECT_THAT(check(mapping).findings(), IsEmpty());
+  ::unsetenv("ROS_DOMAIN_ID");
+}
+
+// A program would say so when it starts.
+TEST(CheckMapping, AProgramHasOneConfigurationForADomain) {
+  const std::string first = dds(in("/a", "/Nav/cmd:o"), "domain='3' interface='lo'");
+  const auto second = [](const std::string& more) { return dds(in("/b", "/other:o"), more); };
+  const auto findings = [](const std::string& mapping) { return check(mapping, "").findings(); };
+  EXPECT_THAT(findings(first + second("domain='3' interface='lo'")), IsEmpty());
+  EXPECT_THAT(findings(first + second("domain='4' interface='eth0'")), IsEmpty());
+  for (const char* other : {"domain='3'", "domain='3' interface='lo' peers='10.0.0.1'",
+                            "domain='3' interface='lo' configuration='x.xml'"}) {
+    EXPECT_THAT(findings(first + second(other)), ElementsAre(HasSubstr("error two-configurations")))
+        << other;
+  }
+  // Of two files nobody knows here whether one program is given both.
+  Read one = read_text(first);
+  const rules::TextFile file("second.xml", second("domain='3'"));
+  const Mapping other = read_mapping(file, one.diagnostics);
+  check_mappings({one.mapping, other}, nullptr, one.diagnostics);
+  ASSERT_THAT(one.findings(), ElementsAre("1:1 warning two-configurations"));
+  EXPECT_THAT(one.message(), HasSubstr("the gateway at mapping.xml:1:1 joins domain 3 with "));
 }
 
 TEST(CheckMapping, TwoPortsThatCommandOneTopicAreNotArbitratedAgainstEachOther) {

@@ -74,12 +74,38 @@ TEST(Mapping, APresetIsTakenAndCanBeChanged) {
   EXPECT_EQ(read.entry().dds->qos.depth, 2u);
 }
 
-TEST(Mapping, NothingOldIsAskedFor) {
-  const std::string topic = "topic='/a' type='std_msgs/msg/Bool' port='/a' ";
-  EXPECT_THAT(read_dds("<in " + topic + "durability='transient_local'/>").findings(),
-              ElementsAre("1:83 error late-history"));
-  EXPECT_THAT(read_dds("<in " + topic + "qos='rosout'/>").message(), HasSubstr("nothing old"));
-  EXPECT_THAT(read_dds("<out " + topic + "durability='transient_local'/>").findings(), IsEmpty());
+// As rmw/qos_profiles.h has them, and the defaults of DDS where ROS 2 leaves it to DDS.
+TEST(Mapping, ROS2sProfilesHaveTheirNames) {
+  using enum Reliability;
+  using enum Durability;
+  struct Profile {
+    const char* name;
+    Reliability of_in, of_out;
+    Durability durability;
+    std::uint32_t depth;
+  };
+  for (const Profile& each : {Profile{"default", kReliable, kReliable, kVolatile, 10},
+                              Profile{"sensor_data", kBestEffort, kBestEffort, kVolatile, 5},
+                              Profile{"latched", kReliable, kReliable, kTransientLocal, 1},
+                              Profile{"system_default", kBestEffort, kReliable, kVolatile, 1},
+                              Profile{"services_default", kReliable, kReliable, kVolatile, 10},
+                              Profile{"services", kReliable, kReliable, kVolatile, 10},
+                              Profile{"parameters", kReliable, kReliable, kVolatile, 1000},
+                              Profile{"parameter_events", kReliable, kReliable, kVolatile, 1000},
+                              Profile{"clock", kBestEffort, kBestEffort, kVolatile, 1},
+                              Profile{"rosout", kReliable, kReliable, kTransientLocal, 1000}}) {
+    for (const bool is_in : {true, false}) {
+      const Read read =
+          read_dds(std::string(is_in ? "<in" : "<out") +
+                   " topic='/t' type='std_msgs/msg/Bool' port='/p' qos='" + each.name + "'/>");
+      ASSERT_THAT(read.findings(), IsEmpty()) << each.name;
+      const Qos& qos = read.entry().dds->qos;
+      EXPECT_EQ(qos.reliability, is_in ? each.of_in : each.of_out) << each.name << is_in;
+      EXPECT_EQ(qos.durability, each.durability) << each.name;
+      EXPECT_EQ(qos.depth, each.depth) << each.name;
+      EXPECT_EQ(qos.history, History::kKeepLast) << each.name;
+    }
+  }
 }
 
 TEST(Mapping, ABooleanTopicIsTwoSources) {
@@ -212,6 +238,72 @@ TEST(Mapping, AnIdleSampleComesFromAFileBesideTheMapping) {
   EXPECT_THAT(with("file:short.bin").message(), HasSubstr("has 1 bytes"));
   EXPECT_THAT(with("file:none.bin").message(), HasSubstr("none.bin"));
   EXPECT_THAT(with("stop.bin").message(), HasSubstr("write none, zero, or file:"));
+}
+
+// A subscriber takes it for a sample of its type, and may read past its end.
+TEST(Mapping, AnIdleSampleOfAFileHasTheSizeOfItsType) {
+  const test::TemporaryDirectory directory;
+  const std::string path = directory.path();
+  const std::string header("\0\1\0\0", 4);
+  directory.write("bool.bin", header + "0");
+  directory.write("padded.bin", header + "0000");
+  directory.write("long.bin", header + "00000");
+  directory.write("plain.bin", "00000000");
+  const auto dds = [&](const std::string& file) {
+    return read_text(
+        "<gateway kind='dds'><out port='/a:i' topic='/a' type='std_msgs/msg/Bool' "
+        "idle='file:" +
+            file + "'/></gateway>",
+        &path);
+  };
+  EXPECT_THAT(dds("bool.bin").findings(), IsEmpty());
+  EXPECT_THAT(dds("padded.bin").findings(), IsEmpty());
+  EXPECT_THAT(dds("long.bin").message(),
+              HasSubstr("has 9 bytes; a sample has 4 of headers and 1 of its own"));
+  EXPECT_THAT(dds("plain.bin").message(), HasSubstr("encapsulation header of DDS"));
+  const auto iceoryx = [&](const std::string& size) {
+    return read_text(
+        "<gateway kind='iceoryx'><out port='/a:i' service='a' instance='b' event='c' "
+        "user_header='4' alignment='4' idle='file:plain.bin' " +
+            size + "/></gateway>",
+        &path);
+  };
+  EXPECT_THAT(iceoryx("").findings(), IsEmpty());
+  EXPECT_THAT(iceoryx("size='4'").findings(), IsEmpty());
+  EXPECT_THAT(iceoryx("size='8'").findings(), ElementsAre("1:113 error idle-size"));
+}
+
+TEST(Mapping, WhatContradictsItselfIsAnError) {
+  const std::string topic = " service='a' instance='b' event='c' ";
+  EXPECT_THAT(read_iceoryx("<in port='/a:o'" + topic + "size='4'/>").findings(),
+              ElementsAre("1:82 error misplaced-attribute"));
+  EXPECT_THAT(read_iceoryx("<out port='/a:i'" + topic + "size='4'/>").findings(),
+              ElementsAre("1:83 error misplaced-attribute"));
+  EXPECT_THAT(
+      read_iceoryx("<in port='/a:o'" + topic + "type='T' size='100' max_size='99'/>").message(),
+      HasSubstr("max_size is 99 bytes, and the sample that size=\"…\" asks for has 100"));
+  EXPECT_THAT(read_dds("<out port='/a:i' topic='/a' type='std_msgs/msg/Bool' idle='zero' "
+                       "max_size='4'/>")
+                  .message(),
+              HasSubstr("the sample that idle=\"…\" asks for has 5"));
+  // Without max_size it is as large as it must be.
+  const Read large = read_iceoryx("<in port='/a:o'" + topic + "type='T' size='1MiB'/>");
+  ASSERT_THAT(large.findings(), IsEmpty());
+  EXPECT_EQ(large.entry().max_size, std::size_t{1} << 20);
+}
+
+TEST(Mapping, RouDisOwnTopicsCanBeReadAndNotWritten) {
+  const std::string topic = " service='Introspection' instance='RouDi_ID' event='Port' ";
+  EXPECT_THAT(read_iceoryx("<in port='/a:o'" + topic + "/>").findings(), IsEmpty());
+  EXPECT_THAT(read_iceoryx("<out port='/a:i'" + topic + "/>").message(),
+              HasSubstr("lets nobody else"));
+}
+
+TEST(Mapping, ListsAreBounded) {
+  std::string many = "a";
+  for (int i = 0; i < 64; ++i) many += ",a";
+  EXPECT_THAT(read_text("<gateway kind='dds' peers='" + many + "'/>").message(),
+              HasSubstr("write at most 64 values"));
 }
 
 TEST(Mapping, NamesOfRos2AreToldFromOthers) {

@@ -86,6 +86,19 @@ TEST(Parameters, AMisspeltRosParametersIsNoNode) {
   EXPECT_TRUE(imported.plan) << testing::PrintToString(imported.findings());
 }
 
+// They would be left out, of a model that then decides otherwise.
+TEST(Parameters, NamesWithDotsAreNotPassedOver) {
+  const auto imported = import_files({"twist_mux: {ros__parameters: {" + kTopics +
+                                      ", locks.stop.topic: stop, locks.stop.timeout: 0.5}}"});
+  ASSERT_EQ(imported.findings().size(), 1u);
+  EXPECT_THAT(imported.findings().front(), HasSubstr("error dotted-name"));
+  const auto others =
+      import_files({"other: {ros__parameters: {rate.a: 1}}\n"
+                    "twist_mux: {ros__parameters: {" +
+                    kTopics + "}}"});
+  EXPECT_TRUE(others.plan) << testing::PrintToString(others.findings());
+}
+
 TEST(Parameters, AMapOfEntriesIsBelowRosParametersOnly) {
   for (const std::string& file : {kTopics, "twist_mux: {" + kTopics + "}"}) {
     const auto imported = import_files({file});

@@ -7,7 +7,7 @@
 namespace arbiter::shm {
 namespace {
 
-constexpr PortInstance kPublisher = 5;
+constexpr PortInstance kOwner = 5;
 
 // A publisher with a few queues, and the receivers' holds, played without threads. Every slot that
 // it is given is checked against what is queued, held and lent.
@@ -24,7 +24,7 @@ class Play {
   Play(const Play&) = delete;
 
   std::uint32_t loan() {
-    const std::uint32_t slot = pool_.acquire(kPublisher, [&](auto&& each) {
+    const std::uint32_t slot = pool_.acquire(kOwner, [&](auto&& each) {
       for (const auto& receiver : holds_) {
         each(receiver.data(), static_cast<std::uint32_t>(receiver.size()));
       }
@@ -50,8 +50,7 @@ class Play {
   }
   // The newest sample of a queue, into a hold.
   void hold(std::size_t queue, std::size_t index) {
-    holds_[queue][index] =
-        queues_[queue].empty() ? 0 : make_hold(kPublisher, queues_[queue].back());
+    holds_[queue][index] = queues_[queue].empty() ? 0 : make_hold(kOwner, queues_[queue].back());
   }
   [[nodiscard]] std::size_t lent() const { return lent_.size(); }
   SlotPool& pool() { return pool_; }
@@ -69,7 +68,7 @@ class Play {
   [[nodiscard]] bool is_held(std::uint32_t slot) const {
     for (const auto& receiver : holds_) {
       for (const auto& hold : receiver) {
-        if (hold.load() == make_hold(kPublisher, slot)) return true;
+        if (hold.load() == make_hold(kOwner, slot)) return true;
       }
     }
     return false;
@@ -148,7 +147,7 @@ TEST(SlotPool, TheHoldsOfAnotherPublisherDoNotCount) {
   Play play(1, 1, 1, 0);
   play.publish(play.loan(), 1);
   play.publish(play.loan(), 1);
-  play.hold_word(0, 0) = make_hold(kPublisher + 1, 0);
+  play.hold_word(0, 0) = make_hold(kOwner + 1, 0);
   EXPECT_NE(play.loan(), kNoSlot);
 }
 

@@ -11,9 +11,11 @@
 
 #include <CLI/CLI.hpp>
 
+#include "found.hpp"
 #include "picture.hpp"
 #include "processes.hpp"
 #include "scene.hpp"
+#include "seconds.hpp"
 #include "signals.hpp"
 #include "terminal.hpp"
 
@@ -38,6 +40,13 @@ constexpr const char* kLoopback =
     R"(<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32)"
     R"(</MaxAutoParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>)";
 
+// Of the example: in the sources, or where it was installed.
+fs::path data_file(const char* name) {
+  return search_and_track::first_of(
+      {fs::path(ROS2_EXAMPLE) / name,
+       search_and_track::own_directory() / ROS2_DATA_FROM_BIN / name});
+}
+
 struct Options {
   double seconds = kSceneSeconds;
   unsigned domain = 91;
@@ -57,12 +66,14 @@ class Demo {
     std::optional<int> signal;
     {
       Processes processes;
-      const fs::path programs = fs::read_symlink("/proc/self/exe").parent_path();
-      processes.start_daemon(programs / "arbiterd", fs::path(ROS2_EXAMPLE) / "base.xml");
+      const fs::path programs = search_and_track::own_directory();
+      processes.start_daemon(search_and_track::first_of({programs / "arbiterd"}),
+                             data_file("base.xml"));
       start_ = Clock::now() + std::chrono::milliseconds(static_cast<int>(kToStart * 1000));
-      start_nodes(processes, programs / "ros2");
-      processes.start_component(programs / "arbiter-gateway-dds",
-                                {std::string(ROS2_EXAMPLE) + "/ros2.xml"});
+      start_nodes(processes, search_and_track::first_of(
+                                 {programs / "ros2", programs / ROS2_LIBEXEC_FROM_BIN}));
+      processes.start_component(search_and_track::first_of({programs / "arbiter-gateway-dds"}),
+                                {data_file("ros2.xml")});
       signal = watch(processes);
     }
     if (signal) return 128 + *signal;
@@ -154,7 +165,7 @@ int run(int argc, char** argv) {
   Options options;
   app.add_option("--seconds", options.seconds, "How long the scene lasts")
       ->capture_default_str()
-      ->check(CLI::Range(15.0, 3600.0));
+      ->check(search_and_track::seconds_between(15.0, 3600.0));
   app.add_option("--domain", options.domain, "The domain of DDS to use")
       ->capture_default_str()
       ->check(CLI::Range(0U, 230U));

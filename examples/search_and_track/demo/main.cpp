@@ -10,6 +10,7 @@
 #include "places.hpp"
 #include "processes.hpp"
 #include "scene.hpp"
+#include "seconds.hpp"
 #include "signals.hpp"
 #include "summary.hpp"
 #include "terminal.hpp"
@@ -131,7 +132,7 @@ int run(int argc, char** argv) {
   Options options;
   app.add_option("--seconds", options.seconds, "How long the scene lasts")
       ->capture_default_str()
-      ->check(CLI::Range(kLeastSeconds, 3600.0));
+      ->check(seconds_between(kLeastSeconds, 3600.0));
   app.add_option("--model", options.model, "Another model for the same components")
       ->type_name("FILE")
       ->check(CLI::ExistingFile);

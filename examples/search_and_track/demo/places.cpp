@@ -1,24 +1,10 @@
 #include "places.hpp"
 
-#include <initializer_list>
-#include <stdexcept>
+#include "found.hpp"
 
 namespace search_and_track {
-namespace {
 
 namespace fs = std::filesystem;
-
-fs::path own_directory() { return fs::read_symlink("/proc/self/exe").parent_path(); }
-
-fs::path first_of(std::initializer_list<fs::path> candidates) {
-  for (const fs::path& candidate : candidates) {
-    if (fs::exists(candidate)) return candidate.lexically_normal();
-  }
-  throw std::runtime_error("there is no " + candidates.begin()->lexically_normal().string() +
-                           "; build everything first, with: ./run build");
-}
-
-}  // namespace
 
 fs::path daemon_program() { return first_of({own_directory() / "arbiterd"}); }
 

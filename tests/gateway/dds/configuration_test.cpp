@@ -1,6 +1,7 @@
 // What Cyclone is configured with.
 #include <gtest/gtest.h>
 
+#include "gateway/dds/dds_middleware.hpp"
 #include "gateway/dds/domain.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/error_of.hpp"
@@ -67,6 +68,33 @@ TEST(DdsDomain, IsTheMappingsOrThatOfRos2) {
     const ScopedVariable bad("ROS_DOMAIN_ID", wrong);
     EXPECT_THROW(static_cast<void>(domain_of({})), DdsError) << wrong;
   }
+}
+
+// The mapping's check does not know the environment.
+TEST(DdsDomain, OfTheEnvironmentIsNoWayPastTheGateway) {
+  const ScopedVariable ros("ROS_DOMAIN_ID", "7");
+  const auto entry = [](Entry::Direction direction, std::vector<std::string> partitions) {
+    Entry result;
+    result.direction = direction;
+    result.dds.emplace().name = "rt/cmd_vel";
+    result.dds->qos.partitions = std::move(partitions);
+    return result;
+  };
+  Mapping mapping;
+  mapping.gateways.resize(2);
+  mapping.gateways[0].entries = {entry(Entry::Direction::kOut, {})};
+  mapping.gateways[1].domain = 7;
+  mapping.gateways[1].entries = {entry(Entry::Direction::kIn, {})};
+  const Bell bell;
+  EXPECT_NE(test::error_of([&] {
+              DdsMiddleware({mapping}, bell);
+            }).find("comes in and goes out within DDS domain 7"),
+            std::string::npos);
+  mapping.gateways[1].domain = 8;
+  EXPECT_NO_THROW(DdsMiddleware({mapping}, bell));
+  mapping.gateways[1].domain = 7;
+  mapping.gateways[1].entries = {entry(Entry::Direction::kIn, {"raw"})};
+  EXPECT_NO_THROW(DdsMiddleware({mapping}, bell));
 }
 
 }  // namespace

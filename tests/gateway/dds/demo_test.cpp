@@ -49,5 +49,14 @@ TEST(Ros2Demo, TheBaseBehindArbiterStandsWhereTheOtherDrivesOn) {
   EXPECT_EQ(mux.stood, 0) << result.out;
 }
 
+TEST(Ros2Demo, ATimeThatIsNoneIsRefused) {
+  for (const char* const seconds : {"nan", "-nan", "inf", "0", "-20", "", "20s", "1e400"}) {
+    const auto result =
+        run_program({std::string(ARBITER_PROGRAMS) + "/ros2-demo", "--seconds", seconds});
+    EXPECT_EQ(result.exit_code, 2) << seconds << result.out << result.err;
+    EXPECT_NE(result.err.find("--seconds"), std::string::npos) << seconds << result.err;
+  }
+}
+
 }  // namespace
 }  // namespace arbiter::test

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "gateway/dds/entity.hpp"
+#include "gateway/dds/opaque_type.hpp"
 #include "tests/gateway/dds/scene.hpp"
 
 namespace arbiter::test {
@@ -106,16 +108,73 @@ TEST_P(DdsMatching, WhoeverPublishesPastArbiterIsWarnedOfAtOnce) {
   gateway.see("publishes there, too: what it sends reaches the subscribers past Arbiter");
 }
 
-// A node of ROS 2 from Iron on warns of ends without one.
-TEST_P(DdsMatching, TheTypeHashOfRos2IsTakenOver) {
+// A status has room for a few sentences: none that a stranger can make long may stand before it.
+TEST_P(DdsMatching, WhoPublishesPastArbiterStandsInTheStatusBesideMany) {
+  const OwnDomain domain;
+  Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(daemon, domain, kBaseOut + "/>");
+  std::vector<Stranger> others;
+  for (int i = 0; i < 3; ++i) {
+    others.push_back(Stranger("cyclone", domain, {"sub", "bool", "rt/cmd_vel"}));
+  }
+  gateway.see("does not match");
+  const Stranger intruder(GetParam(), domain, {"pub", "twist", "rt/cmd_vel"});
+  await_described(daemon, "/Base/cmd_vel:i", "past Arbiter");
+}
+
+// Somebody whose ends come and go without end.
+TEST(DdsStrangers, ThatComeAndGoWithoutEndAreWarnedOfSoManyTimes) {
+  const OwnDomain domain;
+  Daemon daemon(base_model("1s"));
+  DdsGateway gateway(daemon, domain, kNavIn);
+  const gateway::dds::Entity own(dds_create_domain(domain.number(), kLoopback), "domain");
+  const gateway::dds::Entity participant(dds_create_participant(domain.number(), nullptr, nullptr),
+                                         "participant");
+  ddsi_sertype* type = gateway::dds::make_opaque_type("Other", false);
+  const gateway::dds::Entity topic(dds_create_topic_sertype(participant.get(), "rt/cmd_vel_nav",
+                                                            &type, nullptr, nullptr, nullptr),
+                                   "topic");
+  for (int i = 0; i < 600; ++i) {
+    const gateway::dds::Entity writer(
+        dds_create_writer(participant.get(), topic.get(), nullptr, nullptr), "writer");
+    if (i % 20 == 0) gateway.see("does not match");
+  }
+  std::vector<gateway::dds::Entity> many;
+  for (int i = 0; i < 600; ++i) {
+    many.emplace_back(dds_create_writer(participant.get(), topic.get(), nullptr, nullptr),
+                      "writer");
+  }
+  await_described(daemon, "/Nav/cmd_vel:o", "there are more ends than are looked at");
+  Stranger navigation("cyclone", domain, {"pub", "twist", "rt/cmd_vel_nav"});
+  navigation.await("matched 1");
+  navigation.publish("1 0");
+  await_described(daemon, "/Nav/cmd_vel:o", "1 publisher matched");
+  EXPECT_LT(gateway.log().size(), 20'000U);
+  EXPECT_EQ(gateway.end(), 0);
+}
+
+// A node of ROS 2 from Iron on warns of an end without user data, and of a hash that it cannot
+// read.
+TEST_P(DdsMatching, TheTypeHashOfRos2IsTakenOverAndUntilThenTheUserDataAreNotEmpty) {
   const OwnDomain domain;
   const Daemon daemon(base_model("1s"));
-  const DdsGateway gateway(daemon, domain, kNavIn);
-  Stranger navigation(GetParam(), domain,
-                      {"pub", "twist", "rt/cmd_vel_nav", "data=typehash=RIHS01_00ff;"});
-  navigation.await("matched 1");
+  const DdsGateway gateway(daemon, domain, kNavIn + kBaseOut + "/>");
   Stranger watcher("cyclone", domain, {"watch", "twist", "rt/cmd_vel_nav"});
-  watcher.await("reader typehash=RIHS01_00ff;");
+  Stranger of_writers("cyclone", domain, {"watch", "twist", "rt/cmd_vel"});
+  EXPECT_EQ(watcher.next_line(), "reader gateway=arbiter;");
+  EXPECT_EQ(of_writers.next_line(), "writer gateway=arbiter;");
+  const std::string hash = "typehash=RIHS01_" + std::string(60, '0') + "00ff;";
+  Stranger liar(GetParam(), domain,
+                {"pub", "twist", "rt/cmd_vel_nav", "data=typehash=RIHS01_00ff;"});
+  liar.await("matched 1");
+  Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav", "data=" + hash});
+  navigation.await("matched 1");
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel", "data=" + hash});
+  base.await("matched 1");
+  while (watcher.next_line() != "reader " + hash) {
+  }
+  while (of_writers.next_line() != "writer " + hash) {
+  }
 }
 
 // It may come later: a network that is slow to start.
@@ -127,6 +186,15 @@ TEST(DdsInterface, ThatIsNotThereIsWaitedForAndNamed) {
   gateway.see("nosuch0: does not match an available interface; trying again");
   ::poll(nullptr, 0, 2500);  // it does try again, and says nothing more
   EXPECT_EQ(gateway.log().find("trying again"), gateway.log().rfind("trying again"));
+  EXPECT_EQ(gateway.end(), 0);
+}
+
+// Cyclone goes on without it.
+TEST(DdsInterface, APeerThatIsNoHostIsNamed) {
+  const OwnDomain domain;
+  Daemon daemon(base_model("1s"));
+  DdsGateway gateway(daemon, domain, kNavIn, "lo", "peers=\"no host\"");
+  gateway.see("no host: unknown address");
   EXPECT_EQ(gateway.end(), 0);
 }
 

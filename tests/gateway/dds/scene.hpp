@@ -23,8 +23,9 @@ namespace arbiter::test {
 // A program of DDS that knows nothing of Arbiter (strangers/command_line.hpp).
 class Stranger {
  public:
-  // `vendor`: "cyclone" or "fast".
-  Stranger(const std::string& vendor, const OwnDomain& domain, std::vector<std::string> arguments) {
+  // `vendor`: "cyclone" or "fast". `configuration`: of Cyclone, before that of the interface.
+  Stranger(const std::string& vendor, const OwnDomain& domain, std::vector<std::string> arguments,
+           const std::string& configuration = "") {
     std::array<int, 2> in{};
     std::array<int, 2> out{};
     if (::pipe2(in.data(), O_CLOEXEC) != 0 || ::pipe2(out.data(), O_CLOEXEC) != 0) {
@@ -36,7 +37,7 @@ class Stranger {
     out_.reset(out[0]);
     arguments.insert(arguments.begin(), std::string(ARBITER_STRANGERS) + "/stranger_" + vendor);
     arguments.push_back("domain=" + std::to_string(domain.number()));
-    process_ = ChildProcess(arguments, {{"CYCLONEDDS_URI", kLoopback}},
+    process_ = ChildProcess(arguments, {{"CYCLONEDDS_URI", configuration + kLoopback}},
                             {child_in.get(), child_out.get(), -1});
   }
 
@@ -61,6 +62,12 @@ class Stranger {
       if (count <= 0) throw std::runtime_error("the stranger has ended");
       text_.append(buffer.data(), static_cast<std::size_t>(count));
     }
+  }
+  // What it has written until now, and does not need to be awaited.
+  std::vector<std::string> lines_so_far() {
+    std::vector<std::string> lines;
+    while (auto line = line_within(0)) lines.push_back(*line);
+    return lines;
   }
   // Returns once it has written that line; what came before it is dropped.
   void await(const std::string& line) {
@@ -92,10 +99,10 @@ class DdsGateway {
  public:
   // `entries`: the elements of the mapping's <gateway>.
   DdsGateway(const Daemon& daemon, const OwnDomain& domain, const std::string& entries,
-             const std::string& interface = "lo")
+             const std::string& interface = "lo", const std::string& more = "")
       : mapping_(daemon.directory() + "/gateway.xml"), log_(daemon.directory() + "/gateway.log") {
     std::ofstream(mapping_) << "<gateway kind=\"dds\" domain=\"" << domain.number()
-                            << "\" interface=\"" << interface << "\">\n"
+                            << "\" interface=\"" << interface << "\" " << more << ">\n"
                             << entries << "</gateway>\n";
     start();
   }

@@ -44,6 +44,10 @@ class Iceoryx : public testing::Test {
     const auto status = daemon_.source(source);
     return status.contains("described") ? status["described"].get<std::string>() : "";
   }
+  std::string described_input(const std::string& port) {
+    const auto status = daemon_.input(port);
+    return status.contains("described") ? status["described"].get<std::string>() : "";
+  }
   void wait_for_description(const std::string& source, const std::string& text) {
     wait_until([&] { return described(source).find(text) != std::string::npos; });
   }
@@ -52,7 +56,7 @@ class Iceoryx : public testing::Test {
     Spoken publisher = plain_publisher("low");
     Spoken subscriber = plain_subscriber("base");
     ASSERT_TRUE(subscriber.hear("ready"));
-    wait_for_description("/Low:o", "at least 1 publisher matched");
+    wait_for_description("/Low:o", "1 publisher matched");
     publisher.say("x");
     EXPECT_EQ(subscriber.line(), "|x");
   }
@@ -69,7 +73,7 @@ TEST_F(Iceoryx, SamplesOfAnySizeGoThroughWithTheirHeaders) {
   Spoken publisher = plain_publisher("low", 12);
   Spoken subscriber = plain_subscriber("base");
   ASSERT_TRUE(subscriber.hear("ready"));
-  wait_for_description("/Low:o", "at least 1 publisher matched");
+  wait_for_description("/Low:o", "1 publisher matched");
   for (const char* text : {"a", "twelve bytes"}) {
     publisher.say(text);
     EXPECT_EQ(subscriber.line(), std::string("hhhhhhhhhhhh|") + text);
@@ -88,8 +92,8 @@ TEST_F(Iceoryx, TwoPublishersAreArbitratedIntoOneSubscriber) {
   Spoken high = plain_publisher("high");
   Spoken subscriber = plain_subscriber("base");
   ASSERT_TRUE(subscriber.hear("|zeros 4")) << "nobody commands: stop";
-  wait_for_description("/Low:o", "at least 1 publisher matched");
-  wait_for_description("/High:o", "at least 1 publisher matched");
+  wait_for_description("/Low:o", "1 publisher matched");
+  wait_for_description("/High:o", "1 publisher matched");
   low.say("low");
   ASSERT_TRUE(subscriber.hear("|low"));
   high.say("high");
@@ -105,7 +109,7 @@ TEST_F(Iceoryx, AHeaderThatTheMappingDoesNotNameIsTold) {
   const Roudi roudi(directory_);
   Spoken gate = gateway(directory_, in("low", "/Low:o"));
   Spoken publisher = plain_publisher("low", 8);
-  wait_for_description("/Low:o", "at least 1 publisher matched");
+  wait_for_description("/Low:o", "1 publisher matched");
   publisher.say("x");
   wait_for_description("/Low:o",
                        "1 unreadable; chunks have a user header of 8 bytes; write "
@@ -182,7 +186,7 @@ TEST_F(Iceoryx, ForAGatewayThatHasDiedTheIdleSampleIsSent) {
   Spoken gate = gateway(directory_, entries);
   Spoken publisher = plain_publisher("low");
   Spoken subscriber = plain_subscriber("base");
-  wait_for_description("/Low:o", "at least 1 publisher matched");
+  wait_for_description("/Low:o", "1 publisher matched");
   publisher.say("drive");
   ASSERT_TRUE(subscriber.hear("|drive"));
   gate.process.signal(SIGKILL);
@@ -210,18 +214,36 @@ TEST_F(Iceoryx, APortThatSomebodyElseHasIsWaitedFor) {
   expect_that_samples_pass();
 }
 
+// Or each of two gateways would hold what the other one waits for, for ever.
+TEST_F(Iceoryx, WhoWaitsForAPortHoldsNoneBehindIt) {
+  std::optional<Node> other("other");
+  std::optional<OutputPort<void>> taken(other->output_port("/High:o"));
+  Spoken gate =
+      gateway(directory_, in("low", "/Low:o") + in("high", "/High:o") + out("/Base:i", "base"));
+  ASSERT_TRUE(gate.hear("/High:o is held by node \"other\"")) << gate.heard;
+  wait_until([&] { return !described_input("/Base:i").empty(); });
+  EXPECT_FALSE(daemon_.source("/Low:o")["open"]);
+  // Several tries later it has not been said again.
+  const auto begin = shm::monotonic_now();
+  wait_until([&] { return shm::monotonic_now() - begin > 2'500'000'000; });
+  taken.reset();
+  ASSERT_TRUE(gate.hear("serves 2 topics in, 1 out"));
+  EXPECT_EQ(gate.heard.find("iceoryx: the output port /High:o is held by"), std::string::npos)
+      << gate.heard;
+}
+
 TEST_F(Iceoryx, SamplesPassWhileNoDaemonRunsAndTheNextOneKnowsTheGateway) {
   const Roudi roudi(directory_);
   Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
   Spoken publisher = plain_publisher("low");
   Spoken subscriber = plain_subscriber("base");
   ASSERT_TRUE(subscriber.hear("ready"));
-  wait_for_description("/Low:o", "at least 1 publisher matched");
+  wait_for_description("/Low:o", "1 publisher matched");
   daemon_.kill();
   publisher.say("x");
   EXPECT_EQ(subscriber.line(), "|x");
   daemon_.restart();
-  wait_for_description("/Low:o", "at least 1 publisher matched");
+  wait_for_description("/Low:o", "1 publisher matched");
   publisher.say("y");
   EXPECT_EQ(subscriber.line(), "|y");
 }
@@ -233,6 +255,69 @@ TEST_F(Iceoryx, AGatewayThatIsStartedFirstWaitsForTheDaemon) {
   ASSERT_TRUE(gate.hear("no arbiterd of instance")) << gate.heard;
   daemon_.restart();
   expect_that_samples_pass();
+}
+
+// It is past all arbitration.
+TEST_F(Iceoryx, WhoElsePublishesWhereTheGatewayDoesIsTold) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, out("/Base:i", "base"));
+  wait_until([&] { return !described_input("/Base:i").empty(); });
+  std::optional<Spoken> stranger = plain_publisher("base");
+  const std::string name = "plain-publisher-" + std::to_string(stranger->process.pid());
+  ASSERT_TRUE(gate.hear("iceoryx Test/One/base: others publish there too, past all arbitration: " +
+                        name + "; let them publish to another topic, which comes in"));
+  wait_until([&] { return described_input("/Base:i").find(name) != std::string::npos; });
+  stranger->process.signal(SIGTERM);
+  wait_until([&] { return described_input("/Base:i").find(name) == std::string::npos; });
+}
+
+// RouDi tells nobody.
+TEST_F(Iceoryx, ASubscriberThatAsksForWhatTheGatewayDoesNotOfferIsNamed) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, out("/Base:i", "base"));
+  const Spoken subscriber(
+      {ARBITER_TESTS "/plain_iceoryx_subscriber", "Test", "One", "base", "blocking"});
+  const std::string name = "plain-subscriber-" + std::to_string(subscriber.process.pid());
+  wait_until([&] {
+    return described_input("/Base:i").find("no subscriber matched; " + name +
+                                           " subscribes and is not connected: it asks for ") !=
+           std::string::npos;
+  });
+}
+
+// What it could watch at once is 256.
+TEST_F(Iceoryx, MoreTopicsThanIceoryxCanWatchArriveAll) {
+  const Roudi roudi(directory_);
+  std::string entries;
+  for (int i = 0; i < 260; ++i) {
+    entries += in("e" + std::to_string(i), "/p" + std::to_string(i) + ":o", "max_size='64'");
+  }
+  Spoken gate = gateway(directory_, entries);
+  ASSERT_TRUE(gate.hear("iceoryx can watch 256 topics at once; the others are looked at every"))
+      << gate.heard;
+  for (const char* last : {"0", "259"}) {
+    Spoken publisher = plain_publisher("e" + std::string(last));
+    const std::string source = "/p" + std::string(last) + ":o";
+    wait_for_description(source, "1 publisher matched");
+    publisher.say("x");
+    wait_until([&] { return daemon_.source(source)["published"] == 1; });
+  }
+}
+
+// The library has a line for each sample, past its own log, and they are ten a second.
+TEST_F(Iceoryx, WithoutMemoryTheLogStaysShort) {
+  const Roudi roudi(directory_, Roudi::kLittle);
+  Spoken gate = gateway(directory_, out("/Base:i", "base", "size='4' idle='zero' history='16'") +
+                                        out("/Large:i", "large", "size='4096' idle='zero'"));
+  wait_until([&] {
+    return described_input("/Base:i").find("exhausted, for 4 bytes") != std::string::npos &&
+           described_input("/Large:i").find("no memory pool for chunks of 4096 bytes") !=
+               std::string::npos;
+  });
+  gate.process.signal(SIGTERM);
+  while (const auto line = gate.line()) {
+    EXPECT_THAT(*line, testing::StartsWith("arbiter-gateway-iceoryx: "));
+  }
 }
 
 pid_t worker_of(const std::string& source, Daemon& daemon) {

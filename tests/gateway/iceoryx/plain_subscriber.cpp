@@ -1,7 +1,8 @@
 // A subscriber of iceoryx that knows of nothing else: writes a line for each sample that it gets.
 //
-//   plain_subscriber SERVICE INSTANCE EVENT
+//   plain_subscriber SERVICE INSTANCE EVENT [blocking]
 //
+// With "blocking" it asks its publishers to wait for it.
 // "HEADER|PAYLOAD", where a payload of nothing but zero bytes is "zeros SIZE", and one of more than
 // 100 bytes "SIZE bytes BEGIN". Says "ready" when it is subscribed to a publisher.
 #include <unistd.h>
@@ -39,7 +40,9 @@ int main(int argc, char** argv) {
   const std::string name = "plain-subscriber-" + std::to_string(::getpid());
   iox::runtime::PoshRuntime::initRuntime(
       iox::RuntimeName_t(iox::cxx::TruncateToCapacity, name.c_str()));
-  iox::popo::UntypedSubscriber subscriber({id(argv[1]), id(argv[2]), id(argv[3])});
+  iox::popo::SubscriberOptions options;
+  if (argc > 4) options.queueFullPolicy = iox::popo::QueueFullPolicy::BLOCK_PRODUCER;
+  iox::popo::UntypedSubscriber subscriber({id(argv[1]), id(argv[2]), id(argv[3])}, options);
   iox::popo::WaitSet<> waits;
   waits.attachState(subscriber, iox::popo::SubscriberState::HAS_DATA).or_else([](auto&) {
     std::exit(1);

@@ -53,6 +53,10 @@ TEST(GatewayProgram, SaysWhatIsWrongWithItsArguments) {
   const auto none = run_gateway({"/no/such/file.xml"});
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("/no/such/file.xml"));
+  const TemporaryDirectory directory;
+  const auto instance = run_gateway({directory.write("good.xml", kGood), "--instance", "../x"});
+  EXPECT_EQ(instance.exit_code, 2);
+  EXPECT_THAT(instance.err, HasSubstr("\"../x\" is not a name for an instance"));
   const auto help = run_gateway({"--help"});
   EXPECT_EQ(help.exit_code, 0);
   EXPECT_THAT(help.out, HasSubstr("Exit codes: 0"));

@@ -5,7 +5,7 @@
 // TYPE: twist, bool, blob, robot. `pub` publishes a sample for each line of standard input: the
 // numbers of its first fields. `sub` writes a line for each sample. Both write "matched N" when N
 // others have matched. `watch`, by Cyclone alone, writes what the user data of the topic's readers
-// say. OPTION: domain=N (0), reliability=best_effort (reliable), durability=
+// and writers say. OPTION: domain=N (0), reliability=best_effort (reliable), durability=
 // transient_local (volatile), depth=N (10), deadline=MILLISECONDS (none), partition=NAME (none),
 // name=TYPE_NAME (the type's own), data=USER_DATA (none).
 #pragma once

@@ -145,11 +145,13 @@ void run(const CommandLine& line) {
   dds_delete(participant);
 }
 
-// Writes a line for each reader of the topic that somebody has: what its user data say.
-void watch(const CommandLine& line) {
-  const dds_entity_t participant = require(dds_create_participant(line.domain, nullptr, nullptr));
+// Writes a line for each end of the topic that somebody else has: what its user data say.
+template <dds_entity_t kEnds>
+void watch_ends(dds_entity_t participant, const CommandLine& line) {
   dds_listener_t* const listener = dds_create_listener(const_cast<CommandLine*>(&line));
   dds_lset_data_available(listener, [](dds_entity_t reader, void* argument) {
+    constexpr const char* kWhat =
+        kEnds == DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION ? "reader " : "writer ";
     for (;;) {
       void* samples[1] = {nullptr};
       dds_sample_info_t info;
@@ -160,13 +162,19 @@ void watch(const CommandLine& line) {
       std::size_t size = 0;
       if (info.valid_data && static_cast<CommandLine*>(argument)->topic == end->topic_name &&
           dds_qget_userdata(end->qos, &data, &size)) {
-        strangers::write_line("reader " + std::string(static_cast<char*>(data), size));
+        strangers::write_line(kWhat + std::string(static_cast<char*>(data), size));
         dds_free(data);
       }
       dds_return_loan(reader, samples, taken);
     }
   });
-  require(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, nullptr, listener));
+  require(dds_create_reader(participant, kEnds, nullptr, listener));
+}
+
+void watch(const CommandLine& line) {
+  const dds_entity_t participant = require(dds_create_participant(line.domain, nullptr, nullptr));
+  watch_ends<DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION>(participant, line);
+  watch_ends<DDS_BUILTIN_TOPIC_DCPSPUBLICATION>(participant, line);
   double first = 0;
   double second = 0;
   while (strangers::read_numbers(first, second)) {

@@ -107,6 +107,9 @@ DomainParticipantQos loopback() {
   DomainParticipantQos qos;
   auto transport = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
   transport->interfaceWhiteList.push_back("127.0.0.1");
+  // Of participants on this machine that are looked for without multicast: all that a test has, not
+  // the first four.
+  transport->maxInitialPeersRange = 16;
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports.push_back(transport);
   eprosima::fastrtps::rtps::Locator_t here;

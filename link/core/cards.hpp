@@ -1,0 +1,60 @@
+// What a link says of a source that it offers, where DDS carries it: in the user data of a writer.
+// And the message that carries a token.
+//
+// All of it comes from strangers: sizes are bounded, names are such as ports, hosts and types may
+// have, and what does not hold to that is nothing.
+//
+//   host    "ARBH", version 1 (1 byte), incarnation (8), then texts: the host's name, the
+//   instance's offer   "ARBO", version 1, incarnation, then a text: the source's name; revision of
+//   the type (4);
+//           if that is not 0: size (8), alignment (8), and a text: the type's name, empty if it is
+//           untyped
+//   token   "ARBT", version 1, incarnation of the importer, number (8)
+//
+// A text is its length (2 bytes) and its bytes. Numbers are little-endian. What follows the end is
+// padding and is passed over.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <arbiter/bytes.hpp>
+
+#include "link/core/held_tokens.hpp"
+#include "shm/type_info.hpp"
+
+namespace arbiter::link {
+
+inline constexpr std::size_t kMaxHostName = 64;
+
+// Of a writer: an output port that is open there.
+struct OfferCard {
+  Incarnation incarnation = 0;
+  std::string host;
+  std::string source;
+  // 0: not known yet. Another one for each type that the source has had.
+  std::uint32_t type_revision = 0;
+  shm::TypeInfo type;
+};
+
+struct TokenMessage {
+  Incarnation importer = 0;
+  std::uint64_t number = 0;
+};
+
+using ByteString = std::vector<std::byte>;
+
+[[nodiscard]] ByteString write_offer_card(const OfferCard& card);
+[[nodiscard]] ByteString write_token_message(const TokenMessage& message);
+
+// Nothing: it is none, or not a proper one.
+[[nodiscard]] std::optional<OfferCard> read_offer_card(Bytes bytes);
+[[nodiscard]] std::optional<TokenMessage> read_token_message(Bytes bytes);
+
+// Whether links may call a host so: 1 to kMaxHostName letters, digits, `.`, `-` and `_`.
+[[nodiscard]] bool is_host_name(const std::string& name) noexcept;
+
+}  // namespace arbiter::link

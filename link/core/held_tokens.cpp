@@ -1,0 +1,36 @@
+#include "link/core/held_tokens.hpp"
+
+#include <algorithm>
+
+namespace arbiter::link {
+
+bool HeldTokens::note(Incarnation importer, std::uint64_t number, shm::Nanoseconds now) {
+  const std::lock_guard lock(mutex_);
+  const auto found = held_.find(importer);
+  if (found == held_.end() && !make_place(now)) return false;
+  Held& held = found != held_.end() ? found->second : held_[importer];
+  held.heard = now;
+  held.times.note(number, now);
+  return true;
+}
+
+bool HeldTokens::make_place(shm::Nanoseconds now) {
+  if (held_.size() < kMaxImporters) return true;
+  const auto silent = std::min_element(
+      held_.begin(), held_.end(),
+      [](const auto& a, const auto& b) { return a.second.heard < b.second.heard; });
+  if (now - silent->second.heard < kSilence) return false;
+  held_.erase(silent);
+  return true;
+}
+
+void HeldTokens::name(shm::Nanoseconds published, std::vector<NamedToken>& named) const {
+  named.clear();
+  const std::lock_guard lock(mutex_);
+  for (const auto& [importer, held] : held_) {
+    const std::uint64_t newest = held.times.newest_by(published);
+    if (newest != 0) named.push_back({importer, newest});
+  }
+}
+
+}  // namespace arbiter::link

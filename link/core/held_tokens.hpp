@@ -1,0 +1,65 @@
+// The tokens that a link has from those who import from it, and which of them it held when a sample
+// was published.
+//
+// A sample may have waited in this host, for a link that was stopped or starved. So it names no
+// token that came after it was published, although the link holds newer ones when it sends it.
+//
+// Whoever sends tokens is a stranger: their number is bounded, and one that falls silent is
+// forgotten where another one needs its place.
+//
+// Units: nanoseconds of CLOCK_MONOTONIC, by which samples are stamped.
+//
+// Thread safety: any thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <vector>
+
+#include "link/core/token_times.hpp"
+#include "shm/activity.hpp"
+
+namespace arbiter::link {
+
+// A life of a link's process: a random number, never 0.
+using Incarnation = std::uint64_t;
+
+// The newest token of one importer.
+struct NamedToken {
+  Incarnation importer = 0;
+  std::uint64_t number = 0;
+
+  friend bool operator==(const NamedToken&, const NamedToken&) = default;
+};
+
+// Importers of one host; so a header has a size that is known.
+inline constexpr std::size_t kMaxImporters = 64;
+
+class HeldTokens {
+ public:
+  // Who is silent for this long may lose its place to another importer.
+  static constexpr shm::Nanoseconds kSilence = 5'000'000'000;
+
+  // False: there is no place for another importer now. A token that is older than one that came
+  // before changes nothing.
+  bool note(Incarnation importer, std::uint64_t number, shm::Nanoseconds now);
+
+  // Of each importer the newest that had come at `published`, into `named`, of which nothing else
+  // is kept.
+  void name(shm::Nanoseconds published, std::vector<NamedToken>& named) const;
+
+ private:
+  struct Held {
+    TokenTimes times;
+    shm::Nanoseconds heard = 0;
+  };
+
+  bool make_place(shm::Nanoseconds now);
+
+  mutable std::mutex mutex_;
+  std::map<Incarnation, Held> held_;
+};
+
+}  // namespace arbiter::link

@@ -1,0 +1,49 @@
+// The events of one source as other hosts send them: in order, none twice, losses counted.
+//
+// An exporter numbers what happens to a source from 1 upwards: samples, signals, deactivations;
+// what it could not see itself has used numbers as well. It does so once for each of its lives and
+// each source, so a stream is known by its source and the exporter's incarnation. The last event of
+// a stream says what the source is like: whoever joins, or has missed some, needs nothing but that.
+//
+// Thread safety: none of its own.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "link/core/held_tokens.hpp"
+
+namespace arbiter::link {
+
+class Stream {
+ public:
+  // Takes up an event of the exporter `from`, which is the one that is obeyed. False: it came
+  // already, or one behind it did.
+  bool note(Incarnation from, std::uint64_t number, bool deactivated) noexcept;
+
+  // Events that have not come, and will not. What an exporter sent before its first event here, or
+  // while another one was obeyed, is not missed.
+  [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
+  [[nodiscard]] std::uint64_t doubled() const noexcept { return doubled_; }
+  // By the last event: its exporter ended the source's activity, and nothing has come since.
+  [[nodiscard]] bool is_deactivated() const noexcept { return deactivated_; }
+
+ private:
+  // The exporters that were obeyed last: one that comes back goes on where it was, and what it
+  // sends again is known.
+  static constexpr std::size_t kRemembered = 8;
+  struct Exporter {
+    Incarnation incarnation = 0;  // 0: none
+    std::uint64_t last = 0;
+  };
+  void move_to_front(Incarnation from) noexcept;
+
+  std::array<Exporter, kRemembered> exporters_{};  // the one that is obeyed first
+  bool has_begun_ = false;                         // an event of that one was taken up since it is
+  std::uint64_t lost_ = 0;
+  std::uint64_t doubled_ = 0;
+  bool deactivated_ = false;
+};
+
+}  // namespace arbiter::link

@@ -1,0 +1,135 @@
+#include "link/dds/event_topic.hpp"
+
+#include <dds/ddsi/ddsi_sertype.h>
+
+#include <array>
+#include <memory>
+
+#include "gateway/dds/opaque_type.hpp"
+#include "link/core/topic_names.hpp"
+
+namespace arbiter::link {
+namespace {
+
+using gateway::dds::CycloneQos;
+
+constexpr const char* kEventType = "arbiter::Event";
+// How long a writer may wait for readers that do not keep up.
+constexpr dds_duration_t kMaxBlocking = 10'000'000;
+// A bound of what a reader looks at, on a network where anybody may write.
+constexpr std::size_t kMaxOffers = 64;
+
+CycloneQos event_qos() {
+  CycloneQos qos(dds_create_qos());
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, kMaxBlocking);
+  dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
+  dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, 1, DDS_LENGTH_UNLIMITED,
+                              DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
+  return qos;
+}
+
+Entity make_topic(const Network& network, const std::string& source, const ddsi_sertype** type) {
+  const std::string name = topic_of_source(source);
+  ddsi_sertype* made = gateway::dds::make_opaque_type(kEventType, false);
+  const dds_entity_t topic = dds_create_topic_sertype(network.participant(), name.c_str(), &made,
+                                                      nullptr, nullptr, nullptr);
+  if (topic < 0) ddsi_sertype_unref(made);
+  Entity result(topic, "topic " + name);
+  *type = made;
+  return result;
+}
+
+struct FreeEndpoint {
+  void operator()(dds_builtintopic_endpoint_t* endpoint) const {
+    dds_builtintopic_free_endpoint(endpoint);
+  }
+};
+
+std::optional<OfferCard> card_of(dds_entity_t reader, dds_instance_handle_t writer) {
+  const std::unique_ptr<dds_builtintopic_endpoint_t, FreeEndpoint> endpoint(
+      dds_get_matched_publication_data(reader, writer));
+  if (endpoint == nullptr || endpoint->qos == nullptr) return std::nullopt;
+  void* data = nullptr;
+  std::size_t size = 0;
+  if (!dds_qget_userdata(endpoint->qos, &data, &size) || data == nullptr) return std::nullopt;
+  auto card = read_offer_card(Bytes(static_cast<const std::byte*>(data), size));
+  dds_free(data);
+  return card;
+}
+
+}  // namespace
+
+Bytes encapsulation() noexcept {
+  static constexpr std::array<std::byte, 4> kHeader{std::byte{0}, std::byte{1}};
+  return {kHeader.data(), kHeader.size()};
+}
+
+EventWriter::EventWriter(const Network& network, const OfferCard& card, const gateway::Bell& bell)
+    : topic_(make_topic(network, card.source, &type_)) {
+  // Cyclone has one pointer for what a listener is given, and does not write through it.
+  const gateway::dds::Listener listener(dds_create_listener(const_cast<gateway::Bell*>(&bell)));
+  dds_lset_publication_matched(
+      listener.get(), [](dds_entity_t /*writer*/, const dds_publication_matched_status_t /*status*/,
+                         void* rings) { static_cast<const gateway::Bell*>(rings)->ring(); });
+  const CycloneQos qos = event_qos();
+  const ByteString data = write_offer_card(card);
+  dds_qset_userdata(qos.get(), data.data(), data.size());
+  writer_ =
+      Entity(dds_create_writer(network.participant(), topic_.get(), qos.get(), listener.get()),
+             "a writer of " + topic_of_source(card.source));
+}
+
+bool EventWriter::is_wanted() const {
+  dds_publication_matched_status_t status{};
+  return dds_get_publication_matched_status(writer_.get(), &status) == DDS_RETCODE_OK &&
+         status.current_count > 0;
+}
+
+void EventWriter::set_card(const OfferCard& card) {
+  const CycloneQos qos(dds_create_qos());
+  const ByteString data = write_offer_card(card);
+  dds_qset_userdata(qos.get(), data.data(), data.size());
+  const dds_return_t set = dds_set_qos(writer_.get(), qos.get());
+  if (set < 0) {
+    throw DdsError("the type of " + card.source + " cannot be made known: " + dds_strretcode(-set));
+  }
+}
+
+bool EventWriter::write(Bytes header, Bytes sample) noexcept {
+  gateway::dds::Payload* const payload =
+      gateway::dds::make_payload(type_, {encapsulation(), header, sample});
+  return payload != nullptr && dds_writecdr(writer_.get(), &payload->cyclone) == DDS_RETCODE_OK;
+}
+
+EventReader::EventReader(const Network& network, const std::string& source,
+                         gateway::dds::SampleTaker& taker, const gateway::Bell& bell)
+    : cache_(taker) {
+  const gateway::dds::Listener listener(dds_create_listener(const_cast<gateway::Bell*>(&bell)));
+  dds_lset_subscription_matched(
+      listener.get(),
+      [](dds_entity_t /*reader*/, const dds_subscription_matched_status_t /*status*/, void* rings) {
+        static_cast<const gateway::Bell*>(rings)->ring();
+      });
+  const ddsi_sertype* type = nullptr;
+  topic_ = make_topic(network, source, &type);
+  reader_ = Entity(dds_create_reader_rhc(network.participant(), topic_.get(), event_qos().get(),
+                                         listener.get(), cache_.cache()),
+                   "a reader of " + topic_of_source(source));
+}
+
+std::vector<EventReader::Offer> EventReader::offers() const {
+  std::array<dds_instance_handle_t, kMaxOffers> writers{};
+  const dds_return_t found =
+      dds_get_matched_publications(reader_.get(), writers.data(), writers.size());
+  std::vector<Offer> offers;
+  for (std::size_t i = 0; i < writers.size() && static_cast<dds_return_t>(i) < found; ++i) {
+    if (auto card = card_of(reader_.get(), writers.at(i))) {
+      offers.push_back({writers.at(i), std::move(*card)});
+    }
+  }
+  return offers;
+}
+
+}  // namespace arbiter::link

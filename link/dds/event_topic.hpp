@@ -1,0 +1,67 @@
+// The two ends of a source's topic: one writer on each host that has the source open, one reader on
+// each host whose model wants it. Offers and demands travel as DDS makes ends known to each other;
+// a writer's user data say what it offers (link/core/cards.hpp).
+//
+// Both are reliable, keep the last event and give it to a reader that comes later: so whatever is
+// lost, the last event gets through, and it says what the source is like (link/core/stream.hpp).
+// More than one would let new samples wait for old ones.
+#pragma once
+
+#include <dds/dds.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <arbiter/bytes.hpp>
+
+#include "gateway/core/bridge.hpp"
+#include "gateway/dds/reader_cache.hpp"
+#include "link/core/cards.hpp"
+#include "link/dds/network.hpp"
+
+namespace arbiter::link {
+
+// Thread safety: one thread, or a lock of the owner's; is_wanted() any thread.
+class EventWriter {
+ public:
+  // `bell` rings where is_wanted() is another, and outlives this. Throws DdsError.
+  EventWriter(const Network& network, const OfferCard& card, const gateway::Bell& bell);
+
+  // Whether any host reads it now.
+  [[nodiscard]] bool is_wanted() const;
+  // Another card of the same source: its type is known, or another one.
+  void set_card(const OfferCard& card);
+  // Waits 10 ms at most for readers that do not keep up. False: it was not sent.
+  [[nodiscard]] bool write(Bytes header, Bytes sample) noexcept;
+
+ private:
+  const ddsi_sertype* type_ = nullptr;
+  Entity topic_;
+  Entity writer_;
+};
+
+class EventReader {
+ public:
+  // `taker` is called on Cyclone's threads, one at a time. `bell` rings where offers() are others.
+  // Both outlive this. Throws DdsError.
+  EventReader(const Network& network, const std::string& source, gateway::dds::SampleTaker& taker,
+              const gateway::Bell& bell);
+
+  struct Offer {
+    std::uint64_t key = 0;
+    OfferCard card;
+  };
+  // Whoever offers the source now. Cards that are none are passed over.
+  [[nodiscard]] std::vector<Offer> offers() const;
+
+ private:
+  gateway::dds::ReaderCache cache_;
+  Entity topic_;
+  Entity reader_;
+};
+
+// The header of encapsulation that stands before everything that links send.
+[[nodiscard]] Bytes encapsulation() noexcept;
+
+}  // namespace arbiter::link

@@ -1,0 +1,36 @@
+// The topic by which links send each other tokens: those who import to those who export.
+//
+// Best effort, for a token that comes again is worth nothing: the next one is newer.
+#pragma once
+
+#include <functional>
+
+#include "gateway/dds/reader_cache.hpp"
+#include "link/core/cards.hpp"
+#include "link/dds/network.hpp"
+
+namespace arbiter::link {
+
+class TokenTopic : private gateway::dds::SampleTaker {
+ public:
+  // `heard` is called on Cyclone's threads, one at a time. Throws DdsError.
+  TokenTopic(const Network& network, std::function<void(const TokenMessage&)> heard);
+  TokenTopic(const TokenTopic&) = delete;
+  TokenTopic& operator=(const TokenTopic&) = delete;
+  ~TokenTopic() override;
+
+  // Any thread.
+  void send(const TokenMessage& message) noexcept;
+
+ private:
+  void take(const gateway::dds::Payload& payload) noexcept override;
+
+  const std::function<void(const TokenMessage&)> heard_;
+  gateway::dds::ReaderCache cache_;
+  const ddsi_sertype* type_ = nullptr;
+  Entity topic_;
+  Entity writer_;
+  Entity reader_;
+};
+
+}  // namespace arbiter::link

@@ -1,0 +1,227 @@
+#include "link/exports.hpp"
+
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <iterator>
+#include <system_error>
+#include <utility>
+
+#include "gateway/core/say.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::link {
+namespace {
+
+using gateway::Level;
+using gateway::say;
+
+constexpr std::uint64_t kStopId = 0;
+constexpr shm::Nanoseconds kTapAgain = 5'000'000'000;
+// Events of one source that leave before others have their turn.
+constexpr int kMostAtOnce = 64;
+
+shm::TypeInfo info_of(const Type& type) {
+  shm::TypeInfo info;
+  info.set_name(type.name());
+  info.size = type.size();
+  info.alignment = type.alignment();
+  return info;
+}
+
+EventKind kind_of(TapEventKind kind) {
+  switch (kind) {
+    case TapEventKind::sample:
+      return EventKind::kSample;
+    case TapEventKind::signal:
+      return EventKind::kSignal;
+    case TapEventKind::deactivation:
+      return EventKind::kDeactivation;
+    default:
+      return EventKind::kState;
+  }
+}
+
+}  // namespace
+
+Exports::Exports(Node& node, const Network& network, const HeldTokens& tokens, std::string host,
+                 Incarnation incarnation, const gateway::Bell& bell)
+    : node_(node),
+      network_(network),
+      tokens_(tokens),
+      host_(std::move(host)),
+      incarnation_(incarnation),
+      bell_(bell),
+      epoll_(epoll_create1(EPOLL_CLOEXEC)),
+      stop_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.u64 = kStopId;
+  if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, stop_.get(), &event) != 0) {
+    throw std::system_error(errno, std::generic_category(), "no descriptors to watch taps by");
+  }
+  thread_ = std::thread([this] { run(); });
+}
+
+Exports::~Exports() {
+  const std::uint64_t one = 1;
+  static_cast<void>(!::write(stop_.get(), &one, sizeof one));
+  thread_.join();
+}
+
+void Exports::offer(const std::set<std::string, std::less<>>& sources) {
+  for (auto each = ids_.begin(); each != ids_.end();) {
+    if (sources.contains(each->first)) {
+      ++each;
+      continue;
+    }
+    std::unique_ptr<Export> gone;  // its tap is closed without the lock
+    {
+      const std::lock_guard lock(mutex_);
+      gone = std::move(exports_.at(each->second));
+      exports_.erase(each->second);
+    }
+    each = ids_.erase(each);
+  }
+  for (const std::string& source : sources) {
+    if (ids_.contains(source)) continue;
+    OfferCard card;
+    card.incarnation = incarnation_;
+    card.host = host_;
+    card.source = source;
+    auto one = std::make_unique<Export>(network_, std::move(card), bell_);
+    const std::lock_guard lock(mutex_);
+    exports_.emplace(++last_id_, std::move(one));
+    ids_.emplace(source, last_id_);
+  }
+}
+
+void Exports::look() {
+  const shm::Nanoseconds now = shm::monotonic_now();
+  for (const auto& [source, id] : ids_) {
+    Export& one = *exports_.at(id);
+    const bool is_wanted = one.writer.is_wanted();
+    if (is_wanted == one.tap.has_value()) continue;
+    if (is_wanted && now >= one.tap_again) {
+      open_tap(one, id);
+    } else if (!is_wanted) {
+      std::optional<Tap<void>> gone;
+      const std::lock_guard lock(mutex_);
+      gone.swap(one.tap);
+    }
+  }
+}
+
+// The other thread uses a tap once it stands in the export, and not before.
+void Exports::open_tap(Export& one, std::uint64_t id) {
+  try {
+    Tap<void> tap = node_.tap(one.card.source);
+    epoll_event event{};
+    event.events = EPOLLIN;
+    event.data.u64 = id;
+    const int descriptor = tap.fd();
+    const std::lock_guard lock(mutex_);
+    one.tap = std::move(tap);
+    if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, descriptor, &event) != 0) {
+      one.tap.reset();
+      throw Error("no descriptor can be watched");
+    }
+    one.said.clear();
+    while (send_some(one)) {  // the source's state; from there on the tap rings
+    }
+  } catch (const Error& error) {
+    one.tap_again = shm::monotonic_now() + kTapAgain;
+    if (one.said != error.what()) {
+      say(Level::kWarning,
+          one.card.source + " is wanted elsewhere and cannot be sent: " + error.what());
+    }
+    one.said = error.what();
+  }
+}
+
+void Exports::run() {
+  std::array<epoll_event, 64> events{};
+  std::set<std::uint64_t> ready;
+  for (;;) {
+    const int count = epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()),
+                                 ready.empty() ? -1 : 0);
+    for (int i = 0; i < count; ++i) {
+      const std::uint64_t id = events.at(static_cast<std::size_t>(i)).data.u64;
+      if (id == kStopId) return;
+      ready.insert(id);
+    }
+    for (auto each = ready.begin(); each != ready.end();) {
+      const std::lock_guard lock(mutex_);
+      const auto found = exports_.find(*each);
+      const bool has_more =
+          found != exports_.end() && found->second->tap && send_some(*found->second);
+      each = has_more ? std::next(each) : ready.erase(each);
+    }
+  }
+}
+
+// Under the lock. True: there may be more. Only a tap that has nothing left rings again.
+bool Exports::send_some(Export& one) {
+  for (int i = 0; i < kMostAtOnce; ++i) {
+    const auto event = one.tap->take();
+    if (!event) return false;
+    // Whom else the source reaches here is nobody's business there.
+    if (event->kind() != TapEventKind::destinations || event->lost() != 0) send(one, *event);
+  }
+  return true;
+}
+
+void Exports::send(Export& one, const TapEvent<void>& event) {
+  know_type(one, event.type());
+  count_lost(one, event);
+  const auto sample = event.sample();
+  header_.kind = kind_of(event.kind());
+  // A sample that was overwritten before it could be sent, or that is too large, is an arrival
+  // nevertheless.
+  const bool has_sample = sample && sample->size() <= kMaxSampleBytes;
+  if (header_.kind == EventKind::kSample && !has_sample) header_.kind = EventKind::kSignal;
+  header_.is_deactivated = header_.kind == EventKind::kDeactivation ||
+                           (header_.kind == EventKind::kState && event.is_deactivated());
+  header_.exporter = incarnation_;
+  header_.number = ++one.number;
+  header_.sequence = event.sequence();
+  header_.type_revision = one.card.type_revision;
+  header_.length = has_sample ? static_cast<std::uint32_t>(sample->size()) : 0;
+  // Its publisher has written the time: it may be any.
+  const shm::Nanoseconds published = event.time().time_since_epoch().count();
+  tokens_.name(std::min(published, shm::monotonic_now()), header_.tokens);
+  const WritableBytes bytes(buffer_.data(), header_bytes(header_));
+  write_header(header_, bytes);
+  // What is not sent has used a number: it is counted where it does not come.
+  static_cast<void>(one.writer.write(bytes, has_sample ? *sample : Bytes()));
+}
+
+// Events that the tap has missed, or samples that were published while nobody elsewhere read the
+// source.
+void Exports::count_lost(Export& one, const TapEvent<void>& event) {
+  std::uint64_t lost = event.lost();
+  if (event.kind() == TapEventKind::state && event.sequence() > one.sequence) {
+    const bool has_begun = one.number != 0;
+    if (has_begun) lost = std::max(lost, event.sequence() - one.sequence);
+  }
+  one.number += lost;
+  one.sequence = event.sequence();
+}
+
+void Exports::know_type(Export& one, const Type& type) {
+  if (one.type && *one.type == type && one.type->size() == type.size()) return;
+  one.type = type;
+  ++one.card.type_revision;
+  one.card.type = info_of(type);
+  try {
+    one.writer.set_card(one.card);
+  } catch (const DdsError& error) {
+    say(Level::kError, error.what());
+  }
+}
+
+}  // namespace arbiter::link

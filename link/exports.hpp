@@ -1,0 +1,89 @@
+// What this host offers to others: a writer for each output port that a component has open here,
+// and a tap of it while somebody reads it. A source that nobody wants costs its publisher nothing.
+//
+// A tap is no destination: exporting changes no decision and holds up no publisher. Its events
+// leave in their order, on one thread, which waits for nobody but, for 10 ms at most, a network
+// that does not keep up. What the tap or the network loses uses numbers, so that importers count
+// it.
+//
+// Thread safety: offer() and look() on the link's thread; sending has a thread of its own, which
+// shares exports_ under mutex_. Taps are opened and closed without that lock.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+
+#include <arbiter/node.hpp>
+#include <arbiter/tap.hpp>
+
+#include "link/core/event_header.hpp"
+#include "link/core/held_tokens.hpp"
+#include "link/dds/event_topic.hpp"
+#include "shm/file_descriptor.hpp"
+
+namespace arbiter::link {
+
+class Exports {
+ public:
+  // `bell` rings where look() has something to do. Keeps references. Throws std::system_error.
+  Exports(Node& node, const Network& network, const HeldTokens& tokens, std::string host,
+          Incarnation incarnation, const gateway::Bell& bell);
+  Exports(const Exports&) = delete;
+  Exports& operator=(const Exports&) = delete;
+  ~Exports();
+
+  // From now on exactly these sources are offered.
+  void offer(const std::set<std::string, std::less<>>& sources);
+  // Taps what has come to be wanted, and nothing else.
+  void look();
+
+  [[nodiscard]] std::size_t count() const { return exports_.size(); }
+
+ private:
+  struct Export {
+    Export(const Network& network, OfferCard of, const gateway::Bell& bell)
+        : card(std::move(of)), writer(network, card, bell) {}
+    OfferCard card;
+    EventWriter writer;
+    std::optional<Tap<void>> tap;
+    std::optional<Type> type;        // as the card has it
+    std::uint64_t number = 0;        // of the last event
+    std::uint64_t sequence = 0;      // of the last sample
+    std::string said;                // why it cannot be tapped
+    shm::Nanoseconds tap_again = 0;  // not before
+  };
+
+  void open_tap(Export& one, std::uint64_t id);
+  void run();
+  bool send_some(Export& one);
+  void send(Export& one, const TapEvent<void>& event);
+  static void count_lost(Export& one, const TapEvent<void>& event);
+  void know_type(Export& one, const Type& type);
+
+  Node& node_;
+  const Network& network_;
+  const HeldTokens& tokens_;
+  const std::string host_;
+  const Incarnation incarnation_;
+  const gateway::Bell& bell_;
+  shm::FileDescriptor epoll_;
+  shm::FileDescriptor stop_;
+  std::map<std::string, std::uint64_t, std::less<>> ids_;
+  std::uint64_t last_id_ = 0;
+  std::mutex mutex_;
+  std::map<std::uint64_t, std::unique_ptr<Export>> exports_;
+  // Likewise under mutex_: what is sent is made here.
+  EventHeader header_;
+  std::array<std::byte, kMaxHeaderBytes> buffer_{};
+  std::thread thread_;
+};
+
+}  // namespace arbiter::link

@@ -1,0 +1,57 @@
+// What a link knows of its own host: which sources the model in force wants, and which ones
+// components have open.
+//
+// Thread safety: one thread.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+
+#include "shm/activity.hpp"
+#include "watch/instance.hpp"
+
+namespace arbiter::link {
+
+// All links' nodes are called so: what they have open was imported, and is not exported again.
+inline constexpr const char* kNodeName = "arbiter-link";
+
+class HostView {
+ public:
+  // `instance`: as NodeOptions has it.
+  explicit HostView(std::string instance);
+
+  // Takes up what has changed. Asks the daemon at most four times a second, and waits for its
+  // answer for a second at most. What was known stays where there is no daemon.
+  void update();
+
+  // The sources that the model in force connects or reads, with how old their samples may be when
+  // they arrive: T, or for `forever` the model's own timeout.
+  [[nodiscard]] const std::map<std::string, shm::Nanoseconds, std::less<>>& wanted() const {
+    return wanted_;
+  }
+  // Those that components of this host have open, or had when their daemon went.
+  [[nodiscard]] const std::set<std::string, std::less<>>& open_here() const { return open_here_; }
+  // Why nothing is known; empty: it is.
+  [[nodiscard]] const std::string& obstacle() const { return obstacle_; }
+
+ private:
+  bool join();
+  void look_at_model();
+  void look_at_ports();
+
+  const std::string instance_name_;
+  std::unique_ptr<watch::Instance> instance_;
+  std::map<std::string, shm::Nanoseconds, std::less<>> wanted_;
+  std::set<std::string, std::less<>> open_here_;
+  std::shared_ptr<const shm::DecisionMemory> memory_;  // of what follows
+  std::uint64_t generation_ = 0;
+  std::string obstacle_;
+  shm::Nanoseconds join_again_ = 0;
+  shm::Nanoseconds ask_again_ = 0;
+};
+
+}  // namespace arbiter::link

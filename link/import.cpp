@@ -1,0 +1,234 @@
+#include "link/import.hpp"
+
+#include <time.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "gateway/core/say.hpp"
+#include "gateway/dds/arrived_sample.hpp"
+#include "shm/clock.hpp"
+
+namespace arbiter::link {
+namespace {
+
+using gateway::Level;
+using gateway::say;
+
+constexpr shm::Nanoseconds kOpenAgain = 1'000'000'000;
+
+Type type_of(const shm::TypeInfo& info) {
+  if (!info.is_typed()) return Type::untyped(static_cast<std::size_t>(info.size));
+  return {info.type_name(), static_cast<std::size_t>(info.size),
+          static_cast<std::size_t>(info.alignment)};
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
+shm::Nanoseconds time_with_sleep() noexcept {
+  timespec time{};
+  clock_gettime(CLOCK_BOOTTIME, &time);
+  return shm::Nanoseconds{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+}
+
+Import::Import(Node& node, const Network& network, const SentTokens& tokens, std::string source,
+               Incarnation me, const gateway::Bell& bell)
+    : node_(node),
+      tokens_(tokens),
+      source_(std::move(source)),
+      me_(me),
+      reader_(network, source_, *this, bell) {}
+
+Import::~Import() { close(); }
+
+void Import::look(bool is_open_here) {
+  listen_to_speaker();
+  const Offerer* const speaker = speaker_.current();
+  // The model wants it, or there would be no import.
+  const ImportChoice choice = choose_import({true, is_open_here, speaker != nullptr});
+  const OfferCard* const card = speaker == nullptr ? nullptr : &offers_.at(speaker->key);
+  const bool is_other_type = port_ && card != nullptr && card->type_revision != revision_;
+  const bool is_other_host = speaker == nullptr || speaker->incarnation != obeyed_;
+  if (choice != ImportChoice::kImport || is_other_type || (is_other_host && port_)) close();
+  obey(choice == ImportChoice::kImport ? speaker->incarnation : 0);
+  if (choice == ImportChoice::kImport && !port_ && card->type_revision != 0) open(*card);
+  describe();
+}
+
+void Import::obey(Incarnation exporter) {
+  const std::lock_guard lock(mutex_);
+  if (exporter == obeyed_) return;
+  obeyed_ = exporter;
+  const auto last = unheard_.find(exporter);
+  if (last == unheard_.end()) return;
+  stream_.note(exporter, last->second.number, last->second.is_deactivated);
+  unheard_.erase(last);
+}
+
+void Import::listen_to_speaker() {
+  const std::vector<EventReader::Offer> offers = reader_.offers();
+  for (auto each = offers_.begin(); each != offers_.end();) {
+    const bool is_there =
+        std::any_of(offers.begin(), offers.end(), [&](const EventReader::Offer& offer) {
+          return offer.key == each->first && offer.card.source == source_;
+        });
+    if (!is_there) speaker_.remove(each->first);
+    each = is_there ? std::next(each) : offers_.erase(each);
+  }
+  for (const EventReader::Offer& offer : offers) {
+    if (offer.card.source != source_) continue;
+    offers_[offer.key] = offer.card;
+    speaker_.add({offer.key, offer.card.host, offer.card.incarnation});
+  }
+  say_who_speaks();
+}
+
+void Import::say_who_speaks() {
+  const std::vector<std::string> hosts = speaker_.hosts();
+  const std::string text = hosts.size() < 2 ? "" : joined(hosts);
+  if (text == hosts_said_) return;
+  hosts_said_ = text;
+  if (text.empty()) return;
+  say(Level::kWarning, source_ + " is open on several hosts: " + text + "; it is taken from " +
+                           speaker_.current()->host + " until that one is gone");
+}
+
+void Import::open(const OfferCard& card) {
+  const shm::Nanoseconds now = shm::monotonic_now();
+  if (now < open_again_) return;
+  open_again_ = now + kOpenAgain;
+  if (card.type.size > kMaxSampleBytes) {
+    say_once(source_ + " of host " + card.host + " is not imported: its samples have up to " +
+             std::to_string(card.type.size) + " bytes, and no more than " +
+             std::to_string(kMaxSampleBytes) + " cross the network");
+    return;
+  }
+  try {
+    OutputPort<void> port = node_.output_port(source_, type_of(card.type));
+    const std::lock_guard lock(mutex_);
+    port_.emplace(std::move(port));
+    revision_ = card.type_revision;
+    // What came before the port was there.
+    if (stream_.is_deactivated()) port_->deactivate();
+  } catch (const Error& error) {
+    say_once(source_ + " of host " + card.host + " is not imported: " + error.what());
+    return;
+  }
+  described_.clear();
+  said_.clear();
+  open_again_ = 0;
+  say(Level::kInfo, source_ + " comes from host " + card.host);
+}
+
+void Import::close() {
+  std::optional<OutputPort<void>> gone;
+  {
+    const std::lock_guard lock(mutex_);
+    obeyed_ = 0;
+    gone.swap(port_);
+  }
+  if (gone) say(Level::kInfo, source_ + " is not imported any more");
+}
+
+void Import::say_once(const std::string& text) {
+  if (text == said_) return;
+  said_ = text;
+  say(Level::kWarning, text);
+}
+
+std::string Import::text() const {
+  const Offerer* const speaker = speaker_.current();
+  std::string text = "host " + (speaker == nullptr ? std::string("unknown") : speaker->host);
+  const std::vector<std::string> hosts = speaker_.hosts();
+  if (hosts.size() > 1) text += ", open on several hosts: " + joined(hosts);
+  const std::lock_guard lock(mutex_);
+  const auto count = [&](std::uint64_t number, const char* what) {
+    if (number != 0) text += ", " + std::to_string(number) + what;
+  };
+  count(stream_.lost(), " lost");
+  count(counts_.late, " late");
+  count(stream_.doubled(), " that came twice");
+  count(counts_.too_soon, " before the port was open");
+  count(counts_.unreadable, " unreadable");
+  count(counts_.no_memory, " without memory");
+  return text;
+}
+
+void Import::describe() {
+  if (!port_) return;
+  std::string now = text();
+  if (now == described_) return;
+  port_->describe(now);
+  described_ = std::move(now);
+}
+
+void Import::take(const gateway::dds::Payload& payload) noexcept {
+  const std::size_t before = encapsulation().size();
+  const std::lock_guard lock(mutex_);
+  std::array<std::byte, kMaxHeaderBytes> bytes;
+  const std::size_t size = payload.size < before ? 0 : payload.size - before;
+  const WritableBytes beginning(bytes.data(), std::min(size, bytes.size()));
+  const gateway::dds::ArrivedSample sample(payload);
+  if (!sample.copy(std::min<std::size_t>(before, payload.size), beginning) ||
+      !read_header(beginning, size, header_)) {
+    ++counts_.unreadable;
+    return;
+  }
+  if (header_.exporter != obeyed_) {  // one speaker: others are not heard
+    if (unheard_.size() < kMaxUnheard || unheard_.contains(header_.exporter)) {
+      unheard_[header_.exporter] = {header_.number, header_.is_deactivated};
+    }
+    return;
+  }
+  if (!stream_.note(header_.exporter, header_.number, header_.is_deactivated)) return;
+  arrive(payload, before + header_bytes(header_));
+}
+
+void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) noexcept {
+  if (!port_) {
+    if (header_.kind == EventKind::kSample) ++counts_.too_soon;
+    return;
+  }
+  if (header_.is_deactivated) {
+    port_->deactivate();  // never too late
+    return;
+  }
+  if (header_.kind == EventKind::kState) return;
+  const shm::Nanoseconds left = tokens_.time_left(
+      header_.token_of(me_), max_age_.load(std::memory_order_relaxed), time_with_sleep());
+  // A deadline that has passed, where nothing is left: the port counts it, too.
+  const Time deadline(std::chrono::nanoseconds(left < 0 ? -1 : shm::monotonic_now() + left));
+  if (header_.kind == EventKind::kSample && left >= 0) {
+    publish(payload, before, deadline);
+  } else if (port_->signal(deadline).late) {
+    ++counts_.late;
+  }
+}
+
+void Import::publish(const gateway::dds::Payload& payload, std::size_t before,
+                     Time deadline) noexcept {
+  if (header_.type_revision != revision_) {
+    ++counts_.too_soon;  // the port is opened again for it
+    return;
+  }
+  auto loan = port_->loan(header_.length);
+  if (!loan) {
+    const bool fits = header_.length <= port_->max_size() && !port_->type().has_one_size();
+    ++(fits || header_.length == port_->max_size() ? counts_.no_memory : counts_.unreadable);
+    return;
+  }
+  if (!gateway::dds::ArrivedSample(payload).copy(before, **loan)) {
+    ++counts_.unreadable;
+    return;
+  }
+  if (port_->publish(std::move(*loan), deadline).late) ++counts_.late;
+}
+
+}  // namespace arbiter::link

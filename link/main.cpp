@@ -1,0 +1,92 @@
+// arbiter-link: joins this host's daemon with those of other hosts (docs/hosts.md).
+#include <signal.h>
+#include <sys/signalfd.h>
+#include <systemd/sd-daemon.h>
+#include <unistd.h>
+
+#include <array>
+#include <exception>
+#include <iostream>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "gateway/core/say.hpp"
+#include "link/core/cards.hpp"
+#include "link/link.hpp"
+#include "shm/file_descriptor.hpp"
+
+namespace arbiter::link {
+namespace {
+
+constexpr std::uint32_t kMaxDomain = 230;  // above it there are no ports
+
+// Before threads start, so that no other thread takes them.
+shm::FileDescriptor catch_signals() {
+  sigset_t caught;
+  sigemptyset(&caught);
+  for (const int number : {SIGTERM, SIGINT}) sigaddset(&caught, number);
+  sigprocmask(SIG_BLOCK, &caught, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+  return shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
+}
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  if (::gethostname(name.data(), name.size() - 1) != 0) return {};
+  return name.data();
+}
+
+int run(int argc, char** argv) {
+  LinkOptions options;
+  options.host = host_name();
+  CLI::App app("Joins the Arbiter of this host with those of other hosts.", "arbiter-link");
+  app.set_version_flag("--version", std::string("arbiter-link ") + ARBITER_VERSION);
+  app.add_option(
+      "--instance", options.instance,
+      "Name of the daemon; by default $ARBITER_INSTANCE, or \"default\" if that is not set");
+  app.add_option("--host", options.host,
+                 "What other hosts call this one; by default its host name");
+  app.add_option("--interface", options.network.interfaces,
+                 "A network interface, by name or address (repeatable); without it nothing leaves "
+                 "this machine");
+  app.add_option("--peer", options.network.peers,
+                 "The address of a host that multicast does not reach (repeatable)");
+  app.add_option("--domain", options.network.domain, "The domain of DDS, the same on all hosts")
+      ->check(CLI::Range(0U, kMaxDomain))
+      ->capture_default_str();
+  app.footer(
+      "Example:\n  arbiter-link --interface eth0\n\n"
+      "Exit codes: 0 ended by SIGINT or SIGTERM; 1 an error, which was said; 2 wrong use");
+  try {
+    app.parse(argc, argv);
+    if (!is_host_name(options.host)) {
+      throw CLI::ValidationError("--host", "\"" + options.host + "\" is no host's name: use 1 to " +
+                                               std::to_string(kMaxHostName) +
+                                               " letters, digits, dots, hyphens and underscores");
+    }
+  } catch (const CLI::Success& success) {
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    app.exit(error);
+    return 2;
+  }
+  gateway::set_program_name("arbiter-link");
+  const shm::FileDescriptor stop = catch_signals();
+  Link link(options);
+  sd_notify(0, "READY=1");
+  link.run(stop.get());
+  return 0;
+}
+
+}  // namespace
+}  // namespace arbiter::link
+
+int main(int argc, char** argv) {
+  try {
+    return arbiter::link::run(argc, argv);
+  } catch (const std::exception& error) {
+    arbiter::gateway::say(arbiter::gateway::Level::kError, error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,103 @@
+// Links that stop, die and come back: silence, and nothing late.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/link/robot.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::HasSubstr;
+
+class FailingHosts : public testing::Test {
+ protected:
+  explicit FailingHosts(const std::string& timeout = "300ms") : timeout_(timeout) {}
+
+  [[nodiscard]] std::vector<std::string> network() const {
+    return {"--domain", std::to_string(domain_.number())};
+  }
+
+  const std::string timeout_;
+  const OwnDomain domain_;
+  const TemporaryDirectory runtime_;
+  Host head_{"head", runtime_, source_model(timeout_), network()};
+  Host base_{"base", runtime_, motor_model(timeout_), network()};
+  Planner planner_{head_};
+  Body body_{base_};
+};
+
+TEST_F(FailingHosts, ALinkThatDiesIsSilence) {
+  body_.drive(planner_);
+  head_.link().kill();
+  body_.fall_back();
+  head_.start_link();
+  body_.drive(planner_);
+}
+
+TEST_F(FailingHosts, TheImportersLinkThatDiesIsSilenceToo) {
+  body_.drive(planner_);
+  base_.link().kill();
+  body_.fall_back();
+  base_.start_link();
+  body_.drive(planner_);
+}
+
+// A link that was stopped sends what has waited for it. All of it is older than T by then.
+TEST_F(FailingHosts, NothingThatWaitedForAStoppedExporterArrives) {
+  body_.drive(planner_);
+  head_.link().signal(SIGSTOP);
+  for (int i = 0; i < 10; ++i) planner_.publish();
+  const std::int64_t waited = planner_.published();
+  await([&] { return !head_.daemon().source(kPlanner)["active"]; });
+  body_.fall_back();
+  head_.link().signal(SIGCONT);
+  EXPECT_GT(body_.drive(planner_), waited);
+}
+
+TEST_F(FailingHosts, NothingThatWaitedForAStoppedImporterArrives) {
+  body_.drive(planner_);
+  base_.link().signal(SIGSTOP);
+  for (int i = 0; i < 10; ++i) planner_.publish();
+  const std::int64_t waited = planner_.published();
+  await([&] { return !head_.daemon().source(kPlanner)["active"]; });
+  body_.fall_back();
+  base_.link().signal(SIGCONT);
+  EXPECT_GT(body_.drive(planner_), waited);
+}
+
+TEST_F(FailingHosts, ADaemonThatIsRestartedLosesNothingOfTheLink) {
+  body_.drive(planner_);
+  base_.daemon().terminate();
+  body_.drive(planner_);
+  base_.daemon().restart();
+  body_.drive(planner_);
+  head_.daemon().terminate();
+  body_.drive(planner_);
+  head_.daemon().restart();
+  body_.drive(planner_);
+  EXPECT_THAT(base_.described(kPlanner), HasSubstr("host head"));
+}
+
+class ForeverHosts : public FailingHosts {
+ protected:
+  ForeverHosts() : FailingHosts("forever") {}
+};
+
+// There is no T that would end it. To stop is safe; to let the next one drive is not.
+TEST_F(ForeverHosts, ASpeakerThatIsGoneLeavesThePortIdleAndInhibited) {
+  body_.drive(planner_);
+  head_.link().kill();
+  await([&] { return body_.motor().idle(); });
+  EXPECT_EQ(body_.hold().publish(Speed{0}).delivered, 0U);
+  head_.start_link();
+  body_.drive(planner_);
+}
+
+TEST_F(ForeverHosts, APortThatIsClosedThereIsClosedHere) {
+  body_.drive(planner_);
+  { const Planner gone = std::move(planner_); }
+  await([&] { return body_.motor().idle(); });
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,141 @@
+// What passes between hosts, and what does not.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/link/robot.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+class Hosts : public testing::Test {
+ protected:
+  [[nodiscard]] std::vector<std::string> network() const {
+    return {"--domain", std::to_string(domain_.number())};
+  }
+
+  const OwnDomain domain_;
+  const TemporaryDirectory runtime_;
+};
+
+TEST_F(Hosts, ASampleThatIsPublishedOnOneArrivesAtAPortOfTheOther) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Planner planner(head);
+  Body body(base);
+  EXPECT_GT(body.drive(planner), 0);
+  EXPECT_EQ(body.motor().winner(), kPlanner);
+  EXPECT_THAT(base.described(kPlanner), HasSubstr("host head"));
+  EXPECT_EQ(body.hold().publish(Speed{0}).discarded, 1U) << "decided where it is received";
+}
+
+TEST_F(Hosts, ADeactivationEndsTheActivityOnTheOtherHost) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  planner.port().deactivate();
+  body.fall_back();
+}
+
+// Whoever joins is told what the source is like: it need not have seen how it came to that.
+TEST_F(Hosts, ADeactivationIsSaidToWhoeverComesBack) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  base.link().kill();
+  planner.port().deactivate();
+  base.start_link();
+  body.fall_back();
+}
+
+TEST_F(Hosts, OnlyWhatAnotherHostsModelWantsIsTapped) {
+  Host head("head", runtime_, kNoRules, network());
+  Planner planner(head);
+  Node eye = head.node("eye");
+  auto camera = eye.output_port<Speed>("/Camera/image:o");
+  head.see("host head, by the loopback interface");
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Body body(base);
+  body.drive(planner);
+  EXPECT_FALSE(head.daemon().source(kPlanner)["taps"].empty());
+  EXPECT_TRUE(head.daemon().source("/Camera/image:o")["taps"].empty());
+  EXPECT_EQ(base.described("/Camera/image:o"), "");
+  base.daemon().load(kNoRules);
+  await([&] { return head.daemon().source(kPlanner)["taps"].empty(); });
+}
+
+TEST_F(Hosts, WhatIsImportedIsNotExported) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Host rear("rear", runtime_, motor_model("1000s"), network());
+  Planner planner(head);
+  Body front(base);
+  Body back(rear);
+  front.drive(planner);
+  back.drive(planner);
+  // Had one of them offered it to the other, both would have said so.
+  await([&] { return head.daemon().source(kPlanner)["taps"].size() == 1; });
+  front.drive(planner);
+  back.drive(planner);
+  EXPECT_THAT(base.log(), Not(HasSubstr("several hosts")));
+  EXPECT_THAT(rear.log(), Not(HasSubstr("several hosts")));
+}
+
+TEST_F(Hosts, EachObeysItsOwnComponent) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Planner far(head);
+  Body body(base);
+  {
+    Planner near(base);
+    base.see("host base, by");
+    for (int i = 0; i < 5; ++i) body.drive(near);
+    EXPECT_EQ(base.described(kPlanner), "") << "no link has it open";
+  }
+  await([&] {
+    far.publish();
+    return base.described(kPlanner).find("host head") != std::string::npos;
+  });
+}
+
+TEST_F(Hosts, AThirdOneKeepsTheSpeakerThatItHasAndNamesBoth) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  Host rear("rear", runtime_, kNoRules, network());
+  Planner other(rear);
+  base.see("is open on several hosts: head, rear; it is taken from head");
+  await([&] { return base.described(kPlanner).find("head, rear") != std::string::npos; });
+  body.drive(planner);
+  EXPECT_THAT(base.described(kPlanner), HasSubstr("host head"));
+  head.link().kill();  // its lease ends
+  await([&] { return base.described(kPlanner).find("host rear") != std::string::npos; });
+}
+
+TEST_F(Hosts, AnotherTypeOpensThePortAgain) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Node body = base.node("body");
+  auto motor = body.input_port(kMotor);
+  Node brain = head.node("brain");
+  for (const char* const type : {"robot/Speed", "robot/Torque"}) {
+    auto port = brain.output_port(kPlanner, Type::variable(type, 100));
+    const std::array<std::byte, 3> sample{std::byte{1}, std::byte{2}, std::byte{3}};
+    await([&] {
+      port.publish(Bytes(sample.data(), sample.size()));
+      const auto got = motor.wait_for(5ms);
+      return got && got->type().name() == type && got->size() == sample.size();
+    });
+  }
+}
+
+}  // namespace
+}  // namespace arbiter::test

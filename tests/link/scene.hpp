@@ -1,0 +1,98 @@
+// Hosts: each a daemon with a model of its own and a link, all on this machine. Between them the
+// loopback interface, in a domain that no other test uses meanwhile; or cables (cables.hpp).
+#pragma once
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <arbiter/arbiter.hpp>
+
+#include "shm/file_descriptor.hpp"
+#include "tests/gateway/dds/own_domain.hpp"
+#include "tests/support/child_process.hpp"
+#include "tests/support/daemon.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/text_files.hpp"
+
+namespace arbiter::test {
+
+using namespace std::chrono_literals;
+
+// Asks until it holds. That it never does shows as the test's time limit.
+inline void await(const std::function<bool()>& holds) {
+  while (!holds()) ::poll(nullptr, 0, 1);
+}
+
+class Host {
+ public:
+  // `by`: what starts the link, such as in a network namespace.
+  Host(std::string name, const TemporaryDirectory& runtime, const std::string& model,
+       std::vector<std::string> network, std::vector<std::string> by = {})
+      : name_(std::move(name)),
+        daemon_(model, options_of(name_, runtime)),
+        log_(daemon_.directory() + "/link.log"),
+        by_(std::move(by)),
+        network_(std::move(network)) {
+    start_link();
+  }
+
+  [[nodiscard]] Daemon& daemon() { return daemon_; }
+  [[nodiscard]] ChildProcess& link() { return link_; }
+  // A component of this host.
+  [[nodiscard]] Node node(const std::string& name) const {
+    NodeOptions options;
+    options.instance = name_;
+    options.on_notice = [](const Notice&) {};
+    return Node(name, options);
+  }
+  void start_link() {
+    std::vector<std::string> arguments = by_;
+    arguments.insert(arguments.end(), {std::string(ARBITER_PROGRAMS) + "/arbiter-link",
+                                       "--instance", name_, "--host", name_});
+    arguments.insert(arguments.end(), network_.begin(), network_.end());
+    const shm::FileDescriptor log(
+        ::open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600));
+    link_ = ChildProcess(arguments, {{"CYCLONEDDS_URI", std::nullopt}}, {-1, -1, log.get()});
+  }
+  [[nodiscard]] std::string log() const { return content_of(log_); }
+  // Returns once the link has said so.
+  void see(const std::string& text) const {
+    await([&] {
+      pollfd ended{link_.descriptor(), POLLIN, 0};
+      if (::poll(&ended, 1, 0) == 1) throw std::runtime_error("the link has ended: " + log());
+      return log().find(text) != std::string::npos;
+    });
+  }
+  // What the status says of where a source comes from; empty: nobody has it open here.
+  [[nodiscard]] std::string described(const std::string& source) {
+    const nlohmann::json found = daemon_.source(source);
+    return found.is_null() ? "" : found.value("described", "");
+  }
+
+ private:
+  static Daemon::Options options_of(const std::string& name, const TemporaryDirectory& runtime) {
+    Daemon::Options options;
+    options.instance = name;
+    options.runtime_directory = runtime.path();
+    return options;
+  }
+
+  const std::string name_;
+  Daemon daemon_;
+  const std::string log_;
+  const std::vector<std::string> by_;
+  const std::vector<std::string> network_;
+  ChildProcess link_;
+};
+
+}  // namespace arbiter::test

@@ -1,0 +1,168 @@
+// Order, doubles, losses; one speaker; and when a source is imported at all.
+#include "link/core/stream.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "link/core/import_choice.hpp"
+#include "link/core/speaker.hpp"
+
+namespace arbiter::link {
+namespace {
+
+using testing::ElementsAre;
+
+TEST(Stream, CountsWhatDoesNotCome) {
+  Stream stream;
+  EXPECT_TRUE(stream.note(1, 10, false));
+  EXPECT_EQ(stream.lost(), 0U) << "what was sent before it joined is not missed";
+  EXPECT_TRUE(stream.note(1, 11, false));
+  EXPECT_TRUE(stream.note(1, 15, false));
+  EXPECT_EQ(stream.lost(), 3U);
+  EXPECT_EQ(stream.doubled(), 0U);
+}
+
+TEST(Stream, NothingComesTwiceOrOutOfOrder) {
+  Stream stream;
+  EXPECT_TRUE(stream.note(1, 2, false));
+  EXPECT_FALSE(stream.note(1, 2, false));
+  EXPECT_FALSE(stream.note(1, 1, true)) << "a deactivation that was overtaken";
+  EXPECT_FALSE(stream.is_deactivated());
+  EXPECT_EQ(stream.doubled(), 2U);
+}
+
+// Each event that was sent has come once, or is counted as lost.
+TEST(Stream, AccountsForEveryEventOfANetworkThatLosesDoublesAndReorders) {
+  std::mt19937 random(3);
+  for (int round = 0; round < 200; ++round) {
+    std::vector<std::uint64_t> sent;
+    for (std::uint64_t number = 1; number <= 200; ++number) {
+      if (random() % 5 != 0) sent.push_back(number);
+      if (random() % 7 == 0) sent.push_back(number);
+    }
+    for (std::size_t i = 0; i + 3 < sent.size(); i += 2) std::swap(sent[i], sent[i + random() % 3]);
+    Stream stream;
+    std::uint64_t came = 0;
+    std::uint64_t first = 0;
+    std::uint64_t last = 0;
+    for (const std::uint64_t number : sent) {
+      if (!stream.note(9, number, false)) continue;
+      EXPECT_GT(number, last);
+      if (first == 0) first = number;
+      last = number;
+      ++came;
+    }
+    EXPECT_EQ(came + stream.lost(), last - first + 1);
+    EXPECT_EQ(came + stream.doubled(), sent.size());
+  }
+}
+
+TEST(Stream, TheLastEventSaysWhatTheSourceIsLike) {
+  Stream stream;
+  stream.note(1, 1, false);
+  EXPECT_FALSE(stream.is_deactivated());
+  stream.note(1, 5, true);
+  EXPECT_TRUE(stream.is_deactivated()) << "also behind a gap";
+  stream.note(1, 6, false);
+  EXPECT_FALSE(stream.is_deactivated());
+}
+
+TEST(Stream, ALinkThatWasStartedAgainBeginsAgain) {
+  Stream stream;
+  stream.note(1, 100, false);
+  EXPECT_TRUE(stream.note(2, 1, true));
+  EXPECT_TRUE(stream.is_deactivated());
+  EXPECT_EQ(stream.lost(), 0U);
+}
+
+// A host that is obeyed again, after another one was, sends its last event once more.
+TEST(Stream, WhatASpeakerThatComesBackSendsAgainIsKnown) {
+  Stream stream;
+  stream.note(1, 100, false);
+  stream.note(2, 1, false);
+  EXPECT_FALSE(stream.note(1, 100, false));
+  EXPECT_TRUE(stream.note(1, 120, false));
+  EXPECT_EQ(stream.lost(), 0U) << "what it sent while another one was obeyed is not missed";
+  EXPECT_TRUE(stream.note(1, 122, false));
+  EXPECT_EQ(stream.lost(), 1U);
+}
+
+TEST(Speaker, IsKeptUntilItIsGone) {
+  Speaker speaker;
+  EXPECT_EQ(speaker.current(), nullptr);
+  speaker.add({1, "head", 11});
+  speaker.add({2, "base", 22});
+  EXPECT_EQ(speaker.current()->host, "head") << "whoever comes meanwhile";
+  EXPECT_THAT(speaker.hosts(), ElementsAre("base", "head"));
+  speaker.remove(2);
+  EXPECT_EQ(speaker.current()->host, "head");
+  speaker.add({3, "base", 22});
+  speaker.remove(1);
+  EXPECT_EQ(speaker.current()->key, 3U);
+  speaker.remove(3);
+  EXPECT_EQ(speaker.current(), nullptr);
+}
+
+TEST(Speaker, OfSeveralTheFirstByNameFollows) {
+  Speaker speaker;
+  speaker.add({1, "head", 11});
+  speaker.add({2, "rear", 22});
+  speaker.add({3, "base", 33});
+  speaker.remove(1);
+  EXPECT_EQ(speaker.current()->host, "base");
+}
+
+// A link that was killed is believed to live until its lease ends; its successor is the same host.
+TEST(Speaker, TheNextLifeOfAHostTakesItsPlace) {
+  Speaker speaker;
+  speaker.add({1, "head", 11});
+  speaker.add({2, "head", 12});
+  EXPECT_EQ(speaker.current()->incarnation, 12U);
+  EXPECT_THAT(speaker.hosts(), ElementsAre("head"));
+  speaker.remove(1);
+  EXPECT_EQ(speaker.current()->incarnation, 12U);
+  speaker.add({2, "head", 12});
+  speaker.remove(2);
+  EXPECT_EQ(speaker.current(), nullptr) << "a key counts once";
+}
+
+TEST(Speaker, AnotherHostsNextLifeDoesNotTakeOver) {
+  Speaker speaker;
+  speaker.add({1, "head", 11});
+  speaker.add({2, "base", 22});
+  speaker.add({3, "base", 23});
+  EXPECT_EQ(speaker.current()->key, 1U);
+  speaker.remove(1);
+  EXPECT_EQ(speaker.current()->key, 3U) << "of its lives the last";
+}
+
+TEST(ImportChoice, OnlyWhatIsWantedHereOfferedThereAndNotOpenHereIsImported) {
+  int imported = 0;
+  for (const bool wanted : {false, true}) {
+    for (const bool here : {false, true}) {
+      for (const bool offered : {false, true}) {
+        if (choose_import({wanted, here, offered}) == ImportChoice::kImport) {
+          EXPECT_TRUE(wanted && !here && offered);
+          ++imported;
+        }
+      }
+    }
+  }
+  EXPECT_EQ(imported, 1);
+}
+
+// For `forever` nothing else ends what a speaker that is gone has begun (docs/hosts.md).
+TEST(ImportChoice, ThePortIsHeldNoLongerThanThereIsASpeaker) {
+  Speaker speaker;
+  speaker.add({1, "head", 11});
+  EXPECT_EQ(choose_import({true, false, speaker.current() != nullptr}), ImportChoice::kImport);
+  speaker.remove(1);
+  EXPECT_EQ(choose_import({true, false, speaker.current() != nullptr}), ImportChoice::kNoSpeaker);
+}
+
+}  // namespace
+}  // namespace arbiter::link
