@@ -72,7 +72,7 @@ void print(const std::vector<Verdict>& targets) {
   }
 }
 
-// So that it is known before ten minutes have passed.
+// So that it is known before all is measured.
 std::ofstream open(const std::string& file) {
   std::ofstream stream(file);
   if (!stream) throw std::runtime_error("cannot write " + file);
@@ -163,8 +163,9 @@ int main(int argc, char** argv) {
   Arguments arguments;
   bool is_full = false;
   bool is_list = false;
-  auto* const quick = app.add_flag("--quick", arguments.quick, "About a minute, not about ten");
-  app.add_flag("--full", is_full, "About ten minutes (default)")->excludes(quick);
+  auto* const quick =
+      app.add_flag("--quick", arguments.quick, "About two minutes, not about fourteen");
+  app.add_flag("--full", is_full, "About fourteen minutes (default)")->excludes(quick);
   app.add_option("--only", arguments.only, "These measures only")
       ->type_name("NAME")
       ->delimiter(',');

@@ -31,6 +31,7 @@ struct Ratio {
   double quantile;
   double limit;
   std::string their_case{};  // else the same
+  std::string group{};       // Verdict::group
 };
 
 const std::string kSpinning = "64 B, spinning";
@@ -55,6 +56,40 @@ const std::vector<Ratio> kRatios{
     {"a publish() beside arbiter top, p99, to alone", "watched", "16 ports", kWatched, kUnwatched,
      kP99, 1.1},
 };
+
+// What a sample through a gateway may cost, of what it costs through a relay of the same
+// middleware.
+struct GatewayTarget {
+  const char* name;
+  const char* measure;
+  double limit;
+};
+constexpr GatewayTarget kGatewayTargets[] = {{"iceoryx", "gateway-iceoryx", 1.5},
+                                             {"DDS", "gateway-dds", 1.15}};
+
+std::vector<Ratio> ratios_of_gateways() {
+  std::vector<Ratio> ratios;
+  for (const GatewayTarget& each : kGatewayTargets) {
+    for (const std::string size : {"64 B", "64 KiB", "1 MiB"}) {
+      const auto add = [&](const char* what, const std::string& of, double quantile) {
+        ratios.push_back(
+            {std::string(each.name) + " gateway, " + size + ", " + what + ", to a relay",
+             each.measure,
+             size + of,
+             kThroughGateway,
+             kThroughRelay,
+             quantile,
+             each.limit,
+             {},
+             kGateways});
+      };
+      add("p50", kOneWay, kP50);
+      add("p99", kOneWay, kP99);
+      add("processor", kProcessorTime, kP50);
+    }
+  }
+  return ratios;
+}
 
 // `ours` is at most `limit` more than `theirs`, or than nothing.
 struct Excess {
@@ -83,6 +118,13 @@ const std::vector<Excess> kExcesses{
      1000, "ns", "time of a publish()"},
     {"attach of 1000 ports", "scale", "attach", "arbiter: 1000 ports", {}, 1e9},
     {"CPU of an idle daemon", "scale", "daemon idle", "arbiterd", {}, 0, "%"},
+    {"twist_mux's job, of a processor",
+     "gateway-mux",
+     kTwoInputs + std::string(kShareOfProcessor),
+     kThroughGateway,
+     {},
+     1,
+     "%"},
     {"10 000 behaviours compiled and proved", "compile", "10000 behaviours", "arbiter", {}, 1e9},
 };
 
@@ -90,9 +132,11 @@ const std::vector<Excess> kExcesses{
 
 std::vector<Verdict> judge(const Report& report) {
   std::vector<Verdict> verdicts;
-  for (const Ratio& each : kRatios) {
+  std::vector<Ratio> ratios = kRatios;
+  for (Ratio& each : ratios_of_gateways()) ratios.push_back(std::move(each));
+  for (const Ratio& each : ratios) {
     if (report.find(each.measure) == nullptr) continue;  // was not asked for
-    Verdict verdict{each.name, each.limit, {}, "x"};
+    Verdict verdict{each.name, each.limit, {}, "x", each.group};
     const auto ours = figure(report, each.measure, each.of, each.ours, each.quantile);
     const auto theirs =
         figure(report, each.measure, each.their_case.empty() ? each.of : each.their_case,
@@ -102,7 +146,7 @@ std::vector<Verdict> judge(const Report& report) {
   }
   for (const Excess& each : kExcesses) {
     if (report.find(each.measure) == nullptr) continue;
-    Verdict verdict{each.name, each.limit, {}, each.unit};
+    Verdict verdict{each.name, each.limit, {}, each.unit, {}};
     const auto ours = figure(report, each.measure, each.of, each.ours, kP50);
     const auto theirs =
         each.theirs.empty()

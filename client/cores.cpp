@@ -142,6 +142,9 @@ void give_back(InputCore& core, std::uint32_t hold) noexcept {
     close_input(std::move(core.kept_by_samples));
   }
 }
+void disarm(InputCore& core) noexcept {
+  if (is_own(core)) core.disarm_descriptor();
+}
 int wait_descriptor(InputCore& core) {
   require_own(core);
   return core.wait_descriptor();

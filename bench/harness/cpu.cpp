@@ -3,6 +3,7 @@
 #include <sched.h>
 
 #include <cerrno>
+#include <string>
 #include <system_error>
 
 namespace arbiter::bench {
@@ -15,6 +16,17 @@ int try_fifo(int priority) {
 }
 
 }  // namespace
+
+std::int64_t processor_time_ns(pid_t pid) {
+  clockid_t clock{};
+  timespec time{};
+  const int error = ::clock_getcpuclockid(pid, &clock);
+  if (error != 0 || ::clock_gettime(clock, &time) != 0) {
+    throw std::system_error(error != 0 ? error : errno, std::generic_category(),
+                            "the processor time of process " + std::to_string(pid));
+  }
+  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+}
 
 std::vector<int> processors() {
   static const std::vector<int> allowed = [] {

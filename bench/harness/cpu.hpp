@@ -1,6 +1,7 @@
 // Where and how a worker runs.
 #pragma once
 
+#include <sys/types.h>
 #include <time.h>
 
 #include <cstdint>
@@ -20,6 +21,10 @@ template <class T>
 void keep(const T& value) {
   asm volatile("" : : "r,m"(value) : "memory");
 }
+
+// What a process has used since it was started, all its threads together. Throws
+// std::system_error where there is none.
+std::int64_t processor_time_ns(pid_t pid);
 
 // The processors that the benchmark may use, as it was started.
 std::vector<int> processors();

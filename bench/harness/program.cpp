@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <system_error>
 #include <utility>
 
@@ -65,6 +66,18 @@ Program& Program::operator=(Program&& other) noexcept {
 }
 
 Program::~Program() { end(); }
+
+// Of all its threads: a child belongs to the thread that has started it.
+std::vector<pid_t> Program::children() const {
+  std::vector<pid_t> found;
+  std::error_code ignored;
+  const std::string tasks = "/proc/" + std::to_string(pid_) + "/task";
+  for (const auto& task : std::filesystem::directory_iterator(tasks, ignored)) {
+    std::ifstream stream(task.path() / "children");
+    for (pid_t child = 0; stream >> child;) found.push_back(child);
+  }
+  return found;
+}
 
 void Program::signal(int number) const { ::kill(pid_, number); }
 

@@ -26,6 +26,8 @@ class Program {
   ~Program();
 
   [[nodiscard]] pid_t pid() const { return pid_; }
+  // Those that it has started, and still run.
+  [[nodiscard]] std::vector<pid_t> children() const;
   void signal(int number) const;
   // False: it has not ended by then.
   [[nodiscard]] bool ends_within(std::chrono::milliseconds limit);

@@ -99,6 +99,7 @@ nlohmann::json Report::json() const {
                        {"limit", target.limit},
                        {"unit", target.unit},
                        {"met", target.is_met()}};
+    if (!target.group.empty()) one["group"] = target.group;
     if (target.measured) one["measured"] = *target.measured;
     json["targets"].push_back(std::move(one));
   }

@@ -47,12 +47,16 @@ struct Measure {
   [[nodiscard]] const Case* find(const std::string& name) const;
 };
 
+// A Verdict::group: what a gateway costs beside a relay.
+inline constexpr const char* kGateways = "gateways";
+
 // Something that the project has promised, and whether it held in this run.
 struct Verdict {
   std::string name;  // "64 B spinning, p50, to iceoryx"
   double limit = 0;
   std::optional<double> measured{};  // empty: could not be measured
   std::string unit{};                // "x" for ratios
+  std::string group{};               // those of one stand together in the picture: kGateways
 
   [[nodiscard]] bool is_met() const { return measured && *measured <= limit; }
 };

@@ -22,6 +22,13 @@ struct MeasureEntry {
 };
 
 inline const char* const kClockRead = "clock read";
+inline const char* const kThroughGateway = "through the gateway";
+inline const char* const kThroughRelay = "through a relay";
+inline const char* const kStraight = "straight";
+inline const char* const kOneWay = ", one way";
+inline const char* const kProcessorTime = ", processor time of a sample";
+inline const char* const kShareOfProcessor = ", share of a processor";
+inline const char* const kTwoInputs = "two inputs at 100 Hz";
 inline const char* const kUnwatched = "alone";
 inline const char* const kWatched = "beside arbiter top";
 
@@ -29,6 +36,9 @@ Measure measure_compile(const Effort& effort);
 Measure measure_decide(const Effort& effort);
 Measure measure_delivery(const Effort& effort);
 Measure measure_failover(const Effort& effort);
+Measure measure_gateway_dds(const Effort& effort);
+Measure measure_gateway_iceoryx(const Effort& effort);
+Measure measure_gateway_mux(const Effort& effort);
 Measure measure_hit(const Effort& effort);
 Measure measure_load(const Effort& effort);
 Measure measure_publish(const Effort& effort);
@@ -41,13 +51,22 @@ Measure measure_watched(const Effort& effort);
 
 inline std::vector<MeasureEntry> all_measures() {
   return {
-      {"delivery", measure_delivery}, {"publish", measure_publish},
-      {"take", measure_take},         {"hit", measure_hit},
-      {"decide", measure_decide},     {"takeover", measure_takeover},
-      {"failover", measure_failover}, {"swap", measure_swap},
-      {"load", measure_load},         {"throughput", measure_throughput},
-      {"scale", measure_scale},       {"compile", measure_compile},
+      {"delivery", measure_delivery},
+      {"publish", measure_publish},
+      {"take", measure_take},
+      {"hit", measure_hit},
+      {"decide", measure_decide},
+      {"takeover", measure_takeover},
+      {"failover", measure_failover},
+      {"swap", measure_swap},
+      {"load", measure_load},
+      {"throughput", measure_throughput},
+      {"scale", measure_scale},
+      {"compile", measure_compile},
       {"watched", measure_watched},
+      {"gateway-iceoryx", measure_gateway_iceoryx},
+      {"gateway-dds", measure_gateway_dds},
+      {"gateway-mux", measure_gateway_mux},
   };
 }
 

@@ -1,6 +1,5 @@
 // A large robot: 64 components, 1000 input ports, 4096 connections.
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <array>
@@ -65,15 +64,6 @@ Memory memory_of(pid_t pid) {
     std::sscanf(line.c_str(), "Pss_Shmem: %lu kB", &memory.shared_kib);
   }
   return memory;
-}
-
-std::int64_t processor_time_ns(pid_t pid) {
-  clockid_t clock{};
-  timespec time{};
-  if (::clock_getcpuclockid(pid, &clock) != 0 || ::clock_gettime(clock, &time) != 0) {
-    throw BenchError("no processor time of arbiterd");
-  }
-  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
 }
 
 // Opens its ports, says how long each took, and on each word thereafter asks for the status.

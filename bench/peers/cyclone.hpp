@@ -4,9 +4,20 @@
 #include <dds/dds.h>
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
 namespace arbiter::bench {
+
+// Out of the way of applications, which begin at 0. Port numbers allow up to 232.
+inline constexpr dds_domainid_t kDdsDomain = 217;
+// Cyclone's settings there.
+const char* dds_configuration();
+
+struct DeleteDdsQos {
+  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+};
+using DdsQos = std::unique_ptr<dds_qos_t, DeleteDdsQos>;
 
 // Deletes what is made of it too: topics, readers, writers.
 class DdsEntity {
@@ -39,6 +50,8 @@ struct DdsOptions {
 class DdsParticipant {
  public:
   DdsParticipant();
+
+  [[nodiscard]] dds_entity_t get() const { return participant_.get(); }
 
   // Of topics that no other session of the benchmark, nor anybody else, is likely to have.
   [[nodiscard]] DdsEntity topic(std::string name) const;

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <memory>
 #include <utility>
 
 #include "bench/peers/cyclone.hpp"
@@ -8,9 +7,6 @@
 
 namespace arbiter::bench {
 namespace {
-
-// Out of the way of applications, which begin at 0. Port numbers allow up to 232.
-constexpr dds_domainid_t kDomain = 217;
 
 // The settings are Cyclone's own but for where it listens. CYCLONEDDS_URI is not looked at:
 // whatever stands there is meant for others.
@@ -27,14 +23,9 @@ constexpr const char* kConfiguration = R"(
 </Discovery>
 <Tracing><Verbosity>none</Verbosity></Tracing>)";
 
-struct DeleteQos {
-  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
-};
-using Qos = std::unique_ptr<dds_qos_t, DeleteQos>;
-
 // Of both ends.
-Qos qos(const DdsOptions& options) {
-  Qos result(dds_create_qos());
+DdsQos qos(const DdsOptions& options) {
+  DdsQos result(dds_create_qos());
   dds_qset_reliability(result.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(10));
   dds_qset_history(result.get(), DDS_HISTORY_KEEP_LAST, 8);
   dds_qset_ownership(result.get(), DDS_OWNERSHIP_EXCLUSIVE);
@@ -45,6 +36,8 @@ Qos qos(const DdsOptions& options) {
 }
 
 }  // namespace
+
+const char* dds_configuration() { return kConfiguration; }
 
 DdsEntity::DdsEntity(dds_entity_t entity, const char* what) : entity_(entity) {
   if (entity < 0) throw BenchError(std::string(what) + ": " + dds_strretcode(-entity));
@@ -59,8 +52,9 @@ DdsEntity::~DdsEntity() {
 }
 
 DdsParticipant::DdsParticipant()
-    : domain_(dds_create_domain(kDomain, kConfiguration), "dds_create_domain"),
-      participant_(dds_create_participant(kDomain, nullptr, nullptr), "dds_create_participant") {}
+    : domain_(dds_create_domain(kDdsDomain, kConfiguration), "dds_create_domain"),
+      participant_(dds_create_participant(kDdsDomain, nullptr, nullptr), "dds_create_participant") {
+}
 
 DdsEntity DdsParticipant::topic(std::string name) const {
   std::replace(name.begin(), name.end(), '-', '_');  // which DDS does not allow
@@ -70,7 +64,7 @@ DdsEntity DdsParticipant::topic(std::string name) const {
 }
 
 DdsEntity DdsParticipant::writer(const DdsEntity& topic, const DdsOptions& options) const {
-  const Qos wanted = qos(options);
+  const DdsQos wanted = qos(options);
   dds_qset_ownership_strength(wanted.get(), options.strength);
   return {dds_create_writer(participant_.get(), topic.get(), wanted.get(), nullptr),
           "dds_create_writer"};

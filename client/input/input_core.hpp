@@ -72,6 +72,8 @@ class InputCore {
   Waited wait(shm::Nanoseconds timeout, HeldSample& sample);
   void give_back(std::uint32_t hold) noexcept;
   int wait_descriptor();
+  // Nobody rings until a take has found nothing. Nothing to do where there is no descriptor.
+  void disarm_descriptor() noexcept;
   [[nodiscard]] std::optional<std::string_view> winner() noexcept;
   [[nodiscard]] bool is_idle() noexcept;
   [[nodiscard]] std::uint32_t held() const noexcept { return held_; }
@@ -157,7 +159,9 @@ class InputCore {
   Waited wait_once(shm::Nanoseconds timeout, HeldSample& sample);
   bool arm(HeldSample& sample, shm::Command& command);
   void disarm() noexcept;
+  void stop_waiting() noexcept;
   void arm_descriptor(HeldSample& sample);
+  void set_timer(shm::Nanoseconds change_at) noexcept;
   HeldSample take_once();
   void measure(shm::Nanoseconds stamp) const noexcept;
 
@@ -208,6 +212,8 @@ class InputCore {
   bool commanded_ = false;  // a commander was seen, or a sample taken, since idle was last told
   shm::FileDescriptor epoll_;
   shm::FileDescriptor timer_;
+  bool is_disarmed_ = false;                   // by disarm_descriptor(), until it is armed again
+  shm::Nanoseconds timer_at_ = shm::kForever;  // when it expires; what is set is never later
 };
 
 }  // namespace arbiter::detail

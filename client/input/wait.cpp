@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "client/count.hpp"
 #include "client/input/input_core.hpp"
@@ -78,10 +79,14 @@ bool InputCore::arm(HeldSample& sample, shm::Command& command) {
 
 // The next wait has another number. What rang for this one is forgotten before the next begins.
 void InputCore::disarm() noexcept {
+  stop_waiting();
+  bell_.silence();
+}
+
+void InputCore::stop_waiting() noexcept {
   shm::InputHeader& header = segment_->header;
   const std::uint64_t wait = header.wait.load(std::memory_order_relaxed);
   if ((wait & 1) != 0) header.wait.store(wait + 1, std::memory_order_relaxed);
-  bell_.silence();
 }
 
 // In one picture, under the model that was in force while it was taken.
@@ -181,22 +186,39 @@ int InputCore::wait_descriptor() {
   return epoll_.get();
 }
 
+// Relaxed is enough: a publisher that still sees us wait rings for nothing. What has rung is left
+// to be heard, also when the descriptor is armed again: a system call for each sample would cost
+// more than to wake the loop once for nothing.
+void InputCore::disarm_descriptor() noexcept {
+  if (!epoll_) return;
+  stop_waiting();
+  is_disarmed_ = true;
+}
+
 // After a take that found nothing: from now on the descriptor becomes readable when there is cause.
 void InputCore::arm_descriptor(HeldSample& sample) {
   for (;;) {
-    disarm();
+    if (!std::exchange(is_disarmed_, false)) disarm();
     shm::Command command = who_commands();
     const bool armed = arm(sample, command);
     if (sample.data != nullptr) return;
     if (!armed) continue;
-    const shm::Nanoseconds change_at = next_change(command.commander);
-    itimerspec at{};  // zero: no alarm
-    if (change_at != shm::kForever) {
-      at.it_value = {change_at / 1'000'000'000, change_at % 1'000'000'000};
-    }
-    timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &at, nullptr);
+    set_timer(next_change(command.commander));
     return;
   }
+}
+
+// A commander that publishes moves the change away with each sample. A timer that expires too early
+// wakes the loop once, for nothing; to set it for each sample would cost a system call for each.
+void InputCore::set_timer(shm::Nanoseconds change_at) noexcept {
+  const bool has_expired = timer_at_ != shm::kForever && timer_at_ <= shm::monotonic_now();
+  if (change_at >= timer_at_ && !has_expired) return;
+  itimerspec at{};  // zero: no alarm
+  if (change_at != shm::kForever) {
+    at.it_value = {change_at / 1'000'000'000, change_at % 1'000'000'000};
+  }
+  timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &at, nullptr);
+  timer_at_ = change_at;
 }
 
 }  // namespace arbiter::detail

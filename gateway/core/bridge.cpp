@@ -174,9 +174,13 @@ void Bridge::start() {
   std::vector<Middleware::OpenIn> ins;
   std::vector<Middleware::OpenOut> outs;
   for (const auto& part : parts_) {
-    if (part->incoming) ins.push_back({part->gateway, *part->incoming, part->account});
+    if (part->incoming) {
+      ins.push_back({part->gateway, *part->incoming, part->account});
+      ins_.emplace(part->entry.ports().front()->name, part->incoming.get());
+    }
     if (part->outgoing) outs.push_back({part->gateway, *part->outgoing, part->account});
   }
+  for (const auto& out : outs) out.outgoing.lead(ins_, [this] { bell_.ring(); });
   say(Level::kInfo, "serves " + std::to_string(ins.size()) + " topics in, " +
                         std::to_string(outs.size()) + " out");
   middleware_.start(ins, outs);

@@ -102,6 +102,7 @@ class Bridge {
   shm::FileDescriptor epoll_;
   std::optional<Node> node_;
   std::vector<std::unique_ptr<Part>> parts_;
+  InBySource ins_;
   Saying waiting_;  // for the daemon, for ports
   Saying ages_;
   bool stops_ = false;

@@ -83,7 +83,7 @@ Incoming::Incoming(Node& node, const Entry& entry, Account& account)
 // publish() throws for another port's loan, which it never is.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 Incoming::Fate Incoming::deliver(const ForeignSample& sample, Time deadline) noexcept {
-  if (!entry_.choice) return pass_to(*yes_, sample, deadline);
+  if (!entry_.choice) return pass_on(sample, deadline);
   const auto side = choose(*entry_.choice, sample);
   if (!side) {
     fail();
@@ -96,6 +96,20 @@ Incoming::Fate Incoming::deliver(const ForeignSample& sample, Time deadline) noe
   // nothing active, but deactivations are never late.
   other.deactivate();
   if (fate == Fate::kUnreadable) chosen.deactivate();
+  return fate;
+}
+
+// As above. NOLINTNEXTLINE(bugprone-exception-escape)
+Incoming::Fate Incoming::pass_on(const ForeignSample& sample, Time deadline) noexcept {
+  Outgoing* const outgoing = outgoing_.load(std::memory_order_relaxed);
+  if (outgoing == nullptr || !outgoing->begin_turn()) {
+    return pass_to(*yes_, sample, deadline);
+  }
+  const Fate fate = pass_to(*yes_, sample, deadline);
+  // One that has lost would only hold up the others.
+  if (!outgoing->end_turn(yes_->name(), max_age_.get())) {
+    outgoing_.store(nullptr, std::memory_order_relaxed);
+  }
   return fate;
 }
 

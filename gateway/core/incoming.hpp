@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <optional>
 #include <string_view>
@@ -36,6 +37,8 @@ class ForeignSample {
   [[nodiscard]] virtual bool is_big_endian() const noexcept { return false; }
 };
 
+class Outgoing;
+
 // Which source a sample's field chooses; empty: it has none, or it is NaN, or no Boolean.
 enum class Side { kYes, kNo };
 [[nodiscard]] std::optional<Side> choose(const Choice& choice,
@@ -55,6 +58,11 @@ class Incoming {
   // publish() throws for another port's loan, and this one is its own.
   Fate deliver(const ForeignSample& sample,  // NOLINT(bugprone-exception-escape)
                Time deadline) noexcept;
+  // What deliver() publishes is what that `out` entry sends: deliver() then sends it there itself,
+  // until nothing comes there any more. Outlives the last deliver(). The gateway's loop.
+  void follow(Outgoing& outgoing) noexcept {
+    if (!entry_.choice) outgoing_.store(&outgoing, std::memory_order_relaxed);
+  }
   // A sample came that cannot be read at all. With a choice both sources end.
   void fail() noexcept;
 
@@ -67,6 +75,8 @@ class Incoming {
   void describe(std::string_view text);
 
  private:
+  Fate pass_on(const ForeignSample& sample,  // NOLINT(bugprone-exception-escape): as deliver()
+               Time deadline) noexcept;
   Fate pass_to(OutputPort<void>& port,  // NOLINT(bugprone-exception-escape): as deliver()
                const ForeignSample& sample, Time deadline) noexcept;
   void deactivate_all() noexcept;
@@ -76,6 +86,8 @@ class Incoming {
   MaxAge max_age_;
   std::optional<OutputPort<void>> yes_;  // or the only one
   std::optional<OutputPort<void>> no_;
+  // Relaxed is enough: all entries were made before the first sample.
+  std::atomic<Outgoing*> outgoing_{nullptr};
 };
 
 }  // namespace arbiter::gateway

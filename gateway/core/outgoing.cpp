@@ -1,7 +1,16 @@
 #include "gateway/core/outgoing.hpp"
 
+#include <utility>
+
+#include "gateway/core/incoming.hpp"
+#include "shm/clock.hpp"
+
 namespace arbiter::gateway {
 namespace {
+
+// Of this thread, at whatever entry. What it sends may come back to it at once, where a topic leads
+// to itself in a way that no check of the mapping sees; then it goes round by the loop.
+thread_local bool has_turn = false;
 
 InputPort<void> open(Node& node, const Entry& entry) {
   InputPortOptions options;
@@ -23,11 +32,25 @@ Outgoing::Outgoing(Node& node, const Entry& entry, Sender& sender, Account& acco
                    const AgesOfSources& ages)
     : entry_(entry), sender_(sender), account_(account), ages_(ages), port_(open(node, entry)) {}
 
+void Outgoing::lead(const InBySource& ins, std::function<void()> call_loop) {
+  ins_ = &ins;
+  call_loop_ = std::move(call_loop);
+}
+
 void Outgoing::run(shm::Nanoseconds now) {
+  const std::lock_guard lock(turn_);
+  has_turn = true;
+  send_waiting(now);
+  send_idle(now);
+  next_.store(when_next(), std::memory_order_relaxed);
+  has_turn = false;
+}
+
+void Outgoing::send_waiting(shm::Nanoseconds now) {
   // Other ports have their turn: a publisher that never rests must not keep the loop here.
   has_more_ = true;
   for (std::uint32_t i = 0; i < kMostAtOnce; ++i) {
-    auto sample = port_.take();
+    auto sample = left_ ? std::exchange(left_, {}) : port_.take();
     if (!sample) {
       has_more_ = false;
       break;
@@ -36,8 +59,13 @@ void Outgoing::run(shm::Nanoseconds now) {
       account_.late.add();
       continue;
     }
-    send(**sample);
+    account_for(sender_.send(**sample), (*sample)->size());
+    if (ins_ == nullptr) continue;
+    if (const auto in = ins_->find(sample->source()); in != ins_->end()) in->second->follow(*this);
   }
+}
+
+void Outgoing::send_idle(shm::Nanoseconds now) {
   // Taken before the look at the port: a reader that comes in between is served the next time.
   const bool has_matched = matched_.exchange(false, std::memory_order_relaxed);
   if (!port_.idle()) {
@@ -53,20 +81,69 @@ void Outgoing::run(shm::Nanoseconds now) {
   }
 }
 
-shm::Nanoseconds Outgoing::next() const noexcept {
+bool Outgoing::begin_turn() noexcept {
+  if (has_turn || !turn_.try_lock()) return false;
+  if (left_ || has_more_) {
+    turn_.unlock();
+    return false;
+  }
+  has_turn = true;
+  port_.disarm();
+  return true;
+}
+
+// take() throws only where more samples are held than here ever are.
+// NOLINTNEXTLINE(bugprone-exception-escape)
+bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexcept {
+  bool has_come = false;
+  has_more_ = true;
+  for (std::uint32_t i = 0; i < kMostAtOnce; ++i) {
+    auto sample = port_.take();
+    if (!sample) {
+      has_more_ = false;
+      break;
+    }
+    // How old others' may be the loop knows.
+    if (sample->source() != source) {
+      left_ = std::move(sample);
+      break;
+    }
+    has_come = true;
+    if (shm::monotonic_now() - sample->stamp_ns() > max_age) {
+      account_.late.add();
+      continue;
+    }
+    const Sender::Result result = sender_.send_at_once(**sample);
+    if (result == Sender::Result::kBusy) {
+      left_ = std::move(sample);
+      break;
+    }
+    account_for(result, (*sample)->size());
+  }
+  if (has_come) idle_again_.reset();  // somebody commands
+  next_.store(when_next(), std::memory_order_relaxed);
+  const bool leaves_some = has_more_;
+  has_turn = false;
+  turn_.unlock();
+  if (leaves_some) call_loop_();
+  return has_come;
+}
+
+shm::Nanoseconds Outgoing::when_next() const noexcept {
   if (has_more_) return 0;
   if (entry_.idle.kind == Idle::Kind::kNothing) return shm::kForever;
   return idle_again_.value_or(shm::kForever);
 }
 
-void Outgoing::send(Bytes sample) noexcept {
-  switch (sender_.send(sample)) {
+void Outgoing::account_for(Sender::Result result, std::size_t size) noexcept {
+  switch (result) {
     case Sender::Result::kSent:
       account_.passed.add();
-      account_.set_last_size(sample.size());
+      account_.set_last_size(size);
       return;
     case Sender::Result::kNotReady:
     case Sender::Result::kRefused:
+    case Sender::Result::kBusy:
       account_.refused.add();
       return;
     case Sender::Result::kNoMemory:

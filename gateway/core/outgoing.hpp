@@ -1,11 +1,20 @@
 // An `out` entry: what an input port of Arbiter takes is sent outside, and while the port is idle,
 // what the mapping says.
 //
-// Thread safety: one thread, the gateway's loop; peer_matched() from any.
+// A sample of the same gateway's goes straight on: the thread that delivers it takes a turn here,
+// and sends what becomes of it, so that neither the loop nor another thread has to be woken
+// (Incoming::deliver()). The loop serves what comes from other components, and what is left.
+//
+// Thread safety: one thread, the gateway's loop; begin_turn() and end_turn() from the threads that
+// deliver samples; peer_matched() from any. Whoever has the turn has the port.
 #pragma once
 
 #include <atomic>
+#include <functional>
+#include <map>
+#include <mutex>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include <arbiter/input_port.hpp>
@@ -27,6 +36,7 @@ class Sender {
     kNoMemory,
     kTooLarge,
     kRefused,
+    kBusy,  // of send_at_once() alone: it would have to wait
   };
 
   Sender() = default;
@@ -36,7 +46,14 @@ class Sender {
 
   // Copies the bytes once, and does not wait for long: the loop serves other ports too.
   [[nodiscard]] virtual Result send(Bytes sample) noexcept = 0;
+  // As send(), but called where the middleware delivers a sample, on whatever thread it does so. It
+  // must not wait there: that thread may be the one that it would wait for.
+  [[nodiscard]] virtual Result send_at_once(Bytes sample) noexcept { return send(sample); }
 };
+
+class Incoming;
+// The `in` entries of a gateway by their sources.
+using InBySource = std::map<std::string, Incoming*, std::less<>>;
 
 // The type with which an entry's ports are opened.
 [[nodiscard]] Type type_of(const Entry& entry);
@@ -58,8 +75,18 @@ class Outgoing {
   // stopped must not bring old commands to life. And the idle sample where it is due: when the port
   // has become idle, at the start, after peer_matched(), and every kIdlePeriod while it is idle.
   void run(shm::Nanoseconds now);
+  // Before run(): whose samples may go straight on, and what lets the loop run() all. The loop.
+  void lead(const InBySource& ins, std::function<void()> call_loop);
+  // False: somebody else has the turn, or something is left for the loop; publish all the same.
+  // Never waits. Any thread.
+  [[nodiscard]] bool begin_turn() noexcept;
+  // Sends what of `source` waits and ends the turn. False: nothing of it has come here.
+  bool end_turn(std::string_view source, shm::Nanoseconds max_age) noexcept;
   // When run() is to be called again even if the descriptor is not readable; shm::kForever: never.
-  [[nodiscard]] shm::Nanoseconds next() const noexcept;
+  [[nodiscard]] shm::Nanoseconds next() const noexcept {
+    // Relaxed is enough: who leaves something to the loop calls it afterwards.
+    return next_.load(std::memory_order_relaxed);
+  }
   // A reader has come: it is sent the idle sample at the next run(), which the caller brings about.
   void peer_matched() noexcept { matched_.store(true, std::memory_order_relaxed); }
 
@@ -68,16 +95,24 @@ class Outgoing {
   void describe(std::string_view text) { port_.describe(text); }
 
  private:
-  void send(Bytes sample) noexcept;
+  void send_waiting(shm::Nanoseconds now);
+  void send_idle(shm::Nanoseconds now);
+  void account_for(Sender::Result result, std::size_t size) noexcept;
+  [[nodiscard]] shm::Nanoseconds when_next() const noexcept;
 
   const Entry& entry_;
   Sender& sender_;
   Account& account_;
   const AgesOfSources& ages_;
+  std::mutex turn_;  // of the port, the sender, and all below but for the atomics
   InputPort<void> port_;
+  const InBySource* ins_ = nullptr;
+  std::function<void()> call_loop_;
+  std::optional<Sample<void>> left_;  // taken by a thread that could not send it
   std::atomic<bool> matched_{false};
-  bool has_more_ = false;                       // run() has left samples to the next one
-  std::optional<shm::Nanoseconds> idle_again_;  // when; empty: the port was not idle
+  std::atomic<shm::Nanoseconds> next_{shm::kForever};  // when_next()
+  bool has_more_ = false;                              // run() has left samples to the next one
+  std::optional<shm::Nanoseconds> idle_again_;         // when; empty: the port was not idle
 };
 
 }  // namespace arbiter::gateway

@@ -55,7 +55,7 @@ CycloneQos cyclone_qos(const Qos& qos, End end) {
   dds_qset_reliability(to,
                        qos.reliability == Reliability::kReliable ? DDS_RELIABILITY_RELIABLE
                                                                  : DDS_RELIABILITY_BEST_EFFORT,
-                       kMaxBlocking);
+                       0);  // OutTopic waits, where it may
   dds_qset_durability(to, qos.durability == Durability::kTransientLocal
                               ? DDS_DURABILITY_TRANSIENT_LOCAL
                               : DDS_DURABILITY_VOLATILE);

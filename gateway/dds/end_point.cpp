@@ -55,12 +55,19 @@ void EndPoint::open() {
   topic_.qos.durability = durability();
   const CycloneQos qos = cyclone_qos(topic_.qos, which_);
   if (topic_.is_ros || !type_hash_.empty()) set_user_data(qos.get(), type_hash_);
-  end_ = make(domain_->participant(), topic, type, qos.get());
+  Entity made = make(domain_->participant(), topic, type, qos.get());
   seen_.reset();
+  const std::lock_guard lock(in_use_);
+  end_ = std::move(made);
 }
 
 void EndPoint::close() noexcept {
-  end_ = Entity();
+  Entity end;  // goes outside of the lock, which a thread of Cyclone's may want
+  {
+    const std::lock_guard lock(in_use_);
+    end = std::move(end_);
+  }
+  end = Entity();
   topic_entity_ = Entity();
 }
 

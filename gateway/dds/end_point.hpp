@@ -1,10 +1,11 @@
 // One end of a topic of DDS that is ours: what the readers and the writers of a gateway share.
 //
-// Thread safety: one thread, the gateway's loop.
+// Thread safety: one thread, the gateway's loop. Another one may use end() while it holds in_use().
 #pragma once
 
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -51,6 +52,8 @@ class EndPoint {
   [[nodiscard]] virtual std::uint32_t matched() const = 0;
 
   [[nodiscard]] const Entity& end() const { return end_; }
+  // Held, it keeps the entity from being closed.
+  [[nodiscard]] std::mutex& in_use() const { return in_use_; }
   [[nodiscard]] const Entry& entry() const { return entry_; }
   [[nodiscard]] Account& account() const { return account_; }
 
@@ -75,6 +78,7 @@ class EndPoint {
   std::vector<std::string> obstacles_;  // who does not match, and who goes past Arbiter
   std::map<Guid, std::set<std::string>> warned_;
   Entity topic_entity_;
+  mutable std::mutex in_use_;
   Entity end_;
 };
 

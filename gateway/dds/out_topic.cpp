@@ -37,6 +37,19 @@ void OutTopic::on_matched(const dds_publication_matched_status_t& status) noexce
 }
 
 Sender::Result OutTopic::send(Bytes sample) noexcept {
+  Result result = send_at_once(sample);
+  if (result != Result::kBusy) return result;
+  // Cyclone has asked for acknowledgements.
+  dds_wait_for_acks(end().get(), kMaxBlocking);
+  result = send_at_once(sample);
+  if (result != Result::kBusy) return result;
+  return refuse("a subscriber does not keep up: a sample was not sent, the writer was full");
+}
+
+// On a thread of Cyclone's that delivers a sample, perhaps the one that receives acknowledgements:
+// so the writer's own time to wait is none.
+Sender::Result OutTopic::send_at_once(Bytes sample) noexcept {
+  const std::lock_guard lock(in_use());
   if (!is_open()) return Result::kNotReady;
   const Encoding encoding = read_encapsulation(sample).encoding;
   const bool is_xcdr2 = representation_ == Representation::kXcdr2;
@@ -49,9 +62,7 @@ Sender::Result OutTopic::send(Bytes sample) noexcept {
   if (payload == nullptr) return Result::kNoMemory;
   const dds_return_t written = dds_writecdr(end().get(), &payload->cyclone);
   if (written == DDS_RETCODE_OK) return Result::kSent;
-  if (written == DDS_RETCODE_TIMEOUT) {
-    return refuse("a subscriber does not keep up: a sample was not sent, the writer was full");
-  }
+  if (written == DDS_RETCODE_TIMEOUT) return Result::kBusy;
   return refuse(std::string("Cyclone DDS did not send a sample: ") + dds_strretcode(-written));
 }
 

@@ -19,7 +19,9 @@ class OutTopic : public EndPoint, public Sender {
   // Who is told of each reader that comes; null: nobody any more.
   void tell(Outgoing* outgoing) noexcept { outgoing_.store(outgoing); }
 
+  // Waits a little for subscribers that do not keep up. The gateway's loop.
   [[nodiscard]] Result send(Bytes sample) noexcept override;
+  [[nodiscard]] Result send_at_once(Bytes sample) noexcept override;
 
  private:
   Entity make(dds_entity_t participant, dds_entity_t topic, const ddsi_sertype* type,

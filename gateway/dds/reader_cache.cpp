@@ -61,8 +61,8 @@ ReaderCache::ReaderCache(SampleTaker& taker) : hook_{}, taker_(taker) {
   hook_.self = this;
 }
 
-// Cyclone's locks: that of the readers of one writer is held here. Nothing that takes such a lock
-// is called from here on.
+// Cyclone's locks: that of the readers of one writer is held here, as in a listener. Nothing that
+// takes the same one is called from here on; a writer of ours that writes takes its own.
 void ReaderCache::store(const ddsi_serdata& data, ddsi_tkmap_instance* instance) noexcept {
   const std::lock_guard lock(mutex_);
   if (instance_ == nullptr) {

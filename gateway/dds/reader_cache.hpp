@@ -28,7 +28,8 @@ class SampleTaker {
   SampleTaker& operator=(const SampleTaker&) = delete;
   virtual ~SampleTaker() = default;
 
-  // The payload is valid until it returns. Must not wait, nor call Cyclone.
+  // The payload is valid until it returns. Must not wait. As in a listener of Cyclone's, which is
+  // called with the same locks, samples may be written, and nothing may be opened or closed.
   virtual void take(const Payload& payload) noexcept = 0;
 };
 

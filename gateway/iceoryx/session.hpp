@@ -24,7 +24,8 @@
 
 namespace arbiter::gateway {
 
-// The half of an `out` entry that talks to iceoryx. The bridge's loop.
+// The half of an `out` entry that talks to iceoryx. One thread at a time. It never waits: a
+// subscriber that is full loses its oldest chunk.
 class ChunkSender final : public Sender {
  public:
   ChunkSender(const Entry& entry, Account& account) : entry_(entry), account_(account) {}

@@ -16,6 +16,7 @@ namespace {
 
 using test::content_of;
 using testing::HasSubstr;
+using testing::Not;
 
 const std::string kFigures = ARBITER_SOURCE "/docs/figures/";
 
@@ -65,6 +66,14 @@ TEST(Picture, HidesNothing) {
   EXPECT_THAT(svg, HasSubstr("not measured"));
   EXPECT_THAT(svg, HasSubstr("750 ms"));
   EXPECT_THAT(svg, HasSubstr("0 %"));
+}
+
+TEST(Picture, GatewaysHaveAGroupOfTheirOwn) {
+  Report report;
+  EXPECT_THAT(picture(report.json()), Not(HasSubstr("Through a gateway")));
+  report.targets = {{"DDS gateway, 64 B, p50, to a relay", 1.15, 1.1, "x", kGateways}};
+  EXPECT_THAT(picture(report.json()), HasSubstr("Through a gateway"));
+  EXPECT_THAT(picture(report.json()), Not(HasSubstr("Beside others")));
 }
 
 TEST(Picture, SaysWhatMayHaveSpoiltTheFigures) {

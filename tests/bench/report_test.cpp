@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "bench/measures/measures.hpp"
 #include "bench/peers/systems.hpp"
 #include "bench/targets.hpp"
 
@@ -66,6 +67,37 @@ TEST(Judge, WhatCouldNotBeMeasuredIsNotMet) {
   ASSERT_NE(verdict, nullptr);
   EXPECT_FALSE(verdict->measured);
   EXPECT_FALSE(verdict->is_met());
+}
+
+// Times by their percentiles, and the processor time beside them.
+TEST(Judge, AGatewayIsComparedWithARelayInEachOfItsCosts) {
+  Report report;
+  Measure measure{"gateway-dds", "DDS", ""};
+  measure.cases.push_back(
+      {"64 B, one way",
+       64,
+       {of(kThroughGateway, Role::kOurs, 1100), of(kThroughRelay, Role::kPeer, 1000),
+        of(kStraight, Role::kFloor, 10)}});
+  measure.cases.push_back({"64 B, processor time of a sample",
+                           64,
+                           {{kThroughGateway, Role::kOurs, {}, 130.0, {}},
+                            {kThroughRelay, Role::kPeer, {}, 100.0, {}}}});
+  report.measures.push_back(measure);
+  const auto verdicts = judge(report);
+  for (const char* const met :
+       {"DDS gateway, 64 B, p50, to a relay", "DDS gateway, 64 B, p99, to a relay"}) {
+    const Verdict* const verdict = find(verdicts, met);
+    ASSERT_NE(verdict, nullptr);
+    EXPECT_TRUE(verdict->is_met());
+    EXPECT_EQ(verdict->group, kGateways);
+  }
+  const Verdict* const processor = find(verdicts, "DDS gateway, 64 B, processor, to a relay");
+  ASSERT_NE(processor, nullptr);
+  EXPECT_NEAR(processor->measured.value_or(0), 1.3, 0.001);
+  EXPECT_FALSE(processor->is_met());
+  const Verdict* const other_size = find(verdicts, "DDS gateway, 1 MiB, p50, to a relay");
+  ASSERT_NE(other_size, nullptr);
+  EXPECT_FALSE(other_size->measured);
 }
 
 TEST(Judge, WhatWasNotAskedForIsNotJudged) { EXPECT_THAT(judge(Report{}), IsEmpty()); }

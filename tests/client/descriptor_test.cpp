@@ -103,6 +103,61 @@ TEST(Descriptor, BecomesReadableWhenActivityRunsOut) {
   }
 }
 
+// For whoever takes what he publishes himself.
+TEST(Descriptor, IsNotMadeReadableWhileItIsDisarmed) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  in.disarm();  // nothing: there is none
+  const int fd = in.fd();
+  EXPECT_FALSE(in.take());
+  for (int i = 0; i < 3; ++i) {
+    in.disarm();
+    in.disarm();
+    out.publish(Number{i});
+    EXPECT_FALSE(is_readable(fd));
+    EXPECT_EQ(take_from(in), i);
+    EXPECT_FALSE(in.take());
+    EXPECT_FALSE(is_readable(fd));
+  }
+  out.publish(Number{3});
+  EXPECT_TRUE(is_readable(fd)) << "taking to the end has armed it again";
+}
+
+// What has come before is not forgotten.
+TEST(Descriptor, StaysReadableWhereItIsDisarmedThen) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  const int fd = in.fd();
+  EXPECT_FALSE(in.take());
+  out.publish(Number{1});
+  in.disarm();
+  EXPECT_TRUE(is_readable(fd));
+}
+
+// The time at which activity runs out moves away with each sample, and comes all the same.
+TEST(Descriptor, BecomesReadableWhenActivityRunsOutThatWasRenewed) {
+  Daemon daemon(single_model("50ms"));
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in");
+  const int fd = in.fd();
+  for (int i = 0; i < 100; ++i) {
+    out.publish(Number{i});
+    while (in.take()) {
+    }
+  }
+  while (!in.idle()) {
+    wait_until_readable(fd);
+    EXPECT_FALSE(in.take());
+  }
+  EXPECT_FALSE(in.take());
+  EXPECT_FALSE(is_readable(fd));
+}
+
 TEST(Descriptor, WorksBesideWaitFor) {
   Daemon daemon(single_model());
   Node node("test");

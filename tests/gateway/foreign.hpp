@@ -54,7 +54,11 @@ class KeepingSender : public Sender {
     }
     return answer;
   }
+  [[nodiscard]] Result send_at_once(Bytes sample) noexcept override {
+    return would_wait ? Result::kBusy : send(sample);
+  }
   std::vector<std::string> sent;
+  bool would_wait = false;
   Result answer = Result::kSent;
 };
 

@@ -164,6 +164,11 @@ class InputPort {
   // Then call take() until it returns nothing; that arms the descriptor again. The port owns it.
   // Throws arbiter::Error if the system has no descriptor left.
   [[nodiscard]] int fd() { return detail::wait_descriptor(*core_); }
+  // For a thread that is about to publish what this port may get, and then takes from it itself,
+  // until take() returns nothing: publishers meanwhile save the system call that makes the
+  // descriptor readable, and whoever waits for that is not woken. Without those takes a sample may
+  // wait unnoticed. Wait-free.
+  void disarm() noexcept { detail::disarm(*core_); }
 
   // The source of the connection that is selected now, unless the port is idle. At a port that is
   // not arbitrated nothing is selected. The name is valid while the port is open. Wait-free.

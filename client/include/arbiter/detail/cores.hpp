@@ -120,6 +120,7 @@ HeldSample take(InputCore& core);
 Waited wait(InputCore& core, std::int64_t timeout_ns, HeldSample& sample);
 void give_back(InputCore& core, std::uint32_t hold) noexcept;
 int wait_descriptor(InputCore& core);
+void disarm(InputCore& core) noexcept;
 void describe(InputCore& core, std::string_view text) noexcept;
 std::optional<std::string_view> winner(InputCore& core) noexcept;
 bool is_idle(InputCore& core) noexcept;

@@ -1,0 +1,220 @@
+// A sample that goes straight on: whoever delivers it sends what becomes of it, and the loop is
+// neither woken nor needed, unless there is something that it alone can do.
+#include <gmock/gmock.h>
+#include <poll.h>
+
+#include <atomic>
+#include <string>
+#include <thread>
+
+#include <arbiter/arbiter.hpp>
+
+#include "gateway/core/incoming.hpp"
+#include "gateway/core/outgoing.hpp"
+#include "shm/clock.hpp"
+#include "tests/gateway/foreign.hpp"
+#include "tests/gateway/mapping_text.hpp"
+#include "tests/realtime/allocations.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+// Navigation and teleoperation come from outside. A component of this host overrides both.
+constexpr const char* kModel =
+    "<behaviors timeout='1000s'>"
+    "<behavior name='Navigate'><config at='/Base/cmd:i'>/Nav/cmd:o</config></behavior>"
+    "<behavior name='Teleoperate'><config at='/Base/cmd:i'>/Teleop/cmd:o</config>"
+    "<inhibition>Navigate</inhibition></behavior>"
+    "<behavior name='Stop'><config at='/Base/cmd:i'>/Stop/cmd:o</config>"
+    "<inhibition>Navigate</inhibition><inhibition>Teleoperate</inhibition></behavior>"
+    "</behaviors>";
+
+class Straight : public testing::Test {
+ protected:
+  Straight() {
+    ins_.emplace("/Nav/cmd:o", &nav_);
+    ins_.emplace("/Teleop/cmd:o", &teleop_);
+    outgoing_.lead(ins_, [this] { ++calls_; });
+    outgoing_.run(shm::monotonic_now());
+  }
+
+  Incoming::Fate deliver(Incoming& in, const std::string& bytes) {
+    return in.deliver(BytesSample(bytes), Time::max());
+  }
+  [[nodiscard]] bool calls_loop() const {
+    pollfd polled{descriptor_, POLLIN, 0};
+    return ::poll(&polled, 1, 0) == 1;
+  }
+  OutputPort<void> stop() {
+    return node_.output_port("/Stop/cmd:o", Type::variable("a/msg/B", 64));
+  }
+  static void publish(OutputPort<void>& port, const std::string& bytes) {
+    port.publish(Bytes(reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()));
+  }
+  // The loop, where it is called.
+  void run() {
+    if (calls_loop() || outgoing_.next() == 0) outgoing_.run(shm::monotonic_now());
+  }
+  // From now on navigation's samples go straight on.
+  void lead_navigation() {
+    deliver(nav_, "first");
+    run();
+    ASSERT_THAT(sender_.sent, ElementsAre("first"));
+    sender_.sent.clear();
+  }
+
+  test::Daemon daemon_{kModel};
+  Read read_ = read_dds(
+      "<in topic='/nav' type='a/msg/B' port='/Nav/cmd:o' max_size='64'/>"
+      "<in topic='/teleop' type='a/msg/B' port='/Teleop/cmd:o' max_size='64'/>"
+      "<out port='/Base/cmd:i' topic='/cmd' type='a/msg/B'/>");
+  Account nav_account_{"nav", "publisher"};
+  Account teleop_account_{"teleop", "publisher"};
+  Account account_{"cmd", "subscriber"};
+  KeepingSender sender_;
+  OneAge ages_;
+  InBySource ins_;
+  int calls_ = 0;
+  Node node_{"gateway"};
+  Incoming nav_{node_, read_.entry(0), nav_account_};
+  Incoming teleop_{node_, read_.entry(1), teleop_account_};
+  Outgoing outgoing_{node_, read_.entry(2), sender_, account_, ages_};
+  const int descriptor_ = outgoing_.descriptor();
+};
+
+TEST_F(Straight, WhoeverDeliversASampleSendsItAndTheLoopSleeps) {
+  lead_navigation();
+  for (const std::string sample : {"a", "b", "c"}) {
+    EXPECT_EQ(deliver(nav_, sample), Incoming::Fate::kPassed);
+    EXPECT_EQ(sender_.sent.back(), sample);
+    EXPECT_FALSE(calls_loop());
+  }
+  EXPECT_EQ(calls_, 0);
+  EXPECT_EQ(account_.passed.value(), 4u);
+  EXPECT_EQ(nav_account_.passed.value(), 4u);
+  EXPECT_EQ(outgoing_.next(), shm::kForever);
+}
+
+TEST_F(Straight, AnotherSourceThatTakesOverIsSentByTheLoopAndThenStraight) {
+  lead_navigation();
+  deliver(teleop_, "stop");
+  EXPECT_TRUE(calls_loop());
+  run();
+  EXPECT_THAT(sender_.sent, ElementsAre("stop"));
+  deliver(teleop_, "back");
+  EXPECT_FALSE(calls_loop());
+  EXPECT_THAT(sender_.sent, ElementsAre("stop", "back"));
+}
+
+TEST_F(Straight, ASourceThatLosesIsNotSentAndWinsAgainByTheLoop) {
+  lead_navigation();
+  auto stop = this->stop();
+  publish(stop, "stop");
+  run();
+  deliver(nav_, "loses");
+  EXPECT_FALSE(calls_loop());
+  EXPECT_THAT(sender_.sent, ElementsAre("stop"));
+  stop.deactivate();
+  run();
+  deliver(nav_, "wins");
+  EXPECT_TRUE(calls_loop());
+  run();
+  deliver(nav_, "straight");
+  EXPECT_FALSE(calls_loop());
+  EXPECT_THAT(sender_.sent, ElementsAre("stop", "wins", "straight"));
+}
+
+// Between what the thread publishes and what it takes, another component has overridden it.
+TEST_F(Straight, WhatComesFromOthersMeanwhileIsLeftToTheLoopInItsOrder) {
+  lead_navigation();
+  auto stop = this->stop();
+  ASSERT_TRUE(outgoing_.begin_turn());
+  publish(stop, "stop");
+  EXPECT_FALSE(outgoing_.end_turn("/Nav/cmd:o", shm::kForever));
+  EXPECT_EQ(calls_, 1);
+  EXPECT_EQ(outgoing_.next(), 0);
+  EXPECT_FALSE(outgoing_.begin_turn()) << "nobody overtakes what is left";
+  publish(stop, "again");
+  EXPECT_THAT(sender_.sent, IsEmpty());
+  outgoing_.run(shm::monotonic_now());
+  EXPECT_THAT(sender_.sent, ElementsAre("stop", "again"));
+  EXPECT_EQ(outgoing_.next(), shm::kForever);
+  publish(stop, "more");
+  EXPECT_TRUE(calls_loop());
+}
+
+TEST_F(Straight, NobodyTakesATurnThatSomebodyHas) {
+  lead_navigation();
+  ASSERT_TRUE(outgoing_.begin_turn());
+  EXPECT_FALSE(outgoing_.begin_turn());
+  deliver(nav_, "waits");
+  EXPECT_THAT(sender_.sent, IsEmpty());
+  EXPECT_TRUE(outgoing_.end_turn("/Nav/cmd:o", shm::kForever));
+  EXPECT_THAT(sender_.sent, ElementsAre("waits"));
+}
+
+TEST_F(Straight, WhatHasBecomeTooOldOnTheWayIsNotSent) {
+  lead_navigation();
+  ASSERT_TRUE(outgoing_.begin_turn());
+  deliver(nav_, "old");
+  EXPECT_TRUE(outgoing_.end_turn("/Nav/cmd:o", 0));
+  EXPECT_THAT(sender_.sent, IsEmpty());
+  EXPECT_EQ(account_.late.value(), 1u);
+}
+
+TEST_F(Straight, ASampleForWhichTheSenderWouldWaitIsLeftToTheLoop) {
+  lead_navigation();
+  sender_.would_wait = true;
+  deliver(nav_, "large");
+  deliver(nav_, "next");
+  EXPECT_THAT(sender_.sent, IsEmpty());
+  EXPECT_EQ(calls_, 1);
+  EXPECT_EQ(outgoing_.next(), 0);
+  run();
+  EXPECT_THAT(sender_.sent, ElementsAre("large", "next"));
+  EXPECT_EQ(account_.passed.value(), 3u);
+}
+
+TEST_F(Straight, ASampleCostsNoAllocation) {
+  lead_navigation();
+  sender_.sent.reserve(1);
+  const BytesSample sample("x");
+  const auto before = test::allocations_of_this_thread();
+  for (int i = 0; i < 100; ++i) {
+    sender_.sent.clear();
+    nav_.deliver(sample, Time::max());
+  }
+  EXPECT_EQ(test::allocations_of_this_thread(), before);
+  EXPECT_EQ(account_.passed.value(), 101u);
+}
+
+// One that delivers and the loop meet at one port: no sample is sent twice, none out of order, and
+// the last one is not forgotten.
+TEST_F(Straight, ThreadsTakeTurns) {
+  constexpr int kSamples = 5000;
+  std::atomic<bool> ends = false;
+  outgoing_.lead(ins_, [] {});
+  std::thread loop([&] {
+    while (!ends) {
+      run();
+      std::this_thread::yield();
+    }
+  });
+  for (int i = 0; i < kSamples; ++i) deliver(nav_, std::to_string(i));
+  ends = true;
+  loop.join();
+  outgoing_.run(shm::monotonic_now());
+  int next = 0;
+  for (const std::string& sample : sender_.sent) {
+    EXPECT_GE(std::stoi(sample), next);
+    next = std::stoi(sample) + 1;
+  }
+  EXPECT_EQ(next, kSamples);
+}
+
+}  // namespace
+}  // namespace arbiter::gateway
