@@ -6,7 +6,7 @@
 // that does not keep up. What the tap or the network loses uses numbers, so that importers count
 // it.
 //
-// Thread safety: offer() and look() on the link's thread; sending has a thread of its own, which
+// Thread safety: look() on the link's thread; sending has a thread of its own, which
 // shares exports_ under mutex_. Taps are opened and closed without that lock.
 #pragma once
 
@@ -17,7 +17,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <thread>
 
@@ -27,7 +26,9 @@
 #include "link/core/event_header.hpp"
 #include "link/core/held_tokens.hpp"
 #include "link/dds/event_topic.hpp"
+#include "link/host_view.hpp"
 #include "shm/file_descriptor.hpp"
+#include "shm/type_info.hpp"
 
 namespace arbiter::link {
 
@@ -40,10 +41,9 @@ class Exports {
   Exports& operator=(const Exports&) = delete;
   ~Exports();
 
-  // From now on exactly these sources are offered.
-  void offer(const std::set<std::string, std::less<>>& sources);
-  // Taps what has come to be wanted, and nothing else.
-  void look();
+  // From now on exactly the sources are offered that components of this host have open. Taps those
+  // of them that are wanted elsewhere, and nothing else.
+  void look(const HostView& view);
 
   [[nodiscard]] std::size_t count() const { return exports_.size(); }
 
@@ -54,19 +54,23 @@ class Exports {
     OfferCard card;
     EventWriter writer;
     std::optional<Tap<void>> tap;
-    std::optional<Type> type;        // as the card has it
     std::uint64_t number = 0;        // of the last event
     std::uint64_t sequence = 0;      // of the last sample
     std::string said;                // why it cannot be tapped
     shm::Nanoseconds tap_again = 0;  // not before
   };
 
-  void open_tap(Export& one, std::uint64_t id);
+  void withdraw(const HostView::OpenPorts& ports);
+  void offer(const std::string& source, const std::optional<shm::TypeInfo>& type);
+  void tap_what_is_wanted(const HostView& view);
+  void open_tap(Export& one, std::uint64_t id, const HostView& view);
   void run();
+  // Under mutex_.
   bool send_some(Export& one);
+  void state(Export& one, bool is_deactivated);
+  void write(Export& one, Bytes sample);
   void send(Export& one, const TapEvent<void>& event);
-  static void count_lost(Export& one, const TapEvent<void>& event);
-  void know_type(Export& one, const Type& type);
+  static void know_type(Export& one, const shm::TypeInfo& type);
 
   Node& node_;
   const Network& network_;

@@ -68,7 +68,7 @@ void Import::obey(Incarnation exporter) {
   obeyed_ = exporter;
   const auto last = unheard_.find(exporter);
   if (last == unheard_.end()) return;
-  stream_.note(exporter, last->second.number, last->second.is_deactivated);
+  stream_.note(exporter, last->second);
   unheard_.erase(last);
 }
 
@@ -181,13 +181,15 @@ void Import::take(const gateway::dds::Payload& payload) noexcept {
     ++counts_.unreadable;
     return;
   }
+  const StreamEvent event{header_.number, header_.sequence, header_.kind == EventKind::kSample,
+                          header_.is_deactivated};
   if (header_.exporter != obeyed_) {  // one speaker: others are not heard
     if (unheard_.size() < kMaxUnheard || unheard_.contains(header_.exporter)) {
-      unheard_[header_.exporter] = {header_.number, header_.is_deactivated};
+      unheard_[header_.exporter] = event;
     }
     return;
   }
-  if (!stream_.note(header_.exporter, header_.number, header_.is_deactivated)) return;
+  if (!stream_.note(header_.exporter, event)) return;
   arrive(payload, before + header_bytes(header_));
 }
 

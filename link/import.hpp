@@ -93,12 +93,8 @@ class Import : private gateway::dds::SampleTaker {
   Stream stream_;
   // The last event of each exporter that is not obeyed: the first that comes is the present state,
   // and comes before the exporter can be chosen.
-  struct Unheard {
-    std::uint64_t number = 0;
-    bool is_deactivated = false;
-  };
   static constexpr std::size_t kMaxUnheard = 64;
-  std::map<Incarnation, Unheard> unheard_;
+  std::map<Incarnation, StreamEvent> unheard_;
   Counts counts_;
   EventHeader header_;  // of take()
 

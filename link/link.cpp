@@ -116,8 +116,7 @@ void Link::loop(int stop) {
     view_.update();
     say_once(said_of_view_, view_.obstacle());
     try {
-      exports_->offer(view_.open_here());
-      exports_->look();
+      exports_->look(view_);
       choose_imports();
       said.clear();
     } catch (const DdsError& error) {  // memory is short

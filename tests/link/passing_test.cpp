@@ -54,6 +54,20 @@ TEST_F(Hosts, ADeactivationIsSaidToWhoeverComesBack) {
   body.fall_back();
 }
 
+TEST_F(Hosts, ADeactivationIsSaidToWhoeverComesWhenNobodyHasListenedSince) {
+  Host head("head", runtime_, kNoRules, network());
+  Planner planner(head);
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Body body(base);
+  body.drive(planner);
+  base.link().signal(SIGTERM);
+  ASSERT_EQ(base.link().wait(), 0);
+  await([&] { return head.daemon().source(kPlanner)["taps"].empty(); });
+  planner.port().deactivate();
+  base.start_link();
+  body.fall_back();
+}
+
 TEST_F(Hosts, OnlyWhatAnotherHostsModelWantsIsTapped) {
   Host head("head", runtime_, kNoRules, network());
   Planner planner(head);
