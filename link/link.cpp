@@ -81,6 +81,7 @@ void Link::make_node(int stop) {
   options.on_waiting = [](const std::string&) {};
   options.on_notice = [](const Notice& notice) { say(Level::kWarning, notice.text); };
   while (!node_ && !stops_) {
+    if (options_.on_round) options_.on_round();
     try {
       node_.emplace(kNodeName, options);
     } catch (const Error& error) {
@@ -93,6 +94,7 @@ void Link::make_node(int stop) {
 // An interface may come later.
 void Link::join_network(int stop) {
   while (!network_ && !stops_) {
+    if (options_.on_round) options_.on_round();
     const gateway::dds::CycloneWords words;
     try {
       network_.emplace(options_.network);
@@ -113,6 +115,7 @@ void Link::join_network(int stop) {
 
 void Link::loop(int stop) {
   for (std::string said; !stops_; stops_ = waits(stop, kLookPeriod)) {
+    if (options_.on_round) options_.on_round();
     view_.update();
     say_once(said_of_view_, view_.obstacle());
     try {

@@ -4,6 +4,7 @@
 // Thread safety: all of it runs on the thread that calls run(), but for what its parts say.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -27,6 +28,8 @@ struct LinkOptions {
   std::string host;      // as the others are to call it
   std::string instance;  // as NodeOptions has it
   NetworkOptions network;
+  // Called by the loop ten times a second, so that somebody can see that it goes round.
+  std::function<void()> on_round{};
 };
 
 class Link {
