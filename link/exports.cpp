@@ -1,6 +1,5 @@
 #include "link/exports.hpp"
 
-#include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -20,7 +19,7 @@ namespace {
 using gateway::Level;
 using gateway::say;
 
-constexpr std::uint64_t kStopId = 0;
+constexpr std::uint64_t kWakeId = 0;
 constexpr shm::Nanoseconds kTapAgain = 5'000'000'000;
 // Events of one source that leave before others have their turn.
 constexpr int kMostAtOnce = 64;
@@ -57,20 +56,28 @@ Exports::Exports(Node& node, const Network& network, const HeldTokens& tokens, s
       incarnation_(incarnation),
       bell_(bell),
       epoll_(epoll_create1(EPOLL_CLOEXEC)),
-      stop_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+      wake_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   epoll_event event{};
   event.events = EPOLLIN;
-  event.data.u64 = kStopId;
-  if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, stop_.get(), &event) != 0) {
+  event.data.u64 = kWakeId;
+  if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, wake_.get(), &event) != 0) {
     throw std::system_error(errno, std::generic_category(), "no descriptors to watch taps by");
   }
   thread_ = std::thread([this] { run(); });
 }
 
 Exports::~Exports() {
-  const std::uint64_t one = 1;
-  static_cast<void>(!::write(stop_.get(), &one, sizeof one));
+  {
+    const std::lock_guard lock(mutex_);
+    ends_ = true;
+  }
+  wake();
   thread_.join();
+}
+
+void Exports::wake() const noexcept {
+  const std::uint64_t one = 1;
+  static_cast<void>(!::write(wake_.get(), &one, sizeof one));
 }
 
 void Exports::look(const HostView& view) {
@@ -149,8 +156,8 @@ void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
     one.said.clear();
     // Its publisher tells the tap of the source at its next arrival, which may be a long time away.
     state(one, view.is_deactivated(one.card.source));
-    while (send_some(one)) {  // from there on the tap rings
-    }
+    ready_.insert(id);  // a tap rings once somebody has found nothing in it
+    wake();
   } catch (const Error& error) {
     one.tap_again = shm::monotonic_now() + kTapAgain;
     if (one.said != error.what()) {
@@ -163,23 +170,32 @@ void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
 
 void Exports::run() {
   std::array<epoll_event, 64> events{};
-  std::set<std::uint64_t> ready;
-  for (;;) {
-    const int count = epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()),
-                                 ready.empty() ? -1 : 0);
-    for (int i = 0; i < count; ++i) {
-      const std::uint64_t id = events.at(static_cast<std::size_t>(i)).data.u64;
-      if (id == kStopId) return;
-      ready.insert(id);
-    }
-    for (auto each = ready.begin(); each != ready.end();) {
-      const std::lock_guard lock(mutex_);
+  for (bool has_more = false;;) {
+    const int count =
+        epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), has_more ? 0 : -1);
+    if (!take_up(events.data(), count)) return;
+    const std::lock_guard lock(mutex_);
+    for (auto each = ready_.begin(); each != ready_.end();) {
       const auto found = exports_.find(*each);
-      const bool has_more =
-          found != exports_.end() && found->second->tap && send_some(*found->second);
-      each = has_more ? std::next(each) : ready.erase(each);
+      const bool more = found != exports_.end() && found->second->tap && send_some(*found->second);
+      each = more ? std::next(each) : ready_.erase(each);
     }
+    has_more = !ready_.empty();
   }
+}
+
+bool Exports::take_up(const epoll_event* events, int count) {
+  const std::lock_guard lock(mutex_);
+  for (int i = 0; i < count; ++i) {
+    const std::uint64_t id = events[i].data.u64;
+    if (id != kWakeId) {
+      ready_.insert(id);
+      continue;
+    }
+    std::uint64_t rings = 0;
+    static_cast<void>(!::read(wake_.get(), &rings, sizeof rings));
+  }
+  return !ends_;
 }
 
 // Under the lock. True: there may be more. Only a tap that has nothing left rings again.

@@ -10,6 +10,8 @@
 // shares exports_ under mutex_. Taps are opened and closed without that lock.
 #pragma once
 
+#include <sys/epoll.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -17,6 +19,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 
@@ -65,6 +68,9 @@ class Exports {
   void tap_what_is_wanted(const HostView& view);
   void open_tap(Export& one, std::uint64_t id, const HostView& view);
   void run();
+  void wake() const noexcept;
+  // Takes up what epoll_wait() says; false: it is over.
+  bool take_up(const epoll_event* events, int count);
   // Under mutex_.
   bool send_some(Export& one);
   void state(Export& one, bool is_deactivated);
@@ -79,11 +85,13 @@ class Exports {
   const Incarnation incarnation_;
   const gateway::Bell& bell_;
   shm::FileDescriptor epoll_;
-  shm::FileDescriptor stop_;
+  shm::FileDescriptor wake_;
   std::map<std::string, std::uint64_t, std::less<>> ids_;
   std::uint64_t last_id_ = 0;
   std::mutex mutex_;
   std::map<std::uint64_t, std::unique_ptr<Export>> exports_;
+  std::set<std::uint64_t> ready_;  // whose taps may have something
+  bool ends_ = false;
   // Likewise under mutex_: what is sent is made here.
   EventHeader header_;
   std::array<std::byte, kMaxHeaderBytes> buffer_{};

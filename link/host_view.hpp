@@ -40,6 +40,8 @@ class HostView {
   [[nodiscard]] const OpenPorts& open_here() const { return open_here_; }
   // Whether its activity was ended, and nothing has come since.
   [[nodiscard]] bool is_deactivated(const std::string& source) const;
+  // False: ports cannot be opened now, and who tries waits for a second.
+  [[nodiscard]] bool has_daemon() const { return instance_ != nullptr && instance_->has_daemon(); }
   // Why nothing is known; empty: it is.
   [[nodiscard]] const std::string& obstacle() const { return obstacle_; }
 

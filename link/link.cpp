@@ -48,13 +48,6 @@ Link::Link(LinkOptions options)
   gateway::dds::hear_cyclone();
 }
 
-// Who calls others goes before who is called.
-Link::~Link() {
-  clock_.reset();
-  imports_.clear();
-  exports_.reset();
-}
-
 void Link::run(int stop) {
   make_node(stop);
   if (!stops_) join_network(stop);
@@ -140,7 +133,7 @@ void Link::choose_imports() {
       one = std::make_unique<Import>(*node_, *network_, sent_, source, incarnation_, bell_);
     }
     one->set_max_age(age);
-    one->look(view_.open_here().contains(source));
+    one->look(view_.open_here().contains(source), view_.has_daemon());
     shortest = shortest == 0 ? age : std::min(shortest, age);
   }
   clock_->set_period(shortest == 0 ? 0 : token_period(shortest));

@@ -37,7 +37,7 @@ class Link {
   explicit Link(LinkOptions options);
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
-  ~Link();
+  ~Link() = default;
 
   // Returns when `stop` is readable. Waits for the daemon and for the network, and says so.
   void run(int stop);
@@ -61,6 +61,7 @@ class Link {
   std::string said_of_view_;
   bool stops_ = false;
 
+  // Who calls others goes before who is called.
   std::optional<Node> node_;
   std::optional<Network> network_;
   std::optional<TokenTopic> tokens_;
