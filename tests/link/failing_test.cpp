@@ -76,7 +76,7 @@ TEST_F(FailingHosts, ADaemonThatIsRestartedLosesNothingOfTheLink) {
   body_.drive(planner_);
   head_.daemon().restart();
   body_.drive(planner_);
-  await([&] { return base_.described(kPlanner).find("host head") != std::string::npos; });
+  base_.await_described(kPlanner, "host head");
   EXPECT_THAT(base_.log(), Not(HasSubstr("not imported")));
 }
 
