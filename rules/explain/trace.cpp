@@ -18,7 +18,7 @@ class TraceParser {
   TraceParser(const TextFile& file, Diagnostics& diagnostics)
       : file_(file), diagnostics_(diagnostics), records_(file, diagnostics) {}
 
-  std::vector<TraceEvent> parse();
+  std::vector<TraceEvent> parse(std::size_t max_events);
 
  private:
   bool read_header();
@@ -38,13 +38,13 @@ void TraceParser::error(const char* code, const CsvField& field, std::string mes
   diagnostics_.error(code, file_.locate(field.offset), std::move(message));
 }
 
-std::vector<TraceEvent> TraceParser::parse() {
+std::vector<TraceEvent> TraceParser::parse(std::size_t max_events) {
   std::vector<TraceEvent> events;
   if (!check_size(file_, kMaxTraceBytes, diagnostics_) || !read_header()) return events;
   while (const auto record = records_.next()) {
-    if (events.size() == kMaxTraceEvents) {
+    if (events.size() == max_events) {
       error("limit-exceeded", record->front(),
-            "the trace has more events than the limit of " + std::to_string(kMaxTraceEvents) +
+            "the trace has more events than the limit of " + std::to_string(max_events) +
                 "; split it into several");
       break;
     }
@@ -136,8 +136,9 @@ std::optional<TraceKind> TraceParser::read_kind(const CsvRecord& record) {
 
 }  // namespace
 
-std::vector<TraceEvent> parse_trace(const TextFile& file, Diagnostics& diagnostics) {
-  return TraceParser(file, diagnostics).parse();
+std::vector<TraceEvent> parse_trace(const TextFile& file, Diagnostics& diagnostics,
+                                    std::size_t max_events) {
+  return TraceParser(file, diagnostics).parse(max_events);
 }
 
 std::vector<TraceEvent> read_trace(const std::string& path, Diagnostics& diagnostics) {

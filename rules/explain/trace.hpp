@@ -31,7 +31,8 @@ struct TraceEvent {
 };
 
 // Reports all problems in one go; the result is to be used only if there is no error.
-std::vector<TraceEvent> parse_trace(const TextFile& file, Diagnostics& diagnostics);
+std::vector<TraceEvent> parse_trace(const TextFile& file, Diagnostics& diagnostics,
+                                    std::size_t max_events = kMaxTraceEvents);
 
 // Throws FileError.
 std::vector<TraceEvent> read_trace(const std::string& path, Diagnostics& diagnostics);
