@@ -49,12 +49,12 @@ class Finder {
       const std::string& key = entry.key.text;
       const auto dot = key.find('.');
       if (dot == std::string::npos) continue;
-      const std::string first = key.substr(0, dot);
+      std::string first = key.substr(0, dot);
       if (std::find(wanted_.begin(), wanted_.end(), first) == wanted_.end()) continue;
       diagnostics_.error("dotted-name", entry.key.where,
-                         "ROS 2 reads " + rules::quote(key) + " as a part of `" + first +
-                             "`, and the import does not; write it as a map: `" + first +
-                             ": {NAME: {topic: …}}`");
+                         "ROS 2 reads " + rules::quote(key) +
+                             " as a part of a map, and the import does not; write the map: `" +
+                             first.append(": {NAME: {topic: …}}`"));
       return;  // one for all of them
     }
   }

@@ -1,6 +1,5 @@
 #include "link/exports.hpp"
 
-#include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -20,7 +19,7 @@ namespace {
 using gateway::Level;
 using gateway::say;
 
-constexpr std::uint64_t kStopId = 0;
+constexpr std::uint64_t kWakeId = 0;
 constexpr shm::Nanoseconds kTapAgain = 5'000'000'000;
 // Events of one source that leave before others have their turn.
 constexpr int kMostAtOnce = 64;
@@ -57,25 +56,39 @@ Exports::Exports(Node& node, const Network& network, const HeldTokens& tokens, s
       incarnation_(incarnation),
       bell_(bell),
       epoll_(epoll_create1(EPOLL_CLOEXEC)),
-      stop_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+      wake_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   epoll_event event{};
   event.events = EPOLLIN;
-  event.data.u64 = kStopId;
-  if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, stop_.get(), &event) != 0) {
+  event.data.u64 = kWakeId;
+  if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, wake_.get(), &event) != 0) {
     throw std::system_error(errno, std::generic_category(), "no descriptors to watch taps by");
   }
   thread_ = std::thread([this] { run(); });
 }
 
 Exports::~Exports() {
-  const std::uint64_t one = 1;
-  static_cast<void>(!::write(stop_.get(), &one, sizeof one));
+  {
+    const std::lock_guard lock(mutex_);
+    ends_ = true;
+  }
+  wake();
   thread_.join();
 }
 
-void Exports::offer(const std::set<std::string, std::less<>>& sources) {
+void Exports::wake() const noexcept {
+  const std::uint64_t one = 1;
+  static_cast<void>(!::write(wake_.get(), &one, sizeof one));
+}
+
+void Exports::look(const HostView& view) {
+  withdraw(view.open_here());
+  for (const auto& [source, type] : view.open_here()) offer(source, type);
+  tap_what_is_wanted(view);
+}
+
+void Exports::withdraw(const HostView::OpenPorts& ports) {
   for (auto each = ids_.begin(); each != ids_.end();) {
-    if (sources.contains(each->first)) {
+    if (ports.contains(each->first)) {
       ++each;
       continue;
     }
@@ -87,27 +100,37 @@ void Exports::offer(const std::set<std::string, std::less<>>& sources) {
     }
     each = ids_.erase(each);
   }
-  for (const std::string& source : sources) {
-    if (ids_.contains(source)) continue;
-    OfferCard card;
-    card.incarnation = incarnation_;
-    card.host = host_;
-    card.source = source;
-    auto one = std::make_unique<Export>(network_, std::move(card), bell_);
-    const std::lock_guard lock(mutex_);
-    exports_.emplace(++last_id_, std::move(one));
-    ids_.emplace(source, last_id_);
-  }
 }
 
-void Exports::look() {
+void Exports::offer(const std::string& source, const std::optional<shm::TypeInfo>& type) {
+  const auto id = ids_.find(source);
+  if (id != ids_.end()) {
+    const std::lock_guard lock(mutex_);
+    if (type) know_type(*exports_.at(id->second), *type);
+    return;
+  }
+  OfferCard card;
+  card.incarnation = incarnation_;
+  card.host = host_;
+  card.source = source;
+  if (type) {
+    card.type_revision = 1;
+    card.type = *type;
+  }
+  auto one = std::make_unique<Export>(network_, std::move(card), bell_);
+  const std::lock_guard lock(mutex_);
+  exports_.emplace(++last_id_, std::move(one));
+  ids_.emplace(source, last_id_);
+}
+
+void Exports::tap_what_is_wanted(const HostView& view) {
   const shm::Nanoseconds now = shm::monotonic_now();
   for (const auto& [source, id] : ids_) {
     Export& one = *exports_.at(id);
     const bool is_wanted = one.writer.is_wanted();
     if (is_wanted == one.tap.has_value()) continue;
     if (is_wanted && now >= one.tap_again) {
-      open_tap(one, id);
+      open_tap(one, id, view);
     } else if (!is_wanted) {
       std::optional<Tap<void>> gone;
       const std::lock_guard lock(mutex_);
@@ -117,7 +140,7 @@ void Exports::look() {
 }
 
 // The other thread uses a tap once it stands in the export, and not before.
-void Exports::open_tap(Export& one, std::uint64_t id) {
+void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
   try {
     Tap<void> tap = node_.tap(one.card.source);
     epoll_event event{};
@@ -131,8 +154,10 @@ void Exports::open_tap(Export& one, std::uint64_t id) {
       throw Error("no descriptor can be watched");
     }
     one.said.clear();
-    while (send_some(one)) {  // the source's state; from there on the tap rings
-    }
+    // Its publisher tells the tap of the source at its next arrival, which may be a long time away.
+    state(one, view.is_deactivated(one.card.source));
+    ready_.insert(id);  // a tap rings once somebody has found nothing in it
+    wake();
   } catch (const Error& error) {
     one.tap_again = shm::monotonic_now() + kTapAgain;
     if (one.said != error.what()) {
@@ -145,23 +170,32 @@ void Exports::open_tap(Export& one, std::uint64_t id) {
 
 void Exports::run() {
   std::array<epoll_event, 64> events{};
-  std::set<std::uint64_t> ready;
-  for (;;) {
-    const int count = epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()),
-                                 ready.empty() ? -1 : 0);
-    for (int i = 0; i < count; ++i) {
-      const std::uint64_t id = events.at(static_cast<std::size_t>(i)).data.u64;
-      if (id == kStopId) return;
-      ready.insert(id);
-    }
-    for (auto each = ready.begin(); each != ready.end();) {
-      const std::lock_guard lock(mutex_);
+  for (bool has_more = false;;) {
+    const int count =
+        epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), has_more ? 0 : -1);
+    if (!take_up(events.data(), count)) return;
+    const std::lock_guard lock(mutex_);
+    for (auto each = ready_.begin(); each != ready_.end();) {
       const auto found = exports_.find(*each);
-      const bool has_more =
-          found != exports_.end() && found->second->tap && send_some(*found->second);
-      each = has_more ? std::next(each) : ready.erase(each);
+      const bool more = found != exports_.end() && found->second->tap && send_some(*found->second);
+      each = more ? std::next(each) : ready_.erase(each);
     }
+    has_more = !ready_.empty();
   }
+}
+
+bool Exports::take_up(const epoll_event* events, int count) {
+  const std::lock_guard lock(mutex_);
+  for (int i = 0; i < count; ++i) {
+    const std::uint64_t id = events[i].data.u64;
+    if (id != kWakeId) {
+      ready_.insert(id);
+      continue;
+    }
+    std::uint64_t rings = 0;
+    static_cast<void>(!::read(wake_.get(), &rings, sizeof rings));
+  }
+  return !ends_;
 }
 
 // Under the lock. True: there may be more. Only a tap that has nothing left rings again.
@@ -176,9 +210,11 @@ bool Exports::send_some(Export& one) {
 }
 
 void Exports::send(Export& one, const TapEvent<void>& event) {
-  know_type(one, event.type());
-  count_lost(one, event);
-  const auto sample = event.sample();
+  know_type(one, info_of(event.type()));
+  one.number += event.lost();  // that the tap has missed
+  one.sequence = event.sequence();
+  const auto sample =
+      event.kind() == TapEventKind::sample ? event.sample() : std::optional<Bytes>();
   header_.kind = kind_of(event.kind());
   // A sample that was overwritten before it could be sent, or that is too large, is an arrival
   // nevertheless.
@@ -186,39 +222,39 @@ void Exports::send(Export& one, const TapEvent<void>& event) {
   if (header_.kind == EventKind::kSample && !has_sample) header_.kind = EventKind::kSignal;
   header_.is_deactivated = header_.kind == EventKind::kDeactivation ||
                            (header_.kind == EventKind::kState && event.is_deactivated());
-  header_.exporter = incarnation_;
-  header_.number = ++one.number;
-  header_.sequence = event.sequence();
-  header_.type_revision = one.card.type_revision;
-  header_.length = has_sample ? static_cast<std::uint32_t>(sample->size()) : 0;
   // Its publisher has written the time: it may be any.
   const shm::Nanoseconds published = event.time().time_since_epoch().count();
   tokens_.name(std::min(published, shm::monotonic_now()), header_.tokens);
+  write(one, has_sample ? *sample : Bytes());
+}
+
+void Exports::state(Export& one, bool is_deactivated) {
+  header_.kind = EventKind::kState;
+  header_.is_deactivated = is_deactivated;
+  header_.tokens.clear();
+  write(one, {});
+}
+
+// With a header that says what has happened.
+void Exports::write(Export& one, Bytes sample) {
+  header_.exporter = incarnation_;
+  header_.number = ++one.number;
+  header_.sequence = one.sequence;
+  header_.type_revision = one.card.type_revision;
+  header_.length = static_cast<std::uint32_t>(sample.size());
   const WritableBytes bytes(buffer_.data(), header_bytes(header_));
   write_header(header_, bytes);
   // What is not sent has used a number: it is counted where it does not come.
-  static_cast<void>(one.writer.write(bytes, has_sample ? *sample : Bytes()));
+  static_cast<void>(one.writer.write(bytes, sample));
 }
 
-// Events that the tap has missed, or samples that were published while nobody elsewhere read the
-// source.
-void Exports::count_lost(Export& one, const TapEvent<void>& event) {
-  std::uint64_t lost = event.lost();
-  if (event.kind() == TapEventKind::state && event.sequence() > one.sequence) {
-    const bool has_begun = one.number != 0;
-    if (has_begun) lost = std::max(lost, event.sequence() - one.sequence);
-  }
-  one.number += lost;
-  one.sequence = event.sequence();
-}
-
-void Exports::know_type(Export& one, const Type& type) {
-  if (one.type && *one.type == type && one.type->size() == type.size()) return;
-  one.type = type;
-  ++one.card.type_revision;
-  one.card.type = info_of(type);
+void Exports::know_type(Export& one, const shm::TypeInfo& type) {
+  OfferCard& card = one.card;
+  if (card.type_revision != 0 && card.type == type && card.type.size == type.size) return;
+  ++card.type_revision;
+  card.type = type;
   try {
-    one.writer.set_card(one.card);
+    one.writer.set_card(card);
   } catch (const DdsError& error) {
     say(Level::kError, error.what());
   }

@@ -6,9 +6,11 @@
 // that does not keep up. What the tap or the network loses uses numbers, so that importers count
 // it.
 //
-// Thread safety: offer() and look() on the link's thread; sending has a thread of its own, which
+// Thread safety: look() on the link's thread; sending has a thread of its own, which
 // shares exports_ under mutex_. Taps are opened and closed without that lock.
 #pragma once
+
+#include <sys/epoll.h>
 
 #include <array>
 #include <cstddef>
@@ -27,7 +29,9 @@
 #include "link/core/event_header.hpp"
 #include "link/core/held_tokens.hpp"
 #include "link/dds/event_topic.hpp"
+#include "link/host_view.hpp"
 #include "shm/file_descriptor.hpp"
+#include "shm/type_info.hpp"
 
 namespace arbiter::link {
 
@@ -40,10 +44,9 @@ class Exports {
   Exports& operator=(const Exports&) = delete;
   ~Exports();
 
-  // From now on exactly these sources are offered.
-  void offer(const std::set<std::string, std::less<>>& sources);
-  // Taps what has come to be wanted, and nothing else.
-  void look();
+  // From now on exactly the sources are offered that components of this host have open. Taps those
+  // of them that are wanted elsewhere, and nothing else.
+  void look(const HostView& view);
 
   [[nodiscard]] std::size_t count() const { return exports_.size(); }
 
@@ -54,19 +57,26 @@ class Exports {
     OfferCard card;
     EventWriter writer;
     std::optional<Tap<void>> tap;
-    std::optional<Type> type;        // as the card has it
     std::uint64_t number = 0;        // of the last event
     std::uint64_t sequence = 0;      // of the last sample
     std::string said;                // why it cannot be tapped
     shm::Nanoseconds tap_again = 0;  // not before
   };
 
-  void open_tap(Export& one, std::uint64_t id);
+  void withdraw(const HostView::OpenPorts& ports);
+  void offer(const std::string& source, const std::optional<shm::TypeInfo>& type);
+  void tap_what_is_wanted(const HostView& view);
+  void open_tap(Export& one, std::uint64_t id, const HostView& view);
   void run();
+  void wake() const noexcept;
+  // Takes up what epoll_wait() says; false: it is over.
+  bool take_up(const epoll_event* events, int count);
+  // Under mutex_.
   bool send_some(Export& one);
+  void state(Export& one, bool is_deactivated);
+  void write(Export& one, Bytes sample);
   void send(Export& one, const TapEvent<void>& event);
-  static void count_lost(Export& one, const TapEvent<void>& event);
-  void know_type(Export& one, const Type& type);
+  static void know_type(Export& one, const shm::TypeInfo& type);
 
   Node& node_;
   const Network& network_;
@@ -75,11 +85,13 @@ class Exports {
   const Incarnation incarnation_;
   const gateway::Bell& bell_;
   shm::FileDescriptor epoll_;
-  shm::FileDescriptor stop_;
+  shm::FileDescriptor wake_;
   std::map<std::string, std::uint64_t, std::less<>> ids_;
   std::uint64_t last_id_ = 0;
   std::mutex mutex_;
   std::map<std::uint64_t, std::unique_ptr<Export>> exports_;
+  std::set<std::uint64_t> ready_;  // whose taps may have something
+  bool ends_ = false;
   // Likewise under mutex_: what is sent is made here.
   EventHeader header_;
   std::array<std::byte, kMaxHeaderBytes> buffer_{};

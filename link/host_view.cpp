@@ -32,6 +32,15 @@ struct Wanted {
   std::map<shm::SourceId, shm::Nanoseconds> ages;
 };
 
+std::optional<shm::TypeInfo> info_of(const std::optional<wire::SampleType>& type) {
+  if (!type) return std::nullopt;
+  shm::TypeInfo info;
+  info.set_name(type->name);
+  info.size = type->size;
+  info.alignment = type->alignment;
+  return info;
+}
+
 // Nothing: the table was torn.
 std::optional<Wanted> read_table(const shm::TableReader& tables) {
   for (int tries = 0; tries < kMaxTries; ++tries) {
@@ -96,13 +105,26 @@ void HostView::look_at_ports() {
   if (now < ask_again_ || !instance_->has_daemon()) return;
   ask_again_ = now + kAskPeriod;
   const wire::Status status = instance_->status();
-  open_here_.clear();
+  OpenPorts open;
   for (const wire::SourceStatus& source : status.sources) {
     const bool is_ours = source.open && source.open->component.node == kNodeName;
-    // Of one that has not come back to this daemon yet nobody can say whose it is; it holds its
-    // name, and so a link's port that is away is not exported either, for it is not open.
-    if (source.open && !is_ours) open_here_.insert(source.name);
+    if (source.open && !is_ours) open[source.name] = info_of(source.open->type);
+    // A component that has not come back to this daemon yet has what it had: samples go on.
+    const auto before = open_here_.find(source.name);
+    if (source.away_pid && before != open_here_.end()) open[source.name] = before->second;
   }
+  open_here_ = std::move(open);
+}
+
+bool HostView::is_deactivated(const std::string& source) const {
+  if (instance_ == nullptr) return false;
+  const auto id = instance_->find_source(source);
+  if (!id) return false;
+  const watch::Picture picture = watch::take_picture(
+      *instance_->memory(),
+      [&](const shm::TableView& /*table*/) { return std::vector<shm::SourceId>{*id}; });
+  const auto word = picture.words.find(*id);
+  return word != picture.words.end() && shm::is_deactivation(word->second);
 }
 
 }  // namespace arbiter::link

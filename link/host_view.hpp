@@ -8,10 +8,11 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <set>
+#include <optional>
 #include <string>
 
 #include "shm/activity.hpp"
+#include "shm/type_info.hpp"
 #include "watch/instance.hpp"
 
 namespace arbiter::link {
@@ -33,8 +34,14 @@ class HostView {
   [[nodiscard]] const std::map<std::string, shm::Nanoseconds, std::less<>>& wanted() const {
     return wanted_;
   }
-  // Those that components of this host have open, or had when their daemon went.
-  [[nodiscard]] const std::set<std::string, std::less<>>& open_here() const { return open_here_; }
+  // Those that components of this host have open, or had when their daemon went; with what a sample
+  // is. Nothing: the port is untyped, and the status does not say how large its samples are.
+  using OpenPorts = std::map<std::string, std::optional<shm::TypeInfo>, std::less<>>;
+  [[nodiscard]] const OpenPorts& open_here() const { return open_here_; }
+  // Whether its activity was ended, and nothing has come since.
+  [[nodiscard]] bool is_deactivated(const std::string& source) const;
+  // False: ports cannot be opened now, and who tries waits for a second.
+  [[nodiscard]] bool has_daemon() const { return instance_ != nullptr && instance_->has_daemon(); }
   // Why nothing is known; empty: it is.
   [[nodiscard]] const std::string& obstacle() const { return obstacle_; }
 
@@ -46,7 +53,7 @@ class HostView {
   const std::string instance_name_;
   std::unique_ptr<watch::Instance> instance_;
   std::map<std::string, shm::Nanoseconds, std::less<>> wanted_;
-  std::set<std::string, std::less<>> open_here_;
+  OpenPorts open_here_;
   std::shared_ptr<const shm::DecisionMemory> memory_;  // of what follows
   std::uint64_t generation_ = 0;
   std::string obstacle_;

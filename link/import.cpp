@@ -40,15 +40,19 @@ shm::Nanoseconds time_with_sleep() noexcept {
 
 Import::Import(Node& node, const Network& network, const SentTokens& tokens, std::string source,
                Incarnation me, const gateway::Bell& bell)
-    : node_(node),
-      tokens_(tokens),
-      source_(std::move(source)),
-      me_(me),
-      reader_(network, source_, *this, bell) {}
+    : node_(node), tokens_(tokens), source_(std::move(source)), me_(me) {
+  unheard_.reserve(kMaxUnheard);
+  header_.tokens.reserve(kMaxImporters);
+  gateway::dds::SampleTaker& taker = *this;  // a private base
+  reader_.emplace(network, source_, taker, bell);
+}
 
-Import::~Import() { close(); }
+Import::~Import() {
+  reader_.reset();  // it calls take() until then
+  close();
+}
 
-void Import::look(bool is_open_here) {
+void Import::look(bool is_open_here, bool has_daemon) {
   listen_to_speaker();
   const Offerer* const speaker = speaker_.current();
   // The model wants it, or there would be no import.
@@ -58,7 +62,8 @@ void Import::look(bool is_open_here) {
   const bool is_other_host = speaker == nullptr || speaker->incarnation != obeyed_;
   if (choice != ImportChoice::kImport || is_other_type || (is_other_host && port_)) close();
   obey(choice == ImportChoice::kImport ? speaker->incarnation : 0);
-  if (choice == ImportChoice::kImport && !port_ && card->type_revision != 0) open(*card);
+  const bool can_open = has_daemon && card != nullptr && card->type_revision != 0;
+  if (choice == ImportChoice::kImport && !port_ && can_open) open(*card);
   describe();
 }
 
@@ -66,14 +71,25 @@ void Import::obey(Incarnation exporter) {
   const std::lock_guard lock(mutex_);
   if (exporter == obeyed_) return;
   obeyed_ = exporter;
-  const auto last = unheard_.find(exporter);
+  const auto last = std::find_if(unheard_.begin(), unheard_.end(),
+                                 [&](const Unheard& each) { return each.exporter == exporter; });
   if (last == unheard_.end()) return;
-  stream_.note(exporter, last->second.number, last->second.is_deactivated);
+  stream_.note(exporter, last->last);
   unheard_.erase(last);
 }
 
+void Import::remember(Incarnation exporter, const StreamEvent& event) noexcept {
+  const auto found = std::find_if(unheard_.begin(), unheard_.end(),
+                                  [&](const Unheard& each) { return each.exporter == exporter; });
+  if (found != unheard_.end()) {
+    found->last = event;
+  } else if (unheard_.size() < kMaxUnheard) {
+    unheard_.push_back({exporter, event});
+  }
+}
+
 void Import::listen_to_speaker() {
-  const std::vector<EventReader::Offer> offers = reader_.offers();
+  const std::vector<EventReader::Offer> offers = reader_->offers();
   for (auto each = offers_.begin(); each != offers_.end();) {
     const bool is_there =
         std::any_of(offers.begin(), offers.end(), [&](const EventReader::Offer& offer) {
@@ -87,7 +103,19 @@ void Import::listen_to_speaker() {
     offers_[offer.key] = offer.card;
     speaker_.add({offer.key, offer.card.host, offer.card.incarnation});
   }
+  forget(offers);
   say_who_speaks();
+}
+
+// Those who offer nothing any more, where others need their places.
+void Import::forget(const std::vector<EventReader::Offer>& offers) {
+  const std::lock_guard lock(mutex_);
+  if (unheard_.size() < kMaxUnheard) return;
+  std::erase_if(unheard_, [&](const Unheard& each) {
+    return std::none_of(offers.begin(), offers.end(), [&](const EventReader::Offer& offer) {
+      return offer.card.incarnation == each.exporter;
+    });
+  });
 }
 
 void Import::say_who_speaks() {
@@ -169,7 +197,8 @@ void Import::describe() {
   described_ = std::move(now);
 }
 
-void Import::take(const gateway::dds::Payload& payload) noexcept {
+void Import::take(const gateway::dds::Payload& payload)  // NOLINT(bugprone-exception-escape)
+    noexcept {
   const std::size_t before = encapsulation().size();
   const std::lock_guard lock(mutex_);
   std::array<std::byte, kMaxHeaderBytes> bytes;
@@ -181,17 +210,17 @@ void Import::take(const gateway::dds::Payload& payload) noexcept {
     ++counts_.unreadable;
     return;
   }
+  const StreamEvent event{header_.number, header_.sequence, header_.kind == EventKind::kSample,
+                          header_.is_deactivated};
   if (header_.exporter != obeyed_) {  // one speaker: others are not heard
-    if (unheard_.size() < kMaxUnheard || unheard_.contains(header_.exporter)) {
-      unheard_[header_.exporter] = {header_.number, header_.is_deactivated};
-    }
+    remember(header_.exporter, event);
     return;
   }
-  if (!stream_.note(header_.exporter, header_.number, header_.is_deactivated)) return;
+  if (!stream_.note(header_.exporter, event)) return;
   arrive(payload, before + header_bytes(header_));
 }
 
-void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) noexcept {
+void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
   if (!port_) {
     if (header_.kind == EventKind::kSample) ++counts_.too_soon;
     return;
@@ -212,8 +241,7 @@ void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) no
   }
 }
 
-void Import::publish(const gateway::dds::Payload& payload, std::size_t before,
-                     Time deadline) noexcept {
+void Import::publish(const gateway::dds::Payload& payload, std::size_t before, Time deadline) {
   if (header_.type_revision != revision_) {
     ++counts_.too_soon;  // the port is opened again for it
     return;

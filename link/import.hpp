@@ -12,6 +12,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <arbiter/node.hpp>
 #include <arbiter/output_port.hpp>
@@ -43,8 +44,9 @@ class Import : private gateway::dds::SampleTaker {
   void set_max_age(shm::Nanoseconds age) noexcept {
     max_age_.store(age, std::memory_order_relaxed);
   }
-  // Who speaks now, and whether the port is to be open: opens or closes it.
-  void look(bool is_open_here);
+  // Who speaks now, and whether the port is to be open: opens it, if there is a daemon, or closes
+  // it.
+  void look(bool is_open_here, bool has_daemon);
 
   [[nodiscard]] bool is_open() const { return port_.has_value(); }
   // "host head, 3 lost, 2 late".
@@ -58,14 +60,20 @@ class Import : private gateway::dds::SampleTaker {
     std::uint64_t no_memory = 0;
   };
 
-  void take(const gateway::dds::Payload& payload) noexcept override;
+  // publish() throws for another port's loan, and this one is its own; what is remembered here has
+  // its memory from the beginning.
+  void take(const gateway::dds::Payload& payload)  // NOLINT(bugprone-exception-escape)
+      noexcept override;
   // Whom to obey from now on; 0: nobody.
   void obey(Incarnation exporter);
   // Under the lock, by header_.
-  void arrive(const gateway::dds::Payload& payload, std::size_t before) noexcept;
-  void publish(const gateway::dds::Payload& payload, std::size_t before, Time deadline) noexcept;
+  void arrive(const gateway::dds::Payload& payload, std::size_t before);
+  void publish(const gateway::dds::Payload& payload, std::size_t before, Time deadline);
+  // Of one that finds no place the state is not known before its next event.
+  void remember(Incarnation exporter, const StreamEvent& event) noexcept;
 
   void listen_to_speaker();
+  void forget(const std::vector<EventReader::Offer>& offers);
   void open(const OfferCard& card);
   void close();
   void say_who_speaks();
@@ -94,15 +102,15 @@ class Import : private gateway::dds::SampleTaker {
   // The last event of each exporter that is not obeyed: the first that comes is the present state,
   // and comes before the exporter can be chosen.
   struct Unheard {
-    std::uint64_t number = 0;
-    bool is_deactivated = false;
+    Incarnation exporter = 0;
+    StreamEvent last;
   };
   static constexpr std::size_t kMaxUnheard = 64;
-  std::map<Incarnation, Unheard> unheard_;
+  std::vector<Unheard> unheard_;
   Counts counts_;
   EventHeader header_;  // of take()
 
-  EventReader reader_;  // last: it calls take() from then on
+  std::optional<EventReader> reader_;
 };
 
 }  // namespace arbiter::link

@@ -48,13 +48,6 @@ Link::Link(LinkOptions options)
   gateway::dds::hear_cyclone();
 }
 
-// Who calls others goes before who is called.
-Link::~Link() {
-  clock_.reset();
-  imports_.clear();
-  exports_.reset();
-}
-
 void Link::run(int stop) {
   make_node(stop);
   if (!stops_) join_network(stop);
@@ -81,6 +74,7 @@ void Link::make_node(int stop) {
   options.on_waiting = [](const std::string&) {};
   options.on_notice = [](const Notice& notice) { say(Level::kWarning, notice.text); };
   while (!node_ && !stops_) {
+    if (options_.on_round) options_.on_round();
     try {
       node_.emplace(kNodeName, options);
     } catch (const Error& error) {
@@ -93,6 +87,7 @@ void Link::make_node(int stop) {
 // An interface may come later.
 void Link::join_network(int stop) {
   while (!network_ && !stops_) {
+    if (options_.on_round) options_.on_round();
     const gateway::dds::CycloneWords words;
     try {
       network_.emplace(options_.network);
@@ -113,11 +108,11 @@ void Link::join_network(int stop) {
 
 void Link::loop(int stop) {
   for (std::string said; !stops_; stops_ = waits(stop, kLookPeriod)) {
+    if (options_.on_round) options_.on_round();
     view_.update();
     say_once(said_of_view_, view_.obstacle());
     try {
-      exports_->offer(view_.open_here());
-      exports_->look();
+      exports_->look(view_);
       choose_imports();
       said.clear();
     } catch (const DdsError& error) {  // memory is short
@@ -138,7 +133,7 @@ void Link::choose_imports() {
       one = std::make_unique<Import>(*node_, *network_, sent_, source, incarnation_, bell_);
     }
     one->set_max_age(age);
-    one->look(view_.open_here().contains(source));
+    one->look(view_.open_here().contains(source), view_.has_daemon());
     shortest = shortest == 0 ? age : std::min(shortest, age);
   }
   clock_->set_period(shortest == 0 ? 0 : token_period(shortest));

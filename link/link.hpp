@@ -4,6 +4,7 @@
 // Thread safety: all of it runs on the thread that calls run(), but for what its parts say.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -27,6 +28,8 @@ struct LinkOptions {
   std::string host;      // as the others are to call it
   std::string instance;  // as NodeOptions has it
   NetworkOptions network;
+  // Called by the loop ten times a second, so that somebody can see that it goes round.
+  std::function<void()> on_round{};
 };
 
 class Link {
@@ -34,7 +37,7 @@ class Link {
   explicit Link(LinkOptions options);
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
-  ~Link();
+  ~Link() = default;
 
   // Returns when `stop` is readable. Waits for the daemon and for the network, and says so.
   void run(int stop);
@@ -58,6 +61,7 @@ class Link {
   std::string said_of_view_;
   bool stops_ = false;
 
+  // Who calls others goes before who is called.
   std::optional<Node> node_;
   std::optional<Network> network_;
   std::optional<TokenTopic> tokens_;

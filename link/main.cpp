@@ -73,6 +73,7 @@ int run(int argc, char** argv) {
   }
   gateway::set_program_name("arbiter-link");
   const shm::FileDescriptor stop = catch_signals();
+  options.on_round = [] { sd_notify(0, "WATCHDOG=1"); };
   Link link(options);
   sd_notify(0, "READY=1");
   link.run(stop.get());

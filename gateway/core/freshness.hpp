@@ -32,7 +32,8 @@ class MaxAge {
   [[nodiscard]] shm::Nanoseconds get() const noexcept {
     return age_.load(std::memory_order_relaxed);
   }
-  // Whether the model in force gives it a T of forever: what was said before still holds.
+  // Whether the model in force gives it a T of forever, and the entry no max_age: what was said
+  // before still holds.
   [[nodiscard]] bool is_forever() const noexcept {
     return is_forever_.load(std::memory_order_relaxed);
   }

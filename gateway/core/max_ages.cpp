@@ -55,7 +55,7 @@ void MaxAges::update() {
   for (const Watched& each : watched_) {
     // Both sources of a choice come from one topic: the shorter T holds for its samples.
     shm::Nanoseconds age = shm::kForever;
-    bool is_forever = true;
+    bool is_forever = !each.entry->max_age;
     for (const Port* port : each.entry->ports()) {
       const Timeouts timeouts = timeouts_of(port->name);
       age = std::min(age, max_age_of(timeouts.own, timeouts.of_model, each.entry->max_age));

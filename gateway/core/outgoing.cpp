@@ -38,7 +38,10 @@ void Outgoing::lead(const InBySource& ins, std::function<void()> call_loop) {
 }
 
 void Outgoing::run(shm::Nanoseconds now) {
+  // A publisher that never rests would have each next turn, and the loop none.
+  loop_waits_.store(true, std::memory_order_relaxed);
   const std::lock_guard lock(turn_);
+  loop_waits_.store(false, std::memory_order_relaxed);
   has_turn = true;
   send_waiting(now);
   send_idle(now);
@@ -82,7 +85,7 @@ void Outgoing::send_idle(shm::Nanoseconds now) {
 }
 
 bool Outgoing::begin_turn() noexcept {
-  if (has_turn || !turn_.try_lock()) return false;
+  if (has_turn || loop_waits_.load(std::memory_order_relaxed) || !turn_.try_lock()) return false;
   if (left_ || has_more_) {
     turn_.unlock();
     return false;

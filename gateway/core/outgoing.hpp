@@ -105,6 +105,7 @@ class Outgoing {
   Account& account_;
   const AgesOfSources& ages_;
   std::mutex turn_;  // of the port, the sender, and all below but for the atomics
+  std::atomic<bool> loop_waits_{false};  // for the turn; a hint, which nothing depends on
   InputPort<void> port_;
   const InBySource* ins_ = nullptr;
   std::function<void()> call_loop_;

@@ -90,11 +90,12 @@ int serve(const Arguments& arguments, const ProgramKind& kind, std::vector<Mappi
     send_idle(settings.mappings, kind.kind, *middleware, kSendIdle);
     return 0;
   }
+  Bridge bridge(settings.bridge, settings.mappings, kind.kind, bell, *middleware);
   try {
-    Bridge bridge(settings.bridge, settings.mappings, kind.kind, bell, *middleware);
     bridge.run(stop);
   } catch (const NeedsNewProcess& why) {
-    // Its ports are closed by now. What the middleware would do at the end may never return.
+    // What the middleware would do at the end may never return, or end the process in another way.
+    // Its ports are closed as those of a program that dies are: by the daemon, at once.
     say(Level::kWarning, std::string(why.what()) + "; the gateway begins anew");
     std::_Exit(kBeginsAnew);
   }
@@ -145,7 +146,7 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
     return serve(arguments, kind, std::move(*mappings), make, stop.get());
   }
   std::vector<std::string> worker(argv, argv + argc);
-  worker.emplace_back("--worker");
+  worker.insert(worker.begin() + 1, "--worker");  // behind a "--" it would be a mapping
   sd_notify(0, "READY=1");
   return supervise(worker, stop.get(), kind.clean_up);
 }

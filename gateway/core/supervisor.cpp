@@ -43,6 +43,7 @@ struct Worker {
 Worker start(const std::vector<std::string>& arguments) {
   int ends[2];
   Worker worker;
+  worker.started = worker.beat = shm::monotonic_now();
   if (::pipe2(ends, O_CLOEXEC | O_NONBLOCK) != 0) return worker;
   worker.heart.reset(ends[0]);
   const shm::FileDescriptor theirs(ends[1]);
@@ -70,7 +71,6 @@ Worker start(const std::vector<std::string>& arguments) {
     ::execve("/proc/self/exe", argv.data(), environment.data());
     ::_exit(127);
   }
-  worker.started = worker.beat = shm::monotonic_now();
   return worker;
 }
 

@@ -11,12 +11,14 @@
 
 namespace arbiter::gateway::dds {
 
-// How the data behind an encapsulation header are encoded (RTPS 2.5, 10.2). Only those are known
-// in which a field of a final type has a fixed place.
+// How the data behind an encapsulation header are encoded (RTPS 2.5, 10.2; DDS-XTypes 1.3, 7.6.2).
 enum class Encoding { kUnknown, kXcdr1, kXcdr2 };
 struct Encapsulation {
   Encoding encoding = Encoding::kUnknown;
   bool is_big_endian = false;
+  // The fields follow each other, without headers between them. An appendable type of XCDR2 begins
+  // with its length, a mutable one has a header before each field.
+  bool is_plain = false;
 };
 [[nodiscard]] Encapsulation read_encapsulation(Bytes header) noexcept;
 
@@ -28,6 +30,12 @@ class ArrivedSample : public ForeignSample {
   // False: it is too short for a header, or the header is none that is known.
   [[nodiscard]] bool is_readable() const noexcept {
     return encapsulation_.encoding != Encoding::kUnknown;
+  }
+
+  // Whether the field at `offset`, as XCDR1 aligns it, stands there. XCDR2 aligns a double to 4, so
+  // that only the first field certainly does.
+  [[nodiscard]] bool has_field_at(std::size_t offset) const noexcept {
+    return encapsulation_.is_plain && (offset == 0 || encapsulation_.encoding == Encoding::kXcdr1);
   }
 
   [[nodiscard]] std::size_t size() const noexcept override { return payload_.size; }

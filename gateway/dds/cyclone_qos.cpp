@@ -28,6 +28,7 @@ void read_partitions(const dds_qos_t& qos, AnnouncedQos& result) {
     }
     dds_free(names[i]);
   }
+  result.has_more_partitions = count > kMaxPartitions;
   dds_free(names);
 }
 

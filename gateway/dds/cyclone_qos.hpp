@@ -36,6 +36,7 @@ struct AnnouncedQos {
   shm::Nanoseconds latency_budget = 0;
   shm::Nanoseconds lease = shm::kForever;
   std::vector<std::string> partitions;
+  bool has_more_partitions = false;  // than are looked at: any may be among them
   std::vector<int> representations;  // 0 XCDR1, 2 XCDR2; of a writer the first counts
 };
 [[nodiscard]] AnnouncedQos read_announced(const dds_qos_t& qos);

@@ -11,6 +11,8 @@ namespace arbiter::gateway::dds {
 namespace {
 
 constexpr shm::Nanoseconds kOpenAgain = 1'000'000'000;
+// Cyclone needs some ten for each domain.
+constexpr std::size_t kDescriptorsOfDomain = 32;
 
 }  // namespace
 
@@ -34,6 +36,13 @@ DdsMiddleware::DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& b
       }
     }
   }
+  hold_low_descriptors();
+}
+
+void DdsMiddleware::hold_low_descriptors() noexcept {
+  std::size_t closed = 0;
+  for (const auto& [id, site] : sites_) closed += site.domain ? 0 : 1;
+  low_descriptors_.hold(closed * kDescriptorsOfDomain);
 }
 
 // The check of the mapping does not know which domain the environment says.
@@ -114,7 +123,9 @@ bool DdsMiddleware::open(Site& site) {
   if (shm::monotonic_now() < site.open_again) return false;
   const CycloneWords words;
   try {
+    low_descriptors_.let_go();
     site.domain.emplace(*site.gateway, site.topics, bell_);
+    hold_low_descriptors();
     for (EndPoint* const end : site.ends) end->open(*site.domain);
     site.problem.clear();
     words.tell();
@@ -134,6 +145,7 @@ bool DdsMiddleware::open(Site& site) {
 void DdsMiddleware::close(Site& site) noexcept {
   for (EndPoint* const end : site.ends) end->close();
   site.domain.reset();
+  hold_low_descriptors();
 }
 
 }  // namespace arbiter::gateway::dds

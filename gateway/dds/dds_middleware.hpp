@@ -14,6 +14,7 @@
 #include "gateway/core/stall_thread.hpp"
 #include "gateway/dds/domain.hpp"
 #include "gateway/dds/in_topic.hpp"
+#include "gateway/dds/low_descriptors.hpp"
 #include "gateway/dds/out_topic.hpp"
 #include "gateway/mapping/mapping.hpp"
 
@@ -49,11 +50,13 @@ class DdsMiddleware : public Middleware {
   static void refuse_circle(const Site& site, const Entry& entry);
   [[nodiscard]] Site& site_of(const Gateway& gateway);
   void add(Site& site, EndPoint& end, Account& account);
+  void hold_low_descriptors() noexcept;
   // False: not now, and each account says why.
   bool open(Site& site);
   void close(Site& site) noexcept;
 
   const Bell& bell_;
+  LowDescriptors low_descriptors_;
   StallGuard guard_;
   std::optional<StallThread> stall_thread_;
   std::map<dds_domainid_t, Site> sites_;

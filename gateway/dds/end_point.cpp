@@ -132,7 +132,7 @@ void EndPoint::find_obstacles(const PeersOfTopic& peers) {
   // Those that go past Arbiter come first: a status has room for a few sentences alone.
   std::vector<std::string> others;
   for (const auto& [guid, peer] : peers.ends) {
-    const bool meet = share_partition(topic_.qos.partitions, peer.qos.partitions);
+    const bool meet = may_meet(topic_.qos, peer.qos);
     if (peer.end != which_) {
       const std::vector<std::string> reasons = mismatches({which_, topic_, keyed_}, peer);
       if (reasons.empty()) continue;

@@ -37,7 +37,8 @@ std::uint32_t InTopic::matched() const {
 // stopped, comes through here: the guard knows how long that can have been.
 void InTopic::take(const Payload& payload) noexcept {
   const ArrivedSample sample(payload);
-  if (!sample.is_readable()) {
+  const auto& choice = entry().choice;
+  if (!sample.is_readable() || (choice && !sample.has_field_at(choice->offset))) {
     incoming_.fail();
     return;
   }

@@ -178,6 +178,10 @@ bool share_partition(const std::vector<std::string>& a, const std::vector<std::s
   });
 }
 
+bool may_meet(const Qos& ours, const AnnouncedQos& theirs) {
+  return theirs.has_more_partitions || share_partition(ours.partitions, theirs.partitions);
+}
+
 std::vector<std::string> mismatches(const OurEnd& ours, const Peer& peer) {
   Comparison pair(ours, peer);
   if (peer.type != ours.topic.type) {
@@ -190,7 +194,7 @@ std::vector<std::string> mismatches(const OurEnd& ours, const Peer& peer) {
   }
   compare_attributes(pair);
   compare_others(pair);
-  if (!share_partition(ours.topic.qos.partitions, peer.qos.partitions)) {
+  if (!may_meet(ours.topic.qos, peer.qos)) {
     pair.add_plain("partition: it is in " + list(peer.qos.partitions) + ", this entry is in " +
                    list(ours.topic.qos.partitions));
   }

@@ -22,6 +22,9 @@ struct OurEnd {
 // does. What both sides' types look like inside is not compared: their names are.
 [[nodiscard]] std::vector<std::string> mismatches(const OurEnd& ours, const Peer& peer);
 
+// Whether they have a partition in common, or may have one.
+[[nodiscard]] bool may_meet(const Qos& ours, const AnnouncedQos& theirs);
+
 // Whether two ends have a partition in common, by DDS' rules: names, `*` and `?`.
 [[nodiscard]] bool share_partition(const std::vector<std::string>& a,
                                    const std::vector<std::string>& b);

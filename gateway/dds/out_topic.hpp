@@ -17,7 +17,7 @@ class OutTopic : public EndPoint, public Sender {
   ~OutTopic() override { close(); }
 
   // Who is told of each reader that comes; null: nobody any more.
-  void tell(Outgoing* outgoing) noexcept { outgoing_.store(outgoing); }
+  void tell(Outgoing* outgoing) noexcept { outgoing_.store(outgoing, std::memory_order_relaxed); }
 
   // Waits a little for subscribers that do not keep up. The gateway's loop.
   [[nodiscard]] Result send(Bytes sample) noexcept override;
@@ -34,6 +34,8 @@ class OutTopic : public EndPoint, public Sender {
   const Bell& bell_;
   const Representation representation_;
   const ddsi_sertype* type_ = nullptr;
+  // Relaxed is enough: what it points to was made before the writer whose making starts the calls,
+  // and outlives it.
   std::atomic<Outgoing*> outgoing_{nullptr};
 };
 

@@ -109,9 +109,10 @@ void Peers::update(const Entity& reader, End end) {
     for (std::size_t i = 0; i < static_cast<std::size_t>(taken); ++i) {
       if (infos[i].instance_state != DDS_IST_ALIVE) {
         if (const auto gone = handles_.find(infos[i].instance_handle); gone != handles_.end()) {
-          auto& [topic, guid] = gone->second;
-          topic->ends.erase(guid);
-          ++topic->revision;
+          const Place& place = gone->second;
+          place.topic->ends.erase(place.guid);
+          --place.topic->counts[place.end];
+          ++place.topic->revision;
           handles_.erase(gone);
         }
       } else if (infos[i].valid_data) {
@@ -131,10 +132,13 @@ void Peers::add(const dds_builtintopic_endpoint_t& endpoint, End end,
   if (found == topics_.end()) return;
   PeersOfTopic& topic = found->second;
   ++topic.revision;
-  const bool is_full = handles_.size() >= kMaxPeers || topic.ends.size() >= kMaxPeersOfTopic;
-  if (is_full && !handles_.contains(handle)) {
-    topic.has_more = true;
-    return;
+  if (!handles_.contains(handle)) {
+    // Readers must not hide a writer that goes past Arbiter.
+    if (handles_.size() >= kMaxPeers || topic.counts[end] >= kMaxOfTopic) {
+      topic.has_more = true;
+      return;
+    }
+    ++topic.counts[end];
   }
   const Guid guid = guid_of(endpoint.key);
   Peer peer;
@@ -146,7 +150,7 @@ void Peers::add(const dds_builtintopic_endpoint_t& endpoint, End end,
   peer.type_hash = type_hash_in(user_data(*endpoint.qos));
   peer.owner = owner_of(endpoint);
   topic.ends.insert_or_assign(guid, std::move(peer));
-  handles_.insert_or_assign(handle, Place(&topic, guid));
+  handles_.insert_or_assign(handle, Place{&topic, guid, end});
 }
 
 std::string Peers::owner_of(const dds_builtintopic_endpoint_t& endpoint) const {

@@ -11,7 +11,6 @@
 #include <map>
 #include <set>
 #include <string>
-#include <utility>
 
 #include "gateway/core/bridge.hpp"
 #include "gateway/dds/cyclone_qos.hpp"
@@ -39,8 +38,9 @@ using PeerMap = std::map<Guid, Peer>;
 // All that is known of one topic. Strangers may be any number: what does not fit is not looked at.
 struct PeersOfTopic {
   PeerMap ends;
-  bool has_more = false;       // than are looked at
-  std::uint64_t revision = 0;  // another one: something has changed
+  std::map<End, std::size_t> counts;  // of readers, of writers
+  bool has_more = false;              // than are looked at
+  std::uint64_t revision = 0;         // another one: something has changed
 };
 
 class Peers {
@@ -58,14 +58,18 @@ class Peers {
   [[nodiscard]] const PeersOfTopic& of(const std::string& topic) const { return topics_.at(topic); }
 
  private:
-  using Place = std::pair<PeersOfTopic*, Guid>;
+  struct Place {
+    PeersOfTopic* topic;
+    Guid guid;
+    End end;
+  };
 
   void update(const Entity& reader, End end);
   void add(const dds_builtintopic_endpoint_t& endpoint, End end, dds_instance_handle_t handle);
   [[nodiscard]] std::string owner_of(const dds_builtintopic_endpoint_t& endpoint) const;
 
   static constexpr std::size_t kMaxPeers = 4096;
-  static constexpr std::size_t kMaxPeersOfTopic = 512;
+  static constexpr std::size_t kMaxOfTopic = 512;  // readers, and as many writers
 
   std::map<std::string, PeersOfTopic, std::less<>> topics_;
   Guid own_{};  // our participant

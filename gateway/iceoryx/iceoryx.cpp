@@ -13,7 +13,11 @@ namespace arbiter::gateway {
 namespace {
 
 constexpr shm::Nanoseconds kSecond = 1'000'000'000;
-constexpr shm::Nanoseconds kHangs = 2 * kSecond;        // RouDi does not answer
+constexpr shm::Nanoseconds kHangs = 2 * kSecond;  // RouDi does not answer
+// RouDi says something once a second to those whom it knows. Whom it has not heard of for a while,
+// it forgets, also where it was RouDi that did not run; their ends are dead, and nothing tells.
+constexpr shm::Nanoseconds kSilent = 5 * kSecond;
+constexpr shm::Nanoseconds kSilentTooLong = 10 * kSecond;
 constexpr shm::Nanoseconds kHangsInside = 5 * kSecond;  // the thread does not come out of a call
 
 // iceoryx ends the process at what it holds for fatal, and, where it was built with assertions, at
@@ -87,7 +91,11 @@ void Iceoryx::tend() {
   if (now - session_->last_round() > kHangsInside) {
     throw NeedsNewProcess("a call of iceoryx does not return");
   }
-  set_obstacle("");
+  const shm::Nanoseconds silence = now - session_->heard_roudi();
+  if (silence > kSilentTooLong && !is_roudi_stopped()) {
+    throw NeedsNewProcess("RouDi runs and says nothing: it has given the gateway up");
+  }
+  set_obstacle(silence > kSilent ? "RouDi does not answer" : "");
   look_after_senders();
 }
 

@@ -17,7 +17,11 @@ std::string text_of(const iox::cxx::string<Capacity>& text) {
 
 }  // namespace
 
-PortList::PortList() : news_(iox::roudi::IntrospectionPortService, newest_only()) {}
+PortList::PortList()
+    : news_(iox::roudi::IntrospectionPortService, newest_only()),
+      beat_(iox::roudi::IntrospectionPortThroughputService, newest_only()) {}
+
+bool PortList::hears_roudi() { return !beat_.take().has_error(); }
 
 PortList::End PortList::end_of(const iox::roudi::PortData& data) {
   return {text_of(data.m_caproServiceID), text_of(data.m_caproInstanceID),

@@ -20,6 +20,8 @@ class PortList {
 
   // Takes RouDi's newest list. False: there is no newer one.
   bool update();
+  // Whether RouDi has said something since the last call: it does so once a second.
+  bool hears_roudi();
   // The names of the runtimes that have such an end of the topic, once for each end.
   [[nodiscard]] std::vector<std::string> publishers_of(const IceoryxTopic& topic) const;
   [[nodiscard]] std::vector<std::string> subscribers_of(const IceoryxTopic& topic) const;
@@ -34,6 +36,7 @@ class PortList {
                                                          const IceoryxTopic& topic);
 
   iox::popo::Subscriber<iox::roudi::PortIntrospectionFieldTopic> news_;
+  iox::popo::Subscriber<iox::roudi::PortThroughputIntrospectionFieldTopic> beat_;
   std::vector<End> publishers_;
   std::vector<End> subscribers_;
 };

@@ -5,11 +5,14 @@
 #include <sys/un.h>
 
 #include <cstring>
+#include <fstream>
+#include <sstream>
 
 #include <iceoryx_hoofs/platform/platform_settings.hpp>
 #include <iceoryx_posh/iceoryx_posh_types.hpp>
 
 #include "shm/file_descriptor.hpp"
+#include "watch/process.hpp"
 
 namespace arbiter::gateway {
 
@@ -37,6 +40,27 @@ std::optional<RoudiIdentity> find_roudi(const std::string& socket_path) {
   return RoudiIdentity{
       before.st_dev, before.st_ino,
       std::int64_t{before.st_ctim.tv_sec} * 1'000'000'000 + before.st_ctim.tv_nsec};
+}
+
+// It holds a lock as long as it lives. A line of /proc/locks:
+// "3: FLOCK  ADVISORY  WRITE 4502 00:27:7 0 EOF".
+bool is_roudi_stopped() {
+  const std::string path =
+      std::string(iox::platform::IOX_LOCK_FILE_PATH_PREFIX) + iox::roudi::ROUDI_LOCK_NAME + ".lock";
+  struct stat lock {};
+  if (::stat(path.c_str(), &lock) != 0) return false;
+  const std::string file = ":" + std::to_string(lock.st_ino);
+  std::ifstream locks("/proc/locks");
+  for (std::string line; std::getline(locks, line);) {
+    std::istringstream words(line);
+    std::string number, kind, advisory, access, place;
+    int process = 0;
+    if (!(words >> number >> kind >> advisory >> access >> process >> place)) continue;
+    if (kind == "FLOCK" && place.ends_with(file) && process > 0 && watch::is_stopped(process)) {
+      return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace arbiter::gateway

@@ -25,4 +25,7 @@ struct RoudiIdentity {
 // Nothing: none runs. A stopped one does. Sends it nothing.
 [[nodiscard]] std::optional<RoudiIdentity> find_roudi(const std::string& socket_path);
 
+// Whether somebody has stopped it (SIGSTOP); false where that cannot be known.
+[[nodiscard]] bool is_roudi_stopped();
+
 }  // namespace arbiter::gateway

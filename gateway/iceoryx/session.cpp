@@ -122,6 +122,7 @@ void Session::run() {
   last_round_.store(shm::monotonic_now(), std::memory_order_relaxed);
   make_ends();
   last_round_.store(shm::monotonic_now(), std::memory_order_relaxed);
+  heard_roudi_.store(shm::monotonic_now(), std::memory_order_relaxed);
   waits_.announce(*wait_set_);
   take_for_ever();
   wait_set_.reset();
@@ -222,6 +223,7 @@ void Session::take_all(Inlet& inlet) {
 void Session::look_at_list(shm::Nanoseconds now) {
   if (now - looked_at_list_ < kListPeriod) return;
   looked_at_list_ = now;
+  if (port_list_->hears_roudi()) heard_roudi_.store(now, std::memory_order_relaxed);
   if (port_list_->update()) {
     for (const auto& inlet : inlets_) {
       const std::size_t publishers = port_list_->publishers_of(inlet->topic).size();
@@ -239,7 +241,8 @@ void Session::look_at_list(shm::Nanoseconds now) {
 void Session::look_for_refused(Outlet& out) const {
   const auto subscribers = port_list_->subscribers_of(*out.sender->entry().iceoryx);
   if (subscribers.empty() || out.sender->publisher()->hasSubscribers()) {
-    out.looks_without_any = 0;
+    const bool was_refused = std::exchange(out.looks_without_any, 0) >= kLooksUntilRefused;
+    if (was_refused) out.sender->account().set_last_reason("");
     return;
   }
   if (++out.looks_without_any != kLooksUntilRefused) return;

@@ -64,6 +64,10 @@ class Session {
   [[nodiscard]] shm::Nanoseconds last_round() const noexcept {
     return last_round_.load(std::memory_order_relaxed);
   }
+  // When RouDi has said something last. Once it is ready.
+  [[nodiscard]] shm::Nanoseconds heard_roudi() const noexcept {
+    return heard_roudi_.load(std::memory_order_relaxed);
+  }
   // The thread was held up for so long that RouDi has given its process up.
   [[nodiscard]] bool has_stalled() const noexcept {
     return stalled_.load(std::memory_order_relaxed);
@@ -102,6 +106,7 @@ class Session {
   std::atomic<bool> ends_{false};
   std::atomic<bool> ended_{false};
   std::atomic<bool> stalled_{false};
+  std::atomic<shm::Nanoseconds> heard_roudi_{0};
   std::atomic<shm::Nanoseconds> last_round_{0};
   std::thread thread_;
 };

@@ -117,7 +117,10 @@ class MappingCheck {
     check_configurations();
     check_ports();
     check_topics();
-    for (const Placed& each : entries_) check_idle(*each.entry);
+    for (const Placed& each : entries_) {
+      check_idle(*each.entry);
+      check_history(*each.entry);
+    }
     if (model_ == nullptr) return;
     list_model();
     for (const Placed& each : entries_) check_names(*each.entry);
@@ -222,6 +225,20 @@ class MappingCheck {
                       {.ports = {entry.port->name}});
   }
 
+  // A writer that keeps all waits for its slowest reader.
+  void check_history(const Entry& entry) {
+    if (entry.is_in() || !entry.dds || entry.idle.kind == Idle::Kind::kNothing) return;
+    const Qos& qos = entry.dds->qos;
+    if (qos.history != History::kKeepAll || qos.reliability != Reliability::kReliable) return;
+    diagnostics_.warning("held-up-idle", entry.where,
+                         "with history=\"keep_all\" one subscriber that does not keep up, or is "
+                         "stopped, keeps everything from all others until DDS gives it up, and so "
+                         "what " +
+                             entry.outside() + " is sent while " + entry.port->name +
+                             " is idle; write history=\"keep_last\"",
+                         {.ports = {entry.port->name}});
+  }
+
   void list_model() {
     sources_.insert(model_->sources.begin(), model_->sources.end());
     for (const auto& [source, timeout] : model_->timeouts) sources_.insert(source);
@@ -312,15 +329,18 @@ class MappingCheck {
       if (entry.dds->qos.durability == Durability::kVolatile) continue;
       for (const Port* port : entry.ports()) {
         const shm::Nanoseconds timeout = timeout_of(port->name);
-        if (timeout == shm::kForever) continue;
+        if (timeout == shm::kForever && !entry.max_age) continue;
         diagnostics_.error(
             "late-history", port->where,
-            "a topic that keeps samples for those who come later brings old ones, and T of " +
-                rules::quote(port->name) + " is " + rules::to_string(timeout) +
+            "a topic that keeps samples for those who come later brings old ones, and " +
+                (entry.max_age
+                     ? "the entry has a max_age="
+                     : "T of " + rules::quote(port->name) + " is " + rules::to_string(timeout)) +
                 ": an old sample must not become an arrival; give the source timeout=\"forever\" "
                 "in "
-                "the model, if what was said before still holds, or write durability=\"volatile\", "
-                "which such publishers serve, too",
+                "the model and the entry no max_age=, if what was said before still holds, or "
+                "write "
+                "durability=\"volatile\", which such publishers serve, too",
             {.ports = {}, .source = port->name});
       }
     }

@@ -14,6 +14,7 @@ namespace arbiter::gateway {
 namespace {
 
 constexpr std::size_t kEncapsulation = 4;     // bytes of DDS's header
+constexpr unsigned kLastPlainCdr = 1;         // big-endian and little-endian
 constexpr unsigned kLastEncapsulation = 0xb;  // of those that DDS-XTypes knows
 
 // An attribute that another one needs, or excludes, means a mistake; to pass it over would hide it.
@@ -319,6 +320,8 @@ class EntryReader {
       return "does not begin with the encapsulation header of DDS, such as 00 01 00 00 for "
              "little-endian CDR; write it before the sample";
     }
+    const auto encapsulation = static_cast<unsigned char>(bytes[1]);
+    if (encapsulation > kLastPlainCdr) return {};  // other encodings add bytes of their own
     const auto known = fixed_size_of(entry_.type->name);
     const std::size_t own = bytes.size() - header();
     // It may be padded to a multiple of four, as DDS sends it.

@@ -4,21 +4,29 @@
 
 namespace arbiter::link {
 
-bool Stream::note(Incarnation from, std::uint64_t number, bool deactivated) noexcept {
+bool Stream::note(Incarnation from, const StreamEvent& event) noexcept {
   if (exporters_.front().incarnation != from) {
     move_to_front(from);
     has_begun_ = false;
   }
   Exporter& exporter = exporters_.front();
-  if (number <= exporter.last) {
+  if (event.number <= exporter.last) {
     ++doubled_;
     return false;
   }
-  if (has_begun_) lost_ += number - exporter.last - 1;
+  if (has_begun_) lost_ += missed(exporter, event);
   has_begun_ = true;
-  exporter.last = number;
-  deactivated_ = deactivated;
+  exporter.last = event.number;
+  exporter.sequence = event.sequence;
+  deactivated_ = event.is_deactivated;
   return true;
+}
+
+// A successor of the publisher counts from 1 again.
+std::uint64_t Stream::missed(const Exporter& exporter, const StreamEvent& event) noexcept {
+  const std::uint64_t events = event.number - exporter.last - 1;
+  const std::uint64_t next = exporter.sequence + (event.has_sample ? 1 : 0);
+  return std::max(events, event.sequence > next ? event.sequence - next : 0);
 }
 
 // In the place of the one that has not been obeyed for the longest time, where it is not among
@@ -28,7 +36,7 @@ void Stream::move_to_front(Incarnation from) noexcept {
                             [&](const Exporter& each) { return each.incarnation == from; });
   if (found == exporters_.end()) {
     found = exporters_.end() - 1;
-    *found = {from, 0};
+    *found = {from, 0, 0};
   }
   std::rotate(exporters_.begin(), found, found + 1);
 }

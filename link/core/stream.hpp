@@ -16,11 +16,18 @@
 
 namespace arbiter::link {
 
+struct StreamEvent {
+  std::uint64_t number = 0;    // of the exporter
+  std::uint64_t sequence = 0;  // of the publisher: of this sample, or of the last one before
+  bool has_sample = false;
+  bool is_deactivated = false;  // the source is, from here on
+};
+
 class Stream {
  public:
   // Takes up an event of the exporter `from`, which is the one that is obeyed. False: it came
   // already, or one behind it did.
-  bool note(Incarnation from, std::uint64_t number, bool deactivated) noexcept;
+  bool note(Incarnation from, const StreamEvent& event) noexcept;
 
   // Events that have not come, and will not. What an exporter sent before its first event here, or
   // while another one was obeyed, is not missed.
@@ -35,9 +42,12 @@ class Stream {
   static constexpr std::size_t kRemembered = 8;
   struct Exporter {
     Incarnation incarnation = 0;  // 0: none
-    std::uint64_t last = 0;
+    std::uint64_t last = 0;       // number
+    std::uint64_t sequence = 0;   // likewise
   };
   void move_to_front(Incarnation from) noexcept;
+  [[nodiscard]] static std::uint64_t missed(const Exporter& exporter,
+                                            const StreamEvent& event) noexcept;
 
   std::array<Exporter, kRemembered> exporters_{};  // the one that is obeyed first
   bool has_begun_ = false;                         // an event of that one was taken up since it is

@@ -168,8 +168,9 @@ int weaken_each(unsigned jobs, const char* met_file, const std::string& only) {
   std::erase_if(
       all, [&](const auto& each) { return describe(each.first).find(only) == std::string::npos; });
   if (all.empty()) {
-    std::printf("no order to leave out: no case meets one in shm/, client/, service/ or gateway/%s\n",
-                only.empty() ? "" : (" whose row says " + only).c_str());
+    std::printf(
+        "no order to leave out: no case meets one in shm/, client/, service/ or gateway/%s\n",
+        only.empty() ? "" : (" whose row says " + only).c_str());
     return 1;
   }
   std::vector<Job> running;

@@ -55,6 +55,15 @@ TEST(CheckMapping, AGoodMappingHasNoFindings) {
               IsEmpty());
 }
 
+// A base is not told to stop because somebody else who listens there is stopped in a debugger.
+TEST(CheckMapping, WhatSaysStopIsNotHeldUpByAnotherSubscriber) {
+  EXPECT_THAT(check(dds(out("/cmd", "/Base/cmd:i", "history='keep_all'"))).findings(),
+              ElementsAre(HasSubstr("warning held-up-idle")));
+  EXPECT_THAT(check(dds(out("/cmd", "/Base/cmd:i", "history='keep_all' reliability='best_effort'")))
+                  .findings(),
+              IsEmpty());
+}
+
 // What was published before the gateway came is old; where T is forever, it still holds.
 TEST(CheckMapping, SamplesFromBeforeItCameAreForSourcesThatStayActive) {
   const std::string lock =
@@ -73,6 +82,10 @@ TEST(CheckMapping, SamplesFromBeforeItCameAreForSourcesThatStayActive) {
   EXPECT_THAT(check(dds(in("/nav", "/Nav/cmd:o", "durability='transient_local'"))).findings(),
               ElementsAre(HasSubstr("error late-history")));
   EXPECT_THAT(check(dds(out("/cmd", "/Base/cmd:i", "qos='latched'"))).findings(), IsEmpty());
+  const std::string bounded =
+      "<in topic='/map' type='nav_msgs/msg/OccupancyGrid' "
+      "port='/EStop/pressed:o' qos='latched' max_age='1s'/>";
+  EXPECT_THAT(check(dds(bounded), all_forever).message(), HasSubstr("has a max_age="));
 }
 
 TEST(CheckMapping, APortHasOneEntry) {

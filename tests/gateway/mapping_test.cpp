@@ -261,6 +261,10 @@ TEST(Mapping, AnIdleSampleOfAFileHasTheSizeOfItsType) {
   EXPECT_THAT(dds("long.bin").message(),
               HasSubstr("has 9 bytes; a sample has 4 of headers and 1 of its own"));
   EXPECT_THAT(dds("plain.bin").message(), HasSubstr("encapsulation header of DDS"));
+  directory.write("delimited.bin", std::string("\0\x9\0\0\1\0\0\0"
+                                               "0",
+                                               9));  // XCDR2, appendable
+  EXPECT_THAT(dds("delimited.bin").findings(), IsEmpty());
   const auto iceoryx = [&](const std::string& size) {
     return read_text(
         "<gateway kind='iceoryx'><out port='/a:i' service='a' instance='b' event='c' "

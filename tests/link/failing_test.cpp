@@ -8,6 +8,7 @@ namespace arbiter::test {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 class FailingHosts : public testing::Test {
  protected:
@@ -75,7 +76,8 @@ TEST_F(FailingHosts, ADaemonThatIsRestartedLosesNothingOfTheLink) {
   body_.drive(planner_);
   head_.daemon().restart();
   body_.drive(planner_);
-  EXPECT_THAT(base_.described(kPlanner), HasSubstr("host head"));
+  base_.await_described(kPlanner, "host head");
+  EXPECT_THAT(base_.log(), Not(HasSubstr("not imported")));
 }
 
 class ForeverHosts : public FailingHosts {
@@ -87,7 +89,7 @@ class ForeverHosts : public FailingHosts {
 TEST_F(ForeverHosts, ASpeakerThatIsGoneLeavesThePortIdleAndInhibited) {
   body_.drive(planner_);
   head_.link().kill();
-  await([&] { return body_.motor().idle(); });
+  body_.await_idle();
   EXPECT_EQ(body_.hold().publish(Speed{0}).delivered, 0U);
   head_.start_link();
   body_.drive(planner_);
@@ -96,7 +98,7 @@ TEST_F(ForeverHosts, ASpeakerThatIsGoneLeavesThePortIdleAndInhibited) {
 TEST_F(ForeverHosts, APortThatIsClosedThereIsClosedHere) {
   body_.drive(planner_);
   { const Planner gone = std::move(planner_); }
-  await([&] { return body_.motor().idle(); });
+  body_.await_idle();
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <memory>
+
 #include "tests/link/robot.hpp"
 
 namespace arbiter::test {
@@ -27,7 +29,7 @@ TEST_F(Hosts, ASampleThatIsPublishedOnOneArrivesAtAPortOfTheOther) {
   Body body(base);
   EXPECT_GT(body.drive(planner), 0);
   EXPECT_EQ(body.motor().winner(), kPlanner);
-  EXPECT_THAT(base.described(kPlanner), HasSubstr("host head"));
+  base.await_described(kPlanner, "host head");
   EXPECT_EQ(body.hold().publish(Speed{0}).discarded, 1U) << "decided where it is received";
 }
 
@@ -49,6 +51,20 @@ TEST_F(Hosts, ADeactivationIsSaidToWhoeverComesBack) {
   Body body(base);
   body.drive(planner);
   base.link().kill();
+  planner.port().deactivate();
+  base.start_link();
+  body.fall_back();
+}
+
+TEST_F(Hosts, ADeactivationIsSaidToWhoeverComesWhenNobodyHasListenedSince) {
+  Host head("head", runtime_, kNoRules, network());
+  Planner planner(head);
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Body body(base);
+  body.drive(planner);
+  base.link().signal(SIGTERM);
+  ASSERT_EQ(base.link().wait(), 0);
+  await([&] { return head.daemon().source(kPlanner)["taps"].empty(); });
   planner.port().deactivate();
   base.start_link();
   body.fall_back();
@@ -88,16 +104,18 @@ TEST_F(Hosts, WhatIsImportedIsNotExported) {
 }
 
 TEST_F(Hosts, EachObeysItsOwnComponent) {
-  Host head("head", runtime_, kNoRules, network());
   Host base("base", runtime_, motor_model("1000s"), network());
+  auto near = std::make_unique<Planner>(base);
+  Host head("head", runtime_, kNoRules, network());
   Planner far(head);
   Body body(base);
-  {
-    Planner near(base);
-    base.see("host base, by");
-    for (int i = 0; i < 5; ++i) body.drive(near);
-    EXPECT_EQ(base.described(kPlanner), "") << "no link has it open";
-  }
+  body.drive(*near);
+  base.see("host base, by");
+  head.see("host head, by");
+  EXPECT_TRUE(head.daemon().source(kPlanner)["open"]);
+  body.drive(*near);
+  EXPECT_EQ(base.described(kPlanner), "") << "no link has it open";
+  near.reset();
   await([&] {
     far.publish();
     return base.described(kPlanner).find("host head") != std::string::npos;
@@ -113,11 +131,11 @@ TEST_F(Hosts, AThirdOneKeepsTheSpeakerThatItHasAndNamesBoth) {
   Host rear("rear", runtime_, kNoRules, network());
   Planner other(rear);
   base.see("is open on several hosts: head, rear; it is taken from head");
-  await([&] { return base.described(kPlanner).find("head, rear") != std::string::npos; });
+  base.await_described(kPlanner, "head, rear");
   body.drive(planner);
-  EXPECT_THAT(base.described(kPlanner), HasSubstr("host head"));
+  base.await_described(kPlanner, "host head");
   head.link().kill();  // its lease ends
-  await([&] { return base.described(kPlanner).find("host rear") != std::string::npos; });
+  base.await_described(kPlanner, "host rear");
 }
 
 TEST_F(Hosts, AnotherTypeOpensThePortAgain) {

@@ -69,6 +69,13 @@ class Body {
       if (const auto number = commanded()) return *number;
     }
   }
+  // Until nothing is left to take, and nobody commands the motor.
+  void await_idle() {
+    await([&] {
+      static_cast<void>(motor_.take());
+      return motor_.idle();
+    });
+  }
   // Until the motor has what it falls back to.
   void fall_back() {
     for (;;) {

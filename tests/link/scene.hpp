@@ -78,6 +78,10 @@ class Host {
     const nlohmann::json found = daemon_.source(source);
     return found.is_null() ? "" : found.value("described", "");
   }
+  // The daemon hears it a little later.
+  void await_described(const std::string& source, const std::string& text) {
+    await([&] { return described(source).find(text) != std::string::npos; });
+  }
 
  private:
   static Daemon::Options options_of(const std::string& name, const TemporaryDirectory& runtime) {

@@ -16,21 +16,45 @@ namespace {
 
 using testing::ElementsAre;
 
+StreamEvent event(std::uint64_t number, bool is_deactivated) {
+  return {number, 0, false, is_deactivated};
+}
+
+StreamEvent sample(std::uint64_t number, std::uint64_t sequence) {
+  return {number, sequence, true, false};
+}
+
 TEST(Stream, CountsWhatDoesNotCome) {
   Stream stream;
-  EXPECT_TRUE(stream.note(1, 10, false));
+  EXPECT_TRUE(stream.note(1, event(10, false)));
   EXPECT_EQ(stream.lost(), 0U) << "what was sent before it joined is not missed";
-  EXPECT_TRUE(stream.note(1, 11, false));
-  EXPECT_TRUE(stream.note(1, 15, false));
+  EXPECT_TRUE(stream.note(1, event(11, false)));
+  EXPECT_TRUE(stream.note(1, event(15, false)));
   EXPECT_EQ(stream.lost(), 3U);
   EXPECT_EQ(stream.doubled(), 0U);
 }
 
+// While all who read a source are cut off, its exporter does not look at it.
+TEST(Stream, CountsSamplesThatItsExporterDidNotNumber) {
+  Stream stream;
+  EXPECT_TRUE(stream.note(1, sample(1, 500)));
+  EXPECT_TRUE(stream.note(1, sample(2, 501)));
+  EXPECT_EQ(stream.lost(), 0U);
+  EXPECT_TRUE(stream.note(1, {3, 501, false, false})) << "joined again";
+  EXPECT_TRUE(stream.note(1, {4, 511, false, false})) << "its publisher tells how far it is";
+  EXPECT_TRUE(stream.note(1, sample(5, 512)));
+  EXPECT_EQ(stream.lost(), 10U);
+  EXPECT_TRUE(stream.note(1, sample(9, 516)));
+  EXPECT_EQ(stream.lost(), 13U) << "counted once, not twice";
+  EXPECT_TRUE(stream.note(1, sample(10, 1))) << "the publisher's successor";
+  EXPECT_EQ(stream.lost(), 13U);
+}
+
 TEST(Stream, NothingComesTwiceOrOutOfOrder) {
   Stream stream;
-  EXPECT_TRUE(stream.note(1, 2, false));
-  EXPECT_FALSE(stream.note(1, 2, false));
-  EXPECT_FALSE(stream.note(1, 1, true)) << "a deactivation that was overtaken";
+  EXPECT_TRUE(stream.note(1, event(2, false)));
+  EXPECT_FALSE(stream.note(1, event(2, false)));
+  EXPECT_FALSE(stream.note(1, event(1, true))) << "a deactivation that was overtaken";
   EXPECT_FALSE(stream.is_deactivated());
   EXPECT_EQ(stream.doubled(), 2U);
 }
@@ -50,7 +74,7 @@ TEST(Stream, AccountsForEveryEventOfANetworkThatLosesDoublesAndReorders) {
     std::uint64_t first = 0;
     std::uint64_t last = 0;
     for (const std::uint64_t number : sent) {
-      if (!stream.note(9, number, false)) continue;
+      if (!stream.note(9, event(number, false))) continue;
       EXPECT_GT(number, last);
       if (first == 0) first = number;
       last = number;
@@ -63,18 +87,18 @@ TEST(Stream, AccountsForEveryEventOfANetworkThatLosesDoublesAndReorders) {
 
 TEST(Stream, TheLastEventSaysWhatTheSourceIsLike) {
   Stream stream;
-  stream.note(1, 1, false);
+  stream.note(1, event(1, false));
   EXPECT_FALSE(stream.is_deactivated());
-  stream.note(1, 5, true);
+  stream.note(1, event(5, true));
   EXPECT_TRUE(stream.is_deactivated()) << "also behind a gap";
-  stream.note(1, 6, false);
+  stream.note(1, event(6, false));
   EXPECT_FALSE(stream.is_deactivated());
 }
 
 TEST(Stream, ALinkThatWasStartedAgainBeginsAgain) {
   Stream stream;
-  stream.note(1, 100, false);
-  EXPECT_TRUE(stream.note(2, 1, true));
+  stream.note(1, event(100, false));
+  EXPECT_TRUE(stream.note(2, event(1, true)));
   EXPECT_TRUE(stream.is_deactivated());
   EXPECT_EQ(stream.lost(), 0U);
 }
@@ -82,12 +106,12 @@ TEST(Stream, ALinkThatWasStartedAgainBeginsAgain) {
 // A host that is obeyed again, after another one was, sends its last event once more.
 TEST(Stream, WhatASpeakerThatComesBackSendsAgainIsKnown) {
   Stream stream;
-  stream.note(1, 100, false);
-  stream.note(2, 1, false);
-  EXPECT_FALSE(stream.note(1, 100, false));
-  EXPECT_TRUE(stream.note(1, 120, false));
+  stream.note(1, event(100, false));
+  stream.note(2, event(1, false));
+  EXPECT_FALSE(stream.note(1, event(100, false)));
+  EXPECT_TRUE(stream.note(1, event(120, false)));
   EXPECT_EQ(stream.lost(), 0U) << "what it sent while another one was obeyed is not missed";
-  EXPECT_TRUE(stream.note(1, 122, false));
+  EXPECT_TRUE(stream.note(1, event(122, false)));
   EXPECT_EQ(stream.lost(), 1U);
 }
 

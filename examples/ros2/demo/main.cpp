@@ -40,11 +40,10 @@ constexpr const char* kLoopback =
     R"(<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32)"
     R"(</MaxAutoParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>)";
 
-// Of the example: in the sources, or where it was installed.
+// Of the example: where it was installed, or in the sources.
 fs::path data_file(const char* name) {
-  return search_and_track::first_of(
-      {fs::path(ROS2_EXAMPLE) / name,
-       search_and_track::own_directory() / ROS2_DATA_FROM_BIN / name});
+  return search_and_track::first_of({search_and_track::own_directory() / ROS2_DATA_FROM_BIN / name,
+                                     fs::path(ROS2_EXAMPLE) / name});
 }
 
 struct Options {

@@ -89,63 +89,64 @@ TEST_P(DdsComingAndGoing, WhatWaitedWhileTheGatewayWasStoppedIsNotObeyed) {
   }
 }
 
-// A lock that is published once, and kept for who comes later: it was pressed before the gateway
-// came. T of both sources is forever.
-const std::string kLatchedModel = R"(<behaviors timeout="TIMEOUT">
-  <source port="/Lock/pressed:o"/><source port="/Lock/released:o"/></behaviors>
-)";
-std::string latched_model(const std::string& timeout) {
-  std::string result = kLatchedModel;
-  return result.replace(result.find("TIMEOUT"), 7, timeout);
-}
+// A lock that is published once, and kept for who comes later. It was pressed before there was a
+// gateway.
+struct LatchedLock {
+  // `timeout`: T of both of its sources.
+  LatchedLock(const std::string& timeout, const std::string& vendor)
+      : daemon(model(timeout)),
+        lock(vendor, domain, {"pub", "bool", "rt/lock", "durability=transient_local"}),
+        witness(vendor, domain, {"sub", "bool", "rt/lock"}) {
+    lock.await("matched 1");
+    witness.await("matched 1");
+    publish_until_heard(lock, witness, "1 0");
+  }
+  static std::string model(const std::string& timeout) {
+    return "<behaviors timeout=\"" + timeout +
+           "\"><source port=\"/Lock/pressed:o\"/><source port=\"/Lock/released:o\"/></behaviors>";
+  }
+  int published(const std::string& source) {
+    const auto status = daemon.source(source);
+    return status.is_null() ? 0 : status.value("published", 0);
+  }
+  void release_until_heard() {
+    while (published("/Lock/released:o") == 0) {
+      lock.publish("0");
+      ::poll(nullptr, 0, 5);
+    }
+  }
+
+  OwnDomain domain;
+  Daemon daemon;
+  Stranger lock;
+  Stranger witness;
+};
+
 const std::string kLatchedLock = R"(<in topic="/lock" type="std_msgs/msg/Bool" qos="latched" )"
                                  R"(true="/Lock/pressed:o" false="/Lock/released:o"/>)";
 
-int published(Daemon& daemon, const std::string& source) {
-  const auto status = daemon.source(source);
-  return status.is_null() ? 0 : status.value("published", 0);
-}
-
 TEST_P(DdsComingAndGoing, ALatchedSampleFromBeforeTheGatewayCameHoldsWhereTIsForever) {
-  const OwnDomain domain;
-  Daemon daemon(latched_model("forever"));
-  Stranger lock(GetParam(), domain, {"pub", "bool", "rt/lock", "durability=transient_local"});
-  Stranger witness(GetParam(), domain, {"sub", "bool", "rt/lock"});
-  lock.await("matched 1");
-  witness.await("matched 1");
-  publish_until_heard(lock, witness, "1 0");
-  DdsGateway gateway(daemon, domain, kLatchedLock);
-  while (published(daemon, "/Lock/pressed:o") == 0) {
+  LatchedLock latched("forever", GetParam());
+  const DdsGateway gateway(latched.daemon, latched.domain, kLatchedLock);
+  while (latched.published("/Lock/pressed:o") == 0) {
   }
-  EXPECT_TRUE(daemon.source("/Lock/pressed:o").value("active", false));
-  // Once the model says that it ends, it is not taken from before: a new model would be entered
-  // into by old samples otherwise.
-  daemon.load(latched_model("500ms"));
+  EXPECT_TRUE(latched.daemon.source("/Lock/pressed:o").value("active", false));
+  // Once the model says that it ends, what was before is not taken again.
+  latched.daemon.load(LatchedLock::model("500ms"));
   gateway.see("what was published before is not taken, since T is not forever");
-  const int before = published(daemon, "/Lock/pressed:o");
-  lock.await("matched 2");
-  lock.publish("0");
-  while (published(daemon, "/Lock/released:o") == 0) {
-  }
-  EXPECT_EQ(published(daemon, "/Lock/pressed:o"), before);
+  const int before = latched.published("/Lock/pressed:o");
+  latched.lock.await("matched 2");
+  latched.release_until_heard();
+  EXPECT_EQ(latched.published("/Lock/pressed:o"), before);
 }
 
 TEST_P(DdsComingAndGoing, ALatchedSampleFromBeforeTheGatewayCameIsNoArrivalWhereTEnds) {
-  const OwnDomain domain;
-  Daemon daemon(latched_model("1000s"));
-  Stranger lock(GetParam(), domain, {"pub", "bool", "rt/lock", "durability=transient_local"});
-  Stranger witness(GetParam(), domain, {"sub", "bool", "rt/lock"});
-  lock.await("matched 1");
-  witness.await("matched 1");
-  publish_until_heard(lock, witness, "1 0");
-  const DdsGateway gateway(daemon, domain, kLatchedLock);
-  lock.await("matched 2");
+  LatchedLock latched("1000s", GetParam());
+  const DdsGateway gateway(latched.daemon, latched.domain, kLatchedLock);
+  latched.lock.await("matched 2");
   gateway.see("1 publisher matched");
-  while (published(daemon, "/Lock/released:o") == 0) {
-    lock.publish("0");
-    ::poll(nullptr, 0, 5);
-  }
-  EXPECT_EQ(published(daemon, "/Lock/pressed:o"), 0);
+  latched.release_until_heard();
+  EXPECT_EQ(latched.published("/Lock/pressed:o"), 0);
 }
 
 }  // namespace

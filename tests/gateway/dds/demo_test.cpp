@@ -2,12 +2,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "tests/gateway/dds/scene.hpp"
 #include "tests/support/run_program.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -35,10 +37,20 @@ Told told(const std::string& base, const std::string& output) {
   return result;
 }
 
+// As it is installed, beside a daemon and a gateway: it finds its nodes and its model from there.
 TEST(Ros2Demo, TheBaseBehindArbiterStandsWhereTheOtherDrivesOn) {
   const OwnDomain domain;
-  const auto result = run_program({std::string(ARBITER_PROGRAMS) + "/ros2-demo", "--lines",
-                                   "--seconds", "15", "--domain", std::to_string(domain.number())});
+  const TemporaryDirectory prefix;
+  const auto installed = run_program(
+      {ARBITER_CMAKE, "-DCMAKE_INSTALL_PREFIX=" + prefix.path(), "-P", ARBITER_INSTALL_DEMO});
+  ASSERT_EQ(installed.exit_code, 0) << installed.err;
+  const std::string programs = prefix.path() + "/bin/";
+  for (const char* const program : {"arbiterd", "arbiter-gateway-dds"}) {
+    std::filesystem::create_symlink(std::string(ARBITER_PROGRAMS) + "/" + program,
+                                    programs + program);
+  }
+  const auto result = run_program({programs + "ros2-demo", "--lines", "--seconds", "15", "--domain",
+                                   std::to_string(domain.number())});
   const std::string navigation = "drives 0.60 m/s, turns 0.35 rad/s";
   const std::string teleop = "drives 0.30 m/s, turns -0.90 rad/s";
   const Told arbiter = told("Arbiter", result.out);

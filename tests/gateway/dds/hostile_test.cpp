@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 
 #include <cstdlib>
+#include <cstring>
 #include <random>
 #include <string>
 #include <vector>
@@ -84,29 +85,80 @@ TEST(DdsHostile, WhatIsNotEncodedAsDdsEncodesIsPassedOver) {
   gateway.see("malformed packet");
 }
 
+// A liar on a topic that chooses between two sources.
+struct Choosing {
+  // `entry`: the rest of the <in>.
+  Choosing(const std::string& topic, const std::string& type, const std::string& entry)
+      : daemon(
+            "<behaviors timeout=\"1000s\"><source port=\"/yes:o\"/><source port=\"/no:o\"/>"
+            "</behaviors>"),
+        gateway(daemon, domain, "<in " + entry + "/>"),
+        liar(domain, topic, type) {
+    liar.await_reader();
+    gateway.see("1 publisher matched");
+  }
+  // Publishes it, and returns once the source has got it.
+  void publish_to(const std::string& source, const std::string& bytes) {
+    const int before = published(source);
+    liar.publish(bytes);
+    while (published(source) != before + 1) {
+    }
+  }
+  // Publishes it, and returns once neither source is active.
+  void publish_to_none(const std::string& bytes) {
+    liar.publish(bytes);
+    while (is_active("/yes:o") || is_active("/no:o")) {
+    }
+  }
+  int published(const std::string& source) { return daemon.source(source).value("published", 0); }
+  bool is_active(const std::string& source) { return daemon.source(source).value("active", false); }
+
+  OwnDomain domain;
+  Daemon daemon;
+  DdsGateway gateway;
+  Liar liar;
+};
+
+struct Button : Choosing {
+  Button()
+      : Choosing("rt/ready", "std_msgs::msg::dds_::Bool_",
+                 R"(topic="/ready" type="std_msgs/msg/Bool" true="/yes:o" false="/no:o")") {}
+};
+
 // A lock that says neither that it is pressed nor that it is released is not released.
 TEST(DdsHostile, ABooleanThatIsNoneEndsBothSources) {
-  const OwnDomain domain;
-  Daemon daemon(
-      "<behaviors timeout=\"1000s\"><source port=\"/EStop/pressed:o\"/>"
-      "<source port=\"/EStop/released:o\"/></behaviors>");
-  const DdsGateway gateway(daemon, domain,
-                           R"(<in topic="/e_stop" type="std_msgs/msg/Bool" )"
-                           R"(true="/EStop/pressed:o" false="/EStop/released:o"/>)");
-  const Liar button(domain, "rt/e_stop", "std_msgs::msg::dds_::Bool_");
-  button.await_reader();
-  gateway.see("1 publisher matched");
-  const auto await_active = [&](const std::string& source, bool active) {
-    while (daemon.source(source).value("active", !active) != active) {
-    }
-  };
+  Button button;
   for (const std::string& none : {std::string("\2"), std::string("\xff"), std::string()}) {
-    button.publish(kLittle + std::string(1, '\0'));
-    await_active("/EStop/released:o", true);
-    button.publish(kLittle + none);
-    await_active("/EStop/released:o", false);
-    await_active("/EStop/pressed:o", false);
+    button.publish_to("/no:o", kLittle + std::string(1, '\0'));
+    EXPECT_TRUE(button.is_active("/no:o"));
+    button.publish_to_none(kLittle + none);
   }
+}
+
+// An appendable type of XCDR2 begins with its length, which is 1 for a Boolean; a mutable one has
+// headers before its fields. Read as one of a final type, each would be true.
+TEST(DdsHostile, ABooleanThatStandsElsewhereEndsBothSources) {
+  Button button;
+  const std::string length("\1\0\0\0", 4);
+  for (const char kind : {'\2', '\3', '\x8', '\x9', '\xa', '\xb'}) {
+    button.publish_to("/yes:o", kLittle + '\1');
+    button.publish_to_none(std::string("\0", 1) + kind + std::string("\0\0", 2) + length + '\0');
+  }
+  // Of a final one the first field stands where it does in XCDR1.
+  button.publish_to("/yes:o", std::string("\0\7\0\0", 4) + '\1');
+}
+
+// XCDR2 aligns a double to four bytes: at the place that XCDR1 has for it stand halves of two.
+TEST(DdsHostile, ANumberThatStandsElsewhereEndsBothSources) {
+  Choosing battery("robots", "strangers::Robot",
+                   R"(topic="robots" type="strangers::Robot" above="/yes:o" below="/no:o" )"
+                   R"(threshold="0.2" field="f64" offset="8")");
+  std::string half(8, '\0');
+  const double value = 0.5;
+  std::memcpy(half.data(), &value, sizeof value);
+  battery.publish_to("/yes:o", kLittle + std::string(8, '\0') + half);
+  battery.publish_to_none(std::string("\0\7\0\0", 4) + std::string(4, '\0') + half + half);
+  EXPECT_EQ(battery.published("/no:o"), 0);
 }
 
 // Datagrams to all ports on which the gateway may listen: noise, and RTPS with bytes changed.

@@ -113,6 +113,24 @@ TEST(Partition, NamesPatternsAndTheDefaultOne) {
   EXPECT_FALSE(share_partition(Names{"a*"}, Names{"*a"}));  // two patterns
 }
 
+// Names without end are not all looked at: any may be among the others.
+TEST(Partition, AmongVeryManyAnyMayBe) {
+  const CycloneQos qos(dds_create_qos());
+  std::vector<std::string> names;
+  std::vector<const char*> pointers;
+  for (int i = 0; i < 100; ++i) names.push_back("p" + std::to_string(i));
+  for (const std::string& name : names) pointers.push_back(name.c_str());
+  const auto announced = [&](std::uint32_t count) {
+    dds_qset_partition(qos.get(), count, pointers.data());
+    return read_announced(*qos);
+  };
+  Qos ours;
+  ours.partitions = {"p99"};
+  EXPECT_TRUE(may_meet(ours, announced(100)));
+  EXPECT_FALSE(may_meet(ours, announced(64)));
+  EXPECT_LE(announced(100).partitions.size(), 64U);
+}
+
 TEST(Partition, APatternThatIsMadeToBeSlowIsNot) {
   std::string pattern;
   for (int i = 0; i < 60; ++i) pattern += "a*";

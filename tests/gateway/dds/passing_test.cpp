@@ -1,5 +1,8 @@
 // Samples of strangers, through the gateway and Arbiter, to other strangers.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <algorithm>
 
 #include "tests/gateway/dds/scene.hpp"
 
@@ -97,6 +100,35 @@ TEST_P(DdsPassing, WhatDoesNotFitIsCountedAndPassedOver) {
   for (const char* const blob : {"1 5000", "2 8000", "3 100"}) blobs.from.publish(blob);
   EXPECT_EQ(blobs.to.next_line(), "sample 3 100");
   await_described(blobs.daemon, "/From:o", "2 of a size that does not fit");
+}
+
+// Cyclone waits by select(), for descriptors below 1024. Each port needs three.
+TEST(DdsDescriptors, AreLeftForCycloneBesideHundredsOfTopics) {
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  const rlimit more{std::min<rlim_t>(before.rlim_max, 8192), before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &more), 0);
+  {
+    const OwnDomain domain;
+    const Daemon daemon(model_of("/In399:o", "/To:i"));
+    std::string elements = R"(<out port="/To:i" topic="/cmd_vel" )" + kTwist + "/>";
+    for (int i = 0; i < 400; ++i) {
+      const std::string number = std::to_string(i);
+      elements += "<in topic=\"/in" + number + "\" " + kTwist + " max_size=\"64\" port=\"/In" +
+                  number + ":o\"/>";
+    }
+    DdsGateway gateway(daemon, domain, elements);
+    gateway.see("serves 400 topics in, 1 out");
+    Stranger to("cyclone", domain, {"sub", "twist", "rt/cmd_vel"});
+    Stranger from("cyclone", domain, {"pub", "twist", "rt/in399"});
+    to.await("matched 1");
+    from.await("matched 1");
+    gateway.see("1 publisher matched");
+    gateway.see("1 subscriber matched");
+    publish_until_heard(from, to, "1 0");
+    EXPECT_EQ(gateway.end(), 0);
+  }
+  ::setrlimit(RLIMIT_NOFILE, &before);
 }
 
 }  // namespace

@@ -44,6 +44,15 @@ class Iceoryx : public testing::Test {
     const auto status = daemon_.source(source);
     return status.contains("described") ? status["described"].get<std::string>() : "";
   }
+  pid_t worker_of(const std::string& source) {
+    return daemon_.source(source)["component"]["pid"].get<pid_t>();
+  }
+  void wait_for_another_worker(const std::string& source, pid_t worker) {
+    wait_until([&] {
+      const auto status = daemon_.source(source);
+      return status["open"] == true && status["component"]["pid"] != worker;
+    });
+  }
   std::string described_input(const std::string& port) {
     const auto status = daemon_.input(port);
     return status.contains("described") ? status["described"].get<std::string>() : "";
@@ -161,6 +170,42 @@ TEST_F(Iceoryx, ARouDiThatHangsIsToldAndHoldsUpNobodyElse) {
   wait_for_description("/Low:o", "no publisher matched");
 }
 
+TEST_F(Iceoryx, ARouDiThatHangsLaterIsToldAndWhatIsConnectedGoesOn) {
+  Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
+  Spoken publisher = plain_publisher("low");
+  Spoken subscriber = plain_subscriber("base");
+  ASSERT_TRUE(subscriber.hear("ready"));
+  wait_for_description("/Low:o", "1 publisher matched");
+  roudi.process.stop();
+  wait_for_description("/Low:o", "RouDi does not answer");
+  publisher.say("x");
+  EXPECT_EQ(subscriber.line(), "|x");
+  // Whether it then gives up those whom it has not heard of, or not.
+  roudi.process.resume();
+  wait_until(
+      [&] { return described("/Low:o").find("RouDi does not answer") == std::string::npos; });
+  const Spoken anyone = plain_publisher("low");
+  wait_until([&] {
+    const std::string text = described("/Low:o");
+    return text.find("1 publisher matched") != std::string::npos ||
+           text.find("2 publishers matched") != std::string::npos;
+  });
+}
+
+// It notices that its ends are dead when it touches them, or after ten seconds without a word.
+TEST_F(Iceoryx, AGatewayThatRouDiHasGivenUpBeginsAnew) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
+  wait_for_description("/Low:o", "no publisher matched");
+  const pid_t worker = worker_of("/Low:o");
+  Spoken leave(
+      {ARBITER_TESTS "/plain_iceoryx_leave", "arbiter-gateway-iceoryx-" + std::to_string(worker)});
+  ASSERT_EQ(leave.process.wait(), 0);
+  wait_for_another_worker("/Low:o", worker);
+  expect_that_samples_pass();
+}
+
 TEST_F(Iceoryx, AGatewayIsEndedWhetherRouDiRunsOrNot) {
   Spoken without = gateway(directory_, in("low", "/Low:o"));
   ASSERT_TRUE(without.hear("RouDi does not run"));
@@ -275,14 +320,15 @@ TEST_F(Iceoryx, WhoElsePublishesWhereTheGatewayDoesIsTold) {
 TEST_F(Iceoryx, ASubscriberThatAsksForWhatTheGatewayDoesNotOfferIsNamed) {
   const Roudi roudi(directory_);
   Spoken gate = gateway(directory_, out("/Base:i", "base"));
-  const Spoken subscriber(
-      {ARBITER_TESTS "/plain_iceoryx_subscriber", "Test", "One", "base", "blocking"});
+  Spoken subscriber({ARBITER_TESTS "/plain_iceoryx_subscriber", "Test", "One", "base", "blocking"});
   const std::string name = "plain-subscriber-" + std::to_string(subscriber.process.pid());
   wait_until([&] {
     return described_input("/Base:i").find("no subscriber matched; " + name +
                                            " subscribes and is not connected: it asks for ") !=
            std::string::npos;
   });
+  subscriber.process.signal(SIGTERM);
+  wait_until([&] { return described_input("/Base:i").find(name) == std::string::npos; });
 }
 
 // What it could watch at once is 256.
@@ -320,25 +366,18 @@ TEST_F(Iceoryx, WithoutMemoryTheLogStaysShort) {
   }
 }
 
-pid_t worker_of(const std::string& source, Daemon& daemon) {
-  return daemon.source(source)["component"]["pid"].get<pid_t>();
-}
-
 TEST_F(Iceoryx, AWorkerThatDiesIsReplaced) {
   const Roudi roudi(directory_);
   Spoken gate = gateway(directory_, in("low", "/Low:o"));
   wait_for_description("/Low:o", "no publisher matched");
-  const pid_t worker = worker_of("/Low:o", daemon_);
+  const pid_t worker = worker_of("/Low:o");
   EXPECT_NE(worker, gate.process.pid());
   const std::string trace = "/tmp/arbiter-gateway-iceoryx-" + std::to_string(worker);
   EXPECT_TRUE(std::filesystem::exists(trace));
   ::kill(worker, SIGKILL);
   ASSERT_TRUE(gate.hear("the worker was ended by signal 9 (Killed); another one is started"));
   EXPECT_FALSE(std::filesystem::exists(trace));
-  wait_until([&] {
-    const auto source = daemon_.source("/Low:o");
-    return source["open"] == true && source["component"]["pid"] != worker;
-  });
+  wait_for_another_worker("/Low:o", worker);
   wait_for_description("/Low:o", "no publisher matched");
 }
 
@@ -355,7 +394,7 @@ TEST_F(Iceoryx, AWorkerEndsWithoutItsSupervisorAndWithoutRouDi) {
   Roudi roudi(directory_);
   Spoken gate = gateway(directory_, in("low", "/Low:o"));
   wait_for_description("/Low:o", "no publisher matched");
-  const pid_t worker = worker_of("/Low:o", daemon_);
+  const pid_t worker = worker_of("/Low:o");
   roudi.process.stop();
   gate.process.kill();
   wait_until([&] {
@@ -400,7 +439,7 @@ TEST_F(Iceoryx, WhatHasWaitedForLongerThanTNeverArrives) {
     }
   };
   say_until_it_arrives("before");
-  const pid_t worker = worker_of("/Low:o", daemon_);
+  const pid_t worker = worker_of("/Low:o");
   stop(worker);
   const auto stopped = shm::monotonic_now();
   publisher.say("then");

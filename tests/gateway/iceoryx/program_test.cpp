@@ -1,10 +1,12 @@
 // The program around a gateway: options, mappings that are wrong, exit codes. Without RouDi.
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <string>
 #include <vector>
 
 #include "tests/support/run_program.hpp"
+#include "tests/support/spoken.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::test {
@@ -60,6 +62,15 @@ TEST(GatewayProgram, SaysWhatIsWrongWithItsArguments) {
   const auto help = run_gateway({"--help"});
   EXPECT_EQ(help.exit_code, 0);
   EXPECT_THAT(help.out, HasSubstr("Exit codes: 0"));
+}
+
+// Its worker is given the same words, and one of its own.
+TEST(GatewayProgram, AMappingMayFollowADoubleDash) {
+  const TemporaryDirectory directory;
+  const std::string instance = "none-" + std::to_string(::getpid());
+  Spoken gateway({ARBITER_PROGRAMS "/arbiter-gateway-iceoryx", "--instance", instance, "--",
+                  directory.write("good.xml", kGood)});
+  EXPECT_TRUE(gateway.hear("no arbiterd of instance \"" + instance)) << gateway.heard;
 }
 
 }  // namespace

@@ -1,0 +1,96 @@
+// Two hosts with networks of their own, and the cable between them pulled.
+#include <gtest/gtest.h>
+
+#include "tests/link/cables.hpp"
+#include "tests/link/robot.hpp"
+
+namespace arbiter::test {
+namespace {
+
+constexpr int kHead = 1;
+constexpr int kBase = 2;
+constexpr int kUnheard = 100;  // samples that are published during a cut
+
+class Cable : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (const std::string why = why_no_networks(); !why.empty()) GTEST_SKIP() << why;
+  }
+};
+
+// All of a robot, made once it is known that it can be.
+struct CabledRobot {
+  CabledRobot() {
+    cables.connect(head_network, kHead);
+    cables.connect(base_network, kBase);
+  }
+  [[nodiscard]] static std::vector<std::string> arguments() { return {"--interface", "eth0"}; }
+
+  Switch cables;
+  NetworkNamespace head_network;
+  NetworkNamespace base_network;
+  TemporaryDirectory runtime;
+};
+
+// 3 in "host head, 3 lost"; 0: it says nothing of that.
+int count_in(const std::string& description, const std::string& what) {
+  const std::size_t end = description.find(what);
+  if (end == std::string::npos) return 0;
+  return std::stoi(description.substr(description.rfind(' ', end - 1) + 1));
+}
+
+// A cut shorter than the lease: the two do not lose each other. A longer one: they find each other
+// again. Either way the motor gets what it falls back to, and then nothing of what was published
+// meanwhile.
+void cut_and_heal(bool until_gone) {
+  CabledRobot robot;
+  Host head("head", robot.runtime, source_model("300ms"), robot.arguments(),
+            robot.head_network.enter());
+  Host base("base", robot.runtime, motor_model("300ms"), robot.arguments(),
+            robot.base_network.enter());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  robot.cables.cut(kHead);
+  body.fall_back();
+  for (int i = 0; i < kUnheard; ++i) planner.publish();
+  const std::int64_t unheard = planner.published();
+  if (until_gone) {
+    base.see("is not imported any more");
+    await([&] { return head.daemon().source(kPlanner)["taps"].empty(); });
+  } else {
+    await([&] { return !head.daemon().source(kPlanner)["active"]; });
+  }
+  body.fall_back();
+  robot.cables.heal(kHead);
+  EXPECT_GT(body.drive(planner), unheard);
+  // Each of them was lost, or came too late or too soon.
+  await([&] {
+    planner.publish();
+    const std::string described = base.described(kPlanner);
+    return count_in(described, " lost") + count_in(described, " late") +
+               count_in(described, " before the port was open") >=
+           kUnheard;
+  });
+}
+
+TEST_F(Cable, APulledOneIsSilenceAndNothingOfItComesLate) { cut_and_heal(false); }
+
+TEST_F(Cable, AHostThatWasGoneIsFoundAgain) { cut_and_heal(true); }
+
+TEST_F(Cable, AnInterfaceMayComeAfterTheLink) {
+  CabledRobot robot;
+  const NetworkNamespace late;
+  Host base("base", robot.runtime, motor_model("300ms"), robot.arguments(),
+            robot.base_network.enter());
+  Host rear("rear", robot.runtime, kNoRules, robot.arguments(), late.enter());
+  rear.see("trying again");
+  robot.cables.connect(late, 3);
+  Planner planner(rear);
+  Body body(base);
+  body.drive(planner);
+  base.await_described(kPlanner, "host rear");
+}
+
+}  // namespace
+}  // namespace arbiter::test
