@@ -197,6 +197,29 @@ TEST(Descriptor, LosesNoWakeUpHoweverTheTwoMeet) {
   sender.join();
 }
 
+// Nor where it is disarmed in between: what was accepted meanwhile is found by the takes, or by the
+// last look of arming.
+TEST(Descriptor, LosesNoWakeUpWhereItIsDisarmedInBetween) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in", {.depth = 4, .when_full = refuse_new});
+  constexpr std::int64_t kSamples = 10000;
+  const int fd = in.fd();
+  std::thread sender([&] {
+    for (std::int64_t i = 0; i < kSamples;) i += out.publish(Number{i}).delivered;
+  });
+  for (std::int64_t next = 0; next < kSamples;) {
+    wait_until_readable(fd);
+    for (int i = 0; i < 3; ++i) {
+      in.disarm();
+      while (auto sample = in.take()) ASSERT_EQ((**sample).value, next++);
+    }
+    while (auto sample = in.take()) ASSERT_EQ((**sample).value, next++);
+  }
+  sender.join();
+}
+
 TEST(Descriptor, SeveralPortsWaitInOneLoop) {
   constexpr std::uint64_t kPorts = 8;
   Daemon daemon(fan_out_model(kPorts));
