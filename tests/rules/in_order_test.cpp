@@ -145,7 +145,7 @@ TEST(InOrder, RandomRulesDecideAsTheDefinitionSays) {
     Readers(rules, model).check_all_states();
     if (HasFailure()) return;
   }
-  EXPECT_GT(in_order, rounds(200));
+  EXPECT_GT(in_order, rounds(160));  // about half are; of a tenth, 20 of 40
 }
 
 TEST(InOrder, TheSourcesThatAPortReadsAreThoseThatItsWalksTest) {
