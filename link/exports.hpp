@@ -48,8 +48,6 @@ class Exports {
   // of them that are wanted elsewhere, and nothing else.
   void look(const HostView& view);
 
-  [[nodiscard]] std::size_t count() const { return exports_.size(); }
-
  private:
   struct Export {
     Export(const Network& network, OfferCard of, const gateway::Bell& bell)

@@ -1,8 +1,8 @@
 // One source of another host that the model here wants: its events become arrivals at an output
 // port of this link, under the source's name.
 //
-// Thread safety: look(), close() and text() on the link's thread; take() on Cyclone's threads, one
-// at a time. mutex_ guards what both use. A port is opened and closed without it.
+// Thread safety: look() on the link's thread; take() on Cyclone's threads, one at a time. mutex_
+// guards what both use. A port is opened and closed without it.
 #pragma once
 
 #include <atomic>
@@ -48,10 +48,6 @@ class Import : private gateway::dds::SampleTaker {
   // it.
   void look(bool is_open_here, bool has_daemon);
 
-  [[nodiscard]] bool is_open() const { return port_.has_value(); }
-  // "host head, 3 lost, 2 late".
-  [[nodiscard]] std::string text() const;
-
  private:
   struct Counts {
     std::uint64_t late = 0;
@@ -79,6 +75,8 @@ class Import : private gateway::dds::SampleTaker {
   void say_who_speaks();
   void say_once(const std::string& text);
   void describe();
+  // "host head, 3 lost, 2 late".
+  [[nodiscard]] std::string text() const;
 
   Node& node_;
   const SentTokens& tokens_;
