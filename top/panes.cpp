@@ -153,8 +153,8 @@ Cell change_cell(const Takeover& change, const std::string& arrow) {
   return cell;
 }
 
-// Of a cause, "/Face/pos:o became active, /Rest/pos:o went inactive": what stands between a slash and a
-// blank.
+// Of a cause, "/Face/pos:o became active, /Rest/pos:o went inactive": what stands between a slash
+// and a blank.
 std::vector<NamePlace> names_in(const std::string& text) {
   std::vector<NamePlace> names;
   for (std::size_t begin = 0; begin < text.size();) {
