@@ -277,6 +277,7 @@ std::vector<std::string> Watcher::take_refusals() {
     sources.push_back(source);
   }
   std::vector<std::string> texts;
+  texts.reserve(by_reason.size());
   for (const auto& [reason, refused] : by_reason) {
     texts.push_back("cannot record " + rules::enumerate(refused.first) + ": " + refused.second);
   }
