@@ -45,7 +45,9 @@ bool is_loopback(const sockaddr& address) {
 
 Addresses resolve(const std::string& text) {
   const auto colon = text.rfind(':');
-  const std::string advice = "write ADDRESS:PORT, such as 127.0.0.1:9180 or [::1]:9180, or a path";
+  const std::string advice =
+      "write ADDRESS:PORT, such as 127.0.0.1:9180 or [::1]:9180, or a "
+      "socket's path, such as ./metrics or metrics.sock";
   if (colon == std::string::npos) fail(text, advice);
   std::string host = text.substr(0, colon);
   const std::string port = text.substr(colon + 1);
@@ -137,8 +139,8 @@ Listening listen_on_path(const std::string& path) {
 }  // namespace
 
 Listening listen_on(const std::string& address, bool allow_remote) {
-  return address.find('/') == std::string::npos ? listen_on_port(address, allow_remote)
-                                                : listen_on_path(address);
+  const bool is_path = address.find('/') != std::string::npos || address.ends_with(".sock");
+  return is_path ? listen_on_path(address) : listen_on_port(address, allow_remote);
 }
 
 }  // namespace arbiter::cli

@@ -14,9 +14,9 @@ struct Listening {
 };
 
 // `address`: ADDRESS:PORT, with IPv6 in brackets, or localhost:PORT; or a path, which contains a
-// '/'. Asks no name server. Throws Error, which says what is wrong: an address that other machines
-// can reach, unless `allow_remote`; one that is taken. A socket that a program has left behind is
-// replaced.
+// '/' or ends in ".sock". Asks no name server. Throws Error, which says what is wrong: an address
+// that other machines can reach, unless `allow_remote`; one that is taken. A socket that a program
+// has left behind is replaced.
 Listening listen_on(const std::string& address, bool allow_remote);
 
 }  // namespace arbiter::cli

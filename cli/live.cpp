@@ -3,6 +3,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <sys/signalfd.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -104,6 +105,12 @@ shm::FileDescriptor catch_interrupts() {
   }
   sigprocmask(SIG_BLOCK, &caught, nullptr);
   return shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
+}
+
+int interrupted_exit_code(const shm::FileDescriptor& interrupts) {
+  signalfd_siginfo signal{};
+  const bool is_known = ::read(interrupts.get(), &signal, sizeof signal) == sizeof signal;
+  return 128 + (is_known ? static_cast<int>(signal.ssi_signo) : SIGINT);
 }
 
 bool sleep_until(shm::Nanoseconds time, const shm::FileDescriptor& interrupts) {

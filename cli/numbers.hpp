@@ -22,7 +22,7 @@ inline CLI::Validator at_least_one() {
             const char* const end = text.data() + text.size();
             const auto read = std::from_chars(text.data(), end, value);
             if (read.ec == std::errc() && read.ptr == end && value >= 1) return "";
-            return '"' + text + "\" is no whole number of at least 1";
+            return '"' + text + "\" is not a whole number of at least 1";
           },
           ""};
 }
@@ -37,7 +37,7 @@ inline CLI::Validator number_between(double least, double most) {
             if (is_number && std::isfinite(value) && value >= least && value <= most) return "";
             std::ostringstream problem;
             problem.precision(10);
-            problem << '"' << text << "\" is no number from " << least << " to " << most;
+            problem << '"' << text << "\" is not a number from " << least << " to " << most;
             return problem.str();
           },
           ""};

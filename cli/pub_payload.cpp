@@ -79,7 +79,7 @@ std::vector<std::byte> bytes_of_hex(std::string_view hex) {
     if (!digit) {
       throw CLI::ValidationError(
           "--hex", "character " + std::to_string(at + 1) +
-                       " is no hexadecimal digit; write two digits for each byte, such as 0A0B");
+                       " is not a hexadecimal digit; write two digits for each byte, such as 0A0B");
     }
     if (high) bytes.push_back(static_cast<std::byte>(*high << 4 | *digit));
     high = high ? std::nullopt : digit;

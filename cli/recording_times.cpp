@@ -1,5 +1,6 @@
 #include "cli/recording_times.hpp"
 
+#include <cstddef>
 #include <cstdio>
 #include <ctime>
 
@@ -36,6 +37,17 @@ std::string wall_text(const Recorded& recorded, shm::Nanoseconds time) {
   gmtime_r(&seconds, &parts);
   char text[64];
   std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &parts);
+  return text;
+}
+
+std::string clock_text(shm::Nanoseconds wall) {
+  const std::time_t seconds = wall / 1'000'000'000;
+  std::tm parts{};
+  localtime_r(&seconds, &parts);
+  char text[64];
+  const std::size_t length = std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S", &parts);
+  std::snprintf(text + length, sizeof text - length, ".%03d",
+                static_cast<int>(wall / 1'000'000 % 1000));
   return text;
 }
 

@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <iostream>
 #include <map>
+#include <set>
 #include <sstream>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -21,6 +23,7 @@
 #include "evidence/recorded.hpp"
 #include "evidence/verification.hpp"
 #include "rules/ask/report.hpp"
+#include "rules/text/names.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::cli {
@@ -229,6 +232,21 @@ int write_comparison(const Recorded& recorded, const evidence::Comparison& resul
   return is_same ? 0 : 1;
 }
 
+// A model of another robot decides all otherwise, which says nothing of either.
+void warn_of_other_ports(const Recorded& recorded, const evidence::Judge& judge) {
+  std::set<std::string> ports;
+  for (const evidence::Run& run : recorded.runs) {
+    evidence::for_each_decision(
+        run, [&](const evidence::LiveDecision& live) { ports.insert(*live.port); });
+  }
+  const auto has = [&](const std::string& port) {
+    return judge.simulation().find_port(port).has_value();
+  };
+  if (ports.empty() || std::any_of(ports.begin(), ports.end(), has)) return;
+  std::cerr << "arbiter: warning: the model has none of the input ports of the recording: "
+            << shm::printable(rules::enumerate({ports.begin(), ports.end()})) << '\n';
+}
+
 }  // namespace
 
 Recorded load_for_simulation(const std::string& path) {
@@ -259,6 +277,7 @@ int simulate_recording(const SimulateRecordingOptions& options) {
   rules::write_text(std::cerr, diagnostics);
   if (!other) return 1;
   evidence::Judge judge(other->compiled, true);
+  warn_of_other_ports(recorded, judge);
   return write_comparison(recorded, evidence::compare(recorded, models, judge), options);
 }
 

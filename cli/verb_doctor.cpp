@@ -44,7 +44,7 @@ std::string problem_of_finding(std::string& code) {
 std::string problem_of_root(std::string& root) {
   std::error_code error;
   if (std::filesystem::is_directory(root, error)) return "";
-  return rules::quote(root) + " is no directory";
+  return rules::quote(root) + " is not a directory";
 }
 
 // Names come from processes and files of others.
@@ -85,7 +85,10 @@ int examine(const DoctorOptions& options) {
   };
   add(watch::examine_meeting_places());
   add(watch::examine_daemon(who, status));
-  if (status) add(watch::examine_processes(machine, *status));
+  if (status) {
+    add(watch::examine_processes(machine, *status));
+    add(watch::examine_publishers(who, *status));
+  }
   const std::size_t before = findings.size();
   const auto& silenced = options.silenced;
   std::erase_if(findings, [&](const watch::Finding& finding) {
@@ -121,8 +124,10 @@ void add_doctor(CLI::App& app, int& exit_code) {
       "Examples:\n"
       "  arbiter doctor\n"
       "  arbiter doctor --silence governor,realtime-priority\n\n"
-      "It changes nothing, and asks the daemon for its status once. Limits are those of the shell\n"
-      "that it is started from: run it as the user, and where, your components run.\n\n"
+      "It changes nothing, and asks the daemon for its status once. Where components have sources\n"
+      "open, it watches their arrivals for 2.5 s at most. Limits are those of the shell that it "
+      "is\n"
+      "started from: run it as the user, and where, your components run.\n\n"
       "Exit codes: 0 nothing found; 1 findings; 2 wrong use, or it cannot look, or standard output "
       "cannot "
       "be\nwritten");

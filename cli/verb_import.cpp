@@ -145,7 +145,7 @@ CLI::Validator name_of_type() {
                 "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_/";
             const bool is_good = text.find("/msg/") != std::string::npos &&
                                  text.find_first_not_of(kAllowed) == std::string::npos;
-            return is_good ? "" : '"' + text + "\" is no type, such as geometry_msgs/msg/Twist";
+            return is_good ? "" : '"' + text + "\" is not a type, such as geometry_msgs/msg/Twist";
           },
           ""};
 }

@@ -18,6 +18,9 @@
 namespace arbiter::cli {
 namespace {
 
+// Whoever collects metrics waits no longer; meanwhile --listen serves nobody else.
+constexpr std::chrono::milliseconds kAnswerTime{1000};
+
 struct MetricsOptions {
   std::string instance;
   ListenAddress address;
@@ -26,7 +29,9 @@ struct MetricsOptions {
 int write_once(const MetricsOptions& options) {
   wire::Status status;
   try {
-    status = fetch_status("metrics", options.instance);
+    wire::Caller who = caller("metrics", options.instance);
+    who.answer_time = kAnswerTime;
+    status = fetch_status(std::move(who), kAnswerTime);
   } catch (const std::exception&) {
     std::cout << watch::metrics_of_no_daemon();
     throw;
@@ -58,9 +63,6 @@ class Source {
   }
 
  private:
-  // Meanwhile nobody else is served.
-  static constexpr std::chrono::milliseconds kAnswerTime{1000};
-
   wire::Caller caller_;
   std::string said_;
 };
@@ -81,7 +83,8 @@ void add_metrics(CLI::App& app, int& exit_code) {
   CLI::App* verb = app.add_subcommand(
       "metrics", "Write counters and states in Prometheus's text format, or serve them over HTTP");
   auto* listen = verb->add_option("--listen", options->address.text,
-                                  "Serve them until interrupted: ADDRESS:PORT, or a socket's path")
+                                  "Serve them until interrupted: ADDRESS:PORT, or a socket's path, "
+                                  "which has a '/' in it or ends in .sock")
                      ->type_name("ADDRESS");
   verb->add_flag("--allow-remote", options->address.allow_remote,
                  "With --listen: also on an address that other machines can reach")
@@ -92,7 +95,8 @@ void add_metrics(CLI::App& app, int& exit_code) {
       "  arbiter metrics\n"
       "  arbiter metrics --listen 127.0.0.1:9180     # then scrape "
       "http://127.0.0.1:9180/metrics\n\n"
-      "Without a daemon the only metric is arbiter_up 0.\n\n"
+      "Without a daemon, or if it does not answer within a second, the only metric is arbiter_up "
+      "0.\n\n"
       "Exit codes: 0 written, or served until interrupted; 1 no daemon, or you may not observe; "
       "or\n"
       "the address cannot be listened on; 2 wrong use, or standard output cannot be written");

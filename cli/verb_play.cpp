@@ -165,7 +165,8 @@ int play(const PlayOptions& options) {
   Player player(options, events);
   player.note_unknown_sources();
   rules::write_outcome_header(std::cout);
-  return events.empty() || player.run(events, interrupts) ? 0 : 1;
+  if (events.empty() || player.run(events, interrupts)) return 0;
+  return std::cout ? interrupted_exit_code(interrupts) : 1;
 }
 
 }  // namespace
@@ -179,7 +180,11 @@ void add_play(CLI::App& app, int& exit_code) {
       ->type_name("X")
       ->check(number_between(1e-3, 1e6));
   add_instance_option(*verb, options->instance);
-  verb->footer("Example:\n  arbiter play trace.csv --speed 2");
+  verb->footer(
+      "Example:\n  arbiter play trace.csv --speed 2\n\n"
+      "Exit codes: 0 all published; 1 no daemon, or the trace has errors; 2 wrong use, or a file "
+      "that "
+      "cannot\nbe read; 130 stopped by Ctrl-C before the end (143 by SIGTERM)");
   verb->callback([options, &exit_code] { exit_code = play(*options); });
 }
 

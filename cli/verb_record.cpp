@@ -181,29 +181,33 @@ std::size_t read_size(const std::string& text) {
   const int shift = unit == "KiB" ? 10 : unit == "MiB" ? 20 : unit == "GiB" ? 30 : -1;
   if (used == 0 || text.front() == '-' || shift < 0 || number == 0 || number > 4096) {
     throw CLI::ValidationError("--memory", '"' + text +
-                                               "\" is no size, such as 64MiB: 1 to 4096, "
+                                               "\" is not a size such as 64MiB: write 1 to 4096, "
                                                "and KiB, MiB or GiB");
   }
   return static_cast<std::size_t>(number) << shift;
 }
 
 void add_flight_options(CLI::App& verb, const std::shared_ptr<RecordOptions>& options) {
-  auto* ring = verb.add_option_function<std::string>(
-                       "--ring",
-                       [options](const std::string& text) {
-                         options->flight.span = read_span("--ring", text);
-                         if (options->flight.span < 1) {
-                           throw CLI::ValidationError("--ring", "must be more than 0s");
-                         }
-                       },
-                       "Flight recorder: keep the last minutes in memory, and write them to "
-                       "FILE-TIME-WHY.mcap at SIGUSR1, at --dump, when --when becomes true, and "
-                       "when a component dies")
-                   ->type_name("DURATION");
+  auto* ring =
+      verb.add_option_function<std::string>(
+              "--ring",
+              [options](const std::string& text) {
+                options->flight.span = read_span("--ring", text);
+                if (options->flight.span < 1) {
+                  throw CLI::ValidationError("--ring", "must be more than 0s");
+                }
+              },
+              "Flight recorder: keep the records of this time in memory, as far as --memory "
+              "reaches, and write them to "
+              "FILE-TIME-WHY.mcap at SIGUSR1, at --dump, when --when becomes true, and "
+              "when a component dies")
+          ->type_name("DURATION");
   verb.add_option_function<std::string>(
           "--memory",
           [options](const std::string& text) { options->flight.memory = read_size(text); },
-          "What --ring may take up (default 64MiB): older records give way")
+          "How much of them --ring keeps (default 64MiB): beyond it the oldest give way, even if "
+          "they "
+          "are younger than --ring's time")
       ->type_name("SIZE")
       ->needs(ring);
   verb.add_option_function<std::string>(

@@ -6,6 +6,7 @@
 
 #include "cli/recording_export.hpp"
 #include "cli/recording_info.hpp"
+#include "cli/recording_winners.hpp"
 #include "cli/verbs.hpp"
 
 namespace arbiter::cli {
@@ -25,7 +26,7 @@ void add_info(CLI::App& parent, int& exit_code) {
   verb->add_flag("--json", options->json, "Write it as one JSON object");
   verb->footer(
       "Exit codes: 0 the file is whole; 1 it is not: what is whole of it is shown; 2 wrong use, or "
-      "a file\nthat cannot be opened or is no MCAP file\n\n"
+      "a file\nthat cannot be opened or is not an MCAP file\n\n"
       "Example:\n  arbiter recording info incident.mcap");
   verb->callback(
       [options, &exit_code] { exit_code = show_recording(options->file, options->json); });
@@ -51,15 +52,17 @@ void add_repair(CLI::App& parent, int& exit_code) {
 }  // namespace
 
 void add_recording(CLI::App& app, int& exit_code) {
-  CLI::App* verb =
-      app.add_subcommand("recording", "Show what a recording's file has, repair one, or export it");
+  CLI::App* verb = app.add_subcommand(
+      "recording", "Show what a recording has and who commanded, repair or export one");
   verb->require_subcommand(1);
   add_info(*verb, exit_code);
   add_repair(*verb, exit_code);
   add_export(*verb, exit_code);
+  add_recorded_winners(*verb, exit_code);
   verb->footer(
       "Examples:\n"
       "  arbiter recording info incident.mcap\n"
+      "  arbiter recording winners incident.mcap --at 14:03:07\n"
       "  arbiter recording repair incident.mcap -o whole.mcap\n"
       "  arbiter recording export incident.mcap --trace trace.csv\n\n"
       "Exit codes: 0 done; 1 the file is not whole (info); 2 wrong use, or a file that cannot be "

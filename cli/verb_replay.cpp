@@ -41,7 +41,7 @@ int replay(const ReplayVerb& verb) {
     std::cout << counted(replayed.without_payload, "sample")
               << " whose payload is not in the recording became signals\n";
   }
-  return replayed.was_interrupted ? 1 : 0;
+  return replayed.was_interrupted ? interrupted_exit_code(interrupts) : 0;
 }
 
 }  // namespace
@@ -69,7 +69,9 @@ void add_replay(CLI::App& app, int& exit_code) {
       "Example:\n"
       "  arbiter replay incident.mcap --instance desk\n"
       "  arbiter replay incident.mcap --port /Arm/pos:i --rate 2\n\n"
-      "The ports must be free: stop their components, or use an instance of its own.");
+      "The ports must be free: stop their components, or use an instance of its own.\n\n"
+      "Exit codes: 0 all published; 1 no daemon, or the ports cannot be opened; 2 wrong use, or a "
+      "file that\ncannot be read; 130 stopped by Ctrl-C before the end (143 by SIGTERM)");
   verb->callback([options, &exit_code] { exit_code = replay(*options); });
 }
 

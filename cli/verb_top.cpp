@@ -91,6 +91,10 @@ class Top {
     while (!view_.is_over()) {
       take_news();  // first, so that what is new is in the picture
       const shm::Nanoseconds next_look = sampler_.look();
+      for (const std::string& port : tapper_.take_refused()) {
+        view_.forget_tap(port);
+        asked_to_tap_.erase(port);
+      }
       if (shm::monotonic_now() >= next_picture_) {
         view_.add(sampler_.frame(tapper_.tapped(shm::monotonic_now())), sampler_.new_takeovers());
         screen.show(view_.draw(screen.size()));
@@ -202,8 +206,8 @@ void add_top(CLI::App& app, int& exit_code) {
           "--interval",
           [options](const std::string& text) {
             options->interval = read_time("--interval", text);
-            if (options->interval < kOneSecond / 50 || options->interval > 10 * kOneSecond) {
-              throw CLI::ValidationError("--interval", "must be between 20ms and 10s");
+            if (options->interval < kOneSecond / 50 || options->interval > 60 * kOneSecond) {
+              throw CLI::ValidationError("--interval", "must be between 20ms and 60s");
             }
           },
           "How often the screen changes: 20ms to 10s, by default 100ms")

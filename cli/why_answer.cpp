@@ -11,6 +11,7 @@
 #include "cli/why_report.hpp"
 #include "cli/why_summary.hpp"
 #include "rules/text/names.hpp"
+#include "watch/slow_publishers.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -213,6 +214,7 @@ void write_why(std::ostream& out, const WhyOptions& options,
     if (!explanation) continue;  // another model has come into force: that is rare
     port.add_timeouts(look);
     const wire::Status status = instance->status();
+    if (kept == nullptr) watch::add_gaps(port, look, status);
     const WhyAnswer answer(options, port, std::move(look), std::move(*explanation), status, out);
     answer.check_source();
     if (options.json) {

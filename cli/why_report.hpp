@@ -12,18 +12,17 @@
 #include "shm/activity.hpp"
 #include "watch/obstacles.hpp"
 #include "watch/sources.hpp"
+#include "watch/span.hpp"
 
 namespace arbiter::cli {
 
 using watch::Sources;
 using watch::SourceState;
+using watch::span_text;
 
 // "active (arrived 40 ms ago, T 500ms)", "inactive (last arrival 3.2 s ago, T 500ms)".
 std::string activity_text(const Sources& sources, const std::string& name);
 nlohmann::json activity_json(const Sources& sources, const std::string& name);
-
-// 3 200 000 000 -> "3.2 s".
-std::string span_text(shm::Nanoseconds span);
 
 // In one line, without the name of the connection: "inhibited by …".
 std::string cause_text(const rules::Cause& cause, const Sources& sources);

@@ -1,9 +1,13 @@
 #include "evidence/export.hpp"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <map>
+#include <set>
 #include <string>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "evidence/comparison.hpp"
@@ -75,6 +79,81 @@ class WinnersByTime {
   std::map<std::string, std::string> winners_;
 };
 
+// Which input ports are open, at times that do not fall. When a port was opened or closed, the
+// recording knows by when the daemon said so.
+class OpenPorts {
+ public:
+  explicit OpenPorts(const std::vector<PortChange>& changes) : changes_(changes) {}
+
+  bool has(Nanoseconds time, const std::string& port) {
+    for (; next_ < changes_.size() && changes_[next_].seen <= time; ++next_) {
+      const PortChange& change = changes_[next_];
+      using What = PortChange::What;
+      if (change.what == What::open || change.what == What::opened) {
+        open_.insert(change.port);
+      } else {
+        open_.erase(change.port);
+      }
+    }
+    return open_.contains(port);
+  }
+
+ private:
+  const std::vector<PortChange>& changes_;
+  std::size_t next_ = 0;
+  std::set<std::string, std::less<>> open_;
+};
+
+// Writes the rows of the arrivals of a run, which come by time.
+class DecisionRows {
+ public:
+  DecisionRows(const Run& run, Models& models, std::ostream& out)
+      : run_(run),
+        models_(models),
+        out_(out),
+        winners_(winners_of(run, models)),
+        open_(run.port_changes) {}
+
+  void write(const Decision& decision) {
+    rules::TraceEvent event;
+    event.at = decision.arrival().time;
+    event.source = decision.context->source;
+    std::map<std::string, bool> delivered;  // by port
+    for_each_outcome(run_, decision,
+                     [&](const LiveDecision& live) { delivered[*live.port] = live.won; });
+    for (std::string& port : sensing_ports(event, decision.arrival().generation)) {
+      delivered.try_emplace(std::move(port), false);
+    }
+    for (const auto& [port, won] : delivered) {
+      const std::string& by_time = winners_.at(event.at, port);
+      rules::write_outcome(out_, {event, port, {won, won ? event.source : by_time}});
+    }
+  }
+
+ private:
+  // That were open, and read the source without being connected to it: nothing was decided there,
+  // but the arrival may have changed who wins.
+  std::vector<std::string> sensing_ports(const rules::TraceEvent& event, std::uint64_t generation) {
+    std::vector<std::string> ports;
+    const Judge* judge = models_.judge(run_, generation);
+    if (judge == nullptr || !judge->simulation().knows(event.source)) return ports;
+    const rules::Simulation& simulation = judge->simulation();
+    const shm::SourceId source = simulation.source_id(event.source);
+    for (const shm::PortId port : simulation.ports_of(event)) {
+      if (simulation.table().find(source, port) != shm::kNone) continue;
+      const std::string& name = simulation.port_name(port);
+      if (is_chosen(run_, name) && open_.has(event.at, name)) ports.push_back(name);
+    }
+    return ports;
+  }
+
+  const Run& run_;
+  Models& models_;
+  std::ostream& out_;
+  WinnersByTime winners_;
+  OpenPorts open_;
+};
+
 }  // namespace
 
 void write_trace(const Recorded& recorded, Models& models, std::ostream& out) {
@@ -90,15 +169,10 @@ void write_trace(const Recorded& recorded, Models& models, std::ostream& out) {
 void write_decisions(const Recorded& recorded, Models& models, std::ostream& out) {
   rules::write_outcome_header(out);
   for (const Run& run : recorded.runs) {
-    WinnersByTime winners(winners_of(run, models));
-    for_each_decision(run, [&](const LiveDecision& live) {
-      const Step& arrival = live.decision->arrival();
-      rules::TraceEvent event;
-      event.at = arrival.time;
-      event.source = live.decision->context->source;
-      const std::string& by_time = winners.at(arrival.time, *live.port);
-      rules::write_outcome(out, {event, *live.port, {live.won, live.won ? event.source : by_time}});
-    });
+    DecisionRows rows(run, models, out);
+    for (const Decision& decision : run.decisions) {
+      if (decision.arrival().time >= run.start) rows.write(decision);
+    }
   }
 }
 

@@ -13,8 +13,8 @@ namespace arbiter::evidence {
 void write_trace(const Recorded& recorded, Models& models, std::ostream& out);
 
 // What `arbiter simulate` writes: t_ns,source,destination,decision,winner. The decisions are the
-// live ones, and so are those of input ports alone that were open; the winners are those of the
-// models, by the order of time.
+// live ones, at input ports that were open; a source that such a port only reads has a row there,
+// as in a simulation. The winners are those of the models, by the order of time.
 void write_decisions(const Recorded& recorded, Models& models, std::ostream& out);
 
 }  // namespace arbiter::evidence

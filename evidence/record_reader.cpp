@@ -24,12 +24,12 @@ class Fields {
   [[nodiscard]] bool has(const char* name) const { return object_.contains(name); }
   [[nodiscard]] std::uint64_t number(const char* name) const {
     const json& value = at(name);
-    if (!value.is_number_integer() || value < 0) fail(name, "is no whole number of at least 0");
+    if (!value.is_number_integer() || value < 0) fail(name, "is not a whole number of at least 0");
     return value.get<std::uint64_t>();
   }
   [[nodiscard]] Nanoseconds time(const char* name) const {
     const std::uint64_t value = number(name);
-    if (value > static_cast<std::uint64_t>(shm::kMaxTime)) fail(name, "is no time");
+    if (value > static_cast<std::uint64_t>(shm::kMaxTime)) fail(name, "is not a time");
     return static_cast<Nanoseconds>(value);
   }
   [[nodiscard]] bool flag(const char* name) const {
@@ -45,7 +45,7 @@ class Fields {
   [[nodiscard]] std::vector<ModelFile> files(const char* name) const {
     std::vector<ModelFile> all;
     for (const json& each : list(name)) {
-      if (!each.is_object()) fail(name, "has what is no file");
+      if (!each.is_object()) fail(name, "has something that is not a file");
       const Fields file(each);
       all.push_back({file.text("path"), file.text("text")});
     }
@@ -61,7 +61,7 @@ class Fields {
   }
   [[nodiscard]] ActivityWord activity() const {
     const auto word = activity_of(text("activity"), time_of_activity());
-    if (!word) fail("activity", "is no activity");
+    if (!word) fail("activity", "is not an activity");
     return *word;
   }
 
@@ -78,11 +78,11 @@ class Fields {
     return *found;
   }
   [[nodiscard]] const json& list(const char* name) const {
-    if (!at(name).is_array()) fail(name, "is no list");
+    if (!at(name).is_array()) fail(name, "is not a list");
     return at(name);
   }
   [[nodiscard]] static const std::string& text_of(const json& value, const char* name) {
-    if (!value.is_string()) fail(name, "is no text");
+    if (!value.is_string()) fail(name, "is not a text");
     return value.get_ref<const std::string&>();
   }
   [[noreturn]] static void fail(const char* name, const char* what) {
@@ -303,7 +303,7 @@ class Reading {
     };
     result_.end = recording::read_mcap(path_, visitor);
     hand_on();
-    if (!has_metadata_) throw RecordError(path_ + " is no recording that arbiter has made");
+    if (!has_metadata_) throw RecordError(path_ + " is not a recording that arbiter has made");
     return std::move(result_);
   }
 
@@ -342,7 +342,7 @@ class Reading {
     const auto* text = reinterpret_cast<const char*>(message.data.data());
     const json object = json::parse(text, text + message.data.size(), nullptr, false);
     try {
-      if (!object.is_object()) throw RecordError("it is no JSON object");
+      if (!object.is_object()) throw RecordError("it is not a JSON object");
       waiting_ = read_record(kind->second, Fields(object), contexts_);
     } catch (const RecordError& error) {
       throw RecordError(path_ + ": record " + std::to_string(result_.records + 1) + ", of topic " +

@@ -90,7 +90,9 @@ class Loader {
   void add(WinnerChange&& each) { run().winners.push_back(std::move(each)); }
   void add(Start&& /*taken*/) {}
   void add(DestinationsChange&& /*contexts have it*/) {}
-  void add(PortChange&& /*decides nothing*/) {}
+  void add(PortChange&& each) {
+    if (each.is_input) run().port_changes.push_back(std::move(each));
+  }
   // Of what was overtaken a state says where it goes on.
   void add(Missed&& each) {
     run().lost_samples += each.samples;

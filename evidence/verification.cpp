@@ -8,12 +8,6 @@
 namespace arbiter::evidence {
 namespace {
 
-bool is_chosen(const Run& run, const std::string& port) {
-  return run.ports.empty() ||
-         std::any_of(run.ports.begin(), run.ports.end(),
-                     [&](const std::string& pattern) { return rules::matches(pattern, port); });
-}
-
 // T may have changed while a publisher was at work: it took that of a model that was in force
 // between its last arrival and this decision.
 bool fits_timeout(const Run& run, const Decision& decision, Models& models) {
@@ -99,18 +93,28 @@ class Verifier {
 
 }  // namespace
 
+bool is_chosen(const Run& run, const std::string& port) {
+  return run.ports.empty() ||
+         std::any_of(run.ports.begin(), run.ports.end(),
+                     [&](const std::string& pattern) { return rules::matches(pattern, port); });
+}
+
+void for_each_outcome(const Run& run, const Decision& decision,
+                      const std::function<void(const LiveDecision&)>& use) {
+  const shm::Masks& masks = decision.masks;
+  const auto& ports = decision.context->destinations;
+  for (std::size_t i = 0; i < ports.size() && i < shm::kMaxDestinations; ++i) {
+    const std::uint64_t bit = std::uint64_t{1} << i;
+    const bool won = ((masks.accepted | masks.refused) & bit) != 0;
+    const bool is_blind = (masks.blind & bit) != 0;
+    const bool was_decided = won || is_blind || (masks.discarded & bit) != 0;
+    if (was_decided && is_chosen(run, ports[i])) use({&run, &decision, &ports[i], is_blind, won});
+  }
+}
+
 void for_each_decision(const Run& run, const std::function<void(const LiveDecision&)>& use) {
   for (const Decision& decision : run.decisions) {
-    if (decision.arrival().time < run.start) continue;
-    const shm::Masks& masks = decision.masks;
-    const auto& ports = decision.context->destinations;
-    for (std::size_t i = 0; i < ports.size() && i < shm::kMaxDestinations; ++i) {
-      const std::uint64_t bit = std::uint64_t{1} << i;
-      const bool won = ((masks.accepted | masks.refused) & bit) != 0;
-      const bool is_blind = (masks.blind & bit) != 0;
-      const bool was_decided = won || is_blind || (masks.discarded & bit) != 0;
-      if (was_decided && is_chosen(run, ports[i])) use({&run, &decision, &ports[i], is_blind, won});
-    }
+    if (decision.arrival().time >= run.start) for_each_outcome(run, decision, use);
   }
 }
 

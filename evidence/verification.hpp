@@ -22,7 +22,12 @@ struct LiveDecision {
   bool won = false;  // accepted, or refused although it was the winner
 };
 
-// Calls `use` for each decision at chosen ports from the run's start on, by time.
+// Whether the recording is to have all that is decided at this input port.
+[[nodiscard]] bool is_chosen(const Run& run, const std::string& port);
+// Calls `use` for what was decided of an arrival at chosen ports.
+void for_each_outcome(const Run& run, const Decision& decision,
+                      const std::function<void(const LiveDecision&)>& use);
+// The same for all arrivals from the run's start on, by time.
 void for_each_decision(const Run& run, const std::function<void(const LiveDecision&)>& use);
 
 // The first that differs.

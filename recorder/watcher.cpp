@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "rules/model/quantifiers.hpp"
+#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "shm/picture.hpp"
 
@@ -113,7 +114,7 @@ void Watcher::begin() {
   ports_.clear();
   knows_ports_ = false;
   last_death_ = shm::monotonic_now();
-  first_refusal_.clear();
+  refusals_.clear();
   instance_->catch_up();
   const auto model = watch::ModelInForce::fetch(*instance_);
   generation_ = model.generation();
@@ -122,7 +123,9 @@ void Watcher::begin() {
   for (const std::string& source : chosen_sources(model)) open_tap(source, taps);
   const bool has_tap = std::any_of(sources_.begin(), sources_.end(),
                                    [](const auto& each) { return each.second.tap != nullptr; });
-  if (!has_tap && !first_refusal_.empty()) throw Error(first_refusal_);
+  const std::vector<std::string> refused = take_refusals();
+  if (!has_tap && !refused.empty()) throw Error(refused.front());
+  for (const std::string& text : refused) options_.say(text);
   Batch states;
   for (auto& [source, watched] : sources_) {
     if (instance_->find_source(source)) add_page_state(source, page_word(source), states);
@@ -245,8 +248,7 @@ void Watcher::open_tap(const std::string& source, Batch& batch) {
     watched.next_try = shm::monotonic_now() + kTryAgainAfter;
     if (is_known) return;
     watched.seen = watched.reported = page_word(source);
-    if (first_refusal_.empty()) first_refusal_ = error.what();
-    options_.say("cannot record " + source + ": " + error.what());
+    refusals_.emplace_back(source, error.what());
     const Nanoseconds now = shm::monotonic_now();
     add(batch,
         evidence::Missed{source, now, now, 0, 0, evidence::Missed::Why::refused, error.what()});
@@ -259,6 +261,27 @@ void Watcher::tap_newcomers(const std::set<std::string>& sources, Batch& batch) 
     open_tap(source, batch);
     if (instance_->find_source(source)) add_page_state(source, page_word(source), batch);
   }
+  for (const std::string& text : take_refusals()) options_.say(text);
+}
+
+// Sources that are refused for the same reason, as by one line of a policy, share a sentence.
+std::vector<std::string> Watcher::take_refusals() {
+  std::map<std::string, std::pair<std::vector<std::string>, std::string>> by_reason;
+  for (auto& [source, why] : std::exchange(refusals_, {})) {
+    std::string reason = why;
+    if (const auto at = reason.find(source); at != std::string::npos) {
+      reason.erase(at, source.size());
+    }
+    auto& [sources, text] = by_reason[reason];
+    if (sources.empty()) text = why;
+    sources.push_back(source);
+  }
+  std::vector<std::string> texts;
+  texts.reserve(by_reason.size());
+  for (const auto& [reason, refused] : by_reason) {
+    texts.push_back("cannot record " + rules::enumerate(refused.first) + ": " + refused.second);
+  }
+  return texts;
 }
 
 // One at a time, for each may take its while. What its tap tells first is its state.

@@ -26,7 +26,7 @@ InputFile::InputFile(const std::string& path)
   struct stat found {};
   if (::fstat(fd_, &found) != 0 || !S_ISREG(found.st_mode)) {
     ::close(fd_);
-    throw McapError("cannot read " + path + ": it is no regular file");
+    throw McapError("cannot read " + path + ": it is not a regular file");
   }
   size_ = static_cast<std::uint64_t>(found.st_size);
 }

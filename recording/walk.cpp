@@ -56,7 +56,7 @@ void Walk::read_magic() {
                     "program knows");
   }
   if (found != kMagic.substr(0, count)) {
-    throw McapError("cannot read " + path_ + ": it is no MCAP file, by its first bytes");
+    throw McapError("cannot read " + path_ + ": it is not an MCAP file, by its first bytes");
   }
   if (count < kMagic.size()) throw Damage{"the file ends within it"};
   crc_ = crc32(found);

@@ -100,15 +100,20 @@ struct Frame {
   std::shared_ptr<const Census> census;
   std::vector<PortState> ports;          // as in the census
   std::vector<shm::ActivityWord> words;  // as Census::sources
-  std::uint64_t generation = 0;          // of the model in force
-  std::uint64_t memories = 0;            // of daemons that had been seen: each numbers its models
-  std::uint64_t takeovers = 0;           // that there had been
+  // As Census::sources: how far apart arrivals are, if that is more than T; 0: it is not.
+  std::vector<shm::Nanoseconds> slow_periods;
+  std::uint64_t generation = 0;  // of the model in force
+  std::uint64_t memories = 0;    // of daemons that had been seen: each numbers its models
+  std::uint64_t takeovers = 0;   // that there had been
   bool has_daemon = true;
   bool is_counted = true;  // lately; else what the daemon counts is not known any more
   bool is_settled = true;
 
   // When the source last arrived, or was deactivated; 0: never.
   [[nodiscard]] shm::Nanoseconds last_event(std::size_t source) const;
+  [[nodiscard]] shm::Nanoseconds slow_period(std::size_t source) const {
+    return source < slow_periods.size() ? slow_periods[source] : 0;
+  }
 };
 
 // An arrival that was accepted: its source won then.
@@ -127,7 +132,7 @@ struct Takeover {
   std::string port;
   std::string before;  // "": nobody
   std::string winner;
-  std::string because;  // "/Object/pos:o began"
+  std::string because;  // "/Object/pos:o became active"
 };
 
 // Why somebody wins, or does not.

@@ -109,6 +109,14 @@ std::string timeout_text(shm::Nanoseconds timeout) {
   return span(timeout);
 }
 
+// Marked where the publisher is slower.
+Cell timeout_cell(const Frame& frame, std::size_t source) {
+  const shm::Nanoseconds timeout = frame.census->sources[source].timeout;
+  const bool is_slow = frame.slow_period(source) != 0;
+  return number((is_slow ? "!" : "") + timeout_text(timeout), static_cast<double>(timeout),
+                is_slow ? Style::kWarning : Style::kPlain);
+}
+
 Row port_row(const Frame& frame, std::size_t i) {
   const PortFact& port = frame.census->ports[i];
   const PortState& state = frame.ports[i];
@@ -145,8 +153,8 @@ Cell change_cell(const Takeover& change, const std::string& arrow) {
   return cell;
 }
 
-// Of a cause, "/Face/pos:o began, /Rest/pos:o fell silent": what stands between a slash and a
-// blank.
+// Of a cause, "/Face/pos:o became active, /Rest/pos:o went inactive": what stands between a slash
+// and a blank.
 std::vector<NamePlace> names_in(const std::string& text) {
   std::vector<NamePlace> names;
   for (std::size_t begin = 0; begin < text.size();) {
@@ -161,8 +169,7 @@ Row source_row(const Frame& frame, std::size_t i, Charset charset) {
   const SourceFact& source = frame.census->sources[i];
   const ActivityCells activity = activity_cells(frame, i, charset);
   Row row{source.name,
-          {name_cell(source.name), activity.bar, activity.state,
-           number(timeout_text(source.timeout), static_cast<double>(source.timeout)),
+          {name_cell(source.name), activity.bar, activity.state, timeout_cell(frame, i),
            age_cell(frame.now, frame.last_event(i))}};
   if (source.rates && frame.is_counted) {
     row.cells.push_back(rate_cell(source.rates->published));

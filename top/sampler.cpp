@@ -35,6 +35,7 @@ void Sampler::bind() {
     ++memories_;
     is_bound_ = false;
     seats_.clear();
+    paces_.clear();
     last_ = {};
   }
   const shm::TableSnapshot snapshot = memory_->tables().snapshot();
@@ -78,6 +79,9 @@ shm::Nanoseconds Sampler::look() {
       if (each.is_sample) note_arrival(each);
       accepted_.push_back(std::move(each));
     }
+  }
+  for (const auto& [source, word] : last_.words) {
+    paces_[source].look(word, last_.snapshot.table.timeout(source), last_.now);
   }
   // Else who wins is told by the next look.
   if (is_of_binding && last_.is_settled) take_seats();
@@ -215,8 +219,8 @@ std::string Sampler::cause_of(shm::PortId port, shm::Nanoseconds& at) const {
     const shm::Nanoseconds time = has_expired ? word : shm::time_of(word, table.timeout(source));
     at = std::min(at, std::max(time, before_.now));
     text += (text.empty() ? "" : ", ") + name_of(source) +
-            (is(source)    ? " began"
-             : has_expired ? " fell silent"
+            (is(source)    ? " became active"
+             : has_expired ? " went inactive"
                            : " was deactivated");
   }
   return text;
@@ -263,6 +267,9 @@ std::shared_ptr<const Frame> Sampler::frame(
     const bool is_bound = i < source_ids_.size() && source_ids_[i] != shm::kNone;
     const auto word = is_bound ? last_.words.find(source_ids_[i]) : last_.words.end();
     frame->words.push_back(word == last_.words.end() ? shm::kNeverActive : word->second);
+    const auto pace = is_bound ? paces_.find(source_ids_[i]) : paces_.end();
+    const auto period = pace == paces_.end() ? std::nullopt : pace->second.slow_period();
+    frame->slow_periods.push_back(period.value_or(0));
   }
   return frame;
 }

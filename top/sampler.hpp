@@ -19,6 +19,7 @@
 
 #include "top/frame.hpp"
 #include "watch/instance.hpp"
+#include "watch/pace.hpp"
 #include "watch/picture.hpp"
 
 namespace arbiter::top {
@@ -88,7 +89,8 @@ class Sampler {
   watch::Picture before_;
   std::chrono::system_clock::time_point wall_;  // of last_
   std::map<std::string, Seat> seats_;           // by port
-  std::vector<Accepted> accepted_;              // that no picture has come after yet
+  std::map<shm::SourceId, watch::Pace> paces_;
+  std::vector<Accepted> accepted_;  // that no picture has come after yet
   // Of samples that taps told of, by port and source, the latest last: as many as can wait.
   std::map<std::pair<std::string, std::string>, std::deque<shm::Nanoseconds>> arrivals_;
   std::uint64_t takeovers_so_far_ = 0;

@@ -75,7 +75,7 @@ void Tapper::run(const std::stop_token& stop) {
       opened_.emplace_back(port, std::move(tap));
     } catch (const std::exception& error) {
       const std::lock_guard lock(mutex_);
-      refused_ = error.what();
+      refused_.emplace_back(port, error.what());
     }
   }
 }
@@ -85,11 +85,25 @@ void Tapper::take_up_opened() {
   {
     const std::lock_guard lock(mutex_);
     opened.swap(opened_);
-    if (refused_) problem_ = "not tapped: " + *std::exchange(refused_, std::nullopt);
   }
   for (auto& [port, tap] : opened) {
     if (wanted_.count(port) != 0) taps_.insert_or_assign(port, Tapped{std::move(tap)});
   }
+}
+
+std::vector<std::string> Tapper::take_refused() {
+  std::vector<std::pair<std::string, std::string>> refused;
+  {
+    const std::lock_guard lock(mutex_);
+    refused.swap(refused_);
+  }
+  std::vector<std::string> ports;
+  for (auto& [port, why] : refused) {
+    problem_ = "not tapped: " + why;
+    wanted_.erase(port);
+    ports.push_back(std::move(port));
+  }
+  return ports;
 }
 
 std::vector<Accepted> Tapper::collect() {

@@ -33,9 +33,11 @@ class Tapper {
   // Waits for a tap that is being opened: a second at most, where no daemon answers.
   ~Tapper();
 
-  // Which ports are to be tapped from now on. One that was refused is tried again once it has been
-  // left out in between.
+  // Which ports are to be tapped from now on. One that was refused is forgotten, and tried again if
+  // it is among them the next time.
   void watch(const std::set<std::string>& ports);
+  // Which were refused since the last time; problem() says why.
+  [[nodiscard]] std::vector<std::string> take_refused();
   // What the taps have told since the last time, by time.
   std::vector<Accepted> collect();
   // The ports that are tapped, and how long what was taken there during the last ten seconds had
@@ -61,8 +63,8 @@ class Tapper {
   std::condition_variable_any asked_;
   std::vector<std::string> to_open_;
   std::vector<std::pair<std::string, Tap<>>> opened_;
-  std::optional<std::string> refused_;  // why
-  std::jthread thread_;                 // from the first question on; last: it uses all of these
+  std::vector<std::pair<std::string, std::string>> refused_;  // and why
+  std::jthread thread_;  // from the first question on; last: it uses all of these
 };
 
 }  // namespace arbiter::top

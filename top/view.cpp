@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "watch/pace.hpp"
+
 namespace arbiter::top {
 namespace {
 
@@ -283,6 +285,7 @@ std::optional<WhyQuestion> View::ask_why() {
     }
   }
   question.seen = seen_at(question.ports);
+  if (!question.source.empty()) add_slowness(question.source, question.seen);
   asked_ = question;
   if (question.ports.empty()) {
     set_answer({question, {"No port is connected to " + row.name + ", and no rule reads it."}});
@@ -320,6 +323,16 @@ std::vector<std::string> View::seen_at(const std::vector<std::string>& ports) co
     lines.push_back(std::move(line));
   }
   return lines;
+}
+
+void View::add_slowness(const std::string& source, std::vector<std::string>& seen) const {
+  const Frame& frame = *history_.frame();
+  const auto place = frame.census->find_source(source);
+  if (place < 0) return;
+  const auto index = static_cast<std::size_t>(place);
+  const shm::Nanoseconds period = frame.slow_period(index);
+  if (period == 0) return;
+  seen.push_back("  ! " + watch::slow_text(source, period, frame.census->sources[index].timeout));
 }
 
 void View::set_answer(const WhyAnswer& answer) {

@@ -43,6 +43,8 @@ class View {
   std::optional<WhyQuestion> press(const KeyPress& press);
   // The ports that are to be tapped.
   [[nodiscard]] const std::set<std::string>& tapped() const { return tapped_; }
+  // It was refused: `t` asks for it again.
+  void forget_tap(const std::string& port) { tapped_.erase(port); }
   [[nodiscard]] bool is_over() const { return is_over_; }
 
   // At most size.rows lines, each exactly size.columns wide.
@@ -74,6 +76,8 @@ class View {
   void reverse();
   std::optional<WhyQuestion> ask_why();
   [[nodiscard]] std::vector<std::string> seen_at(const std::vector<std::string>& ports) const;
+  // What the T of this source is marked for.
+  void add_slowness(const std::string& source, std::vector<std::string>& seen) const;
   void find_selected(Pane pane, const Table& table);
   void take_up_names(const std::shared_ptr<const Census>& census);
   [[nodiscard]] std::vector<Line> draw_pane(Pane pane, Table table, Size size);

@@ -126,7 +126,7 @@ class Processes {
     if (machine_.is_stopped(process)) {
       found_.push_back({"stopped", name + " is stopped",
                         is_daemon ? "no port can be opened, and no model changed"
-                                  : "it neither publishes nor takes, and its sources fall silent "
+                                  : "it neither publishes nor takes, and its sources go inactive "
                                     "when their T has passed",
                         "kill -CONT " + process});
     }
@@ -264,6 +264,14 @@ Findings examine_daemon(const wire::Caller& caller, std::optional<wire::Status>&
 
 Findings examine_processes(const Machine& machine, const wire::Status& status) {
   Findings found;
+  if (!machine.has_process(status.pid)) {
+    found.push_back(
+        {"no-daemon",
+         "no daemon runs on the machine of --root: the one that answers here, with pid " +
+             std::to_string(status.pid) + ", is not among its processes",
+         "nothing is known of the daemon's and the components' processes there",
+         "leave out --root, or copy /proc and /sys while the daemon runs"});
+  }
   const auto files = machine.limit(std::to_string(status.pid), "Max open files");
   if (files && *files < kDaemonDescriptors) {
     found.push_back(
@@ -313,7 +321,8 @@ const std::vector<std::string>& finding_codes() {
                                               "stopped",
                                               "replaced-program",
                                               "time-namespace",
-                                              "stranger"};
+                                              "stranger",
+                                              "slow-publisher"};
   return codes;
 }
 

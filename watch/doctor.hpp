@@ -35,6 +35,11 @@ using Findings = std::vector<Finding>;
 // The processes that a status names.
 [[nodiscard]] Findings examine_processes(const Machine& machine, const wire::Status& status);
 
+// Sources that are inactive between their arrivals, because their publishers are slower than T. The
+// daemon is asked for its memory, and activities are watched for some seconds where components have
+// sources open.
+[[nodiscard]] Findings examine_publishers(const wire::Caller& caller, const wire::Status& status);
+
 // All codes, in the order in which they are looked for.
 [[nodiscard]] const std::vector<std::string>& finding_codes();
 

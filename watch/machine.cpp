@@ -50,6 +50,11 @@ std::optional<std::string> Machine::read_link(const std::string& path) const {
   return error ? std::nullopt : std::optional(target.string());
 }
 
+bool Machine::has_process(std::int32_t pid) const {
+  std::error_code error;
+  return root_.empty() || fs::exists(root_ + "/proc/" + std::to_string(pid), error);
+}
+
 std::vector<std::string> Machine::list(const std::string& directory) const {
   std::vector<std::string> names;
   std::error_code error;

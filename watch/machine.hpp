@@ -32,6 +32,8 @@ class Machine {
   [[nodiscard]] std::optional<std::uint64_t> limit(const std::string& process,
                                                    const std::string& name) const;
   [[nodiscard]] bool has_capability(const std::string& process, Capability capability) const;
+  // False only below a root of its own: /proc may hide what others run.
+  [[nodiscard]] bool has_process(std::int32_t pid) const;
   // It was sent SIGSTOP, or is being debugged.
   [[nodiscard]] bool is_stopped(const std::string& process) const;
 

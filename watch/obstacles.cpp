@@ -9,6 +9,7 @@
 #include "rules/text/names.hpp"
 #include "shm/utf8.hpp"
 #include "watch/process.hpp"
+#include "watch/span.hpp"
 
 namespace arbiter::watch {
 namespace {
@@ -201,6 +202,12 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
       sources_.is_active(source) && sources_.state(source).timeout == shm::kForever;
   if (output->open) {
     add_stopped(output->open->component.pid, "its component " + component_text(*output), result);
+    const SourceState state = sources_.state(source);
+    if (state.gap) {
+      result.push_back({"slow-publisher", "its last two arrivals were " + span_text(*state.gap) +
+                                              " apart, and its T is " + span_text(state.timeout) +
+                                              ": it is inactive in between"});
+    }
     add_outside(source, " comes from ", *output->open, result);
     return;
   }

@@ -19,6 +19,8 @@ struct SourceState {
   std::optional<shm::Nanoseconds> timeout_before{};
   shm::Nanoseconds timeout_changed = 0;
   shm::ActivityWord word_at_change = shm::kNeverActive;
+  // How long after this arrival, when T had passed, the next one came, if somebody waited for it.
+  std::optional<shm::Nanoseconds> gap{};
 
   // Nothing where it is not known, because T may have been another one then.
   [[nodiscard]] std::optional<shm::Nanoseconds> last_arrival() const;

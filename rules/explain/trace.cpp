@@ -70,7 +70,8 @@ bool TraceParser::read_header() {
     is_header = (*record)[i].value == kColumns[i];
   }
   if (!is_header) {
-    error("trace-header", record->front(), std::string("this is no header of a trace; ") + kHint);
+    error("trace-header", record->front(),
+          std::string("this is not the header of a trace; ") + kHint);
   }
   return is_header;
 }

@@ -51,9 +51,10 @@ constexpr std::array<Spelling, 2> kComparisons{{
     {"=", TokenKind::kEquals},
 }};
 
-constexpr std::array<Spelling, 2> kStatementWords{{
+constexpr std::array<Spelling, 3> kStatementWords{{
     {"winner", TokenKind::kWinner},
     {"idle", TokenKind::kIdle},
+    {"active", TokenKind::kActive},
 }};
 
 // What other languages write, and what to write here. Those that others begin with come later.

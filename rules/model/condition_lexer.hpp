@@ -25,6 +25,7 @@ enum class TokenKind {
   kClose,
   kWinner,  // in statements only, as those that follow
   kIdle,
+  kActive,
   kEquals,
   kDiffers,
 };

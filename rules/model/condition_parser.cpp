@@ -143,6 +143,8 @@ class Parser {
       case TokenKind::kWinner:
       case TokenKind::kIdle:
         return parse_winner();
+      case TokenKind::kActive:
+        return parse_active();
       default:
         break;
     }
@@ -160,6 +162,23 @@ class Parser {
     Mention glob = take_pattern(quantifier);
     ExpressionPtr expression = make_quantifier(operator_of(quantifier.kind), glob.name);
     if (statement_ != nullptr) statement_->globs.push_back(std::move(glob));
+    return {std::move(expression)};
+  }
+
+  // "active(/Deadman:o)" says the same as the name alone, beside winner(…) and idle(…).
+  Parsed parse_active() {
+    const std::string example = "active(/Deadman:o)";
+    lexer_.take();
+    const Token open = lexer_.peek();
+    if (open.kind != TokenKind::kOpen) {
+      fail(open.at, "active takes a source in parentheses; write " + example +
+                        ", or the source's name alone");
+    }
+    lexer_.take();
+    Mention source = take_port("a source's name, as in " + example);
+    expect_close(open);
+    ExpressionPtr expression = make_source(source.name);
+    sources_->push_back(std::move(source));
     return {std::move(expression)};
   }
 

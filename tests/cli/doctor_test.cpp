@@ -23,9 +23,16 @@ ProgramResult doctor(const TemporaryDirectory& root, std::vector<std::string> mo
   return arbiter(more);
 }
 
+// Of a machine on which the daemon runs, and nothing else is known.
+void add_process(const TemporaryDirectory& root, Daemon& daemon) {
+  std::filesystem::create_directories(root.path() + "/proc/" +
+                                      std::to_string(daemon.process().pid()));
+}
+
 TEST(DoctorProgram, FindsNothing) {
   const TemporaryDirectory root;
   Daemon daemon;
+  add_process(root, daemon);
   const auto result = doctor(root);
   EXPECT_EQ(result.exit_code, 0) << result.out;
   EXPECT_THAT(result.out, HasSubstr("nothing found"));
@@ -39,6 +46,7 @@ TEST(DoctorProgram, SaysWhatIsWrongWhyItMattersAndHowToMendIt) {
   std::filesystem::create_directories(root.path() + "/proc");
   root.write("proc/meminfo", "MemAvailable: 1000 kB\n");
   Daemon daemon;
+  add_process(root, daemon);
   auto result = doctor(root);
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.out, HasSubstr("the machine has 1000 KiB of memory left  [memory]\n  why:  "));
@@ -62,6 +70,33 @@ TEST(DoctorProgram, FindsThatThereIsNoDaemon) {
   const auto result = doctor(root, {"--instance", "nobody-has-this-instance"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.out, HasSubstr("[no-daemon]"));
+}
+
+TEST(DoctorProgram, SaysThatNoDaemonRunsOnTheMachineOfAnEmptyRoot) {
+  const TemporaryDirectory root;
+  Daemon daemon;
+  const auto result = doctor(root);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, HasSubstr("no daemon runs on the machine of --root"));
+  EXPECT_THAT(result.out, HasSubstr("[no-daemon]"));
+}
+
+// 250 ms is more than its T.
+TEST(DoctorProgram, SaysWhichPublisherIsSlowerThanItsT) {
+  Daemon daemon(R"(<behaviors timeout="1s"><source port="/slow" timeout="100ms"/>
+    <behavior name="A"><config at="/p">/slow</config></behavior>
+    <behavior name="B"><config at="/q">/quick</config></behavior></behaviors>)");
+  const ChildProcess slow({ARBITER_PROGRAMS "/arbiter", "pub", "/slow", "--rate", "4"}, {}, {});
+  const ChildProcess quick({ARBITER_PROGRAMS "/arbiter", "pub", "/quick", "--rate", "20"}, {}, {});
+  std::string out;
+  // Where the machine is busy, two periods may differ too much.
+  while (out.find("[slow-publisher]") == std::string::npos) {
+    out = arbiter({"doctor", "--silence", kOfTheMachine}).out;
+  }
+  EXPECT_THAT(out, testing::ContainsRegex("/slow publishes every [0-9]+ ms, and its T is 100 ms"));
+  EXPECT_THAT(out, HasSubstr("(arbiter-pub, pid " + std::to_string(slow.pid()) + ")"));
+  EXPECT_THAT(out, HasSubstr("<source port=\"/slow\" timeout="));
+  EXPECT_THAT(out, testing::Not(HasSubstr("/quick publishes")));
 }
 
 TEST(DoctorProgram, RefusesWhatItCannotLookAt) {

@@ -126,6 +126,19 @@ TEST(MetricsProgram, SaysThatThereIsNoDaemon) {
   EXPECT_THAT(result.err, HasSubstr("no arbiterd of instance"));
 }
 
+TEST(MetricsProgram, GivesADaemonThatDoesNotAnswerOneSecond) {
+  Daemon daemon(kGazeModel);
+  daemon.process().stop();
+  const auto result = arbiter({"metrics"});
+  daemon.process().signal(SIGCONT);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(read_metrics(result.out).at("arbiter_up").samples.at({}), 0);
+  const std::string within = "did not answer within ";
+  const auto at = result.err.find(within);
+  ASSERT_NE(at, std::string::npos) << result.err;
+  EXPECT_LT(std::stoi(result.err.substr(at + within.size())), 5000) << "a second, and not five";
+}
+
 TEST(MetricsServer, FollowsTheDaemonsThatComeAndGo) {
   Daemon daemon(kGazeModel);
   Served served(daemon.directory());
@@ -250,6 +263,16 @@ TEST(MetricsServer, IsReachedByAPathOfItsOwnersOnly) {
   directory.write("socket", "precious");
   EXPECT_EQ(arbiter({"metrics", "--listen", path}).exit_code, 1);
   EXPECT_EQ(content_of(path), "precious");
+}
+
+// In the directory where it is started: no slash is needed.
+TEST(MetricsServer, TakesANameThatEndsInSockForAPath) {
+  const TemporaryDirectory directory;
+  const ChildProcess served(
+      {"/bin/sh", "-c",
+       "cd " + directory.path() + " && exec " ARBITER_PROGRAMS "/arbiter metrics --listen m.sock"},
+      {}, {});
+  while (!std::filesystem::is_socket(directory.path() + "/m.sock")) std::this_thread::yield();
 }
 
 TEST(MetricsServer, ListensNowhereElseUnlessItMay) {

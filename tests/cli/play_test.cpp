@@ -45,6 +45,20 @@ TEST(Play, DecidesAsSimulateSays) {
   EXPECT_EQ(played.out, simulated.out);
 }
 
+// As a shell says of a program that a signal has ended.
+TEST(Play, ThatIsStoppedBeforeItsEndSaysBySoMuchOfItsSignal) {
+  Daemon daemon(kPlayedModel);
+  const TemporaryDirectory files;
+  const auto trace = files.write("trace.csv", "t_ns,source\n0,/low\n3600000000000,/low\n");
+  for (const int signal : {SIGINT, SIGTERM}) {
+    ChildProcess play({ARBITER_PROGRAMS "/arbiter", "play", trace}, {}, {});
+    while (daemon.source("/low")["component"]["pid"] != play.pid()) {
+    }
+    play.signal(signal);
+    EXPECT_EQ(play.wait(), 128 + signal);
+  }
+}
+
 TEST(Play, NotesSourcesThatTheModelDoesNotKnow) {
   Daemon daemon(kPlayedModel);
   const TemporaryDirectory files;

@@ -105,7 +105,7 @@ TEST(Program, TellsTheBoundsOfNumbersShortly) {
            {"rollback", "0"}, {"echo", "/p", "--count", "0"}, {"pub", "/p", "--count", "x"}}) {
     const auto result = arbiter(arguments);
     EXPECT_EQ(result.exit_code, 2);
-    EXPECT_THAT(result.err, HasSubstr("is no whole number of at least 1\n"));
+    EXPECT_THAT(result.err, HasSubstr("is not a whole number of at least 1\n"));
   }
 }
 
@@ -274,7 +274,7 @@ TEST(Program, TakesNoNumberThatIsNone) {
       typed.emplace_back(number);
       const auto result = arbiter(typed);
       EXPECT_EQ(result.exit_code, 2) << arguments.front() << ' ' << number;
-      EXPECT_THAT(result.err, HasSubstr("is no number from 0.001 to 1000"));
+      EXPECT_THAT(result.err, HasSubstr("is not a number from 0.001 to 1000"));
     }
   }
 }

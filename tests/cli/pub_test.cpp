@@ -140,7 +140,7 @@ TEST(Pub, SaysWhatIsWrongWithTheCommandLine) {
     EXPECT_EQ(result.out, "");
     return result.err;
   };
-  EXPECT_THAT(error({"--hex", "0A 0G"}), HasSubstr("character 5 is no hexadecimal digit"));
+  EXPECT_THAT(error({"--hex", "0A 0G"}), HasSubstr("character 5 is not a hexadecimal digit"));
   EXPECT_THAT(error({"--hex", "0A0"}), HasSubstr("half a byte at the end, behind 1 byte;"));
   EXPECT_THAT(error({"--file", "/nowhere/payload"}), HasSubstr("cannot open /nowhere/payload"));
   const TemporaryDirectory files;

@@ -165,7 +165,7 @@ TEST(Wait, WithoutADaemonOrWithAConditionThatCannotBeReadIsAnError) {
   {
     Daemon daemon(kGazeModel);
     for (const std::string condition :
-         {"", "  ", "active(/face)", "/face and", "/face\x01", "=0"}) {
+         {"", "  ", "is_active(/face)", "/face and", "/face\x01", "=0"}) {
       const auto result = wait_until(condition, {"--timeout", "0s"});
       EXPECT_EQ(result.exit_code, 2) << condition;
       EXPECT_THAT(result.err, HasSubstr("--until")) << condition;

@@ -31,6 +31,18 @@ std::string status_text() {
   return result.out;
 }
 
+TEST(WhyDaemon, SaysThatAPublisherIsSlowerThanItsT) {
+  Daemon daemon(
+      "<behaviors timeout='100ms'><arbiter at='/arm'><select from='/rest'/></arbiter></behaviors>");
+  const ChildProcess slow({ARBITER_PROGRAMS "/arbiter", "pub", "/rest", "--rate", "4"}, {}, {});
+  // It is asked again until it is inactive at that moment.
+  std::string text;
+  while (text.find("its last two arrivals") == std::string::npos) text = why({"/arm"});
+  EXPECT_THAT(text,
+              testing::ContainsRegex("! its last two arrivals were [0-9]+ ms apart, and its T "
+                                     "is 100 ms: it is inactive in between"));
+}
+
 TEST(WhyDaemon, OfAComponentThatHasNotComeBackSaysThatWhatIsConnectedGoesOn) {
   Daemon daemon(kOneDefault);
   Node node("test");

@@ -41,7 +41,7 @@ inline rules::CompiledModel compile_text(const std::string& text) {
 // It begins at 1000, with sources that have never been active.
 class Incident {
  public:
-  enum class Fate { accepted, discarded, refused, blind };
+  enum class Fate { accepted, discarded, refused, blind, none };  // none: only sensed
 
   explicit Incident(const std::string& model = kOverride,
                     const std::vector<std::string>& sources = {"/low", "/high"},
@@ -90,7 +90,7 @@ class Incident {
     arrival.word = shm::arrival(time, timeout);
     std::uint64_t* const masks[] = {&arrival.masks.accepted, &arrival.masks.discarded,
                                     &arrival.masks.refused, &arrival.masks.blind};
-    *masks[static_cast<int>(fate)] = 1;
+    if (fate != Fate::none) *masks[static_cast<int>(fate)] = 1;
     add(arrival);
   }
   void deactivate(const std::string& source, shm::Nanoseconds time, shm::Nanoseconds seen) {

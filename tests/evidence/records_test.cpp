@@ -228,14 +228,14 @@ TEST(Records, ThatNobodyCouldHaveWrittenAreRefused) {
     return what.substr(std::min(what.size(), file.size()));
   };
   EXPECT_EQ(error("arbiter/missed", "{"),
-            ": record 1, of topic arbiter/missed: it is no JSON object");
+            ": record 1, of topic arbiter/missed: it is not a JSON object");
   EXPECT_EQ(error("arbiter/start", R"({"time_ns":-1})"),
-            ": record 1, of topic arbiter/start: its field \"time_ns\" is no whole number of at "
+            ": record 1, of topic arbiter/start: its field \"time_ns\" is not a whole number of at "
             "least 0");
   EXPECT_EQ(error("arbiter/start", R"({"time_ns":9223372036854775807})"),
-            ": record 1, of topic arbiter/start: its field \"time_ns\" is no time");
+            ": record 1, of topic arbiter/start: its field \"time_ns\" is not a time");
   EXPECT_EQ(error("arbiter/deactivation", R"({"source":7})"),
-            ": record 1, of topic arbiter/deactivation: its field \"source\" is no text");
+            ": record 1, of topic arbiter/deactivation: its field \"source\" is not a text");
 }
 
 TEST(Records, AreThoseOfARecording) {
@@ -243,7 +243,7 @@ TEST(Records, AreThoseOfARecording) {
   const std::string path = directory.path() + "/other.mcap";
   recording::McapWriter file(path, "test", {});
   file.close();
-  EXPECT_EQ(error_of_reading(path), path + " is no recording that arbiter has made");
+  EXPECT_EQ(error_of_reading(path), path + " is not a recording that arbiter has made");
 }
 
 }  // namespace

@@ -37,6 +37,78 @@ TEST(Export, WritesATraceThatSimulateReads) {
             "1200,/low,/p,delivered,/low\n");
 }
 
+// As in a simulation: nothing of it is decided there, but it may change who wins.
+TEST(Export, HasRowsForSourcesThatOpenPortsOnlyRead) {
+  const TemporaryDirectory directory;
+  Incident incident(R"(<behaviors timeout="500ns">
+  <behavior name="Go"><config at="/p">/low</config><condition>not /stop</condition></behavior>
+  <behavior name="Go elsewhere"><config at="/closed">/low</config><condition>/stop</condition></behavior>
+</behaviors>
+)",
+                    {"/low", "/stop"});
+  evidence::PortChange open;
+  open.what = evidence::PortChange::What::open;
+  open.is_input = true;
+  open.port = "/p";
+  open.seen = 1000;
+  incident.add(open);
+  incident.arrive("/low", 1100, 1101, Incident::Fate::accepted);
+  incident.arrive("/stop", 1110, 1111, Incident::Fate::none);
+  incident.arrive("/low", 1120, 1121, Incident::Fate::discarded);
+  open.what = evidence::PortChange::What::closed;
+  open.seen = 1130;
+  incident.add(open);
+  incident.arrive("/stop", 1140, 1141, Incident::Fate::none);
+  const std::string csv = directory.file("decisions.csv");
+  const auto result = arbiter({"recording", "export", incident.file(), "--csv", csv});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(content_of(csv),
+            "t_ns,source,destination,decision,winner\n1100,/low,/p,delivered,/low\n"
+            "1110,/stop,/p,discarded,-\n1120,/low,/p,discarded,-\n");
+}
+
+// The clock on the wall was 5 ms ahead of the recording's times: they begin at 1970-01-01
+// 00:00:00.005.
+TEST(RecordedWinners, SaysWhoCommandedAtATimeOfTheClock) {
+  constexpr shm::Nanoseconds kMs = 1'000'000;
+  Incident incident(kOverride, {"/low", "/high"});
+  const auto change = [&](const char* winner, const char* before, shm::Nanoseconds time,
+                          evidence::WinnerChange::Why why, const char* by) {
+    incident.add(evidence::WinnerChange{"/p", winner, before, time, why, by, 1});
+  };
+  using Why = evidence::WinnerChange::Why;
+  change("", "", 1000, Why::start, "");
+  change("/low", "", 1000 * kMs, Why::arrival, "/low");
+  change("/high", "/low", 2500 * kMs, Why::arrival, "/high");
+  change("/low", "/high", 2700 * kMs, Why::expiry, "/high");
+  incident.arrive("/low", 4000 * kMs, 4000 * kMs, Incident::Fate::accepted);
+  const std::string file = incident.file();
+  const auto winners = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"/usr/bin/env", "TZ=UTC",  ARBITER_PROGRAMS "/arbiter",
+                                       "recording",    "winners", file};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_program(arguments);
+  };
+  const std::string low = "1970-01-01 00:00:01.005  /p  /low  for 1.500 s: /low arrived\n";
+  const std::string high = "1970-01-01 00:00:02.505  /p  /high  for 0.200 s: /high arrived\n";
+  const std::string again = "1970-01-01 00:00:02.705  /p  /low  for 1.300 s: /high went inactive\n";
+  EXPECT_THAT(winners({}).out,
+              testing::AllOf(testing::HasSubstr("/p  idle  for 1.000 s: so it was when the "),
+                             testing::EndsWith(low + high + again)));
+  EXPECT_EQ(winners({"--at", "00:00:02"}).out, low + high + again) << "in all of that second";
+  EXPECT_EQ(winners({"--at", "00:00:02.600"}).out, high);
+  EXPECT_EQ(winners({"--at", "1970-01-01 00:00:03"}).out, again);
+  EXPECT_EQ(winners({"--at", "00:00:03", "--port", "/q*"}).out,
+            "no input port of the recording is arbitrated and matches\n");
+  EXPECT_THAT(winners({"--at", "00:00:02.6", "--json"}).out,
+              testing::HasSubstr("\"winner\": \"/high\""));
+  for (const char* time : {"00:00:09", "1970-01-02 00:00:02", "nine", "00:00:02.", "2"}) {
+    const auto result = winners({"--at", time});
+    EXPECT_EQ(result.exit_code, 2) << time;
+    EXPECT_THAT(result.err, testing::HasSubstr("--at")) << time;
+  }
+}
+
 TEST(Export, NeedsToKnowWhat) {
   Incident incident;
   EXPECT_EQ(arbiter({"recording", "export", incident.file()}).exit_code, 2);

@@ -270,6 +270,25 @@ TEST(Record, KnowsWhoWinsWhereASourceMayNotBeTapped) {
   EXPECT_GE(result["behind_gap"], 1) << result.dump(2);
 }
 
+// One line of the policy, one sentence.
+TEST(Record, SaysOnceWhatKeepsSeveralSourcesOut) {
+  const TemporaryDirectory files;
+  const std::string policy =
+      files.write("policy", "deny everyone tap /low /high\nallow everyone all\n");
+  Daemon daemon(R"(<behaviors><arbiter at="/p"><select from="/low"/></arbiter>
+    <arbiter at="/q"><select from="/high"/></arbiter>
+    <arbiter at="/r"><select from="/other"/></arbiter></behaviors>)",
+                {.arguments = {"--policy", policy}});
+  Recording recording(daemon);
+  recording.see("recording 1 source");
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  const std::string said = recording.error();
+  EXPECT_NE(said.find("cannot record /high and /low: user "), std::string::npos) << said;
+  const auto first = said.find("may not tap");
+  EXPECT_NE(first, std::string::npos) << said;
+  EXPECT_EQ(said.find("may not tap", first + 1), std::string::npos) << said;
+}
+
 TEST(Record, TakesUpASourceOnceItCanBeTapped) {
   Daemon daemon(kLasting);
   Node node("test");

@@ -137,6 +137,22 @@ std::string overridden_for_a_while(Incident& incident) {
 }
 
 // What matters first; and a thousand arrivals that change alike are one line.
+TEST(SimulateRecording, SaysThatAForeignModelHasNoneOfThePorts) {
+  Incident incident;
+  incident.arrive("/low", 1100, 1101, Incident::Fate::accepted);
+  const TemporaryDirectory directory;
+  const std::string file = incident.file();
+  const auto with = [&](const std::string& port) {
+    const std::string model =
+        directory.write("other.xml", "<behaviors><behavior name='X'><config at='" + port +
+                                         "'>/low</config></behavior></behaviors>");
+    return arbiter({"simulate", "--recording", file, "--model", model}).err;
+  };
+  EXPECT_THAT(with("/q"), HasSubstr("warning: the model has none of the input ports of the "
+                                    "recording: /p\n"));
+  EXPECT_EQ(with("/p"), "");
+}
+
 TEST(SimulateRecording, ShowsIntervalsFirstAndFoldsDecisionsThatChangeAlike) {
   const TemporaryDirectory directory;
   const std::string other = directory.write("other.xml", kReversed);

@@ -78,6 +78,17 @@ TEST(Statement, SpeaksOfWinnersWithEachSpelling) {
   EXPECT_FALSE(found.statements[4].parsed.terms[0].source.has_value());
 }
 
+// Beside winner(/p) some write it so; a condition has the name alone.
+TEST(Statement, TakesActiveOfASourceForTheSource) {
+  const auto found = read("winner(/p) = /s and not active(/d:o)\nactive ( \"/e:o\" )\n");
+  EXPECT_THAT(found.items, IsEmpty());
+  ASSERT_EQ(found.statements.size(), 2u);
+  EXPECT_EQ(show(found.statements[0].parsed.expression), "(=0 and not(/d:o))");
+  ASSERT_EQ(found.statements[0].parsed.sources.size(), 1u);
+  EXPECT_EQ(found.statements[0].parsed.sources[0].where, (Location{"safety.txt", 1, 32}));
+  EXPECT_EQ(show(found.statements[1].parsed.expression), "/e:o");
+}
+
 TEST(Statement, MaySpeakOfOneOfSeveralWinnersAndOfTheSame) {
   const auto found = read(
       "winner(/p) = any(/Nav/*)\nwinner(/p) != any( \"/odd *\" )\nwinner(/p) = winner(/q)\n"
@@ -103,7 +114,9 @@ TEST(Statement, WhatOtherLanguagesWriteIsToldWhatToWriteHere) {
        "\"=\" compares a winner, as in winner(/Arm/pos:i) = /Teleop/pos:o; between "
        "conditions write iff"},
       {"/a != /b", "between conditions write xor"},
-      {"active(/a) -> idle(/p)", "write the name alone"},
+      {"is_active(/a) -> idle(/p)", "write the name alone"},
+      {"active /a -> idle(/p)", "active takes a source in parentheses; write active(/Deadman:o)"},
+      {"active(/Nav/*)", "\"*\" has no meaning in a statement"},
       {"winner(/p) = none(/Nav/*)", "write winner(/p) != any(/Nav/*)"},
       {"winner(/p) = all(/Nav/*)", "only one source wins at a port; write any(/Nav/*)"},
       {"winner(/p) = any", "any takes a pattern in parentheses"},

@@ -115,7 +115,7 @@ TEST_F(TopKeys, WhySpeaksOfTheMomentShown) {
   EXPECT_EQ(question->moment, then);
   EXPECT_EQ(question->seen,
             (std::vector<std::string>{"  /arm:i: /object:o has won for 3.0 s, since " +
-                                      clock_text({}) + ": /object:o began"}));
+                                      clock_text({}) + ": /object:o became active"}));
   EXPECT_THAT(screen(), HasSubstr("Why /arm:i, at " + clock_text(then->wall)));
   view_.set_answer({{question->ports, "", nullptr}, {"of now"}});
   EXPECT_THAT(screen(), Not(HasSubstr("of now")));  // that was another question

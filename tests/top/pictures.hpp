@@ -64,7 +64,7 @@ inline Takeover takeover(std::uint64_t number, const std::string& winner) {
   result.number = number;
   result.port = "/arm:i";
   result.winner = winner;
-  result.because = winner + " began";
+  result.because = winner + " became active";
   return result;
 }
 

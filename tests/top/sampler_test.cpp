@@ -74,10 +74,10 @@ TEST_F(TopSampler, TellsEachChangeOfAWinnerAndWhatMadeIt) {
   ASSERT_EQ(takeovers.size(), 4u);
   EXPECT_EQ(takeovers[0].before, "");
   EXPECT_EQ(takeovers[0].winner, "/low:o");
-  EXPECT_EQ(takeovers[0].because, "/low:o began");
+  EXPECT_EQ(takeovers[0].because, "/low:o became active");
   EXPECT_EQ(takeovers[1].before, "/low:o");
   EXPECT_EQ(takeovers[1].winner, "/high:o");
-  EXPECT_EQ(takeovers[1].because, "/high:o began");
+  EXPECT_EQ(takeovers[1].because, "/high:o became active");
   EXPECT_EQ(takeovers[2].because, "/high:o was deactivated");
   EXPECT_EQ(takeovers[3].winner, "");
   shm::Nanoseconds last = before;

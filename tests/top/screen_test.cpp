@@ -72,7 +72,7 @@ TEST_F(TopScreen, ShowsARateOnceTheDaemonHasCounted) {
 TEST_F(TopScreen, EachChangeOfAWinnerScrollsBy) {
   high_.publish(1);
   ASSERT_TRUE(top_.wait_for("/low:o → /high:o")) << top_.text();
-  EXPECT_THAT(top_.row(top_.row_with("/low:o → /high:o")), HasSubstr("/high:o began"));
+  EXPECT_THAT(top_.row(top_.row_with("/low:o → /high:o")), HasSubstr("/high:o became active"));
   ASSERT_TRUE(top_.wait_until([&] { return top_.row_with("/high:o") == 2; })) << top_.text();
   high_.deactivate();
   low_.deactivate();
@@ -269,8 +269,24 @@ TEST(TopScreenOf, SaysThatThePolicyForbidsATap) {
   top.type("t");
   ASSERT_TRUE(top.wait_for("not tapped: ")) << top.text();
   EXPECT_TRUE(top.wait_for("may not tap the port /p:i")) << top.text();
+  // It is not taken for tapped: the next press asks again.
+  files.write("policy", "allow everyone all\n");
+  ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
   top.type("t");
-  EXPECT_TRUE(top.wait_for("q quit")) << top.text();
+  EXPECT_TRUE(top.wait_for(">t /p:i")) << top.text();
+}
+
+// However long the interval: what somebody waits for is drawn when it comes.
+TEST(TopScreenOf, DrawsTheFirstPictureAndTheFirstRatesAtOnce) {
+  Daemon daemon(kTopModel);
+  Node node("robot");
+  auto low = node.output_port<int>("/low:o");
+  EmulatedTerminal top({kArbiter, "top", "--interval", "60s"}, top_environment(), {24, 80});
+  EXPECT_TRUE(top.wait_for("/low:o")) << top.text();
+  EXPECT_TRUE(top.wait_until([&] {
+    const int source = top.row_with(" /low:o");
+    return source != -1 && std::regex_search(top.row(source), std::regex("never +forever +0 +0 "));
+  })) << top.text();
 }
 
 TEST_F(TopScreen, SortsByTheNextColumn) {

@@ -220,9 +220,24 @@ TEST_F(TopView, LongNamesCanBeToldApartInEightyColumns) {
   EXPECT_EQ(winners.size(), names.size()) << screen({80, 30});
   EXPECT_EQ(sources.size(), names.size()) << screen({80, 30});
   const std::string text = line_with(" → ", {80, 30});
-  EXPECT_THAT(text, testing::EndsWith("began"));
+  EXPECT_THAT(text, testing::EndsWith("became active"));
   EXPECT_THAT(text, HasSubstr("…"));
-  EXPECT_THAT(screen({200, 30}), HasSubstr(names[2] + " began"));
+  EXPECT_THAT(screen({200, 30}), HasSubstr(names[2] + " became active"));
+}
+
+TEST_F(TopView, MarksASourceWhosePublisherIsSlowerThanItsT) {
+  Frame frame = frame_at(10);
+  frame.slow_periods = {0, kSecond * 3 / 4, 0};
+  view_.add(shared(frame), {});
+  EXPECT_THAT(line_with("/object:o █"), HasSubstr("active !500 ms"));
+  EXPECT_THAT(line_with("/face:o"), HasSubstr("silent  500 ms"));
+  press(Key::kTab);
+  press(Key::kDown);
+  const auto question = press(Key::kEnter);
+  ASSERT_TRUE(question);
+  EXPECT_THAT(question->seen,
+              testing::Contains("  ! /object:o publishes every 750 ms, and its T is "
+                                "500 ms: it is inactive in between"));
 }
 
 // The mark of a tapped port is not part of what is sorted by.

@@ -167,8 +167,9 @@ TEST(Doctor, LooksAtTheProcessesOfTheStatus) {
   const MadeUpMachine machine;
   wire::Status status = full_status();
   const Findings stranger = watch::examine_processes(machine.machine(), status);
-  ASSERT_THAT(codes_of(stranger), ElementsAre("stranger"));
-  EXPECT_THAT(stranger[0].what, HasSubstr("lost (pid 43, user 1000)"));
+  ASSERT_THAT(codes_of(stranger), ElementsAre("no-daemon", "stranger"));
+  EXPECT_THAT(stranger[0].what, HasSubstr("with pid 42, is not among its processes"));
+  EXPECT_THAT(stranger[1].what, HasSubstr("lost (pid 43, user 1000)"));
   status.strangers.clear();
   machine.set("proc/42/limits", limits("unlimited", "4095", "0"));
   machine.set("proc/42/stat", "42 (arbiterd) S 1\n");
