@@ -107,11 +107,11 @@ const std::string or_name_it = std::string("or name the type with --type ") + kT
                                      const std::vector<std::string>& closed) {
   const auto* const input = status.find_input(port);
   const auto* const source = status.find_source(port);
-  const auto away = input != nullptr && input->away_pid     ? input->away_pid
-                    : source != nullptr && source->away_pid ? source->away_pid
-                                                            : std::nullopt;
-  if (away) {
-    fail_like("the component that has " + port + " open (process " + std::to_string(*away) +
+  const int away = input != nullptr && input->away_pid     ? *input->away_pid
+                   : source != nullptr && source->away_pid ? *source->away_pid
+                                                           : 0;
+  if (away != 0) {
+    fail_like("the component that has " + port + " open (process " + std::to_string(away) +
                   ") has not come back to this daemon yet",
               "try again, " + or_name_it);
   }

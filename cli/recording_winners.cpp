@@ -28,12 +28,11 @@ namespace arbiter::cli {
 namespace {
 
 using evidence::Recorded;
-using evidence::WinnerChange;
 using nlohmann::ordered_json;
 
-constexpr shm::Nanoseconds kSecond = 1'000'000'000;
+constexpr shm::Nanoseconds kWholeSecond = 1'000'000'000;
 
-struct WinnersOptions {
+struct RecordedWinners {
   std::string file;
   std::string port;  // a pattern; empty: all
   std::string at;
@@ -42,15 +41,15 @@ struct WinnersOptions {
 
 // From a change to the next, or to the end of the run.
 struct Reign {
-  const WinnerChange* change = nullptr;
+  const evidence::WinnerChange* change = nullptr;
   shm::Nanoseconds end = 0;
 };
 
 std::vector<Reign> reigns_of(const Recorded& recorded, const std::string& pattern) {
   std::vector<Reign> all;
   for (const evidence::Run& run : recorded.runs) {
-    std::map<std::string, std::vector<const WinnerChange*>> by_port;
-    for (const WinnerChange& each : run.winners) {
+    std::map<std::string, std::vector<const evidence::WinnerChange*>> by_port;
+    for (const evidence::WinnerChange& each : run.winners) {
       if (pattern.empty() || rules::matches(pattern, each.port))
         by_port[each.port].push_back(&each);
     }
@@ -97,7 +96,7 @@ Span read_moment(const std::string& text, const Recorded& recorded) {
   const shm::Nanoseconds begin = recorded.runs.front().start + offset;
   const shm::Nanoseconds end = recorded.runs.back().end + offset;
   for (const char* format : {"%Y-%m-%d %H:%M:%S", "%Y-%m-%dT%H:%M:%S", "%H:%M:%S"}) {
-    const std::time_t first = begin / kSecond;
+    const std::time_t first = begin / kWholeSecond;
     std::tm parts{};
     localtime_r(&first, &parts);
     const char* const rest = strptime(text.c_str(), format, &parts);
@@ -106,10 +105,11 @@ Span read_moment(const std::string& text, const Recorded& recorded) {
     parts.tm_isdst = -1;
     std::tm day_after = parts;
     ++day_after.tm_mday;
-    shm::Nanoseconds wall = std::mktime(&parts) * kSecond;
-    if (format[1] == 'H' && wall + kSecond <= begin) wall = std::mktime(&day_after) * kSecond;
+    shm::Nanoseconds wall = std::mktime(&parts) * kWholeSecond;
+    if (format[1] == 'H' && wall + kWholeSecond <= begin)
+      wall = std::mktime(&day_after) * kWholeSecond;
     const bool is_whole_second = *rest == '\0';
-    const Span span{wall + *fraction, wall + *fraction + (is_whole_second ? kSecond : 1)};
+    const Span span{wall + *fraction, wall + *fraction + (is_whole_second ? kWholeSecond : 1)};
     if (span.to <= begin || span.from > end) {
       fail_at(text, "is not in the recording, which is from " + clock_text(begin) + " to " +
                         clock_text(end));
@@ -119,26 +119,26 @@ Span read_moment(const std::string& text, const Recorded& recorded) {
   fail_at(text, "is not a time: write 14:03:07, 14:03:07.250 or 2026-11-22 14:03:07");
 }
 
-std::string cause_text(const WinnerChange& change) {
+std::string cause_text(const evidence::WinnerChange& change) {
   const std::string by = shm::printable(change.by);
   switch (change.why) {
-    case WinnerChange::Why::start:
+    case evidence::WinnerChange::Why::start:
       return "so it was when the recording began";
-    case WinnerChange::Why::arrival:
+    case evidence::WinnerChange::Why::arrival:
       return by + " arrived";
-    case WinnerChange::Why::expiry:
+    case evidence::WinnerChange::Why::expiry:
       return by + " went inactive";
-    case WinnerChange::Why::deactivation:
+    case evidence::WinnerChange::Why::deactivation:
       return by + " was deactivated";
-    case WinnerChange::Why::model:
+    case evidence::WinnerChange::Why::model:
       return "model " + std::to_string(change.generation) + " came into force";
-    case WinnerChange::Why::state:
+    case evidence::WinnerChange::Why::state:
       break;
   }
   return "noticed late";
 }
 
-int show_winners(const WinnersOptions& options) {
+int show_winners(const RecordedWinners& options) {
   const Recorded recorded = load_for_simulation(options.file);
   warn_of_missed(recorded);
   std::vector<Reign> reigns = reigns_of(recorded, options.port);
@@ -152,7 +152,7 @@ int show_winners(const WinnersOptions& options) {
   if (options.json) {
     ordered_json list = ordered_json::array();
     for (const Reign& reign : reigns) {
-      const WinnerChange& change = *reign.change;
+      const evidence::WinnerChange& change = *reign.change;
       list.push_back(
           {{"from", clock_text(change.time + offset)},
            {"from_ns", change.time},
@@ -168,7 +168,7 @@ int show_winners(const WinnersOptions& options) {
   }
   std::ostringstream out;
   for (const Reign& reign : reigns) {
-    const WinnerChange& change = *reign.change;
+    const evidence::WinnerChange& change = *reign.change;
     out << clock_text(change.time + offset) << "  " << shm::printable(change.port) << "  "
         << (change.winner.empty() ? "idle" : shm::printable(change.winner)) << "  for "
         << seconds_text(reign.end - change.time) << ": " << cause_text(change) << '\n';
@@ -181,7 +181,7 @@ int show_winners(const WinnersOptions& options) {
 }  // namespace
 
 void add_recorded_winners(CLI::App& parent, int& exit_code) {
-  const auto options = std::make_shared<WinnersOptions>();
+  const auto options = std::make_shared<RecordedWinners>();
   CLI::App* verb =
       parent.add_subcommand("winners", "Show who commanded when, by the clock on the wall");
   verb->add_option("FILE", options->file, "A recording that `arbiter record` has made")->required();

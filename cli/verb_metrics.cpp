@@ -19,7 +19,7 @@ namespace arbiter::cli {
 namespace {
 
 // Whoever collects metrics waits no longer; meanwhile --listen serves nobody else.
-constexpr std::chrono::milliseconds kAnswerTime{1000};
+constexpr std::chrono::milliseconds kScrapeTime{1000};
 
 struct MetricsOptions {
   std::string instance;
@@ -30,8 +30,8 @@ int write_once(const MetricsOptions& options) {
   wire::Status status;
   try {
     wire::Caller who = caller("metrics", options.instance);
-    who.answer_time = kAnswerTime;
-    status = fetch_status(std::move(who), kAnswerTime);
+    who.answer_time = kScrapeTime;
+    status = fetch_status(std::move(who), kScrapeTime);
   } catch (const std::exception&) {
     std::cout << watch::metrics_of_no_daemon();
     throw;
@@ -45,13 +45,13 @@ class Source {
  public:
   explicit Source(const std::string& instance) : caller_(caller("metrics", instance)) {
     caller_.patience = std::chrono::milliseconds(10);
-    caller_.answer_time = kAnswerTime;
+    caller_.answer_time = kScrapeTime;
     caller_.on_waiting = {};
   }
 
   std::string operator()() {
     try {
-      std::string text = watch::metrics_of(fetch_status(caller_, kAnswerTime));
+      std::string text = watch::metrics_of(fetch_status(caller_, kScrapeTime));
       said_.clear();
       return text;
     } catch (const std::exception& error) {

@@ -240,7 +240,7 @@ TEST_F(ChangingModels, RollbackGoesBackStepByStepOrToOneByItsNumber) {
                  "model 9 is not in the history; arbiter history shows what is");
   const auto wrong = arbiter({"rollback", "0"});
   EXPECT_EQ(wrong.exit_code, 2);
-  EXPECT_THAT(wrong.err, HasSubstr("\"0\" is no whole number of at least 1"));
+  EXPECT_THAT(wrong.err, HasSubstr("\"0\" is not a whole number of at least 1"));
   EXPECT_EQ(daemon.generation(), 6u);
   ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
   EXPECT_EQ(source_in_force(), "/c") << "what the file says";
