@@ -162,7 +162,7 @@ void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
     one.tap_again = shm::monotonic_now() + kTapAgain;
     if (one.said != error.what()) {
       say(Level::kWarning,
-          one.card.source + " is wanted elsewhere and cannot be sent: " + error.what());
+          one.card.source + " cannot be sent to the hosts that want it: " + error.what());
     }
     one.said = error.what();
   }

@@ -73,14 +73,15 @@ std::string longer_timeout(shm::Nanoseconds period) {
 Finding slowness(const wire::SourceStatus& source, shm::Nanoseconds period,
                  shm::Nanoseconds timeout) {
   const wire::Component& component = source.open->component;
-  return {"slow-publisher",
-          slow_text(source.name, period, timeout) + " (" + component.node + ", pid " +
-              std::to_string(component.pid) + ")",
-          "each time that its T has passed, the next in command takes over, or the port is idle, "
-          "until the source arrives again",
-          "publish at least twice within T, or give the source a longer T in the model: <source "
-          "port=\"" +
-              source.name + "\" timeout=\"" + longer_timeout(period) + "\"/>"};
+  return {
+      "slow-publisher",
+      slow_text(source.name, period, timeout) + " (" + component.node + ", pid " +
+          std::to_string(component.pid) + ")",
+      "whenever its T has passed, the next in command takes over, or the port is idle, until the "
+      "source arrives again",
+      "publish at least twice within T, or give the source a longer T in the model: <source "
+      "port=\"" +
+          source.name + "\" timeout=\"" + longer_timeout(period) + "\"/>"};
 }
 
 }  // namespace

@@ -107,7 +107,7 @@ void end(Worker& worker, const Patience& patience) {
   while (!status_of(worker)) {
     if (shm::monotonic_now() >= give_up) {
       say(Level::kWarning,
-          "the worker did not end for " + in_words(patience.end) + ", and is killed");
+          "the worker did not end within " + in_words(patience.end) + ": killing it");
       ::kill(worker.pid, SIGKILL);
       ::waitpid(worker.pid, nullptr, 0);
       return;
@@ -134,8 +134,8 @@ std::optional<int> watch_over(Worker& worker, int stop, const Patience& patience
     const bool is_silent = now - worker.beat > silence / 4;
     if (was_stopped || (is_silent && watch::is_stopped(worker.pid))) worker.beat = now;
     if (now - worker.beat < silence) continue;
-    say(Level::kError, "the worker hangs (for " + in_words(patience.silence) +
-                           " nothing has come of it), and is killed");
+    say(Level::kError,
+        "the worker hangs (no sign of life for " + in_words(patience.silence) + "): killing it");
     ::kill(worker.pid, SIGKILL);
     worker.beat = now;
   }
@@ -193,8 +193,8 @@ void end_with_supervisor(const CleanUp& clean_up, const Patience& patience) {
     // Nothing is waited for but the pipe's fault: that nobody can read it any more.
     while (::poll(&end, 1, -1) <= 0) continue;
     ::poll(nullptr, 0, static_cast<int>(patience.end.count()));
-    say(Level::kError, "the supervisor has ended, and the worker has not for " +
-                           in_words(patience.end) + ": it is killed");
+    say(Level::kError, "the supervisor has ended, but the worker did not end within " +
+                           in_words(patience.end) + ": killing it");
     clean_up(::getpid());
     ::kill(::getpid(), SIGKILL);
   }).detach();

@@ -26,7 +26,7 @@ void handle_error(iox::Error error, const std::function<void()>&, iox::ErrorLeve
   if (level != iox::ErrorLevel::FATAL) return;
   const std::string made = what_is_made();
   say(Level::kError, std::string("iceoryx gives up: ") + iox::ErrorHandler::toString(error) +
-                         (made.empty() ? "" : ": RouDi does not grant it " + made));
+                         (made.empty() ? "" : ": RouDi refuses " + made));
   std::_Exit(1);
 }
 
@@ -93,7 +93,7 @@ void Iceoryx::tend() {
   }
   const shm::Nanoseconds silence = now - session_->heard_roudi();
   if (silence > kSilentTooLong && !is_roudi_stopped()) {
-    throw NeedsNewProcess("RouDi runs and says nothing: it has given the gateway up");
+    throw NeedsNewProcess("RouDi runs but is silent: it has given the gateway up");
   }
   set_obstacle(silence > kSilent ? "RouDi does not answer" : "");
   look_after_senders();

@@ -248,8 +248,8 @@ void Session::look_for_refused(Outlet& out) const {
   if (++out.looks_without_any != kLooksUntilRefused) return;
   out.sender->account().set_last_reason(
       subscribers.front() +
-      " subscribes and is not connected: it asks for history=\"…\", or to be waited for when its "
-      "queue is full, which no gateway does");
+      " subscribes and is not connected: it asks for history=\"…\", or that publishers wait when "
+      "its queue is full, which no gateway does");
 }
 
 // What does not pass the gateway can bypass it.
@@ -269,7 +269,7 @@ void Session::look_for_strangers(Outlet& out) const {
   out.sender->account().set_obstacle(text);
   if (strangers.empty() || strangers == before) return;
   say(Level::kWarning, out.sender->entry().outside() + ": " + text +
-                           "; let them publish to another topic, which comes in");
+                           "; let them publish to another topic, and map that one with <in>");
 }
 
 }  // namespace arbiter::gateway
