@@ -1,4 +1,4 @@
-// What `arbiter why` says of one connection, or of one source that is only sensed.
+// What `arbiter why` says about one connection, or one source that is only sensed.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>

@@ -129,7 +129,7 @@ std::optional<int> watch_over(Worker& worker, int stop, const Patience& patience
     if (::read(worker.heart.get(), beats, sizeof beats) > 0) worker.beat = now;
     if (const auto status = status_of(worker)) return status;
     if ((ends[0].revents & POLLHUP) != 0) ::poll(nullptr, 0, 1);  // it is about to end
-    // Time does not count in which one of the two was stopped: who is resumed last has had none.
+    // Time in which one of the two was stopped does not count: the one resumed last has not run.
     const bool was_stopped = now - std::exchange(looked, now) > silence / 2;
     const bool is_silent = now - worker.beat > silence / 4;
     if (was_stopped || (is_silent && watch::is_stopped(worker.pid))) worker.beat = now;
@@ -190,7 +190,7 @@ void end_with_supervisor(const CleanUp& clean_up, const Patience& patience) {
   if (descriptor < 0) return;
   std::thread([=] {
     pollfd end{descriptor, 0, 0};
-    // Nothing is waited for but the pipe's fault: that nobody can read it any more.
+    // Waits only for POLLERR: nobody can read the pipe any more.
     while (::poll(&end, 1, -1) <= 0) continue;
     ::poll(nullptr, 0, static_cast<int>(patience.end.count()));
     say(Level::kError, "the supervisor has ended, but the worker did not end within " +
