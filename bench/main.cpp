@@ -72,7 +72,7 @@ void print(const std::vector<Verdict>& targets) {
   }
 }
 
-// So that it is known before all is measured.
+// Opened first, so that an error shows before anything is measured.
 std::ofstream open(const std::string& file) {
   std::ofstream stream(file);
   if (!stream) throw std::runtime_error("cannot write " + file);

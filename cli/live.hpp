@@ -65,8 +65,8 @@ wire::Status fetch_status(wire::Caller caller, std::chrono::milliseconds answer_
 // summary, also where the terminal has gone. Call before threads start.
 shm::FileDescriptor catch_interrupts();
 
-// Of a verb that was stopped before it had done all that it was asked for: 128 and the signal's
-// number, as a shell says it of a program that the signal has ended. `interrupts` is readable.
+// For a verb that was stopped before it was done: 128 plus the signal's number, which is what a
+// shell reports for a program that the signal has ended. `interrupts` is readable.
 [[nodiscard]] int interrupted_exit_code(const shm::FileDescriptor& interrupts);
 
 // Sleeps until `time` on CLOCK_MONOTONIC, or until `interrupts` is readable; true: it is.

@@ -13,7 +13,7 @@ namespace arbiter::cli {
 // "2026-11-22 14:02:41 UTC".
 [[nodiscard]] std::string wall_text(const evidence::Recorded& recorded, shm::Nanoseconds time);
 
-// Of a time of the calendar: "2026-11-22 15:02:41.250", in this time zone.
+// Of a time by the wall clock: "2026-11-22 15:02:41.250", in this time zone.
 [[nodiscard]] std::string clock_text(shm::Nanoseconds wall);
 
 }  // namespace arbiter::cli

@@ -89,8 +89,8 @@ std::optional<shm::Nanoseconds> fraction_of(const char* rest) {
   return std::stoll(digits + std::string(9 - digits.size(), '0'));
 }
 
-// By the clock on the wall, in this time zone; without a date, the first such time from the
-// beginning of the recording on.
+// By the wall clock, in this time zone; without a date, the first such time from the beginning of
+// the recording on.
 Span read_moment(const std::string& text, const Recorded& recorded) {
   const shm::Nanoseconds offset = recorded.about.wall_offset;
   const shm::Nanoseconds begin = recorded.runs.front().start + offset;
@@ -123,7 +123,7 @@ std::string cause_text(const evidence::WinnerChange& change) {
   const std::string by = shm::printable(change.by);
   switch (change.why) {
     case evidence::WinnerChange::Why::start:
-      return "so it was when the recording began";
+      return "it was so when the recording began";
     case evidence::WinnerChange::Why::arrival:
       return by + " arrived";
     case evidence::WinnerChange::Why::expiry:
@@ -173,7 +173,7 @@ int show_winners(const RecordedWinners& options) {
         << (change.winner.empty() ? "idle" : shm::printable(change.winner)) << "  for "
         << seconds_text(reign.end - change.time) << ": " << cause_text(change) << '\n';
   }
-  if (reigns.empty()) out << "no input port of the recording is arbitrated and matches\n";
+  if (reigns.empty()) out << "no arbitrated input port of the recording matches\n";
   std::cout << out.str();
   return 0;
 }
@@ -182,21 +182,19 @@ int show_winners(const RecordedWinners& options) {
 
 void add_recorded_winners(CLI::App& parent, int& exit_code) {
   const auto options = std::make_shared<RecordedWinners>();
-  CLI::App* verb =
-      parent.add_subcommand("winners", "Show who commanded when, by the clock on the wall");
+  CLI::App* verb = parent.add_subcommand("winners", "Show who commanded when, by the wall clock");
   verb->add_option("FILE", options->file, "A recording that `arbiter record` has made")->required();
   verb->add_option("--at", options->at,
-                   "Only at this time of the clock, in your time zone (TZ): 14:03:07 (all of that "
+                   "Only at this time of day, in your time zone (TZ): 14:03:07 (all of that "
                    "second), 14:03:07.250, '2026-11-22 14:03:07'")
       ->type_name("TIME");
-  verb->add_option("--port", options->port, "Only at input ports of this pattern")
+  verb->add_option("--port", options->port, "Only at input ports that match this pattern")
       ->type_name("PATTERN");
   verb->add_flag("--json", options->json,
                  "A list of {from, from_ns, to_ns, port, winner, why, by, generation}");
   verb->footer(
-      "Exit codes: 0 shown; 2 wrong use, a time that is not in the recording, or a file that "
-      "cannot "
-      "be\nread\n\n"
+      "Exit codes: 0 shown; 2 wrong use, a time that is not in the recording, or a file that\n"
+      "cannot be read\n\n"
       "Example:\n  arbiter recording winners incident.mcap --at 14:03:07");
   verb->callback([options, &exit_code] { exit_code = show_winners(*options); });
 }

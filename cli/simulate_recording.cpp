@@ -232,7 +232,7 @@ int write_comparison(const Recorded& recorded, const evidence::Comparison& resul
   return is_same ? 0 : 1;
 }
 
-// A model of another robot decides all otherwise, which says nothing of either.
+// A model of another robot decides everything differently, which tells nothing about either.
 void warn_of_other_ports(const Recorded& recorded, const evidence::Judge& judge) {
   std::set<std::string> ports;
   for (const evidence::Run& run : recorded.runs) {

@@ -125,9 +125,8 @@ void add_doctor(CLI::App& app, int& exit_code) {
       "  arbiter doctor\n"
       "  arbiter doctor --silence governor,realtime-priority\n\n"
       "It changes nothing, and asks the daemon for its status once. Where components have sources\n"
-      "open, it watches their arrivals for 2.5 s at most. Limits are those of the shell that it "
-      "is\n"
-      "started from: run it as the user, and where, your components run.\n\n"
+      "open, it watches their arrivals for 2.5 s at most. It reports the limits of the shell that\n"
+      "starts it: run it as the same user, and in the same place, as your components.\n\n"
       "Exit codes: 0 nothing found; 1 findings; 2 wrong use, or it cannot look, or standard output "
       "cannot "
       "be\nwritten");

@@ -18,7 +18,7 @@
 namespace arbiter::cli {
 namespace {
 
-// Whoever collects metrics waits no longer; meanwhile --listen serves nobody else.
+// A collector of metrics waits no longer than this; meanwhile --listen serves nobody else.
 constexpr std::chrono::milliseconds kScrapeTime{1000};
 
 struct MetricsOptions {

@@ -197,17 +197,15 @@ void add_flight_options(CLI::App& verb, const std::shared_ptr<RecordOptions>& op
                   throw CLI::ValidationError("--ring", "must be more than 0s");
                 }
               },
-              "Flight recorder: keep the records of this time in memory, as far as --memory "
-              "reaches, and write them to "
-              "FILE-TIME-WHY.mcap at SIGUSR1, at --dump, when --when becomes true, and "
-              "when a component dies")
+              "Flight recorder: keep the records of this time in memory, up to --memory, and "
+              "write them to FILE-TIME-WHY.mcap at SIGUSR1, at --dump, when --when becomes true, "
+              "and when a component dies")
           ->type_name("DURATION");
   verb.add_option_function<std::string>(
           "--memory",
           [options](const std::string& text) { options->flight.memory = read_size(text); },
-          "How much of them --ring keeps (default 64MiB): beyond it the oldest give way, even if "
-          "they "
-          "are younger than --ring's time")
+          "How much memory --ring may use (default 64MiB): beyond it the oldest records give way, "
+          "even if they are younger than --ring's time")
       ->type_name("SIZE")
       ->needs(ring);
   verb.add_option_function<std::string>(

@@ -1,8 +1,8 @@
 // The answer of `arbiter why`: of one port, at one moment.
 //
-//   why_answer.cpp      what is told, and in which order; JSON
-//   why_port.cpp        what is said of the port
-//   why_connection.cpp  what is said of a connection, or of a source that is only sensed
+//   why_answer.cpp      what the answer contains, and in which order; JSON
+//   why_port.cpp        about the port
+//   why_connection.cpp  about a connection, or a source that is only sensed
 #pragma once
 
 #include <memory>

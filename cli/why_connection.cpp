@@ -1,4 +1,4 @@
-// What `arbiter why` says of one connection, or of one source that is only sensed.
+// What `arbiter why` says about one connection, or one source that is only sensed.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace {
 
 using rules::ConnectionExplanation;
 
-// Where there is something to say of many connections.
+// Per connection, if there are many of them.
 constexpr std::size_t kMaxCauses = 3;
 
 }  // namespace
@@ -78,7 +78,7 @@ void WhyAnswer::write_kept_out(const ConnectionExplanation& connection) const {
   }
 }
 
-// Where only one connection is told of, what there is to say of the sources that keep it out.
+// If you asked about one connection only: what is wrong with the sources that keep it out.
 void WhyAnswer::write_reasons(const ConnectionExplanation& connection) const {
   if (connection.wins) return;
   for (const auto& source : sources_that_matter(connection)) {

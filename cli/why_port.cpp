@@ -1,4 +1,4 @@
-// What `arbiter why` says of the port itself: who wins, since when, and by which model.
+// What `arbiter why` says about the port itself: who wins, since when, and by which model.
 #include <ostream>
 #include <string>
 #include <utility>

@@ -313,7 +313,7 @@ std::vector<std::string> sources_that_matter(const rules::ConnectionExplanation&
 void write_obstacles(std::ostream& out, const std::vector<watch::Obstacle>& obstacles,
                      const std::string& of) {
   for (const auto& each : obstacles) {
-    // Some name what they are of themselves.
+    // Some texts begin with the name already.
     const bool is_named = !of.empty() && each.text.starts_with(of + ' ');
     out << "  ! " << (of.empty() || is_named ? "" : of + ": ") << each.text << '\n';
   }

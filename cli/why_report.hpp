@@ -55,7 +55,7 @@ nlohmann::json event_json(const std::string& source, const SourceState& state,
 shm::Nanoseconds event_time(const SourceState& state, shm::Nanoseconds now);
 
 nlohmann::json obstacles_json(const std::vector<watch::Obstacle>& obstacles);
-// A line each. `of`: whose they are, where that does not go without saying.
+// One line each. `of`: whose they are, if the reader could not tell.
 void write_obstacles(std::ostream& out, const std::vector<watch::Obstacle>& obstacles,
                      const std::string& of = {});
 

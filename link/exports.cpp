@@ -139,7 +139,7 @@ void Exports::tap_what_is_wanted(const HostView& view) {
   }
 }
 
-// The other thread uses a tap once it stands in the export, and not before.
+// The other thread uses a tap once it is in the export, and not before.
 void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
   try {
     Tap<void> tap = node_.tap(one.card.source);
@@ -162,7 +162,7 @@ void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
     one.tap_again = shm::monotonic_now() + kTapAgain;
     if (one.said != error.what()) {
       say(Level::kWarning,
-          one.card.source + " is wanted elsewhere and cannot be sent: " + error.what());
+          one.card.source + " cannot be sent to the hosts that want it: " + error.what());
     }
     one.said = error.what();
   }
@@ -235,7 +235,7 @@ void Exports::state(Export& one, bool is_deactivated) {
   write(one, {});
 }
 
-// With a header that says what has happened.
+// Sends header_, which says what has happened, and the sample.
 void Exports::write(Export& one, Bytes sample) {
   header_.exporter = incarnation_;
   header_.number = ++one.number;
@@ -244,7 +244,7 @@ void Exports::write(Export& one, Bytes sample) {
   header_.length = static_cast<std::uint32_t>(sample.size());
   const WritableBytes bytes(buffer_.data(), header_bytes(header_));
   write_header(header_, bytes);
-  // What is not sent has used a number: it is counted where it does not come.
+  // An event that is not sent has used a number, so importers count it as lost.
   static_cast<void>(one.writer.write(bytes, sample));
 }
 

@@ -17,7 +17,7 @@
 
 namespace arbiter::link {
 
-// All links' nodes are called so: what they have open was imported, and is not exported again.
+// The node of every link has this name: what it has open was imported, and is not exported again.
 inline constexpr const char* kNodeName = "arbiter-link";
 
 class HostView {
@@ -40,7 +40,7 @@ class HostView {
   [[nodiscard]] const OpenPorts& open_here() const { return open_here_; }
   // Whether its activity was ended, and nothing has come since.
   [[nodiscard]] bool is_deactivated(const std::string& source) const;
-  // False: ports cannot be opened now, and who tries waits for a second.
+  // False: ports cannot be opened now, and an attempt waits for a second.
   [[nodiscard]] bool has_daemon() const { return instance_ != nullptr && instance_->has_daemon(); }
   // Why nothing is known; empty: it is.
   [[nodiscard]] const std::string& obstacle() const { return obstacle_; }

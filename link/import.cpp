@@ -107,7 +107,7 @@ void Import::listen_to_speaker() {
   say_who_speaks();
 }
 
-// Those who offer nothing any more, where others need their places.
+// Forgets exporters that offer nothing any more, if others need their places.
 void Import::forget(const std::vector<EventReader::Offer>& offers) {
   const std::lock_guard lock(mutex_);
   if (unheard_.size() < kMaxUnheard) return;

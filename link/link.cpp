@@ -103,7 +103,7 @@ void Link::join_network(int stop) {
   });
   exports_.emplace(*node_, *network_, held_, options_.host, incarnation_, bell_);
   clock_.emplace([this] { tokens_->send({incarnation_, sent_.next(time_with_sleep())}); });
-  say(Level::kInfo, "host " + options_.host + ", by " + name_of(options_.network));
+  say(Level::kInfo, "host " + options_.host + ", on " + name_of(options_.network));
 }
 
 void Link::loop(int stop) {

@@ -1,5 +1,5 @@
-// A link: what other hosts want of this one is sent to them, what the model here wants of others is
-// imported. No host is special, and none asks another before it decides (docs/hosts.md).
+// A link: sends to other hosts what they want from this one, and imports what the model here wants
+// from them. No host is special, and none asks another before it decides (docs/hosts.md).
 //
 // Thread safety: all of it runs on the thread that calls run(), but for what its parts say.
 #pragma once
@@ -25,7 +25,7 @@
 namespace arbiter::link {
 
 struct LinkOptions {
-  std::string host;      // as the others are to call it
+  std::string host;      // its name for the others
   std::string instance;  // as NodeOptions has it
   NetworkOptions network;
   // Called by the loop ten times a second, so that somebody can see that it goes round.
@@ -61,7 +61,7 @@ class Link {
   std::string said_of_view_;
   bool stops_ = false;
 
-  // Who calls others goes before who is called.
+  // Destroyed in reverse: callers go before what they call.
   std::optional<Node> node_;
   std::optional<Network> network_;
   std::optional<TokenTopic> tokens_;

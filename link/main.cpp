@@ -46,7 +46,7 @@ int run(int argc, char** argv) {
       "--instance", options.instance,
       "Name of the daemon; by default $ARBITER_INSTANCE, or \"default\" if that is not set");
   app.add_option("--host", options.host,
-                 "What other hosts call this one; by default its host name");
+                 "The name of this host for the others; by default its host name");
   app.add_option("--interface", options.network.interfaces,
                  "A network interface, by name or address (repeatable); without it nothing leaves "
                  "this machine");
@@ -57,11 +57,12 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   app.footer(
       "Example:\n  arbiter-link --interface eth0\n\n"
-      "Exit codes: 0 ended by SIGINT or SIGTERM; 1 an error, which was said; 2 wrong use");
+      "Exit codes: 0 ended by SIGINT or SIGTERM; 1 an error; 2 wrong use");
   try {
     app.parse(argc, argv);
     if (!is_host_name(options.host)) {
-      throw CLI::ValidationError("--host", "\"" + options.host + "\" is no host's name: use 1 to " +
+      throw CLI::ValidationError("--host", "\"" + options.host +
+                                               "\" is not a host name: use 1 to " +
                                                std::to_string(kMaxHostName) +
                                                " letters, digits, dots, hyphens and underscores");
     }

@@ -1,5 +1,5 @@
-// The thread that sends tokens. It asks nobody else for anything, so that it is late only where the
-// whole process is.
+// The thread that sends tokens. It waits for nobody else, so it is late only if the whole process
+// is.
 #pragma once
 
 #include <condition_variable>

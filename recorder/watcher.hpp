@@ -66,7 +66,7 @@ class Watcher {
   [[nodiscard]] evidence::ModelChange model_change(const watch::ModelInForce& model) const;
   [[nodiscard]] std::shared_ptr<const evidence::RuleTable> rule_table() const;
   void open_tap(const std::string& source, Batch& batch);
-  // What is to be said of those.
+  // Texts about the sources that cannot be recorded, and were not reported yet.
   [[nodiscard]] std::vector<std::string> take_refusals();
   void tap_newcomers(const std::set<std::string>& sources, Batch& batch);
   void look_for_newcomers();
@@ -86,7 +86,7 @@ class Watcher {
   std::shared_ptr<const shm::DecisionMemory> memory_;  // of this run
   std::optional<Node> node_;
   std::uint64_t generation_ = 0;
-  std::vector<std::pair<std::string, std::string>> refusals_;  // sources, and why; not told yet
+  std::vector<std::pair<std::string, std::string>> refusals_;  // sources, and why; not reported yet
   struct Watched {
     std::shared_ptr<TapReader> tap;  // null: it cannot be tapped, and is tried again
     Nanoseconds next_try = 0;

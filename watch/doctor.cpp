@@ -269,7 +269,7 @@ Findings examine_processes(const Machine& machine, const wire::Status& status) {
         {"no-daemon",
          "no daemon runs on the machine of --root: the one that answers here, with pid " +
              std::to_string(status.pid) + ", is not among its processes",
-         "nothing is known of the daemon's and the components' processes there",
+         "the processes of the daemon and of the components cannot be examined",
          "leave out --root, or copy /proc and /sys while the daemon runs"});
   }
   const auto files = machine.limit(std::to_string(status.pid), "Max open files");

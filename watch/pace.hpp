@@ -1,8 +1,8 @@
-// How often a source arrives, as its activity word tells whoever looks at it now and then.
+// How often a source arrives, judged by looking at its activity word now and then.
 //
 // A publisher that is slower than its source's T makes the source inactive between any two of its
-// arrivals, so that whom it commands is commanded by turns. No counter tells of it: each arrival is
-// as good as any other.
+// arrivals, so the port that it commands changes hands each time. No counter shows it: each arrival
+// is as good as any other.
 #pragma once
 
 #include <optional>
@@ -40,7 +40,7 @@ class Pace {
   shm::Nanoseconds gap_before_ = 0;
 };
 
-// "/Nav/cmd:o publishes every 250 ms, and its T is 100 ms", with what comes of it.
+// "/Nav/cmd:o publishes every 250 ms, and its T is 100 ms", and what follows from that.
 [[nodiscard]] std::string slow_text(const std::string& source, shm::Nanoseconds period,
                                     shm::Nanoseconds timeout);
 

@@ -21,12 +21,12 @@ namespace {
 // Long enough for the last arrival before it and two more, a second apart.
 constexpr shm::Nanoseconds kLongestLook = 2'500'000'000;
 
-// Whoever asks once does not wait longer for what may never come.
+// A single question does not wait longer for an arrival that may never come.
 constexpr shm::Nanoseconds kLongestGap = 1'000'000'000;
 
 void sleep_for_a_look() { std::this_thread::sleep_for(std::chrono::nanoseconds(kPaceLook)); }
 
-// Until when the next arrival is waited for; nothing: it is not.
+// Until when to wait for the next arrival; nothing: do not wait.
 std::optional<shm::Nanoseconds> waits_until(const SourceState& state, shm::Nanoseconds now,
                                             const wire::SourceStatus* source) {
   const bool has_expired = shm::is_finite(state.word) && state.word != shm::kNeverActive &&
@@ -73,14 +73,15 @@ std::string longer_timeout(shm::Nanoseconds period) {
 Finding slowness(const wire::SourceStatus& source, shm::Nanoseconds period,
                  shm::Nanoseconds timeout) {
   const wire::Component& component = source.open->component;
-  return {"slow-publisher",
-          slow_text(source.name, period, timeout) + " (" + component.node + ", pid " +
-              std::to_string(component.pid) + ")",
-          "each time that its T has passed, the next in command takes over, or the port is idle, "
-          "until the source arrives again",
-          "publish at least twice within T, or give the source a longer T in the model: <source "
-          "port=\"" +
-              source.name + "\" timeout=\"" + longer_timeout(period) + "\"/>"};
+  return {
+      "slow-publisher",
+      slow_text(source.name, period, timeout) + " (" + component.node + ", pid " +
+          std::to_string(component.pid) + ")",
+      "whenever its T has passed, the next in command takes over, or the port is idle, until the "
+      "source arrives again",
+      "publish at least twice within T, or give the source a longer T in the model: <source "
+      "port=\"" +
+          source.name + "\" timeout=\"" + longer_timeout(period) + "\"/>"};
 }
 
 }  // namespace
@@ -129,7 +130,7 @@ Findings examine_publishers(const wire::Caller& caller, const wire::Status& stat
       if (period) found.push_back(slowness(*known.at(source), *period, known.at(source)->timeout));
     }
   } catch (const wire::CallError&) {
-    // What is wrong with the daemon, others say.
+    // Other checks report what is wrong with the daemon.
   }
   return found;
 }

@@ -1,4 +1,4 @@
-// Something that one thread makes, and that others use from then on.
+// Something that one thread makes, and that others use once it is made.
 #pragma once
 
 #include "shm/atomic.hpp"

@@ -106,7 +106,7 @@ Incoming::Fate Incoming::pass_on(const ForeignSample& sample, Time deadline) noe
     return pass_to(*yes_, sample, deadline);
   }
   const Fate fate = pass_to(*yes_, sample, deadline);
-  // One that has lost would only hold up the others.
+  // A source that has lost would only hold up the others.
   if (!outgoing->end_turn(yes_->name(), max_age_.get())) {
     outgoing_.store(nullptr, std::memory_order_relaxed);
   }

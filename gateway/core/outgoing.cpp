@@ -8,8 +8,8 @@
 namespace arbiter::gateway {
 namespace {
 
-// Of this thread, at whatever entry. What it sends may come back to it at once, where a topic leads
-// to itself in a way that no check of the mapping sees; then it goes round by the loop.
+// Whether this thread has the turn at any entry. What it sends may come back to it at once, if a
+// topic leads to itself in a way that no check of the mapping sees; then the loop passes it on.
 thread_local bool has_turn = false;
 
 InputPort<void> open(Node& node, const Entry& entry) {
@@ -106,7 +106,7 @@ bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexc
       has_more_ = false;
       break;
     }
-    // How old others' may be the loop knows.
+    // A sample of another source is left to the loop, which knows how old it may be.
     if (sample->source() != source) {
       left_ = std::move(sample);
       break;

@@ -28,9 +28,8 @@ namespace arbiter::gateway {
 namespace {
 
 constexpr const char* kExitCodes =
-    "\nExit codes: 0 ended by SIGINT or SIGTERM, or the mapping is fine (--check); 1 an error, "
-    "which "
-    "was said;\n2 wrong use, or a mapping that cannot be read or has errors";
+    "\nExit codes: 0 ended by SIGINT or SIGTERM, or the mapping is fine (--check); 1 an error;\n"
+    "2 wrong use, or a mapping that cannot be read or has errors";
 
 constexpr shm::Nanoseconds kSendIdle = 1'000'000'000;
 

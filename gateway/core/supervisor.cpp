@@ -107,7 +107,7 @@ void end(Worker& worker, const Patience& patience) {
   while (!status_of(worker)) {
     if (shm::monotonic_now() >= give_up) {
       say(Level::kWarning,
-          "the worker did not end for " + in_words(patience.end) + ", and is killed");
+          "the worker did not end within " + in_words(patience.end) + ": killing it");
       ::kill(worker.pid, SIGKILL);
       ::waitpid(worker.pid, nullptr, 0);
       return;
@@ -129,13 +129,13 @@ std::optional<int> watch_over(Worker& worker, int stop, const Patience& patience
     if (::read(worker.heart.get(), beats, sizeof beats) > 0) worker.beat = now;
     if (const auto status = status_of(worker)) return status;
     if ((ends[0].revents & POLLHUP) != 0) ::poll(nullptr, 0, 1);  // it is about to end
-    // Time does not count in which one of the two was stopped: who is resumed last has had none.
+    // Time in which one of the two was stopped does not count: the one resumed last has not run.
     const bool was_stopped = now - std::exchange(looked, now) > silence / 2;
     const bool is_silent = now - worker.beat > silence / 4;
     if (was_stopped || (is_silent && watch::is_stopped(worker.pid))) worker.beat = now;
     if (now - worker.beat < silence) continue;
-    say(Level::kError, "the worker hangs (for " + in_words(patience.silence) +
-                           " nothing has come of it), and is killed");
+    say(Level::kError,
+        "the worker hangs (no sign of life for " + in_words(patience.silence) + "): killing it");
     ::kill(worker.pid, SIGKILL);
     worker.beat = now;
   }
@@ -190,11 +190,11 @@ void end_with_supervisor(const CleanUp& clean_up, const Patience& patience) {
   if (descriptor < 0) return;
   std::thread([=] {
     pollfd end{descriptor, 0, 0};
-    // Nothing is waited for but the pipe's fault: that nobody can read it any more.
+    // Waits only for POLLERR: nobody can read the pipe any more.
     while (::poll(&end, 1, -1) <= 0) continue;
     ::poll(nullptr, 0, static_cast<int>(patience.end.count()));
-    say(Level::kError, "the supervisor has ended, and the worker has not for " +
-                           in_words(patience.end) + ": it is killed");
+    say(Level::kError, "the supervisor has ended, but the worker did not end within " +
+                           in_words(patience.end) + ": killing it");
     clean_up(::getpid());
     ::kill(::getpid(), SIGKILL);
   }).detach();

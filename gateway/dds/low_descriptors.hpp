@@ -1,9 +1,8 @@
 // Descriptors that are kept free for Cyclone DDS.
 //
 // Cyclone waits for its sockets by select(), which takes descriptors below 1024 alone: a socket
-// beyond ends the process. Each port of the gateway needs two or three, so that with some five
-// hundred entries none would be left. They are held from the start, and let go while a domain is
-// joined.
+// beyond ends the process. Each entry of the gateway needs at least three, so with some 340 entries
+// none would be left. They are held from the start, and let go while a domain is joined.
 //
 // Thread safety: one thread. Other threads may take a few of those that are let go.
 #pragma once

@@ -10,7 +10,7 @@ namespace arbiter::gateway::dds {
 namespace {
 
 constexpr std::size_t kMaxName = 256;  // of what strangers say
-// Of who they are: so that what they do is not cut off behind it in a status.
+// Of an owner's name, so that a status has room for what the owner does.
 constexpr std::size_t kMaxOwner = 80;
 
 std::string bounded(const char* text) {

@@ -14,8 +14,9 @@ namespace {
 
 constexpr shm::Nanoseconds kSecond = 1'000'000'000;
 constexpr shm::Nanoseconds kHangs = 2 * kSecond;  // RouDi does not answer
-// RouDi says something once a second to those whom it knows. Whom it has not heard of for a while,
-// it forgets, also where it was RouDi that did not run; their ends are dead, and nothing tells.
+// RouDi sends something once a second to each process that it knows. It forgets a process that it
+// has not heard from for a while, even if it was RouDi that did not run. The ends of that process
+// are then dead, and nothing reports it.
 constexpr shm::Nanoseconds kSilent = 5 * kSecond;
 constexpr shm::Nanoseconds kSilentTooLong = 10 * kSecond;
 constexpr shm::Nanoseconds kHangsInside = 5 * kSecond;  // the thread does not come out of a call
@@ -26,7 +27,7 @@ void handle_error(iox::Error error, const std::function<void()>&, iox::ErrorLeve
   if (level != iox::ErrorLevel::FATAL) return;
   const std::string made = what_is_made();
   say(Level::kError, std::string("iceoryx gives up: ") + iox::ErrorHandler::toString(error) +
-                         (made.empty() ? "" : ": RouDi does not grant it " + made));
+                         (made.empty() ? "" : ": RouDi refuses " + made));
   std::_Exit(1);
 }
 
@@ -35,8 +36,8 @@ void handle_error(iox::Error error, const std::function<void()>&, iox::ErrorLeve
 Iceoryx::Iceoryx(std::string name) : name_(std::move(name)) {
   iox::log::LogManager::GetLogManager().SetDefaultLogLevel(iox::log::LogLevel::kError,
                                                            iox::log::LogLevelOutput::kHideLogLevel);
-  // It writes a line for each sample for which no chunk is left, past its own log and its error
-  // handler: a subscriber that keeps what it gets would fill a disk. The account counts those.
+  // For each sample for which no chunk is left, iceoryx writes a line, past its own log and error
+  // handler: a subscriber that keeps what it gets would fill a disk. The account counts them.
   std::cerr.setstate(std::ios::badbit);
   static const auto handler = iox::ErrorHandler::setTemporaryErrorHandler(handle_error);
 }
@@ -93,7 +94,7 @@ void Iceoryx::tend() {
   }
   const shm::Nanoseconds silence = now - session_->heard_roudi();
   if (silence > kSilentTooLong && !is_roudi_stopped()) {
-    throw NeedsNewProcess("RouDi runs and says nothing: it has given the gateway up");
+    throw NeedsNewProcess("RouDi runs but is silent: it has given the gateway up");
   }
   set_obstacle(silence > kSilent ? "RouDi does not answer" : "");
   look_after_senders();

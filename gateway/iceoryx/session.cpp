@@ -230,7 +230,7 @@ void Session::look_at_list(shm::Nanoseconds now) {
       inlet->in.account.set_peers(static_cast<std::uint32_t>(publishers));
     }
   }
-  // Also where the list is the same: who has ended stays in it for a while.
+  // Even if the list is the same: a process that has ended stays in it for a while.
   for (Outlet& out : outs_) {
     look_for_strangers(out);
     look_for_refused(out);
@@ -248,8 +248,8 @@ void Session::look_for_refused(Outlet& out) const {
   if (++out.looks_without_any != kLooksUntilRefused) return;
   out.sender->account().set_last_reason(
       subscribers.front() +
-      " subscribes and is not connected: it asks for history=\"…\", or to be waited for when its "
-      "queue is full, which no gateway does");
+      " subscribes and is not connected: it asks for history=\"…\", or that publishers wait when "
+      "its queue is full, which no gateway does");
 }
 
 // What does not pass the gateway can bypass it.
@@ -265,11 +265,11 @@ void Session::look_for_strangers(Outlet& out) const {
   if (strangers.empty() && before.empty()) return;
   const std::string text =
       strangers.empty() ? "" : "others publish there too, past all arbitration: " + strangers;
-  // Each time: the loop takes back what it has said of RouDi, and with it this.
+  // Set each time, because the loop clears it together with what it has said about RouDi.
   out.sender->account().set_obstacle(text);
   if (strangers.empty() || strangers == before) return;
   say(Level::kWarning, out.sender->entry().outside() + ": " + text +
-                           "; let them publish to another topic, which comes in");
+                           "; let them publish to another topic, and map that one with <in>");
 }
 
 }  // namespace arbiter::gateway

@@ -146,7 +146,7 @@ class MappingCheck {
       const std::string text =
           "the gateway at " + rules::describe(first.where) + " joins domain " +
           std::to_string(found->first) +
-          " with another interface, peers or configuration, and a program has one for each "
+          " with another interface, peers or configuration, but a program has one for each "
           "domain; give both the same";
       if (is_one_file) {
         diagnostics_.error("two-configurations", gateway->where,
@@ -232,7 +232,7 @@ class MappingCheck {
     if (qos.history != History::kKeepAll || qos.reliability != Reliability::kReliable) return;
     diagnostics_.warning("held-up-idle", entry.where,
                          "with history=\"keep_all\" one subscriber that does not keep up, or is "
-                         "stopped, keeps everything from all others until DDS gives it up, and so "
+                         "stopped, keeps everything from all others until DDS gives it up, also "
                          "what " +
                              entry.outside() + " is sent while " + entry.port->name +
                              " is idle; write history=\"keep_last\"",
@@ -332,15 +332,13 @@ class MappingCheck {
         if (timeout == shm::kForever && !entry.max_age) continue;
         diagnostics_.error(
             "late-history", port->where,
-            "a topic that keeps samples for those who come later brings old ones, and " +
+            "the topic also brings samples that were published before the gateway came, and " +
                 (entry.max_age
                      ? "the entry has a max_age="
                      : "T of " + rules::quote(port->name) + " is " + rules::to_string(timeout)) +
-                ": an old sample must not become an arrival; give the source timeout=\"forever\" "
-                "in "
-                "the model and the entry no max_age=, if what was said before still holds, or "
-                "write "
-                "durability=\"volatile\", which such publishers serve, too",
+                ": an old sample must not become an arrival; if old samples still hold, give the "
+                "source timeout=\"forever\" in the model, and the entry no max_age=; otherwise "
+                "write durability=\"volatile\", which matches such publishers, too",
             {.ports = {}, .source = port->name});
       }
     }

@@ -1,14 +1,12 @@
-// What a link says of a source that it offers, where DDS carries it: in the user data of a writer.
-// And the message that carries a token.
+// What a link says about a source that it offers, in the user data of a DDS writer; and the message
+// that carries a token.
 //
-// All of it comes from strangers: sizes are bounded, names are such as ports, hosts and types may
-// have, and what does not hold to that is nothing.
+// All of it comes from strangers: sizes are bounded, names must be those that ports, hosts and
+// types may have, and anything else is refused.
 //
-//   host    "ARBH", version 1 (1 byte), incarnation (8), then texts: the host's name, the
-//   instance's offer   "ARBO", version 1, incarnation, then a text: the source's name; revision of
-//   the type (4);
-//           if that is not 0: size (8), alignment (8), and a text: the type's name, empty if it is
-//           untyped
+//   offer   "ARBO", version 1 (1 byte), incarnation (8), two texts: the host's name, the source's
+//           name; revision of the type (4); if that is not 0: size (8), alignment (8), and a text:
+//           the type's name, empty if it is untyped
 //   token   "ARBT", version 1, incarnation of the importer, number (8)
 //
 // A text is its length (2 bytes) and its bytes. Numbers are little-endian. What follows the end is

@@ -1,4 +1,4 @@
-// What stands before each event of a source on the network, and what is believed of it.
+// The header of each event of a source on the network, and the checks on it.
 //
 //   0   4  "ARBL"
 //   4   1  version, 1
@@ -15,7 +15,7 @@
 //   …      the sample
 //
 // Numbers are little-endian. What follows the sample is padding. A header that is not exactly so is
-// nobody's: no part of it is used.
+// refused: no part of it is used.
 #pragma once
 
 #include <cstddef>

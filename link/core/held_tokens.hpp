@@ -4,8 +4,8 @@
 // A sample may have waited in this host, for a link that was stopped or starved. So it names no
 // token that came after it was published, although the link holds newer ones when it sends it.
 //
-// Whoever sends tokens is a stranger: their number is bounded, and one that falls silent is
-// forgotten where another one needs its place.
+// Senders of tokens are strangers: their number is bounded, and one that falls silent is forgotten
+// if another one needs its place.
 //
 // Units: nanoseconds of CLOCK_MONOTONIC, by which samples are stamped.
 //
@@ -39,7 +39,7 @@ inline constexpr std::size_t kMaxImporters = 64;
 
 class HeldTokens {
  public:
-  // Who is silent for this long may lose its place to another importer.
+  // An importer that is silent for this long may lose its place to another.
   static constexpr shm::Nanoseconds kSilence = 5'000'000'000;
 
   // False: there is no place for another importer now. A token that is older than one that came

@@ -7,7 +7,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string_view>
 
 namespace arbiter::link {
 
@@ -28,21 +27,6 @@ struct ImportFacts {
   if (!facts.is_wanted) return ImportChoice::kNotWanted;
   if (facts.is_open_here) return ImportChoice::kSpokenHere;
   return facts.has_speaker ? ImportChoice::kImport : ImportChoice::kNoSpeaker;
-}
-
-// For people.
-[[nodiscard]] constexpr std::string_view words_of(ImportChoice choice) noexcept {
-  switch (choice) {
-    case ImportChoice::kNotWanted:
-      return "the model does not mention it";
-    case ImportChoice::kSpokenHere:
-      return "a component of this host has it open";
-    case ImportChoice::kNoSpeaker:
-      return "no other host offers it";
-    case ImportChoice::kImport:
-      return "imported";
-  }
-  return "";
 }
 
 }  // namespace arbiter::link

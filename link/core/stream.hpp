@@ -3,7 +3,7 @@
 // An exporter numbers what happens to a source from 1 upwards: samples, signals, deactivations;
 // what it could not see itself has used numbers as well. It does so once for each of its lives and
 // each source, so a stream is known by its source and the exporter's incarnation. The last event of
-// a stream says what the source is like: whoever joins, or has missed some, needs nothing but that.
+// a stream tells the source's state: an importer that joins, or has missed some, needs only that.
 //
 // Thread safety: none of its own.
 #pragma once
@@ -25,8 +25,8 @@ struct StreamEvent {
 
 class Stream {
  public:
-  // Takes up an event of the exporter `from`, which is the one that is obeyed. False: it came
-  // already, or one behind it did.
+  // Takes up an event of the exporter `from`, which is the one that is obeyed. False: it,
+  // or a later one, came before.
   bool note(Incarnation from, const StreamEvent& event) noexcept;
 
   // Events that have not come, and will not. What an exporter sent before its first event here, or

@@ -1,5 +1,5 @@
-// When tokens were sent, or when they came: of the last ones exactly, of earlier ones ever more
-// coarsely, in memory that does not grow.
+// When tokens were sent, or when they came: exact for the last ones, ever coarser for earlier ones,
+// in memory that does not grow.
 //
 // Tokens are numbered from 1 upwards. Level 0 keeps the last 64, level 1 the last 64 whose numbers
 // are multiples of 8, level 2 those of 64, and so on. So what is known of a token that lies some

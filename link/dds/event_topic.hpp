@@ -3,8 +3,8 @@
 // a writer's user data say what it offers (link/core/cards.hpp).
 //
 // Both are reliable, keep the last event and give it to a reader that comes later: so whatever is
-// lost, the last event gets through, and it says what the source is like (link/core/stream.hpp).
-// More than one would let new samples wait for old ones.
+// lost, the last event gets through, and it tells the source's state (link/core/stream.hpp). If
+// they kept more, new samples would wait for old ones.
 #pragma once
 
 #include <dds/dds.h>
@@ -25,12 +25,12 @@ namespace arbiter::link {
 // Thread safety: one thread, or a lock of the owner's; is_wanted() any thread.
 class EventWriter {
  public:
-  // `bell` rings where is_wanted() is another, and outlives this. Throws DdsError.
+  // `bell` rings when is_wanted() changes, and outlives this. Throws DdsError.
   EventWriter(const Network& network, const OfferCard& card, const gateway::Bell& bell);
 
   // Whether any host reads it now.
   [[nodiscard]] bool is_wanted() const;
-  // Another card of the same source: its type is known, or another one.
+  // Another card for the same source: its type is now known, or has changed.
   void set_card(const OfferCard& card);
   // Waits 10 ms at most for readers that do not keep up. False: it was not sent.
   [[nodiscard]] bool write(Bytes header, Bytes sample) noexcept;
@@ -43,7 +43,7 @@ class EventWriter {
 
 class EventReader {
  public:
-  // `taker` is called on Cyclone's threads, one at a time. `bell` rings where offers() are others.
+  // `taker` is called on Cyclone's threads, one at a time. `bell` rings when offers() change.
   // Both outlive this. Throws DdsError.
   EventReader(const Network& network, const std::string& source, gateway::dds::SampleTaker& taker,
               const gateway::Bell& bell);
@@ -52,7 +52,7 @@ class EventReader {
     std::uint64_t key = 0;
     OfferCard card;
   };
-  // Whoever offers the source now. Cards that are none are passed over.
+  // Who offers the source now. Malformed cards are passed over.
   [[nodiscard]] std::vector<Offer> offers() const;
 
  private:

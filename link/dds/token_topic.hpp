@@ -1,6 +1,6 @@
-// The topic by which links send each other tokens: those who import to those who export.
+// The topic by which importing links send their tokens to those that export.
 //
-// Best effort, for a token that comes again is worth nothing: the next one is newer.
+// Best effort: a repeated token is worth nothing, because the next one is newer.
 #pragma once
 
 #include <functional>

@@ -47,7 +47,8 @@ constexpr int kLong = 600'000;
 TEST(Supervisor, KillsAWorkerThatHangsAndStartsAnother) {
   Spoken program = supervised("hang", 200, kLong);
   const pid_t first = next_worker(program);
-  EXPECT_THAT(program.line().value_or(""), HasSubstr("the worker hangs (for 200 ms nothing has "));
+  EXPECT_THAT(program.line().value_or(""),
+              HasSubstr("the worker hangs (no sign of life for 200 ms"));
   EXPECT_EQ(program.line(), "cleaned up after " + std::to_string(first));
   EXPECT_THAT(program.line().value_or(""), HasSubstr("was ended by signal 9 (Killed); another"));
   EXPECT_NE(next_worker(program), first);
@@ -58,7 +59,7 @@ TEST(Supervisor, KillsAWorkerThatDoesNotEndWhenItIsAskedTo) {
   const pid_t worker = next_worker(program);
   EXPECT_EQ(program.line(), "beats");
   program.process.signal(SIGTERM);
-  EXPECT_THAT(program.line().value_or(""), HasSubstr("did not end for 100 ms, and is killed"));
+  EXPECT_THAT(program.line().value_or(""), HasSubstr("did not end within 100 ms: killing it"));
   EXPECT_EQ(program.line(), "cleaned up after " + std::to_string(worker));
   EXPECT_EQ(program.process.wait(), 0);
 }
@@ -83,7 +84,7 @@ TEST(Supervisor, AWorkerThatHangsEndsWithoutItsSupervisor) {
   const pid_t worker = next_worker(program);
   program.process.kill();
   EXPECT_THAT(program.line().value_or(""),
-              HasSubstr("the supervisor has ended, and the worker has not for 100 ms: it is "));
+              HasSubstr("the supervisor has ended, but the worker did not end within 100 ms: "));
   EXPECT_EQ(program.line(), "cleaned up after " + std::to_string(worker));
   wait_until_ended(worker);
 }
@@ -94,7 +95,7 @@ TEST(Supervisor, AWorkerWhoseSupervisorLivesIsNotEnded) {
   ::usleep(100'000);
   EXPECT_EQ(state_of(worker), "S");
   program.process.signal(SIGTERM);
-  EXPECT_THAT(program.line().value_or(""), HasSubstr("did not end for 0 s, and is killed"));
+  EXPECT_THAT(program.line().value_or(""), HasSubstr("did not end within 0 s: killing it"));
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ TEST_F(Hosts, OnlyWhatAnotherHostsModelWantsIsTapped) {
   Planner planner(head);
   Node eye = head.node("eye");
   auto camera = eye.output_port<Speed>("/Camera/image:o");
-  head.see("host head, by the loopback interface");
+  head.see("host head, on the loopback interface");
   Host base("base", runtime_, motor_model("1000s"), network());
   Body body(base);
   body.drive(planner);
@@ -110,8 +110,8 @@ TEST_F(Hosts, EachObeysItsOwnComponent) {
   Planner far(head);
   Body body(base);
   body.drive(*near);
-  base.see("host base, by");
-  head.see("host head, by");
+  base.see("host base, on");
+  head.see("host head, on");
   EXPECT_TRUE(head.daemon().source(kPlanner)["open"]);
   body.drive(*near);
   EXPECT_EQ(base.described(kPlanner), "") << "no link has it open";

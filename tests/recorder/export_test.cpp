@@ -67,7 +67,7 @@ TEST(Export, HasRowsForSourcesThatOpenPortsOnlyRead) {
             "1110,/stop,/p,discarded,-\n1120,/low,/p,discarded,-\n");
 }
 
-// The clock on the wall was 5 ms ahead of the recording's times: they begin at 1970-01-01
+// The wall clock was 5 ms ahead of the recording's times: they begin at 1970-01-01
 // 00:00:00.005.
 TEST(RecordedWinners, SaysWhoCommandedAtATimeOfTheClock) {
   constexpr shm::Nanoseconds kMs = 1'000'000;
@@ -93,13 +93,13 @@ TEST(RecordedWinners, SaysWhoCommandedAtATimeOfTheClock) {
   const std::string high = "1970-01-01 00:00:02.505  /p  /high  for 0.200 s: /high arrived\n";
   const std::string again = "1970-01-01 00:00:02.705  /p  /low  for 1.300 s: /high went inactive\n";
   EXPECT_THAT(winners({}).out,
-              testing::AllOf(testing::HasSubstr("/p  idle  for 1.000 s: so it was when the "),
+              testing::AllOf(testing::HasSubstr("/p  idle  for 1.000 s: it was so when the "),
                              testing::EndsWith(low + high + again)));
   EXPECT_EQ(winners({"--at", "00:00:02"}).out, low + high + again) << "in all of that second";
   EXPECT_EQ(winners({"--at", "00:00:02.600"}).out, high);
   EXPECT_EQ(winners({"--at", "1970-01-01 00:00:03"}).out, again);
   EXPECT_EQ(winners({"--at", "00:00:03", "--port", "/q*"}).out,
-            "no input port of the recording is arbitrated and matches\n");
+            "no arbitrated input port of the recording matches\n");
   EXPECT_THAT(winners({"--at", "00:00:02.6", "--json"}).out,
               testing::HasSubstr("\"winner\": \"/high\""));
   for (const char* time : {"00:00:09", "1970-01-02 00:00:02", "nine", "00:00:02.", "2"}) {

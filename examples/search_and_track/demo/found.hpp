@@ -11,7 +11,7 @@ namespace search_and_track {
   return std::filesystem::read_symlink("/proc/self/exe").parent_path();
 }
 
-// The first that is there. Throws if none is.
+// The first that exists. Throws if none does.
 [[nodiscard]] inline std::filesystem::path first_of(
     std::initializer_list<std::filesystem::path> candidates) {
   for (const std::filesystem::path& candidate : candidates) {

@@ -15,8 +15,8 @@ namespace search_and_track {
             const bool is_number = CLI::detail::lexical_cast(text, value) && value == value;
             return is_number
                        ? range(text)
-                       : text + " is no number of seconds from " + CLI::detail::to_string(least) +
-                             " to " + CLI::detail::to_string(most);
+                       : text + " is not a number of seconds from " +
+                             CLI::detail::to_string(least) + " to " + CLI::detail::to_string(most);
           },
           range.get_description()};
 }

@@ -133,7 +133,7 @@ TEST_P(DdsComingAndGoing, ALatchedSampleFromBeforeTheGatewayCameHoldsWhereTIsFor
   EXPECT_TRUE(latched.daemon.source("/Lock/pressed:o").value("active", false));
   // Once the model says that it ends, what was before is not taken again.
   latched.daemon.load(LatchedLock::model("500ms"));
-  gateway.see("what was published before is not taken, since T is not forever");
+  gateway.see("samples published before are not taken, because T is not forever");
   const int before = latched.published("/Lock/pressed:o");
   latched.lock.await("matched 2");
   latched.release_until_heard();

@@ -144,7 +144,7 @@ TEST(DdsStrangers, ThatComeAndGoWithoutEndAreWarnedOfSoManyTimes) {
     many.emplace_back(dds_create_writer(participant.get(), topic.get(), nullptr, nullptr),
                       "writer");
   }
-  await_described(daemon, "/Nav/cmd_vel:o", "there are more ends than are looked at");
+  await_described(daemon, "/Nav/cmd_vel:o", "there are more ends than the gateway looks at");
   Stranger navigation("cyclone", domain, {"pub", "twist", "rt/cmd_vel_nav"});
   navigation.await("matched 1");
   navigation.publish("1 0");

@@ -310,7 +310,7 @@ TEST_F(Iceoryx, WhoElsePublishesWhereTheGatewayDoesIsTold) {
   std::optional<Spoken> stranger = plain_publisher("base");
   const std::string name = "plain-publisher-" + std::to_string(stranger->process.pid());
   ASSERT_TRUE(gate.hear("iceoryx Test/One/base: others publish there too, past all arbitration: " +
-                        name + "; let them publish to another topic, which comes in"));
+                        name + "; let them publish to another topic, and map that one with <in>"));
   wait_until([&] { return described_input("/Base:i").find(name) != std::string::npos; });
   stranger->process.signal(SIGTERM);
   wait_until([&] { return described_input("/Base:i").find(name) == std::string::npos; });
