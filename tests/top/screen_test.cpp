@@ -31,6 +31,19 @@ class TopScreen : public testing::Test {
     ASSERT_TRUE(top_.wait_for("/low:o")) << top_.text();
   }
   void press(const std::string& keys) const { top_.type(keys); }
+  // A picture comes in pieces, its last line last. So what a key brings is there as a whole once
+  // the last line is another.
+  void await_last_line(const std::string& beginning) {
+    ASSERT_TRUE(top_.wait_until([&] {
+      return top_.row(23).substr(0, beginning.size()) == beginning;
+    })) << top_.text();
+  }
+  void await_whole_picture() {
+    press("?");
+    ASSERT_NO_FATAL_FAILURE(await_last_line("Esc or q close"));
+    press("\x1b");
+    ASSERT_NO_FATAL_FAILURE(await_last_line("q quit"));
+  }
 
   Daemon daemon_{kTopModel};
   Node node_{"robot"};
@@ -180,6 +193,7 @@ TEST_F(TopScreen, WhyOfAStepBackIsOfTheMomentShown) {
     const std::string shown = top_.row(0);  // with the time
     press(kLeft);
     ASSERT_TRUE(top_.wait_until([&] { return top_.row(0) != shown; })) << top_.text();
+    ASSERT_NO_FATAL_FAILURE(await_whole_picture());
   }
   press("w");
   ASSERT_TRUE(top_.wait_for("/p:i: /high:o wins")) << top_.text();
