@@ -124,11 +124,17 @@ bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexc
     account_for(result, (*sample)->size());
   }
   if (has_come) idle_again_.reset();  // somebody commands
+  // Nobody rings for a port that is disarmed, and the last take may have swallowed a ring and have
+  // set a timer again that had expired: what has become idle meanwhile only this look finds. The
+  // port is armed: what becomes idle from now on rings.
+  const bool has_idle_sample = entry_.idle.kind != Idle::Kind::kNothing;
+  const bool became_idle = has_idle_sample && !has_more_ && !idle_again_ && port_.idle();
+  if (became_idle) idle_again_ = 0;  // it is due
   next_.store(when_next(), std::memory_order_relaxed);
-  const bool leaves_some = has_more_;
+  const bool calls_loop = has_more_ || became_idle;
   has_turn = false;
   turn_.unlock();
-  if (leaves_some) call_loop_();
+  if (calls_loop) call_loop_();
   return has_come;
 }
 

@@ -80,7 +80,8 @@ class Outgoing {
   // False: somebody else has the turn, or something is left for the loop; publish all the same.
   // Never waits. Any thread.
   [[nodiscard]] bool begin_turn() noexcept;
-  // Sends what of `source` waits and ends the turn. False: nothing of it has come here.
+  // Sends what of `source` waits and ends the turn; calls the loop for what is left, and for the
+  // idle sample if the port has become idle meanwhile. False: nothing of it has come here.
   bool end_turn(std::string_view source, shm::Nanoseconds max_age) noexcept;
   // When run() is to be called again even if the descriptor is not readable; shm::kForever: never.
   [[nodiscard]] shm::Nanoseconds next() const noexcept {

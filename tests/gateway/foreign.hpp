@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstring>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,6 +39,9 @@ class BytesSample : public ForeignSample {
   const bool big_endian_;
 };
 
+// What an entry with idle='zero' size='4' sends.
+inline const std::string kZeros("\0\1\0\0\0\0\0\0", 8);
+
 template <class Number>
 std::string bytes_of(Number number) {
   std::string bytes(sizeof number, '\0');
@@ -52,12 +56,14 @@ class KeepingSender : public Sender {
     if (answer == Result::kSent) {
       sent.emplace_back(reinterpret_cast<const char*>(sample.data()), sample.size());
     }
+    if (meanwhile) meanwhile();
     return answer;
   }
   [[nodiscard]] Result send_at_once(Bytes sample) noexcept override {
     return would_wait ? Result::kBusy : send(sample);
   }
   std::vector<std::string> sent;
+  std::function<void()> meanwhile{};  // what happens while it sends
   bool would_wait = false;
   Result answer = Result::kSent;
 };

@@ -21,7 +21,6 @@ constexpr const char* kDepartures =
     "<behaviors timeout='10s'>"
     "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config></behavior>"
     "</behaviors>";
-const std::string kZeros("\0\1\0\0\0\0\0\0", 8);
 
 class Leaving : public testing::Test {
  protected:
