@@ -63,6 +63,7 @@ void Outgoing::send_waiting(shm::Nanoseconds now) {
       continue;
     }
     account_for(sender_.send(**sample), (*sample)->size());
+    idle_again_.reset();  // somebody commanded: the next idle sample must not wait for its period
     if (ins_ == nullptr) continue;
     if (const auto in = ins_->find(sample->source()); in != ins_->end()) in->second->follow(*this);
   }

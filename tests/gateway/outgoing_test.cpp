@@ -79,6 +79,16 @@ TEST_F(Leaving, APortThatBecomesIdleSaysStopAtOnce) {
   EXPECT_THAT(sender_.sent, ElementsAre(kZeros, "drive", kZeros));
 }
 
+// The loop sees the port idle before and after, and has sent a command in between.
+TEST_F(Leaving, APortThatBecomesIdleWhileACommandIsSentSaysStopAtOnce) {
+  outgoing_.run(now_);
+  auto nav = publisher();
+  publish(nav, "drive");
+  sender_.meanwhile = [&] { nav.deactivate(); };
+  outgoing_.run(now_ + 1);
+  EXPECT_THAT(sender_.sent, ElementsAre(kZeros, "drive", kZeros));
+}
+
 TEST_F(Leaving, AReaderThatComesIsToldToStop) {
   outgoing_.run(now_);
   outgoing_.peer_matched();
