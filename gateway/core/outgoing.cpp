@@ -1,5 +1,6 @@
 #include "gateway/core/outgoing.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "gateway/core/incoming.hpp"
@@ -58,7 +59,9 @@ void Outgoing::send_waiting(shm::Nanoseconds now) {
       has_more_ = false;
       break;
     }
-    if (now - sample->stamp_ns() > ages_.of(sample->source())) {
+    // To send one to a subscriber that is full takes a while, here and at the ports before.
+    const shm::Nanoseconds age = std::max(now, shm::monotonic_now()) - sample->stamp_ns();
+    if (age > ages_.of(sample->source())) {
       account_.late.add();
       continue;
     }

@@ -74,6 +74,7 @@ class Outgoing {
   // Sends what waits, unless it has waited for longer than its source's T: a gateway that was
   // stopped must not bring old commands to life. And the idle sample where it is due: when the port
   // has become idle, at the start, after peer_matched(), and every kIdlePeriod while it is idle.
+  // A sample's age is that at which it is sent, and not at `now`: others may have waited meanwhile.
   void run(shm::Nanoseconds now);
   // Before run(): whose samples may go straight on, and what lets the loop run() all. The loop.
   void lead(const InBySource& ins, std::function<void()> call_loop);

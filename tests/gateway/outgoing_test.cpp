@@ -89,6 +89,23 @@ TEST_F(Leaving, APortThatBecomesIdleWhileACommandIsSentSaysStopAtOnce) {
   EXPECT_THAT(sender_.sent, ElementsAre(kZeros, "drive", kZeros));
 }
 
+// A subscriber that is full holds up what comes behind, which grows old meanwhile.
+TEST_F(Leaving, WhatGrowsOldWhileAnotherSampleIsSentIsNotSent) {
+  auto nav = publisher();
+  const shm::Nanoseconds before = shm::monotonic_now();
+  publish(nav, "held up");
+  publish(nav, "old");
+  const shm::Nanoseconds after = shm::monotonic_now();
+  sender_.meanwhile = [&] {
+    ages_.age = after - before;
+    while (shm::monotonic_now() - after <= ages_.age) {
+    }
+  };
+  outgoing_.run(after);
+  EXPECT_THAT(sender_.sent, ElementsAre("held up"));
+  EXPECT_EQ(account_.late.value(), 1u);
+}
+
 TEST_F(Leaving, AReaderThatComesIsToldToStop) {
   outgoing_.run(now_);
   outgoing_.peer_matched();
