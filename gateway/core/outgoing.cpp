@@ -88,7 +88,8 @@ void Outgoing::send_idle(shm::Nanoseconds now) {
   }
 }
 
-bool Outgoing::begin_turn() noexcept {
+bool Outgoing::begin_turn(std::size_t bytes) noexcept {
+  if (bytes > sender_.largest_at_once()) return false;
   if (has_turn || loop_waits_.load(std::memory_order_relaxed) || !turn_.try_lock()) return false;
   if (left_ || has_more_) {
     turn_.unlock();
@@ -120,7 +121,10 @@ bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexc
       account_.late.add();
       continue;
     }
-    const Sender::Result result = sender_.send_at_once(**sample);
+    // One that is too large may have come before the turn, and the loop not to it yet.
+    const bool is_for_loop = (*sample)->size() > sender_.largest_at_once();
+    const Sender::Result result =
+        is_for_loop ? Sender::Result::kBusy : sender_.send_at_once(**sample);
     if (result == Sender::Result::kBusy) {
       left_ = std::move(sample);
       break;

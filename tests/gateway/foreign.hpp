@@ -1,6 +1,8 @@
 // A middleware that a test plays itself.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <functional>
 #include <string>
@@ -62,9 +64,11 @@ class KeepingSender : public Sender {
   [[nodiscard]] Result send_at_once(Bytes sample) noexcept override {
     return would_wait ? Result::kBusy : send(sample);
   }
+  [[nodiscard]] std::size_t largest_at_once() const noexcept override { return largest; }
   std::vector<std::string> sent;
   std::function<void()> meanwhile{};  // what happens while it sends
   bool would_wait = false;
+  std::size_t largest = SIZE_MAX;
   Result answer = Result::kSent;
 };
 

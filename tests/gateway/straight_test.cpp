@@ -141,12 +141,12 @@ TEST_F(Straight, ASourceThatLosesIsNotSentAndWinsAgainByTheLoop) {
 TEST_F(Straight, WhatComesFromOthersMeanwhileIsLeftToTheLoopInItsOrder) {
   lead_navigation();
   auto stop = this->stop();
-  ASSERT_TRUE(outgoing_.begin_turn());
+  ASSERT_TRUE(outgoing_.begin_turn(1));
   publish(stop, "stop");
   EXPECT_FALSE(outgoing_.end_turn("/Nav/cmd:o", shm::kForever));
   EXPECT_EQ(calls_, 1);
   EXPECT_EQ(outgoing_.next(), 0);
-  EXPECT_FALSE(outgoing_.begin_turn()) << "nobody overtakes what is left";
+  EXPECT_FALSE(outgoing_.begin_turn(1)) << "nobody overtakes what is left";
   publish(stop, "again");
   EXPECT_THAT(sender_.sent, IsEmpty());
   outgoing_.run(shm::monotonic_now());
@@ -158,8 +158,8 @@ TEST_F(Straight, WhatComesFromOthersMeanwhileIsLeftToTheLoopInItsOrder) {
 
 TEST_F(Straight, NobodyTakesATurnThatSomebodyHas) {
   lead_navigation();
-  ASSERT_TRUE(outgoing_.begin_turn());
-  EXPECT_FALSE(outgoing_.begin_turn());
+  ASSERT_TRUE(outgoing_.begin_turn(1));
+  EXPECT_FALSE(outgoing_.begin_turn(1));
   deliver(nav_, "waits");
   EXPECT_THAT(sender_.sent, IsEmpty());
   EXPECT_TRUE(outgoing_.end_turn("/Nav/cmd:o", shm::kForever));
@@ -168,7 +168,7 @@ TEST_F(Straight, NobodyTakesATurnThatSomebodyHas) {
 
 TEST_F(Straight, WhatHasBecomeTooOldOnTheWayIsNotSent) {
   lead_navigation();
-  ASSERT_TRUE(outgoing_.begin_turn());
+  ASSERT_TRUE(outgoing_.begin_turn(1));
   deliver(nav_, "old");
   EXPECT_TRUE(outgoing_.end_turn("/Nav/cmd:o", 0));
   EXPECT_THAT(sender_.sent, IsEmpty());
@@ -186,6 +186,36 @@ TEST_F(Straight, ASampleForWhichTheSenderWouldWaitIsLeftToTheLoop) {
   run();
   EXPECT_THAT(sender_.sent, ElementsAre("large", "next"));
   EXPECT_EQ(account_.passed.value(), 3u);
+}
+
+// To send it would hold up the thread that delivers, and with it what comes next.
+TEST_F(Straight, ALargeSampleIsSentByTheLoop) {
+  lead_navigation();
+  sender_.largest = 5;
+  deliver(nav_, "12345");
+  EXPECT_FALSE(calls_loop());
+  EXPECT_THAT(sender_.sent, ElementsAre("12345"));
+  deliver(nav_, "123456");
+  EXPECT_TRUE(calls_loop());
+  EXPECT_THAT(sender_.sent, ElementsAre("12345"));
+  run();
+  EXPECT_THAT(sender_.sent, ElementsAre("12345", "123456"));
+  deliver(nav_, "small");
+  EXPECT_FALSE(calls_loop());
+  EXPECT_THAT(sender_.sent, ElementsAre("12345", "123456", "small"));
+  EXPECT_EQ(calls_, 0);
+}
+
+TEST_F(Straight, NobodySendsALargeSampleThatTheLoopHasNotComeToYetNorOvertakesIt) {
+  lead_navigation();
+  sender_.largest = 5;
+  deliver(nav_, "123456");
+  deliver(nav_, "small");
+  deliver(nav_, "next");
+  EXPECT_THAT(sender_.sent, IsEmpty());
+  EXPECT_EQ(calls_, 1);
+  run();
+  EXPECT_THAT(sender_.sent, ElementsAre("123456", "small", "next"));
 }
 
 class StraightWithALock : public Straight {
@@ -221,7 +251,7 @@ TEST_F(StraightWithALock, APortThatBecomesIdleInATurnIsLeftToTheLoop) {
 
 TEST_F(StraightWithALock, APortThatBecomesIdleInATurnWithoutASampleIsLeftToTheLoop) {
   lead_navigation();
-  ASSERT_TRUE(outgoing_.begin_turn());
+  ASSERT_TRUE(outgoing_.begin_turn(1));
   lock_.deactivate();
   EXPECT_FALSE(outgoing_.end_turn("/Nav/cmd:o", shm::kForever));
   EXPECT_EQ(calls_, 1);
@@ -243,7 +273,7 @@ TEST_F(StraightWithALock, APortThatBecomesIdleAfterATurnRings) {
 // Released again before the loop has come: there is nothing to be sent.
 TEST_F(StraightWithALock, APortThatIsCommandedAgainBeforeTheLoopComesIsNotStopped) {
   lead_navigation();
-  ASSERT_TRUE(outgoing_.begin_turn());
+  ASSERT_TRUE(outgoing_.begin_turn(1));
   lock_.deactivate();
   outgoing_.end_turn("/Nav/cmd:o", shm::kForever);
   lock_.signal();
@@ -270,7 +300,7 @@ TEST_F(StraightWithALockThatTimesOut, ATurnBetweenTheTimerAndTheLoopHidesNoIdleP
   while (shm::monotonic_now() <= released + kTimeout) std::this_thread::yield();
   calls_ = 0;
   sender_.sent.clear();
-  ASSERT_TRUE(outgoing_.begin_turn());
+  ASSERT_TRUE(outgoing_.begin_turn(1));
   EXPECT_FALSE(outgoing_.end_turn("/Nav/cmd:o", shm::kForever));
   EXPECT_EQ(calls_, 1);
   run();
