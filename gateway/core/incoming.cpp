@@ -102,7 +102,7 @@ Incoming::Fate Incoming::deliver(const ForeignSample& sample, Time deadline) noe
 // As above. NOLINTNEXTLINE(bugprone-exception-escape)
 Incoming::Fate Incoming::pass_on(const ForeignSample& sample, Time deadline) noexcept {
   Outgoing* const outgoing = outgoing_.load(std::memory_order_relaxed);
-  if (outgoing == nullptr || !outgoing->begin_turn()) {
+  if (outgoing == nullptr || !outgoing->begin_turn(sample.size())) {
     return pass_to(*yes_, sample, deadline);
   }
   const Fate fate = pass_to(*yes_, sample, deadline);

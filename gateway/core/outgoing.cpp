@@ -1,5 +1,6 @@
 #include "gateway/core/outgoing.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "gateway/core/incoming.hpp"
@@ -58,11 +59,14 @@ void Outgoing::send_waiting(shm::Nanoseconds now) {
       has_more_ = false;
       break;
     }
-    if (now - sample->stamp_ns() > ages_.of(sample->source())) {
+    // To send one to a subscriber that is full takes a while, here and at the ports before.
+    const shm::Nanoseconds age = std::max(now, shm::monotonic_now()) - sample->stamp_ns();
+    if (age > ages_.of(sample->source())) {
       account_.late.add();
       continue;
     }
     account_for(sender_.send(**sample), (*sample)->size());
+    idle_again_.reset();  // somebody commanded: the next idle sample must not wait for its period
     if (ins_ == nullptr) continue;
     if (const auto in = ins_->find(sample->source()); in != ins_->end()) in->second->follow(*this);
   }
@@ -84,7 +88,8 @@ void Outgoing::send_idle(shm::Nanoseconds now) {
   }
 }
 
-bool Outgoing::begin_turn() noexcept {
+bool Outgoing::begin_turn(std::size_t bytes) noexcept {
+  if (bytes > sender_.largest_at_once()) return false;
   if (has_turn || loop_waits_.load(std::memory_order_relaxed) || !turn_.try_lock()) return false;
   if (left_ || has_more_) {
     turn_.unlock();
@@ -116,7 +121,10 @@ bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexc
       account_.late.add();
       continue;
     }
-    const Sender::Result result = sender_.send_at_once(**sample);
+    // One that is too large may have come before the turn, and the loop not to it yet.
+    const bool is_for_loop = (*sample)->size() > sender_.largest_at_once();
+    const Sender::Result result =
+        is_for_loop ? Sender::Result::kBusy : sender_.send_at_once(**sample);
     if (result == Sender::Result::kBusy) {
       left_ = std::move(sample);
       break;
@@ -124,11 +132,17 @@ bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexc
     account_for(result, (*sample)->size());
   }
   if (has_come) idle_again_.reset();  // somebody commands
+  // Nobody rings for a port that is disarmed, and the last take may have swallowed a ring and have
+  // set a timer again that had expired: what has become idle meanwhile only this look finds. The
+  // port is armed: what becomes idle from now on rings.
+  const bool has_idle_sample = entry_.idle.kind != Idle::Kind::kNothing;
+  const bool became_idle = has_idle_sample && !has_more_ && !idle_again_ && port_.idle();
+  if (became_idle) idle_again_ = 0;  // it is due
   next_.store(when_next(), std::memory_order_relaxed);
-  const bool leaves_some = has_more_;
+  const bool calls_loop = has_more_ || became_idle;
   has_turn = false;
   turn_.unlock();
-  if (leaves_some) call_loop_();
+  if (calls_loop) call_loop_();
   return has_come;
 }
 

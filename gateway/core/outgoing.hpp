@@ -3,13 +3,16 @@
 //
 // A sample of the same gateway's goes straight on: the thread that delivers it takes a turn here,
 // and sends what becomes of it, so that neither the loop nor another thread has to be woken
-// (Incoming::deliver()). The loop serves what comes from other components, and what is left.
+// (Incoming::deliver()). The loop serves what comes from other components, what is too large for
+// that, and what is left.
 //
 // Thread safety: one thread, the gateway's loop; begin_turn() and end_turn() from the threads that
 // deliver samples; peer_matched() from any. Whoever has the turn has the port.
 #pragma once
 
 #include <atomic>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -49,6 +52,9 @@ class Sender {
   // As send(), but called where the middleware delivers a sample, on whatever thread it does so. It
   // must not wait there: that thread may be the one that it would wait for.
   [[nodiscard]] virtual Result send_at_once(Bytes sample) noexcept { return send(sample); }
+  // Samples of more bytes are none for send_at_once(), because to send them takes so long that what
+  // that thread delivers next would be held up.
+  [[nodiscard]] virtual std::size_t largest_at_once() const noexcept { return SIZE_MAX; }
 };
 
 class Incoming;
@@ -74,13 +80,16 @@ class Outgoing {
   // Sends what waits, unless it has waited for longer than its source's T: a gateway that was
   // stopped must not bring old commands to life. And the idle sample where it is due: when the port
   // has become idle, at the start, after peer_matched(), and every kIdlePeriod while it is idle.
+  // A sample's age is that at which it is sent, and not at `now`: others may have waited meanwhile.
   void run(shm::Nanoseconds now);
   // Before run(): whose samples may go straight on, and what lets the loop run() all. The loop.
   void lead(const InBySource& ins, std::function<void()> call_loop);
-  // False: somebody else has the turn, or something is left for the loop; publish all the same.
-  // Never waits. Any thread.
-  [[nodiscard]] bool begin_turn() noexcept;
-  // Sends what of `source` waits and ends the turn. False: nothing of it has come here.
+  // Before a sample of that many bytes is published. False: somebody else has the turn, or
+  // something is left for the loop, or the sample itself is; publish all the same. Never waits. Any
+  // thread.
+  [[nodiscard]] bool begin_turn(std::size_t bytes) noexcept;
+  // Sends what of `source` waits and ends the turn; calls the loop for what is left, and for the
+  // idle sample if the port has become idle meanwhile. False: nothing of it has come here.
   bool end_turn(std::string_view source, shm::Nanoseconds max_age) noexcept;
   // When run() is to be called again even if the descriptor is not readable; shm::kForever: never.
   [[nodiscard]] shm::Nanoseconds next() const noexcept {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 
 #include "gateway/core/bridge.hpp"
 #include "gateway/core/outgoing.hpp"
@@ -12,6 +13,11 @@ namespace arbiter::gateway::dds {
 
 class OutTopic : public EndPoint, public Sender {
  public:
+  // What Cyclone's receiving thread sends itself. It reads no datagram meanwhile, of no topic, and
+  // an emergency stop may be next: 64 KiB take half a millisecond at 1 Gbit/s, but 8 MiB would take
+  // 65 ms, in which the socket's buffer overflows.
+  static constexpr std::size_t kLargestAtOnce = kEncapsulationBytes + (std::size_t{64} << 10);
+
   // Keeps references.
   OutTopic(const Entry& entry, Account& account, const Bell& bell);
   ~OutTopic() override { close(); }
@@ -22,6 +28,7 @@ class OutTopic : public EndPoint, public Sender {
   // Waits a little for subscribers that do not keep up. The gateway's loop.
   [[nodiscard]] Result send(Bytes sample) noexcept override;
   [[nodiscard]] Result send_at_once(Bytes sample) noexcept override;
+  [[nodiscard]] std::size_t largest_at_once() const noexcept override { return kLargestAtOnce; }
 
  private:
   Entity make(dds_entity_t participant, dds_entity_t topic, const ddsi_sertype* type,

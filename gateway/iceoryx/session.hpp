@@ -25,7 +25,8 @@
 namespace arbiter::gateway {
 
 // The half of an `out` entry that talks to iceoryx. One thread at a time. It never waits: a
-// subscriber that is full loses its oldest chunk.
+// subscriber that is full loses its oldest chunk. To send is to copy, whatever the size, so that
+// chunks of any size are sent at once.
 class ChunkSender final : public Sender {
  public:
   ChunkSender(const Entry& entry, Account& account) : entry_(entry), account_(account) {}

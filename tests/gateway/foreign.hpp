@@ -1,7 +1,10 @@
 // A middleware that a test plays itself.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,6 +41,9 @@ class BytesSample : public ForeignSample {
   const bool big_endian_;
 };
 
+// What an entry with idle='zero' size='4' sends.
+inline const std::string kZeros("\0\1\0\0\0\0\0\0", 8);
+
 template <class Number>
 std::string bytes_of(Number number) {
   std::string bytes(sizeof number, '\0');
@@ -52,13 +58,17 @@ class KeepingSender : public Sender {
     if (answer == Result::kSent) {
       sent.emplace_back(reinterpret_cast<const char*>(sample.data()), sample.size());
     }
+    if (meanwhile) meanwhile();
     return answer;
   }
   [[nodiscard]] Result send_at_once(Bytes sample) noexcept override {
     return would_wait ? Result::kBusy : send(sample);
   }
+  [[nodiscard]] std::size_t largest_at_once() const noexcept override { return largest; }
   std::vector<std::string> sent;
+  std::function<void()> meanwhile{};  // what happens while it sends
   bool would_wait = false;
+  std::size_t largest = SIZE_MAX;
   Result answer = Result::kSent;
 };
 

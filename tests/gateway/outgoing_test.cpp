@@ -21,7 +21,6 @@ constexpr const char* kDepartures =
     "<behaviors timeout='10s'>"
     "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config></behavior>"
     "</behaviors>";
-const std::string kZeros("\0\1\0\0\0\0\0\0", 8);
 
 class Leaving : public testing::Test {
  protected:
@@ -78,6 +77,33 @@ TEST_F(Leaving, APortThatBecomesIdleSaysStopAtOnce) {
   nav.deactivate();
   outgoing_.run(now_ + 2);
   EXPECT_THAT(sender_.sent, ElementsAre(kZeros, "drive", kZeros));
+}
+
+// The loop sees the port idle before and after, and has sent a command in between.
+TEST_F(Leaving, APortThatBecomesIdleWhileACommandIsSentSaysStopAtOnce) {
+  outgoing_.run(now_);
+  auto nav = publisher();
+  publish(nav, "drive");
+  sender_.meanwhile = [&] { nav.deactivate(); };
+  outgoing_.run(now_ + 1);
+  EXPECT_THAT(sender_.sent, ElementsAre(kZeros, "drive", kZeros));
+}
+
+// A subscriber that is full holds up what comes behind, which grows old meanwhile.
+TEST_F(Leaving, WhatGrowsOldWhileAnotherSampleIsSentIsNotSent) {
+  auto nav = publisher();
+  const shm::Nanoseconds before = shm::monotonic_now();
+  publish(nav, "held up");
+  publish(nav, "old");
+  const shm::Nanoseconds after = shm::monotonic_now();
+  sender_.meanwhile = [&] {
+    ages_.age = after - before;
+    while (shm::monotonic_now() - after <= ages_.age) {
+    }
+  };
+  outgoing_.run(after);
+  EXPECT_THAT(sender_.sent, ElementsAre("held up"));
+  EXPECT_EQ(account_.late.value(), 1u);
 }
 
 TEST_F(Leaving, AReaderThatComesIsToldToStop) {

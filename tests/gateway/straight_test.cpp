@@ -33,9 +33,21 @@ constexpr const char* kModel =
     "<inhibition>Navigate</inhibition><inhibition>Teleoperate</inhibition></behavior>"
     "</behaviors>";
 
+// Navigation commands while a lock is released.
+std::string locked(const std::string& timeout) {
+  return "<behaviors timeout='" + timeout +
+         "'><behavior name='Navigate'><config at='/Base/cmd:i'>/Nav/cmd:o</config>"
+         "<condition>/EStop/released:o</condition></behavior></behaviors>";
+}
+
 class Straight : public testing::Test {
  protected:
-  Straight() {
+  explicit Straight(const std::string& model = kModel, const std::string& idle = "")
+      : daemon_(model),
+        read_(read_dds("<in topic='/nav' type='a/msg/B' port='/Nav/cmd:o' max_size='64'/>"
+                       "<in topic='/teleop' type='a/msg/B' port='/Teleop/cmd:o' max_size='64'/>"
+                       "<out port='/Base/cmd:i' topic='/cmd' type='a/msg/B' " +
+                       idle + "/>")) {
     ins_.emplace("/Nav/cmd:o", &nav_);
     ins_.emplace("/Teleop/cmd:o", &teleop_);
     outgoing_.lead(ins_, [this] { ++calls_; });
@@ -67,11 +79,8 @@ class Straight : public testing::Test {
     sender_.sent.clear();
   }
 
-  test::Daemon daemon_{kModel};
-  Read read_ = read_dds(
-      "<in topic='/nav' type='a/msg/B' port='/Nav/cmd:o' max_size='64'/>"
-      "<in topic='/teleop' type='a/msg/B' port='/Teleop/cmd:o' max_size='64'/>"
-      "<out port='/Base/cmd:i' topic='/cmd' type='a/msg/B'/>");
+  test::Daemon daemon_;
+  Read read_;
   Account nav_account_{"nav", "publisher"};
   Account teleop_account_{"teleop", "publisher"};
   Account account_{"cmd", "subscriber"};
@@ -132,12 +141,12 @@ TEST_F(Straight, ASourceThatLosesIsNotSentAndWinsAgainByTheLoop) {
 TEST_F(Straight, WhatComesFromOthersMeanwhileIsLeftToTheLoopInItsOrder) {
   lead_navigation();
   auto stop = this->stop();
-  ASSERT_TRUE(outgoing_.begin_turn());
+  ASSERT_TRUE(outgoing_.begin_turn(1));
   publish(stop, "stop");
   EXPECT_FALSE(outgoing_.end_turn("/Nav/cmd:o", shm::kForever));
   EXPECT_EQ(calls_, 1);
   EXPECT_EQ(outgoing_.next(), 0);
-  EXPECT_FALSE(outgoing_.begin_turn()) << "nobody overtakes what is left";
+  EXPECT_FALSE(outgoing_.begin_turn(1)) << "nobody overtakes what is left";
   publish(stop, "again");
   EXPECT_THAT(sender_.sent, IsEmpty());
   outgoing_.run(shm::monotonic_now());
@@ -149,8 +158,8 @@ TEST_F(Straight, WhatComesFromOthersMeanwhileIsLeftToTheLoopInItsOrder) {
 
 TEST_F(Straight, NobodyTakesATurnThatSomebodyHas) {
   lead_navigation();
-  ASSERT_TRUE(outgoing_.begin_turn());
-  EXPECT_FALSE(outgoing_.begin_turn());
+  ASSERT_TRUE(outgoing_.begin_turn(1));
+  EXPECT_FALSE(outgoing_.begin_turn(1));
   deliver(nav_, "waits");
   EXPECT_THAT(sender_.sent, IsEmpty());
   EXPECT_TRUE(outgoing_.end_turn("/Nav/cmd:o", shm::kForever));
@@ -159,7 +168,7 @@ TEST_F(Straight, NobodyTakesATurnThatSomebodyHas) {
 
 TEST_F(Straight, WhatHasBecomeTooOldOnTheWayIsNotSent) {
   lead_navigation();
-  ASSERT_TRUE(outgoing_.begin_turn());
+  ASSERT_TRUE(outgoing_.begin_turn(1));
   deliver(nav_, "old");
   EXPECT_TRUE(outgoing_.end_turn("/Nav/cmd:o", 0));
   EXPECT_THAT(sender_.sent, IsEmpty());
@@ -177,6 +186,139 @@ TEST_F(Straight, ASampleForWhichTheSenderWouldWaitIsLeftToTheLoop) {
   run();
   EXPECT_THAT(sender_.sent, ElementsAre("large", "next"));
   EXPECT_EQ(account_.passed.value(), 3u);
+}
+
+// To send it would hold up the thread that delivers, and with it what comes next.
+TEST_F(Straight, ALargeSampleIsSentByTheLoop) {
+  lead_navigation();
+  sender_.largest = 5;
+  deliver(nav_, "12345");
+  EXPECT_FALSE(calls_loop());
+  EXPECT_THAT(sender_.sent, ElementsAre("12345"));
+  deliver(nav_, "123456");
+  EXPECT_TRUE(calls_loop());
+  EXPECT_THAT(sender_.sent, ElementsAre("12345"));
+  run();
+  EXPECT_THAT(sender_.sent, ElementsAre("12345", "123456"));
+  deliver(nav_, "small");
+  EXPECT_FALSE(calls_loop());
+  EXPECT_THAT(sender_.sent, ElementsAre("12345", "123456", "small"));
+  EXPECT_EQ(calls_, 0);
+}
+
+TEST_F(Straight, NobodySendsALargeSampleThatTheLoopHasNotComeToYetNorOvertakesIt) {
+  lead_navigation();
+  sender_.largest = 5;
+  deliver(nav_, "123456");
+  deliver(nav_, "small");
+  deliver(nav_, "next");
+  EXPECT_THAT(sender_.sent, IsEmpty());
+  EXPECT_EQ(calls_, 1);
+  run();
+  EXPECT_THAT(sender_.sent, ElementsAre("123456", "small", "next"));
+}
+
+class StraightWithALock : public Straight {
+ protected:
+  explicit StraightWithALock(const std::string& timeout = "1000s",
+                             const std::string& idle = "idle='zero' size='4'")
+      : Straight(locked(timeout), idle) {}
+
+  void lead_navigation() {
+    sender_.sent.clear();
+    lock_.signal();
+    Straight::lead_navigation();
+  }
+
+  OutputPort<void> lock_ = node_.output_port("/EStop/released:o", Type::untyped(1));
+};
+
+// While a thread has the turn the port rings for nobody.
+TEST_F(StraightWithALock, APortThatBecomesIdleInATurnIsLeftToTheLoop) {
+  lead_navigation();
+  sender_.meanwhile = [this] { lock_.deactivate(); };
+  deliver(nav_, "drive");
+  sender_.meanwhile = {};
+  EXPECT_THAT(sender_.sent, ElementsAre("drive"));
+  EXPECT_EQ(calls_, 1);
+  EXPECT_EQ(outgoing_.next(), 0);
+  run();
+  EXPECT_THAT(sender_.sent, ElementsAre("drive", kZeros));
+  EXPECT_EQ(account_.idle.value(), 2u) << "at the start, and now";
+  deliver(nav_, "loses");
+  EXPECT_EQ(calls_, 1) << "the loop knows that it is idle";
+}
+
+TEST_F(StraightWithALock, APortThatBecomesIdleInATurnWithoutASampleIsLeftToTheLoop) {
+  lead_navigation();
+  ASSERT_TRUE(outgoing_.begin_turn(1));
+  lock_.deactivate();
+  EXPECT_FALSE(outgoing_.end_turn("/Nav/cmd:o", shm::kForever));
+  EXPECT_EQ(calls_, 1);
+  run();
+  EXPECT_THAT(sender_.sent, ElementsAre(kZeros));
+}
+
+TEST_F(StraightWithALock, APortThatBecomesIdleAfterATurnRings) {
+  lead_navigation();
+  deliver(nav_, "drive");
+  EXPECT_FALSE(calls_loop());
+  lock_.deactivate();
+  EXPECT_TRUE(calls_loop());
+  EXPECT_EQ(calls_, 0);
+  run();
+  EXPECT_THAT(sender_.sent, ElementsAre("drive", kZeros));
+}
+
+// Released again before the loop has come: there is nothing to be sent.
+TEST_F(StraightWithALock, APortThatIsCommandedAgainBeforeTheLoopComesIsNotStopped) {
+  lead_navigation();
+  ASSERT_TRUE(outgoing_.begin_turn(1));
+  lock_.deactivate();
+  outgoing_.end_turn("/Nav/cmd:o", shm::kForever);
+  lock_.signal();
+  run();
+  EXPECT_THAT(sender_.sent, IsEmpty());
+  EXPECT_EQ(outgoing_.next(), shm::kForever);
+}
+
+class StraightWithALockThatTimesOut : public StraightWithALock {
+ protected:
+  static constexpr shm::Nanoseconds kTimeout = 10'000'000;
+  StraightWithALockThatTimesOut() : StraightWithALock("10ms") {}
+};
+
+// The turn sets the port's timer anew, which has expired and of which the loop has not heard yet.
+TEST_F(StraightWithALockThatTimesOut, ATurnBetweenTheTimerAndTheLoopHidesNoIdlePort) {
+  shm::Nanoseconds released = 0;
+  while (outgoing_.next() != shm::kForever) {
+    lock_.signal();
+    deliver(nav_, "drive");
+    released = shm::monotonic_now();
+    outgoing_.run(released);
+  }
+  while (shm::monotonic_now() <= released + kTimeout) std::this_thread::yield();
+  calls_ = 0;
+  sender_.sent.clear();
+  ASSERT_TRUE(outgoing_.begin_turn(1));
+  EXPECT_FALSE(outgoing_.end_turn("/Nav/cmd:o", shm::kForever));
+  EXPECT_EQ(calls_, 1);
+  run();
+  EXPECT_THAT(sender_.sent, ElementsAre(kZeros));
+}
+
+class StraightWithALockAndNoIdleSample : public StraightWithALock {
+ protected:
+  StraightWithALockAndNoIdleSample() : StraightWithALock("1000s", "idle='none'") {}
+};
+
+TEST_F(StraightWithALockAndNoIdleSample, APortThatBecomesIdleConcernsNobody) {
+  lead_navigation();
+  sender_.meanwhile = [this] { lock_.deactivate(); };
+  deliver(nav_, "drive");
+  EXPECT_EQ(calls_, 0);
+  EXPECT_EQ(outgoing_.next(), shm::kForever);
+  EXPECT_THAT(sender_.sent, ElementsAre("drive"));
 }
 
 TEST_F(Straight, ASampleCostsNoAllocation) {

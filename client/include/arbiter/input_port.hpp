@@ -165,9 +165,10 @@ class InputPort {
   // Throws arbiter::Error if the system has no descriptor left.
   [[nodiscard]] int fd() { return detail::wait_descriptor(*core_); }
   // For a thread that is about to publish what this port may get, and then takes from it itself,
-  // until take() returns nothing: publishers meanwhile save the system call that makes the
-  // descriptor readable, and whoever waits for that is not woken. Without those takes a sample may
-  // wait unnoticed. Wait-free.
+  // until take() returns nothing, and then looks at idle(): publishers meanwhile save the system
+  // call that makes the descriptor readable, and whoever waits for that is not woken, not even when
+  // the port becomes idle. Without those takes a sample may wait unnoticed; without that look, the
+  // end of all commands. Wait-free.
   void disarm() noexcept { detail::disarm(*core_); }
 
   // The source of the connection that is selected now, unless the port is idle. At a port that is
