@@ -110,7 +110,7 @@ void Exports::offer(const std::string& source, const std::optional<shm::TypeInfo
     return;
   }
   OfferCard card;
-  card.incarnation = incarnation_;
+  card.incarnation = incarnation_of(last_id_ + 1);
   card.host = host_;
   card.source = source;
   if (type) {
@@ -121,6 +121,11 @@ void Exports::offer(const std::string& source, const std::optional<shm::TypeInfo
   const std::lock_guard lock(mutex_);
   exports_.emplace(++last_id_, std::move(one));
   ids_.emplace(source, last_id_);
+}
+
+Incarnation Exports::incarnation_of(std::uint64_t id) const noexcept {
+  const Incarnation incarnation = incarnation_ + id;
+  return incarnation != 0 ? incarnation : incarnation_;  // which no other id leads to
 }
 
 void Exports::tap_what_is_wanted(const HostView& view) {
@@ -237,7 +242,7 @@ void Exports::state(Export& one, bool is_deactivated) {
 
 // With a header that says what has happened.
 void Exports::write(Export& one, Bytes sample) {
-  header_.exporter = incarnation_;
+  header_.exporter = one.card.incarnation;
   header_.number = ++one.number;
   header_.sequence = one.sequence;
   header_.type_revision = one.card.type_revision;

@@ -37,7 +37,8 @@ namespace arbiter::link {
 
 class Exports {
  public:
-  // `bell` rings where look() has something to do. Keeps references. Throws std::system_error.
+  // `incarnation` of this link, from which each export has one of its own. `bell` rings where
+  // look() has something to do. Keeps references. Throws std::system_error.
   Exports(Node& node, const Network& network, const HeldTokens& tokens, std::string host,
           Incarnation incarnation, const gateway::Bell& bell);
   Exports(const Exports&) = delete;
@@ -63,6 +64,9 @@ class Exports {
 
   void withdraw(const HostView::OpenPorts& ports);
   void offer(const std::string& source, const std::optional<shm::TypeInfo>& type);
+  // Of the export with that id. What is offered again begins a stream of its own, whose numbers and
+  // types have nothing to do with those before.
+  [[nodiscard]] Incarnation incarnation_of(std::uint64_t id) const noexcept;
   void tap_what_is_wanted(const HostView& view);
   void open_tap(Export& one, std::uint64_t id, const HostView& view);
   void run();

@@ -1,9 +1,10 @@
 // The events of one source as other hosts send them: in order, none twice, losses counted.
 //
 // An exporter numbers what happens to a source from 1 upwards: samples, signals, deactivations;
-// what it could not see itself has used numbers as well. It does so once for each of its lives and
-// each source, so a stream is known by its source and the exporter's incarnation. The last event of
-// a stream says what the source is like: whoever joins, or has missed some, needs nothing but that.
+// what it could not see itself has used numbers as well. It begins again whenever it offers the
+// source again, because its own process or the publisher was started again: so a stream is known by
+// its source and the incarnation of the offer. The last event of a stream says what the source is
+// like: whoever joins, or has missed some, needs nothing but that.
 //
 // Thread safety: none of its own.
 #pragma once
