@@ -23,6 +23,7 @@ constexpr std::uint64_t kWakeId = 0;
 constexpr shm::Nanoseconds kTapAgain = 5'000'000'000;
 // Events of one source that leave before others have their turn.
 constexpr int kMostAtOnce = 64;
+constexpr int kSayAgain = 10;  // ms
 
 shm::TypeInfo info_of(const Type& type) {
   shm::TypeInfo info;
@@ -175,9 +176,9 @@ void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
 
 void Exports::run() {
   std::array<epoll_event, 64> events{};
-  for (bool has_more = false;;) {
+  for (int patience = -1;;) {
     const int count =
-        epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), has_more ? 0 : -1);
+        epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), patience);
     if (!take_up(events.data(), count)) return;
     const std::lock_guard lock(mutex_);
     for (auto each = ready_.begin(); each != ready_.end();) {
@@ -185,7 +186,8 @@ void Exports::run() {
       const bool more = found != exports_.end() && found->second->tap && send_some(*found->second);
       each = more ? std::next(each) : ready_.erase(each);
     }
-    has_more = !ready_.empty();
+    const bool is_left = say_unsaid();
+    patience = !ready_.empty() ? 0 : (is_left ? kSayAgain : -1);
   }
 }
 
@@ -240,6 +242,15 @@ void Exports::state(Export& one, bool is_deactivated) {
   write(one, {});
 }
 
+bool Exports::say_unsaid() {
+  bool is_left = false;
+  for (const auto& [id, one] : exports_) {
+    if (one->is_unsaid) state(*one, one->is_deactivated);
+    is_left = is_left || one->is_unsaid;
+  }
+  return is_left;
+}
+
 // With a header that says what has happened.
 void Exports::write(Export& one, Bytes sample) {
   header_.exporter = one.card.incarnation;
@@ -249,8 +260,9 @@ void Exports::write(Export& one, Bytes sample) {
   header_.length = static_cast<std::uint32_t>(sample.size());
   const WritableBytes bytes(buffer_.data(), header_bytes(header_));
   write_header(header_, bytes);
+  one.is_deactivated = header_.is_deactivated;
   // What is not sent has used a number: it is counted where it does not come.
-  static_cast<void>(one.writer.write(bytes, sample));
+  one.is_unsaid = !one.writer.write(bytes, sample);
 }
 
 void Exports::know_type(Export& one, const shm::TypeInfo& type) {

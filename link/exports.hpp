@@ -2,9 +2,9 @@
 // and a tap of it while somebody reads it. A source that nobody wants costs its publisher nothing.
 //
 // A tap is no destination: exporting changes no decision and holds up no publisher. Its events
-// leave in their order, on one thread, which waits for nobody but, for 10 ms at most, a network
-// that does not keep up. What the tap or the network loses uses numbers, so that importers count
-// it.
+// leave in their order, on one thread, which waits for no reader. What the tap or the network loses
+// uses numbers, so that importers count it. Where an event cannot be written, the state of its
+// source is said until it is.
 //
 // Thread safety: look() on the link's thread; sending has a thread of its own, which
 // shares exports_ under mutex_. Taps are opened and closed without that lock.
@@ -58,6 +58,8 @@ class Exports {
     std::optional<Tap<void>> tap;
     std::uint64_t number = 0;        // of the last event
     std::uint64_t sequence = 0;      // of the last sample
+    bool is_deactivated = false;     // by the last event
+    bool is_unsaid = false;          // that event was not written
     std::string said;                // why it cannot be tapped
     shm::Nanoseconds tap_again = 0;  // not before
   };
@@ -76,6 +78,8 @@ class Exports {
   // Under mutex_.
   bool send_some(Export& one);
   void state(Export& one, bool is_deactivated);
+  // Says the state of those whose last event was not written. True: one is left.
+  bool say_unsaid();
   void write(Export& one, Bytes sample);
   void send(Export& one, const TapEvent<void>& event);
   static void know_type(Export& one, const shm::TypeInfo& type);
