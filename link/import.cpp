@@ -71,6 +71,8 @@ void Import::obey(Incarnation exporter) {
   const std::lock_guard lock(mutex_);
   if (exporter == obeyed_) return;
   obeyed_ = exporter;
+  if (exporter == 0) return;
+  stream_.obey(exporter);
   const auto last = std::find_if(unheard_.begin(), unheard_.end(),
                                  [&](const Unheard& each) { return each.exporter == exporter; });
   if (last == unheard_.end()) return;

@@ -26,6 +26,8 @@ struct StreamEvent {
 
 class Stream {
  public:
+  // From now on `exporter` is the one that is obeyed, with the state that it was last known to have.
+  void obey(Incarnation exporter) noexcept;
   // Takes up an event of the exporter `from`, which is the one that is obeyed. False: it came
   // already, or one behind it did.
   bool note(Incarnation from, const StreamEvent& event) noexcept;
@@ -34,8 +36,9 @@ class Stream {
   // while another one was obeyed, is not missed.
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
   [[nodiscard]] std::uint64_t doubled() const noexcept { return doubled_; }
-  // By the last event: its exporter ended the source's activity, and nothing has come since.
-  [[nodiscard]] bool is_deactivated() const noexcept { return deactivated_; }
+  // By the last event of the one that is obeyed: it ended the source's activity, and nothing has
+  // come since.
+  [[nodiscard]] bool is_deactivated() const noexcept { return exporters_.front().is_deactivated; }
 
  private:
   // The exporters that were obeyed last: one that comes back goes on where it was, and what it
@@ -45,6 +48,7 @@ class Stream {
     Incarnation incarnation = 0;  // 0: none
     std::uint64_t last = 0;       // number
     std::uint64_t sequence = 0;   // likewise
+    bool is_deactivated = false;  // likewise
   };
   void move_to_front(Incarnation from) noexcept;
   [[nodiscard]] static std::uint64_t missed(const Exporter& exporter,
@@ -54,7 +58,6 @@ class Stream {
   bool has_begun_ = false;                         // an event of that one was taken up since it is
   std::uint64_t lost_ = 0;
   std::uint64_t doubled_ = 0;
-  bool deactivated_ = false;
 };
 
 }  // namespace arbiter::link
