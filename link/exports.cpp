@@ -81,10 +81,10 @@ void Exports::wake() const noexcept {
   static_cast<void>(!::write(wake_.get(), &one, sizeof one));
 }
 
-void Exports::look(const HostView& view) {
+void Exports::look(const HostView& view, const Patience& patience) {
   withdraw(view.open_here());
   for (const auto& [source, type] : view.open_here()) offer(source, type);
-  tap_what_is_wanted(view);
+  tap_what_is_wanted(view, patience);
 }
 
 void Exports::withdraw(const HostView::OpenPorts& ports) {
@@ -129,14 +129,14 @@ Incarnation Exports::incarnation_of(std::uint64_t id) const noexcept {
   return incarnation != 0 ? incarnation : incarnation_;  // which no other id leads to
 }
 
-void Exports::tap_what_is_wanted(const HostView& view) {
-  const shm::Nanoseconds now = shm::monotonic_now();
+void Exports::tap_what_is_wanted(const HostView& view, const Patience& patience) {
   for (const auto& [source, id] : ids_) {
     Export& one = *exports_.at(id);
     const bool is_wanted = one.writer.is_wanted();
     if (is_wanted == one.tap.has_value()) continue;
-    if (is_wanted && now >= one.tap_again) {
+    if (is_wanted && shm::monotonic_now() >= one.tap_again && patience.is_left()) {
       open_tap(one, id, view);
+      patience.note_call();
     } else if (!is_wanted) {
       std::optional<Tap<void>> gone;
       const std::lock_guard lock(mutex_);

@@ -28,6 +28,7 @@
 
 #include "link/core/event_header.hpp"
 #include "link/core/held_tokens.hpp"
+#include "link/core/patience.hpp"
 #include "link/dds/event_topic.hpp"
 #include "link/host_view.hpp"
 #include "shm/file_descriptor.hpp"
@@ -47,7 +48,7 @@ class Exports {
 
   // From now on exactly the sources are offered that components of this host have open. Taps those
   // of them that are wanted elsewhere, and nothing else.
-  void look(const HostView& view);
+  void look(const HostView& view, const Patience& patience);
 
  private:
   struct Export {
@@ -69,7 +70,7 @@ class Exports {
   // Of the export with that id. What is offered again begins a stream of its own, whose numbers and
   // types have nothing to do with those before.
   [[nodiscard]] Incarnation incarnation_of(std::uint64_t id) const noexcept;
-  void tap_what_is_wanted(const HostView& view);
+  void tap_what_is_wanted(const HostView& view, const Patience& patience);
   void open_tap(Export& one, std::uint64_t id, const HostView& view);
   void run();
   void wake() const noexcept;

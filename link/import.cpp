@@ -52,7 +52,7 @@ Import::~Import() {
   close();
 }
 
-void Import::look(bool is_open_here, bool has_daemon) {
+void Import::look(bool is_open_here) {
   listen_to_speaker();
   const Offerer* const speaker = speaker_.current();
   // The model wants it, or there would be no import.
@@ -62,8 +62,18 @@ void Import::look(bool is_open_here, bool has_daemon) {
   const bool is_other_host = speaker == nullptr || speaker->incarnation != obeyed_;
   if (choice != ImportChoice::kImport || is_other_type || (is_other_host && port_)) close();
   obey(choice == ImportChoice::kImport ? speaker->incarnation : 0);
-  const bool can_open = has_daemon && card != nullptr && card->type_revision != 0;
-  if (choice == ImportChoice::kImport && !port_ && can_open) open(*card);
+}
+
+void Import::open(bool has_daemon, const Patience& patience) {
+  const Offerer* const speaker = speaker_.current();
+  const bool is_wanted = obeyed_ != 0 && speaker != nullptr && !port_;
+  const bool may_open = has_daemon && shm::monotonic_now() >= open_again_ && patience.is_left();
+  if (is_wanted && may_open && offers_.at(speaker->key).type_revision != 0) {
+    open_port(offers_.at(speaker->key));
+    // Not before, whether it is open or not: strangers may have it opened again and again.
+    open_again_ = shm::monotonic_now() + kOpenAgain;
+    patience.note_call();
+  }
   describe();
 }
 
@@ -130,10 +140,7 @@ void Import::say_who_speaks() {
                            speaker_.current()->host + " until that one is gone");
 }
 
-void Import::open(const OfferCard& card) {
-  const shm::Nanoseconds now = shm::monotonic_now();
-  if (now < open_again_) return;
-  open_again_ = now + kOpenAgain;
+void Import::open_port(const OfferCard& card) {
   if (card.type.size > kMaxSampleBytes) {
     say_once(source_ + " of host " + card.host + " is not imported: its samples have up to " +
              std::to_string(card.type.size) + " bytes, and no more than " +
@@ -153,7 +160,6 @@ void Import::open(const OfferCard& card) {
   }
   described_.clear();
   said_.clear();
-  open_again_ = 0;
   say(Level::kInfo, source_ + " comes from host " + card.host);
 }
 
