@@ -69,7 +69,7 @@ Exports::Exports(Node& node, const Network& network, const HeldTokens& tokens, s
 
 Exports::~Exports() {
   {
-    const std::lock_guard lock(mutex_);
+    const auto lock = lock_first();
     ends_ = true;
   }
   wake();
@@ -95,7 +95,7 @@ void Exports::withdraw(const HostView::OpenPorts& ports) {
     }
     std::unique_ptr<Export> gone;  // its tap is closed without the lock
     {
-      const std::lock_guard lock(mutex_);
+      const auto lock = lock_first();
       gone = std::move(exports_.at(each->second));
       exports_.erase(each->second);
     }
@@ -106,7 +106,7 @@ void Exports::withdraw(const HostView::OpenPorts& ports) {
 void Exports::offer(const std::string& source, const std::optional<shm::TypeInfo>& type) {
   const auto id = ids_.find(source);
   if (id != ids_.end()) {
-    const std::lock_guard lock(mutex_);
+    const auto lock = lock_first();
     if (type) know_type(*exports_.at(id->second), *type);
     return;
   }
@@ -119,7 +119,7 @@ void Exports::offer(const std::string& source, const std::optional<shm::TypeInfo
     card.type = *type;
   }
   auto one = std::make_unique<Export>(network_, std::move(card), bell_);
-  const std::lock_guard lock(mutex_);
+  const auto lock = lock_first();
   exports_.emplace(++last_id_, std::move(one));
   ids_.emplace(source, last_id_);
 }
@@ -139,7 +139,7 @@ void Exports::tap_what_is_wanted(const HostView& view, const Patience& patience)
       patience.note_call();
     } else if (!is_wanted) {
       std::optional<Tap<void>> gone;
-      const std::lock_guard lock(mutex_);
+      const auto lock = lock_first();
       gone.swap(one.tap);
     }
   }
@@ -153,7 +153,7 @@ void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
     event.events = EPOLLIN;
     event.data.u64 = id;
     const int descriptor = tap.fd();
-    const std::lock_guard lock(mutex_);
+    const auto lock = lock_first();
     one.tap = std::move(tap);
     if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, descriptor, &event) != 0) {
       one.tap.reset();
@@ -174,13 +174,23 @@ void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
   }
 }
 
+std::unique_lock<std::mutex> Exports::lock_first() {
+  const std::lock_guard gate(gate_);
+  return std::unique_lock(mutex_);
+}
+
+std::unique_lock<std::mutex> Exports::lock_after() {
+  { const std::lock_guard gate(gate_); }
+  return std::unique_lock(mutex_);
+}
+
 void Exports::run() {
   std::array<epoll_event, 64> events{};
   for (int patience = -1;;) {
     const int count =
         epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), patience);
     if (!take_up(events.data(), count)) return;
-    const std::lock_guard lock(mutex_);
+    const auto lock = lock_after();
     for (auto each = ready_.begin(); each != ready_.end();) {
       const auto found = exports_.find(*each);
       const bool more = found != exports_.end() && found->second->tap && send_some(*found->second);
@@ -192,7 +202,7 @@ void Exports::run() {
 }
 
 bool Exports::take_up(const epoll_event* events, int count) {
-  const std::lock_guard lock(mutex_);
+  const auto lock = lock_after();
   for (int i = 0; i < count; ++i) {
     const std::uint64_t id = events[i].data.u64;
     if (id != kWakeId) {

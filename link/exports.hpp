@@ -7,7 +7,8 @@
 // source is said until it is.
 //
 // Thread safety: look() on the link's thread; sending has a thread of its own, which
-// shares exports_ under mutex_. Taps are opened and closed without that lock.
+// shares exports_ under mutex_. Taps are opened and closed without that lock. A publisher that never
+// rests keeps the sending thread locking: gate_ gives the link's thread its turn.
 #pragma once
 
 #include <sys/epoll.h>
@@ -74,6 +75,10 @@ class Exports {
   void open_tap(Export& one, std::uint64_t id, const HostView& view);
   void run();
   void wake() const noexcept;
+  // mutex_, for the link's thread: before the sending thread has it again.
+  [[nodiscard]] std::unique_lock<std::mutex> lock_first();
+  // Likewise for the sending thread: after the link's.
+  [[nodiscard]] std::unique_lock<std::mutex> lock_after();
   // Takes up what epoll_wait() says; false: it is over.
   bool take_up(const epoll_event* events, int count);
   // Under mutex_.
@@ -95,6 +100,8 @@ class Exports {
   shm::FileDescriptor wake_;
   std::map<std::string, std::uint64_t, std::less<>> ids_;
   std::uint64_t last_id_ = 0;
+  // Held by the link's thread while it waits for mutex_; the other one passes through.
+  std::mutex gate_;
   std::mutex mutex_;
   std::map<std::uint64_t, std::unique_ptr<Export>> exports_;
   std::set<std::uint64_t> ready_;  // whose taps may have something
