@@ -256,8 +256,11 @@ void Import::publish(const gateway::dds::Payload& payload, std::size_t before, T
   }
   auto loan = port_->loan(header_.length);
   if (!loan) {
-    const bool fits = header_.length <= port_->max_size() && !port_->type().has_one_size();
-    ++(fits || header_.length == port_->max_size() ? counts_.no_memory : counts_.unreadable);
+    const bool fits = header_.length == port_->max_size() ||
+                      (header_.length < port_->max_size() && !port_->type().has_one_size());
+    ++(fits ? counts_.no_memory : counts_.unreadable);
+    // The source goes on, though nobody can have the sample.
+    if (fits && port_->signal(deadline).late) ++counts_.late;
     return;
   }
   if (!gateway::dds::ArrivedSample(payload).copy(before, **loan)) {
