@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "gateway/core/say.hpp"
+#include "link/say_sparingly.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::link {
@@ -166,11 +167,10 @@ void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
     wake();
   } catch (const Error& error) {
     one.tap_again = shm::monotonic_now() + kTapAgain;
-    if (one.said != error.what()) {
-      say(Level::kWarning,
-          one.card.source + " is wanted elsewhere and cannot be sent: " + error.what());
-    }
-    one.said = error.what();
+    if (one.said == error.what()) return;
+    const std::string text =
+        one.card.source + " is wanted elsewhere and cannot be sent: " + error.what();
+    if (say_sparingly(Level::kWarning, text)) one.said = error.what();
   }
 }
 

@@ -7,8 +7,8 @@
 // source is said until it is.
 //
 // Thread safety: look() on the link's thread; sending has a thread of its own, which
-// shares exports_ under mutex_. Taps are opened and closed without that lock. A publisher that never
-// rests keeps the sending thread locking: gate_ gives the link's thread its turn.
+// shares exports_ under mutex_. Taps are opened and closed without that lock. A publisher that
+// never rests keeps the sending thread locking: gate_ gives the link's thread its turn.
 #pragma once
 
 #include <sys/epoll.h>

@@ -6,15 +6,14 @@
 #include <array>
 #include <utility>
 
-#include "gateway/core/say.hpp"
 #include "gateway/dds/arrived_sample.hpp"
+#include "link/say_sparingly.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::link {
 namespace {
 
 using gateway::Level;
-using gateway::say;
 
 constexpr shm::Nanoseconds kOpenAgain = 1'000'000'000;
 
@@ -134,10 +133,12 @@ void Import::say_who_speaks() {
   const std::vector<std::string> hosts = speaker_.hosts();
   const std::string text = hosts.size() < 2 ? "" : joined(hosts);
   if (text == hosts_said_) return;
-  hosts_said_ = text;
-  if (text.empty()) return;
-  say(Level::kWarning, source_ + " is open on several hosts: " + text + "; it is taken from " +
-                           speaker_.current()->host + " until that one is gone");
+  const bool is_said =
+      text.empty() ||
+      say_sparingly(Level::kWarning, source_ + " is open on several hosts: " + text +
+                                         "; it is taken from " + speaker_.current()->host +
+                                         " until that one is gone");
+  if (is_said) hosts_said_ = text;
 }
 
 void Import::open_port(const OfferCard& card) {
@@ -160,7 +161,7 @@ void Import::open_port(const OfferCard& card) {
   }
   described_.clear();
   said_.clear();
-  say(Level::kInfo, source_ + " comes from host " + card.host);
+  say_sparingly(Level::kInfo, source_ + " comes from host " + card.host);
 }
 
 void Import::close() {
@@ -170,13 +171,11 @@ void Import::close() {
     obeyed_ = 0;
     gone.swap(port_);
   }
-  if (gone) say(Level::kInfo, source_ + " is not imported any more");
+  if (gone) say_sparingly(Level::kInfo, source_ + " is not imported any more");
 }
 
 void Import::say_once(const std::string& text) {
-  if (text == said_) return;
-  said_ = text;
-  say(Level::kWarning, text);
+  if (text != said_ && say_sparingly(Level::kWarning, text)) said_ = text;
 }
 
 std::string Import::text() const {
