@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
+#include <string_view>
 #include <utility>
 
 #include "gateway/dds/arrived_sample.hpp"
@@ -16,6 +18,8 @@ namespace {
 using gateway::Level;
 
 constexpr shm::Nanoseconds kOpenAgain = 1'000'000'000;
+// Twice the lease: an earlier life of a host is not believed to live for so long.
+constexpr shm::Nanoseconds kNoEarlierLife = 3'000'000'000;
 
 Type type_of(const shm::TypeInfo& info) {
   if (!info.is_typed()) return Type::untyped(static_cast<std::size_t>(info.size));
@@ -56,7 +60,7 @@ void Import::look(bool is_open_here) {
   const Offerer* const speaker = speaker_.current();
   // The model wants it, or there would be no import.
   const ImportChoice choice = choose_import({true, is_open_here, speaker != nullptr});
-  const OfferCard* const card = speaker == nullptr ? nullptr : &offers_.at(speaker->key);
+  const OfferCard* const card = speaker == nullptr ? nullptr : &offers_.at(speaker->key).card;
   const bool is_other_type = port_ && card != nullptr && card->type_revision != revision_;
   const bool is_other_host = speaker == nullptr || speaker->incarnation != obeyed_;
   if (choice != ImportChoice::kImport || is_other_type || (is_other_host && port_)) close();
@@ -67,8 +71,8 @@ void Import::open(bool has_daemon, const Patience& patience) {
   const Offerer* const speaker = speaker_.current();
   const bool is_wanted = obeyed_ != 0 && speaker != nullptr && !port_;
   const bool may_open = has_daemon && shm::monotonic_now() >= open_again_ && patience.is_left();
-  if (is_wanted && may_open && offers_.at(speaker->key).type_revision != 0) {
-    open_port(offers_.at(speaker->key));
+  if (is_wanted && may_open && offers_.at(speaker->key).card.type_revision != 0) {
+    open_port(offers_.at(speaker->key).card);
     // Not before, whether it is open or not: strangers may have it opened again and again.
     open_again_ = shm::monotonic_now() + kOpenAgain;
     patience.note_call();
@@ -111,10 +115,13 @@ void Import::listen_to_speaker() {
   }
   for (const EventReader::Offer& offer : offers) {
     if (offer.card.source != source_) continue;
-    offers_[offer.key] = offer.card;
+    Offered& known = offers_[offer.key];
+    if (known.since == 0) known.since = shm::monotonic_now();
+    known.card = offer.card;
     speaker_.add({offer.key, offer.card.host, offer.card.incarnation});
   }
   forget(offers);
+  find_shared_name();
   say_who_speaks();
 }
 
@@ -127,6 +134,25 @@ void Import::forget(const std::vector<EventReader::Offer>& offers) {
       return offer.card.incarnation == each.exporter;
     });
   });
+}
+
+// One host has the source open once: who offers it beside its like for long is another machine.
+void Import::find_shared_name() {
+  shared_name_.clear();
+  const shm::Nanoseconds now = shm::monotonic_now();
+  std::map<std::string_view, Incarnation> first;
+  for (const auto& [key, offer] : offers_) {
+    if (now - offer.since < kNoEarlierLife) continue;
+    const auto [one, is_new] = first.emplace(offer.card.host, offer.card.incarnation);
+    if (!is_new && one->second != offer.card.incarnation) shared_name_ = offer.card.host;
+  }
+  if (shared_name_ == shared_name_said_) return;
+  const bool is_said =
+      shared_name_.empty() ||
+      say_sparingly(Level::kWarning,
+                    source_ + " is open on several machines that are all called " + shared_name_ +
+                        ", and is taken from the one that came last: give each its own --host");
+  if (is_said) shared_name_said_ = shared_name_;
 }
 
 void Import::say_who_speaks() {
@@ -183,6 +209,7 @@ std::string Import::text() const {
   std::string text = "host " + (speaker == nullptr ? std::string("unknown") : speaker->host);
   const std::vector<std::string> hosts = speaker_.hosts();
   if (hosts.size() > 1) text += ", open on several hosts: " + joined(hosts);
+  if (!shared_name_.empty()) text += ", several machines are called " + shared_name_;
   const std::lock_guard lock(mutex_);
   const auto count = [&](std::uint64_t number, const char* what) {
     if (number != 0) text += ", " + std::to_string(number) + what;

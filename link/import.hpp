@@ -75,6 +75,7 @@ class Import : private gateway::dds::SampleTaker {
   void open_port(const OfferCard& card);
   void close();
   void say_who_speaks();
+  void find_shared_name();
   void say_once(const std::string& text);
   void describe();
   // "host head, 3 lost, 2 late".
@@ -88,10 +89,16 @@ class Import : private gateway::dds::SampleTaker {
 
   // The link's thread.
   Speaker speaker_;
-  std::map<std::uint64_t, OfferCard> offers_;
+  struct Offered {
+    OfferCard card;
+    shm::Nanoseconds since = 0;
+  };
+  std::map<std::uint64_t, Offered> offers_;
   std::string said_;
   std::string described_;
   std::string hosts_said_;
+  std::string shared_name_;  // of several machines; empty: there is none
+  std::string shared_name_said_;
   shm::Nanoseconds open_again_ = 0;
 
   mutable std::mutex mutex_;
