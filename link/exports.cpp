@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "gateway/core/say.hpp"
+#include "link/say_sparingly.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::link {
@@ -23,6 +24,7 @@ constexpr std::uint64_t kWakeId = 0;
 constexpr shm::Nanoseconds kTapAgain = 5'000'000'000;
 // Events of one source that leave before others have their turn.
 constexpr int kMostAtOnce = 64;
+constexpr int kSayAgain = 10;  // ms
 
 shm::TypeInfo info_of(const Type& type) {
   shm::TypeInfo info;
@@ -68,7 +70,7 @@ Exports::Exports(Node& node, const Network& network, const HeldTokens& tokens, s
 
 Exports::~Exports() {
   {
-    const std::lock_guard lock(mutex_);
+    const auto lock = lock_first();
     ends_ = true;
   }
   wake();
@@ -80,10 +82,10 @@ void Exports::wake() const noexcept {
   static_cast<void>(!::write(wake_.get(), &one, sizeof one));
 }
 
-void Exports::look(const HostView& view) {
+void Exports::look(const HostView& view, const Patience& patience) {
   withdraw(view.open_here());
   for (const auto& [source, type] : view.open_here()) offer(source, type);
-  tap_what_is_wanted(view);
+  tap_what_is_wanted(view, patience);
 }
 
 void Exports::withdraw(const HostView::OpenPorts& ports) {
@@ -94,7 +96,7 @@ void Exports::withdraw(const HostView::OpenPorts& ports) {
     }
     std::unique_ptr<Export> gone;  // its tap is closed without the lock
     {
-      const std::lock_guard lock(mutex_);
+      const auto lock = lock_first();
       gone = std::move(exports_.at(each->second));
       exports_.erase(each->second);
     }
@@ -105,12 +107,12 @@ void Exports::withdraw(const HostView::OpenPorts& ports) {
 void Exports::offer(const std::string& source, const std::optional<shm::TypeInfo>& type) {
   const auto id = ids_.find(source);
   if (id != ids_.end()) {
-    const std::lock_guard lock(mutex_);
+    const auto lock = lock_first();
     if (type) know_type(*exports_.at(id->second), *type);
     return;
   }
   OfferCard card;
-  card.incarnation = incarnation_;
+  card.incarnation = incarnation_of(last_id_ + 1);
   card.host = host_;
   card.source = source;
   if (type) {
@@ -118,22 +120,27 @@ void Exports::offer(const std::string& source, const std::optional<shm::TypeInfo
     card.type = *type;
   }
   auto one = std::make_unique<Export>(network_, std::move(card), bell_);
-  const std::lock_guard lock(mutex_);
+  const auto lock = lock_first();
   exports_.emplace(++last_id_, std::move(one));
   ids_.emplace(source, last_id_);
 }
 
-void Exports::tap_what_is_wanted(const HostView& view) {
-  const shm::Nanoseconds now = shm::monotonic_now();
+Incarnation Exports::incarnation_of(std::uint64_t id) const noexcept {
+  const Incarnation incarnation = incarnation_ + id;
+  return incarnation != 0 ? incarnation : incarnation_;  // which no other id leads to
+}
+
+void Exports::tap_what_is_wanted(const HostView& view, const Patience& patience) {
   for (const auto& [source, id] : ids_) {
     Export& one = *exports_.at(id);
     const bool is_wanted = one.writer.is_wanted();
     if (is_wanted == one.tap.has_value()) continue;
-    if (is_wanted && now >= one.tap_again) {
+    if (is_wanted && shm::monotonic_now() >= one.tap_again && patience.is_left()) {
       open_tap(one, id, view);
+      patience.note_call();
     } else if (!is_wanted) {
       std::optional<Tap<void>> gone;
-      const std::lock_guard lock(mutex_);
+      const auto lock = lock_first();
       gone.swap(one.tap);
     }
   }
@@ -147,7 +154,7 @@ void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
     event.events = EPOLLIN;
     event.data.u64 = id;
     const int descriptor = tap.fd();
-    const std::lock_guard lock(mutex_);
+    const auto lock = lock_first();
     one.tap = std::move(tap);
     if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, descriptor, &event) != 0) {
       one.tap.reset();
@@ -160,32 +167,42 @@ void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
     wake();
   } catch (const Error& error) {
     one.tap_again = shm::monotonic_now() + kTapAgain;
-    if (one.said != error.what()) {
-      say(Level::kWarning,
-          one.card.source + " cannot be sent to the hosts that want it: " + error.what());
-    }
-    one.said = error.what();
+    if (one.said == error.what()) return;
+    const std::string text =
+        one.card.source + " cannot be sent to the hosts that want it: " + error.what();
+    if (say_sparingly(Level::kWarning, text)) one.said = error.what();
   }
+}
+
+std::unique_lock<std::mutex> Exports::lock_first() {
+  const std::lock_guard gate(gate_);
+  return std::unique_lock(mutex_);
+}
+
+std::unique_lock<std::mutex> Exports::lock_after() {
+  { const std::lock_guard gate(gate_); }
+  return std::unique_lock(mutex_);
 }
 
 void Exports::run() {
   std::array<epoll_event, 64> events{};
-  for (bool has_more = false;;) {
+  for (int patience = -1;;) {
     const int count =
-        epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), has_more ? 0 : -1);
+        epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), patience);
     if (!take_up(events.data(), count)) return;
-    const std::lock_guard lock(mutex_);
+    const auto lock = lock_after();
     for (auto each = ready_.begin(); each != ready_.end();) {
       const auto found = exports_.find(*each);
       const bool more = found != exports_.end() && found->second->tap && send_some(*found->second);
       each = more ? std::next(each) : ready_.erase(each);
     }
-    has_more = !ready_.empty();
+    const bool is_left = say_unsaid();
+    patience = !ready_.empty() ? 0 : (is_left ? kSayAgain : -1);
   }
 }
 
 bool Exports::take_up(const epoll_event* events, int count) {
-  const std::lock_guard lock(mutex_);
+  const auto lock = lock_after();
   for (int i = 0; i < count; ++i) {
     const std::uint64_t id = events[i].data.u64;
     if (id != kWakeId) {
@@ -235,17 +252,27 @@ void Exports::state(Export& one, bool is_deactivated) {
   write(one, {});
 }
 
+bool Exports::say_unsaid() {
+  bool is_left = false;
+  for (const auto& [id, one] : exports_) {
+    if (one->is_unsaid) state(*one, one->is_deactivated);
+    is_left = is_left || one->is_unsaid;
+  }
+  return is_left;
+}
+
 // Sends header_, which says what has happened, and the sample.
 void Exports::write(Export& one, Bytes sample) {
-  header_.exporter = incarnation_;
+  header_.exporter = one.card.incarnation;
   header_.number = ++one.number;
   header_.sequence = one.sequence;
   header_.type_revision = one.card.type_revision;
   header_.length = static_cast<std::uint32_t>(sample.size());
   const WritableBytes bytes(buffer_.data(), header_bytes(header_));
   write_header(header_, bytes);
+  one.is_deactivated = header_.is_deactivated;
   // An event that is not sent has used a number, so importers count it as lost.
-  static_cast<void>(one.writer.write(bytes, sample));
+  one.is_unsaid = !one.writer.write(bytes, sample);
 }
 
 void Exports::know_type(Export& one, const shm::TypeInfo& type) {

@@ -2,12 +2,13 @@
 // and a tap of it while somebody reads it. A source that nobody wants costs its publisher nothing.
 //
 // A tap is no destination: exporting changes no decision and holds up no publisher. Its events
-// leave in their order, on one thread, which waits for nobody but, for 10 ms at most, a network
-// that does not keep up. What the tap or the network loses uses numbers, so that importers count
-// it.
+// leave in their order, on one thread, which waits for no reader. What the tap or the network loses
+// uses numbers, so that importers count it. Where an event cannot be written, the state of its
+// source is said until it is.
 //
 // Thread safety: look() on the link's thread; sending has a thread of its own, which
-// shares exports_ under mutex_. Taps are opened and closed without that lock.
+// shares exports_ under mutex_. Taps are opened and closed without that lock. A publisher that
+// never rests keeps the sending thread locking: gate_ gives the link's thread its turn.
 #pragma once
 
 #include <sys/epoll.h>
@@ -28,6 +29,7 @@
 
 #include "link/core/event_header.hpp"
 #include "link/core/held_tokens.hpp"
+#include "link/core/patience.hpp"
 #include "link/dds/event_topic.hpp"
 #include "link/host_view.hpp"
 #include "shm/file_descriptor.hpp"
@@ -37,7 +39,8 @@ namespace arbiter::link {
 
 class Exports {
  public:
-  // `bell` rings where look() has something to do. Keeps references. Throws std::system_error.
+  // `incarnation` of this link, from which each export has one of its own. `bell` rings where
+  // look() has something to do. Keeps references. Throws std::system_error.
   Exports(Node& node, const Network& network, const HeldTokens& tokens, std::string host,
           Incarnation incarnation, const gateway::Bell& bell);
   Exports(const Exports&) = delete;
@@ -46,7 +49,7 @@ class Exports {
 
   // From now on exactly the sources are offered that components of this host have open. Taps those
   // of them that are wanted elsewhere, and nothing else.
-  void look(const HostView& view);
+  void look(const HostView& view, const Patience& patience);
 
  private:
   struct Export {
@@ -57,21 +60,32 @@ class Exports {
     std::optional<Tap<void>> tap;
     std::uint64_t number = 0;        // of the last event
     std::uint64_t sequence = 0;      // of the last sample
+    bool is_deactivated = false;     // by the last event
+    bool is_unsaid = false;          // that event was not written
     std::string said;                // why it cannot be tapped
     shm::Nanoseconds tap_again = 0;  // not before
   };
 
   void withdraw(const HostView::OpenPorts& ports);
   void offer(const std::string& source, const std::optional<shm::TypeInfo>& type);
-  void tap_what_is_wanted(const HostView& view);
+  // Of the export with that id. What is offered again begins a stream of its own, whose numbers and
+  // types have nothing to do with those before.
+  [[nodiscard]] Incarnation incarnation_of(std::uint64_t id) const noexcept;
+  void tap_what_is_wanted(const HostView& view, const Patience& patience);
   void open_tap(Export& one, std::uint64_t id, const HostView& view);
   void run();
   void wake() const noexcept;
+  // mutex_, for the link's thread: before the sending thread has it again.
+  [[nodiscard]] std::unique_lock<std::mutex> lock_first();
+  // Likewise for the sending thread: after the link's.
+  [[nodiscard]] std::unique_lock<std::mutex> lock_after();
   // Takes up what epoll_wait() says; false: it is over.
   bool take_up(const epoll_event* events, int count);
   // Under mutex_.
   bool send_some(Export& one);
   void state(Export& one, bool is_deactivated);
+  // Says the state of those whose last event was not written. True: one is left.
+  bool say_unsaid();
   void write(Export& one, Bytes sample);
   void send(Export& one, const TapEvent<void>& event);
   static void know_type(Export& one, const shm::TypeInfo& type);
@@ -86,6 +100,8 @@ class Exports {
   shm::FileDescriptor wake_;
   std::map<std::string, std::uint64_t, std::less<>> ids_;
   std::uint64_t last_id_ = 0;
+  // Held by the link's thread while it waits for mutex_; the other one passes through.
+  std::mutex gate_;
   std::mutex mutex_;
   std::map<std::uint64_t, std::unique_ptr<Export>> exports_;
   std::set<std::uint64_t> ready_;  // whose taps may have something

@@ -4,19 +4,22 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
+#include <string_view>
 #include <utility>
 
-#include "gateway/core/say.hpp"
 #include "gateway/dds/arrived_sample.hpp"
+#include "link/say_sparingly.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::link {
 namespace {
 
 using gateway::Level;
-using gateway::say;
 
 constexpr shm::Nanoseconds kOpenAgain = 1'000'000'000;
+// Twice the lease: an earlier life of a host is not believed to live for so long.
+constexpr shm::Nanoseconds kNoEarlierLife = 3'000'000'000;
 
 Type type_of(const shm::TypeInfo& info) {
   if (!info.is_typed()) return Type::untyped(static_cast<std::size_t>(info.size));
@@ -52,18 +55,28 @@ Import::~Import() {
   close();
 }
 
-void Import::look(bool is_open_here, bool has_daemon) {
+void Import::look(bool is_open_here) {
   listen_to_speaker();
   const Offerer* const speaker = speaker_.current();
   // The model wants it, or there would be no import.
   const ImportChoice choice = choose_import({true, is_open_here, speaker != nullptr});
-  const OfferCard* const card = speaker == nullptr ? nullptr : &offers_.at(speaker->key);
+  const OfferCard* const card = speaker == nullptr ? nullptr : &offers_.at(speaker->key).card;
   const bool is_other_type = port_ && card != nullptr && card->type_revision != revision_;
   const bool is_other_host = speaker == nullptr || speaker->incarnation != obeyed_;
   if (choice != ImportChoice::kImport || is_other_type || (is_other_host && port_)) close();
   obey(choice == ImportChoice::kImport ? speaker->incarnation : 0);
-  const bool can_open = has_daemon && card != nullptr && card->type_revision != 0;
-  if (choice == ImportChoice::kImport && !port_ && can_open) open(*card);
+}
+
+void Import::open(bool has_daemon, const Patience& patience) {
+  const Offerer* const speaker = speaker_.current();
+  const bool is_wanted = obeyed_ != 0 && speaker != nullptr && !port_;
+  const bool may_open = has_daemon && shm::monotonic_now() >= open_again_ && patience.is_left();
+  if (is_wanted && may_open && offers_.at(speaker->key).card.type_revision != 0) {
+    open_port(offers_.at(speaker->key).card);
+    // Not before, whether it is open or not: strangers may have it opened again and again.
+    open_again_ = shm::monotonic_now() + kOpenAgain;
+    patience.note_call();
+  }
   describe();
 }
 
@@ -71,6 +84,8 @@ void Import::obey(Incarnation exporter) {
   const std::lock_guard lock(mutex_);
   if (exporter == obeyed_) return;
   obeyed_ = exporter;
+  if (exporter == 0) return;
+  stream_.obey(exporter);
   const auto last = std::find_if(unheard_.begin(), unheard_.end(),
                                  [&](const Unheard& each) { return each.exporter == exporter; });
   if (last == unheard_.end()) return;
@@ -100,10 +115,13 @@ void Import::listen_to_speaker() {
   }
   for (const EventReader::Offer& offer : offers) {
     if (offer.card.source != source_) continue;
-    offers_[offer.key] = offer.card;
+    Offered& known = offers_[offer.key];
+    if (known.since == 0) known.since = shm::monotonic_now();
+    known.card = offer.card;
     speaker_.add({offer.key, offer.card.host, offer.card.incarnation});
   }
   forget(offers);
+  find_shared_name();
   say_who_speaks();
 }
 
@@ -118,20 +136,38 @@ void Import::forget(const std::vector<EventReader::Offer>& offers) {
   });
 }
 
+// One host has the source open once: who offers it beside its like for long is another machine.
+void Import::find_shared_name() {
+  shared_name_.clear();
+  const shm::Nanoseconds now = shm::monotonic_now();
+  std::map<std::string_view, Incarnation> first;
+  for (const auto& [key, offer] : offers_) {
+    if (now - offer.since < kNoEarlierLife) continue;
+    const auto [one, is_new] = first.emplace(offer.card.host, offer.card.incarnation);
+    if (!is_new && one->second != offer.card.incarnation) shared_name_ = offer.card.host;
+  }
+  if (shared_name_ == shared_name_said_) return;
+  const bool is_said =
+      shared_name_.empty() ||
+      say_sparingly(Level::kWarning,
+                    source_ + " is open on several machines that are all called " + shared_name_ +
+                        ", and is taken from the one that came last: give each its own --host");
+  if (is_said) shared_name_said_ = shared_name_;
+}
+
 void Import::say_who_speaks() {
   const std::vector<std::string> hosts = speaker_.hosts();
   const std::string text = hosts.size() < 2 ? "" : joined(hosts);
   if (text == hosts_said_) return;
-  hosts_said_ = text;
-  if (text.empty()) return;
-  say(Level::kWarning, source_ + " is open on several hosts: " + text + "; it is taken from " +
-                           speaker_.current()->host + " until that one is gone");
+  const bool is_said =
+      text.empty() ||
+      say_sparingly(Level::kWarning, source_ + " is open on several hosts: " + text +
+                                         "; it is taken from " + speaker_.current()->host +
+                                         " until that one is gone");
+  if (is_said) hosts_said_ = text;
 }
 
-void Import::open(const OfferCard& card) {
-  const shm::Nanoseconds now = shm::monotonic_now();
-  if (now < open_again_) return;
-  open_again_ = now + kOpenAgain;
+void Import::open_port(const OfferCard& card) {
   if (card.type.size > kMaxSampleBytes) {
     say_once(source_ + " of host " + card.host + " is not imported: its samples have up to " +
              std::to_string(card.type.size) + " bytes, and no more than " +
@@ -151,8 +187,7 @@ void Import::open(const OfferCard& card) {
   }
   described_.clear();
   said_.clear();
-  open_again_ = 0;
-  say(Level::kInfo, source_ + " comes from host " + card.host);
+  say_sparingly(Level::kInfo, source_ + " comes from host " + card.host);
 }
 
 void Import::close() {
@@ -162,13 +197,11 @@ void Import::close() {
     obeyed_ = 0;
     gone.swap(port_);
   }
-  if (gone) say(Level::kInfo, source_ + " is not imported any more");
+  if (gone) say_sparingly(Level::kInfo, source_ + " is not imported any more");
 }
 
 void Import::say_once(const std::string& text) {
-  if (text == said_) return;
-  said_ = text;
-  say(Level::kWarning, text);
+  if (text != said_ && say_sparingly(Level::kWarning, text)) said_ = text;
 }
 
 std::string Import::text() const {
@@ -176,6 +209,7 @@ std::string Import::text() const {
   std::string text = "host " + (speaker == nullptr ? std::string("unknown") : speaker->host);
   const std::vector<std::string> hosts = speaker_.hosts();
   if (hosts.size() > 1) text += ", open on several hosts: " + joined(hosts);
+  if (!shared_name_.empty()) text += ", several machines are called " + shared_name_;
   const std::lock_guard lock(mutex_);
   const auto count = [&](std::uint64_t number, const char* what) {
     if (number != 0) text += ", " + std::to_string(number) + what;
@@ -248,8 +282,11 @@ void Import::publish(const gateway::dds::Payload& payload, std::size_t before, T
   }
   auto loan = port_->loan(header_.length);
   if (!loan) {
-    const bool fits = header_.length <= port_->max_size() && !port_->type().has_one_size();
-    ++(fits || header_.length == port_->max_size() ? counts_.no_memory : counts_.unreadable);
+    const bool fits = header_.length == port_->max_size() ||
+                      (header_.length < port_->max_size() && !port_->type().has_one_size());
+    ++(fits ? counts_.no_memory : counts_.unreadable);
+    // The source goes on, though nobody can have the sample.
+    if (fits && port_->signal(deadline).late) ++counts_.late;
     return;
   }
   if (!gateway::dds::ArrivedSample(payload).copy(before, **loan)) {

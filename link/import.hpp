@@ -19,6 +19,7 @@
 
 #include "link/core/event_header.hpp"
 #include "link/core/import_choice.hpp"
+#include "link/core/patience.hpp"
 #include "link/core/sent_tokens.hpp"
 #include "link/core/speaker.hpp"
 #include "link/core/stream.hpp"
@@ -44,9 +45,10 @@ class Import : private gateway::dds::SampleTaker {
   void set_max_age(shm::Nanoseconds age) noexcept {
     max_age_.store(age, std::memory_order_relaxed);
   }
-  // Who speaks now, and whether the port is to be open: opens it, if there is a daemon, or closes
-  // it.
-  void look(bool is_open_here, bool has_daemon);
+  // Who speaks now, and whether the port is to be open: closes it if it is not.
+  void look(bool is_open_here);
+  // After look(): opens the port if it is to be open and is not.
+  void open(bool has_daemon, const Patience& patience);
 
  private:
   struct Counts {
@@ -70,9 +72,10 @@ class Import : private gateway::dds::SampleTaker {
 
   void listen_to_speaker();
   void forget(const std::vector<EventReader::Offer>& offers);
-  void open(const OfferCard& card);
+  void open_port(const OfferCard& card);
   void close();
   void say_who_speaks();
+  void find_shared_name();
   void say_once(const std::string& text);
   void describe();
   // "host head, 3 lost, 2 late".
@@ -86,10 +89,16 @@ class Import : private gateway::dds::SampleTaker {
 
   // The link's thread.
   Speaker speaker_;
-  std::map<std::uint64_t, OfferCard> offers_;
+  struct Offered {
+    OfferCard card;
+    shm::Nanoseconds since = 0;
+  };
+  std::map<std::uint64_t, Offered> offers_;
   std::string said_;
   std::string described_;
   std::string hosts_said_;
+  std::string shared_name_;  // of several machines; empty: there is none
+  std::string shared_name_said_;
   shm::Nanoseconds open_again_ = 0;
 
   mutable std::mutex mutex_;

@@ -74,7 +74,7 @@ void Link::make_node(int stop) {
   options.on_waiting = [](const std::string&) {};
   options.on_notice = [](const Notice& notice) { say(Level::kWarning, notice.text); };
   while (!node_ && !stops_) {
-    if (options_.on_round) options_.on_round();
+    options_.on_round();
     try {
       node_.emplace(kNodeName, options);
     } catch (const Error& error) {
@@ -87,7 +87,7 @@ void Link::make_node(int stop) {
 // An interface may come later.
 void Link::join_network(int stop) {
   while (!network_ && !stops_) {
-    if (options_.on_round) options_.on_round();
+    options_.on_round();
     const gateway::dds::CycloneWords words;
     try {
       network_.emplace(options_.network);
@@ -107,36 +107,47 @@ void Link::join_network(int stop) {
 }
 
 void Link::loop(int stop) {
-  for (std::string said; !stops_; stops_ = waits(stop, kLookPeriod)) {
-    if (options_.on_round) options_.on_round();
-    view_.update();
-    say_once(said_of_view_, view_.obstacle());
+  std::string said_of_exports;
+  std::string said_of_imports;
+  // What fails on one side does not hold up the other.
+  const auto attempt = [this](std::string& said, const auto& step) {
     try {
-      exports_->look(view_);
-      choose_imports();
+      step();
       said.clear();
     } catch (const DdsError& error) {  // memory is short
       say_once(said, error.what());
     }
+  };
+  for (; !stops_; stops_ = waits(stop, kLookPeriod)) {
+    options_.on_round();
+    view_.update();
+    say_once(said_of_view_, view_.obstacle());
+    options_.on_round();
+    const Patience patience([] { return shm::monotonic_now(); }, options_.on_round);
+    attempt(said_of_exports, [&] { exports_->look(view_, patience); });
+    attempt(said_of_imports, [&] { choose_imports(patience); });
   }
 }
 
-void Link::choose_imports() {
+// What is to be closed is closed before anything waits for the daemon.
+void Link::choose_imports(const Patience& patience) {
   const auto& wanted = view_.wanted();
-  for (auto each = imports_.begin(); each != imports_.end();) {
-    each = wanted.contains(each->first) ? std::next(each) : imports_.erase(each);
+  std::erase_if(imports_, [&](const auto& each) { return !wanted.contains(each.first); });
+  for (const auto& [source, one] : imports_) {
+    one->set_max_age(wanted.find(source)->second);
+    one->look(view_.open_here().contains(source));
   }
   shm::Nanoseconds shortest = 0;  // no import
   for (const auto& [source, age] : wanted) {
-    std::unique_ptr<Import>& one = imports_[source];
-    if (one == nullptr) {
-      one = std::make_unique<Import>(*node_, *network_, sent_, source, incarnation_, bell_);
-    }
-    one->set_max_age(age);
-    one->look(view_.open_here().contains(source), view_.has_daemon());
     shortest = shortest == 0 ? age : std::min(shortest, age);
   }
   clock_->set_period(shortest == 0 ? 0 : token_period(shortest));
+  for (const auto& [source, one] : imports_) one->open(view_.has_daemon(), patience);
+  for (const auto& [source, age] : wanted) {
+    std::unique_ptr<Import>& one = imports_[source];
+    if (one != nullptr) continue;
+    one = std::make_unique<Import>(*node_, *network_, sent_, source, incarnation_, bell_);
+  }
 }
 
 }  // namespace arbiter::link

@@ -14,6 +14,7 @@
 
 #include "gateway/core/bridge.hpp"
 #include "link/core/held_tokens.hpp"
+#include "link/core/patience.hpp"
 #include "link/core/sent_tokens.hpp"
 #include "link/dds/network.hpp"
 #include "link/dds/token_topic.hpp"
@@ -28,8 +29,9 @@ struct LinkOptions {
   std::string host;      // its name for the others
   std::string instance;  // as NodeOptions has it
   NetworkOptions network;
-  // Called by the loop ten times a second, so that somebody can see that it goes round.
-  std::function<void()> on_round{};
+  // Called by the loop ten times a second, and between calls that wait for the daemon, so that
+  // somebody can see that it goes round.
+  std::function<void()> on_round = [] {};
 };
 
 class Link {
@@ -46,7 +48,7 @@ class Link {
   void make_node(int stop);
   void join_network(int stop);
   void loop(int stop);
-  void choose_imports();
+  void choose_imports(const Patience& patience);
   void say_once(std::string& said, const std::string& text);
   // Sleeps, or until the bell rings; true: `stop` is readable.
   [[nodiscard]] bool waits(int stop, int milliseconds) const;

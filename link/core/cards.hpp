@@ -30,6 +30,7 @@ inline constexpr std::size_t kMaxHostName = 64;
 
 // Of a writer: an output port that is open there.
 struct OfferCard {
+  // Of this offer. The port that is opened again is another one.
   Incarnation incarnation = 0;
   std::string host;
   std::string source;

@@ -4,8 +4,8 @@
 //   4   1  version, 1
 //   5   1  kind (EventKind)
 //   6   2  flags: 1, the source is deactivated
-//   8   8  incarnation of the exporter, not 0
-//  16   8  number of the event in the exporter's stream of the source, from 1
+//   8   8  incarnation of the exporter's offer, not 0
+//  16   8  number of the event in the stream of that offer, from 1
 //  24   8  sequence of the sample by its publisher; of other events that of the last one before
 //  32   4  revision of the type that the source's samples have, from 1; 0: not known yet
 //  36   4  length of the sample behind the header, in bytes

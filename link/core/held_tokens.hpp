@@ -23,7 +23,8 @@
 
 namespace arbiter::link {
 
-// A life of a link's process: a random number, never 0.
+// A life: of a link's process, as importers have it, or of one of its offers. A number that differs
+// from all others because it was begun at random; never 0.
 using Incarnation = std::uint64_t;
 
 // The newest token of one importer.

@@ -4,11 +4,14 @@
 
 namespace arbiter::link {
 
+void Stream::obey(Incarnation exporter) noexcept {
+  if (exporters_.front().incarnation == exporter) return;
+  move_to_front(exporter);
+  has_begun_ = false;
+}
+
 bool Stream::note(Incarnation from, const StreamEvent& event) noexcept {
-  if (exporters_.front().incarnation != from) {
-    move_to_front(from);
-    has_begun_ = false;
-  }
+  obey(from);
   Exporter& exporter = exporters_.front();
   if (event.number <= exporter.last) {
     ++doubled_;
@@ -18,7 +21,7 @@ bool Stream::note(Incarnation from, const StreamEvent& event) noexcept {
   has_begun_ = true;
   exporter.last = event.number;
   exporter.sequence = event.sequence;
-  deactivated_ = event.is_deactivated;
+  exporter.is_deactivated = event.is_deactivated;
   return true;
 }
 
@@ -36,7 +39,7 @@ void Stream::move_to_front(Incarnation from) noexcept {
                             [&](const Exporter& each) { return each.incarnation == from; });
   if (found == exporters_.end()) {
     found = exporters_.end() - 1;
-    *found = {from, 0, 0};
+    *found = {from, 0, 0, false};
   }
   std::rotate(exporters_.begin(), found, found + 1);
 }

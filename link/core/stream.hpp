@@ -1,9 +1,10 @@
 // The events of one source as other hosts send them: in order, none twice, losses counted.
 //
 // An exporter numbers what happens to a source from 1 upwards: samples, signals, deactivations;
-// what it could not see itself has used numbers as well. It does so once for each of its lives and
-// each source, so a stream is known by its source and the exporter's incarnation. The last event of
-// a stream tells the source's state: an importer that joins, or has missed some, needs only that.
+// what it could not see itself has used numbers as well. It begins again whenever it offers the
+// source again, because its own process or the publisher was started again: so a stream is known by
+// its source and the incarnation of the offer. The last event of a stream tells the source's state:
+// an importer that joins, or has missed some, needs only that.
 //
 // Thread safety: none of its own.
 #pragma once
@@ -25,6 +26,9 @@ struct StreamEvent {
 
 class Stream {
  public:
+  // From now on `exporter` is the one that is obeyed, with the state that it was last known to
+  // have.
+  void obey(Incarnation exporter) noexcept;
   // Takes up an event of the exporter `from`, which is the one that is obeyed. False: it,
   // or a later one, came before.
   bool note(Incarnation from, const StreamEvent& event) noexcept;
@@ -33,8 +37,9 @@ class Stream {
   // while another one was obeyed, is not missed.
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
   [[nodiscard]] std::uint64_t doubled() const noexcept { return doubled_; }
-  // By the last event: its exporter ended the source's activity, and nothing has come since.
-  [[nodiscard]] bool is_deactivated() const noexcept { return deactivated_; }
+  // By the last event of the one that is obeyed: it ended the source's activity, and nothing has
+  // come since.
+  [[nodiscard]] bool is_deactivated() const noexcept { return exporters_.front().is_deactivated; }
 
  private:
   // The exporters that were obeyed last: one that comes back goes on where it was, and what it
@@ -44,6 +49,7 @@ class Stream {
     Incarnation incarnation = 0;  // 0: none
     std::uint64_t last = 0;       // number
     std::uint64_t sequence = 0;   // likewise
+    bool is_deactivated = false;  // likewise
   };
   void move_to_front(Incarnation from) noexcept;
   [[nodiscard]] static std::uint64_t missed(const Exporter& exporter,
@@ -53,7 +59,6 @@ class Stream {
   bool has_begun_ = false;                         // an event of that one was taken up since it is
   std::uint64_t lost_ = 0;
   std::uint64_t doubled_ = 0;
-  bool deactivated_ = false;
 };
 
 }  // namespace arbiter::link

@@ -14,8 +14,9 @@ namespace {
 using gateway::dds::CycloneQos;
 
 constexpr const char* kEventType = "arbiter::Event";
-// How long a writer may wait for readers that do not keep up.
-constexpr dds_duration_t kMaxBlocking = 10'000'000;
+// A writer that keeps the last event alone need not wait for readers that do not keep up, and in
+// Cyclone it does not: no reader holds up the one thread that sends.
+constexpr dds_duration_t kMaxBlocking = 0;
 // A bound of what a reader looks at, on a network where anybody may write.
 constexpr std::size_t kMaxOffers = 64;
 

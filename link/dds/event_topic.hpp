@@ -32,7 +32,7 @@ class EventWriter {
   [[nodiscard]] bool is_wanted() const;
   // Another card for the same source: its type is now known, or has changed.
   void set_card(const OfferCard& card);
-  // Waits 10 ms at most for readers that do not keep up. False: it was not sent.
+  // Waits for no reader. False: it was not written, because memory is short.
   [[nodiscard]] bool write(Bytes header, Bytes sample) noexcept;
 
  private:

@@ -78,6 +78,34 @@ TEST_F(Cable, APulledOneIsSilenceAndNothingOfItComesLate) { cut_and_heal(false);
 
 TEST_F(Cable, AHostThatWasGoneIsFoundAgain) { cut_and_heal(true); }
 
+// The large sample waits for a receipt that does not come; what is said after it must not be lost.
+TEST_F(Cable, ADeactivationBehindALargeSampleOutlivesACut) {
+  CabledRobot robot;
+  Host head("head", robot.runtime, source_model("forever"), robot.arguments(),
+            robot.head_network.enter());
+  Host base("base", robot.runtime, motor_model("forever"), robot.arguments(),
+            robot.base_network.enter());
+  Node brain = head.node("brain");
+  auto planner = brain.output_port(kPlanner, Type::variable("robot/Cloud", 200'000));
+  Node body = base.node("body");
+  auto hold = body.output_port<Speed>(kHold);
+  auto motor = body.input_port(kMotor);
+  const std::vector<std::byte> cloud(200'000);
+  await([&] {
+    planner.publish(Bytes(cloud.data(), 8));
+    return motor.wait_for(5ms).has_value();
+  });
+  robot.cables.cut(kHead);
+  planner.publish(Bytes(cloud.data(), cloud.size()));
+  planner.deactivate();
+  robot.cables.heal(kHead);
+  await([&] {
+    hold.publish(Speed{0});
+    const auto got = motor.wait_for(5ms);
+    return got && got->source() == kHold;
+  });
+}
+
 TEST_F(Cable, AnInterfaceMayComeAfterTheLink) {
   CabledRobot robot;
   const NetworkNamespace late;

@@ -17,8 +17,8 @@ using link::EventKind;
 // A program on the network that says that it has the planner.
 class Stranger {
  public:
-  explicit Stranger(std::uint32_t domain) : network_({domain, {}, {}}) {
-    card_.incarnation = 666;
+  explicit Stranger(const link::Network& network, link::Incarnation incarnation = 666) {
+    card_.incarnation = incarnation;
     card_.host = "stranger";
     card_.source = kPlanner;
     card_.type_revision = 1;
@@ -26,7 +26,7 @@ class Stranger {
     card_.type.set_name(type.name());
     card_.type.size = type.size();
     card_.type.alignment = type.alignment();
-    writer_.emplace(network_, card_, bell_);
+    writer_.emplace(network, card_, bell_);
   }
   // An event that is proper but for what `spoil` makes of it.
   void send(const std::function<void(EventHeader&)>& spoil, std::size_t size = sizeof(Speed)) {
@@ -49,7 +49,6 @@ class Stranger {
 
  private:
   const gateway::Bell bell_;
-  link::Network network_;
   link::OfferCard card_;
   std::uint64_t number_ = 0;
   std::optional<link::EventWriter> writer_;
@@ -73,7 +72,8 @@ class HostileHost : public testing::Test {
   Host base_{
       "base", runtime_, motor_model("1000s"), {"--domain", std::to_string(domain_.number())}};
   Body body_{base_};
-  Stranger stranger_{domain_.number()};
+  const link::Network network_{{domain_.number(), {}, {}}};
+  Stranger stranger_{network_};
 };
 
 TEST_F(HostileHost, ASampleThatNamesNoTokenMovesNothing) {
@@ -100,6 +100,13 @@ TEST_F(HostileHost, NumbersThatLeapCountAsLost) {
   send_until(" lost", [&] {
     stranger_.send([](EventHeader& header) { header.number *= 1'000'000'000'000; });
   });
+}
+
+// The second one is taken for the next life of the first, until both are there for too long.
+TEST_F(HostileHost, TwoMachinesWithOneNameAreNamed) {
+  const Stranger namesake(network_, 667);
+  base_.see("several machines that are all called stranger");
+  base_.await_described(kPlanner, "several machines are called stranger");
 }
 
 }  // namespace

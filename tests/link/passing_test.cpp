@@ -138,6 +138,26 @@ TEST_F(Hosts, AThirdOneKeepsTheSpeakerThatItHasAndNamesBoth) {
   base.await_described(kPlanner, "host rear");
 }
 
+// Its numbers begin again there, and nothing of it must be taken for what came before.
+TEST_F(Hosts, APublisherThatIsStartedAgainIsHeardFromItsFirstSampleOn) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("forever"), network());
+  Body body(base);
+  std::int64_t published = 0;
+  {
+    Planner planner(head);
+    while (planner.published() < 200) body.drive(planner);
+    published = planner.published();
+  }
+  base.see("is not imported any more");
+  Planner again(head, published);
+  body.drive(again);
+  base.await_described(kPlanner, "host head");
+  EXPECT_THAT(base.described(kPlanner), Not(HasSubstr("twice")));
+  again.port().deactivate();
+  body.fall_back();
+}
+
 TEST_F(Hosts, AnotherTypeOpensThePortAgain) {
   Host head("head", runtime_, kNoRules, network());
   Host base("base", runtime_, motor_model("1000s"), network());

@@ -35,8 +35,11 @@ inline std::string source_model(const std::string& timeout) {
 
 class Planner {
  public:
-  explicit Planner(const Host& host)
-      : node_(host.node("brain")), port_(node_.output_port<Speed>(kPlanner)) {}
+  // `published`: where its numbers go on, if it was there before.
+  explicit Planner(const Host& host, std::int64_t published = 0)
+      : node_(host.node("brain")),
+        port_(node_.output_port<Speed>(kPlanner)),
+        published_(published) {}
   // Returns the number of the sample.
   std::int64_t publish() {
     port_.publish(Speed{++published_});
@@ -48,7 +51,7 @@ class Planner {
  private:
   Node node_;
   OutputPort<Speed> port_;
-  std::int64_t published_ = 0;
+  std::int64_t published_;
 };
 
 class Body {

@@ -115,6 +115,24 @@ TEST(Stream, WhatASpeakerThatComesBackSendsAgainIsKnown) {
   EXPECT_EQ(stream.lost(), 1U);
 }
 
+// Of another one that was obeyed meanwhile nothing stays: not even if nothing new comes.
+TEST(Stream, ASpeakerThatIsObeyedAgainHasTheStateOfItsOwnLastEvent) {
+  Stream stream;
+  stream.obey(1);
+  stream.note(1, event(100, true));
+  stream.obey(2);
+  EXPECT_FALSE(stream.is_deactivated()) << "nothing is known of it yet";
+  stream.note(2, event(1, false));
+  stream.obey(1);
+  EXPECT_TRUE(stream.is_deactivated());
+  EXPECT_FALSE(stream.note(1, event(100, true)));
+  EXPECT_TRUE(stream.is_deactivated());
+  stream.obey(2);
+  EXPECT_FALSE(stream.is_deactivated());
+  EXPECT_TRUE(stream.note(2, event(5, false)));
+  EXPECT_EQ(stream.lost(), 0U) << "what it sent while another one was obeyed is not missed";
+}
+
 TEST(Speaker, IsKeptUntilItIsGone) {
   Speaker speaker;
   EXPECT_EQ(speaker.current(), nullptr);
