@@ -64,7 +64,7 @@ void Import::look(bool is_open_here) {
   const bool is_other_type = port_ && card != nullptr && card->type_revision != revision_;
   const bool is_other_host = speaker == nullptr || speaker->incarnation != obeyed_;
   if (choice != ImportChoice::kImport || is_other_type || (is_other_host && port_)) close();
-  obey(choice == ImportChoice::kImport ? speaker->incarnation : 0);
+  obey(choice == ImportChoice::kImport ? speaker : nullptr);
 }
 
 void Import::open(bool has_daemon, const Patience& patience) {
@@ -80,26 +80,29 @@ void Import::open(bool has_daemon, const Patience& patience) {
   describe();
 }
 
-void Import::obey(Incarnation exporter) {
+void Import::obey(const Offerer* speaker) {
   const std::lock_guard lock(mutex_);
-  if (exporter == obeyed_) return;
+  const Incarnation exporter = speaker == nullptr ? 0 : speaker->incarnation;
+  const std::uint64_t writer = speaker == nullptr ? 0 : speaker->key;
+  if (exporter == obeyed_ && writer == writer_) return;
   obeyed_ = exporter;
+  writer_ = writer;
   if (exporter == 0) return;
   stream_.obey(exporter);
   const auto last = std::find_if(unheard_.begin(), unheard_.end(),
-                                 [&](const Unheard& each) { return each.exporter == exporter; });
+                                 [&](const Unheard& each) { return each.writer == writer; });
   if (last == unheard_.end()) return;
-  stream_.note(exporter, last->last);
+  if (last->exporter == exporter) stream_.note(exporter, last->last);
   unheard_.erase(last);
 }
 
-void Import::remember(Incarnation exporter, const StreamEvent& event) noexcept {
+void Import::remember(std::uint64_t writer, const StreamEvent& event) noexcept {
   const auto found = std::find_if(unheard_.begin(), unheard_.end(),
-                                  [&](const Unheard& each) { return each.exporter == exporter; });
+                                  [&](const Unheard& each) { return each.writer == writer; });
   if (found != unheard_.end()) {
-    found->last = event;
+    *found = {writer, header_.exporter, event};
   } else if (unheard_.size() < kMaxUnheard) {
-    unheard_.push_back({exporter, event});
+    unheard_.push_back({writer, header_.exporter, event});
   }
 }
 
@@ -130,9 +133,8 @@ void Import::forget(const std::vector<EventReader::Offer>& offers) {
   const std::lock_guard lock(mutex_);
   if (unheard_.size() < kMaxUnheard) return;
   std::erase_if(unheard_, [&](const Unheard& each) {
-    return std::none_of(offers.begin(), offers.end(), [&](const EventReader::Offer& offer) {
-      return offer.card.incarnation == each.exporter;
-    });
+    return std::none_of(offers.begin(), offers.end(),
+                        [&](const EventReader::Offer& offer) { return offer.key == each.writer; });
   });
 }
 
@@ -195,6 +197,7 @@ void Import::close() {
   {
     const std::lock_guard lock(mutex_);
     obeyed_ = 0;
+    writer_ = 0;
     gone.swap(port_);
   }
   if (gone) say_sparingly(Level::kInfo, source_ + " is not imported any more");
@@ -231,8 +234,8 @@ void Import::describe() {
   described_ = std::move(now);
 }
 
-void Import::take(const gateway::dds::Payload& payload)  // NOLINT(bugprone-exception-escape)
-    noexcept {
+void Import::take(const gateway::dds::Payload& payload,  // NOLINT(bugprone-exception-escape)
+                  dds_instance_handle_t writer) noexcept {
   const std::size_t before = encapsulation().size();
   const std::lock_guard lock(mutex_);
   std::array<std::byte, kMaxHeaderBytes> bytes;
@@ -246,8 +249,12 @@ void Import::take(const gateway::dds::Payload& payload)  // NOLINT(bugprone-exce
   }
   const StreamEvent event{header_.number, header_.sequence, header_.kind == EventKind::kSample,
                           header_.is_deactivated};
-  if (header_.exporter != obeyed_) {  // one speaker: others are not heard
-    remember(header_.exporter, event);
+  if (writer != writer_) {  // one speaker: others are not heard
+    remember(writer, event);
+    return;
+  }
+  if (header_.exporter != obeyed_) {
+    ++counts_.unreadable;  // its own card says otherwise
     return;
   }
   if (!stream_.note(header_.exporter, event)) return;

@@ -60,15 +60,15 @@ class Import : private gateway::dds::SampleTaker {
 
   // publish() throws for another port's loan, and this one is its own; what is remembered here has
   // its memory from the beginning.
-  void take(const gateway::dds::Payload& payload)  // NOLINT(bugprone-exception-escape)
-      noexcept override;
-  // Whom to obey from now on; 0: nobody.
-  void obey(Incarnation exporter);
+  void take(const gateway::dds::Payload& payload,  // NOLINT(bugprone-exception-escape)
+            dds_instance_handle_t writer) noexcept override;
+  // Whom to obey from now on; null: nobody.
+  void obey(const Offerer* speaker);
   // Under the lock, by header_.
   void arrive(const gateway::dds::Payload& payload, std::size_t before);
   void publish(const gateway::dds::Payload& payload, std::size_t before, Time deadline);
   // Of one that finds no place the state is not known before its next event.
-  void remember(Incarnation exporter, const StreamEvent& event) noexcept;
+  void remember(std::uint64_t writer, const StreamEvent& event) noexcept;
 
   void listen_to_speaker();
   void forget(const std::vector<EventReader::Offer>& offers);
@@ -105,10 +105,12 @@ class Import : private gateway::dds::SampleTaker {
   std::optional<OutputPort<void>> port_;
   std::uint32_t revision_ = 0;  // of the port's type
   Incarnation obeyed_ = 0;      // the speaker's; 0: nobody
+  std::uint64_t writer_ = 0;    // likewise its key: nobody else speaks in its name
   Stream stream_;
   // The last event of each exporter that is not obeyed: the first that comes is the present state,
   // and comes before the exporter can be chosen.
   struct Unheard {
+    std::uint64_t writer = 0;
     Incarnation exporter = 0;
     StreamEvent last;
   };

@@ -13,9 +13,9 @@ struct ReaderCache::Calls {
     return DDS_RETCODE_OK;
   }
   // True: it has been taken; false would have Cyclone try it again.
-  static bool store(ddsi_rhc* cache, const ddsi_writer_info* /*writer*/, ddsi_serdata* data,
+  static bool store(ddsi_rhc* cache, const ddsi_writer_info* writer, ddsi_serdata* data,
                     ddsi_tkmap_instance* instance) {
-    of(cache).store(*data, instance);
+    of(cache).store(*data, instance, writer->iid);
     return true;
   }
   static void unregister_writer(ddsi_rhc* /*cache*/, const ddsi_writer_info* /*writer*/) {}
@@ -63,14 +63,15 @@ ReaderCache::ReaderCache(SampleTaker& taker) : hook_{}, taker_(taker) {
 
 // Cyclone's locks: that of the readers of one writer is held here, as in a listener. Nothing that
 // takes the same one is called from here on; a writer of ours that writes takes its own.
-void ReaderCache::store(const ddsi_serdata& data, ddsi_tkmap_instance* instance) noexcept {
+void ReaderCache::store(const ddsi_serdata& data, ddsi_tkmap_instance* instance,
+                        dds_instance_handle_t writer) noexcept {
   const std::lock_guard lock(mutex_);
   if (instance_ == nullptr) {
     ddsi_tkmap_instance_ref(instance);
     instance_ = instance;
   }
   // That an instance has been disposed of, or has lost its writer, is no sample.
-  if (data.kind == SDK_DATA && data.statusinfo == 0) taker_.take(*payload_of(&data));
+  if (data.kind == SDK_DATA && data.statusinfo == 0) taker_.take(*payload_of(&data), writer);
 }
 
 void ReaderCache::let_go() noexcept {

@@ -28,9 +28,10 @@ class SampleTaker {
   SampleTaker& operator=(const SampleTaker&) = delete;
   virtual ~SampleTaker() = default;
 
-  // The payload is valid until it returns. Must not wait. As in a listener of Cyclone's, which is
+  // `writer`: the handle by which dds_get_matched_publications() names who has written it. The
+  // payload is valid until it returns. Must not wait. As in a listener of Cyclone's, which is
   // called with the same locks, samples may be written, and nothing may be opened or closed.
-  virtual void take(const Payload& payload) noexcept = 0;
+  virtual void take(const Payload& payload, dds_instance_handle_t writer) noexcept = 0;
 };
 
 // Outlives the reader that has it.
@@ -53,7 +54,8 @@ class ReaderCache {
   // What Cyclone calls.
   struct Calls;
 
-  void store(const ddsi_serdata& data, ddsi_tkmap_instance* instance) noexcept;
+  void store(const ddsi_serdata& data, ddsi_tkmap_instance* instance,
+             dds_instance_handle_t writer) noexcept;
   void let_go() noexcept;
 
   Hook hook_;

@@ -48,7 +48,8 @@ void TokenTopic::send(const TokenMessage& message) noexcept {
   if (payload != nullptr) static_cast<void>(dds_writecdr(writer_.get(), &payload->cyclone));
 }
 
-void TokenTopic::take(const gateway::dds::Payload& payload) noexcept {
+void TokenTopic::take(const gateway::dds::Payload& payload,
+                      dds_instance_handle_t /*writer*/) noexcept {
   const std::size_t before = encapsulation().size();
   std::array<std::byte, kTokenMessageBytes> bytes{};
   if (payload.size < before + bytes.size()) return;

@@ -23,7 +23,8 @@ class TokenTopic : private gateway::dds::SampleTaker {
   void send(const TokenMessage& message) noexcept;
 
  private:
-  void take(const gateway::dds::Payload& payload) noexcept override;
+  void take(const gateway::dds::Payload& payload,
+            dds_instance_handle_t /*writer*/) noexcept override;
 
   const std::function<void(const TokenMessage&)> heard_;
   gateway::dds::ReaderCache cache_;

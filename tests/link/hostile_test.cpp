@@ -17,9 +17,10 @@ using link::EventKind;
 // A program on the network that says that it has the planner.
 class Stranger {
  public:
-  explicit Stranger(const link::Network& network, link::Incarnation incarnation = 666) {
+  explicit Stranger(const link::Network& network, link::Incarnation incarnation = 666,
+                    const std::string& host = "stranger") {
     card_.incarnation = incarnation;
-    card_.host = "stranger";
+    card_.host = host;
     card_.source = kPlanner;
     card_.type_revision = 1;
     const Type type = type_of<Speed>();
@@ -99,6 +100,24 @@ TEST_F(HostileHost, WhatIsNoEventIsCounted) {
 TEST_F(HostileHost, NumbersThatLeapCountAsLost) {
   send_until(" lost", [&] {
     stranger_.send([](EventHeader& header) { header.number *= 1'000'000'000'000; });
+  });
+}
+
+// One event with the last of all numbers would make all that follow come twice.
+TEST_F(HostileHost, NobodySpeaksInTheNameOfAnother) {
+  send_until(" late", [&] { stranger_.send([](EventHeader&) {}); });
+  Stranger forger(network_, 667, "forger");
+  base_.await_described(kPlanner, "open on several hosts");
+  forger.send([](EventHeader& header) {
+    header.exporter = 666;
+    header.number = ~std::uint64_t{0};
+  });
+  const std::string before = base_.described(kPlanner);
+  await([&] {
+    stranger_.send([](EventHeader&) {});
+    const std::string now = base_.described(kPlanner);
+    EXPECT_THAT(now, testing::Not(testing::HasSubstr("twice")));
+    return now != before || HasFailure();
   });
 }
 
