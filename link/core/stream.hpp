@@ -26,7 +26,8 @@ struct StreamEvent {
 
 class Stream {
  public:
-  // From now on `exporter` is the one that is obeyed, with the state that it was last known to have.
+  // From now on `exporter` is the one that is obeyed, with the state that it was last known to
+  // have.
   void obey(Incarnation exporter) noexcept;
   // Takes up an event of the exporter `from`, which is the one that is obeyed. False: it came
   // already, or one behind it did.
