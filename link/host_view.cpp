@@ -6,6 +6,7 @@
 
 #include "gateway/core/max_ages.hpp"
 #include "shm/clock.hpp"
+#include "shm/picture.hpp"
 #include "watch/picture.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -120,11 +121,10 @@ bool HostView::is_deactivated(const std::string& source) const {
   if (instance_ == nullptr) return false;
   const auto id = instance_->find_source(source);
   if (!id) return false;
-  const watch::Picture picture = watch::take_picture(
-      *instance_->memory(),
-      [&](const shm::TableView& /*table*/) { return std::vector<shm::SourceId>{*id}; });
-  const auto word = picture.words.find(*id);
-  return word != picture.words.end() && shm::is_deactivation(word->second);
+  // One word, which needs no model to be read by.
+  shm::Sight sight{*id, instance_->memory()->pages().find(*id), {}};
+  sight.look();
+  return sight.activity != nullptr && shm::is_deactivation(sight.seen.word);
 }
 
 }  // namespace arbiter::link

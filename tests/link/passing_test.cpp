@@ -70,6 +70,21 @@ TEST_F(Hosts, ADeactivationIsSaidToWhoeverComesWhenNobodyHasListenedSince) {
   body.fall_back();
 }
 
+// What it says of a silent source does not depend on a model.
+TEST_F(Hosts, ADeactivationIsSaidByAHostWithoutAModel) {
+  Host head("head", runtime_, "", network());
+  Planner planner(head);
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Body body(base);
+  body.drive(planner);
+  base.link().signal(SIGTERM);
+  ASSERT_EQ(base.link().wait(), 0);
+  await([&] { return head.daemon().source(kPlanner)["taps"].empty(); });
+  planner.port().deactivate();
+  base.start_link();
+  body.fall_back();
+}
+
 TEST_F(Hosts, OnlyWhatAnotherHostsModelWantsIsTapped) {
   Host head("head", runtime_, kNoRules, network());
   Planner planner(head);

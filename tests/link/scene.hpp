@@ -35,11 +35,12 @@ inline void await(const std::function<bool()>& holds) {
 
 class Host {
  public:
-  // `by`: what starts the link, such as in a network namespace.
+  // `model`: empty, and the host has none. `by`: what starts the link, such as in a network
+  // namespace.
   Host(std::string name, const TemporaryDirectory& runtime, const std::string& model,
        std::vector<std::string> network, std::vector<std::string> by = {})
       : name_(std::move(name)),
-        daemon_(model, options_of(name_, runtime)),
+        daemon_(model, options_of(name_, runtime, model.empty())),
         log_(daemon_.directory() + "/link.log"),
         by_(std::move(by)),
         network_(std::move(network)) {
@@ -84,9 +85,11 @@ class Host {
   }
 
  private:
-  static Daemon::Options options_of(const std::string& name, const TemporaryDirectory& runtime) {
+  static Daemon::Options options_of(const std::string& name, const TemporaryDirectory& runtime,
+                                    bool without_model) {
     Daemon::Options options;
     options.instance = name;
+    options.without_model = without_model;
     options.runtime_directory = runtime.path();
     return options;
   }
