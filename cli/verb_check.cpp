@@ -39,34 +39,17 @@ struct Statements {
 };
 
 // Of the warnings and notes that reading, compiling and proving a model can bring.
-const std::vector<std::string_view> silenceable{"decided-in-order",
-                                                "duplicate-config",
-                                                "duplicate-connection",
-                                                "forever-commands",
-                                                "held-up-idle",
-                                                "inhibition-across-ports",
-                                                "left-open",
-                                                "matches-nothing",
-                                                "more-conflicts",
-                                                "never-published",
-                                                "never-read",
-                                                "never-runs",
-                                                "never-selected",
-                                                "never-wins",
-                                                "no-idle",
-                                                "no-children",
-                                                "no-config",
-                                                "no-rule-at-port",
-                                                "not-arbitrated",
-                                                "nobody-wins",
-                                                "proved",
-                                                "similar-name",
-                                                "starved",
-                                                "two-configurations",
-                                                "two-outs",
-                                                "unmentioned-port",
-                                                "unreachable-children",
-                                                "wrong-end"};
+const std::vector<std::string_view> silenceable{
+    "decided-in-order", "duplicate-config", "duplicate-connection",
+    "forever-commands", "held-up-idle",     "inhibition-across-ports",
+    "left-open",        "matches-nothing",  "more-conflicts",
+    "never-published",  "never-read",       "never-runs",
+    "never-selected",   "never-wins",       "no-idle",
+    "no-children",      "no-config",        "no-rule-at-port",
+    "not-arbitrated",   "nobody-wins",      "proved",
+    "similar-name",     "starved",          "two-configurations",
+    "two-outs",         "unmentioned-port", "unreachable-children",
+    "wrong-end"};
 
 std::string problem_of_code(std::string& code) {
   if (std::find(silenceable.begin(), silenceable.end(), code) != silenceable.end()) return "";
