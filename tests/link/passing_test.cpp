@@ -56,10 +56,9 @@ TEST_F(Hosts, ADeactivationIsSaidToWhoeverComesBack) {
   body.fall_back();
 }
 
-TEST_F(Hosts, ADeactivationIsSaidToWhoeverComesWhenNobodyHasListenedSince) {
-  Host head("head", runtime_, kNoRules, network());
+// Of a source of `head`, to a host that was there before, and has come again.
+void deactivation_is_said_later(Host& head, Host& base) {
   Planner planner(head);
-  Host base("base", runtime_, motor_model("1000s"), network());
   Body body(base);
   body.drive(planner);
   base.link().signal(SIGTERM);
@@ -70,19 +69,17 @@ TEST_F(Hosts, ADeactivationIsSaidToWhoeverComesWhenNobodyHasListenedSince) {
   body.fall_back();
 }
 
+TEST_F(Hosts, ADeactivationIsSaidToWhoeverComesWhenNobodyHasListenedSince) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  deactivation_is_said_later(head, base);
+}
+
 // What it says of a silent source does not depend on a model.
 TEST_F(Hosts, ADeactivationIsSaidByAHostWithoutAModel) {
   Host head("head", runtime_, "", network());
-  Planner planner(head);
   Host base("base", runtime_, motor_model("1000s"), network());
-  Body body(base);
-  body.drive(planner);
-  base.link().signal(SIGTERM);
-  ASSERT_EQ(base.link().wait(), 0);
-  await([&] { return head.daemon().source(kPlanner)["taps"].empty(); });
-  planner.port().deactivate();
-  base.start_link();
-  body.fall_back();
+  deactivation_is_said_later(head, base);
 }
 
 TEST_F(Hosts, OnlyWhatAnotherHostsModelWantsIsTapped) {
