@@ -1,6 +1,4 @@
 // arbiter-link: joins this host's daemon with those of other hosts (docs/hosts.md).
-#include <signal.h>
-#include <sys/signalfd.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
@@ -12,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "gateway/core/say.hpp"
+#include "gateway/core/stop_signals.hpp"
 #include "link/core/cards.hpp"
 #include "link/link.hpp"
 #include "shm/file_descriptor.hpp"
@@ -20,16 +19,6 @@ namespace arbiter::link {
 namespace {
 
 constexpr std::uint32_t kMaxDomain = 230;  // above it there are no ports
-
-// Before threads start, so that no other thread takes them.
-shm::FileDescriptor catch_signals() {
-  sigset_t caught;
-  sigemptyset(&caught);
-  for (const int number : {SIGTERM, SIGINT}) sigaddset(&caught, number);
-  sigprocmask(SIG_BLOCK, &caught, nullptr);
-  signal(SIGPIPE, SIG_IGN);
-  return shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
-}
 
 std::string host_name() {
   std::array<char, 256> name{};
@@ -73,7 +62,7 @@ int run(int argc, char** argv) {
     return 2;
   }
   gateway::set_program_name("arbiter-link");
-  const shm::FileDescriptor stop = catch_signals();
+  const shm::FileDescriptor stop = gateway::catch_stop_signals();
   options.on_round = [] { sd_notify(0, "WATCHDOG=1"); };
   Link link(options);
   sd_notify(0, "READY=1");

@@ -1,8 +1,6 @@
 #include "gateway/core/program.hpp"
 
-#include <signal.h>
 #include <sys/prctl.h>
-#include <sys/signalfd.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
@@ -16,6 +14,7 @@
 
 #include "gateway/core/say.hpp"
 #include "gateway/core/send_idle.hpp"
+#include "gateway/core/stop_signals.hpp"
 #include "gateway/core/supervisor.hpp"
 #include "gateway/mapping/check_mapping.hpp"
 #include "gateway/mapping/read_mapping.hpp"
@@ -42,16 +41,6 @@ struct Arguments {
 };
 
 constexpr unsigned kEndsWithin = 2;  // s
-
-// Before threads start, so that no other thread takes them.
-shm::FileDescriptor catch_signals() {
-  sigset_t caught;
-  sigemptyset(&caught);
-  for (const int number : {SIGTERM, SIGINT}) sigaddset(&caught, number);
-  sigprocmask(SIG_BLOCK, &caught, nullptr);
-  signal(SIGPIPE, SIG_IGN);
-  return shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
-}
 
 // Nothing: there are errors, which have been said.
 std::optional<std::vector<Mapping>> read(const Arguments& arguments, const ProgramKind& kind) {
@@ -138,7 +127,7 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
   auto mappings = read(arguments, kind);
   if (!mappings) return 2;
   if (arguments.check) return 0;
-  const shm::FileDescriptor stop = catch_signals();
+  const shm::FileDescriptor stop = catch_stop_signals();
   if (arguments.is_worker) end_with_supervisor(kind.clean_up);
   if (!kind.is_supervised || arguments.is_worker || arguments.send_idle) {
     if (!arguments.is_worker && !arguments.send_idle) sd_notify(0, "READY=1");

@@ -1,0 +1,17 @@
+#include "gateway/core/stop_signals.hpp"
+
+#include <signal.h>
+#include <sys/signalfd.h>
+
+namespace arbiter::gateway {
+
+shm::FileDescriptor catch_stop_signals() {
+  sigset_t caught;
+  sigemptyset(&caught);
+  for (const int number : {SIGTERM, SIGINT}) sigaddset(&caught, number);
+  sigprocmask(SIG_BLOCK, &caught, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+  return shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
+}
+
+}  // namespace arbiter::gateway
