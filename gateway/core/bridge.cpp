@@ -141,7 +141,7 @@ void Bridge::open_all(int stop) {
     for (const auto& part : parts_) {
       part->account.set_obstacle("not served: another port of the gateway is not open, " + problem);
     }
-    look_after_all();
+    look_after_all(false);  // why, has been said once for all of them
     stops_ = waits(stop, kRetryPeriod);
     if (stops_) return;
   }
@@ -230,7 +230,7 @@ void Bridge::serve(shm::Nanoseconds now, bool all) {
   }
 }
 
-void Bridge::look_after_all() {
+void Bridge::look_after_all(bool says) {
   const shm::Nanoseconds now = shm::monotonic_now();
   for (const auto& part : parts_) {
     if (!part->is_open()) continue;
@@ -240,7 +240,7 @@ void Bridge::look_after_all() {
       if (part->outgoing) part->outgoing->describe(text);
       part->described = std::move(text);
     }
-    if (now < part->say_again) continue;
+    if (!says || now < part->say_again) continue;
     std::string state = part->account.state();
     if (state == part->said) continue;
     part->say_again = now + kSayPeriod;

@@ -91,7 +91,8 @@ class Bridge {
   void start();
   void loop(int stop);
   void serve(shm::Nanoseconds now, bool all);
-  void look_after_all();
+  // `says`: in the log, too, and not in the description alone.
+  void look_after_all(bool says = true);
   // Sleeps; true: `stop` is readable.
   static bool waits(int stop, int milliseconds);
 

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -120,9 +121,21 @@ class StallGuard {
   // The watch lives as long as the guard.
   Watch& add(const MaxAge& max_age);
 
+  // Who repeats what was lost while this process did not run may do so long after a stop: for
+  // shorter ones nothing is lost, because a socket's buffer holds as much.
+  static constexpr shm::Nanoseconds kShortestStop = RunRecord::kLongestDrain;
+
   // One thread: tick(now), then sleep for what it returns. That is a quarter of the shortest T, so
-  // that a sample that comes between two ticks is always in time.
-  shm::Nanoseconds tick(shm::Nanoseconds now);
+  // that a sample that comes between two ticks is always in time. `suspended`: for how long the
+  // machine has slept so far, which CLOCK_MONOTONIC does not count.
+  shm::Nanoseconds tick(shm::Nanoseconds now, shm::Nanoseconds suspended = 0);
+
+  // How often the process, or the machine, has stopped for longer than the shortest T and than
+  // kShortestStop. Any thread.
+  [[nodiscard]] std::uint64_t stops() const noexcept {
+    // Relaxed is enough: whoever asks asks again.
+    return stops_.load(std::memory_order_relaxed);
+  }
 
   // Any thread, wait-free: until when a sample that is delivered at `now` may arrive.
   [[nodiscard]] shm::Nanoseconds deadline(const Watch& watch, shm::Nanoseconds now) const noexcept {
@@ -133,6 +146,8 @@ class StallGuard {
   mutable std::mutex mutex_;  // of watches_
   std::vector<std::unique_ptr<Watch>> watches_;
   RunRecord record_;
+  shm::Atomic<std::uint64_t> stops_{0};
+  std::optional<shm::Nanoseconds> last_;  // tick, suspended time included; the ticking thread's own
 };
 
 }  // namespace arbiter::gateway

@@ -32,6 +32,8 @@ class ForeignSample {
   // Copies the bytes from `from` on, to.size() of them, which lie within size(). False: it cannot
   // be read.
   [[nodiscard]] virtual bool copy(std::size_t from, WritableBytes to) const noexcept = 0;
+  // As copy(0, to), and the same bytes to `also`, which is as large, while they are in the cache.
+  [[nodiscard]] virtual bool copy_twice(WritableBytes to, WritableBytes also) const noexcept;
   // Where its data begin: behind headers. Offsets of fields count from there.
   [[nodiscard]] virtual std::size_t data_begin() const noexcept { return 0; }
   [[nodiscard]] virtual bool is_big_endian() const noexcept { return false; }
@@ -77,8 +79,9 @@ class Incoming {
  private:
   Fate pass_on(const ForeignSample& sample,  // NOLINT(bugprone-exception-escape): as deliver()
                Time deadline) noexcept;
+  // `outgoing`: null, or where this thread has the turn.
   Fate pass_to(OutputPort<void>& port,  // NOLINT(bugprone-exception-escape): as deliver()
-               const ForeignSample& sample, Time deadline) noexcept;
+               const ForeignSample& sample, Time deadline, Outgoing* outgoing = nullptr) noexcept;
   void deactivate_all() noexcept;
 
   const Entry& entry_;

@@ -100,6 +100,29 @@ bool Outgoing::begin_turn(std::size_t bytes) noexcept {
   return true;
 }
 
+WritableBytes Outgoing::draft(std::size_t bytes) noexcept {
+  if (bytes < kSmallestDraft) return {};
+  const WritableBytes room = sender_.draft(bytes);
+  if (!room.empty()) draft_ = Draft{bytes, shm::monotonic_now()};
+  return room;
+}
+
+// Of the turn's source: nobody but this thread publishes for it, and what waited before this turn
+// has an older stamp.
+bool Outgoing::is_drafted(const Sample<void>& sample) const noexcept {
+  return draft_ && sample.size() == draft_->bytes && sample.stamp_ns() > draft_->since;
+}
+
+Sender::Result Outgoing::send_in_turn(const Sample<void>& sample) noexcept {
+  if (is_drafted(sample)) {
+    draft_.reset();
+    return sender_.send_draft();
+  }
+  // One that is too large may have come before the turn, and the loop not to it yet.
+  if (sample.size() > sender_.largest_at_once()) return Sender::Result::kBusy;
+  return sender_.send_at_once(*sample);
+}
+
 // take() throws only where more samples are held than here ever are.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexcept {
@@ -121,16 +144,14 @@ bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexc
       account_.late.add();
       continue;
     }
-    // One that is too large may have come before the turn, and the loop not to it yet.
-    const bool is_for_loop = (*sample)->size() > sender_.largest_at_once();
-    const Sender::Result result =
-        is_for_loop ? Sender::Result::kBusy : sender_.send_at_once(**sample);
+    const Sender::Result result = send_in_turn(*sample);
     if (result == Sender::Result::kBusy) {
       left_ = std::move(sample);
       break;
     }
     account_for(result, (*sample)->size());
   }
+  if (std::exchange(draft_, {})) sender_.drop_draft();
   if (has_come) idle_again_.reset();  // somebody commands
   // Nobody rings for a port that is disarmed, and the last take may have swallowed a ring and have
   // set a timer again that had expired: what has become idle meanwhile only this look finds. The

@@ -55,6 +55,15 @@ class Sender {
   // Samples of more bytes are none for send_at_once(), because to send them takes so long that what
   // that thread delivers next would be held up.
   [[nodiscard]] virtual std::size_t largest_at_once() const noexcept { return SIZE_MAX; }
+
+  // Memory of the middleware's for a sample of that many bytes: who copies it somewhere anyway, and
+  // does not know yet whether it is to be sent, writes it there at the same time, and a large
+  // sample is read once. Empty: not to be had, or not worth it. There is one draft at a time, until
+  // send_draft() or drop_draft(), which come from the same thread.
+  [[nodiscard]] virtual WritableBytes draft(std::size_t /*bytes*/) noexcept { return {}; }
+  // As send_at_once().
+  [[nodiscard]] virtual Result send_draft() noexcept { return Result::kNotReady; }
+  virtual void drop_draft() noexcept {}
 };
 
 class Incoming;
@@ -70,6 +79,8 @@ class Outgoing {
   static constexpr shm::Nanoseconds kIdlePeriod = 100'000'000;
   // Samples that run() sends before others have their turn.
   static constexpr std::uint32_t kMostAtOnce = 64;
+  // To copy fewer bytes again costs less than to take care of a draft.
+  static constexpr std::size_t kSmallestDraft = 4096;
 
   // Opens the port. Keeps references. Throws arbiter::Error.
   Outgoing(Node& node, const Entry& entry, Sender& sender, Account& account,
@@ -88,6 +99,9 @@ class Outgoing {
   // something is left for the loop, or the sample itself is; publish all the same. Never waits. Any
   // thread.
   [[nodiscard]] bool begin_turn(std::size_t bytes) noexcept;
+  // In a turn: where the sample that is about to be published may also be written, so that the end
+  // of the turn need not copy it. Empty: nowhere.
+  [[nodiscard]] WritableBytes draft(std::size_t bytes) noexcept;
   // Sends what of `source` waits and ends the turn; calls the loop for what is left, and for the
   // idle sample if the port has become idle meanwhile. False: nothing of it has come here.
   bool end_turn(std::string_view source, shm::Nanoseconds max_age) noexcept;
@@ -106,6 +120,8 @@ class Outgoing {
  private:
   void send_waiting(shm::Nanoseconds now);
   void send_idle(shm::Nanoseconds now);
+  [[nodiscard]] Sender::Result send_in_turn(const Sample<void>& sample) noexcept;
+  [[nodiscard]] bool is_drafted(const Sample<void>& sample) const noexcept;
   void account_for(Sender::Result result, std::size_t size) noexcept;
   [[nodiscard]] shm::Nanoseconds when_next() const noexcept;
 
@@ -119,6 +135,12 @@ class Outgoing {
   const InBySource* ins_ = nullptr;
   std::function<void()> call_loop_;
   std::optional<Sample<void>> left_;  // taken by a thread that could not send it
+  // Of the turn, until it is sent or dropped.
+  struct Draft {
+    std::size_t bytes;
+    shm::Nanoseconds since;  // before its sample was published
+  };
+  std::optional<Draft> draft_;
   std::atomic<bool> matched_{false};
   std::atomic<shm::Nanoseconds> next_{shm::kForever};  // when_next()
   bool has_more_ = false;                              // run() has left samples to the next one

@@ -27,8 +27,8 @@ namespace arbiter::gateway {
 namespace {
 
 constexpr const char* kExitCodes =
-    "\nExit codes: 0 ended by SIGINT or SIGTERM, or the mapping is fine (--check); 1 an error;\n"
-    "2 wrong use, or a mapping that cannot be read or has errors";
+    "\nExit codes: 0 ended by SIGINT, SIGTERM or SIGHUP, or the mapping is fine (--check);\n"
+    "1 an error; 2 wrong use, or a mapping that cannot be read or has errors";
 
 constexpr shm::Nanoseconds kSendIdle = 1'000'000'000;
 
@@ -150,7 +150,7 @@ int run_program(int argc, char** argv, const ProgramKind& kind, const MakeMiddle
     return 2;
   } catch (const std::exception& error) {
     say(Level::kError, error.what());
-    return 1;
+    return kHasFailed;
   }
 }
 

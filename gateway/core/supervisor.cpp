@@ -15,8 +15,8 @@
 #include <cstring>
 #include <string_view>
 #include <thread>
-#include <utility>
 
+#include "gateway/core/life_signs.hpp"
 #include "gateway/core/say.hpp"
 #include "shm/clock.hpp"
 #include "shm/file_descriptor.hpp"
@@ -27,23 +27,19 @@ namespace {
 
 constexpr const char* kPipe = "ARBITER_GATEWAY_HEARTBEAT";
 constexpr shm::Nanoseconds kSecond = 1'000'000'000;
-// Between two starts: at once after a long life, and ever more patiently after short ones.
 constexpr shm::Nanoseconds kLongLife = 10 * kSecond;
-constexpr shm::Nanoseconds kFirstPause = kSecond / 10;
-constexpr shm::Nanoseconds kLongestPause = 2 * kSecond;
 
 struct Worker {
   pid_t pid = -1;
   shm::FileDescriptor heart;  // readable when it beats; at its end when it has ended
   shm::Nanoseconds started = 0;
-  shm::Nanoseconds beat = 0;
 };
 
 // Between fork() and exec() only what is safe there: no allocation.
 Worker start(const std::vector<std::string>& arguments) {
   int ends[2];
   Worker worker;
-  worker.started = worker.beat = shm::monotonic_now();
+  worker.started = shm::monotonic_now();
   if (::pipe2(ends, O_CLOEXEC | O_NONBLOCK) != 0) return worker;
   worker.heart.reset(ends[0]);
   const shm::FileDescriptor theirs(ends[1]);
@@ -82,6 +78,10 @@ std::string describe(int status) {
   return "ended with exit code " + std::to_string(WEXITSTATUS(status));
 }
 
+bool ends_with(const std::optional<int>& status, int exit_code) {
+  return status && WIFEXITED(*status) && WEXITSTATUS(*status) == exit_code;
+}
+
 // Empty: it lives.
 std::optional<int> status_of(const Worker& worker) {
   int status = 0;
@@ -117,27 +117,31 @@ void end(Worker& worker, const Patience& patience) {
 }
 
 // Returns what became of it; empty: `stop` is readable.
-std::optional<int> watch_over(Worker& worker, int stop, const Patience& patience) {
-  const shm::Nanoseconds silence = std::chrono::nanoseconds(patience.silence).count();
+std::optional<int> watch_over(const Worker& worker, int stop, const Patience& patience) {
+  LifeSigns signs(std::chrono::nanoseconds(patience.silence).count(), shm::monotonic_now());
   const auto look_again = static_cast<int>(patience.silence.count() / 5);
-  for (shm::Nanoseconds looked = shm::monotonic_now();;) {
+  bool left_alone = false;
+  const auto is_stopped = [&] {
+    const bool stopped = watch::is_stopped(worker.pid);
+    if (stopped && !left_alone) {
+      say(Level::kWarning, "the worker is stopped: it is left alone until it goes on");
+    }
+    return left_alone = stopped;
+  };
+  for (;;) {
     pollfd ends[2] = {{worker.heart.get(), POLLIN, 0}, {stop, POLLIN, 0}};
     ::poll(ends, 2, look_again);
     if (ends[1].revents != 0) return {};
     const shm::Nanoseconds now = shm::monotonic_now();
     char beats[64];
-    if (::read(worker.heart.get(), beats, sizeof beats) > 0) worker.beat = now;
+    if (::read(worker.heart.get(), beats, sizeof beats) > 0) signs.beat(now);
     if (const auto status = status_of(worker)) return status;
     if ((ends[0].revents & POLLHUP) != 0) ::poll(nullptr, 0, 1);  // it is about to end
-    // Time in which one of the two was stopped does not count: the one resumed last has not run.
-    const bool was_stopped = now - std::exchange(looked, now) > silence / 2;
-    const bool is_silent = now - worker.beat > silence / 4;
-    if (was_stopped || (is_silent && watch::is_stopped(worker.pid))) worker.beat = now;
-    if (now - worker.beat < silence) continue;
+    if (!signs.hangs(now, is_stopped)) continue;
     say(Level::kError,
         "the worker hangs (no sign of life for " + in_words(patience.silence) + "): killing it");
     ::kill(worker.pid, SIGKILL);
-    worker.beat = now;
+    signs.beat(now);
   }
 }
 
@@ -155,27 +159,28 @@ int heart() {
 
 int supervise(const std::vector<std::string>& arguments, int stop, const CleanUp& clean_up,
               const Patience& patience) {
-  shm::Nanoseconds pause = kFirstPause;
+  std::chrono::milliseconds pause = patience.pause;
   for (;;) {
     Worker worker = start(arguments);
+    std::optional<int> status;
     if (worker.pid < 0) {
       say(Level::kError, std::string("no worker can be started: ") + std::strerror(errno));
     } else {
-      const auto status = watch_over(worker, stop, patience);
-      if (!status) {
-        end(worker, patience);
-        clean_up(worker.pid);
-        return 0;
-      }
+      status = watch_over(worker, stop, patience);
+      if (!status) end(worker, patience);
       clean_up(worker.pid);
-      const bool has_said = WIFEXITED(*status) && WEXITSTATUS(*status) == kBeginsAnew;
-      if (!has_said) {
-        say(Level::kWarning, "the worker " + describe(*status) + "; another one is started");
-      }
+      if (!status) return 0;
     }
     const bool lived_long = shm::monotonic_now() - worker.started > kLongLife;
-    pause = lived_long ? kFirstPause : std::min(2 * pause, kLongestPause);
-    if (is_readable(stop, static_cast<int>(pause / 1'000'000))) return 0;
+    pause = lived_long
+                ? patience.pause
+                : std::min(2 * pause, ends_with(status, kHasFailed) ? patience.longest_after_failure
+                                                                    : patience.longest_pause);
+    if (status && !ends_with(status, kBeginsAnew)) {
+      say(Level::kWarning,
+          "the worker " + describe(*status) + "; another one is started in " + in_words(pause));
+    }
+    if (is_readable(stop, static_cast<int>(pause.count()))) return 0;
   }
 }
 
@@ -185,13 +190,17 @@ std::optional<std::function<void()>> heartbeat() {
   return [descriptor] { static_cast<void>(!::write(descriptor, ".", 1)); };
 }
 
+// Waits only for POLLERR.
+bool has_lost_its_reader(int pipe, int milliseconds) {
+  pollfd end{pipe, 0, 0};
+  return ::poll(&end, 1, milliseconds) > 0;
+}
+
 void end_with_supervisor(const CleanUp& clean_up, const Patience& patience) {
   const int descriptor = heart();
   if (descriptor < 0) return;
   std::thread([=] {
-    pollfd end{descriptor, 0, 0};
-    // Waits only for POLLERR: nobody can read the pipe any more.
-    while (::poll(&end, 1, -1) <= 0) continue;
+    while (!has_lost_its_reader(descriptor, -1)) continue;
     ::poll(nullptr, 0, static_cast<int>(patience.end.count()));
     say(Level::kError, "the supervisor has ended, but the worker did not end within " +
                            in_words(patience.end) + ": killing it");

@@ -18,7 +18,16 @@ namespace arbiter::gateway {
 struct Patience {
   std::chrono::milliseconds silence{5000};  // until a worker that does not beat is killed
   std::chrono::milliseconds end{3000};      // until one is that does not end when it is asked to
+  // Between two starts: this after a long life, and twice as long after each short one. Where the
+  // worker itself has said what is wrong, such as a limit of the system, that will hardly change by
+  // itself, and each start would fill the log with the same lines.
+  std::chrono::milliseconds pause{100};
+  std::chrono::milliseconds longest_pause{2000};
+  std::chrono::milliseconds longest_after_failure{30'000};
 };
+
+// How a worker ends that has said what is wrong.
+inline constexpr int kHasFailed = 1;
 
 // How a worker ends that asks for another one.
 inline constexpr int kBeginsAnew = 75;
@@ -34,6 +43,10 @@ int supervise(const std::vector<std::string>& arguments, int stop, const CleanUp
 
 // In a worker: says that it runs. None where nobody supervises.
 std::optional<std::function<void()>> heartbeat();
+
+// Waits until nobody can read what is written to the pipe any more; false: somebody can. With -1
+// for as long as it takes, or until a signal comes.
+[[nodiscard]] bool has_lost_its_reader(int pipe, int milliseconds);
 
 // In a worker: a thread that kills it where its supervisor has ended, however that was, and it has
 // not ended either for patience.end. It is sent SIGTERM then, but may hang, or be ending where the

@@ -24,6 +24,11 @@ ArrivedSample::ArrivedSample(const Payload& payload) noexcept : payload_(payload
   }
 }
 
+bool ArrivedSample::copy_twice(WritableBytes to, WritableBytes also) const noexcept {
+  if (payload_.fragments != nullptr) return copy_fragments(payload_.fragments, 0, to, also);
+  return ForeignSample::copy_twice(to, also);
+}
+
 bool ArrivedSample::copy(std::size_t from, WritableBytes to) const noexcept {
   if (payload_.fragments != nullptr) return copy_fragments(payload_.fragments, from, to);
   std::memcpy(to.data(), payload_.bytes() + from, to.size());

@@ -105,10 +105,13 @@ void DdsMiddleware::stop() noexcept {
 
 void DdsMiddleware::tend() {
   if (!started_) return;
+  const std::uint64_t stops = guard_.stops();
+  const bool was_stopped = std::exchange(stops_, stops) != stops;
   for (auto& [id, site] : sites_) {
     if (!site.domain && !open(site)) continue;
     site.domain->peers().update();
     try {
+      if (was_stopped) subscribe_again(site);
       for (EndPoint* const end : site.ends)
         end->look_at(site.domain->peers().of(end->topic().name));
     } catch (const DdsError& error) {  // an end that was opened again could not be
@@ -117,6 +120,28 @@ void DdsMiddleware::tend() {
       site.open_again = shm::monotonic_now() + kOpenAgain;
     }
   }
+}
+
+// A reliable publisher repeats what was lost while this process was stopped, perhaps seconds later,
+// and it would look fresh. To a subscriber that is new it repeats nothing. The whole participant
+// leaves, because Fast DDS does not notice when a single reader does.
+void DdsMiddleware::subscribe_again(Site& site) {
+  const auto each_reader = [&](auto call) {
+    for (EndPoint* const end : site.ends) {
+      if (end->which() == End::kReader) call(*end);
+    }
+  };
+  bool is_any_reliable = false;
+  each_reader([&](const EndPoint& end) {
+    is_any_reliable = is_any_reliable || end.topic().qos.reliability == Reliability::kReliable;
+  });
+  if (!is_any_reliable) return;
+  say(Level::kWarning,
+      "the gateway did not run for a while: it subscribes again, lest publishers repeat what is "
+      "old");
+  each_reader([](EndPoint& end) { end.close(); });
+  site.domain->leave_readers();
+  each_reader([&](EndPoint& end) { end.open(*site.domain); });
 }
 
 bool DdsMiddleware::open(Site& site) {

@@ -54,6 +54,8 @@ class DdsMiddleware : public Middleware {
   // False: not now, and each account says why.
   bool open(Site& site);
   void close(Site& site) noexcept;
+  // Throws DdsError.
+  static void subscribe_again(Site& site);
 
   const Bell& bell_;
   LowDescriptors low_descriptors_;
@@ -64,6 +66,7 @@ class DdsMiddleware : public Middleware {
   std::map<const Entry*, OutTopic*> out_of_;
   std::list<InTopic> ins_;
   bool started_ = false;
+  std::uint64_t stops_ = 0;  // of the guard, that have been dealt with
 };
 
 }  // namespace arbiter::gateway::dds

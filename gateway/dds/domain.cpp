@@ -17,6 +17,26 @@ namespace {
 // costs a datagram now and then.
 constexpr int kMaxParticipants = 32;
 
+bool is_address(const std::string& interface) {
+  return interface.find_first_not_of("0123456789.") == std::string::npos ||
+         interface.find(':') != std::string::npos;
+}
+
+// Of this thread: where CycloneWords keeps them; null: nowhere.
+thread_local std::vector<std::string>* kept_words = nullptr;
+constexpr std::size_t kMaxKept = 32;
+
+bool is_loopback(const std::string& interface) {
+  return interface == "lo" || interface.starts_with("127.") || interface == "::1";
+}
+
+Entity join(dds_domainid_t domain) {
+  return {dds_create_participant(domain, nullptr, nullptr),
+          "a participant in domain " + std::to_string(domain)};
+}
+
+}  // namespace
+
 std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
@@ -42,21 +62,6 @@ std::string escaped(const std::string& text) {
   }
   return result;
 }
-
-bool is_address(const std::string& interface) {
-  return interface.find_first_not_of("0123456789.") == std::string::npos ||
-         interface.find(':') != std::string::npos;
-}
-
-// Of this thread: where CycloneWords keeps them; null: nowhere.
-thread_local std::vector<std::string>* kept_words = nullptr;
-constexpr std::size_t kMaxKept = 32;
-
-bool is_loopback(const std::string& interface) {
-  return interface == "lo" || interface.starts_with("127.") || interface == "::1";
-}
-
-}  // namespace
 
 dds_domainid_t domain_of(const Gateway& gateway) {
   if (gateway.domain) return *gateway.domain;
@@ -108,11 +113,20 @@ std::string configuration_of(const Gateway& gateway) {
 }
 
 Domain::Domain(const Gateway& gateway, const std::set<std::string>& topics, const Bell& bell)
-    : domain_(dds_create_domain(domain_of(gateway), configuration_of(gateway).c_str()),
-              "domain " + std::to_string(domain_of(gateway))),
-      participant_(dds_create_participant(domain_of(gateway), nullptr, nullptr),
-                   "a participant in domain " + std::to_string(domain_of(gateway))),
+    : id_(domain_of(gateway)),
+      domain_(dds_create_domain(id_, configuration_of(gateway).c_str()),
+              "domain " + std::to_string(id_)),
+      participant_(join(id_)),
       peers_(participant_.get(), topics, bell) {}
+
+dds_entity_t Domain::participant(End end) {
+  if (end == End::kWriter) return participant_.get();
+  if (!readers_) {
+    readers_ = join(id_);
+    peers_.note_own(readers_.get());
+  }
+  return readers_.get();
+}
 
 CycloneWords::CycloneWords() { kept_words = &lines_; }
 CycloneWords::~CycloneWords() { kept_words = nullptr; }

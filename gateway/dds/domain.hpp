@@ -1,4 +1,5 @@
-// A domain of DDS, and our participant in it.
+// A domain of DDS, and our participants in it: one that writes and looks at who is there, and one
+// that reads, so that it can leave and come back without those who are written to noticing.
 #pragma once
 
 #include <set>
@@ -19,17 +20,25 @@ namespace arbiter::gateway::dds {
 // where it says nothing, what CYCLONEDDS_URI says. Not both: Cyclone adds up interfaces and peers.
 [[nodiscard]] std::string configuration_of(const Gateway& gateway);
 
+// As text of that configuration.
+[[nodiscard]] std::string escaped(const std::string& text);
+
 class Domain {
  public:
   // Throws DdsError: there is no such network interface now, for example.
   Domain(const Gateway& gateway, const std::set<std::string>& topics, const Bell& bell);
 
-  [[nodiscard]] dds_entity_t participant() const { return participant_.get(); }
+  // The one of our readers is made when it is asked for first. Throws DdsError.
+  [[nodiscard]] dds_entity_t participant(End end);
+  // The participant that reads leaves. No reader is open.
+  void leave_readers() noexcept { readers_ = Entity(); }
   [[nodiscard]] Peers& peers() { return peers_; }
 
  private:
+  const dds_domainid_t id_;
   Entity domain_;
   Entity participant_;
+  Entity readers_;
   Peers peers_;
 };
 

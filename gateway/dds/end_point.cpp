@@ -47,15 +47,16 @@ void EndPoint::open(Domain& domain) {
 }
 
 void EndPoint::open() {
+  const dds_entity_t participant = domain_->participant(which_);
   ddsi_sertype* type = make_opaque_type(topic_.type, keyed_);
-  const dds_entity_t topic = dds_create_topic_sertype(domain_->participant(), topic_.name.c_str(),
-                                                      &type, nullptr, nullptr, nullptr);
+  const dds_entity_t topic =
+      dds_create_topic_sertype(participant, topic_.name.c_str(), &type, nullptr, nullptr, nullptr);
   if (topic < 0) ddsi_sertype_unref(type);
   topic_entity_ = Entity(topic, "topic " + topic_.name);
   topic_.qos.durability = durability();
   const CycloneQos qos = cyclone_qos(topic_.qos, which_);
   if (topic_.is_ros || !type_hash_.empty()) set_user_data(qos.get(), type_hash_);
-  Entity made = make(domain_->participant(), topic, type, qos.get());
+  Entity made = make(participant, topic, type, qos.get());
   seen_.reset();
   const std::lock_guard lock(in_use_);
   end_ = std::move(made);
@@ -171,10 +172,11 @@ void EndPoint::tell_obstacles() {
 }
 
 void EndPoint::warn(const Guid& guid, const std::string& sentence) {
+  constexpr std::size_t kMaxWarnings = 16;  // of one end, which may change without an end
   // Ends that come and go make warnings: their number must not fill a disk.
   static Quota& quota = *new Quota(20, 10'000'000'000);
   std::set<std::string>& said = warned_[guid];
-  if (said.contains(sentence)) return;
+  if (said.contains(sentence) || said.size() >= kMaxWarnings) return;
   const auto passed = quota.take();
   if (!passed) return;
   said.insert(sentence);

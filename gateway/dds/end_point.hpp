@@ -36,6 +36,7 @@ class EndPoint {
   // `peers`: of its topic.
   void look_at(const PeersOfTopic& peers);
 
+  [[nodiscard]] End which() const { return which_; }
   [[nodiscard]] const DdsTopic& topic() const { return topic_; }
   [[nodiscard]] bool keyed() const { return keyed_; }
 

@@ -3,12 +3,30 @@
 #include <dds/dds.h>
 #include <dds/ddsi/q_radmin.h>
 
+#include <algorithm>
 #include <cstring>
 
 namespace arbiter::gateway::dds {
 
+namespace {
+
+// Written twice while they are in the first-level cache: a fragment may have 64 KiB.
+constexpr std::size_t kBlock = std::size_t{16} << 10;
+
+void copy_block(const unsigned char* from, std::byte* to, std::byte* also,
+                std::size_t size) noexcept {
+  for (std::size_t at = 0; at < size; at += kBlock) {
+    const std::size_t length = std::min(kBlock, size - at);
+    std::memcpy(to + at, from + at, length);
+    std::memcpy(also + at, to + at, length);
+  }
+}
+
+}  // namespace
+
 // They are in the order of their beginnings, and may overlap.
-bool copy_fragments(const nn_rdata* first, std::size_t from, WritableBytes to) noexcept {
+bool copy_fragments(const nn_rdata* first, std::size_t from, WritableBytes to,
+                    WritableBytes also) noexcept {
   const std::size_t end = from + to.size();
   std::size_t at = from;
   for (const nn_rdata* fragment = first; fragment != nullptr && at < end;
@@ -18,7 +36,12 @@ bool copy_fragments(const nn_rdata* first, std::size_t from, WritableBytes to) n
     const auto* const bytes =
         NN_RMSG_PAYLOADOFF(fragment->rmsg, NN_RDATA_PAYLOAD_OFF(fragment)) + (at - fragment->min);
     const std::size_t length = (fragment->maxp1 < end ? fragment->maxp1 : end) - at;
-    std::memcpy(to.data() + (at - from), bytes, length);
+    std::byte* const out = to.data() + (at - from);
+    if (also.empty()) {
+      std::memcpy(out, bytes, length);
+    } else {
+      copy_block(bytes, out, also.data() + (at - from), length);
+    }
     at += length;
   }
   return at == end;

@@ -12,8 +12,9 @@ struct nn_rdata;
 
 namespace arbiter::gateway::dds {
 
-// Copies the sample's bytes from `from` on. False: they are not all there.
-[[nodiscard]] bool copy_fragments(const nn_rdata* first, std::size_t from,
-                                  WritableBytes to) noexcept;
+// Copies the sample's bytes from `from` on; if `also` is not empty, which then is as large as `to`,
+// there, too. False: they are not all there.
+[[nodiscard]] bool copy_fragments(const nn_rdata* first, std::size_t from, WritableBytes to,
+                                  WritableBytes also = {}) noexcept;
 
 }  // namespace arbiter::gateway::dds

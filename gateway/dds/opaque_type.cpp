@@ -16,13 +16,17 @@ namespace {
 
 // The operations of a serdata. Cyclone calls them on threads of its own, also several at once.
 
+void prepare(Payload& payload, const ddsi_sertype* type, ddsi_serdata_kind kind) noexcept {
+  ddsi_serdata_init(&payload.cyclone, type, kind);
+  payload.cyclone.hash = 0;  // one instance
+  payload.fragments = nullptr;
+}
+
 Payload* new_payload(const ddsi_sertype* type, ddsi_serdata_kind kind, std::size_t room) noexcept {
   Payload* const payload = PayloadPool::of_process().take(room);
   if (payload == nullptr) return nullptr;
-  ddsi_serdata_init(&payload->cyclone, type, kind);
-  payload->cyclone.hash = 0;  // one instance
+  prepare(*payload, type, kind);
   payload->size = 0;
-  payload->fragments = nullptr;
   return payload;
 }
 
@@ -199,17 +203,27 @@ Payload* make_payload(const ddsi_sertype* type, Bytes bytes) noexcept {
 Payload* make_payload(const ddsi_sertype* type, std::initializer_list<Bytes> parts) noexcept {
   std::size_t size = 0;
   for (const Bytes& part : parts) size += part.size();
-  const std::size_t room = padded(size);
-  Payload* const payload = new_payload(type, SDK_DATA, room);
+  Payload* const payload = draft_payload(size);
   if (payload == nullptr) return nullptr;
   std::byte* at = payload->bytes();
   for (const Bytes& part : parts) {
     if (!part.empty()) std::memcpy(at, part.data(), part.size());
     at += part.size();
   }
-  std::memset(at, 0, room - size);
-  payload->size = static_cast<std::uint32_t>(size);
+  begin_payload(*payload, type);
   return payload;
+}
+
+Payload* draft_payload(std::size_t bytes) noexcept {
+  Payload* const payload = PayloadPool::of_process().take(padded(bytes));
+  if (payload == nullptr) return nullptr;
+  payload->size = static_cast<std::uint32_t>(bytes);
+  std::memset(payload->bytes() + bytes, 0, padded(bytes) - bytes);
+  return payload;
+}
+
+void begin_payload(Payload& draft, const ddsi_sertype* type) noexcept {
+  prepare(draft, type, SDK_DATA);
 }
 
 }  // namespace arbiter::gateway::dds

@@ -27,4 +27,10 @@ namespace arbiter::gateway::dds {
 [[nodiscard]] Payload* make_payload(const ddsi_sertype* type,
                                     std::initializer_list<Bytes> parts) noexcept;
 
+// Room for a sample of so many bytes, encapsulation header included, which begin_payload() makes
+// one of that type when they are written; until then Cyclone knows nothing of it, and the pool
+// takes it back. Null: no memory.
+[[nodiscard]] Payload* draft_payload(std::size_t bytes) noexcept;
+void begin_payload(Payload& draft, const ddsi_sertype* type) noexcept;
+
 }  // namespace arbiter::gateway::dds

@@ -1,7 +1,12 @@
 #include "gateway/dds/out_topic.hpp"
 
+#include <cstring>
+#include <string>
+#include <utility>
+
 #include "gateway/dds/arrived_sample.hpp"
 #include "gateway/dds/opaque_type.hpp"
+#include "shm/clock.hpp"
 
 namespace arbiter::gateway::dds {
 
@@ -50,18 +55,53 @@ Sender::Result OutTopic::send(Bytes sample) noexcept {
 // so the writer's own time to wait is none.
 Sender::Result OutTopic::send_at_once(Bytes sample) noexcept {
   const std::lock_guard lock(in_use());
+  if (const auto result = obstacle(sample)) return *result;
+  Payload* const draft = draft_payload(sample.size());
+  if (draft == nullptr) return Result::kNoMemory;
+  std::memcpy(draft->bytes(), sample.data(), sample.size());
+  return write(*draft);
+}
+
+WritableBytes OutTopic::draft(std::size_t bytes) noexcept {
+  draft_ = draft_payload(bytes);
+  if (draft_ == nullptr) return {};
+  return {draft_->bytes(), bytes};
+}
+
+Sender::Result OutTopic::send_draft() noexcept {
+  Payload& draft = *std::exchange(draft_, nullptr);
+  const std::lock_guard lock(in_use());
+  const auto result = obstacle({draft.bytes(), draft.size});
+  if (!result) return write(draft);
+  PayloadPool::of_process().give_back(&draft);
+  return *result;
+}
+
+void OutTopic::drop_draft() noexcept {
+  PayloadPool::of_process().give_back(std::exchange(draft_, nullptr));
+}
+
+std::optional<Sender::Result> OutTopic::obstacle(Bytes sample) noexcept {
   if (!is_open()) return Result::kNotReady;
   const Encoding encoding = read_encapsulation(sample).encoding;
   const bool is_xcdr2 = representation_ == Representation::kXcdr2;
-  if (encoding != (is_xcdr2 ? Encoding::kXcdr2 : Encoding::kXcdr1)) {
-    return refuse(std::string("a sample does not begin with the encapsulation header of ") +
-                  (is_xcdr2 ? "XCDR2" : "XCDR1") +
-                  ": who publishes it must send what DDS would (docs/dds.md)");
+  if (encoding == (is_xcdr2 ? Encoding::kXcdr2 : Encoding::kXcdr1)) return {};
+  return refuse(std::string("a sample does not begin with the encapsulation header of ") +
+                (is_xcdr2 ? "XCDR2" : "XCDR1") +
+                ": who publishes it must send what DDS would (docs/dds.md)");
+}
+
+Sender::Result OutTopic::write(Payload& draft) noexcept {
+  const std::size_t size = draft.size;
+  // To send it to nobody takes no time, and says nothing.
+  const bool is_measured = size > Pace::kAlways && matched() != 0;
+  const shm::Nanoseconds begin = is_measured ? shm::monotonic_now() : 0;
+  begin_payload(draft, type_);
+  const dds_return_t written = dds_writecdr(end().get(), &draft.cyclone);
+  if (written == DDS_RETCODE_OK) {
+    if (is_measured) pace_.note(size, shm::monotonic_now() - begin);
+    return Result::kSent;
   }
-  Payload* const payload = make_payload(type_, sample);
-  if (payload == nullptr) return Result::kNoMemory;
-  const dds_return_t written = dds_writecdr(end().get(), &payload->cyclone);
-  if (written == DDS_RETCODE_OK) return Result::kSent;
   if (written == DDS_RETCODE_TIMEOUT) return Result::kBusy;
   return refuse(std::string("Cyclone DDS did not send a sample: ") + dds_strretcode(-written));
 }

@@ -83,8 +83,7 @@ std::string type_hash_in(const std::string& user_data) {
 
 Peers::Peers(dds_entity_t participant, const std::set<std::string>& topics, const Bell& bell) {
   for (const std::string& topic : topics) topics_.try_emplace(topic);
-  dds_guid_t own{};
-  if (dds_get_guid(participant, &own) == DDS_RETCODE_OK) own_ = guid_of(own);
+  note_own(participant);
   const Listener listener = on_data(bell);
   const auto reader = [&](dds_entity_t topic, const dds_listener_t* calls, const char* what) {
     return Entity(dds_create_reader(participant, topic, nullptr, calls), what);
@@ -92,6 +91,11 @@ Peers::Peers(dds_entity_t participant, const std::set<std::string>& topics, cons
   participants_ = reader(DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, "the reader of participants");
   readers_ = reader(DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, listener.get(), "the reader of readers");
   writers_ = reader(DDS_BUILTIN_TOPIC_DCPSPUBLICATION, listener.get(), "the reader of writers");
+}
+
+void Peers::note_own(dds_entity_t participant) {
+  dds_guid_t own{};
+  if (dds_get_guid(participant, &own) == DDS_RETCODE_OK) own_.insert(guid_of(own));
 }
 
 void Peers::update() {
@@ -126,7 +130,7 @@ void Peers::update(const Entity& reader, End end) {
 
 void Peers::add(const dds_builtintopic_endpoint_t& endpoint, End end,
                 dds_instance_handle_t handle) {
-  if (guid_of(endpoint.participant_key) == own_) return;
+  if (own_.contains(guid_of(endpoint.participant_key))) return;
   if (endpoint.topic_name == nullptr || endpoint.qos == nullptr) return;
   const auto found = topics_.find(std::string_view(endpoint.topic_name));
   if (found == topics_.end()) return;

@@ -52,6 +52,8 @@ class Peers {
   Peers& operator=(const Peers&) = delete;
   ~Peers() = default;
 
+  // A further participant of ours. Before it has ends.
+  void note_own(dds_entity_t participant);
   // Takes in what has come. Does not wait.
   void update();
   // Of one of `topics`.
@@ -72,7 +74,7 @@ class Peers {
   static constexpr std::size_t kMaxOfTopic = 512;  // readers, and as many writers
 
   std::map<std::string, PeersOfTopic, std::less<>> topics_;
-  Guid own_{};  // our participant
+  std::set<Guid> own_;  // our participants, those that have left, too
   std::map<dds_instance_handle_t, Place> handles_;
   Entity participants_;
   Entity readers_;

@@ -94,6 +94,23 @@ Sender::Result ChunkSender::send(Bytes sample) noexcept {
   return Result::kSent;
 }
 
+// Why there is no chunk, send() says.
+WritableBytes ChunkSender::draft(std::size_t bytes) noexcept {
+  iox::popo::UntypedPublisher* const to = publisher();
+  if (to == nullptr || entry_.iceoryx->padded_header() != 0 || bytes > UINT32_MAX) return {};
+  auto loan = to->loan(static_cast<std::uint32_t>(bytes), entry_.iceoryx->alignment);
+  if (loan.has_error()) return {};
+  draft_ = loan.value();
+  return {static_cast<std::byte*>(draft_), bytes};
+}
+
+Sender::Result ChunkSender::send_draft() noexcept {
+  publisher()->publish(std::exchange(draft_, nullptr));
+  return Result::kSent;
+}
+
+void ChunkSender::drop_draft() noexcept { publisher()->release(std::exchange(draft_, nullptr)); }
+
 std::string what_is_made() { return made; }
 
 Session::Session(std::string gateway, RoudiIdentity roudi, std::vector<Middleware::OpenIn> ins,

@@ -32,6 +32,10 @@ class ChunkSender final : public Sender {
   ChunkSender(const Entry& entry, Account& account) : entry_(entry), account_(account) {}
 
   [[nodiscard]] Result send(Bytes sample) noexcept override;
+  // A chunk. Where the topic has user headers, a sample does not lie in a chunk in one piece.
+  [[nodiscard]] WritableBytes draft(std::size_t bytes) noexcept override;
+  [[nodiscard]] Result send_draft() noexcept override;
+  void drop_draft() noexcept override;
   // From the session's thread, once; the loop sees it from then on.
   void use(iox::popo::UntypedPublisher& publisher) noexcept { publisher_.announce(publisher); }
   [[nodiscard]] iox::popo::UntypedPublisher* publisher() const noexcept { return publisher_.get(); }
@@ -42,6 +46,7 @@ class ChunkSender final : public Sender {
   const Entry& entry_;
   Account& account_;
   Announced<iox::popo::UntypedPublisher> publisher_;
+  void* draft_ = nullptr;  // of whoever has the entry's turn
 };
 
 // What this process's thread of iceoryx is making, for what is said where that ends the process;

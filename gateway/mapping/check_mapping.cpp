@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "gateway/mapping/ros_names.hpp"
-#include "rules/model/expression.hpp"
+#include "rules/model/polarity.hpp"
 #include "rules/model/print_rules.hpp"
 #include "rules/text/names.hpp"
 
@@ -62,43 +62,6 @@ bool are_one_topic(const Placed& one, const Placed& other) {
   }
   return false;
 }
-
-// Whether some activity of sources makes the expression true only with this source active: it
-// stands somewhere where being active can help. `positive`: what surrounds it is not negated.
-class Polarity {
- public:
-  void visit(const rules::Expression& expression, bool positive) {
-    if (!seen_.insert({&expression, positive}).second) return;
-    using rules::Operator;
-    const auto& operands = expression.operands;
-    switch (expression.op) {
-      case Operator::kSource:
-        if (positive) required_.insert(expression.name);
-        return;
-      case Operator::kNot:
-        visit(*operands[0], !positive);
-        return;
-      case Operator::kImplies:
-        visit(*operands[0], !positive);
-        visit(*operands[1], positive);
-        return;
-      case Operator::kXor:
-      case Operator::kIff:
-        for (const auto& operand : operands) {
-          visit(*operand, positive);
-          visit(*operand, !positive);
-        }
-        return;
-      default:
-        for (const auto& operand : operands) visit(*operand, positive);
-    }
-  }
-  [[nodiscard]] const std::set<std::string>& required() const { return required_; }
-
- private:
-  std::set<std::pair<const rules::Expression*, bool>> seen_;
-  std::set<std::string> required_;
-};
 
 class MappingCheck {
  public:
@@ -299,17 +262,15 @@ class MappingCheck {
       }
     }
     if (forever.empty()) return;
-    Polarity polarity;
-    std::set<std::string> required;
+    rules::Polarity polarity;
     for (const rules::PortRules& port : model_->ports) {
       for (const rules::ConnectionRule& rule : port.rules) {
-        polarity.visit(*rule.condition, true);
-        required.insert(rule.source);
+        polarity.visit(*rule.condition);
+        polarity.add(rule.source, true);
       }
     }
-    required.insert(polarity.required().begin(), polarity.required().end());
     for (const auto& [name, port] : forever) {
-      if (!required.contains(name)) continue;
+      if (!polarity.required().contains(name)) continue;
       diagnostics_.error(
           "forever-choice", port->where,
           "a condition requires " + rules::quote(name) +

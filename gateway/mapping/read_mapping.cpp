@@ -16,6 +16,8 @@ namespace {
 using rules::Elements;
 using rules::XmlNode;
 
+constexpr std::size_t kMaxConfigurationBytes = std::size_t{1} << 20;
+
 class MappingReader {
  public:
   MappingReader(const rules::TextFile& file, rules::Diagnostics& diagnostics,
@@ -85,6 +87,7 @@ class MappingReader {
       gateway.peers = attributes.list("peers", 255);
       if (const auto file = attributes.text("configuration", 4096)) {
         gateway.configuration = path_of(*file);
+        check_configuration(attributes, gateway.configuration);
       }
     } else {
       reader_.check_attributes(element, {"kind"});
@@ -109,6 +112,19 @@ class MappingReader {
       }
     }
     mapping_.gateways.push_back(std::move(gateway));
+  }
+
+  // What stands in it is Cyclone's business, which says what it does not like.
+  void check_configuration(Attributes& attributes, const std::string& path) const {
+    if (directory_ == nullptr) return;
+    try {
+      rules::read_bytes(path, kMaxConfigurationBytes, rules::Accept::kRegularFile);
+    } catch (const rules::FileError& error) {
+      attributes.error("configuration-file", "configuration",
+                       std::string(error.what()) +
+                           "; write the name of a configuration file of Cyclone DDS, as seen from "
+                           "the mapping");
+    }
   }
 
   [[nodiscard]] std::string path_of(const std::string& written) const {

@@ -65,6 +65,23 @@ class KeepingSender : public Sender {
     return would_wait ? Result::kBusy : send(sample);
   }
   [[nodiscard]] std::size_t largest_at_once() const noexcept override { return largest; }
+  [[nodiscard]] WritableBytes draft(std::size_t bytes) noexcept override {
+    if (!drafts) return {};
+    room.assign(bytes, '\0');
+    ++drafted;
+    return {reinterpret_cast<std::byte*>(room.data()), bytes};
+  }
+  [[nodiscard]] Result send_draft() noexcept override {
+    ++sent_drafts;
+    return send_at_once({reinterpret_cast<const std::byte*>(room.data()), room.size()});
+  }
+  void drop_draft() noexcept override { ++dropped_drafts; }
+
+  bool drafts = false;
+  std::string room;  // the last draft
+  int drafted = 0;
+  int sent_drafts = 0;
+  int dropped_drafts = 0;
   std::vector<std::string> sent;
   std::function<void()> meanwhile{};  // what happens while it sends
   bool would_wait = false;

@@ -227,5 +227,46 @@ TEST(MaxAgeOf, IsTOrLessAndForEverHasABoundOfItsOwn) {
   EXPECT_EQ(max_age_of(kForever, kForever, {}), shm::kDefaultTimeout);
 }
 
+// What reliable publishers repeat after that may be older than T, and looks fresh.
+TEST_F(Guarded, AStopOfLongerThanTIsCounted) {
+  start();
+  run_until(now_ + 10 * kT);
+  EXPECT_EQ(guard_.stops(), 0u);
+  stall(5 * kT);
+  EXPECT_EQ(guard_.stops(), 1u);
+  run_until(now_ + 10 * kT);
+  EXPECT_EQ(guard_.stops(), 1u);
+}
+
+// A scheduler that is late is no stop, and nothing is lost meanwhile.
+TEST_F(Guarded, AShortPauseIsNoStopEvenIfTIsShorter) {
+  start();
+  stall(StallGuard::kShortestStop);
+  EXPECT_TRUE(is_late());
+  EXPECT_EQ(guard_.stops(), 0u);
+}
+
+TEST_F(Guarded, AStopThatIsShorterThanEachTIsNone) {
+  age_.set(100 * kT);
+  start();
+  stall(99 * kT);
+  EXPECT_EQ(guard_.stops(), 0u);
+  MaxAge short_age;
+  short_age.set(kT);
+  guard_.add(short_age);
+  stall(99 * kT);
+  EXPECT_EQ(guard_.stops(), 1u);
+}
+
+// CLOCK_MONOTONIC does not count it.
+TEST_F(Guarded, AMachineThatWasSuspendedHasStopped) {
+  start();
+  tick(ticked_ + period_);
+  guard_.tick(ticked_ + 2 * period_, 5 * kT);
+  EXPECT_EQ(guard_.stops(), 1u);
+  guard_.tick(ticked_ + 3 * period_, 5 * kT);
+  EXPECT_EQ(guard_.stops(), 1u);
+}
+
 }  // namespace
 }  // namespace arbiter::gateway

@@ -240,6 +240,21 @@ TEST(Mapping, AnIdleSampleComesFromAFileBesideTheMapping) {
   EXPECT_THAT(with("stop.bin").message(), HasSubstr("write none, zero, or file:"));
 }
 
+// Before the robot moves, and not when the gateway starts.
+TEST(Mapping, AConfigurationThatCannotBeReadIsReported) {
+  const test::TemporaryDirectory directory;
+  directory.write("dds.xml", "<CycloneDDS/>");
+  const std::string path = directory.path();
+  const auto with = [&](const std::string& file) {
+    return read_text("<gateway kind='dds' configuration='" + file + "'/>", &path);
+  };
+  EXPECT_THAT(with("dds.xml").findings(), IsEmpty());
+  const Read missing = with("none.xml");
+  EXPECT_THAT(missing.findings(), ElementsAre("1:36 error configuration-file"));
+  EXPECT_THAT(missing.message(), HasSubstr("none.xml"));
+  EXPECT_THAT(with(".").findings(), ElementsAre("1:36 error configuration-file"));
+}
+
 // A subscriber takes it for a sample of its type, and may read past its end.
 TEST(Mapping, AnIdleSampleOfAFileHasTheSizeOfItsType) {
   const test::TemporaryDirectory directory;

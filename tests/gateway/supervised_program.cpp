@@ -3,7 +3,8 @@
 //   supervised_program MODE SILENCE_MS END_MS
 //
 // The worker says "worker PID", and "beats" at its second beat; as MODE says, it then goes on
-// ("beat"), or heeds nothing any more ("hang").
+// ("beat"), or heeds nothing any more ("hang"). With "fail" and "crash" it ends at once, and the
+// pauses between two workers are a few milliseconds.
 #include <signal.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
@@ -25,6 +26,8 @@ int work(const std::string& mode, const Patience& patience) {
   const auto beat = heartbeat();
   if (!beat) return 1;
   end_with_supervisor(clean_up, patience);
+  if (mode == "fail") return kHasFailed;
+  if (mode == "crash") ::raise(SIGKILL);
   std::cout << "worker " << ::getpid() << std::endl;
   if (mode == "hang") {
     for (;;) ::pause();
@@ -40,8 +43,14 @@ int work(const std::string& mode, const Patience& patience) {
 
 int main(int argc, char** argv) {
   if (argc < 4) return 2;
-  const Patience patience{std::chrono::milliseconds(std::atoi(argv[2])),
-                          std::chrono::milliseconds(std::atoi(argv[3]))};
+  Patience patience{std::chrono::milliseconds(std::atoi(argv[2])),
+                    std::chrono::milliseconds(std::atoi(argv[3]))};
+  const std::string mode = argv[1];
+  if (mode == "fail" || mode == "crash") {
+    patience.pause = std::chrono::milliseconds(1);
+    patience.longest_pause = std::chrono::milliseconds(4);
+    patience.longest_after_failure = std::chrono::milliseconds(16);
+  }
   sigset_t caught;
   sigemptyset(&caught);
   sigaddset(&caught, SIGTERM);

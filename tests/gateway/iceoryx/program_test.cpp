@@ -1,7 +1,9 @@
 // The program around a gateway: options, mappings that are wrong, exit codes. Without RouDi.
 #include <gmock/gmock.h>
+#include <signal.h>
 #include <unistd.h>
 
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -62,6 +64,35 @@ TEST(GatewayProgram, SaysWhatIsWrongWithItsArguments) {
   const auto help = run_gateway({"--help"});
   EXPECT_EQ(help.exit_code, 0);
   EXPECT_THAT(help.out, HasSubstr("Exit codes: 0"));
+}
+
+// As where the terminal closes in which it was started.
+TEST(GatewayProgram, EndsInGoodOrderAtAHangup) {
+  const TemporaryDirectory directory;
+  ::signal(SIGHUP, SIG_DFL);  // what a test was started with, the program has too
+  const std::string instance = "none-" + std::to_string(::getpid());
+  Spoken gateway({ARBITER_PROGRAMS "/arbiter-gateway-iceoryx", "--instance", instance,
+                  directory.write("good.xml", kGood)});
+  ASSERT_TRUE(gateway.hear("no arbiterd of instance \"" + instance)) << gateway.heard;
+  gateway.process.signal(SIGHUP);
+  EXPECT_EQ(gateway.process.wait(), 0);
+}
+
+TEST(GatewayProgram, GoesOnAfterAHangupThatIsIgnored) {
+  const TemporaryDirectory directory;
+  ::signal(SIGHUP, SIG_IGN);  // as nohup does
+  const std::string instance = "none-" + std::to_string(::getpid());
+  Spoken gateway({ARBITER_PROGRAMS "/arbiter-gateway-iceoryx", "--instance", instance,
+                  directory.write("good.xml", kGood)});
+  ::signal(SIGHUP, SIG_DFL);
+  ASSERT_TRUE(gateway.hear("no arbiterd of instance \"" + instance)) << gateway.heard;
+  gateway.process.signal(SIGHUP);
+  const std::string pid = std::to_string(gateway.process.pid());
+  pid_t worker = 0;
+  std::ifstream("/proc/" + pid + "/task/" + pid + "/children") >> worker;
+  ASSERT_GT(worker, 0);
+  ::kill(worker, SIGKILL);
+  EXPECT_TRUE(gateway.hear("another one is started")) << gateway.heard;
 }
 
 // Its worker is given the same words, and one of its own.

@@ -1,0 +1,137 @@
+// A large sample that goes straight on is read once: it is written to Arbiter's memory and to the
+// middleware's at the same time. What is sent from there is that sample and no other.
+#include <gmock/gmock.h>
+
+#include <string>
+
+#include <arbiter/arbiter.hpp>
+
+#include "gateway/core/incoming.hpp"
+#include "gateway/core/outgoing.hpp"
+#include "shm/clock.hpp"
+#include "tests/gateway/foreign.hpp"
+#include "tests/gateway/mapping_text.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+constexpr std::size_t kSize = 100'000;  // more than a few blocks, and not a whole number of them
+
+// No two blocks are equal.
+std::string large(char name) {
+  std::string bytes(kSize, name);
+  for (std::size_t i = 0; i < bytes.size(); i += 7) bytes[i] = static_cast<char>(i >> 7);
+  return bytes;
+}
+
+class Drafts : public testing::Test {
+ protected:
+  Drafts() {
+    ins_.emplace("/Nav/cmd:o", &nav_);
+    outgoing_.lead(ins_, [] {});
+    sender_.drafts = true;
+    outgoing_.run(shm::monotonic_now());
+    deliver("first");
+    outgoing_.run(shm::monotonic_now());
+    sender_.sent.clear();
+  }
+
+  Incoming::Fate deliver(const std::string& bytes, Time deadline = Time::max()) {
+    return nav_.deliver(BytesSample(bytes), deadline);
+  }
+
+  test::Daemon daemon_{
+      "<behaviors timeout='1000s'>"
+      "<behavior name='Navigate'><config at='/Base/cmd:i'>/Nav/cmd:o</config></behavior>"
+      "<behavior name='Stop'><config at='/Base/cmd:i'>/Stop/cmd:o</config>"
+      "<inhibition>Navigate</inhibition></behavior></behaviors>"};
+  Read read_ = read_dds(
+      "<in topic='/nav' type='a/msg/B' port='/Nav/cmd:o' max_size='128KiB'/>"
+      "<out port='/Base/cmd:i' topic='/cmd' type='a/msg/B' max_size='128KiB'/>");
+  Account nav_account_{"nav", "publisher"};
+  Account account_{"cmd", "subscriber"};
+  KeepingSender sender_;
+  OneAge ages_;
+  InBySource ins_;
+  Node node_{"gateway"};
+  Incoming nav_{node_, read_.entry(0), nav_account_};
+  Outgoing outgoing_{node_, read_.entry(1), sender_, account_, ages_};
+  const int descriptor_ = outgoing_.descriptor();
+};
+
+TEST_F(Drafts, ALargeSampleIsSentFromItsDraft) {
+  EXPECT_EQ(deliver(large('a')), Incoming::Fate::kPassed);
+  EXPECT_EQ(deliver(large('b')), Incoming::Fate::kPassed);
+  EXPECT_THAT(sender_.sent, ElementsAre(large('a'), large('b')));
+  EXPECT_EQ(sender_.sent_drafts, 2);
+  EXPECT_EQ(sender_.dropped_drafts, 0);
+  EXPECT_EQ(account_.passed.value(), 3u);
+}
+
+TEST_F(Drafts, ASmallSampleHasNone) {
+  deliver("small");
+  EXPECT_THAT(sender_.sent, ElementsAre("small"));
+  EXPECT_EQ(sender_.drafted, 0);
+}
+
+TEST_F(Drafts, WhatIsLateLeavesNothingBehind) {
+  EXPECT_EQ(deliver(large('a'), Time::min()), Incoming::Fate::kLate);
+  EXPECT_EQ(sender_.dropped_drafts, 1);
+  EXPECT_THAT(sender_.sent, IsEmpty());
+}
+
+TEST_F(Drafts, WhatCannotBeReadLeavesNothingBehind) {
+  BytesSample sample(large('a'));
+  sample.is_broken = true;
+  EXPECT_EQ(nav_.deliver(sample, Time::max()), Incoming::Fate::kUnreadable);
+  EXPECT_EQ(sender_.dropped_drafts, 1);
+  EXPECT_THAT(sender_.sent, IsEmpty());
+}
+
+TEST_F(Drafts, TheDraftOfALoserIsDropped) {
+  auto stop = node_.output_port("/Stop/cmd:o", Type::variable("a/msg/B", kSize));
+  stop.signal();
+  deliver(large('a'));
+  EXPECT_THAT(sender_.sent, IsEmpty());
+  EXPECT_EQ(sender_.dropped_drafts, 1);
+}
+
+// One that has waited since before the turn is of the same size, and comes first.
+TEST_F(Drafts, AnEarlierSampleOfTheSourceIsNotTakenForTheDraft) {
+  sender_.largest = 1;  // not straight on
+  deliver(large('a'));
+  sender_.largest = SIZE_MAX;
+  deliver(large('b'));
+  EXPECT_THAT(sender_.sent, ElementsAre(large('a'), large('b')));
+  EXPECT_EQ(sender_.sent_drafts, 1);
+}
+
+// What overrides it while the first of the two is sent, overrides it.
+TEST_F(Drafts, ASampleThatIsOverriddenBeforeItIsTakenIsNotSent) {
+  auto stop = node_.output_port("/Stop/cmd:o", Type::variable("a/msg/B", kSize));
+  sender_.largest = 1;
+  deliver(large('a'));
+  sender_.largest = SIZE_MAX;
+  sender_.meanwhile = [&] { stop.signal(); };
+  deliver(large('b'));
+  EXPECT_THAT(sender_.sent, ElementsAre(large('a')));
+  EXPECT_EQ(sender_.sent_drafts, 0);
+  EXPECT_EQ(sender_.dropped_drafts, 1);
+}
+
+TEST_F(Drafts, ADraftThatCannotBeSentAtOnceIsLeftToTheLoop) {
+  sender_.would_wait = true;
+  deliver(large('a'));
+  EXPECT_THAT(sender_.sent, IsEmpty());
+  sender_.would_wait = false;
+  outgoing_.run(shm::monotonic_now());
+  EXPECT_THAT(sender_.sent, ElementsAre(large('a')));
+  EXPECT_EQ(sender_.dropped_drafts, 0) << "whoever sends it has ended it";
+}
+
+}  // namespace
+}  // namespace arbiter::gateway
