@@ -74,7 +74,8 @@ void Explorer::run_once(const Scenario& scenario) {
   ++execution_;
   step_ = 0;
   preemptions_ = stale_reads_ = halts_ = uninterrupted = 0;
-  operations_ = 0;
+  operations_ = moment_ = waits_ = 0;
+  fences_ = {};
   store_count_ = 0;
   shared_count_ = View::kThreads;
   fence_view_.clear();
@@ -100,6 +101,7 @@ void Explorer::add_thread(std::size_t index, Execution::Body body) {
   thread.mortal = body.mortal;
   thread.ready = nullptr;
   thread.finished = thread.halted = false;
+  thread.stopped_at = 0;
   thread.view.clear();
   thread.acquired.clear();
   thread.released.clear();
@@ -122,6 +124,7 @@ void Explorer::enter(boost::context::detail::transfer_t from) {
     const Image::Inside inside;
     explorer.threads_[index]->body();
   }
+  explorer.end_step();
   explorer.threads_[index]->finished = true;
   explorer.resume_another();
 }
@@ -204,6 +207,8 @@ void Explorer::fail(const std::string& what) {
 
 void Explorer::wait_until(std::function<bool()> ready, std::int64_t deadline) {
   const Image::Outside outside;
+  end_step();
+  ++waits_;
   self().ready = std::move(ready);
   self().deadline = deadline;
   resume_another();
@@ -222,6 +227,7 @@ void Explorer::wait_for_end_of(std::size_t thread) {
 void Explorer::take_turns() {
   if (++operations_ == kMaxOperations) fail("it goes on for ever");
   if (uninterrupted != 0) return;
+  end_step();
   std::size_t others[View::kThreads];
   std::uint32_t count = preemptions_ == limits_.preemptions ? 0 : find_others(others);
   const bool may_halt = self().mortal && halts_ != limits_.halts;
@@ -229,12 +235,50 @@ void Explorer::take_turns() {
   if (chosen == 0) return;
   if (chosen <= count) {
     ++preemptions_;
-    switch_to(others[chosen - 1]);
+    give_turn_to(others[chosen - 1]);
     return;
   }
   ++halts_;
   self().halted = true;
   resume_another();
+}
+
+void Explorer::give_turn_to(std::size_t thread) {
+  Thread& stopped = self();
+  const bool is_followed = limits_.leaves_redundant && !is_anybody_waiting();
+  stopped.stopped_at = is_followed ? ++moment_ : 0;
+  stopped.waits_before = waits_;
+  switch_to(thread);
+}
+
+// What somebody waits for may be anything, and is not followed.
+bool Explorer::is_anybody_waiting() const {
+  for (std::size_t i = 0; i < thread_count_; ++i) {
+    if (threads_[i]->ready) return true;
+  }
+  return false;
+}
+
+// The active thread reads or writes the word.
+void Explorer::touch(Word& word, bool writes) {
+  std::uint32_t& stopped_at = self().stopped_at;
+  for (std::size_t i = 0; stopped_at != 0 && i < thread_count_; ++i) {
+    if (i == active_) continue;
+    if (word.written_at[i] >= stopped_at || (writes && word.read_at[i] >= stopped_at)) {
+      stopped_at = 0;
+    }
+  }
+  (writes ? word.written_at : word.read_at)[active_] = moment_;
+}
+
+// All up to the point where the active thread's turn may be taken again is done.
+void Explorer::end_step() {
+  Thread& thread = self();
+  if (std::exchange(thread.stopped_at, 0) == 0 || thread.waits_before != waits_) return;
+  // Nothing in it had to do with what others did since its turn was taken. An execution in which
+  // its turn is taken only here has the same outcome, and is seen as well.
+  abandoned_ = true;
+  leave();
 }
 
 void Explorer::rehash() {
@@ -267,6 +311,8 @@ Explorer::Word* Explorer::visit(const void* address, bool writes, std::uint64_t 
   if (word->execution != execution_) {
     word->execution = execution_;
     word->readers = word->writers = 0;
+    std::fill_n(word->read_at, View::kThreads, 0);
+    std::fill_n(word->written_at, View::kThreads, 0);
     word->history.clear();
   }
   (writes ? word->writers : word->readers) |= 1u << active_;
@@ -278,6 +324,7 @@ Explorer::Word* Explorer::visit(const void* address, bool writes, std::uint64_t 
   }
   take_turns();
   word = &words_[at];
+  touch(*word, writes);
   if (word->history.empty()) {
     word->index = shared_count_++;
     if (stores_.size() == store_count_) stores_.emplace_back();

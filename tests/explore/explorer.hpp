@@ -10,6 +10,12 @@
 //   - at each load: which of the values that it may see. Any but the newest costs one of
 //     `stale_reads`.
 //
+// Of executions that differ only in the order of operations that have nothing to do with each
+// other, not all are run to their end. A thread that was stopped before an operation could as well
+// have been stopped after it if no other has touched the same words meanwhile; then this execution
+// is left, for that other one is seen as well: it has the same operations with the same outcome,
+// and costs no more (Explorer::end_step()).
+//
 // The memory is that of C++: each word has a history of stores, and each thread a view, the oldest
 // store of each word that it may still see. A release store carries its thread's view along, an
 // acquire load takes it up; fences as the standard has them. It contains all that x86 does with its
@@ -39,6 +45,7 @@ struct Limits {
   int stale_reads = 1;
   int halts = 0;  // of threads that may die
   std::uint64_t executions = 20'000'000;
+  bool leaves_redundant = true;  // executions; false: to see what that leaves out
 };
 
 // What an operation loses when it is weakened: it becomes relaxed, or a fence nothing.
@@ -133,6 +140,8 @@ class Explorer {
     const void* address = nullptr;
     std::uint64_t execution = 0;
     std::uint32_t readers = 0, writers = 0;  // bits by thread
+    // By thread, the moment at which it has last read or written it.
+    std::uint32_t read_at[View::kThreads] = {}, written_at[View::kThreads] = {};
     bool shared = false;  // several threads use it, one of them writing: learned on the way
     std::uint32_t index = 0;
     std::vector<std::uint32_t> history;  // in stores_
@@ -150,6 +159,10 @@ class Explorer {
     bool finished = false;
     bool halted = false;
     View view, acquired, released;
+    // The moment at which its turn was taken, while it does again what it was about to do then, and
+    // nothing that it does has to do with what others have done since; otherwise 0.
+    std::uint32_t stopped_at = 0;
+    std::uint32_t waits_before = 0;
   };
   struct Choice {
     std::uint32_t taken;
@@ -164,6 +177,10 @@ class Explorer {
   bool next_path();
   std::uint32_t choose(std::uint32_t count);
   void take_turns();
+  void give_turn_to(std::size_t thread);
+  void touch(Word& word, bool writes);
+  void end_step();
+  [[nodiscard]] bool is_anybody_waiting() const;
   bool can_run(std::size_t thread) const;
   [[nodiscard]] std::uint32_t find_others(std::size_t* others) const;
   void resume_another();
@@ -207,6 +224,9 @@ class Explorer {
   int stale_reads_ = 0;
   int halts_ = 0;
   std::uint32_t operations_ = 0;
+  std::uint32_t moment_ = 0;  // how often a turn was taken
+  std::uint32_t waits_ = 0;   // how often a thread began to wait
+  Word fences_;               // as if each full fence wrote it
   std::vector<std::unique_ptr<Thread>> threads_;
   std::size_t thread_count_ = 0;
   std::size_t active_ = 0;

@@ -112,6 +112,7 @@ void Explorer::full_fence(const Where& where) {
   const Image::Outside outside;
   if (is_weak(Weakness::kFence, where)) return;
   take_turns();
+  touch(fences_, true);
   trace("fence", nullptr, 0, where);
   self().view.join(self().acquired);
   self().view.join(fence_view_);
@@ -136,6 +137,7 @@ void Explorer::read_plain(const void* address, const Where& where) {
   const Image::Outside outside;
   trace("read", address, 0, where);
   Word& data = find_plain(address);
+  touch(data, false);
   const View& view = self().view;
   if (data.write > view.at(data.writer)) fail("data was read that was still being written");
   data.reads[active_] = view.at(active_);
@@ -145,6 +147,7 @@ void Explorer::write_plain(const void* address, const Where& where) {
   const Image::Outside outside;
   trace("write", address, 0, where);
   Word& data = find_plain(address);
+  touch(data, true);
   const View& view = self().view;
   for (std::size_t i = 0; i < thread_count_; ++i) {
     if (i != active_ && data.reads[i] > view.at(i)) {
@@ -163,6 +166,8 @@ Explorer::Word& Explorer::find_plain(const void* address) {
   if (data.execution != execution_) {
     data.execution = execution_;
     std::fill(std::begin(data.reads), std::end(data.reads), 0);
+    std::fill_n(data.read_at, View::kThreads, 0);
+    std::fill_n(data.written_at, View::kThreads, 0);
     data.writer = active_;
     data.write = 0;
   }
