@@ -52,24 +52,50 @@ class ApplicationReader {
   }
 
   // Of what is not ours nothing is an error: a text that cannot be read tells nothing.
-  void read_module(const XmlNode& module) {
-    for (const XmlNode& element : Elements(module.first_child)) {
-      if (element.text == "prefix" || element.text == "name") {
-        add_prefix(read_text(element));
-      } else if (element.text == "parameters") {
-        const std::string parameters = collapse_blanks(read_text(element)) + " ";
+  void read_module(const XmlNode& element) {
+    Application::Module module;
+    module.where = locate(file_, element);
+    for (const XmlNode& child : Elements(element.first_child)) {
+      if (child.text == "name") {
+        module.name = trim(read_text(child));
+      } else if (child.text == "node") {
+        module.node = host_of(read_text(child));
+      } else if (child.text == "prefix") {
+        add_prefix(read_text(child), module.prefixes);
+      } else if (child.text == "parameters") {
+        const std::string parameters = collapse_blanks(read_text(child)) + " ";
         const std::size_t at = (" " + parameters).find(" --name ");
         if (at == std::string::npos) continue;
         const std::size_t first = at + std::string_view("--name ").size();
-        add_prefix(parameters.substr(first, parameters.find(' ', first) - first));
+        add_prefix(parameters.substr(first, parameters.find(' ', first) - first), module.prefixes);
       }
     }
+    auto& all = application_.prefixes;
+    all.insert(all.end(), module.prefixes.begin(), module.prefixes.end());
+    add_prefix(module.name, all);
+    if (module.prefixes.empty()) add_prefix(module.name, module.prefixes);
+    application_.modules.push_back(std::move(module));
   }
 
-  void add_prefix(std::string_view text) {
-    const std::string_view prefix = trim(text);
+  // YARP's manager takes "/icub1" and "icub1" for one node, and networks take "ICUB1" for the same.
+  static std::string host_of(std::string_view text) {
+    std::string_view node = trim(text);
+    if (!node.empty() && node[0] == '/') node.remove_prefix(1);
+    std::string host(node);
+    for (char& each : host) {
+      if (each >= 'A' && each <= 'Z') each = static_cast<char>(each - 'A' + 'a');
+    }
+    return host;
+  }
+
+  static void add_prefix(std::string_view text, std::vector<std::string>& prefixes) {
+    std::string_view prefix = trim(text);
+    while (prefix.size() >= 2 && prefix.front() == '"' && prefix.back() == '"') {
+      prefix = trim(prefix.substr(1, prefix.size() - 2));
+    }
+    while (!prefix.empty() && prefix.back() == '/') prefix.remove_suffix(1);
     if (prefix.empty()) return;
-    application_.prefixes.push_back((prefix[0] == '/' ? "" : "/") + std::string(prefix));
+    prefixes.push_back((prefix[0] == '/' ? "" : "/") + std::string(prefix));
   }
 
   std::string read_text(const XmlNode& element) {

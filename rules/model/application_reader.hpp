@@ -1,4 +1,4 @@
-// YARP's description of an application, of which the connections alone concern us.
+// YARP's description of an application, of which the connections concern us, and the modules.
 #pragma once
 
 #include "rules/model/model.hpp"
@@ -7,7 +7,7 @@
 
 namespace arbiter::rules {
 
-// Everything that is no connection is passed over, for these files are written for other readers.
+// Everything else is passed over, for these files are written for other readers.
 Application read_application(const TextFile& file, Diagnostics& diagnostics);
 
 }  // namespace arbiter::rules

@@ -97,7 +97,16 @@ struct Application {
     std::string port;
     Location where;
   };
+  // A program that runs on a host, as far as it says so.
+  struct Module {
+    std::string name;
+    std::string node;  // without a leading '/', in small letters; empty if there is none
+    // What the names of its ports begin with: --name and <prefix>, and if it has neither, <name>.
+    std::vector<std::string> prefixes;
+    Location where;
+  };
   std::vector<Link> connections;  // each once
+  std::vector<Module> modules;    // in document order
   // What the names of its modules' ports begin with: <prefix>, <name>, and --name among their
   // parameters.
   std::vector<std::string> prefixes;

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "rules/model/hosts.hpp"
 #include "rules/text/names.hpp"
 #include "shm/limits.hpp"
 
@@ -170,11 +171,8 @@ class UnpublishedSources {
 
  private:
   [[nodiscard]] bool has_module(std::string_view source) const {
-    return std::any_of(prefixes_.begin(), prefixes_.end(), [&](std::string_view prefix) {
-      if (!source.starts_with(prefix)) return false;
-      const auto rest = source.substr(prefix.size());
-      return rest.empty() || rest[0] == '/' || rest[0] == ':';
-    });
+    return std::any_of(prefixes_.begin(), prefixes_.end(),
+                       [&](std::string_view prefix) { return begins_with_prefix(source, prefix); });
   }
 
   // What one who has misspelt it may have meant: a source of a connection, or of a module.

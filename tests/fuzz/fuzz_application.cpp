@@ -1,4 +1,6 @@
 // An application file, beside a model of which it has all connections, or not.
+#include "rules/ask/across_hosts.hpp"
+#include "rules/model/application_reader.hpp"
 #include "rules/model/load.hpp"
 #include "rules/prove/compile.hpp"
 #include "tests/fuzz/file_in_memory.hpp"
@@ -10,6 +12,20 @@ namespace {
 
 constexpr std::string_view kModel =
     "<behaviors><arbiter at='/p'><select from='/s'/></arbiter></behaviors>";
+
+// Where its modules run: each port is on one host, or it is said why not.
+void check_hosts(const rules::Application& application, const rules::RuleSet& rules,
+                 const rules::CompiledModel& compiled) {
+  rules::Diagnostics diagnostics;
+  const rules::SourceUses uses = rules::uses_of_sources(rules);
+  const rules::HostPlaces places(rules, uses, application, "application.xml", diagnostics);
+  for (const rules::PortRules& port : rules.ports) {
+    require(diagnostics.has_errors() || !places.of_port(port.port).empty(), "a port has a host");
+  }
+  rules::Budget budget(1'000'000);
+  rules::find_across_hosts(rules, compiled, uses, places, {}, diagnostics, budget);
+  check_findings(diagnostics);
+}
 
 void check_application(std::string_view text) {
   static const FileInMemory model(kModel);
@@ -23,6 +39,9 @@ void check_application(std::string_view text) {
     const rules::CompiledModel compiled = rules::compile(rules, diagnostics);
     check_findings(diagnostics);
     if (diagnostics.has_errors()) continue;
+    rules::Diagnostics of_file;
+    check_hosts(rules::read_application(rules::TextFile(file.path(), std::string(text)), of_file),
+                rules, compiled);
     test::LiveTable table(compiled);
     for (const auto& connection : rules.other_connections) {
       const bool delivers = table.delivers(connection.source, connection.port);

@@ -46,7 +46,7 @@ Found found_in(const rules::RuleSet& set, std::uint64_t steps = kFindingsSteps) 
   return {account, budget.spent(), more.items()};
 }
 
-std::string name(int i) { return "/s" + std::to_string(i); }
+std::string numbered(int i) { return "/s" + std::to_string(i); }
 
 TEST(Findings, NothingIsSaidOfPrioritiesThatLeaveNobodyOut) {
   const auto found =
@@ -152,8 +152,8 @@ rules::RuleSet inhibited(int ports, int sources, const Graph& inhibitors, bool f
     std::vector<std::pair<std::string, ExpressionPtr>> rules;
     for (int i = 0; i < sources; ++i) {
       std::vector<ExpressionPtr> literals;
-      for (const int other : inhibitors(i)) literals.push_back(inactive(name(other)));
-      rules.emplace_back(name(i), all_of(std::move(literals)));
+      for (const int other : inhibitors(i)) literals.push_back(inactive(numbered(other)));
+      rules.emplace_back(numbered(i), all_of(std::move(literals)));
     }
     by_hand.port("/p" + std::to_string(port), std::move(rules), first_wins);
   }
@@ -245,9 +245,9 @@ TEST(FindingsScale, TreesWhoseParentsInhibitAllBelow) {
 }
 
 TEST(FindingsScale, ParitiesAndEqualitiesFarApart) {
-  ExpressionPtr parity = active(name(0));
+  ExpressionPtr parity = active(numbered(0));
   std::vector<ExpressionPtr> mention, equal;
-  for (int i = 1; i < 200; ++i) parity = binary(Operator::kXor, parity, active(name(i)));
+  for (int i = 1; i < 200; ++i) parity = binary(Operator::kXor, parity, active(numbered(i)));
   for (int i = 0; i < 12; ++i) {
     mention.push_back(active("/x" + std::to_string(i)));
     equal.push_back(

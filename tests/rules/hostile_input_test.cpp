@@ -86,7 +86,7 @@ TEST(HostileInput, AnyByteChangedGivesAnAnswer) {
   }
 }
 
-std::string repeat(const std::string& text, int times) {
+std::string times_over(const std::string& text, int times) {
   std::string result;
   for (int i = 0; i < times; ++i) result += text;
   return result;
@@ -97,32 +97,32 @@ TEST(HostileInput, MadeToBeDeepOrLongEndsSoonWithAnError) {
   const std::string select = "<arbiter at='/p'><select from='/s'>";
   const std::string end = "</select></arbiter>";
   for (const std::string& model : {
-           repeat("<a>", many) + repeat("</a>", many),
-           repeat("<behaviors>", many),
-           repeat("<meta_behavior name='M'>", many) + repeat("</meta_behavior>", many),
-           repeat("<!--", many),
-           repeat("<![CDATA[", many),
-           repeat("<?", many),
-           repeat("<!DOCTYPE a [", many),
-           repeat("&lt;", many),
-           repeat("<a ", many),
-           repeat("\"", many),
-           "<a " + repeat("a='' ", many) + "/>",
-           "<source " + repeat("port='/a' ", 3'000) + "/>",
-           "<" + repeat("a", many) + "/>",
-           "<behavior name='" + repeat("a", many) + "'/>",
-           "<behavior name='B'><inhibition>" + repeat("X,", many) + "</inhibition></behavior>",
-           "<source port='/" + repeat("${", many) + "'/>",
-           "<source port='/" + repeat("${a}", many) + "'/>",
-           "<define name='a'>" + repeat("a", many) + "</define><source port='/${a}'/>",
-           select + repeat("(", many) + end,
-           select + repeat("not ", many) + end,
-           select + repeat("/a -> ", many) + "/a" + end,
-           select + repeat("/a xor ", many) + "/a" + end,
-           select + "\"" + repeat("a", many) + end,
-           select + "/" + repeat("a", many) + end,
-           repeat("<x/>", many),
-           repeat("<behavior/>", many),
+           times_over("<a>", many) + times_over("</a>", many),
+           times_over("<behaviors>", many),
+           times_over("<meta_behavior name='M'>", many) + times_over("</meta_behavior>", many),
+           times_over("<!--", many),
+           times_over("<![CDATA[", many),
+           times_over("<?", many),
+           times_over("<!DOCTYPE a [", many),
+           times_over("&lt;", many),
+           times_over("<a ", many),
+           times_over("\"", many),
+           "<a " + times_over("a='' ", many) + "/>",
+           "<source " + times_over("port='/a' ", 3'000) + "/>",
+           "<" + times_over("a", many) + "/>",
+           "<behavior name='" + times_over("a", many) + "'/>",
+           "<behavior name='B'><inhibition>" + times_over("X,", many) + "</inhibition></behavior>",
+           "<source port='/" + times_over("${", many) + "'/>",
+           "<source port='/" + times_over("${a}", many) + "'/>",
+           "<define name='a'>" + times_over("a", many) + "</define><source port='/${a}'/>",
+           select + times_over("(", many) + end,
+           select + times_over("not ", many) + end,
+           select + times_over("/a -> ", many) + "/a" + end,
+           select + times_over("/a xor ", many) + "/a" + end,
+           select + "\"" + times_over("a", many) + end,
+           select + "/" + times_over("a", many) + end,
+           times_over("<x/>", many),
+           times_over("<behavior/>", many),
        }) {
     const Stopwatch stopwatch;
     const Loaded loaded = load_text(model);

@@ -25,7 +25,7 @@ using Rules = std::vector<std::pair<std::string, ExpressionPtr>>;
 
 const std::vector<std::string> kSixSources = {"/a", "/b", "/c", "/d", "/e", "/f"};
 
-std::string source_name(std::size_t i) { return "/s" + std::to_string(1000 + i); }
+std::string numbered_source(std::size_t i) { return "/s" + std::to_string(1000 + i); }
 
 // `s and not a and not b and not c`, with others at random.
 Rules random_inhibitions(std::size_t count, unsigned seed) {
@@ -35,9 +35,9 @@ Rules random_inhibitions(std::size_t count, unsigned seed) {
     std::vector<ExpressionPtr> literals;
     while (literals.size() < 3) {
       const std::size_t other = random() % count;
-      if (other != i) literals.push_back(inactive(source_name(other)));
+      if (other != i) literals.push_back(inactive(numbered_source(other)));
     }
-    rules.emplace_back(source_name(i), all_of(literals));
+    rules.emplace_back(numbered_source(i), all_of(literals));
   }
   return rules;
 }
@@ -185,12 +185,12 @@ TEST_P(ManyConnections, WithThreeRandomInhibitionsEachLoadAndDecideExactly) {
       Active now;
       const auto sparse = 1 + random() % 40;
       for (std::size_t i = 0; i < count; ++i) {
-        if (random() % sparse == 0) now.insert(source_name(i));
+        if (random() % sparse == 0) now.insert(numbered_source(i));
       }
       live.activate_only(now);
       const auto expected = first_that_holds(rules, now);
       ASSERT_EQ(live.winners("/p"), expected ? std::vector{*expected} : std::vector<std::string>());
-      const std::string arriving = source_name(random() % count);
+      const std::string arriving = numbered_source(random() % count);
       now.insert(arriving);
       EXPECT_EQ(live.delivers(arriving, "/p"), first_that_holds(rules, now) == arriving);
     }

@@ -27,13 +27,13 @@ using testing::IsEmpty;
 
 const std::vector<std::string> kSources = {"/a", "/b", "/c", "/d", "/e"};
 
-ExpressionPtr random_condition(std::mt19937& random, int depth) {
+ExpressionPtr any_condition(std::mt19937& random, int depth) {
   const auto pick = [&](unsigned n) { return static_cast<unsigned>(random() % n); };
   if (depth == 0 || pick(4) == 0) {
     const auto& source = kSources[pick(static_cast<unsigned>(kSources.size()))];
     return pick(2) == 0 ? active(source) : inactive(source);
   }
-  const auto operand = [&] { return random_condition(random, depth - 1); };
+  const auto operand = [&] { return any_condition(random, depth - 1); };
   switch (pick(6)) {
     case 0:
       return all_of({operand(), operand(), operand()});
@@ -54,7 +54,7 @@ RulesByHand random_port(std::mt19937& random, bool first_wins) {
   std::vector<std::pair<std::string, ExpressionPtr>> rules;
   const std::size_t count = 2 + random() % 3;
   for (std::size_t i = 0; i < count; ++i) {
-    ExpressionPtr condition = random_condition(random, 3);
+    ExpressionPtr condition = any_condition(random, 3);
     // Some ports should have no conflict at all.
     for (std::size_t j = 0; j < i; ++j) {
       if (random() % 4 != 0) condition = all_of({condition, inactive(kSources[j])});

@@ -26,7 +26,7 @@ rules::CompiledModel compiled(const rules::RuleSet& set) {
 }
 
 // The paper's arm, and a base that navigation drives.
-rules::CompiledModel robot() {
+rules::CompiledModel arm_and_base() {
   return compiled(
       RulesByHand()
           .port("/Arm", {{"/Rest", inactive("/Object")}, {"/Object", inactive("/collision")}})
@@ -62,12 +62,12 @@ TEST(Verdict, WhatIsTrueInEveryStateIsProved) {
         "/Object -> idle(/Base)", "/Object and /collision -> idle(/Arm) and idle(/Base)",
         "winner(/Arm) = /Object -> not winner(/Base) = /Nav", "none(*) -> idle(/Arm)",
         "idle(/Arm) or any(/Rest) or any(/Obj*)", "winner(/Arm) = none <-> idle(/Arm)"}) {
-    EXPECT_EQ(kind_of(robot(), text), Verdict::Kind::kProved) << text;
+    EXPECT_EQ(kind_of(arm_and_base(), text), Verdict::Kind::kProved) << text;
   }
 }
 
 TEST(Verdict, WhatIsNotIsRefutedWithAShortestWitnessAndItsWinners) {
-  const auto result = judged(robot(), "/collision -> idle(/Arm)\n");
+  const auto result = judged(arm_and_base(), "/collision -> idle(/Arm)\n");
   ASSERT_EQ(result.verdicts.size(), 1u);
   const auto& verdict = result.verdicts[0];
   EXPECT_EQ(verdict.kind, Verdict::Kind::kRefuted);
@@ -116,7 +116,7 @@ TEST(Verdict, OneOfSeveralAndTheSameAtTwoPortsAreProvedAndRefuted) {
 }
 
 TEST(Verdict, NamesOfOneOfSeveralAndOfTheSameAreJudged) {
-  const auto result = judged(robot(),
+  const auto result = judged(arm_and_base(),
                              "winner(/Arm) = winner(/Leg)\n"
                              "winner(/View) = winner(/Arm)\n"
                              "winner(/Base) = any(/Object*)\n");
@@ -134,7 +134,7 @@ TEST(Verdict, WithConflictFirstTheOrderDecidesWhoWins) {
 }
 
 TEST(Verdict, NamesThatMeanNothingInTheModelAreErrorsWithTheirPlaces) {
-  const auto result = judged(robot(),
+  const auto result = judged(arm_and_base(),
                              "/collison -> idle(/Arm)\n"
                              "idle(/Arms)\n"
                              "idle(/View)\n"
@@ -154,14 +154,14 @@ TEST(Verdict, NamesThatMeanNothingInTheModelAreErrorsWithTheirPlaces) {
 }
 
 TEST(Verdict, APatternThatNothingMatchesIsAWarning) {
-  const auto result = judged(robot(), "none(/Teleop*)\n");
+  const auto result = judged(arm_and_base(), "none(/Teleop*)\n");
   ASSERT_EQ(result.diagnostics.items().size(), 1u);
   EXPECT_EQ(result.diagnostics.items()[0].code, "matches-nothing");
   EXPECT_FALSE(result.diagnostics.has_errors());
 }
 
 TEST(Verdict, WhatTakesTooManyStepsIsLeftOpenAndAnError) {
-  const auto result = judged(robot(), "/collision -> idle(/Arm)\n", 3);
+  const auto result = judged(arm_and_base(), "/collision -> idle(/Arm)\n", 3);
   ASSERT_EQ(result.verdicts.size(), 1u);
   EXPECT_EQ(result.verdicts[0].kind, Verdict::Kind::kOpen);
   Diagnostics diagnostics;

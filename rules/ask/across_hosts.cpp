@@ -1,0 +1,204 @@
+#include "rules/ask/across_hosts.hpp"
+
+#include <map>
+#include <set>
+#include <utility>
+
+#include "rules/model/polarity.hpp"
+#include "rules/model/print_rules.hpp"
+#include "rules/text/names.hpp"
+
+namespace arbiter::rules {
+namespace {
+
+// "/Arm/pos:i on base", or without the host where that is not known.
+std::string at_host(const std::string& port, const HostPlaces& places) {
+  const auto host = places.of_port(port);
+  return host.empty() ? port : port + " on " + std::string(host);
+}
+
+// Names with more to each of them: a sentence holds fewer than of plain ones.
+std::string first_of(std::vector<std::string> names) {
+  constexpr std::size_t kMost = 3;
+  if (names.size() > kMost + 1) {
+    const std::string more = std::to_string(names.size() - kMost) + " more";
+    names.resize(kMost);
+    names.push_back(more);
+  }
+  return enumerate(names);
+}
+
+std::size_t count_hosts(const std::vector<std::string>& ports, const HostPlaces& places) {
+  std::set<std::string_view> hosts;
+  for (const std::string& port : ports) {
+    if (const auto host = places.of_port(port); !host.empty()) hosts.insert(host);
+  }
+  return hosts.size();
+}
+
+std::string at_hosts(const std::vector<std::string>& ports, const HostPlaces& places) {
+  std::vector<std::string> all;
+  if (count_hosts(ports, places) == 1) {
+    const auto host = places.of_port(ports.front());
+    return first_of(ports) + " on " + std::string(host);
+  }
+  all.reserve(ports.size());
+  for (const std::string& port : ports) all.push_back(at_host(port, places));
+  return first_of(std::move(all));
+}
+
+// How the rules at the ports of other hosts use a source.
+struct RemoteUse {
+  std::vector<std::string> required_at;  // ports, as below
+  std::vector<std::string> negated_at;
+  std::vector<std::string> freed;  // "/Rest/pos:o at /Arm/pos:i": what waits for its silence
+};
+
+class AcrossHosts {
+ public:
+  AcrossHosts(const RuleSet& rules, const SourceUses& uses, const HostPlaces& places,
+              Diagnostics& diagnostics)
+      : rules_(rules), uses_(uses), places_(places), diagnostics_(diagnostics) {}
+
+  void find() {
+    for (const PortRules& port : rules_.ports) {
+      if (!places_.of_port(port.port).empty()) look_at(port);
+    }
+    for (const auto& [source, use] : uses_) {
+      note_crossing(source, use);
+      const auto remote = remote_.find(source);
+      if (remote == remote_.end()) continue;
+      const shm::Nanoseconds timeout = timeout_of(source);
+      if (timeout == shm::kForever) refuse_forever(source, use, remote->second);
+      warn_of_negation(source, use, remote->second, timeout);
+    }
+    note_behaviours();
+  }
+
+ private:
+  void look_at(const PortRules& port) {
+    Polarity before;  // with conflict="first", what keeps the next rule from winning
+    std::set<std::string> required, negated;
+    for (const ConnectionRule& rule : port.rules) {
+      Polarity polarity;
+      polarity.visit(*rule.condition);
+      polarity.add(rule.source, true);
+      required.insert(polarity.required().begin(), polarity.required().end());
+      std::set<std::string> silent = polarity.negated();
+      silent.insert(before.negated().begin(), before.negated().end());
+      for (const std::string& source : silent) {
+        if (source == rule.source || !places_.are_apart(source, port.port)) continue;
+        remote_[source].freed.push_back(rule.source + " at " + port.port);
+        negated.insert(source);
+      }
+      if (!port.first_wins) continue;
+      before.visit(*rule.condition, false);
+      before.add(rule.source, false);
+    }
+    for (const std::string& source : required) {
+      if (places_.are_apart(source, port.port)) remote_[source].required_at.push_back(port.port);
+    }
+    for (const std::string& source : negated) remote_[source].negated_at.push_back(port.port);
+  }
+
+  void note_crossing(const std::string& source, const SourceUse& use) {
+    std::vector<std::string> connected, read, all;
+    for (const std::string& port : use.connected_to) {
+      if (places_.are_apart(source, port)) connected.push_back(port);
+    }
+    for (const std::string& port : use.read_at) {
+      if (places_.are_apart(source, port)) read.push_back(port);
+    }
+    if (connected.empty() && read.empty()) return;
+    all = connected;
+    all.insert(all.end(), read.begin(), read.end());
+    std::string message =
+        source + " crosses the network from " + enumerate(places_.of_source(source)) + ": it is ";
+    if (!connected.empty()) {
+      message += "connected to " + at_hosts(connected, places_);
+      if (!read.empty()) message += ", and ";
+    }
+    if (!read.empty()) message += "read at " + at_hosts(read, places_);
+    diagnostics_.note("crosses-network", use.where, message,
+                      {.ports = std::move(all), .source = source});
+  }
+
+  void refuse_forever(const std::string& source, const SourceUse& use, const RemoteUse& remote) {
+    if (remote.required_at.empty()) return;
+    diagnostics_.error(
+        "remote-forever", use.where,
+        source + " is on " + enumerate(places_.of_source(source)) +
+            ", its T is forever, and a rule at " + at_hosts(remote.required_at, places_) +
+            " requires it to be active: a cut network would not end its activity there; give it a "
+            "finite T, and let it publish more often than that",
+        {.ports = remote.required_at, .source = source});
+  }
+
+  void warn_of_negation(const std::string& source, const SourceUse& use, const RemoteUse& remote,
+                        shm::Nanoseconds timeout) {
+    if (remote.negated_at.empty()) return;
+    const std::string what_happens =
+        timeout == shm::kForever
+            ? ". What begins or ends while the network is cut is not known there: "
+            : ". A cut network counts as its silence there: after " + to_string(timeout) + ", ";
+    diagnostics_.warning(
+        "negated-across-hosts", use.where,
+        source + " is on " + enumerate(places_.of_source(source)) + ", and a rule at " +
+            at_hosts(remote.negated_at, places_) + " requires it to be inactive" + what_happens +
+            first_of(remote.freed) + " may win although " + source +
+            " is active; make sure that this is safe, or let the rule require an active source "
+            "instead",
+        {.ports = remote.negated_at, .source = source});
+  }
+
+  void note_behaviours() {
+    for (const BehaviourRules& behaviour : rules_.behaviours) {
+      std::set<std::string> unique;
+      for (const auto& [port, rule] : behaviour.rules) unique.insert(port);
+      std::vector<std::string> ports(unique.begin(), unique.end());
+      if (count_hosts(ports, places_) < 2) continue;
+      const std::string message = "the behaviour " + quote(behaviour.name) +
+                                  " has connections to " + at_hosts(ports, places_) +
+                                  ": it does not begin and end there at one instant, and while "
+                                  "the network is cut it may run on one of them alone";
+      diagnostics_.note("behaviour-on-two-hosts", behaviour.where, message,
+                        {.ports = std::move(ports), .behaviour = behaviour.name});
+    }
+  }
+
+  [[nodiscard]] shm::Nanoseconds timeout_of(const std::string& source) const {
+    const auto own = rules_.timeouts.find(source);
+    return own == rules_.timeouts.end() ? rules_.timeout : own->second;
+  }
+
+  const RuleSet& rules_;
+  const SourceUses& uses_;
+  const HostPlaces& places_;
+  Diagnostics& diagnostics_;
+  std::map<std::string, RemoteUse> remote_;
+};
+
+void warn_of_statements(const std::vector<Verdict>& verdicts, const HostPlaces& places,
+                        Diagnostics& diagnostics) {
+  for (const Verdict& verdict : verdicts) {
+    if (verdict.kind != Verdict::Kind::kProved || count_hosts(verdict.ports, places) < 2) continue;
+    diagnostics.warning("statement-on-two-hosts", verdict.where,
+                        "this is true in every state, but " + at_hosts(verdict.ports, places) +
+                            " are decided by hosts that do not see the same state at one instant: "
+                            "it may be false while a sample crosses, and while the network is cut; "
+                            "put these ports on one host, or silence this if that is harmless",
+                        {.ports = verdict.ports, .statement = verdict.statement});
+  }
+}
+
+}  // namespace
+
+void find_across_hosts(const RuleSet& rules, const CompiledModel& model, const SourceUses& uses,
+                       const HostPlaces& places, const std::vector<Verdict>& verdicts,
+                       Diagnostics& diagnostics, Budget& budget) {
+  AcrossHosts(rules, uses, places, diagnostics).find();
+  warn_of_statements(verdicts, places, diagnostics);
+  find_instants(rules, model, places, diagnostics, budget);
+}
+
+}  // namespace arbiter::rules
