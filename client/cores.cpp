@@ -83,6 +83,24 @@ Outcome publish_copy(OutputCore& core, const void* data, std::size_t size, Time 
 Outcome signal(OutputCore& core, Time deadline) noexcept {
   return is_own(core) ? core.signal_by(nanoseconds(deadline), shm::monotonic_now()) : Outcome{};
 }
+Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline,
+                Origin origin) noexcept {
+  if (!is_own(core)) return {};
+  return core.pass_on_loan({origin.publisher, origin.sequence}, nanoseconds(deadline), slot, size,
+                           shm::monotonic_now());
+}
+Outcome signal(OutputCore& core, Time deadline, Origin origin) noexcept {
+  if (!is_own(core)) return {};
+  return core.pass_on_signal({origin.publisher, origin.sequence}, nanoseconds(deadline),
+                             shm::monotonic_now());
+}
+Outcome publish_signalled(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline,
+                          Origin origin) noexcept {
+  if (!is_own(core)) return {};
+  return core.publish_signalled({origin.publisher, origin.sequence}, nanoseconds(deadline), slot,
+                                size, shm::monotonic_now());
+}
+bool wants_samples(const OutputCore& core) noexcept { return is_own(core) && core.wants_samples(); }
 void deactivate(OutputCore& core) noexcept {
   if (is_own(core)) core.deactivate(shm::monotonic_now());
 }
@@ -108,6 +126,7 @@ void deactivate_at(OutputCore& core, Time at) {
 void describe(OutputCore& core, std::string_view text) noexcept {
   if (is_own(core)) core.node->describe(core.instance(), text);
 }
+bool asked_to_yield(const OutputCore& core) noexcept { return core.asked_to_yield(); }
 std::size_t max_size(const OutputCore& core) noexcept { return core.type().size; }
 const std::string& name(const OutputCore& core) noexcept { return core.name(); }
 const Type& type(const OutputCore& core) noexcept { return core.declared_type(); }
@@ -163,6 +182,10 @@ const std::string& source_name(const InputCore& core, std::uint32_t source) noex
 }
 const Type& sample_type(const InputCore& core, std::uint32_t hold) noexcept {
   return core.type_of_held(hold);
+}
+Origin sample_origin(const InputCore& core, std::uint32_t hold) noexcept {
+  const shm::SampleOrigin origin = core.origin_of_held(hold);
+  return {origin.publisher, origin.sequence};
 }
 
 std::shared_ptr<TapCore> open_tap(NodeCore& node, std::string_view name, const Type& type,

@@ -51,6 +51,7 @@ std::shared_ptr<const InputPeer> map_input_peer(const wire::Received& announced,
   peer->depth = header.depth;
   peer->max_held = header.max_held;
   peer->refuse_new = header.refuse_new != 0;
+  peer->keep = header.keep != 0;
   // What is used is judged, whatever it was when it was mapped.
   if (peer->depth < 1 || peer->depth > shm::kMaxDepth || peer->max_held < 1 ||
       peer->max_held > shm::kMaxHeld) {

@@ -36,6 +36,7 @@ struct InputPeer {
   std::uint32_t depth = 1;
   std::uint32_t max_held = 1;
   bool refuse_new = false;
+  bool keep = false;
   // Set by the port's thread once its memory says what no honest one writes.
   mutable shm::Atomic<bool> misbehaved{false};
 };

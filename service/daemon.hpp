@@ -113,8 +113,10 @@ class Daemon final : private Takeover::Host {
   bool hand_back(Client& client, wire::Received& received);
   // False: it is about no change of the model.
   bool change_model(Client& client, const wire::Message& message);
+  void ask_for_switch(Client& client, const wire::Message& message);
   void hello(Client& client, const wire::Received& received);
   void welcome(Client& client) override;
+  void say_whether_may(Client& client, const wire::Message& message);
   void answer_status(shm::Nanoseconds now);
   void send_model(Client& client, std::uint64_t request);
 
@@ -127,9 +129,15 @@ class Daemon final : private Takeover::Host {
   void open_tap(Client& client, wire::Received& received);
   void connect(Client& client, std::uint64_t request, shm::PortInstance port);
   void deactivate(Client& client, const wire::Message& message);
-  // Throws std::runtime_error if a live component has the name. One that has closed its port, or
-  // has ended, before `asking` asked, has not.
+  // The live component that has the name; null: nobody. One that has closed its port, or has ended,
+  // before `asking` asked, has not.
+  Client* find_holder(const Client& asking, shm::PortInstance holder);
+  // Throws std::runtime_error if there is one.
   void require_free(const Client& asking, shm::PortInstance holder, const std::string& what);
+  // The same where an output port is to be opened; a holder that yields to it is asked to go, and
+  // NotYet is thrown.
+  void require_yielded(const Client& asking, Source& source, bool yields);
+  void remove_port(shm::PortInstance port);
   // Throws NotYet.
   void require_not_changing(const Source& source) const;
   // Calls `changed` once another page is in force, which `user` may be given, or nobody; not if the

@@ -142,7 +142,7 @@ void Daemon::drop(ClientId id) {
   if (!client->name.empty() && !client->is_turned_away) log_end_of(*client, is_away);
   switchboard_.lose_taps(*client, is_away);
   if (is_away) takeover_.set_away(*client);
-  while (!client->ports.empty()) switchboard_.remove(*client->ports.begin());
+  while (!client->ports.empty()) remove_port(*client->ports.begin());
   for (const shm::PortInstance port : client->to_hand_back) switchboard_.forget_away(port);
   observers_.forget(id);
   barriers_.forget(id);

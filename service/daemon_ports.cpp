@@ -12,26 +12,58 @@
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
+namespace {
 
-void Daemon::require_free(const Client& asking, shm::PortInstance holder, const std::string& what) {
-  if (holder == 0) return;
+// How long a component waits for a port of its name that yields, and may not do so.
+constexpr shm::Nanoseconds kMaxWaitForYield = kMaxWaitForClients;
+
+}  // namespace
+
+Client* Daemon::find_holder(const Client& asking, shm::PortInstance holder) {
+  if (holder == 0) return nullptr;
   Client* client = nullptr;
   if (const auto* output = switchboard_.output(holder)) client = output->client;
   if (const auto* input = switchboard_.input(holder)) client = input->client;
-  if (client == nullptr) return;
-  if (client != &asking) {
-    if (client->has_died()) {
-      drop(client->id());
-      return;
-    }
-    // What others sent earlier may come later, for each has a socket of its own.
-    client->read_ahead();
-    if (client->take_closing_of(holder)) {
-      switchboard_.remove(holder);
-      return;
-    }
+  if (client == nullptr || client == &asking) return client;
+  if (client->has_died()) {
+    drop(client->id());
+    return nullptr;
   }
-  throw std::runtime_error(what + " is held by " + client->description());
+  // What others sent earlier may come later, for each has a socket of its own.
+  client->read_ahead();
+  if (!client->take_closing_of(holder)) return client;
+  remove_port(holder);
+  return nullptr;
+}
+
+void Daemon::require_free(const Client& asking, shm::PortInstance holder, const std::string& what) {
+  const Client* const client = find_holder(asking, holder);
+  if (client != nullptr) throw std::runtime_error(what + " is held by " + client->description());
+}
+
+// The port is asked once, however many want its name and however often. The name is promised to
+// them, or a holder that closes its port and asks again at once would have it before they do.
+void Daemon::require_yielded(const Client& asking, Source& source, bool yields) {
+  const std::string what = "the output port " + source.name;
+  const shm::Nanoseconds now = shm::monotonic_now();
+  Client* const holder = find_holder(asking, source.open);
+  if (holder == nullptr) {
+    if (!yields || now >= source.promised_until) return;
+    throw std::runtime_error(what + " yields to a component that has asked for it");
+  }
+  const std::string why = what + " is held by " + holder->description();
+  const bool may_wait = switchboard_.output(source.open)->yields && !yields && holder != &asking;
+  if (!may_wait) throw std::runtime_error(why);
+  source.promised_until = now + kMaxWaitForYield;
+  switchboard_.ask_to_yield(source.open, asking.description());
+  throw NotYet(why, source.promised_until);
+}
+
+// Somebody may wait for its name.
+void Daemon::remove_port(shm::PortInstance port) {
+  const OutputPort* const output = switchboard_.output(port);
+  if (output != nullptr && output->is_asked_to_yield) try_postponed_ = true;
+  switchboard_.remove(port);
 }
 
 void Daemon::open_output(Client& client, wire::Received& received) {
@@ -42,7 +74,7 @@ void Daemon::open_output(Client& client, wire::Received& received) {
   port->charge = shares_.take(client.user(), Share::kDescriptors, kDescriptorsOfOutput);
   Source& source = names_.source(name, client.user());
   names_.let_go(source);  // if it is not opened after all
-  require_free(client, source.open, "the output port " + name);
+  require_yielded(client, source, port->yields);
   takeover_.require_not_kept(source.away, "the output port " + name);
   require_not_changing(source);
   if (!source.has_page()) {  // its last publisher has ended, and nobody has handed it back
@@ -66,6 +98,7 @@ void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_p
   const auto why_no_replay = gate_.why_not(client, Action::kReplay, source.name);
   takeover_.remember_component(client);
   names_.give_page(source, client.user());
+  source.promised_until = 0;
   const OutputPort& opened = switchboard_.add(std::move(port), client, source);
   auto reply = reply_to(request, wire::MessageKind::kOpened);
   reply.port = opened.instance;
@@ -113,7 +146,7 @@ void Daemon::close_port(const Client& client, shm::PortInstance port) {
     log_event({EventKind::kClosed, {client.name}, {}, {input->name->name}}, log::level::info,
               "{} closed input port {}", client.description(), input->name->name);
   }
-  switchboard_.remove(port);
+  remove_port(port);
 }
 
 // A tap is told by those whom it taps, before its program is told that it is open.

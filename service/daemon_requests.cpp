@@ -6,6 +6,7 @@
 #include "service/daemon.hpp"
 #include "service/log/event.hpp"
 #include "service/log/log.hpp"
+#include "service/policy/users.hpp"
 #include "service/status.hpp"
 #include "shm/assertion.hpp"
 #include "shm/clock.hpp"
@@ -34,7 +35,7 @@ bool is_question(wire::MessageKind kind) {
          kind == MessageKind::kReload || kind == MessageKind::kStatus ||
          kind == MessageKind::kDeactivate || kind == MessageKind::kObserve ||
          kind == MessageKind::kSwitch || kind == MessageKind::kRollback ||
-         kind == MessageKind::kModel;
+         kind == MessageKind::kModel || kind == MessageKind::kMay;
 }
 
 }  // namespace
@@ -83,6 +84,10 @@ void Daemon::handle(Client& client, wire::Received& received) {
     case wire::MessageKind::kModel:
       gate_.require(client, Action::kObserve);
       send_model(client, message.request);
+      break;
+    case wire::MessageKind::kMay:
+      gate_.require(client, Action::kObserve);
+      say_whether_may(client, message);
       break;
     case wire::MessageKind::kDeactivate:
       deactivate(client, message);
@@ -158,8 +163,7 @@ bool Daemon::change_model(Client& client, const wire::Message& message) {
       return true;
     case wire::MessageKind::kSwitch:
       gate_.require(client, Action::kSwitch);
-      changes_.ask({Change::Kind::kSwitch, std::string(message.name_view()), 0, {}, {}}, client,
-                   message);
+      ask_for_switch(client, message);
       return true;
     case wire::MessageKind::kRollback:
       gate_.require(client, Action::kReload);
@@ -167,6 +171,15 @@ bool Daemon::change_model(Client& client, const wire::Message& message) {
       return true;
     default:
       return false;
+  }
+}
+
+void Daemon::ask_for_switch(Client& client, const wire::Message& message) {
+  Change change{Change::Kind::kSwitch, std::string(message.name_view()), 0, {}, {}};
+  if ((message.flags & wire::kDryRun) != 0) {
+    changes_.ask_ahead(std::move(change), client, message);
+  } else {
+    changes_.ask(std::move(change), client, message);
   }
 }
 
@@ -204,6 +217,15 @@ void Daemon::welcome(Client& client) {
   takeover_.know(client);
   client.send(welcome, {board_.readable().get(), registry_.readable().get()});
   log::debug("{} is here", client.description());
+}
+
+// For a program that lets others look through it, such as a link.
+void Daemon::say_whether_may(Client& client, const wire::Message& message) {
+  const std::string name(message.name_view());
+  const auto action = action_on_no_port(name);
+  if (!action) throw std::runtime_error("there is no action \"" + shm::printable(name) + '"');
+  gate_.require(identity_of(message.value, message.text_view()), *action);
+  client.send(reply_to(message.request, wire::MessageKind::kDone));
 }
 
 // One document for all who have asked by now.

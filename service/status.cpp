@@ -171,11 +171,13 @@ class Document {
     for (const Tap* tap : of_.switchboard.taps_of(output.instance)) {
       taps.push_back(component_of(*tap->client));
     }
-    return {component_of(*output.client), std::move(taps),        type_of(output.type),
-            read(counters.published),     read(counters.signals), read(counters.delivered),
-            read(counters.discarded),     read(counters.refused), read(counters.blind),
-            read(counters.unsettled),     read(counters.no_slot), read(counters.late),
-            text_of(output.described)};
+    return {component_of(*output.client), std::move(taps),
+            type_of(output.type),         output.type.size,
+            read(counters.published),     read(counters.signals),
+            read(counters.delivered),     read(counters.discarded),
+            read(counters.refused),       read(counters.blind),
+            read(counters.unsettled),     read(counters.no_slot),
+            read(counters.late),          text_of(output.described)};
   }
 
   wire::InputStatus input(const InputName& name) {

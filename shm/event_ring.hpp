@@ -63,7 +63,7 @@ class EventWriter {
   // the event's number sees what was stored before it, and the sample. SYNC POINT:
   // event-overwritten. The release fence pairs with the acquire fence there: who has read a word of
   // this event in the place of an older one sees the number changed.
-  void write(const EventRecord& record) noexcept {
+  void write(const EventRecord& record, const SampleOrigin& origin = {}) noexcept {
     Event& event = segment_->events[next_ & (shape_.events - 1)];
     event.number.store(2 * next_ + 1, std::memory_order_relaxed);
     release_fence();
@@ -72,8 +72,13 @@ class EventWriter {
     event.sample.store(record.sample, std::memory_order_relaxed);
     event.activity.store(record.activity, std::memory_order_relaxed);
     event.generation.store(record.generation, std::memory_order_relaxed);
-    event.revision_and_kind.store(record.revision << 8 | static_cast<std::uint8_t>(record.kind),
-                                  std::memory_order_relaxed);
+    std::uint64_t revision_and_kind = record.revision << 8 | static_cast<std::uint8_t>(record.kind);
+    if (origin.publisher != 0) [[unlikely]] {
+      revision_and_kind |= kHasOrigin;
+      event.origin_publisher.store(origin.publisher, std::memory_order_relaxed);
+      event.origin_sequence.store(origin.sequence, std::memory_order_relaxed);
+    }
+    event.revision_and_kind.store(revision_and_kind, std::memory_order_relaxed);
     event.accepted.store(is_state ? record.joined : record.masks.accepted,
                          std::memory_order_relaxed);
     event.discarded.store(record.masks.discarded, std::memory_order_relaxed);
@@ -121,7 +126,7 @@ class EventReader {
       // SYNC POINT: event-written (see EventWriter::write()).
       std::uint64_t number = event.number.load(std::memory_order_acquire);
       if (number == 2 * next) {
-        copy(event, record);
+        copy(event, record, origin_);
         acquire_fence();  // SYNC POINT: event-overwritten (see EventWriter::write())
         const std::uint64_t again = event.number.load(std::memory_order_relaxed);
         if (again == number) {
@@ -142,6 +147,9 @@ class EventReader {
     return Found::kNothing;
   }
 
+  // Where the arrival began that read() gave last.
+  [[nodiscard]] const SampleOrigin& origin() const noexcept { return origin_; }
+
   // Announces a hold on a sample that an event told of. False: it is not kept any more. SYNC POINT:
   // kept-sample-held. Fence (e) pairs with fence (b) in OutputCore::acquire_slot(). The release is
   // that of `slot-released`, as in ChannelReader::hold().
@@ -160,15 +168,20 @@ class EventReader {
  private:
   static constexpr int kMaxTries = 64;
 
-  static void copy(const Event& event, EventRecord& record) noexcept {
+  static void copy(const Event& event, EventRecord& record, SampleOrigin& origin) noexcept {
     const std::uint64_t revision_and_kind = event.revision_and_kind.load(std::memory_order_relaxed);
-    record.kind = static_cast<EventKind>(revision_and_kind & 0xff);
+    record.kind = static_cast<EventKind>(revision_and_kind & (kHasOrigin - 1));
     record.revision = revision_and_kind >> 8;
     record.time = event.time.load(std::memory_order_relaxed);
     record.sample = event.sample.load(std::memory_order_relaxed);
     record.activity = event.activity.load(std::memory_order_relaxed);
     record.generation = event.generation.load(std::memory_order_relaxed);
     record.size = event.size.load(std::memory_order_relaxed);
+    origin = {};
+    if ((revision_and_kind & kHasOrigin) != 0) {
+      origin = {event.origin_publisher.load(std::memory_order_relaxed),
+                event.origin_sequence.load(std::memory_order_relaxed)};
+    }
     record.joined = event.accepted.load(std::memory_order_relaxed);
     record.masks = {record.joined, event.discarded.load(std::memory_order_relaxed),
                     event.refused.load(std::memory_order_relaxed),
@@ -181,6 +194,7 @@ class EventReader {
   std::uint64_t link_ = 0;
   EventShape shape_;
   std::uint64_t next_ = 0;  // number of the next event; 0: not joined yet
+  SampleOrigin origin_;
 };
 
 }  // namespace arbiter::shm

@@ -55,6 +55,9 @@ struct EventRecord {
   Masks masks;
 };
 
+// The event says where it began; others leave what an older one has said there.
+inline constexpr std::uint64_t kHasOrigin = 0x80;
+
 // No slot: of these there are fewer (kMaxSlots).
 inline constexpr std::uint32_t kNoSampleSlot = 0xffff;
 static_assert(kMaxSlots <= kNoSampleSlot);
@@ -66,12 +69,14 @@ struct alignas(2 * kCacheLine) Event {
   Atomic<Entry> sample;
   Atomic<ActivityWord> activity;
   Atomic<std::uint64_t> generation;
-  Atomic<std::uint64_t> revision_and_kind;  // the kind in the lowest eight bits
+  Atomic<std::uint64_t> revision_and_kind;  // the kind in the lowest seven bits, then kHasOrigin
   Atomic<std::uint64_t> accepted;           // of a state: the tap's link
   Atomic<std::uint64_t> discarded;
   Atomic<std::uint64_t> refused;
   Atomic<std::uint64_t> blind;
   Atomic<std::uint64_t> size;
+  Atomic<std::uint64_t> origin_publisher;  // only with kHasOrigin, as the next
+  Atomic<std::uint64_t> origin_sequence;
 };
 static_assert(sizeof(Event) == 2 * kCacheLine);
 
@@ -108,7 +113,7 @@ struct EventShape {
 
 struct EventHeader {
   static constexpr std::uint64_t kMagic = 0x31747665'74696272;
-  static constexpr std::uint32_t kVersion = 1;
+  static constexpr std::uint32_t kVersion = 2;
 
   std::uint64_t magic;
   std::uint32_t version;

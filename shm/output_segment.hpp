@@ -40,12 +40,38 @@ constexpr std::uint32_t slot_of(Entry entry) noexcept {
   return static_cast<std::uint32_t>(entry & ((1u << kSlotBits) - 1));
 }
 
+// Where a sample began that its publisher passes on: one life of a source on another host, and the
+// sample's sequence there. `publisher` 0: it began here.
+struct SampleOrigin {
+  std::uint64_t publisher = 0;
+  std::uint64_t sequence = 0;
+};
+
 // A line of its own: a receiver reads one while the publisher writes the next.
 struct alignas(kCacheLine) SlotHeader {
   Atomic<std::uint64_t> sequence;  // of the source: counts its samples from 1
   Atomic<Nanoseconds> stamp;       // arrival time
   Atomic<std::uint64_t> size;      // bytes of the sample
+  // Only samples that are passed on write these. So they say of which sample they are, by its
+  // sequence: another one has no origin.
+  Atomic<std::uint64_t> origin_of;
+  Atomic<std::uint64_t> origin_publisher;
+  Atomic<std::uint64_t> origin_sequence;
+
+  // Relaxed is enough for both: the slot's samples are ordered by its entries (channel.hpp).
+  void set_origin(std::uint64_t of, SampleOrigin origin) noexcept {
+    origin_of.store(of, std::memory_order_relaxed);
+    origin_publisher.store(origin.publisher, std::memory_order_relaxed);
+    origin_sequence.store(origin.sequence, std::memory_order_relaxed);
+  }
+  [[nodiscard]] SampleOrigin origin() const noexcept {
+    const std::uint64_t of = origin_of.load(std::memory_order_relaxed);
+    if (of == 0 || of != sequence.load(std::memory_order_relaxed)) return {};
+    return {origin_publisher.load(std::memory_order_relaxed),
+            origin_sequence.load(std::memory_order_relaxed)};
+  }
 };
+static_assert(sizeof(SlotHeader) == kCacheLine);
 
 // Written by the publisher. `receiver` is the number of the link whose queue this is (the daemon
 // gives each another); it is written last when an input port joins and first, to 0, when it leaves
@@ -81,7 +107,7 @@ struct OutputCounters {
 
 struct OutputHeader {
   static constexpr std::uint64_t kMagic = 0x31747562'74696272;
-  static constexpr std::uint32_t kVersion = 2;
+  static constexpr std::uint32_t kVersion = 3;
 
   std::uint64_t magic;
   std::uint32_t version;

@@ -43,7 +43,7 @@ enum class MessageKind : std::uint32_t {
                // the node it was welcomed as before, or 0; if it rejoins, descriptors: board,
                // registry. One that was here and does not rejoin has nothing left of what it was;
                // descriptor: the board, of which the number is
-  kOpenOutput,   // name, type; descriptor: its segment
+  kOpenOutput,   // name, type, flags (kYields); descriptor: its segment
   kOpenInput,    // name, type; descriptors: its segment, its bell
   kClosePort,    // port
   kSynced,       // request: that of the kSync
@@ -57,7 +57,8 @@ enum class MessageKind : std::uint32_t {
   kSwitch,       // name: a model that is loaded; kDone (value: the generation) in force
   kRollback,     // link: a generation of the history, 0: the one before; as kReload
   kHandBackPage = 40,  // id, value: its number; descriptor: an activity page of a source
-  kHandBackOutput,     // port, id = source, type; descriptors: its segment, its page
+  kHandBackOutput,     // port, id = source, type, flags (kYields); descriptors: its segment, its
+                       // page
   kHandBackInput,      // port, id = port id, type; descriptors: its segment, its bell
   kHandBackLink,       // port, peer; link: its number, 0 if not connected
   kHandedBack,         // that was all
@@ -70,6 +71,8 @@ enum class MessageKind : std::uint32_t {
   // again
   kTapped,    // answers kTap. port, peer; link, value: where the tap reads; descriptor: the events
   kDescribe,  // port, text: what stands behind it, for the status; empty: nothing
+  kMay = 60,  // value: a user; text: its groups, numbers between blanks; name: an action that is
+              // about no port. kDone: the policy allows it; kRefused, text: why not
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; peer: the daemon's clock, 0 if it does not say;
@@ -104,6 +107,7 @@ enum class MessageKind : std::uint32_t {
                // segment of the output port, its events
   kTapInput,   // to tap `port` of an input port: peer has that open, name; descriptor: its segment
   kMeasure,    // to input `port`, which is tapped: value 1: count how long samples wait; 0: no more
+  kYield,      // to output `port`, which yields: a component asks for its name, once; text: which
 };
 
 enum MessageFlag : std::uint32_t {
@@ -112,11 +116,12 @@ enum MessageFlag : std::uint32_t {
   kComesBack = 4,        // the client will rejoin if the conversation is lost
   kRejoins = 8,          // it does so now; or the tap was opened by another daemon
   kWantsReport = 16,     // of a change of the model: kReport is the answer, whatever comes of it
-  kDryRun = 32,          // of a reload: only say what it would do
+  kDryRun = 32,          // of a reload: only say what it would do; of a switch: whether it would be
   kMayReplay = 64,       // the output port may be given times of arrival (Action::kReplay)
   kTapsInput = 128,      // the tap is of an input port: of all sources that are connected to it
   kIsPrivileged = 256,   // the tap is root's, or of the daemon's own user
   kTellsActivity = 512,  // else the daemon does not know it
+  kYields = 1024,        // the output port gives way to one of its name that does not
 };
 
 struct Message {

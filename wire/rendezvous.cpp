@@ -21,6 +21,10 @@ namespace arbiter::wire {
 namespace {
 
 constexpr const char* kSystemDirectory = "/run/arbiter";
+// Of the link's service, which has a user of its own.
+constexpr const char* kLinkDirectory = "/run/arbiter-link";
+constexpr const char* kSocketEnding = ".sock";
+constexpr const char* kLinkEnding = ".link";
 
 std::string environment(const char* name) {
   const char* value = std::getenv(name);
@@ -105,13 +109,13 @@ shm::FileDescriptor make_socket() {
   return made;
 }
 
-// Whether root has given the system's directory to `user`: nobody else can make it in /run. So a
-// daemon of a dynamic user is known as the system's where no name service knows that user.
-bool has_system_directory(uid_t user) {
+// Whether root has given that directory of the system to `user`: nobody else can make it in /run.
+// So a daemon of a dynamic user is known as the system's where no name service knows that user.
+bool has_system_directory(uid_t user, const std::string& directory) {
   struct stat parent {};
   struct stat status {};
   return lstat("/run", &parent) == 0 && parent.st_uid == 0 &&
-         (parent.st_mode & (S_IWGRP | S_IWOTH)) == 0 && lstat(kSystemDirectory, &status) == 0 &&
+         (parent.st_mode & (S_IWGRP | S_IWOTH)) == 0 && lstat(directory.c_str(), &status) == 0 &&
          S_ISDIR(status.st_mode) && status.st_uid == user &&
          (status.st_mode & (S_IWGRP | S_IWOTH)) == 0;
 }
@@ -119,7 +123,8 @@ bool has_system_directory(uid_t user) {
 // As far as no name service needs to be asked.
 bool is_surely_trusted(uid_t user, const std::string& directory) {
   return user == 0 || user == geteuid() ||
-         (directory == kSystemDirectory && has_system_directory(user));
+         ((directory == kSystemDirectory || directory == kLinkDirectory) &&
+          has_system_directory(user, directory));
 }
 
 bool is_trusted(uid_t user, const std::string& directory) {
@@ -154,15 +159,15 @@ const char* why_not_connected(int error) {
   return described == nullptr ? "it cannot be connected to" : described;
 }
 
-void pass_over(const std::string& directory, const std::string& instance, const char* why,
+void pass_over(const std::string& directory, const std::string& file, const char* why,
                std::string& why_not) {
   why_not.append(why_not.empty() ? "tried " : ", ");
-  why_not.append(directory).append("/").append(instance).append(".sock: ").append(why);
+  why_not.append(directory).append("/").append(file).append(": ").append(why);
 }
 
-// The daemon of the instance that listens in the directory, if it is trusted.
-std::optional<shm::FileDescriptor> connect_in(const std::string& directory,
-                                              const std::string& instance, std::string& why_not) {
+// Who listens at that file of the directory, if it is trusted. `who`: "daemon", "link".
+std::optional<shm::FileDescriptor> connect_in(const std::string& directory, const std::string& file,
+                                              const char* who, std::string& why_not) {
   // Not even connected to: who listens there could let nobody in, for a second each time.
   if (const auto stranger = stranger_who_owns(directory)) {
     char why[112];
@@ -170,28 +175,28 @@ std::optional<shm::FileDescriptor> connect_in(const std::string& directory,
         why, sizeof why,
         "that directory belongs to user %u, who is neither root, nor \"arbiter\", nor you",
         *stranger);
-    pass_over(directory, instance, why, why_not);
+    pass_over(directory, file, why, why_not);
     return {};
   }
   shm::FileDescriptor socket = make_socket();
-  const Address at = address_of(directory, instance + ".sock");
+  const Address at = address_of(directory, file);
   const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
   if (connect(socket.get(), address, sizeof at.address) != 0) {
-    pass_over(directory, instance, why_not_connected(errno), why_not);
+    pass_over(directory, file, why_not_connected(errno), why_not);
     return {};
   }
   ucred peer{};
   socklen_t size = sizeof peer;
   if (getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
-    pass_over(directory, instance, "it is not known whose daemon that is", why_not);
+    pass_over(directory, file, "it is not known whose that is", why_not);
     return {};
   }
   if (is_trusted(peer.uid, directory)) return socket;
   char why[96];
   std::snprintf(why, sizeof why,
-                "that daemon runs as user %u, who is neither root, nor \"arbiter\", nor you",
+                "that %s runs as user %u, who is neither root, nor \"arbiter\", nor you", who,
                 peer.uid);
-  pass_over(directory, instance, why, why_not);
+  pass_over(directory, file, why, why_not);
   return {};
 }
 
@@ -269,19 +274,24 @@ std::vector<std::string> client_directories() {
   return directories;
 }
 
-Listener listen_at(const std::string& directory, const std::string& instance) {
+namespace {
+
+// `who`: "a daemon", "a link".
+Listener listen_as(const std::string& directory, const std::string& instance,
+                   const std::string& ending, const std::string& lock_ending, const char* who) {
   Listener listener;
-  listener.path = directory + "/" + instance + ".sock";
-  const std::string lock_path = directory + "/" + instance + ".lock";
+  listener.path = directory + "/" + instance + ending;
+  const std::string lock_path = directory + "/" + instance + lock_ending;
   listener.lock.reset(open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
   if (!listener.lock) fail("cannot open " + lock_path);
   if (flock(listener.lock.get(), LOCK_EX | LOCK_NB) != 0) {
-    throw std::runtime_error("a daemon of instance \"" + instance + "\" is running already (" +
-                             listener.path + "); choose another name with --instance");
+    throw std::runtime_error(std::string(who) + " of instance \"" + instance +
+                             "\" is running already (" + listener.path +
+                             "); choose another name with --instance");
   }
-  unlink(listener.path.c_str());  // left by a daemon that was killed: the lock says nobody has it
+  unlink(listener.path.c_str());  // left by one that was killed: the lock says nobody has it
   listener.socket = make_socket();
-  const Address at = address_of(directory, instance + ".sock");
+  const Address at = address_of(directory, instance + ending);
   const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
   if (bind(listener.socket.get(), address, sizeof at.address) != 0) {
     fail("cannot listen at " + listener.path);
@@ -291,11 +301,21 @@ Listener listen_at(const std::string& directory, const std::string& instance) {
   return listener;
 }
 
+}  // namespace
+
+Listener listen_at(const std::string& directory, const std::string& instance) {
+  return listen_as(directory, instance, kSocketEnding, ".lock", "a daemon");
+}
+
+Listener listen_as_link(const std::string& directory, const std::string& instance) {
+  return listen_as(directory, instance, kLinkEnding, ".link-lock", "a link");
+}
+
 std::optional<shm::FileDescriptor> connect_to_daemon(const std::string& instance,
                                                      std::string& why_not, std::string* found_in) {
   why_not.clear();
   const auto try_in = [&](const std::string& directory) {
-    auto socket = connect_in(directory, instance, why_not);
+    auto socket = connect_in(directory, instance + kSocketEnding, "daemon", why_not);
     if (socket && found_in != nullptr) *found_in = directory;
     return socket;
   };
@@ -306,6 +326,17 @@ std::optional<shm::FileDescriptor> connect_to_daemon(const std::string& instance
   const auto last = last_directory();
   const bool is_new = last && std::find(usual.begin(), usual.end(), *last) == usual.end();
   return is_new ? try_in(*last) : std::nullopt;
+}
+
+std::optional<shm::FileDescriptor> connect_to_link(const std::string& instance,
+                                                   std::string& why_not) {
+  why_not.clear();
+  std::vector<std::string> directories = usual_directories();
+  directories.emplace_back(kLinkDirectory);
+  for (const std::string& directory : directories) {
+    if (auto socket = connect_in(directory, instance + kLinkEnding, "link", why_not)) return socket;
+  }
+  return std::nullopt;
 }
 
 std::vector<std::string> other_daemons(const std::string& instance, const std::string& directory) {
@@ -325,7 +356,7 @@ std::vector<std::string> other_daemons(const std::string& instance, const std::s
     if (is_known) continue;
     try {
       std::string why_not;
-      if (connect_in(other, instance, why_not)) known.push_back(path);
+      if (connect_in(other, instance + kSocketEnding, "daemon", why_not)) known.push_back(path);
     } catch (const std::exception&) {  // no descriptor is left: that is told where one is needed
     }
   }

@@ -37,6 +37,10 @@ struct Listener {
 };
 Listener listen_at(const std::string& directory, const std::string& instance);
 
+// The same for the instance's link, at DIRECTORY/INSTANCE.link: in daemon_directory(), which for
+// the service is /run/arbiter-link.
+Listener listen_as_link(const std::string& directory, const std::string& instance);
+
 // Connects to the instance's daemon, if one listens in any of the directories. One is trusted that
 // runs as root, as the user `arbiter`, as this user, or, in /run/arbiter, as the user to whom root
 // has given that directory. Where there is none, `why_not` lists the sockets that were tried, each
@@ -45,6 +49,11 @@ Listener listen_at(const std::string& directory, const std::string& instance);
 std::optional<shm::FileDescriptor> connect_to_daemon(const std::string& instance,
                                                      std::string& why_not,
                                                      std::string* directory = nullptr);
+
+// Likewise to the instance's link, which is trusted as a daemon is; in /run/arbiter-link, as the
+// user to whom root has given that.
+std::optional<shm::FileDescriptor> connect_to_link(const std::string& instance,
+                                                   std::string& why_not);
 
 // The sockets of trusted daemons of the instance that listen elsewhere than in `directory`: whose
 // environment is another meets them, and shares nothing with who meets here. Not looked for in

@@ -112,6 +112,7 @@ void describe(auto& field, Is<OpenOutput> auto& of) {
   field("component", of.component);
   field("taps", of.taps);
   field("type", of.type);
+  field("max_size", of.max_size);
   field.counter("published", of.published);
   field.counter("signals", of.signals);
   field.counter("delivered", of.delivered);

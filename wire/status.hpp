@@ -88,6 +88,7 @@ struct OpenOutput {
   Component component;
   std::vector<Component> taps;     // who watches it
   std::optional<SampleType> type;  // none: untyped
+  std::uint64_t max_size = 0;      // bytes of the largest sample
   std::uint64_t published = 0;
   std::uint64_t signals = 0;
   std::uint64_t delivered = 0;

@@ -10,10 +10,14 @@ struct HeaderInFile {
   std::uint64_t sequence;
   shm::Nanoseconds stamp;
   std::uint64_t size;
+  std::uint64_t origin_of;
+  shm::SampleOrigin origin;
 };
 static_assert(offsetof(shm::SlotHeader, sequence) == offsetof(HeaderInFile, sequence));
 static_assert(offsetof(shm::SlotHeader, stamp) == offsetof(HeaderInFile, stamp));
 static_assert(offsetof(shm::SlotHeader, size) == offsetof(HeaderInFile, size));
+static_assert(offsetof(shm::SlotHeader, origin_of) == offsetof(HeaderInFile, origin_of));
+static_assert(offsetof(shm::SlotHeader, origin_publisher) == offsetof(HeaderInFile, origin));
 
 }  // namespace
 
@@ -38,6 +42,8 @@ bool Copies::copy(const OutputPeer& from, std::uint32_t slot, bool has_one_size,
     return false;
   }
   sample = {header.sequence, header.stamp, size, data};
+  const bool has_origin = header.origin_of != 0 && header.origin_of == header.sequence;
+  origins_[number] = has_origin ? header.origin : shm::SampleOrigin{};
   return true;
 }
 

@@ -34,6 +34,10 @@ class Copies {
   // for it, or it is too large. Two system calls.
   [[nodiscard]] bool copy(const OutputPeer& from, std::uint32_t slot, bool has_one_size,
                           std::uint32_t number, CopiedSample& sample) noexcept;
+  // Where the sample began that was copied last by that number.
+  [[nodiscard]] shm::SampleOrigin origin(std::uint32_t number) const noexcept {
+    return origins_[number];
+  }
   // Frees what is not in use.
   void forget(std::uint32_t number) noexcept { data_[number].reset(); }
 
@@ -42,6 +46,7 @@ class Copies {
     void operator()(std::byte* data) const noexcept { std::free(data); }  // NOLINT: aligned_alloc()
   };
   std::array<std::unique_ptr<std::byte, Free>, shm::kMaxHeld> data_;
+  std::array<shm::SampleOrigin, shm::kMaxHeld> origins_;
 };
 
 }  // namespace arbiter::detail

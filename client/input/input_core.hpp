@@ -82,6 +82,8 @@ class InputCore {
     return held_from_[hold]->type;
   }
 
+  [[nodiscard]] shm::SampleOrigin origin_of_held(std::uint32_t hold) const noexcept;
+
   // Either.
 
   [[nodiscard]] shm::PortId port() const noexcept { return port_; }

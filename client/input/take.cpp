@@ -344,6 +344,16 @@ void InputCore::give_back(std::uint32_t hold) noexcept {
   if (!lingering_.empty()) let_go_of(from);
 }
 
+// A slot that was copied may be known to be allocated by now: what is held stays as it is.
+shm::SampleOrigin InputCore::origin_of_held(std::uint32_t hold) const noexcept {
+  const OutputPeer& from = *held_from_[hold];
+  // Relaxed is enough: our own store.
+  const std::uint32_t slot =
+      shm::slot_of(segment_->header.holds[hold].load(std::memory_order_relaxed));
+  const bool is_allocated = slot < from.allocated_slots.load(std::memory_order_relaxed);
+  return is_allocated ? from.segment.slot_header(slot).origin() : copies_.origin(hold);
+}
+
 // Of a publisher that is gone, with its last sample. The service thread unmaps it.
 void InputCore::let_go_of(const OutputPeer* peer) noexcept {
   if (peer->held != 0) return;

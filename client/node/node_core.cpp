@@ -303,6 +303,7 @@ std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const T
     core->process = process_;
     wire::Message question = message_of(wire::MessageKind::kOpenOutput, name);
     question.type = core->type();
+    question.flags = options.yields ? wire::kYields : 0u;
     converse(question, {core->segment_descriptor().get(), -1}, memory.get(),
              [&](wire::Received& opened) {
                const wire::Message& said = opened.message;

@@ -144,6 +144,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void refuse_peer(const wire::Message& announced, const std::string& why);
   void handle_refusal(const wire::Message& refusal);
   void handle_unmentioned(const wire::Message& message);
+  void handle_yield(const wire::Message& message);
   void add_page(wire::Received& received);
   void note_unseen(const std::string& source, const std::string& why);
   void make_tables_resident();

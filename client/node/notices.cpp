@@ -140,4 +140,13 @@ void NodeCore::handle_unmentioned(const wire::Message& message) {
   note(NoticeKind::unmentioned, message.port, {}, std::string(message.text_view()));
 }
 
+void NodeCore::handle_yield(const wire::Message& message) {
+  const std::lock_guard lock(mutex_);
+  const auto output = outputs_.find(message.port);
+  if (output == outputs_.end() || !output->second->yields()) return;
+  output->second->ask_to_yield();
+  note(NoticeKind::asked_to_yield, message.port, {},
+       output->second->name() + " is asked to yield to " + std::string(message.text_view()));
+}
+
 }  // namespace arbiter::detail

@@ -124,6 +124,7 @@ void NodeCore::rejoin() {
     for (const auto& [instance, core] : outputs_) {
       ports.push_back(port_at_hand(wire::MessageKind::kHandBackOutput, *core, core->source(),
                                    core->page_descriptor()));
+      if (core->yields()) ports.back().message.flags = wire::kYields;
     }
     for (const auto& [instance, core] : inputs_) {
       core->set_measured(false);  // unless the next daemon says so

@@ -250,6 +250,9 @@ void NodeCore::handle(wire::Received& received) {
     case wire::MessageKind::kUnmentioned:
       handle_unmentioned(message);
       break;
+    case wire::MessageKind::kYield:
+      handle_yield(message);
+      break;
     case wire::MessageKind::kSync: {
       make_tables_resident();
       wire::Message synced;

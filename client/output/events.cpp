@@ -212,9 +212,9 @@ void EventTeller::accept(const TapView& view, shm::EventRecord state, shm::SlotP
   }
 }
 
-void EventTeller::tell(shm::EventRecord& record) noexcept {
+void EventTeller::tell(shm::EventRecord& record, const shm::SampleOrigin& origin) noexcept {
   record.revision = revision_;
-  writer_->write(record);
+  writer_->write(record, origin);
   if (has_sleepers_) ring_sleepers();
 }
 

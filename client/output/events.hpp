@@ -98,7 +98,7 @@ class EventTeller {
   // is asked for a slot.
   void accept(const TapView& view, shm::EventRecord state, shm::SlotPool& pool);
   // Writes an event, with the list that is in force.
-  void tell(shm::EventRecord& record) noexcept;
+  void tell(shm::EventRecord& record, const shm::SampleOrigin& origin = {}) noexcept;
   // Keeps a sample; returns the slot of the one that gave way to it, or kNoSlot.
   [[nodiscard]] std::uint32_t keep(shm::Entry sample) noexcept { return writer_->keep(sample); }
   // Of an arrival under way: `mask` has refused it because its queue is full.

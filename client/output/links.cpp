@@ -40,7 +40,8 @@ OutputCore::OutputCore(std::string name, const Type& type, const OutputPortOptio
       max_loans_(options.max_loans),
       memory_(std::move(memory)),
       slots_of_components_(reserved_slots(type_, options)),
-      slots_of_taps_(slots_for_taps(stride_of(type_), slots_of_components_)) {
+      slots_of_taps_(slots_for_taps(stride_of(type_), slots_of_components_)),
+      yields_(options.yields) {
   const auto layout = shm::OutputLayout::plan(type_, slots_of_components_ + slots_of_taps_);
   descriptor_ = shm::make_segment("arbiter-output", layout.total_size);
   mapping_ = shm::Mapping(descriptor_, layout.total_size, shm::Access::kReadWrite);

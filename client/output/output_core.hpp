@@ -91,6 +91,16 @@ class OutputCore {
   Outcome publish_copy_by(shm::Nanoseconds deadline, const void* data, std::size_t size,
                           shm::Nanoseconds now) noexcept;
   Outcome signal_by(shm::Nanoseconds deadline, shm::Nanoseconds now) noexcept;
+  // The same with an arrival that began elsewhere.
+  Outcome pass_on_loan(shm::SampleOrigin origin, shm::Nanoseconds deadline, std::uint32_t slot,
+                       std::size_t size, shm::Nanoseconds now) noexcept;
+  Outcome pass_on_signal(shm::SampleOrigin origin, shm::Nanoseconds deadline,
+                         shm::Nanoseconds now) noexcept;
+  // The sample of the last arrival, which was a signal: as OutputPort::publish_signalled().
+  Outcome publish_signalled(shm::SampleOrigin origin, shm::Nanoseconds deadline, std::uint32_t slot,
+                            std::size_t size, shm::Nanoseconds now) noexcept;
+  // As OutputPort::wants_samples().
+  [[nodiscard]] bool wants_samples() const noexcept;
   // For replay: the next call of those above may be given the time `at`, as if it had read the
   // clock then and had been held up until `now`. Throws Error.
   void begin_replay(shm::Nanoseconds at, shm::Nanoseconds now);
@@ -100,6 +110,12 @@ class OutputCore {
   // Either.
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] bool yields() const noexcept { return yields_; }
+  // Relaxed is enough: nothing else is read by it. The service thread alone writes it.
+  [[nodiscard]] bool asked_to_yield() const noexcept {
+    return asked_to_yield_.load(std::memory_order_relaxed);
+  }
+  void ask_to_yield() noexcept { asked_to_yield_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] shm::PortInstance instance() const noexcept { return instance_; }
   [[nodiscard]] shm::SourceId source() const noexcept { return source_; }
   [[nodiscard]] const shm::TypeInfo& type() const noexcept { return type_; }
@@ -195,6 +211,8 @@ class OutputCore {
   std::map<shm::PortInstance, InputLink> links_;
   TapSeats taps_;
   std::uint32_t allocated_slots_ = 0;
+  const bool yields_;
+  shm::Atomic<bool> asked_to_yield_{false};
 
   Handover<OutputView> handover_;
   Blindness blindness_;
@@ -214,6 +232,7 @@ class OutputCore {
   EventTeller teller_;
   std::uint32_t loans_ = 0;
   std::uint64_t sequence_ = 0;
+  shm::SampleOrigin origin_;  // of the arrival under way, where it began elsewhere
   shm::ActivityWord own_word_ = shm::kNeverActive;
   shm::Nanoseconds last_ = kUnknown;  // time of the last arrival or deactivation
   shm::Epoch bound_epoch_ = UINT64_MAX;

@@ -267,6 +267,17 @@ Counts OutputCore::publish_copy(const void* data, std::size_t size, shm::Nanosec
 
 Counts OutputCore::signal(shm::Nanoseconds now) noexcept { return arrive(shm::kNoSlot, 0, now); }
 
+bool OutputCore::wants_samples() const noexcept {
+  if (!rules_are_bound()) return true;
+  const bool is_read = std::any_of(teller_.seats().begin(), teller_.seats().end(),
+                                   [](const TapSeat& seat) { return seat.peer->max_held != 0; });
+  return is_read ||
+         std::any_of(destinations_.begin(), destinations_.end(), [&](const Destination& each) {
+           if (!each.has_rule || (!each.joined && !each.refused)) return false;
+           return each.peer->keep || decisions_[each.decision].verdict != shm::Verdict::kLoses;
+         });
+}
+
 void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
   if (!rules_are_bound()) bind_rules();

@@ -58,7 +58,7 @@ void OutputCore::tell_arrival(std::uint32_t slot) noexcept {
     const std::uint32_t evicted = teller_.keep(record.sample);
     if (evicted != shm::kNoSlot) pool_.evict(evicted);
   }
-  teller_.tell(record);
+  teller_.tell(record, origin_);
 }
 
 void OutputCore::tell_deactivation() noexcept {

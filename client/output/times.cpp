@@ -26,6 +26,54 @@ Outcome OutputCore::signal_by(shm::Nanoseconds deadline, shm::Nanoseconds now) n
   return be_late();
 }
 
+Outcome OutputCore::pass_on_loan(shm::SampleOrigin origin, shm::Nanoseconds deadline,
+                                 std::uint32_t slot, std::size_t size,
+                                 shm::Nanoseconds now) noexcept {
+  // Where it is late the number goes to another sample.
+  const std::uint64_t number = sequence_ + 1;
+  if (now <= deadline) segment_.slot_header(slot).set_origin(number, origin);
+  origin_ = origin;
+  const Outcome outcome = publish_loan_by(deadline, slot, size, now);
+  origin_ = {};
+  // Nor has it used the number where nobody is connected.
+  if (sequence_ != number) segment_.slot_header(slot).set_origin(0, {});
+  return outcome;
+}
+
+Outcome OutputCore::pass_on_signal(shm::SampleOrigin origin, shm::Nanoseconds deadline,
+                                   shm::Nanoseconds now) noexcept {
+  origin_ = origin;
+  const Outcome outcome = signal_by(deadline, now);
+  origin_ = {};
+  return outcome;
+}
+
+// It is decided for the time that it bears. Verdicts may have been found for a later one since:
+// they are forgotten.
+Outcome OutputCore::publish_signalled(shm::SampleOrigin origin, shm::Nanoseconds deadline,
+                                      std::uint32_t slot, std::size_t size,
+                                      shm::Nanoseconds now) noexcept {
+  Outcome outcome;
+  if (now > deadline || last_ == kUnknown || !shm::is_active(own_word_, now)) {
+    outcome.late = true;
+  } else {
+    if (handover_.has_offer()) accept_view();
+    bind_rules_and_view();
+    if (origin.publisher != 0) segment_.slot_header(slot).set_origin(sequence_ + 1, origin);
+    origin_ = origin;
+    if (teller_.is_on()) {
+      outcome = hand_over_and_tell(slot, size, false);
+    } else {
+      decide_all(last_);
+      outcome = hand_over(slot, size, last_);
+    }
+    origin_ = {};
+    count(segment_.header().counters.published);
+  }
+  end_loan(slot);
+  return outcome;
+}
+
 Outcome OutputCore::be_late() noexcept {
   count(segment_.header().counters.late);
   Outcome outcome;

@@ -176,6 +176,13 @@ void TapCore::fill(Stream& stream, TapEventData& event) {
   event.discarded = head.masks.discarded;
   event.refused = head.masks.refused;
   event.blind = head.masks.blind;
+  const bool is_arrival =
+      head.kind == shm::EventKind::kSample || head.kind == shm::EventKind::kSignal;
+  event.origin = {};
+  if (is_arrival && !stream.head_is_end) {
+    const shm::SampleOrigin& origin = stream.reader.origin();
+    event.origin = {origin.publisher, origin.sequence};
+  }
   event.count = 0;
   event.size = std::min<std::uint64_t>(head.size, stream.source->output->segment.layout().stride);
   event.data = nullptr;

@@ -74,7 +74,11 @@ void Gate::put_in_force(const Policy& policy) {
 
 std::optional<std::string> Gate::why_not(const Client& client, Action action,
                                          std::string_view port) const {
-  const Identity who = peer_identity(client.socket());
+  return why_not(peer_identity(client.socket()), action, port);
+}
+
+std::optional<std::string> Gate::why_not(const Identity& who, Action action,
+                                         std::string_view port) const {
   const Policy::Verdict verdict = policy_.may(who, action, port);
   if (verdict.allowed) return {};
   return "user " + describe_user(who.user) + " may not " + describe(action, port) + ": " +
@@ -83,6 +87,10 @@ std::optional<std::string> Gate::why_not(const Client& client, Action action,
 
 void Gate::require(const Client& client, Action action, std::string_view port) const {
   if (const auto why = why_not(client, action, port)) throw std::runtime_error(*why);
+}
+
+void Gate::require(const Identity& who, Action action) const {
+  if (const auto why = why_not(who, action, {})) throw std::runtime_error(*why);
 }
 
 }  // namespace arbiter::service

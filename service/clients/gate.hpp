@@ -26,8 +26,13 @@ class Gate {
                                                    std::string_view port = {}) const;
   // The same, thrown as std::runtime_error.
   void require(const Client& client, Action action, std::string_view port = {}) const;
+  // Of somebody for whom a client asks.
+  void require(const Identity& who, Action action) const;
 
  private:
+  [[nodiscard]] std::optional<std::string> why_not(const Identity& who, Action action,
+                                                   std::string_view port) const;
+
   std::optional<std::string> file_;
   Policy policy_;
 };

@@ -127,22 +127,43 @@ void ModelChanges::reserve_tables(const Library& library) {
   board_.reserve(words);
 }
 
+// The one to switch to. Throws std::runtime_error where there is none.
+const LoadedModel& ModelChanges::loaded_model(const std::string& name) const {
+  const LoadedModel* const found = library_.find(name);
+  if (found != nullptr) return *found;
+  // The name is a client's: it must not break lines.
+  throw std::runtime_error(
+      "there is no model " + (is_model_name(name) ? '"' + name + '"' : "of that name") +
+      (library_.models().empty() ? "; none is loaded" : "; there are: " + library_.names()));
+}
+
 void ModelChanges::prepare_switch(Swap& swap) {
-  const LoadedModel* const next = library_.find(swap.change.name);
-  if (next == nullptr) {
-    const std::string& name = swap.change.name;  // from a client: it must not break lines
-    throw std::runtime_error(
-        "there is no model " + (is_model_name(name) ? '"' + name + '"' : "of that name") +
-        (library_.models().empty() ? "; none is loaded" : "; there are: " + library_.names()));
-  }
-  if (next->model == in_force_.model) {
+  const LoadedModel& next = loaded_model(swap.change.name);
+  if (next.model == in_force_.model) {
     answer_done(swap, nullptr);
     return;
   }
-  swap.to = *next;
+  swap.to = next;
   swap.how = "switch";
-  swap.content = content_of(*next);
+  swap.content = content_of(next);
   begin_swap(swap);
+}
+
+// Nothing is logged: nothing happens.
+void ModelChanges::ask_ahead(Change change, const Client& client, const wire::Message& message) {
+  change.asking = {asking(client, message)};
+  Swap swap;
+  swap.change = std::move(change);
+  try {
+    static_cast<void>(loaded_model(swap.change.name));
+    if (swap_ || preparing_ || !waiting_.empty()) {
+      throw std::runtime_error("another change of the model is under way");
+    }
+  } catch (const std::runtime_error& error) {
+    answer_refused(swap, error.what());
+    return;
+  }
+  answer_done(swap, nullptr);
 }
 
 // The one to go back to. Throws std::runtime_error saying why there is none.

@@ -79,8 +79,12 @@ void ModelChanges::start(bool is_fresh) {
 
 void ModelChanges::ask(Change change, const Client& client, const wire::Message& message) {
   change.by = client.description() + ", user " + describe_user(client.user());
-  change.asking = {{client.id(), message.request, (message.flags & wire::kWantsReport) != 0}};
+  change.asking = {asking(client, message)};
   waiting_.add(std::move(change));
+}
+
+Change::Asking ModelChanges::asking(const Client& client, const wire::Message& message) {
+  return {client.id(), message.request, (message.flags & wire::kWantsReport) != 0};
 }
 
 void ModelChanges::reload_for_signal(const std::string& by) {

@@ -73,6 +73,9 @@ class ModelChanges {
 
   // Each is answered when it is over. Throws std::length_error where too many wait.
   void ask(Change change, const Client& client, const wire::Message& message);
+  // Whether a switch would be made now: answers at once, as for one, and makes none. It is refused
+  // as a switch would be, and while another change is under way.
+  void ask_ahead(Change change, const Client& client, const wire::Message& message);
   void reload_for_signal(const std::string& by);
   // Begins the next change, if one waits and no other is under way.
   void advance();
@@ -90,6 +93,7 @@ class ModelChanges {
   [[nodiscard]] const shm::FileDescriptor& document();
 
  private:
+  static Change::Asking asking(const Client& client, const wire::Message& message);
   // Calls `step`; where it throws, the change is refused.
   void attempt(Swap& swap, const std::function<void()>& step);
   // For the compiler's thread; `after_reading` may add to what was read.
@@ -102,6 +106,7 @@ class ModelChanges {
   void prepare_reload(Swap& swap);
   void finish_reload(Swap& swap, Reading reading);
   void prepare_switch(Swap& swap);
+  [[nodiscard]] const LoadedModel& loaded_model(const std::string& name) const;
   void prepare_rollback(Swap& swap);
   [[nodiscard]] const PastModel& past_model(std::uint64_t asked) const;
   void prepare_comparison(Swap& swap);

@@ -52,6 +52,9 @@ struct Accounts {
 };
 Accounts accounts_of_this_machine();
 
+// The action of that name that is about no port, such as "observe"; nothing: there is none.
+std::optional<Action> action_on_no_port(std::string_view name);
+
 class Policy {
  public:
   struct Verdict {

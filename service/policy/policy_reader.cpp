@@ -63,6 +63,13 @@ std::optional<Entry> look_up(Function function, const std::string& name) {
 
 }  // namespace
 
+std::optional<Action> action_on_no_port(std::string_view name) {
+  for (const NamedAction& each : kActions) {
+    if (each.name == name && !each.on_ports) return each.action;
+  }
+  return std::nullopt;
+}
+
 Accounts accounts_of_this_machine() {
   return {[](const std::string& name) -> std::optional<uid_t> {
             const auto entry = look_up<passwd>(getpwnam_r, name);

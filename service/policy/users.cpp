@@ -1,14 +1,17 @@
 #include "service/policy/users.hpp"
 
 #include <pwd.h>
-#include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
-#include <cerrno>
+#include <charconv>
 #include <cstdio>
 #include <memory>
-#include <system_error>
+#include <stdexcept>
+#include <utility>
 #include <vector>
+
+#include "wire/local_user.hpp"
 
 namespace arbiter::service {
 
@@ -28,22 +31,22 @@ std::string describe_user(uid_t user) {
 }
 
 Identity peer_identity(int socket) {
-  ucred peer{};
-  socklen_t size = sizeof peer;
-  if (getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
-    throw std::system_error(errno, std::generic_category(), "asking who connects");
-  }
-  Identity identity{peer.uid, std::vector<gid_t>(32)};
-  for (;;) {
-    size = static_cast<socklen_t>(identity.groups.size() * sizeof(gid_t));
-    const int result = getsockopt(socket, SOL_SOCKET, SO_PEERGROUPS, identity.groups.data(), &size);
-    if (result != 0 && errno != ERANGE) {
-      throw std::system_error(errno, std::generic_category(), "asking for a client's groups");
+  wire::LocalUser who = wire::user_at(socket);
+  return {who.user, std::move(who.groups)};
+}
+
+Identity identity_of(uid_t user, std::string_view groups) {
+  Identity identity{user, {}};
+  while (!groups.empty()) {
+    gid_t group = 0;
+    const auto [end, error] = std::from_chars(groups.data(), groups.data() + groups.size(), group);
+    const auto read = static_cast<std::size_t>(end - groups.data());
+    if (error != std::errc{} || (read != groups.size() && groups[read] != ' ')) {
+      throw std::runtime_error("the groups of a user are numbers between blanks");
     }
-    identity.groups.resize(size / sizeof(gid_t));
-    if (result == 0) break;
+    identity.groups.push_back(group);
+    groups.remove_prefix(std::min(read + 1, groups.size()));
   }
-  identity.groups.push_back(peer.gid);
   return identity;
 }
 

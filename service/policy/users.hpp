@@ -4,6 +4,7 @@
 #include <sys/types.h>
 
 #include <string>
+#include <string_view>
 
 #include "service/policy/policy.hpp"
 
@@ -13,6 +14,8 @@ namespace arbiter::service {
 // at that moment, which the kernel keeps with the socket. Nothing that a client says enters.
 // Throws std::system_error.
 Identity peer_identity(int socket);
+// Of a user whose groups are such a text: numbers between single blanks. Throws std::runtime_error.
+Identity identity_of(uid_t user, std::string_view groups);
 
 // "nobody (65534)"; the number alone where it has no name.
 std::string describe_user(uid_t user);

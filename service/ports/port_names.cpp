@@ -189,6 +189,10 @@ shm::Nanoseconds PortNames::give_back(shm::Nanoseconds now) {
   for (const shm::SourceId id : std::exchange(let_go_sources_, {})) {
     Source& source = *sources_[id];
     if (source.name.empty() || is_needed(source) || source.changing_for != 0) continue;
+    if (now < source.promised_until) {
+      running_out_.emplace(source.promised_until, id);
+      continue;
+    }
     const shm::ActivityWord word = source.has_page()
                                        ? source.activity().word.load(std::memory_order_relaxed)
                                        : shm::kNeverActive;
@@ -214,6 +218,7 @@ void PortNames::forget(Source& source) {
   source.page = {};
   source.next = {};
   source.page_user.reset();
+  source.promised_until = 0;
   source.charge = {};
   source.page_charge = {};
   source.next_charge = {};

@@ -50,6 +50,7 @@ struct Source {
   shm::PortInstance away = 0;            // of a component that lives and has not come back yet
   std::uint64_t news = 0;                // its number among what observers are told
   std::uint64_t changing_for = 0;        // the client for whom the next page is being shown
+  shm::Nanoseconds promised_until = 0;   // to who has asked a port that yields: none gets it before
   Charge charge;       // of the user for whom the name is kept, or the daemon's own
   Charge page_charge;  // of who can write the page
   Charge next_charge;
@@ -176,7 +177,7 @@ class PortNames {
   std::deque<shm::PortId> free_inputs_;
   std::set<shm::SourceId> let_go_sources_;  // of which some may not be needed any more
   std::set<std::pair<shm::Nanoseconds, shm::SourceId>>
-      running_out_;  // only their activity needs it
+      running_out_;  // only their activity, or a promise, needs it
   std::set<shm::PortId> let_go_inputs_;
   std::unique_ptr<shm::ActivityPages> pages_ = std::make_unique<shm::ActivityPages>();
   std::uint64_t generation_ = 0;

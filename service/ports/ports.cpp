@@ -103,6 +103,7 @@ std::unique_ptr<OutputPort> adopt_output(const wire::Received& open, uid_t user)
   port->segment = kept(open.descriptors[0]);
   port->user = user;
   port->type = fine_type(open.message);
+  port->yields = (open.message.flags & wire::kYields) != 0;
   return port;
 }
 

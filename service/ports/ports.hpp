@@ -63,6 +63,8 @@ struct OutputPort {
   bool is_told_unmentioned = false;  // that the model in force does not mention it
   bool is_known_blind = false;       // the log has it
   std::string described;             // by its component; printable
+  bool yields = false;               // to another component that asks for its name
+  bool is_asked_to_yield = false;    // one has asked
   Charge charge;
 
   ~OutputPort();

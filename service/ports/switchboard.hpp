@@ -91,6 +91,8 @@ class Switchboard {
   void note_blind(shm::PortInstance port, const std::string& text);
   // What its component says of it.
   void describe(shm::PortInstance port, std::string text);
+  // Asks an output port that yields to go: `who` wants its name. Once for each port.
+  void ask_to_yield(shm::PortInstance port, const std::string& who);
   // Wakes every component that waits, to look anew.
   void ring_all() const;
   // Wakes those that a source concerns.

@@ -1,9 +1,11 @@
 // What components should know of their ports, and the log too: connections that are refused, ports
 // that the model does not mention, ports that cannot see.
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "rules/text/names.hpp"
+#include "service/kept/step.hpp"
 #include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "service/ports/switchboard.hpp"
@@ -127,6 +129,19 @@ void Switchboard::describe(shm::PortInstance port, std::string text) {
   } else if (const auto input = inputs_.find(port); input != inputs_.end()) {
     input->second->described = std::move(text);
   }
+}
+
+void Switchboard::ask_to_yield(shm::PortInstance port, const std::string& who) {
+  OutputPort& output = *outputs_.at(port);
+  if (std::exchange(output.is_asked_to_yield, true)) return;
+  wire::Message message;
+  message.kind = wire::MessageKind::kYield;
+  message.port = port;
+  message.set_text(who);
+  output.client->send(message);
+  at_step("holder-asked-to-yield");
+  log::info("{} is asked to yield output port {} to {}", output.client->description(),
+            output.source->name, who);
 }
 
 }  // namespace arbiter::service

@@ -31,6 +31,7 @@ class Component {
     words >> verb;
     if (verb == "node") return node(words);
     if (verb == "output") return output(words);
+    if (verb == "output-that-yields") return output(words, true);
     if (verb == "input") return input(words);
     if (verb == "tap") return tap(words);
     if (verb == "images-out") return images_out(words);
@@ -62,10 +63,13 @@ class Component {
     node_ = std::make_unique<Node>(name);
     return "done";
   }
-  std::string output(std::istringstream& words) {
+  std::string output(std::istringstream& words, bool yields = false) {
     std::string name;
+    OutputPortOptions options;
+    options.yields = yields;
     words >> name;
-    outputs_[name] = std::make_unique<OutputPort<Number>>(node_->output_port<Number>(name));
+    outputs_[name] =
+        std::make_unique<OutputPort<Number>>(node_->output_port<Number>(name, options));
     return "open";
   }
   std::string input(std::istringstream& words) {

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <regex>
+#include <set>
 
 #include "tests/support/daemon.hpp"
 #include "tests/support/run_program.hpp"
@@ -52,6 +53,32 @@ TEST(Consumer, FindsWhatTheInstalledPagesLinkTo) {
     }
   }
   EXPECT_GT(links, 40u);
+}
+
+std::set<std::string> first_of_each(const fs::path& file, const std::regex& line) {
+  std::set<std::string> found;
+  std::ifstream in(file);
+  for (std::string text; std::getline(in, text);) {
+    if (std::smatch match; std::regex_match(text, match, line)) found.insert(match[1]);
+  }
+  return found;
+}
+
+// arbiterd refuses a policy with a user who does not exist, and one whom systemd makes for a
+// service exists only while that runs.
+TEST(Consumer, FindsTheUsersOfServicesInTheListOfThoseToBeMade) {
+  const TemporaryDirectory directory;
+  ASSERT_NO_FATAL_FAILURE(install(directory.path()));
+  const fs::path lib = directory.path() + "/lib";
+  std::set<std::string> users;
+  for (const auto& unit : fs::directory_iterator(lib / "systemd/system")) {
+    if (unit.path().filename() == "arbiterd.service") continue;  // it reads the policy
+    users.merge(first_of_each(unit.path(), std::regex("User=(.+)")));
+  }
+  EXPECT_EQ(users.size(), 3u);
+  // Its last field goes into a file whose fields end with colons.
+  const std::regex line(R"re(u (\S+) +- "[^:]+")re");
+  EXPECT_EQ(first_of_each(lib / "sysusers.d/arbiter.conf", line), users);
 }
 
 TEST(Consumer, NeedsAtMost15Megabytes) {

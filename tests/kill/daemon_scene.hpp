@@ -20,6 +20,7 @@ class DaemonScene {
   struct Options {
     bool stores = false;        // the service manager keeps descriptors
     bool by_stranger = false;   // the one that asks is another user's
+    bool yields = false;        // a survivor has /fresh:o, and yields it
     bool has_survivors = true;  // components are there when the daemon is told to die
   };
   explicit DaemonScene(const Options& options);
@@ -49,6 +50,7 @@ class DaemonScene {
   bool lives();
   void restart();
   void finish_asking();
+  [[nodiscard]] bool is_refused_for_now(const std::string& answer) const;
   void require_model_in_force();
   void require_one_writer();
   void require_accounts_balance();
@@ -61,6 +63,7 @@ class DaemonScene {
   Daemon daemon_;
   std::string in_force_ = "a";  // whose samples the model lets through, once it is in force
   std::int64_t next_ = 0;
+  std::optional<OutputPort<Number>> yielding_;  // until the node's thread closes it
   std::optional<Node> node_;
   std::map<std::string, OutputPort<Number>> outputs_;
   std::optional<OutputPort<Number>> side_;  // what a new input port is connected to

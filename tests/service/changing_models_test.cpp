@@ -75,6 +75,29 @@ TEST_F(ChangingModels, SwitchReadsNoFile) {
   EXPECT_EQ(source_in_force(), "/b");
 }
 
+// What a link asks before all hosts switch.
+TEST_F(ChangingModels, ADryRunSaysWhetherASwitchWouldBeRefusedAndMakesNone) {
+  start();
+  RawClient client(daemon_->instance());
+  client.hello("asks");
+  const auto ask = [&](const std::string& name, std::uint32_t flags) {
+    auto message = RawClient::message(MessageKind::kSwitch, name);
+    message.flags = wire::kDryRun | flags;
+    client.send(message);
+  };
+  ask("other", 0);
+  EXPECT_EQ(client.expect(MessageKind::kDone).message.value, 1u) << "the one in force";
+  ask("default", 0);
+  client.expect(MessageKind::kDone);
+  ask("third", 0);
+  EXPECT_EQ(client.expect_refusal(), "there is no model \"third\"; there are: default and other");
+  ask("third", wire::kWantsReport);
+  client.expect(MessageKind::kReport);
+  EXPECT_EQ(daemon_->generation(), 1u);
+  EXPECT_EQ(name_in_force(), "default");
+  EXPECT_THAT(daemon_->log(), Not(HasSubstr("the model in force stays")));
+}
+
 TEST_F(ChangingModels, SwitchWithoutAModelSaysSo) {
   daemon_.emplace("", Daemon::Options{.without_model = true});
   expect_success(arbiter({"switch"}), "no model is loaded; start the daemon with --model\n");

@@ -149,6 +149,23 @@ TEST_F(Compiling, OthersAreServedWhileADryRunIsPrepared) {
   asking->expect(MessageKind::kReport);
 }
 
+// Nobody knows what the reload will make of the model's name, and whoever asks does not wait.
+TEST_F(Compiling, ADryRunOfASwitchIsRefusedMeanwhileAtOnce) {
+  start();
+  const auto reloading = client("reloading");
+  ask_for_reload(*reloading);
+  gate_.await();
+  const auto asking = client("asking");
+  auto message = RawClient::message(MessageKind::kSwitch, "one");
+  message.flags = wire::kDryRun;
+  asking->send(message);
+  EXPECT_EQ(asking->expect_refusal(), "another change of the model is under way");
+  gate_.open();
+  reloading->expect(MessageKind::kDone);
+  asking->send(message);
+  asking->expect(MessageKind::kDone);
+}
+
 TEST_F(Compiling, AStopEndsItAtOnce) {
   start();
   const auto asking = client("asking");

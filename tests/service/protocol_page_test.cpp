@@ -148,6 +148,7 @@ TEST(ProtocolPage, SaysWhatAnswersWhat) {
        {MessageKind::kStatus, MessageKind::kModel, MessageKind::kObserve}) {
     note(kind, client.ask(kind));
   }
+  note(MessageKind::kMay, client.ask(MessageKind::kMay, "observe"));
   daemon.write_model(override_model());
   for (const MessageKind kind :
        {MessageKind::kReload, MessageKind::kSwitch, MessageKind::kRollback}) {
@@ -227,6 +228,7 @@ std::map<std::string, Heard> hear_all() {
   client.open_input("/in");
   client.open_output("/mine");
   client.open_output("/may-be-replayed");
+  client.open_output("/yields", wire::kYields);
   client.open_input("/unmentioned");
   for (int i = 0; i < 2; ++i) client.open_tap("/other");  // the second one's place is not 0
   client.open_tap("/out");
@@ -250,6 +252,13 @@ std::map<std::string, Heard> hear_all() {
     lost.expect(MessageKind::kOpened);
   }
   client.hear(MessageKind::kTapAway);
+  {
+    RawClient wants(daemon.instance());
+    wants.hello("wants");
+    const auto segment = raw_output_segment();
+    wants.send(RawClient::message(MessageKind::kOpenOutput, "/yields"), {segment.get(), -1});
+    client.hear(MessageKind::kYield);
+  }
   daemon.write_model(rules(first(select("/out")) + mine));
   client.ask(MessageKind::kReload);
   client.ask(MessageKind::kReload, {}, wire::kWantsReport);

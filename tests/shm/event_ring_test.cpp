@@ -53,7 +53,7 @@ TEST_F(EventRing, GivesEachEventAsItWasWritten) {
   written.generation = 3;
   written.revision = 2;
   written.masks = {1, 2, 4, 8};
-  writer().write(written);
+  writer().write(written, {7, 70});
   ASSERT_EQ(reader.read(record_, lost_), EventReader::Found::kEvent);
   EXPECT_EQ(record_.kind, EventKind::kSample);
   EXPECT_EQ(record_.time, 123);
@@ -66,6 +66,8 @@ TEST_F(EventRing, GivesEachEventAsItWasWritten) {
   EXPECT_EQ(record_.masks.discarded, 2u);
   EXPECT_EQ(record_.masks.refused, 4u);
   EXPECT_EQ(record_.masks.blind, 8u);
+  EXPECT_EQ(reader.origin().publisher, 7u);
+  EXPECT_EQ(reader.origin().sequence, 70u);
   EXPECT_EQ(reader.read(record_, lost_), EventReader::Found::kNothing);
   EXPECT_EQ(lost_, 0u);
 }

@@ -81,9 +81,11 @@ class Listener {
       if (answer.request == request) kinds.insert(name_of(answer.kind));
     }
   }
-  Words open_output(const std::string& name) {
+  Words open_output(const std::string& name, std::uint32_t flags = 0) {
     const auto segment = raw_output_segment();
-    return ask(RawClient::message(wire::MessageKind::kOpenOutput, name), {segment.get(), -1});
+    auto open = RawClient::message(wire::MessageKind::kOpenOutput, name);
+    open.flags = flags;
+    return ask(open, {segment.get(), -1});
   }
   Words open_input(const std::string& name) {
     const auto segment = raw_input_segment();

@@ -25,6 +25,7 @@ inline wire::Status full_status() {
   source.open = {{"face", 44, 4'294'967'294},
                  {{"recorder", 48, 1002}},
                  wire::SampleType{"Pose", 24, 8},
+                 100,
                  101,
                  102,
                  103,

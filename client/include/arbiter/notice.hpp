@@ -25,6 +25,9 @@ enum class NoticeKind : std::uint8_t {
   apart,
   // Memory could not be locked (NodeOptions::lock_memory); it is used all the same.
   not_locked,
+  // Another component opens a port of the name of this one, which yields
+  // (OutputPortOptions::yields): close it.
+  asked_to_yield,
 };
 
 struct Notice {

@@ -68,6 +68,15 @@ struct OutputPortOptions {
   // of 64 bytes; at least max_loans + 3 must fit. Memory is taken as input ports connect: each
   // needs its depth and its max_held. A port that does not fit gets a smaller depth.
   std::size_t max_memory = std::size_t{1} << 30;
+  // Whether the port gives way to a component that opens a port of the same name. It is for
+  // programs that stand in for a component while there is none, such as arbiter-link; any program
+  // may use it. When another node opens the name and does not yield itself, this port is asked to
+  // go: asked_to_yield() is true from then on, and the node has a notice
+  // (NoticeKind::asked_to_yield). Close the port then. The other node waits for that for 0.2 s at
+  // most; if the port is still open then, it is refused, as the name is taken. Until then, no port
+  // that yields gets the name. A node that yields displaces nobody: while another port has the
+  // name, it is refused. The activity of the source goes on from one port to the next.
+  bool yields = false;
 };
 
 // Which sample gives way when `depth` samples of one connection already wait.

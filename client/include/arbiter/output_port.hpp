@@ -89,8 +89,19 @@ class OutputPortBase {
   Outcome signal() noexcept { return detail::signal(*core_); }
   // The same, unless it is too late: as publish() with a deadline.
   Outcome signal(Time deadline) noexcept { return detail::signal(*core_, deadline); }
+  // The same, and says where it began. See publish() with an origin.
+  Outcome signal(Time deadline, Origin origin) noexcept {
+    return detail::signal(*core_, deadline, origin);
+  }
   // Ends the source's activity at once. Never too late. Wait-free.
   void deactivate() noexcept { detail::deactivate(*core_); }
+
+  // Whether anybody could use a sample. False: at the last arrival, a sample or a signal, the
+  // source won nowhere, no connected port has `keep`, and no tap reads samples. Until that changes
+  // signal() does what publish() would do, so a sample that is expensive to make or to fetch need
+  // not be made: signal() instead, ask again, and publish_signalled() where this has become true.
+  // Ask right after an arrival; true where nothing is known. Wait-free.
+  [[nodiscard]] bool wants_samples() const noexcept { return detail::wants_samples(*core_); }
 
   // For replay: as signal() and deactivate(), at a given time. See publish_at().
   Outcome signal_at(Time at) { return detail::signal_at(*core_, at); }
@@ -104,6 +115,10 @@ class OutputPortBase {
   // second, the last word always; so does the next daemon. Takes a lock and allocates: call it when
   // something has changed, off the data path.
   void describe(std::string_view text) noexcept { detail::describe(*core_, text); }
+
+  // Whether another component waits for the port's name (OutputPortOptions::yields). Once true, it
+  // stays true. Reads one word; any thread may call it while the port is open.
+  [[nodiscard]] bool asked_to_yield() const noexcept { return detail::asked_to_yield(*core_); }
 
   // The port's name, which is also its source's.
   [[nodiscard]] const std::string& name() const noexcept { return detail::name(*core_); }
@@ -165,6 +180,24 @@ class OutputPort : public OutputPortBase {
   Outcome publish(const T& sample, Time deadline) noexcept {
     return detail::publish_copy(*core_, &sample, sizeof(T), deadline);
   }
+  // The same, for a component that passes on samples from elsewhere: Sample::origin() and
+  // TapEvent::origin() tell where this one began, and recordings contain it. It is the component's
+  // word, which nobody checks, and no decision depends on it.
+  Outcome publish(Loan<T> loan, Time deadline, Origin origin) {
+    require_own(loan);
+    return detail::publish(*core_, release(loan), sizeof(T), deadline, origin);
+  }
+
+  // The sample of the last arrival, which was a signal(): for one that is fetched only where it is
+  // wanted (wants_samples()). It is no arrival: the source's activity stays as it was. The sample
+  // bears the time of the signal(), is decided for that time, as publish_at() is, and is handed to
+  // the ports where the source wins. If `deadline` has passed, or the source is not active any
+  // more, the outcome says `late`, and nothing happens. Throws as publish(). Wait-free; but each
+  // call binds the rules again.
+  Outcome publish_signalled(Loan<T> loan, Time deadline, Origin origin = {}) {
+    require_own(loan);
+    return detail::publish_signalled(*core_, release(loan), sizeof(T), deadline, origin);
+  }
 
   // For replay: an arrival at a given time, as if publish() had been called then, had read the
   // clock, and had been held up until now. It is decided for `at`, the sample bears that time
@@ -217,9 +250,17 @@ class OutputPort<void> : public OutputPortBase {
     const std::size_t size = size_of(loan);
     return detail::publish(*core_, release(loan), size, deadline);
   }
+  Outcome publish(Loan<void> loan, Time deadline, Origin origin) {
+    const std::size_t size = size_of(loan);
+    return detail::publish(*core_, release(loan), size, deadline, origin);
+  }
   Outcome publish(Bytes bytes, Time deadline) {
     require_size(bytes.size());
     return detail::publish_copy(*core_, bytes.data(), bytes.size(), deadline);
+  }
+  Outcome publish_signalled(Loan<void> loan, Time deadline, Origin origin = {}) {
+    const std::size_t size = size_of(loan);
+    return detail::publish_signalled(*core_, release(loan), size, deadline, origin);
   }
   Outcome publish_at(Time at, Loan<void> loan) {
     const std::size_t size = size_of(loan);

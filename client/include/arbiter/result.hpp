@@ -18,6 +18,16 @@ class Error : public std::runtime_error {
 // tells. Clocks of other hosts, and of this one before it was started, have nothing to do with it.
 using Time = std::chrono::time_point<std::chrono::steady_clock, std::chrono::nanoseconds>;
 
+// Where an arrival began that a component passes on, as a link does with what comes from another
+// host. Whoever has recorded both hosts can tell by it which sample became which.
+struct Origin {
+  // One life of the source's output port there, as the component that passes it on numbers them.
+  // 0: the arrival began here.
+  std::uint64_t publisher = 0;
+  // The sample's sequence() there; of a signal, that of the last sample before.
+  std::uint64_t sequence = 0;
+};
+
 // What became of one arrival (paper, section III.A), counted in input ports that are open and
 // connected.
 struct Outcome {

@@ -23,8 +23,8 @@
 // Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC. Threads: use a tap, and its
 // events, from one thread at a time. Blocking: only wait_for() blocks. Cost: take() needs no lock
 // and no system call, and allocates only where a source's destinations have changed, or an input
-// port has not given out what it had accepted. A publish of a source that is tapped takes some 210
-// to 240 instructions more, however many taps there are; if one of them sleeps, a ring more.
+// port has not given out what it had accepted. A publish of a source that is tapped takes some 220
+// to 250 instructions more, however many taps there are; if one of them sleeps, a ring more.
 // Errors: take() and wait_for() throw arbiter::Error for more than max_held events with samples.
 // The paper has nothing of it.
 #pragma once
@@ -98,6 +98,9 @@ class TapEventBase {
   [[nodiscard]] std::uint64_t generation() const noexcept { return data_.generation; }
   // Bytes of the sample as it was published, be it held or not.
   [[nodiscard]] std::size_t size() const noexcept { return data_.size; }
+  // Of an arrival: where it began if its publisher passed it on (OutputPort::publish() with an
+  // origin).
+  [[nodiscard]] Origin origin() const noexcept { return data_.origin; }
   // How many events of this source were lost immediately before this one, which is of kind `state`
   // then; or `closed`, where a component was killed during an arrival or deactivation that others
   // may have seen, before it told of it.

@@ -178,7 +178,9 @@ class Run {
     wire::Message message;
     message.kind = kind;
     message.set_name(kNames[script_.byte() % std::size(kNames)]);
-    message.type.size = script_.byte() % 16;
+    const std::uint8_t how = script_.byte();
+    message.type.size = how % 16;
+    message.flags = how >= 240 ? wire::kYields : 0u;
     std::vector<int> descriptors;
     if (kind == MessageKind::kOpenOutput) {
       descriptors = {make(make_output_segment(message.type, 1 + script_.byte() % 8u))};

@@ -78,6 +78,7 @@ struct TapEventData {
   std::uint64_t accepted = 0, discarded = 0, refused = 0, blind = 0;
   std::uint64_t count = 0;  // of samples that were dropped or overtaken
   std::size_t size = 0;
+  Origin origin;
   const std::byte* data = nullptr;  // null: no sample is held
   std::uint32_t hold = 0;
   std::shared_ptr<const TapContext> context;
@@ -101,6 +102,14 @@ Counts signal(OutputCore& core) noexcept;
 Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline) noexcept;
 Outcome publish_copy(OutputCore& core, const void* data, std::size_t size, Time deadline) noexcept;
 Outcome signal(OutputCore& core, Time deadline) noexcept;
+// And with an origin.
+Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline,
+                Origin origin) noexcept;
+Outcome signal(OutputCore& core, Time deadline, Origin origin) noexcept;
+// For an arrival that was a signal.
+Outcome publish_signalled(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline,
+                          Origin origin) noexcept;
+bool wants_samples(const OutputCore& core) noexcept;
 // With a given time of arrival. Throw Error.
 Counts publish_at(OutputCore& core, Time at, std::uint32_t slot, std::size_t size);
 Counts publish_copy_at(OutputCore& core, Time at, const void* data, std::size_t size);
@@ -109,6 +118,7 @@ void deactivate_at(OutputCore& core, Time at);
 void require_replay(const OutputCore& core);
 void deactivate(OutputCore& core) noexcept;
 void describe(OutputCore& core, std::string_view text) noexcept;
+bool asked_to_yield(const OutputCore& core) noexcept;
 std::size_t max_size(const OutputCore& core) noexcept;
 const std::string& name(const OutputCore& core) noexcept;
 const Type& type(const OutputCore& core) noexcept;
@@ -126,6 +136,7 @@ std::optional<std::string_view> winner(InputCore& core) noexcept;
 bool is_idle(InputCore& core) noexcept;
 const std::string& source_name(const InputCore& core, std::uint32_t source) noexcept;
 const Type& sample_type(const InputCore& core, std::uint32_t hold) noexcept;
+Origin sample_origin(const InputCore& core, std::uint32_t hold) noexcept;
 std::int64_t believable_time(std::int64_t stamp_ns) noexcept;
 const std::string& name(const InputCore& core) noexcept;
 const Type& type(const InputCore& core) noexcept;
