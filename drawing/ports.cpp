@@ -104,11 +104,18 @@ std::string Ports::input_rows(const Input& in, const std::string& id) const {
   return rows;
 }
 
+std::string Ports::host_text(const std::string& source) const {
+  if (situation_ == nullptr) return {};
+  const auto host = situation_->hosts.find(source);
+  return host == situation_->hosts.end() ? std::string() : " (host " + host->second + ")";
+}
+
 std::string Ports::output_row(const std::string& source, const std::string& id,
                               const rules::ConnectionRule* beside) const {
   const Mark& mark = look_of(is_active(source) ? MarkKind::kActive : MarkKind::kInactive);
   const std::string sign = situation_ == nullptr ? "" : std::string(mark.sign) + " ";
-  return cell(id, "RIGHT", mark.colour, html(sign + shortened(source, kMaxPort) + " ▸"),
+  return cell(id, "RIGHT", mark.colour,
+              html(sign + shortened(source, kMaxPort) + host_text(source) + " ▸"),
               beside == nullptr ? 1 : count_lines(lines_of(*beside)));
 }
 

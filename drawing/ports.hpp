@@ -28,6 +28,8 @@ class Ports {
   Ports(const Situation* situation, DotWriter& out) : situation_(situation), out_(out) {}
 
   [[nodiscard]] bool is_active(const std::string& source) const;
+  // " (host head)" of a source that comes from there.
+  [[nodiscard]] std::string host_text(const std::string& source) const;
 
   // Rows of tables; arrows end at their ids: of an input port `id` itself, of its rule i "IDri", of
   // its connection without a rule "IDni".

@@ -12,7 +12,7 @@ bool holds(const rules::ConnectionRule& rule, const std::set<std::string>& activ
 }
 
 Situation decide(const rules::RuleSet& rules, std::set<std::string> active) {
-  Situation situation{std::move(active), {}};
+  Situation situation{std::move(active), {}, {}};
   for (const rules::PortRules& port : rules.ports) {
     for (const rules::ConnectionRule& rule : port.rules) {
       // Where more than one may hold, the first one wins.

@@ -12,6 +12,7 @@ namespace arbiter::drawing {
 struct Situation {
   std::set<std::string> active;                // sources
   std::map<std::string, std::string> winners;  // by arbitrated port; none where it is idle
+  std::map<std::string, std::string> hosts;    // by source: another host, from which it comes
 };
 
 // Whether the rule holds: its source is active, and its condition true.

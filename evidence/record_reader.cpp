@@ -1,5 +1,6 @@
 #include "evidence/record_reader.hpp"
 
+#include <charconv>
 #include <map>
 #include <string_view>
 #include <unordered_map>
@@ -31,6 +32,14 @@ class Fields {
     const std::uint64_t value = number(name);
     if (value > static_cast<std::uint64_t>(shm::kMaxTime)) fail(name, "is not a time");
     return static_cast<Nanoseconds>(value);
+  }
+  [[nodiscard]] std::uint64_t hex(const char* name) const {
+    const std::string& digits = text(name);
+    const char* const end = digits.data() + digits.size();
+    std::uint64_t value = 0;
+    const auto read = std::from_chars(digits.data(), end, value, 16);
+    if (read.ec != std::errc() || read.ptr != end) fail(name, "is no hexadecimal number");
+    return value;
   }
   [[nodiscard]] bool flag(const char* name) const {
     if (!at(name).is_boolean()) fail(name, "is neither true nor false");
@@ -155,6 +164,7 @@ Record read_arrival(const Fields& in, Contexts& contexts) {
   each.masks.discarded = contexts.mask(each.context, in.texts("discarded"));
   each.masks.refused = contexts.mask(each.context, in.texts("refused"));
   each.masks.blind = contexts.mask(each.context, in.texts("blind"));
+  if (in.has("origin")) each.origin = {in.hex("origin"), in.number("origin_sequence")};
   return each;
 }
 

@@ -42,7 +42,7 @@ const std::array<RecordSchema, kRecordKinds> record_schemas{{
     {"arbiter/arrival", "arbiter.Arrival",
      "source:text kind:sample|signal time_ns:int seen_ns:int sequence:int size:int generation:int "
      "activity:never|until|forever|deactivated activity_ns:int has_payload:bool "
-     "accepted:texts discarded:texts refused:texts blind:texts"},
+     "accepted:texts discarded:texts refused:texts blind:texts origin:text? origin_sequence:int?"},
     {"arbiter/deactivation", "arbiter.Deactivation",
      "source:text time_ns:int seen_ns:int sequence:int generation:int"},
     {"arbiter/state", "arbiter.State",

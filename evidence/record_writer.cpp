@@ -100,6 +100,13 @@ class JsonLine {
   std::string& out_;
 };
 
+// As text: in a number of JSON not all readers keep 64 bits.
+std::string hex_of(std::uint64_t number) {
+  char digits[16];
+  const auto end = std::to_chars(digits, digits + sizeof digits, number, 16).ptr;
+  return {digits, end};
+}
+
 struct Written {
   RecordKind kind;
   Nanoseconds time;
@@ -126,6 +133,9 @@ Written put(JsonLine& out, const Arrival& each) {
       .add("discarded", ports, each.masks.discarded)
       .add("refused", ports, each.masks.refused)
       .add("blind", ports, each.masks.blind);
+  if (each.origin.publisher != 0) {
+    out.add("origin", hex_of(each.origin.publisher)).add("origin_sequence", each.origin.sequence);
+  }
   return {RecordKind::kArrival, each.time};
 }
 

@@ -21,6 +21,7 @@ class Loader {
   }
 
   std::vector<Run> finish() {
+    for (std::size_t i = 1; i < runs_.size(); ++i) leave_out_strangers(runs_[i - 1], runs_[i]);
     for (Run& run : runs_) {
       std::stable_sort(run.decisions.begin(), run.decisions.end(),
                        [](const Decision& one, const Decision& other) {
@@ -32,6 +33,15 @@ class Loader {
 
  private:
   Run& run() { return runs_.back(); }
+
+  // Until the recorder notices that a daemon has come with memory of its own, taps tell of that
+  // memory already. Of what decided there, the run before knows nothing.
+  static void leave_out_strangers(Run& run, const Run& next) {
+    if (next.models.empty()) return;
+    const Nanoseconds begun = next.models.begin()->second.time;
+    run.lost += std::erase_if(run.decisions,
+                              [&](const Decision& each) { return each.arrival().time >= begun; });
+  }
 
   // Each takes effect after the one before.
   SourceHistory& add_step(const SourceContext& context, Step step) {

@@ -56,7 +56,8 @@ struct Arrival {
   std::uint64_t generation = 0;
   ActivityWord word = shm::kNeverActive;  // after it
   shm::Masks masks{};
-  bool has_payload = false;  // in the file
+  shm::SampleOrigin origin{};  // publisher 0: it began here
+  bool has_payload = false;    // in the file
   std::optional<std::vector<std::byte>> payload{};
 };
 

@@ -147,6 +147,7 @@ void TapReader::add_arrival(const TapEvent<>& event, Nanoseconds seen, Room room
   arrival.generation = event.generation();
   arrival.word = word_of(event);
   arrival.masks = masks_of(destinations);
+  arrival.origin = {event.origin().publisher, event.origin().sequence};
   ++counts_.arrivals;
   if (with_payloads_ && arrival.is_sample) {
     const auto bytes = event.sample();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <map>
 
+#include "watch/imported.hpp"
+
 namespace arbiter::top {
 namespace {
 
@@ -86,6 +88,7 @@ SourceFact fact_of(const wire::SourceStatus& source) {
   fact.is_open = source.open.has_value();
   fact.component = source.open ? component_text(source.open->component)
                                : (source.away_pid ? "away" : "not open");
+  fact.host = watch::host_of(source);
   fact.timeout = source.timeout;
   return fact;
 }

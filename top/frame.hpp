@@ -43,6 +43,7 @@ struct PortFact {
 struct SourceFact {
   std::string name;
   std::string component;
+  std::string host;  // another one, from which arbiter-link has it; "": a component of this one
   bool is_open = false;
   shm::Nanoseconds timeout = 0;
   std::optional<SourceRates> rates;

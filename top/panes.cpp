@@ -178,7 +178,15 @@ Row source_row(const Frame& frame, std::size_t i, Charset charset) {
     row.cells.insert(row.cells.end(), 2, source.is_open ? unknown() : nothing());
   }
   row.cells.push_back({source.component, source.is_open ? Style::kPlain : Style::kDim});
+  row.cells.push_back({source.host});
   return row;
+}
+
+// Whether any source comes from another host.
+bool is_any_imported(const Frame& frame) {
+  const auto& sources = frame.census->sources;
+  return std::any_of(sources.begin(), sources.end(),
+                     [](const SourceFact& source) { return !source.host.empty(); });
 }
 
 std::size_t longest_source(const Frame& frame, Charset charset) {
@@ -227,8 +235,10 @@ Table sources_table(const Frame& frame, const std::string& filter, Charset chars
       {"", 6, Align::kLeft, 0, false},           {"T", 7, Align::kRight, 4, true},
       {"LAST", 6, Align::kRight, 1, true},       {"RATE", 6, Align::kRight, 2, true},
       {"SIGNALS", 8, Align::kRight, 6, true},    {"COMPONENT", 0, Align::kLeft, 5, false}};
+  if (is_any_imported(frame)) table.columns.push_back({"HOST", 0, Align::kLeft, 2, false});
   for (std::size_t i = 0; i < frame.words.size(); ++i) {
     Row row = source_row(frame, i, charset);
+    row.cells.resize(table.columns.size());
     if (matches(filter, {row.name})) table.rows.push_back(std::move(row));
   }
   return table;

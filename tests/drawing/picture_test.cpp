@@ -246,6 +246,16 @@ TEST(Picture, HasALegendOfWhatThereIsInIt) {
               HasSubstr(look_of(MarkKind::kRuns).meaning));
 }
 
+TEST(Picture, SaysFromWhichHostASourceComes) {
+  const auto model = load_model("<arbiter at='/p'><select from='/a'>not /b</select></arbiter>");
+  Situation situation = decide(model.rules, {"/a"});
+  EXPECT_THAT(draw(model, View::kConnections, {}, &situation), Not(HasSubstr("(host ")));
+  situation.hosts["/b"] = "head";
+  const std::string dot = draw(model, View::kConnections, {}, &situation);
+  EXPECT_THAT(dot, HasSubstr("/b (host head)"));
+  EXPECT_THAT(dot, Not(HasSubstr("/a (host")));
+}
+
 TEST(Picture, ShortensWhatIsLongAndHasItAllInTheTooltip) {
   const std::string name = "Begin " + std::string(80, 'x') + " End";
   const std::string port = "/" + std::string(80, 'y') + "/pos:i";

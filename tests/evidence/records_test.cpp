@@ -27,6 +27,7 @@ void add_everything(Incident& incident) {
   arrival.time = arrival.seen = 1012;
   arrival.payload = std::vector<std::byte>{std::byte{1}, std::byte{0}, std::byte{255}};
   arrival.word = shm::kForeverFlag | 1012;
+  arrival.origin = {0xfedc'ba98'7654'3210, 8841};
   incident.add(payload);
   incident.deactivate("/low", 1020, 1021);
   incident.state("/high", 1030, 1031, shm::deactivation(1030), evidence::SourceState::Why::gap, 4);

@@ -95,6 +95,23 @@ TEST(Verification, AsksOnlyForChosenPortsAndFromTheStart) {
   EXPECT_EQ(Verified(early).result.all(), 0u);
 }
 
+// The taps are at the new daemon's publishers before the recorder has noticed that it is a new one.
+TEST(Verification, PassesOverWhatADaemonDecidedThatKnowsNothingOfTheRun) {
+  Incident incident;
+  incident.arrive("/high", 1010, 1011, Fate::accepted);
+  incident.arrive("/low", 1020, 1021, Fate::discarded);
+  incident.arrive("/low", 1210, 1211, Fate::accepted);
+  incident.add(evidence::Start{1250, "test", {}, "none"});
+  incident.state("/low", 0, 1249, shm::arrival(1210, 500));
+  incident.state("/high", 0, 1249, shm::kNeverActive);
+  incident.put_in_force(kOverride, 1, 1200);
+  incident.arrive("/low", 1260, 1261, Fate::accepted);
+  const Verified verified(incident);
+  EXPECT_EQ(verified.result.different, 0u);
+  EXPECT_EQ(verified.result.equal, 3u);
+  EXPECT_EQ(evidence::missed_text(verified.recorded), "1 event");
+}
+
 TEST(Verification, CountsWhatWasDecidedByAModelThatIsNotThere) {
   Incident incident;
   incident.arrive("/low", 1010, 1011, Fate::accepted);

@@ -64,6 +64,20 @@ TEST(TopCensus, CountsPerSecondBetweenTwoDocuments) {
   EXPECT_EQ(source.ports, std::vector<std::string>{"/p:i"});
 }
 
+TEST(TopCensus, KnowsFromWhichHostALinkHasASource) {
+  StampedStatus now = status_of(10, 100, kSecond);
+  const auto host = [&] { return census_of(now, nullptr).sources.at(0).host; };
+  wire::OpenOutput& open = *now.status.sources[0].open;
+  open.described = "host head";
+  EXPECT_EQ(host(), "") << "any component may describe itself so";
+  open.component.node = "arbiter-link";
+  EXPECT_EQ(host(), "head");
+  open.described = "host head, 3 lost";
+  EXPECT_EQ(host(), "head");
+  open.described.reset();
+  EXPECT_EQ(host(), "?");
+}
+
 TEST(TopCensus, HasNoRatesFromOneDocument) {
   const Census census = census_of(status_of(10, 100, kSecond), nullptr);
   EXPECT_FALSE(census.ports.at(0).rates);

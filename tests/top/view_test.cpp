@@ -262,9 +262,21 @@ TEST_F(TopView, SortsByNoColumnThatIsNotShown) {
   }
 }
 
+TEST_F(TopView, ShowsFromWhichHostASourceComesWhereOneDoes) {
+  press(Key::kTab);
+  EXPECT_THAT(screen(), Not(HasSubstr("HOST")));
+  Census census = census_of_robot();
+  census.sources[0].host = "head";
+  view_.add(shared(frame_at(11, std::make_shared<const Census>(census))), {});
+  EXPECT_THAT(screen(), HasSubstr("HOST"));
+  EXPECT_THAT(line_with(census.sources[0].name), HasSubstr(" head"));
+}
+
 TEST_F(TopView, ThePageNamesEachColumn) {
   const std::string page = test::content_of(std::string(ARBITER_TEST_DATA) + "/../../docs/top.md");
-  const Frame frame = frame_at(10);
+  Census census = census_of_robot();
+  census.sources[0].host = "head";
+  const Frame frame = frame_at(10, std::make_shared<const Census>(census));
   for (const Table& table :
        {ports_table(frame, "", Charset::kUtf8), sources_table(frame, "", Charset::kUtf8)}) {
     for (std::size_t i = 1; i < table.columns.size(); ++i) {
