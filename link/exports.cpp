@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "gateway/core/say.hpp"
+#include "link/first_failure.hpp"
 #include "link/say_sparingly.hpp"
 #include "shm/clock.hpp"
 
@@ -21,6 +22,7 @@ using gateway::Level;
 using gateway::say;
 
 constexpr std::uint64_t kWakeId = 0;
+constexpr std::uint64_t kReadersId = ~std::uint64_t{0};
 constexpr shm::Nanoseconds kTapAgain = 5'000'000'000;
 // Events of one source that leave before others have their turn.
 constexpr int kMostAtOnce = 64;
@@ -58,12 +60,16 @@ Exports::Exports(Node& node, const Network& network, const HeldTokens& tokens, s
       incarnation_(incarnation),
       bell_(bell),
       epoll_(epoll_create1(EPOLL_CLOEXEC)),
-      wake_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.u64 = kWakeId;
-  if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, wake_.get(), &event) != 0) {
-    throw std::system_error(errno, std::generic_category(), "no descriptors to watch taps by");
+      wake_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
+      demands_(network, EndWatch::Ends::kReaders, readers_) {
+  for (const auto& [id, descriptor] :
+       {std::pair(kWakeId, wake_.get()), std::pair(kReadersId, readers_.descriptor())}) {
+    epoll_event event{};
+    event.events = EPOLLIN;
+    event.data.u64 = id;
+    if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, descriptor, &event) != 0) {
+      throw std::system_error(errno, std::generic_category(), "no descriptors to watch taps by");
+    }
   }
   thread_ = std::thread([this] { run(); });
 }
@@ -84,8 +90,12 @@ void Exports::wake() const noexcept {
 
 void Exports::look(const HostView& view, const Patience& patience) {
   withdraw(view.open_here());
-  for (const auto& [source, type] : view.open_here()) offer(source, type);
+  FirstFailure failure;
+  for (const auto& each : view.open_here()) {
+    failure.attempt([&] { offer(each.first, each.second); });
+  }
   tap_what_is_wanted(view, patience);
+  failure.rethrow();
 }
 
 void Exports::withdraw(const HostView::OpenPorts& ports) {
@@ -104,25 +114,26 @@ void Exports::withdraw(const HostView::OpenPorts& ports) {
   }
 }
 
-void Exports::offer(const std::string& source, const std::optional<shm::TypeInfo>& type) {
+void Exports::offer(const std::string& source, const shm::TypeInfo& type) {
   const auto id = ids_.find(source);
   if (id != ids_.end()) {
     const auto lock = lock_first();
-    if (type) know_type(*exports_.at(id->second), *type);
+    Export& one = *exports_.at(id->second);
+    // A tap knows it better: how things stand was asked some time ago.
+    if (!one.tap) know_type(one, type);
     return;
   }
   OfferCard card;
   card.incarnation = incarnation_of(last_id_ + 1);
   card.host = host_;
   card.source = source;
-  if (type) {
-    card.type_revision = 1;
-    card.type = *type;
-  }
-  auto one = std::make_unique<Export>(network_, std::move(card), bell_);
+  card.type_revision = 1;
+  card.type = type;
+  auto one = std::make_unique<Export>(network_, std::move(card), readers_);
   const auto lock = lock_first();
   exports_.emplace(++last_id_, std::move(one));
   ids_.emplace(source, last_id_);
+  readers_.ring();  // those that came before it was here
 }
 
 Incarnation Exports::incarnation_of(std::uint64_t id) const noexcept {
@@ -142,6 +153,7 @@ void Exports::tap_what_is_wanted(const HostView& view, const Patience& patience)
       std::optional<Tap<void>> gone;
       const auto lock = lock_first();
       gone.swap(one.tap);
+      one.kept.end();
     }
   }
 }
@@ -205,6 +217,11 @@ bool Exports::take_up(const epoll_event* events, int count) {
   const auto lock = lock_after();
   for (int i = 0; i < count; ++i) {
     const std::uint64_t id = events[i].data.u64;
+    if (id == kReadersId) {
+      readers_.silence();
+      if (hear_readers()) bell_.ring();  // look() opens and closes taps by it
+      continue;
+    }
     if (id != kWakeId) {
       ready_.insert(id);
       continue;
@@ -239,10 +256,51 @@ void Exports::send(Export& one, const TapEvent<void>& event) {
   if (header_.kind == EventKind::kSample && !has_sample) header_.kind = EventKind::kSignal;
   header_.is_deactivated = header_.kind == EventKind::kDeactivation ||
                            (header_.kind == EventKind::kState && event.is_deactivated());
+  const bool stays = has_sample && is_withheld(one.demand, sample->size());
+  if (stays) header_.kind = EventKind::kWithheld;
   // Its publisher has written the time: it may be any.
   const shm::Nanoseconds published = event.time().time_since_epoch().count();
   tokens_.name(std::min(published, shm::monotonic_now()), header_.tokens);
-  write(one, has_sample ? *sample : Bytes());
+  write(one, has_sample && !stays ? *sample : Bytes());
+  // What was missed may have made it old.
+  const bool is_over = event.kind() == TapEventKind::sample || header_.is_deactivated ||
+                       event.lost() != 0 || event.kind() == TapEventKind::closed;
+  if (is_over) one.kept.drop();
+  if (stays) one.kept.keep(header_.tokens, *sample);
+}
+
+// Whatever says that there is something may say so of what is gone, or twice: each looks at what is
+// so now. A reader may match before or after what it wants is known here.
+bool Exports::hear_readers() {
+  bool has_changed = false;
+  for (const auto& [id, one] : exports_) {
+    if (one->writer.changes_of_readers() == one->reader_changes) continue;
+    hear_readers(*one);
+    has_changed = true;
+  }
+  const std::vector<std::string> topics = demands_.changed();
+  if (topics.empty()) return has_changed;
+  for (const auto& [id, one] : exports_) {
+    if (std::binary_search(topics.begin(), topics.end(), one->writer.topic())) hear_readers(*one);
+  }
+  return has_changed;
+}
+
+void Exports::hear_readers(Export& one) {
+  one.reader_changes = one.writer.changes_of_readers();
+  one.demand = one.writer.demand();
+  const bool is_due = one.kept.is_there() && !is_withheld(one.demand, one.kept.sample().size());
+  if (is_due) send_again(one);
+  if (is_due || one.demand == Demand::kSamples) one.kept.end();
+}
+
+// It is no other event, and bears the number of the last one.
+void Exports::send_again(Export& one) {
+  header_.kind = EventKind::kAgain;
+  header_.is_deactivated = false;
+  header_.tokens = one.kept.tokens();
+  // One that is not sent is missed until the next one.
+  static_cast<void>(put(one, one.kept.sample()));
 }
 
 void Exports::state(Export& one, bool is_deactivated) {
@@ -263,23 +321,29 @@ bool Exports::say_unsaid() {
 
 // Sends header_, which says what has happened, and the sample.
 void Exports::write(Export& one, Bytes sample) {
+  ++one.number;
+  one.is_deactivated = header_.is_deactivated;
+  // An event that is not sent has used a number, so importers count it as lost.
+  one.is_unsaid = !put(one, sample);
+}
+
+bool Exports::put(Export& one, Bytes sample) {
   header_.exporter = one.card.incarnation;
-  header_.number = ++one.number;
+  header_.number = one.number;
   header_.sequence = one.sequence;
   header_.type_revision = one.card.type_revision;
   header_.length = static_cast<std::uint32_t>(sample.size());
   const WritableBytes bytes(buffer_.data(), header_bytes(header_));
   write_header(header_, bytes);
-  one.is_deactivated = header_.is_deactivated;
-  // An event that is not sent has used a number, so importers count it as lost.
-  one.is_unsaid = !one.writer.write(bytes, sample);
+  return one.writer.write(bytes, sample);
 }
 
 void Exports::know_type(Export& one, const shm::TypeInfo& type) {
   OfferCard& card = one.card;
-  if (card.type_revision != 0 && card.type == type && card.type.size == type.size) return;
+  if (card.type == type && card.type.size == type.size) return;
   ++card.type_revision;
   card.type = type;
+  one.kept.drop();  // it is of the type before
   try {
     one.writer.set_card(card);
   } catch (const DdsError& error) {

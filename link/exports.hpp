@@ -4,7 +4,8 @@
 // A tap is no destination: exporting changes no decision and holds up no publisher. Its events
 // leave in their order, on one thread, which waits for no reader. What the tap or the network loses
 // uses numbers, so that importers count it. Where an event cannot be written, the state of its
-// source is said until it is.
+// source is said until it is. A sample that all importers can do without stays here, until one of
+// them wants it (core/demand.hpp).
 //
 // Thread safety: look() on the link's thread; sending has a thread of its own, which
 // shares exports_ under mutex_. Taps are opened and closed without that lock. A publisher that
@@ -27,9 +28,12 @@
 #include <arbiter/node.hpp>
 #include <arbiter/tap.hpp>
 
+#include "link/core/demand.hpp"
 #include "link/core/event_header.hpp"
 #include "link/core/held_tokens.hpp"
+#include "link/core/kept_sample.hpp"
 #include "link/core/patience.hpp"
+#include "link/dds/demands.hpp"
 #include "link/dds/event_topic.hpp"
 #include "link/host_view.hpp"
 #include "shm/file_descriptor.hpp"
@@ -58,16 +62,19 @@ class Exports {
     OfferCard card;
     EventWriter writer;
     std::optional<Tap<void>> tap;
-    std::uint64_t number = 0;        // of the last event
-    std::uint64_t sequence = 0;      // of the last sample
-    bool is_deactivated = false;     // by the last event
-    bool is_unsaid = false;          // that event was not written
-    std::string said;                // why it cannot be tapped
-    shm::Nanoseconds tap_again = 0;  // not before
+    std::uint64_t number = 0;          // of the last event
+    std::uint64_t sequence = 0;        // of the last sample
+    bool is_deactivated = false;       // by the last event
+    bool is_unsaid = false;            // that event was not written
+    Demand demand = Demand::kSamples;  // of those who read it
+    std::uint32_t reader_changes = 0;  // that `demand` knows of
+    KeptSample kept;                   // the last event's, where it was withheld
+    std::string said;                  // why it cannot be tapped
+    shm::Nanoseconds tap_again = 0;    // not before
   };
 
   void withdraw(const HostView::OpenPorts& ports);
-  void offer(const std::string& source, const std::optional<shm::TypeInfo>& type);
+  void offer(const std::string& source, const shm::TypeInfo& type);
   // Of the export with that id. What is offered again begins a stream of its own, whose numbers and
   // types have nothing to do with those before.
   [[nodiscard]] Incarnation incarnation_of(std::uint64_t id) const noexcept;
@@ -87,7 +94,13 @@ class Exports {
   // Says the state of those whose last event was not written. True: one is left.
   bool say_unsaid();
   void write(Export& one, Bytes sample);
+  // As write(), of an event that has its number already.
+  [[nodiscard]] bool put(Export& one, Bytes sample);
   void send(Export& one, const TapEvent<void>& event);
+  // Whose readers have come, gone, or said something else. True: one has come or gone.
+  bool hear_readers();
+  void hear_readers(Export& one);
+  void send_again(Export& one);
   static void know_type(Export& one, const shm::TypeInfo& type);
 
   Node& node_;
@@ -98,6 +111,8 @@ class Exports {
   const gateway::Bell& bell_;
   shm::FileDescriptor epoll_;
   shm::FileDescriptor wake_;
+  const gateway::Bell readers_;  // rings where readers of ours change
+  EndWatch demands_;             // the sending thread's
   std::map<std::string, std::uint64_t, std::less<>> ids_;
   std::uint64_t last_id_ = 0;
   // Held by the link's thread while it waits for mutex_; the other one passes through.

@@ -9,11 +9,14 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
+#include "link/core/demand.hpp"
 #include "shm/activity.hpp"
 #include "shm/type_info.hpp"
 #include "watch/instance.hpp"
+#include "wire/status.hpp"
 
 namespace arbiter::link {
 
@@ -22,22 +25,37 @@ inline constexpr const char* kNodeName = "arbiter-link";
 
 class HostView {
  public:
-  // `instance`: as NodeOptions has it.
-  explicit HostView(std::string instance);
+  // `instance`: as NodeOptions has it. `max_age`: how old a sample may be at most; nothing: as the
+  // model says.
+  HostView(std::string instance, std::optional<shm::Nanoseconds> max_age);
 
   // Takes up what has changed. Asks the daemon at most four times a second, and waits for its
   // answer for a second at most. What was known stays where there is no daemon.
   void update();
 
   // The sources that the model in force connects or reads, with how old their samples may be when
-  // they arrive: T, or for `forever` the model's own timeout.
+  // they arrive: T, or max_age where that is shorter; for `forever` max_age, or without one the
+  // model's own timeout.
   [[nodiscard]] const std::map<std::string, shm::Nanoseconds, std::less<>>& wanted() const {
     return wanted_;
   }
+  // What the model does with one of them.
+  [[nodiscard]] SourceUse use_of(const std::string& source) const;
   // Those that components of this host have open, or had when their daemon went; with what a sample
-  // is. Nothing: the port is untyped, and the status does not say how large its samples are.
-  using OpenPorts = std::map<std::string, std::optional<shm::TypeInfo>, std::less<>>;
+  // is.
+  using OpenPorts = std::map<std::string, shm::TypeInfo, std::less<>>;
   [[nodiscard]] const OpenPorts& open_here() const { return open_here_; }
+  // The input ports that components of this host have open.
+  [[nodiscard]] const std::set<std::string, std::less<>>& inputs_here() const {
+    return inputs_here_;
+  }
+  // What is in force; generation 0: nothing.
+  struct Model {
+    std::uint64_t generation = 0;
+    std::string name;          // empty: it has none
+    std::uint64_t digest = 0;  // of its texts; 0: the daemon does not have them
+  };
+  [[nodiscard]] const Model& model() const { return model_; }
   // Whether its activity was ended, and nothing has come since.
   [[nodiscard]] bool is_deactivated(const std::string& source) const;
   // False: ports cannot be opened now, and an attempt waits for a second.
@@ -49,11 +67,17 @@ class HostView {
   bool join();
   void look_at_model();
   void look_at_ports();
+  void know_model(const wire::ModelStatus& model);
 
   const std::string instance_name_;
+  const std::optional<shm::Nanoseconds> max_age_;
   std::unique_ptr<watch::Instance> instance_;
   std::map<std::string, shm::Nanoseconds, std::less<>> wanted_;
+  std::map<std::string, SourceUse, std::less<>> uses_;
   OpenPorts open_here_;
+  std::set<std::string, std::less<>> inputs_here_;
+  Model model_;
+  std::uint64_t model_of_daemon_ = 0;
   std::shared_ptr<const shm::DecisionMemory> memory_;  // of what follows
   std::uint64_t generation_ = 0;
   std::string obstacle_;

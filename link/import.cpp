@@ -18,6 +18,8 @@ namespace {
 using gateway::Level;
 
 constexpr shm::Nanoseconds kOpenAgain = 1'000'000'000;
+// Counts go up with each event, and each description is a message to the daemon.
+constexpr shm::Nanoseconds kDescribeAgain = 1'000'000'000;
 // Twice the lease: an earlier life of a host is not believed to live for so long.
 constexpr shm::Nanoseconds kNoEarlierLife = 3'000'000'000;
 
@@ -42,12 +44,21 @@ shm::Nanoseconds time_with_sleep() noexcept {
 }
 
 Import::Import(Node& node, const Network& network, const SentTokens& tokens, std::string source,
-               Incarnation me, const gateway::Bell& bell)
-    : node_(node), tokens_(tokens), source_(std::move(source)), me_(me) {
+               Incarnation me, const gateway::Bell& bell, DemandTeller& demands, SourceUse use)
+    : node_(node),
+      tokens_(tokens),
+      source_(std::move(source)),
+      me_(me),
+      demands_(demands),
+      demand_(use, shm::monotonic_now()),
+      said_demand_(demand_.demand()) {
   unheard_.reserve(kMaxUnheard);
   header_.tokens.reserve(kMaxImporters);
   gateway::dds::SampleTaker& taker = *this;  // a private base
-  reader_.emplace(network, source_, taker, bell);
+  reader_.emplace(network, source_, taker, bell, DemandCard{me_, said_demand_});
+  const std::lock_guard lock(mutex_);
+  demanding_ = reader_->handle();
+  say_demand();  // what has come meanwhile may have changed it
 }
 
 Import::~Import() {
@@ -55,21 +66,28 @@ Import::~Import() {
   close();
 }
 
-void Import::look(bool is_open_here) {
+void Import::look(bool is_open_here, SourceUse use) {
+  is_open_here = has_just_yielded() || is_open_here;
   listen_to_speaker();
+  {
+    const std::lock_guard lock(mutex_);
+    demand_.set_use(is_open_here ? SourceUse::kNone : use, shm::monotonic_now());
+    say_demand();
+  }
   const Offerer* const speaker = speaker_.current();
   // The model wants it, or there would be no import.
   const ImportChoice choice = choose_import({true, is_open_here, speaker != nullptr});
   const OfferCard* const card = speaker == nullptr ? nullptr : &offers_.at(speaker->key).card;
-  const bool is_other_type = port_ && card != nullptr && card->type_revision != revision_;
+  const bool is_other_type = card != nullptr && card->type_revision != revision_;
   const bool is_other_host = speaker == nullptr || speaker->incarnation != obeyed_;
-  if (choice != ImportChoice::kImport || is_other_type || (is_other_host && port_)) close();
+  const bool is_open_otherwise = (is_other_type || is_other_host) && is_open();
+  if (choice != ImportChoice::kImport || is_open_otherwise) close();
   obey(choice == ImportChoice::kImport ? speaker : nullptr);
 }
 
 void Import::open(bool has_daemon, const Patience& patience) {
   const Offerer* const speaker = speaker_.current();
-  const bool is_wanted = obeyed_ != 0 && speaker != nullptr && !port_;
+  const bool is_wanted = obeyed_ != 0 && speaker != nullptr && !is_open();
   const bool may_open = has_daemon && shm::monotonic_now() >= open_again_ && patience.is_left();
   if (is_wanted && may_open && offers_.at(speaker->key).card.type_revision != 0) {
     open_port(offers_.at(speaker->key).card);
@@ -78,6 +96,31 @@ void Import::open(bool has_daemon, const Patience& patience) {
     patience.note_call();
   }
   describe();
+}
+
+bool Import::is_open() const {
+  const std::lock_guard lock(mutex_);
+  return port_.has_value();
+}
+
+void Import::yield() {
+  std::optional<OutputPort<void>> gone;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!port_ || !port_->asked_to_yield()) return;
+    spoken_here_until_ = shm::monotonic_now() + kOpenAgain;
+    gone.swap(port_);
+  }
+  gone.reset();
+  say_sparingly(Level::kInfo, source_ +
+                                  " is opened by a component of this host, and is not "
+                                  "imported any more");
+}
+
+bool Import::has_just_yielded() {
+  yield();  // a port that has only just been opened
+  const std::lock_guard lock(mutex_);
+  return shm::monotonic_now() < spoken_here_until_;
 }
 
 void Import::obey(const Offerer* speaker) {
@@ -89,6 +132,7 @@ void Import::obey(const Offerer* speaker) {
   writer_ = writer;
   if (exporter == 0) return;
   stream_.obey(exporter);
+  demand_.begin_exporter(shm::monotonic_now());
   const auto last = std::find_if(unheard_.begin(), unheard_.end(),
                                  [&](const Unheard& each) { return each.writer == writer; });
   if (last == unheard_.end()) return;
@@ -107,7 +151,8 @@ void Import::remember(std::uint64_t writer, const StreamEvent& event) noexcept {
 }
 
 void Import::listen_to_speaker() {
-  const std::vector<EventReader::Offer> offers = reader_->offers();
+  const std::vector<EventReader::Offer> offers =
+      reader_->offers(speaker_.current() == nullptr ? 0 : speaker_.current()->key);
   for (auto each = offers_.begin(); each != offers_.end();) {
     const bool is_there =
         std::any_of(offers.begin(), offers.end(), [&](const EventReader::Offer& offer) {
@@ -177,9 +222,12 @@ void Import::open_port(const OfferCard& card) {
     return;
   }
   try {
-    OutputPort<void> port = node_.output_port(source_, type_of(card.type));
+    OutputPortOptions options;
+    options.yields = true;
+    OutputPort<void> port = node_.output_port(source_, type_of(card.type), options);
     const std::lock_guard lock(mutex_);
     port_.emplace(std::move(port));
+    awaits_sample_ = false;
     revision_ = card.type_revision;
     // What came before the port was there.
     if (stream_.is_deactivated()) port_->deactivate();
@@ -188,6 +236,7 @@ void Import::open_port(const OfferCard& card) {
     return;
   }
   described_.clear();
+  describe_again_ = 0;
   said_.clear();
   say_sparingly(Level::kInfo, source_ + " comes from host " + card.host);
 }
@@ -219,6 +268,8 @@ std::string Import::text() const {
   };
   count(stream_.lost(), " lost");
   count(counts_.late, " late");
+  count(counts_.withheld, " withheld");
+  count(counts_.unbelieved, " withheld though they were wanted");
   count(stream_.doubled(), " that came twice");
   count(counts_.too_soon, " before the port was open");
   count(counts_.unreadable, " unreadable");
@@ -226,12 +277,27 @@ std::string Import::text() const {
   return text;
 }
 
+wire::ImportStatus Import::status() const {
+  wire::ImportStatus status;
+  status.source = source_;
+  if (const Offerer* const speaker = speaker_.current()) status.host = speaker->host;
+  status.hosts = speaker_.hosts();
+  const std::lock_guard lock(mutex_);
+  status.is_open = port_.has_value();
+  status.lost = stream_.lost();
+  status.late = counts_.late;
+  return status;
+}
+
 void Import::describe() {
-  if (!port_) return;
+  const shm::Nanoseconds time = shm::monotonic_now();
+  if (!is_open() || time < describe_again_) return;
   std::string now = text();
   if (now == described_) return;
-  port_->describe(now);
+  const std::lock_guard lock(mutex_);
+  if (port_) port_->describe(now);
   described_ = std::move(now);
+  describe_again_ = time + kDescribeAgain;
 }
 
 void Import::take(const gateway::dds::Payload& payload,  // NOLINT(bugprone-exception-escape)
@@ -247,8 +313,8 @@ void Import::take(const gateway::dds::Payload& payload,  // NOLINT(bugprone-exce
     ++counts_.unreadable;
     return;
   }
-  const StreamEvent event{header_.number, header_.sequence, header_.kind == EventKind::kSample,
-                          header_.is_deactivated};
+  const StreamEvent event{header_.number, header_.sequence, has_sample(header_.kind),
+                          header_.is_deactivated, header_.kind == EventKind::kWithheld};
   if (writer != writer_) {  // one speaker: others are not heard
     remember(writer, event);
     return;
@@ -257,50 +323,99 @@ void Import::take(const gateway::dds::Payload& payload,  // NOLINT(bugprone-exce
     ++counts_.unreadable;  // its own card says otherwise
     return;
   }
-  if (!stream_.note(header_.exporter, event)) return;
-  arrive(payload, before + header_bytes(header_));
+  const std::size_t header_and_before = before + header_bytes(header_);
+  if (header_.kind == EventKind::kAgain && stream_.completes(header_.exporter, header_.number)) {
+    complete(payload, header_and_before);
+    return;
+  }
+  if (stream_.note(header_.exporter, event)) arrive(payload, header_and_before);
+}
+
+shm::Nanoseconds Import::time_left() const {
+  return tokens_.time_left(header_.token_of(me_), max_age_.load(std::memory_order_relaxed),
+                           time_with_sleep());
 }
 
 void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
+  if (header_.kind == EventKind::kWithheld) ++counts_.withheld;
   if (!port_) {
-    if (header_.kind == EventKind::kSample) ++counts_.too_soon;
+    if (has_sample(header_.kind)) ++counts_.too_soon;
     return;
   }
   if (header_.is_deactivated) {
+    awaits_sample_ = false;
     port_->deactivate();  // never too late
     return;
   }
   if (header_.kind == EventKind::kState) return;
-  const shm::Nanoseconds left = tokens_.time_left(
-      header_.token_of(me_), max_age_.load(std::memory_order_relaxed), time_with_sleep());
-  // A deadline that has passed, where nothing is left: the port counts it, too.
-  const Time deadline(std::chrono::nanoseconds(left < 0 ? -1 : shm::monotonic_now() + left));
-  if (header_.kind == EventKind::kSample && left >= 0) {
-    publish(payload, before, deadline);
-  } else if (port_->signal(deadline).late) {
-    ++counts_.late;
+  // Read first: if this thread is held up before the other clock is read, less is left, not more.
+  const shm::Nanoseconds now = shm::monotonic_now();
+  const bool is_alone = header_.kind == EventKind::kWithheld;
+  if (is_alone && !demand_.believes_header(max_age_.load(std::memory_order_relaxed), now)) {
+    ++counts_.unbelieved;
+    return;
   }
+  const shm::Nanoseconds left = time_left();
+  // A deadline that has passed, where nothing is left: the port counts it, too.
+  const Time deadline(std::chrono::nanoseconds(left < 0 ? -1 : now + left));
+  const bool brings_sample = has_sample(header_.kind) && !is_alone && left >= 0;
+  const std::optional<Outcome> outcome =
+      brings_sample ? publish(payload, before, deadline) : port_->signal(deadline, origin());
+  if (!outcome) return;
+  if (outcome->late) {
+    ++counts_.late;
+    return;
+  }
+  if (has_sample(header_.kind)) awaits_sample_ = is_alone;
+  demand_.note_arrival(port_->wants_samples(), now);
+  say_demand();
 }
 
-void Import::publish(const gateway::dds::Payload& payload, std::size_t before, Time deadline) {
+Origin Import::origin() const noexcept { return {header_.exporter, header_.sequence}; }
+
+std::optional<Outcome> Import::publish(const gateway::dds::Payload& payload, std::size_t before,
+                                       Time deadline) {
+  const std::uint64_t no_memory = counts_.no_memory;
+  if (auto sample = sample_in(payload, before))
+    return port_->publish(std::move(*sample), deadline, origin());
+  // The source goes on, though nobody can have the sample.
+  if (counts_.no_memory != no_memory) return port_->signal(deadline, origin());
+  return std::nullopt;
+}
+
+void Import::say_demand() {
+  if (demanding_ == 0 || demand_.demand() == said_demand_) return;
+  if (demands_.tell(demanding_, {me_, demand_.demand()})) said_demand_ = demand_.demand();
+}
+
+void Import::complete(const gateway::dds::Payload& payload, std::size_t before) {
+  const bool is_awaited = std::exchange(awaits_sample_, false);
+  // Another host has asked for it.
+  if (!is_awaited || !port_ || demand_.demand() != Demand::kSamples) return;
+  const shm::Nanoseconds now = shm::monotonic_now();  // first, as in arrive()
+  const shm::Nanoseconds left = time_left();
+  const Time deadline(std::chrono::nanoseconds(left < 0 ? -1 : now + left));
+  auto sample = sample_in(payload, before);
+  if (sample && port_->publish_signalled(std::move(*sample), deadline, origin()).late)
+    ++counts_.late;
+}
+
+std::optional<Loan<void>> Import::sample_in(const gateway::dds::Payload& payload,
+                                            std::size_t before) {
   if (header_.type_revision != revision_) {
     ++counts_.too_soon;  // the port is opened again for it
-    return;
+    return std::nullopt;
   }
   auto loan = port_->loan(header_.length);
   if (!loan) {
     const bool fits = header_.length == port_->max_size() ||
                       (header_.length < port_->max_size() && !port_->type().has_one_size());
     ++(fits ? counts_.no_memory : counts_.unreadable);
-    // The source goes on, though nobody can have the sample.
-    if (fits && port_->signal(deadline).late) ++counts_.late;
-    return;
+    return std::nullopt;
   }
-  if (!gateway::dds::ArrivedSample(payload).copy(before, **loan)) {
-    ++counts_.unreadable;
-    return;
-  }
-  if (port_->publish(std::move(*loan), deadline).late) ++counts_.late;
+  if (gateway::dds::ArrivedSample(payload).copy(before, **loan)) return loan;
+  ++counts_.unreadable;
+  return std::nullopt;
 }
 
 }  // namespace arbiter::link

@@ -1,8 +1,9 @@
 // One source of another host that the model here wants: its events become arrivals at an output
 // port of this link, under the source's name.
 //
-// Thread safety: look() on the link's thread; take() on Cyclone's threads, one at a time. mutex_
-// guards what both use. A port is opened and closed without it.
+// Thread safety: look() and open() on the link's thread; take() on Cyclone's threads, one at a
+// time; yield() on the node's. mutex_ guards what they share. A port is opened and closed without
+// it.
 #pragma once
 
 #include <atomic>
@@ -17,14 +18,17 @@
 #include <arbiter/node.hpp>
 #include <arbiter/output_port.hpp>
 
+#include "link/core/demand.hpp"
 #include "link/core/event_header.hpp"
 #include "link/core/import_choice.hpp"
 #include "link/core/patience.hpp"
 #include "link/core/sent_tokens.hpp"
 #include "link/core/speaker.hpp"
 #include "link/core/stream.hpp"
+#include "link/dds/demands.hpp"
 #include "link/dds/event_topic.hpp"
 #include "shm/activity.hpp"
+#include "wire/hosts.hpp"
 
 namespace arbiter::link {
 
@@ -36,7 +40,7 @@ class Import : private gateway::dds::SampleTaker {
   // `me`: of this link, in whose name tokens are sent. `bell` rings where look() has something to
   // do. Keeps references. Throws DdsError.
   Import(Node& node, const Network& network, const SentTokens& tokens, std::string source,
-         Incarnation me, const gateway::Bell& bell);
+         Incarnation me, const gateway::Bell& bell, DemandTeller& demands, SourceUse use);
   Import(const Import&) = delete;
   Import& operator=(const Import&) = delete;
   ~Import() override;
@@ -45,10 +49,16 @@ class Import : private gateway::dds::SampleTaker {
   void set_max_age(shm::Nanoseconds age) noexcept {
     max_age_.store(age, std::memory_order_relaxed);
   }
-  // Who speaks now, and whether the port is to be open: closes it if it is not.
-  void look(bool is_open_here);
+  // Who speaks now, and whether the port is to be open: closes it if it is not. `use`: by the model
+  // in force.
+  void look(bool is_open_here, SourceUse use);
   // After look(): opens the port if it is to be open and is not.
   void open(bool has_daemon, const Patience& patience);
+  // Any thread: a component of this host asks for the name. Closes the port at once.
+  void yield();
+
+  // For the hosts document, but for what this host has open itself.
+  [[nodiscard]] wire::ImportStatus status() const;
 
  private:
   struct Counts {
@@ -56,6 +66,8 @@ class Import : private gateway::dds::SampleTaker {
     std::uint64_t unreadable = 0;  // no event, or a sample that its type cannot have
     std::uint64_t too_soon = 0;    // samples that came while the port was not open
     std::uint64_t no_memory = 0;
+    std::uint64_t withheld = 0;    // samples that stayed at home
+    std::uint64_t unbelieved = 0;  // of them, headers alone, long after samples were asked for
   };
 
   // publish() throws for another port's loan, and this one is its own; what is remembered here has
@@ -66,7 +78,19 @@ class Import : private gateway::dds::SampleTaker {
   void obey(const Offerer* speaker);
   // Under the lock, by header_.
   void arrive(const gateway::dds::Payload& payload, std::size_t before);
-  void publish(const gateway::dds::Payload& payload, std::size_t before, Time deadline);
+  // Of the event in header_.
+  [[nodiscard]] Origin origin() const noexcept;
+  // Nothing: it was no arrival, and is counted.
+  std::optional<Outcome> publish(const gateway::dds::Payload& payload, std::size_t before,
+                                 Time deadline);
+  // The sample, behind header_, in the port's memory; nothing: there is none, and it is counted.
+  std::optional<Loan<void>> sample_in(const gateway::dds::Payload& payload, std::size_t before);
+  // The sample of the last arrival, which was withheld.
+  void complete(const gateway::dds::Payload& payload, std::size_t before);
+  // How long an event with header_'s tokens is in time; below 0: it is late.
+  [[nodiscard]] shm::Nanoseconds time_left() const;
+  // Has exporters told what is wanted, if that has changed.
+  void say_demand();
   // Of one that finds no place the state is not known before its next event.
   void remember(std::uint64_t writer, const StreamEvent& event) noexcept;
 
@@ -74,6 +98,9 @@ class Import : private gateway::dds::SampleTaker {
   void forget(const std::vector<EventReader::Offer>& offers);
   void open_port(const OfferCard& card);
   void close();
+  // Whether it has yielded, and this host's status may not say yet to whom.
+  [[nodiscard]] bool has_just_yielded();
+  [[nodiscard]] bool is_open() const;
   void say_who_speaks();
   void find_shared_name();
   void say_once(const std::string& text);
@@ -85,6 +112,7 @@ class Import : private gateway::dds::SampleTaker {
   const SentTokens& tokens_;
   const std::string source_;
   const Incarnation me_;
+  DemandTeller& demands_;
   std::atomic<shm::Nanoseconds> max_age_{shm::kDefaultTimeout};
 
   // The link's thread.
@@ -100,12 +128,14 @@ class Import : private gateway::dds::SampleTaker {
   std::string shared_name_;  // of several machines; empty: there is none
   std::string shared_name_said_;
   shm::Nanoseconds open_again_ = 0;
+  shm::Nanoseconds describe_again_ = 0;
 
   mutable std::mutex mutex_;
   std::optional<OutputPort<void>> port_;
-  std::uint32_t revision_ = 0;  // of the port's type
-  Incarnation obeyed_ = 0;      // the speaker's; 0: nobody
-  std::uint64_t writer_ = 0;    // likewise its key: nobody else speaks in its name
+  shm::Nanoseconds spoken_here_until_ = 0;  // it has yielded
+  std::uint32_t revision_ = 0;              // of the port's type
+  Incarnation obeyed_ = 0;                  // the speaker's; 0: nobody
+  std::uint64_t writer_ = 0;                // likewise its key: nobody else speaks in its name
   Stream stream_;
   // The last event of each exporter that is not obeyed: the first that comes is the present state,
   // and comes before the exporter can be chosen.
@@ -118,6 +148,10 @@ class Import : private gateway::dds::SampleTaker {
   std::vector<Unheard> unheard_;
   Counts counts_;
   EventHeader header_;  // of take()
+  ImportDemand demand_;
+  Demand said_demand_;
+  dds_entity_t demanding_ = 0;  // the reader that says so; 0: there is none yet
+  bool awaits_sample_ = false;  // the port's last arrival was a signal for one that was withheld
 
   std::optional<EventReader> reader_;
 };

@@ -11,7 +11,11 @@
 
 #include "gateway/core/say.hpp"
 #include "gateway/dds/domain.hpp"
+#include "link/core/what_passes.hpp"
+#include "link/first_failure.hpp"
+#include "link/say_sparingly.hpp"
 #include "shm/clock.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::link {
 namespace {
@@ -21,6 +25,8 @@ using gateway::say;
 
 constexpr int kLookPeriod = 100;    // ms
 constexpr int kRetryPeriod = 1000;  // ms
+// More often than the daemon is asked what is open.
+constexpr shm::Nanoseconds kTellPeriod = 200'000'000;
 
 Incarnation new_incarnation() {
   Incarnation incarnation = 0;
@@ -33,25 +39,71 @@ Incarnation new_incarnation() {
 }
 
 std::string name_of(const NetworkOptions& network) {
-  if (network.interfaces.empty()) {
-    return "the loopback interface: nothing leaves this machine (--interface names a network)";
-  }
+  if (network.interfaces.empty()) return "the loopback interface";
   std::string text;
   for (const std::string& each : network.interfaces) text += (text.empty() ? "" : ", ") + each;
   return text;
 }
 
+HostCard own_card(const LinkOptions& options, Incarnation incarnation) {
+  HostCard card;
+  card.host = options.host;
+  card.instance = wire::instance_name(options.instance);
+  card.version = options.version;
+  card.incarnation = incarnation;
+  return card;
+}
+
 }  // namespace
 
 Link::Link(LinkOptions options)
-    : options_(std::move(options)), incarnation_(new_incarnation()), view_(options_.instance) {
+    : options_(std::move(options)),
+      incarnation_(new_incarnation()),
+      view_(options_.instance, options_.max_age),
+      interfaces_(options_.network.interfaces.empty() ? std::vector<std::string>{"lo"}
+                                                      : options_.network.interfaces),
+      desk_(own_card(options_, incarnation_)) {
   gateway::dds::hear_cyclone();
 }
 
-void Link::run(int stop) {
+Link::~Link() {
+  const std::lock_guard lock(imports_mutex_);
+  imports_.clear();
+}
+
+void Link::hear(const Notice& notice) {
+  if (notice.kind != NoticeKind::asked_to_yield) {
+    say(Level::kWarning, notice.text);
+    return;
+  }
+  const std::lock_guard lock(imports_mutex_);
+  const auto found = imports_.find(notice.port);
+  if (found != imports_.end()) found->second->yield();
+  bell_.ring();
+}
+
+Link::End Link::run(int stop) {
   make_node(stop);
   if (!stops_) join_network(stop);
-  if (!stops_) loop(stop);
+  return stops_ ? End::kStopped : loop(stop);
+}
+
+bool Link::has_network_changed() {
+  const std::string change = interfaces_.change();
+  if (change.empty()) return false;
+  network_->note_cut_off();
+  say_sparingly(Level::kWarning, change + ": joining the network again");
+  return true;
+}
+
+void Link::say_what_passes() {
+  if (has_said_what_passes_ || !view_.has_daemon() || !view_.obstacle().empty()) return;
+  has_said_what_passes_ = true;
+  std::vector<std::string> offered;
+  for (const auto& [source, type] : view_.open_here()) offered.push_back(source);
+  std::vector<std::string> wanted;
+  for (const auto& [source, age] : view_.wanted()) wanted.push_back(source);
+  say(Level::kInfo, what_passes(offered, wanted));
 }
 
 bool Link::waits(int stop, int milliseconds) const {
@@ -72,41 +124,63 @@ void Link::make_node(int stop) {
   options.instance = options_.instance;
   options.connect_timeout = std::chrono::milliseconds(200);
   options.on_waiting = [](const std::string&) {};
-  options.on_notice = [](const Notice& notice) { say(Level::kWarning, notice.text); };
+  options.on_notice = [this](const Notice& notice) { hear(notice); };
   while (!node_ && !stops_) {
     options_.on_round();
     try {
       node_.emplace(kNodeName, options);
     } catch (const Error& error) {
       say_once(said_, error.what());
+      tell_desk(said_);
       stops_ = waits(stop, kRetryPeriod / 2);
     }
   }
 }
 
-// An interface may come later.
+// An interface may come later, and DDS Security may forbid a topic until its rules are changed.
 void Link::join_network(int stop) {
   while (!network_ && !stops_) {
     options_.on_round();
     const gateway::dds::CycloneWords words;
+    interfaces_.begin();
     try {
-      network_.emplace(options_.network);
+      enter_network();
     } catch (const DdsError& error) {
+      leave_network();
       say_once(said_,
                (words.last().empty() ? error.what() : "DDS: " + words.last()) + "; trying again");
+      tell_desk(said_);
       stops_ = waits(stop, kRetryPeriod);
     }
   }
   if (stops_) return;
-  tokens_.emplace(*network_, [this](const TokenMessage& message) {
-    held_.note(message.importer, message.number, shm::monotonic_now());
-  });
-  exports_.emplace(*node_, *network_, held_, options_.host, incarnation_, bell_);
-  clock_.emplace([this] { tokens_->send({incarnation_, sent_.next(time_with_sleep())}); });
-  say(Level::kInfo, "host " + options_.host + ", on " + name_of(options_.network));
+  say(Level::kInfo, "host " + options_.host + ", on " + name_of(options_.network) +
+                        (options_.network.interfaces.empty()
+                             ? ": nothing leaves this machine (--interface names a network)"
+                             : ""));
 }
 
-void Link::loop(int stop) {
+void Link::enter_network() {
+  network_.emplace(options_.network);
+  tokens_.emplace(*network_, [this](const TokenMessage& message, std::uint64_t writer) {
+    held_.note(message.importer, message.number, writer, shm::monotonic_now());
+  });
+  demands_.emplace();
+  exports_.emplace(*node_, *network_, held_, options_.host, incarnation_, bell_);
+  clock_.emplace([this] { tokens_->send({incarnation_, sent_.next(time_with_sleep())}); });
+  desk_.join(*network_, name_of(options_.network), bell_);
+}
+
+void Link::leave_network() {
+  desk_.leave();
+  clock_.reset();
+  exports_.reset();
+  demands_.reset();
+  tokens_.reset();
+  network_.reset();
+}
+
+Link::End Link::loop(int stop) {
   std::string said_of_exports;
   std::string said_of_imports;
   // What fails on one side does not hold up the other.
@@ -119,23 +193,39 @@ void Link::loop(int stop) {
     }
   };
   for (; !stops_; stops_ = waits(stop, kLookPeriod)) {
+    if (has_network_changed()) return End::kNetworkChanged;
     options_.on_round();
     view_.update();
     say_once(said_of_view_, view_.obstacle());
+    say_what_passes();
     options_.on_round();
     const Patience patience([] { return shm::monotonic_now(); }, options_.on_round);
     attempt(said_of_exports, [&] { exports_->look(view_, patience); });
     attempt(said_of_imports, [&] { choose_imports(patience); });
+    if (shm::monotonic_now() < tell_again_) continue;
+    tell_again_ = shm::monotonic_now() + kTellPeriod;
+    tell_desk(view_.obstacle());
   }
+  if (!interfaces_.change().empty()) network_->note_cut_off();
+  return End::kStopped;
 }
 
 // What is to be closed is closed before anything waits for the daemon.
 void Link::choose_imports(const Patience& patience) {
   const auto& wanted = view_.wanted();
-  std::erase_if(imports_, [&](const auto& each) { return !wanted.contains(each.first); });
+  // Each waits for Cyclone where it ends, and a component that wants its name must not.
+  decltype(imports_) gone;
+  {
+    const std::lock_guard lock(imports_mutex_);
+    for (auto each = imports_.begin(); each != imports_.end();) {
+      const auto one = each++;
+      if (!wanted.contains(one->first)) gone.insert(imports_.extract(one));
+    }
+  }
+  for (auto each = gone.begin(); each != gone.end(); each = gone.erase(each)) options_.on_round();
   for (const auto& [source, one] : imports_) {
     one->set_max_age(wanted.find(source)->second);
-    one->look(view_.open_here().contains(source));
+    one->look(view_.open_here().contains(source), view_.use_of(source));
   }
   shm::Nanoseconds shortest = 0;  // no import
   for (const auto& [source, age] : wanted) {
@@ -143,11 +233,40 @@ void Link::choose_imports(const Patience& patience) {
   }
   clock_->set_period(shortest == 0 ? 0 : token_period(shortest));
   for (const auto& [source, one] : imports_) one->open(view_.has_daemon(), patience);
-  for (const auto& [source, age] : wanted) {
-    std::unique_ptr<Import>& one = imports_[source];
-    if (one != nullptr) continue;
-    one = std::make_unique<Import>(*node_, *network_, sent_, source, incarnation_, bell_);
+  FirstFailure failure;
+  for (const auto& each : wanted) {
+    if (imports_.contains(each.first)) continue;
+    failure.attempt([&] { add_import(each.first); });
   }
+  failure.rethrow();
+}
+
+void Link::add_import(const std::string& source) {
+  auto one = std::make_unique<Import>(*node_, *network_, sent_, source, incarnation_, bell_,
+                                      *demands_, view_.use_of(source));
+  const std::lock_guard lock(imports_mutex_);
+  imports_.emplace(source, std::move(one));
+}
+
+void Link::tell_desk(const std::string& obstacle) {
+  OwnHost own;
+  own.waits_for = obstacle;
+  HostCard& card = own.card;
+  card.has_daemon = view_.has_daemon();
+  card.generation = view_.model().generation;
+  card.digest = view_.model().digest;
+  card.model = view_.model().name;
+  card.inputs.assign(view_.inputs_here().begin(), view_.inputs_here().end());
+  for (const auto& [source, type] : view_.open_here()) card.outputs.push_back(source);
+  card.input_count = static_cast<std::uint32_t>(card.inputs.size());
+  card.output_count = static_cast<std::uint32_t>(card.outputs.size());
+  for (const auto& [source, one] : imports_) {
+    wire::ImportStatus status = one->status();
+    status.is_open_here = view_.open_here().contains(source);
+    if (status.is_open) ++card.imports;
+    if (!status.hosts.empty() || status.is_open) own.imports.push_back(std::move(status));
+  }
+  desk_.look(std::move(own));
 }
 
 }  // namespace arbiter::link

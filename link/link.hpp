@@ -1,12 +1,18 @@
 // A link: sends to other hosts what they want from this one, and imports what the model here wants
 // from them. No host is special, and none asks another before it decides (docs/hosts.md).
 //
-// Thread safety: all of it runs on the thread that calls run(), but for what its parts say.
+// It is made again where the network has to be joined again: of what it knew of other hosts nothing
+// holds then, and for them it is a link that has been started again.
+//
+// Thread safety: all of it runs on the thread that calls run(), but for hear() and what its parts
+// say. That thread alone changes imports_, under imports_mutex_; others look there under it.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -16,11 +22,14 @@
 #include "link/core/held_tokens.hpp"
 #include "link/core/patience.hpp"
 #include "link/core/sent_tokens.hpp"
+#include "link/dds/demands.hpp"
 #include "link/dds/network.hpp"
 #include "link/dds/token_topic.hpp"
+#include "link/desk.hpp"
 #include "link/exports.hpp"
 #include "link/host_view.hpp"
 #include "link/import.hpp"
+#include "link/interface_watch.hpp"
 #include "link/token_clock.hpp"
 
 namespace arbiter::link {
@@ -28,7 +37,11 @@ namespace arbiter::link {
 struct LinkOptions {
   std::string host;      // its name for the others
   std::string instance;  // as NodeOptions has it
+  std::string version;
   NetworkOptions network;
+  // How old a sample may be when it arrives, where its T is `forever` or longer; nothing: as the
+  // model says.
+  std::optional<shm::Nanoseconds> max_age;
   // Called by the loop ten times a second, and between calls that wait for the daemon, so that
   // somebody can see that it goes round.
   std::function<void()> on_round = [] {};
@@ -39,16 +52,31 @@ class Link {
   explicit Link(LinkOptions options);
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
-  ~Link() = default;
+  ~Link();
 
-  // Returns when `stop` is readable. Waits for the daemon and for the network, and says so.
-  void run(int stop);
+  // Returns when `stop` is readable; or when the network has to be joined again, and says so. Waits
+  // for the daemon and for the network, and says that, too.
+  enum class End : std::uint8_t { kStopped, kNetworkChanged };
+  [[nodiscard]] End run(int stop);
 
  private:
   void make_node(int stop);
   void join_network(int stop);
-  void loop(int stop);
+  // Throws DdsError; then leave_network() follows.
+  void enter_network();
+  void leave_network();
+  End loop(int stop);
+  // True, and said: the network has to be joined again.
+  [[nodiscard]] bool has_network_changed();
+  // Once, when it is known.
+  void say_what_passes();
   void choose_imports(const Patience& patience);
+  void add_import(const std::string& source);
+  // On the node's thread, which waits for nothing: a component that wants its name does not wait
+  // for what the loop is doing.
+  void hear(const Notice& notice);
+  // Tells the desk how this host stands. `obstacle`: what the link waits for; empty: nothing.
+  void tell_desk(const std::string& obstacle);
   void say_once(std::string& said, const std::string& text);
   // Sleeps, or until the bell rings; true: `stop` is readable.
   [[nodiscard]] bool waits(int stop, int milliseconds) const;
@@ -61,15 +89,22 @@ class Link {
   HeldTokens held_;
   std::string said_;
   std::string said_of_view_;
+  shm::Nanoseconds tell_again_ = 0;
+  bool has_said_what_passes_ = false;
   bool stops_ = false;
+  InterfaceWatch interfaces_;
+  std::mutex imports_mutex_;
+  // Empty before what they use goes; the node's thread may look there until the node has gone.
+  std::map<std::string, std::unique_ptr<Import>, std::less<>> imports_;
 
   // Destroyed in reverse: callers go before what they call.
   std::optional<Node> node_;
   std::optional<Network> network_;
   std::optional<TokenTopic> tokens_;
   std::optional<Exports> exports_;
-  std::map<std::string, std::unique_ptr<Import>, std::less<>> imports_;
+  std::optional<DemandTeller> demands_;
   std::optional<TokenClock> clock_;
+  Desk desk_;
 };
 
 }  // namespace arbiter::link

@@ -13,6 +13,7 @@
 #include "gateway/core/stop_signals.hpp"
 #include "link/core/cards.hpp"
 #include "link/link.hpp"
+#include "rules/text/duration.hpp"
 #include "shm/file_descriptor.hpp"
 
 namespace arbiter::link {
@@ -26,9 +27,22 @@ std::string host_name() {
   return name.data();
 }
 
+// Throws CLI::ValidationError.
+shm::Nanoseconds read_max_age(const std::string& text) {
+  constexpr const char* kAdvice =
+      "write a whole number with a unit (ns, us, ms or s), such as 100ms or 2s";
+  const auto parsed = rules::parse_duration(text, {"", "is zero", "shorten it", kAdvice});
+  if (!parsed.problem.empty()) throw CLI::ValidationError("--max-age", parsed.problem);
+  if (parsed.value == shm::kForever) {
+    throw CLI::ValidationError("--max-age", std::string("may not be forever; ") + kAdvice);
+  }
+  return parsed.value;
+}
+
 int run(int argc, char** argv) {
   LinkOptions options;
   options.host = host_name();
+  options.version = ARBITER_VERSION;
   CLI::App app("Joins the Arbiter of this host with those of other hosts.", "arbiter-link");
   app.set_version_flag("--version", std::string("arbiter-link ") + ARBITER_VERSION);
   app.add_option(
@@ -36,14 +50,25 @@ int run(int argc, char** argv) {
       "Name of the daemon; by default $ARBITER_INSTANCE, or \"default\" if that is not set");
   app.add_option("--host", options.host,
                  "The name of this host for the others; by default its host name");
-  app.add_option("--interface", options.network.interfaces,
-                 "A network interface, by name or address (repeatable); without it nothing leaves "
-                 "this machine");
+  app.add_option(
+      "--interface", options.network.interfaces,
+      "A network interface, by name or IPv4 address (repeatable); without it nothing leaves "
+      "this machine");
   app.add_option("--peer", options.network.peers,
                  "The address of a host that multicast does not reach (repeatable)");
   app.add_option("--domain", options.network.domain, "The domain of DDS, the same on all hosts")
       ->check(CLI::Range(0U, kMaxDomain))
       ->capture_default_str();
+  app.add_option(
+         "--security", options.network.security,
+         "A folder with the keys for DDS Security: HOST.pem, HOST_key.pem, identity_ca.pem, "
+         "permissions_ca.pem, governance.p7s, permissions.p7s")
+      ->check(CLI::ExistingDirectory);
+  std::string max_age;
+  app.add_option("--max-age", max_age,
+                 "How old a sample may be when it arrives, such as 100ms: where T is forever, or "
+                 "longer than that; by default T, or for forever the model's timeout")
+      ->type_name("DURATION");
   app.footer(
       "Example:\n  arbiter-link --interface eth0\n\n"
       "Exit codes: 0 ended by SIGINT or SIGTERM; 1 an error; 2 wrong use");
@@ -55,19 +80,22 @@ int run(int argc, char** argv) {
                                                std::to_string(kMaxHostName) +
                                                " letters, digits, dots, hyphens and underscores");
     }
+    if (!max_age.empty()) options.max_age = read_max_age(max_age);
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
     app.exit(error);
     return 2;
   }
+  options.network.name = options.host;
   gateway::set_program_name("arbiter-link");
   const shm::FileDescriptor stop = gateway::catch_stop_signals();
   options.on_round = [] { sd_notify(0, "WATCHDOG=1"); };
-  Link link(options);
-  sd_notify(0, "READY=1");
-  link.run(stop.get());
-  return 0;
+  for (bool is_first = true;; is_first = false) {
+    Link link(options);
+    if (is_first) sd_notify(0, "READY=1");
+    if (link.run(stop.get()) == Link::End::kStopped) return 0;
+  }
 }
 
 }  // namespace

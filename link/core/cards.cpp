@@ -1,84 +1,23 @@
 #include "link/core/cards.hpp"
 
 #include <algorithm>
-#include <cstring>
-#include <string_view>
 
-#include "link/core/little_endian.hpp"
+#include "link/core/card_bytes.hpp"
 #include "shm/limits.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::link {
 namespace {
 
-constexpr std::uint32_t kOfferMagic = 0x4f425241;  // "ARBO"
-constexpr std::uint32_t kTokenMagic = 0x54425241;  // "ARBT"
-constexpr std::uint8_t kCardVersion = 1;
+constexpr std::uint32_t kOfferMagic = 0x4f425241;   // "ARBO"
+constexpr std::uint32_t kTokenMagic = 0x54425241;   // "ARBT"
+constexpr std::uint32_t kDemandMagic = 0x44425241;  // "ARBD"
 
-class CardWriter {
- public:
-  CardWriter(std::uint32_t magic, Incarnation incarnation) {
-    number(magic);
-    number(kCardVersion);
-    number(incarnation);
-  }
-  template <class Number>
-  void number(Number value) {
-    const std::size_t at = bytes_.size();
-    bytes_.resize(at + sizeof value);
-    put(bytes_.data() + at, value);
-  }
-  void text(std::string_view text) {
-    number(static_cast<std::uint16_t>(text.size()));
-    for (const char each : text) bytes_.push_back(static_cast<std::byte>(each));
-  }
-  ByteString take() { return std::move(bytes_); }
-
- private:
-  ByteString bytes_;
-};
-
-// Once something is missing, all that follows is 0 or empty.
-class CardReader {
- public:
-  CardReader(Bytes bytes, std::uint32_t magic) : bytes_(bytes) {
-    is_good_ = number<std::uint32_t>() == magic && number<std::uint8_t>() == kCardVersion;
-  }
-  template <class Number>
-  Number number() {
-    const std::byte* const from = take(sizeof(Number));
-    return from == nullptr ? Number{} : get<Number>(from);
-  }
-  std::string text(std::size_t most) {
-    const std::size_t length = number<std::uint16_t>();
-    if (length > most) is_good_ = false;
-    const std::byte* const from = take(length);
-    if (from == nullptr) return {};
-    return {reinterpret_cast<const char*>(from), length};
-  }
-  [[nodiscard]] bool is_good() const { return is_good_; }
-
- private:
-  const std::byte* take(std::size_t count) {
-    if (!is_good_ || bytes_.size() - at_ < count) {
-      is_good_ = false;
-      return nullptr;
-    }
-    const std::byte* const from = bytes_.data() + at_;
-    at_ += count;
-    return from;
-  }
-
-  Bytes bytes_;
-  std::size_t at_ = 0;
-  bool is_good_ = true;
-};
+}  // namespace
 
 bool is_port_name(const std::string& name) {
   return name.size() > 1 && name.front() == '/' && !shm::find_fault_in_name(name);
 }
-
-}  // namespace
 
 bool is_host_name(const std::string& name) noexcept {
   const auto is_fine = [](char c) {
@@ -105,6 +44,12 @@ ByteString write_offer_card(const OfferCard& card) {
 ByteString write_token_message(const TokenMessage& message) {
   CardWriter writer(kTokenMagic, message.importer);
   writer.number(message.number);
+  return writer.take();
+}
+
+ByteString write_demand_card(const DemandCard& card) {
+  CardWriter writer(kDemandMagic, card.importer);
+  writer.number(static_cast<std::uint8_t>(card.demand));
   return writer.take();
 }
 
@@ -137,6 +82,18 @@ std::optional<TokenMessage> read_token_message(Bytes bytes) {
   message.number = reader.number<std::uint64_t>();
   if (!reader.is_good() || message.importer == 0 || message.number == 0) return std::nullopt;
   return message;
+}
+
+std::optional<DemandCard> read_demand_card(Bytes bytes) {
+  CardReader reader(bytes, kDemandMagic);
+  DemandCard card;
+  card.importer = reader.number<std::uint64_t>();
+  const auto demand = reader.number<std::uint8_t>();
+  card.demand = static_cast<Demand>(demand);
+  if (!reader.is_good() || card.importer == 0 || demand < 1 || card.demand > Demand::kHeaders) {
+    return std::nullopt;
+  }
+  return card;
 }
 
 }  // namespace arbiter::link

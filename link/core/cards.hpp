@@ -1,5 +1,5 @@
-// What a link says about a source that it offers, in the user data of a DDS writer; and the message
-// that carries a token.
+// What a link says about a source that it offers, in the user data of a DDS writer, and about one
+// that it wants, in those of a reader; and the message that carries a token.
 //
 // All of it comes from strangers: sizes are bounded, names must be those that ports, hosts and
 // types may have, and anything else is refused.
@@ -8,6 +8,7 @@
 //           name; revision of the type (4); if that is not 0: size (8), alignment (8), and a text:
 //           the type's name, empty if it is untyped
 //   token   "ARBT", version 1, incarnation of the importer, number (8)
+//   demand  "ARBD", version 1, incarnation of the importer, what it wants (1; demand.hpp)
 //
 // A text is its length (2 bytes) and its bytes. Numbers are little-endian. What follows the end is
 // padding and is passed over.
@@ -17,10 +18,11 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include <arbiter/bytes.hpp>
 
+#include "link/core/card_bytes.hpp"
+#include "link/core/demand.hpp"
 #include "link/core/held_tokens.hpp"
 #include "shm/type_info.hpp"
 
@@ -44,15 +46,23 @@ struct TokenMessage {
   std::uint64_t number = 0;
 };
 
-using ByteString = std::vector<std::byte>;
+// Of a reader: what its host wants of the source.
+struct DemandCard {
+  Incarnation importer = 0;
+  Demand demand = Demand::kSamples;
+};
 
 [[nodiscard]] ByteString write_offer_card(const OfferCard& card);
 [[nodiscard]] ByteString write_token_message(const TokenMessage& message);
+[[nodiscard]] ByteString write_demand_card(const DemandCard& card);
 
 // Nothing: it is none, or not a proper one.
 [[nodiscard]] std::optional<OfferCard> read_offer_card(Bytes bytes);
 [[nodiscard]] std::optional<TokenMessage> read_token_message(Bytes bytes);
+[[nodiscard]] std::optional<DemandCard> read_demand_card(Bytes bytes);
 
+// Whether a port may be called so.
+[[nodiscard]] bool is_port_name(const std::string& name);
 // Whether links may call a host so: 1 to kMaxHostName letters, digits, `.`, `-` and `_`.
 [[nodiscard]] bool is_host_name(const std::string& name) noexcept;
 

@@ -13,8 +13,10 @@ constexpr std::uint16_t kDeactivatedFlag = 1;
 bool is_consistent(const EventHeader& header) noexcept {
   switch (header.kind) {
     case EventKind::kSample:
+    case EventKind::kAgain:
       return !header.is_deactivated && header.type_revision != 0;
     case EventKind::kSignal:
+    case EventKind::kWithheld:
       return !header.is_deactivated && header.length == 0;
     case EventKind::kDeactivation:
       return header.is_deactivated && header.length == 0;

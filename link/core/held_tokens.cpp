@@ -4,11 +4,16 @@
 
 namespace arbiter::link {
 
-bool HeldTokens::note(Incarnation importer, std::uint64_t number, shm::Nanoseconds now) {
+bool HeldTokens::note(Incarnation importer, std::uint64_t number, std::uint64_t writer,
+                      shm::Nanoseconds now) {
   const std::lock_guard lock(mutex_);
   const auto found = held_.find(importer);
   if (found == held_.end() && !make_place(now)) return false;
+  const bool is_anothers = found != held_.end() && found->second.writer != writer &&
+                           now - found->second.heard < kOtherWriter;
+  if (is_anothers) return false;
   Held& held = found != held_.end() ? found->second : held_[importer];
+  held.writer = writer;
   held.heard = now;
   held.times.note(number, now);
   return true;

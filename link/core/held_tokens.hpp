@@ -43,9 +43,15 @@ class HeldTokens {
   // An importer that is silent for this long may lose its place to another.
   static constexpr shm::Nanoseconds kSilence = 5'000'000'000;
 
-  // False: there is no place for another importer now. A token that is older than one that came
-  // before changes nothing.
-  bool note(Incarnation importer, std::uint64_t number, shm::Nanoseconds now);
+  // An importer that is silent for this long may go on by another writer: the transport takes one
+  // that it has lost for another when it finds it again. Until then others are not heard in its
+  // name. Tokens come more often.
+  static constexpr shm::Nanoseconds kOtherWriter = 1'200'000'000;
+
+  // `writer`: whose token the transport says it is. False: there is no place for another importer
+  // now, or another writer speaks for this one. A token that is older than one that came before
+  // changes nothing.
+  bool note(Incarnation importer, std::uint64_t number, std::uint64_t writer, shm::Nanoseconds now);
 
   // Of each importer the newest that had come at `published`, into `named`, of which nothing else
   // is kept.
@@ -54,6 +60,7 @@ class HeldTokens {
  private:
   struct Held {
     TokenTimes times;
+    std::uint64_t writer = 0;
     shm::Nanoseconds heard = 0;
   };
 

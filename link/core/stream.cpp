@@ -22,6 +22,15 @@ bool Stream::note(Incarnation from, const StreamEvent& event) noexcept {
   exporter.last = event.number;
   exporter.sequence = event.sequence;
   exporter.is_deactivated = event.is_deactivated;
+  // A signal that follows leaves it what it was: the newest sample.
+  if (event.has_sample || event.is_deactivated) exporter.is_awaited = event.is_withheld;
+  return true;
+}
+
+bool Stream::completes(Incarnation from, std::uint64_t number) noexcept {
+  Exporter& exporter = exporters_.front();
+  if (exporter.incarnation != from || exporter.last != number || !exporter.is_awaited) return false;
+  exporter.is_awaited = false;
   return true;
 }
 
@@ -39,7 +48,7 @@ void Stream::move_to_front(Incarnation from) noexcept {
                             [&](const Exporter& each) { return each.incarnation == from; });
   if (found == exporters_.end()) {
     found = exporters_.end() - 1;
-    *found = {from, 0, 0, false};
+    *found = {from, 0, 0, false, false};
   }
   std::rotate(exporters_.begin(), found, found + 1);
 }

@@ -22,6 +22,7 @@ struct StreamEvent {
   std::uint64_t sequence = 0;  // of the publisher: of this sample, or of the last one before
   bool has_sample = false;
   bool is_deactivated = false;  // the source is, from here on
+  bool is_withheld = false;     // the sample may come later, with the number of the last event
 };
 
 class Stream {
@@ -32,6 +33,10 @@ class Stream {
   // Takes up an event of the exporter `from`, which is the one that is obeyed. False: it,
   // or a later one, came before.
   bool note(Incarnation from, const StreamEvent& event) noexcept;
+
+  // Whether a sample with this number, which is sent again, belongs to the last arrival, and has
+  // not come yet. Then it is no other event; else note() judges it as any other.
+  bool completes(Incarnation from, std::uint64_t number) noexcept;
 
   // Events that have not come, and will not. What an exporter sent before its first event here, or
   // while another one was obeyed, is not missed.
@@ -50,6 +55,7 @@ class Stream {
     std::uint64_t last = 0;       // number
     std::uint64_t sequence = 0;   // likewise
     bool is_deactivated = false;  // likewise
+    bool is_awaited = false;      // the sample of the last arrival
   };
   void move_to_front(Incarnation from) noexcept;
   [[nodiscard]] static std::uint64_t missed(const Exporter& exporter,

@@ -12,5 +12,10 @@ namespace arbiter::link {
 
 // Of the messages that carry tokens.
 inline constexpr const char* kTokenTopic = "arbiter/tokens";
+// By which links know each other, and ask.
+inline constexpr const char* kHostTopic = "arbiter/hosts";
+inline constexpr const char* kPulseTopic = "arbiter/pulses";
+inline constexpr const char* kQuestionTopic = "arbiter/questions";
+inline constexpr const char* kAnswerTopic = "arbiter/answers";
 
 }  // namespace arbiter::link

@@ -7,6 +7,7 @@
 
 #include "gateway/dds/opaque_type.hpp"
 #include "link/core/topic_names.hpp"
+#include "link/dds/demands.hpp"
 
 namespace arbiter::link {
 namespace {
@@ -68,7 +69,7 @@ Bytes encapsulation() noexcept {
 }
 
 EventWriter::EventWriter(const Network& network, const OfferCard& card, const gateway::Bell& bell)
-    : topic_(make_topic(network, card.source, &type_)) {
+    : name_(topic_of_source(card.source)), topic_(make_topic(network, card.source, &type_)) {
   // Cyclone has one pointer for what a listener is given, and does not write through it.
   const gateway::dds::Listener listener(dds_create_listener(const_cast<gateway::Bell*>(&bell)));
   dds_lset_publication_matched(
@@ -88,6 +89,14 @@ bool EventWriter::is_wanted() const {
          status.current_count > 0;
 }
 
+Demand EventWriter::demand() const { return demand_of_readers(writer_.get()); }
+
+std::uint32_t EventWriter::changes_of_readers() const {
+  dds_publication_matched_status_t status{};
+  static_cast<void>(dds_get_publication_matched_status(writer_.get(), &status));
+  return 2 * status.total_count - status.current_count;  // those that came, and those that went
+}
+
 void EventWriter::set_card(const OfferCard& card) {
   const CycloneQos qos(dds_create_qos());
   const ByteString data = write_offer_card(card);
@@ -105,7 +114,8 @@ bool EventWriter::write(Bytes header, Bytes sample) noexcept {
 }
 
 EventReader::EventReader(const Network& network, const std::string& source,
-                         gateway::dds::SampleTaker& taker, const gateway::Bell& bell)
+                         gateway::dds::SampleTaker& taker, const gateway::Bell& bell,
+                         const DemandCard& demand)
     : cache_(taker) {
   const gateway::dds::Listener listener(dds_create_listener(const_cast<gateway::Bell*>(&bell)));
   dds_lset_subscription_matched(
@@ -115,17 +125,24 @@ EventReader::EventReader(const Network& network, const std::string& source,
       });
   const ddsi_sertype* type = nullptr;
   topic_ = make_topic(network, source, &type);
-  reader_ = Entity(dds_create_reader_rhc(network.participant(), topic_.get(), event_qos().get(),
+  const CycloneQos qos = event_qos();
+  const ByteString data = write_demand_card(demand);
+  dds_qset_userdata(qos.get(), data.data(), data.size());
+  reader_ = Entity(dds_create_reader_rhc(network.participant(), topic_.get(), qos.get(),
                                          listener.get(), cache_.cache()),
                    "a reader of " + topic_of_source(source));
 }
 
-std::vector<EventReader::Offer> EventReader::offers() const {
+std::vector<EventReader::Offer> EventReader::offers(std::uint64_t current) const {
   std::array<dds_instance_handle_t, kMaxOffers> writers{};
   const dds_return_t found =
       dds_get_matched_publications(reader_.get(), writers.data(), writers.size());
   std::vector<Offer> offers;
+  if (current != 0) {
+    if (auto card = card_of(reader_.get(), current)) offers.push_back({current, std::move(*card)});
+  }
   for (std::size_t i = 0; i < writers.size() && static_cast<dds_return_t>(i) < found; ++i) {
+    if (writers.at(i) == current) continue;
     if (auto card = card_of(reader_.get(), writers.at(i))) {
       offers.push_back({writers.at(i), std::move(*card)});
     }

@@ -4,7 +4,8 @@
 //
 // Both are reliable, keep the last event and give it to a reader that comes later: so whatever is
 // lost, the last event gets through, and it tells the source's state (link/core/stream.hpp). If
-// they kept more, new samples would wait for old ones.
+// they kept more, new samples would wait for old ones. A reader's user data say which samples it
+// wants (demands.hpp).
 #pragma once
 
 #include <dds/dds.h>
@@ -18,6 +19,7 @@
 #include "gateway/core/bridge.hpp"
 #include "gateway/dds/reader_cache.hpp"
 #include "link/core/cards.hpp"
+#include "link/core/demand.hpp"
 #include "link/dds/network.hpp"
 
 namespace arbiter::link {
@@ -25,17 +27,22 @@ namespace arbiter::link {
 // Thread safety: one thread, or a lock of the owner's; is_wanted() any thread.
 class EventWriter {
  public:
-  // `bell` rings when is_wanted() changes, and outlives this. Throws DdsError.
+  // `bell` rings when readers come or go, and outlives this. Throws DdsError.
   EventWriter(const Network& network, const OfferCard& card, const gateway::Bell& bell);
 
+  [[nodiscard]] const std::string& topic() const { return name_; }
   // Whether any host reads it now.
   [[nodiscard]] bool is_wanted() const;
+  // What all its readers want together (demands.hpp), and how often readers have come or gone.
+  [[nodiscard]] Demand demand() const;
+  [[nodiscard]] std::uint32_t changes_of_readers() const;
   // Another card for the same source: its type is now known, or has changed.
   void set_card(const OfferCard& card);
   // Waits for no reader. False: it was not written, because memory is short.
   [[nodiscard]] bool write(Bytes header, Bytes sample) noexcept;
 
  private:
+  const std::string name_;  // of the topic
   const ddsi_sertype* type_ = nullptr;
   Entity topic_;
   Entity writer_;
@@ -46,14 +53,17 @@ class EventReader {
   // `taker` is called on Cyclone's threads, one at a time. `bell` rings when offers() change.
   // Both outlive this. Throws DdsError.
   EventReader(const Network& network, const std::string& source, gateway::dds::SampleTaker& taker,
-              const gateway::Bell& bell);
+              const gateway::Bell& bell, const DemandCard& demand);
 
   struct Offer {
     std::uint64_t key = 0;
     OfferCard card;
   };
-  // Who offers the source now. Malformed cards are passed over.
-  [[nodiscard]] std::vector<Offer> offers() const;
+  // By which DemandTeller knows it.
+  [[nodiscard]] dds_entity_t handle() const { return reader_.get(); }
+  // Who offers the source now. Malformed cards are passed over. Of very many not all are looked at,
+  // but `current` is, if it is there.
+  [[nodiscard]] std::vector<Offer> offers(std::uint64_t current) const;
 
  private:
   gateway::dds::ReaderCache cache_;

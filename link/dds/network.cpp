@@ -1,6 +1,16 @@
 #include "link/dds/network.hpp"
 
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <iterator>
+#include <system_error>
+#include <utility>
+
 #include "gateway/dds/domain.hpp"
+#include "link/dds/security.hpp"
 
 namespace arbiter::link {
 namespace {
@@ -15,6 +25,24 @@ constexpr const char* kForAll =
     "<Discovery><LeaseDuration>1500ms</LeaseDuration><SPDPInterval>250ms</SPDPInterval></"
     "Discovery>";
 
+// This process's, in order. Where they cannot be listed: none.
+std::vector<int> datagram_sockets() {
+  std::vector<int> sockets;
+  std::error_code error;
+  for (const auto& each : std::filesystem::directory_iterator("/proc/self/fd", error)) {
+    const int fd = std::atoi(each.path().filename().c_str());
+    int domain = 0;
+    int type = 0;
+    socklen_t size = sizeof domain;
+    if (::getsockopt(fd, SOL_SOCKET, SO_DOMAIN, &domain, &size) != 0) continue;
+    size = sizeof type;
+    if (::getsockopt(fd, SOL_SOCKET, SO_TYPE, &type, &size) != 0) continue;
+    if ((domain == AF_INET || domain == AF_INET6) && type == SOCK_DGRAM) sockets.push_back(fd);
+  }
+  std::sort(sockets.begin(), sockets.end());
+  return sockets;
+}
+
 }  // namespace
 
 std::string configuration_of(const NetworkOptions& options) {
@@ -22,13 +50,30 @@ std::string configuration_of(const NetworkOptions& options) {
   gateway.interfaces = options.interfaces;
   if (gateway.interfaces.empty()) gateway.interfaces.emplace_back("lo");
   gateway.peers = options.peers;
-  return std::string(kForAll) + "," + gateway::dds::configuration_of(gateway);
+  std::string all = std::string(kForAll) + "," + gateway::dds::configuration_of(gateway);
+  if (!options.security.empty()) {
+    all += "," + security_configuration(options.security, options.name);
+  }
+  return all;
 }
 
 Network::Network(const NetworkOptions& options)
-    : domain_(dds_create_domain(options.domain, configuration_of(options).c_str()),
+    : sockets_(datagram_sockets()),
+      domain_(dds_create_domain(options.domain, configuration_of(options).c_str()),
               "DDS domain " + std::to_string(options.domain)),
       participant_(dds_create_participant(options.domain, nullptr, nullptr),
-                   "a participant in DDS domain " + std::to_string(options.domain)) {}
+                   "a participant in DDS domain " + std::to_string(options.domain)) {
+  std::vector<int> now = datagram_sockets();
+  std::vector<int> made;
+  std::set_difference(now.begin(), now.end(), sockets_.begin(), sockets_.end(),
+                      std::back_inserter(made));
+  sockets_ = std::move(made);
+}
+
+// Who waits for a datagram is woken, and finds that it is over once the domain is deleted.
+Network::~Network() {
+  if (!is_cut_off_) return;
+  for (const int socket : sockets_) static_cast<void>(::shutdown(socket, SHUT_RD));
+}
 
 }  // namespace arbiter::link

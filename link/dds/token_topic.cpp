@@ -18,7 +18,7 @@ constexpr std::size_t kTokenMessageBytes = 21;
 
 }  // namespace
 
-TokenTopic::TokenTopic(const Network& network, std::function<void(const TokenMessage&)> heard)
+TokenTopic::TokenTopic(const Network& network, Heard heard)
     : heard_(std::move(heard)), cache_(*this) {
   ddsi_sertype* type = gateway::dds::make_opaque_type("arbiter::Token", false);
   const dds_entity_t topic = dds_create_topic_sertype(network.participant(), kTokenTopic, &type,
@@ -48,14 +48,14 @@ void TokenTopic::send(const TokenMessage& message) noexcept {
   if (payload != nullptr) static_cast<void>(dds_writecdr(writer_.get(), &payload->cyclone));
 }
 
-void TokenTopic::take(const gateway::dds::Payload& payload,
-                      dds_instance_handle_t /*writer*/) noexcept {
+void TokenTopic::take(const gateway::dds::Payload& payload, dds_instance_handle_t writer) noexcept {
   const std::size_t before = encapsulation().size();
   std::array<std::byte, kTokenMessageBytes> bytes{};
   if (payload.size < before + bytes.size()) return;
   const gateway::dds::ArrivedSample sample(payload);
   if (!sample.copy(before, WritableBytes(bytes.data(), bytes.size()))) return;
-  if (const auto message = read_token_message(Bytes(bytes.data(), bytes.size()))) heard_(*message);
+  if (const auto message = read_token_message(Bytes(bytes.data(), bytes.size())))
+    heard_(*message, writer);
 }
 
 }  // namespace arbiter::link

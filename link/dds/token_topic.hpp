@@ -13,8 +13,10 @@ namespace arbiter::link {
 
 class TokenTopic : private gateway::dds::SampleTaker {
  public:
+  // `writer`: the key of who has sent it.
+  using Heard = std::function<void(const TokenMessage& message, std::uint64_t writer)>;
   // `heard` is called on Cyclone's threads, one at a time. Throws DdsError.
-  TokenTopic(const Network& network, std::function<void(const TokenMessage&)> heard);
+  TokenTopic(const Network& network, Heard heard);
   TokenTopic(const TokenTopic&) = delete;
   TokenTopic& operator=(const TokenTopic&) = delete;
   ~TokenTopic() override;
@@ -23,10 +25,9 @@ class TokenTopic : private gateway::dds::SampleTaker {
   void send(const TokenMessage& message) noexcept;
 
  private:
-  void take(const gateway::dds::Payload& payload,
-            dds_instance_handle_t /*writer*/) noexcept override;
+  void take(const gateway::dds::Payload& payload, dds_instance_handle_t writer) noexcept override;
 
-  const std::function<void(const TokenMessage&)> heard_;
+  const Heard heard_;
   gateway::dds::ReaderCache cache_;
   const ddsi_sertype* type_ = nullptr;
   Entity topic_;

@@ -3,9 +3,15 @@
 #include <algorithm>
 
 #include "link/core/cards.hpp"
+#include "link/core/disagreements.hpp"
 #include "link/core/event_header.hpp"
+#include "link/core/host_card.hpp"
+#include "link/core/pulse.hpp"
+#include "link/core/questions.hpp"
 #include "link/core/topic_names.hpp"
 #include "tests/fuzz/fuzz.hpp"
+#include "wire/document.hpp"
+#include "wire/switch_request.hpp"
 
 namespace arbiter::fuzz {
 namespace {
@@ -39,6 +45,62 @@ void check_cards(Bytes bytes) {
     require(message->number != 0, "tokens have numbers");
     require(is_beginning(write_token_message(*message), bytes), "a token is what was written");
   }
+  if (const auto card = read_demand_card(bytes)) {
+    require(card->demand >= Demand::kSamples && card->demand <= Demand::kHeaders,
+            "a demand is one of those that there are");
+    require(is_beginning(write_demand_card(*card), bytes), "a demand is what was written");
+  }
+}
+
+void check_hosts(Bytes bytes) {
+  if (const auto card = read_host_card(bytes)) {
+    require(is_host_name(card->host), "a host has a name");
+    require(card->inputs.size() <= kMaxPortsOfCard, "the ports are bounded");
+    require(card->inputs.size() <= card->input_count, "none is there that is not counted");
+    require(is_beginning(write_host_card(*card), bytes), "a host's card is what was written");
+    const PresentHost host{&*card, 0};
+    Disagreements disagreements;
+    static_cast<void>(disagreements.look({host, host}, 0));
+  }
+  if (const auto pulse = read_pulse(bytes)) {
+    require(is_beginning(write_pulse(*pulse), bytes), "a pulse is what was written");
+    RoundTrips trips(1);
+    static_cast<void>(trips.next(0));
+    trips.note(*pulse, 1000);
+    const auto measured = trips.of(pulse->sender);
+    require(!measured || (*measured >= 0 && *measured <= 1000), "a round trip is one that can be");
+  }
+}
+
+void check_questions(Bytes bytes) {
+  if (const auto question = read_question(bytes)) {
+    require(question->argument.size() <= kMaxArgument, "an argument is bounded");
+    require(question->asked.size() <= kMaxAsked, "those who are asked are bounded");
+    require(is_beginning(write_question(*question), bytes), "a question is what was written");
+  }
+  if (const auto answer = read_answer(bytes)) {
+    require(is_beginning(write_answer(*answer), bytes), "an answer is what was written");
+    OpenQuestions open;
+    const std::uint64_t number = open.ask({7}, 0);
+    const bool is_heard = open.note(*answer, 1);
+    require(is_heard == (answer->answerer == 7 && answer->number == number),
+            "only who was asked is heard");
+  }
+}
+
+// What hosts ask each other when they switch, and what they answer.
+void check_switch(std::string_view text) {
+  if (const auto request = wire::read_switch_request(text)) {
+    require(request->attempt != 0, "an attempt has a number");
+    require(request->without.size() <= wire::kMaxHostsLeftOut, "hosts left out are bounded");
+    const std::string written = wire::write_switch_request(*request);
+    require(wire::read_switch_request(written) == request, "a request is read as it is written");
+  }
+  try {
+    const wire::SwitchAnswer answer = wire::read_switch_answer(text);
+    static_cast<void>(wire::read_switch_answer(wire::write_switch_answer(answer)));
+  } catch (const wire::DocumentError&) {
+  }
 }
 
 }  // namespace
@@ -48,5 +110,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const arbiter::Bytes bytes(reinterpret_cast<const std::byte*>(data), size);
   arbiter::fuzz::check_event(bytes);
   arbiter::fuzz::check_cards(bytes);
+  arbiter::fuzz::check_hosts(bytes);
+  arbiter::fuzz::check_questions(bytes);
+  arbiter::fuzz::check_switch(arbiter::fuzz::text_of(data, size));
   return 0;
 }

@@ -1,6 +1,10 @@
 // Two hosts with networks of their own, and the cable between them pulled.
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <string>
+
+#include "tests/client/models.hpp"
 #include "tests/link/cables.hpp"
 #include "tests/link/robot.hpp"
 
@@ -118,6 +122,75 @@ TEST_F(Cable, AnInterfaceMayComeAfterTheLink) {
   Body body(base);
   body.drive(planner);
   base.await_described(kPlanner, "host rear");
+}
+
+// What happens to the network of the head, while its planner commands the motor on the base; then
+// it commands again.
+void change_network(const std::function<void(CabledRobot&)>& change, const std::string& said) {
+  CabledRobot robot;
+  Host head("head", robot.runtime, source_model("300ms"), robot.arguments(),
+            robot.head_network.enter());
+  Host base("base", robot.runtime, motor_model("300ms"), robot.arguments(),
+            robot.base_network.enter());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  change(robot);
+  if (!said.empty()) head.see(said);
+  body.drive(planner);
+  // And in the other direction.
+  Node node = base.node("sensor");
+  auto sensor = node.output_port<Speed>("/Sensor/speed:o");
+  head.daemon().load(rules(arbiter_at("/Display/speed:i", select("/Sensor/speed:o"))));
+  Node display = head.node("display");
+  auto in = display.input_port<Speed>("/Display/speed:i");
+  await([&] {
+    sensor.publish(Speed{1});
+    return in.wait_for(5ms).has_value();
+  });
+}
+
+void give_address(const std::string& address) {
+  change_network(
+      [&](CabledRobot& robot) {
+        robot.head_network.ip("addr del 10.77.0.1/24 dev eth0");
+        robot.head_network.ip("addr add " + address + " dev eth0");
+      },
+      "joining the network again");
+}
+
+TEST_F(Cable, AnotherAddressOfTheInterfaceIsNoticed) { give_address("10.77.0.11/24"); }
+
+// Perhaps before anybody has looked.
+TEST_F(Cable, AnAddressThatWasGoneForAMomentIsNoticed) { give_address("10.77.0.1/24"); }
+
+TEST_F(Cable, AnInterfaceThatGoesAndComesBackIsUsedAgain) {
+  change_network(
+      [](CabledRobot& robot) {
+        robot.head_network.ip("link del eth0");
+        robot.cables.connect(robot.head_network, kHead);
+      },
+      "joining the network again");
+}
+
+// Cyclone's threads wait for datagrams that cannot come any more.
+TEST_F(Cable, ALinkWhoseAddressIsGoneEndsAllTheSame) {
+  CabledRobot robot;
+  Host base("base", robot.runtime, motor_model("300ms"), robot.arguments(),
+            robot.base_network.enter());
+  base.see("host base, on eth0");
+  robot.base_network.ip("addr del 10.77.0.2/24 dev eth0");
+  base.link().signal(SIGTERM);
+  EXPECT_EQ(base.link().wait(), 0);
+}
+
+TEST_F(Cable, AnInterfaceThatIsSwitchedOffAndOnIsUsedAgain) {
+  change_network(
+      [](CabledRobot& robot) {
+        robot.head_network.ip("link set eth0 down");
+        robot.head_network.ip("link set eth0 up");
+      },
+      "");
 }
 
 }  // namespace

@@ -4,9 +4,12 @@
 
 #include "link/core/cards.hpp"
 #include "link/core/event_header.hpp"
-#include "link/dds/event_topic.hpp"
+#include "link/core/held_tokens.hpp"
 #include "link/dds/network.hpp"
+#include "link/dds/token_topic.hpp"
+#include "shm/clock.hpp"
 #include "tests/link/robot.hpp"
+#include "tests/link/stranger.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -14,49 +17,10 @@ namespace {
 using link::EventHeader;
 using link::EventKind;
 
-// A program on the network that says that it has the planner.
-class Stranger {
- public:
-  explicit Stranger(const link::Network& network, link::Incarnation incarnation = 666,
-                    const std::string& host = "stranger") {
-    card_.incarnation = incarnation;
-    card_.host = host;
-    card_.source = kPlanner;
-    card_.type_revision = 1;
-    const Type type = type_of<Speed>();
-    card_.type.set_name(type.name());
-    card_.type.size = type.size();
-    card_.type.alignment = type.alignment();
-    writer_.emplace(network, card_, bell_);
-  }
-  // An event that is proper but for what `spoil` makes of it.
-  void send(const std::function<void(EventHeader&)>& spoil, std::size_t size = sizeof(Speed)) {
-    EventHeader header;
-    header.kind = EventKind::kSample;
-    header.exporter = card_.incarnation;
-    header.number = ++number_;
-    header.sequence = number_;
-    header.type_revision = 1;
-    header.length = static_cast<std::uint32_t>(size);
-    spoil(header);
-    link::ByteString bytes(link::header_bytes(header));
-    link::write_header(header, WritableBytes(bytes.data(), bytes.size()));
-    const std::vector<std::byte> sample(size);
-    write(bytes, Bytes(sample.data(), sample.size()));
-  }
-  void write(const link::ByteString& header, Bytes sample = {}) {
-    static_cast<void>(writer_->write(Bytes(header.data(), header.size()), sample));
-  }
-
- private:
-  const gateway::Bell bell_;
-  link::OfferCard card_;
-  std::uint64_t number_ = 0;
-  std::optional<link::EventWriter> writer_;
-};
-
 class HostileHost : public testing::Test {
  protected:
+  explicit HostileHost(const std::string& timeout = "1000s") : timeout_(timeout) {}
+
   // Sends until the status says that of the source; the motor gets nothing of it.
   void send_until(const std::string& text, const std::function<void()>& send) {
     await([&] {
@@ -68,10 +32,11 @@ class HostileHost : public testing::Test {
     EXPECT_FALSE(base_.daemon().source(kPlanner)["active"]);
   }
 
+  const std::string timeout_;
   const OwnDomain domain_;
   const TemporaryDirectory runtime_;
   Host base_{
-      "base", runtime_, motor_model("1000s"), {"--domain", std::to_string(domain_.number())}};
+      "base", runtime_, motor_model(timeout_), {"--domain", std::to_string(domain_.number())}};
   Body body_{base_};
   const link::Network network_{{domain_.number(), {}, {}}};
   Stranger stranger_{network_};
@@ -126,6 +91,66 @@ TEST_F(HostileHost, TwoMachinesWithOneNameAreNamed) {
   const Stranger namesake(network_, 667);
   base_.see("several machines that are all called stranger");
   base_.await_described(kPlanner, "several machines are called stranger");
+}
+
+// A stranger who hears the tokens of the links, and names them.
+class HostileExporter : public HostileHost {
+ protected:
+  explicit HostileExporter(const std::string& timeout = "300ms") : HostileHost(timeout) {}
+
+  // Without another number where `again`.
+  void send_in_time(EventKind kind, bool again = false) {
+    stranger_.send(
+        [&](EventHeader& header) {
+          header.kind = kind;
+          if (again) header.number = header.sequence = number_;
+          number_ = header.number;
+          held_.name(shm::monotonic_now(), header.tokens);
+        },
+        kind == EventKind::kWithheld ? 0 : sizeof(Speed));
+  }
+  void take_the_motor() {
+    await([&] {
+      send_in_time(EventKind::kWithheld);
+      return body_.motor().winner() == kPlanner;
+    });
+  }
+
+  std::uint64_t number_ = 0;
+  link::HeldTokens held_;
+  link::TokenTopic tokens_{
+      network_, [this](const link::TokenMessage& message, std::uint64_t writer) {
+        held_.note(message.importer, message.number, writer, shm::monotonic_now());
+      }};
+};
+
+// It would hold the place of the winner, and nobody would command the motor.
+TEST_F(HostileExporter, OneThatKeepsItsSamplesThoughTheyAreWantedIsTakenForSilent) {
+  take_the_motor();
+  await([&] {
+    send_in_time(EventKind::kWithheld);
+    body_.hold().publish(Speed{0});
+    const auto got = body_.motor().wait_for(2ms);
+    return got && got->source() == kHold;
+  });
+  base_.await_described(kPlanner, "withheld though they were wanted");
+}
+
+class PatientHostileExporter : public HostileExporter {
+ protected:
+  PatientHostileExporter() : HostileExporter("1000s") {}
+};
+
+TEST_F(PatientHostileExporter, ASampleThatItSendsAgainAndAgainComesOnce) {
+  take_the_motor();
+  for (int i = 0; i < 5; ++i) send_in_time(EventKind::kAgain, true);
+  int taken = 0;
+  await([&] {
+    while (body_.motor().take()) ++taken;
+    return base_.described(kPlanner).find("twice") != std::string::npos;
+  });
+  while (body_.motor().take()) ++taken;
+  EXPECT_EQ(taken, 1);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "link/core/cards.hpp"
 #include "link/core/event_header.hpp"
 #include "link/core/topic_names.hpp"
+#include "link/core/what_passes.hpp"
 
 namespace arbiter::link {
 namespace {
@@ -77,6 +78,7 @@ TEST(EventHeader, IsNobodysWhereItContradictsItself) {
            [](EventHeader& header) { header.kind = EventKind::kSignal; },
            [](EventHeader& header) { header.kind = EventKind::kDeactivation; },
            [](EventHeader& header) { header.kind = EventKind::kState; },
+           [](EventHeader& header) { header.kind = EventKind::kWithheld; },
            [](EventHeader& header) { header.kind = static_cast<EventKind>(0); },
            [](EventHeader& header) { header.kind = static_cast<EventKind>(5); },
        }) {
@@ -190,6 +192,23 @@ TEST(Cards, TokensAreNumberedFromOne) {
   EXPECT_FALSE(read_token_message(Bytes()));
 }
 
+TEST(Cards, ADemandIsOneOfThoseThatThereAre) {
+  for (const Demand demand : {Demand::kSamples, Demand::kSmallSamples, Demand::kHeaders}) {
+    const ByteString bytes = write_demand_card({7, demand});
+    const auto read = read_demand_card(Bytes(bytes.data(), bytes.size()));
+    ASSERT_TRUE(read);
+    EXPECT_EQ(read->importer, 7U);
+    EXPECT_EQ(read->demand, demand);
+    EXPECT_FALSE(read_demand_card(Bytes(bytes.data(), bytes.size() - 1)));
+  }
+  for (const int wrong : {0, 4, 255}) {
+    const ByteString bytes = write_demand_card({7, static_cast<Demand>(wrong)});
+    EXPECT_FALSE(read_demand_card(Bytes(bytes.data(), bytes.size()))) << wrong;
+  }
+  const ByteString nobody = write_demand_card({0, Demand::kSamples});
+  EXPECT_FALSE(read_demand_card(Bytes(nobody.data(), nobody.size())));
+}
+
 TEST(TopicNames, AreDifferentForDifferentSources) {
   EXPECT_EQ(topic_of_source("/Nav/cmd:o"), "arbiter/source/Nav/cmd_3ao");
   std::set<std::string> topics;
@@ -200,6 +219,17 @@ TEST(TopicNames, AreDifferentForDifferentSources) {
                                       "0123456789_/"),
               std::string::npos);
   }
+}
+
+TEST(WhatPasses, IsALineHoweverMuchThereIs) {
+  EXPECT_EQ(what_passes({}, {"/a:o", "/b:o"}),
+            "offers what components of this host will open: nothing yet; imports from other hosts, "
+            "unless it is open here: /a:o, /b:o");
+  std::vector<std::string> many;
+  for (int i = 0; i < 1000; ++i) many.push_back("/" + std::to_string(i));
+  EXPECT_EQ(what_passes(many, {}),
+            "offers what components of this host have open: /0, /1, /2, /3, /4, /5, /6, /7 and 992 "
+            "more; imports nothing: the model in force here reads no source");
 }
 
 }  // namespace

@@ -2,9 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "tests/link/robot.hpp"
+#include "tests/support/run_program.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -31,6 +34,27 @@ TEST_F(Hosts, ASampleThatIsPublishedOnOneArrivesAtAPortOfTheOther) {
   EXPECT_EQ(body.motor().winner(), kPlanner);
   base.await_described(kPlanner, "host head");
   EXPECT_EQ(body.hold().publish(Speed{0}).discarded, 1U) << "decided where it is received";
+}
+
+// What the motor gets is numbered by the link; where it began, it says as well.
+TEST_F(Hosts, ASampleSaysWhichOneItWasThere) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  const auto next = [&] {
+    for (;;) {
+      planner.publish();
+      if (auto sample = body.motor().take()) return std::pair((*sample)->number, sample->origin());
+    }
+  };
+  const auto [number, origin] = next();
+  const auto [later_number, later_origin] = next();
+  EXPECT_NE(origin.publisher, 0U);
+  EXPECT_EQ(later_origin.publisher, origin.publisher);
+  EXPECT_EQ(later_origin.sequence - origin.sequence,
+            static_cast<std::uint64_t>(later_number - number));
 }
 
 TEST_F(Hosts, ADeactivationEndsTheActivityOnTheOtherHost) {
@@ -132,6 +156,99 @@ TEST_F(Hosts, EachObeysItsOwnComponent) {
     far.publish();
     return base.described(kPlanner).find("host head") != std::string::npos;
   });
+}
+
+// A planner on a host whose link has the name. On a busy machine the link may take longer to yield
+// than the daemon waits for it.
+std::unique_ptr<Planner> planner_where_it_is_imported(const Host& host, std::int64_t published) {
+  for (;;) {
+    try {
+      return std::make_unique<Planner>(host, published);
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), HasSubstr("is held by node \"arbiter-link\""));
+    }
+  }
+}
+
+TEST_F(Hosts, AComponentHasItsNameThoughItIsImportedAndTheImportComesBackAfterIt) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Planner far(head);
+  Body body(base);
+  for (std::int64_t round = 1; round <= 2; ++round) {
+    await([&] {
+      far.publish();
+      return base.described(kPlanner).find("host head") != std::string::npos;
+    });
+    auto near = planner_where_it_is_imported(base, round * 1'000'000);
+    while (body.motor().take()) {
+    }
+    body.drive(*near);
+    EXPECT_EQ(base.described(kPlanner), "") << "no link has it open";
+    EXPECT_EQ(base.daemon().source(kPlanner)["component"]["node"], "brain");
+    EXPECT_EQ(body.hold().publish(Speed{0}).discarded, 1U) << "the source stays active";
+  }
+  base.see("is opened by a component of this host, and is not imported any more");
+  EXPECT_THAT(base.log(), Not(HasSubstr("is not imported: ")));
+}
+
+// Its offer is whole before it has sent anything.
+TEST_F(Hosts, AnUntypedSourceThatIsSilentIsImported) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Node brain = head.node("brain");
+  OutputPortOptions options;
+  options.max_size = 77;
+  auto planner = brain.output_port(kPlanner, options);
+  base.await_described(kPlanner, "host head");
+  const nlohmann::json imported = base.daemon().source(kPlanner);
+  EXPECT_TRUE(imported["type"].is_null());
+  EXPECT_EQ(imported["max_size"], 77);
+  Node body = base.node("body");
+  auto motor = body.input_port(kMotor);
+  await([&] {
+    planner.publish(Bytes(reinterpret_cast<const std::byte*>("go"), 2));
+    const auto got = motor.wait_for(5ms);
+    return got && got->size() == 2;
+  });
+}
+
+// No sample gets here so fast, so none is an arrival.
+TEST_F(Hosts, TheOptionSaysHowOldASampleMayBe) {
+  Host head("head", runtime_, kNoRules, network());
+  for (const char* const timeout : {"forever", "1000s"}) {
+    std::vector<std::string> options = network();
+    options.insert(options.end(), {"--max-age", "1ns"});
+    Host base("base", runtime_, motor_model(timeout), options);
+    Planner planner(head);
+    Body body(base);
+    await([&] {
+      planner.publish();
+      return base.described(kPlanner).find(" late") != std::string::npos;
+    });
+    EXPECT_FALSE(body.motor().take());
+    EXPECT_FALSE(base.daemon().source(kPlanner)["active"]);
+  }
+}
+
+TEST_F(Hosts, AMaximumAgeThatIsNoneIsWrongUse) {
+  for (const char* const age : {"0ms", "forever", "5", "1.5s", "-1s", ""}) {
+    const auto result = run_program(
+        {std::string(ARBITER_PROGRAMS) + "/arbiter-link", "--max-age=" + std::string(age)});
+    EXPECT_EQ(result.exit_code, 2) << age;
+    EXPECT_THAT(result.err, HasSubstr("--max-age")) << age;
+  }
+}
+
+TEST_F(Hosts, EachLinkSaysWhatItOffersAndWants) {
+  Host head("head", runtime_, kNoRules, network());
+  head.see("offers what components of this host will open: nothing yet; imports nothing: ");
+  const Planner planner(head);
+  head.link().kill();
+  head.start_link();
+  head.see("offers what components of this host have open: /Planner/speed:o; imports nothing: ");
+  Host base("base", runtime_, motor_model("1000s"), network());
+  base.see("imports from other hosts, unless it is open here: /Hold/speed:o, /Planner/speed:o");
 }
 
 TEST_F(Hosts, AThirdOneKeepsTheSpeakerThatItHasAndNamesBoth) {

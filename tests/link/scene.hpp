@@ -36,11 +36,12 @@ inline void await(const std::function<bool()>& holds) {
 class Host {
  public:
   // `model`: empty, and the host has none. `by`: what starts the link, such as in a network
-  // namespace.
+  // namespace. `arguments`: more of the daemon's.
   Host(std::string name, const TemporaryDirectory& runtime, const std::string& model,
-       std::vector<std::string> network, std::vector<std::string> by = {})
+       std::vector<std::string> network, std::vector<std::string> by = {},
+       std::vector<std::string> arguments = {})
       : name_(std::move(name)),
-        daemon_(model, options_of(name_, runtime, model.empty())),
+        daemon_(model, options_of(name_, runtime, model.empty(), std::move(arguments))),
         log_(daemon_.directory() + "/link.log"),
         by_(std::move(by)),
         network_(std::move(network)) {
@@ -86,8 +87,9 @@ class Host {
 
  private:
   static Daemon::Options options_of(const std::string& name, const TemporaryDirectory& runtime,
-                                    bool without_model) {
+                                    bool without_model, std::vector<std::string> arguments) {
     Daemon::Options options;
+    options.arguments = std::move(arguments);
     options.instance = name;
     options.without_model = without_model;
     options.runtime_directory = runtime.path();

@@ -17,6 +17,7 @@ namespace {
 using shm::Nanoseconds;
 
 constexpr Nanoseconds kMs = 1'000'000;
+constexpr std::uint64_t kWriter = 5;
 
 TEST(TokenTimes, KnowsTheLastOnesExactly) {
   TokenTimes times;
@@ -95,8 +96,8 @@ TEST(SentTokens, ATokenThatWasNeverSentIsNoEvidence) {
 
 TEST(HeldTokens, ASampleThatWaitedNamesNoTokenThatCameAfterIt) {
   HeldTokens held;
-  ASSERT_TRUE(held.note(7, 1, 10));
-  ASSERT_TRUE(held.note(7, 2, 20));
+  ASSERT_TRUE(held.note(7, 1, kWriter, 10));
+  ASSERT_TRUE(held.note(7, 2, kWriter, 20));
   std::vector<NamedToken> named;
   held.name(19, named);
   EXPECT_EQ(named, (std::vector<NamedToken>{{7, 1}}));
@@ -106,15 +107,34 @@ TEST(HeldTokens, ASampleThatWaitedNamesNoTokenThatCameAfterIt) {
   EXPECT_TRUE(named.empty());
 }
 
+// With a number that the importer has not reached, a stranger would have samples named that are
+// taken for young later, or all of them for late.
+TEST(HeldTokens, NobodyElseSpeaksInAnImportersName) {
+  HeldTokens held;
+  ASSERT_TRUE(held.note(7, 1, kWriter, 0));
+  EXPECT_FALSE(held.note(7, 1000, kWriter + 1, 1));
+  EXPECT_TRUE(held.note(7, 2, kWriter, 2));
+  std::vector<NamedToken> named;
+  held.name(2, named);
+  EXPECT_EQ(named, (std::vector<NamedToken>{{7, 2}}));
+}
+
+TEST(HeldTokens, AnImporterThatWasLostMayComeBackByAnotherWriter) {
+  HeldTokens held;
+  ASSERT_TRUE(held.note(7, 1, kWriter, 0));
+  EXPECT_TRUE(held.note(7, 2, kWriter + 1, HeldTokens::kOtherWriter));
+  EXPECT_FALSE(held.note(7, 3, kWriter, HeldTokens::kOtherWriter + 1));
+}
+
 TEST(HeldTokens, StrangersCannotTakeThePlacesOfThoseWhoAreThere) {
   HeldTokens held;
   for (Incarnation importer = 1; importer <= kMaxImporters; ++importer) {
-    ASSERT_TRUE(held.note(importer, 1, 0));
+    ASSERT_TRUE(held.note(importer, 1, kWriter, 0));
   }
-  EXPECT_FALSE(held.note(1000, 1, 1)) << "all places are taken";
-  EXPECT_TRUE(held.note(1, 2, 1));
+  EXPECT_FALSE(held.note(1000, 1, kWriter, 1)) << "all places are taken";
+  EXPECT_TRUE(held.note(1, 2, kWriter, 1));
   // Importer 1 spoke last of all: of the silent ones one gives way.
-  EXPECT_TRUE(held.note(1000, 1, HeldTokens::kSilence));
+  EXPECT_TRUE(held.note(1000, 1, kWriter, HeldTokens::kSilence));
   std::vector<NamedToken> named;
   held.name(HeldTokens::kSilence, named);
   EXPECT_EQ(named.size(), kMaxImporters);
@@ -167,7 +187,7 @@ class Network {
     std::sort(underway_.begin(), underway_.end(),
               [](const Underway& a, const Underway& b) { return a.arrives < b.arrives; });
     while (!underway_.empty() && underway_.front().arrives <= time) {
-      held_.note(1, underway_.front().number, underway_.front().arrives);
+      held_.note(1, underway_.front().number, kWriter, underway_.front().arrives);
       underway_.pop_front();
     }
     now_ = std::max(now_, time);

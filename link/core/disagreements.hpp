@@ -1,0 +1,64 @@
+// What hosts do not agree upon, by their cards: the same input port open on two of them, the same
+// source, the same name for two machines, different models.
+//
+// A port that moves from one host to another is in two cards for a moment: what has not stood for
+// kSettles is not reported. The earlier life of a link that was started again is not heard beside
+// the later one, until the two have been there together for kNoEarlierLife.
+//
+// Units: nanoseconds of a monotonic clock. Thread safety: none of its own.
+#pragma once
+
+#include <map>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "link/core/host_card.hpp"
+
+namespace arbiter::link {
+
+enum class DisagreementKind : std::uint8_t { kInputPort, kSource, kHostName, kModel };
+
+struct Disagreement {
+  DisagreementKind kind = DisagreementKind::kInputPort;
+  std::string name;                // the port's, the source's, the host's; of models: empty
+  std::vector<std::string> hosts;  // in byte order
+
+  // A sentence without its end.
+  [[nodiscard]] std::string text() const;
+  // Else it is a warning.
+  [[nodiscard]] bool is_error() const noexcept { return kind == DisagreementKind::kInputPort; }
+
+  friend bool operator<(const Disagreement& one, const Disagreement& other) {
+    return std::tie(one.kind, one.name, one.hosts) < std::tie(other.kind, other.name, other.hosts);
+  }
+};
+
+// A host whose link is there.
+struct PresentHost {
+  const HostCard* card = nullptr;
+  shm::Nanoseconds since = 0;
+};
+
+class Disagreements {
+ public:
+  static constexpr shm::Nanoseconds kSettles = 1'500'000'000;
+  // Longer than a lease.
+  static constexpr shm::Nanoseconds kNoEarlierLife = 3'000'000'000;
+  // Reported at once; a host may say that it has thousands of ports.
+  static constexpr std::size_t kMost = 64;
+
+  // Returns those that were not reported before, errors first.
+  std::vector<Disagreement> look(const std::vector<PresentHost>& hosts, shm::Nanoseconds now);
+  // Those that stand now, errors first.
+  [[nodiscard]] std::vector<Disagreement> standing() const;
+
+ private:
+  struct Standing {
+    shm::Nanoseconds since = 0;
+    bool is_reported = false;
+  };
+  std::map<Disagreement, Standing> found_;
+};
+
+}  // namespace arbiter::link

@@ -1,0 +1,75 @@
+#include "link/core/pulse.hpp"
+
+#include "link/core/card_bytes.hpp"
+
+namespace arbiter::link {
+namespace {
+
+constexpr std::uint32_t kPulseMagic = 0x50425241;  // "ARBP"
+
+}  // namespace
+
+ByteString write_pulse(const Pulse& pulse) {
+  CardWriter writer(kPulseMagic, pulse.sender);
+  writer.number(pulse.number);
+  writer.number(static_cast<std::uint16_t>(pulse.echoes.size()));
+  for (const Echo& echo : pulse.echoes) {
+    writer.number(echo.of);
+    writer.number(echo.number);
+    writer.number(echo.lay);
+  }
+  return writer.take();
+}
+
+std::optional<Pulse> read_pulse(Bytes bytes) {
+  CardReader reader(bytes, kPulseMagic);
+  Pulse pulse;
+  pulse.sender = reader.number<std::uint64_t>();
+  pulse.number = reader.number<std::uint64_t>();
+  const std::size_t count = reader.number<std::uint16_t>();
+  reader.require(pulse.sender != 0 && pulse.number != 0 && count <= kMaxEchoes);
+  for (std::size_t i = 0; i < count && reader.is_good(); ++i) {
+    Echo& echo = pulse.echoes.emplace_back();
+    echo.of = reader.number<std::uint64_t>();
+    echo.number = reader.number<std::uint64_t>();
+    echo.lay = reader.number<std::uint64_t>();
+  }
+  if (!reader.is_good()) return std::nullopt;
+  return pulse;
+}
+
+Pulse RoundTrips::next(shm::Nanoseconds now) {
+  std::erase_if(others_, [&](const auto& each) { return now - each.second.came >= kSilence; });
+  Pulse pulse{me_, ++last_, {}};
+  sent_.at(last_ % kKept) = now;
+  for (const auto& [incarnation, other] : others_) {
+    pulse.echoes.push_back(
+        {incarnation, other.number, static_cast<std::uint64_t>(now - other.came)});
+  }
+  return pulse;
+}
+
+void RoundTrips::note(const Pulse& pulse, shm::Nanoseconds now) {
+  if (pulse.sender == me_) return;
+  if (others_.size() >= kMaxEchoes && !others_.contains(pulse.sender)) return;
+  Other& other = others_[pulse.sender];
+  if (pulse.number <= other.number) return;
+  other.number = pulse.number;
+  other.came = now;
+  for (const Echo& echo : pulse.echoes) {
+    if (echo.of != me_ || echo.number == 0 || echo.number > last_ || last_ - echo.number >= kKept) {
+      continue;
+    }
+    const shm::Nanoseconds passed = now - sent_.at(echo.number % kKept);
+    // It cannot have lain there for longer than that.
+    if (passed < 0 || echo.lay > static_cast<std::uint64_t>(passed)) continue;
+    other.round_trip = passed - static_cast<shm::Nanoseconds>(echo.lay);
+  }
+}
+
+std::optional<shm::Nanoseconds> RoundTrips::of(Incarnation other) const {
+  const auto found = others_.find(other);
+  return found == others_.end() ? std::nullopt : found->second.round_trip;
+}
+
+}  // namespace arbiter::link

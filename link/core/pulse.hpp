@@ -1,0 +1,68 @@
+// Round trips between links, without comparing clocks: each link numbers the pulses that it sends,
+// once a second, and each pulse names the newest one of every other link, and for how long it has
+// been here. Who finds its own number in it knows the round trip: the time since it sent that, less
+// the time that it lay there.
+//
+//   pulse  "ARBP", version 1, incarnation of the sender, number (8), how many echoes (2); each:
+//          incarnation (8), number (8), nanoseconds since it came (8)
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "link/core/cards.hpp"
+
+namespace arbiter::link {
+
+inline constexpr std::size_t kMaxEchoes = 256;
+
+struct Echo {
+  Incarnation of = 0;
+  std::uint64_t number = 0;
+  std::uint64_t lay = 0;  // nanoseconds
+};
+
+struct Pulse {
+  Incarnation sender = 0;
+  std::uint64_t number = 0;
+  std::vector<Echo> echoes;
+};
+
+[[nodiscard]] ByteString write_pulse(const Pulse& pulse);
+[[nodiscard]] std::optional<Pulse> read_pulse(Bytes bytes);
+
+// What a link knows of round trips.
+//
+// Units: nanoseconds of a monotonic clock. Thread safety: none of its own.
+class RoundTrips {
+ public:
+  // Others are forgotten who have been silent for so long.
+  static constexpr shm::Nanoseconds kSilence = 10'000'000'000;
+
+  explicit RoundTrips(Incarnation me) : me_(me) {}
+
+  // The next pulse, which is sent after this call.
+  [[nodiscard]] Pulse next(shm::Nanoseconds now);
+  // One that has come. Senders that find no place are passed over.
+  void note(const Pulse& pulse, shm::Nanoseconds now);
+  // The last that was measured; nothing: none.
+  [[nodiscard]] std::optional<shm::Nanoseconds> of(Incarnation other) const;
+
+ private:
+  static constexpr std::size_t kKept = 16;  // of the pulses that were sent
+  struct Other {
+    std::uint64_t number = 0;
+    shm::Nanoseconds came = 0;
+    std::optional<shm::Nanoseconds> round_trip;
+  };
+
+  const Incarnation me_;
+  std::uint64_t last_ = 0;
+  std::array<shm::Nanoseconds, kKept> sent_{};  // by number
+  std::map<Incarnation, Other> others_;
+};
+
+}  // namespace arbiter::link

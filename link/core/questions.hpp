@@ -1,0 +1,125 @@
+// What links ask each other, and the answers: messages, and what an asking link makes of it.
+//
+// A question goes to links, each in one of its lives (its incarnation), and has a number, which
+// grows with each question of an asker. An answer is heard only if its question waits for it, from
+// whom it was asked. No answer within kPatience is an outcome: the host is silent.
+//
+//   question  "ARBQ", version 1, incarnation of the asker, number (8), how many are asked (2),
+//   their
+//             incarnations (8 each); texts: the asker's host, the verb; a long text: the argument
+//   answer    "ARBA", version 1, incarnation of who answers, incarnation of the asker (8), number
+//             (8), 1 byte: 1 answered, 0 refused; a long text: the answer, or why not
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "link/core/cards.hpp"
+
+namespace arbiter::link {
+
+inline constexpr std::size_t kMaxAsked = 256;
+inline constexpr std::size_t kMaxVerb = 32;
+inline constexpr std::size_t kMaxArgument = 4096;
+// A status document with thousands of ports. Larger answers are refused where they are made.
+inline constexpr std::size_t kMaxAnswer = std::size_t{8} << 20;
+
+struct QuestionMessage {
+  Incarnation asker = 0;
+  std::uint64_t number = 0;
+  std::vector<Incarnation> asked;
+  std::string host;  // the asker's
+  std::string verb;
+  std::string argument;
+};
+
+struct AnswerMessage {
+  Incarnation answerer = 0;
+  Incarnation asker = 0;
+  std::uint64_t number = 0;
+  bool is_refusal = false;
+  std::string text;
+};
+
+[[nodiscard]] ByteString write_question(const QuestionMessage& message);
+[[nodiscard]] ByteString write_answer(const AnswerMessage& message);
+// Nothing: it is none, or not a proper one. The text of an answer is not judged: it is a document.
+[[nodiscard]] std::optional<QuestionMessage> read_question(Bytes bytes);
+[[nodiscard]] std::optional<AnswerMessage> read_answer(Bytes bytes);
+
+// The questions of this link that wait for an answer.
+//
+// Units: nanoseconds of a monotonic clock. Thread safety: none of its own.
+class OpenQuestions {
+ public:
+  static constexpr shm::Nanoseconds kPatience = 1'000'000'000;
+  // Until it is asked again, where nothing has come: the other link may just have been found.
+  static constexpr shm::Nanoseconds kAskAgain = 250'000'000;
+  static constexpr std::size_t kMost = 256;  // questions
+
+  enum class Outcome : std::uint8_t { kWaiting, kAnswered, kRefused, kSilent };
+  struct Reply {
+    Outcome outcome = Outcome::kWaiting;
+    shm::Nanoseconds took = 0;  // until it came
+    std::string text;
+  };
+  using Replies = std::map<Incarnation, Reply>;
+
+  // Its number, from 1 upwards; 0: too many wait.
+  std::uint64_t ask(const std::vector<Incarnation>& asked, shm::Nanoseconds now);
+  // False: nobody waits for it.
+  bool note(AnswerMessage answer, shm::Nanoseconds now);
+  // Whether all have an outcome. Who has not answered for kPatience is silent from now on.
+  [[nodiscard]] bool is_over(std::uint64_t number, shm::Nanoseconds now);
+  // Those to be asked again now.
+  [[nodiscard]] std::vector<Incarnation> due(std::uint64_t number, shm::Nanoseconds now);
+  // What has become of it; it is forgotten.
+  [[nodiscard]] Replies take(std::uint64_t number);
+
+ private:
+  struct Open {
+    shm::Nanoseconds since = 0;
+    shm::Nanoseconds ask_again = 0;
+    Replies replies;
+  };
+  std::map<std::uint64_t, Open> open_;
+  std::uint64_t last_ = 0;
+};
+
+// Those who ask this link: each question is answered once, and not too many in a second.
+//
+// Askers are strangers: each has a quota, all together have one, and their number is bounded.
+//
+// Thread safety: none of its own.
+class Askers {
+ public:
+  static constexpr std::uint32_t kMostOfOne = 20;   // questions within a second
+  static constexpr std::uint32_t kMostOfAll = 200;  // likewise
+  static constexpr std::size_t kMostAskers = 256;
+
+  enum class Verdict : std::uint8_t {
+    kAnswer,
+    kRepeated,  // it is answered already, or is being answered
+    kTooMany,
+  };
+  // `asker`: one of its lives.
+  Verdict judge(Incarnation asker, std::uint64_t number, shm::Nanoseconds now);
+
+ private:
+  struct Asker {
+    std::uint64_t last = 0;
+    shm::Nanoseconds since = 0;  // of the second that is counted
+    std::uint32_t count = 0;
+    shm::Nanoseconds heard = 0;
+  };
+  void make_place();
+
+  std::map<Incarnation, Asker> askers_;
+  shm::Nanoseconds since_ = 0;
+  std::uint32_t count_ = 0;
+};
+
+}  // namespace arbiter::link

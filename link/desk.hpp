@@ -1,0 +1,140 @@
+// Where this link is asked, and asks: it knows the other links, answers them and the programs of
+// this host, and carries questions of these to other hosts.
+//
+// It shows and says; it changes nothing that is decided. Whatever others send, and however long the
+// daemon takes to answer, the link's loop and its samples do not wait for it.
+//
+// Thread safety: look() and join() on the link's thread. Messages are heard on Cyclone's threads,
+// programs are served on threads of their own (link/local_socket.hpp), questions are answered on
+// one more. mutex_ guards what they share, and is held while nothing waits. send_mutex_ is held
+// while a question is numbered and sent; topics_mutex_ while topics are used, so that they stay.
+// Who takes several takes send_mutex_ first and mutex_ last.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <shared_mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "gateway/core/bridge.hpp"
+#include "link/answers.hpp"
+#include "link/core/disagreements.hpp"
+#include "link/core/neighbours.hpp"
+#include "link/core/pulse.hpp"
+#include "link/core/questions.hpp"
+#include "link/dds/message_topic.hpp"
+#include "link/dds/network.hpp"
+#include "link/local_socket.hpp"
+#include "link/own_daemon.hpp"
+#include "link/switching.hpp"
+#include "link/token_clock.hpp"
+#include "wire/hosts.hpp"
+
+namespace arbiter::link {
+
+// What the link's loop knows of its own host.
+struct OwnHost {
+  HostCard card;  // but for who this link is
+  std::vector<wire::ImportStatus> imports;
+  std::string waits_for;  // empty: for nothing
+};
+
+class Desk {
+ public:
+  // `me`: who this link is: host, instance, version, incarnation.
+  explicit Desk(HostCard me);
+  Desk(const Desk&) = delete;
+  Desk& operator=(const Desk&) = delete;
+  ~Desk();
+
+  // From now on other links are known. `network`: what to call it. Keeps a reference to `bell`,
+  // which rings when links come and go. Throws DdsError.
+  void join(const Network& network, std::string name, const gateway::Bell& bell);
+  // The network goes: nobody is heard, or asked, until join() is called again.
+  void leave();
+  // Takes up what has changed, here and elsewhere, and logs what hosts do not agree upon. Ten times
+  // a second.
+  void look(OwnHost own);
+
+  // Of this host, to which verbs may be added before anybody can ask: see add_verbs().
+  [[nodiscard]] Answers& answers() noexcept { return answers_; }
+
+ private:
+  struct Asked {
+    QuestionMessage message;
+    bool is_ours = false;  // a program of this host asks through this link
+    shm::Nanoseconds came = 0;
+  };
+  struct Topics;
+
+  void add_verbs();
+  void open_socket();
+  void send_card();
+  void look_at_others();
+
+  // On Cyclone's threads.
+  void hear_card(Bytes message, std::uint64_t writer);
+  void hear_pulse(Bytes message);
+  void hear_question(Bytes message);
+  void hear_answer(Bytes message);
+
+  // On the answering thread.
+  void answer_questions();
+  void answer(const Asked& asked);
+
+  // On threads of programs.
+  std::string serve(const LocalUser& who, const wire::LinkQuestion& question);
+  std::vector<wire::HostAnswer> ask_hosts(const wire::LinkQuestion& question);
+  // Nobody hears it while there is no network.
+  void send_question(const QuestionMessage& message);
+  void send_answer(const AnswerMessage& message);
+  // Under send_mutex_ alone.
+  void put_question(const QuestionMessage& message);
+  // Asks again those who do not answer, until their time is over.
+  OpenQuestions::Replies await_replies(QuestionMessage& message);
+
+  [[nodiscard]] wire::HostsDocument document() const;
+
+  const HostCard me_;
+  const shm::Nanoseconds began_;
+  const OwnDaemon daemon_;
+  Switching switching_;  // of the answering thread
+  Answers answers_;
+
+  std::mutex send_mutex_;
+  std::shared_mutex topics_mutex_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  HostCard card_;  // as it was sent last, or is to be sent
+  OwnHost own_;
+  std::string network_;  // empty: not joined
+  Neighbours neighbours_;
+  RoundTrips round_trips_;
+  Disagreements disagreements_;         // of the link's thread
+  std::vector<Disagreement> standing_;  // as that has found last
+  OpenQuestions open_;
+  Askers askers_;
+  std::deque<Asked> to_answer_;
+  bool ends_ = false;
+
+  // Of the link's thread.
+  bool is_card_sent_ = false;
+  std::uint64_t compared_changes_ = 0;
+  shm::Nanoseconds compare_until_ = 0;
+  shm::Nanoseconds compare_again_ = 0;
+  shm::Nanoseconds send_again_ = 0;
+  shm::Nanoseconds open_again_ = 0;
+  std::string said_;
+
+  // Destroyed in reverse: callers go before what they call.
+  std::unique_ptr<Topics> topics_;
+  std::thread answering_;
+  std::unique_ptr<TokenClock> pulse_;
+  std::unique_ptr<LocalSocket> socket_;
+};
+
+}  // namespace arbiter::link

@@ -1,0 +1,53 @@
+// Whether the network interfaces that a link uses are still as they were when it joined its
+// network.
+//
+// DDS takes an interface's address and its groups when it joins, and never again. So an interface
+// that has another address, or that went away and came back, leads nowhere until the link joins
+// anew. Both are seen: what it is like now, and, by netlink, that it was gone in between.
+//
+// Thread safety: one thread.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "shm/file_descriptor.hpp"
+
+namespace arbiter::link {
+
+class InterfaceWatch {
+ public:
+  // By name or by IPv4 address. Throws std::system_error.
+  explicit InterfaceWatch(std::vector<std::string> interfaces);
+
+  // They are what they are now. Call it before joining: nothing that happens from then on is
+  // missed.
+  void begin();
+  // What has changed since, as a sentence for people; empty: nothing that matters. Does not wait.
+  [[nodiscard]] std::string change();
+
+ private:
+  // An interface by its number, which a new one of the same name does not have, and the address
+  // that DDS uses: the first. 0: there is none.
+  struct Place {
+    unsigned index = 0;
+    std::uint32_t address = 0;
+    friend bool operator==(const Place& one, const Place& other) noexcept {
+      return one.index == other.index && one.address == other.address;
+    }
+  };
+  using Places = std::map<std::string, Place>;
+
+  [[nodiscard]] Places look() const;
+  // What netlink has said. True: something may have changed; `was_gone`: one of ours was.
+  [[nodiscard]] bool hear(bool& was_gone);
+  [[nodiscard]] bool is_loss_of_ours(const void* message) const;
+
+  const std::vector<std::string> interfaces_;
+  shm::FileDescriptor netlink_;
+  Places places_;
+};
+
+}  // namespace arbiter::link

@@ -1,0 +1,199 @@
+#include "link/local_socket.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <condition_variable>
+#include <cstring>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "wire/link_call.hpp"
+
+namespace arbiter::link {
+namespace {
+
+// For a program to say something, or to take its answer.
+constexpr timeval kPatience{10, 0};
+
+// A file in memory that can only be read.
+shm::FileDescriptor sealed_document(const std::string& text) {
+  const shm::FileDescriptor file(::memfd_create("arbiter-hosts", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+  for (std::size_t at = 0; file && at < text.size();) {
+    const ssize_t written = ::write(file.get(), text.data() + at, text.size() - at);
+    if (written <= 0) throw std::runtime_error("no memory for the answer");
+    at += static_cast<std::size_t>(written);
+  }
+  if (!file || ::fcntl(file.get(), F_ADD_SEALS,
+                       F_SEAL_WRITE | F_SEAL_GROW | F_SEAL_SHRINK | F_SEAL_SEAL) != 0) {
+    throw std::system_error(errno, std::generic_category(), "no memory for the answer");
+  }
+  const std::string path = "/proc/self/fd/" + std::to_string(file.get());
+  shm::FileDescriptor readable(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!readable) throw std::system_error(errno, std::generic_category(), "no descriptor is left");
+  return readable;
+}
+
+// False: it has gone, or does not read.
+bool send_packet(int socket, const std::string& bytes, int document) {
+  iovec data{const_cast<char*>(bytes.data()), bytes.size()};
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
+  msghdr header{};
+  header.msg_iov = &data;
+  header.msg_iovlen = 1;
+  if (document >= 0) {
+    header.msg_control = control.data();
+    header.msg_controllen = control.size();
+    cmsghdr* const part = CMSG_FIRSTHDR(&header);
+    part->cmsg_level = SOL_SOCKET;
+    part->cmsg_type = SCM_RIGHTS;
+    part->cmsg_len = CMSG_LEN(sizeof document);
+    std::memcpy(CMSG_DATA(part), &document, sizeof document);
+  }
+  return ::sendmsg(socket, &header, MSG_NOSIGNAL) >= 0;
+}
+
+bool refuse(int socket, const std::string& why) {
+  return send_packet(socket, why.substr(0, wire::kMaxLinkPacket), -1);
+}
+
+}  // namespace
+
+struct LocalSocket::Shared {
+  explicit Shared(Serve with) : serve(std::move(with)) {}
+
+  // As many as are let in have a place, which they give back.
+  bool take_place(uid_t user) {
+    const std::lock_guard lock(mutex);
+    const bool is_privileged = user == 0 || user == ::geteuid();
+    if (ends || of_user[user] >= kMostOfUser || (count >= kMost && !is_privileged)) return false;
+    ++of_user[user];
+    ++count;
+    return true;
+  }
+  void give_back_place(uid_t user) {
+    const std::lock_guard lock(mutex);
+    --count;
+    if (--of_user[user] == 0) of_user.erase(user);
+  }
+  // Throws why there is none.
+  std::string answer(const LocalUser& who, const std::string& question);
+
+  const Serve serve;
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::map<uid_t, unsigned> of_user;
+  unsigned count = 0;
+  unsigned serving = 0;
+  bool ends = false;
+};
+
+std::string LocalSocket::Shared::answer(const LocalUser& who, const std::string& question) {
+  {
+    const std::lock_guard lock(mutex);
+    if (ends) throw std::runtime_error("the link ends");
+    ++serving;
+  }
+  const auto finish = [this] {
+    const std::lock_guard lock(mutex);
+    --serving;
+    changed.notify_all();
+  };
+  try {
+    std::string document = serve(who, wire::read_link_question(question));
+    finish();
+    return document;
+  } catch (...) {
+    finish();
+    throw;
+  }
+}
+
+LocalSocket::LocalSocket(const std::string& instance, Serve serve)
+    : listener_(wire::listen_as_link(wire::daemon_directory(), wire::instance_name(instance))),
+      end_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
+      shared_(std::make_shared<Shared>(std::move(serve))) {
+  if (!end_) throw std::system_error(errno, std::generic_category(), "no descriptor is left");
+  thread_ = std::thread([this] { run(); });
+}
+
+LocalSocket::~LocalSocket() {
+  const std::uint64_t one = 1;
+  static_cast<void>(!::write(end_.get(), &one, sizeof one));
+  thread_.join();
+  ::unlink(listener_.path.c_str());
+  std::unique_lock lock(shared_->mutex);
+  shared_->ends = true;
+  shared_->changed.wait(lock, [this] { return shared_->serving == 0; });
+}
+
+void LocalSocket::run() {
+  for (;;) {
+    std::array<pollfd, 2> ends{{{end_.get(), POLLIN, 0}, {listener_.socket.get(), POLLIN, 0}}};
+    if (::poll(ends.data(), ends.size(), -1) < 0) continue;
+    if (ends[0].revents != 0) return;
+    let_in();
+  }
+}
+
+// Until it has gone. May be lost for long in the descriptors that a program has sent: it keeps what
+// it needs, and a place of that user.
+void LocalSocket::serve_program(Shared& shared, const LocalUser& who, shm::FileDescriptor socket) {
+  ::setsockopt(socket.get(), SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
+  ::setsockopt(socket.get(), SOL_SOCKET, SO_SNDTIMEO, &kPatience, sizeof kPatience);
+  std::string packet(wire::kMaxLinkPacket, '\0');
+  for (bool is_sent = true; is_sent;) {
+    const ssize_t size = ::recv(socket.get(), packet.data(), packet.size(), 0);
+    if (size <= 0) break;
+    std::string why_not;
+    try {
+      const std::string document =
+          shared.answer(who, packet.substr(0, static_cast<std::size_t>(size)));
+      is_sent = send_packet(socket.get(), "{}", sealed_document(document).get());
+    } catch (const std::exception& error) {
+      why_not = error.what();
+    }
+    if (!why_not.empty()) is_sent = refuse(socket.get(), why_not);
+  }
+  socket.reset();
+  shared.give_back_place(who.user);
+}
+
+void LocalSocket::let_in() {
+  shm::FileDescriptor socket(::accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  if (!socket) {
+    // It stays readable where no descriptor is left: others need the processor, too.
+    if (errno == EMFILE || errno == ENFILE) ::poll(nullptr, 0, 100);
+    return;
+  }
+  LocalUser who;
+  try {
+    who = wire::user_at(socket.get());
+  } catch (const std::system_error&) {  // it has gone
+    return;
+  }
+  if (!shared_->take_place(who.user)) {
+    refuse(socket.get(), "too many programs ask the link at once");
+    return;
+  }
+  try {
+    std::thread([shared = shared_, who, one = std::move(socket)]() mutable {
+      serve_program(*shared, who, std::move(one));
+    }).detach();
+  } catch (const std::system_error&) {  // no thread is left
+    shared_->give_back_place(who.user);
+  }
+}
+
+}  // namespace arbiter::link

@@ -1,0 +1,54 @@
+// Where programs of this host ask the link: `arbiter hosts`, `arbiter status --all`
+// (wire/link_call.hpp has their side).
+//
+// Any local user may connect, and may be hostile: say nothing, send too much, not read, or send
+// descriptors that take long to close. So each program is served by a thread of its own, and a user
+// may have kMostOfUser at a time; whatever one of them does holds up nobody but its user.
+//
+// Thread safety: `serve` is called on many threads at once.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "link/own_daemon.hpp"
+#include "shm/file_descriptor.hpp"
+#include "wire/hosts.hpp"
+#include "wire/rendezvous.hpp"
+
+namespace arbiter::link {
+
+class LocalSocket {
+ public:
+  static constexpr unsigned kMostOfUser = 8;
+  // Of all; root and the link's own user find a place besides.
+  static constexpr unsigned kMost = 64;
+
+  // The document that answers; what it throws (std::exception) is the reason why there is none.
+  using Serve = std::function<std::string(const LocalUser&, const wire::LinkQuestion&)>;
+
+  // Throws std::runtime_error where it cannot listen, or another link of the instance does.
+  LocalSocket(const std::string& instance, Serve serve);
+  LocalSocket(const LocalSocket&) = delete;
+  LocalSocket& operator=(const LocalSocket&) = delete;
+  // Waits for calls of `serve` that have begun.
+  ~LocalSocket();
+
+  [[nodiscard]] const std::string& path() const noexcept { return listener_.path; }
+
+ private:
+  struct Shared;
+
+  void run();
+  void let_in();
+  static void serve_program(Shared& shared, const LocalUser& who, shm::FileDescriptor socket);
+
+  wire::Listener listener_;
+  shm::FileDescriptor end_;  // readable: it is over
+  std::shared_ptr<Shared> shared_;
+  std::thread thread_;
+};
+
+}  // namespace arbiter::link

@@ -1,0 +1,221 @@
+#include "tests/link/failures/checker.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+namespace arbiter::failures {
+namespace {
+
+using Kind = Happened::Kind;
+using Pair = std::pair<std::uint32_t, std::uint64_t>;
+
+// A publisher that was started again has published no more by the time at which it is heard of.
+constexpr std::uint64_t kFirstOfALife = 1000;
+
+const std::vector<Happened>& of(const HostEvidence& host, const std::string& source) {
+  static const std::vector<Happened> kNone;
+  const auto found = host.sources.find(source);
+  return found == host.sources.end() ? kNone : found->second;
+}
+
+std::string ms(Nanoseconds time) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3f ms", static_cast<double>(time) / 1e6);
+  return text;
+}
+
+bool is_arrival(const Happened& event) {
+  return event.kind == Kind::sample || event.kind == Kind::signal;
+}
+
+// Of the publisher. A signal does not say.
+bool is_other_life(const Happened& before, const Happened& event) {
+  if (before.command && event.command) return before.command->life != event.command->life;
+  return event.sequence < before.sequence && event.sequence <= kFirstOfALife;
+}
+
+std::string number_of(const Happened& event) {
+  if (!event.command) return "number " + std::to_string(event.sequence);
+  return std::to_string(event.command->life) + "." + std::to_string(event.command->number);
+}
+
+// When a source is surely active: from when an arrival was seen to its end.
+struct Active {
+  Nanoseconds from = 0;
+  Nanoseconds to = 0;
+};
+
+std::vector<Active> surely_active(const HostEvidence& host, const std::string& source,
+                                  Nanoseconds timeout) {
+  std::vector<Active> result;
+  for (const Happened& event : of(host, source)) {
+    // Until here: from its time on it may have been different.
+    if (event.kind == Kind::deactivation || event.kind == Kind::gap) {
+      if (!result.empty()) result.back().to = std::min(result.back().to, event.time);
+      continue;
+    }
+    Nanoseconds to = event.time + timeout;
+    for (const Nanoseconds beginning : host.beginnings) {
+      if (event.time < beginning) to = std::min(to, beginning);
+    }
+    if (!result.empty() && event.seen <= result.back().to) {
+      result.back().to = std::max(result.back().to, to);
+    } else {
+      result.push_back({event.seen, to});
+    }
+  }
+  return result;
+}
+
+bool overlaps(const std::vector<Span>& spans, Nanoseconds from, Nanoseconds to) {
+  return std::any_of(spans.begin(), spans.end(),
+                     [&](const Span& span) { return span.from <= to && from <= span.to; });
+}
+
+}  // namespace
+
+void check_decisions(const HostEvidence& host, Findings& found, Checked& checked) {
+  checked.decisions += host.decisions;
+  checked.uncertain += host.uncertain;
+  for (const std::string& each : host.wrong) found.push_back(host.name + ": " + each);
+}
+
+void check_winners(const HostEvidence& host, const std::map<std::string, Ranked>& ranks,
+                   Findings& found, Checked& checked) {
+  for (const auto& [first, its] : ranks) {
+    const std::vector<Active> active = surely_active(host, first, its.timeout);
+    for (const auto& [second, other] : ranks) {
+      if (other.rank <= its.rank) continue;
+      auto span = active.begin();
+      for (const Happened& event : of(host, second)) {
+        if (!event.won) continue;
+        ++checked.pairs;
+        while (span != active.end() && span->to < event.seen) ++span;
+        if (span == active.end() || span->from > event.time) continue;
+        found.push_back(host.name + ": " + second + " commands at " + ms(event.time) + " though " +
+                        first + " is active from " + ms(span->from) + " to " + ms(span->to));
+      }
+    }
+  }
+}
+
+void check_age(const HostEvidence& importer, const HostEvidence& exporter,
+               const std::string& source, Nanoseconds most, Findings& found, Checked& checked) {
+  // A successor of the publisher counts from 1 again.
+  std::map<std::uint64_t, std::vector<Nanoseconds>> published;
+  for (const Happened& event : of(exporter, source)) {
+    if (is_arrival(event)) published[event.sequence].push_back(event.time);
+  }
+  for (const Happened& event : of(importer, source)) {
+    if (!is_arrival(event)) continue;
+    ++checked.arrivals;
+    const Nanoseconds least = event.command ? event.command->made : 0;
+    if (event.command && 2 * (event.time - least) > most) ++checked.old;
+    if (event.command && event.time - least <= most) continue;  // it was published after that
+    Nanoseconds latest = 0;
+    for (const Nanoseconds time : published[event.sequence]) {
+      if (time <= event.time && time >= least) latest = std::max(latest, time);
+    }
+    if (latest == 0) {
+      ++checked.unsure;
+    } else if (event.time - latest > most) {
+      found.push_back(importer.name + ": " + source + " " + number_of(event) +
+                      " arrived when it was " + ms(event.time - latest) +
+                      " old, which is more than " + ms(most));
+    }
+  }
+}
+
+void check_order(const HostEvidence& importer, const std::string& source, Findings& found) {
+  Pair last{};
+  std::map<std::uint64_t, const Happened*> before;  // by exporter
+  for (const Happened& event : of(importer, source)) {
+    if (!is_arrival(event)) continue;
+    if (event.command) {
+      const Pair current{event.command->life, event.command->number};
+      if (current <= last) {
+        found.push_back(importer.name + ": " + source + " " + number_of(event) + " arrived after " +
+                        std::to_string(last.first) + "." + std::to_string(last.second));
+      }
+      last = std::max(last, current);
+    }
+    const Happened*& its = before[event.exporter];
+    // What was withheld may follow its signal, once.
+    const bool completes = its != nullptr && event.sequence == its->sequence &&
+                           its->kind == Kind::signal && event.kind == Kind::sample;
+    const bool follows = its == nullptr || event.exporter == 0 || completes ||
+                         event.sequence > its->sequence || is_other_life(*its, event);
+    if (!follows) {
+      found.push_back(importer.name + ": " + source + " number " + std::to_string(event.sequence) +
+                      " arrived after number " + std::to_string(its->sequence));
+    }
+    its = &event;
+  }
+}
+
+void check_losses(const HostEvidence& importer, const std::string& source, std::uint64_t counted,
+                  const std::vector<Span>& spans, Findings& found, Checked& checked) {
+  std::uint64_t missing = 0;
+  const Happened* before = nullptr;
+  bool is_whole = true;  // the recording, since `before`
+  for (const Happened& event : of(importer, source)) {
+    is_whole = is_whole && event.kind != Kind::gap;
+    if (!is_arrival(event)) continue;
+    if (before != nullptr && is_whole && before->exporter == event.exporter &&
+        !is_other_life(*before, event) && event.sequence > before->sequence &&
+        !overlaps(spans, before->time, event.time)) {
+      missing += event.sequence - before->sequence - 1;
+    }
+    before = &event;
+    is_whole = true;
+  }
+  checked.missing += missing;
+  checked.counted += counted;
+  if (missing <= counted) return;
+  found.push_back(importer.name + ": of " + source + " " + std::to_string(missing) +
+                  " samples are missing, but only " + std::to_string(counted) + " are counted");
+}
+
+void check_cuts(const HostEvidence& importer, const std::string& source,
+                const std::vector<Span>& cuts, Findings& found) {
+  for (const Happened& event : of(importer, source)) {
+    if (!event.command) continue;
+    for (const Span& cut : cuts) {
+      if (event.command->made <= cut.from || event.time >= cut.to) continue;
+      found.push_back(importer.name + ": " + source + " " + number_of(event) +
+                      " came through a cut");
+    }
+  }
+}
+
+Recovery first_arrival_after(const HostEvidence& host, const std::string& source,
+                             Nanoseconds time) {
+  for (const Happened& event : of(host, source)) {
+    if (event.time >= time && event.kind == Kind::sample) return {true, event.time - time};
+  }
+  return {};
+}
+
+Recovery next_in_command(const HostEvidence& host, const std::string& source, Nanoseconds timeout,
+                         const Span& cut) {
+  const Happened* last = nullptr;
+  for (const Happened& event : of(host, source)) {
+    if (event.time < cut.to) last = &event;
+  }
+  const bool commanded = last != nullptr && last->won && last->time + timeout > cut.from;
+  if (!commanded || last->time + timeout > cut.to) return {};
+  Recovery next;
+  for (const auto& [other, events] : host.sources) {
+    if (other == source) continue;
+    const auto found = std::find_if(events.begin(), events.end(), [&](const Happened& event) {
+      return event.won && event.time > last->time;
+    });
+    if (found == events.end()) continue;
+    const Nanoseconds took = found->time - last->time - timeout;
+    next = {true, next.is_there ? std::min(next.took, took) : took};
+  }
+  return next;
+}
+
+}  // namespace arbiter::failures

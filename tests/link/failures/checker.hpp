@@ -1,0 +1,77 @@
+// What must be true of all hosts' recordings together, whatever befell the links between them. All
+// hosts of a test share one clock, so the checker may compare their times. Links never do.
+//
+// Each function adds a sentence to `found` for each violation, and what it has looked at to
+// `checked`.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tests/link/failures/evidence_of_host.hpp"
+#include "tests/link/failures/plan.hpp"
+
+namespace arbiter::failures {
+
+struct Checked {
+  std::uint64_t arrivals = 0;  // of samples from other hosts
+  std::uint64_t old = 0;       // older than half of their T; none is older than T
+  std::uint64_t decisions = 0;
+  std::uint64_t uncertain = 0;
+  std::uint64_t pairs = 0;    // winners, of which no other can have won meanwhile
+  std::uint64_t missing = 0;  // samples that never arrived
+  std::uint64_t counted = 0;  // as lost, late, too soon
+  std::uint64_t unsure = 0;   // arrivals of which the exporter's recording does not have the time
+};
+
+using Findings = std::vector<std::string>;
+
+// Nothing is delivered that the host's rules forbid: each decision again, by the host's own model.
+void check_decisions(const HostEvidence& host, Findings& found, Checked& checked);
+
+// No two winners, without asking the product's rules: nothing is delivered while a source that
+// stands before it is surely active. `rank` and `timeouts` by source: those of lower rank give way.
+struct Ranked {
+  unsigned rank = 0;
+  Nanoseconds timeout = 0;
+};
+void check_winners(const HostEvidence& host, const std::map<std::string, Ranked>& ranks,
+                   Findings& found, Checked& checked);
+
+// No arrival is older than `most` since it was published at `exporter`, whose recording has the
+// time.
+void check_age(const HostEvidence& importer, const HostEvidence& exporter,
+               const std::string& source, Nanoseconds most, Findings& found, Checked& checked);
+
+// In the order in which they were published, and none twice, over all lives of all processes.
+void check_order(const HostEvidence& importer, const std::string& source, Findings& found);
+
+// Samples that did not arrive, between others that did, were counted, to the last one. `spans`:
+// times in which the process that counts was not there, or was another one; what is missing there
+// it may not know of.
+struct Span {
+  Nanoseconds from = 0;
+  Nanoseconds to = 0;
+};
+void check_losses(const HostEvidence& importer, const std::string& source, std::uint64_t counted,
+                  const std::vector<Span>& spans, Findings& found, Checked& checked);
+
+// Nothing that was published in a cut has arrived before its end: else the cable was no cable.
+void check_cuts(const HostEvidence& importer, const std::string& source,
+                const std::vector<Span>& cuts, Findings& found);
+
+// Whether the source commands again after a time; how long that took.
+struct Recovery {
+  bool is_there = false;
+  Nanoseconds took = 0;
+};
+[[nodiscard]] Recovery first_arrival_after(const HostEvidence& host, const std::string& source,
+                                           Nanoseconds time);
+// Where the source commanded when the cut came, and T then ended its activity: how long after that
+// the next in command did.
+[[nodiscard]] Recovery next_in_command(const HostEvidence& host, const std::string& source,
+                                       Nanoseconds timeout, const Span& cut);
+
+}  // namespace arbiter::failures

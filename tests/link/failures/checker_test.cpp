@@ -1,0 +1,220 @@
+// The checker sees what it is there for: recordings that are made up, each with one thing wrong.
+#include "tests/link/failures/checker.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/evidence/incident.hpp"
+
+namespace arbiter::failures {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Kind = Happened::Kind;
+
+constexpr const char* kSource = "/Host1/cmd:o";
+constexpr const char* kLower = "/Hold2/cmd:o";
+
+// The source of host1, as host2 has recorded it; times are in milliseconds.
+class Recorded {
+ public:
+  Recorded() { importer.name = "host2"; }
+
+  Recorded& arrives(std::uint64_t number, Nanoseconds at, Nanoseconds made,
+                    std::uint32_t life = 1) {
+    Happened event;
+    event.time = at * kMs;
+    event.seen = event.time;
+    event.command = Command{1, life, number, made * kMs};
+    event.exporter = 70 + life;
+    event.sequence = number;
+    importer.sources[kSource].push_back(event);
+    return *this;
+  }
+  Recorded& published(std::uint64_t number, Nanoseconds at) {
+    Happened event;
+    event.time = event.seen = at * kMs;
+    event.command = Command{1, 1, number, at * kMs};
+    event.sequence = number;
+    exporter.sources[kSource].push_back(event);
+    return *this;
+  }
+  Recorded& happens(Kind kind, Nanoseconds at, const char* source = kSource, bool won = false) {
+    Happened event;
+    event.kind = kind;
+    event.time = event.seen = at * kMs;
+    event.won = won;
+    importer.sources[source].push_back(event);
+    return *this;
+  }
+
+  // Its sample stays at home.
+  Recorded& signals(std::uint64_t number, Nanoseconds at) {
+    Happened event;
+    event.kind = Kind::signal;
+    event.time = event.seen = at * kMs;
+    event.exporter = 71;
+    event.sequence = number;
+    importer.sources[kSource].push_back(event);
+    return *this;
+  }
+
+  [[nodiscard]] Findings age(Nanoseconds most) const {
+    Findings found;
+    Checked checked;
+    check_age(importer, exporter, kSource, most * kMs, found, checked);
+    return found;
+  }
+  [[nodiscard]] Findings order() const {
+    Findings found;
+    check_order(importer, kSource, found);
+    return found;
+  }
+  [[nodiscard]] Findings losses(std::uint64_t counted, const std::vector<Span>& spans = {}) const {
+    Findings found;
+    Checked checked;
+    check_losses(importer, kSource, counted, spans, found, checked);
+    return found;
+  }
+  [[nodiscard]] Findings winners(Nanoseconds timeout = 100) const {
+    Findings found;
+    Checked checked;
+    check_winners(importer, {{kSource, {0, timeout * kMs}}, {kLower, {1, 100 * kMs}}}, found,
+                  checked);
+    return found;
+  }
+
+  HostEvidence importer;
+  HostEvidence exporter;
+};
+
+TEST(Checker, SeesASampleThatIsTooOld) {
+  EXPECT_THAT(Recorded().published(1, 10).arrives(1, 110, 10).age(100), IsEmpty());
+  EXPECT_THAT(Recorded().published(1, 10).arrives(1, 111, 10).age(100),
+              ElementsAre(HasSubstr("arrived when it was 101.000 ms old")));
+}
+
+// A publisher that is held up before publish() makes it late, not the network.
+TEST(Checker, TakesTheTimeOfPublishingFromTheExporter) {
+  EXPECT_THAT(Recorded().published(1, 50).arrives(1, 120, 10).age(100), IsEmpty());
+  Findings found;
+  Checked checked;
+  const Recorded unknown = Recorded().arrives(1, 120, 10);
+  check_age(unknown.importer, unknown.exporter, kSource, 100 * kMs, found, checked);
+  EXPECT_THAT(found, IsEmpty());
+  EXPECT_EQ(checked.unsure, 1U);
+}
+
+TEST(Checker, SeesDoublesAndWhatIsOutOfOrder) {
+  EXPECT_THAT(Recorded().arrives(1, 10, 9).arrives(3, 20, 19).order(), IsEmpty());
+  EXPECT_THAT(Recorded().arrives(1, 10, 9).arrives(1, 20, 9).order(),
+              testing::Contains(HasSubstr("1.1 arrived after 1.1")));
+  EXPECT_THAT(Recorded().arrives(2, 10, 9).arrives(1, 20, 8).arrives(3, 30, 29).order(),
+              testing::Contains(HasSubstr("1.1 arrived after 1.2")));
+}
+
+TEST(Checker, SeesWhatAnEarlierLifeSays) {
+  EXPECT_THAT(Recorded().arrives(9, 10, 9).arrives(1, 20, 19, 2).order(), IsEmpty());
+  EXPECT_THAT(Recorded().arrives(1, 10, 9, 2).arrives(9, 20, 5, 1).order(),
+              ElementsAre(HasSubstr("1.9 arrived after 2.1")));
+}
+
+TEST(Checker, KnowsWhatStaysAtHome) {
+  EXPECT_THAT(Recorded().signals(1, 10).arrives(1, 11, 9).signals(2, 20).order(), IsEmpty());
+  EXPECT_THAT(Recorded().signals(1, 10).signals(1, 11).order(),
+              ElementsAre(HasSubstr("number 1 arrived after number 1")));
+  EXPECT_THAT(Recorded().published(1, 10).signals(1, 111).age(100),
+              ElementsAre(HasSubstr("number 1 arrived when it was 101.000 ms old")));
+  EXPECT_THAT(Recorded().signals(1, 10).signals(4, 20).losses(1),
+              ElementsAre(HasSubstr("2 samples are missing, but only 1")));
+}
+
+TEST(Checker, SeesLossesThatNobodyCounted) {
+  const Recorded gap = Recorded().arrives(1, 10, 9).arrives(4, 20, 19).arrives(6, 30, 29);
+  EXPECT_THAT(gap.losses(3), IsEmpty());
+  EXPECT_THAT(gap.losses(2), ElementsAre(HasSubstr("3 samples are missing, but only 2")));
+}
+
+TEST(Checker, DoesNotMissWhatNobodyWasThereToCount) {
+  const Recorded gap = Recorded().arrives(1, 10, 9).arrives(4, 20, 19).arrives(6, 30, 29);
+  EXPECT_THAT(gap.losses(1, {{15 * kMs, 16 * kMs}}), IsEmpty());
+  EXPECT_THAT(gap.losses(0, {{15 * kMs, 16 * kMs}}), testing::SizeIs(1));
+  EXPECT_THAT(Recorded().arrives(5, 10, 9).arrives(9, 20, 19, 2).losses(0), IsEmpty());
+  EXPECT_THAT(Recorded().arrives(1, 10, 9).happens(Kind::gap, 15).arrives(4, 20, 19).losses(0),
+              IsEmpty());
+}
+
+TEST(Checker, SeesTwoWinners) {
+  const auto commands_at = [](Nanoseconds at) {
+    return Recorded().happens(Kind::signal, 10).happens(Kind::sample, at, kLower, true).winners();
+  };
+  EXPECT_THAT(commands_at(9), IsEmpty());
+  EXPECT_THAT(commands_at(11), ElementsAre(HasSubstr("/Hold2/cmd:o commands at 11.000 ms")));
+  EXPECT_THAT(commands_at(110), testing::SizeIs(1));
+  EXPECT_THAT(commands_at(111), IsEmpty());
+}
+
+TEST(Checker, KnowsWhatEndsAnActivity) {
+  Recorded ended = Recorded().happens(Kind::signal, 10).happens(Kind::deactivation, 20);
+  EXPECT_THAT(ended.happens(Kind::sample, 21, kLower, true).winners(), IsEmpty());
+  Recorded forgotten = Recorded().happens(Kind::signal, 10).happens(Kind::sample, 21, kLower, true);
+  forgotten.importer.beginnings = {0, 20 * kMs};
+  EXPECT_THAT(forgotten.winners(), IsEmpty());
+  forgotten.importer.beginnings = {0, 22 * kMs};
+  EXPECT_THAT(forgotten.winners(), testing::SizeIs(1));
+}
+
+TEST(Checker, SeesWhatComesThroughACut) {
+  const auto through = [](Nanoseconds made, Nanoseconds at) {
+    Findings found;
+    check_cuts(Recorded().arrives(1, at, made).importer, kSource, {{100 * kMs, 200 * kMs}}, found);
+    return found;
+  };
+  EXPECT_THAT(through(99, 101), IsEmpty());
+  EXPECT_THAT(through(101, 200), IsEmpty());
+  EXPECT_THAT(through(101, 199), testing::SizeIs(1));
+}
+
+// By the product's own rules, over a recording in a file.
+TEST(Checker, SeesADecisionThatTheModelForbids) {
+  using Fate = test::Incident::Fate;
+  test::Incident incident;
+  incident.arrive("/high", 1010, 1011, Fate::accepted);
+  incident.arrive("/low", 1020, 1021, Fate::accepted);
+  const HostEvidence evidence = read_evidence("host2", "/p", incident.file());
+  Findings found;
+  Checked checked;
+  check_decisions(evidence, found, checked);
+  EXPECT_THAT(found, ElementsAre(HasSubstr("1 decisions that its model does not permit")));
+  EXPECT_EQ(checked.decisions, 2U);
+  check_winners(evidence, {{"/high", {0, 500}}, {"/low", {1, 500}}}, found, checked);
+  EXPECT_THAT(found, testing::SizeIs(2));
+}
+
+TEST(Checker, MeasuresWhoIsNextInCommand) {
+  Recorded fell = Recorded()
+                      .happens(Kind::sample, 10, kSource, true)
+                      .happens(Kind::sample, 113, kLower, true)
+                      .happens(Kind::sample, 120, kLower, true);
+  const Recovery next = next_in_command(fell.importer, kSource, 100 * kMs, {50 * kMs, 200 * kMs});
+  ASSERT_TRUE(next.is_there);
+  EXPECT_EQ(next.took, 3 * kMs);
+  // Its T had ended before the cut.
+  EXPECT_FALSE(next_in_command(fell.importer, kSource, 100 * kMs, {115 * kMs, 200 * kMs}).is_there);
+  EXPECT_EQ(first_arrival_after(fell.importer, kLower, 100 * kMs).took, 13 * kMs);
+}
+
+TEST(Checker, FindsNothingWhereNothingIsWrong) {
+  const Recorded good =
+      Recorded().published(1, 10).published(2, 20).arrives(1, 12, 10).arrives(2, 22, 20).happens(
+          Kind::deactivation, 30);
+  EXPECT_THAT(good.age(100), IsEmpty());
+  EXPECT_THAT(good.order(), IsEmpty());
+  EXPECT_THAT(good.losses(0), IsEmpty());
+  EXPECT_THAT(good.winners(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace arbiter::failures

@@ -1,0 +1,46 @@
+// What one host's recording tells, in the checker's words.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "evidence/records.hpp"
+#include "tests/link/failures/command.hpp"
+#include "tests/link/failures/time.hpp"
+
+namespace arbiter::failures {
+
+// An arrival or a deactivation.
+struct Happened {
+  enum class Kind : std::uint8_t { sample, signal, deactivation, gap };
+  Kind kind = Kind::sample;
+  Nanoseconds time = 0;  // by its publisher at this host
+  Nanoseconds seen = 0;  // the recorder knew of it
+  bool won = false;      // at the host's motor
+  std::optional<Command> command{};
+  // Of one that came from another host: its export there, and its number by its publisher.
+  std::uint64_t exporter = 0;
+  std::uint64_t sequence = 0;
+  std::uint64_t events = 0;  // gap: that the recorder does not have
+};
+
+struct HostEvidence {
+  std::string name;
+  std::map<std::string, std::vector<Happened>> sources;  // each in its order
+  // When daemons began that knew nothing of any activity before.
+  std::vector<Nanoseconds> beginnings;
+  std::uint64_t decisions = 0;
+  std::uint64_t uncertain = 0;     // of which the recording does not have all
+  std::vector<std::string> wrong;  // decisions that the host's model does not permit
+};
+
+// Adds what happened at `motor`.
+void add(HostEvidence& evidence, const std::string& motor, const evidence::Record& record);
+// Of one recording, with all its decisions taken again. Throws.
+[[nodiscard]] HostEvidence read_evidence(const std::string& name, const std::string& motor,
+                                         const std::string& path);
+
+}  // namespace arbiter::failures

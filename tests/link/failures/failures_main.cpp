@@ -1,0 +1,111 @@
+// Hosts with networks of their own, joined by links, and what can befall them: cables cut, frames
+// lost, doubled and late, processes stopped and killed. A checker over the recordings of all hosts
+// says what was wrong (checker.hpp). A run is a series of rounds, each with another plan that
+// follows from the seed; how processes and frames interleave, the seed cannot give back.
+#include <signal.h>
+
+#include <cstdio>
+#include <exception>
+#include <random>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "tests/link/cables.hpp"
+#include "tests/link/failures/component.hpp"
+#include "tests/link/failures/round.hpp"
+
+namespace {
+
+using namespace arbiter::failures;
+
+constexpr int kSkipped = 77;
+
+unsigned long long number(std::uint64_t value) { return value; }
+
+void report(const Totals& totals, double seconds) {
+  const Checked& checked = totals.checked;
+  std::printf(
+      "%llu rounds, %.0f s, %llu troubles; %llu frames passed on: %llu lost, %llu doubled, %llu "
+      "late, %llu in cuts\n",
+      number(totals.rounds), seconds, number(totals.troubles), number(totals.passed.frames),
+      number(totals.passed.lost), number(totals.passed.doubled), number(totals.passed.delayed),
+      number(totals.passed.cut));
+  std::printf(
+      "%llu samples from other hosts arrived, %llu of them older than T/2, none older than T (of "
+      "%llu the age is not known exactly)\n%llu never arrived, between others that did; counted as "
+      "lost, late or too soon: %llu\n%llu decisions were taken again (%llu of them may have been "
+      "one or the other); %llu commands had no rival\n",
+      number(checked.arrivals), number(checked.old), number(checked.unsure),
+      number(checked.missing), number(checked.counted), number(checked.decisions),
+      number(checked.uncertain), number(checked.pairs));
+  std::printf(
+      "the next in command after T, in a cut: %s\nback after a cut: %s\nall back after all: %s\n",
+      totals.fallbacks.text().c_str(), totals.recoveries.text().c_str(),
+      totals.flows.text().c_str());
+}
+
+int run(const Options& options) {
+  if (const std::string why = arbiter::test::why_no_networks(); !why.empty()) {
+    std::printf("skipped: %s\n", why.c_str());
+    return kSkipped;
+  }
+  // Inherited: a component that has only been started keeps them until it is ready.
+  sigset_t kept;
+  sigemptyset(&kept);
+  sigaddset(&kept, SIGUSR1);
+  sigaddset(&kept, SIGUSR2);
+  sigprocmask(SIG_BLOCK, &kept, nullptr);
+  std::printf("seed %llu\n", number(options.seed));
+  const Nanoseconds begin = now();
+  const auto seconds = [&] { return static_cast<double>(now() - begin) / 1e9; };
+  Totals totals;
+  for (std::uint64_t i = 0; i == 0 || seconds() < options.seconds; ++i) {
+    const Plan plan = make_plan(options, options.seed + i);
+    std::printf("round %llu, seed %llu: %s", number(i + 1), number(plan.seed), plan.text().c_str());
+    std::fflush(stdout);
+    Round round(options, plan, totals);
+    const Findings found = round.run();
+    if (found.empty()) continue;
+    report(totals, seconds());
+    for (const std::string& each : found) std::printf("FOUND: %s\n", each.c_str());
+    std::printf("FAILED; --seed %llu makes the same plan again\n", number(plan.seed));
+    return 1;
+  }
+  report(totals, seconds());
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  options.seed = std::random_device()() & 0x7fffffff;
+  ComponentOptions component;
+  CLI::App app("Hosts that are joined by links, and all that can befall them");
+  app.add_option("--seed", options.seed, "Makes the plans");
+  app.add_option("--seconds", options.seconds, "Begins rounds for so long")->capture_default_str();
+  app.add_option("--hosts", options.hosts, "3 to 5; else each round another number")
+      ->check(CLI::Range(3, 5));
+  app.add_option("--rate", options.rate, "Samples of each source in a second")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  app.add_option("--keep", options.keep,
+                 "Where recordings and logs are left if something is found");
+  app.add_flag("--bounds", options.has_bounds,
+               "Sources must be back within a second: on a machine that does nothing else");
+  app.add_flag("--short", options.is_short, "One round, in which nothing lasts long");
+  app.add_option("--component", component.instance)->group("");
+  app.add_option("--number", component.host)->group("");
+  app.add_option("--life", component.life)->group("");
+  app.add_option("--period", component.period_ns)->group("");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    if (component.instance.empty()) return run(options);
+    component.seed = options.seed;
+    return run_component(component);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,364 @@
+// What links say of their hosts, by injected time: cards, round trips, who is there, what hosts do
+// not agree upon, questions.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "link/core/disagreements.hpp"
+#include "link/core/host_card.hpp"
+#include "link/core/neighbours.hpp"
+#include "link/core/pulse.hpp"
+#include "link/core/questions.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using namespace link;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+constexpr shm::Nanoseconds kMs = 1'000'000;
+constexpr shm::Nanoseconds kS = 1000 * kMs;
+
+Bytes as_bytes(const ByteString& bytes) { return {bytes.data(), bytes.size()}; }
+
+HostCard host_card(const std::string& host, Incarnation incarnation,
+                   std::vector<std::string> inputs = {}, std::vector<std::string> outputs = {}) {
+  HostCard card;
+  card.incarnation = incarnation;
+  card.host = host;
+  card.instance = "default";
+  card.version = "1.2";
+  card.has_daemon = true;
+  card.generation = 3;
+  card.digest = 7;
+  card.model = "patrol";
+  card.imports = 1;
+  card.input_count = static_cast<std::uint32_t>(inputs.size());
+  card.output_count = static_cast<std::uint32_t>(outputs.size());
+  card.inputs = std::move(inputs);
+  card.outputs = std::move(outputs);
+  return card;
+}
+
+TEST(HostCard, IsReadAsItWasWritten) {
+  const HostCard card = host_card("head", 5, {"/a:i", "/b:i"}, {"/c:o"});
+  EXPECT_EQ(read_host_card(as_bytes(write_host_card(card))), card);
+}
+
+TEST(HostCard, IsRefusedWhereItIsCutAnywhere) {
+  const ByteString whole = write_host_card(host_card("head", 5, {"/a:i"}, {"/c:o"}));
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    EXPECT_FALSE(read_host_card(Bytes(whole.data(), size))) << size;
+  }
+}
+
+TEST(HostCard, IsRefusedWhereItsNamesAreNone) {
+  const auto is_read = [](const HostCard& card) {
+    return read_host_card(as_bytes(write_host_card(card))).has_value();
+  };
+  EXPECT_TRUE(is_read(host_card("head", 5)));
+  EXPECT_FALSE(is_read(host_card("he ad", 5)));
+  EXPECT_FALSE(is_read(host_card("head", 0)));
+  EXPECT_FALSE(is_read(host_card("head", 5, {"a"})));
+  EXPECT_FALSE(is_read(host_card("head", 5, {"/b", "/a"}))) << "in order";
+  EXPECT_FALSE(is_read(host_card("head", 5, {"/a", "/a"}))) << "each once";
+  HostCard card = host_card("head", 5);
+  card.model = "a\nb";
+  EXPECT_FALSE(is_read(card));
+  card = host_card("head", 5);
+  card.instance = ".x";
+  EXPECT_FALSE(is_read(card));
+}
+
+TEST(HostCard, LeavesOutNamesForWhichThereIsNoRoom) {
+  std::vector<std::string> ports;
+  for (int i = 0; i < 2000; ++i) {
+    ports.push_back("/" + std::to_string(10'000 + i) + std::string(200, 'x'));
+  }
+  const ByteString bytes = write_host_card(host_card("head", 5, ports, {"/c:o"}));
+  EXPECT_LE(bytes.size(), kMaxCardBytes);
+  const auto card = read_host_card(as_bytes(bytes));
+  ASSERT_TRUE(card);
+  EXPECT_EQ(card->input_count, 2000U);
+  EXPECT_LT(card->inputs.size(), 2000U);
+  EXPECT_FALSE(card->names_all());
+  EXPECT_THAT(card->outputs, ElementsAre("/c:o"));
+}
+
+TEST(ModelDigest, DiffersWhereTextsDo) {
+  const auto of = [](const std::vector<std::string>& texts) {
+    Digest digest;
+    for (const std::string& text : texts) digest.add(text);
+    return digest.value();
+  };
+  EXPECT_EQ(of({"a", "b"}), of({"a", "b"}));
+  EXPECT_NE(of({"a", "b"}), of({"ab"}));
+  EXPECT_NE(of({"a"}), of({"a", ""}));
+  EXPECT_EQ(hexadecimal(0x1fU), "000000000000001f");
+}
+
+// Their clocks have nothing to do with each other.
+TEST(RoundTrip, IsMeasuredWithoutComparingClocks) {
+  RoundTrips head(1);
+  RoundTrips base(2);
+  base.note(head.next(1000 * kS), 5 * kS);            // 2 ms on the way, let us say
+  head.note(base.next(6 * kS), 1001 * kS + 5 * kMs);  // it lay there for a second
+  EXPECT_EQ(head.of(2), 5 * kMs);
+  EXPECT_EQ(base.of(1), std::nullopt);
+  base.note(head.next(1002 * kS), 7 * kS + 3 * kMs);
+  EXPECT_EQ(base.of(1), kS + 3 * kMs - (1002 * kS - 1001 * kS - 5 * kMs));
+}
+
+TEST(RoundTrip, IsNotTakenFromEchoesThatCannotBe) {
+  RoundTrips me(1);
+  static_cast<void>(me.next(100 * kS));
+  me.note({2, 1, {{1, 1, static_cast<std::uint64_t>(2 * kS)}}}, 101 * kS);  // lay for longer
+  EXPECT_EQ(me.of(2), std::nullopt);
+  me.note({2, 2, {{1, 9, 0}}}, 101 * kS);  // never sent
+  me.note({2, 3, {{1, 0, 0}}}, 101 * kS);
+  me.note({2, 4, {{3, 1, 0}}}, 101 * kS);  // another's
+  EXPECT_EQ(me.of(2), std::nullopt);
+  me.note({1, 5, {{1, 1, 0}}}, 101 * kS);  // pretends to be me
+  EXPECT_EQ(me.of(1), std::nullopt);
+  me.note({2, 5, {{1, 1, 0}}}, 101 * kS);
+  EXPECT_EQ(me.of(2), kS);
+  me.note({2, 4, {{1, 1, 5}}}, 102 * kS);  // overtaken
+  EXPECT_EQ(me.of(2), kS);
+  for (int i = 0; i < 20; ++i) static_cast<void>(me.next(103 * kS));
+  me.note({2, 6, {{1, 1, 0}}}, 104 * kS);  // too long ago to be known
+  EXPECT_EQ(me.of(2), kS);
+}
+
+TEST(RoundTrip, KnowsABoundedNumberOfOthersAndForgetsThoseThatAreSilent) {
+  RoundTrips me(1);
+  for (Incarnation other = 2; other < 1000; ++other) me.note({other, 1, {}}, kS);
+  EXPECT_EQ(me.next(2 * kS).echoes.size(), kMaxEchoes);
+  const ByteString largest = write_pulse(me.next(2 * kS));
+  EXPECT_TRUE(read_pulse(as_bytes(largest)));
+  EXPECT_THAT(me.next(kS + RoundTrips::kSilence).echoes, IsEmpty());
+}
+
+std::vector<std::string> names_of(const Neighbours& neighbours) {
+  std::vector<std::string> names;
+  for (const Neighbour& each : neighbours.all()) {
+    names.push_back(each.card->host + (each.is_up ? "" : " gone"));
+  }
+  return names;
+}
+
+TEST(NeighbouringHosts, AreGoneWithTheirWritersAndListedForSomeMinutes) {
+  Neighbours neighbours;
+  neighbours.note(1, host_card("rear", 11), kS);
+  neighbours.note(2, host_card("head", 12), kS);
+  neighbours.keep({1, 2}, 2 * kS);
+  EXPECT_THAT(names_of(neighbours), ElementsAre("head", "rear"));
+  neighbours.keep({1}, 3 * kS);
+  EXPECT_THAT(names_of(neighbours), ElementsAre("rear", "head gone"));
+  EXPECT_EQ(neighbours.all().back().since, 3 * kS);
+  neighbours.keep({1}, 3 * kS + Neighbours::kRemembered - 1);
+  EXPECT_THAT(names_of(neighbours), ElementsAre("rear", "head gone"));
+  neighbours.keep({1}, 3 * kS + Neighbours::kRemembered);
+  EXPECT_THAT(names_of(neighbours), ElementsAre("rear"));
+}
+
+TEST(NeighbouringHosts, ThatAreStartedAgainAreNotListedAsGone) {
+  Neighbours neighbours;
+  neighbours.note(1, host_card("head", 11), kS);
+  neighbours.note(2, host_card("head", 12), 2 * kS);  // its earlier life has a lease
+  EXPECT_THAT(names_of(neighbours), ElementsAre("head", "head"));
+  neighbours.keep({2}, 3 * kS);
+  EXPECT_THAT(names_of(neighbours), ElementsAre("head"));
+  neighbours.keep({}, 4 * kS);
+  EXPECT_THAT(names_of(neighbours), ElementsAre("head gone"));
+  neighbours.note(3, host_card("head", 12), 5 * kS);  // the cable is back
+  EXPECT_THAT(names_of(neighbours), ElementsAre("head"));
+}
+
+TEST(NeighbouringHosts, AreBoundedInNumberAndThoseThatAreGoneGiveWay) {
+  Neighbours neighbours;
+  std::vector<std::uint64_t> keys;
+  for (std::uint64_t key = 1; key <= Neighbours::kMost; ++key) {
+    EXPECT_TRUE(neighbours.note(key, host_card("host" + std::to_string(key), key), kS));
+    keys.push_back(key);
+  }
+  EXPECT_FALSE(neighbours.note(999, host_card("more", 999), kS));
+  keys.pop_back();
+  neighbours.keep(keys, 2 * kS);
+  EXPECT_TRUE(neighbours.note(999, host_card("more", 999), 2 * kS));
+  EXPECT_EQ(neighbours.all().size(), Neighbours::kMost);
+}
+
+// Returns what stands once it has settled.
+std::vector<std::string> texts_of(const std::vector<HostCard>& cards,
+                                  std::vector<shm::Nanoseconds> since = {}) {
+  since.resize(cards.size());
+  std::vector<PresentHost> hosts;
+  for (std::size_t i = 0; i < cards.size(); ++i) hosts.push_back({&cards[i], since[i]});
+  Disagreements disagreements;
+  const shm::Nanoseconds begin = 10 * kS;
+  EXPECT_THAT(disagreements.look(hosts, begin), IsEmpty()) << "a port may be on its way";
+  std::vector<std::string> texts;
+  for (const Disagreement& each : disagreements.look(hosts, begin + Disagreements::kSettles)) {
+    texts.push_back((each.is_error() ? "error: " : "warning: ") + each.text());
+  }
+  EXPECT_THAT(disagreements.look(hosts, begin + 2 * Disagreements::kSettles), IsEmpty())
+      << "each is news once";
+  return texts;
+}
+
+TEST(HostDisagreement, IsAnInputPortThatIsOpenOnTwo) {
+  EXPECT_THAT(texts_of({host_card("rear", 1, {"/m:i", "/r:i"}), host_card("base", 2, {"/m:i"})}),
+              ElementsAre("error: the input port /m:i is open on the hosts base and rear, and each "
+                          "decides it for itself: close it on all but one"));
+}
+
+TEST(HostDisagreement, IsASourceThatIsOpenOnSeveral) {
+  EXPECT_THAT(texts_of({host_card("c", 1, {}, {"/s"}), host_card("b", 2, {}, {"/s"}),
+                        host_card("a", 3, {}, {"/s"})}),
+              ElementsAre("warning: the source /s is open on the hosts a, b and c: each of them "
+                          "obeys its own"));
+}
+
+TEST(HostDisagreement, IsADifferentModel) {
+  HostCard other = host_card("base", 2);
+  other.digest = 8;
+  EXPECT_THAT(texts_of({host_card("head", 1), other}),
+              ElementsAre("warning: the models of the hosts base and head are not all the same"));
+  other.digest = 0;  // not known, or none is in force
+  EXPECT_THAT(texts_of({host_card("head", 1), other}), IsEmpty());
+}
+
+TEST(HostDisagreement, IsANameOfTwoMachinesButNotOfALinkThatWasStartedAgain) {
+  const std::vector<HostCard> cards{host_card("head", 1, {"/p"}), host_card("head", 2, {"/p"})};
+  EXPECT_THAT(texts_of(cards, {kS, 9 * kS}), IsEmpty()) << "a lease has not run out";
+  EXPECT_THAT(
+      texts_of(cards, {kS, 2 * kS}),
+      ElementsAre(testing::HasSubstr("the input port /p is open on the hosts head and head"),
+                  "warning: several machines are called head: give each its own --host"));
+}
+
+TEST(HostDisagreement, IsNewsAgainWhenItHasBeenSettled) {
+  const HostCard base = host_card("base", 1, {"/p"});
+  const HostCard head = host_card("head", 2, {"/p"});
+  Disagreements disagreements;
+  const std::vector<PresentHost> both{{&base, 0}, {&head, 0}};
+  disagreements.look(both, 10 * kS);
+  EXPECT_EQ(disagreements.look(both, 12 * kS).size(), 1U);
+  EXPECT_EQ(disagreements.standing().size(), 1U);
+  EXPECT_THAT(disagreements.look({{&base, 0}}, 13 * kS), IsEmpty());
+  EXPECT_THAT(disagreements.standing(), IsEmpty());
+  disagreements.look(both, 14 * kS);
+  EXPECT_EQ(disagreements.look(both, 16 * kS).size(), 1U);
+}
+
+TEST(HostDisagreement, IsBoundedInNumber) {
+  std::vector<std::string> ports;
+  for (int i = 0; i < 1000; ++i) ports.push_back("/" + std::to_string(10'000 + i));
+  EXPECT_EQ(texts_of({host_card("a", 1, ports), host_card("b", 2, ports)}).size(),
+            Disagreements::kMost);
+}
+
+TEST(QuestionMessages, AreReadAsTheyWereWritten) {
+  const QuestionMessage question{5, 9, {6, 7}, "head", "status", "all of it"};
+  const auto read = read_question(as_bytes(write_question(question)));
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->asker, 5U);
+  EXPECT_EQ(read->number, 9U);
+  EXPECT_THAT(read->asked, ElementsAre(6U, 7U));
+  EXPECT_EQ(read->host, "head");
+  EXPECT_EQ(read->verb, "status");
+  EXPECT_EQ(read->argument, "all of it");
+  const AnswerMessage answer{6, 5, 9, true, std::string(100'000, 'x')};
+  const auto given = read_answer(as_bytes(write_answer(answer)));
+  ASSERT_TRUE(given);
+  EXPECT_TRUE(given->is_refusal);
+  EXPECT_EQ(given->text, answer.text);
+}
+
+TEST(QuestionMessages, AreRefusedWhereTheyExceedTheirBounds) {
+  const auto is_read = [](QuestionMessage question) {
+    return read_question(as_bytes(write_question(question))).has_value();
+  };
+  EXPECT_TRUE(is_read({5, 9, {6}, "head", "status", {}}));
+  EXPECT_FALSE(is_read({0, 9, {6}, "head", "status", {}}));
+  EXPECT_FALSE(is_read({5, 0, {6}, "head", "status", {}}));
+  EXPECT_FALSE(is_read({5, 9, {}, "head", "status", {}}));
+  EXPECT_FALSE(is_read({5, 9, {6}, "he/ad", "status", {}}));
+  EXPECT_FALSE(is_read({5, 9, {6}, "head", "Status", {}}));
+  EXPECT_FALSE(is_read({5, 9, {6}, "head", std::string(kMaxVerb + 1, 'x'), {}}));
+  EXPECT_FALSE(is_read({5, 9, {6}, "head", "status", std::string(kMaxArgument + 1, 'x')}));
+  EXPECT_FALSE(is_read({5, 9, std::vector<Incarnation>(kMaxAsked + 1, 6), "head", "status", {}}));
+}
+
+TEST(OpenQuestion, IsSilentAfterASecond) {
+  OpenQuestions open;
+  const auto number = open.ask({6, 7}, kS);
+  EXPECT_TRUE(open.note({6, 5, number, false, "here"}, kS + 3 * kMs));
+  EXPECT_FALSE(open.is_over(number, kS + OpenQuestions::kPatience - 1));
+  EXPECT_TRUE(open.is_over(number, kS + OpenQuestions::kPatience));
+  const auto replies = open.take(number);
+  EXPECT_EQ(replies.at(6).outcome, OpenQuestions::Outcome::kAnswered);
+  EXPECT_EQ(replies.at(6).took, 3 * kMs);
+  EXPECT_EQ(replies.at(6).text, "here");
+  EXPECT_EQ(replies.at(7).outcome, OpenQuestions::Outcome::kSilent);
+}
+
+TEST(OpenQuestion, HearsOnlyWhoWasAskedAndOnce) {
+  OpenQuestions open;
+  const auto number = open.ask({6}, kS);
+  EXPECT_FALSE(open.note({8, 5, number, false, "a stranger"}, kS));
+  EXPECT_FALSE(open.note({6, 5, number + 1, false, "another question"}, kS));
+  EXPECT_TRUE(open.note({6, 5, number, true, "no"}, kS));
+  EXPECT_FALSE(open.note({6, 5, number, false, "yes after all"}, kS));
+  EXPECT_TRUE(open.is_over(number, kS));
+  EXPECT_EQ(open.take(number).at(6).outcome, OpenQuestions::Outcome::kRefused);
+  EXPECT_FALSE(open.note({6, 5, number, false, "late"}, kS)) << "nobody waits any more";
+}
+
+TEST(OpenQuestion, IsAskedAgainUntilItIsAnswered) {
+  OpenQuestions open;
+  const auto number = open.ask({6, 7}, kS);
+  EXPECT_THAT(open.due(number, kS + OpenQuestions::kAskAgain - 1), IsEmpty());
+  open.note({7, 5, number, false, "here"}, kS);
+  EXPECT_THAT(open.due(number, kS + OpenQuestions::kAskAgain), ElementsAre(6U));
+  EXPECT_THAT(open.due(number, kS + OpenQuestions::kAskAgain + 1), IsEmpty());
+  EXPECT_THAT(open.due(number, kS + 2 * OpenQuestions::kAskAgain), ElementsAre(6U));
+}
+
+TEST(OpenQuestion, WaitsInBoundedNumber) {
+  OpenQuestions open;
+  for (std::size_t i = 0; i < OpenQuestions::kMost; ++i) EXPECT_NE(open.ask({6}, kS), 0U);
+  EXPECT_EQ(open.ask({6}, kS), 0U);
+  static_cast<void>(open.take(1));
+  EXPECT_NE(open.ask({6}, kS), 0U);
+}
+
+TEST(AskingLinks, AreAnsweredOnceAndNotTooOften) {
+  using Verdict = Askers::Verdict;
+  Askers askers;
+  EXPECT_EQ(askers.judge(5, 1, 10 * kS), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 1, 10 * kS), Verdict::kRepeated);
+  for (std::uint64_t number = 2; number <= Askers::kMostOfOne; ++number) {
+    EXPECT_EQ(askers.judge(5, number, 10 * kS), Verdict::kAnswer);
+  }
+  EXPECT_EQ(askers.judge(5, 100, 10 * kS), Verdict::kTooMany);
+  EXPECT_EQ(askers.judge(6, 1, 10 * kS), Verdict::kAnswer) << "another one";
+  EXPECT_EQ(askers.judge(5, 100, 11 * kS), Verdict::kAnswer)
+      << "what was not answered may come again";
+  EXPECT_EQ(askers.judge(5, 99, 12 * kS), Verdict::kRepeated);
+}
+
+TEST(AskingLinks, AllTogetherHaveAQuota) {
+  Askers askers;
+  std::uint32_t answered = 0;
+  for (Incarnation asker = 1; asker <= 1000; ++asker) {
+    if (askers.judge(asker, 1, 10 * kS) == Askers::Verdict::kAnswer) ++answered;
+  }
+  EXPECT_EQ(answered, Askers::kMostOfAll);
+  EXPECT_EQ(askers.judge(2000, 1, 11 * kS), Askers::Verdict::kAnswer);
+}
+
+}  // namespace
+}  // namespace arbiter::test

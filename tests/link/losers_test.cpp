@@ -1,0 +1,387 @@
+// Losers stay at home: samples that win nowhere do not cross, and are there when they win again.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+#include <map>
+#include <mutex>
+#include <optional>
+
+#include "gateway/dds/arrived_sample.hpp"
+#include "link/core/event_header.hpp"
+#include "link/core/held_tokens.hpp"
+#include "link/dds/event_topic.hpp"
+#include "link/dds/network.hpp"
+#include "link/dds/token_topic.hpp"
+#include "shm/clock.hpp"
+#include "tests/link/cables.hpp"
+#include "tests/link/robot.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using link::Demand;
+using link::EventKind;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr const char* kCamera = "/Camera/image:o";
+constexpr const char* kPause = "/Pause/image:o";
+constexpr const char* kView = "/View/image:i";
+
+struct Image {
+  std::int64_t number;
+  std::array<std::byte, 40'000> pixels;
+};
+
+// The view shows the camera, but for a pause.
+std::string view_model(const std::string& timeout) {
+  return "<behaviors timeout='" + timeout + R"('>
+    <source port="/Pause/image:o" timeout="forever"/>
+    <behavior name="Watch"><config at="/View/image:i">/Camera/image:o</config></behavior>
+    <behavior name="Pause"><config at="/View/image:i">/Pause/image:o</config>
+      <inhibition>Watch</inhibition></behavior>
+  </behaviors>)";
+}
+
+constexpr const char* kOnlySensed = R"(<behaviors timeout='500s'>
+    <behavior name="Watch"><config at="/View/image:i">/Other/image:o</config>
+      <condition>/Camera/image:o</condition></behavior>
+  </behaviors>)";
+
+class Camera {
+ public:
+  explicit Camera(const Host& host)
+      : node_(host.node("eye")), port_(node_.output_port<Image>(kCamera)) {}
+  std::int64_t publish() {
+    auto image = port_.loan();
+    (*image)->number = ++published_;
+    port_.publish(std::move(*image));
+    return published_;
+  }
+  OutputPort<Image>& port() { return port_; }
+  [[nodiscard]] std::int64_t published() const { return published_; }
+
+ private:
+  Node node_;
+  OutputPort<Image> port_;
+  std::int64_t published_ = 0;
+};
+
+class View {
+ public:
+  explicit View(const Host& host)
+      : node_(host.node("view")),
+        pause_(node_.output_port<Image>(kPause)),
+        in_(node_.input_port<Image>(kView)) {}
+  // The camera publishes until its image is seen.
+  void watch(Camera& camera) {
+    await([&] {
+      camera.publish();
+      return seen(5ms).has_value();
+    });
+  }
+  // The number of the camera's next image.
+  std::optional<std::int64_t> seen(std::chrono::milliseconds within) {
+    const auto got = in_.wait_for(within);
+    if (!got || got->source() != kCamera) return std::nullopt;
+    EXPECT_GT((*got)->number, last_) << "in order, and none twice";
+    last_ = (*got)->number;
+    return last_;
+  }
+  // What waits is dropped.
+  void pause() {
+    pause_.signal();
+    EXPECT_FALSE(in_.take());
+  }
+  void go_on() { pause_.deactivate(); }
+  InputPort<Image>& in() { return in_; }
+  [[nodiscard]] Node& node() { return node_; }
+
+ private:
+  Node node_;
+  OutputPort<Image> pause_;
+  InputPort<Image> in_;
+  std::int64_t last_ = 0;
+};
+
+// 412 in "412 withheld"; 0: it says nothing of it.
+int withheld_at(Host& host) {
+  const std::string described = host.described(kCamera);
+  const std::size_t end = described.find(" withheld");
+  if (end == std::string::npos) return 0;
+  return std::stoi(described.substr(described.rfind(' ', end - 1) + 1));
+}
+
+// Publishes until samples stay at home.
+void lose(Host& base, Camera& camera) {
+  const int before = withheld_at(base);
+  await([&] {
+    camera.publish();
+    return withheld_at(base) > before;
+  });
+}
+
+// Sees what crosses the network, as a reader that wants what `demand` says.
+class Eavesdropper : private gateway::dds::SampleTaker {
+ public:
+  Eavesdropper(const link::Network& network, Demand demand)
+      : reader_(network, kCamera, *this, bell_, {99, demand}) {}
+  ~Eavesdropper() override = default;
+  Eavesdropper(const Eavesdropper&) = delete;
+  Eavesdropper& operator=(const Eavesdropper&) = delete;
+
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+  [[nodiscard]] int seen(EventKind kind) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = kinds_.find(kind);
+    return found == kinds_.end() ? 0 : found->second;
+  }
+
+ private:
+  void take(const gateway::dds::Payload& payload,
+            dds_instance_handle_t /*writer*/) noexcept override {
+    const std::lock_guard lock(mutex_);
+    std::array<std::byte, link::kMaxHeaderBytes> bytes;
+    const std::size_t before = link::encapsulation().size();
+    const WritableBytes beginning(bytes.data(), std::min(payload.size - before, bytes.size()));
+    ASSERT_TRUE(gateway::dds::ArrivedSample(payload).copy(before, beginning));
+    link::EventHeader header;
+    ASSERT_TRUE(link::read_header(beginning, payload.size - before, header));
+    bytes_ += payload.size;
+    ++kinds_[header.kind];
+  }
+
+  mutable std::mutex mutex_;
+  std::atomic<std::size_t> bytes_{0};
+  std::map<EventKind, int> kinds_;
+  const gateway::Bell bell_;
+  link::EventReader reader_;
+};
+
+class Losers : public testing::Test {
+ protected:
+  [[nodiscard]] std::vector<std::string> network() const {
+    return {"--domain", std::to_string(domain_.number())};
+  }
+
+  // Of what is published for longer than a loser is given. Somebody else reads the source by now.
+  void expect_nothing_withheld(Camera& camera) const {
+    const Eavesdropper ear(here_, Demand::kHeaders);
+    const shm::Nanoseconds end = shm::monotonic_now() + 3 * link::ImportDemand::kLosesFor;
+    while (shm::monotonic_now() < end || ear.seen(EventKind::kSample) < 20) {
+      camera.publish();
+      ::poll(nullptr, 0, 3);
+    }
+    EXPECT_EQ(ear.seen(EventKind::kWithheld), 0);
+  }
+
+  const OwnDomain domain_;
+  const link::Network here_{{domain_.number(), {}, {}}};
+  const TemporaryDirectory runtime_;
+  Host head_{"head", runtime_, kNoRules, network()};
+};
+
+TEST_F(Losers, OnlyHeadersCrossAndTheNewestImageIsThereWhenItWinsAgain) {
+  Host base("base", runtime_, view_model("500s"), network());
+  Camera camera(head_);
+  View view(base);
+  view.watch(camera);
+  EXPECT_EQ(withheld_at(base), 0);
+  Eavesdropper ear(here_, Demand::kHeaders);
+  view.pause();
+  lose(base, camera);
+  await([&] {
+    camera.publish();
+    return ear.seen(EventKind::kWithheld) > 0;
+  });
+  const int samples = ear.seen(EventKind::kSample);
+  const std::size_t bytes = ear.bytes();
+  for (int i = 0; i < 20; ++i) camera.publish();
+  await([&] { return ear.seen(EventKind::kWithheld) >= 20; });
+  EXPECT_EQ(ear.seen(EventKind::kSample), samples);
+  EXPECT_LT(ear.bytes() - bytes, 25 * sizeof(Image) / 100);
+  EXPECT_EQ(ear.seen(EventKind::kAgain), 0);
+  EXPECT_FALSE(view.in().take());
+
+  TapOptions without_samples;
+  without_samples.max_held = 0;
+  auto tap = view.node().tap(kCamera, without_samples);
+  view.go_on();
+  const std::int64_t last = camera.publish();  // its header wins
+  await([&] { return view.seen(5ms) == last; });
+  EXPECT_EQ(ear.seen(EventKind::kAgain), 1);
+  std::optional<Time> signalled;
+  await([&] {  // it is told after it has been handed over
+    const auto event = tap.take();
+    if (event && event->kind() == TapEventKind::signal) signalled = event->time();
+    if (!event || event->kind() != TapEventKind::sample) return false;
+    EXPECT_EQ(signalled, event->time()) << "no second arrival";
+    return true;
+  });
+  EXPECT_FALSE(view.seen(5ms)) << "it comes once";
+  view.watch(camera);
+  EXPECT_THAT(base.described(kCamera), Not(HasSubstr("lost")));
+  EXPECT_THAT(base.described(kCamera), Not(HasSubstr("twice")));
+}
+
+TEST_F(Losers, AHeaderIsAnArrivalAtOnce) {
+  Host base("base", runtime_, view_model("500s"), network());
+  Camera camera(head_);
+  View view(base);
+  view.watch(camera);
+  view.pause();
+  lose(base, camera);
+  camera.port().deactivate();
+  await([&] { return !base.daemon().source(kCamera)["active"]; });
+  camera.publish();
+  await([&] { return base.daemon().source(kCamera)["active"].get<bool>(); });
+}
+
+// What was kept at home is not sent after a deactivation: nothing of it is wanted any more.
+TEST_F(Losers, ADeactivationEndsWhatWasKept) {
+  Host base("base", runtime_, view_model("500s"), network());
+  Camera camera(head_);
+  View view(base);
+  view.watch(camera);
+  view.pause();
+  lose(base, camera);
+  camera.port().deactivate();
+  view.go_on();
+  camera.port().signal();
+  await([&] { return view.in().winner() == kCamera; });
+  EXPECT_FALSE(view.seen(20ms));
+  view.watch(camera);
+}
+
+TEST_F(Losers, AHostWhereItWinsHasItAll) {
+  Host base("base", runtime_, view_model("500s"), network());
+  Host rear("rear", runtime_, view_model("500s"), network());
+  Camera camera(head_);
+  View view(base);
+  View other(rear);
+  view.watch(camera);
+  other.watch(camera);
+  view.pause();
+  expect_nothing_withheld(camera);
+  // One that goes wants nothing any more.
+  rear.link().kill();
+  lose(base, camera);
+  rear.start_link();
+  other.watch(camera);
+}
+
+TEST_F(Losers, ATapThatReadsSamplesHasThem) {
+  Host base("base", runtime_, view_model("500s"), network());
+  Camera camera(head_);
+  View view(base);
+  view.watch(camera);
+  view.pause();
+  lose(base, camera);
+  auto tap = view.node().tap(kCamera);
+  await([&] {
+    camera.publish();
+    while (const auto event = tap.take()) {
+      if (event->sample()) return true;
+    }
+    return false;
+  });
+}
+
+TEST_F(Losers, APortThatKeepsHasItAll) {
+  Host base("base", runtime_, view_model("500s"), network());
+  Camera camera(head_);
+  Node node = base.node("keeper");
+  InputPortOptions options;
+  options.keep = true;
+  auto in = node.input_port<Image>(kView, options);
+  auto pause = node.output_port<Image>(kPause);
+  await([&] {
+    camera.publish();
+    return in.wait_for(5ms).has_value();
+  });
+  pause.signal();
+  expect_nothing_withheld(camera);
+}
+
+TEST_F(Losers, ASourceThatNeverBecomesInactiveIsNotWithheld) {
+  Host base("base", runtime_, view_model("forever"), network());
+  Camera camera(head_);
+  View view(base);
+  view.watch(camera);
+  view.pause();
+  expect_nothing_withheld(camera);
+}
+
+TEST_F(Losers, OfASourceThatIsOnlySensedNoSampleCrosses) {
+  Camera camera(head_);
+  Eavesdropper ear(here_, Demand::kHeaders);
+  await([&] {
+    camera.publish();
+    return ear.seen(EventKind::kWithheld) > 0;
+  });
+  Host base("base", runtime_, kOnlySensed, network());
+  await([&] {
+    camera.publish();
+    const auto source = base.daemon().source(kCamera);
+    return !source.is_null() && source["active"].get<bool>();
+  });
+  EXPECT_EQ(ear.seen(EventKind::kSample) + ear.seen(EventKind::kAgain), 0);
+  base.await_described(kCamera, "withheld");
+  base.daemon().load(view_model("500s"));
+  View view(base);
+  view.watch(camera);
+}
+
+// Who is cut off while it loses, and wins meanwhile, has the newest image after the cut, and none
+// from before.
+TEST(CutLosers, AChangeDuringACutIsMadeUpFor) {
+  if (const std::string why = why_no_networks(); !why.empty()) GTEST_SKIP() << why;
+  Switch cables;
+  const NetworkNamespace head_network;
+  const NetworkNamespace base_network;
+  cables.connect(head_network, 1);
+  cables.connect(base_network, 2);
+  const TemporaryDirectory runtime;
+  const std::vector<std::string> network = {"--interface", "eth0"};
+  Host head("head", runtime, kNoRules, network, head_network.enter());
+  Host base("base", runtime, view_model("500ms"), network, base_network.enter());
+  Camera camera(head);
+  View view(base);
+  view.watch(camera);
+  view.pause();
+  lose(base, camera);
+  cables.cut(1);
+  for (int i = 0; i < 20; ++i) camera.publish();
+  const std::int64_t unseen = camera.published();
+  view.go_on();
+  await([&] { return !base.daemon().source(kCamera)["active"].get<bool>(); });
+  cables.heal(1);
+  await([&] {
+    camera.publish();
+    const auto number = view.seen(5ms);
+    EXPECT_GT(number.value_or(unseen + 1), unseen);
+    return number.has_value();
+  });
+}
+
+// It speaks for itself alone.
+TEST_F(Losers, AStrangerWhoWantsNothingKeepsNothingFromOthers) {
+  Host base("base", runtime_, view_model("500s"), network());
+  Camera camera(head_);
+  View view(base);
+  view.watch(camera);
+  Eavesdropper wants_nothing(here_, Demand::kHeaders);
+  for (int i = 0; i < 5; ++i) view.watch(camera);
+  Eavesdropper says_nonsense(here_, static_cast<Demand>(77));
+  await([&] {
+    camera.publish();
+    return says_nonsense.seen(EventKind::kSample) > 0;
+  });
+  view.pause();
+  expect_nothing_withheld(camera);
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,187 @@
+// All hosts switch to another model, or none does; and what is said where neither is so.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/switch_everywhere.hpp"
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/link/scene.hpp"
+#include "wire/link_call.hpp"
+#include "wire/switch_request.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using cli::HostSwitch;
+using testing::AllOf;
+using testing::Each;
+using testing::HasSubstr;
+
+// Three hosts. Each has the models "default" and "rest", and two have "dance", too.
+class SwitchAll : public testing::Test {
+ protected:
+  SwitchAll() {
+    const auto models = files_.write("model.xml", kNoRules);
+    const std::vector<std::string> rest{"--model", "rest=" + models};
+    std::vector<std::string> both = rest;
+    both.insert(both.end(), {"--model", "dance=" + models});
+    const std::vector<std::string> network{"--domain", std::to_string(domain_.number())};
+    for (const std::string name : {"arm", "base", "cam"}) {
+      hosts_.emplace(
+          std::piecewise_construct, std::forward_as_tuple(name),
+          std::forward_as_tuple(name, runtime_, kNoRules, network, std::vector<std::string>(),
+                                name == "cam" ? rest : both));
+    }
+    // A release of what was never prepared harms nobody: who answers it is there.
+    const std::string nothing = wire::write_switch_request({1, "rest", {}});
+    for (const auto& [name, host] : hosts_) {
+      await([&, &asking = name] {
+        try {
+          return answered(ask(asking, wire::kReleaseVerb, nothing)) == hosts_.size();
+        } catch (const wire::CallError&) {  // its link is not there yet
+          return false;
+        }
+      });
+    }
+  }
+
+  static std::vector<wire::HostAnswer> ask(const std::string& at, const std::string& verb,
+                                           const std::string& text) {
+    return wire::LinkCall(at).ask_hosts({wire::kAllHosts, verb, text});
+  }
+  static std::size_t answered(const std::vector<wire::HostAnswer>& answers) {
+    std::size_t count = 0;
+    for (const auto& each : answers) count += each.outcome == wire::HostOutcome::kAnswered ? 1 : 0;
+    return count;
+  }
+  // Again where somebody was merely too slow: a second goes by on a machine that is busy.
+  static ProgramResult switch_all(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "switch");
+    arguments.emplace_back("--all");
+    for (;;) {
+      ProgramResult result = arbiter(arguments);
+      const auto says = [&](const char* text) {
+        return result.out.find(text) != std::string::npos;
+      };
+      if (!says("does not answer") && !says("did not answer") && !says("busy")) return result;
+    }
+  }
+  std::vector<std::string> in_force() {
+    std::vector<std::string> names;
+    for (auto& [name, host] : hosts_) names.push_back(host.daemon().status()["model"]["name"]);
+    return names;
+  }
+
+  const OwnDomain domain_;
+  const TemporaryDirectory runtime_, files_;
+  std::map<std::string, Host> hosts_;
+};
+
+TEST_F(SwitchAll, AllHostsSwitch) {
+  const auto result = switch_all({"rest", "--instance", "base"});
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_THAT(result.out, AllOf(HasSubstr("arm   switched after "), HasSubstr(": model 2\n"),
+                                HasSubstr("3 hosts switched to \"rest\" one by one, within ")));
+  EXPECT_THAT(in_force(), Each("rest"));
+}
+
+TEST_F(SwitchAll, IfOneCannotNoneDoes) {
+  const auto result = switch_all({"dance", "--instance", "arm"});
+  EXPECT_EQ(result.exit_code, 1) << result.out;
+  EXPECT_THAT(result.out, HasSubstr("cam   not switched: there is no model \"dance\""));
+  EXPECT_THAT(result.err, HasSubstr("no host has switched to \"dance\""));
+  EXPECT_THAT(in_force(), Each("default"));
+  // The others were released, and are not busy.
+  const auto without = switch_all({"dance", "--instance", "base", "--without", "cam", "--json"});
+  EXPECT_EQ(without.exit_code, 0) << without.out << without.err;
+  const auto report = nlohmann::json::parse(without.out);
+  EXPECT_EQ(report["ok"], true);
+  ASSERT_EQ(report["hosts"].size(), 3u);
+  EXPECT_EQ(report["hosts"][2]["outcome"], "left out");
+  EXPECT_THAT(in_force(), testing::ElementsAre("dance", "dance", "default"));
+}
+
+TEST_F(SwitchAll, AHostThatIsSilentMeansThatNoneDoes) {
+  hosts_.at("cam").link().signal(SIGSTOP);
+  const auto result = arbiter({"switch", "rest", "--all", "--instance", "arm"});
+  hosts_.at("cam").link().signal(SIGCONT);
+  EXPECT_EQ(result.exit_code, 1) << result.out;
+  EXPECT_THAT(result.out, HasSubstr("cam   not switched: it "));
+  EXPECT_THAT(in_force(), Each("default"));
+}
+
+TEST_F(SwitchAll, ALinkThatDiesBetweenPrepareAndCommitIsUnknownAndItsHostKeepsItsModel) {
+  cli::SwitchEverywhere result;
+  std::uint64_t attempt = 76;
+  await([&] {
+    const wire::SwitchRequest request{++attempt, "rest", {}};
+    result = cli::switch_everywhere(request, [&](const std::string& verb, const std::string& text) {
+      if (verb == wire::kCommitVerb) hosts_.at("cam").link().kill();
+      return ask("arm", verb, text);
+    });
+    return result.is_committed;
+  });
+  ASSERT_EQ(result.hosts.size(), 3u);
+  EXPECT_EQ(result.hosts[2].outcome, HostSwitch::Outcome::kUnknown) << result.hosts[2].why;
+  EXPECT_EQ(cli::exit_code_of(result), 3);
+  await([&] { return in_force() == std::vector<std::string>{"rest", "rest", "default"}; });
+  // Its next life was promised nothing.
+  hosts_.at("cam").start_link();
+  await([&] { return answered(ask("arm", wire::kReleaseVerb, "000000000000004d\nrest")) == 3; });
+  EXPECT_EQ(answered(ask("arm", wire::kCommitVerb, "000000000000004d\nrest")), 0u);
+  EXPECT_EQ(in_force()[2], "default");
+}
+
+// Whoever has prepared goes away: the hosts are busy for two seconds, and free again.
+TEST_F(SwitchAll, AnOperatorWhoGoesAwayHoldsNobodyForLong) {
+  await([&] { return answered(ask("arm", wire::kPrepareVerb, "000000000000004d\nrest")) == 3; });
+  const auto second = arbiter({"switch", "rest", "--all", "--instance", "base"});
+  // On a machine that stood still for two seconds, the promise is over.
+  if (second.exit_code != 0) {
+    EXPECT_THAT(second.out, HasSubstr("not switched: busy: it is prepared for another switch"));
+    EXPECT_THAT(in_force(), Each("default"));
+    await([] { return arbiter({"switch", "rest", "--all", "--instance", "base"}).exit_code == 0; });
+  }
+  EXPECT_THAT(in_force(), Each("rest"));
+  EXPECT_EQ(answered(ask("arm", wire::kCommitVerb, "000000000000004d\nrest")), 0u) << "too late";
+}
+
+// Both ask at once: one wins at all hosts, or neither does.
+TEST_F(SwitchAll, OfTwoOperatorsOneSwitchesOrNone) {
+  for (int round = 0; round < 3; ++round) {
+    const std::string before = in_force()[0];
+    const auto switch_at = [](const std::string& host, const std::string& model) {
+      return ChildProcess({std::string(ARBITER_PROGRAMS) + "/arbiter", "switch", model, "--all",
+                           "--instance", host},
+                          {}, {});
+    };
+    ChildProcess one = switch_at("arm", "rest");
+    ChildProcess other = switch_at("base", "default");
+    const int first = one.wait();
+    const int second = other.wait();
+    if (first == 3 || second == 3) continue;  // the machine stood still between two questions
+    const auto names = in_force();
+    EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), 1u)
+        << "all hosts have one model";
+    if (first != 0 && second != 0) {
+      EXPECT_EQ(names[0], before);
+    }
+  }
+}
+
+TEST_F(SwitchAll, WithoutALinkItIsAnError) {
+  hosts_.at("arm").link().kill();
+  const auto result = arbiter({"switch", "rest", "--all", "--instance", "arm"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("arbiter-link"));
+  EXPECT_THAT(in_force(), Each("default"));
+}
+
+}  // namespace
+}  // namespace arbiter::test
