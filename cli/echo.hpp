@@ -12,6 +12,7 @@
 #include <string>
 
 #include <arbiter/arbiter.hpp>
+#include <nlohmann/json.hpp>
 
 #include "shm/activity.hpp"
 #include "shm/file_descriptor.hpp"
@@ -48,6 +49,9 @@ TapOf kind_of_port(const EchoOptions& options);
 
 // "01 02 … ", all bytes or the first few.
 std::string hex_of(const Bytes& bytes, std::size_t most);
+// {publisher, sequence} of an arrival that was passed on. The publisher as text: in a number of
+// JSON not all readers keep 64 bits.
+nlohmann::json json_of(const Origin& origin);
 std::string preview(const Bytes& bytes);
 // A line for each 16 bytes, with its offset.
 std::string hex_dump(const Bytes& bytes);

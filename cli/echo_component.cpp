@@ -51,13 +51,13 @@ class Echo {
   void print(const Sample<void>& sample) {
     ++by_source_[sample.source()];
     if (options_.json) {
-      std::cout << nlohmann::json{{"port", options_.port},
-                                  {"source", sample.source()},
-                                  {"sequence", sample.sequence()},
-                                  {"stamp_ns", sample.stamp_ns()},
-                                  {"size", sample.size()}}
-                       .dump()
-                << '\n';
+      nlohmann::json line{{"port", options_.port},
+                          {"source", sample.source()},
+                          {"sequence", sample.sequence()},
+                          {"stamp_ns", sample.stamp_ns()},
+                          {"size", sample.size()}};
+      if (sample.origin().publisher != 0) line["origin"] = json_of(sample.origin());
+      std::cout << line.dump() << '\n';
       return;
     }
     std::cout << seconds_text(sample.stamp_ns() - started_) << "  " << sample.source() << "  #"

@@ -129,6 +129,7 @@ class TapEcho {
     line["type"] =
         event.type().is_untyped() ? nlohmann::json() : nlohmann::json(event.type().name());
     if (event.count() != 0) line["count"] = event.count();
+    if (event.origin().publisher != 0) line["origin"] = json_of(event.origin());
     if (options_.hex && event.sample()) {
       line["data"] = hex_of(*event.sample(), event.sample()->size());
     }
@@ -147,7 +148,9 @@ class TapEcho {
       std::cout << "  " << name_of(event.kind()) << fates_text(event) << '\n';
       return;
     }
-    std::cout << "  #" << event.sequence() << "  " << event.size() << " bytes";
+    std::cout << "  #" << event.sequence();
+    if (event.origin().publisher != 0) std::cout << " (there #" << event.origin().sequence << ')';
+    std::cout << "  " << event.size() << " bytes";
     if (!event.sample()) {
       std::cout << "  (overwritten)" << fates_text(event) << '\n';
     } else if (options_.hex) {

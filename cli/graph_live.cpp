@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -12,6 +13,7 @@
 
 #include "cli/live.hpp"
 #include "shm/clock.hpp"
+#include "watch/imported.hpp"
 #include "watch/instance.hpp"
 #include "watch/model_in_force.hpp"
 #include "watch/picture.hpp"
@@ -23,6 +25,7 @@ using drawing::Situation;
 using nlohmann::json;
 
 constexpr shm::Nanoseconds kFollowPeriod = 100'000'000;
+constexpr shm::Nanoseconds kHostsPeriod = 1'000'000'000;
 // Where models change faster than they can be drawn.
 constexpr int kMostLoads = 5;
 
@@ -108,6 +111,8 @@ class LivePicture {
       now = look(instance_, picture_.rules());
     } while (now.generation != drawn_ && ++tries < kMostLoads);
     fits_ = now.fits;
+    look_at_hosts();
+    now.situation.hosts = hosts_;
     if (!fits_ && is_same_ && !std::exchange(warned_, true)) {
       std::cerr << "arbiter: the daemon decides differently from this model; is it the model in "
                    "force, and unchanged since? (arbiter status, arbiter reload)\n";
@@ -142,6 +147,17 @@ class LivePicture {
     return true;
   }
 
+  // Which hosts sources come from: the daemon is asked once a second, and what was known stays.
+  void look_at_hosts() {
+    if (!instance_.has_daemon() || shm::monotonic_now() < ask_again_) return;
+    ask_again_ = shm::monotonic_now() + kHostsPeriod;
+    hosts_.clear();
+    for (const wire::SourceStatus& source : instance_.status().sources) {
+      const std::string host = watch::host_of(source);
+      if (!host.empty()) hosts_[source.name] = host;
+    }
+  }
+
   void warn_if_other(const rules::ModelTexts& given, const watch::ModelInForce& in_force) {
     is_same_ =
         !in_force.is_none() && (!in_force.has_texts() || same_texts(given, in_force.texts()));
@@ -159,6 +175,8 @@ class LivePicture {
   Picture picture_;
   std::shared_ptr<const shm::DecisionMemory> drawn_of_;
   std::uint64_t drawn_ = 0;  // the generation of the model that the picture is of
+  std::map<std::string, std::string> hosts_;
+  shm::Nanoseconds ask_again_ = 0;
   bool fits_ = false;
   bool is_same_ = true;  // as far as it is known: given is what is in force
   bool warned_ = false;

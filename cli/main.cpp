@@ -81,6 +81,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_replay(app, exit_code);
   arbiter::cli::add_recording(app, exit_code);
   arbiter::cli::add_status(app, exit_code);
+  arbiter::cli::add_hosts(app, exit_code);
   arbiter::cli::add_top(app, exit_code);
   arbiter::cli::add_why(app, exit_code);
   arbiter::cli::add_wait(app, exit_code);

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -14,9 +15,12 @@
 #include "cli/verbs.hpp"
 #include "gateway/mapping/check_mapping.hpp"
 #include "gateway/mapping/read_mapping.hpp"
+#include "rules/ask/across_hosts.hpp"
 #include "rules/ask/findings.hpp"
+#include "rules/ask/host_places.hpp"
 #include "rules/ask/report.hpp"
 #include "rules/ask/verdict.hpp"
+#include "rules/model/application_reader.hpp"
 #include "rules/text/names.hpp"
 
 namespace arbiter::cli {
@@ -26,6 +30,7 @@ struct CheckOptions {
   rules::ModelFiles files;
   std::vector<std::string> statements;  // files
   std::vector<std::string> gateways;    // files: mappings
+  std::string hosts;                    // file: an application that says where its modules run
   std::vector<std::string> silenced;    // codes
   double effort = 1;
   bool strict = false;
@@ -36,20 +41,46 @@ struct Statements {
   std::size_t proved = 0, refuted = 0, open = 0;
   std::size_t not_judged = 0;  // malformed, or of names that the model does not have
   rules::ProvedStatements facts;
+  std::vector<rules::Verdict> verdicts;
 };
 
 // Of the warnings and notes that reading, compiling and proving a model can bring.
-const std::vector<std::string_view> silenceable{
-    "decided-in-order", "duplicate-config", "duplicate-connection",
-    "forever-commands", "held-up-idle",     "inhibition-across-ports",
-    "left-open",        "matches-nothing",  "more-conflicts",
-    "never-published",  "never-read",       "never-runs",
-    "never-selected",   "never-wins",       "no-idle",
-    "no-children",      "no-config",        "no-rule-at-port",
-    "not-arbitrated",   "nobody-wins",      "proved",
-    "similar-name",     "starved",          "two-configurations",
-    "two-outs",         "unmentioned-port", "unreachable-children",
-    "wrong-end"};
+const std::vector<std::string_view> silenceable{"behaviour-on-two-hosts",
+                                                "crosses-network",
+                                                "decided-in-order",
+                                                "duplicate-config",
+                                                "duplicate-connection",
+                                                "forever-commands",
+                                                "held-up-idle",
+                                                "inhibition-across-ports",
+                                                "left-open",
+                                                "localhost-among-hosts",
+                                                "matches-nothing",
+                                                "more-conflicts",
+                                                "negated-across-hosts",
+                                                "never-published",
+                                                "never-read",
+                                                "never-runs",
+                                                "never-selected",
+                                                "never-wins",
+                                                "no-children",
+                                                "no-config",
+                                                "no-idle",
+                                                "no-rule-at-port",
+                                                "nobody-wins",
+                                                "not-arbitrated",
+                                                "not-at-one-instant",
+                                                "place-unknown",
+                                                "proved",
+                                                "similar-name",
+                                                "source-on-two-hosts",
+                                                "starved",
+                                                "statement-on-two-hosts",
+                                                "two-configurations",
+                                                "two-outs",
+                                                "unmentioned-port",
+                                                "unreachable-children",
+                                                "wrong-end"};
 
 std::string problem_of_code(std::string& code) {
   if (std::find(silenceable.begin(), silenceable.end(), code) != silenceable.end()) return "";
@@ -83,7 +114,7 @@ Statements judge_statements(const CheckOptions& options, const rules::CompiledMo
     result.not_judged += malformed;
   }
   if (model == nullptr) return result;
-  const auto verdicts = rules::judge(statements, *model, diagnostics, budget);
+  auto verdicts = rules::judge(statements, *model, diagnostics, budget);
   result.not_judged += statements.size() - verdicts.size();
   rules::report(verdicts, diagnostics, options.json);
   for (const auto& verdict : verdicts) {
@@ -93,6 +124,7 @@ Statements judge_statements(const CheckOptions& options, const rules::CompiledMo
     result.refuted += verdict.kind == Kind::kRefuted ? 1 : 0;
     result.open += verdict.kind == Kind::kOpen ? 1 : 0;
   }
+  result.verdicts = std::move(verdicts);
   return result;
 }
 
@@ -106,6 +138,32 @@ void check_gateways(const CheckOptions& options, const rules::RuleSet* model,
   }
   if (!of_mappings.has_errors()) gateway::check_mappings(mappings, model, of_mappings);
   diagnostics.add(std::move(of_mappings));
+}
+
+// "base 1 port and 1 source, head 1 port and 4 sources": what is on each host, if that is known.
+std::string check_hosts(const CheckOptions& options, const Model* model,
+                        const Statements& statements, rules::Diagnostics& diagnostics,
+                        rules::Budget& budget) {
+  if (options.hosts.empty()) return "";
+  const rules::TextFile file(options.hosts, rules::read_bytes(options.hosts));
+  rules::Diagnostics of_file;
+  const rules::Application application = rules::read_application(file, of_file);
+  const auto& models = options.files.models;
+  const bool was_read = options.files.application == options.hosts ||
+                        std::find(models.begin(), models.end(), options.hosts) != models.end();
+  const bool is_fine = !of_file.has_errors();
+  if (!was_read) diagnostics.add(std::move(of_file));
+  if (!is_fine || model == nullptr) return "";
+  const rules::SourceUses uses = rules::uses_of_sources(model->rules);
+  const rules::HostPlaces places(model->rules, uses, application, options.hosts, diagnostics);
+  rules::find_across_hosts(model->rules, model->compiled, uses, places, statements.verdicts,
+                           diagnostics, budget);
+  std::string summary;
+  for (const auto& [host, count] : places.counts()) {
+    summary += (summary.empty() ? "" : ", ") + host + " " + counted(count.ports, "input port") +
+               " and " + counted(count.sources, "source");
+  }
+  return summary;
 }
 
 void write_summary(std::ostream& out, const Statements& statements) {
@@ -128,6 +186,8 @@ int check(const CheckOptions& options) {
     rules::find_more(model->rules, model->compiled, diagnostics, budget, statements.facts);
   }
   check_gateways(options, model ? &model->rules : nullptr, diagnostics);
+  const std::string hosts =
+      check_hosts(options, model ? &*model : nullptr, statements, diagnostics, budget);
   if (!model && !options.statements.empty()) {
     diagnostics.note("left-open", {options.statements.front(), 1, 1},
                      "the statements were not checked, because the model has errors");
@@ -144,6 +204,7 @@ int check(const CheckOptions& options) {
   if (!options.statements.empty() && model) {
     write_summary(std::cout, statements);
   }
+  if (!hosts.empty()) std::cout << "hosts: " << hosts << '\n';
   if (failed) {
     std::cout << "failed: " << rules::counts(diagnostics)
               << (options.strict ? " (--strict treats warnings as errors)\n" : "\n");
@@ -168,6 +229,9 @@ void add_check(CLI::App& app, int& exit_code) {
                    "Mapping of a gateway, to be looked at beside the model (docs/gateways.md)")
       ->type_name("FILE")
       ->allow_extra_args(false);
+  verb->add_option("--hosts", options->hosts,
+                   "Application whose modules have <node>s: also check what crosses the network")
+      ->type_name("FILE");
   verb->add_option("--silence", options->silenced,
                    "Hide warnings and notes with this code, such as nobody-wins")
       ->type_name("CODE")
@@ -182,6 +246,7 @@ void add_check(CLI::App& app, int& exit_code) {
       "  arbiter check search_and_track.xml --application application.xml\n"
       "  arbiter check search_and_track.xml --assert safety.txt --silence nobody-wins,starved\n"
       "  arbiter check robot.xml --gateway ros2.xml --gateway radar.xml\n"
+      "  arbiter check robot.xml --hosts application.xml\n"
       "\nStatements are about sources and winners:\n"
       "  /collision:o -> idle(/Arm/pos:i)\n"
       "  winner(/Arm/pos:i) = /Teleop/pos:o -> not winner(/Base/vel:i) = /Nav/vel:o\n"

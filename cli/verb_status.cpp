@@ -1,20 +1,19 @@
-// arbiter status: ports, connections, who is active, who wins, and the counters.
-#include <cstdint>
-#include <initializer_list>
+// arbiter status: ports, connections, who is active, who wins, and the counters; of this host, or
+// of all that links join.
 #include <iostream>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "cli/live.hpp"
+#include "cli/other_hosts.hpp"
+#include "cli/status_text.hpp"
 #include "cli/verbs.hpp"
-#include "shm/clock.hpp"
 #include "shm/utf8.hpp"
-#include "watch/process.hpp"
 #include "wire/document.hpp"
+#include "wire/link_call.hpp"
 #include "wire/status.hpp"
 
 namespace arbiter::cli {
@@ -23,172 +22,73 @@ namespace {
 struct StatusOptions {
   std::string instance;
   bool json = false;
+  bool all = false;
 };
 
-std::string process_text(const wire::Component& component) {
-  return component.node + " (pid " + std::to_string(component.pid) +
-         (watch::is_stopped(component.pid) ? ", stopped)" : ")");
-}
-
-// Of a source or an input port.
-std::string holder(const auto& port) {
-  if (port.away_pid) {
-    return "pid " + std::to_string(*port.away_pid) +
-           (watch::is_stopped(*port.away_pid) ? ", stopped" : "") +
-           ", has not come back yet: its connections keep working";
-  }
-  return port.open ? process_text(port.open->component) : "not open";
-}
-
-// What its component says of it.
-void print_outside(const auto& port, const char* how) {
-  if (!port.open || !port.open->described) return;
-  std::cout << "           " << how << shm::printable(*port.open->described) << '\n';
-}
-
-std::string type_of(const auto& port) {
-  if (!port.open) return "";
-  return port.open->type ? ", " + port.open->type->name : ", untyped";
-}
-
-struct Count {
-  const char* name;
-  std::uint64_t value;
-};
-
-// "  name 3" for each of the counters that is worth saying.
-std::string counts(std::initializer_list<Count> counters, bool zeros) {
-  std::string text;
-  for (const auto& [name, value] : counters) {
-    if (value != 0 || zeros) text += std::string("  ") + name + ' ' + std::to_string(value);
-  }
-  return text;
-}
-
-void print_model(const wire::Status& status) {
-  const wire::ModelStatus& model = status.model;
-  std::cout << "instance " << status.instance << ", pid " << status.pid << ", model "
-            << model.generation;
-  if (status.models.size() > 1) std::cout << ' ' << model.name.value_or("-");
-  for (const auto& file : model.files) std::cout << ' ' << file;
-  if (model.application) std::cout << ", application " << *model.application;
-  std::cout << '\n';
-  if (model.reloads_refused != 0) {
-    std::cout << "  " << model.reloads_refused << " reloads refused: the daemon's log says why\n";
-  }
-}
-
-// Of a model in force; without one there is nothing to be misspelt.
-const char* unmentioned(const auto& port, bool has_model) {
-  return !has_model || port.mentioned ? "" : " (the model does not mention it)";
-}
-
-// Who else runs, though nothing of it is seen below.
-void print_strangers(const std::vector<wire::StrangerStatus>& strangers) {
-  if (strangers.empty()) return;
-  std::cout << "\nunknown to this daemon, because the state of the last daemon is lost; they "
-               "continue by themselves: restart them\n";
-  for (const auto& each : strangers) {
-    std::cout << "  " << process_text({each.node, each.pid, each.user});
-    for (const auto& port : each.outputs) std::cout << ' ' << port;
-    for (const auto& port : each.inputs) std::cout << ' ' << port;
-    std::cout << "  asked " << seconds_text(shm::monotonic_now() - each.seen) << " ago\n";
-  }
-}
-
-void print_source(const wire::SourceStatus& source, bool has_model) {
-  std::cout << "  " << (source.active ? "active   " : "inactive ") << source.name << "  ["
-            << holder(source) << type_of(source) << ']';
-  if (const auto& open = source.open) {
-    std::cout << counts({{"published", open->published}}, true)
-              << counts({{"signals", open->signals},
-                         {"late", open->late},
-                         {"blind", open->blind},
-                         {"unsettled", open->unsettled},
-                         {"no_slot", open->no_slot}},
-                        false);
-  }
-  const std::string mark = unmentioned(source, has_model);
-  std::cout << (mark.empty() ? "" : " " + mark) << '\n';
-  if (!source.open) return;
-  print_outside(source, "comes from ");
-  for (const auto& tap : source.open->taps) {
-    std::cout << "           tapped by " << process_text(tap) << ", user " << tap.user << '\n';
-  }
-}
-
-// `is_useless`: it is selected, and cannot deliver.
-void print_connection(const wire::ConnectionStatus& connection, bool is_useless) {
-  const char* mark = connection.winner   ? "  * "
-                     : is_useless        ? "  x "
-                     : connection.active ? "  - "
-                                         : "    ";
-  std::cout << mark << connection.source;
-  if (connection.mismatch) {
-    std::cout << "  MISMATCH: " << *connection.mismatch << '\n';
-    return;
-  }
-  if (!connection.is_connected()) {
-    std::cout << "  (" << connection.state() << ")\n";
-    return;
-  }
-  std::cout << counts({{"accepted", connection.accepted},
-                       {"discarded", connection.discarded},
-                       {"taken", connection.taken}},
-                      true)
-            << counts({{"dropped", connection.dropped},
-                       {"overtaken", connection.overtaken},
-                       {"refused", connection.refused},
-                       {"waiting", connection.waiting}},
-                      false)
-            << '\n';
-}
-
-void print_input(const wire::InputStatus& input, bool has_model) {
-  std::cout << input.name << "  [" << holder(input) << type_of(input) << "]  ";
-  const auto& useless = input.cannot_deliver;
-  if (!input.arbitrated) {
-    std::cout << "not arbitrated" << unmentioned(input, has_model);
-  } else if (useless) {
-    std::cout << "idle: " << useless->source
-              << " is selected, but cannot deliver: " << useless->why;
-  } else {
-    std::cout << (input.winner ? "winner " + *input.winner : "idle");
-  }
-  if (input.in_order) std::cout << "  (rules tried in order)";
-  if (const auto& open = input.open) {
-    std::cout << counts(
-        {{"blind", open->blind}, {"unsettled", open->unsettled}, {"misbehaved", open->misbehaved}},
-        false);
-  }
-  std::cout << '\n';
-  print_outside(input, "goes to ");
-  for (const auto& connection : input.connections) {
-    print_connection(connection, useless && useless->source == connection.source);
-  }
-  for (const auto& sensed : input.senses) {
-    std::cout << (sensed.active ? "  ! " : "    ") << sensed.source << "  (sensed)\n";
-  }
-}
-
-int status(const StatusOptions& options) {
+int status_here(const StatusOptions& options) {
   const std::string text = fetch_status_text("status", options.instance);
   if (options.json) {
     // As the daemon has it: a newer one may say more than this program knows.
     std::cout << wire::write_document(wire::parse_document(text));
     return 0;
   }
-  const wire::Status status = wire::read_status(text);
-  print_model(status);
-  print_strangers(status.strangers);
-  const bool has_model = status.model.generation != 0;
-  std::cout << "\nsources\n";
-  for (const auto& source : status.sources) print_source(source, has_model);
-  std::cout << "\ninput ports  (* winner, x selected but cannot deliver, - active and overridden, "
-               "! active and "
-               "sensed)\n";
-  for (const auto& input : status.inputs) print_input(input, has_model);
+  write_status(std::cout, wire::read_status(text), StatusPlace::kHere);
+  write_port_errors(std::cout, hosts_if_linked(options.instance));
   return 0;
+}
+
+// Writes one host's answer; what is wrong with it stands in `why_not`.
+void write_host(const wire::HostAnswer& answer, bool is_here, std::string& why_not) {
+  try {
+    const wire::Status status = wire::read_status(answer.text);
+    std::cout << "== host " << answer.host << (is_here ? " (this one)" : "") << " ==\n";
+    write_status(std::cout, status, is_here ? StatusPlace::kHere : StatusPlace::kElsewhere);
+    std::cout << '\n';
+  } catch (const wire::DocumentError& error) {
+    why_not = std::string("sent no status that can be read: ") + error.what();
+  }
+}
+
+nlohmann::json json_of(const wire::HostAnswer& answer, std::string& why_not) {
+  nlohmann::json host = {{"host", answer.host},
+                         {"outcome", wire::outcome_name(answer.outcome)},
+                         {"took_ns", answer.took},
+                         {"status", nullptr}};
+  if (answer.outcome == wire::HostOutcome::kAnswered) {
+    try {
+      host["status"] = wire::parse_document(answer.text);
+    } catch (const wire::DocumentError& error) {
+      why_not = error.what();
+    }
+  }
+  host["why_not"] = why_not.empty() ? nlohmann::json(nullptr) : nlohmann::json(why_not);
+  return host;
+}
+
+int status_of_all(const StatusOptions& options) {
+  wire::LinkCall link(options.instance);
+  const wire::HostsDocument hosts = wire::read_hosts(link.ask({"", "hosts"}));
+  const wire::HostStatus* const here = hosts.find_this();
+  nlohmann::json all = nlohmann::json::array();
+  int exit_code = 0;
+  for (const wire::HostAnswer& answer : link.ask_hosts({wire::kAllHosts, "status"})) {
+    std::string why_not = answer.why_not();
+    const bool is_here = here != nullptr && answer.incarnation == here->incarnation;
+    if (options.json) {
+      all.push_back(json_of(answer, why_not));
+    } else if (why_not.empty()) {
+      write_host(answer, is_here, why_not);
+    }
+    if (why_not.empty()) continue;
+    exit_code = 1;
+    std::cerr << "arbiter: host " << answer.host << ' ' << shm::printable(why_not) << '\n';
+  }
+  if (options.json) {
+    std::cout << wire::write_document({{"hosts", all}});
+  } else {
+    write_port_errors(std::cout, hosts);
+  }
+  return exit_code;
 }
 
 }  // namespace
@@ -196,10 +96,21 @@ int status(const StatusOptions& options) {
 void add_status(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<StatusOptions>();
   CLI::App* verb = app.add_subcommand("status", "Show ports, connections, winners and counters");
-  verb->add_flag("--json", options->json, "Write the daemon's JSON document");
+  verb->add_flag("--all", options->all, "Of all hosts that arbiter-link knows, one after another");
+  verb->add_flag(
+      "--json", options->json,
+      "Write the daemon's JSON document; with --all an object that has one for each host");
   add_instance_option(*verb, options->instance);
-  verb->footer("Example:\n  arbiter status");
-  verb->callback([options, &exit_code] { exit_code = status(*options); });
+  verb->footer(
+      "Example:\n"
+      "  arbiter status\n"
+      "  arbiter status --all\n\n"
+      "Exit codes: 0 shown; 1 no daemon, or you may not observe; with --all: no link, or a host "
+      "is\n"
+      "silent, gone, or refuses; 2 wrong use, or the answer cannot be written");
+  verb->callback([options, &exit_code] {
+    exit_code = options->all ? status_of_all(*options) : status_here(*options);
+  });
 }
 
 }  // namespace arbiter::cli

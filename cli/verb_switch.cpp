@@ -1,15 +1,20 @@
 // arbiter switch: puts another of the models in force that the daemon has loaded.
+#include <cstdint>
 #include <iostream>
 #include <memory>
+#include <random>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "cli/changes.hpp"
 #include "cli/live.hpp"
+#include "cli/switch_everywhere.hpp"
 #include "cli/verbs.hpp"
 #include "wire/document.hpp"
+#include "wire/link_call.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -17,6 +22,8 @@ namespace {
 struct SwitchOptions {
   std::string instance;
   std::string model;
+  std::vector<std::string> without;  // hosts
+  bool all = false;
   bool json = false;
 };
 
@@ -39,8 +46,31 @@ int list(const SwitchOptions& options) {
   return 0;
 }
 
+// Nobody can guess it, and no two attempts have the same.
+std::uint64_t new_attempt() {
+  std::random_device random;
+  std::uint64_t number = 0;
+  while (number == 0) number = std::uint64_t{random()} << 32 | random();
+  return number;
+}
+
+int switch_all(const SwitchOptions& options) {
+  wire::LinkCall link(options.instance);
+  const auto result = switch_everywhere({new_attempt(), options.model, options.without},
+                                        [&](const std::string& verb, const std::string& text) {
+                                          return link.ask_hosts({wire::kAllHosts, verb, text});
+                                        });
+  if (options.json) {
+    write_json(result, options.model);
+  } else {
+    write_text(result, options.model);
+  }
+  return exit_code_of(result);
+}
+
 int switch_model(const SwitchOptions& options) {
   if (options.model.empty()) return list(options);
+  if (options.all) return switch_all(options);
   wire::Message question;
   question.kind = wire::MessageKind::kSwitch;
   question.set_name(options.model);
@@ -55,15 +85,32 @@ void add_switch(CLI::App& app, int& exit_code) {
   CLI::App* verb =
       app.add_subcommand("switch", "Put another loaded model in force; without NAME, list them");
   verb->add_option("NAME", options->model, "As in arbiterd --model NAME=FILE")->type_name("NAME");
-  verb->add_flag("--json", options->json, "Write the list, or the daemon's report, as JSON");
+  CLI::Option* all = verb->add_flag("--all", options->all,
+                                    "On all hosts (docs/hosts.md): none switches unless all can");
+  verb->add_option("--without", options->without, "With --all: a host that is left out; repeatable")
+      ->type_name("HOST")
+      ->needs(all)
+      ->expected(1)
+      ->take_all();
+  verb->add_flag("--json", options->json,
+                 "Write the list, the daemon's report, or what each host has done, as JSON");
   add_instance_option(*verb, options->instance);
   verb->footer(R"(Example:
   arbiter switch          # * marks the one in force
   arbiter switch dance    # returns when it is in force, for all ports at once
+  arbiter switch dance --all --without camera
 
 The models were read and proved when the daemon started, or at the last arbiter reload; a switch
-reads no file.)");
-  verb->callback([options, &exit_code] { exit_code = switch_model(*options); });
+reads no file.
+
+Exit codes: 0 done; 1 an error in what you asked about, or no daemon, or, with --all, no link: nothing
+has switched; 2 wrong use; 3 with --all: some hosts have not switched, or that is not known)");
+  verb->callback([options, &exit_code] {
+    if (options->all && options->model.empty()) {
+      throw CLI::ValidationError("--all", "it needs the NAME of a model");
+    }
+    exit_code = switch_model(*options);
+  });
 }
 
 }  // namespace arbiter::cli

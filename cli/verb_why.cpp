@@ -10,8 +10,10 @@
 
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
+#include "cli/other_hosts.hpp"
 #include "cli/verbs.hpp"
 #include "cli/why_answer.hpp"
+#include "cli/why_elsewhere.hpp"
 #include "cli/why_follow.hpp"
 
 namespace arbiter::cli {
@@ -19,7 +21,21 @@ namespace {
 
 int why(const WhyOptions& options) {
   if (options.follow) return follow_winners(options);
-  write_why(std::cout, options, watch_instance("why", options.instance));
+  const auto hosts = hosts_if_linked(options.instance);
+  const wire::HostStatus* const here = hosts ? hosts->find_this() : nullptr;
+  const bool is_here = here != nullptr && here->host == options.host;
+  std::optional<std::string> elsewhere;
+  if (!options.host.empty() && !is_here) elsewhere = options.host;
+  if (options.host.empty() && hosts) elsewhere = host_that_decides(options.port, *hosts);
+  if (elsewhere) {
+    write_why_elsewhere(std::cout, options, *elsewhere);
+    return 0;
+  }
+  const auto instance = watch_instance("why", options.instance);
+  write_why(std::cout, options, instance);
+  if (hosts && !options.json) {
+    write_imports_of(std::cout, options.port, *hosts, instance->status());
+  }
   return 0;
 }
 
@@ -43,14 +59,19 @@ void add_why(CLI::App& app, int& exit_code) {
                  "Show everything about every connection; otherwise the answer fits a screen")
       ->excludes(follow);
   verb->add_flag("--json", options->json, "As JSON; with --follow one object a line");
+  verb->add_option("--host", options->host,
+                   "Ask that host, by arbiter-link; by default the one that has the port open")
+      ->type_name("NAME")
+      ->excludes(follow);
   add_instance_option(*verb, options->instance);
   verb->footer(
       "Example:\n"
       "  arbiter why /Gaze/pos:i\n"
       "  arbiter why /Gaze/pos:i /Face/pos:o\n"
-      "  arbiter why /Gaze/pos:i --follow\n\n"
-      "Exit codes: 0 answered, whoever wins; 1 no daemon, no such port or source, or you may not\n"
-      "observe; 2 wrong use, or the answer cannot be written");
+      "  arbiter why /Gaze/pos:i --follow\n"
+      "  arbiter why /Gaze/pos:i --host head\n\n"
+      "Exit codes: 0 answered, whoever wins; 1 no daemon, no such port or source, you may not\n"
+      "observe, or the other host does not answer; 2 wrong use, or the answer cannot be written");
   verb->callback([options, &exit_code] { exit_code = why(*options); });
 }
 

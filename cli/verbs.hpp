@@ -22,6 +22,7 @@ void add_pub(CLI::App& app, int& exit_code);
 void add_record(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
 void add_recording(CLI::App& app, int& exit_code);
+void add_hosts(CLI::App& app, int& exit_code);
 void add_status(CLI::App& app, int& exit_code);
 void add_deactivate(CLI::App& app, int& exit_code);
 void add_reload(CLI::App& app, int& exit_code);

@@ -14,6 +14,7 @@ struct WhyOptions {
   std::string port;
   std::string source;
   std::string instance;
+  std::string host;  // empty: the one that has the port open
   bool follow = false;
   bool all = false;
   bool json = false;

@@ -1,0 +1,42 @@
+#include "cli/other_hosts.hpp"
+
+#include <cstdio>
+#include <iostream>
+#include <stdexcept>
+
+#include "shm/utf8.hpp"
+#include "wire/link_call.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+constexpr std::chrono::milliseconds kPatience{1000};
+
+}  // namespace
+
+std::optional<wire::HostsDocument> hosts_if_linked(const std::string& instance) {
+  try {
+    return wire::read_hosts(wire::LinkCall(instance, kPatience).ask({"", "hosts"}));
+  } catch (const wire::NoLinkError&) {
+    return std::nullopt;
+  } catch (const std::runtime_error& error) {
+    std::cerr << "arbiter: nothing is known of other hosts: " << error.what() << '\n';
+    return std::nullopt;
+  }
+}
+
+void write_port_errors(std::ostream& out, const std::optional<wire::HostsDocument>& hosts) {
+  if (!hosts) return;
+  for (const wire::HostDisagreement& each : hosts->disagreements) {
+    if (each.is_error) out << "\nERROR: " << shm::printable(each.text) << '\n';
+  }
+}
+
+std::string round_trip_text(const std::optional<shm::Nanoseconds>& round_trip) {
+  if (!round_trip) return "-";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f ms", static_cast<double>(*round_trip) / 1e6);
+  return text;
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,152 @@
+#include "cli/switch_everywhere.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "shm/utf8.hpp"
+#include "wire/call.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+using SwitchOutcome = HostSwitch::Outcome;
+using wire::HostAnswer;
+using wire::HostOutcome;
+
+bool is_left_out(const wire::SwitchRequest& request, const std::string& host) {
+  return std::find(request.without.begin(), request.without.end(), host) != request.without.end();
+}
+
+// What a host has answered; throws std::runtime_error saying why it has not, or what is wrong.
+wire::SwitchAnswer answer_of(const HostAnswer& each) {
+  switch (each.outcome) {
+    case HostOutcome::kAnswered:
+      return wire::read_switch_answer(each.text);
+    case HostOutcome::kRefused:
+      throw std::runtime_error(each.text);
+    case HostOutcome::kSilent:
+      throw std::runtime_error("it does not answer");
+    case HostOutcome::kGone:
+      break;
+  }
+  throw std::runtime_error("it was there some minutes ago, and is not now");
+}
+
+HostSwitch prepared(const wire::SwitchRequest& request, const HostAnswer& each) {
+  HostSwitch host{.host = each.host, .incarnation = each.incarnation, .why = {}};
+  if (is_left_out(request, each.host)) {
+    host.outcome = SwitchOutcome::kLeftOut;
+    return host;
+  }
+  try {
+    host.has_prepared = !answer_of(each).is_left_out;
+    if (!host.has_prepared) host.why = "it says that it is left out";
+  } catch (const std::runtime_error& error) {
+    host.why = shm::printable(error.what());
+  }
+  return host;
+}
+
+void note_commit(HostSwitch& host, const HostAnswer& each) {
+  host.took = each.took;
+  try {
+    const wire::SwitchAnswer answer = answer_of(each);
+    host.generation = answer.generation;
+    host.why = shm::printable(answer.unknown);
+    host.outcome = answer.unknown.empty() ? SwitchOutcome::kSwitched : SwitchOutcome::kUnknown;
+  } catch (const std::runtime_error& error) {
+    // A refusal is the answer of one that has not done it. Whatever else is wrong tells nothing.
+    host.outcome = each.outcome == HostOutcome::kRefused ? SwitchOutcome::kNotSwitched
+                                                         : SwitchOutcome::kUnknown;
+    host.why = shm::printable(error.what());
+  }
+}
+
+void commit(const wire::SwitchRequest& request, const AskHosts& ask, SwitchEverywhere& result) {
+  result.is_committed = true;
+  for (HostSwitch& host : result.hosts) {
+    if (!host.has_prepared) continue;
+    host.outcome = SwitchOutcome::kUnknown;
+    host.why = "it is not there any longer";
+  }
+  std::vector<HostAnswer> answers;
+  try {
+    answers = ask(wire::kCommitVerb, wire::write_switch_request(request));
+  } catch (const wire::CallError& error) {
+    for (HostSwitch& host : result.hosts) {
+      if (host.has_prepared) host.why = error.what();
+    }
+    return;
+  }
+  for (const HostAnswer& each : answers) {
+    const auto host =
+        std::find_if(result.hosts.begin(), result.hosts.end(), [&](const HostSwitch& known) {
+          return known.host == each.host && known.incarnation == each.incarnation;
+        });
+    if (host == result.hosts.end()) {
+      const bool is_out = is_left_out(request, each.host);
+      result.hosts.push_back(
+          {.host = each.host,
+           .incarnation = each.incarnation,
+           .outcome = is_out ? SwitchOutcome::kLeftOut : SwitchOutcome::kNotSwitched,
+           .why = is_out ? "" : "it has come after the others had prepared"});
+    } else if (host->has_prepared) {
+      note_commit(*host, each);
+      result.interval = std::max(result.interval, each.took);
+    }
+  }
+}
+
+void put_in_order(std::vector<HostSwitch>& hosts) {
+  std::stable_sort(hosts.begin(), hosts.end(),
+                   [](const HostSwitch& a, const HostSwitch& b) { return a.host < b.host; });
+}
+
+}  // namespace
+
+std::size_t SwitchEverywhere::count(SwitchOutcome outcome) const {
+  return static_cast<std::size_t>(std::count_if(
+      hosts.begin(), hosts.end(), [&](const HostSwitch& each) { return each.outcome == outcome; }));
+}
+
+bool SwitchEverywhere::is_whole() const {
+  return is_committed && count(SwitchOutcome::kNotSwitched) == 0 &&
+         count(SwitchOutcome::kUnknown) == 0;
+}
+
+SwitchEverywhere switch_everywhere(const wire::SwitchRequest& request, const AskHosts& ask) {
+  SwitchEverywhere result;
+  const std::string text = wire::write_switch_request(request);
+  for (const HostAnswer& each : ask(wire::kPrepareVerb, text)) {
+    result.hosts.push_back(prepared(request, each));
+  }
+  const bool has_any = std::any_of(result.hosts.begin(), result.hosts.end(),
+                                   [](const HostSwitch& each) { return each.has_prepared; });
+  const bool have_all =
+      std::all_of(result.hosts.begin(), result.hosts.end(), [](const HostSwitch& each) {
+        return each.has_prepared || each.outcome == SwitchOutcome::kLeftOut;
+      });
+  if (has_any && have_all) {
+    commit(request, ask, result);
+  } else if (has_any) {
+    for (HostSwitch& host : result.hosts) {
+      if (host.has_prepared) host.why = "it was prepared, and keeps its model";
+    }
+    // Otherwise they would be held for two seconds.
+    try {
+      static_cast<void>(ask(wire::kReleaseVerb, text));
+    } catch (const wire::CallError&) {
+    }
+  }
+  put_in_order(result.hosts);
+  return result;
+}
+
+int exit_code_of(const SwitchEverywhere& result) {
+  if (result.is_whole()) return 0;
+  const bool is_any =
+      result.count(SwitchOutcome::kSwitched) + result.count(SwitchOutcome::kUnknown) != 0;
+  return result.is_committed && is_any ? 3 : 1;
+}
+
+}  // namespace arbiter::cli

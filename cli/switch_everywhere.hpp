@@ -1,0 +1,60 @@
+// A switch of all hosts at once, as far as that goes: each is asked to prepare; if all have, each
+// is asked to commit. Nothing is switched unless all have prepared. From the first commit on there
+// is no way back, and what has become of each host is told.
+//
+// Thread safety: none.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "shm/activity.hpp"
+#include "wire/link_call.hpp"
+#include "wire/switch_request.hpp"
+
+namespace arbiter::cli {
+
+struct HostSwitch {
+  enum class Outcome : std::uint8_t {
+    kSwitched,
+    kNotSwitched,  // it keeps the model that it has
+    kUnknown,      // it was asked to commit, and has not said what has come of it
+    kLeftOut,
+  };
+  std::string host;
+  std::string incarnation;  // of its link
+  Outcome outcome = Outcome::kNotSwitched;
+  bool has_prepared = false;
+  shm::Nanoseconds took = 0;     // from the commit until its answer; 0: there was none
+  std::uint64_t generation = 0;  // of the model in force there; 0: not known
+  std::string why;               // of kNotSwitched and kUnknown; for people
+};
+
+struct SwitchEverywhere {
+  bool is_committed = false;      // else none has switched
+  std::vector<HostSwitch> hosts;  // in the order of their names
+  shm::Nanoseconds interval = 0;  // from the first commit to the last answer, as seen here
+
+  [[nodiscard]] std::size_t count(HostSwitch::Outcome outcome) const;
+  // All that were not left out have switched.
+  [[nodiscard]] bool is_whole() const;
+};
+
+// The question of that verb to all hosts: wire::LinkCall::ask_hosts(). May throw wire::CallError.
+using AskHosts =
+    std::function<std::vector<wire::HostAnswer>(const std::string& verb, const std::string& text)>;
+
+// Throws wire::CallError if hosts cannot be asked to prepare; then none has switched.
+[[nodiscard]] SwitchEverywhere switch_everywhere(const wire::SwitchRequest& request,
+                                                 const AskHosts& ask);
+
+// 0: all hosts have switched; 1: none has; 3: some have not, or that is not known.
+[[nodiscard]] int exit_code_of(const SwitchEverywhere& result);
+// cli/switch_report.cpp
+void write_text(const SwitchEverywhere& result, const std::string& model);
+void write_json(const SwitchEverywhere& result, const std::string& model);
+
+}  // namespace arbiter::cli

@@ -1,0 +1,78 @@
+// What has come of a switch of all hosts, for people and for programs.
+#include <algorithm>
+#include <iostream>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/numbers.hpp"
+#include "cli/switch_everywhere.hpp"
+#include "watch/span.hpp"
+#include "wire/document.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+using SwitchOutcome = HostSwitch::Outcome;
+
+const char* name_of(SwitchOutcome outcome) {
+  switch (outcome) {
+    case SwitchOutcome::kSwitched:
+      return "switched";
+    case SwitchOutcome::kNotSwitched:
+      return "not switched";
+    case SwitchOutcome::kUnknown:
+      return "unknown";
+    case SwitchOutcome::kLeftOut:
+      break;
+  }
+  return "left out";
+}
+
+}  // namespace
+
+void write_text(const SwitchEverywhere& result, const std::string& model) {
+  std::size_t width = 0;
+  for (const HostSwitch& each : result.hosts) width = std::max(width, each.host.size());
+  for (const HostSwitch& each : result.hosts) {
+    std::cout << each.host << std::string(width - each.host.size() + 2, ' ')
+              << name_of(each.outcome);
+    if (each.outcome == SwitchOutcome::kSwitched) {
+      std::cout << " after " << watch::span_text(each.took) << ": model " << each.generation;
+    }
+    if (!each.why.empty()) std::cout << ": " << each.why;
+    std::cout << '\n';
+  }
+  std::cout << std::flush;
+  const std::size_t switched = result.count(SwitchOutcome::kSwitched);
+  if (!result.is_committed) {
+    const std::string why = result.hosts.empty() ? "there is none" : "all must prepare first";
+    std::cerr << "arbiter: no host has switched to \"" + model + "\": " + why + "\n";
+    return;
+  }
+  std::cout << counted(switched, "host") << " switched to \"" << model << "\" one by one, within "
+            << watch::span_text(result.interval) << " of the first commit\n";
+  if (result.is_whole()) return;
+  std::cerr << "arbiter: " << counted(result.count(SwitchOutcome::kNotSwitched), "host")
+            << " not switched, " << result.count(SwitchOutcome::kUnknown)
+            << " unknown; arbiter hosts shows which model is in force on each\n";
+}
+
+void write_json(const SwitchEverywhere& result, const std::string& model) {
+  auto hosts = nlohmann::json::array();
+  for (const HostSwitch& each : result.hosts) {
+    hosts.push_back({{"host", each.host},
+                     {"incarnation", each.incarnation},
+                     {"outcome", name_of(each.outcome)},
+                     {"prepared", each.has_prepared},
+                     {"took", each.took},
+                     {"generation", each.generation},
+                     {"why", each.why}});
+  }
+  std::cout << wire::write_document({{"model", model},
+                                     {"committed", result.is_committed},
+                                     {"ok", result.is_whole()},
+                                     {"interval", result.interval},
+                                     {"hosts", std::move(hosts)}});
+}
+
+}  // namespace arbiter::cli

@@ -1,0 +1,226 @@
+#include "cli/why_elsewhere.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/other_hosts.hpp"
+#include "cli/why_report.hpp"
+#include "rules/explain/explain.hpp"
+#include "rules/model/load.hpp"
+#include "rules/text/names.hpp"
+#include "shm/utf8.hpp"
+#include "watch/model_in_force.hpp"
+#include "watch/port.hpp"
+#include "wire/document.hpp"
+#include "wire/link_call.hpp"
+#include "wire/model_document.hpp"
+#include "wire/status.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+using nlohmann::json;
+
+// Both of one model: another may come into force between the two questions.
+constexpr int kTries = 3;
+
+std::string text_from(wire::LinkCall& link, const std::string& host, const char* verb) {
+  const wire::HostAnswer answer = link.ask_hosts({host, verb, {}}).at(0);
+  const std::string why_not = answer.why_not();
+  if (!why_not.empty()) {
+    throw wire::CallError("host " + host + ' ' + shm::printable(why_not));
+  }
+  return answer.text;
+}
+
+struct Elsewhere {
+  wire::HostsDocument hosts;
+  wire::Status status;
+  watch::ModelInForce model;
+};
+
+Elsewhere ask(const std::string& instance, const std::string& host) {
+  wire::LinkCall link(instance);
+  Elsewhere there;
+  there.hosts = wire::read_hosts(link.ask({"", "hosts", {}}));
+  for (int tries = 0; tries < kTries; ++tries) {
+    there.status = wire::read_status(text_from(link, host, "status"));
+    there.model = watch::ModelInForce(wire::read_model_document(text_from(link, host, "model")));
+    if (there.status.model.generation == there.model.generation()) return there;
+  }
+  throw watch::WatchError("the model of host " + host + " changes again and again; ask again");
+}
+
+// Of each connection of the port what keeps it out; nothing where the daemon has no texts.
+rules::PortExplanation explain(const Elsewhere& there, const std::string& port) {
+  rules::PortExplanation explanation;
+  if (!there.model.has_texts()) return explanation;
+  rules::Diagnostics diagnostics;
+  const rules::RuleSet rules =
+      rules::load(there.model.texts(), diagnostics, rules::Keep::kProvenance);
+  if (diagnostics.has_errors()) {
+    throw watch::WatchError("this program cannot read that host's model; are both of one version?");
+  }
+  return rules::Explainer(rules).explain(port, [&](const std::string& source) {
+    const wire::SourceStatus* const found = there.status.find_source(source);
+    return found != nullptr && found->active;
+  });
+}
+
+std::string component_text(const wire::Status& status, const std::string& source) {
+  const wire::SourceStatus* const found = status.find_source(source);
+  if (found == nullptr || !found->open) return "not open there";
+  std::string text = found->open->component.node;
+  if (found->open->described) text += ", comes from " + *found->open->described;
+  return shm::printable(text);
+}
+
+// The causes in one line each; because of which sources.
+std::vector<std::string> causes_of(const rules::PortExplanation& explanation,
+                                   const std::string& source) {
+  std::vector<std::string> causes;
+  for (const rules::ConnectionExplanation& each : explanation.connections) {
+    if (each.source != source || each.wins) continue;
+    if (!each.has_rule) causes.emplace_back("no rule lets it win");
+    if (each.earlier) causes.push_back("an earlier rule holds: that of " + *each.earlier);
+    for (const rules::Part& part : each.parts) {
+      for (const rules::Cause& cause : part.causes) causes.push_back(headline(cause));
+    }
+  }
+  return causes;
+}
+
+const wire::InputStatus& require_input(const Elsewhere& there, const std::string& port,
+                                       const std::string& host) {
+  if (const wire::InputStatus* const input = there.status.find_input(port)) return *input;
+  std::vector<std::string_view> known;
+  for (const wire::InputStatus& each : there.status.inputs) known.push_back(each.name);
+  throw watch::WatchError("host " + host + " has no input port " + port +
+                          rules::advise(port, known, "`arbiter status --all` lists them"));
+}
+
+// The answer may be about one source alone.
+wire::InputStatus only(wire::InputStatus input, const std::string& source) {
+  if (source.empty()) return input;
+  const auto is_other = [&](const auto& each) { return each.source != source; };
+  std::erase_if(input.connections, is_other);
+  std::erase_if(input.senses, is_other);
+  if (input.connections.empty() && input.senses.empty()) {
+    throw watch::WatchError("there is no connection from " + source + " to " + input.name +
+                            " there, and its rules do not read it");
+  }
+  return input;
+}
+
+void write_text(std::ostream& out, const Elsewhere& there, const wire::InputStatus& input,
+                const std::string& host) {
+  const rules::PortExplanation explanation = explain(there, input.name);
+  const wire::HostStatus* const found = there.hosts.find_host(host);
+  out << input.name << " is decided on host " << host << ", round trip "
+      << round_trip_text(found == nullptr ? std::nullopt : found->round_trip) << ", by "
+      << shm::printable(there.model.text()) << '\n';
+  if (!input.arbitrated) {
+    out << "  not arbitrated: everything is delivered\n";
+  } else if (input.cannot_deliver) {
+    out << "  " << input.cannot_deliver->source
+        << " is selected, but cannot deliver: " << shm::printable(input.cannot_deliver->why)
+        << '\n';
+  } else {
+    out << "  " << (input.winner ? *input.winner + " wins" : "idle: no connection wins") << '\n';
+  }
+  for (const wire::ConnectionStatus& each : input.connections) {
+    out << '\n'
+        << each.source << "  " << (each.active ? "active" : "inactive")
+        << (each.winner ? ", wins" : "") << "  [" << component_text(there.status, each.source)
+        << "]\n";
+    for (const std::string& cause : causes_of(explanation, each.source)) {
+      out << "  " << shm::printable(cause) << '\n';
+    }
+  }
+  for (const wire::SensedStatus& each : input.senses) {
+    out << '\n'
+        << each.source << "  " << (each.active ? "active" : "inactive") << ", sensed  ["
+        << component_text(there.status, each.source) << "]\n";
+  }
+}
+
+json json_of(const Elsewhere& there, const wire::InputStatus& input, const std::string& host) {
+  const rules::PortExplanation explanation = explain(there, input.name);
+  const wire::HostStatus* const found = there.hosts.find_host(host);
+  json document = {{"port", input.name},
+                   {"host", host},
+                   {"round_trip_ns", nullptr},
+                   {"generation", there.model.generation()},
+                   {"arbitrated", input.arbitrated},
+                   {"winner", nullptr},
+                   {"connections", json::array()},
+                   {"senses", json::array()}};
+  if (found != nullptr && found->round_trip) document["round_trip_ns"] = *found->round_trip;
+  if (input.winner) document["winner"] = *input.winner;
+  for (const wire::ConnectionStatus& each : input.connections) {
+    document["connections"].push_back({{"source", each.source},
+                                       {"active", each.active},
+                                       {"wins", each.winner},
+                                       {"component", component_text(there.status, each.source)},
+                                       {"causes", causes_of(explanation, each.source)}});
+  }
+  for (const wire::SensedStatus& each : input.senses) {
+    document["senses"].push_back({{"source", each.source}, {"active", each.active}});
+  }
+  return document;
+}
+
+}  // namespace
+
+std::optional<std::string> host_that_decides(const std::string& port,
+                                             const wire::HostsDocument& hosts) {
+  std::vector<std::string> found;
+  for (const wire::HostStatus& host : hosts.hosts) {
+    const bool has_it =
+        std::find(host.inputs.begin(), host.inputs.end(), port) != host.inputs.end();
+    if (!has_it || !host.is_up) continue;
+    if (host.is_this) return std::nullopt;
+    found.push_back(host.host);
+  }
+  if (found.size() > 1) {
+    throw watch::WatchError(port + " is open on the hosts " + rules::enumerate(found) +
+                            ", and each decides it for itself: name one with --host");
+  }
+  return found.empty() ? std::nullopt : std::optional(found.front());
+}
+
+void write_why_elsewhere(std::ostream& out, const WhyOptions& options, const std::string& host) {
+  const Elsewhere there = ask(options.instance, host);
+  const wire::InputStatus input = only(require_input(there, options.port, host), options.source);
+  if (options.json) {
+    out << wire::write_document(json_of(there, input, host));
+  } else {
+    write_text(out, there, input, host);
+  }
+}
+
+void write_imports_of(std::ostream& out, const std::string& port, const wire::HostsDocument& hosts,
+                      const wire::Status& status) {
+  const wire::InputStatus* const input = status.find_input(port);
+  if (input == nullptr) return;
+  std::vector<std::string> sources;
+  for (const auto& each : input->connections) sources.push_back(each.source);
+  for (const auto& each : input->senses) sources.push_back(each.source);
+  bool is_first = true;
+  for (const std::string& source : sources) {
+    const wire::ImportStatus* const import = hosts.find_import(source);
+    if (import == nullptr || !import->is_open) continue;
+    const wire::HostStatus* const host = hosts.find_host(import->host);
+    out << (is_first ? "\nFrom other hosts:\n" : "") << "  " << source << "  from host "
+        << shm::printable(import->host) << ", round trip "
+        << round_trip_text(host == nullptr ? std::nullopt : host->round_trip);
+    if (import->lost != 0) out << ", " << import->lost << " lost";
+    if (import->late != 0) out << ", " << import->late << " late";
+    out << '\n';
+    is_first = false;
+  }
+}
+
+}  // namespace arbiter::cli

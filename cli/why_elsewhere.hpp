@@ -1,0 +1,30 @@
+// arbiter why about a port that another host decides: from that host's status and model, which the
+// links bring here, explained here.
+//
+// Its clock is another, so the answer says what is active there, and not since when.
+#pragma once
+
+#include <optional>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "cli/why_follow.hpp"
+#include "wire/hosts.hpp"
+
+namespace arbiter::cli {
+
+// The host that has the port open, if it is not this one: nothing where this one has, or none has.
+// Throws watch::WatchError where several have.
+[[nodiscard]] std::optional<std::string> host_that_decides(const std::string& port,
+                                                           const wire::HostsDocument& hosts);
+
+// Throws wire::CallError where that host cannot be asked, watch::WatchError where it has no such
+// port.
+void write_why_elsewhere(std::ostream& out, const WhyOptions& options, const std::string& host);
+
+// Of the answer about a port of this host: which of its sources come from other hosts.
+void write_imports_of(std::ostream& out, const std::string& port, const wire::HostsDocument& hosts,
+                      const wire::Status& status);
+
+}  // namespace arbiter::cli
