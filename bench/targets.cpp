@@ -55,6 +55,15 @@ const std::vector<Ratio> kRatios{
     {"publish() to 64 ports, p50, to iceoryx", "publish", kMany, kWinner, kIceoryx, kP50, 0.05},
     {"a publish() beside arbiter top, p99, to alone", "watched", "16 ports", kWatched, kUnwatched,
      kP99, 1.1},
+    {"between hosts, 64 B, p99, to Cyclone DDS", "hosts-delivery", kSmallBetweenHosts,
+     kThroughLinks, kCyclone, kP99, 2},
+    // Rates: the larger the better, so it is Cyclone's that is `ours`.
+    {"between hosts, 64 B, Cyclone DDS's rate to a link's", "hosts-delivery", kSmallThroughput,
+     kCyclone, kThroughLinks, kP50, 1 / 0.6},
+    {"between hosts, 1 MiB, Cyclone DDS's rate to a link's", "hosts-delivery", kLargeThroughput,
+     kCyclone, kThroughLinks, kP50, 1 / 0.95},
+    {"a losing 1 MiB camera, bytes on the wire, to a winning one", "hosts-losers", kOnTheWire,
+     kLosesThere, kWinsThere, kP50, 0.01},
 };
 
 // What a sample through a gateway may cost, of what it costs through a relay of the same
@@ -128,6 +137,23 @@ const std::vector<Excess> kExcesses{
     {"10 000 behaviours compiled and proved", "compile", "10000 behaviours", "arbiter", {}, 1e9},
 };
 
+// Two threads more are woken on the way, which is no link's doing.
+std::optional<Verdict> between_hosts(const Report& report) {
+  if (report.find("hosts-delivery") == nullptr) return std::nullopt;
+  const auto of = [&](const char* system) {
+    return figure(report, "hosts-delivery", kSmallBetweenHosts, system, kP50);
+  };
+  Verdict verdict{
+      "between hosts, 64 B, p50 without two wake-ups, to Cyclone DDS", 1.3, {}, "x", {}};
+  const auto ours = of(kThroughLinks);
+  const auto theirs = of(kCyclone);
+  const auto wake_up = of(kWakeUp);
+  if (ours && theirs && wake_up && *theirs > 0) {
+    verdict.measured = (*ours - 2 * *wake_up) / *theirs;
+  }
+  return verdict;
+}
+
 }  // namespace
 
 std::vector<Verdict> judge(const Report& report) {
@@ -156,6 +182,7 @@ std::vector<Verdict> judge(const Report& report) {
     if (ours && theirs) verdict.measured = *ours - *theirs;
     verdicts.push_back(std::move(verdict));
   }
+  if (auto verdict = between_hosts(report)) verdicts.push_back(std::move(*verdict));
   return verdicts;
 }
 

@@ -40,6 +40,8 @@ class Conversation {
   Histogram hear_histogram() { return Histogram::of(hear_words()); }
   // False: the other has ended the conversation.
   bool hear_or_end(std::uint64_t& word);
+  // Readable when there is something to hear, or the other has ended it.
+  [[nodiscard]] int descriptor() const { return socket_.get(); }
 
  private:
   void send(std::uint64_t kind, const void* data, std::size_t size);

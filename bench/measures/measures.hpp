@@ -29,6 +29,14 @@ inline const char* const kOneWay = ", one way";
 inline const char* const kProcessorTime = ", processor time of a sample";
 inline const char* const kShareOfProcessor = ", share of a processor";
 inline const char* const kTwoInputs = "two inputs at 100 Hz";
+inline const char* const kThroughLinks = "through two links";
+inline const char* const kWakeUp = "a wake-up";
+inline const char* const kSmallBetweenHosts = "64 B, one way";
+inline const char* const kSmallThroughput = "64 B, throughput";
+inline const char* const kLargeThroughput = "1 MiB, throughput";
+inline const char* const kOnTheWire = "1 MiB at 30 Hz, on the wire";
+inline const char* const kWinsThere = "wins at the other host";
+inline const char* const kLosesThere = "loses at the other host";
 inline const char* const kUnwatched = "alone";
 inline const char* const kWatched = "beside arbiter top";
 
@@ -40,6 +48,9 @@ Measure measure_gateway_dds(const Effort& effort);
 Measure measure_gateway_iceoryx(const Effort& effort);
 Measure measure_gateway_mux(const Effort& effort);
 Measure measure_hit(const Effort& effort);
+Measure measure_hosts_delivery(const Effort& effort);
+Measure measure_hosts_losers(const Effort& effort);
+Measure measure_hosts_scale(const Effort& effort);
 Measure measure_load(const Effort& effort);
 Measure measure_publish(const Effort& effort);
 Measure measure_scale(const Effort& effort);
@@ -67,6 +78,9 @@ inline std::vector<MeasureEntry> all_measures() {
       {"gateway-iceoryx", measure_gateway_iceoryx},
       {"gateway-dds", measure_gateway_dds},
       {"gateway-mux", measure_gateway_mux},
+      {"hosts-delivery", measure_hosts_delivery},
+      {"hosts-losers", measure_hosts_losers},
+      {"hosts-scale", measure_hosts_scale},
   };
 }
 

@@ -1,4 +1,4 @@
-// Cyclone DDS, over UDP on the loopback interface.
+// Cyclone DDS, over UDP on the loopback interface, or between network namespaces.
 #pragma once
 
 #include <dds/dds.h>
@@ -13,6 +13,9 @@ namespace arbiter::bench {
 inline constexpr dds_domainid_t kDdsDomain = 217;
 // Cyclone's settings there.
 const char* dds_configuration();
+// In a worker, before it makes anything: not on the loopback interface but on that one, with
+// Cyclone's own settings.
+void set_dds_interface(const char* name);
 
 struct DeleteDdsQos {
   void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }

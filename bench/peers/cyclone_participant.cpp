@@ -23,6 +23,8 @@ constexpr const char* kConfiguration = R"(
 </Discovery>
 <Tracing><Verbosity>none</Verbosity></Tracing>)";
 
+std::string on_interface;  // in place of those; empty: they hold
+
 // Of both ends.
 DdsQos qos(const DdsOptions& options) {
   DdsQos result(dds_create_qos());
@@ -37,7 +39,14 @@ DdsQos qos(const DdsOptions& options) {
 
 }  // namespace
 
-const char* dds_configuration() { return kConfiguration; }
+const char* dds_configuration() {
+  return on_interface.empty() ? kConfiguration : on_interface.c_str();
+}
+
+void set_dds_interface(const char* name) {
+  on_interface = std::string("<General><Interfaces><NetworkInterface name=\"") + name +
+                 "\"/></Interfaces></General><Tracing><Verbosity>none</Verbosity></Tracing>";
+}
 
 DdsEntity::DdsEntity(dds_entity_t entity, const char* what) : entity_(entity) {
   if (entity < 0) throw BenchError(std::string(what) + ": " + dds_strretcode(-entity));
@@ -52,7 +61,7 @@ DdsEntity::~DdsEntity() {
 }
 
 DdsParticipant::DdsParticipant()
-    : domain_(dds_create_domain(kDdsDomain, kConfiguration), "dds_create_domain"),
+    : domain_(dds_create_domain(kDdsDomain, dds_configuration()), "dds_create_domain"),
       participant_(dds_create_participant(kDdsDomain, nullptr, nullptr), "dds_create_participant") {
 }
 

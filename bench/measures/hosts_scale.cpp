@@ -1,0 +1,175 @@
+// How the cost of links grows with sources and with hosts.
+#include <poll.h>
+
+#include <cstdio>
+#include <deque>
+#include <fstream>
+#include <memory>
+
+#include "bench/harness/hosts.hpp"
+#include "bench/measures/measures.hpp"
+
+namespace arbiter::bench {
+namespace {
+
+std::string source_of(int host, int number) {
+  return "/Host" + std::to_string(host) + "/" + std::to_string(number) + ":o";
+}
+
+std::vector<std::string> sources_of(int host, int count) {
+  std::vector<std::string> names;
+  for (int i = 0; i < count; ++i) names.push_back(source_of(host, i));
+  return names;
+}
+
+// A model that takes so many sources of that host, where components may have `own` open.
+std::string model_for(int host, int sources, const std::vector<std::string>& own) {
+  std::string behaviours = declared(own);
+  for (int i = 0; i < sources; ++i) {
+    behaviours += behaviour(source_of(host, i), "/In" + std::to_string(i) + ":i", 0);
+  }
+  return model(behaviours);
+}
+
+// A component that has that many output ports of host `host` open.
+Worker publisher(const LinkedHost& on, int host, int sources) {
+  Worker worker("publisher", [&on, host, sources](Conversation& with) {
+    Node node = on.robot().node("publisher");
+    std::vector<OutputPort<std::uint64_t>> ports;
+    for (int i = 0; i < sources; ++i) {
+      ports.push_back(node.output_port<std::uint64_t>(source_of(host, i)));
+    }
+    with.say(1);
+    std::uint64_t word = 0;
+    while (with.hear_or_end(word)) {
+    }
+  });
+  static_cast<void>(worker.hear());
+  return worker;
+}
+
+double resident_mib(pid_t pid) {
+  std::ifstream stream("/proc/" + std::to_string(pid) + "/status");
+  double kib = 0;
+  for (std::string line; std::getline(stream, line);) {
+    std::sscanf(line.c_str(), "VmRSS: %lf kB", &kib);
+  }
+  return kib / 1024;
+}
+
+// Of a processor, in percent, while nobody publishes.
+double share_of_processor(const std::vector<const LinkedHost*>& hosts, double seconds) {
+  const auto used = [&] {
+    std::int64_t sum = 0;
+    for (const LinkedHost* const each : hosts) sum += processor_time_ns(each->link());
+    return sum;
+  };
+  const std::int64_t before = used();
+  const std::int64_t began = now_ns();
+  ::poll(nullptr, 0, static_cast<int>(seconds * 1000));
+  return 100.0 * static_cast<double>(used() - before) / static_cast<double>(now_ns() - began) /
+         static_cast<double>(hosts.size());
+}
+
+Case one_value(const std::string& name, const char* unit, const char* system, double value) {
+  Case one{name};
+  one.unit = unit;
+  one.results.push_back({system, Role::kOurs, {}, value, {}});
+  return one;
+}
+
+void measure_sources(Measure& measure, bool quick) {
+  const int sources = quick ? 200 : 1000;
+  const int imports = sources / 10;
+  const double seconds = quick ? 1 : 5;
+  NetworkSwitch network;
+  LinkedHost head("head", model(declared(sources_of(0, sources))), network);
+  LinkedHost base("base", model_for(0, imports, {}), network);
+  head.start_link();
+  ::poll(nullptr, 0, 1000);
+  const double memory_before = resident_mib(head.link());
+  const Worker component = publisher(head, 0, sources);
+  ::poll(nullptr, 0, 1500);  // all are offered
+  base.start_link();
+  const std::int64_t began = now_ns();
+  base.await_imported(imports);
+  const double found = static_cast<double>(now_ns() - began) / 1e6;
+  const std::string of =
+      std::to_string(sources) + " sources, " + std::to_string(imports) + " imported: ";
+  ::poll(nullptr, 0, 1000);
+  measure.cases.push_back(one_value(of + "until all are", "ms", "importing link", found));
+  Case memory{of + "memory"};
+  memory.unit = "MiB";
+  memory.results = {
+      {"exporting link", Role::kOurs, {}, resident_mib(head.link()), {}},
+      {"of which its sources", Role::kOurs, {}, resident_mib(head.link()) - memory_before, {}},
+      {"importing link", Role::kOurs, {}, resident_mib(base.link()), {}}};
+  measure.cases.push_back(std::move(memory));
+  Case rest{of + "share of a processor at rest"};
+  rest.unit = "%";
+  rest.results = {{"exporting link", Role::kOurs, {}, share_of_processor({&head}, seconds), {}},
+                  {"importing link", Role::kOurs, {}, share_of_processor({&base}, seconds), {}}};
+  measure.cases.push_back(std::move(rest));
+  const std::uint64_t before = head.space().bytes();
+  ::poll(nullptr, 0, static_cast<int>(seconds * 1000));
+  measure.cases.push_back(one_value(of + "on the wire at rest", "bytes/s", "exporting link",
+                                    static_cast<double>(head.space().bytes() - before) / seconds));
+}
+
+// Each host has ten sources, and takes all of the next one's.
+void measure_hosts(Measure& measure, int count, double seconds) {
+  constexpr int kSources = 10;
+  NetworkSwitch network;
+  std::deque<LinkedHost> hosts;
+  std::vector<Worker> components;
+  std::vector<const LinkedHost*> all;
+  for (int i = 0; i < count; ++i) {
+    hosts.emplace_back("host" + std::to_string(i),
+                       model_for((i + 1) % count, kSources, sources_of(i, kSources)), network);
+    all.push_back(&hosts.back());
+  }
+  for (int i = 0; i < count; ++i) {
+    components.push_back(publisher(hosts[static_cast<std::size_t>(i)], i, kSources));
+  }
+  const std::int64_t began = now_ns();
+  for (LinkedHost& each : hosts) each.start_link();
+  for (const LinkedHost& each : hosts) each.await_imported(kSources);
+  const std::string of = std::to_string(count) + " hosts: ";
+  const auto add = [&](const char* what, const char* unit, double value) {
+    Case one = one_value(of + what, unit, "each link", value);
+    one.x = count;
+    measure.cases.push_back(std::move(one));
+  };
+  add("until all have imported", "ms", static_cast<double>(now_ns() - began) / 1e6);
+  ::poll(nullptr, 0, 2000);
+  add("memory", "MiB", resident_mib(hosts.front().link()));
+  add("share of a processor at rest", "%", share_of_processor(all, seconds));
+  const std::uint64_t before = hosts.front().space().bytes();
+  ::poll(nullptr, 0, static_cast<int>(seconds * 1000));
+  add("on the wire at rest", "bytes/s",
+      static_cast<double>(hosts.front().space().bytes() - before) / seconds);
+}
+
+}  // namespace
+
+Measure measure_hosts_scale(const Effort& effort) {
+  Measure measure{"hosts-scale", "Links, by sources and by hosts",
+                  "A host with 1000 output ports, of which another imports 100; and so many hosts "
+                  "on this machine, each in a network namespace of its own, with ten sources that "
+                  "the next host imports. Until all are imported, counted from the start of the "
+                  "links; then the links' memory, processor time and traffic while nobody "
+                  "publishes. All hosts share this machine's processors."};
+  measure.x_label = "hosts";
+  try {
+    measure_sources(measure, effort.quick);
+    for (const int hosts : effort.quick ? std::vector<int>{2, 5} : std::vector<int>{2, 10, 50}) {
+      measure_hosts(measure, hosts, effort.quick ? 1 : 5);
+    }
+  } catch (const std::exception& error) {
+    measure.cases.push_back(
+        {"links, by hosts", {}, {absent("each link", Role::kOurs, error.what())}});
+  }
+  return measure;
+}
+
+}  // namespace arbiter::bench
