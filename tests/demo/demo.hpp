@@ -56,7 +56,6 @@ class Demo {
     return processes();
   }
 
- private:
   [[nodiscard]] std::vector<std::pair<pid_t, std::string>> own() const {
     std::vector<std::pair<pid_t, std::string>> found;
     std::error_code gone;
@@ -70,6 +69,7 @@ class Demo {
     return found;
   }
 
+ private:
   TemporaryDirectory directory_;
 };
 

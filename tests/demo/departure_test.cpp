@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "tests/demo/demo.hpp"
 #include "tests/demo/terminal_session.hpp"
@@ -11,12 +13,15 @@
 namespace arbiter::test {
 namespace {
 
-using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::SizeIs;
 
-// Runs until both ports have a winner; then all processes are there.
+const std::vector<std::string> kProcesses{"arbiterd",      "arm-control",  "collision-detector",
+                                          "face-detector", "gaze-control", "object-detector",
+                                          "random-look",   "rest-arm",     "search-and-track-demo"};
+
+// Runs until all processes are there. Both ports may have a winner before the last one is what it
+// is to be.
 class RunningDemo {
  public:
   RunningDemo() : session_(demo_.command({"--lines"}), 24, 80) {
@@ -24,6 +29,7 @@ class RunningDemo {
       return session_.written().find("/RandomLook/pos:o") != std::string::npos &&
              session_.written().find("/RestArm/pos:o") != std::string::npos;
     });
+    while (demo_.processes() != kProcesses) std::this_thread::yield();
   }
   [[nodiscard]] const Demo& demo() const { return demo_; }
   TerminalSession& session() { return session_; }
@@ -35,10 +41,6 @@ class RunningDemo {
 
 TEST(Departure, LeavesNothingBehindWhenTerminated) {
   RunningDemo running;
-  EXPECT_THAT(
-      running.demo().processes(),
-      ElementsAre("arbiterd", "arm-control", "collision-detector", "face-detector", "gaze-control",
-                  "object-detector", "random-look", "rest-arm", "search-and-track-demo"));
   running.session().send(SIGTERM);
   EXPECT_EQ(running.session().watch_to_the_end(), 128 + SIGTERM);
   EXPECT_THAT(running.demo().processes(), IsEmpty());
@@ -47,7 +49,6 @@ TEST(Departure, LeavesNothingBehindWhenTerminated) {
 
 TEST(Departure, LeavesNoProcessBehindWhenKilled) {
   RunningDemo running;
-  EXPECT_THAT(running.demo().processes(), SizeIs(9));
   running.session().send(SIGKILL);
   EXPECT_EQ(running.session().watch_to_the_end(), 128 + SIGKILL);
   EXPECT_THAT(running.demo().processes_after_a_while(), IsEmpty());

@@ -1,0 +1,101 @@
+// Search and Track on two hosts. What the page says of it is what the demo itself judges.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <fstream>
+#include <map>
+#include <set>
+#include <string>
+
+#include "tests/demo/demo.hpp"
+#include "tests/demo/terminal_session.hpp"
+#include "tests/gateway/dds/own_domain.hpp"
+#include "tests/support/run_program.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+std::vector<std::string> of_hosts(const Demo& demo, const std::vector<std::string>& arguments) {
+  std::vector<std::string> command = demo.command(arguments);
+  for (std::string& word : command) {
+    if (word == ARBITER_PROGRAMS "/search-and-track-demo") word = ARBITER_PROGRAMS "/hosts-demo";
+  }
+  return command;
+}
+
+void expect_as_the_page_says(const Demo& demo, const ProgramResult& result) {
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_THAT(result.out, HasSubstr("While the cable was out"));
+  EXPECT_THAT(result.out, Not(HasSubstr("\x1b")));
+  EXPECT_THAT(demo.processes(), IsEmpty());
+  EXPECT_THAT(demo.files_left(), IsEmpty());
+}
+
+TEST(TwoHosts, TheArmRestsWhileTheCableIsOut) {
+  const Demo demo;
+  const ProgramResult result = run_program(of_hosts(demo, {"--seconds", "20"}));
+  if (result.err.find("no networks of their own") != std::string::npos) GTEST_SKIP() << result.err;
+  EXPECT_THAT(result.err, IsEmpty());
+  expect_as_the_page_says(demo, result);
+}
+
+TEST(TwoHosts, WithoutNetworksOfTheirOwnALinkIsStopped) {
+  const Demo demo;
+  const OwnDomain domain;
+  const ProgramResult result = run_program(of_hosts(
+      demo, {"--loopback", "--seconds", "20", "--domain", std::to_string(domain.number())}));
+  EXPECT_THAT(result.err, HasSubstr("both use the loopback interface"));
+  expect_as_the_page_says(demo, result);
+}
+
+// Whatever is killed comes back, and the scene goes on.
+TEST(TwoHosts, AnyProcessMayBeKilled) {
+  const Demo demo;
+  const OwnDomain domain;
+  TerminalSession session(of_hosts(demo, {"--lines", "--loopback", "--seconds", "30", "--domain",
+                                          std::to_string(domain.number())}),
+                          24, 100);
+  session.watch_until([&] {
+    const auto again = session.written().find("It is started again");
+    return again != std::string::npos &&
+           session.written().find("/Arm/pos:i  /Object/pos:o", again) != std::string::npos;
+  });
+  for (const auto& [pid, program] : demo.own()) {
+    if (program != "hosts-demo") ::kill(pid, SIGKILL);
+  }
+  EXPECT_EQ(session.watch_to_the_end(), 0) << session.written();
+  for (const char* const program :
+       {"head: arbiterd", "head: arbiter-link", "head: object-detector", "body: arbiterd",
+        "body: arbiter-link", "body: rest-arm", "body: arm-control"}) {
+    EXPECT_THAT(session.written(), HasSubstr(std::string(program) + " is dead"));
+    EXPECT_THAT(session.written(), HasSubstr(std::string(program) + " is there again"));
+  }
+  EXPECT_THAT(demo.processes(), IsEmpty());
+  EXPECT_THAT(demo.files_left(), IsEmpty());
+}
+
+TEST(TwoHosts, ThePictureShowsWhoIsWhere) {
+  const Demo demo;
+  const OwnDomain domain;
+  TerminalSession session(of_hosts(demo, {"--loopback", "--seconds", "20", "--domain",
+                                          std::to_string(domain.number())}),
+                          24, 80);
+  session.watch_until([&] {
+    return session.written().find("obeys /Object/pos:o") != std::string::npos &&
+           session.written().find("pulled") != std::string::npos;
+  });
+  for (const char* const text : {"head", "body", "object-detector", "arm-control"}) {
+    EXPECT_THAT(session.written(), HasSubstr(text));
+  }
+  session.send(SIGTERM);
+  EXPECT_EQ(session.watch_to_the_end(), 128 + SIGTERM);
+  EXPECT_THAT(demo.processes(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace arbiter::test
