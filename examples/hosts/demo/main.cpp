@@ -6,22 +6,19 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include <CLI/CLI.hpp>
 
 #include "actors.hpp"
 #include "cast.hpp"
+#include "command_line.hpp"
 #include "found.hpp"
 #include "network.hpp"
 #include "picture.hpp"
-#include "seconds.hpp"
 #include "signals.hpp"
 #include "terminal.hpp"
 
@@ -272,22 +269,12 @@ int run(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(0U, 230U));
   app.add_flag("--lines", options.lines, "Print lines in a terminal too");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  return Demo(options).run();
+  return search_and_track::parse_and_run(app, argc, argv, [&] { return Demo(options).run(); });
 }
 
 }  // namespace
 }  // namespace hosts_demo
 
 int main(int argc, char** argv) {
-  try {
-    return hosts_demo::run(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "hosts-demo: " << error.what() << '\n';
-    return 1;
-  }
+  return search_and_track::exit_code_of("hosts-demo", [&] { return hosts_demo::run(argc, argv); });
 }

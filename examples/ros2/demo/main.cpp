@@ -11,11 +11,11 @@
 
 #include <CLI/CLI.hpp>
 
+#include "command_line.hpp"
 #include "found.hpp"
 #include "picture.hpp"
 #include "processes.hpp"
 #include "scene.hpp"
-#include "seconds.hpp"
 #include "signals.hpp"
 #include "terminal.hpp"
 
@@ -169,22 +169,12 @@ int run(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(0U, 230U));
   app.add_flag("--lines", options.lines, "Print lines in a terminal too");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  return Demo(options).run();
+  return search_and_track::parse_and_run(app, argc, argv, [&] { return Demo(options).run(); });
 }
 
 }  // namespace
 }  // namespace ros2_demo
 
 int main(int argc, char** argv) {
-  try {
-    return ros2_demo::run(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "ros2-demo: " << error.what() << '\n';
-    return 1;
-  }
+  return search_and_track::exit_code_of("ros2-demo", [&] { return ros2_demo::run(argc, argv); });
 }

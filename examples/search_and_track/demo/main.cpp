@@ -7,10 +7,10 @@
 
 #include <CLI/CLI.hpp>
 
+#include "command_line.hpp"
 #include "places.hpp"
 #include "processes.hpp"
 #include "scene.hpp"
-#include "seconds.hpp"
 #include "signals.hpp"
 #include "summary.hpp"
 #include "terminal.hpp"
@@ -137,22 +137,13 @@ int run(int argc, char** argv) {
       ->type_name("FILE")
       ->check(CLI::ExistingFile);
   app.add_flag("--lines", options.lines, "Print lines in a terminal too");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  return Demo(options).run();
+  return parse_and_run(app, argc, argv, [&] { return Demo(options).run(); });
 }
 
 }  // namespace
 }  // namespace search_and_track
 
 int main(int argc, char** argv) {
-  try {
-    return search_and_track::run(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "search-and-track-demo: " << error.what() << '\n';
-    return 1;
-  }
+  return search_and_track::exit_code_of("search-and-track-demo",
+                                        [&] { return search_and_track::run(argc, argv); });
 }
