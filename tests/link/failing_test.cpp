@@ -10,17 +10,11 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-class FailingHosts : public testing::Test {
+class FailingHosts : public LoopbackHosts {
  protected:
   explicit FailingHosts(const std::string& timeout = "300ms") : timeout_(timeout) {}
 
-  [[nodiscard]] std::vector<std::string> network() const {
-    return {"--domain", std::to_string(domain_.number())};
-  }
-
   const std::string timeout_;
-  const OwnDomain domain_;
-  const TemporaryDirectory runtime_;
   Host head_{"head", runtime_, source_model(timeout_), network()};
   Host base_{"base", runtime_, motor_model(timeout_), network()};
   Planner planner_{head_};

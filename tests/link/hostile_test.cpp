@@ -17,7 +17,7 @@ namespace {
 using link::EventHeader;
 using link::EventKind;
 
-class HostileHost : public testing::Test {
+class HostileHost : public LoopbackHosts {
  protected:
   explicit HostileHost(const std::string& timeout = "1000s") : timeout_(timeout) {}
 
@@ -33,10 +33,7 @@ class HostileHost : public testing::Test {
   }
 
   const std::string timeout_;
-  const OwnDomain domain_;
-  const TemporaryDirectory runtime_;
-  Host base_{
-      "base", runtime_, motor_model(timeout_), {"--domain", std::to_string(domain_.number())}};
+  Host base_{"base", runtime_, motor_model(timeout_), network()};
   Body body_{base_};
   const link::Network network_{{domain_.number(), {}, {}}};
   Stranger stranger_{network_};

@@ -24,15 +24,7 @@ using testing::IsEmpty;
 using testing::Not;
 using wire::HostOutcome;
 
-class KnownHosts : public testing::Test {
- protected:
-  [[nodiscard]] std::vector<std::string> network() const {
-    return {"--domain", std::to_string(domain_.number())};
-  }
-
-  const OwnDomain domain_;
-  const TemporaryDirectory runtime_;
-};
+class KnownHosts : public LoopbackHosts {};
 
 wire::HostsDocument hosts_of(const std::string& instance) {
   for (;;) {

@@ -96,12 +96,8 @@ class Arrivals {
   Tap<void> tap_;
 };
 
-class Losers : public testing::Test {
+class Losers : public LoopbackHosts {
  protected:
-  [[nodiscard]] std::vector<std::string> network() const {
-    return {"--domain", std::to_string(domain_.number())};
-  }
-
   // Of what is published for longer than a loser is given. Somebody else reads the source by now.
   void expect_nothing_withheld(Camera& camera) const {
     const Eavesdropper ear(here_, Demand::kHeaders);
@@ -113,9 +109,7 @@ class Losers : public testing::Test {
     EXPECT_EQ(ear.seen(EventKind::kWithheld), 0);
   }
 
-  const OwnDomain domain_;
   const link::Network here_{{domain_.number(), {}, {}}};
-  const TemporaryDirectory runtime_;
   Host head_{"head", runtime_, kNoRules, network()};
 };
 

@@ -15,15 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-class Hosts : public testing::Test {
- protected:
-  [[nodiscard]] std::vector<std::string> network() const {
-    return {"--domain", std::to_string(domain_.number())};
-  }
-
-  const OwnDomain domain_;
-  const TemporaryDirectory runtime_;
-};
+class Hosts : public LoopbackHosts {};
 
 TEST_F(Hosts, ASampleThatIsPublishedOnOneArrivesAtAPortOfTheOther) {
   Host head("head", runtime_, kNoRules, network());

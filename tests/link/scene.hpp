@@ -104,4 +104,16 @@ class Host {
   ChildProcess link_;
 };
 
+// Hosts that find each other on the loopback interface.
+class LoopbackHosts : public testing::Test {
+ protected:
+  // What each link is told of it.
+  [[nodiscard]] std::vector<std::string> network() const {
+    return {"--domain", std::to_string(domain_.number())};
+  }
+
+  const OwnDomain domain_;
+  const TemporaryDirectory runtime_;
+};
+
 }  // namespace arbiter::test

@@ -55,13 +55,12 @@ class LinkKeys {
   TemporaryDirectory folder_;
 };
 
-class SecuredHosts : public testing::Test {
+class SecuredHosts : public LoopbackHosts {
  protected:
-  [[nodiscard]] std::vector<std::string> open() const {
-    return {"--domain", std::to_string(domain_.number())};
-  }
   [[nodiscard]] std::vector<std::string> secured(const LinkKeys& keys) const {
-    return {"--domain", std::to_string(domain_.number()), "--security", keys.path()};
+    std::vector<std::string> arguments = network();
+    arguments.insert(arguments.end(), {"--security", keys.path()});
+    return arguments;
   }
   // Two hosts are there that are not of the robot's, and hear each other.
   void expect_kept_out(const std::vector<std::string>& theirs) {
@@ -84,8 +83,6 @@ class SecuredHosts : public testing::Test {
 
   static constexpr std::int64_t kBeyond = 1'000'000;
   const LinkKeys keys_;
-  const OwnDomain domain_;
-  const TemporaryDirectory runtime_;
 };
 
 TEST_F(SecuredHosts, WhoHasACertificateTakesPart) {
@@ -100,7 +97,9 @@ TEST_F(SecuredHosts, WhoHasACertificateTakesPart) {
   body.drive(planner);
 }
 
-TEST_F(SecuredHosts, ALinkWithoutACertificateIsNotHeardAndHearsNothing) { expect_kept_out(open()); }
+TEST_F(SecuredHosts, ALinkWithoutACertificateIsNotHeardAndHearsNothing) {
+  expect_kept_out(network());
+}
 
 // Somebody has made keys with the same script.
 TEST_F(SecuredHosts, ACertificateOfAnotherAuthorityIsNone) {

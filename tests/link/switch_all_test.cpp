@@ -24,18 +24,17 @@ using testing::Each;
 using testing::HasSubstr;
 
 // Three hosts. Each has the models "default" and "rest", and two have "dance", too.
-class SwitchAll : public testing::Test {
+class SwitchAll : public LoopbackHosts {
  protected:
   SwitchAll() {
     const auto models = files_.write("model.xml", kNoRules);
     const std::vector<std::string> rest{"--model", "rest=" + models};
     std::vector<std::string> both = rest;
     both.insert(both.end(), {"--model", "dance=" + models});
-    const std::vector<std::string> network{"--domain", std::to_string(domain_.number())};
     for (const std::string name : {"arm", "base", "cam"}) {
       hosts_.emplace(
           std::piecewise_construct, std::forward_as_tuple(name),
-          std::forward_as_tuple(name, runtime_, kNoRules, network, std::vector<std::string>(),
+          std::forward_as_tuple(name, runtime_, kNoRules, network(), std::vector<std::string>(),
                                 name == "cam" ? rest : both));
     }
     // A release of what was never prepared harms nobody: who answers it is there.
@@ -78,8 +77,7 @@ class SwitchAll : public testing::Test {
     return names;
   }
 
-  const OwnDomain domain_;
-  const TemporaryDirectory runtime_, files_;
+  const TemporaryDirectory files_;
   std::map<std::string, Host> hosts_;
 };
 
