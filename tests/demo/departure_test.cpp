@@ -13,8 +13,10 @@
 namespace arbiter::test {
 namespace {
 
+using testing::ElementsAreArray;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::SizeIs;
 
 const std::vector<std::string> kProcesses{"arbiterd",      "arm-control",  "collision-detector",
                                           "face-detector", "gaze-control", "object-detector",
@@ -41,6 +43,7 @@ class RunningDemo {
 
 TEST(Departure, LeavesNothingBehindWhenTerminated) {
   RunningDemo running;
+  EXPECT_THAT(running.demo().processes(), ElementsAreArray(kProcesses));
   running.session().send(SIGTERM);
   EXPECT_EQ(running.session().watch_to_the_end(), 128 + SIGTERM);
   EXPECT_THAT(running.demo().processes(), IsEmpty());
@@ -49,6 +52,7 @@ TEST(Departure, LeavesNothingBehindWhenTerminated) {
 
 TEST(Departure, LeavesNoProcessBehindWhenKilled) {
   RunningDemo running;
+  EXPECT_THAT(running.demo().processes(), SizeIs(9));
   running.session().send(SIGKILL);
   EXPECT_EQ(running.session().watch_to_the_end(), 128 + SIGKILL);
   EXPECT_THAT(running.demo().processes_after_a_while(), IsEmpty());
