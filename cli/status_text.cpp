@@ -92,6 +92,20 @@ void print_strangers(std::ostream& out, StatusPlace place,
   }
 }
 
+// Who has asked for a port that nobody has open, in vain.
+void print_refusals(std::ostream& out, StatusPlace place, const wire::Status& status,
+                    std::optional<std::string> wire::RefusalStatus::*end, const auto& port) {
+  if (port.open || port.away_pid) return;
+  for (const wire::RefusalStatus& each : status.refusals) {
+    if (each.*end != port.name) continue;
+    out << "           refused to " << process_text(place, {each.node, each.pid, each.user});
+    if (place == StatusPlace::kHere) {
+      out << ' ' << seconds_text(shm::monotonic_now() - each.at) << " ago";
+    }
+    out << ": " << shm::printable(each.why) << '\n';
+  }
+}
+
 void print_source(std::ostream& out, StatusPlace place, const wire::SourceStatus& source,
                   bool has_model) {
   out << "  " << (source.active ? "active   " : "inactive ") << source.name << "  ["
@@ -176,11 +190,17 @@ void write_status(std::ostream& out, const wire::Status& status, StatusPlace pla
   print_strangers(out, place, status.strangers);
   const bool has_model = status.model.generation != 0;
   out << "\nsources\n";
-  for (const auto& source : status.sources) print_source(out, place, source, has_model);
+  for (const auto& source : status.sources) {
+    print_source(out, place, source, has_model);
+    print_refusals(out, place, status, &wire::RefusalStatus::output, source);
+  }
   out << "\ninput ports  (* winner, x selected but cannot deliver, - active and overridden, "
          "! active and "
          "sensed)\n";
-  for (const auto& input : status.inputs) print_input(out, place, input, has_model);
+  for (const auto& input : status.inputs) {
+    print_input(out, place, input, has_model);
+    print_refusals(out, place, status, &wire::RefusalStatus::input, input);
+  }
 }
 
 }  // namespace arbiter::cli

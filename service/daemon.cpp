@@ -282,22 +282,25 @@ void Daemon::retry(Client& client) {
   handle_or_refuse(client, request.request.received(), request.deadline);
 }
 
-namespace {
-
 // What it is about, as far as the request says: only a name that has passed for one is a name.
-void log_refusal(const Client& client, const wire::Message& request, const std::string& why) {
+void Daemon::log_refusal(const Client& client, const wire::Message& request,
+                         const std::string& why) {
   Event event{EventKind::kRefused, {client.name}};
   const std::string name(request.name_view());
   const bool is_port = !rules::find_problem_in_port(name);
-  if (is_port && request.kind == wire::MessageKind::kOpenInput) event.ports = {name};
-  if (is_port && (request.kind == wire::MessageKind::kOpenOutput ||
-                  request.kind == wire::MessageKind::kDeactivate)) {
-    event.sources = {name};
+  const auto is = [&](wire::MessageKind kind) { return is_port && request.kind == kind; };
+  bool is_news = true;
+  if (is(wire::MessageKind::kOpenInput)) {
+    event.ports = {name};
+    is_news = refusals_.note(client, Refusals::End::kInput, name, why, shm::monotonic_now());
   }
-  log_event(event, log::level::warn, "{}: {}", client.description(), why);
+  if (is(wire::MessageKind::kOpenOutput)) {
+    event.sources = {name};
+    is_news = refusals_.note(client, Refusals::End::kOutput, name, why, shm::monotonic_now());
+  }
+  if (is(wire::MessageKind::kDeactivate)) event.sources = {name};
+  if (is_news) log_event(event, log::level::warn, "{}: {}", client.description(), why);
 }
-
-}  // namespace
 
 // `deadline`: of a request that was postponed.
 void Daemon::handle_or_refuse(Client& client, wire::Received& received, shm::Nanoseconds deadline) {

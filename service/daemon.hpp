@@ -33,6 +33,7 @@
 #include "service/ports/introductions.hpp"
 #include "service/ports/observers.hpp"
 #include "service/ports/port_names.hpp"
+#include "service/ports/refusals.hpp"
 #include "service/ports/switchboard.hpp"
 #include "service/takeover/takeover.hpp"
 #include "service/watchdog.hpp"
@@ -93,6 +94,8 @@ class Daemon final : private Takeover::Host {
   bool serve(Client& client);
   void retry(Client& client);
   void handle_or_refuse(Client& client, wire::Received& received, shm::Nanoseconds deadline);
+  // Once for a component that asks again and again.
+  void log_refusal(const Client& client, const wire::Message& request, const std::string& why);
   // Those that are to be tried again are in the next turns of who asked.
   void retry_postponed(shm::Nanoseconds now);
   void settle();
@@ -165,6 +168,7 @@ class Daemon final : private Takeover::Host {
   Switchboard switchboard_{names_, registry_};
   Barriers barriers_;
   Introductions introductions_{switchboard_, barriers_};
+  Refusals refusals_;
   wire::Listener listener_;
   shm::FileDescriptor epoll_;
   // Not before: there was no descriptor even to turn a client away.

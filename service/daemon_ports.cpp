@@ -109,6 +109,7 @@ void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_p
     reply.flags = wire::kMayReplay;
   }
   client.send(reply, {source.page.writable.get(), -1});
+  refusals_.forget(Refusals::End::kOutput, source.name);
   at_step("output-open");
   log_event({EventKind::kOpened, {client.name}, {source.name}}, log::level::info,
             "{} opened output port {}", client.description(), source.name);
@@ -131,6 +132,7 @@ void Daemon::open_input(Client& client, wire::Received& received) {
   reply.port = opened.instance;
   reply.id = input.id;
   client.send(reply);
+  refusals_.forget(Refusals::End::kInput, name);
   at_step("input-open");
   log_event({EventKind::kOpened, {client.name}, {}, {name}}, log::level::info,
             "{} opened input port {}", client.description(), name);

@@ -234,11 +234,11 @@ void Daemon::answer_status(shm::Nanoseconds now) {
   shm::FileDescriptor document;
   std::string why_not;
   try {
-    document = make_document(
-        status_document({instance_, board_, changes_.library(), changes_.in_force(),
-                         changes_.history(), names_, registry_, switchboard_, takeover_.strangers(),
-                         takeover_.deaths(), clients_.size(), changes_.reloads_refused()},
-                        now));
+    document = make_document(status_document(
+        {instance_, board_, changes_.library(), changes_.in_force(), changes_.history(), names_,
+         registry_, switchboard_, takeover_.strangers(), takeover_.deaths(), refusals_,
+         clients_.size(), changes_.reloads_refused()},
+        now));
   } catch (const std::exception& error) {  // no descriptors are left
     why_not = error.what();
   }

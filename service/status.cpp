@@ -114,6 +114,7 @@ class Document {
       status.strangers.push_back(status_of(*each));
     }
     status.deaths.assign(of_.deaths.all().begin(), of_.deaths.all().end());
+    status.refusals.assign(of_.refusals.all().begin(), of_.refusals.all().end());
     for (const auto& each : of_.directory.sources()) {
       if (is_worth_showing(*each)) status.sources.push_back(source(*each));
     }

@@ -6,6 +6,7 @@
 
 #include "service/models/board.hpp"
 #include "service/models/history.hpp"
+#include "service/ports/refusals.hpp"
 #include "service/ports/switchboard.hpp"
 #include "service/takeover/deaths.hpp"
 #include "service/takeover/strangers.hpp"
@@ -23,6 +24,7 @@ struct StatusOf {
   const Switchboard& switchboard;
   const Strangers& strangers;
   const Deaths& deaths;
+  const Refusals& refusals;
   std::size_t clients = 0;
   std::uint64_t reloads_refused = 0;
 };

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "rules/text/names.hpp"
+#include "shm/clock.hpp"
 #include "shm/utf8.hpp"
 #include "watch/process.hpp"
 #include "watch/span.hpp"
@@ -50,6 +51,23 @@ void add_unknown(const StrangerStatus& stranger, std::vector<Obstacle>& result) 
 void add_outside(const std::string& name, const char* how, const auto& open,
                  std::vector<Obstacle>& result) {
   if (open.described) result.push_back({"outside", name + how + shm::printable(*open.described)});
+}
+
+// Who has asked for the port in vain last; null: nobody.
+const wire::RefusalStatus* refusal_of(const wire::Status& status,
+                                      std::optional<std::string> wire::RefusalStatus::*end,
+                                      const std::string& port) {
+  const auto found = std::find_if(status.refusals.begin(), status.refusals.end(),
+                                  [&](const auto& each) { return each.*end == port; });
+  return found == status.refusals.end() ? nullptr : &*found;
+}
+
+void add_refusal(const wire::RefusalStatus* refusal, std::vector<Obstacle>& result) {
+  if (refusal == nullptr) return;
+  result.push_back(
+      {"opening-refused", "component " + process_text(*refusal) + " asked for the port " +
+                              span_text(shm::monotonic_now() - refusal->at) +
+                              " ago and was refused: " + shm::printable(refusal->why)});
 }
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
@@ -97,6 +115,7 @@ std::vector<Obstacle> Obstacles::of_port() const {
     add_away(*input_->away_pid, result);
   } else if (stranger == nullptr) {
     result.push_back({"port-not-open", "no component has the port open: nothing is taken"});
+    add_refusal(refusal_of(status_, &wire::RefusalStatus::input, port_), result);
   }
   if (stranger != nullptr) add_unknown(*stranger, result);
   add_other_strangers(result);
@@ -216,7 +235,11 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
     return;
   }
   if (stranger != nullptr) return;
-  if (sources_.state(source).word == shm::kNeverActive) {
+  const auto* refusal = refusal_of(status_, &wire::RefusalStatus::output, source);
+  if (refusal != nullptr) {
+    result.push_back({"output-not-open", "no component has the output port open"});
+    add_refusal(refusal, result);
+  } else if (sources_.state(source).word == shm::kNeverActive) {
     result.push_back({"output-not-open",
                       "no component has the output port open: it was never "
                       "started, or opens it under another name"});
@@ -265,6 +288,7 @@ bool Obstacles::was_never_started(const std::string& source) const {
   const wire::SourceStatus* output = status_.find_source(source);
   return output != nullptr && !output->open && !output->away_pid &&
          stranger_with(&StrangerStatus::outputs, source) == nullptr &&
+         refusal_of(status_, &wire::RefusalStatus::output, source) == nullptr &&
          sources_.state(source).word == shm::kNeverActive && !other_source(source);
 }
 

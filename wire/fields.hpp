@@ -14,6 +14,7 @@
 //                               null. Structs, vectors and maps by name are read into.
 //   field.counter(key, member)  The same, but 0 where it is missing: a program and a daemon of two
 //                               versions may differ in what they count.
+//   field.list(key, vector)     The same, but empty where it is missing.
 //   field.maybe(key, optional)  Missing where it is empty.
 //   field.beside(key, optional) `key` is a boolean; where it is true, the fields of the struct
 //                               stand beside it.
@@ -81,6 +82,10 @@ class FieldWriter {
   }
   void counter(const char* key, std::uint64_t value) { object_[key] = value; }
   template <class T>
+  void list(const char* key, const std::vector<T>& values) {
+    object_[key] = json_of(values);
+  }
+  template <class T>
   void maybe(const char* key, const std::optional<T>& value) {
     if (value) object_[key] = json_of(*value);
   }
@@ -126,6 +131,10 @@ class FieldReader {
   }
   void counter(const char* key, std::uint64_t& value) {
     if (const auto* found = find(key)) read(*found, path_of(key), value);
+  }
+  template <class T>
+  void list(const char* key, std::vector<T>& values) {
+    if (const auto* found = find(key)) read(*found, path_of(key), values);
   }
   template <class T>
   void maybe(const char* key, std::optional<T>& value) {

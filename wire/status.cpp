@@ -108,6 +108,16 @@ void describe(auto& field, Is<DeathStatus> auto& of) {
   field("inputs", of.inputs);
 }
 
+void describe(auto& field, Is<RefusalStatus> auto& of) {
+  field("node", of.node);
+  field("pid", of.pid);
+  field("user", of.user);
+  field("at_ns", of.at);
+  field("why", of.why);
+  field.maybe("output", of.output);
+  field.maybe("input", of.input);
+}
+
 void describe(auto& field, Is<OpenOutput> auto& of) {
   field("component", of.component);
   field("taps", of.taps);
@@ -202,6 +212,7 @@ void describe(auto& field, Is<Status> auto& of) {
   field("clients", of.clients);
   field("strangers", of.strangers);
   field("deaths", of.deaths);
+  field.list("refusals", of.refusals);
   field("sources", of.sources);
   field("inputs", of.inputs);
 }

@@ -83,6 +83,17 @@ struct DeathStatus {
   std::vector<std::string> inputs;
 };
 
+// A port that a component has asked for and was refused. It has one of the two.
+struct RefusalStatus {
+  std::string node;
+  std::int32_t pid = 0;
+  std::uint32_t user = 0;
+  shm::Nanoseconds at = 0;  // CLOCK_MONOTONIC: when it asked last
+  std::string why;
+  std::optional<std::string> output;
+  std::optional<std::string> input;
+};
+
 // An output port that a component has open.
 struct OpenOutput {
   Component component;
@@ -189,7 +200,8 @@ struct Status {
   std::vector<PastModelStatus> history;  // the latest first
   std::uint64_t clients = 0;
   std::vector<StrangerStatus> strangers;
-  std::vector<DeathStatus> deaths;  // the latest first
+  std::vector<DeathStatus> deaths;      // the latest first
+  std::vector<RefusalStatus> refusals;  // the latest first
   std::vector<SourceStatus> sources;
   std::vector<InputStatus> inputs;
 

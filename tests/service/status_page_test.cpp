@@ -118,6 +118,22 @@ void see_deaths(ObservedFields& observed) {
   observed.see(status);
 }
 
+void see_refusals(ObservedFields& observed) {
+  const TemporaryDirectory files;
+  Daemon daemon(
+      single_model(),
+      {.arguments = {
+           "--policy",
+           files.write("policy", "deny everyone output,input *\nallow everyone observe\n")}});
+  Component arm("arm");
+  EXPECT_THAT(arm.tell("input /in 8 1 0"), HasSubstr("may not open"));
+  EXPECT_THAT(arm.tell("output /out"), HasSubstr("may not open"));
+  const json status = daemon.status();
+  EXPECT_EQ(status["refusals"][0]["output"], "/out");
+  EXPECT_EQ(status["refusals"][1]["input"], "/in");
+  observed.see(status);
+}
+
 TEST(StatusPage, NamesEachFieldOfTheDocumentAndNoOther) {
   ObservedFields observed;
   see_models(observed);
@@ -125,6 +141,7 @@ TEST(StatusPage, NamesEachFieldOfTheDocumentAndNoOther) {
   see_ports(observed);
   see_strangers(observed);
   see_deaths(observed);
+  see_refusals(observed);
   EXPECT_THAT(disagreements(status_page(), observed), IsEmpty());
 }
 

@@ -123,7 +123,8 @@ TEST(StatusFields, WithoutACounterHasNoneCountedAndWithoutAnythingElseIsRefused)
     if (kCounters.contains(leaf.back())) {
       const json read = there_and_back(document);
       EXPECT_EQ(read[leaf], 0) << leaf;
-    } else if (leaf.back() == "away" || leaf.back() == "described" ||
+    } else if (leaf.back() == "away" || leaf.back() == "described" || leaf.back() == "output" ||
+               leaf.back() == "input" ||
                (leaf.back() == "depth" &&
                 leaf.to_string().find("connections") != std::string::npos)) {
       EXPECT_EQ(refusal_of(document.dump()), "read") << leaf;
@@ -133,6 +134,12 @@ TEST(StatusFields, WithoutACounterHasNoneCountedAndWithoutAnythingElseIsRefused)
                                             "same version?"));
     }
   }
+}
+
+TEST(StatusFields, OfADaemonThatKnowsOfNoRefusalsHasNone) {
+  json document = to_json(full_status());
+  document.erase("refusals");
+  EXPECT_TRUE(wire::read_status(document.dump()).refusals.empty());
 }
 
 TEST(StatusFields, PassesOverWhatALaterVersionAdds) {
