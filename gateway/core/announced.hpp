@@ -13,7 +13,9 @@ class Announced {
     // SYNC POINT: made-announced (release): who sees it finds it made, and what was made before.
     made_.store(&made, std::memory_order_release);
   }
-  // Null: it is not there yet. Any thread.
+  // It is not to be used any more.
+  void withdraw() noexcept { made_.store(nullptr, std::memory_order_relaxed); }
+  // Null: it is not there yet, or not any more. Any thread.
   [[nodiscard]] T* get() const noexcept {
     // SYNC POINT: made-announced (acquire)
     return made_.load(std::memory_order_acquire);

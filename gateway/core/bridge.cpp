@@ -20,7 +20,12 @@ namespace {
 constexpr shm::Nanoseconds kMillisecond = 1'000'000;
 constexpr shm::Nanoseconds kTendPeriod = 100 * kMillisecond;
 constexpr shm::Nanoseconds kSayPeriod = 1000 * kMillisecond;  // of each entry
-constexpr int kRetryPeriod = 1000;                            // ms
+constexpr int kRetryPeriod = 500;                             // ms, for the daemon
+constexpr shm::Nanoseconds kOpenPeriod = 1000 * kMillisecond;
+// A daemon refuses at once.
+constexpr shm::Nanoseconds kNoAnswer = 100 * kMillisecond;
+// In a round of the loop, which goes round ten times a second.
+constexpr shm::Nanoseconds kOpenBudget = 10 * kMillisecond;
 
 }  // namespace
 
@@ -68,11 +73,7 @@ void Bridge::run(int stop) {
     part->sender = &middleware_.sender(part->gateway, part->entry, part->account);
   }
   make_node(stop);
-  if (!stops_) open_all(stop);
-  if (!stops_) {
-    start();
-    loop(stop);
-  }
+  if (!stops_) loop(stop);
   middleware_.stop();
 }
 
@@ -99,51 +100,46 @@ void Bridge::make_node(int stop) {
       node_.emplace(options_.name, options);
     } catch (const Error& error) {
       waiting_.say_once(error.what());
-      stops_ = waits(stop, kRetryPeriod / 2);
+      stops_ = waits(stop, kRetryPeriod);
       if (stops_) return;
     }
   }
   waiting_.say_once("");
 }
 
-// In the order of their names, and none behind the first that cannot be had: of two gateways that
-// have ports in common none must hold what the other one waits for.
-std::string Bridge::open_in_order() {
-  std::vector<Part*> in_order;
-  for (const auto& part : parts_) {
-    if (!part->is_open()) in_order.push_back(part.get());
-  }
-  const auto name_of = [](const Part* part) -> const std::string& {
-    return part->entry.ports().front()->name;
-  };
-  std::sort(in_order.begin(), in_order.end(),
-            [&](const Part* a, const Part* b) { return name_of(a) < name_of(b); });
-  for (Part* const part : in_order) {
-    try {
-      open(*part);
-    } catch (const Error& error) {
-      return error.what();
-    }
+// The loop has others to serve: it waits at most once for a daemon that does not answer, and tries
+// some ports after others where many are refused.
+void Bridge::open_closed() {
+  const shm::Nanoseconds begin = shm::monotonic_now();
+  open_again_ = begin + kOpenPeriod;
+  if (has_started_ && max_ages_.knows_of_no_daemon()) return;
+  std::vector<Part*> opened;
+  for (std::size_t tried = 0; tried < parts_.size(); ++tried) {
+    Part& part = *parts_[open_next_];
+    open_next_ = (open_next_ + 1) % parts_.size();
+    if (part.is_open()) continue;
+    const shm::Nanoseconds before = shm::monotonic_now();
+    if (try_to_open(part)) opened.push_back(&part);
     if (options_.on_round) options_.on_round();
+    const shm::Nanoseconds now = shm::monotonic_now();
+    if (!part.is_open() && now - before > kNoAnswer) break;
+    if (has_started_ && now - begin > kOpenBudget) {
+      open_again_ = now;  // at the next round
+      break;
+    }
   }
-  return {};
+  if (!opened.empty() || !has_started_) start(opened);
 }
 
-void Bridge::open_all(int stop) {
-  for (;;) {
-    const std::string problem = open_in_order();
-    if (options_.on_round) options_.on_round();
-    waiting_.say_once(problem);
-    if (problem.empty()) {
-      for (const auto& part : parts_) part->account.set_obstacle("");
-      return;
-    }
-    for (const auto& part : parts_) {
-      part->account.set_obstacle("not served: another port of the gateway is not open, " + problem);
-    }
-    look_after_all(false);  // why, has been said once for all of them
-    stops_ = waits(stop, kRetryPeriod);
-    if (stops_) return;
+bool Bridge::try_to_open(Part& part) {
+  try {
+    open(part);
+    part.waiting.say_once("");
+    return true;
+  } catch (const Error& error) {
+    part.waiting.say_once(part.entry.ports().front()->name + " is not served: " + error.what() +
+                          "; trying again");
+    return false;
   }
 }
 
@@ -170,19 +166,23 @@ void Bridge::watch(int descriptor, Part* part) const {
   }
 }
 
-void Bridge::start() {
+void Bridge::start(const std::vector<Part*>& opened) {
   std::vector<Middleware::OpenIn> ins;
   std::vector<Middleware::OpenOut> outs;
-  for (const auto& part : parts_) {
+  for (Part* const part : opened) {
     if (part->incoming) {
       ins.push_back({part->gateway, *part->incoming, part->account});
       ins_.emplace(part->entry.ports().front()->name, part->incoming.get());
     }
     if (part->outgoing) outs.push_back({part->gateway, *part->outgoing, part->account});
+    if (has_started_) say(Level::kInfo, part->entry.ports().front()->name + " is served now");
   }
   for (const auto& out : outs) out.outgoing.lead(ins_, [this] { bell_.ring(); });
-  say(Level::kInfo, "serves " + std::to_string(ins.size()) + " topics in, " +
-                        std::to_string(outs.size()) + " out");
+  if (!has_started_) {
+    say(Level::kInfo, "serves " + std::to_string(ins.size()) + " topics in, " +
+                          std::to_string(outs.size()) + " out");
+  }
+  has_started_ = true;
   middleware_.start(ins, outs);
 }
 
@@ -194,6 +194,7 @@ void Bridge::loop(int stop) {
     shm::Nanoseconds now = shm::monotonic_now();
     if (now >= tend_at || all) {
       tend_at = now + kTendPeriod;
+      if (now >= open_again_) open_closed();
       max_ages_.update();
       middleware_.tend();
       look_after_all();
@@ -230,7 +231,7 @@ void Bridge::serve(shm::Nanoseconds now, bool all) {
   }
 }
 
-void Bridge::look_after_all(bool says) {
+void Bridge::look_after_all() {
   const shm::Nanoseconds now = shm::monotonic_now();
   for (const auto& part : parts_) {
     if (!part->is_open()) continue;
@@ -240,7 +241,7 @@ void Bridge::look_after_all(bool says) {
       if (part->outgoing) part->outgoing->describe(text);
       part->described = std::move(text);
     }
-    if (!says || now < part->say_again) continue;
+    if (now < part->say_again) continue;
     std::string state = part->account.state();
     if (state == part->said) continue;
     part->say_again = now + kSayPeriod;

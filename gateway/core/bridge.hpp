@@ -1,9 +1,9 @@
 // A gateway's loop: opens the ports of a mapping, sends what they take, looks after ages, idle
 // samples and descriptions, until it is told to end.
 //
-// A gateway is open as a whole or not at all: where a port cannot be opened, because it is taken or
-// the policy does not allow it, it says so and tries again once a second. A daemon that goes and
-// comes again is the node's business (arbiter/node.hpp); samples pass meanwhile.
+// Where a port cannot be opened, because it is taken or the policy does not allow it, it says so,
+// serves the other entries, and tries again once a second. A daemon that goes and comes again is
+// the node's business (arbiter/node.hpp); samples pass meanwhile.
 //
 // Thread safety: all of it runs on the thread that calls run(), but for wake().
 #pragma once
@@ -58,6 +58,15 @@ class Bridge {
   void run(int stop);
 
  private:
+  // Each change of it is said once.
+  class Saying {
+   public:
+    void say_once(const std::string& text);
+
+   private:
+    std::string last_;
+  };
+
   // An entry with all that belongs to it.
   struct Part {
     Part(const Gateway& in, const Entry& of);
@@ -70,29 +79,21 @@ class Bridge {
     std::string said;  // in the log
     shm::Nanoseconds say_again = 0;
     std::string described;
+    Saying waiting;  // for its port
     [[nodiscard]] bool is_open() const { return incoming != nullptr || outgoing != nullptr; }
   };
 
-  // Each change of it is said once.
-  class Saying {
-   public:
-    void say_once(const std::string& text);
-
-   private:
-    std::string last_;
-  };
-
   void make_node(int stop);
-  void open_all(int stop);
-  // What keeps one from being opened; empty: nothing.
-  std::string open_in_order();
+  // Opens what is not open yet, as far as it can be, and lets the middleware serve that.
+  void open_closed();
+  // False: not now, and the log says why.
+  bool try_to_open(Part& part);
   void open(Part& part);
   void watch(int descriptor, Part* part) const;
-  void start();
+  void start(const std::vector<Part*>& opened);
   void loop(int stop);
   void serve(shm::Nanoseconds now, bool all);
-  // `says`: in the log, too, and not in the description alone.
-  void look_after_all(bool says = true);
+  void look_after_all();
   // Sleeps; true: `stop` is readable.
   static bool waits(int stop, int milliseconds);
 
@@ -104,8 +105,11 @@ class Bridge {
   std::optional<Node> node_;
   std::vector<std::unique_ptr<Part>> parts_;
   InBySource ins_;
-  Saying waiting_;  // for the daemon, for ports
+  shm::Nanoseconds open_again_ = 0;  // what is not open yet
+  std::size_t open_next_ = 0;        // of parts_
+  Saying waiting_;                   // for the daemon
   Saying ages_;
+  bool has_started_ = false;
   bool stops_ = false;
 };
 

@@ -111,14 +111,14 @@ Incoming::Fate Incoming::deliver(const ForeignSample& sample, Time deadline) noe
 
 // As above. NOLINTNEXTLINE(bugprone-exception-escape)
 Incoming::Fate Incoming::pass_on(const ForeignSample& sample, Time deadline) noexcept {
-  Outgoing* const outgoing = outgoing_.load(std::memory_order_relaxed);
+  Outgoing* const outgoing = outgoing_.get();
   if (outgoing == nullptr || !outgoing->begin_turn(sample.size())) {
     return pass_to(*yes_, sample, deadline);
   }
   const Fate fate = pass_to(*yes_, sample, deadline, outgoing);
   // A source that has lost would only hold up the others.
   if (!outgoing->end_turn(yes_->name(), max_age_.get())) {
-    outgoing_.store(nullptr, std::memory_order_relaxed);
+    outgoing_.withdraw();
   }
   return fate;
 }

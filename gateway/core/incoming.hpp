@@ -5,7 +5,6 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstddef>
 #include <optional>
 #include <string_view>
@@ -14,6 +13,7 @@
 #include <arbiter/output_port.hpp>
 
 #include "gateway/core/account.hpp"
+#include "gateway/core/announced.hpp"
 #include "gateway/core/freshness.hpp"
 #include "gateway/mapping/mapping.hpp"
 
@@ -63,7 +63,7 @@ class Incoming {
   // What deliver() publishes is what that `out` entry sends: deliver() then sends it there itself,
   // until nothing comes there any more. Outlives the last deliver(). The gateway's loop.
   void follow(Outgoing& outgoing) noexcept {
-    if (!entry_.choice) outgoing_.store(&outgoing, std::memory_order_relaxed);
+    if (!entry_.choice) outgoing_.announce(outgoing);
   }
   // A sample came that cannot be read at all. With a choice both sources end.
   void fail() noexcept;
@@ -89,8 +89,7 @@ class Incoming {
   MaxAge max_age_;
   std::optional<OutputPort<void>> yes_;  // or the only one
   std::optional<OutputPort<void>> no_;
-  // Relaxed is enough: all entries were made before the first sample.
-  std::atomic<Outgoing*> outgoing_{nullptr};
+  Announced<Outgoing> outgoing_;
 };
 
 }  // namespace arbiter::gateway

@@ -33,6 +33,10 @@ class MaxAges final : public AgesOfSources {
   // Reads memory, and the daemon's news; does not wait. Call it ten times a second.
   void update();
   [[nodiscard]] shm::Nanoseconds of(std::string_view source) const override;
+  // The daemon that it knew has gone, and no other has come yet.
+  [[nodiscard]] bool knows_of_no_daemon() const noexcept {
+    return instance_ != nullptr && !instance_->has_daemon();
+  }
   // What keeps it from knowing T, such as a policy that does not allow this user to `observe`;
   // empty: nothing.
   [[nodiscard]] const std::string& obstacle() const noexcept { return obstacle_; }

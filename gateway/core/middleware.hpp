@@ -40,8 +40,8 @@ class Middleware {
     Outgoing& outgoing;
     Account& account;
   };
-  // All ports are open: from here on samples may be delivered, on threads of its own. What it
-  // refers to outlives stop().
+  // From here on samples may be delivered, on threads of its own. Called again with entries whose
+  // ports could be opened only later. What it refers to outlives stop().
   virtual void start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& outs) = 0;
   // When it returns, deliver() is not called any more. Also called where start() was not.
   virtual void stop() noexcept = 0;

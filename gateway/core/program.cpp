@@ -12,6 +12,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "gateway/core/kept_files.hpp"
+#include "gateway/core/reload.hpp"
 #include "gateway/core/say.hpp"
 #include "gateway/core/send_idle.hpp"
 #include "gateway/core/stop_signals.hpp"
@@ -27,7 +29,8 @@ namespace arbiter::gateway {
 namespace {
 
 constexpr const char* kExitCodes =
-    "\nExit codes: 0 ended by SIGINT, SIGTERM or SIGHUP, or the mapping is fine (--check);\n"
+    "\nSIGUSR1 makes it read its mapping again; a bad one changes nothing, and the log says why.\n"
+    "Exit codes: 0 ended by SIGINT, SIGTERM or SIGHUP, or the mapping is fine (--check);\n"
     "1 an error; 2 wrong use, or a mapping that cannot be read or has errors";
 
 constexpr shm::Nanoseconds kSendIdle = 1'000'000'000;
@@ -38,17 +41,19 @@ struct Arguments {
   bool check = false;
   bool send_idle = false;
   bool is_worker = false;  // of a supervised program
+  int files = -1;          // which the supervisor has read for it
 };
 
 constexpr unsigned kEndsWithin = 2;  // s
 
 // Nothing: there are errors, which have been said.
-std::optional<std::vector<Mapping>> read(const Arguments& arguments, const ProgramKind& kind) {
+std::optional<std::vector<Mapping>> read(const Arguments& arguments, const ProgramKind& kind,
+                                         const ReadFile& read_file) {
   rules::Diagnostics diagnostics;
   std::vector<Mapping> mappings;
   std::size_t entries = 0;
   for (const std::string& path : arguments.mappings) {
-    mappings.push_back(read_mapping_file(path, diagnostics));
+    mappings.push_back(read_mapping_file(path, diagnostics, read_file));
     for (const Gateway& gateway : mappings.back().gateways) {
       if (gateway.kind == kind.kind) entries += gateway.entries.size();
     }
@@ -66,21 +71,66 @@ std::optional<std::vector<Mapping>> read(const Arguments& arguments, const Progr
   return mappings;
 }
 
+std::function<void()> sign_of_life() {
+  if (auto beat = heartbeat()) return std::move(*beat);
+  if (sd_watchdog_enabled(0, nullptr) <= 0) return {};
+  return [] { sd_notify(0, "WATCHDOG=1"); };
+}
+
+std::unique_ptr<Setup> setup_of(const Arguments& arguments, const ProgramKind& kind,
+                                std::vector<Mapping> mappings, const MakeMiddleware& make) {
+  auto setup = std::make_unique<Setup>();
+  setup->settings = {std::move(mappings), {kind.name, arguments.instance, {}}};
+  setup->middleware = make(setup->settings, setup->bell);
+  return setup;
+}
+
+// Null: something is wrong, which has been said. Reads regular files alone, because the gateway
+// serves on the same thread.
+std::unique_ptr<Setup> read_again(const Arguments& arguments, const ProgramKind& kind,
+                                  const MakeMiddleware& make) {
+  try {
+    KeptFiles files;
+    auto mappings = read(arguments, kind, files.from_disk(true));
+    if (mappings) return setup_of(arguments, kind, std::move(*mappings), make);
+  } catch (const std::exception& error) {
+    say(Level::kError, error.what());
+  }
+  return nullptr;
+}
+
+int send_idle_of(const Setup& setup, const ProgramKind& kind) {
+  // What needs a supervisor may also hang, and here nobody looks after it.
+  if (kind.is_supervised) ::alarm(kSendIdle / 1'000'000'000 + kEndsWithin);
+  send_idle(setup.settings.mappings, kind.kind, *setup.middleware, kSendIdle);
+  return 0;
+}
+
+// Until it is to stop. `asked`: for another mapping; of a worker, its supervisor is.
+void serve(std::unique_ptr<Setup> setup, const ProgramKind& kind, Reload& reload) {
+  const auto beat = sign_of_life();
+  for (; setup != nullptr; setup = reload.take()) {
+    BridgeOptions options = setup->settings.bridge;
+    options.on_round = [&] {
+      if (beat) beat();
+      reload.look();
+    };
+    Bridge bridge(std::move(options), setup->settings.mappings, kind.kind, setup->bell,
+                  *setup->middleware);
+    bridge.run(reload.ends());
+  }
+}
+
 int serve(const Arguments& arguments, const ProgramKind& kind, std::vector<Mapping> mappings,
           const MakeMiddleware& make, int stop) {
-  Settings settings{std::move(mappings), {kind.name, arguments.instance, {}}};
-  if (auto beat = heartbeat()) settings.bridge.on_round = std::move(*beat);
-  const Bell bell;
-  const auto middleware = make(settings, bell);
-  if (arguments.send_idle) {
-    // What needs a supervisor may also hang, and here nobody looks after it.
-    if (kind.is_supervised) ::alarm(kSendIdle / 1'000'000'000 + kEndsWithin);
-    send_idle(settings.mappings, kind.kind, *middleware, kSendIdle);
-    return 0;
-  }
-  Bridge bridge(settings.bridge, settings.mappings, kind.kind, bell, *middleware);
+  auto setup = setup_of(arguments, kind, std::move(mappings), make);
+  if (arguments.send_idle) return send_idle_of(*setup, kind);
+  shm::FileDescriptor asked;
+  if (!arguments.is_worker) asked = catch_reload_signal();
+  Reload reload(asked.get(), stop, [&] { return read_again(arguments, kind, make); });
+  if (!arguments.is_worker) sd_notify(0, "READY=1");
   try {
-    bridge.run(stop);
+    serve(std::move(setup), kind, reload);
   } catch (const NeedsNewProcess& why) {
     // What the middleware would do at the end may never return, or end the process in another way.
     // Its ports are closed as those of a program that dies are: by the daemon, at once.
@@ -91,6 +141,34 @@ int serve(const Arguments& arguments, const ProgramKind& kind, std::vector<Mappi
   // has gone; and the supervisor, who would see to it, may be gone as well.
   if (arguments.is_worker) ::alarm(kEndsWithin);
   return 0;
+}
+
+// Each worker is given the mapping as it was when it was good last, under one number.
+int supervise_workers(const Arguments& arguments, const ProgramKind& kind, const KeptFiles& files,
+                      std::vector<std::string> worker, int stop) {
+  const shm::FileDescriptor copy = files.in_memory();
+  worker.insert(worker.begin() + 1,  // behind a "--" they would be mappings
+                {"--worker", "--files=" + std::to_string(copy.get())});
+  const shm::FileDescriptor asked = catch_reload_signal();
+  const auto renew = [&] {
+    if (!take_signal(asked.get())) return false;
+    KeptFiles again;
+    try {
+      if (read(arguments, kind, again.from_disk(true))) {
+        const shm::FileDescriptor another = again.in_memory();
+        if (::dup2(another.get(), copy.get()) >= 0) {
+          say(Level::kInfo, "the mapping was read again: the gateway begins anew with it");
+          return true;
+        }
+      }
+    } catch (const std::exception& error) {
+      say(Level::kError, error.what());
+    }
+    say(Level::kError, "the mapping was not read again: the one before stays");
+    return false;
+  };
+  sd_notify(0, "READY=1");
+  return supervise(worker, stop, kind.clean_up, {}, {asked.get(), renew});
 }
 
 int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& make) {
@@ -112,6 +190,7 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
                "Only send, for a second, what is sent while nobody commands (idle=): for a gateway "
                "that has died. Needs no daemon");
   app.add_flag("--worker", arguments.is_worker)->group("");
+  app.add_option("--files", arguments.files)->group("");
   app.footer(kind.more + kExitCodes);
   try {
     app.parse(argc, argv);
@@ -124,19 +203,21 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
     say(Level::kError, error.what());
     return 2;
   }
-  auto mappings = read(arguments, kind);
+  KeptFiles files;
+  if (arguments.files >= 0) files = KeptFiles(arguments.files);
+  auto mappings =
+      read(arguments, kind, arguments.files >= 0 ? files.kept() : files.from_disk(false));
   if (!mappings) return 2;
   if (arguments.check) return 0;
   const shm::FileDescriptor stop = catch_stop_signals();
-  if (arguments.is_worker) end_with_supervisor(kind.clean_up);
+  if (arguments.is_worker) {
+    ignore_reload_signal();
+    end_with_supervisor(kind.clean_up);
+  }
   if (!kind.is_supervised || arguments.is_worker || arguments.send_idle) {
-    if (!arguments.is_worker && !arguments.send_idle) sd_notify(0, "READY=1");
     return serve(arguments, kind, std::move(*mappings), make, stop.get());
   }
-  std::vector<std::string> worker(argv, argv + argc);
-  worker.insert(worker.begin() + 1, "--worker");  // behind a "--" it would be a mapping
-  sd_notify(0, "READY=1");
-  return supervise(worker, stop.get(), kind.clean_up);
+  return supervise_workers(arguments, kind, files, {argv, argv + argc}, stop.get());
 }
 
 }  // namespace

@@ -15,8 +15,19 @@ shm::FileDescriptor catch_stop_signals() {
     sigaddset(&caught, SIGHUP);
   }
   sigprocmask(SIG_BLOCK, &caught, nullptr);
-  signal(SIGPIPE, SIG_IGN);
+  for (const int number : {SIGPIPE, SIGXFSZ}) signal(number, SIG_IGN);
   return shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
 }
+
+shm::FileDescriptor catch_reload_signal() {
+  sigset_t caught;
+  sigemptyset(&caught);
+  sigaddset(&caught, SIGUSR1);
+  sigprocmask(SIG_BLOCK, &caught, nullptr);
+  return shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
+}
+
+// Whoever signals a service signals all of its processes.
+void ignore_reload_signal() { signal(SIGUSR1, SIG_IGN); }
 
 }  // namespace arbiter::gateway

@@ -116,8 +116,15 @@ void end(Worker& worker, const Patience& patience) {
   }
 }
 
-// Returns what became of it; empty: `stop` is readable.
-std::optional<int> watch_over(const Worker& worker, int stop, const Patience& patience) {
+// Why it is watched no longer: what became of it; or else `stop` is readable, or there is to be
+// another one.
+struct EndOfWatch {
+  std::optional<int> status{};
+  bool is_renewed = false;
+};
+
+EndOfWatch watch_over(const Worker& worker, int stop, const Patience& patience,
+                      const Renewal& renewal) {
   LifeSigns signs(std::chrono::nanoseconds(patience.silence).count(), shm::monotonic_now());
   const auto look_again = static_cast<int>(patience.silence.count() / 5);
   bool left_alone = false;
@@ -129,13 +136,15 @@ std::optional<int> watch_over(const Worker& worker, int stop, const Patience& pa
     return left_alone = stopped;
   };
   for (;;) {
-    pollfd ends[2] = {{worker.heart.get(), POLLIN, 0}, {stop, POLLIN, 0}};
-    ::poll(ends, 2, look_again);
+    pollfd ends[3] = {
+        {worker.heart.get(), POLLIN, 0}, {stop, POLLIN, 0}, {renewal.asked, POLLIN, 0}};
+    ::poll(ends, 3, look_again);
     if (ends[1].revents != 0) return {};
+    if (ends[2].revents != 0 && renewal.renew()) return {{}, true};
     const shm::Nanoseconds now = shm::monotonic_now();
     char beats[64];
     if (::read(worker.heart.get(), beats, sizeof beats) > 0) signs.beat(now);
-    if (const auto status = status_of(worker)) return status;
+    if (const auto status = status_of(worker)) return {status};
     if ((ends[0].revents & POLLHUP) != 0) ::poll(nullptr, 0, 1);  // it is about to end
     if (!signs.hangs(now, is_stopped)) continue;
     say(Level::kError,
@@ -155,10 +164,23 @@ int heart() {
   return descriptor;
 }
 
+// Before the next worker, which has the newest mapping in any case. True: `stop` is readable.
+bool waits_out(std::chrono::milliseconds pause, int stop, const Renewal& renewal) {
+  const shm::Nanoseconds until = shm::monotonic_now() + std::chrono::nanoseconds(pause).count();
+  for (;;) {
+    const shm::Nanoseconds left = (until - shm::monotonic_now()) / 1'000'000;
+    if (left <= 0) return is_readable(stop, 0);
+    pollfd ends[2] = {{stop, POLLIN, 0}, {renewal.asked, POLLIN, 0}};
+    ::poll(ends, 2, static_cast<int>(left));
+    if (ends[0].revents != 0) return true;
+    if (ends[1].revents != 0 && renewal.renew()) return false;
+  }
+}
+
 }  // namespace
 
 int supervise(const std::vector<std::string>& arguments, int stop, const CleanUp& clean_up,
-              const Patience& patience) {
+              const Patience& patience, const Renewal& renewal) {
   std::chrono::milliseconds pause = patience.pause;
   for (;;) {
     Worker worker = start(arguments);
@@ -166,9 +188,14 @@ int supervise(const std::vector<std::string>& arguments, int stop, const CleanUp
     if (worker.pid < 0) {
       say(Level::kError, std::string("no worker can be started: ") + std::strerror(errno));
     } else {
-      status = watch_over(worker, stop, patience);
+      const EndOfWatch end_of_watch = watch_over(worker, stop, patience, renewal);
+      status = end_of_watch.status;
       if (!status) end(worker, patience);
       clean_up(worker.pid);
+      if (end_of_watch.is_renewed) {
+        pause = patience.pause;
+        continue;
+      }
       if (!status) return 0;
     }
     const bool lived_long = shm::monotonic_now() - worker.started > kLongLife;
@@ -180,7 +207,7 @@ int supervise(const std::vector<std::string>& arguments, int stop, const CleanUp
       say(Level::kWarning,
           "the worker " + describe(*status) + "; another one is started in " + in_words(pause));
     }
-    if (is_readable(stop, static_cast<int>(pause.count()))) return 0;
+    if (waits_out(pause, stop, renewal)) return 0;
   }
 }
 

@@ -35,11 +35,18 @@ inline constexpr int kBeginsAnew = 75;
 // What a worker that has ended may have left behind; called with its process's id.
 using CleanUp = std::function<void(int)>;
 
+// Another worker in place of the one that runs: `renew` is called where `asked` is readable, and
+// says whether it is to be so.
+struct Renewal {
+  int asked = -1;
+  std::function<bool()> renew = [] { return false; };
+};
+
 // Runs until `stop` is readable, and the worker has ended, which is asked to by SIGTERM. The
 // `arguments` are the worker's, which is this program; it finds its pipe in the environment.
 // Returns the exit code.
 int supervise(const std::vector<std::string>& arguments, int stop, const CleanUp& clean_up,
-              const Patience& patience = {});
+              const Patience& patience = {}, const Renewal& renewal = {});
 
 // In a worker: says that it runs. None where nobody supervises.
 std::optional<std::function<void()>> heartbeat();

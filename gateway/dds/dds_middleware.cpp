@@ -70,6 +70,7 @@ DdsMiddleware::Site& DdsMiddleware::site_of(const Gateway& gateway) {
 void DdsMiddleware::add(Site& site, EndPoint& end, Account& account) {
   site.ends.push_back(&end);
   site.accounts.push_back(&account);
+  if (!site.problem.empty()) account.set_obstacle(site.problem);
 }
 
 Sender& DdsMiddleware::sender(const Gateway& gateway, const Entry& entry, Account& account) {
@@ -80,14 +81,19 @@ Sender& DdsMiddleware::sender(const Gateway& gateway, const Entry& entry, Accoun
 }
 
 void DdsMiddleware::start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& outs) {
-  for (const OpenOut& out : outs) out_of_.at(&out.outgoing.entry())->tell(&out.outgoing);
+  for (const OpenOut& out : outs) out_of_.at(&out.outgoing.entry())->tell(out.outgoing);
+  std::vector<InTopic*> added;
   for (const OpenIn& in : ins) {
-    add(site_of(in.gateway), ins_.emplace_back(in.incoming, in.account, guard_), in.account);
+    added.push_back(&ins_.emplace_back(in.incoming, in.account, guard_));
+    add(site_of(in.gateway), *added.back(), in.account);
   }
-  // One tick before there is a reader: see StallGuard.
-  guard_.tick(shm::monotonic_now());
-  stall_thread_.emplace(guard_);
+  if (!started_) {
+    // One tick before there is a reader: see StallGuard.
+    guard_.tick(shm::monotonic_now());
+    stall_thread_.emplace(guard_);
+  }
   started_ = true;
+  for (std::size_t i = 0; i < ins.size(); ++i) open(site_of(ins[i].gateway), *added[i]);
   tend();
 }
 
@@ -100,7 +106,7 @@ void DdsMiddleware::stop() noexcept {
   }
   stall_thread_.reset();
   ins_.clear();
-  for (OutTopic& out : outs_) out.tell(nullptr);
+  for (OutTopic& out : outs_) out.tell_nobody();
 }
 
 void DdsMiddleware::tend() {
@@ -115,11 +121,15 @@ void DdsMiddleware::tend() {
       for (EndPoint* const end : site.ends)
         end->look_at(site.domain->peers().of(end->topic().name));
     } catch (const DdsError& error) {  // an end that was opened again could not be
-      say(Level::kError, error.what());
-      close(site);
-      site.open_again = shm::monotonic_now() + kOpenAgain;
+      give_up(site, error);
     }
   }
+}
+
+void DdsMiddleware::give_up(Site& site, const DdsError& error) {
+  say(Level::kError, error.what());
+  close(site);
+  site.open_again = shm::monotonic_now() + kOpenAgain;
 }
 
 // A reliable publisher repeats what was lost while this process was stopped, perhaps seconds later,
@@ -164,6 +174,16 @@ bool DdsMiddleware::open(Site& site) {
     for (Account* const account : site.accounts) account->set_obstacle(problem);
     site.open_again = shm::monotonic_now() + kOpenAgain;
     return false;
+  }
+}
+
+// A domain that is not open yet opens it with all others.
+void DdsMiddleware::open(Site& site, EndPoint& end) {
+  if (!site.domain) return;
+  try {
+    end.open(*site.domain);
+  } catch (const DdsError& error) {
+    give_up(site, error);
   }
 }
 

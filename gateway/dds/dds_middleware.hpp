@@ -53,6 +53,9 @@ class DdsMiddleware : public Middleware {
   void hold_low_descriptors() noexcept;
   // False: not now, and each account says why.
   bool open(Site& site);
+  void open(Site& site, EndPoint& end);
+  // Until it is tried again.
+  void give_up(Site& site, const DdsError& error);
   void close(Site& site) noexcept;
   // Throws DdsError.
   static void subscribe_again(Site& site);

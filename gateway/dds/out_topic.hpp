@@ -1,10 +1,10 @@
 // An `out` entry: what an input port takes is published on a topic of DDS.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <optional>
 
+#include "gateway/core/announced.hpp"
 #include "gateway/core/bridge.hpp"
 #include "gateway/core/outgoing.hpp"
 #include "gateway/dds/end_point.hpp"
@@ -19,8 +19,9 @@ class OutTopic : public EndPoint, public Sender {
   OutTopic(const Entry& entry, Account& account, const Bell& bell);
   ~OutTopic() override { close(); }
 
-  // Who is told of each reader that comes; null: nobody any more.
-  void tell(Outgoing* outgoing) noexcept { outgoing_.store(outgoing, std::memory_order_relaxed); }
+  // Who is told of each reader that comes.
+  void tell(Outgoing& outgoing) noexcept { outgoing_.announce(outgoing); }
+  void tell_nobody() noexcept { outgoing_.withdraw(); }
 
   // Waits a little for subscribers that do not keep up. The gateway's loop.
   [[nodiscard]] Result send(Bytes sample) noexcept override;
@@ -47,9 +48,7 @@ class OutTopic : public EndPoint, public Sender {
   const ddsi_sertype* type_ = nullptr;
   Payload* draft_ = nullptr;  // of whoever has the entry's turn, as is note() of the next one
   Pace pace_;
-  // Relaxed is enough: what it points to was made before the writer whose making starts the calls,
-  // and outlives it.
-  std::atomic<Outgoing*> outgoing_{nullptr};
+  Announced<Outgoing> outgoing_;
 };
 
 }  // namespace arbiter::gateway::dds

@@ -1,5 +1,6 @@
 #include "gateway/iceoryx/iceoryx.hpp"
 
+#include <algorithm>
 #include <iostream>
 #include <utility>
 
@@ -7,6 +8,7 @@
 #include <iceoryx_hoofs/log/logmanager.hpp>
 
 #include "gateway/core/say.hpp"
+#include "gateway/iceoryx/runtime.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::gateway {
@@ -26,8 +28,10 @@ constexpr shm::Nanoseconds kHangsInside = 5 * kSecond;  // the thread does not c
 void handle_error(iox::Error error, const std::function<void()>&, iox::ErrorLevel level) {
   if (level != iox::ErrorLevel::FATAL) return;
   const std::string made = what_is_made();
+  const std::string why_not = why_no_traces();
   say(Level::kError, std::string("iceoryx gives up: ") + iox::ErrorHandler::toString(error) +
-                         (made.empty() ? "" : ": RouDi refuses " + made));
+                         (made.empty() ? "" : ": RouDi refuses " + made) +
+                         (why_not.empty() ? "" : ": " + why_not));
   std::_Exit(1);
 }
 
@@ -45,13 +49,22 @@ Iceoryx::Iceoryx(std::string name) : name_(std::move(name)) {
 Iceoryx::~Iceoryx() { stop(); }
 
 Sender& Iceoryx::sender(const Gateway&, const Entry& entry, Account& account) {
-  return *senders_.emplace_back(std::make_unique<ChunkSender>(entry, account));
+  return *outs_.emplace_back(Out{std::make_unique<ChunkSender>(entry, account)}).sender;
 }
 
 void Iceoryx::start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& outs) {
-  std::vector<OpenIn>(ins).swap(ins_);
-  std::vector<OpenOut>(outs).swap(outs_);
-  had_readers_.assign(senders_.size(), false);
+  for (const OpenIn& in : ins) {
+    ins_.push_back(in);
+    in.account.set_obstacle(obstacle_);
+  }
+  for (const OpenOut& open : outs) {
+    const auto out = std::find_if(outs_.begin(), outs_.end(), [&](const Out& each) {
+      return &each.sender->entry() == &open.outgoing.entry();
+    });
+    out->outgoing = &open.outgoing;
+    out->had_readers = false;
+  }
+  if (session_ != nullptr) session_->add(ins);
   has_started_ = true;
   tend();
 }
@@ -65,7 +78,7 @@ void Iceoryx::set_obstacle(const std::string& text) {
   if (text == obstacle_) return;
   obstacle_ = text;
   for (const OpenIn& in : ins_) in.account.set_obstacle(text);
-  for (const OpenOut& out : outs_) out.account.set_obstacle(text);
+  for (const Out& out : outs_) out.sender->account().set_obstacle(text);
 }
 
 void Iceoryx::tend() {
@@ -76,7 +89,7 @@ void Iceoryx::tend() {
     set_obstacle(roudi ? "RouDi has just come" : "RouDi does not run");
     if (!roudi) return;
     std::vector<ChunkSender*> senders;
-    for (const auto& each : senders_) senders.push_back(each.get());
+    for (const Out& each : outs_) senders.push_back(each.sender.get());
     joined_ = now;
     session_ = std::make_unique<Session>(name_, *roudi, ins_, senders);
     return;
@@ -101,12 +114,11 @@ void Iceoryx::tend() {
 }
 
 void Iceoryx::look_after_senders() {
-  for (std::size_t i = 0; i < senders_.size(); ++i) {
-    const bool has_readers = senders_[i]->publisher()->hasSubscribers();
-    senders_[i]->account().set_peers(has_readers ? 1 : 0, true);
-    // Without a bridge there are senders, and no ports behind them.
-    if (has_readers && !had_readers_[i] && i < outs_.size()) outs_[i].outgoing.peer_matched();
-    had_readers_[i] = has_readers;
+  for (Out& out : outs_) {
+    const bool has_readers = out.sender->publisher()->hasSubscribers();
+    out.sender->account().set_peers(has_readers ? 1 : 0, true);
+    if (has_readers && !out.had_readers && out.outgoing != nullptr) out.outgoing->peer_matched();
+    out.had_readers = has_readers;
   }
 }
 

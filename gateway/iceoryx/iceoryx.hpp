@@ -29,11 +29,16 @@ class Iceoryx final : public Middleware {
   void set_obstacle(const std::string& text);
   void look_after_senders();
 
+  // Of an `out` entry.
+  struct Out {
+    std::unique_ptr<ChunkSender> sender;
+    Outgoing* outgoing = nullptr;  // while its port is not open, or there is no bridge: null
+    bool had_readers = false;
+  };
+
   const std::string name_;
-  std::vector<std::unique_ptr<ChunkSender>> senders_;
+  std::vector<Out> outs_;
   std::vector<OpenIn> ins_;
-  std::vector<OpenOut> outs_;
-  std::vector<bool> had_readers_;
   std::unique_ptr<Session> session_;
   shm::Nanoseconds joined_ = 0;  // when the session began
   std::string obstacle_;

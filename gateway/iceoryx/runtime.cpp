@@ -1,8 +1,10 @@
 #include "gateway/iceoryx/runtime.hpp"
 
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <charconv>
+#include <filesystem>
 
 #include <iceoryx_hoofs/platform/platform_settings.hpp>
 
@@ -19,6 +21,17 @@ std::optional<pid_t> process_of(const std::string& gateway, const std::string& r
   const char* const end = runtime.data() + runtime.size();
   const auto [rest, fault] = std::from_chars(runtime.data() + begin.size(), end, pid);
   return fault == std::errc() && rest == end && pid > 0 ? std::optional(pid) : std::nullopt;
+}
+
+std::string why_no_traces() {
+  const std::string directory =
+      std::filesystem::path(iox::platform::IOX_LOCK_FILE_PATH_PREFIX).parent_path().string();
+  struct statvfs room {};
+  if (::statvfs(directory.c_str(), &room) != 0) return directory + " is not there";
+  if (room.f_files != 0 && room.f_favail == 0) return directory + " has no room for more files";
+  if (room.f_bavail == 0) return directory + " is full";
+  if (::access(directory.c_str(), W_OK) != 0) return directory + " may not be written";
+  return {};
 }
 
 void remove_traces(const std::string& runtime) {

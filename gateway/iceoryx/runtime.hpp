@@ -14,6 +14,9 @@ namespace arbiter::gateway {
 // The process whose runtime has that name; nothing: it is no gateway's.
 [[nodiscard]] std::optional<pid_t> process_of(const std::string& gateway,
                                               const std::string& runtime);
+// Why iceoryx cannot make files for a process, such as "/tmp is full"; empty: nothing is known of
+// it.
+[[nodiscard]] std::string why_no_traces();
 // Removes what iceoryx leaves in /tmp of a process that was killed.
 void remove_traces(const std::string& runtime);
 

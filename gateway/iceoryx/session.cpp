@@ -164,18 +164,7 @@ void Session::make_ends() {
   made = "the subscriber of RouDi's list of ports";
   port_list_.emplace();
   wait_set_ = std::make_unique<iox::popo::WaitSet<>>();
-  for (const Middleware::OpenIn& in : ins_) {
-    const Entry& entry = in.incoming.entry();
-    made = "the subscriber of " + entry.outside();
-    iox::popo::SubscriberOptions options;
-    options.queueCapacity = entry.iceoryx->queue;
-    options.historyRequest = 0;  // nothing old
-    inlets_.push_back(std::make_unique<Inlet>(in, options));
-    watches_all_ =
-        watches_all_ && wait_set_->size() < wait_set_->capacity() &&
-        !wait_set_->attachState(inlets_.back()->subscriber, iox::popo::SubscriberState::HAS_DATA)
-             .has_error();
-  }
+  for (const Middleware::OpenIn& in : ins_) make_inlet(in);
   made.clear();
   // From here on it has a line for each sample that does not fit, and the account counts those.
   iox::log::LogManager::GetLogManager().SetDefaultLogLevel(iox::log::LogLevel::kOff,
@@ -183,6 +172,38 @@ void Session::make_ends() {
   if (watches_all_) return;
   say(Level::kInfo, "iceoryx can watch " + std::to_string(wait_set_->size()) +
                         " topics at once; the others are looked at every 5 ms");
+}
+
+void Session::make_inlet(const Middleware::OpenIn& in) {
+  const Entry& entry = in.incoming.entry();
+  made = "the subscriber of " + entry.outside();
+  iox::popo::SubscriberOptions options;
+  options.queueCapacity = entry.iceoryx->queue;
+  options.historyRequest = 0;  // nothing old
+  inlets_.push_back(std::make_unique<Inlet>(in, options));
+  watches_all_ =
+      watches_all_ && wait_set_->size() < wait_set_->capacity() &&
+      !wait_set_->attachState(inlets_.back()->subscriber, iox::popo::SubscriberState::HAS_DATA)
+           .has_error();
+}
+
+void Session::add(const std::vector<Middleware::OpenIn>& ins) {
+  const std::lock_guard lock(adding_);
+  for (const Middleware::OpenIn& in : ins) added_.push_back(in);
+}
+
+void Session::make_added() {
+  std::vector<Middleware::OpenIn> added;
+  {
+    const std::lock_guard lock(adding_);
+    added.swap(added_);
+  }
+  for (const Middleware::OpenIn& in : added) {
+    make_inlet(in);
+    take_all(*inlets_.back());  // from here on it is known to be empty
+    count_publishers(*inlets_.back());
+  }
+  made.clear();
 }
 
 void Session::take_for_ever() {
@@ -199,6 +220,7 @@ void Session::take_for_ever() {
     const shm::Nanoseconds now = shm::monotonic_now();
     const shm::Nanoseconds before = last_round_.exchange(now, std::memory_order_relaxed);
     if (now - before > kGivenUp) stalled_.store(true, std::memory_order_relaxed);
+    make_added();
     for (const auto& inlet : inlets_) take_all(*inlet);
     look_at_list(now);
   }
@@ -242,16 +264,18 @@ void Session::look_at_list(shm::Nanoseconds now) {
   looked_at_list_ = now;
   if (port_list_->hears_roudi()) heard_roudi_.store(now, std::memory_order_relaxed);
   if (port_list_->update()) {
-    for (const auto& inlet : inlets_) {
-      const std::size_t publishers = port_list_->publishers_of(inlet->topic).size();
-      inlet->in.account.set_peers(static_cast<std::uint32_t>(publishers));
-    }
+    for (const auto& inlet : inlets_) count_publishers(*inlet);
   }
   // Even if the list is the same: a process that has ended stays in it for a while.
   for (Outlet& out : outs_) {
     look_for_strangers(out);
     look_for_refused(out);
   }
+}
+
+void Session::count_publishers(const Inlet& inlet) const {
+  const std::size_t publishers = port_list_->publishers_of(inlet.topic).size();
+  inlet.in.account.set_peers(static_cast<std::uint32_t>(publishers));
 }
 
 // RouDi connects no subscriber that asks for what its publisher does not offer, and tells neither.

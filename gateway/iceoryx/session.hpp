@@ -8,6 +8,7 @@
 
 #include <atomic>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -63,6 +64,9 @@ class Session {
   // Waits for the thread, if it comes to an end within a second; else leaves it behind.
   ~Session();
 
+  // Entries whose ports could be opened only now. Keeps references. The loop.
+  void add(const std::vector<Middleware::OpenIn>& ins);
+
   [[nodiscard]] const RoudiIdentity& roudi() const noexcept { return roudi_; }
   // All publishers and subscribers are made.
   [[nodiscard]] bool is_ready() const noexcept { return waits_.get() != nullptr; }
@@ -90,15 +94,20 @@ class Session {
 
   void run();
   void make_ends();
+  void make_inlet(const Middleware::OpenIn& in);
+  void make_added();
   void take_all(Inlet& inlet);
   void take_for_ever();
   void look_at_list(shm::Nanoseconds now);
+  void count_publishers(const Inlet& inlet) const;
   void look_for_strangers(Outlet& out) const;
   void look_for_refused(Outlet& out) const;
 
   const std::string gateway_;
   const RoudiIdentity roudi_;
-  const std::vector<Middleware::OpenIn> ins_;
+  const std::vector<Middleware::OpenIn> ins_;  // at the beginning
+  std::mutex adding_;                          // of the next one
+  std::vector<Middleware::OpenIn> added_;      // not made yet
   std::vector<Outlet> outs_;
   std::vector<std::unique_ptr<iox::popo::UntypedPublisher>> publishers_;
   std::vector<std::unique_ptr<Inlet>> inlets_;

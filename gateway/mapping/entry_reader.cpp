@@ -285,7 +285,7 @@ class EntryReader {
     if (name.is_relative()) entry_.idle.path = (*context_.directory / name).string();
     try {
       const std::string bytes =
-          rules::read_bytes(entry_.idle.path, kMaxIdleBytes, rules::Accept::kRegularFile);
+          context_.read_file(entry_.idle.path, kMaxIdleBytes, rules::Accept::kRegularFile);
       if (const auto fault = fault_of_idle(bytes); !fault.empty()) {
         attributes_.error("idle-size", "idle", rules::quote(entry_.idle.path) + " " + fault);
         return;

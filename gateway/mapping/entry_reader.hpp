@@ -5,6 +5,7 @@
 #include <string>
 
 #include "gateway/mapping/mapping.hpp"
+#include "gateway/mapping/read_mapping.hpp"
 #include "rules/model/element_reader.hpp"
 
 namespace arbiter::gateway {
@@ -13,6 +14,7 @@ struct EntryContext {
   Kind kind = Kind::kDds;
   // Where files lie that the mapping names; null: they are not looked at.
   const std::string* directory = nullptr;
+  const ReadFile& read_file;
 };
 
 // Nothing where too much of it is wrong to check it any further; that was reported.

@@ -21,10 +21,11 @@ constexpr std::size_t kMaxConfigurationBytes = std::size_t{1} << 20;
 class MappingReader {
  public:
   MappingReader(const rules::TextFile& file, rules::Diagnostics& diagnostics,
-                const std::string* directory)
+                const std::string* directory, const ReadFile& read_file)
       : file_(file),
         diagnostics_(diagnostics),
         directory_(directory),
+        read_file_(read_file),
         reader_(file, defines_, diagnostics) {
     mapping_.path = file.path();
   }
@@ -93,7 +94,7 @@ class MappingReader {
       reader_.check_attributes(element, {"kind"});
     }
     reader_.check_no_text(element.first_child);
-    const EntryContext context{*kind, directory_};
+    const EntryContext context{*kind, directory_, read_file_};
     for (const XmlNode& child : Elements(element.first_child)) {
       if (child.text != "in" && child.text != "out") {
         reader_.report_unknown_element(child, {"in", "out"});
@@ -118,7 +119,7 @@ class MappingReader {
   void check_configuration(Attributes& attributes, const std::string& path) const {
     if (directory_ == nullptr) return;
     try {
-      rules::read_bytes(path, kMaxConfigurationBytes, rules::Accept::kRegularFile);
+      read_file_(path, kMaxConfigurationBytes, rules::Accept::kRegularFile);
     } catch (const rules::FileError& error) {
       attributes.error("configuration-file", "configuration",
                        std::string(error.what()) +
@@ -136,6 +137,7 @@ class MappingReader {
   const rules::TextFile& file_;
   rules::Diagnostics& diagnostics_;
   const std::string* const directory_;
+  const ReadFile& read_file_;
   rules::Defines defines_;  // none: a mapping has no defines
   rules::ElementReader reader_;
   Mapping mapping_;
@@ -145,14 +147,15 @@ class MappingReader {
 }  // namespace
 
 Mapping read_mapping(const rules::TextFile& file, rules::Diagnostics& diagnostics,
-                     const std::string* directory) {
-  return MappingReader(file, diagnostics, directory).read();
+                     const std::string* directory, const ReadFile& read_file) {
+  return MappingReader(file, diagnostics, directory, read_file).read();
 }
 
-Mapping read_mapping_file(const std::string& path, rules::Diagnostics& diagnostics) {
-  const rules::TextFile file(path, rules::read_bytes(path));
+Mapping read_mapping_file(const std::string& path, rules::Diagnostics& diagnostics,
+                          const ReadFile& read_file) {
+  const rules::TextFile file(path, read_file(path, rules::kMaxFileBytes, rules::Accept::kAnyFile));
   const std::string directory = std::filesystem::path(path).parent_path().string();
-  return read_mapping(file, diagnostics, &directory);
+  return read_mapping(file, diagnostics, &directory, read_file);
 }
 
 }  // namespace arbiter::gateway

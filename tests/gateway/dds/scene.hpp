@@ -10,6 +10,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "shm/file_descriptor.hpp"
@@ -99,12 +100,20 @@ class DdsGateway {
  public:
   // `entries`: the elements of the mapping's <gateway>.
   DdsGateway(const Daemon& daemon, const OwnDomain& domain, const std::string& entries,
-             const std::string& interface = "lo", const std::string& more = "")
-      : mapping_(daemon.directory() + "/gateway.xml"), log_(daemon.directory() + "/gateway.log") {
-    std::ofstream(mapping_) << "<gateway kind=\"dds\" domain=\"" << domain.number()
-                            << "\" interface=\"" << interface << "\" " << more << ">\n"
-                            << entries << "</gateway>\n";
+             const std::string& interface = "lo", const std::string& more = "",
+             std::vector<std::string> by = {})
+      : domain_(domain.number()),
+        mapping_(daemon.directory() + "/gateway.xml"),
+        log_(daemon.directory() + "/gateway.log"),
+        by_(std::move(by)) {
+    write_mapping(entries, interface, more);
     start();
+  }
+  void write_mapping(const std::string& entries, const std::string& interface = "lo",
+                     const std::string& more = "") const {
+    std::ofstream(mapping_) << "<gateway kind=\"dds\" domain=\"" << domain_ << "\" interface=\""
+                            << interface << "\" " << more << ">\n"
+                            << entries << "</gateway>\n";
   }
   void start() { process_ = program({mapping_}); }
   // For one that has died: its exit code.
@@ -128,14 +137,21 @@ class DdsGateway {
   [[nodiscard]] ChildProcess program(std::vector<std::string> arguments) const {
     const shm::FileDescriptor log(
         ::open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600));
-    arguments.insert(arguments.begin(), std::string(ARBITER_PROGRAMS) + "/arbiter-gateway-dds");
+    // By a descriptor: whoever it runs as may not be let into this directory.
+    const std::string path = std::string(ARBITER_PROGRAMS) + "/arbiter-gateway-dds";
+    const shm::FileDescriptor executable(::open(path.c_str(), O_RDONLY));
+    arguments.insert(arguments.begin(),
+                     by_.empty() ? path : "/proc/self/fd/" + std::to_string(executable.get()));
+    arguments.insert(arguments.begin(), by_.begin(), by_.end());
     return {arguments,
             {{"CYCLONEDDS_URI", std::nullopt}, {"ROS_DOMAIN_ID", std::nullopt}},
             {-1, -1, log.get()}};
   }
 
+  const unsigned domain_;
   const std::string mapping_;
   const std::string log_;
+  const std::vector<std::string> by_;  // a program that is given the command line to execute
   ChildProcess process_;
 };
 

@@ -20,61 +20,6 @@ using testing::HasSubstr;
 
 const auto* const machine = testing::AddGlobalTestEnvironment(new PrivateMachine);
 
-// "High" overrides "Low"; both T are long enough for a slow machine.
-constexpr const char* kModel =
-    "<behaviors timeout='60s'>"
-    "<behavior name='Low'><config at='/Base:i'>/Low:o</config></behavior>"
-    "<behavior name='High'><config at='/Base:i'>/High:o</config><inhibition>Low</inhibition>"
-    "</behavior></behaviors>";
-
-std::string in(const std::string& event, const std::string& port, const std::string& more = "") {
-  return "<in service='Test' instance='One' event='" + event + "' port='" + port + "' " + more +
-         "/>";
-}
-std::string out(const std::string& port, const std::string& event, const std::string& more = "") {
-  return "<out port='" + port + "' service='Test' instance='One' event='" + event + "' " + more +
-         "/>";
-}
-
-class Iceoryx : public testing::Test {
- protected:
-  void SetUp() override { ::signal(SIGPIPE, SIG_IGN); }
-
-  std::string described(const std::string& source) {
-    const auto status = daemon_.source(source);
-    return status.contains("described") ? status["described"].get<std::string>() : "";
-  }
-  pid_t worker_of(const std::string& source) {
-    return daemon_.source(source)["component"]["pid"].get<pid_t>();
-  }
-  void wait_for_another_worker(const std::string& source, pid_t worker) {
-    wait_until([&] {
-      const auto status = daemon_.source(source);
-      return status["open"] == true && status["component"]["pid"] != worker;
-    });
-  }
-  std::string described_input(const std::string& port) {
-    const auto status = daemon_.input(port);
-    return status.contains("described") ? status["described"].get<std::string>() : "";
-  }
-  void wait_for_description(const std::string& source, const std::string& text) {
-    wait_until([&] { return described(source).find(text) != std::string::npos; });
-  }
-  // From a new publisher to a new subscriber.
-  void expect_that_samples_pass() {
-    Spoken publisher = plain_publisher("low");
-    Spoken subscriber = plain_subscriber("base");
-    ASSERT_TRUE(subscriber.hear("ready"));
-    wait_for_description("/Low:o", "1 publisher matched");
-    publisher.say("x");
-    EXPECT_EQ(subscriber.line(), "|x");
-  }
-
-  EmptyMachine empty_;
-  TemporaryDirectory directory_;
-  Daemon daemon_{kModel};
-};
-
 TEST_F(Iceoryx, SamplesOfAnySizeGoThroughWithTheirHeaders) {
   const Roudi roudi(directory_);
   Spoken gate = gateway(directory_, in("low", "/Low:o", "max_size='2MiB' user_header='12'") +
@@ -244,37 +189,6 @@ TEST_F(Iceoryx, ForAGatewayThatHasDiedTheIdleSampleIsSent) {
 TEST_F(Iceoryx, TheIdleSampleIsNotWaitedForWithoutRouDi) {
   Spoken after = idle_sender(directory_, out("/Base:i", "base", "size='4' idle='zero'"));
   EXPECT_EQ(after.process.wait(), 0);
-}
-
-TEST_F(Iceoryx, APortThatSomebodyElseHasIsWaitedFor) {
-  const Roudi roudi(directory_);
-  std::optional<Node> other("other");
-  std::optional<OutputPort<void>> taken(other->output_port("/Low:o"));
-  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
-  ASSERT_TRUE(gate.hear("/Low:o")) << gate.heard;
-  wait_until([&] { return daemon_.input("/Base:i").contains("described"); });
-  EXPECT_THAT(daemon_.input("/Base:i")["described"].get<std::string>(),
-              HasSubstr("not served: another port of the gateway is not open, "));
-  taken.reset();
-  expect_that_samples_pass();
-}
-
-// Or each of two gateways would hold what the other one waits for, for ever.
-TEST_F(Iceoryx, WhoWaitsForAPortHoldsNoneBehindIt) {
-  std::optional<Node> other("other");
-  std::optional<OutputPort<void>> taken(other->output_port("/High:o"));
-  Spoken gate =
-      gateway(directory_, in("low", "/Low:o") + in("high", "/High:o") + out("/Base:i", "base"));
-  ASSERT_TRUE(gate.hear("/High:o is held by node \"other\"")) << gate.heard;
-  wait_until([&] { return !described_input("/Base:i").empty(); });
-  EXPECT_FALSE(daemon_.source("/Low:o")["open"]);
-  // Several tries later it has not been said again.
-  const auto begin = shm::monotonic_now();
-  wait_until([&] { return shm::monotonic_now() - begin > 2'500'000'000; });
-  taken.reset();
-  ASSERT_TRUE(gate.hear("serves 2 topics in, 1 out"));
-  EXPECT_EQ(gate.heard.find("iceoryx: the output port /High:o is held by"), std::string::npos)
-      << gate.heard;
 }
 
 TEST_F(Iceoryx, SamplesPassWhileNoDaemonRunsAndTheNextOneKnowsTheGateway) {

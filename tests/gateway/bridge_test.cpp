@@ -1,0 +1,271 @@
+// A gateway some of whose ports cannot be opened, by the policy or because somebody has them.
+#include "gateway/core/bridge.hpp"
+
+#include <gmock/gmock.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <list>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include <arbiter/arbiter.hpp>
+
+#include "tests/gateway/foreign.hpp"
+#include "tests/gateway/mapping_text.hpp"
+#include "tests/support/daemon.hpp"
+#include "tests/support/run_program.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr const char* kDriving =
+    "<behaviors timeout='60s'>"
+    "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config></behavior>"
+    "<behavior name='Steer'><config at='/Base/cmd:i'>/Joy/cmd:o</config>"
+    "<inhibition>Drive</inhibition></behavior></behaviors>";
+
+constexpr const char* kEntries =
+    "<in topic='/nav' type='a/msg/B' port='/Nav/cmd:o' max_size='64'/>"
+    "<in topic='/joy' type='a/msg/B' port='/Joy/cmd:o' max_size='64'/>"
+    "<out port='/Base/cmd:i' topic='/base' type='a/msg/B' idle='zero' size='4'/>";
+
+// As long as it takes, for a test has an end of its own.
+template <class Condition>
+void await(Condition condition) {
+  while (!condition()) ::usleep(1000);
+}
+
+// Delivers what the test says, on the test's thread.
+class PlayedMiddleware : public Middleware {
+ public:
+  Sender& sender(const Gateway&, const Entry&, Account&) override { return sender_; }
+  void start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& outs) override {
+    const std::lock_guard lock(mutex_);
+    for (const OpenIn& in : ins) ins_[in.incoming.entry().ports().front()->name] = &in.incoming;
+    outs_ += outs.size();
+    ++starts_;
+  }
+  void stop() noexcept override {}
+
+  [[nodiscard]] bool serves(const std::string& source) {
+    const std::lock_guard lock(mutex_);
+    return ins_.count(source) != 0;
+  }
+  [[nodiscard]] std::size_t outs() {
+    const std::lock_guard lock(mutex_);
+    return outs_;
+  }
+  [[nodiscard]] bool has_started() {
+    const std::lock_guard lock(mutex_);
+    return starts_ != 0;
+  }
+  Incoming::Fate deliver(const std::string& source, const std::string& bytes) {
+    Incoming* in = nullptr;
+    {
+      const std::lock_guard lock(mutex_);
+      in = ins_.at(source);
+    }
+    return in->deliver(BytesSample(bytes), Time::max());
+  }
+
+ private:
+  // Counts what is sent, on the loop's thread and the test's.
+  class NoSender : public Sender {
+   public:
+    [[nodiscard]] Result send(Bytes) noexcept override { return Result::kSent; }
+  };
+
+  NoSender sender_;
+  std::mutex mutex_;
+  std::map<std::string, Incoming*> ins_;
+  std::size_t outs_ = 0;
+  int starts_ = 0;
+};
+
+// A gateway that runs.
+class Running {
+ public:
+  explicit Running(const std::string& name = "gateway", const std::string& entries = kEntries)
+      : stop_(::eventfd(0, EFD_CLOEXEC)) {
+    mappings_.push_back(read_dds(entries).mapping);
+    bridge_.emplace(BridgeOptions{name, "", {}}, mappings_, Kind::kDds, bell_, middleware);
+    thread_ = std::thread([this] { bridge_->run(stop_.get()); });
+  }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+  ~Running() {
+    const std::uint64_t one = 1;
+    EXPECT_EQ(::write(stop_.get(), &one, sizeof one), static_cast<ssize_t>(sizeof one));
+    thread_.join();
+  }
+
+  PlayedMiddleware middleware;
+
+ private:
+  shm::FileDescriptor stop_;
+  Bell bell_;
+  std::vector<Mapping> mappings_;
+  std::optional<Bridge> bridge_;
+  std::thread thread_;
+};
+
+class Refused : public testing::Test {
+ protected:
+  // Whoever runs the tests: a line that names everyone counts for root, too.
+  void start(const std::string& denied) {
+    daemon_.emplace(kDriving,
+                    test::Daemon::Options{
+                        .arguments = {"--policy", files_.write("policy", policy_without(denied))}});
+  }
+  void reload(const std::string& denied) {
+    files_.write("policy", policy_without(denied));
+    daemon_->load(kDriving);
+  }
+  static std::string policy_without(const std::string& denied) {
+    return (denied.empty() ? "" : "deny everyone " + denied + "\n") + "allow everyone all\n";
+  }
+  std::string described(const std::string& source) {
+    const auto status = daemon_->source(source);
+    return status.contains("described") ? status["described"].get<std::string>() : "";
+  }
+  // The program, to its end.
+  static std::string arbiter(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), ARBITER_PROGRAMS "/arbiter");
+    return test::run_program(arguments, {}).out;
+  }
+  [[nodiscard]] std::size_t refusals_in_the_log(const std::string& port) const {
+    const std::string text = "may not open the output port " + port;
+    const std::string log = daemon_->log();
+    std::size_t count = 0;
+    for (auto at = log.find(text); at != std::string::npos; at = log.find(text, at + 1)) ++count;
+    return count;
+  }
+
+  test::TemporaryDirectory files_;
+  std::optional<test::Daemon> daemon_;
+};
+
+TEST_F(Refused, AnEntryIsLeftOutAndTheOthersAreServed) {
+  start("output /Nav/*");
+  Running gateway;
+  await([&] { return gateway.middleware.serves("/Joy/cmd:o"); });
+  EXPECT_FALSE(gateway.middleware.serves("/Nav/cmd:o"));
+  EXPECT_EQ(gateway.middleware.outs(), 1u);
+  EXPECT_EQ(gateway.middleware.deliver("/Joy/cmd:o", "left"), Incoming::Fate::kPassed);
+  await([&] { return daemon_->input("/Base/cmd:i")["taken"] == 1; });
+}
+
+TEST_F(Refused, StatusAndWhySayWhoMayNotAndByWhichLine) {
+  start("output /Nav/*");
+  Running gateway;
+  await([&] { return gateway.middleware.has_started(); });
+  const std::string who = "gateway (pid " + std::to_string(::getpid()) + ")";
+  EXPECT_THAT(arbiter({"status"}), AllOf(HasSubstr("refused to " + who),
+                                         HasSubstr("policy:1 says: deny everyone output /Nav/*")));
+  EXPECT_THAT(arbiter({"why", "/Base/cmd:i", "/Nav/cmd:o"}),
+              AllOf(HasSubstr("component " + who + " asked for the port "),
+                    HasSubstr(" ago and was refused: "),
+                    HasSubstr("may not open the output port /Nav/cmd:o")));
+}
+
+TEST_F(Refused, AnEntryIsTakenUpOnceThePolicyAllowsIt) {
+  start("output /Nav/*");
+  Running gateway;
+  await([&] { return gateway.middleware.has_started(); });
+  reload("");
+  await([&] { return gateway.middleware.serves("/Nav/cmd:o"); });
+  EXPECT_EQ(gateway.middleware.deliver("/Nav/cmd:o", "on"), Incoming::Fate::kPassed);
+  await([&] { return daemon_->input("/Base/cmd:i")["taken"] == 1; });
+  await([&] { return described("/Nav/cmd:o") != ""; });
+  EXPECT_TRUE(daemon_->status()["refusals"].empty());
+  EXPECT_THAT(arbiter({"status"}), Not(HasSubstr("refused to")));
+}
+
+TEST_F(Refused, APortThatMayNotBeReadIsTakenUpToo) {
+  start("input /Base/*");
+  Running gateway;
+  await([&] { return gateway.middleware.serves("/Nav/cmd:o"); });
+  EXPECT_EQ(gateway.middleware.outs(), 0u);
+  EXPECT_THAT(arbiter({"why", "/Base/cmd:i"}),
+              HasSubstr("may not open the input port /Base/cmd:i"));
+  gateway.middleware.deliver("/Nav/cmd:o", "nobody takes it");
+  reload("");
+  await([&] { return gateway.middleware.outs() == 1; });
+  gateway.middleware.deliver("/Nav/cmd:o", "on");
+  await([&] { return daemon_->input("/Base/cmd:i")["taken"] == 1; });
+}
+
+TEST_F(Refused, OfATopicThatIsTwoSourcesNeitherIsOpenedWhereOneMayNotBe) {
+  start("output /EStop/released:o");
+  Running gateway("gateway",
+                  "<in topic='/stop' type='std_msgs/msg/Bool' true='/EStop/pressed:o' "
+                  "false='/EStop/released:o'/>");
+  await([&] { return !daemon_->status()["refusals"].empty(); });
+  EXPECT_FALSE(gateway.middleware.serves("/EStop/pressed:o"));
+  reload("");
+  await([&] { return gateway.middleware.serves("/EStop/pressed:o"); });
+}
+
+// It asks again every second.
+TEST_F(Refused, TheDaemonsLogSaysItOnce) {
+  start("output /Nav/*");
+  Running gateway;
+  await([&] { return gateway.middleware.has_started(); });
+  const auto first = daemon_->status()["refusals"][0]["at_ns"];
+  for (int i = 0; i < 2; ++i) {
+    const auto last = daemon_->status()["refusals"][0]["at_ns"];
+    await([&] { return daemon_->status()["refusals"][0]["at_ns"] != last; });
+  }
+  EXPECT_NE(daemon_->status()["refusals"][0]["at_ns"], first);
+  EXPECT_EQ(refusals_in_the_log("/Nav/cmd:o"), 1u);
+}
+
+TEST_F(Refused, WhoMayOpenNothingWaits) {
+  start("output,input *");
+  Running gateway;
+  await([&] { return daemon_->status()["refusals"].size() == 3; });
+  reload("");
+  await([&] { return gateway.middleware.serves("/Nav/cmd:o"); });
+  await([&] { return gateway.middleware.outs() == 1; });
+}
+
+TEST_F(Refused, APortThatSomebodyElseHasIsTakenUpWhenItIsFree) {
+  start("");
+  Node node("other");
+  std::optional<OutputPort<void>> taken(node.output_port("/Nav/cmd:o"));
+  Running gateway;
+  await([&] { return gateway.middleware.serves("/Joy/cmd:o"); });
+  EXPECT_FALSE(gateway.middleware.serves("/Nav/cmd:o"));
+  taken.reset();
+  await([&] { return gateway.middleware.serves("/Nav/cmd:o"); });
+}
+
+// Whatever each of them got first, no entry is without a gateway, and none has two.
+TEST_F(Refused, TwoGatewaysOfTheSameMappingShareItAndOneTakesUpWhatTheOtherHad) {
+  start("");
+  std::optional<Running> one("one");
+  Running two("two");
+  const auto outs = [&] { return one->middleware.outs() + two.middleware.outs(); };
+  const auto serving = [&](const std::string& source) {
+    return one->middleware.serves(source) + two.middleware.serves(source);
+  };
+  await([&] { return serving("/Nav/cmd:o") != 0 && serving("/Joy/cmd:o") != 0 && outs() != 0; });
+  EXPECT_EQ(serving("/Nav/cmd:o"), 1);
+  EXPECT_EQ(serving("/Joy/cmd:o"), 1);
+  EXPECT_EQ(outs(), 1u);
+  one.reset();
+  await([&] {
+    return two.middleware.serves("/Nav/cmd:o") && two.middleware.serves("/Joy/cmd:o") &&
+           two.middleware.outs() == 1;
+  });
+}
+
+}  // namespace
+}  // namespace arbiter::gateway
