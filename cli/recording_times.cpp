@@ -3,11 +3,18 @@
 #include <cstddef>
 #include <cstdio>
 #include <ctime>
+#include <optional>
+
+#include <CLI/CLI.hpp>
+
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {
 
 using evidence::Recorded;
+
+constexpr shm::Nanoseconds kWholeSecond = 1'000'000'000;
 
 shm::Nanoseconds first_arrival(const Recorded& recorded) {
   for (const auto& run : recorded.runs) {
@@ -24,6 +31,21 @@ std::string exact_seconds(shm::Nanoseconds span) {
   return text;
 }
 
+[[noreturn]] void fail_at(const std::string& text, const std::string& why) {
+  throw CLI::ValidationError("--at", rules::quote(text) + ' ' + why);
+}
+
+// Of a second, in nanoseconds: ".25", or nothing.
+std::optional<shm::Nanoseconds> fraction_of(const char* rest) {
+  if (*rest == '\0') return 0;
+  const std::string digits = *rest == '.' ? rest + 1 : "";
+  if (digits.empty() || digits.size() > 9 ||
+      digits.find_first_not_of("0123456789") != std::string::npos) {
+    return std::nullopt;
+  }
+  return std::stoll(digits + std::string(9 - digits.size(), '0'));
+}
+
 }  // namespace
 
 std::string since_first(const Recorded& recorded, shm::Nanoseconds time) {
@@ -38,6 +60,34 @@ std::string wall_text(const Recorded& recorded, shm::Nanoseconds time) {
   char text[64];
   std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &parts);
   return text;
+}
+
+TimeSpan read_moment(const std::string& text, shm::Nanoseconds begin, shm::Nanoseconds end,
+                     shm::Nanoseconds wall_offset) {
+  begin += wall_offset;
+  end += wall_offset;
+  for (const char* format : {"%Y-%m-%d %H:%M:%S", "%Y-%m-%dT%H:%M:%S", "%H:%M:%S"}) {
+    const std::time_t first = begin / kWholeSecond;
+    std::tm parts{};
+    localtime_r(&first, &parts);
+    const char* const rest = strptime(text.c_str(), format, &parts);
+    const auto fraction = rest == nullptr ? std::nullopt : fraction_of(rest);
+    if (!fraction) continue;
+    parts.tm_isdst = -1;
+    std::tm day_after = parts;
+    ++day_after.tm_mday;
+    shm::Nanoseconds wall = std::mktime(&parts) * kWholeSecond;
+    if (format[1] == 'H' && wall + kWholeSecond <= begin)
+      wall = std::mktime(&day_after) * kWholeSecond;
+    const bool is_whole_second = *rest == '\0';
+    const TimeSpan span{wall + *fraction, wall + *fraction + (is_whole_second ? kWholeSecond : 1)};
+    if (span.to <= begin || span.from > end) {
+      fail_at(text, "is not in the recording, which is from " + clock_text(begin) + " to " +
+                        clock_text(end));
+    }
+    return {span.from - wall_offset, span.to - wall_offset};
+  }
+  fail_at(text, "is not a time: write 14:03:07, 14:03:07.250 or 2026-11-22 14:03:07");
 }
 
 std::string clock_text(shm::Nanoseconds wall) {

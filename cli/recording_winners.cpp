@@ -1,10 +1,6 @@
 #include "cli/recording_winners.hpp"
 
-#include <time.h>
-
 #include <algorithm>
-#include <array>
-#include <cstddef>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -29,8 +25,6 @@ namespace {
 
 using evidence::Recorded;
 using nlohmann::ordered_json;
-
-constexpr shm::Nanoseconds kWholeSecond = 1'000'000'000;
 
 struct RecordedWinners {
   std::string file;
@@ -69,56 +63,6 @@ std::vector<Reign> reigns_of(const Recorded& recorded, const std::string& patter
   return all;
 }
 
-// What was asked for with --at, as times of the recording: a moment, or all of a second.
-struct Span {
-  shm::Nanoseconds from = 0;
-  shm::Nanoseconds to = 0;
-};
-
-[[noreturn]] void fail_at(const std::string& text, const std::string& why) {
-  throw CLI::ValidationError("--at", rules::quote(text) + ' ' + why);
-}
-
-std::optional<shm::Nanoseconds> fraction_of(const char* rest) {
-  if (*rest == '\0') return 0;
-  const std::string digits = *rest == '.' ? rest + 1 : "";
-  if (digits.empty() || digits.size() > 9 ||
-      digits.find_first_not_of("0123456789") != std::string::npos) {
-    return std::nullopt;
-  }
-  return std::stoll(digits + std::string(9 - digits.size(), '0'));
-}
-
-// By the wall clock, in this time zone; without a date, the first such time from the beginning of
-// the recording on.
-Span read_moment(const std::string& text, const Recorded& recorded) {
-  const shm::Nanoseconds offset = recorded.about.wall_offset;
-  const shm::Nanoseconds begin = recorded.runs.front().start + offset;
-  const shm::Nanoseconds end = recorded.runs.back().end + offset;
-  for (const char* format : {"%Y-%m-%d %H:%M:%S", "%Y-%m-%dT%H:%M:%S", "%H:%M:%S"}) {
-    const std::time_t first = begin / kWholeSecond;
-    std::tm parts{};
-    localtime_r(&first, &parts);
-    const char* const rest = strptime(text.c_str(), format, &parts);
-    const auto fraction = rest == nullptr ? std::nullopt : fraction_of(rest);
-    if (!fraction) continue;
-    parts.tm_isdst = -1;
-    std::tm day_after = parts;
-    ++day_after.tm_mday;
-    shm::Nanoseconds wall = std::mktime(&parts) * kWholeSecond;
-    if (format[1] == 'H' && wall + kWholeSecond <= begin)
-      wall = std::mktime(&day_after) * kWholeSecond;
-    const bool is_whole_second = *rest == '\0';
-    const Span span{wall + *fraction, wall + *fraction + (is_whole_second ? kWholeSecond : 1)};
-    if (span.to <= begin || span.from > end) {
-      fail_at(text, "is not in the recording, which is from " + clock_text(begin) + " to " +
-                        clock_text(end));
-    }
-    return {span.from - offset, span.to - offset};
-  }
-  fail_at(text, "is not a time: write 14:03:07, 14:03:07.250 or 2026-11-22 14:03:07");
-}
-
 std::string cause_text(const evidence::WinnerChange& change) {
   const std::string by = shm::printable(change.by);
   switch (change.why) {
@@ -143,7 +87,8 @@ int show_winners(const RecordedWinners& options) {
   warn_of_missed(recorded);
   std::vector<Reign> reigns = reigns_of(recorded, options.port);
   if (!options.at.empty()) {
-    const Span span = read_moment(options.at, recorded);
+    const TimeSpan span = read_moment(options.at, recorded.runs.front().start,
+                                      recorded.runs.back().end, recorded.about.wall_offset);
     std::erase_if(reigns, [&](const Reign& reign) {
       return reign.change->time >= span.to || reign.end <= span.from;
     });

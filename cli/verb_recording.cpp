@@ -6,6 +6,7 @@
 
 #include "cli/recording_export.hpp"
 #include "cli/recording_info.hpp"
+#include "cli/recording_sample.hpp"
 #include "cli/recording_winners.hpp"
 #include "cli/verbs.hpp"
 
@@ -53,16 +54,19 @@ void add_repair(CLI::App& parent, int& exit_code) {
 
 void add_recording(CLI::App& app, int& exit_code) {
   CLI::App* verb = app.add_subcommand(
-      "recording", "Show what a recording has and who commanded, repair or export one");
+      "recording",
+      "Show what a recording has, a sample of it, and who commanded; repair or export it");
   verb->require_subcommand(1);
   add_info(*verb, exit_code);
   add_repair(*verb, exit_code);
   add_export(*verb, exit_code);
   add_recorded_winners(*verb, exit_code);
+  add_recorded_sample(*verb, exit_code);
   verb->footer(
       "Examples:\n"
       "  arbiter recording info incident.mcap\n"
       "  arbiter recording winners incident.mcap --at 14:03:07\n"
+      "  arbiter recording sample incident.mcap --source /Nav/cmd_vel:o -o last.bin\n"
       "  arbiter recording repair incident.mcap -o whole.mcap\n"
       "  arbiter recording export incident.mcap --trace trace.csv\n\n"
       "Exit codes: 0 done; 1 the file is not whole (info); 2 wrong use, or a file that cannot be "
