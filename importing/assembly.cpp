@@ -44,7 +44,7 @@ std::string Assembly::topic_of(const MuxEntry& entry) {
     diagnostics_.error("invalid-topic", entry.topic.where,
                        rules::quote(entry.topic.value) +
                            " is not a name of a topic; write letters, digits and _ between "
-                           "slashes, such as /robot/joy_vel");
+                           "slashes, such as /robot/joy_vel, at most 200 in all");
     return "";
   }
   const auto [earlier, is_new] = topics_.emplace(*topic, entry.topic.where);
@@ -65,7 +65,7 @@ void Assembly::set_output(Plan& plan, const std::string& written, const rules::L
     diagnostics_.error("invalid-topic", where,
                        "the output " + rules::quote(name) +
                            " is not a name of a topic; write letters, digits and _ between "
-                           "slashes, such as /cmd_vel");
+                           "slashes, such as /cmd_vel, at most 200 in all");
     return;
   }
   if (const auto found = topics_.find(*topic); found != topics_.end()) {

@@ -64,7 +64,10 @@ class Reader {
     const rules::Location where = parser_.error == YAML_READER_ERROR
                                       ? file_.locate(parser_.problem_offset)
                                       : locate(parser_.problem_mark);
-    error(where, "this is no YAML: " + std::string(problem) + "; correct it");
+    const bool is_tab =
+        parser_.error == YAML_SCANNER_ERROR && byte_at(parser_.problem_mark) == '\t';
+    error(where, is_tab ? "a tab is no indentation in YAML; write blanks"
+                        : "this is no YAML: " + std::string(problem) + "; correct it");
     return false;
   }
 
@@ -143,8 +146,16 @@ class Reader {
   }
 
   // libyaml counts characters, we count bytes.
+  [[nodiscard]] std::size_t offset_of(const yaml_mark_t& mark) const {
+    return starts_[std::min(mark.index, starts_.size() - 1)];
+  }
   [[nodiscard]] rules::Location locate(const yaml_mark_t& mark) const {
-    return file_.locate(starts_[std::min(mark.index, starts_.size() - 1)]);
+    return file_.locate(offset_of(mark));
+  }
+  // At the end of the file: NUL.
+  [[nodiscard]] char byte_at(const yaml_mark_t& mark) const {
+    const std::size_t offset = offset_of(mark);
+    return offset < file_.content().size() ? file_.content()[offset] : '\0';
   }
 
   std::nullopt_t refuse_tag() {

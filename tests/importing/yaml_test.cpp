@@ -78,7 +78,7 @@ TEST(Yaml, WindowsLineEndsAndAByteOrderMarkCountAsTheyShould) {
 TEST(Yaml, WhatIsMalformedHasAPlaceAndAReason) {
   EXPECT_THAT(parse("a: [1, 2\nb: 3\n").error(), HasSubstr("2:2 this is no YAML: "));
   EXPECT_THAT(parse("a: 'x\n").error(), HasSubstr("2:1 this is no YAML: found unexpected end"));
-  EXPECT_THAT(parse("a: 1\n\tb: 2\n").error(), HasSubstr("2:1 this is no YAML: "));
+  EXPECT_THAT(parse("a: 1\n\tb: 2\n").error(), HasSubstr("2:1 a tab is no indentation"));
   EXPECT_THAT(parse("").error(), HasSubstr("the file is empty"));
   EXPECT_THAT(parse("# nothing\n").error(), HasSubstr("the file is empty"));
 }
