@@ -11,12 +11,14 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/graph_hosts.hpp"
 #include "cli/live.hpp"
 #include "shm/clock.hpp"
 #include "watch/imported.hpp"
 #include "watch/instance.hpp"
 #include "watch/model_in_force.hpp"
 #include "watch/picture.hpp"
+#include "watch/span.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -32,8 +34,9 @@ constexpr int kMostLoads = 5;
 // What the sources do at one moment, and who wins by the rules that are drawn.
 struct LiveSituation {
   Situation situation;
-  std::uint64_t generation = 0;  // of the model in force then
-  bool fits = false;             // the daemon's table has the same winners
+  std::map<std::string, std::string> ages;  // by source: since its last event; none if it had none
+  std::uint64_t generation = 0;             // of the model in force then
+  bool fits = false;                        // the daemon's table has the same winners
 };
 
 // Of a port whose name has not come yet nothing is known.
@@ -54,10 +57,15 @@ LiveSituation look(const watch::Instance& instance, const rules::RuleSet& rules)
   for (;;) {
     const watch::Picture picture = watch::take_picture(memory, watch::all_sources);
     std::set<std::string> active;
+    std::map<std::string, std::string> ages;
     for (const auto& [source, word] : picture.words) {
-      if (picture.is_active(source)) active.insert(memory.source_name(source));
+      const std::string name = memory.source_name(source);
+      if (picture.is_active(source)) active.insert(name);
+      const shm::Nanoseconds last = shm::time_of(word, picture.snapshot.table.timeout(source));
+      if (last >= 0) ages[name] = watch::span_text(picture.now - last) + " ago";
     }
-    LiveSituation seen{drawing::decide(rules, std::move(active)), picture.snapshot.generation};
+    LiveSituation seen{drawing::decide(rules, std::move(active)), std::move(ages),
+                       picture.snapshot.generation};
     seen.fits = fits(instance, picture, seen.situation);
     if (memory.tables().is_whole(picture.snapshot)) return seen;
   }
@@ -97,7 +105,11 @@ rules::ModelFiles files_of(const wire::Status& status) {
 class LivePicture {
  public:
   LivePicture(const GraphOptions& options, watch::Instance& instance)
-      : options_(options), instance_(instance), picture_(options) {}
+      : options_(options), instance_(instance), picture_(options), inquirer_(options.instance) {
+    static_cast<void>(inquirer_.ask());
+  }
+  // What is to be drawn again and again must not wait for other hosts.
+  void begin_to_follow() { inquirer_.begin(); }
 
   // False: the model cannot be drawn.
   bool update() {
@@ -111,13 +123,23 @@ class LivePicture {
       now = look(instance_, picture_.rules());
     } while (now.generation != drawn_ && ++tries < kMostLoads);
     fits_ = now.fits;
-    look_at_hosts();
-    now.situation.hosts = hosts_;
+    const auto seen = inquirer_.last();
+    auto places = seen == nullptr ? std::nullopt : places_by(*seen, now.situation);
+    if (places) {
+      if (std::exchange(seen_, seen) != seen) ages_ = now.ages;
+      for (const wire::ImportStatus& each : seen->hosts.imports) {
+        const auto age = ages_.find(each.source);
+        if (each.is_open && age != ages_.end()) places->notes[each.source] = age->second;
+      }
+    } else {
+      look_at_hosts();
+      now.situation.hosts = hosts_;
+    }
     if (!fits_ && is_same_ && !std::exchange(warned_, true)) {
       std::cerr << "arbiter: the daemon decides differently from this model; is it the model in "
                    "force, and unchanged since? (arbiter status, arbiter reload)\n";
     }
-    picture_.write(&now.situation);
+    picture_.write(&now.situation, places ? &*places : nullptr);
     return true;
   }
   // Whether the picture is of what the daemon does.
@@ -147,7 +169,8 @@ class LivePicture {
     return true;
   }
 
-  // Which hosts sources come from: the daemon is asked once a second, and what was known stays.
+  // Which hosts sources come from, where no link says so: the daemon is asked once a second, and
+  // what was known stays.
   void look_at_hosts() {
     if (!instance_.has_daemon() || shm::monotonic_now() < ask_again_) return;
     ask_again_ = shm::monotonic_now() + kHostsPeriod;
@@ -175,6 +198,9 @@ class LivePicture {
   Picture picture_;
   std::shared_ptr<const shm::DecisionMemory> drawn_of_;
   std::uint64_t drawn_ = 0;  // the generation of the model that the picture is of
+  HostsInquirer inquirer_;
+  std::shared_ptr<const SeenHosts> seen_;
+  std::map<std::string, std::string> ages_;  // as they were when that came
   std::map<std::string, std::string> hosts_;
   shm::Nanoseconds ask_again_ = 0;
   bool fits_ = false;
@@ -197,6 +223,7 @@ int draw_and_follow(const GraphOptions& options) {
   const auto instance = follow_instance("graph", options.instance);
   LivePicture picture(options, *instance);
   if (!picture.update()) return 1;
+  picture.begin_to_follow();
   DaemonNews news("drawing");
   std::string said;
   for (shm::Nanoseconds next = shm::monotonic_now();;) {

@@ -11,6 +11,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/graph_hosts.hpp"
 #include "cli/model_files.hpp"
 #include "cli/output_file.hpp"
 #include "cli/progress.hpp"
@@ -98,6 +99,7 @@ bool Picture::load(const rules::ModelTexts& texts, const std::string& in_force) 
   choose_view();
   set_title(texts, in_force);
   check();
+  find_places();
   return true;
 }
 
@@ -106,6 +108,7 @@ void Picture::choose_view() {
   view_ = options_.view == "behaviours"    ? View::kBehaviours
           : options_.view == "connections" ? View::kConnections
           : options_.view == "both"        ? View::kBoth
+          : !options_.hosts.empty()        ? View::kConnections  // behaviours are in no boxes
                                            : drawing::natural_view(drawn);
   if (options_.view == "behaviours" && drawn.model.behaviours.empty()) {
     std::cerr << "arbiter: "
@@ -126,6 +129,7 @@ void Picture::set_title(const rules::ModelTexts& texts, const std::string& in_fo
   if (page_.name.empty() && texts.application) page_.name = name_of(texts.application->path);
   page_.details = {list(texts.models, path_of)};
   if (texts.application) page_.details.push_back("application: " + texts.application->path);
+  if (!options_.hosts.empty()) page_.details.push_back("hosts: " + options_.hosts);
   if (!in_force.empty()) page_.details.push_back(in_force);
   if (part_) {
     page_.details.push_back("only what decides at " +
@@ -140,6 +144,15 @@ void Picture::check() {
   is_good_ = !proof.has_errors();
   proof.drop_notes();
   if (!is_good_) rules::write_text(std::cerr, proof);
+}
+
+void Picture::find_places() {
+  if (options_.hosts.empty()) return;
+  rules::Diagnostics diagnostics;
+  places_ = places_by(options_.hosts, model_.rules, diagnostics);
+  is_good_ = is_good_ && !diagnostics.has_errors();
+  diagnostics.drop_notes();
+  rules::write_text(std::cerr, diagnostics);
 }
 
 std::string Picture::lay_out(const std::string& text) const {
@@ -159,8 +172,9 @@ std::string Picture::lay_out(const std::string& text) const {
   return std::move(layout.picture);
 }
 
-void Picture::write(const drawing::Situation* situation) {
-  std::string text = drawing::draw(part_ ? *part_ : model_, view_, page_, situation);
+void Picture::write(const drawing::Situation* situation, const drawing::Places* places) {
+  if (places == nullptr && situation == nullptr && places_) places = &*places_;
+  std::string text = drawing::draw(part_ ? *part_ : model_, view_, page_, situation, places);
   if (text == last_) return;
   write_output(options_.output, format_ == "dot" ? text : lay_out(text));
   last_ = std::move(text);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "drawing/drawing.hpp"
+#include "drawing/places.hpp"
 #include "rules/model/load.hpp"
 
 namespace arbiter::cli {
@@ -18,6 +19,7 @@ struct GraphOptions {
   std::string output;
   std::string instance;
   std::string dpi;
+  std::string hosts;  // an application that says where modules run
   double effort = 1;
   bool live = false;
   bool follow = false;
@@ -39,12 +41,14 @@ class Picture {
   // All of them, drawn or not.
   [[nodiscard]] const rules::RuleSet& rules() const { return model_.rules; }
 
-  // Where nothing has changed, nothing is written. Throws rules::FileError, std::runtime_error.
-  void write(const drawing::Situation* situation);
+  // Where nothing has changed, nothing is written. `places`: null, and they are as --hosts
+  // says. Throws rules::FileError, std::runtime_error.
+  void write(const drawing::Situation* situation, const drawing::Places* places = nullptr);
 
  private:
   void check();
   void choose_view();
+  void find_places();
   void set_title(const rules::ModelTexts& texts, const std::string& in_force);
   [[nodiscard]] std::string lay_out(const std::string& text) const;
 
@@ -53,6 +57,7 @@ class Picture {
   drawing::Page page_;
   rules::LoadedModel model_;
   std::optional<rules::LoadedModel> part_;  // of it, where only that is wanted
+  std::optional<drawing::Places> places_;   // by the application, not by links
   drawing::View view_ = drawing::View::kBehaviours;
   bool is_good_ = false;
   std::string last_;

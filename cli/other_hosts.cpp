@@ -39,4 +39,15 @@ std::string round_trip_text(const std::optional<shm::Nanoseconds>& round_trip) {
   return text;
 }
 
+std::string model_text(const wire::HostStatus& host, const wire::HostStatus* here) {
+  if (!host.has_daemon) return host.is_up ? "no daemon" : "-";
+  if (!host.model) return "no model";
+  std::string text = shm::printable(host.model->name);
+  if (host.model->digest.empty()) return text;
+  text += ' ' + shm::printable(host.model->digest).substr(0, 8);
+  const bool is_other = here != nullptr && here->model && !here->model->digest.empty() &&
+                        here->model->digest != host.model->digest;
+  return text + (is_other ? ", differs" : "");
+}
+
 }  // namespace arbiter::cli

@@ -19,4 +19,7 @@ void write_port_errors(std::ostream& out, const std::optional<wire::HostsDocumen
 // "0.32 ms"; "-": not measured.
 [[nodiscard]] std::string round_trip_text(const std::optional<shm::Nanoseconds>& round_trip);
 
+// "default 08056122", "no daemon", …; "differs" where it is not that of `here` (may be null).
+[[nodiscard]] std::string model_text(const wire::HostStatus& host, const wire::HostStatus* here);
+
 }  // namespace arbiter::cli

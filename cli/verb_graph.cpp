@@ -59,17 +59,25 @@ void add_graph(CLI::App& app, int& exit_code) {
       ->type_name("N");
   verb->add_option("-o,--output", options->output, kOutputHelp)->type_name("FILE");
   add_effort_option(*verb, options->effort);
-  verb->add_flag("--live", options->live, "Colour it by who is active and who wins now");
-  verb->add_flag("--follow", options->follow,
-                 "Like --live, and write the picture again at each change");
+  auto* live =
+      verb->add_flag("--live", options->live, "Colour it by who is active and who wins now");
+  auto* follow = verb->add_flag("--follow", options->follow,
+                                "Like --live, and write the picture again at each change");
+  verb->add_option("--hosts", options->hosts,
+                   "Application whose modules have <node>s: draw connections in boxes of hosts; "
+                   "with --live the links say where things are")
+      ->type_name("FILE")
+      ->excludes(live)
+      ->excludes(follow);
   add_instance_option(*verb, options->instance);
   verb->footer(
       "What is drawn:\n" + drawing::legend_in_words() +
       "A model of many connections is drawn port by port, each with its own sources beside it.\n\n"
       "Pictures are made by Graphviz (apt install graphviz); --format dot does without it.\n"
       "Rules that contradict each other are drawn all the same.\n\n"
-      "Exit codes: 0 drawn; 1 an error in the model, a port that it lacks, no daemon, no "
-      "Graphviz,\n"
+      "Exit codes: 0 drawn; 1 an error in the model, a port that it lacks or that is on no host, "
+      "no\n"
+      "daemon, no Graphviz,\n"
       "or a model that is not the one in force; 2 wrong use, or a file cannot be opened or "
       "written\n\n"
       "Examples:\n"
@@ -77,6 +85,7 @@ void add_graph(CLI::App& app, int& exit_code) {
       "  arbiter graph search_and_track.xml --view connections --application application.xml \\\n"
       "      -o ports.png --dpi 200\n"
       "  arbiter graph search_and_track.xml --port /Gaze/pos:i -o gaze.svg\n"
+      "  arbiter graph search_and_track.xml --hosts two_hosts.xml -o hosts.svg\n"
       "  arbiter graph --follow -o now.svg");
   verb->callback([options, &exit_code] { exit_code = graph(*options); });
 }

@@ -32,17 +32,6 @@ std::string link_text(const wire::HostStatus& host) {
   return (host.is_up ? "up " : "gone ") + seconds_text(shm::monotonic_now() - host.since);
 }
 
-std::string model_text(const wire::HostStatus& host, const wire::HostStatus* here) {
-  if (!host.has_daemon) return host.is_up ? "no daemon" : "-";
-  if (!host.model) return "no model";
-  std::string text = shown(host.model->name);
-  if (host.model->digest.empty()) return text;
-  text += ' ' + shown(host.model->digest).substr(0, 8);
-  const bool is_other = here != nullptr && here->model && !here->model->digest.empty() &&
-                        here->model->digest != host.model->digest;
-  return text + (is_other ? ", differs" : "");
-}
-
 using Row = std::array<std::string, 7>;
 
 Row row_of(const wire::HostsDocument& document, const wire::HostStatus& host) {

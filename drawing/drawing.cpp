@@ -36,7 +36,7 @@ std::string legend_rows(const DotWriter& out, View view, bool is_live) {
   }
   for (const Sign& sign : kSigns) {
     if (!out.has_sign(sign.text)) continue;
-    rows += row(small(sign.text, colour::kRed) + " " + small(html(sign.meaning)));
+    rows += row(small(sign.text, sign.colour) + " " + small(html(sign.meaning)));
   }
   for (const Mark& mark : kMarks) {
     if (!is_live) break;
@@ -71,7 +71,7 @@ View natural_view(const rules::LoadedModel& model) {
 }
 
 std::string draw(const rules::LoadedModel& model, View view, const Page& page,
-                 const Situation* situation) {
+                 const Situation* situation, const Places* places) {
   DotWriter out;
   out.open("digraph arbiter");
   // Behaviours stand in the order of who overrides whom, from above; data flows to the right.
@@ -88,7 +88,7 @@ std::string draw(const rules::LoadedModel& model, View view, const Page& page,
   out.statement("node", {{"fontname", kFont}, {"fontsize", "11"}, {"shape", "plain"}});
   out.statement("edge", {{"fontname", kFont}, {"fontsize", "9"}, {"arrowsize", "0.8"}});
   if (view != View::kConnections) draw_behaviours(model, situation, out);
-  if (view != View::kBehaviours) draw_connections(model, situation, out);
+  if (view != View::kBehaviours) draw_connections(model, situation, places, out);
   if (out.line_count() > kMaxCarefulLines) {
     for (const char* effort : {"mclimit", "nslimit", "nslimit1"}) out.attribute(effort, "0.1");
     out.attribute("splines", "line");

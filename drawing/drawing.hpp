@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "drawing/places.hpp"
 #include "drawing/situation.hpp"
 #include "rules/model/load.hpp"
 
@@ -28,10 +29,11 @@ struct Page {
   int dpi = 0;  // dots per inch, where a picture is made of dots; 0: what Graphviz takes
 };
 
-// With a situation it is coloured by who is active and who wins. The model must have no errors, but
-// its rules need not be proved.
+// With a situation it is coloured by who is active and who wins. With places, connections are drawn
+// in boxes of hosts, each coloured by what that host knows. The model must have no errors, but its
+// rules need not be proved.
 std::string draw(const rules::LoadedModel& model, View view, const Page& page = {},
-                 const Situation* situation = nullptr);
+                 const Situation* situation = nullptr, const Places* places = nullptr);
 
 // What each line and sign means, in lines of text, for those who cannot see the picture's legend.
 std::string legend_in_words();

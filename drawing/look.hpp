@@ -90,18 +90,24 @@ inline constexpr std::array<Mark, 4> kMarks{{
 
 constexpr const Mark& look_of(MarkKind kind) { return kMarks[static_cast<std::size_t>(kind)]; }
 
-// What is said in red beside arrows.
+// What is said beside arrows, and around boxes.
 struct Sign {
   const char* text;
   const char* meaning;
+  const char* colour = colour::kRed;
 };
 
 inline constexpr const char* kAllAfter = "⇊ all after it";
 inline constexpr const char* kMutual = "⇄ each other";
+inline constexpr const char* kHostBox = "▭ host";
 
-inline constexpr std::array<Sign, 2> kSigns{{
+inline constexpr std::array<Sign, 3> kSigns{{
     {kAllAfter, "inhibits all that its arrows lead to, by way of others too"},
     {kMutual, "in such a frame each inhibits the others"},
+    {kHostBox,
+     "the ports that a host decides, and the sources that live there; arrows from another box, and "
+     "sources with a host behind their names, cross the network",
+     colour::kBlack},
 }};
 
 }  // namespace arbiter::drawing

@@ -55,14 +55,54 @@ std::map<std::string, Input> find_inputs(const rules::RuleSet& rules) {
   return inputs;
 }
 
-bool Ports::is_active(const std::string& source) const {
-  return situation_ != nullptr && situation_->active.contains(source);
+std::string Ports::host_of_source(const std::string& source) const {
+  return places_ == nullptr ? std::string() : places_->host_of_source(source);
+}
+
+std::string Ports::host_of_port(const std::string& port) const {
+  return places_ == nullptr ? std::string() : places_->host_of_port(port);
+}
+
+const Situation* Ports::situation_on(const std::string& host) const {
+  return host.empty() ? situation_ : places_->boxes.at(host).situation;
+}
+
+const Situation* Ports::situation_at(const std::string& port) const {
+  return situation_on(host_of_port(port));
+}
+
+bool Ports::is_active(const std::string& source, const std::string& port) const {
+  const Situation* const situation = situation_at(port);
+  return situation != nullptr && situation->active.contains(source);
 }
 
 bool Ports::wins(const std::string& source, const std::string& port) const {
-  if (situation_ == nullptr) return false;
-  const auto winner = situation_->winners.find(port);
-  return winner != situation_->winners.end() && winner->second == source;
+  const Situation* const situation = situation_at(port);
+  if (situation == nullptr) return false;
+  const auto winner = situation->winners.find(port);
+  return winner != situation->winners.end() && winner->second == source;
+}
+
+void Ports::open_box(const std::string& host) {
+  if (host.empty()) return;
+  out_.note_sign(kHostBox);
+  out_.open("subgraph cluster_h" + std::to_string(boxes_++));
+  std::string rows = row("<B>" + html(shortened(host, kMaxName)) + "</B>");
+  for (const std::string& each : places_->boxes.at(host).captions) {
+    rows += row(small(html(shortened(each, kMaxFormula))));
+  }
+  out_.attribute("style", "rounded");
+  out_.attribute("color", quoted(colour::kBlack));
+  out_.attribute("bgcolor", quoted(colour::kPaleGrey));
+  out_.attribute("margin", "12");
+  out_.attribute("labeljust", "l");
+  out_.attribute("tooltip", quoted("host " + host));
+  out_.attribute("label", R"(<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="1" CELLPADDING="0">)" +
+                              rows + "</TABLE>>");
+}
+
+void Ports::close_box(const std::string& host) {
+  if (!host.empty()) out_.close();
 }
 
 std::string Ports::title_row(const std::string& name) {
@@ -77,10 +117,10 @@ std::string Ports::table(const std::string& rows) {
 
 std::string Ports::rule_row(const rules::ConnectionRule& rule, const std::string& port,
                             const std::string& id) const {
-  const Mark& mark = look_of(wins(rule.source, port)  ? MarkKind::kRuns
-                             : is_active(rule.source) ? MarkKind::kOverridden
-                                                      : MarkKind::kInactive);
-  std::string text = situation_ == nullptr ? "" : std::string(mark.sign) + " ";
+  const Mark& mark = look_of(wins(rule.source, port)        ? MarkKind::kRuns
+                             : is_active(rule.source, port) ? MarkKind::kOverridden
+                                                            : MarkKind::kInactive);
+  std::string text = situation_at(port) == nullptr ? "" : std::string(mark.sign) + " ";
   text += lines_of(rule);
   return cell(id, "LEFT", mark.colour, small(html_lines(text)), count_lines(text));
 }
@@ -104,27 +144,43 @@ std::string Ports::input_rows(const Input& in, const std::string& id) const {
   return rows;
 }
 
-std::string Ports::host_text(const std::string& source) const {
-  if (situation_ == nullptr) return {};
-  const auto host = situation_->hosts.find(source);
-  return host == situation_->hosts.end() ? std::string() : " (host " + host->second + ")";
+std::string Ports::text_behind(const std::string& source, const std::string& host) const {
+  const auto in = [&](const std::map<std::string, std::string>& texts) {
+    const auto found = texts.find(source);
+    return found == texts.end() ? std::string() : found->second;
+  };
+  std::string text;
+  if (places_ != nullptr) {
+    const std::string home = host_of_source(source);
+    if (home != host) text = home.empty() ? "no host" : "host " + home;
+    const std::string note = in(places_->notes);
+    text += (text.empty() || note.empty() ? "" : ", ") + note;
+  } else if (situation_ != nullptr) {
+    const std::string home = in(situation_->hosts);
+    if (!home.empty()) text = "host " + home;
+  }
+  return text.empty() ? text : " (" + text + ")";
 }
 
-std::string Ports::output_row(const std::string& source, const std::string& id,
-                              const rules::ConnectionRule* beside) const {
-  const Mark& mark = look_of(is_active(source) ? MarkKind::kActive : MarkKind::kInactive);
-  const std::string sign = situation_ == nullptr ? "" : std::string(mark.sign) + " ";
+std::string Ports::output_row(const std::string& source, const std::string& host,
+                              const std::string& id, const rules::ConnectionRule* beside) const {
+  const Situation* const situation = situation_on(host_of_source(source));
+  const bool is_active = situation != nullptr && situation->active.contains(source);
+  const Mark& mark = look_of(is_active ? MarkKind::kActive : MarkKind::kInactive);
+  const std::string sign = situation == nullptr ? "" : std::string(mark.sign) + " ";
   return cell(id, "RIGHT", mark.colour,
-              html(sign + shortened(source, kMaxPort) + host_text(source) + " ▸"),
+              html(sign + shortened(source, kMaxPort) + text_behind(source, host) + " ▸"),
               beside == nullptr ? 1 : count_lines(lines_of(*beside)));
 }
 
-std::string Ports::rest_row(const std::vector<std::string>& sources, const std::string& id) const {
-  const auto active = std::count_if(sources.begin(), sources.end(),
-                                    [&](const std::string& source) { return is_active(source); });
+std::string Ports::rest_row(const std::vector<std::string>& sources, const std::string& port,
+                            const std::string& id) const {
+  const auto active = std::count_if(sources.begin(), sources.end(), [&](const std::string& source) {
+    return is_active(source, port);
+  });
   const Mark& mark = look_of(active != 0 ? MarkKind::kActive : MarkKind::kInactive);
   std::string text = "and " + std::to_string(sources.size()) + " more, only sensed";
-  if (situation_ != nullptr) text += ", " + std::to_string(active) + " of them active";
+  if (situation_at(port) != nullptr) text += ", " + std::to_string(active) + " of them active";
   return cell(id, "RIGHT", mark.colour, small("<I>" + html(text) + "</I>"));
 }
 
@@ -140,10 +196,10 @@ void Ports::draw_rest(const std::vector<std::string>& sources, const std::string
 
 void Ports::draw_selected(const rules::ConnectionRule& rule, const std::string& port,
                           const std::string& arrow) {
-  const LineKind kind = situation_ == nullptr     ? LineKind::kSelected
-                        : wins(rule.source, port) ? LineKind::kWins
-                        : is_active(rule.source)  ? LineKind::kOverridden
-                                                  : LineKind::kInactive;
+  const LineKind kind = situation_at(port) == nullptr  ? LineKind::kSelected
+                        : wins(rule.source, port)      ? LineKind::kWins
+                        : is_active(rule.source, port) ? LineKind::kOverridden
+                                                       : LineKind::kInactive;
   out_.line(kind, arrow,
             {{"tooltip", quoted(rule.source + " → " + port +
                                 (rule.behaviour.empty() ? "" : "\n" + rule.behaviour) + "\n" +
@@ -160,7 +216,7 @@ void Ports::draw_other(const Input& in, const std::string& source, const std::st
 void Ports::draw_sensed(const std::string& source, const std::string& port,
                         const std::string& arrow) {
   out_.line(LineKind::kSensed, arrow,
-            {{"penwidth", is_active(source) ? "2.5" : ""},
+            {{"penwidth", is_active(source, port) ? "2.5" : ""},
              {"tooltip", quoted(source + " is sensed at " + port)}});
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "drawing/dot.hpp"
+#include "drawing/places.hpp"
 #include "drawing/situation.hpp"
 #include "rules/model/rule_set.hpp"
 
@@ -25,21 +26,28 @@ std::map<std::string, Input> find_inputs(const rules::RuleSet& rules);
 
 class Ports {
  public:
-  Ports(const Situation* situation, DotWriter& out) : situation_(situation), out_(out) {}
+  Ports(const Situation* situation, const Places* places, DotWriter& out)
+      : situation_(situation), places_(places), out_(out) {}
 
-  [[nodiscard]] bool is_active(const std::string& source) const;
-  // " (host head)" of a source that comes from there.
-  [[nodiscard]] std::string host_text(const std::string& source) const;
+  // As the host knows it that decides at this port.
+  [[nodiscard]] bool is_active(const std::string& source, const std::string& port) const;
+  // The boxes that they stand in; empty: none.
+  [[nodiscard]] std::string host_of_source(const std::string& source) const;
+  [[nodiscard]] std::string host_of_port(const std::string& port) const;
+  // What follows is in the box of that host, until it is closed; nothing where there is none.
+  void open_box(const std::string& host);
+  void close_box(const std::string& host);
 
   // Rows of tables; arrows end at their ids: of an input port `id` itself, of its rule i "IDri", of
   // its connection without a rule "IDni".
   [[nodiscard]] std::string input_rows(const Input& in, const std::string& id) const;
-  // As high as the rule's row, where it stands beside that.
-  [[nodiscard]] std::string output_row(const std::string& source, const std::string& id,
+  // In the box of `host`; as high as the rule's row, where it stands beside that.
+  [[nodiscard]] std::string output_row(const std::string& source, const std::string& host,
+                                       const std::string& id,
                                        const rules::ConnectionRule* beside = nullptr) const;
-  // For several sources that are only sensed, and have no rows.
+  // For several sources that are only sensed at the port, and have no rows.
   [[nodiscard]] std::string rest_row(const std::vector<std::string>& sources,
-                                     const std::string& id) const;
+                                     const std::string& port, const std::string& id) const;
   static std::string title_row(const std::string& name);
   static std::string table(const std::string& rows);
 
@@ -71,6 +79,11 @@ class Ports {
                            const std::string& id) {
     return tail + ":e -> " + node + ":" + id + ":w";
   }
+  // What is known on that host; null: nothing, or the picture is still.
+  [[nodiscard]] const Situation* situation_on(const std::string& host) const;
+  [[nodiscard]] const Situation* situation_at(const std::string& port) const;
+  // Behind the name of a source in the box of `host`: " (host head)", and its note.
+  [[nodiscard]] std::string text_behind(const std::string& source, const std::string& host) const;
   [[nodiscard]] bool wins(const std::string& source, const std::string& port) const;
   [[nodiscard]] std::string rule_row(const rules::ConnectionRule& rule, const std::string& port,
                                      const std::string& id) const;
@@ -80,7 +93,9 @@ class Ports {
   void draw_sensed(const std::string& source, const std::string& port, const std::string& arrow);
 
   const Situation* situation_;
+  const Places* places_;
   DotWriter& out_;
+  int boxes_ = 0;  // that have been opened
 };
 
 }  // namespace arbiter::drawing

@@ -106,6 +106,35 @@ TEST(Graph, DrawsNothingOfAModelWithErrors) {
   EXPECT_THAT(result.err, HasSubstr("error: "));
 }
 
+const std::string kTwoHosts = R"(<application>
+  <module><name>Low</name><parameters>--name /low</parameters><node>base</node></module>
+  <module><name>Ports</name><parameters>--name /p</parameters><node>base</node></module>
+  <module><name>High</name><parameters>--name /high</parameters><node>head</node></module>
+</application>)";
+
+TEST(Graph, DrawsBoxesOfTheHostsThatAnApplicationNames) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const auto hosts = directory.write("hosts.xml", kTwoHosts);
+  const auto result = arbiter({"graph", model, "--hosts", hosts, "--format", "dot"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("tooltip=\"host base\""));
+  EXPECT_THAT(result.out, HasSubstr("tooltip=\"host head\""));
+  EXPECT_EQ(arbiter({"graph", "--live", "--hosts", hosts}).exit_code, 2);
+}
+
+TEST(Graph, SaysWhatIsOnNoHostAndDrawsItAllTheSame) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const auto hosts = directory.write("hosts.xml", R"(<application>
+    <module><name>Low</name><parameters>--name /low</parameters><node>base</node></module>
+    </application>)");
+  const auto result = arbiter({"graph", model, "--hosts", hosts, "--format", "dot"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, HasSubstr("tooltip=\"host base\""));
+  EXPECT_THAT(result.err, HasSubstr("[no-host]"));
+}
+
 // To see why is what one looks at them for.
 TEST(Graph, DrawsRulesThatContradictEachOtherAndSaysSo) {
   const TemporaryDirectory directory;

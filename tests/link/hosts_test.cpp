@@ -198,6 +198,30 @@ TEST_F(KnownHosts, WhyIsAskedOfTheOneThatDecides) {
               HasSubstr("host base has no input port /Other:i"));
 }
 
+TEST_F(KnownHosts, AreBoxesInALivePicture) {
+  Host head("head", runtime_, source_model("1000s"), network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  const auto drawn_on_base = [](const std::string& what) {
+    const std::string dot =
+        run_arbiter("base", {"graph", "--live", "--view", "connections", "--format", "dot"}).out;
+    return dot.find(what) != std::string::npos;
+  };
+  await([&] { return drawn_on_base("<B>head</B>") && drawn_on_base("round trip "); });
+  // As its own host knows it, with what this one knows of its age.
+  await([&] { return drawn_on_base("● /Planner/speed:o ("); });
+  EXPECT_TRUE(drawn_on_base("▶ /Planner/speed:o"));
+  head.daemon().process().signal(SIGSTOP);
+  await([&] { return !drawn_on_base("● /Planner/speed:o ("); });
+  EXPECT_TRUE(drawn_on_base("▶ /Planner/speed:o")) << "decided here";
+  head.daemon().process().signal(SIGCONT);
+  await([&] { return drawn_on_base("● /Planner/speed:o ("); });
+  head.link().signal(SIGKILL);
+  await([&] { return drawn_on_base("gone for "); });
+}
+
 // Its link is there, and the daemon behind it does not answer.
 TEST_F(KnownHosts, OneWhoseDaemonIsStoppedIsNamed) {
   Host head("head", runtime_, kNoRules, network());
