@@ -2,6 +2,7 @@
 #include <fcntl.h>
 
 #include <algorithm>
+#include <iterator>
 #include <stdexcept>
 #include <system_error>
 
@@ -42,6 +43,7 @@ std::shared_ptr<const TapInput> map_tap_input(const wire::Received& announced,
                                               shm::Residence residence) {
   auto input = std::make_shared<TapInput>();
   input->instance = announced.message.peer;
+  input->identity = shm::identity_of(announced.descriptors[0]);
   input->mapping = map_input_segment(announced.descriptors[0]);
   shm::make_resident(input->mapping, 0, sizeof(shm::InputSegment), residence);
   const auto& segment = *input->mapping.as<const shm::InputSegment>();
@@ -77,51 +79,76 @@ TapCore::TapCore(std::string name, const Type& type, const TapOptions& options,
   shm::close_in_children(descriptor_);
 }
 
+namespace {
+
+// A daemon with memory of its own numbers ports from the beginning: one of its ports may have the
+// number of one from before, of which not all is taken yet. They lie one behind the other.
+template <class Link>
+using Links = std::multimap<shm::PortInstance, Link>;
+
+// The port that has that number now; null: there is none.
+template <class Link>
+Link* newest_of(Links<Link>& links, shm::PortInstance instance) {
+  const auto [begin, end] = links.equal_range(instance);
+  return begin == end ? nullptr : &std::prev(end)->second;
+}
+
+// No more than one from before, for a publisher may say again and again that it is another.
+template <class Link>
+Link& add_newest(Links<Link>& links, shm::PortInstance instance) {
+  if (links.count(instance) > 1) links.erase(links.lower_bound(instance));
+  return links.emplace(instance, Link{})->second;
+}
+
+}  // namespace
+
 // A source that is known already goes on as it is: a daemon that has taken over tells of it again.
 // An output port that another has in its place has ended, though no daemon was there to tell.
 void TapCore::add_source(std::shared_ptr<const TapSource> source) {
   const auto instance = source->output->instance;
-  const auto known = links_.find(instance);
-  if (known != links_.end() && known->second.source->link == source->link &&
-      known->second.source->identity == source->identity && !known->second.gone) {
-    return;
-  }
+  TapSourceLink* known = newest_of(links_, instance);
+  if (known != nullptr && !(known->source->identity == source->identity)) known = nullptr;
+  if (known != nullptr && known->source->link == source->link && !known->gone) return;
   for (auto& [other, link] : links_) {
-    if (other != instance && link.source->name == source->name) link.gone = true;
+    if (&link != known && link.source->name == source->name) link.gone = true;
   }
-  links_[instance] = {};
-  links_[instance].source = std::move(source);
+  TapSourceLink& added = known == nullptr ? add_newest(links_, instance) : *known;
+  added = {};
+  added.source = std::move(source);
   offer_view();
 }
 
 void TapCore::lose_source(shm::PortInstance output, std::optional<shm::ActivityWord> activity) {
-  const auto found = links_.find(output);
-  if (found == links_.end()) return;
-  found->second.gone = true;
-  found->second.end = activity;
+  TapSourceLink* const found = newest_of(links_, output);
+  if (found == nullptr) return;
+  found->gone = true;
+  found->end = activity;
   offer_view();
 }
 
 void TapCore::lose_all_of(shm::SourceId source) {
-  std::vector<shm::PortInstance> outputs;
-  for (const auto& [output, link] : links_) {
-    if (link.source->output->source == source && !link.gone) outputs.push_back(output);
+  bool is_lost = false;
+  for (auto& [output, link] : links_) {
+    if (link.source->output->source != source || link.gone) continue;
+    link.gone = is_lost = true;
+    link.end.reset();
   }
-  for (const shm::PortInstance output : outputs) lose_source(output, {});
+  if (is_lost) offer_view();
 }
 
 void TapCore::add_input(std::shared_ptr<const TapInput> input) {
   const auto instance = input->instance;
-  if (inputs_.count(instance) != 0) return;
+  const TapInputLink* const known = newest_of(inputs_, instance);
+  if (known != nullptr && known->input->identity == input->identity) return;
   for (auto& [other, link] : inputs_) link.gone = true;  // a port has one at a time
-  inputs_[instance] = {std::move(input), false};
+  add_newest(inputs_, instance).input = std::move(input);
   offer_view();
 }
 
 void TapCore::lose_input(shm::PortInstance input) {
-  const auto found = inputs_.find(input);
-  if (found == inputs_.end()) return;
-  found->second.gone = true;
+  TapInputLink* const found = newest_of(inputs_, input);
+  if (found == nullptr) return;
+  found->gone = true;
   offer_view();
 }
 

@@ -66,6 +66,7 @@ struct TapSourceLink {
 // The input port that is tapped, while a component has it open.
 struct TapInput {
   shm::PortInstance instance = 0;
+  shm::SegmentIdentity identity;
   shm::Mapping mapping;
   std::optional<shm::Bequest> bequest;
   mutable std::optional<TakeWatch> watch;                       // tap's thread, once it is told
@@ -196,8 +197,8 @@ class TapCore {
   shm::PortInstance instance_ = 0;
 
   // Service thread.
-  std::map<shm::PortInstance, TapSourceLink> links_;
-  std::map<shm::PortInstance, TapInputLink> inputs_;
+  std::multimap<shm::PortInstance, TapSourceLink> links_;
+  std::multimap<shm::PortInstance, TapInputLink> inputs_;
 
   Handover<TapSourceView> handover_;
 

@@ -82,6 +82,32 @@ TEST(Tap, HearsThatASourceHasEndedThoughNoDaemonWasThere) {
   EXPECT_EQ(wait_for_kind(tap, TapEventKind::closed).sequence(), 1u);
 }
 
+// A daemon that knows of nobody who was there before numbers ports from the beginning.
+TEST(Tap, HearsThatASourceHasEndedThoughItsSuccessorHasItsNumber) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto tap = node.tap<Number>("/out");
+  {
+    Component second("second");
+    ASSERT_EQ(second.tell("output /second"), "open");
+    Component sender("sender");
+    ASSERT_EQ(sender.tell("output /out"), "open");
+    sender.tell("publish /out 1");
+    EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 1);
+    daemon.kill();
+    second.kill();
+    sender.kill();
+  }
+  daemon.restart();
+  auto second = node.output_port<Number>("/second");  // behind the tap: it is known by now
+  Component successor("successor");
+  ASSERT_EQ(successor.tell("output /out"), "open");
+  successor.tell("publish /out 2");
+  EXPECT_EQ(wait_for_kind(tap, TapEventKind::closed).sequence(), 1u);
+  successor.tell("publish /out 3");
+  EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).source(), "/out");
+}
+
 TEST(Tap, HearsOfTheEndFromADaemonThatNeverKnewTheSource) {
   for (const TapOf of : {TapOf::output, TapOf::input}) {
     Daemon daemon(single_model());
