@@ -88,8 +88,9 @@ void Daemon::watch(int fd, Tag tag, ClientId client, std::uint32_t events) {
   epoll_event event{};
   event.events = events;
   event.data.u64 = event_key(static_cast<std::uint32_t>(tag), client);
-  if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) != 0 &&
-      (errno != EEXIST || epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, fd, &event) != 0)) {
+  // Most are watched already.
+  if (epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, fd, &event) != 0 &&
+      (errno != ENOENT || epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event) != 0)) {
     throw std::system_error(errno, std::generic_category(), "epoll_ctl");
   }
 }
@@ -167,7 +168,7 @@ void Daemon::hear_client(ClientId id, std::uint32_t events) {
   if ((events & EPOLLOUT) != 0) client.flush();
   if ((events & ~EPOLLOUT) != 0) client.has_turn = true;
   if (client.has_turn) turns_.add(client.user(), id);
-  watch_client(client);
+  watch_heard(client);
 }
 
 // It is given up in a turn of its user's, lest the end of a process that had a thousand nodes keep
@@ -205,10 +206,16 @@ void Daemon::give_turns() {
 // One that waits for its turn is not heard again before it, and whoever is heard is not until this.
 void Daemon::watch_client(Client& client) {
   const std::uint32_t in = client.has_turn ? 0u : static_cast<std::uint32_t>(EPOLLIN | EPOLLRDHUP);
-  const bool may_write = client.has_queue() && !client.is_held_back();
-  const std::uint32_t out = may_write ? static_cast<std::uint32_t>(EPOLLOUT) : 0u;
+  client.watches_queue = client.has_queue() && !client.is_held_back();
+  const std::uint32_t out = client.watches_queue ? static_cast<std::uint32_t>(EPOLLOUT) : 0u;
   watch(client.socket(), Tag::kClient, client.id(), in | out | EPOLLONESHOT);
-  client.watches_queue = out != 0;
+}
+
+// Who has hung up is heard whatever is asked for: while he waits for his turn, nothing is. Or a
+// thousand who have hung up at once would be heard again and again before one of them is served.
+void Daemon::watch_heard(Client& client) {
+  client.watches_queue = false;
+  if (!client.has_turn || (client.has_queue() && !client.is_held_back())) watch_client(client);
 }
 
 bool Daemon::handle_signal(int signal_descriptor) {

@@ -88,6 +88,8 @@ class Daemon final : private Takeover::Host {
   void hear_death(ClientId id);
   void give_turns();
   void watch_client(Client& client);
+  // After an event of its, which ends the watching.
+  void watch_heard(Client& client);
   // What is owed to strangers' descriptors and to the service manager, once in each round.
   void look_after_the_loop(shm::Nanoseconds now);
   // Handles what it has sent, a bounded part of it: others wait too. True: there may be more.

@@ -1,10 +1,12 @@
-// What the daemon keeps for those who hang up and live is bounded as what it has for those who are
-// here. On the fuzz target's stage, where thousands of processes cost nothing.
+// What those who hang up cost the daemon: what it keeps for those who live is bounded as what it
+// has for those who are here, and that they have gone it hears once. On the fuzz target's stage,
+// where thousands of processes cost nothing.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include <string>
+#include <vector>
 
 #include "tests/fuzz/daemon/stage.hpp"
 #include "tests/support/raw_port.hpp"
@@ -73,6 +75,26 @@ TEST(Absentees, CountAmongTheClientsOfTheirUser) {
   stage.run();
   EXPECT_THAT(refusal(stage, process), testing::HasSubstr("kMaxClients"));
   EXPECT_EQ(refusal(stage, another), "");
+}
+
+// The kernel says of each that it has hung up, whatever is asked for, until it is closed.
+TEST(HungUp, ManyAtOnceAreNotHeardAgainWhileTheyWaitForTheirTurn) {
+  allow_as_many_descriptors_as_may_be();
+  Stage stage;
+  const Process process(1 << 23, 4'000'000);
+  constexpr int kMany = 200;
+  std::vector<Connection> many;
+  for (int i = 0; i < kMany; ++i) {
+    many.emplace_back(stage.path(), process);
+    stage.run();
+    many.back().send(message(MessageKind::kHello, "many"));
+    stage.run();
+  }
+  many.clear();
+  Loop::heard = 0;
+  stage.run();
+  EXPECT_GE(Loop::heard, kMany);
+  EXPECT_LE(Loop::heard, 3 * kMany);
 }
 
 }  // namespace

@@ -73,6 +73,7 @@ void Loop::tell_to_return() const {
 int wait_for_events(int epoll, epoll_event* events, int most, int timeout_ms) {
   require(++Loop::rounds < kMostRounds, "the daemon rests when it has nothing to do");
   const int count = __real_epoll_wait(epoll, events, most, 0);
+  Loop::heard += std::max(count, 0);
   if (count != 0 || timeout_ms == 0) return count;
   const shm::Nanoseconds timeout =
       timeout_ms < 0 ? shm::kForever : shm::Nanoseconds{timeout_ms} * 1'000'000;

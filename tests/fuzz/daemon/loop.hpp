@@ -36,6 +36,7 @@ class Loop {
   static inline shm::Nanoseconds now = 0;
   static inline shm::Nanoseconds may_pass = 0;  // how much time, in this run
   static inline int rounds = 0;                 // in this run
+  static inline int heard = 0;                  // events, since somebody has set it
   static inline bool was_told_to_return = false;
 
  private:
