@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <deque>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -30,6 +31,11 @@ struct Batch {
   Nanoseconds horizon = 0;
   // Watching begins here: these come before all that follows, in this order.
   bool is_start = false;
+
+  template <class T>
+  void add(T record) {
+    records.push_back(std::make_shared<const Record>(std::move(record)));
+  }
 };
 
 class RecordQueue {

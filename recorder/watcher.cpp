@@ -14,7 +14,6 @@ namespace {
 
 using evidence::ActivityWord;
 using evidence::ModelChange;
-using evidence::PortChange;
 using evidence::SourceContext;
 using evidence::SourceState;
 
@@ -33,11 +32,6 @@ std::vector<evidence::ModelFile> files_of(const std::vector<rules::FileText>& te
   files.reserve(texts.size());
   for (const rules::FileText& text : texts) files.push_back({text.path, text.content});
   return files;
-}
-
-template <class T>
-void add(Batch& batch, T record) {
-  batch.records.push_back(std::make_shared<const Record>(std::move(record)));
 }
 
 }  // namespace
@@ -111,9 +105,7 @@ void Watcher::begin() {
   node_.reset();
   node_.emplace(options_.caller.name, options_.node);
   sources_.clear();
-  ports_.clear();
-  knows_ports_ = false;
-  last_death_ = shm::monotonic_now();
+  ports_ = OpenPorts(shm::monotonic_now());
   refusals_.clear();
   instance_->catch_up();
   const auto model = watch::ModelInForce::fetch(*instance_);
@@ -132,11 +124,11 @@ void Watcher::begin() {
   }
   Batch start;
   start.is_start = true;
-  add(start,
+  start.add(
       evidence::Start{shm::monotonic_now(), instance_->name(), options_.ports, options_.payloads});
   for (RecordPtr& record : states.records) start.records.push_back(std::move(record));
   for (RecordPtr& record : taps.records) start.records.push_back(std::move(record));
-  add(start, model_change(model));
+  start.add(model_change(model));
   queue_.push(std::move(start));
   hand_over_taps(true);
   try {
@@ -161,7 +153,7 @@ void Watcher::take_up_model() {
     if (model.generation() != memory_->tables().generation()) continue;
     generation_ = model.generation();
     Batch batch;
-    add(batch, model_change(model));
+    batch.add(model_change(model));
     tap_newcomers(chosen_sources(model), batch);
     queue_.push(std::move(batch));
     hand_over_taps(false);
@@ -250,7 +242,7 @@ void Watcher::open_tap(const std::string& source, Batch& batch) {
     watched.seen = watched.reported = page_word(source);
     refusals_.emplace_back(source, error.what());
     const Nanoseconds now = shm::monotonic_now();
-    add(batch,
+    batch.add(
         evidence::Missed{source, now, now, 0, 0, evidence::Missed::Why::refused, error.what()});
   }
 }
@@ -327,7 +319,7 @@ void Watcher::add_page_state(const std::string& source, ActivityWord word, Batch
   state.seen = shm::monotonic_now();
   state.generation = generation_;
   state.word = word;
-  add(batch, std::move(state));
+  batch.add(std::move(state));
 }
 
 // What nobody tells: an operator deactivates a source whose port is closed; a publisher dies
@@ -351,90 +343,20 @@ void Watcher::look_at_pages() {
   if (!batch.records.empty()) queue_.push(std::move(batch));
 }
 
-Watcher::Ports Watcher::ports_of(const wire::Status& status) {
-  Ports ports;
-  const auto note = [&](bool is_input, const std::string& name, const auto& open) {
-    PortChange& port = ports[{is_input, name}];
-    port.is_input = is_input;
-    port.port = name;
-    port.node = open.component.node;
-    port.pid = open.component.pid;
-    if (open.type) port.type = open.type->name;
-  };
-  for (const auto& source : status.sources) {
-    if (source.open) note(false, source.name, *source.open);
-  }
-  for (const auto& input : status.inputs) {
-    if (input.open) note(true, input.name, *input.open);
-  }
-  return ports;
-}
-
 void Watcher::look_at_ports() {
   const Nanoseconds now = shm::monotonic_now();
   const bool is_due =
-      !knows_ports_ || now - last_ports_ >= kPortsAtLeastEvery ||
+      !ports_.is_known() || now - last_ports_ >= kPortsAtLeastEvery ||
       (now - last_ports_ >= kPortsAtMostEvery && ports_changed_.load(std::memory_order_relaxed));
   if (!is_due || !instance_->has_daemon()) return;
   ports_changed_.store(false, std::memory_order_relaxed);
   last_ports_ = now;
   try {
     const wire::Status status = instance_->status();
-    note_ports(ports_of(status), status.deaths);
+    Batch batch;
+    ports_.note(status, shm::monotonic_now(), batch);
+    if (!batch.records.empty()) queue_.push(std::move(batch));
   } catch (const wire::RefusedError&) {  // the policy does not let this user ask
-  }
-}
-
-void Watcher::note_ports(Ports ports, const std::vector<wire::DeathStatus>& deaths) {
-  Batch batch;
-  const Nanoseconds seen = shm::monotonic_now();
-  const auto tell = [&](PortChange change, PortChange::What what, Nanoseconds when) {
-    change.what = what;
-    change.seen = when;
-    add(batch, std::move(change));
-  };
-  const auto is_same = [](const PortChange& one, const PortChange& other) {
-    return one.pid == other.pid && one.node == other.node && one.type == other.type;
-  };
-  note_deaths(deaths, batch);
-  for (const auto& [key, before] : ports_) {
-    const auto now = ports.find(key);
-    if (now != ports.end() && is_same(now->second, before)) continue;
-    tell(before, PortChange::What::closed, seen);
-  }
-  for (const auto& [key, now] : ports) {
-    const auto before = ports_.find(key);
-    if (before != ports_.end() && is_same(before->second, now)) continue;
-    tell(now, knows_ports_ ? PortChange::What::opened : PortChange::What::open, seen);
-  }
-  knows_ports_ = true;
-  ports_ = std::move(ports);
-  if (!batch.records.empty()) queue_.push(std::move(batch));
-}
-
-// Also of ports that were opened since the last look.
-void Watcher::note_deaths(const std::vector<wire::DeathStatus>& deaths, Batch& batch) {
-  const Nanoseconds before = last_death_;
-  for (const wire::DeathStatus& death : deaths) {
-    if (death.at <= before) continue;
-    last_death_ = std::max(last_death_, death.at);
-    for (const bool is_input : {false, true}) {
-      for (const std::string& name : is_input ? death.inputs : death.outputs) {
-        PortChange change;
-        const auto known = ports_.find({is_input, name});
-        if (known != ports_.end() && known->second.pid == death.pid) {
-          change = known->second;
-          ports_.erase(known);  // and is not closed besides
-        }
-        change.what = PortChange::What::died;
-        change.is_input = is_input;
-        change.port = name;
-        change.node = death.node;
-        change.pid = death.pid;
-        change.seen = death.at;
-        add(batch, std::move(change));
-      }
-    }
   }
 }
 

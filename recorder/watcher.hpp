@@ -21,6 +21,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "evidence/rule_table.hpp"
+#include "recorder/open_ports.hpp"
 #include "recorder/options.hpp"
 #include "recorder/record_queue.hpp"
 #include "recorder/tap_reader.hpp"
@@ -54,8 +55,6 @@ class Watcher {
   void note_ports_changed() { ports_changed_.store(true, std::memory_order_relaxed); }
 
  private:
-  using Ports = std::map<std::pair<bool, std::string>, evidence::PortChange>;
-
   void run();
   void look();
   void begin();
@@ -76,9 +75,6 @@ class Watcher {
   void look_at_pages();
   void try_refused();
   void look_at_ports();
-  void note_deaths(const std::vector<wire::DeathStatus>& deaths, Batch& batch);
-  [[nodiscard]] static Ports ports_of(const wire::Status& status);
-  void note_ports(Ports ports, const std::vector<wire::DeathStatus>& deaths);
 
   const RecorderOptions& options_;
   RecordQueue& queue_;
@@ -95,10 +91,8 @@ class Watcher {
     evidence::ActivityWord reported = shm::kNeverActive;
   };
   std::map<std::string, Watched> sources_;
-  Ports ports_;
-  bool knows_ports_ = false;
+  OpenPorts ports_{0};
   Nanoseconds last_ports_ = 0;
-  Nanoseconds last_death_ = 0;
   std::vector<std::shared_ptr<TapReader>> opened_;  // and not handed over yet
 
   std::mutex mutex_;
