@@ -1,4 +1,6 @@
-// arbiter reload, switch, rollback and history, and what the next daemon makes of it.
+// arbiter reload, switch, rollback and history.
+#include "tests/service/changing_models.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/inotify.h>
@@ -7,10 +9,8 @@
 #include <arbiter/arbiter.hpp>
 
 #include "tests/cli/arbiter_program.hpp"
-#include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
-#include "tests/support/daemon.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -19,35 +19,6 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 using wire::MessageKind;
-
-// The models "default", which takes /a, and "other", which takes /b.
-class ChangingModels : public testing::Test {
- protected:
-  Daemon& start(const std::vector<std::string>& arguments = {}) {
-    Daemon::Options options;
-    options.arguments = {"--model", "other=" + files_.write("other.xml", only("b"))};
-    options.arguments.insert(options.arguments.end(), arguments.begin(), arguments.end());
-    return daemon_.emplace(only("a"), options);
-  }
-  void write_other(const std::string& text) { files_.write("other.xml", text); }
-
-  std::string source_in_force() { return daemon_->input("/in")["connections"][0]["source"]; }
-  std::string name_in_force() { return daemon_->status()["model"]["name"]; }
-
-  TemporaryDirectory files_;
-  std::optional<Daemon> daemon_;
-};
-
-void expect_success(const ProgramResult& result, const std::string& out) {
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(result.out, out);
-  EXPECT_EQ(result.err, "");
-}
-void expect_refusal(const ProgramResult& result, const std::string& err) {
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.out, "");
-  EXPECT_EQ(result.err, "arbiter: " + err + "\n");
-}
 
 TEST_F(ChangingModels, SwitchGoesToAnotherModelAndListsAll) {
   start();
@@ -362,74 +333,6 @@ TEST_F(ChangingModels, WaitForEachOther) {
   const std::vector<std::pair<std::uint64_t, std::uint32_t>> expected{{1, 2}, {2, 3}, {3, 3},
                                                                       {4, 4}, {5, 5}, {6, 0}};
   EXPECT_EQ(answers, expected);
-  EXPECT_EQ(name_in_force(), "other");
-}
-
-TEST_F(ChangingModels, TheNextDaemonGoesOnWithTheModelOfThatName) {
-  Daemon& daemon = start();
-  Node node("test");
-  auto b = node.output_port<Number>("/b");
-  auto in = node.input_port<Number>("/in");
-  ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
-  daemon.kill();
-  daemon.restart();
-  EXPECT_EQ(name_in_force(), "other");
-  EXPECT_EQ(b.publish(Number{1}).delivered, 1u);
-  EXPECT_EQ(take_from(in), 1);
-  const auto history = daemon.status()["history"];
-  ASSERT_EQ(history.size(), 2u);
-  EXPECT_EQ(history[0]["how"], "start");
-  EXPECT_EQ(history[1]["how"], "takeover");
-  EXPECT_EQ(history[1]["name"], "other");
-  expect_refusal(arbiter({"rollback"}),
-                 "model 2 is not kept any longer, or was another daemon's; only its name is known");
-}
-
-TEST_F(ChangingModels, TheNextDaemonThatLacksTheModelBeginsWithItsFirst) {
-  Daemon& daemon = start();
-  Node node("test");
-  auto in = node.input_port<Number>("/in");
-  daemon.write_model(only("c"));
-  ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
-  daemon.kill();
-  daemon.restart_without_model();  // it has "other" yet
-  EXPECT_EQ(name_in_force(), "other");
-  EXPECT_EQ(source_in_force(), "/b");
-}
-
-// Whenever it dies, what was in force goes on under its name.
-TEST_F(ChangingModels, ADaemonKilledInTheMiddleOfASwitchLeavesOneOfTheTwo) {
-  Daemon& daemon = start();
-  Node node("test");
-  auto a = node.output_port<Number>("/a");
-  auto b = node.output_port<Number>("/b");
-  auto in = node.input_port<Number>("/in");
-  Component stopped("stopped");
-  ASSERT_EQ(stopped.tell("output /c"), "open");
-  for (int i = 0; i < 3; ++i) {
-    RawClient client(daemon.instance());
-    client.hello("asks");
-    stopped.process().stop();  // what the switch waits for
-    client.send(RawClient::message(MessageKind::kSwitch, i % 2 == 0 ? "other" : "default"));
-    while (a.publish(Number{1}).delivered + b.publish(Number{2}).delivered == 0) {
-    }
-    daemon.kill();
-    stopped.process().signal(SIGCONT);
-    daemon.restart();
-    const auto history = daemon.status()["history"];
-    ASSERT_EQ(history.size(), 2u);
-    EXPECT_EQ(history[0]["name"], history[1]["name"]);
-    const bool is_other = history[0]["name"] == "other";
-    EXPECT_EQ(a.publish(Number{1}).delivered, is_other ? 0u : 1u);
-    EXPECT_EQ(b.publish(Number{2}).delivered, is_other ? 1u : 0u);
-  }
-}
-
-TEST_F(ChangingModels, TheDescriptorStoreKeepsTheNameToo) {
-  Daemon& daemon = start({"--descriptor-store"});
-  ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
-  daemon.kill();
-  daemon.restart_with_stored();
   EXPECT_EQ(name_in_force(), "other");
 }
 

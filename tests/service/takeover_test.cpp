@@ -10,6 +10,7 @@
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
+#include "tests/service/impatient.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/raw_port.hpp"
 #include "tests/support/threads.hpp"
@@ -18,14 +19,6 @@ namespace arbiter::test {
 namespace {
 
 constexpr auto kForEver = std::chrono::hours::max();
-
-// Waits for no daemon for long.
-NodeOptions impatient() {
-  NodeOptions options;
-  options.connect_timeout = std::chrono::milliseconds(1);
-  options.on_waiting = [](const std::string&) {};
-  return options;
-}
 
 TEST(Takeover, WhatIsOpenStaysOpenAndObeysTheNewModel) {
   Daemon daemon(only("a"));
@@ -226,65 +219,6 @@ TEST(Takeover, WhoeverComesBeforeTheModelIsInForceWaitsForIt) {
   auto out = node.output_port<Number>("/out");
   EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
   EXPECT_EQ(take_from(in), 1);
-}
-
-TEST(Takeover, OpeningWaitsForADaemon) {
-  Daemon daemon(single_model());
-  const auto patient = [](std::atomic<int>& told) {
-    NodeOptions options;
-    options.connect_timeout = std::chrono::hours(1);
-    options.on_waiting = [&told](const std::string& text) {
-      EXPECT_NE(text.find("waits for an arbiterd of instance \"test\""), std::string::npos) << text;
-      ++told;
-    };
-    return options;
-  };
-  std::atomic<int> early_told{0};
-  std::atomic<int> late_told{0};
-  Node node("early", patient(early_told));
-  daemon.kill();
-  std::thread opener([&] { auto out = node.output_port<Number>("/out"); });
-  std::thread starter([&] { Node("late", patient(late_told)); });
-  while (early_told == 0 || late_told == 0) {
-  }
-  daemon.restart();
-  opener.join();
-  starter.join();
-  EXPECT_EQ(early_told, 1);
-  EXPECT_EQ(late_told, 1);
-}
-
-TEST(Takeover, OpeningWithoutADaemonEndsInTime) {
-  Daemon daemon(single_model());
-  Node node("test", impatient());
-  daemon.kill();
-  try {
-    auto out = node.output_port<Number>("/out");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("no arbiterd of instance \"test\" answered"),
-              std::string::npos)
-        << error.what();
-  }
-  daemon.restart();
-  auto out = node.output_port<Number>("/out");
-}
-
-TEST(Takeover, OpeningWhileTheDaemonIsStoppedEndsInTime) {
-  Daemon daemon(single_model());
-  Node node("test", impatient());
-  daemon.process().stop();
-  try {
-    auto out = node.output_port<Number>("/out");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_STREQ(error.what(), "the daemon is there, but has not answered in time");
-  }
-  daemon.process().signal(SIGCONT);
-  // What it opens too late is closed again.
-  auto out = node.output_port<Number>("/other");
-  while (daemon.source("/out")["open"] == true) {
-  }
 }
 
 TEST(Takeover, WithoutAServiceThreadComesWithTheNextCall) {
