@@ -7,7 +7,8 @@
 //
 // Invariants
 //  1. Entry n lies at index (n - first) % depth of the ring; storing it takes entry n - depth out.
-//  2. A slot is written only while no ring has an entry of it and no receiver holds it.
+//  2. A slot is written only while no receiver holds it, and no ring has an entry of it that its
+//     receiver is not done with.
 //  3. A receiver reads a slot only while it holds it, and it holds it only if the entry was still
 //     in the ring after the hold could be seen.
 //  4. A receiver reads only entries from `first` on, which the publisher stored when it had mapped
@@ -17,6 +18,9 @@
 // again; the publisher overwrites the entry, passes fence (b), and reads the holds. Of the two
 // fences one comes first: either the receiver sees the entry gone and lets go, or the publisher
 // sees the hold and waits.
+//
+// And why a receiver's word is enough: what it is done with it reads only while it holds it, and it
+// says so behind its hold. It looks at no entry twice; one that lies reads what nobody promises it.
 #pragma once
 
 #include <cstdint>
@@ -94,6 +98,20 @@ class ChannelWriter {
     return evicted;
   }
 
+  // Takes out of the queue what the receiver is done with, by its own word, before newer samples
+  // push it out. Calls `evicted(slot)` for each; the entries stay where they are.
+  // SYNC POINT: entries-consumed. The acquire pairs with the release in ChannelReader::tell(): who
+  // finds an entry done with finds the hold on its slot, too, or the end of that hold.
+  template <class Evicted>
+  void forget(const Atomic<std::uint64_t>& consumed, Evicted evicted) noexcept {
+    // More than were ever accepted is a lie, and nothing is forgotten for it.
+    const std::uint64_t waiting = accepted_ - consumed.load(std::memory_order_acquire);
+    for (; live_ > waiting; --live_) {
+      const std::uint32_t oldest = next_ < live_ ? next_ + depth_ - live_ : next_ - live_;
+      evicted(slot_of(ring_[oldest].load(std::memory_order_relaxed)));  // our own store
+    }
+  }
+
   // Whether `depth` samples wait, given the receiver's own word for how far it is. A receiver that
   // lies harms nobody else: it is refused samples, or overtaken.
   [[nodiscard]] bool is_full(std::uint64_t consumed) const noexcept {
@@ -111,7 +129,7 @@ class ChannelWriter {
   std::uint64_t accepted_ = 0;
   std::uint32_t depth_ = 1;
   std::uint32_t next_ = 0;  // index of the next entry
-  std::uint32_t live_ = 0;  // entries stored since join(), at most depth
+  std::uint32_t live_ = 0;  // the newest entries since join() that are not forgotten, at most depth
 };
 
 class ChannelReader {
@@ -224,6 +242,10 @@ class ChannelReader {
   void skip(std::uint64_t count) noexcept {
     next_ = (next_ + count) & kSequenceMask;
     advance(static_cast<std::uint32_t>(count % depth_));
+  }
+  // Says so to the publisher, in its lane. SYNC POINT: entries-consumed.
+  void tell(Atomic<std::uint64_t>& consumed) const noexcept {
+    consumed.store(this->consumed(), std::memory_order_release);
   }
   [[nodiscard]] std::uint64_t consumed() const noexcept { return next_ - 1; }
   [[nodiscard]] std::uint64_t next() const noexcept { return next_; }

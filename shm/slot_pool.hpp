@@ -2,7 +2,7 @@
 // shared.
 //
 // A slot goes round: free -> loaned -> in queues -> retired -> free. It is retired when the last
-// ring entry of it is overwritten, and becomes free once no receiver holds it.
+// ring entry of it is overwritten or forgotten, and becomes free once no receiver holds it.
 //
 // Invariant: with at least (sum of the queues' depths) + (sum of the receivers' max_held) + (loans)
 // slots, acquire() always finds one: at worst every queue is full of samples of its own, every
@@ -41,10 +41,12 @@ class SlotPool {
 
   // A free slot, or kNoSlot. `for_each_holds(f)` calls f(const Atomic<Hold>* holds, count) for
   // every receiver that may hold slots of `publisher`. A fence (b) stands between the last evict()
-  // and this.
+  // and this, or the slot was forgotten (ChannelWriter::forget()). `recent`: the one that was used
+  // last, for it may be in the cache; else retired slots are looked at only where none is free.
   template <class ForEachHolds>
-  [[nodiscard]] std::uint32_t acquire(PortInstance publisher, ForEachHolds for_each_holds) {
-    if (free_.empty()) reclaim(publisher, for_each_holds);
+  [[nodiscard]] std::uint32_t acquire(PortInstance publisher, ForEachHolds for_each_holds,
+                                      bool recent = false) {
+    if (free_.empty() || (recent && !retired_.empty())) reclaim(publisher, for_each_holds);
     if (free_.empty()) return kNoSlot;
     const std::uint32_t slot = free_.back();
     free_.pop_back();

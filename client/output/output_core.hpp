@@ -136,6 +136,10 @@ class OutputCore {
   // How often a decision is taken anew because seven models were loaded during it.
   static constexpr int kMaxTableRetries = 3;
 
+  // To write samples from here on takes longer than to look at what receivers are done with: a few
+  // lines that others write, and a walk through their holds.
+  static constexpr std::size_t kSmallestLarge = std::size_t{32} << 10;
+
   // As last_, before this port's first arrival: a predecessor's.
   static constexpr shm::Nanoseconds kUnknown = -1;
 
@@ -180,11 +184,15 @@ class OutputCore {
   void tell_arrival(std::uint32_t slot) noexcept;
   void tell_deactivation() noexcept;
   [[nodiscard]] Counts refuse(const Destination& destination, bool is_sample) const noexcept;
+  [[nodiscard]] const shm::Lane* lane_of(Destination& destination) const noexcept;
   [[nodiscard]] bool is_full(Destination& destination) const noexcept;
   static void ring_if_waiting(Destination& destination) noexcept;
   void ring_where_selection_changed() noexcept;
   [[nodiscard]] bool selection_differs(const Destination& destination) noexcept;
-  std::uint32_t acquire_slot() noexcept;
+  // For a sample of that many bytes.
+  std::uint32_t acquire_slot(std::size_t size) noexcept;
+  // Retires what all receivers are done with.
+  void forget_consumed() noexcept;
 
   // Constant once bound.
   const std::string name_;

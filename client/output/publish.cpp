@@ -19,8 +19,13 @@
 
 namespace arbiter::detail {
 
-std::uint32_t OutputCore::acquire_slot() noexcept {
-  const std::uint32_t slot = pool_.acquire(instance_, [&](auto&& each) {
+// A large sample is written to the slot that was used last: round all slots of a queue that nothing
+// waits in, each would be written after it has left the cache. A small one does not pay for a look
+// at what receivers write.
+std::uint32_t OutputCore::acquire_slot(std::size_t size) noexcept {
+  const bool is_large = size >= kSmallestLarge;
+  if (is_large) forget_consumed();
+  const auto each_hold = [&](auto&& each) {
     // SYNC POINT: kept-sample-held. Fence (b) for what is kept for taps, here and not in each
     // publish: between what has given way and our reading of holds. Pairs with fence (e) of a tap.
     if (!teller_.seats().empty()) shm::full_fence();
@@ -29,16 +34,25 @@ std::uint32_t OutputCore::acquire_slot() noexcept {
     for (const Destination& destination : destinations_) {
       each(destination.peer->segment->header.holds, destination.peer->max_held);
     }
-  });
+  };
+  const std::uint32_t slot = pool_.acquire(instance_, each_hold, is_large);
   // Its last receiver has it in its cache: let it come back while the sample is written.
   if (slot != shm::kNoSlot) shm::prefetch_to_write(&segment_.slot_header(slot));
   return slot;
 }
 
+[[gnu::noinline]] void OutputCore::forget_consumed() noexcept {
+  for (Destination& destination : destinations_) {
+    const shm::Lane* const lane = destination.joined ? lane_of(destination) : nullptr;
+    if (lane == nullptr) continue;
+    destination.writer.forget(lane->consumed, [&](std::uint32_t slot) { pool_.evict(slot); });
+  }
+}
+
 LoanedSlot OutputCore::loan(std::size_t size) noexcept {
   if (handover_.has_offer()) accept_view();
   if (size > type_.size || loans_ == max_loans_) return {};
-  const std::uint32_t slot = acquire_slot();
+  const std::uint32_t slot = acquire_slot(size);
   if (slot == shm::kNoSlot) {
     count(segment_.header().counters.no_slot);
     return {};
@@ -184,27 +198,31 @@ Counts OutputCore::refuse(const Destination& destination, bool is_sample) const 
   return outcome;
 }
 
-// The receiver's lane for us tells how far it has read; until it has one, it has read nothing.
+// The receiver's lane for us tells how far it has read; null: it has none yet.
 // SYNC POINT: lane-given. The acquire pairs with the release in InputCore::accept_view(): who finds
-// a lane its own finds no earlier publisher's count in it. Relaxed is enough for the count: it says
-// what may be pushed; what may be written, the holds say.
-bool OutputCore::is_full(Destination& destination) const noexcept {
-  const shm::InputSegment& segment = *destination.peer->segment;
+// a lane its own finds no earlier publisher's count in it.
+const shm::Lane* OutputCore::lane_of(Destination& destination) const noexcept {
   const auto is_ours = [&](const shm::Lane& lane) {
     return lane.publisher.load(std::memory_order_acquire) == instance_ &&
            lane.link.load(std::memory_order_relaxed) == destination.link;
   };
   if (destination.lane == nullptr || !is_ours(*destination.lane)) {
     destination.lane = nullptr;
-    for (const shm::Lane& lane : segment.lanes) {
+    for (const shm::Lane& lane : destination.peer->segment->lanes) {
       if (is_ours(lane)) destination.lane = &lane;
     }
   }
+  return destination.lane;
+}
+
+// Until the receiver has a lane for us, it has read nothing. Relaxed is enough for its count: it
+// says what may be pushed; what may be written, the holds say.
+bool OutputCore::is_full(Destination& destination) const noexcept {
+  const shm::Lane* const lane = lane_of(destination);
   const std::uint64_t nothing_read =
       destination.writer.channel().first.load(std::memory_order_relaxed) - 1;
-  const std::uint64_t consumed = destination.lane == nullptr
-                                     ? nothing_read
-                                     : destination.lane->consumed.load(std::memory_order_relaxed);
+  const std::uint64_t consumed =
+      lane == nullptr ? nothing_read : lane->consumed.load(std::memory_order_relaxed);
   if (consumed > destination.writer.accepted() &&
       !destination.peer->misbehaved.exchange(true, std::memory_order_relaxed)) {
     memory_->service_bell().ring();
@@ -254,7 +272,7 @@ Counts OutputCore::publish_loan(std::uint32_t slot, std::size_t size,
 
 Counts OutputCore::publish_copy(const void* data, std::size_t size, shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
-  const std::uint32_t slot = acquire_slot();
+  const std::uint32_t slot = acquire_slot(size);
   if (slot == shm::kNoSlot) {
     count(segment_.header().counters.no_slot);
     return signal(now);  // it did arrive

@@ -98,6 +98,35 @@ TEST(ZeroCopy, ALoanIsMemoryOfTheSegmentAndPublishingMovesItNowhere) {
   }
 }
 
+// A large sample is written to memory that may be in the cache still.
+TEST(ZeroCopy, ALargeSampleIsWrittenWhereTheLastOneWasOnceThatIsDoneWith) {
+  Daemon daemon(single_model());
+  Node node("camera");
+  auto out = node.output_port<Image>("/out");
+  auto in = node.input_port<Image>("/in", {.max_held = 2});
+  const auto publish = [&](unsigned char value) {
+    auto loan = out.loan();
+    Image* const image = loan->get();
+    image->bytes[0] = value;
+    out.publish(std::move(*loan));
+    return image;
+  };
+  const Image* const first = publish(1);
+  ASSERT_TRUE(in.take());
+  EXPECT_EQ(publish(2), first);
+  const auto held = in.take();
+  ASSERT_TRUE(held);
+  const Image* const second = publish(3);
+  EXPECT_NE(second, first) << "a sample is held there";
+  EXPECT_NE(publish(4), second) << "a sample waits there";
+  EXPECT_EQ((*held)->bytes[0], 2);
+  for (const int value : {3, 4}) {
+    const auto sample = in.take();
+    ASSERT_TRUE(sample);
+    EXPECT_EQ((*sample)->bytes[0], value);
+  }
+}
+
 TEST(ZeroCopy, UntypedSamplesAreReadInPlaceToo) {
   Daemon daemon(single_model());
   Node node("camera");

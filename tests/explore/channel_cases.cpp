@@ -12,6 +12,7 @@ struct World {
   Publisher publisher;
   Receiver receiver;
   shm::Atomic<shm::Hold> hold{0};
+  shm::Atomic<std::uint64_t> consumed{0};
   Plain<std::uint64_t> payloads[SegmentMemory::kSlots];
 
   // A queue with as few slots as may be, full, and with some samples overtaken already.
@@ -54,6 +55,40 @@ const Register kDepth2("TheQueueAloneKeepsItsPromiseWithDepth2", {5, 3},
                          World world;
                          explore(publish_and_take(world, 2, 3, 2));
                        });
+
+// A publisher that uses again at once what its receiver says it is done with.
+Explorer::Scenario forget_and_reuse(World& world, std::uint32_t depth, int publishes, int takes) {
+  return [&world, depth, publishes, takes](Execution& execution) {
+    world.reset(depth);
+    world.consumed.store(0);
+    world.publisher.consumed = &world.consumed;
+    world.receiver.consumed = &world.consumed;
+    execution.thread([&world, publishes] {
+      for (int i = 0; i < publishes; ++i) world.publisher.publish();
+    });
+    execution.thread([&world, takes] {
+      for (int i = 0; i < takes; ++i) world.receiver.take_and_read_later();
+    });
+    execution.finally([&world] {
+      while (world.receiver.take()) {
+      }
+      require(world.receiver.last == world.publisher.published, "the newest sample is not there");
+      world.publisher.writer.leave([&](std::uint32_t slot) { world.publisher.pool.evict(slot); });
+      world.publisher.pool.require_balance();
+    });
+  };
+}
+
+const Register kForgets1("WhatAReceiverIsDoneWithIsNotWrittenWhileItHoldsItWithDepth1", {4, 3},
+                         [](const Explore& explore) {
+                           World world;
+                           explore(forget_and_reuse(world, 1, 2, 2));
+                         });
+const Register kForgets2("WhatAReceiverIsDoneWithIsNotWrittenWhileItHoldsItWithDepth2", {4, 3},
+                         [](const Explore& explore) {
+                           World world;
+                           explore(forget_and_reuse(world, 2, 3, 2));
+                         });
 
 // A queue ends while its receiver takes hold, and its slots are used again at once.
 Explorer::Scenario leave_and_reuse(World& world) {

@@ -45,10 +45,15 @@ struct Publisher {
   const shm::Atomic<shm::Hold>* holds = nullptr;
   std::uint32_t hold_count = 0;
   std::uint64_t published = 0;
+  // How far the receiver is; null: its publisher does not look, as with samples that are small.
+  const shm::Atomic<std::uint64_t>* consumed = nullptr;
 
   std::uint32_t acquire() {
-    const std::uint32_t slot =
-        pool.acquire(instance, [&](auto&& each) { each(holds, hold_count); });
+    if (consumed != nullptr) {
+      writer.forget(*consumed, [&](std::uint32_t slot) { pool.evict(slot); });
+    }
+    const std::uint32_t slot = pool.acquire(
+        instance, [&](auto&& each) { each(holds, hold_count); }, consumed != nullptr);
     require(slot != shm::kNoSlot, "no slot is free");
     return slot;
   }
@@ -77,6 +82,7 @@ struct Receiver {
   Plain<std::uint64_t>* payloads = nullptr;
   std::uint64_t lost = 0;
   std::uint64_t last = 0;
+  shm::Atomic<std::uint64_t>* consumed = nullptr;  // its word for how far it is
 
   // Takes, reads and gives back one sample; what it reads must be what was published.
   bool take() {
@@ -87,6 +93,20 @@ struct Receiver {
     require(value > last, "a sample came twice, or late");
     last = value;
     reader.consume();
+    if (consumed != nullptr) reader.tell(*consumed);
+    shm::ChannelReader::release(*hold);
+    return true;
+  }
+  // The same with the port's order of things: it says that it is done with the entry as soon as it
+  // holds the slot, and reads later.
+  bool take_and_read_later() {
+    const shm::Entry entry = reader.peek(lost);
+    if (entry == 0 || !reader.hold(entry, *hold)) return false;
+    reader.consume();
+    reader.tell(*consumed);
+    require(payloads[shm::slot_of(entry)].read() == shm::sequence_of(entry),
+            "a sample was written over while it was held");
+    last = shm::sequence_of(entry);
     shm::ChannelReader::release(*hold);
     return true;
   }

@@ -105,6 +105,43 @@ TEST_F(Channels, EachSlotThatWentInComesOutOnceByEvictionOrWhenTheQueueEnds) {
   }
 }
 
+TEST_F(Channels, WhatAReceiverIsDoneWithComesOutOnceHoweverFarItIs) {
+  for (std::uint32_t depth = 1; depth <= 4; ++depth) {
+    for (std::uint32_t pushes = 0; pushes <= 9; ++pushes) {
+      for (std::uint32_t done = 0; done <= pushes; ++done) {
+        ChannelWriter writer = join(depth, kReceiver, 0);
+        const std::uint64_t before = writer.accepted();
+        std::vector<int> out(pushes + depth, 0);
+        const auto count = [&](std::uint32_t slot) { ++out[slot]; };
+        const auto push_and_count = [&](std::uint32_t slot) {
+          if (const std::uint32_t evicted = writer.push(slot); evicted != kNoSlot) count(evicted);
+        };
+        for (std::uint32_t slot = 0; slot < pushes; ++slot) push_and_count(slot);
+        const Atomic<std::uint64_t> consumed{before + done};
+        writer.forget(consumed, count);
+        writer.forget(consumed, count);
+        for (std::uint32_t slot = 0; slot < pushes; ++slot) {
+          const bool is_overtaken = slot + depth < pushes;
+          EXPECT_EQ(out[slot], slot < done || is_overtaken ? 1 : 0) << slot << " of " << pushes;
+        }
+        // The rest comes out as if nothing had been forgotten.
+        for (std::uint32_t slot = pushes; slot < pushes + depth; ++slot) push_and_count(slot);
+        writer.leave(count);
+        for (const int times : out) EXPECT_EQ(times, 1);
+      }
+    }
+  }
+}
+
+TEST_F(Channels, AReceiverThatLiesAboutHowFarItIsTakesNothingOut) {
+  ChannelWriter writer = join(3);
+  push(writer, 1);
+  for (const std::uint64_t lie : {writer.accepted() + 1, UINT64_MAX, kSequenceMask}) {
+    const Atomic<std::uint64_t> consumed{lie};
+    writer.forget(consumed, [](std::uint32_t slot) { ADD_FAILURE() << slot; });
+  }
+}
+
 TEST_F(Channels, OneThatIsNotNamedHasNoQueue) {
   join(4, kOther);
   ChannelReader receiver = reader();

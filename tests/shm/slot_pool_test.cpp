@@ -23,12 +23,13 @@ class Play {
   }
   Play(const Play&) = delete;
 
-  std::uint32_t loan() {
-    const std::uint32_t slot = pool_.acquire(kOwner, [&](auto&& each) {
+  std::uint32_t loan(bool recent = false) {
+    const auto each_hold = [&](auto&& each) {
       for (const auto& receiver : holds_) {
         each(receiver.data(), static_cast<std::uint32_t>(receiver.size()));
       }
-    });
+    };
+    const std::uint32_t slot = pool_.acquire(kOwner, each_hold, recent);
     if (slot == kNoSlot) return slot;
     EXPECT_LT(slot, pool_.size());
     EXPECT_FALSE(is_queued(slot));
@@ -47,6 +48,11 @@ class Play {
     }
     lent_.erase(slot);
     pool_.end_loan(slot);
+  }
+  // All samples of a queue: its receiver is done with them.
+  void forget(std::size_t queue) {
+    for (const std::uint32_t slot : queues_[queue]) pool_.evict(slot);
+    queues_[queue].clear();
   }
   // The newest sample of a queue, into a hold.
   void hold(std::size_t queue, std::size_t index) {
@@ -149,6 +155,31 @@ TEST(SlotPool, TheHoldsOfAnotherPublisherDoNotCount) {
   play.publish(play.loan(), 1);
   play.hold_word(0, 0) = make_hold(kOwner + 1, 0);
   EXPECT_NE(play.loan(), kNoSlot);
+}
+
+TEST(SlotPool, TheRecentOneOfThoseThatAreDoneWithComesFirst) {
+  Play play(1, 2, 1, 1);
+  const std::uint32_t first = play.loan();
+  const std::uint32_t second = play.loan();
+  for (const std::uint32_t slot : {first, second}) {
+    play.publish(slot, 1);
+  }
+  play.forget(0);
+  EXPECT_EQ(play.loan(true), second);
+  EXPECT_EQ(play.loan(true), first);
+}
+
+TEST(SlotPool, TheRecentOneIsNotGivenOutWhileItIsHeld) {
+  Play play(1, 2, 1, 1);
+  const std::uint32_t slot = play.loan();
+  play.publish(slot, 1);
+  play.hold(0, 0);
+  play.forget(0);
+  const std::uint32_t other = play.loan(true);
+  EXPECT_NE(other, slot);
+  play.publish(other, 0);
+  ChannelReader::release(play.hold_word(0, 0));
+  EXPECT_EQ(play.loan(true), slot);
 }
 
 TEST(SlotPool, ALoanThatNobodyAcceptsIsFreeAgain) {
