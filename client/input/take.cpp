@@ -265,8 +265,7 @@ void InputCore::count_overtaken(Queue& queue, std::uint64_t lost) noexcept {
   if (lost == 0) return;
   count(queue.lane->overtaken, lost);
   count(segment_->header.counters.overtaken, lost);
-  // Relaxed is enough: its publisher has pushed them out itself.
-  queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_relaxed);
+  queue.reader.tell(queue.lane->consumed);
 }
 
 void InputCore::consume(Queue& queue) noexcept {
