@@ -136,7 +136,9 @@ void Import::obey(const Offerer* speaker) {
   const auto last = std::find_if(unheard_.begin(), unheard_.end(),
                                  [&](const Unheard& each) { return each.writer == writer; });
   if (last == unheard_.end()) return;
-  if (last->exporter == exporter) stream_.note(exporter, last->last);
+  // It is noted for its state; its sample no port had.
+  const bool is_new = last->exporter == exporter && stream_.note(exporter, last->last);
+  if (is_new && last->last.has_sample) ++counts_.too_soon;
   unheard_.erase(last);
 }
 
@@ -313,8 +315,12 @@ void Import::take(const gateway::dds::Payload& payload,  // NOLINT(bugprone-exce
     ++counts_.unreadable;
     return;
   }
-  const StreamEvent event{header_.number, header_.sequence, has_sample(header_.kind),
-                          header_.is_deactivated, header_.kind == EventKind::kWithheld};
+  const StreamEvent event{header_.number,
+                          header_.sequence,
+                          has_sample(header_.kind),
+                          header_.is_deactivated,
+                          header_.kind == EventKind::kWithheld,
+                          header_.token_of(me_) == 0};
   if (writer != writer_) {  // one speaker: others are not heard
     remember(writer, event);
     return;

@@ -18,7 +18,7 @@ bool Stream::note(Incarnation from, const StreamEvent& event) noexcept {
     return false;
   }
   if (has_begun_) lost_ += missed(exporter, event);
-  has_begun_ = true;
+  has_begun_ = has_begun_ || !event.is_unasked;
   exporter.last = event.number;
   exporter.sequence = event.sequence;
   exporter.is_deactivated = event.is_deactivated;
@@ -34,9 +34,11 @@ bool Stream::completes(Incarnation from, std::uint64_t number) noexcept {
   return true;
 }
 
-// A successor of the publisher counts from 1 again.
+// A successor of the publisher counts from 1 again. An exporter that has only joined does not know
+// yet how far its publisher is: what was published before is not missed.
 std::uint64_t Stream::missed(const Exporter& exporter, const StreamEvent& event) noexcept {
   const std::uint64_t events = event.number - exporter.last - 1;
+  if (exporter.sequence == 0) return events;
   const std::uint64_t next = exporter.sequence + (event.has_sample ? 1 : 0);
   return std::max(events, event.sequence > next ? event.sequence - next : 0);
 }

@@ -23,6 +23,7 @@ struct StreamEvent {
   bool has_sample = false;
   bool is_deactivated = false;  // the source is, from here on
   bool is_withheld = false;     // the sample may come later, with the number of the last event
+  bool is_unasked = false;      // its exporter had heard nothing of this importer when it happened
 };
 
 class Stream {
@@ -38,7 +39,7 @@ class Stream {
   // not come yet. Then it is no other event; else note() judges it as any other.
   bool completes(Incarnation from, std::uint64_t number) noexcept;
 
-  // Events that have not come, and will not. What an exporter sent before its first event here, or
+  // Events that have not come, and will not. What an exporter sent before it knew this importer, or
   // while another one was obeyed, is not missed.
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
   [[nodiscard]] std::uint64_t doubled() const noexcept { return doubled_; }
@@ -62,7 +63,8 @@ class Stream {
                                             const StreamEvent& event) noexcept;
 
   std::array<Exporter, kRemembered> exporters_{};  // the one that is obeyed first
-  bool has_begun_ = false;                         // an event of that one was taken up since it is
+  // An event of that one was taken up since it is, which happened when it knew this importer.
+  bool has_begun_ = false;
   std::uint64_t lost_ = 0;
   std::uint64_t doubled_ = 0;
 };

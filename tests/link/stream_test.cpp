@@ -50,6 +50,29 @@ TEST(Stream, CountsSamplesThatItsExporterDidNotNumber) {
   EXPECT_EQ(stream.lost(), 13U);
 }
 
+// It tells of the source before its publisher has told it anything.
+TEST(Stream, DoesNotMissWhatWasPublishedBeforeItsExporterJoined) {
+  Stream stream;
+  EXPECT_TRUE(stream.note(1, {1, 0, false, false}));
+  EXPECT_TRUE(stream.note(1, sample(2, 1387)));
+  EXPECT_EQ(stream.lost(), 0U);
+  EXPECT_TRUE(stream.note(1, sample(4, 1389)));
+  EXPECT_EQ(stream.lost(), 1U);
+}
+
+// The last event of a source waits for whoever joins, for as long as nobody does.
+TEST(Stream, DoesNotMissWhatWasPublishedWhileItWasNotThere) {
+  Stream stream;
+  EXPECT_TRUE(stream.note(1, {100, 2000, true, false, false, true})) << "from before";
+  EXPECT_TRUE(stream.note(1, {101, 2000, false, false, false, true})) << "it joins again";
+  EXPECT_TRUE(stream.note(1, {102, 3000, false, false, false, true}));
+  EXPECT_TRUE(stream.note(1, sample(103, 3001)));
+  EXPECT_EQ(stream.lost(), 0U);
+  EXPECT_TRUE(stream.note(1, {105, 3003, true, false, false, true}))
+      << "it has not heard of us since";
+  EXPECT_EQ(stream.lost(), 1U);
+}
+
 TEST(Stream, NothingComesTwiceOrOutOfOrder) {
   Stream stream;
   EXPECT_TRUE(stream.note(1, event(2, false)));
