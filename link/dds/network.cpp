@@ -20,10 +20,14 @@ namespace {
 // LeaseDuration: a host that is silent for so long is gone. A link that is starved for longer is
 // taken for dead, and comes back.
 // SPDPInterval: a host that was cut off is found again within that time.
+// HeartbeatInterval, AutoReschedNackDelay: what a network has lost is asked for again within that
+// time. By default a writer that is not answered asks less and less often, at last every 8 s, and a
+// reader that is not waits for 3 s; discovery is several such conversations, one after another.
 constexpr const char* kForAll =
     "<General><MaxMessageSize>1400B</MaxMessageSize><FragmentSize>1300B</FragmentSize></General>"
     "<Discovery><LeaseDuration>1500ms</LeaseDuration><SPDPInterval>250ms</SPDPInterval></"
-    "Discovery>";
+    "Discovery><Internal><HeartbeatInterval max=\"500ms\">100ms</HeartbeatInterval>"
+    "<AutoReschedNackDelay>500ms</AutoReschedNackDelay></Internal>";
 
 // This process's, in order. Where they cannot be listed: none.
 std::vector<int> datagram_sockets() {
