@@ -68,6 +68,23 @@ std::vector<Active> surely_active(const HostEvidence& host, const std::string& s
   return result;
 }
 
+constexpr Nanoseconds kEnd = 1'000'000'000 * kSecond;
+
+// From each arrival to the last moment at which it may count, or the end that was told.
+std::vector<Active> possibly_active(const std::vector<Happened>& events, Nanoseconds timeout) {
+  std::vector<Active> result;
+  for (const Happened& event : events) {
+    if (event.kind == Kind::deactivation) {
+      if (!result.empty()) result.back().to = std::min(result.back().to, event.seen);
+    } else if (result.empty() || event.time > result.back().to) {
+      result.push_back({event.time, event.seen + timeout});
+    } else {
+      result.back().to = std::max(result.back().to, event.seen + timeout);
+    }
+  }
+  return result;
+}
+
 bool overlaps(const std::vector<Span>& spans, Nanoseconds from, Nanoseconds to) {
   return std::any_of(spans.begin(), spans.end(),
                      [&](const Span& span) { return span.from <= to && from <= span.to; });
@@ -81,8 +98,8 @@ void check_decisions(const HostEvidence& host, Findings& found, Checked& checked
   for (const std::string& each : host.wrong) found.push_back(host.name + ": " + each);
 }
 
-void check_winners(const HostEvidence& host, const std::map<std::string, Ranked>& ranks,
-                   Findings& found, Checked& checked) {
+void check_winners(const HostEvidence& host, const std::string& model,
+                   const std::map<std::string, Ranked>& ranks, Findings& found, Checked& checked) {
   for (const auto& [first, its] : ranks) {
     const std::vector<Active> active = surely_active(host, first, its.timeout);
     for (const auto& [second, other] : ranks) {
@@ -90,9 +107,10 @@ void check_winners(const HostEvidence& host, const std::map<std::string, Ranked>
       auto span = active.begin();
       for (const Happened& event : of(host, second)) {
         if (!event.won) continue;
-        ++checked.pairs;
         while (span != active.end() && span->to < event.seen) ++span;
-        if (span == active.end() || span->from > event.time) continue;
+        const bool is_of_it = model.empty() || had_model(host, model, event.time, event.seen);
+        checked.pairs += is_of_it ? 1 : 0;
+        if (!is_of_it || span == active.end() || span->from > event.time) continue;
         found.push_back(host.name + ": " + second + " commands at " + ms(event.time) + " though " +
                         first + " is active from " + ms(span->from) + " to " + ms(span->to));
       }
@@ -177,6 +195,34 @@ void check_losses(const HostEvidence& importer, const std::string& source, std::
                   " samples are missing, but only " + std::to_string(counted) + " are counted");
 }
 
+void check_counts(const HostEvidence& importer, const HostEvidence& exporter,
+                  const std::string& source, std::uint64_t counted, std::uint64_t joins,
+                  Nanoseconds since, Findings& found) {
+  // A recorder joins later than a publisher begins, but samples are numbered. A deactivation that
+  // does not come is counted, too, and what a recorder did not see.
+  std::uint64_t published = 0;
+  std::map<std::uint32_t, Pair> lives;  // the last before `since`, the last
+  for (const Happened& event : of(exporter, source)) {
+    if (event.command) {
+      Pair& last = lives[event.command->life];
+      last.second = event.command->number;
+      if (event.time < since) last.first = static_cast<std::uint32_t>(last.second);
+    } else if (event.time >= since) {
+      published += event.kind == Kind::gap ? event.events : 1;
+    }
+  }
+  for (const auto& [life, last] : lives) published += last.second - last.first;
+  const auto& events = of(importer, source);
+  const auto arrived = static_cast<std::uint64_t>(
+      std::count_if(events.begin(), events.end(), [&](const Happened& event) {
+        return event.kind == Kind::sample && event.command && event.command->made >= since;
+      }));
+  if (counted + arrived <= published + joins) return;
+  found.push_back(importer.name + ": of " + source + " " + std::to_string(published) +
+                  " events were published and " + std::to_string(arrived) + " arrived, but " +
+                  std::to_string(counted) + " are counted as missing");
+}
+
 void check_cuts(const HostEvidence& importer, const std::string& source,
                 const std::vector<Span>& cuts, Findings& found) {
   for (const Happened& event : of(importer, source)) {
@@ -189,6 +235,20 @@ void check_cuts(const HostEvidence& importer, const std::string& source,
   }
 }
 
+bool is_closed_in(const HostEvidence& importer, const std::string& source, const Span& cut) {
+  const auto its = importer.closures.find(source);
+  return its != importer.closures.end() &&
+         std::any_of(its->second.begin(), its->second.end(),
+                     [&](Nanoseconds time) { return time >= cut.from && time <= cut.to; });
+}
+
+bool was_there(const HostEvidence& importer, const std::string& source, Nanoseconds time) {
+  const auto& events = of(importer, source);
+  return std::any_of(events.begin(), events.end(), [&](const Happened& event) {
+    return is_arrival(event) && event.time <= time && event.time > time - 100 * kMs;
+  });
+}
+
 Recovery first_arrival_after(const HostEvidence& host, const std::string& source,
                              Nanoseconds time) {
   for (const Happened& event : of(host, source)) {
@@ -197,25 +257,36 @@ Recovery first_arrival_after(const HostEvidence& host, const std::string& source
   return {};
 }
 
-Recovery next_in_command(const HostEvidence& host, const std::string& source, Nanoseconds timeout,
-                         const Span& cut) {
-  const Happened* last = nullptr;
-  for (const Happened& event : of(host, source)) {
-    if (event.time < cut.to) last = &event;
+std::vector<Fallback> fallbacks(const HostEvidence& host,
+                                const std::map<std::string, Ranked>& ranks, const std::string& last,
+                                Nanoseconds least) {
+  std::vector<Active> active;
+  for (const auto& [source, its] : ranks) {
+    if (its.rank >= ranks.at(last).rank) continue;
+    for (const Active& each : possibly_active(of(host, source), its.timeout)) {
+      active.push_back(each);
+    }
   }
-  const bool commanded = last != nullptr && last->won && last->time + timeout > cut.from;
-  if (!commanded || last->time + timeout > cut.to) return {};
-  Recovery next;
-  for (const auto& [other, events] : host.sources) {
-    if (other == source) continue;
-    const auto found = std::find_if(events.begin(), events.end(), [&](const Happened& event) {
-      return event.won && event.time > last->time;
-    });
-    if (found == events.end()) continue;
-    const Nanoseconds took = found->time - last->time - timeout;
-    next = {true, next.is_there ? std::min(next.took, took) : took};
+  std::sort(active.begin(), active.end(),
+            [](const Active& a, const Active& b) { return a.from < b.from; });
+  std::vector<Fallback> result;
+  Nanoseconds until = 0;
+  const auto& events = of(host, last);
+  for (std::size_t i = 0; i <= active.size(); ++i) {
+    const Nanoseconds next = i < active.size() ? active[i].from : kEnd;
+    if (until != 0 && next > until + least) {
+      const auto first = std::find_if(events.begin(), events.end(), [&](const Happened& event) {
+        return event.won && event.time > until;
+      });
+      if (first != events.end() && first->time < next) {
+        result.push_back({until, {true, first->time - until}});
+      } else if (next != kEnd) {
+        result.push_back({until, {}});
+      }
+    }
+    if (i < active.size()) until = std::max(until, active[i].to);
   }
-  return next;
+  return result;
 }
 
 }  // namespace arbiter::failures

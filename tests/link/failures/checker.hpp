@@ -20,10 +20,16 @@ struct Checked {
   std::uint64_t old = 0;       // older than half of their T; none is older than T
   std::uint64_t decisions = 0;
   std::uint64_t uncertain = 0;
-  std::uint64_t pairs = 0;    // winners, of which no other can have won meanwhile
-  std::uint64_t missing = 0;  // samples that never arrived
-  std::uint64_t counted = 0;  // as lost, late, too soon
-  std::uint64_t unsure = 0;   // arrivals of which the exporter's recording does not have the time
+  std::uint64_t pairs = 0;     // winners, of which no other can have won meanwhile
+  std::uint64_t missing = 0;   // samples that never arrived
+  std::uint64_t counted = 0;   // as lost, late, too soon
+  std::uint64_t unsure = 0;    // arrivals of which the exporter's recording does not have the time
+  std::uint64_t shared = 0;    // samples from other hosts of a source that several have open
+  std::uint64_t speakers = 0;  // changes of whom they came from
+  std::uint64_t switched = 0;  // models that came into force because all hosts were to switch
+  std::uint64_t refused = 0;   // switches that no host made
+  std::uint64_t partly = 0;    // switches that not all hosts made, or of which that is not known
+  std::uint64_t closed = 0;    // ports of `forever` sources, in whose cuts the link closed them
 };
 
 using Findings = std::vector<std::string>;
@@ -37,8 +43,9 @@ struct Ranked {
   unsigned rank = 0;
   Nanoseconds timeout = 0;
 };
-void check_winners(const HostEvidence& host, const std::map<std::string, Ranked>& ranks,
-                   Findings& found, Checked& checked);
+// While `model` is in force; empty: whatever is.
+void check_winners(const HostEvidence& host, const std::string& model,
+                   const std::map<std::string, Ranked>& ranks, Findings& found, Checked& checked);
 
 // No arrival is older than `most` since it was published at `exporter`, whose recording has the
 // time.
@@ -58,9 +65,23 @@ struct Span {
 void check_losses(const HostEvidence& importer, const std::string& source, std::uint64_t counted,
                   const std::vector<Span>& spans, Findings& found, Checked& checked);
 
+// No more was counted than what was published since `since` and did not arrive, and `joins`: what
+// an exporter says of a source's state when somebody joins may be lost as well.
+void check_counts(const HostEvidence& importer, const HostEvidence& exporter,
+                  const std::string& source, std::uint64_t counted, std::uint64_t joins,
+                  Nanoseconds since, Findings& found);
+
 // Nothing that was published in a cut has arrived before its end: else the cable was no cable.
 void check_cuts(const HostEvidence& importer, const std::string& source,
                 const std::vector<Span>& cuts, Findings& found);
+
+// A source that is active for ever loses its port in a cut: a dead speaker is not kept. `within`:
+// after the cut's beginning. False: it did not, or had none.
+[[nodiscard]] bool is_closed_in(const HostEvidence& importer, const std::string& source,
+                                const Span& cut);
+// It arrived in the 100 ms before.
+[[nodiscard]] bool was_there(const HostEvidence& importer, const std::string& source,
+                             Nanoseconds time);
 
 // Whether the source commands again after a time; how long that took.
 struct Recovery {
@@ -69,9 +90,14 @@ struct Recovery {
 };
 [[nodiscard]] Recovery first_arrival_after(const HostEvidence& host, const std::string& source,
                                            Nanoseconds time);
-// Where the source commanded when the cut came, and T then ended its activity: how long after that
-// the next in command did.
-[[nodiscard]] Recovery next_in_command(const HostEvidence& host, const std::string& source,
-                                       Nanoseconds timeout, const Span& cut);
+// Since when no source but `last` can have been active any more, and how long after that `last`
+// commanded. Where nobody's rule holds `last` up for less than `least`, there is none.
+struct Fallback {
+  Nanoseconds since = 0;
+  Recovery next;
+};
+[[nodiscard]] std::vector<Fallback> fallbacks(const HostEvidence& host,
+                                              const std::map<std::string, Ranked>& ranks,
+                                              const std::string& last, Nanoseconds least);
 
 }  // namespace arbiter::failures

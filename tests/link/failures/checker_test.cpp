@@ -81,7 +81,7 @@ class Recorded {
   [[nodiscard]] Findings winners(Nanoseconds timeout = 100) const {
     Findings found;
     Checked checked;
-    check_winners(importer, {{kSource, {0, timeout * kMs}}, {kLower, {1, 100 * kMs}}}, found,
+    check_winners(importer, "", {{kSource, {0, timeout * kMs}}, {kLower, {1, 100 * kMs}}}, found,
                   checked);
     return found;
   }
@@ -137,6 +137,29 @@ TEST(Checker, SeesLossesThatNobodyCounted) {
   EXPECT_THAT(gap.losses(2), ElementsAre(HasSubstr("3 samples are missing, but only 2")));
 }
 
+TEST(Checker, SeesLossesThatAreCountedThoughNothingWasLost) {
+  const Recorded one = Recorded().published(1, 10).published(2, 20).arrives(2, 22, 20);
+  Findings found;
+  check_counts(one.importer, one.exporter, kSource, 1, 0, 0, found);
+  EXPECT_THAT(found, IsEmpty());
+  check_counts(one.importer, one.exporter, kSource, 2, 1, 0, found);
+  EXPECT_THAT(found, IsEmpty()) << "the state that its exporter said";
+  check_counts(one.importer, one.exporter, kSource, 2, 0, 0, found);
+  EXPECT_THAT(found, ElementsAre(HasSubstr("1 arrived, but 2 are counted as missing")));
+}
+
+TEST(Checker, KnowsWhichModelWasInForce) {
+  Recorded one = Recorded().happens(Kind::signal, 10).happens(Kind::sample, 50, kLower, true);
+  one.importer.models = {{5 * kMs, 1, "default", "start"}, {40 * kMs, 2, "other", "switch"}};
+  const std::map<std::string, Ranked> ranks{{kSource, {0, 100 * kMs}}, {kLower, {1, 100 * kMs}}};
+  Findings found;
+  Checked checked;
+  check_winners(one.importer, "default", ranks, found, checked);
+  EXPECT_THAT(found, IsEmpty());
+  check_winners(one.importer, "other", ranks, found, checked);
+  EXPECT_THAT(found, testing::SizeIs(1));
+}
+
 TEST(Checker, DoesNotMissWhatNobodyWasThereToCount) {
   const Recorded gap = Recorded().arrives(1, 10, 9).arrives(4, 20, 19).arrives(6, 30, 29);
   EXPECT_THAT(gap.losses(1, {{15 * kMs, 16 * kMs}}), IsEmpty());
@@ -189,20 +212,27 @@ TEST(Checker, SeesADecisionThatTheModelForbids) {
   check_decisions(evidence, found, checked);
   EXPECT_THAT(found, ElementsAre(HasSubstr("1 decisions that its model does not permit")));
   EXPECT_EQ(checked.decisions, 2U);
-  check_winners(evidence, {{"/high", {0, 500}}, {"/low", {1, 500}}}, found, checked);
+  check_winners(evidence, "", {{"/high", {0, 500}}, {"/low", {1, 500}}}, found, checked);
   EXPECT_THAT(found, testing::SizeIs(2));
 }
 
-TEST(Checker, MeasuresWhoIsNextInCommand) {
+TEST(Checker, MeasuresWhenTheLastInCommandCommands) {
+  const std::map<std::string, Ranked> ranks{{kSource, {0, 100 * kMs}}, {kLower, {1, 100 * kMs}}};
   Recorded fell = Recorded()
                       .happens(Kind::sample, 10, kSource, true)
+                      .happens(Kind::sample, 50, kLower)
                       .happens(Kind::sample, 113, kLower, true)
-                      .happens(Kind::sample, 120, kLower, true);
-  const Recovery next = next_in_command(fell.importer, kSource, 100 * kMs, {50 * kMs, 200 * kMs});
-  ASSERT_TRUE(next.is_there);
-  EXPECT_EQ(next.took, 3 * kMs);
-  // Its T had ended before the cut.
-  EXPECT_FALSE(next_in_command(fell.importer, kSource, 100 * kMs, {115 * kMs, 200 * kMs}).is_there);
+                      .happens(Kind::sample, 400, kSource, true);
+  const auto once = fallbacks(fell.importer, ranks, kLower, 100 * kMs);
+  ASSERT_THAT(once, testing::SizeIs(1));
+  EXPECT_EQ(once[0].since, 110 * kMs);
+  EXPECT_EQ(once[0].next.took, 3 * kMs);
+  // Nothing commands before the next one comes.
+  const Recorded silent = Recorded().happens(Kind::sample, 10).happens(Kind::sample, 400);
+  const auto never = fallbacks(silent.importer, ranks, kLower, 100 * kMs);
+  ASSERT_THAT(never, testing::SizeIs(1));
+  EXPECT_FALSE(never[0].next.is_there);
+  EXPECT_THAT(fallbacks(silent.importer, ranks, kLower, 300 * kMs), IsEmpty());
   EXPECT_EQ(first_arrival_after(fell.importer, kLower, 100 * kMs).took, 13 * kMs);
 }
 

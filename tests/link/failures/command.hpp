@@ -20,6 +20,8 @@ inline constexpr std::size_t kLarge = 4096;
   return host % 2 == 0 ? kLarge : sizeof(Command);
 }
 
+// Of one name on several hosts at once.
+inline constexpr const char* kShared = "/Shared/cmd:o";
 inline std::string instance_of(unsigned host) { return "host" + std::to_string(host); }
 inline std::string source_of(unsigned host) { return "/Host" + std::to_string(host) + "/cmd:o"; }
 inline std::string hold_of(unsigned host) { return "/Hold" + std::to_string(host) + "/cmd:o"; }

@@ -48,24 +48,49 @@ NodeOptions node_options(const ComponentOptions& options) {
   return result;
 }
 
+Type type() { return Type::variable("failures/Command", kLarge); }
+
+int heard(int signals) {
+  signalfd_siginfo info{};
+  return ::read(signals, &info, sizeof info) == sizeof info ? static_cast<int>(info.ssi_signo) : 0;
+}
+
+class Rival {
+ public:
+  explicit Rival(const ComponentOptions& options)
+      : options_(options),
+        node_(open([&] { return Node("rival", node_options(options)); })),
+        port_(open([&] { return node_.output_port(kShared, type()); })) {}
+
+  void run(int signals) {
+    bool is_over = false;
+    for (std::uint64_t number = 1;;) {
+      const int signal = heard(signals);
+      if (signal == SIGTERM) return;
+      is_over = is_over || signal == SIGUSR2;
+      if (!is_over) {
+        const Command command{options_.host, options_.life, number++, now()};
+        port_.publish(Bytes(reinterpret_cast<const std::byte*>(&command), sizeof command));
+      }
+      std::this_thread::sleep_for(std::chrono::nanoseconds(options_.period_ns));
+    }
+  }
+
+ private:
+  const ComponentOptions options_;
+  Node node_;
+  OutputPort<void> port_;
+};
+
 class Component {
  public:
   explicit Component(const ComponentOptions& options)
       : options_(options),
         random_(options.seed * 977 + options.host * 31 + options.life),
         node_(open([&] { return Node("component", node_options(options)); })),
-        port_(open([&] {
-          return node_.output_port(source_of(options.host),
-                                   Type::variable("failures/Command", kLarge));
-        })),
-        hold_(open([&] {
-          return node_.output_port(hold_of(options.host),
-                                   Type::variable("failures/Command", kLarge));
-        })),
-        motor_(open([&] {
-          return node_.input_port(motor_of(options.host),
-                                  Type::variable("failures/Command", kLarge));
-        })) {}
+        port_(open([&] { return node_.output_port(source_of(options.host), type()); })),
+        hold_(open([&] { return node_.output_port(hold_of(options.host), type()); })),
+        motor_(open([&] { return node_.input_port(motor_of(options.host), type()); })) {}
 
   void run(int signals) {
     Nanoseconds next = now();
@@ -97,12 +122,6 @@ class Component {
   }
 
  private:
-  static int heard(int signals) {
-    signalfd_siginfo info{};
-    return ::read(signals, &info, sizeof info) == sizeof info ? static_cast<int>(info.ssi_signo)
-                                                              : 0;
-  }
-
   void step() {
     if (is_over_) return;
     publish(hold_, ++held_);
@@ -123,7 +142,7 @@ class Component {
   void look_at(const Sample<void>& sample) {
     Command command;
     std::memcpy(&command, sample.data(), sizeof command);
-    Pair& last = last_[sample.source()];
+    Pair& last = last_[{std::string(sample.source()), command.host}];
     const Pair current{command.life, command.number};
     if (current <= last) {
       std::fprintf(stderr, "FOUND %s took %u.%llu of %s after %u.%llu\n",
@@ -147,7 +166,7 @@ class Component {
   bool is_steady_ = false;
   bool is_over_ = false;
   Nanoseconds until_ = 0;
-  std::map<std::string, Pair, std::less<>> last_;
+  std::map<std::pair<std::string, std::uint32_t>, Pair> last_;  // of each speaker
 };
 
 }  // namespace
@@ -158,8 +177,11 @@ int run_component(const ComponentOptions& options) {
   for (const int each : {SIGTERM, SIGUSR1, SIGUSR2}) sigaddset(&heard, each);
   sigprocmask(SIG_BLOCK, &heard, nullptr);
   const shm::FileDescriptor signals(::signalfd(-1, &heard, SFD_NONBLOCK | SFD_CLOEXEC));
-  Component component(options);
-  component.run(signals.get());
+  if (options.is_rival) {
+    Rival(options).run(signals.get());
+  } else {
+    Component(options).run(signals.get());
+  }
   return 0;
 }
 

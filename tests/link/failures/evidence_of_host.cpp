@@ -9,6 +9,7 @@
 #include "evidence/verification.hpp"
 #include "rules/model/load.hpp"
 #include "rules/prove/compile.hpp"
+#include "tests/link/failures/plan.hpp"
 
 namespace arbiter::failures {
 namespace {
@@ -36,6 +37,17 @@ Happened happened(const evidence::Arrival& arrival, const std::string& motor) {
   return result;
 }
 
+// Where a recorder begins again, its old taps and its new ones tell the same for a moment. Nothing
+// is published twice at one time.
+bool is_told(const std::vector<Happened>& events, const Happened& event) {
+  constexpr std::ptrdiff_t kLast = 200;
+  const auto from = events.end() - std::min<std::ptrdiff_t>(kLast, std::ssize(events));
+  return std::any_of(from, events.end(), [&](const Happened& each) {
+    return each.time == event.time && each.kind == event.kind && each.sequence == event.sequence &&
+           each.exporter == event.exporter;
+  });
+}
+
 rules::CompiledModel compile_texts(const rules::ModelTexts& texts) {
   rules::Diagnostics diagnostics;
   auto compiled = rules::compile(rules::load(texts, diagnostics), diagnostics);
@@ -47,7 +59,9 @@ rules::CompiledModel compile_texts(const rules::ModelTexts& texts) {
 
 void add(HostEvidence& evidence, const std::string& motor, const evidence::Record& record) {
   if (const auto* arrival = std::get_if<evidence::Arrival>(&record)) {
-    evidence.sources[arrival->context->source].push_back(happened(*arrival, motor));
+    std::vector<Happened>& events = evidence.sources[arrival->context->source];
+    const Happened event = happened(*arrival, motor);
+    if (evidence.beginnings.size() < 2 || !is_told(events, event)) events.push_back(event);
   } else if (const auto* end = std::get_if<evidence::Deactivation>(&record)) {
     Happened result;
     result.kind = Happened::Kind::deactivation;
@@ -56,7 +70,14 @@ void add(HostEvidence& evidence, const std::string& motor, const evidence::Recor
     evidence.sources[end->context->source].push_back(result);
   } else if (std::holds_alternative<evidence::Start>(record)) {
     evidence.beginnings.push_back(0);
+  } else if (const auto* port = std::get_if<evidence::PortChange>(&record)) {
+    using What = evidence::PortChange::What;
+    const bool is_gone = port->what == What::closed || port->what == What::died;
+    if (!port->is_input && is_gone) evidence.closures[port->port].push_back(port->seen);
   } else if (const auto* model = std::get_if<evidence::ModelChange>(&record)) {
+    // The first one, which nobody has switched to, is said without its name.
+    evidence.models.push_back({model->time, model->generation,
+                               model->name.empty() ? kModels[0] : model->name, model->how});
     if (evidence.beginnings.back() != 0) return;
     evidence.beginnings.back() = model->time;
     // The recorder notices the new daemon a little later than it has come; until then its old taps
@@ -80,6 +101,27 @@ void add(HostEvidence& evidence, const std::string& motor, const evidence::Recor
     result.events = std::max<std::uint64_t>(state->lost, 1);
     evidence.sources[state->context->source].push_back(result);
   }
+}
+
+bool had_model(const HostEvidence& evidence, const std::string& name, Nanoseconds from,
+               Nanoseconds to) {
+  const ModelInForce* before = nullptr;
+  for (const ModelInForce& each : evidence.models) {
+    if (each.time <= from) before = &each;
+    if (each.time > from && each.time <= to) return false;
+  }
+  return before != nullptr && before->name == name;
+}
+
+HostEvidence said_by(const HostEvidence& evidence, const std::string& source, unsigned host) {
+  HostEvidence result;
+  result.name = evidence.name;
+  const auto found = evidence.sources.find(source);
+  if (found == evidence.sources.end()) return result;
+  for (const Happened& event : found->second) {
+    if (event.command && event.command->host == host) result.sources[source].push_back(event);
+  }
+  return result;
 }
 
 HostEvidence read_evidence(const std::string& name, const std::string& motor,

@@ -27,15 +27,33 @@ struct Happened {
   std::uint64_t events = 0;  // gap: that the recorder does not have
 };
 
+// That a model came into force.
+struct ModelInForce {
+  Nanoseconds time = 0;
+  std::uint64_t generation = 0;
+  std::string name;
+  std::string how;
+};
+
 struct HostEvidence {
   std::string name;
   std::map<std::string, std::vector<Happened>> sources;  // each in its order
+  std::vector<ModelInForce> models;                      // by time
+  // When ports of a source were closed, or whoever had them died, by the daemon.
+  std::map<std::string, std::vector<Nanoseconds>> closures;
   // When daemons began that knew nothing of any activity before.
   std::vector<Nanoseconds> beginnings;
   std::uint64_t decisions = 0;
   std::uint64_t uncertain = 0;     // of which the recording does not have all
   std::vector<std::string> wrong;  // decisions that the host's model does not permit
 };
+
+// The model was in force from then on until then, and no other.
+[[nodiscard]] bool had_model(const HostEvidence& evidence, const std::string& name,
+                             Nanoseconds from, Nanoseconds to);
+// Of that source only, and what the host of that number has published.
+[[nodiscard]] HostEvidence said_by(const HostEvidence& evidence, const std::string& source,
+                                   unsigned host);
 
 // Adds what happened at `motor`.
 void add(HostEvidence& evidence, const std::string& motor, const evidence::Record& record);

@@ -23,14 +23,34 @@ constexpr int kSkipped = 77;
 
 unsigned long long number(std::uint64_t value) { return value; }
 
+void report_troubles(const Totals& totals) {
+  std::printf("%-28s", "what happened, by how long");
+  for (const char* const name : Happenings::kNames) std::printf("%10s", name);
+  std::printf("   back again\n");
+  for (unsigned i = 0; i < kTroubles; ++i) {
+    const auto trouble = static_cast<Trouble>(i);
+    const auto its = totals.troubles.find(trouble);
+    const Happenings happened = its == totals.troubles.end() ? Happenings{} : its->second;
+    const auto back = totals.recoveries.find(trouble);
+    std::printf("%-28s", name_of(trouble));
+    for (const std::uint64_t each : happened.lasting) std::printf("%10llu", number(each));
+    std::printf("   %s\n", back == totals.recoveries.end() ? "" : back->second.text().c_str());
+  }
+}
+
 void report(const Totals& totals, double seconds) {
   const Checked& checked = totals.checked;
+  std::printf("%llu rounds, %.0f s:", number(totals.rounds), seconds);
+  for (const auto& [hosts, rounds] : totals.rounds_of) {
+    std::printf(" %llu of %u hosts,", number(rounds), hosts);
+  }
   std::printf(
-      "%llu rounds, %.0f s, %llu troubles; %llu frames passed on: %llu lost, %llu doubled, %llu "
-      "late, %llu in cuts\n",
-      number(totals.rounds), seconds, number(totals.troubles), number(totals.passed.frames),
-      number(totals.passed.lost), number(totals.passed.doubled), number(totals.passed.delayed),
+      " %llu with an interface that came after its link\n%llu frames passed on: %llu lost, %llu "
+      "doubled, %llu late, %llu of them overtaken, %llu in cuts\n",
+      number(totals.late_interfaces), number(totals.passed.frames), number(totals.passed.lost),
+      number(totals.passed.doubled), number(totals.passed.delayed), number(totals.passed.overtaken),
       number(totals.passed.cut));
+  report_troubles(totals);
   std::printf(
       "%llu samples from other hosts arrived, %llu of them older than T/2, none older than T (of "
       "%llu the age is not known exactly)\n%llu never arrived, between others that did; counted as "
@@ -40,8 +60,18 @@ void report(const Totals& totals, double seconds) {
       number(checked.missing), number(checked.counted), number(checked.decisions),
       number(checked.uncertain), number(checked.pairs));
   std::printf(
-      "the next in command after T, in a cut: %s\nback after a cut: %s\nall back after all: %s\n",
-      totals.fallbacks.text().c_str(), totals.recoveries.text().c_str(),
+      "%llu samples of a source that several hosts have open arrived at others, which changed the "
+      "speaker %llu times\n%llu models came into force by switches of all hosts; of these %llu "
+      "were "
+      "made by none, %llu not by all\n%llu ports of sources that are active for ever were closed "
+      "in "
+      "cuts\n",
+      number(checked.shared), number(checked.speakers), number(checked.switched),
+      number(checked.refused), number(checked.partly), number(checked.closed));
+  std::printf(
+      "the last in command, when nothing else is active: %s\nthe next speaker, when one is gone: "
+      "%s\nall back after all: %s\n",
+      totals.fallbacks.text().c_str(), totals.successions.text().c_str(),
       totals.flows.text().c_str());
 }
 
@@ -93,15 +123,25 @@ int main(int argc, char** argv) {
   app.add_option("--keep", options.keep,
                  "Where recordings and logs are left if something is found");
   app.add_flag("--bounds", options.has_bounds,
-               "Sources must be back within a second: on a machine that does nothing else");
+               "Who is to command again does so in time, where processes had a processor");
+  std::vector<std::string> names;
+  for (unsigned i = 0; i < kTroubles; ++i) names.emplace_back(name_of(static_cast<Trouble>(i)));
+  app.add_option("--only", options.only, "A trouble that happens, such as \"noise\"; repeatable")
+      ->check(CLI::IsMember(names));
   app.add_flag("--short", options.is_short, "One round, in which nothing lasts long");
   app.add_option("--component", component.instance)->group("");
   app.add_option("--number", component.host)->group("");
   app.add_option("--life", component.life)->group("");
   app.add_option("--period", component.period_ns)->group("");
+  app.add_flag("--rival", component.is_rival)->group("");
+  std::string model;
+  int victim = 0;
+  app.add_option("--switch", model)->group("");
+  app.add_option("--kill", victim)->group("");
   CLI11_PARSE(app, argc, argv);
   try {
     if (component.instance.empty()) return run(options);
+    if (!model.empty()) return switch_and_kill(component.instance, model, victim);
     component.seed = options.seed;
     return run_component(component);
   } catch (const std::exception& error) {

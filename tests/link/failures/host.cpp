@@ -11,18 +11,26 @@
 #include "tests/link/failures/command.hpp"
 
 namespace arbiter::failures {
-namespace {
-
-test::Daemon::Options daemon_options(unsigned number, const std::string& runtime) {
-  test::Daemon::Options options;
-  options.instance = instance_of(number);
-  options.runtime_directory = runtime;
-  return options;
-}
 
 std::string program(const char* name) { return std::string(ARBITER_PROGRAMS) + "/" + name; }
 
-}  // namespace
+std::string own_program() { return std::filesystem::read_symlink("/proc/self/exe"); }
+
+test::Daemon::Options FailingHost::daemon_options(const Plan& plan, unsigned number,
+                                                  const std::string& runtime,
+                                                  const std::string& directory) {
+  test::Daemon::Options options;
+  options.instance = instance_of(number);
+  options.runtime_directory = runtime;
+  for (unsigned model = 1; model < kModels.size(); ++model) {
+    if (model + 1 == kModels.size() && number == plan.host_without) continue;
+    const std::string path = directory + "/" + options.instance + "." + kModels[model] + ".xml";
+    std::ofstream(path) << plan.model_text(number, model);
+    options.arguments.insert(options.arguments.end(),
+                             {"--model", std::string(kModels[model]) + "=" + path});
+  }
+  return options;
+}
 
 FailingHost::FailingHost(const Plan& plan, unsigned number, const std::string& runtime,
                          std::string directory)
@@ -30,12 +38,13 @@ FailingHost::FailingHost(const Plan& plan, unsigned number, const std::string& r
       number_(number),
       directory_(std::move(directory)),
       network_(number),
-      daemon_(plan.model_text(number), daemon_options(number, runtime)) {
+      daemon_(plan.model_text(number, 0), daemon_options(plan, number, runtime, directory_)) {
   recorder_ = start({program("arbiter"), "record", "--instance", name(), "-o", recording(),
                      "--payloads", "all", "--compression", "lz4", "--period", "5ms"},
                     "recorder");
   start_link();
   start_component();
+  if (plan.speakers.count(number) != 0) start_rival();
 }
 
 test::ChildProcess FailingHost::start(std::vector<std::string> command,
@@ -56,19 +65,57 @@ void FailingHost::start_link() {
 }
 
 void FailingHost::kill_link() {
-  without_link_.push_back({now(), 0});
+  if (without_link_.empty() || without_link_.back().to != 0) expect_death_of_link();
   link_.kill();
 }
 
-void FailingHost::start_component() {
-  component_ =
-      start({std::filesystem::read_symlink("/proc/self/exe"), "--component", name(), "--number",
-             std::to_string(number_), "--life", std::to_string(++life_), "--seed",
-             std::to_string(plan_.seed), "--period", std::to_string(plan_.period)},
-            "component");
+test::ChildProcess FailingHost::start_component(std::uint32_t life, bool is_rival) const {
+  std::vector<std::string> command{own_program(),
+                                   "--component",
+                                   name(),
+                                   "--number",
+                                   std::to_string(number_),
+                                   "--life",
+                                   std::to_string(life),
+                                   "--seed",
+                                   std::to_string(plan_.seed),
+                                   "--period",
+                                   std::to_string(plan_.period)};
+  if (is_rival) command.emplace_back("--rival");
+  return start(std::move(command), "component");
 }
 
-std::vector<FailingHost::Import> FailingHost::imports() {
+void FailingHost::start_component() { component_ = start_component(++life_, false); }
+
+void FailingHost::start_rival() {
+  rivals_.push_back({static_cast<std::uint32_t>(rivals_.size() + 1), {now(), 0}, false});
+  rival_ = start_component(rivals_.back().life, true);
+}
+
+// One that cannot go yet, because nobody opens its port for it, is not waited for.
+void FailingHost::end_rival(bool abruptly) {
+  if (!rival_.runs()) return;
+  rivals_.back().span.to = now();
+  rivals_.back().is_abrupt = abruptly;
+  if (abruptly) {
+    rival_.kill();
+  } else {
+    rival_.signal(SIGTERM);
+    former_rivals_.push_back(std::exchange(rival_, {}));
+  }
+}
+
+std::vector<pid_t> FailingHost::pids() const {
+  std::vector<pid_t> result;
+  for (const auto* each : {&link_, &component_, &rival_}) {
+    if (each->runs()) result.push_back(each->pid());
+  }
+  return result;
+}
+
+HostHistory FailingHost::history() { return {link_since_, without_link_, rivals_, imports()}; }
+
+std::vector<Import> FailingHost::imports() {
   std::vector<Import> result(plan_.hosts.size());
   const nlohmann::json status = daemon_.status();
   for (const auto& source : status["sources"]) {
@@ -82,8 +129,11 @@ std::vector<FailingHost::Import> FailingHost::imports() {
 }
 
 void FailingHost::end(Findings& found) {
-  for (const auto& [process, what] :
-       {std::pair{&component_, "component"}, {&link_, "link"}, {&recorder_, "recorder"}}) {
+  std::vector<std::pair<test::ChildProcess*, const char*>> all{{&component_, "component"}};
+  if (rival_.runs()) all.emplace_back(&rival_, "rival");
+  for (test::ChildProcess& each : former_rivals_) all.emplace_back(&each, "rival");
+  all.insert(all.end(), {{&link_, "link"}, {&recorder_, "recorder"}});
+  for (const auto& [process, what] : all) {
     process->signal(SIGTERM);
     const int status = process->wait();
     if (status != 0) {
@@ -97,22 +147,6 @@ void FailingHost::add_seen_by_component(Findings& found) const {
   for (std::string line; std::getline(log, line);) {
     if (line.rfind("FOUND ", 0) == 0) found.push_back(line.substr(6));
   }
-}
-
-std::uint64_t counted_in(const std::string& described) {
-  constexpr std::array<const char*, 6> kCounts{" lost",
-                                               " late",
-                                               " before the port was open",
-                                               " withheld though they were wanted",
-                                               " unreadable",
-                                               " without memory"};
-  std::uint64_t sum = 0;
-  for (const char* const count : kCounts) {
-    const std::size_t end = described.find(count);
-    if (end == std::string::npos) continue;
-    sum += std::stoull(described.substr(described.rfind(' ', end - 1) + 1));
-  }
-  return sum;
 }
 
 }  // namespace arbiter::failures

@@ -6,13 +6,17 @@
 #include <string>
 #include <vector>
 
-#include "tests/link/failures/checker.hpp"
+#include "tests/link/failures/history.hpp"
 #include "tests/link/failures/network.hpp"
 #include "tests/link/failures/plan.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::failures {
+
+// The program of that name, of those that are tested.
+[[nodiscard]] std::string program(const char* name);
+[[nodiscard]] std::string own_program();
 
 class FailingHost {
  public:
@@ -30,17 +34,17 @@ class FailingHost {
   [[nodiscard]] test::ChildProcess& link() { return link_; }
   [[nodiscard]] test::ChildProcess& component() { return component_; }
   [[nodiscard]] test::Daemon& daemon() { return daemon_; }
-  // From each kill of its link to the next start, and its first life's beginning.
-  [[nodiscard]] const std::vector<Span>& without_link() const { return without_link_; }
-  [[nodiscard]] Nanoseconds link_since() const { return link_since_; }
+  // Somebody else kills it from now on; kill_link() before the next start.
+  void expect_death_of_link() { without_link_.push_back({now(), 0}); }
+  [[nodiscard]] bool has_rival() const { return rival_.runs(); }
+  void start_rival();
+  void end_rival(bool abruptly);
 
-  // What the status says of what it gets from another: "published" and "described".
-  struct Import {
-    std::uint64_t published = 0;
-    std::string described;
-    bool operator==(const Import&) const = default;
-  };
   [[nodiscard]] std::vector<Import> imports();  // by the other's number - 1; its own is empty
+  // What there is to tell of it at the end.
+  [[nodiscard]] HostHistory history();
+  // The processes of which the delays count.
+  [[nodiscard]] std::vector<pid_t> pids() const;
 
   // Ends all but the daemon, in order; adds what did not end well.
   void end(Findings& found);
@@ -49,7 +53,11 @@ class FailingHost {
   void add_seen_by_component(Findings& found) const;
 
  private:
+  static test::Daemon::Options daemon_options(const Plan& plan, unsigned number,
+                                              const std::string& runtime,
+                                              const std::string& directory);
   test::ChildProcess start(std::vector<std::string> command, const std::string& log) const;
+  test::ChildProcess start_component(std::uint32_t life, bool is_rival) const;
 
   const Plan& plan_;
   const unsigned number_;
@@ -59,12 +67,12 @@ class FailingHost {
   test::ChildProcess recorder_;
   test::ChildProcess link_;
   test::ChildProcess component_;
+  test::ChildProcess rival_;
+  std::vector<test::ChildProcess> former_rivals_;  // were told to end
   std::uint32_t life_ = 0;
   Nanoseconds link_since_ = 0;
   std::vector<Span> without_link_;
+  std::vector<RivalLife> rivals_;
 };
-
-// Of "host head, 3 lost, 2 late, …": all that has not arrived.
-[[nodiscard]] std::uint64_t counted_in(const std::string& described);
 
 }  // namespace arbiter::failures

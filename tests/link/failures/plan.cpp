@@ -26,10 +26,20 @@ Nanoseconds duration(const Options& options, stress::Random& random) {
   return 60 * kSecond;
 }
 
+Trouble draw_trouble(const Options& options, stress::Random& random) {
+  for (;;) {
+    const auto trouble = static_cast<Trouble>(random.below(kTroubles));
+    if (options.only.empty() || options.only.count(name_of(trouble)) != 0) return trouble;
+  }
+}
+
 Event draw(const Options& options, unsigned hosts, stress::Random& random) {
   Event event;
-  event.trouble = static_cast<Trouble>(random.below(kTroubles));
+  event.trouble = draw_trouble(options, random);
   event.host = 1 + random.below(hosts);
+  event.other = 1 + (event.host + random.below(hosts - 1)) % hosts;
+  event.model = event.trouble == Trouble::switch_cannot ? 2 : random.below(2);
+  event.is_abrupt = random.one_in(2);
   if (event.trouble == Trouble::split && event.host == hosts) --event.host;
   event.lasts = duration(options, random);
   event.fault.lost = random.below(300);
@@ -59,14 +69,29 @@ std::string timeout_text(Nanoseconds timeout) {
 }  // namespace
 
 const char* name_of(Trouble trouble) noexcept {
-  constexpr std::array<const char*, kTroubles> kNames{
-      "cable cut",    "heard by nobody", "hears nobody",     "network split", "noise",
-      "noise at all", "slow network",    "interface down",   "host stopped",  "link stopped",
-      "link killed",  "daemon killed",   "component killed", "host killed"};
+  constexpr std::array<const char*, kTroubles> kNames{"cable cut",
+                                                      "heard by nobody",
+                                                      "hears nobody",
+                                                      "network split",
+                                                      "noise",
+                                                      "noise at all",
+                                                      "slow network",
+                                                      "interface down",
+                                                      "host stopped",
+                                                      "link stopped",
+                                                      "link killed",
+                                                      "daemon killed",
+                                                      "component killed",
+                                                      "host killed",
+                                                      "link killed in a switch",
+                                                      "rival",
+                                                      "switch of all",
+                                                      "switch that one host cannot",
+                                                      "two switches at once"};
   return kNames[static_cast<std::size_t>(trouble)];
 }
 
-std::string Plan::model_text(unsigned host) const {
+std::string Plan::model_text(unsigned host, unsigned model) const {
   const HostPlan& plan = hosts[host - 1];
   const std::string at = R"(<config at=")" + motor_of(host) + "\">";
   std::string text = "<behaviors timeout='" + timeout_text(kModelTimeout) + "'>\n";
@@ -74,9 +99,12 @@ std::string Plan::model_text(unsigned host) const {
     text += "<source port='" + source_of(other) + "' timeout='" +
             timeout_text(plan.timeouts[other - 1]) + "'/>\n";
   }
-  std::string lower = "Hold";
+  std::string lower = "Hold, Shared";
   text += "<behavior name='Hold'>" + at + hold_of(host) + "</config></behavior>\n";
-  for (auto each = plan.order.rbegin(); each != plan.order.rend(); ++each) {
+  text += "<behavior name='Shared'>" + at + kShared +
+          "</config><inhibition>Hold</inhibition></behavior>\n";
+  const std::vector<unsigned>& order = plan.orders[model];
+  for (auto each = order.rbegin(); each != order.rend(); ++each) {
     const std::string name = "Obey " + std::to_string(*each);
     text += "<behavior name='" + name + "'>" + at + source_of(*each) + "</config><inhibition>" +
             lower + "</inhibition></behavior>\n";
@@ -108,11 +136,16 @@ Plan make_plan(const Options& options, std::uint64_t seed) {
     HostPlan one;
     for (unsigned other = 1; other <= hosts; ++other) one.timeouts.push_back(timeout(random));
     // Its own source last: it would hide what the others do.
-    for (unsigned i = 0; i < hosts; ++i) one.order.push_back((host + i) % hosts + 1);
-    std::swap(one.order[0], one.order[random.below(hosts - 1)]);
+    for (unsigned i = 0; i < hosts; ++i) one.orders[0].push_back((host + i) % hosts + 1);
+    std::swap(one.orders[0][0], one.orders[0][random.below(hosts - 1)]);
+    one.orders[1] = one.orders[0];
+    std::reverse(one.orders[1].begin(), one.orders[1].end() - 1);
+    one.orders[2] = one.orders[0];
     plan.hosts.push_back(std::move(one));
   }
   if (random.one_in(3)) plan.late_host = 1 + random.below(hosts);
+  plan.host_without = 1 + random.below(hosts);
+  plan.speakers = {1 + random.below(hosts), 1 + random.below(hosts)};
   const double most = options.is_short ? options.seconds : std::min(options.seconds, 90.0);
   const auto until = static_cast<Nanoseconds>(most * 1e9);
   for (Nanoseconds at = kBeginning; at < until;) {

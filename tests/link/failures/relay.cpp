@@ -86,25 +86,30 @@ void Relay::send(unsigned from, unsigned to, const unsigned char* frame, std::si
     ++passed_.lost;
     return;
   }
+  const std::uint64_t order = ++order_;
   const bool is_double = happens(fault.doubled);
   passed_.doubled += is_double ? 1 : 0;
   for (int copies = is_double ? 2 : 1; copies > 0; --copies) {
     if (!happens(fault.delayed)) {
-      deliver(from, to, frame, size);
+      deliver(from, to, order, frame, size);
       continue;
     }
     ++passed_.delayed;
     const auto most = static_cast<std::uint32_t>(std::max<Nanoseconds>(fault.delay / 1000, 1));
     const Nanoseconds delay = fault.is_even ? fault.delay : Nanoseconds{random_.below(most)} * 1000;
-    late_.push({now() + delay, ++order_, from, to, {frame, frame + size}});
+    late_.push({now() + delay, order, from, to, {frame, frame + size}});
   }
 }
 
-void Relay::deliver(unsigned from, unsigned to, const unsigned char* frame, std::size_t size) {
+void Relay::deliver(unsigned from, unsigned to, std::uint64_t order, const unsigned char* frame,
+                    std::size_t size) {
   if (faults_[{from, to}].is_cut) {
     ++passed_.cut;
     return;
   }
+  std::uint64_t& newest = newest_[{from, to}];
+  passed_.overtaken += order < newest ? 1 : 0;
+  newest = std::max(newest, order);
   const auto cable = cables_.find(to);
   // A host that does not take its frames loses them, as at any switch.
   if (cable != cables_.end()) static_cast<void>(!::write(cable->second, frame, size));
@@ -115,7 +120,7 @@ int Relay::pass_late_ones() {
     const Nanoseconds left = late_.top().due - now();
     if (left > 0) return static_cast<int>(left / 1'000'000) + 1;
     const Late& first = late_.top();
-    deliver(first.from, first.to, first.frame.data(), first.frame.size());
+    deliver(first.from, first.to, first.order, first.frame.data(), first.frame.size());
     late_.pop();
   }
   return -1;

@@ -37,6 +37,7 @@ struct Passed {
   std::uint64_t lost = 0;
   std::uint64_t doubled = 0;
   std::uint64_t delayed = 0;
+  std::uint64_t overtaken = 0;
 };
 
 class Relay {
@@ -67,7 +68,9 @@ class Relay {
   // Under the lock.
   void take_from(unsigned host, int cable);
   void send(unsigned from, unsigned to, const unsigned char* frame, std::size_t size);
-  void deliver(unsigned from, unsigned to, const unsigned char* frame, std::size_t size);
+  // `order`: by which frames came in.
+  void deliver(unsigned from, unsigned to, std::uint64_t order, const unsigned char* frame,
+               std::size_t size);
   int pass_late_ones();  // for how many ms there is nothing to do
   bool happens(unsigned of_1000) { return of_1000 != 0 && random_.below(1000) < of_1000; }
 
@@ -76,6 +79,8 @@ class Relay {
   std::map<std::pair<unsigned, unsigned>, Fault> faults_;
   std::priority_queue<Late> late_;
   std::uint64_t order_ = 0;
+  // When the last frame came in, of those that came out.
+  std::map<std::pair<unsigned, unsigned>, std::uint64_t> newest_;
   stress::Random random_;
   Passed passed_;
   bool ends_ = false;

@@ -16,43 +16,13 @@ namespace {
 constexpr Nanoseconds kNotBack = 60 * kSecond;
 constexpr std::uint64_t kFlowing = 20;  // samples of each source
 constexpr Nanoseconds kAtRest = 1500 * kMs;
-// What the page promises of a healthy network.
-constexpr Nanoseconds kPromised = kSecond;
-// The end of a trouble is noted a little after it.
-constexpr Nanoseconds kSettling = 20 * kMs;
-// What a link's earlier life has sent may come so long after the next one has begun: no sample
-// arrives that is older than its T.
-constexpr Nanoseconds kAfterRestart = kSecond;
-constexpr Nanoseconds kLong = 3'600 * kSecond;
-
-void pass(Nanoseconds time) { ::poll(nullptr, 0, static_cast<int>(time / kMs)); }
 
 bool has_ended(const test::ChildProcess& process) {
   pollfd ended{process.descriptor(), POLLIN, 0};
   return ::poll(&ended, 1, 0) == 1;
 }
 
-bool is_cut(Trouble trouble) {
-  return trouble == Trouble::cut || trouble == Trouble::mute || trouble == Trouble::deaf ||
-         trouble == Trouble::split;
-}
-
 }  // namespace
-
-std::string Times::text() const {
-  if (each.empty()) return "none";
-  std::vector<Nanoseconds> sorted = each;
-  std::sort(sorted.begin(), sorted.end());
-  const auto at = [&](double share) {
-    const auto place = static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1));
-    return static_cast<double>(sorted[place]) / 1e6;
-  };
-  char text[120];
-  std::snprintf(text, sizeof text,
-                "%zu: half within %.0f ms, 95%% within %.0f ms, all within %.0f ms", sorted.size(),
-                at(0.5), at(0.95), at(1));
-  return text;
-}
 
 Round::Round(const Options& options, const Plan& plan, Totals& totals)
     : options_(options), plan_(plan), totals_(totals), relay_(plan.seed) {
@@ -68,6 +38,14 @@ Round::~Round() {
   while (!hosts_.empty()) hosts_.pop_back();
 }
 
+void Round::pass(Nanoseconds time) {
+  ::poll(nullptr, 0, static_cast<int>(time / kMs));
+  operators_.reap();
+  history_.waits.look(static_cast<unsigned>(hosts_.size()), [&](unsigned number) {
+    return number == 0 ? std::vector<pid_t>{::getpid()} : host(number).pids();
+  });
+}
+
 void Round::plug_in(unsigned number) {
   host(number).network().plug_in();
   relay_.connect(number, host(number).network().cable());
@@ -80,16 +58,20 @@ Findings Round::run() {
   heal();
   await_flow(found);
   await_rest();
-  for (const auto& each : hosts_) imports_.push_back(each->imports());
+  history_.switches = operators_.end();
+  for (const auto& each : hosts_) history_.hosts.push_back(each->history());
   for (const auto& each : hosts_) each->end(found);
   check(found);
   ++totals_.rounds;
+  ++totals_.rounds_of[static_cast<unsigned>(hosts_.size())];
+  totals_.late_interfaces += plan_.late_host != 0 ? 1 : 0;
   const Passed passed = relay_.passed();
   totals_.passed.frames += passed.frames;
   totals_.passed.cut += passed.cut;
   totals_.passed.lost += passed.lost;
   totals_.passed.doubled += passed.doubled;
   totals_.passed.delayed += passed.delayed;
+  totals_.passed.overtaken += passed.overtaken;
   if (!found.empty() && !options_.keep.empty()) keep();
   return found;
 }
@@ -108,9 +90,12 @@ void Round::work() {
         ++i;
         continue;
       }
-      const Event event = ongoing_[i].event;
+      // It is not among them any more when the faults are made anew.
+      const Ongoing ended = ongoing_[i];
       ongoing_.erase(ongoing_.begin() + static_cast<std::ptrdiff_t>(i));
-      end(event);
+      if (!end(ended.event)) {
+        ongoing_.insert(ongoing_.begin() + static_cast<std::ptrdiff_t>(i++), ended);
+      }
     }
     if (next != plan_.events.end() && next->at <= time) begin(*next++);
     pass(2 * kMs);
@@ -118,36 +103,69 @@ void Round::work() {
 }
 
 void Round::begin(const Event& event) {
-  const bool is_of_processes = event.trouble >= Trouble::unplugged;
+  const bool is_on_host = is_of_processes(event.trouble);
   if (event.host == plan_.late_host && host(event.host).network().cable() < 0) return;
-  if (is_of_processes && is_busy_[event.host]) return;
-  ++totals_.troubles;
-  const bool is_of_all = event.trouble == Trouble::split || event.trouble == Trouble::all_noise;
+  const bool is_skipped = (is_on_host && is_busy_[event.host]) ||
+                          (event.trouble == Trouble::rival && is_sharing_[event.host]);
+  if (is_skipped) {
+    ++totals_.troubles[event.trouble].skipped;
+    return;
+  }
+  totals_.troubles[event.trouble].add(event.lasts);
+  if (!is_on_host && !is_of_frames(event.trouble) && event.trouble != Trouble::rival) {
+    begin_switch(event);
+    return;
+  }
   const Nanoseconds since = now();
-  troubled_.push_back({is_of_all ? 0 : event.host, event.trouble, {since, since + kLong}});
+  history_.troubled.push_back(
+      {is_of_all(event.trouble) ? 0 : event.host, event.trouble, {since, since + kLong}});
   ongoing_.push_back({event, now() - begin_ + event.lasts});
-  if (is_of_processes) {
+  if (is_on_host) {
     is_busy_[event.host] = true;
     change_processes(event, true);
+  } else if (event.trouble == Trouble::rival) {
+    change_shared(event, true);
   } else {
     renew_faults();
   }
 }
 
-void Round::end(const Event& event) {
-  if (event.trouble >= Trouble::unplugged) {
+void Round::begin_switch(const Event& event) {
+  operators_.start(host(event.host), event.model);
+  if (event.trouble == Trouble::switch_twice) operators_.start(host(event.other), 1 - event.model);
+}
+
+bool Round::end(const Event& event) {
+  if (event.trouble == Trouble::switch_death && operators_.has_killer()) return false;
+  if (is_of_processes(event.trouble)) {
     change_processes(event, false);
     is_busy_[event.host] = false;
+  } else if (event.trouble == Trouble::rival) {
+    change_shared(event, false);
   } else {
     renew_faults();
   }
-  const bool is_of_all = event.trouble == Trouble::split || event.trouble == Trouble::all_noise;
-  for (Troubled& each : troubled_) {
-    const bool is_it = each.host == (is_of_all ? 0 : event.host) && each.trouble == event.trouble &&
-                       each.span.to - each.span.from == kLong;
+  note_end(event);
+  return true;
+}
+
+void Round::note_end(const Event& event) {
+  for (Troubled& each : history_.troubled) {
+    const bool is_it = each.host == (is_of_all(event.trouble) ? 0 : event.host) &&
+                       each.trouble == event.trouble && each.span.to - each.span.from == kLong;
     if (!is_it) continue;
     each.span.to = now();
     break;
+  }
+}
+
+// Who speaks falls silent for a while, and who is silent speaks.
+void Round::change_shared(const Event& event, bool begins) {
+  is_sharing_[event.host] = begins;
+  if (host(event.host).has_rival()) {
+    host(event.host).end_rival(event.is_abrupt);
+  } else {
+    host(event.host).start_rival();
   }
 }
 
@@ -167,6 +185,15 @@ void Round::change_processes(const Event& event, bool begins) {
       break;
     case Trouble::link_kill:
       begins ? one.kill_link() : one.start_link();
+      break;
+    case Trouble::switch_death:
+      if (begins) {
+        one.expect_death_of_link();
+        operators_.start_killer(host(event.other), event.model, one);
+      } else {
+        one.kill_link();
+        one.start_link();
+      }
       break;
     case Trouble::daemon_kill:
       begins ? one.daemon().kill() : one.daemon().restart();
@@ -188,7 +215,7 @@ void Round::change_processes(const Event& event, bool begins) {
   }
 }
 
-std::vector<Round::Direction> Round::directions_of(const Event& event) const {
+std::vector<Direction> Round::directions_of(const Event& event) const {
   std::vector<Direction> result;
   const auto hosts = static_cast<unsigned>(plan_.hosts.size());
   for (unsigned from = 1; from <= hosts; ++from) {
@@ -222,7 +249,7 @@ std::vector<Round::Direction> Round::directions_of(const Event& event) const {
 void Round::renew_faults() {
   std::map<Direction, Fault> faults;
   for (const Ongoing& ongoing : ongoing_) {
-    if (ongoing.event.trouble >= Trouble::unplugged) continue;
+    if (!is_of_frames(ongoing.event.trouble)) continue;
     for (const Direction& direction : directions_of(ongoing.event)) {
       Fault& fault = faults[direction];
       if (is_cut(ongoing.event.trouble)) {
@@ -239,7 +266,7 @@ void Round::renew_faults() {
     for (unsigned to = 1; to <= hosts; ++to) {
       if (from == to) continue;
       const Direction direction{from, to};
-      std::vector<Span>& spans = cuts_[direction];
+      std::vector<Span>& spans = history_.cuts[direction];
       const bool was_cut = !spans.empty() && spans.back().to == kLong;
       const bool is_now = faults[direction].is_cut;
       if (was_cut && !is_now) spans.back().to = now();
@@ -257,7 +284,7 @@ void Round::heal() {
 
 // All sources come to all hosts.
 void Round::await_flow(Findings& found) {
-  std::vector<std::vector<FailingHost::Import>> before;
+  std::vector<std::vector<Import>> before;
   for (const auto& each : hosts_) before.push_back(each->imports());
   const Nanoseconds since = now();
   for (std::size_t i = 0; i < hosts_.size();) {
@@ -292,9 +319,9 @@ void Round::await_flow(Findings& found) {
 // Until the statuses say nothing new: what links have counted is told a little later.
 void Round::await_rest() {
   for (const auto& each : hosts_) each->component().signal(SIGUSR2);
-  std::vector<std::vector<FailingHost::Import>> before;
+  std::vector<std::vector<Import>> before;
   for (Nanoseconds since = now(); now() - since < kAtRest; pass(50 * kMs)) {
-    std::vector<std::vector<FailingHost::Import>> at_present;
+    std::vector<std::vector<Import>> at_present;
     for (const auto& each : hosts_) at_present.push_back(each->imports());
     if (at_present == before) continue;
     before = std::move(at_present);
@@ -312,72 +339,9 @@ void Round::check(Findings& found) {
       return;
     }
   }
-  for (unsigned number = 1; number <= hosts_.size(); ++number) {
-    const HostEvidence& importer = evidence[number - 1];
-    const HostPlan& plan = plan_.hosts[number - 1];
-    check_decisions(importer, found, totals_.checked);
-    std::map<std::string, Ranked> ranks;
-    for (unsigned rank = 0; rank < plan.order.size(); ++rank) {
-      const Nanoseconds timeout = plan.timeouts[plan.order[rank] - 1];
-      ranks[source_of(plan.order[rank])] = {rank, timeout == kForever ? kLong : timeout};
-    }
-    ranks[hold_of(number)] = {static_cast<unsigned>(plan.order.size()), kModelTimeout};
-    check_winners(importer, ranks, found, totals_.checked);
-    for (unsigned other = 1; other <= hosts_.size(); ++other) {
-      check_order(importer, source_of(other), found);
-      if (other != number) check_import(importer, number, evidence[other - 1], other, found);
-    }
-    host(number).add_seen_by_component(found);
-  }
-}
-
-void Round::check_import(const HostEvidence& importer, unsigned number,
-                         const HostEvidence& exporter, unsigned other, Findings& found) {
-  const Nanoseconds timeout = plan_.hosts[number - 1].timeouts[other - 1];
-  const std::string source = source_of(other);
-  check_age(importer, exporter, source, timeout == kForever ? kModelTimeout : timeout, found,
-            totals_.checked);
-  check_cuts(importer, source, cuts_[{other, number}], found);
-  // The link that counts is the last one.
-  std::vector<Span> spans{{0, host(number).link_since()}};
-  for (const Span& span : host(other).without_link()) {
-    spans.push_back({span.from, span.to + kAfterRestart});
-  }
-  check_losses(importer, source, counted_in(imports_[number - 1][other - 1].described), spans,
-               found, totals_.checked);
-  measure(importer, number, exporter, other, found);
-}
-
-bool Round::is_quiet(unsigned one, unsigned other, const Span& when, Of what) const {
-  return std::none_of(troubled_.begin(), troubled_.end(), [&](const Troubled& each) {
-    const bool is_of_them = each.host == 0 || each.host == one || each.host == other;
-    const bool counts = what == Of::anything || each.trouble >= Trouble::unplugged;
-    return is_of_them && counts && each.span.from < when.to && when.from < each.span.to;
-  });
-}
-
-void Round::measure(const HostEvidence& importer, unsigned number, const HostEvidence& exporter,
-                    unsigned other, Findings& found) {
-  const std::string source = source_of(other);
-  const Nanoseconds timeout = plan_.hosts[number - 1].timeouts[other - 1];
-  for (const Span& cut : cuts_[{other, number}]) {
-    const Recovery next = next_in_command(importer, source, timeout, cut);
-    const bool is_told = timeout != kForever && is_quiet(number, number, cut, Of::processes);
-    if (next.is_there && is_told && next.took >= 0) totals_.fallbacks.each.push_back(next.took);
-    if (cut.to == kLong) continue;
-    const Recovery published = first_arrival_after(exporter, source, cut.to);
-    const Recovery arrived = first_arrival_after(importer, source, cut.to);
-    if (!published.is_there || !arrived.is_there) continue;
-    const Nanoseconds took = arrived.took - published.took;
-    // Else something else delayed it.
-    const Nanoseconds until = cut.to + published.took + std::min(took, kPromised);
-    if (!is_quiet(number, other, {cut.to + kSettling, until}, Of::anything)) continue;
-    totals_.recoveries.each.push_back(std::max<Nanoseconds>(took, 0));
-    if (!options_.has_bounds || took <= kPromised) continue;
-    found.push_back(importer.name + ": " + source + " came back only " +
-                    std::to_string(took / kMs) + " ms after a cut of " +
-                    std::to_string((cut.to - cut.from) / kMs) + " ms");
-  }
+  const Findings judged = Judge(options_, plan_, history_, totals_).judge(evidence);
+  found.insert(found.end(), judged.begin(), judged.end());
+  for (const auto& each : hosts_) each->add_seen_by_component(found);
 }
 
 // For whoever looks into it.
