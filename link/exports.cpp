@@ -26,7 +26,8 @@ constexpr std::uint64_t kReadersId = ~std::uint64_t{0};
 constexpr shm::Nanoseconds kTapAgain = 5'000'000'000;
 // Events of one source that leave before others have their turn.
 constexpr int kMostAtOnce = 64;
-constexpr int kSayAgain = 10;  // ms
+constexpr int kSayAgain = 10;         // ms
+constexpr std::size_t kAlone = 1024;  // bytes of a sample that is one datagram
 
 shm::TypeInfo info_of(const Type& type) {
   shm::TypeInfo info;
@@ -232,13 +233,19 @@ bool Exports::take_up(const epoll_event* events, int count) {
   return !ends_;
 }
 
-// Under the lock. True: there may be more. Only a tap that has nothing left rings again.
+// Under the lock. True: there may be more. Only a tap that has nothing left rings again. The first
+// event leaves at once, and so does a large sample; small ones that have waited leave together.
 bool Exports::send_some(Export& one) {
+  std::optional<DatagramTrain::Boarding> boarding;
   for (int i = 0; i < kMostAtOnce; ++i) {
     const auto event = one.tap->take();
     if (!event) return false;
     // Whom else the source reaches here is nobody's business there.
-    if (event->kind() != TapEventKind::destinations || event->lost() != 0) send(one, *event);
+    if (event->kind() == TapEventKind::destinations && event->lost() == 0) continue;
+    const bool is_large = event->size() > kAlone;
+    if (!boarding && (is_large || i != 0)) boarding.emplace(train_);
+    send(one, *event);
+    if (is_large) train_.depart();
   }
   return true;
 }
@@ -299,6 +306,7 @@ void Exports::send_again(Export& one) {
   header_.kind = EventKind::kAgain;
   header_.is_deactivated = false;
   header_.tokens = one.kept.tokens();
+  const DatagramTrain::Boarding boarding(train_);
   // One that is not sent is missed until the next one.
   static_cast<void>(put(one, one.kept.sample()));
 }
@@ -311,11 +319,13 @@ void Exports::state(Export& one, bool is_deactivated) {
 }
 
 bool Exports::say_unsaid() {
+  if (!has_unsaid_) return false;
   bool is_left = false;
   for (const auto& [id, one] : exports_) {
     if (one->is_unsaid) state(*one, one->is_deactivated);
     is_left = is_left || one->is_unsaid;
   }
+  has_unsaid_ = is_left;
   return is_left;
 }
 
@@ -325,6 +335,7 @@ void Exports::write(Export& one, Bytes sample) {
   one.is_deactivated = header_.is_deactivated;
   // An event that is not sent has used a number, so importers count it as lost.
   one.is_unsaid = !put(one, sample);
+  has_unsaid_ = has_unsaid_ || one.is_unsaid;
 }
 
 bool Exports::put(Export& one, Bytes sample) {

@@ -33,6 +33,7 @@
 #include "link/core/held_tokens.hpp"
 #include "link/core/kept_sample.hpp"
 #include "link/core/patience.hpp"
+#include "link/dds/datagram_train.hpp"
 #include "link/dds/demands.hpp"
 #include "link/dds/event_topic.hpp"
 #include "link/host_view.hpp"
@@ -120,10 +121,12 @@ class Exports {
   std::mutex mutex_;
   std::map<std::uint64_t, std::unique_ptr<Export>> exports_;
   std::set<std::uint64_t> ready_;  // whose taps may have something
+  bool has_unsaid_ = false;        // one of them may be
   bool ends_ = false;
   // Likewise under mutex_: what is sent is made here.
   EventHeader header_;
   std::array<std::byte, kMaxHeaderBytes> buffer_{};
+  DatagramTrain train_;
   std::thread thread_;
 };
 

@@ -95,8 +95,10 @@ void be_receiver(Conversation& with, Tally& tally) {
 // A sender and a receiver of one system.
 class Pair {
  public:
-  Pair(std::shared_ptr<Progress> progress, Worker sender, Worker receiver)
+  Pair(std::shared_ptr<Progress> progress, Worker sender, Worker receiver,
+       std::vector<Worker> between = {})
       : progress_(std::move(progress)),
+        between_(std::move(between)),
         sender_(std::move(sender)),
         receiver_(std::move(receiver)) {}
 
@@ -118,6 +120,7 @@ class Pair {
 
  private:
   std::shared_ptr<Progress> progress_;
+  std::vector<Worker> between_;
   Worker sender_;
   Worker receiver_;
 };
@@ -179,6 +182,78 @@ Pair plain(const LinkedHost& from, const LinkedHost& to) {
     be_receiver(with, tally);
   });
   return {std::move(progress), std::move(sender), std::move(receiver)};
+}
+
+// A pipe that passes samples on, and thereby wakes who waits for them.
+class Bell {
+ public:
+  Bell() {
+    if (::pipe(ends_.data()) != 0) throw BenchError("no pipe");
+  }
+  Bell(const Bell&) = delete;
+  Bell& operator=(const Bell&) = delete;
+  ~Bell() {
+    for (const int end : ends_) ::close(end);
+  }
+  void pass(const Passed& passed) const {
+    if (::write(ends_[1], &passed, sizeof passed) != sizeof passed) {
+      throw BenchError("a pipe has broken");
+    }
+  }
+  // Calls `heard` for each sample, and `told` for each word of the conversation, until that ends.
+  template <class Heard, class Told>
+  void wait(Conversation& with, Heard heard, Told told) const {
+    for (std::uint64_t word = 0;;) {
+      std::array<pollfd, 2> ends{{{ends_[0], POLLIN, 0}, {with.descriptor(), POLLIN, 0}}};
+      static_cast<void>(::poll(ends.data(), ends.size(), -1));
+      Passed passed;
+      const bool rings = (ends[0].revents & POLLIN) != 0;
+      if (rings && ::read(ends_[0], &passed, sizeof passed) == sizeof passed) heard(passed);
+      if (rings || ends[1].revents == 0) continue;
+      if (!with.hear_or_end(word)) return;
+      told();
+    }
+  }
+
+ private:
+  std::array<int, 2> ends_{};
+};
+
+// As plain(), but with the wake-ups that links add, where they add them: the sender wakes a process
+// that publishes, and who receives wakes the process that has been waiting for the sample.
+Pair woken(const LinkedHost& from, const LinkedHost& to) {
+  auto progress = std::make_shared<Progress>();
+  const auto there = std::make_shared<Bell>();
+  const auto here = std::make_shared<Bell>();
+  std::vector<Worker> between;
+  between.emplace_back("Cyclone's sender, woken", [&](Conversation& with) {
+    from.space().move_in();
+    set_dds_interface("eth0");
+    const auto passing = cyclone_passing();
+    const auto publisher = passing->publisher("bench_woken", kSmall);
+    there->wait(
+        with, [&](const Passed& passed) { publisher->publish(passed); }, [] {});
+  });
+  between.emplace_back("Cyclone's receiver, waking", [&](Conversation& with) {
+    to.space().move_in();
+    set_dds_interface("eth0");
+    const auto passing = cyclone_passing();
+    const auto subscriber =
+        passing->subscriber("bench_woken", [&](const Passed& passed) { here->pass(passed); });
+    std::uint64_t word = 0;
+    while (with.hear_or_end(word)) {
+    }
+  });
+  Worker sender("a sender who wakes", [&](Conversation& with) {
+    be_sender(with, *progress,
+              [&](std::size_t /*bytes*/, const Passed& passed) { there->pass(passed); });
+  });
+  Worker receiver("a receiver who is woken", [&](Conversation& with) {
+    Tally tally(*progress);
+    here->wait(
+        with, [&](const Passed& passed) { tally.add(passed); }, [&] { with.say(tally.take()); });
+  });
+  return {std::move(progress), std::move(sender), std::move(receiver), std::move(between)};
 }
 
 // Of a thread that blocks, by another: half of a round trip over two pipes.
@@ -264,6 +339,11 @@ void measure_pairs(Measure& measure, const Budget& budget) {
                             return pair->send(kSmall, kPeriodNs, seconds);
                           }});
   }
+  const auto with_wake_ups = std::make_shared<Pair>(woken(head, base));
+  with_wake_ups->await();
+  contenders.push_back({kCycloneWoken, Role::kFloor, [with_wake_ups](double seconds) {
+                          return with_wake_ups->send(kSmall, kPeriodNs, seconds);
+                        }});
   const auto wake_up = std::make_shared<WakeUp>();
   contenders.push_back(
       {kWakeUp, Role::kFloor, [wake_up](double seconds) { return wake_up->round(seconds); }});
@@ -283,7 +363,10 @@ Measure measure_hosts_delivery(const Effort& effort) {
                   "the same two network namespaces, in interleaved rounds: a sample of 64 B each "
                   "millisecond; and as many as pass while at most eight are on their way. "
                   "The rule at the receiver reads eight activities. Through links a sample wakes "
-                  "two threads more, each of which costs a wake-up."};
+                  "two threads more. What these cost is measured beside it: the same programs of "
+                  "Cyclone DDS, but the sender wakes a process that publishes, and who receives "
+                  "wakes another; and, by itself, half of a round trip over two pipes between two "
+                  "threads of one process, which mostly share a processor."};
   try {
     measure_pairs(measure, effort.quick ? Budget{3, 0.2} : Budget{20, 0.4});
   } catch (const std::exception& error) {

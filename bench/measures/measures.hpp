@@ -31,6 +31,7 @@ inline const char* const kShareOfProcessor = ", share of a processor";
 inline const char* const kTwoInputs = "two inputs at 100 Hz";
 inline const char* const kThroughLinks = "through two links";
 inline const char* const kWakeUp = "a wake-up";
+inline const char* const kCycloneWoken = "Cyclone DDS, two wake-ups more";
 inline const char* const kSmallBetweenHosts = "64 B, one way";
 inline const char* const kSmallThroughput = "64 B, throughput";
 inline const char* const kLargeThroughput = "1 MiB, throughput";

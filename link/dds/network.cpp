@@ -25,6 +25,7 @@ namespace {
 // reader that is not waits for 3 s; discovery is several such conversations, one after another.
 constexpr const char* kForAll =
     "<General><MaxMessageSize>1400B</MaxMessageSize><FragmentSize>1300B</FragmentSize></General>"
+    "<Internal><SocketReceiveBufferSize max=\"8MiB\"/></Internal>"
     "<Discovery><LeaseDuration>1500ms</LeaseDuration><SPDPInterval>250ms</SPDPInterval></"
     "Discovery><Internal><HeartbeatInterval max=\"500ms\">100ms</HeartbeatInterval>"
     "<AutoReschedNackDelay>500ms</AutoReschedNackDelay></Internal>";
