@@ -2,10 +2,10 @@
 // and a tap of it while somebody reads it. A source that nobody wants costs its publisher nothing.
 //
 // A tap is no destination: exporting changes no decision and holds up no publisher. Its events
-// leave in their order, on one thread, which waits for no reader. What the tap or the network loses
-// uses numbers, so that importers count it. Where an event cannot be written, the state of its
-// source is said until it is. A sample that all importers can do without stays here, until one of
-// them wants it (core/demand.hpp).
+// leave in their order, on one thread, which waits for no reader, but keeps a pace where they are
+// large (core/train_pace.hpp). What the tap or the network loses uses numbers, so that importers
+// count it. Where an event cannot be written, the state of its source is said until it is. A sample
+// that all importers can do without stays here, until one of them wants it (core/demand.hpp).
 //
 // Thread safety: look() on the link's thread; sending has a thread of its own, which
 // shares exports_ under mutex_. Taps are opened and closed without that lock. A publisher that
