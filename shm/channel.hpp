@@ -100,8 +100,8 @@ class ChannelWriter {
 
   // Takes out of the queue what the receiver is done with, by its own word, before newer samples
   // push it out. Calls `evicted(slot)` for each; the entries stay where they are.
-  // SYNC POINT: entries-consumed. The acquire pairs with the release in ChannelReader::tell(): who
-  // finds an entry done with finds the hold on its slot, too, or the end of that hold.
+  // SYNC POINT: entries-consumed. The acquire pairs with fence (c), behind which the receiver
+  // tells: who finds an entry done with finds the hold on its slot, too, or the end of that hold.
   template <class Evicted>
   void forget(const Atomic<std::uint64_t>& consumed, Evicted evicted) noexcept {
     // More than were ever accepted is a lie, and nothing is forgotten for it.
@@ -243,9 +243,11 @@ class ChannelReader {
     next_ = (next_ + count) & kSequenceMask;
     advance(static_cast<std::uint32_t>(count % depth_));
   }
-  // Says so to the publisher, in its lane. SYNC POINT: entries-consumed.
+  // Says so to the publisher, in its lane. SYNC POINT: entries-consumed. Relaxed is enough: between
+  // the hold and this stands fence (c), and between a stamp that was peeked and this the fence of
+  // peek_stamp().
   void tell(Atomic<std::uint64_t>& consumed) const noexcept {
-    consumed.store(this->consumed(), std::memory_order_release);
+    consumed.store(this->consumed(), std::memory_order_relaxed);
   }
   [[nodiscard]] std::uint64_t consumed() const noexcept { return next_ - 1; }
   [[nodiscard]] std::uint64_t next() const noexcept { return next_; }
