@@ -34,9 +34,8 @@ OutputPort<void> open(Node& node, const std::string& name, const Entry& entry) {
 }  // namespace
 
 bool ForeignSample::copy_twice(WritableBytes to, WritableBytes also) const noexcept {
-  constexpr std::size_t kBlock = std::size_t{16} << 10;  // stays in the first-level cache
-  for (std::size_t at = 0; at < to.size(); at += kBlock) {
-    const WritableBytes block(to.data() + at, std::min(kBlock, to.size() - at));
+  for (std::size_t at = 0; at < to.size(); at += kCopyBlock) {
+    const WritableBytes block(to.data() + at, std::min(kCopyBlock, to.size() - at));
     if (!copy(at, block)) return false;
     std::memcpy(also.data() + at, block.data(), block.size());
   }

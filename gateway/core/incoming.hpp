@@ -19,6 +19,11 @@
 
 namespace arbiter::gateway {
 
+// What is written to two places is written by blocks of so many bytes: three of them, with what is
+// read, fit into the first-level cache. A page: measured, both less and more take longer where the
+// memory has left the cache (docs/performance.md).
+inline constexpr std::size_t kCopyBlock = 4096;
+
 // A sample as the middleware has it. The bytes are those that Arbiter's components get: for DDS
 // the serialised sample with its encapsulation header, for iceoryx user header and payload.
 class ForeignSample {

@@ -6,17 +6,17 @@
 #include <algorithm>
 #include <cstring>
 
+#include "gateway/core/incoming.hpp"
+
 namespace arbiter::gateway::dds {
 
 namespace {
 
-// Written twice while they are in the first-level cache: a fragment may have 64 KiB.
-constexpr std::size_t kBlock = std::size_t{16} << 10;
-
+// A fragment may have 64 KiB.
 void copy_block(const unsigned char* from, std::byte* to, std::byte* also,
                 std::size_t size) noexcept {
-  for (std::size_t at = 0; at < size; at += kBlock) {
-    const std::size_t length = std::min(kBlock, size - at);
+  for (std::size_t at = 0; at < size; at += kCopyBlock) {
+    const std::size_t length = std::min(kCopyBlock, size - at);
     std::memcpy(to + at, from + at, length);
     std::memcpy(also + at, to + at, length);
   }

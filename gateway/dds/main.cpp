@@ -3,9 +3,11 @@
 
 #include "gateway/core/program.hpp"
 #include "gateway/dds/dds_middleware.hpp"
+#include "gateway/dds/freed_memory.hpp"
 
 int main(int argc, char** argv) {
   using namespace arbiter;
+  gateway::dds::keep_freed_memory();
   const gateway::ProgramKind kind{
       gateway::Kind::kDds, "arbiter-gateway-dds",
       "Passes topics of DDS and ROS 2 through the ports of Arbiter.",
