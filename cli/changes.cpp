@@ -27,7 +27,7 @@ wire::ChangeReport ask_for_change(const std::string& verb, const std::string& in
                                   wire::Message question, bool json) {
   question.flags |= wire::kWantsReport;
   wire::Call daemon(caller(verb, instance));
-  const std::string text = wire::read_document(daemon.ask(question).descriptors[0]);
+  const std::string text = wire::change_report_text(daemon.ask(question));
   wire::ChangeReport report = wire::read_change_report(text);
   if (json) {
     std::cout << wire::write_document(wire::parse_document(text));

@@ -46,8 +46,7 @@ SwitchTo switch_of_daemon(const std::string& instance) {
     wire::Call daemon(caller);
     wire::ChangeReport report;
     try {
-      report = wire::read_change_report(
-          wire::read_document(daemon.ask(message, kUntilDone).descriptors[0]));
+      report = wire::read_change_report(wire::change_report_text(daemon.ask(message, kUntilDone)));
     } catch (const wire::RefusedError&) {
       throw;
     } catch (const std::exception& error) {

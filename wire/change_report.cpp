@@ -1,5 +1,8 @@
 #include "wire/change_report.hpp"
 
+#include <nlohmann/json.hpp>
+
+#include "wire/document.hpp"
 #include "wire/fields.hpp"
 #include "wire/past_model_fields.hpp"
 
@@ -29,6 +32,15 @@ void describe(auto& field, Is<ChangeReport> auto& of) {
 
 ChangeReport read_change_report(std::string_view text) {
   return FieldReader::read_whole<ChangeReport>(text);
+}
+
+std::string change_report_text(const Received& answer) {
+  if (answer.message.kind != MessageKind::kDone) return read_document(answer.descriptors[0]);
+  return write_document({{"ok", true},
+                         {"has_errors", false},
+                         {"findings", nlohmann::json::array()},
+                         {"text", "the daemon had no descriptor left for its report\n"},
+                         {"generation", answer.message.value}});
 }
 
 }  // namespace arbiter::wire

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "wire/messages.hpp"
 #include "wire/status.hpp"
 
 namespace arbiter::wire {
@@ -40,5 +41,9 @@ struct ChangeReport {
 
 // Throws DocumentError.
 [[nodiscard]] ChangeReport read_change_report(std::string_view text);
+
+// What a daemon answered that was asked for a report (kWantsReport), as JSON: one that has no
+// descriptor left for it says kDone instead, and that makes a report, too. Throws DocumentError.
+[[nodiscard]] std::string change_report_text(const Received& answer);
 
 }  // namespace arbiter::wire

@@ -257,18 +257,25 @@ void ModelChanges::answer(const Swap& swap, nlohmann::json document, const std::
       try {
         send_document(client, each.request, wire::MessageKind::kReport, report);
       } catch (const std::exception& error) {  // no descriptors are left
-        refuse(client, each.request,
-               (why_not.empty() ? "it is done" : why_not) +
-                   "; the report could not be sent: " + error.what());
+        answer_without_report(swap, client, each.request, why_not,
+                              std::string("; the report could not be sent: ") + error.what());
       }
-    } else if (!why_not.empty()) {
-      refuse(client, each.request, why_not);
     } else {
-      auto reply = reply_to(each.request, wire::MessageKind::kDone);
-      reply.value = static_cast<std::uint32_t>(board_.in_force().generation);
-      client.send(reply);
+      answer_without_report(swap, client, each.request, why_not, "");
     }
   }
+}
+
+// A refusal says that nothing has changed: what is done is not refused. A comparison is its report.
+void ModelChanges::answer_without_report(const Swap& swap, Client& client, std::uint64_t request,
+                                         const std::string& why_not, const std::string& lacks) {
+  if (!why_not.empty()) return refuse(client, request, why_not + lacks);
+  if (swap.change.kind == Change::Kind::kCompare && !lacks.empty()) {
+    return refuse(client, request, "the files were compared" + lacks);
+  }
+  auto reply = reply_to(request, wire::MessageKind::kDone);
+  reply.value = static_cast<std::uint32_t>(board_.in_force().generation);
+  client.send(reply);
 }
 
 }  // namespace arbiter::service

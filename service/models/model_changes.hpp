@@ -124,6 +124,9 @@ class ModelChanges {
   void answer_refused(const Swap& swap, const std::string& why);
   // `why_not`: of what was refused.
   void answer(const Swap& swap, nlohmann::json document, const std::string& why_not = {});
+  // `lacks`: why a report that was wanted is not sent.
+  void answer_without_report(const Swap& swap, Client& client, std::uint64_t request,
+                             const std::string& why_not, const std::string& lacks);
 
   const Options options_;
   Gate& gate_;

@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/inotify.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <arbiter/arbiter.hpp>
 
@@ -46,6 +48,16 @@ TEST_F(ChangingModels, SwitchReadsNoFile) {
   EXPECT_EQ(source_in_force(), "/b");
 }
 
+// The number that the next one of that process would have.
+rlim_t lowest_free_descriptor(pid_t process) {
+  rlim_t free = 0;
+  while (::access(("/proc/" + std::to_string(process) + "/fd/" + std::to_string(free)).c_str(),
+                  F_OK) == 0) {
+    ++free;
+  }
+  return free;
+}
+
 // What a link asks before all hosts switch.
 TEST_F(ChangingModels, ADryRunSaysWhetherASwitchWouldBeRefusedAndMakesNone) {
   start();
@@ -67,6 +79,38 @@ TEST_F(ChangingModels, ADryRunSaysWhetherASwitchWouldBeRefusedAndMakesNone) {
   EXPECT_EQ(daemon_->generation(), 1u);
   EXPECT_EQ(name_in_force(), "default");
   EXPECT_THAT(daemon_->log(), Not(HasSubstr("the model in force stays")));
+}
+
+// The table of a model that has been in force before is there; the report needs a descriptor. It
+// must never say that nothing was done where it was.
+TEST_F(ChangingModels, ASwitchThatIsDoneIsNoRefusalThoughNoDescriptorIsLeft) {
+  start();
+  arbiter({"switch", "other"});
+  const pid_t daemon = daemon_->process().pid();
+  std::uint64_t generation = daemon_->generation();
+  bool was_done_without_report = false;
+  for (const std::string model : {"default", "other", "default", "other"}) {
+    RawClient client(daemon_->instance());
+    client.hello("switches");
+    rlimit before{};
+    ASSERT_EQ(::prlimit(daemon, RLIMIT_NOFILE, nullptr, &before), 0);
+    const rlimit none{lowest_free_descriptor(daemon), before.rlim_max};
+    ASSERT_EQ(::prlimit(daemon, RLIMIT_NOFILE, &none, nullptr), 0);
+    auto question = RawClient::message(MessageKind::kSwitch, model);
+    question.flags = wire::kWantsReport;
+    client.send(question);
+    wire::Received answer;
+    const bool is_answered = client.receive(answer);
+    ASSERT_EQ(::prlimit(daemon, RLIMIT_NOFILE, &before, nullptr), 0);
+    ASSERT_TRUE(is_answered);
+    const std::uint64_t now = daemon_->generation();
+    const bool is_done = now != generation;
+    EXPECT_EQ(answer.message.kind, is_done ? MessageKind::kDone : MessageKind::kRefused);
+    if (is_done) EXPECT_EQ(answer.message.value, now);
+    was_done_without_report = was_done_without_report || is_done;
+    generation = now;
+  }
+  EXPECT_TRUE(was_done_without_report);
 }
 
 TEST_F(ChangingModels, SwitchWithoutAModelSaysSo) {
