@@ -100,11 +100,11 @@ void Import::open(bool has_daemon, const Patience& patience) {
 
 bool Import::is_open() const {
   const std::lock_guard lock(mutex_);
-  return port_.has_value();
+  return port_ != nullptr;
 }
 
 void Import::yield() {
-  std::optional<OutputPort<void>> gone;
+  std::shared_ptr<OutputPort<void>> gone;
   {
     const std::lock_guard lock(mutex_);
     if (!port_ || !port_->asked_to_yield()) return;
@@ -226,9 +226,10 @@ void Import::open_port(const OfferCard& card) {
   try {
     OutputPortOptions options;
     options.yields = true;
-    OutputPort<void> port = node_.output_port(source_, type_of(card.type), options);
+    auto port =
+        std::make_shared<OutputPort<void>>(node_.output_port(source_, type_of(card.type), options));
     const std::lock_guard lock(mutex_);
-    port_.emplace(std::move(port));
+    port_ = std::move(port);
     awaits_sample_ = false;
     revision_ = card.type_revision;
     // What came before the port was there.
@@ -244,7 +245,7 @@ void Import::open_port(const OfferCard& card) {
 }
 
 void Import::close() {
-  std::optional<OutputPort<void>> gone;
+  std::shared_ptr<OutputPort<void>> gone;
   {
     const std::lock_guard lock(mutex_);
     obeyed_ = 0;
@@ -285,7 +286,7 @@ wire::ImportStatus Import::status() const {
   if (const Offerer* const speaker = speaker_.current()) status.host = speaker->host;
   status.hosts = speaker_.hosts();
   const std::lock_guard lock(mutex_);
-  status.is_open = port_.has_value();
+  status.is_open = port_ != nullptr;
   status.lost = stream_.lost();
   status.late = counts_.late;
   return status;
@@ -296,8 +297,14 @@ void Import::describe() {
   if (!is_open() || time < describe_again_) return;
   std::string now = text();
   if (now == described_) return;
-  const std::lock_guard lock(mutex_);
-  if (port_) port_->describe(now);
+  std::shared_ptr<OutputPort<void>> port;
+  {
+    const std::lock_guard lock(mutex_);
+    port = port_;
+  }
+  // Without the lock, for which samples wait: the node has one of its own. If the port is to yield
+  // meanwhile, it is closed here.
+  if (port) port->describe(now);
   described_ = std::move(now);
   describe_again_ = time + kDescribeAgain;
 }

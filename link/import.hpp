@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -131,7 +132,8 @@ class Import : private gateway::dds::SampleTaker {
   shm::Nanoseconds describe_again_ = 0;
 
   mutable std::mutex mutex_;
-  std::optional<OutputPort<void>> port_;
+  // Kept by describe(), too, while that waits for the node.
+  std::shared_ptr<OutputPort<void>> port_;
   shm::Nanoseconds spoken_here_until_ = 0;  // it has yielded
   std::uint32_t revision_ = 0;              // of the port's type
   Incarnation obeyed_ = 0;                  // the speaker's; 0: nobody
