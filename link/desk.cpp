@@ -1,19 +1,14 @@
 #include "link/desk.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <stdexcept>
+#include <exception>
 #include <utility>
 
-#include <nlohmann/json.hpp>
-
 #include "gateway/core/say.hpp"
-#include "link/core/topic_names.hpp"
-#include "link/host_status.hpp"
+#include "link/desk_topics.hpp"
 #include "link/import.hpp"
 #include "link/say_sparingly.hpp"
 #include "shm/clock.hpp"
-#include "wire/document.hpp"
 
 namespace arbiter::link {
 namespace {
@@ -27,32 +22,8 @@ constexpr shm::Nanoseconds kComparing =
     Disagreements::kSettles + Disagreements::kNoEarlierLife + 4 * kCompareEvery;
 constexpr shm::Nanoseconds kSocketPeriod = 1'000'000'000;
 constexpr std::size_t kMostToAnswer = 64;
-constexpr std::size_t kMostPulseBytes = 64 + kMaxEchoes * 24;
-constexpr std::size_t kMostQuestionBytes = 8192;
-constexpr std::size_t kMostAnswerBytes = kMaxAnswer + 64;
 
 }  // namespace
-
-struct Desk::Topics {
-  Topics(Desk& desk, const Network& network, const gateway::Bell& bell)
-      : cards(
-            network, kHostTopic, Delivery::kState, kMaxCardBytes,
-            [&desk](Bytes bytes, std::uint64_t writer) { desk.hear_card(bytes, writer); }, bell),
-        pulses(
-            network, kPulseTopic, Delivery::kPulse, kMostPulseBytes,
-            [&desk](Bytes bytes, std::uint64_t) { desk.hear_pulse(bytes); }, bell),
-        questions(
-            network, kQuestionTopic, Delivery::kMessage, kMostQuestionBytes,
-            [&desk](Bytes bytes, std::uint64_t) { desk.hear_question(bytes); }, bell),
-        answers(
-            network, kAnswerTopic, Delivery::kMessage, kMostAnswerBytes,
-            [&desk](Bytes bytes, std::uint64_t) { desk.hear_answer(bytes); }, bell) {}
-
-  MessageTopic cards;
-  MessageTopic pulses;
-  MessageTopic questions;
-  MessageTopic answers;
-};
 
 Desk::Desk(HostCard me)
     : me_(std::move(me)),
@@ -117,6 +88,16 @@ void Desk::leave() {
     network_.clear();
     neighbours_.keep({}, shm::monotonic_now());
   }
+}
+
+void Desk::close() {
+  leave();
+  if (socket_ != nullptr) socket_->close();
+  {
+    const std::lock_guard lock(mutex_);
+    closes_ = true;
+  }
+  changed_.notify_all();
 }
 
 void Desk::look(OwnHost own) {
@@ -199,7 +180,14 @@ void Desk::look_at_others() {
 
 void Desk::hear_card(Bytes message, std::uint64_t writer) {
   auto card = read_host_card(message);
-  if (!card) return;
+  if (!card) {
+    if (is_of_other_version(message)) {
+      say_sparingly(gateway::Level::kWarning,
+                    "a link of another version of Arbiter is on this network, which this one "
+                    "cannot read: install the same version on all hosts");
+    }
+    return;
+  }
   const std::lock_guard lock(mutex_);
   neighbours_.note(writer, std::move(*card), shm::monotonic_now());
 }
@@ -212,7 +200,7 @@ void Desk::hear_pulse(Bytes message) {
   round_trips_.note(*pulse, now);
 }
 
-void Desk::hear_question(Bytes message) {
+void Desk::hear_question(Bytes message, std::uint64_t writer) {
   auto question = read_question(message);
   if (!question || question->asker == me_.incarnation) return;
   const bool is_for_us = std::find(question->asked.begin(), question->asked.end(),
@@ -220,9 +208,10 @@ void Desk::hear_question(Bytes message) {
   if (!is_for_us) return;
   const std::lock_guard lock(mutex_);
   if (network_.empty()) return;  // join() has not returned yet
-  const auto verdict = askers_.judge(question->asker, question->number, shm::monotonic_now());
+  const shm::Nanoseconds now = shm::monotonic_now();
+  const auto verdict = askers_.judge(question->asker, writer, question->number, now);
   if (verdict != Askers::Verdict::kAnswer || to_answer_.size() >= kMostToAnswer) return;
-  to_answer_.push_back({std::move(*question), false, shm::monotonic_now()});
+  to_answer_.push_back({std::move(*question), false, now});
   changed_.notify_all();
 }
 
@@ -231,153 +220,6 @@ void Desk::hear_answer(Bytes message) {
   if (!answer || answer->asker != me_.incarnation) return;
   const std::lock_guard lock(mutex_);
   if (open_.note(std::move(*answer), shm::monotonic_now())) changed_.notify_all();
-}
-
-void Desk::answer_questions() {
-  std::unique_lock lock(mutex_);
-  for (;;) {
-    changed_.wait(lock, [this] { return ends_ || !to_answer_.empty(); });
-    if (ends_) return;
-    const Asked asked = std::move(to_answer_.front());
-    to_answer_.pop_front();
-    // Nobody waits for it any more: a daemon that is stopped holds up whoever asks after it.
-    if (shm::monotonic_now() - asked.came >= OpenQuestions::kPatience) continue;
-    lock.unlock();
-    answer(asked);
-    lock.lock();
-  }
-}
-
-void Desk::answer(const Asked& asked) {
-  const QuestionMessage& message = asked.message;
-  Answer given = answers_.answer({message.host, message.asker, message.verb, message.argument});
-  AnswerMessage reply{me_.incarnation, message.asker, message.number, given.is_refusal,
-                      std::move(given.text)};
-  if (!asked.is_ours) {
-    send_answer(reply);
-    return;
-  }
-  const std::lock_guard lock(mutex_);
-  open_.note(std::move(reply), shm::monotonic_now());
-  changed_.notify_all();
-}
-
-std::string Desk::serve(const LocalUser& who, const wire::LinkQuestion& question) {
-  const bool is_about_hosts = question.verb == "hosts" && question.host.empty();
-  const std::string* const action = answers_.action_of(question.verb);
-  if (!is_about_hosts && action == nullptr) {
-    throw std::runtime_error("links cannot be asked for \"" + question.verb + '"');
-  }
-  daemon_.require(who, is_about_hosts ? "observe" : *action);
-  if (!is_about_hosts) return wire::write_host_answers(ask_hosts(question));
-  return wire::write_document(to_json(document()));
-}
-
-wire::HostsDocument Desk::document() const {
-  wire::HostsDocument document;
-  const std::lock_guard lock(mutex_);
-  document.host = me_.host;
-  document.instance = me_.instance;
-  document.version = me_.version;
-  if (!network_.empty()) document.network = network_;
-  if (!own_.waits_for.empty()) document.waits_for = own_.waits_for;
-  wire::HostStatus& here = document.hosts.emplace_back(status_of(own_.card));
-  here.is_this = true;
-  here.since = began_;
-  for (const Neighbour& each : neighbours_.all()) {
-    wire::HostStatus& host = document.hosts.emplace_back(status_of(*each.card));
-    host.is_up = each.is_up;
-    host.since = each.since;
-    if (each.is_up) host.round_trip = round_trips_.of(each.card->incarnation);
-  }
-  document.imports = own_.imports;
-  for (const Disagreement& each : standing_) {
-    document.disagreements.push_back(status_of(each));
-  }
-  return document;
-}
-
-std::vector<wire::HostAnswer> Desk::ask_hosts(const wire::LinkQuestion& question) {
-  if (question.argument.size() > kMaxArgument) throw std::runtime_error("that is too much to ask");
-  const bool is_for_all = question.host == wire::kAllHosts;
-  const std::string& wanted = question.host.empty() ? me_.host : question.host;
-  std::vector<wire::HostAnswer> answers;
-  std::vector<Incarnation> asked;  // of answers, as long as they are not known to be gone
-  QuestionMessage message{me_.incarnation, 0, {}, me_.host, question.verb, question.argument};
-  {
-    const std::lock_guard sending(send_mutex_);
-    {
-      const std::lock_guard lock(mutex_);
-      const auto add = [&](const HostCard& card, bool is_up) {
-        if (!is_for_all && card.host != wanted) return;
-        wire::HostAnswer& one = answers.emplace_back();
-        one.host = card.host;
-        one.incarnation = hexadecimal(card.incarnation);
-        one.outcome = is_up ? wire::HostOutcome::kSilent : wire::HostOutcome::kGone;
-        if (is_up) asked.push_back(card.incarnation);
-      };
-      add(me_, true);
-      if (!network_.empty()) {
-        for (const Neighbour& each : neighbours_.all()) add(*each.card, each.is_up);
-      }
-      if (answers.empty()) {
-        throw std::runtime_error("no host is called \"" + wanted + "\": see arbiter hosts");
-      }
-      message.asked = asked;
-      message.number = open_.ask(asked, shm::monotonic_now());
-      if (message.number == 0) throw std::runtime_error("too many questions wait for an answer");
-    }
-    put_question(message);
-  }
-  const OpenQuestions::Replies replies = await_replies(message);
-  for (std::size_t i = 0, next = 0; i < answers.size(); ++i) {
-    if (answers[i].outcome == wire::HostOutcome::kGone) continue;
-    const OpenQuestions::Reply& reply = replies.at(asked.at(next++));
-    answers[i].outcome = outcome_of(reply.outcome);
-    answers[i].took = reply.took;
-    answers[i].text = reply.text;
-  }
-  return answers;
-}
-
-// Our own answer is made here; others get the question.
-void Desk::put_question(const QuestionMessage& message) {
-  QuestionMessage others = message;
-  const bool is_for_us = std::erase(others.asked, me_.incarnation) != 0;
-  if (is_for_us) {
-    const std::lock_guard lock(mutex_);
-    to_answer_.push_back({message, true, shm::monotonic_now()});
-    changed_.notify_all();
-  }
-  if (!others.asked.empty()) send_question(others);
-}
-
-void Desk::send_question(const QuestionMessage& message) {
-  const std::shared_lock using_topics(topics_mutex_);
-  if (topics_ != nullptr) topics_->questions.send(write_question(message));
-}
-
-void Desk::send_answer(const AnswerMessage& message) {
-  const std::shared_lock using_topics(topics_mutex_);
-  if (topics_ != nullptr) topics_->answers.send(write_answer(message));
-}
-
-OpenQuestions::Replies Desk::await_replies(QuestionMessage& message) {
-  constexpr auto kStep = std::chrono::milliseconds(50);
-  std::unique_lock lock(mutex_);
-  while (!open_.is_over(message.number, shm::monotonic_now())) {
-    changed_.wait_for(lock, kStep);
-    message.asked = open_.due(message.number, shm::monotonic_now());
-    std::erase(message.asked, me_.incarnation);
-    if (message.asked.empty()) continue;
-    lock.unlock();
-    {
-      const std::lock_guard sending(send_mutex_);
-      send_question(message);
-    }
-    lock.lock();
-  }
-  return open_.take(message.number);
 }
 
 }  // namespace arbiter::link

@@ -56,6 +56,9 @@ class Desk {
   void join(const Network& network, std::string name, const gateway::Bell& bell);
   // The network goes: nobody is heard, or asked, until join() is called again.
   void leave();
+  // The last call: nobody can ask any more, and nobody else is asked. Does not wait; the destructor
+  // waits for the daemon, for those who have asked, for some seconds at most.
+  void close();
   // Takes up what has changed, here and elsewhere, and logs what hosts do not agree upon. Ten times
   // a second.
   void look(OwnHost own);
@@ -79,7 +82,7 @@ class Desk {
   // On Cyclone's threads.
   void hear_card(Bytes message, std::uint64_t writer);
   void hear_pulse(Bytes message);
-  void hear_question(Bytes message);
+  void hear_question(Bytes message, std::uint64_t writer);
   void hear_answer(Bytes message);
 
   // On the answering thread.
@@ -119,6 +122,7 @@ class Desk {
   OpenQuestions open_;
   Askers askers_;
   std::deque<Asked> to_answer_;
+  bool closes_ = false;  // answers of others are not awaited any more
   bool ends_ = false;
 
   // Of the link's thread.

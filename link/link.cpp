@@ -62,13 +62,18 @@ Link::Link(LinkOptions options)
       view_(options_.instance, options_.max_age),
       interfaces_(options_.network.interfaces.empty() ? std::vector<std::string>{"lo"}
                                                       : options_.network.interfaces),
-      desk_(own_card(options_, incarnation_)) {
+      desk_(std::make_unique<Desk>(own_card(options_, incarnation_))) {
   gateway::dds::hear_cyclone();
 }
 
 Link::~Link() {
   const std::lock_guard lock(imports_mutex_);
   imports_.clear();
+}
+
+std::unique_ptr<Desk> Link::take_desk() {
+  desk_->close();
+  return std::move(desk_);
 }
 
 void Link::hear(const Notice& notice) {
@@ -168,11 +173,11 @@ void Link::enter_network() {
   demands_.emplace();
   exports_.emplace(*node_, *network_, held_, options_.host, incarnation_, bell_);
   clock_.emplace([this] { tokens_->send({incarnation_, sent_.next(time_with_sleep())}); });
-  desk_.join(*network_, name_of(options_.network), bell_);
+  desk_->join(*network_, name_of(options_.network), bell_);
 }
 
 void Link::leave_network() {
-  desk_.leave();
+  desk_->leave();
   clock_.reset();
   exports_.reset();
   demands_.reset();
@@ -266,7 +271,7 @@ void Link::tell_desk(const std::string& obstacle) {
     if (status.is_open) ++card.imports;
     if (!status.hosts.empty() || status.is_open) own.imports.push_back(std::move(status));
   }
-  desk_.look(std::move(own));
+  desk_->look(std::move(own));
 }
 
 }  // namespace arbiter::link

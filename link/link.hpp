@@ -59,6 +59,10 @@ class Link {
   enum class End : std::uint8_t { kStopped, kNetworkChanged };
   [[nodiscard]] End run(int stop);
 
+  // After run(): what still answers programs that have asked, closed. To destroy it may take some
+  // seconds; it needs nothing of the link.
+  [[nodiscard]] std::unique_ptr<Desk> take_desk();
+
  private:
   void make_node(int stop);
   void join_network(int stop);
@@ -104,7 +108,7 @@ class Link {
   std::optional<Exports> exports_;
   std::optional<DemandTeller> demands_;
   std::optional<TokenClock> clock_;
-  Desk desk_;
+  std::unique_ptr<Desk> desk_;  // null: it has been taken
 };
 
 }  // namespace arbiter::link

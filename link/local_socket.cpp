@@ -128,13 +128,21 @@ LocalSocket::LocalSocket(const std::string& instance, Serve serve)
   thread_ = std::thread([this] { run(); });
 }
 
-LocalSocket::~LocalSocket() {
+void LocalSocket::close() {
+  if (!thread_.joinable()) return;
   const std::uint64_t one = 1;
   static_cast<void>(!::write(end_.get(), &one, sizeof one));
   thread_.join();
   ::unlink(listener_.path.c_str());
-  std::unique_lock lock(shared_->mutex);
+  listener_.socket.reset();
+  listener_.lock.reset();
+  const std::lock_guard lock(shared_->mutex);
   shared_->ends = true;
+}
+
+LocalSocket::~LocalSocket() {
+  close();
+  std::unique_lock lock(shared_->mutex);
   shared_->changed.wait(lock, [this] { return shared_->serving == 0; });
 }
 

@@ -33,8 +33,11 @@ class LocalSocket {
   LocalSocket(const std::string& instance, Serve serve);
   LocalSocket(const LocalSocket&) = delete;
   LocalSocket& operator=(const LocalSocket&) = delete;
-  // Waits for calls of `serve` that have begun.
+  // As close(); and waits for calls of `serve` that have begun.
   ~LocalSocket();
+
+  // Nobody is let in any more, and another link may listen. Does not wait.
+  void close();
 
   [[nodiscard]] const std::string& path() const noexcept { return listener_.path; }
 

@@ -3,9 +3,12 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <exception>
+#include <future>
 #include <iostream>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -91,10 +94,17 @@ int run(int argc, char** argv) {
   gateway::set_program_name("arbiter-link");
   const shm::FileDescriptor stop = gateway::catch_stop_signals();
   options.on_round = [] { sd_notify(0, "WATCHDOG=1"); };
+  // A program that waits for an answer does not hold up the next link.
+  std::vector<std::future<void>> closing;
   for (bool is_first = true;; is_first = false) {
     Link link(options);
     if (is_first) sd_notify(0, "READY=1");
     if (link.run(stop.get()) == Link::End::kStopped) return 0;
+    std::erase_if(closing, [](const std::future<void>& each) {
+      return each.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    });
+    closing.push_back(
+        std::async(std::launch::async, [desk = link.take_desk()]() mutable { desk.reset(); }));
   }
 }
 

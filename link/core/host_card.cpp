@@ -84,6 +84,11 @@ std::optional<HostCard> read_host_card(Bytes bytes) {
   return card;
 }
 
+bool is_of_other_version(Bytes bytes) {
+  return bytes.size() > sizeof kHostMagic && get<std::uint32_t>(bytes.data()) == kHostMagic &&
+         get<std::uint8_t>(bytes.data() + sizeof kHostMagic) != kCardVersion;
+}
+
 // FNV-1a: https://datatracker.ietf.org/doc/html/draft-eastlake-fnv
 void Digest::add_byte(unsigned char byte) noexcept {
   value_ ^= byte;

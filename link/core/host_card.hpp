@@ -52,6 +52,8 @@ struct HostCard {
 [[nodiscard]] ByteString write_host_card(const HostCard& card);
 // Nothing: it is none, or not a proper one.
 [[nodiscard]] std::optional<HostCard> read_host_card(Bytes bytes);
+// Whether it is a card as another version of this program writes it.
+[[nodiscard]] bool is_of_other_version(Bytes bytes);
 
 // A number for texts that differs where they differ: to compare models, not to trust them.
 class Digest {

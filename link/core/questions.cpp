@@ -89,9 +89,14 @@ bool OpenQuestions::note(AnswerMessage answer, shm::Nanoseconds now) {
   if (reply == open->second.replies.end() || reply->second.outcome != Outcome::kWaiting) {
     return false;
   }
+  if (answer.text.size() > kMostBytes - bytes_) {
+    answer.is_refusal = true;
+    answer.text = "the answers of all hosts are too long together; ask for one host";
+  }
   reply->second.outcome = answer.is_refusal ? Outcome::kRefused : Outcome::kAnswered;
   reply->second.took = now - open->second.since;
   reply->second.text = std::move(answer.text);
+  bytes_ += std::min(reply->second.text.size(), kMostBytes - bytes_);
   return true;
 }
 
@@ -122,12 +127,21 @@ std::vector<Incarnation> OpenQuestions::due(std::uint64_t number, shm::Nanosecon
 }
 
 OpenQuestions::Replies OpenQuestions::take(std::uint64_t number) {
-  auto node = open_.extract(number);
-  return node ? std::move(node.mapped().replies) : Replies{};
+  const auto node = open_.extract(number);
+  if (node.empty()) return {};
+  Replies replies = std::move(node.mapped().replies);
+  for (const auto& [incarnation, reply] : replies) bytes_ -= std::min(bytes_, reply.text.size());
+  return replies;
 }
 
-Askers::Verdict Askers::judge(Incarnation asker, std::uint64_t number, shm::Nanoseconds now) {
-  const auto found = askers_.find(asker);
+Askers::Verdict Askers::judge(Incarnation asker, std::uint64_t writer, std::uint64_t number,
+                              shm::Nanoseconds now) {
+  auto found = askers_.find(asker);
+  if (found != askers_.end() && found->second.writer != writer) {
+    if (now - found->second.heard < kKept) return Verdict::kInAnothersName;
+    askers_.erase(found);
+    found = askers_.end();
+  }
   if (found != askers_.end() && number <= found->second.last) return Verdict::kRepeated;
   if (now - since_ >= kSecond) {
     since_ = now;
@@ -140,6 +154,7 @@ Askers::Verdict Askers::judge(Incarnation asker, std::uint64_t number, shm::Nano
     one.since = now;
     one.count = 0;
   }
+  one.writer = writer;
   one.heard = now;
   if (one.count >= kMostOfOne) return Verdict::kTooMany;
   one.last = number;

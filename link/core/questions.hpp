@@ -59,6 +59,8 @@ class OpenQuestions {
   // Until it is asked again, where nothing has come: the other link may just have been found.
   static constexpr shm::Nanoseconds kAskAgain = 250'000'000;
   static constexpr std::size_t kMost = 256;  // questions
+  // Of all answers together that are not taken yet: each may be large, and hosts are many.
+  static constexpr std::size_t kMostBytes = 8 * kMaxAnswer;
 
   enum class Outcome : std::uint8_t { kWaiting, kAnswered, kRefused, kSilent };
   struct Reply {
@@ -70,7 +72,7 @@ class OpenQuestions {
 
   // Its number, from 1 upwards; 0: too many wait.
   std::uint64_t ask(const std::vector<Incarnation>& asked, shm::Nanoseconds now);
-  // False: nobody waits for it.
+  // False: nobody waits for it. One that finds no room is a refusal, which says so.
   bool note(AnswerMessage answer, shm::Nanoseconds now);
   // Whether all have an outcome. Who has not answered for kPatience is silent from now on.
   [[nodiscard]] bool is_over(std::uint64_t number, shm::Nanoseconds now);
@@ -86,12 +88,15 @@ class OpenQuestions {
     Replies replies;
   };
   std::map<std::uint64_t, Open> open_;
+  std::size_t bytes_ = 0;  // of the texts in open_
   std::uint64_t last_ = 0;
 };
 
 // Those who ask this link: each question is answered once, and not too many in a second.
 //
-// Askers are strangers: each has a quota, all together have one, and their number is bounded.
+// Askers are strangers: each has a quota, all together have one, and their number is bounded. The
+// name of an asker is that of the first writer who uses it, and another one's as soon as that has
+// been silent for kKept: a link has one writer for all its life.
 //
 // Thread safety: none of its own.
 class Askers {
@@ -99,17 +104,21 @@ class Askers {
   static constexpr std::uint32_t kMostOfOne = 20;   // questions within a second
   static constexpr std::uint32_t kMostOfAll = 200;  // likewise
   static constexpr std::size_t kMostAskers = 256;
+  static constexpr shm::Nanoseconds kKept = 10'000'000'000;
 
   enum class Verdict : std::uint8_t {
     kAnswer,
     kRepeated,  // it is answered already, or is being answered
     kTooMany,
+    kInAnothersName,
   };
-  // `asker`: one of its lives.
-  Verdict judge(Incarnation asker, std::uint64_t number, shm::Nanoseconds now);
+  // `asker`: one of its lives. `writer`: by which the transport knows who sent it.
+  Verdict judge(Incarnation asker, std::uint64_t writer, std::uint64_t number,
+                shm::Nanoseconds now);
 
  private:
   struct Asker {
+    std::uint64_t writer = 0;
     std::uint64_t last = 0;
     shm::Nanoseconds since = 0;  // of the second that is counted
     std::uint32_t count = 0;

@@ -72,6 +72,18 @@ TEST(HostCard, IsRefusedWhereItsNamesAreNone) {
   EXPECT_FALSE(is_read(card));
 }
 
+TEST(HostCard, OfAnotherVersionIsKnownToBeOne) {
+  const HostCard card = host_card("head", 7);
+  ByteString bytes = write_host_card(card);
+  EXPECT_FALSE(is_of_other_version(as_bytes(bytes)));
+  bytes[4] = std::byte{kCardVersion + 1};
+  EXPECT_FALSE(read_host_card(as_bytes(bytes)));
+  EXPECT_TRUE(is_of_other_version(as_bytes(bytes)));
+  bytes[0] = std::byte{0};
+  EXPECT_FALSE(is_of_other_version(as_bytes(bytes))) << "nonsense";
+  EXPECT_FALSE(is_of_other_version(Bytes(bytes.data(), 4)));
+}
+
 TEST(HostCard, LeavesOutNamesForWhichThereIsNoRoom) {
   std::vector<std::string> ports;
   for (int i = 0; i < 2000; ++i) {
@@ -335,29 +347,58 @@ TEST(OpenQuestion, WaitsInBoundedNumber) {
   EXPECT_NE(open.ask({6}, kS), 0U);
 }
 
+TEST(OpenQuestion, KeepsABoundedNumberOfBytesOfAllAnswersTogether) {
+  OpenQuestions open;
+  const std::size_t most = OpenQuestions::kMostBytes / kMaxAnswer;
+  std::vector<Incarnation> asked;
+  for (Incarnation each = 1; each <= most + 1; ++each) asked.push_back(each);
+  const auto number = open.ask(asked, kS);
+  const std::string large(kMaxAnswer, 'x');
+  for (const Incarnation each : asked) EXPECT_TRUE(open.note({each, 5, number, false, large}, kS));
+  EXPECT_TRUE(open.is_over(number, kS));
+  const auto replies = open.take(number);
+  EXPECT_EQ(replies.at(most).outcome, OpenQuestions::Outcome::kAnswered);
+  EXPECT_EQ(replies.at(most + 1).outcome, OpenQuestions::Outcome::kRefused);
+  EXPECT_LT(replies.at(most + 1).text.size(), 100U);
+  const auto next = open.ask({6}, kS);
+  EXPECT_TRUE(open.note({6, 5, next, false, large}, kS));
+  EXPECT_EQ(open.take(next).at(6).outcome, OpenQuestions::Outcome::kAnswered)
+      << "there is room again";
+}
+
 TEST(AskingLinks, AreAnsweredOnceAndNotTooOften) {
   using Verdict = Askers::Verdict;
   Askers askers;
-  EXPECT_EQ(askers.judge(5, 1, 10 * kS), Verdict::kAnswer);
-  EXPECT_EQ(askers.judge(5, 1, 10 * kS), Verdict::kRepeated);
+  EXPECT_EQ(askers.judge(5, 5, 1, 10 * kS), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 5, 1, 10 * kS), Verdict::kRepeated);
   for (std::uint64_t number = 2; number <= Askers::kMostOfOne; ++number) {
-    EXPECT_EQ(askers.judge(5, number, 10 * kS), Verdict::kAnswer);
+    EXPECT_EQ(askers.judge(5, 5, number, 10 * kS), Verdict::kAnswer);
   }
-  EXPECT_EQ(askers.judge(5, 100, 10 * kS), Verdict::kTooMany);
-  EXPECT_EQ(askers.judge(6, 1, 10 * kS), Verdict::kAnswer) << "another one";
-  EXPECT_EQ(askers.judge(5, 100, 11 * kS), Verdict::kAnswer)
+  EXPECT_EQ(askers.judge(5, 5, 100, 10 * kS), Verdict::kTooMany);
+  EXPECT_EQ(askers.judge(6, 6, 1, 10 * kS), Verdict::kAnswer) << "another one";
+  EXPECT_EQ(askers.judge(5, 5, 100, 11 * kS), Verdict::kAnswer)
       << "what was not answered may come again";
-  EXPECT_EQ(askers.judge(5, 99, 12 * kS), Verdict::kRepeated);
+  EXPECT_EQ(askers.judge(5, 5, 99, 12 * kS), Verdict::kRepeated);
 }
 
 TEST(AskingLinks, AllTogetherHaveAQuota) {
   Askers askers;
   std::uint32_t answered = 0;
   for (Incarnation asker = 1; asker <= 1000; ++asker) {
-    if (askers.judge(asker, 1, 10 * kS) == Askers::Verdict::kAnswer) ++answered;
+    if (askers.judge(asker, asker, 1, 10 * kS) == Askers::Verdict::kAnswer) ++answered;
   }
   EXPECT_EQ(answered, Askers::kMostOfAll);
-  EXPECT_EQ(askers.judge(2000, 1, 11 * kS), Askers::Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(2000, 2000, 1, 11 * kS), Askers::Verdict::kAnswer);
+}
+
+TEST(AskingLinks, NobodyAsksInAnothersName) {
+  using Verdict = Askers::Verdict;
+  Askers askers;
+  EXPECT_EQ(askers.judge(5, 50, 1, 10 * kS), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 66, 1000, 10 * kS), Verdict::kInAnothersName);
+  EXPECT_EQ(askers.judge(5, 50, 2, 11 * kS), Verdict::kAnswer) << "it is heard all the same";
+  EXPECT_EQ(askers.judge(5, 66, 1000, 20 * kS), Verdict::kInAnothersName);
+  EXPECT_EQ(askers.judge(5, 66, 1, 11 * kS + Askers::kKept), Verdict::kAnswer);
 }
 
 }  // namespace

@@ -1,0 +1,163 @@
+// What a desk asks and is asked: by links, and by programs of this host.
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "link/desk_topics.hpp"
+#include "link/host_status.hpp"
+#include "shm/clock.hpp"
+#include "wire/document.hpp"
+
+namespace arbiter::link {
+
+void Desk::answer_questions() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [this] { return ends_ || !to_answer_.empty(); });
+    if (ends_) return;
+    const Asked asked = std::move(to_answer_.front());
+    to_answer_.pop_front();
+    // Nobody waits for it any more: a daemon that is stopped holds up whoever asks after it.
+    if (shm::monotonic_now() - asked.came >= OpenQuestions::kPatience) continue;
+    lock.unlock();
+    answer(asked);
+    lock.lock();
+  }
+}
+
+void Desk::answer(const Asked& asked) {
+  const QuestionMessage& message = asked.message;
+  Answer given = answers_.answer({message.host, message.asker, message.verb, message.argument});
+  AnswerMessage reply{me_.incarnation, message.asker, message.number, given.is_refusal,
+                      std::move(given.text)};
+  if (!asked.is_ours) {
+    send_answer(reply);
+    return;
+  }
+  const std::lock_guard lock(mutex_);
+  open_.note(std::move(reply), shm::monotonic_now());
+  changed_.notify_all();
+}
+
+std::string Desk::serve(const LocalUser& who, const wire::LinkQuestion& question) {
+  const bool is_about_hosts = question.verb == "hosts" && question.host.empty();
+  const std::string* const action = answers_.action_of(question.verb);
+  if (!is_about_hosts && action == nullptr) {
+    throw std::runtime_error("links cannot be asked for \"" + question.verb + '"');
+  }
+  daemon_.require(who, is_about_hosts ? "observe" : *action);
+  if (!is_about_hosts) return wire::write_host_answers(ask_hosts(question));
+  return wire::write_document(to_json(document()));
+}
+
+wire::HostsDocument Desk::document() const {
+  wire::HostsDocument document;
+  const std::lock_guard lock(mutex_);
+  document.host = me_.host;
+  document.instance = me_.instance;
+  document.version = me_.version;
+  if (!network_.empty()) document.network = network_;
+  if (!own_.waits_for.empty()) document.waits_for = own_.waits_for;
+  wire::HostStatus& here = document.hosts.emplace_back(status_of(own_.card));
+  here.is_this = true;
+  here.since = began_;
+  for (const Neighbour& each : neighbours_.all()) {
+    wire::HostStatus& host = document.hosts.emplace_back(status_of(*each.card));
+    host.is_up = each.is_up;
+    host.since = each.since;
+    if (each.is_up) host.round_trip = round_trips_.of(each.card->incarnation);
+  }
+  document.imports = own_.imports;
+  for (const Disagreement& each : standing_) {
+    document.disagreements.push_back(status_of(each));
+  }
+  return document;
+}
+
+std::vector<wire::HostAnswer> Desk::ask_hosts(const wire::LinkQuestion& question) {
+  if (question.argument.size() > kMaxArgument) throw std::runtime_error("that is too much to ask");
+  const bool is_for_all = question.host == wire::kAllHosts;
+  const std::string& wanted = question.host.empty() ? me_.host : question.host;
+  std::vector<wire::HostAnswer> answers;
+  std::vector<Incarnation> asked;  // of answers, as long as they are not known to be gone
+  QuestionMessage message{me_.incarnation, 0, {}, me_.host, question.verb, question.argument};
+  {
+    const std::lock_guard sending(send_mutex_);
+    {
+      const std::lock_guard lock(mutex_);
+      const auto add = [&](const HostCard& card, bool is_up) {
+        if (!is_for_all && card.host != wanted) return;
+        wire::HostAnswer& one = answers.emplace_back();
+        one.host = card.host;
+        one.incarnation = hexadecimal(card.incarnation);
+        one.outcome = is_up ? wire::HostOutcome::kSilent : wire::HostOutcome::kGone;
+        if (is_up) asked.push_back(card.incarnation);
+      };
+      add(me_, true);
+      if (!network_.empty()) {
+        for (const Neighbour& each : neighbours_.all()) add(*each.card, each.is_up);
+      }
+      if (answers.empty()) {
+        throw std::runtime_error("no host is called \"" + wanted + "\": see arbiter hosts");
+      }
+      message.asked = asked;
+      message.number = open_.ask(asked, shm::monotonic_now());
+      if (message.number == 0) throw std::runtime_error("too many questions wait for an answer");
+    }
+    put_question(message);
+  }
+  const OpenQuestions::Replies replies = await_replies(message);
+  for (std::size_t i = 0, next = 0; i < answers.size(); ++i) {
+    if (answers[i].outcome == wire::HostOutcome::kGone) continue;
+    const OpenQuestions::Reply& reply = replies.at(asked.at(next++));
+    answers[i].outcome = outcome_of(reply.outcome);
+    answers[i].took = reply.took;
+    answers[i].text = reply.text;
+  }
+  return answers;
+}
+
+// Our own answer is made here; others get the question.
+void Desk::put_question(const QuestionMessage& message) {
+  QuestionMessage others = message;
+  const bool is_for_us = std::erase(others.asked, me_.incarnation) != 0;
+  if (is_for_us) {
+    const std::lock_guard lock(mutex_);
+    to_answer_.push_back({message, true, shm::monotonic_now()});
+    changed_.notify_all();
+  }
+  if (!others.asked.empty()) send_question(others);
+}
+
+void Desk::send_question(const QuestionMessage& message) {
+  const std::shared_lock using_topics(topics_mutex_);
+  if (topics_ != nullptr) topics_->questions.send(write_question(message));
+}
+
+void Desk::send_answer(const AnswerMessage& message) {
+  const std::shared_lock using_topics(topics_mutex_);
+  if (topics_ != nullptr) topics_->answers.send(write_answer(message));
+}
+
+OpenQuestions::Replies Desk::await_replies(QuestionMessage& message) {
+  constexpr auto kStep = std::chrono::milliseconds(50);
+  std::unique_lock lock(mutex_);
+  while (!closes_ && !open_.is_over(message.number, shm::monotonic_now())) {
+    changed_.wait_for(lock, kStep);
+    message.asked = open_.due(message.number, shm::monotonic_now());
+    std::erase(message.asked, me_.incarnation);
+    if (message.asked.empty()) continue;
+    lock.unlock();
+    {
+      const std::lock_guard sending(send_mutex_);
+      send_question(message);
+    }
+    lock.lock();
+  }
+  return open_.take(message.number);
+}
+
+}  // namespace arbiter::link
