@@ -25,11 +25,12 @@ wire::SwitchAnswer answer_of(const HostAnswer& each) {
     case HostOutcome::kRefused:
       throw std::runtime_error(each.text);
     case HostOutcome::kSilent:
-      throw std::runtime_error("it does not answer");
+      throw std::runtime_error("its link did not answer within 1 s");
     case HostOutcome::kGone:
       break;
   }
-  throw std::runtime_error("it was there some minutes ago, and is not now");
+  throw std::runtime_error("it is gone, and was there within the last five minutes; --without " +
+                           each.host + " leaves it out");
 }
 
 HostSwitch prepared(const wire::SwitchRequest& request, const HostAnswer& each) {
@@ -39,7 +40,9 @@ HostSwitch prepared(const wire::SwitchRequest& request, const HostAnswer& each) 
     return host;
   }
   try {
-    host.has_prepared = !answer_of(each).is_left_out;
+    const wire::SwitchAnswer answer = answer_of(each);
+    host.has_prepared = !answer.is_left_out;
+    host.before = answer.generation;
     if (!host.has_prepared) host.why = "it says that it is left out";
   } catch (const std::runtime_error& error) {
     host.why = shm::printable(error.what());
@@ -97,6 +100,36 @@ void commit(const wire::SwitchRequest& request, const AskHosts& ask, SwitchEvery
   }
 }
 
+// Of a host whose commit is not answered: whether the model has come into force.
+void look_at(HostSwitch& host, const wire::HostsDocument& hosts, const std::string& model) {
+  const auto there =
+      std::find_if(hosts.hosts.begin(), hosts.hosts.end(), [&](const wire::HostStatus& each) {
+        return each.host == host.host && each.is_up && each.has_daemon && each.model;
+      });
+  if (there == hosts.hosts.end()) return;
+  // What it said before it prepared may be old. To switch to the model in force changes nothing.
+  if (there->model->generation < host.before || there->model->name != model) return;
+  host.outcome = SwitchOutcome::kSwitched;
+  host.generation = there->model->generation;
+  host.took = 0;
+  host.why = "it did not answer, and has the model in force";
+}
+
+void find_out(const wire::SwitchRequest& request, const LookAtHosts& look,
+              SwitchEverywhere& result) {
+  for (int i = 0; i < kMostLooks && result.count(SwitchOutcome::kUnknown) != 0; ++i) {
+    wire::HostsDocument hosts;
+    try {
+      hosts = look();
+    } catch (const wire::CallError&) {  // the link has gone
+      return;
+    }
+    for (HostSwitch& each : result.hosts) {
+      if (each.outcome == SwitchOutcome::kUnknown) look_at(each, hosts, request.model);
+    }
+  }
+}
+
 void put_in_order(std::vector<HostSwitch>& hosts) {
   std::stable_sort(hosts.begin(), hosts.end(),
                    [](const HostSwitch& a, const HostSwitch& b) { return a.host < b.host; });
@@ -114,7 +147,8 @@ bool SwitchEverywhere::is_whole() const {
          count(SwitchOutcome::kUnknown) == 0;
 }
 
-SwitchEverywhere switch_everywhere(const wire::SwitchRequest& request, const AskHosts& ask) {
+SwitchEverywhere switch_everywhere(const wire::SwitchRequest& request, const AskHosts& ask,
+                                   const LookAtHosts& look) {
   SwitchEverywhere result;
   const std::string text = wire::write_switch_request(request);
   for (const HostAnswer& each : ask(wire::kPrepareVerb, text)) {
@@ -128,6 +162,7 @@ SwitchEverywhere switch_everywhere(const wire::SwitchRequest& request, const Ask
       });
   if (has_any && have_all) {
     commit(request, ask, result);
+    find_out(request, look, result);
   } else if (has_any) {
     for (HostSwitch& host : result.hosts) {
       if (host.has_prepared) host.why = "it was prepared, and keeps its model";

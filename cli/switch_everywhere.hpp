@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "shm/activity.hpp"
+#include "wire/hosts.hpp"
 #include "wire/link_call.hpp"
 #include "wire/switch_request.hpp"
 
@@ -30,6 +31,7 @@ struct HostSwitch {
   bool has_prepared = false;
   shm::Nanoseconds took = 0;     // from the commit until its answer; 0: there was none
   std::uint64_t generation = 0;  // of the model in force there; 0: not known
+  std::uint64_t before = 0;      // of that when it prepared
   std::string why;               // of kNotSwitched and kUnknown; for people
 };
 
@@ -47,9 +49,17 @@ struct SwitchEverywhere {
 using AskHosts =
     std::function<std::vector<wire::HostAnswer>(const std::string& verb, const std::string& text)>;
 
-// Throws wire::CallError if hosts cannot be asked to prepare; then none has switched.
+// What the link of this host knows of the others, some time after the last look. May throw
+// wire::CallError.
+using LookAtHosts = std::function<wire::HostsDocument()>;
+// Until it is given up: a daemon may have been busy, and a cut may be short.
+inline constexpr int kMostLooks = 12;
+
+// Throws wire::CallError if hosts cannot be asked to prepare; then none has switched. A host that
+// does not say what has come of its commit is looked at: if the model is in force there since, it
+// has switched. If it is not, it may still come into force.
 [[nodiscard]] SwitchEverywhere switch_everywhere(const wire::SwitchRequest& request,
-                                                 const AskHosts& ask);
+                                                 const AskHosts& ask, const LookAtHosts& look);
 
 // 0: all hosts have switched; 1: none has; 3: some have not, or that is not known.
 [[nodiscard]] int exit_code_of(const SwitchEverywhere& result);

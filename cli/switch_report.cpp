@@ -37,7 +37,8 @@ void write_text(const SwitchEverywhere& result, const std::string& model) {
     std::cout << each.host << std::string(width - each.host.size() + 2, ' ')
               << name_of(each.outcome);
     if (each.outcome == SwitchOutcome::kSwitched) {
-      std::cout << " after " << watch::span_text(each.took) << ": model " << each.generation;
+      if (each.took != 0) std::cout << " after " << watch::span_text(each.took);
+      std::cout << ": model " << each.generation;
     }
     if (!each.why.empty()) std::cout << ": " << each.why;
     std::cout << '\n';
@@ -54,7 +55,9 @@ void write_text(const SwitchEverywhere& result, const std::string& model) {
   if (result.is_whole()) return;
   std::cerr << "arbiter: " << counted(result.count(SwitchOutcome::kNotSwitched), "host")
             << " not switched, " << result.count(SwitchOutcome::kUnknown)
-            << " unknown; arbiter hosts shows which model is in force on each\n";
+            << " unknown; arbiter hosts shows which model is in force on each, as soon as it is "
+               "heard again: then run arbiter switch \""
+            << model << "\" on those that lack it, or switch all again\n";
 }
 
 void write_json(const SwitchEverywhere& result, const std::string& model) {

@@ -1,9 +1,11 @@
 // arbiter switch: puts another of the models in force that the daemon has loaded.
+#include <chrono>
 #include <cstdint>
 #include <iostream>
 #include <memory>
 #include <random>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -18,6 +20,9 @@
 
 namespace arbiter::cli {
 namespace {
+
+// Links say twice a second at most what has changed.
+constexpr std::chrono::milliseconds kLookPeriod{250};
 
 struct SwitchOptions {
   std::string instance;
@@ -56,10 +61,14 @@ std::uint64_t new_attempt() {
 
 int switch_all(const SwitchOptions& options) {
   wire::LinkCall link(options.instance);
-  const auto result = switch_everywhere({new_attempt(), options.model, options.without},
-                                        [&](const std::string& verb, const std::string& text) {
-                                          return link.ask_hosts({wire::kAllHosts, verb, text});
-                                        });
+  const auto ask = [&](const std::string& verb, const std::string& text) {
+    return link.ask_hosts({wire::kAllHosts, verb, text});
+  };
+  const auto look = [&] {
+    std::this_thread::sleep_for(kLookPeriod);
+    return wire::read_hosts(link.ask({"", "hosts"}));
+  };
+  const auto result = switch_everywhere({new_attempt(), options.model, options.without}, ask, look);
   if (options.json) {
     write_json(result, options.model);
   } else {

@@ -36,13 +36,19 @@ class FakeHosts {
  public:
   std::map<std::string, std::vector<HostAnswer>> answers;  // by verb
   std::vector<std::string> asked;
+  wire::HostsDocument seen;  // afterwards
+  int looks = 0;
 
   SwitchEverywhere run(const wire::SwitchRequest& request = kRequest) {
-    return switch_everywhere(request, [&](const std::string& verb, const std::string& text) {
+    const auto ask = [&](const std::string& verb, const std::string& text) {
       EXPECT_EQ(wire::read_switch_request(text), request);
       asked.push_back(verb);
       if (!answers.contains(verb)) throw wire::CallError("the link has gone");
       return answers.at(verb);
+    };
+    return switch_everywhere(request, ask, [&] {
+      ++looks;
+      return seen;
     });
   }
 };
@@ -177,6 +183,49 @@ TEST(SwitchRequest, WhatIsNoneIsNotRead) {
         std::string("000000000000002a\n") + std::string(5000, 'x'), many}) {
     EXPECT_EQ(wire::read_switch_request(text), std::nullopt) << text;
   }
+}
+
+wire::HostStatus with_model(const std::string& host, std::uint64_t generation,
+                            const std::string& model) {
+  wire::HostStatus status;
+  status.host = host;
+  status.has_daemon = true;
+  status.model.emplace();
+  status.model->generation = generation;
+  status.model->name = model;
+  return status;
+}
+
+TEST(SwitchEverywhere, WhoDoesNotAnswerIsLookedAt) {
+  FakeHosts hosts;
+  hosts.answers = {{"prepare", {yes("a"), yes("b"), yes("c")}},
+                   {"commit", {silent("a"), silent("b"), yes("c", 6)}}};
+  hosts.seen.hosts = {with_model("a", 6, "dance"), with_model("b", 5, "calm")};
+  const auto result = hosts.run();
+  EXPECT_THAT(outcomes(result), ElementsAre("a switched", "b unknown", "c switched"));
+  EXPECT_EQ(result.hosts[0].generation, 6u);
+  EXPECT_THAT(result.hosts[0].why, HasSubstr("did not answer"));
+  EXPECT_EQ(hosts.looks, kMostLooks) << "b may still switch";
+  EXPECT_EQ(exit_code_of(result), 3);
+}
+
+TEST(SwitchEverywhere, WhatAHostSaidBeforeItPreparedOrIsGoneTellsNothing) {
+  FakeHosts hosts;
+  hosts.answers = {{"prepare", {yes("a", 5)}}, {"commit", {silent("a")}}};
+  hosts.seen.hosts = {with_model("a", 4, "dance")};
+  EXPECT_THAT(outcomes(hosts.run()), ElementsAre("a unknown"));
+  hosts.seen.hosts = {with_model("a", 6, "dance")};
+  hosts.seen.hosts[0].is_up = false;
+  EXPECT_THAT(outcomes(hosts.run()), ElementsAre("a unknown"));
+  hosts.seen.hosts[0].is_up = true;
+  EXPECT_THAT(outcomes(hosts.run()), ElementsAre("a switched"));
+}
+
+TEST(SwitchEverywhere, WhereAllHaveAnsweredNobodyIsLookedAt) {
+  FakeHosts hosts;
+  hosts.answers = {{"prepare", {yes("a")}}, {"commit", {yes("a", 6)}}};
+  EXPECT_EQ(exit_code_of(hosts.run()), 0);
+  EXPECT_EQ(hosts.looks, 0);
 }
 
 }  // namespace

@@ -119,9 +119,12 @@ TEST_F(SwitchAll, ALinkThatDiesBetweenPrepareAndCommitIsUnknownAndItsHostKeepsIt
   std::uint64_t attempt = 76;
   await([&] {
     const wire::SwitchRequest request{++attempt, "rest", {}};
-    result = cli::switch_everywhere(request, [&](const std::string& verb, const std::string& text) {
+    const auto ask_arm = [&](const std::string& verb, const std::string& text) {
       if (verb == wire::kCommitVerb) hosts_.at("cam").link().kill();
       return ask("arm", verb, text);
+    };
+    result = cli::switch_everywhere(request, ask_arm, [] {
+      return wire::read_hosts(wire::LinkCall("arm").ask({"", "hosts"}));
     });
     return result.is_committed;
   });
