@@ -77,6 +77,16 @@ void write_imports(const wire::HostsDocument& document) {
   }
 }
 
+// Links of several versions may understand each other, and need not.
+void write_versions(const wire::HostsDocument& document) {
+  for (const wire::HostStatus& each : document.hosts) {
+    if (!each.is_up || each.version == document.version) continue;
+    std::cout << "warning: the link of host " << shown(each.host) << " is version "
+              << shown(each.version) << ", and this one is " << shown(document.version)
+              << ": install the same version on all hosts\n";
+  }
+}
+
 int hosts(const HostsOptions& options) {
   const std::string text = wire::LinkCall(options.instance).ask({"", "hosts"});
   const wire::HostsDocument document = wire::read_hosts(text);
@@ -97,6 +107,7 @@ int hosts(const HostsOptions& options) {
   write_table(rows);
   write_imports(document);
   if (!document.disagreements.empty()) std::cout << '\n';
+  write_versions(document);
   for (const wire::HostDisagreement& each : document.disagreements) {
     std::cout << (each.is_error ? "ERROR: " : "warning: ") << shown(each.text) << '\n';
   }

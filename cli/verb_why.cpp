@@ -20,13 +20,16 @@ namespace arbiter::cli {
 namespace {
 
 int why(const WhyOptions& options) {
-  if (options.follow) return follow_winners(options);
   const auto hosts = hosts_if_linked(options.instance);
+  if (hosts) require_one_host(options.host, *hosts);
   const wire::HostStatus* const here = hosts ? hosts->find_this() : nullptr;
   const bool is_here = here != nullptr && here->host == options.host;
   std::optional<std::string> elsewhere;
   if (!options.host.empty() && !is_here) elsewhere = options.host;
   if (options.host.empty() && hosts) elsewhere = host_that_decides(options.port, *hosts);
+  if (options.follow) {
+    return elsewhere ? follow_elsewhere(options, *elsewhere) : follow_winners(options);
+  }
   if (elsewhere) {
     write_why_elsewhere(std::cout, options, *elsewhere);
     return 0;
@@ -49,7 +52,8 @@ void add_why(CLI::App& app, int& exit_code) {
   auto* source = verb->add_option("SOURCE", options->source,
                                   "An output port's name: show its connection only");
   auto* follow = verb->add_flag("--follow", options->follow,
-                                "Print each change of the winner, and its cause, as it comes");
+                                "Print each change of the winner, and its cause, as it comes; of "
+                                "a port of another host, what has changed every half second");
   source->excludes(follow);
   verb->add_option("--count", options->count, "With --follow: stop after this many changes")
       ->type_name("N")
@@ -61,15 +65,15 @@ void add_why(CLI::App& app, int& exit_code) {
   verb->add_flag("--json", options->json, "As JSON; with --follow one object a line");
   verb->add_option("--host", options->host,
                    "Ask that host, by arbiter-link; by default the one that has the port open")
-      ->type_name("NAME")
-      ->excludes(follow);
+      ->type_name("NAME");
   add_instance_option(*verb, options->instance);
   verb->footer(
       "Example:\n"
       "  arbiter why /Gaze/pos:i\n"
       "  arbiter why /Gaze/pos:i /Face/pos:o\n"
       "  arbiter why /Gaze/pos:i --follow\n"
-      "  arbiter why /Gaze/pos:i --host head\n\n"
+      "  arbiter why /Gaze/pos:i --host head\n"
+      "  arbiter why /Gaze/pos:i --host head --follow\n\n"
       "Exit codes: 0 answered, whoever wins; 1 no daemon, no such port or source, you may not\n"
       "observe, or the other host does not answer; 2 wrong use, or the answer cannot be written");
   verb->callback([options, &exit_code] { exit_code = why(*options); });

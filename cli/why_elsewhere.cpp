@@ -1,15 +1,23 @@
 #include "cli/why_elsewhere.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <iostream>
+#include <map>
+#include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "cli/broken_pipe.hpp"
+#include "cli/live.hpp"
 #include "cli/other_hosts.hpp"
 #include "cli/why_report.hpp"
 #include "rules/explain/explain.hpp"
 #include "rules/model/load.hpp"
 #include "rules/text/names.hpp"
+#include "shm/clock.hpp"
 #include "shm/utf8.hpp"
 #include "watch/model_in_force.hpp"
 #include "watch/port.hpp"
@@ -25,8 +33,11 @@ using nlohmann::json;
 
 // Both of one model: another may come into force between the two questions.
 constexpr int kTries = 3;
+// A link answers another one twenty times a second, whoever asks through it.
+constexpr shm::Nanoseconds kFollowPeriod = 500'000'000;
 
 std::string text_from(wire::LinkCall& link, const std::string& host, const char* verb) {
+  // Those that are gone come last.
   const wire::HostAnswer answer = link.ask_hosts({host, verb, {}}).at(0);
   const std::string why_not = answer.why_not();
   if (!why_not.empty()) {
@@ -172,7 +183,108 @@ json json_of(const Elsewhere& there, const wire::InputStatus& input, const std::
   return document;
 }
 
+// What a change of the winner is made of, as far as two answers show it.
+struct SeenPort {
+  std::string winner;  // "idle", "not open there"
+  std::map<std::string, bool> active;
+  std::uint64_t generation = 0;
+};
+
+SeenPort seen_in(const wire::Status& status, const std::string& port) {
+  SeenPort seen{"not open there", {}, status.model.generation};
+  const wire::InputStatus* const input = status.find_input(port);
+  if (input == nullptr) return seen;
+  seen.winner = !input->arbitrated ? "not arbitrated" : input->winner.value_or("idle");
+  for (const auto& each : input->connections) seen.active[each.source] = each.active;
+  for (const auto& each : input->senses) seen.active[each.source] = each.active;
+  return seen;
+}
+
+std::string difference(const SeenPort& before, const SeenPort& now) {
+  std::string text;
+  if (before.generation != now.generation) {
+    text = "model " + std::to_string(now.generation) + " came into force";
+  }
+  for (const auto& [source, is_active] : now.active) {
+    const auto was = before.active.find(source);
+    if (was == before.active.end() || was->second == is_active) continue;
+    text += (text.empty() ? "" : " and ") + source +
+            (is_active ? " became active" : " became inactive");
+  }
+  return text.empty() ? "something happened between two looks" : text;
+}
+
+class FollowerElsewhere {
+ public:
+  FollowerElsewhere(const WhyOptions& options, std::string host)
+      : options_(options), host_(std::move(host)), link_(options.instance) {
+    Elsewhere there;
+    there.status = status();
+    static_cast<void>(require_input(there, options_.port, host_));
+    last_ = seen_in(there.status, options_.port);
+    write(last_, nullptr);
+  }
+
+  int run(const shm::FileDescriptor& interrupts) {
+    std::uint64_t changes = 0;
+    while (std::cout && !has_reader_gone()) {
+      if (sleep_until(shm::monotonic_now() + kFollowPeriod, interrupts)) return 0;
+      try {
+        SeenPort now = seen_in(status(), options_.port);
+        say("host " + host_ + " answers");
+        if (now.winner != last_.winner) {
+          write(now, &last_);
+          if (++changes == options_.count) return 0;
+        }
+        last_ = std::move(now);
+      } catch (const std::runtime_error& error) {  // it may come back
+        say(error.what());
+      }
+    }
+    return 0;
+  }
+
+ private:
+  wire::Status status() { return wire::read_status(text_from(link_, host_, "status")); }
+
+  void say(const std::string& text) {
+    if (std::exchange(said_, text) == text) return;
+    std::cerr << "arbiter: " << text << '\n';
+  }
+
+  void write(const SeenPort& now, const SeenPort* before) const {
+    const shm::Nanoseconds at = shm::monotonic_now();
+    if (options_.json) {
+      json line = {{"at_ns", at}, {"port", options_.port}, {"host", host_}, {"winner", now.winner}};
+      if (before != nullptr) line["old"] = before->winner;
+      if (before != nullptr) line["because"] = difference(*before, now);
+      std::cout << line.dump(-1, ' ', false, json::error_handler_t::replace) << std::endl;
+      return;
+    }
+    std::cout << seconds_text(at - started_) << "  ";
+    if (before == nullptr) {
+      std::cout << options_.port << " on host " << host_ << ": " << now.winner << ", by model "
+                << now.generation << "; asked twice a second" << std::endl;
+    } else {
+      std::cout << before->winner << " -> " << now.winner << "  because "
+                << difference(*before, now) << std::endl;
+    }
+  }
+
+  const WhyOptions& options_;
+  const std::string host_;
+  const shm::Nanoseconds started_ = shm::monotonic_now();
+  wire::LinkCall link_;
+  SeenPort last_;
+  std::string said_ = "host " + host_ + " answers";
+};
+
 }  // namespace
+
+int follow_elsewhere(const WhyOptions& options, const std::string& host) {
+  const shm::FileDescriptor interrupts = catch_interrupts();
+  return FollowerElsewhere(options, host).run(interrupts);
+}
 
 std::optional<std::string> host_that_decides(const std::string& port,
                                              const wire::HostsDocument& hosts) {
@@ -189,6 +301,15 @@ std::optional<std::string> host_that_decides(const std::string& port,
                             ", and each decides it for itself: name one with --host");
   }
   return found.empty() ? std::nullopt : std::optional(found.front());
+}
+
+void require_one_host(const std::string& name, const wire::HostsDocument& hosts) {
+  const auto count = std::count_if(hosts.hosts.begin(), hosts.hosts.end(), [&](const auto& each) {
+    return each.is_up && each.host == name;
+  });
+  if (count < 2) return;
+  throw watch::WatchError(std::to_string(count) + " machines are called " + name +
+                          ": give the link of each its own --host");
 }
 
 void write_why_elsewhere(std::ostream& out, const WhyOptions& options, const std::string& host) {

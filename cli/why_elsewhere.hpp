@@ -19,9 +19,17 @@ namespace arbiter::cli {
 [[nodiscard]] std::optional<std::string> host_that_decides(const std::string& port,
                                                            const wire::HostsDocument& hosts);
 
+// Throws watch::WatchError where several machines have that name.
+void require_one_host(const std::string& name, const wire::HostsDocument& hosts);
+
 // Throws wire::CallError where that host cannot be asked, watch::WatchError where it has no such
 // port.
 void write_why_elsewhere(std::ostream& out, const WhyOptions& options, const std::string& host);
+
+// --follow of a port of that host: asks twice a second who wins, and prints what has changed. Which
+// change came first, and what was shorter, it does not see. Returns the exit code. Throws as
+// write_why_elsewhere() at the beginning.
+int follow_elsewhere(const WhyOptions& options, const std::string& host);
 
 // Of the answer about a port of this host: which of its sources come from other hosts.
 void write_imports_of(std::ostream& out, const std::string& port, const wire::HostsDocument& hosts,

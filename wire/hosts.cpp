@@ -138,9 +138,9 @@ std::string HostAnswer::why_not() const {
     case HostOutcome::kRefused:
       return "refuses: " + text;
     case HostOutcome::kSilent:
-      return "is silent: it did not answer within 1 s";
+      return "is silent: its link did not answer within 1 s";
     case HostOutcome::kGone:
-      return "is gone";
+      return "is gone: its link has ended, or the network is cut (arbiter hosts says since when)";
     case HostOutcome::kAnswered:
       break;
   }

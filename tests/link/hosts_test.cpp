@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 
 #include <memory>
@@ -196,6 +197,28 @@ TEST_F(KnownHosts, WhyIsAskedOfTheOneThatDecides) {
   EXPECT_THAT(nobody.err, HasSubstr("no host is called \"nobody\""));
   EXPECT_THAT(run_arbiter("head", {"why", "/Other:i", "--host", "base"}).err,
               HasSubstr("host base has no input port /Other:i"));
+}
+
+TEST_F(KnownHosts, TheWinnersOfAPortOfAnotherOneAreFollowed) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  await([&] {
+    return run_arbiter("head", {"why", kMotor}).out.find("is decided on host base") !=
+           std::string::npos;
+  });
+  const shm::FileDescriptor seen(::memfd_create("follow", MFD_CLOEXEC));
+  ChildProcess follow({std::string(ARBITER_PROGRAMS) + "/arbiter", "why", kMotor, "--follow",
+                       "--count", "1", "--instance", "head"},
+                      {}, {-1, seen.get(), -1});
+  const auto text = [&] { return content_of("/proc/self/fd/" + std::to_string(seen.get())); };
+  await([&] { return text().find("on host base: /Planner/speed:o") != std::string::npos; });
+  planner.port().deactivate();
+  EXPECT_EQ(follow.wait(), 0);
+  EXPECT_THAT(text(), HasSubstr("/Planner/speed:o -> idle  because /Planner/speed:o became "
+                                "inactive"));
 }
 
 TEST_F(KnownHosts, AreBoxesInALivePicture) {
