@@ -14,6 +14,7 @@
 #include "rules/text/text_file.hpp"
 #include "shm/clock.hpp"
 #include "shm/utf8.hpp"
+#include "wire/document.hpp"
 #include "wire/link_call.hpp"
 #include "wire/status.hpp"
 
