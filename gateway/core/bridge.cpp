@@ -18,7 +18,8 @@ namespace arbiter::gateway {
 namespace {
 
 constexpr shm::Nanoseconds kMillisecond = 1'000'000;
-constexpr shm::Nanoseconds kTendPeriod = 100 * kMillisecond;
+// Between two looks whether another model is in force, of which nobody tells.
+constexpr shm::Nanoseconds kLookPeriod = 100 * kMillisecond;
 constexpr shm::Nanoseconds kSayPeriod = 1000 * kMillisecond;  // of each entry
 constexpr int kRetryPeriod = 500;                             // ms, for the daemon
 constexpr shm::Nanoseconds kOpenPeriod = 1000 * kMillisecond;
@@ -156,14 +157,20 @@ void Bridge::open(Part& part) {
   part.outgoing = std::move(outgoing);
 }
 
-void Bridge::watch(int descriptor, Part* part) const {
+void Bridge::watch(int descriptor, const void* whose) const {
   epoll_event event{};
   event.events = EPOLLIN;
-  event.data.ptr = part;
+  event.data.ptr = const_cast<void*>(whose);
   if (epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, descriptor, &event) != 0) {
     throw Error(std::string("no descriptor can be watched: ") +
                 std::generic_category().message(errno));
   }
+}
+
+void Bridge::watch_news() {
+  if (watches_news_ || max_ages_.descriptor() < 0) return;
+  watch(max_ages_.descriptor(), &max_ages_);
+  watches_news_ = true;
 }
 
 void Bridge::start(const std::vector<Part*>& opened) {
@@ -188,41 +195,58 @@ void Bridge::start(const std::vector<Part*>& opened) {
 
 void Bridge::loop(int stop) {
   watch(stop, nullptr);
-  watch(bell_.descriptor(), nullptr);
-  shm::Nanoseconds tend_at = 0;
+  watch(bell_.descriptor(), &bell_);
   for (bool all = true;;) {
-    shm::Nanoseconds now = shm::monotonic_now();
-    if (now >= tend_at || all) {
-      tend_at = now + kTendPeriod;
-      if (now >= open_again_) open_closed();
-      max_ages_.update();
-      middleware_.tend();
-      look_after_all();
-      if (options_.on_round) options_.on_round();
-    }
+    look_after(shm::monotonic_now(), all || max_ages_.is_outdated());
     serve(shm::monotonic_now(), all);
     all = false;
-    shm::Nanoseconds next = tend_at;
-    for (const auto& part : parts_) {
-      if (part->outgoing) next = std::min(next, part->outgoing->next());
-    }
-    now = shm::monotonic_now();
-    const auto wait = std::max<shm::Nanoseconds>(0, next - now + kMillisecond - 1) / kMillisecond;
-    std::array<epoll_event, 64> events;
-    const int count = epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()),
-                                 static_cast<int>(wait));
-    if (waits(stop, 0)) return;
-    now = shm::monotonic_now();
-    for (int i = 0; i < count; ++i) {
-      auto* const part = static_cast<Part*>(events[static_cast<std::size_t>(i)].data.ptr);
-      if (part != nullptr) {
-        part->outgoing->run(now);
-      } else {
-        bell_.silence();
-        all = true;
-      }
+    const shm::Nanoseconds now = shm::monotonic_now();
+    const auto wait = std::max<shm::Nanoseconds>(0, next_round(now) - now + kMillisecond - 1);
+    if (!hear(static_cast<int>(wait / kMillisecond), all)) return;
+  }
+}
+
+// A round that finds nothing costs little: there are ten in a second.
+void Bridge::look_after(shm::Nanoseconds now, bool all) {
+  if (now < tend_at_ && !all) return;
+  if (now >= open_again_) open_closed();
+  const bool is_any_closed =
+      std::any_of(parts_.begin(), parts_.end(), [](const auto& part) { return !part->is_open(); });
+  tend_at_ = now + (is_any_closed ? kLookPeriod : middleware_.tend_period());
+  max_ages_.update();
+  watch_news();
+  middleware_.tend();
+  look_after_all();
+  if (options_.on_round) options_.on_round();
+}
+
+shm::Nanoseconds Bridge::next_round(shm::Nanoseconds now) const {
+  shm::Nanoseconds next = std::min(tend_at_, now + kLookPeriod);
+  for (const auto& part : parts_) {
+    if (part->outgoing) next = std::min(next, part->outgoing->next());
+  }
+  return next;
+}
+
+bool Bridge::hear(int milliseconds, bool& all) {
+  std::array<epoll_event, 64> events;
+  const int count =
+      epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), milliseconds);
+  const shm::Nanoseconds now = shm::monotonic_now();
+  for (int i = 0; i < count; ++i) {
+    void* const whose = events[static_cast<std::size_t>(i)].data.ptr;
+    if (whose == nullptr) return false;
+    if (whose == &bell_) {
+      bell_.silence();
+      all = true;
+    } else if (whose == &max_ages_) {
+      all = all || max_ages_.is_outdated();
+      max_ages_.update();
+    } else {
+      static_cast<Part*>(whose)->outgoing->run(now);
     }
   }
+  return true;
 }
 
 void Bridge::serve(shm::Nanoseconds now, bool all) {

@@ -29,7 +29,8 @@ namespace arbiter::gateway {
 struct BridgeOptions {
   std::string name;      // of the node, and in the log
   std::string instance;  // as NodeOptions has it
-  // Called by the loop ten times a second, so that somebody can see that it goes round.
+  // Called by the loop every Middleware::tend_period() at least, so that somebody can see that it
+  // goes round.
   std::function<void()> on_round{};
 };
 
@@ -89,9 +90,15 @@ class Bridge {
   // False: not now, and the log says why.
   bool try_to_open(Part& part);
   void open(Part& part);
-  void watch(int descriptor, Part* part) const;
+  // `whose`: a Part, or what else the loop knows the descriptor by.
+  void watch(int descriptor, const void* whose) const;
+  void watch_news();
   void start(const std::vector<Part*>& opened);
   void loop(int stop);
+  void look_after(shm::Nanoseconds now, bool all);
+  [[nodiscard]] shm::Nanoseconds next_round(shm::Nanoseconds now) const;
+  // False: `stop` is readable.
+  bool hear(int milliseconds, bool& all);
   void serve(shm::Nanoseconds now, bool all);
   void look_after_all();
   // Sleeps; true: `stop` is readable.
@@ -110,6 +117,8 @@ class Bridge {
   Saying waiting_;                   // for the daemon
   Saying ages_;
   bool has_started_ = false;
+  shm::Nanoseconds tend_at_ = 0;
+  bool watches_news_ = false;  // of the daemon's, for max_ages_
   bool stops_ = false;
 };
 

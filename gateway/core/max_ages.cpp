@@ -52,6 +52,8 @@ void MaxAges::update() {
       obstacle_ = error.what();
     }
   }
+  // Before they are read: what comes in between is found the next time.
+  if (instance_ != nullptr) epoch_ = instance_->memory()->tables().epoch();
   for (const Watched& each : watched_) {
     // Both sources of a choice come from one topic: the shorter T holds for its samples.
     shm::Nanoseconds age = shm::kForever;
@@ -63,6 +65,10 @@ void MaxAges::update() {
     }
     each.age->set(age, is_forever);
   }
+}
+
+bool MaxAges::is_outdated() const {
+  return instance_ != nullptr && instance_->memory()->tables().epoch() != epoch_;
 }
 
 void MaxAges::join() {

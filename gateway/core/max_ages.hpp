@@ -14,6 +14,7 @@
 #include "gateway/core/freshness.hpp"
 #include "gateway/mapping/mapping.hpp"
 #include "shm/activity.hpp"
+#include "shm/table_ring.hpp"
 #include "watch/instance.hpp"
 
 namespace arbiter::gateway {
@@ -30,8 +31,15 @@ class MaxAges final : public AgesOfSources {
 
   // `age` belongs to the caller and is written by update(), also by this call.
   void add(const Entry& entry, MaxAge& age);
-  // Reads memory, and the daemon's news; does not wait. Call it ten times a second.
+  // Reads memory, and the daemon's news; does not wait. Call it where there is news, and twice a
+  // second.
   void update();
+  // Whether another model may be in force than at the last update(): one load. Ten times a second.
+  [[nodiscard]] bool is_outdated() const;
+  // Readable when the daemon has said something; negative: it has not let us in yet.
+  [[nodiscard]] int descriptor() const noexcept {
+    return instance_ == nullptr ? -1 : instance_->descriptor();
+  }
   [[nodiscard]] shm::Nanoseconds of(std::string_view source) const override;
   // The daemon that it knew has gone, and no other has come yet.
   [[nodiscard]] bool knows_of_no_daemon() const noexcept {
@@ -59,6 +67,7 @@ class MaxAges final : public AgesOfSources {
   std::unique_ptr<watch::Instance> instance_;
   std::string obstacle_;
   shm::Nanoseconds join_again_ = 0;
+  shm::Epoch epoch_ = 0;  // of the tables, at the last update()
   std::vector<Watched> watched_;
 };
 

@@ -8,6 +8,7 @@
 #include "gateway/core/incoming.hpp"
 #include "gateway/core/outgoing.hpp"
 #include "gateway/mapping/mapping.hpp"
+#include "shm/activity.hpp"
 
 namespace arbiter::gateway {
 
@@ -46,9 +47,11 @@ class Middleware {
   // When it returns, deliver() is not called any more. Also called where start() was not.
   virtual void stop() noexcept = 0;
 
-  // Ten times a second, and at Bell::ring(): to look after what is out there, to count peers.
+  // Every tend_period(), and at Bell::ring(): to look after what is out there, to count peers.
   // Throws NeedsNewProcess.
   virtual void tend() {}
+  // A middleware that rings for what happens need not be asked often.
+  [[nodiscard]] virtual shm::Nanoseconds tend_period() const { return 100'000'000; }
 };
 
 }  // namespace arbiter::gateway

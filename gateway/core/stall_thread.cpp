@@ -1,9 +1,10 @@
 #include "gateway/core/stall_thread.hpp"
 
+#include <poll.h>
 #include <pthread.h>
 #include <time.h>
 
-#include <chrono>
+#include <cstdint>
 
 #include "shm/clock.hpp"
 
@@ -18,24 +19,25 @@ shm::Nanoseconds suspended() {
 
 }  // namespace
 
-StallThread::StallThread(StallGuard& guard) : guard_(guard), thread_([this] { run(); }) {
+StallThread::StallThread(StallGuard& guard, const Bell& bell)
+    : guard_(guard), bell_(bell), thread_([this] { run(); }) {
   pthread_setname_np(thread_.native_handle(), "stall-guard");
 }
 
 StallThread::~StallThread() {
-  {
-    const std::lock_guard lock(mutex_);
-    ends_ = true;
-  }
-  ended_.notify_one();
+  end_.ring();
   thread_.join();
 }
 
+// One system call for each tick: it ticks several times a second, also where nothing comes.
 void StallThread::run() {
-  std::unique_lock lock(mutex_);
-  while (!ends_) {
-    const std::chrono::nanoseconds period(guard_.tick(shm::monotonic_now(), suspended()));
-    ended_.wait_for(lock, period, [this] { return ends_; });
+  for (;;) {
+    const std::uint64_t stops = guard_.stops();
+    const shm::Nanoseconds period = guard_.tick(shm::monotonic_now(), suspended());
+    if (guard_.stops() != stops) bell_.ring();
+    const timespec time{period / 1'000'000'000, period % 1'000'000'000};
+    pollfd end{end_.descriptor(), POLLIN, 0};
+    if (::ppoll(&end, 1, &time, nullptr) > 0) return;
   }
 }
 

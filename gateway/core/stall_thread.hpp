@@ -1,18 +1,18 @@
-// The thread that ticks a StallGuard. It asks the kernel for nothing else, so that it is late only
-// where the whole process is.
+// The thread that ticks a StallGuard, and rings where the guard has found that the process had
+// stopped. It asks the kernel for nothing else, so that it is late only where the whole process is.
 #pragma once
 
-#include <condition_variable>
-#include <mutex>
 #include <thread>
 
+#include "gateway/core/bridge.hpp"
 #include "gateway/core/freshness.hpp"
 
 namespace arbiter::gateway {
 
 class StallThread {
  public:
-  explicit StallThread(StallGuard& guard);
+  // Keeps references.
+  StallThread(StallGuard& guard, const Bell& bell);
   StallThread(const StallThread&) = delete;
   StallThread& operator=(const StallThread&) = delete;
   ~StallThread();
@@ -21,9 +21,8 @@ class StallThread {
   void run();
 
   StallGuard& guard_;
-  std::mutex mutex_;
-  std::condition_variable ended_;
-  bool ends_ = false;
+  const Bell& bell_;
+  const Bell end_;  // rung once
   std::thread thread_;
 };
 

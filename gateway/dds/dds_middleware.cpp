@@ -84,13 +84,13 @@ void DdsMiddleware::start(const std::vector<OpenIn>& ins, const std::vector<Open
   for (const OpenOut& out : outs) out_of_.at(&out.outgoing.entry())->tell(out.outgoing);
   std::vector<InTopic*> added;
   for (const OpenIn& in : ins) {
-    added.push_back(&ins_.emplace_back(in.incoming, in.account, guard_));
+    added.push_back(&ins_.emplace_back(in.incoming, in.account, guard_, bell_));
     add(site_of(in.gateway), *added.back(), in.account);
   }
   if (!started_) {
     // One tick before there is a reader: see StallGuard.
     guard_.tick(shm::monotonic_now());
-    stall_thread_.emplace(guard_);
+    stall_thread_.emplace(guard_, bell_);
   }
   started_ = true;
   for (std::size_t i = 0; i < ins.size(); ++i) open(site_of(ins[i].gateway), *added[i]);

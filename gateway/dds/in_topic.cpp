@@ -9,16 +9,23 @@
 
 namespace arbiter::gateway::dds {
 
-InTopic::InTopic(Incoming& incoming, Account& account, StallGuard& guard)
+InTopic::InTopic(Incoming& incoming, Account& account, StallGuard& guard, const Bell& bell)
     : EndPoint(End::kReader, incoming.entry(), account),
       incoming_(incoming),
       guard_(guard),
       watch_(guard.add(incoming.max_age())),
+      bell_(bell),
       cache_(*this) {}
 
 Entity InTopic::make(dds_entity_t participant, dds_entity_t topic, const ddsi_sertype* /*type*/,
                      const dds_qos_t* qos) {
-  return {dds_create_reader_rhc(participant, topic, qos, nullptr, cache_.cache()),
+  const Listener listener(dds_create_listener(const_cast<Bell*>(&bell_)));
+  dds_lset_subscription_matched(
+      listener.get(),
+      [](dds_entity_t /*reader*/, const dds_subscription_matched_status_t /*status*/, void* bell) {
+        static_cast<const Bell*>(bell)->ring();
+      });
+  return {dds_create_reader_rhc(participant, topic, qos, listener.get(), cache_.cache()),
           "a reader of " + this->topic().name};
 }
 

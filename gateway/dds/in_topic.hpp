@@ -10,8 +10,8 @@ namespace arbiter::gateway::dds {
 
 class InTopic : public EndPoint, private SampleTaker {
  public:
-  // Keeps references.
-  InTopic(Incoming& incoming, Account& account, StallGuard& guard);
+  // Keeps references. `bell`: rings where a publisher has come or gone.
+  InTopic(Incoming& incoming, Account& account, StallGuard& guard, const Bell& bell);
   ~InTopic() override { close(); }
 
  private:
@@ -26,6 +26,7 @@ class InTopic : public EndPoint, private SampleTaker {
   Incoming& incoming_;
   const StallGuard& guard_;
   const StallGuard::Watch& watch_;
+  const Bell& bell_;
   ReaderCache cache_;
 };
 

@@ -34,11 +34,11 @@ std::uint32_t OutTopic::matched() const {
 
 // A reader that comes while nobody commands is to be told so at once.
 void OutTopic::on_matched(const dds_publication_matched_status_t& status) noexcept {
-  if (status.current_count_change <= 0) return;
-  if (Outgoing* const outgoing = outgoing_.get(); outgoing != nullptr) {
+  if (Outgoing* const outgoing = outgoing_.get();
+      outgoing != nullptr && status.current_count_change > 0) {
     outgoing->peer_matched();
-    bell_.ring();
   }
+  bell_.ring();  // who has gone is to be told, too
 }
 
 Sender::Result OutTopic::send(Bytes sample) noexcept {
