@@ -41,9 +41,10 @@ bool ElementReader::check_attributes(const XmlNode& element, KnownNames known) {
     const XmlAttribute& attribute = element.attributes[i];
     const Location where = file_.locate(file_.offset_of(attribute.name.data()));
     if (std::find(known.begin(), known.end(), attribute.name) == known.end()) {
-      error("unknown-attribute", where,
-            in_brackets(element) + " has no attribute " + quote(attribute.name) +
-                propose(attribute.name, known, "", ""));
+      error("unknown-attribute", where, [&] {
+        return in_brackets(element) + " has no attribute " + quote(attribute.name) +
+               propose(attribute.name, known, "", "");
+      });
       fine = false;
       continue;
     }
@@ -83,9 +84,10 @@ std::optional<Text> ElementReader::optional_attribute(const XmlNode& element,
 
 std::optional<Text> ElementReader::attribute(const XmlNode& element, std::string_view name) {
   if (!has_attribute(element, name)) {
-    error("missing-attribute", where(element),
-          in_brackets(element) + " lacks the attribute " + std::string(name) + "; write " +
-              std::string(name) + "=\"…\"");
+    error("missing-attribute", where(element), [&] {
+      return in_brackets(element) + " lacks the attribute " + std::string(name) + "; write " +
+             std::string(name) + "=\"…\"";
+    });
     return {};
   }
   return optional_attribute(element, name);
@@ -125,8 +127,9 @@ bool ElementReader::check_no_text(const XmlNode* first_child) {
 }
 
 void ElementReader::report_unknown_element(const XmlNode& element, KnownNames known) {
-  error("unknown-element", where(element),
-        in_brackets(element) + " is not known here" + propose(element.text, known, "<", ">"));
+  error("unknown-element", where(element), [&] {
+    return in_brackets(element) + " is not known here" + propose(element.text, known, "<", ">");
+  });
 }
 
 std::optional<Mention> ElementReader::port_name(const Text& text, std::string_view what) {

@@ -1,10 +1,12 @@
 // Strict access to the elements of a model file: what is unknown, missing or misplaced is reported.
 #pragma once
 
+#include <concepts>
 #include <initializer_list>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "rules/model/model.hpp"
 #include "rules/text/defines.hpp"
@@ -46,6 +48,12 @@ class ElementReader {
 
   void error(std::string code, Location where, std::string message) {
     diagnostics_.error(std::move(code), std::move(where), std::move(message));
+  }
+  // `compose` returns the message; it is not called for what is only counted.
+  template <std::invocable Compose>
+  void error(const std::string& code, Location where, const Compose& compose) {
+    const bool is_kept = diagnostics_.keeps_another(Severity::kError, code);
+    diagnostics_.error(code, std::move(where), is_kept ? compose() : std::string());
   }
 
  private:

@@ -116,7 +116,7 @@ std::size_t Diagnostics::count(Severity severity, const std::string& code) const
 void Diagnostics::find(Diagnostic item) {
   // A message cites what stands in a file. Nothing of it may begin a line of its own, which would
   // look like another finding, or have a meaning to a terminal.
-  item.message = shm::printable(item.message);
+  if (keeps_another(item.severity, item.code)) item.message = shm::printable(item.message);
   add(std::move(item));
 }
 

@@ -76,6 +76,10 @@ class Diagnostics {
   void note(std::string code, Location where, std::string message);
   void note(std::string code, Location where, std::string message, Subject about,
             std::optional<Witness> witness = {}, std::vector<Witness> more_witnesses = {});
+  // Whether one more of this code is kept. What is only counted needs no message.
+  [[nodiscard]] bool keeps_another(Severity severity, const std::string& code) const {
+    return count(severity, code) < kMaxOfCode;
+  }
   // All that another one has, behind what is here.
   void add(Diagnostics other);
   // Without those of these codes; errors stay.
