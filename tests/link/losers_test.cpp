@@ -72,18 +72,18 @@ class Eavesdropper : private gateway::dds::SampleTaker {
 // What becomes of the camera's images where they are imported, as a tap that holds none sees it.
 class Arrivals {
  public:
-  // Returns once nothing more is missed.
-  explicit Arrivals(Node& node) : tap_(node.tap(kCamera, without_samples())) {
-    while (!tap_.wait_for(1s)) {
-    }
+  // The camera publishes until the tap sees its source: nothing is missed then.
+  Arrivals(Node& node, Camera& camera) : tap_(node.tap(kCamera, without_samples())) {
+    test::await([&] {
+      camera.publish();
+      return tap_.take().has_value();
+    });
   }
-  // Of the image with that number: when it arrived.
-  Time await(TapEventKind kind, std::int64_t number) {
+  // The next of that kind.
+  TapEvent<void> await(TapEventKind kind) {
     for (;;) {
-      const auto event = tap_.wait_for(1s);
-      const bool is_it = event && event->kind() == kind &&
-                         event->origin().sequence == static_cast<std::uint64_t>(number);
-      if (is_it) return event->time();
+      auto event = tap_.wait_for(1s);
+      if (event && event->kind() == kind) return std::move(*event);
     }
   }
 
@@ -135,13 +135,16 @@ TEST_F(Losers, OnlyHeadersCrossAndTheNewestImageIsThereWhenItWinsAgain) {
   EXPECT_EQ(ear.seen(EventKind::kAgain), 0);
   EXPECT_FALSE(view.in().take());
 
-  Arrivals arrivals(view.node());
-  // With this one all that was sent while the view was paused has come.
-  arrivals.await(TapEventKind::signal, camera.publish());
+  Arrivals arrivals(view.node(), camera);
+  // Once it is here, nothing that was sent before is on its way, or still being looked at.
+  camera.port().deactivate();
+  arrivals.await(TapEventKind::deactivation);
   view.go_on();
   const std::int64_t last = camera.publish();  // its header wins
-  const Time signalled = arrivals.await(TapEventKind::signal, last);
-  EXPECT_EQ(arrivals.await(TapEventKind::sample, last), signalled) << "no second arrival";
+  const auto signalled = arrivals.await(TapEventKind::signal);
+  const auto completed = arrivals.await(TapEventKind::sample);
+  EXPECT_EQ(completed.time(), signalled.time()) << "no second arrival";
+  EXPECT_EQ(completed.origin().sequence, signalled.origin().sequence);
   await([&] { return view.seen(5ms) == last; });
   EXPECT_FALSE(view.seen(5ms)) << "it comes once";
   await([&] { return ear.seen(EventKind::kAgain) > 0; });
