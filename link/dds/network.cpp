@@ -1,10 +1,14 @@
 #include "link/dds/network.hpp"
 
+#include <fcntl.h>
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
+#include <exception>
 #include <filesystem>
+#include <future>
 #include <iterator>
 #include <system_error>
 #include <utility>
@@ -29,6 +33,9 @@ constexpr const char* kForAll =
     "<Discovery><LeaseDuration>1500ms</LeaseDuration><SPDPInterval>250ms</SPDPInterval></"
     "Discovery><Internal><HeartbeatInterval max=\"500ms\">100ms</HeartbeatInterval>"
     "<AutoReschedNackDelay>500ms</AutoReschedNackDelay></Internal>";
+
+// With its address, Cyclone ends within it, but for samples that nobody acknowledges.
+constexpr std::chrono::seconds kEndsWithin{1};
 
 // This process's, in order. Where they cannot be listed: none.
 std::vector<int> datagram_sockets() {
@@ -62,23 +69,42 @@ std::string configuration_of(const NetworkOptions& options) {
   return all;
 }
 
-Network::Network(const NetworkOptions& options)
-    : sockets_(datagram_sockets()),
-      domain_(dds_create_domain(options.domain, configuration_of(options).c_str()),
-              "DDS domain " + std::to_string(options.domain)),
-      participant_(dds_create_participant(options.domain, nullptr, nullptr),
-                   "a participant in DDS domain " + std::to_string(options.domain)) {
-  std::vector<int> now = datagram_sockets();
+Domain::Domain(const NetworkOptions& options) {
+  const std::vector<int> before = datagram_sockets();
+  entity_ = Entity(dds_create_domain(options.domain, configuration_of(options).c_str()),
+                   "DDS domain " + std::to_string(options.domain));
+  const std::vector<int> now = datagram_sockets();
   std::vector<int> made;
-  std::set_difference(now.begin(), now.end(), sockets_.begin(), sockets_.end(),
+  std::set_difference(now.begin(), now.end(), before.begin(), before.end(),
                       std::back_inserter(made));
-  sockets_ = std::move(made);
+  for (const int socket : made) {
+    shm::FileDescriptor own(::fcntl(socket, F_DUPFD_CLOEXEC, 0));
+    if (own) sockets_.push_back(std::move(own));
+  }
 }
 
-// Who waits for a datagram is woken, and finds that it is over once the domain is deleted.
-Network::~Network() {
-  if (!is_cut_off_) return;
-  for (const int socket : sockets_) static_cast<void>(::shutdown(socket, SHUT_RD));
+Domain::~Domain() {
+  if (is_cut_off_) wake_receivers();
+  std::promise<void> deleted;  // the address may go even now
+  std::future<void> watch;
+  try {
+    watch = std::async(std::launch::async, [this, over = deleted.get_future()] {
+      if (over.wait_for(kEndsWithin) == std::future_status::timeout) wake_receivers();
+    });
+  } catch (const std::exception&) {  // there is no thread to be had
+    wake_receivers();
+  }
+  entity_ = Entity();
+  deleted.set_value();
 }
+
+void Domain::wake_receivers() const noexcept {
+  for (const auto& socket : sockets_) static_cast<void>(::shutdown(socket.get(), SHUT_RD));
+}
+
+Network::Network(const NetworkOptions& options)
+    : domain_(options),
+      participant_(dds_create_participant(options.domain, nullptr, nullptr),
+                   "a participant in DDS domain " + std::to_string(options.domain)) {}
 
 }  // namespace arbiter::link

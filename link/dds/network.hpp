@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gateway/dds/entity.hpp"
+#include "shm/file_descriptor.hpp"
 
 namespace arbiter::link {
 
@@ -29,24 +30,42 @@ struct NetworkOptions {
 // Cyclone's configuration for it. CYCLONEDDS_URI is not looked at: all links must agree.
 [[nodiscard]] std::string configuration_of(const NetworkOptions& options);
 
+// A domain, and the sockets that Cyclone makes for it.
+//
+// Cyclone ends its receiving threads by sending to its own address. If that address is gone, it
+// would wait for them for ever: they are woken by the end of what they read from.
+class Domain {
+ public:
+  // Throws DdsError.
+  explicit Domain(const NetworkOptions& options);
+  Domain(const Domain&) = delete;
+  Domain& operator=(const Domain&) = delete;
+  // Takes no longer than kEndsWithin more than Cyclone needs where it still has its address.
+  ~Domain();
+
+  void note_cut_off() noexcept { is_cut_off_ = true; }
+
+ private:
+  void wake_receivers() const noexcept;
+
+  // Of our own, so that none is another one's by the time it is used.
+  std::vector<shm::FileDescriptor> sockets_;
+  bool is_cut_off_ = false;
+  Entity entity_;
+};
+
 class Network {
  public:
   // Throws DdsError: there is no such network interface now, for example.
   explicit Network(const NetworkOptions& options);
-  Network(const Network&) = delete;
-  Network& operator=(const Network&) = delete;
-  ~Network();
 
-  // Its address may be gone. Cyclone ends its receiving threads by sending to itself, and would
-  // wait for them for ever: they are woken otherwise when this ends.
-  void note_cut_off() noexcept { is_cut_off_ = true; }
+  // Its address may be gone: nothing is waited for when this ends.
+  void note_cut_off() noexcept { domain_.note_cut_off(); }
 
   [[nodiscard]] dds_entity_t participant() const { return participant_.get(); }
 
  private:
-  std::vector<int> sockets_;  // Cyclone's; before it makes them: those that are others'
-  bool is_cut_off_ = false;
-  Entity domain_;
+  Domain domain_;
   Entity participant_;
 };
 

@@ -1,9 +1,14 @@
 // Two hosts with networks of their own, and the cable between them pulled.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <functional>
 #include <string>
+#include <thread>
 
+#include "link/dds/network.hpp"
+#include "shm/file_descriptor.hpp"
 #include "tests/client/models.hpp"
 #include "tests/link/cables.hpp"
 #include "tests/link/robot.hpp"
@@ -191,6 +196,21 @@ TEST_F(Cable, AnInterfaceThatIsSwitchedOffAndOnIsUsedAgain) {
         robot.head_network.ip("link set eth0 up");
       },
       "");
+}
+
+// Cyclone ends its threads by sending to its own address, which is gone: nobody has noticed yet.
+TEST_F(Cable, ANetworkEndsThoughItsAddressGoesJustThen) {
+  Switch cables;
+  const NetworkNamespace place;
+  cables.connect(place, kHead);
+  std::thread thread([&] {
+    const shm::FileDescriptor there(
+        ::open(("/proc/" + place.pid() + "/ns/net").c_str(), O_RDONLY | O_CLOEXEC));
+    ASSERT_EQ(::setns(there.get(), CLONE_NEWNET), 0);  // of this thread, and of those it makes
+    const link::Network network({43, {"eth0"}, {}});
+    place.ip("addr flush dev eth0");
+  });
+  thread.join();
 }
 
 }  // namespace

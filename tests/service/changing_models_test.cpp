@@ -106,7 +106,9 @@ TEST_F(ChangingModels, ASwitchThatIsDoneIsNoRefusalThoughNoDescriptorIsLeft) {
     const std::uint64_t now = daemon_->generation();
     const bool is_done = now != generation;
     EXPECT_EQ(answer.message.kind, is_done ? MessageKind::kDone : MessageKind::kRefused);
-    if (is_done) EXPECT_EQ(answer.message.value, now);
+    if (is_done) {
+      EXPECT_EQ(answer.message.value, now);
+    }
     was_done_without_report = was_done_without_report || is_done;
     generation = now;
   }
