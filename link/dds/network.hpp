@@ -40,7 +40,7 @@ class Domain {
   explicit Domain(const NetworkOptions& options);
   Domain(const Domain&) = delete;
   Domain& operator=(const Domain&) = delete;
-  // Takes no longer than kEndsWithin more than Cyclone needs where it still has its address.
+  // Takes a second longer than Cyclone needs where it still has its address, at most.
   ~Domain();
 
   void note_cut_off() noexcept { is_cut_off_ = true; }

@@ -88,11 +88,15 @@ int switch_and_kill(const std::string& instance, const std::string& model, int p
   std::random_device random;
   const wire::SwitchRequest request{std::uint64_t{random()} << 32 | random() | 1, model, {}};
   wire::LinkCall link(instance);
-  const auto result =
-      cli::switch_everywhere(request, [&](const std::string& verb, const std::string& text) {
-        if (verb == wire::kCommitVerb) ::kill(pid, SIGKILL);
-        return link.ask_hosts({wire::kAllHosts, verb, text});
-      });
+  const auto ask = [&](const std::string& verb, const std::string& text) {
+    if (verb == wire::kCommitVerb) ::kill(pid, SIGKILL);
+    return link.ask_hosts({wire::kAllHosts, verb, text});
+  };
+  const auto look = [&] {
+    ::poll(nullptr, 0, 250);  // as arbiter does
+    return wire::read_hosts(link.ask({"", "hosts"}));
+  };
+  const auto result = cli::switch_everywhere(request, ask, look);
   cli::write_json(result, model);
   return cli::exit_code_of(result);
 }
