@@ -110,7 +110,7 @@ TEST_F(SwitchAll, AHostThatIsSilentMeansThatNoneDoes) {
   const auto result = arbiter({"switch", "rest", "--all", "--instance", "arm"});
   hosts_.at("cam").link().signal(SIGCONT);
   EXPECT_EQ(result.exit_code, 1) << result.out;
-  EXPECT_THAT(result.out, HasSubstr("cam   not switched: it "));
+  EXPECT_THAT(result.out, HasSubstr("cam   not switched: it"));
   EXPECT_THAT(in_force(), Each("default"));
 }
 
