@@ -243,9 +243,9 @@ class ChannelReader {
     next_ = (next_ + count) & kSequenceMask;
     advance(static_cast<std::uint32_t>(count % depth_));
   }
-  // Says so to the publisher, in its lane. SYNC POINT: entries-consumed. Relaxed is enough: between
-  // the hold and this stands fence (c), and between a stamp that was peeked and this the fence of
-  // peek_stamp().
+  // Says so to the publisher, in its lane. SYNC POINT: entries-consumed. Relaxed is enough behind a
+  // hold, for fence (c) stands between. Behind a stamp that was peeked, and no hold, only the load
+  // must stay before the store: each processor keeps them so, although the language does not say.
   void tell(Atomic<std::uint64_t>& consumed) const noexcept {
     consumed.store(this->consumed(), std::memory_order_relaxed);
   }

@@ -43,13 +43,13 @@ void InputCore::accept_view() {
     queue.lane = free_lane();
     if (queue.lane == nullptr) continue;
     queue.lane->source.store(link.peer->source, std::memory_order_relaxed);
-    queue.lane->link.store(link.peer->link, std::memory_order_relaxed);
     queue.lane->consumed.store(0, std::memory_order_relaxed);
     queue.lane->taken.store(0, std::memory_order_relaxed);
     queue.lane->dropped.store(0, std::memory_order_relaxed);
     queue.lane->overtaken.store(0, std::memory_order_relaxed);
-    // SYNC POINT: lane-given. Release, with the acquire in OutputCore::is_full().
-    queue.lane->publisher.store(link.peer->instance, std::memory_order_release);
+    queue.lane->publisher.store(link.peer->instance, std::memory_order_relaxed);
+    // SYNC POINT: lane-given. Release, with the acquire in OutputCore::lane_of().
+    queue.lane->link.store(link.peer->link, std::memory_order_release);
     queues_.push_back(std::move(queue));
   }
   require_lanes_balance(*segment_, queues_);

@@ -200,11 +200,11 @@ Counts OutputCore::refuse(const Destination& destination, bool is_sample) const 
 
 // The receiver's lane for us tells how far it has read; null: it has none yet.
 // SYNC POINT: lane-given. The acquire pairs with the release in InputCore::accept_view(): who finds
-// a lane its own finds no earlier publisher's count in it.
+// its link in a lane, whose number never comes back, finds no earlier link's count in it, be it of
+// another publisher or of its own.
 const shm::Lane* OutputCore::lane_of(Destination& destination) const noexcept {
   const auto is_ours = [&](const shm::Lane& lane) {
-    return lane.publisher.load(std::memory_order_acquire) == instance_ &&
-           lane.link.load(std::memory_order_relaxed) == destination.link;
+    return lane.link.load(std::memory_order_acquire) == destination.link;
   };
   if (destination.lane == nullptr || !is_ours(*destination.lane)) {
     destination.lane = nullptr;

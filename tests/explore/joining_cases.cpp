@@ -137,6 +137,40 @@ void reuse_lane(const Explore& explore) {
 const Register kLane("AReceiversWordToOnePublisherIsNotTakenForItsWordToTheNext", {5, 3},
                      reuse_lane);
 
+// The same publisher is connected again, by another channel, of which less has been read.
+struct Relinked : Scene {
+  Relinked() : Scene(everything(), refusing(), {kA}), other(instance.make_input(kOther, depth(1))) {
+    for (int i = 0; i < 3; ++i) {
+      a().publish();
+      input->take();
+    }
+    a().core->disconnect_peer(input->core->instance());
+    input->core->disconnect_peer(a().core->instance());
+    a().publish();
+    instance.connect(a(), *other);  // by the channel that is free now
+    a().publish();
+    instance.connect(a(), *input);
+    a().publish();
+  }
+  std::unique_ptr<Input> other;
+};
+
+void relink(const Explore& explore) {
+  explore_anew<Relinked>(explore, [](Relinked& scene, Execution& execution) {
+    execution.thread([&scene] {
+      scene.a().publish();
+      scene.a().publish();
+    });
+    execution.thread([&scene] { scene.input->take(); });
+    execution.finally([&scene] {
+      scene.drain();
+      require(scene.input->counters().overtaken.load(std::memory_order_relaxed) == 0,
+              "a port that refuses was overtaken");
+    });
+  });
+}
+const Register kRelink("AReceiversWordOnOneLinkIsNotTakenForItsWordOnTheNext", {5, 3}, relink);
+
 // Two publishers of one source come and go, each leaving a sample that its successor's pushes out.
 // They are let go of by the service thread, while the component takes; before or after it has known
 // of them. Each of their samples is taken, or counted, once.
