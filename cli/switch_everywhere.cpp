@@ -75,7 +75,7 @@ void commit(const wire::SwitchRequest& request, const AskHosts& ask, SwitchEvery
   std::vector<HostAnswer> answers;
   try {
     answers = ask(wire::kCommitVerb, wire::write_switch_request(request));
-  } catch (const wire::CallError& error) {
+  } catch (const std::runtime_error& error) {  // or its answers cannot be read
     for (HostSwitch& host : result.hosts) {
       if (host.has_prepared) host.why = error.what();
     }
@@ -100,13 +100,24 @@ void commit(const wire::SwitchRequest& request, const AskHosts& ask, SwitchEvery
   }
 }
 
+// The one that prepared, or the only one of its name: its link may have begun again. Null: nobody
+// can tell which it is.
+const wire::HostStatus* find_host(const HostSwitch& host, const wire::HostsDocument& hosts) {
+  const wire::HostStatus* found = nullptr;
+  int namesakes = 0;
+  for (const wire::HostStatus& each : hosts.hosts) {
+    if (each.host != host.host || !each.is_up) continue;
+    if (each.incarnation == host.incarnation) return &each;
+    found = &each;
+    ++namesakes;
+  }
+  return namesakes == 1 ? found : nullptr;
+}
+
 // Of a host whose commit is not answered: whether the model has come into force.
 void look_at(HostSwitch& host, const wire::HostsDocument& hosts, const std::string& model) {
-  const auto there =
-      std::find_if(hosts.hosts.begin(), hosts.hosts.end(), [&](const wire::HostStatus& each) {
-        return each.host == host.host && each.is_up && each.has_daemon && each.model;
-      });
-  if (there == hosts.hosts.end()) return;
+  const wire::HostStatus* there = find_host(host, hosts);
+  if (there == nullptr || !there->has_daemon || !there->model) return;
   // What it said before it prepared may be old. To switch to the model in force changes nothing.
   if (there->model->generation < host.before || there->model->name != model) return;
   host.outcome = SwitchOutcome::kSwitched;
@@ -121,8 +132,8 @@ void find_out(const wire::SwitchRequest& request, const LookAtHosts& look,
     wire::HostsDocument hosts;
     try {
       hosts = look();
-    } catch (const wire::CallError&) {  // the link has gone
-      return;
+    } catch (const std::runtime_error&) {  // the link joins its network again, or has gone
+      continue;
     }
     for (HostSwitch& each : result.hosts) {
       if (each.outcome == SwitchOutcome::kUnknown) look_at(each, hosts, request.model);
@@ -170,7 +181,7 @@ SwitchEverywhere switch_everywhere(const wire::SwitchRequest& request, const Ask
     // Otherwise they would be held for two seconds.
     try {
       static_cast<void>(ask(wire::kReleaseVerb, text));
-    } catch (const wire::CallError&) {
+    } catch (const std::runtime_error&) {
     }
   }
   put_in_order(result.hosts);

@@ -50,7 +50,7 @@ using AskHosts =
     std::function<std::vector<wire::HostAnswer>(const std::string& verb, const std::string& text)>;
 
 // What the link of this host knows of the others, some time after the last look. May throw
-// wire::CallError.
+// std::runtime_error: it is asked again.
 using LookAtHosts = std::function<wire::HostsDocument()>;
 // Until it is given up: a daemon may have been busy, and a cut may be short.
 inline constexpr int kMostLooks = 12;

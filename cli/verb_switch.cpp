@@ -66,7 +66,8 @@ int switch_all(const SwitchOptions& options) {
   };
   const auto look = [&] {
     std::this_thread::sleep_for(kLookPeriod);
-    return wire::read_hosts(link.ask({"", "hosts"}));
+    // Each time anew: a link that joins its network again hangs up.
+    return wire::read_hosts(wire::LinkCall(options.instance).ask({"", "hosts"}));
   };
   const auto result = switch_everywhere({new_attempt(), options.model, options.without}, ask, look);
   if (options.json) {

@@ -38,6 +38,7 @@ class FakeHosts {
   std::vector<std::string> asked;
   wire::HostsDocument seen;  // afterwards
   int looks = 0;
+  int looks_in_vain = 0;  // at first
 
   SwitchEverywhere run(const wire::SwitchRequest& request = kRequest) {
     const auto ask = [&](const std::string& verb, const std::string& text) {
@@ -47,7 +48,7 @@ class FakeHosts {
       return answers.at(verb);
     };
     return switch_everywhere(request, ask, [&] {
-      ++looks;
+      if (++looks <= looks_in_vain) throw wire::CallError("the link ends");
       return seen;
     });
   }
@@ -218,6 +219,29 @@ TEST(SwitchEverywhere, WhatAHostSaidBeforeItPreparedOrIsGoneTellsNothing) {
   hosts.seen.hosts[0].is_up = false;
   EXPECT_THAT(outcomes(hosts.run()), ElementsAre("a unknown"));
   hosts.seen.hosts[0].is_up = true;
+  EXPECT_THAT(outcomes(hosts.run()), ElementsAre("a switched"));
+}
+
+// A link that joins its network again hangs up.
+TEST(SwitchEverywhere, ALookThatFailsIsTakenAgain) {
+  FakeHosts hosts;
+  hosts.answers = {{"prepare", {yes("a")}}, {"commit", {silent("a")}}};
+  hosts.seen.hosts = {with_model("a", 6, "dance")};
+  hosts.looks_in_vain = 2;
+  EXPECT_THAT(outcomes(hosts.run()), ElementsAre("a switched"));
+}
+
+TEST(SwitchEverywhere, OfTwoMachinesWithOneNameOnlyTheOneThatPreparedIsLookedAt) {
+  FakeHosts hosts;
+  hosts.answers = {{"prepare", {yes("a")}}, {"commit", {silent("a")}}};
+  hosts.seen.hosts = {with_model("a", 6, "dance"), with_model("a", 5, "calm")};
+  hosts.seen.hosts[0].incarnation = "a-2";
+  hosts.seen.hosts[1].incarnation = "a-1";
+  EXPECT_THAT(outcomes(hosts.run()), ElementsAre("a unknown"));
+  hosts.seen.hosts[1].incarnation = "a-3";
+  EXPECT_THAT(outcomes(hosts.run()), ElementsAre("a unknown")) << "either may be the one";
+  hosts.seen.hosts[1].model->name = "dance";
+  hosts.seen.hosts[1].incarnation = "a-1";
   EXPECT_THAT(outcomes(hosts.run()), ElementsAre("a switched"));
 }
 
