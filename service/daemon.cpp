@@ -206,7 +206,7 @@ void Daemon::give_turns() {
 // One that waits for its turn is not heard again before it, and whoever is heard is not until this.
 void Daemon::watch_client(Client& client) {
   const std::uint32_t in = client.has_turn ? 0u : static_cast<std::uint32_t>(EPOLLIN | EPOLLRDHUP);
-  client.watches_queue = client.has_queue() && !client.is_held_back();
+  client.watches_queue = client.can_be_sent_more();
   const std::uint32_t out = client.watches_queue ? static_cast<std::uint32_t>(EPOLLOUT) : 0u;
   watch(client.socket(), Tag::kClient, client.id(), in | out | EPOLLONESHOT);
 }
@@ -215,7 +215,7 @@ void Daemon::watch_client(Client& client) {
 // thousand who have hung up at once would be heard again and again before one of them is served.
 void Daemon::watch_heard(Client& client) {
   client.watches_queue = false;
-  if (!client.has_turn || (client.has_queue() && !client.is_held_back())) watch_client(client);
+  if (!client.has_turn || client.can_be_sent_more()) watch_client(client);
 }
 
 bool Daemon::handle_signal(int signal_descriptor) {
@@ -371,9 +371,7 @@ void Daemon::settle() {
       client->has_turn = true;
       turns_.add(client->user(), id);
     }
-    if (client->has_queue() && !client->is_held_back() && !client->watches_queue) {
-      watch_client(*client);
-    }
+    if (client->can_be_sent_more() && !client->watches_queue) watch_client(*client);
   }
   for (const ClientId id : lost) drop(id);
   // Another round: others are told of it, who may be slow to read, or lost for it.

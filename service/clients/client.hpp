@@ -62,6 +62,8 @@ class Client {
   // What is queued waits until descriptors are read that it, or others of its user, have been sent;
   // its socket may have room.
   [[nodiscard]] bool is_held_back() const { return held_back_ && !queue_.empty(); }
+  // Whether its socket is worth watching for room.
+  [[nodiscard]] bool can_be_sent_more() const { return has_queue() && !is_held_back() && !lost_; }
   // How many flushes in turn have sent nothing, since it was held back.
   [[nodiscard]] unsigned flushed_in_vain() const { return flushed_in_vain_; }
   // Looks whether it has read what it was sent.
