@@ -163,7 +163,8 @@ void relink(const Explore& explore) {
     });
     execution.thread([&scene] { scene.input->take(); });
     execution.finally([&scene] {
-      scene.drain();
+      while (scene.input->take()) {
+      }
       require(scene.input->counters().overtaken.load(std::memory_order_relaxed) == 0,
               "a port that refuses was overtaken");
     });
