@@ -112,6 +112,7 @@ TEST(Record, TakesUpSourcesOfANewModelAndNewPorts) {
   auto fresh = node.output_port<int>("/new");
   auto in = node.input_port<int>("/p");
   fresh.publish(1);
+  recording.wait_for<Arrival>([](const auto&) { return true; });
   EXPECT_EQ(recording.end(SIGTERM), 0) << recording.error();
   EXPECT_EQ(recording.records<evidence::ModelChange>().size(), 2u);
   EXPECT_EQ(recording.records<Arrival>().size(), 1u);
