@@ -23,8 +23,11 @@ constexpr shm::Nanoseconds kLookPeriod = 100 * kMillisecond;
 constexpr shm::Nanoseconds kSayPeriod = 1000 * kMillisecond;  // of each entry
 constexpr int kRetryPeriod = 500;                             // ms, for the daemon
 constexpr shm::Nanoseconds kOpenPeriod = 1000 * kMillisecond;
-// A daemon refuses at once.
+// A daemon refuses at once, unless it waits for somebody to yield.
 constexpr shm::Nanoseconds kNoAnswer = 100 * kMillisecond;
+constexpr shm::Nanoseconds kSilence = 400 * kMillisecond;
+// A try that has held up the loop is made again after so many times as long.
+constexpr int kTimesAsLong = 20;
 // In a round of the loop, which goes round ten times a second.
 constexpr shm::Nanoseconds kOpenBudget = 10 * kMillisecond;
 
@@ -93,7 +96,10 @@ void Bridge::make_node(int stop) {
   NodeOptions options;
   options.instance = options_.instance;
   options.connect_timeout = std::chrono::milliseconds(200);
-  options.on_waiting = [](const std::string&) {};
+  // Once there is a node: a port waits for a daemon that has gone. It does not wait any longer.
+  options.on_waiting = [this](const std::string&) {
+    if (node_) throw Error("there is no daemon");
+  };
   options.on_notice = [](const Notice& notice) { say(Level::kWarning, notice.text); };
   while (!node_) {
     if (options_.on_round) options_.on_round();
@@ -108,12 +114,13 @@ void Bridge::make_node(int stop) {
   waiting_.say_once("");
 }
 
-// The loop has others to serve: it waits at most once for a daemon that does not answer, and tries
-// some ports after others where many are refused.
+// The loop has others to serve: it waits at most once for a daemon that does not answer, and seldom
+// again; and it tries some ports after others where many are refused.
 void Bridge::open_closed() {
   const shm::Nanoseconds begin = shm::monotonic_now();
   open_again_ = begin + kOpenPeriod;
   if (has_started_ && max_ages_.knows_of_no_daemon()) return;
+  shm::Nanoseconds pause = kOpenPeriod;
   std::vector<Part*> opened;
   for (std::size_t tried = 0; tried < parts_.size(); ++tried) {
     Part& part = *parts_[open_next_];
@@ -123,13 +130,23 @@ void Bridge::open_closed() {
     if (try_to_open(part)) opened.push_back(&part);
     if (options_.on_round) options_.on_round();
     const shm::Nanoseconds now = shm::monotonic_now();
-    if (!part.is_open() && now - before > kNoAnswer) break;
+    if (!part.is_open() && now - before > (has_started_ ? kNoAnswer : kSilence)) {
+      // While none is open nobody is held up.
+      if (is_any(true)) pause = std::max(kOpenPeriod, kTimesAsLong * (now - before));
+      break;
+    }
     if (has_started_ && now - begin > kOpenBudget) {
-      open_again_ = now;  // at the next round
+      pause = 0;  // at the next round
       break;
     }
   }
   if (!opened.empty() || !has_started_) start(opened);
+  open_again_ = shm::monotonic_now() + pause;
+}
+
+bool Bridge::is_any(bool open) const {
+  return std::any_of(parts_.begin(), parts_.end(),
+                     [open](const auto& part) { return part->is_open() == open; });
 }
 
 bool Bridge::try_to_open(Part& part) {
@@ -210,13 +227,12 @@ void Bridge::loop(int stop) {
 void Bridge::look_after(shm::Nanoseconds now, bool all) {
   if (now < tend_at_ && !all) return;
   if (now >= open_again_) open_closed();
-  const bool is_any_closed =
-      std::any_of(parts_.begin(), parts_.end(), [](const auto& part) { return !part->is_open(); });
-  tend_at_ = now + (is_any_closed ? kLookPeriod : middleware_.tend_period());
   max_ages_.update();
   watch_news();
   middleware_.tend();
   look_after_all();
+  // From here on: who was held up above serves before the next round.
+  tend_at_ = shm::monotonic_now() + (is_any(false) ? kLookPeriod : middleware_.tend_period());
   if (options_.on_round) options_.on_round();
 }
 

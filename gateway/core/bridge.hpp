@@ -2,8 +2,9 @@
 // samples and descriptions, until it is told to end.
 //
 // Where a port cannot be opened, because it is taken or the policy does not allow it, it says so,
-// serves the other entries, and tries again once a second. A daemon that goes and comes again is
-// the node's business (arbiter/node.hpp); samples pass meanwhile.
+// serves the other entries, and tries again once a second; where the daemon does not answer, which
+// holds up the loop, 10 to 20 s later. A daemon that goes and comes again is the node's business
+// (arbiter/node.hpp); samples pass meanwhile.
 //
 // Thread safety: all of it runs on the thread that calls run(), but for wake().
 #pragma once
@@ -87,6 +88,7 @@ class Bridge {
   void make_node(int stop);
   // Opens what is not open yet, as far as it can be, and lets the middleware serve that.
   void open_closed();
+  [[nodiscard]] bool is_any(bool open) const;
   // False: not now, and the log says why.
   bool try_to_open(Part& part);
   void open(Part& part);

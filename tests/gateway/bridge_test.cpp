@@ -52,7 +52,10 @@ class PlayedMiddleware : public Middleware {
     outs_ += outs.size();
   }
   void stop() noexcept override {}
+  // In each round of the loop.
+  void tend() override { ++tends_; }
 
+  [[nodiscard]] int tends() const { return tends_; }
   [[nodiscard]] bool serves(const std::string& source) {
     const std::lock_guard lock(mutex_);
     return ins_.count(source) != 0;
@@ -81,6 +84,7 @@ class PlayedMiddleware : public Middleware {
   std::mutex mutex_;
   std::map<std::string, Incoming*> ins_;
   std::size_t outs_ = 0;
+  std::atomic<int> tends_{0};
 };
 
 // A gateway that runs.
@@ -89,7 +93,8 @@ class Running {
   explicit Running(const std::string& name = "gateway", const std::string& entries = kEntries)
       : stop_(::eventfd(0, EFD_CLOEXEC)) {
     mappings_.push_back(read_dds(entries).mapping);
-    bridge_.emplace(BridgeOptions{name, "", {}}, mappings_, Kind::kDds, bell_, middleware);
+    bridge_.emplace(BridgeOptions{name, "", [this] { ++signs_; }}, mappings_, Kind::kDds, bell_,
+                    middleware);
     thread_ = std::thread([this] { bridge_->run(stop_.get()); });
   }
   Running(const Running&) = delete;
@@ -100,9 +105,13 @@ class Running {
     thread_.join();
   }
 
+  // So many times it has asked for a port: a sign of life comes after each, and in each round.
+  [[nodiscard]] int tries() const { return signs_ - middleware.tends(); }
+
   PlayedMiddleware middleware;
 
  private:
+  std::atomic<int> signs_{0};
   shm::FileDescriptor stop_;
   Bell bell_;
   std::vector<Mapping> mappings_;
@@ -240,6 +249,32 @@ TEST_F(Refused, APortThatSomebodyElseHasIsTakenUpWhenItIsFree) {
   EXPECT_FALSE(gateway.middleware.serves("/Nav/cmd:o"));
   taken.reset();
   await([&] { return gateway.middleware.serves("/Nav/cmd:o"); });
+}
+
+// While it waits for an answer it serves nobody: it must not wait again in each of its rounds.
+void expect_that_it_seldom_asks(Running& gateway) {
+  const int tends = gateway.middleware.tends();
+  const int tries = gateway.tries();
+  await([&] { return gateway.middleware.tends() >= tends + 40; });
+  EXPECT_LT(gateway.tries() - tries, 10);
+}
+
+TEST_F(Refused, ADaemonThatIsStoppedIsSeldomAsked) {
+  start("output /Nav/*");
+  Running gateway;
+  await([&] { return gateway.middleware.outs() == 1; });
+  daemon_->process().stop();
+  expect_that_it_seldom_asks(gateway);
+  daemon_->process().resume();
+}
+
+// It is not let in as a watcher, so it does not learn that the daemon has gone.
+TEST_F(Refused, ADaemonThatHasGoneIsSeldomAskedByWhoMayNotObserve) {
+  start("observe\ndeny everyone output /Nav/*");
+  Running gateway;
+  await([&] { return gateway.middleware.outs() == 1; });
+  daemon_->kill();
+  expect_that_it_seldom_asks(gateway);
 }
 
 // Whatever each of them got first, no entry is without a gateway, and none has two.
