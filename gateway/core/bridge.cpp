@@ -163,7 +163,7 @@ bool Bridge::try_to_open(Part& part) {
 
 void Bridge::open(Part& part) {
   if (part.entry.is_in()) {
-    auto incoming = std::make_unique<Incoming>(*node_, part.entry, part.account);
+    auto incoming = std::make_unique<Incoming>(*node_, part.entry, part.account, &part.first);
     max_ages_.add(part.entry, incoming->max_age());
     part.incoming = std::move(incoming);
     return;

@@ -81,7 +81,8 @@ class Bridge {
     std::string said;  // in the log
     shm::Nanoseconds say_again = 0;
     std::string described;
-    Saying waiting;  // for its port
+    Saying waiting;         // for its port
+    std::size_t first = 0;  // of its ports, to be opened
     [[nodiscard]] bool is_open() const { return incoming != nullptr || outgoing != nullptr; }
   };
 

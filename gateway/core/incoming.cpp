@@ -82,11 +82,16 @@ std::optional<Side> choose(const Choice& choice, const ForeignSample& sample) no
   return compare<double>(choice, bytes);
 }
 
-Incoming::Incoming(Node& node, const Entry& entry, Account& account)
+Incoming::Incoming(Node& node, const Entry& entry, Account& account, std::size_t* first)
     : entry_(entry), account_(account) {
   const auto ports = entry.ports();
-  yes_.emplace(open(node, ports.at(0)->name, entry));
-  if (ports.size() > 1) no_.emplace(open(node, ports.at(1)->name, entry));
+  const std::array<std::optional<OutputPort<void>>*, 2> sides = {&yes_, &no_};
+  const std::size_t begin = first == nullptr ? 0 : *first;
+  for (std::size_t tried = 0; tried < ports.size(); ++tried) {
+    const std::size_t at = (begin + tried) % ports.size();
+    if (first != nullptr) *first = at;
+    sides.at(at)->emplace(open(node, ports[at]->name, entry));
+  }
 }
 
 // publish() throws for another port's loan, which it never is.

@@ -56,8 +56,10 @@ class Incoming {
   // What became of a sample.
   enum class Fate { kPassed, kLate, kTooLarge, kUnreadable, kNoSlot };
 
-  // Opens the entry's port, or both. Keeps references. Throws arbiter::Error.
-  Incoming(Node& node, const Entry& entry, Account& account);
+  // Opens the entry's port, or both. Keeps references. Throws arbiter::Error. `first`: the
+  // number of the port to begin with; left at the one that is refused, so that who tries again
+  // does not open the other in vain.
+  Incoming(Node& node, const Entry& entry, Account& account, std::size_t* first = nullptr);
 
   // One copy into Arbiter's memory, and an arrival, unless `deadline` has passed by then. With a
   // choice: an arrival at the source that the field chooses, and then the end of the other's

@@ -217,6 +217,35 @@ TEST_F(Refused, OfATopicThatIsTwoSourcesNeitherIsOpenedWhereOneMayNotBe) {
   await([&] { return gateway.middleware.serves("/EStop/pressed:o"); });
 }
 
+// Asked to yield each second, a link that stands in for it would stop and start all the time.
+TEST_F(Refused, WhileOneOfTwoSourcesMayNotBeOpenedTheOtherIsLeftAlone) {
+  start("output /EStop/released:o");
+  Running gateway("gateway",
+                  "<in topic='/stop' type='std_msgs/msg/Bool' true='/EStop/pressed:o' "
+                  "false='/EStop/released:o'/>");
+  await([&] { return !daemon_->status()["refusals"].empty(); });
+  Node link("link");
+  std::optional<OutputPort<void>> stand_in;
+  await([&] {  // the gateway closes its own
+    try {
+      OutputPortOptions options;
+      options.yields = true;
+      stand_in.emplace(link.output_port("/EStop/pressed:o", options));
+    } catch (const Error&) {
+    }
+    return stand_in.has_value();
+  });
+  for (int i = 0; i < 2; ++i) {
+    const auto last = daemon_->status()["refusals"];
+    await([&] { return stand_in->asked_to_yield() || daemon_->status()["refusals"] != last; });
+  }
+  EXPECT_FALSE(stand_in->asked_to_yield());
+  reload("");
+  await([&] { return stand_in->asked_to_yield(); });
+  stand_in.reset();
+  await([&] { return gateway.middleware.serves("/EStop/pressed:o"); });
+}
+
 // It asks again every second.
 TEST_F(Refused, TheDaemonsLogSaysItOnce) {
   start("output /Nav/*");
