@@ -210,10 +210,7 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
   if (!mappings) return 2;
   if (arguments.check) return 0;
   const shm::FileDescriptor stop = catch_stop_signals();
-  if (arguments.is_worker) {
-    ignore_reload_signal();
-    end_with_supervisor(kind.clean_up);
-  }
+  if (arguments.is_worker) end_with_supervisor(kind.clean_up);
   if (!kind.is_supervised || arguments.is_worker || arguments.send_idle) {
     return serve(arguments, kind, std::move(*mappings), make, stop.get());
   }

@@ -27,7 +27,4 @@ shm::FileDescriptor catch_reload_signal() {
   return shm::FileDescriptor(signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
 }
 
-// Whoever signals a service signals all of its processes.
-void ignore_reload_signal() { signal(SIGUSR1, SIG_IGN); }
-
 }  // namespace arbiter::gateway

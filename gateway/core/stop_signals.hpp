@@ -13,7 +13,5 @@ namespace arbiter::gateway {
 
 // The same of SIGUSR1, which asks for the mapping to be read again.
 [[nodiscard]] shm::FileDescriptor catch_reload_signal();
-// In a worker: its supervisor reads it.
-void ignore_reload_signal();
 
 }  // namespace arbiter::gateway

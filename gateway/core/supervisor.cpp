@@ -61,6 +61,9 @@ Worker start(const std::vector<std::string>& arguments) {
     // It ends with its supervisor, however that ends.
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != parent) ::_exit(0);
+    // Who asks a service to read its mapping again may signal all of its processes. A worker leaves
+    // that to us, from its first instruction on.
+    ::signal(SIGUSR1, SIG_IGN);
     sigset_t none;
     sigemptyset(&none);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);

@@ -4,7 +4,7 @@
 //
 // The worker says "worker PID", and "beats" at its second beat; as MODE says, it then goes on
 // ("beat"), or heeds nothing any more ("hang"). With "fail" and "crash" it ends at once, and the
-// pauses between two workers are a few milliseconds.
+// pauses between two workers are a few milliseconds. With "signalled" SIGUSR1 comes first.
 #include <signal.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
@@ -23,6 +23,7 @@ using namespace arbiter::gateway;
 void clean_up(int pid) { std::cout << "cleaned up after " << pid << std::endl; }
 
 int work(const std::string& mode, const Patience& patience) {
+  if (mode == "signalled") ::raise(SIGUSR1);
   const auto beat = heartbeat();
   if (!beat) return 1;
   end_with_supervisor(clean_up, patience);

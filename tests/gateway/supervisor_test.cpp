@@ -79,6 +79,13 @@ TEST(Supervisor, LeavesAWorkerAloneThatIsStopped) {
   EXPECT_EQ(program.line(), "cleaned up after " + std::to_string(worker));
 }
 
+// It asks for the mapping to be read again, which is the supervisor's business.
+TEST(Supervisor, AWorkerThatHasOnlyBegunIsNotEndedBySigusr1) {
+  Spoken program = supervised("signalled", kLong, 100);
+  next_worker(program);
+  EXPECT_EQ(program.line(), "beats");
+}
+
 // It is asked to by SIGTERM, which it does not heed.
 TEST(Supervisor, AWorkerThatHangsEndsWithoutItsSupervisor) {
   Spoken program = supervised("hang", kLong, 100);
