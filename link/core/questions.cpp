@@ -138,11 +138,14 @@ Askers::Verdict Askers::judge(Incarnation asker, std::uint64_t writer, std::uint
                               shm::Nanoseconds now) {
   auto found = askers_.find(asker);
   if (found != askers_.end() && found->second.writer != writer) {
-    if (now - found->second.heard < kKept) return Verdict::kInAnothersName;
+    if (now - found->second.heard < kOtherWriter) return Verdict::kInAnothersName;
     askers_.erase(found);
     found = askers_.end();
   }
-  if (found != askers_.end() && number <= found->second.last) return Verdict::kRepeated;
+  if (found != askers_.end() && number <= found->second.last) {
+    found->second.heard = now;
+    return Verdict::kRepeated;
+  }
   if (now - since_ >= kSecond) {
     since_ = now;
     count_ = 0;

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "link/core/cards.hpp"
+#include "link/core/held_tokens.hpp"
 
 namespace arbiter::link {
 
@@ -96,7 +97,8 @@ class OpenQuestions {
 //
 // Askers are strangers: each has a quota, all together have one, and their number is bounded. The
 // name of an asker is that of the first writer who uses it, and another one's as soon as that has
-// been silent for kKept: a link has one writer for all its life.
+// been silent for kOtherWriter: a link that was cut off comes back in the same life, and the
+// transport takes its writer for another one (held_tokens.hpp).
 //
 // Thread safety: none of its own.
 class Askers {
@@ -104,7 +106,7 @@ class Askers {
   static constexpr std::uint32_t kMostOfOne = 20;   // questions within a second
   static constexpr std::uint32_t kMostOfAll = 200;  // likewise
   static constexpr std::size_t kMostAskers = 256;
-  static constexpr shm::Nanoseconds kKept = 10'000'000'000;
+  static constexpr shm::Nanoseconds kOtherWriter = HeldTokens::kOtherWriter;
 
   enum class Verdict : std::uint8_t {
     kAnswer,

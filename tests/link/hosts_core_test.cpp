@@ -393,7 +393,20 @@ TEST(AskingLinks, NobodyAsksInAnothersName) {
   EXPECT_EQ(askers.judge(5, 50, 1, 10 * kS), Verdict::kAnswer);
   EXPECT_EQ(askers.judge(5, 66, 1000, 10 * kS), Verdict::kInAnothersName);
   EXPECT_EQ(askers.judge(5, 50, 2, 11 * kS), Verdict::kAnswer) << "it is heard all the same";
-  EXPECT_EQ(askers.judge(5, 66, 1, 11 * kS + Askers::kKept), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 50, 2, 12 * kS), Verdict::kRepeated);
+  EXPECT_EQ(askers.judge(5, 66, 1, 13 * kS), Verdict::kInAnothersName) << "it has just repeated it";
+  EXPECT_EQ(askers.judge(5, 66, 1, 12 * kS + Askers::kOtherWriter), Verdict::kAnswer);
+}
+
+// The transport has lost its writer after a lease, and found it again as another one.
+TEST(AskingLinks, ALinkThatWasCutOffIsAnsweredAsSoonAsItIsFoundAgain) {
+  constexpr shm::Nanoseconds kLease = 1'500'000'000;  // dds/network.cpp
+  Askers askers;
+  using Verdict = Askers::Verdict;
+  EXPECT_EQ(askers.judge(5, 50, 7, 10 * kS), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 51, 8, 10 * kS + kLease), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 50, 9, 10 * kS + kLease), Verdict::kInAnothersName)
+      << "the name is the new writer's";
 }
 
 }  // namespace
