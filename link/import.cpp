@@ -72,6 +72,10 @@ void Import::look(bool is_open_here, SourceUse use) {
   const bool is_other_host = speaker == nullptr || speaker->incarnation != obeyed_;
   const bool is_open_otherwise = (is_other_type || is_other_host) && is_open();
   if (choice != ImportChoice::kImport || is_open_otherwise) close();
+  if (choice == ImportChoice::kSpokenHere) {
+    const std::lock_guard lock(mutex_);
+    stream_.pause();
+  }
   obey(choice == ImportChoice::kImport ? speaker : nullptr);
 }
 

@@ -31,6 +31,8 @@ class Stream {
   // From now on `exporter` is the one that is obeyed, with the state that it was last known to
   // have.
   void obey(Incarnation exporter) noexcept;
+  // Nobody listens from now on: what is sent until the next event is taken up is not missed.
+  void pause() noexcept { has_begun_ = false; }
   // Takes up an event of the exporter `from`, which is the one that is obeyed. False: it,
   // or a later one, came before.
   bool note(Incarnation from, const StreamEvent& event) noexcept;
@@ -40,7 +42,7 @@ class Stream {
   bool completes(Incarnation from, std::uint64_t number) noexcept;
 
   // Events that have not come, and will not. What an exporter sent before it knew this importer, or
-  // while another one was obeyed, is not missed.
+  // while another one was obeyed or nobody listened, is not missed.
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
   [[nodiscard]] std::uint64_t doubled() const noexcept { return doubled_; }
   // By the last event of the one that is obeyed: it ended the source's activity, and nothing has

@@ -156,6 +156,33 @@ TEST(Stream, ASpeakerThatIsObeyedAgainHasTheStateOfItsOwnLastEvent) {
   EXPECT_EQ(stream.lost(), 0U) << "what it sent while another one was obeyed is not missed";
 }
 
+// A component of this host has the source open meanwhile.
+TEST(Stream, DoesNotMissWhatWasSentWhileNobodyListened) {
+  Stream stream;
+  stream.obey(1);
+  EXPECT_TRUE(stream.note(1, sample(1, 500)));
+  EXPECT_TRUE(stream.note(1, sample(2, 501)));
+  stream.pause();
+  stream.obey(1);
+  EXPECT_TRUE(stream.note(1, sample(90, 589))) << "of all that came, the last";
+  EXPECT_EQ(stream.lost(), 0U);
+  EXPECT_TRUE(stream.note(1, sample(91, 590)));
+  EXPECT_EQ(stream.lost(), 0U);
+  EXPECT_TRUE(stream.note(1, sample(94, 593)));
+  EXPECT_EQ(stream.lost(), 2U) << "it is listened to again";
+  stream.pause();
+  EXPECT_FALSE(stream.note(1, sample(94, 593))) << "what it knew before it still knows";
+}
+
+TEST(Stream, MissesWhatWasSentWhileItWasCutOff) {
+  Stream stream;
+  stream.obey(1);
+  EXPECT_TRUE(stream.note(1, sample(2, 501)));
+  stream.obey(1);
+  EXPECT_TRUE(stream.note(1, sample(5, 504)));
+  EXPECT_EQ(stream.lost(), 2U);
+}
+
 TEST(Speaker, IsKeptUntilItIsGone) {
   Speaker speaker;
   EXPECT_EQ(speaker.current(), nullptr);
