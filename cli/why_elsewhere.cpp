@@ -34,7 +34,7 @@ using nlohmann::json;
 // Both of one model: another may come into force between the two questions.
 constexpr int kTries = 3;
 // A link answers another one twenty times a second, whoever asks through it.
-constexpr shm::Nanoseconds kFollowPeriod = 500'000'000;
+constexpr shm::Nanoseconds kWhyPeriod = 500'000'000;
 
 std::string text_from(wire::LinkCall& link, const std::string& host, const char* verb) {
   // Those that are gone come last.
@@ -228,7 +228,7 @@ class FollowerElsewhere {
   int run(const shm::FileDescriptor& interrupts) {
     std::uint64_t changes = 0;
     while (std::cout && !has_reader_gone()) {
-      if (sleep_until(shm::monotonic_now() + kFollowPeriod, interrupts)) return 0;
+      if (sleep_until(shm::monotonic_now() + kWhyPeriod, interrupts)) return 0;
       try {
         SeenPort now = seen_in(status(), options_.port);
         say("host " + host_ + " answers");

@@ -71,7 +71,9 @@ ReadFile KeptFiles::kept() const {
 shm::FileDescriptor KeptFiles::in_memory() const {
   std::string content;
   for (const auto& [path, bytes] : by_path_) {
-    content += path + '\0' + std::to_string(bytes.size()) + '\0' + bytes + '\0';
+    for (const std::string& part : {path, std::to_string(bytes.size()), bytes}) {
+      content.append(part).push_back('\0');
+    }
   }
   shm::FileDescriptor file(::memfd_create("arbiter-mapping", 0));
   if (!file) fail("no memory for a copy of the mapping");

@@ -131,7 +131,8 @@ TEST_F(Losers, OnlyHeadersCrossAndTheNewestImageIsThereWhenItWinsAgain) {
   await([&] { return ear.seen(EventKind::kWithheld) >= 20; });
   EXPECT_EQ(ear.seen(EventKind::kSample), samples);
   const std::size_t bytes = ear.bytes(EventKind::kWithheld);
-  EXPECT_LT(bytes, ear.seen(EventKind::kWithheld) * sizeof(Image) / 100);
+  const auto withheld = static_cast<std::size_t>(ear.seen(EventKind::kWithheld));
+  EXPECT_LT(bytes, withheld * sizeof(Image) / 100);
   EXPECT_EQ(ear.seen(EventKind::kAgain), 0);
   EXPECT_FALSE(view.in().take());
 
