@@ -14,8 +14,6 @@
 #include <utility>
 
 #include "rules/text/names.hpp"
-#include "service/clients/errands.hpp"
-#include "service/clients/hang_up.hpp"
 #include "service/clients/headroom.hpp"
 #include "service/kept/step.hpp"
 #include "service/log/event.hpp"
@@ -24,6 +22,8 @@
 #include "service/policy/users.hpp"
 #include "shm/assertion.hpp"
 #include "shm/clock.hpp"
+#include "wire/errands.hpp"
+#include "wire/hang_up.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -74,10 +74,10 @@ Daemon::~Daemon() {
   unlink(listener_.path.c_str());
   at_step("socket-removed");
   // Who has connected and was not accepted may have sent something, too.
-  Errands::of_the_process().close(geteuid(), std::move(listener_.socket));
+  wire::Errands::of_the_process().close(geteuid(), std::move(listener_.socket));
   while (!lobby_.empty()) {
     for (Lobby::Waiting& each : lobby_.next()) {
-      Errands::of_the_process().close(each.user, std::move(each.socket));
+      wire::Errands::of_the_process().close(each.user, std::move(each.socket));
     }
   }
   takeover_.leave_nothing_if_nobody_is_left();
@@ -105,7 +105,7 @@ int Daemon::timeout_ms() const {
   shm::Nanoseconds deadline =
       std::min({barriers_.next_deadline(), takeover_.deadline(), introductions_.deadline(),
                 give_back_at_, status_requests_.next(), listen_again_at_, look_in_flight_at_,
-                watchdog_.deadline(), Errands::of_the_process().deadline()});
+                watchdog_.deadline(), wire::Errands::of_the_process().deadline()});
   for (const Postponed& request : postponed_) deadline = std::min(deadline, request.deadline);
   if (deadline == shm::kForever) return -1;
   const shm::Nanoseconds left = std::max<shm::Nanoseconds>(deadline - shm::monotonic_now(), 0);
@@ -239,7 +239,7 @@ void Daemon::look_after_the_loop(shm::Nanoseconds now) {
     watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
   }
   look_in_flight(now);
-  const std::string lost = Errands::of_the_process().look_after(now);
+  const std::string lost = wire::Errands::of_the_process().look_after(now);
   if (!lost.empty()) log::warn("{}", lost);
 }
 
@@ -264,16 +264,16 @@ bool Daemon::serve(Client& client) {
       case wire::ReceiveResult::kMalformed:
         log_event({EventKind::kGivenUp, {client.name}}, log::level::warn,
                   "{} sent something that is not a message; dropped", client.description());
-        dispose_of(received, user);
+        wire::dispose_of(received, user);
         drop(id);
         return false;
       case wire::ReceiveResult::kClosed:
-        dispose_of(received, user);
+        wire::dispose_of(received, user);
         drop(id);
         return false;
     }
     handle_or_refuse(client, received, shm::kForever);
-    dispose_of(received, user);
+    wire::dispose_of(received, user);
     if (clients_.find(id) == nullptr) return false;
     if (shm::monotonic_now() >= until) break;
   }

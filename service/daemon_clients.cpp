@@ -10,14 +10,14 @@
 #include <memory>
 #include <utility>
 
-#include "service/clients/errands.hpp"
-#include "service/clients/hang_up.hpp"
 #include "service/clients/headroom.hpp"
 #include "service/daemon.hpp"
 #include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "service/log/log_sink.hpp"
 #include "shm/clock.hpp"
+#include "wire/errands.hpp"
+#include "wire/hang_up.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -47,9 +47,9 @@ uid_t user_of(const shm::FileDescriptor& socket) {
 // An errand costs the loop least. But errands of a user who is stuck are not done: each socket
 // would keep a descriptor that is charged to nobody.
 void turn_away(shm::FileDescriptor socket, uid_t user) {
-  Errands& errands = Errands::of_the_process();
+  wire::Errands& errands = wire::Errands::of_the_process();
   if (errands.is_stuck(user)) {
-    hang_up(std::move(socket), user);
+    wire::hang_up(std::move(socket), user);
   } else {
     errands.close(user, std::move(socket));
   }
@@ -190,7 +190,7 @@ void Daemon::turn_away_client() {
             "a client of user {} was turned away: no descriptors are left (RLIMIT_NOFILE, "
             "LimitNOFILE= in a systemd unit)",
             user);
-  hang_up(std::move(socket), user);
+  wire::hang_up(std::move(socket), user);
 }
 
 // Whoever connects and says nothing costs two descriptors, and gives way to those who come later:

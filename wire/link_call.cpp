@@ -17,10 +17,14 @@ namespace {
 struct Packet {
   std::string bytes;
   shm::FileDescriptor document;
+  bool was_asked = true;  // false: the link has hung up on a question that it has not read
 };
 
-Packet receive_packet(int socket) {
-  Packet packet{std::string(kMaxLinkPacket, '\0'), {}};
+constexpr const char* kNotAsked = "the link has hung up before it could be asked";
+
+// `is_sent`: false, and it can only be the reason why the question was not taken.
+Packet receive_packet(int socket, bool is_sent) {
+  Packet packet{std::string(kMaxLinkPacket, '\0'), {}, is_sent};
   iovec data{packet.bytes.data(), packet.bytes.size()};
   alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
   msghdr header{};
@@ -29,9 +33,13 @@ Packet receive_packet(int socket) {
   header.msg_control = control.data();
   header.msg_controllen = control.size();
   ssize_t size = 0;
-  do {
+  for (;;) {
     size = recvmsg(socket, &header, MSG_CMSG_CLOEXEC | MSG_DONTWAIT);
-  } while (size < 0 && errno == EINTR);
+    if (size >= 0 || (errno != EINTR && errno != ECONNRESET)) break;
+    // Said once, before what the link has sent: it may have said why.
+    if (errno == ECONNRESET) packet.was_asked = false;
+  }
+  if (size <= 0 && !packet.was_asked) throw NotAskedError(kNotAsked);
   if (size <= 0) throw CallError("the link has gone without an answer");
   packet.bytes.resize(static_cast<std::size_t>(size));
   const cmsghdr* const part = CMSG_FIRSTHDR(&header);
@@ -61,9 +69,10 @@ LinkCall::LinkCall(const std::string& instance, std::chrono::milliseconds answer
 std::string LinkCall::ask(const LinkQuestion& question) {
   const std::string text = write_link_question(question);
   if (text.size() > kMaxLinkPacket) throw CallError("that question is too long");
-  if (::send(socket_.get(), text.data(), text.size(), MSG_NOSIGNAL) < 0) {
-    // It may have said why before it hung up.
-    if (errno != EPIPE && errno != ECONNRESET) throw CallError("the link cannot be asked");
+  const bool is_sent = ::send(socket_.get(), text.data(), text.size(), MSG_NOSIGNAL) >= 0;
+  // It may have said why before it hung up.
+  if (!is_sent && errno != EPIPE && errno != ECONNRESET) {
+    throw NotAskedError("the link cannot be asked");
   }
   pollfd answered{socket_.get(), POLLIN, 0};
   int ready = 0;
@@ -74,7 +83,8 @@ std::string LinkCall::ask(const LinkQuestion& question) {
     throw CallError("arbiter-link runs, but did not answer within " +
                     std::to_string(answer_time_.count()) + " ms: it is stopped, or busy");
   }
-  const Packet packet = receive_packet(socket_.get());
+  const Packet packet = receive_packet(socket_.get(), is_sent);
+  if (!packet.was_asked) throw NotAskedError(shm::printable(packet.bytes));
   if (!packet.document) throw RefusedError(shm::printable(packet.bytes));
   return read_document(packet.document);
 }

@@ -25,6 +25,12 @@ class NoLinkError : public CallError {
   using CallError::CallError;
 };
 
+// The link has hung up and not heard the question, so that nobody has been asked.
+class NotAskedError : public CallError {
+ public:
+  using CallError::CallError;
+};
+
 class LinkCall {
  public:
   // Longer than a link waits for other hosts and its daemon together.
@@ -34,11 +40,12 @@ class LinkCall {
   explicit LinkCall(const std::string& instance,
                     std::chrono::milliseconds answer_time = kAnswerTime);
 
-  // The document with which this host's link answers. Throws CallError where it refuses, has gone,
-  // or says nothing within the answer time.
+  // The document with which this host's link answers. Throws NotAskedError; another CallError where
+  // it refuses, has gone, or says nothing within the answer time.
   [[nodiscard]] std::string ask(const LinkQuestion& question);
   // The same question to that host, or to all: what became of it at each. Takes little more than a
-  // second at most. Throws CallError, DocumentError.
+  // second at most; to have all prepare a switch, 1.5 s longer while the link has just joined its
+  // network. Throws CallError, DocumentError.
   [[nodiscard]] std::vector<HostAnswer> ask_hosts(const LinkQuestion& question);
 
  private:

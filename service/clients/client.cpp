@@ -12,13 +12,13 @@
 #include <cstring>
 #include <system_error>
 
-#include "service/clients/errands.hpp"
-#include "service/clients/hang_up.hpp"
 #include "service/clients/headroom.hpp"
 #include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "shm/assertion.hpp"
 #include "shm/foreign.hpp"
+#include "wire/errands.hpp"
+#include "wire/hang_up.hpp"
 
 #ifndef SO_PEERPIDFD
 #define SO_PEERPIDFD 77  // Linux 6.5; older headers lack it
@@ -39,7 +39,7 @@ shm::FileDescriptor open_process(int socket, pid_t pid) {
 }
 
 std::string too_much_waits(uid_t user) {
-  return "limit-exceeded: more than " + std::to_string(Errands::kMaxWaiting) +
+  return "limit-exceeded: more than " + std::to_string(wire::Errands::kMaxWaiting) +
          " descriptors of user " + std::to_string(user) +
          " wait behind others that take long to close: end the processes that have sent them, "
          "and " +
@@ -62,7 +62,7 @@ Client::Client(ClientId id, shm::FileDescriptor socket, Shares& shares)
     : id_(id), shares_(shares), socket_(std::move(socket)) {
   const auto fail = [&](const char* what) {
     const int error = errno;
-    hang_up(std::move(socket_), user_);
+    wire::hang_up(std::move(socket_), user_);
     throw std::system_error(error, std::generic_category(), what);
   };
   ucred peer{};
@@ -73,10 +73,10 @@ Client::Client(ClientId id, shm::FileDescriptor socket, Shares& shares)
   pid_ = peer.pid;
   user_ = peer.uid;
   try {
-    if (Errands::of_the_process().is_stuck(user_)) throw LimitExceeded(too_much_waits(user_));
+    if (wire::Errands::of_the_process().is_stuck(user_)) throw LimitExceeded(too_much_waits(user_));
     descriptors_ = shares_.take(user_, Share::kDescriptors, 2);  // the socket, and the process
   } catch (const LimitExceeded&) {
-    hang_up(std::move(socket_), user_);
+    wire::hang_up(std::move(socket_), user_);
     throw;
   }
   process_ = open_process(socket_.get(), pid_);
@@ -84,10 +84,12 @@ Client::Client(ClientId id, shm::FileDescriptor socket, Shares& shares)
 }
 
 Client::Queued::~Queued() {
-  for (auto& descriptor : descriptors) Errands::of_the_process().close(user, std::move(descriptor));
+  for (auto& descriptor : descriptors) {
+    wire::Errands::of_the_process().close(user, std::move(descriptor));
+  }
 }
 
-Client::~Client() { hang_up(std::move(socket_), user_); }
+Client::~Client() { wire::hang_up(std::move(socket_), user_); }
 
 LeftUnread::Client Client::release_unread() {
   return {user_, std::move(socket_), std::move(in_flight_), std::move(descriptors_)};
@@ -184,8 +186,8 @@ wire::ReceiveResult Client::receive(wire::Received& received) {
 // descriptors that there are is given up, lest the next message find none. Of a user who is stuck
 // nothing more is received: what is unread counts against the limit of who has sent it.
 wire::ReceiveResult Client::receive_from_socket(wire::Received& received) {
-  dispose_of(received, user_);
-  if (Errands::of_the_process().is_stuck(user_)) {
+  wire::dispose_of(received, user_);
+  if (wire::Errands::of_the_process().is_stuck(user_)) {
     log_event({EventKind::kGivenUp, {name}}, log::level::warn, "{} is given up: {}", description(),
               too_much_waits(user_));
     return wire::ReceiveResult::kClosed;
@@ -203,7 +205,7 @@ wire::ReceiveResult Client::receive_from_socket(wire::Received& received) {
     received.is_strange |= !is_tame;
     received.lost_descriptors |= is_last;
   }
-  if (received.is_strange || received.lost_descriptors) dispose_of(received, user_);
+  if (received.is_strange || received.lost_descriptors) wire::dispose_of(received, user_);
   return result;
 }
 
@@ -220,7 +222,7 @@ void Client::read_ahead() {
       ahead_ended_ = result;
     }
   }
-  dispose_of(received, user_);
+  wire::dispose_of(received, user_);
 }
 
 bool Client::take_closing_of(shm::PortInstance port) {

@@ -7,13 +7,13 @@
 #include <algorithm>
 #include <utility>
 
-#include "service/clients/hang_up.hpp"
 #include "shm/assertion.hpp"
+#include "wire/hang_up.hpp"
 
 namespace arbiter::service {
 namespace {
 
-void end(LeftUnread::Client& client) { hang_up(std::move(client.socket), client.user); }
+void end(LeftUnread::Client& client) { wire::hang_up(std::move(client.socket), client.user); }
 
 }  // namespace
 

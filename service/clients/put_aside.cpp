@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "service/clients/hang_up.hpp"
+#include "wire/hang_up.hpp"
 
 namespace arbiter::service {
 
@@ -23,7 +23,7 @@ PutAside& PutAside::operator=(PutAside&& other) noexcept {
 }
 
 PutAside::~PutAside() {
-  if (received_ != nullptr) dispose_of(*received_, user_);
+  if (received_ != nullptr) wire::dispose_of(*received_, user_);
 }
 
 }  // namespace arbiter::service

@@ -6,11 +6,11 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "service/clients/errands.hpp"
 #include "service/ports/foreign_parts.hpp"
 #include "shm/bell.hpp"
 #include "shm/foreign.hpp"
 #include "shm/utf8.hpp"
+#include "wire/errands.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -74,20 +74,20 @@ std::shared_ptr<const PortBell> own_bell(const shm::FileDescriptor& bell, uid_t 
 }
 
 PortBell::~PortBell() {
-  Errands::of_the_process().close(user_, shm::FileDescriptor(pipe_.release()));
+  wire::Errands::of_the_process().close(user_, shm::FileDescriptor(pipe_.release()));
 }
 
 void PortBell::ring() const {
   if (pending_.ask()) return;
-  Errands::of_the_process().run(user_, [self = shared_from_this()] {
+  wire::Errands::of_the_process().run(user_, [self = shared_from_this()] {
     self->pending_.begin();
     shm::ring_bell(self->pipe_.get());
   });
 }
 
 // The last who closes a segment frees its memory, which takes its time.
-OutputPort::~OutputPort() { Errands::of_the_process().close(user, std::move(segment)); }
-InputPort::~InputPort() { Errands::of_the_process().close(user, std::move(segment)); }
+OutputPort::~OutputPort() { wire::Errands::of_the_process().close(user, std::move(segment)); }
+InputPort::~InputPort() { wire::Errands::of_the_process().close(user, std::move(segment)); }
 
 std::unique_ptr<OutputPort> adopt_output(const wire::Received& open, uid_t user) {
   // What is handed back comes with the activity page.

@@ -2,16 +2,16 @@
 
 #include <algorithm>
 
-#include "service/clients/errands.hpp"
 #include "service/ports/foreign_parts.hpp"
 #include "service/ports/switchboard.hpp"
 #include "shm/event_segment.hpp"
 #include "shm/tap_segment.hpp"
+#include "wire/errands.hpp"
 
 namespace arbiter::service {
 
 // The last who closes a segment frees its memory, which takes its time.
-Tap::~Tap() { Errands::of_the_process().close(user, std::move(segment)); }
+Tap::~Tap() { wire::Errands::of_the_process().close(user, std::move(segment)); }
 
 std::unique_ptr<Tap> adopt_tap(const wire::Received& open, uid_t user) {
   require_descriptors(open, 2);

@@ -1,23 +1,24 @@
 // What a client can do to the daemon by descriptors that it sends along and that take for ever to
 // close.
 #include <gtest/gtest.h>
-#include <netinet/in.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 
 #include <deque>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <arbiter/arbiter.hpp>
 
-#include "service/clients/errands.hpp"
 #include "tests/attack/attacker.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/lingering.hpp"
 #include "tests/support/other_user.hpp"
 #include "tests/support/raw_port.hpp"
+#include "wire/errands.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -25,59 +26,9 @@ namespace {
 using shm::FileDescriptor;
 using wire::MessageKind;
 
-// A TCP connection whose peer does not read: closing it waits for an hour. The last who closes it
-// waits; so whoever sends it stops the daemon, closes its own, and lets the daemon go on.
-class Lingering {
- public:
-  Lingering() {
-    const FileDescriptor listener(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    auto* const name = reinterpret_cast<sockaddr*>(&address);
-    socklen_t size = sizeof address;
-    require(::bind(listener.get(), name, size) == 0 && ::listen(listener.get(), 1) == 0 &&
-            ::getsockname(listener.get(), name, &size) == 0);
-    end_.reset(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-    require(::connect(end_.get(), name, size) == 0);
-    peer_.reset(::accept4(listener.get(), nullptr, nullptr, SOCK_CLOEXEC));
-    const linger an_hour{1, 3600};
-    require(peer_ &&
-            ::setsockopt(end_.get(), SOL_SOCKET, SO_LINGER, &an_hour, sizeof an_hour) == 0);
-    const std::vector<char> unread(1 << 16);
-    while (::send(end_.get(), unread.data(), unread.size(), MSG_DONTWAIT) > 0) {
-    }
-  }
-
-  [[nodiscard]] int get() const { return end_.get(); }
-  void close() { end_.reset(); }
-  // Closing it waits no more.
-  void release() { peer_.reset(); }
-
- private:
-  static void require(bool succeeded) {
-    if (!succeeded) throw std::runtime_error("a connection to linger at cannot be made");
-  }
-  FileDescriptor end_;
-  FileDescriptor peer_;
-};
-
-// Any number of descriptors, more than a client library would send. False: nobody listens.
 bool try_to_send_with(int socket, const wire::Message& message,
                       const std::vector<int>& descriptors) {
-  iovec data{const_cast<wire::Message*>(&message), sizeof message};
-  std::vector<char> control(CMSG_SPACE(sizeof(int) * descriptors.size()));
-  msghdr header{};
-  header.msg_iov = &data;
-  header.msg_iovlen = 1;
-  header.msg_control = control.data();
-  header.msg_controllen = control.size();
-  cmsghdr* const part = CMSG_FIRSTHDR(&header);
-  part->cmsg_level = SOL_SOCKET;
-  part->cmsg_type = SCM_RIGHTS;
-  part->cmsg_len = CMSG_LEN(sizeof(int) * descriptors.size());
-  std::memcpy(CMSG_DATA(part), descriptors.data(), sizeof(int) * descriptors.size());
-  return ::sendmsg(socket, &header, MSG_NOSIGNAL) > 0;
+  return test::try_to_send_with(socket, std::as_bytes(std::span(&message, 1)), descriptors);
 }
 
 void send_with(int socket, const wire::Message& message, const std::vector<int>& descriptors) {
@@ -213,8 +164,8 @@ TEST_F(ALingeringSocket, SentManyTimesHoldsUpNobody) {
 class AUserWhoseThreadsAreLost : public ALingeringSocket {
  protected:
   // A thread, and all that may wait for one, and a message that is read before that is seen.
-  static constexpr std::size_t kMostKept = service::Errands::kMaxLostOfAUser +
-                                           service::Errands::kMaxWaiting +
+  static constexpr std::size_t kMostKept = wire::Errands::kMaxLostOfAUser +
+                                           wire::Errands::kMaxWaiting +
                                            2 * wire::kMostDescriptorsOfAMessage;
 
   explicit AUserWhoseThreadsAreLost(Daemon::Options options = {})
@@ -229,7 +180,7 @@ class AUserWhoseThreadsAreLost : public ALingeringSocket {
     while (daemon_.log().find("4 of 4") == std::string::npos) daemon_.status();
   }
 
-  std::vector<Lingering> lingering_{service::Errands::kMaxLostOfAUser};
+  std::vector<Lingering> lingering_{wire::Errands::kMaxLostOfAUser};
 };
 
 TEST_F(AUserWhoseThreadsAreLost, CostsNothingByConnectingAgainAndAgain) {
@@ -273,7 +224,7 @@ class AUserWithoutThreadsOrShare : public AUserWhoseThreadsAreLost {
     }
     clients_.pop_back();
     const FileDescriptor zero(::open("/dev/zero", O_RDONLY | O_CLOEXEC));
-    for (std::size_t waiting = 0; waiting < service::Errands::kMaxWaiting; waiting += 2) {
+    for (std::size_t waiting = 0; waiting < wire::Errands::kMaxWaiting; waiting += 2) {
       send_with(clients_.back().socket(), RawClient::message(MessageKind::kConnect),
                 {zero.get(), zero.get()});
       clients_.back().expect_refusal();

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "service/clients/client.hpp"
-#include "service/clients/errands.hpp"
 #include "service/clients/turns.hpp"
 #include "shm/segment.hpp"
+#include "wire/errands.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -150,7 +150,7 @@ TEST(WhatIsPutAside, CountsAsItsSendersAndIsClosedAsHisErrand) {
   }
   EXPECT_EQ(shares.taken(kOne, Share::kDescriptors), 0u);
   EXPECT_EQ(shares.taken(kOne, Share::kQueue), 0u);
-  ASSERT_TRUE(Errands::of_the_process().wait_until_done(shm::kForever / 2));
+  ASSERT_TRUE(wire::Errands::of_the_process().wait_until_done(shm::kForever / 2));
   EXPECT_EQ(::fcntl(number, F_GETFD), -1) << "it is still open";
 }
 

@@ -6,9 +6,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "service/clients/errands.hpp"
 #include "service/log/log.hpp"
 #include "tests/fuzz/fuzz.hpp"
+#include "wire/errands.hpp"
 
 namespace arbiter::fuzz {
 namespace {
@@ -39,7 +39,7 @@ void log_to_nobody() {
 
 // Those aside that the daemon leaves to threads to close: nothing here keeps them waiting.
 std::size_t count_descriptors() {
-  require(service::Errands::of_the_process().wait_until_done(60'000'000'000),
+  require(wire::Errands::of_the_process().wait_until_done(60'000'000'000),
           "what is closed elsewhere is closed");
   std::size_t count = 0;
   DIR* const listing = ::opendir("/proc/self/fd");

@@ -1,4 +1,4 @@
-#include "service/clients/errands.hpp"
+#include "wire/errands.hpp"
 
 #include <pthread.h>
 #include <signal.h>
@@ -15,7 +15,7 @@
 
 #include "shm/clock.hpp"
 
-namespace arbiter::service {
+namespace arbiter::wire {
 namespace {
 
 using Errand = std::function<void()>;
@@ -185,4 +185,4 @@ bool Errands::wait_until_done(shm::Nanoseconds limit) const {
                                [&] { return state_->lanes.empty(); });
 }
 
-}  // namespace arbiter::service
+}  // namespace arbiter::wire

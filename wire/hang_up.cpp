@@ -1,4 +1,4 @@
-#include "service/clients/hang_up.hpp"
+#include "wire/hang_up.hpp"
 
 #include <sys/socket.h>
 
@@ -6,9 +6,9 @@
 #include <cerrno>
 #include <utility>
 
-#include "service/clients/errands.hpp"
+#include "wire/errands.hpp"
 
-namespace arbiter::service {
+namespace arbiter::wire {
 namespace {
 
 // The most messages that are looked at before a socket is closed.
@@ -48,7 +48,7 @@ void hang_up(shm::FileDescriptor socket, uid_t user) {
   }
 }
 
-void dispose_of(wire::Received& received, uid_t user) {
+void dispose_of(Received& received, uid_t user) {
   const auto dispose = [&](shm::FileDescriptor& descriptor) {
     Errands::of_the_process().close(user, std::move(descriptor));
   };
@@ -56,4 +56,4 @@ void dispose_of(wire::Received& received, uid_t user) {
   std::for_each(received.surplus.begin(), received.surplus.end(), dispose);
 }
 
-}  // namespace arbiter::service
+}  // namespace arbiter::wire

@@ -7,13 +7,13 @@
 #include "shm/file_descriptor.hpp"
 #include "wire/messages.hpp"
 
-namespace arbiter::service {
+namespace arbiter::wire {
 
 // Closes a client's socket: at once, or, where unread messages in it bring descriptors, which may
 // take any time to close, as an errand of that user.
 void hang_up(shm::FileDescriptor socket, uid_t user);
 
 // Closes what a message has brought and nobody has taken, as errands of the user who sent it.
-void dispose_of(wire::Received& received, uid_t user);
+void dispose_of(Received& received, uid_t user);
 
-}  // namespace arbiter::service
+}  // namespace arbiter::wire

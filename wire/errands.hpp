@@ -3,9 +3,9 @@
 // To close a descriptor that another user's process has sent can take as long as he likes: a TCP
 // socket with SO_LINGER waits for its peer, a file of FUSE for its server; a socket may hold either
 // in messages that were never read. A write to a pipe waits for its lock, which a process that
-// writes to it from memory that it does not provide holds for ever. The daemon's loop does none of
-// it, but leaves it to a thread of that user's errands: one that waits for ever holds up nobody but
-// the user whose descriptor it was.
+// writes to it from memory that it does not provide holds for ever. Neither the daemon's loop nor a
+// link's listener does any of it, but leaves it to a thread of that user's errands: one that waits
+// for ever holds up nobody but the user whose descriptor it was.
 //
 // A user has one thread while there is something to do. Once an errand has taken kOverdue its
 // thread is taken for lost, and another goes on with the rest, up to kMaxLostOfAUser: then the rest
@@ -26,7 +26,7 @@
 #include "shm/activity.hpp"
 #include "shm/file_descriptor.hpp"
 
-namespace arbiter::service {
+namespace arbiter::wire {
 
 class Errands {
  public:
@@ -67,4 +67,4 @@ class Errands {
   const std::shared_ptr<State> state_;
 };
 
-}  // namespace arbiter::service
+}  // namespace arbiter::wire

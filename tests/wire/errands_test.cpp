@@ -1,5 +1,5 @@
 // What is left to threads that may be lost: a user's errands wait for that user's alone.
-#include "service/clients/errands.hpp"
+#include "wire/errands.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -10,7 +10,7 @@
 
 #include "shm/clock.hpp"
 
-namespace arbiter::service {
+namespace arbiter::wire {
 namespace {
 
 constexpr uid_t kOne = 1;
@@ -163,4 +163,4 @@ TEST(Errands, CloseWhatTheyAreGiven) {
 }
 
 }  // namespace
-}  // namespace arbiter::service
+}  // namespace arbiter::wire
