@@ -165,6 +165,10 @@ class BoundRule {
     return Verdict::kUnsettled;
   }
 
+  // When time alone can change the last verdict, or a little earlier: at the first end among the
+  // activities that it was found by.
+  [[nodiscard]] Nanoseconds until() const noexcept { return count_ == 0 ? kForever : until_; }
+
  private:
   static constexpr Word kNobody = UINT32_MAX;
 

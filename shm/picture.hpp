@@ -79,6 +79,13 @@ template <class IsActive>
   return is_active(rule.source) && holds_for_arrival(rule, is_active);
 }
 
+inline bool reads(const Rule& rule, SourceId source) noexcept {
+  for (Word i = 0; i < rule.reads.count; ++i) {
+    if ((rule.reads[i] & ~table::kExpectActive) == source) return true;
+  }
+  return false;
+}
+
 // The rule of the connection that the port selects: of one that is not arbitrated, and may select
 // several, the first. Without a source: none.
 template <class IsActive>
@@ -216,6 +223,20 @@ class PortPicture {
       selection.is_sure = selection.is_sure && verdict == Verdict::kLoses;
     }
     return selection;
+  }
+
+  // When time alone can change what the picture says of a connection: at the first end among the
+  // activities that its rule reads, and its own. As they were seen: who was active then, and has
+  // been deactivated once it had ended, rings for nobody.
+  [[nodiscard]] Nanoseconds first_end(const Rule& rule) const noexcept {
+    Nanoseconds first = kForever;
+    for (const Sight& each : std::span(sights_.data(), count_)) {
+      if (!active_.contains(each.source) || !is_finite(each.seen.word)) continue;
+      if (rule.source == each.source || reads(rule, each.source)) {
+        first = std::min(first, each.seen.word);
+      }
+    }
+    return first;
   }
 
  private:

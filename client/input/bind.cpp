@@ -55,6 +55,7 @@ void InputCore::accept_view() {
   require_lanes_balance(*segment_, queues_);
   // Nothing is known of them yet: no word says so.
   watches_.assign(queues_.size(), {&nothing_seen, 1});
+  last_taken_ = kNoQueue;
   waiting_.clear();
   waiting_.reserve(queues_.size());
   handover_.retire(std::exchange(view_, std::move(view)));
@@ -100,6 +101,7 @@ void InputCore::bind_rules() {
   bound_epoch_ = snapshot_.epoch;
   const shm::TableView& table = snapshot_.table;
   picture_.bind(table, port_, memory_->pages());
+  selects_one_ = table.is_arbitrated(port_);
   std::size_t reads = 0;
   for (Queue& queue : queues_) {
     queue.connection = table.rule(table.find(queue.peer->source, port_));
@@ -109,6 +111,7 @@ void InputCore::bind_rules() {
   shm::Read* next = reads_.data();
   for (Queue& queue : queues_) {
     queue.rule.bind(queue.connection, memory_->pages(), next, false);
+    queue.own = memory_->pages().find(queue.peer->source);
     next += shm::BoundRule::reads_of(queue.connection);
   }
 }

@@ -110,9 +110,10 @@ class InputCore {
     bool gone = false;
     shm::ChannelReader reader;
     shm::Lane* lane = nullptr;
-    shm::Rule connection;               // the connection's rule, under snapshot_
-    shm::BoundRule rule;                // the same
-    std::uint32_t allocated_slots = 0;  // of the peer's, when it was last looked at
+    shm::Rule connection;                // the connection's rule, under snapshot_
+    shm::BoundRule rule;                 // the same
+    const shm::Activity* own = nullptr;  // its source's; null: it has no page here
+    std::uint32_t allocated_slots = 0;   // of the peer's, when it was last looked at
     // Of the take under way.
     shm::Entry head = 0;
     shm::Nanoseconds head_stamp = 0;
@@ -157,9 +158,11 @@ class InputCore {
   [[nodiscard]] bool ends_by_itself(shm::SourceId source) const noexcept;
 
   // wait() in parts.
-  [[nodiscard]] shm::Nanoseconds next_change(const shm::Rule& commander) const noexcept;
   Waited wait_once(shm::Nanoseconds timeout, HeldSample& sample);
   bool arm(HeldSample& sample, shm::Command& command);
+  bool arm_again(HeldSample& sample);
+  [[nodiscard]] bool believes_last_taken() const noexcept;
+  void wait_anew() noexcept;
   void disarm() noexcept;
   void stop_waiting() noexcept;
   void arm_descriptor(HeldSample& sample);
@@ -200,6 +203,9 @@ class InputCore {
   std::vector<Queue> queues_;
   std::vector<shm::ChannelReader::Watch> watches_;  // by queue: what says that nothing is new
   std::vector<Queue*> waiting_;  // those in which the take under way found a head
+  static constexpr std::size_t kNoQueue = SIZE_MAX;
+  std::size_t last_taken_ = kNoQueue;  // of queues_, the last sample's
+  bool selects_one_ = false;           // at most, under snapshot_: the port is arbitrated
   shm::TableSnapshot snapshot_;
   shm::Epoch bound_epoch_ = UINT64_MAX;
   std::uint64_t bound_pages_ = 0;

@@ -306,6 +306,7 @@ bool InputCore::hold(Queue& queue, HeldSample& sample) noexcept {
   consume(queue);
   count(queue.lane->taken);
   count(segment_->header.counters.taken);
+  last_taken_ = static_cast<std::size_t>(&queue - queues_.data());
   held_from_[index] = queue.peer.get();
   ++queue.peer->held;
   ++held_;

@@ -48,7 +48,8 @@ Waited InputCore::wait_once(shm::Nanoseconds timeout, HeldSample& sample) {
     if (deadline < 0) deadline = after(now, timeout);
     if (now >= deadline) return Waited::kTimeout;
     if (arm(sample, command)) {
-      bell_.wait(std::min(deadline, next_change(command.commander)));
+      // Whatever else happens rings: a sample, or a begin or an end that makes another the winner.
+      bell_.wait(std::min(deadline, picture_.first_end(command.commander)));
       count(segment_->header.counters.wakes);
     }
     disarm();
@@ -67,10 +68,7 @@ bool InputCore::arm(HeldSample& sample, shm::Command& command) {
   header.believed.store(believed, std::memory_order_relaxed);
   // Relaxed is enough: a publisher that sees us wait and does not see what we believe has passed
   // its fence before ours; then our last look sees what it has done, and we do not sleep.
-  // A take that throws leaves the last wait as it was, odd.
-  header.wait.store((header.wait.load(std::memory_order_relaxed) + 1) | 1,
-                    std::memory_order_relaxed);
-  shm::full_fence();
+  wait_anew();
   sample = take_once();
   if (sample.data != nullptr) return false;
   command = who_commands();
@@ -87,6 +85,14 @@ void InputCore::stop_waiting() noexcept {
   shm::InputHeader& header = segment_->header;
   const std::uint64_t wait = header.wait.load(std::memory_order_relaxed);
   if ((wait & 1) != 0) header.wait.store(wait + 1, std::memory_order_relaxed);
+}
+
+// The next wait, and fence (d). A take that throws leaves the last wait as it was, odd.
+void InputCore::wait_anew() noexcept {
+  shm::InputHeader& header = segment_->header;
+  header.wait.store((header.wait.load(std::memory_order_relaxed) + 1) | 1,
+                    std::memory_order_relaxed);
+  shm::full_fence();
 }
 
 // In one picture, under the model that was in force while it was taken.
@@ -139,25 +145,6 @@ bool InputCore::is_refused(shm::SourceId source) const noexcept {
   return std::find(refused.begin(), refused.end(), source) != refused.end();
 }
 
-// When the command will change of itself: at the first end among the activities that the
-// commander's rule reads. Whatever else happens rings: a sample, or a begin or an end that makes
-// another the winner. Then, or there, it is looked at anew.
-shm::Nanoseconds InputCore::next_change(const shm::Rule& commander) const noexcept {
-  shm::Nanoseconds next = shm::kForever;
-  if (commander.source == shm::kNone) return next;
-  const auto heed = [&](shm::SourceId source) {
-    const auto* activity = memory_->pages().find(source);
-    if (activity == nullptr) return;
-    const shm::ActivityWord word = activity->word.load(std::memory_order_relaxed);
-    if (shm::is_finite(word) && word > last_reading_) next = std::min(next, word);
-  };
-  heed(commander.source);
-  for (shm::Word i = 0; i < commander.reads.count; ++i) {
-    heed(commander.reads[i] & ~shm::table::kExpectActive);
-  }
-  return next;
-}
-
 std::optional<std::string_view> InputCore::winner() noexcept {
   const shm::SourceId commander = who_commands().commander.source;
   if (commander == shm::kNone || !snapshot_.table.is_arbitrated(port_)) return std::nullopt;
@@ -195,15 +182,52 @@ void InputCore::disarm_descriptor() noexcept {
   is_disarmed_ = true;
 }
 
+// As arm(), with the belief of the last time. If that is the source of the last sample, its
+// connection's decision, which the take has just read, says whether it still holds: no picture of
+// the port is needed, which would be fetched into cold caches for each sample. Not where a port may
+// select several: one decision does not say which is the first.
+//
+// The source's own activity and those that its rule reads need not be of one moment. Each look
+// comes behind fence (d). So if nothing is written after the fence, they show what is selected; and
+// whoever writes after it sees us wait, and rings where the port then selects another. All are
+// judged by one reading of the clock, and the timer is set to the first end after that.
+bool InputCore::arm_again(HeldSample& sample) {
+  if (!believes_last_taken()) return false;
+  wait_anew();
+  sample = take_once();
+  if (sample.data != nullptr || !believes_last_taken()) return false;  // it has bound anew
+  Queue& queue = queues_[last_taken_];
+  if (queue.own == nullptr) return false;
+  const shm::ActivityWord own = queue.own->word.load(std::memory_order_relaxed);
+  shm::DecisionClock clock(last_reading_, false);
+  if (shm::is_finite(own)) clock.read();
+  const bool wins = queue.rule.decide(snapshot_.table, clock) == shm::Verdict::kWins;
+  last_reading_ = clock.reading();
+  if (!wins || !shm::is_active(own, last_reading_)) return false;
+  if (!memory_->tables().is_in_force(snapshot_)) return false;
+  commanded_ = true;
+  set_timer(std::min(shm::is_finite(own) ? own : shm::kForever, queue.rule.until()));
+  return true;
+}
+
+// Whether the port believes in the source of the last sample, of which more can come.
+bool InputCore::believes_last_taken() const noexcept {
+  if (last_taken_ == kNoQueue || !selects_one_) return false;
+  const Queue& queue = queues_[last_taken_];
+  return !queue.gone && queue.reader.state() != shm::ChannelReader::State::kMisbehaved &&
+         queue.peer->source == segment_->header.believed.load(std::memory_order_relaxed);
+}
+
 // After a take that found nothing: from now on the descriptor becomes readable when there is cause.
 void InputCore::arm_descriptor(HeldSample& sample) {
-  for (;;) {
-    if (!std::exchange(is_disarmed_, false)) disarm();
+  if (!std::exchange(is_disarmed_, false)) disarm();
+  if (arm_again(sample) || sample.data != nullptr) return;
+  for (;; disarm()) {
     shm::Command command = who_commands();
     const bool armed = arm(sample, command);
     if (sample.data != nullptr) return;
     if (!armed) continue;
-    set_timer(next_change(command.commander));
+    set_timer(picture_.first_end(command.commander));
     return;
   }
 }

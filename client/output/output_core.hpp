@@ -126,6 +126,10 @@ class OutputCore {
   }
   [[nodiscard]] const SharedMemory& memory() const noexcept { return *memory_; }
 
+  // To write samples of so many bytes takes longer than to look at what receivers are done with: a
+  // few lines that others write, and a walk through their holds. Nobody changes it but the
+  // explorer, whose samples are small.
+  std::size_t smallest_large = std::size_t{32} << 10;
   shm::ProcessMark process;        // the node's
   mutable pid_t warned_about = 0;  // the child that was told that the port is not its own
   std::shared_ptr<NodeCore>
@@ -135,10 +139,6 @@ class OutputCore {
  private:
   // How often a decision is taken anew because seven models were loaded during it.
   static constexpr int kMaxTableRetries = 3;
-
-  // To write samples from here on takes longer than to look at what receivers are done with: a few
-  // lines that others write, and a walk through their holds.
-  static constexpr std::size_t kSmallestLarge = std::size_t{32} << 10;
 
   // As last_, before this port's first arrival: a predecessor's.
   static constexpr shm::Nanoseconds kUnknown = -1;

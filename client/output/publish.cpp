@@ -23,7 +23,7 @@ namespace arbiter::detail {
 // waits in, each would be written after it has left the cache. A small one does not pay for a look
 // at what receivers write.
 std::uint32_t OutputCore::acquire_slot(std::size_t size) noexcept {
-  const bool is_large = size >= kSmallestLarge;
+  const bool is_large = size >= smallest_large;
   if (is_large) forget_consumed();
   const auto each_hold = [&](auto&& each) {
     // SYNC POINT: kept-sample-held. Fence (b) for what is kept for taps, here and not in each
@@ -260,7 +260,11 @@ bool OutputCore::selection_differs(const Destination& destination) noexcept {
   if (!picture.take(clock)) return true;
   const auto selection = picture.selection();
   // What is not known here, let it look at for itself.
-  return !selection.is_sure || selection.rule.source != believed;
+  if (!selection.is_sure || selection.rule.source != believed) return true;
+  // Nor does it know when our activity, which has begun, will run out: where alternatives keep it
+  // selected, that may change the selection, and nobody rings then.
+  return selection.rule.kind != shm::table::kConjunction && shm::is_finite(own_word_) &&
+         shm::reads(selection.rule, source_);
 }
 
 Counts OutputCore::publish_loan(std::uint32_t slot, std::size_t size,

@@ -3,6 +3,7 @@
 #include <poll.h>
 #include <sys/epoll.h>
 
+#include <chrono>
 #include <thread>
 
 #include <arbiter/arbiter.hpp>
@@ -14,6 +15,8 @@
 
 namespace arbiter::test {
 namespace {
+
+using namespace std::chrono_literals;
 
 bool is_readable(int fd) {
   pollfd polled{fd, POLLIN, 0};
@@ -136,6 +139,77 @@ TEST(Descriptor, StaysReadableWhereItIsDisarmedThen) {
   out.publish(Number{1});
   in.disarm();
   EXPECT_TRUE(is_readable(fd));
+}
+
+// A port that believes low, and is armed again and again for the samples of low.
+class DescriptorOfLow : public testing::Test {
+ protected:
+  DescriptorOfLow() {
+    EXPECT_FALSE(in.take());
+    for (int i = 0; i < 3; ++i) {
+      in.disarm();
+      low.publish(Number{i});
+      EXPECT_EQ(take_from(in), i);
+      EXPECT_FALSE(in.take());
+    }
+    EXPECT_FALSE(is_readable(fd));
+  }
+
+  Daemon daemon{override_model()};
+  Node node{"test"};
+  OutputPort<Number> low = node.output_port<Number>("/low");
+  OutputPort<Number> stop = node.output_port<Number>("/stop");
+  InputPort<Number> in = node.input_port<Number>("/in");
+  const int fd = in.fd();
+};
+
+TEST_F(DescriptorOfLow, BecomesReadableForTheNextSample) {
+  low.publish(Number{3});
+  EXPECT_TRUE(is_readable(fd));
+}
+
+TEST_F(DescriptorOfLow, BecomesReadableAtAnOverride) {
+  stop.signal();
+  EXPECT_TRUE(is_readable(fd));
+}
+
+TEST_F(DescriptorOfLow, BecomesReadableAtItsEnd) {
+  low.deactivate();
+  EXPECT_TRUE(is_readable(fd));
+}
+
+// While it is disarmed nobody rings: what is so then is found where it is armed again.
+TEST_F(DescriptorOfLow, IsArmedForAnOverrideThatCameBefore) {
+  in.disarm();
+  low.publish(Number{3});
+  stop.signal();
+  EXPECT_FALSE(in.take());
+  EXPECT_FALSE(is_readable(fd));
+  EXPECT_TRUE(in.idle());
+  stop.deactivate();
+  EXPECT_TRUE(is_readable(fd)) << "low commands again";
+}
+
+TEST_F(DescriptorOfLow, IsArmedForAnEndThatCameBefore) {
+  in.disarm();
+  low.publish(Number{3});
+  EXPECT_EQ(take_from(in), 3);
+  low.deactivate();
+  EXPECT_FALSE(in.take());
+  EXPECT_FALSE(is_readable(fd));
+  EXPECT_TRUE(in.idle());
+  low.signal();
+  EXPECT_TRUE(is_readable(fd)) << "low commands again";
+}
+
+// It may be asked in two ways by turns.
+TEST_F(DescriptorOfLow, TellsOfIdlenessAgainWhereThePortWasCommandedBySignals) {
+  for (int i = 0; i < 3; ++i) {
+    low.deactivate();
+    EXPECT_EQ(in.wait_for(0s).status(), WaitStatus::idle);
+    low.signal();
+    EXPECT_FALSE(in.take());
+  }
 }
 
 // The time at which activity runs out moves away with each sample, and comes all the same.

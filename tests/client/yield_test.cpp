@@ -110,6 +110,8 @@ TEST(Yielding, IsToldToTheNodeOfThePortAndTheComponentHasTheName) {
   EXPECT_EQ(stand_in.port().publish(Number{1}).delivered, 1U);
   EXPECT_FALSE(stand_in.port().asked_to_yield());
   auto out = open_patiently(node, "/out");
+  while (stand_in.notices() == 0) {  // it is counted once it has been heard
+  }
   EXPECT_EQ(stand_in.notices(), 1);
   EXPECT_TRUE(stand_in.was_asked());
   EXPECT_EQ(stand_in.asked_in_port(), "/out");
@@ -187,7 +189,7 @@ TEST(Yielding, APortOfAProcessThatIsStoppedOrKilledHoldsNobodyUp) {
   Daemon daemon(single_model());
   Component other("stand-in");
   ASSERT_EQ(other.tell("output-that-yields /out"), "open");
-  other.process().signal(SIGSTOP);
+  other.process().stop();
   Node node("component");
   EXPECT_THAT(error_of_opening(node), HasSubstr("is held by node \"stand-in\""));
   EXPECT_EQ(daemon.source("/out")["component"]["node"], "stand-in");

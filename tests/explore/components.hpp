@@ -29,6 +29,8 @@ struct Output {
   Outcome publish();
   Outcome signal() { return core->signal(shm::monotonic_now()); }
   void deactivate() { core->deactivate(shm::monotonic_now()); }
+  // From now on its samples are written where the last one was, as large ones are.
+  void publish_as_large() const { core->smallest_large = 0; }
   // Takes up what the service thread has offered.
   void settle() { static_cast<void>(core->loan(sizeof published)); }
   [[nodiscard]] const shm::OutputCounters& counters() const;

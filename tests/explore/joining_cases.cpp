@@ -96,8 +96,9 @@ struct Leaving : Scene {
   std::unique_ptr<Input> other;
 };
 
-void leave(const Explore& explore) {
-  explore_anew<Leaving>(explore, [](Leaving& scene, Execution& execution) {
+void leave(const Explore& explore, bool are_large) {
+  explore_anew<Leaving>(explore, [=](Leaving& scene, Execution& execution) {
+    if (are_large) scene.a().publish_as_large();
     execution.thread([&scene] {
       scene.a().core->disconnect_peer(scene.input->core->instance());
       for (int i = 0; i < 3; ++i) scene.a().publish();
@@ -105,7 +106,10 @@ void leave(const Explore& explore) {
     execution.thread([&scene] { scene.input->take(); });
   });
 }
-const Register kLeave("AConnectionThatEndsTakesItsSampleFromNobodyWhoHoldsIt", {4, 3}, leave);
+const Register kLeave("AConnectionThatEndsTakesItsSampleFromNobodyWhoHoldsIt", {4, 3},
+                      [](const Explore& explore) { leave(explore, false); });
+const Register kLeaveLarge("AConnectionThatEndsTakesItsLargeSampleFromNobodyWhoHoldsIt", {4, 3},
+                           [](const Explore& explore) { leave(explore, true); });
 
 // A receiver's lane is given to another publisher, which must not take the old one's word for its
 // own.
@@ -155,8 +159,9 @@ struct Relinked : Scene {
   std::unique_ptr<Input> other;
 };
 
-void relink(const Explore& explore) {
-  explore_anew<Relinked>(explore, [](Relinked& scene, Execution& execution) {
+void relink(const Explore& explore, bool are_large) {
+  explore_anew<Relinked>(explore, [=](Relinked& scene, Execution& execution) {
+    if (are_large) scene.a().publish_as_large();
     execution.thread([&scene] {
       scene.a().publish();
       scene.a().publish();
@@ -170,7 +175,10 @@ void relink(const Explore& explore) {
     });
   });
 }
-const Register kRelink("AReceiversWordOnOneLinkIsNotTakenForItsWordOnTheNext", {5, 3}, relink);
+const Register kRelink("AReceiversWordOnOneLinkIsNotTakenForItsWordOnTheNext", {5, 3},
+                       [](const Explore& explore) { relink(explore, false); });
+const Register kRelinkLarge("AReceiversWordOnOneLinkFreesNoLargeSampleOfTheNext", {4, 3},
+                            [](const Explore& explore) { relink(explore, true); });
 
 // Two publishers of one source come and go, each leaving a sample that its successor's pushes out.
 // They are let go of by the service thread, while the component takes; before or after it has known

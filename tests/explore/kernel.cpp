@@ -4,6 +4,7 @@
 
 #include <sys/eventfd.h>
 #include <sys/mman.h>
+#include <sys/timerfd.h>
 #include <time.h>
 
 #include <algorithm>
@@ -21,6 +22,7 @@
 extern "C" {
 void* __real_mmap(void* at, std::size_t size, int protection, int flags, int fd, off_t offset);
 int __real_munmap(void* at, std::size_t size);
+int __real_timerfd_create(int clock, int flags);
 void* __real_memcpy(void* to, const void* from, std::size_t size);
 }
 
@@ -42,12 +44,19 @@ int next_segment = kFirstSegment;
 // By descriptor: whether the bell has been rung. The words lie in the image.
 std::map<int, shm::Atomic<std::uint32_t>*> bells;
 
+// When the timer that was made last expires. The word lies in the image.
+shm::Atomic<shm::Nanoseconds>* timer = nullptr;
+
 shm::Atomic<shm::Nanoseconds> now{1000};
 
 }  // namespace
 
 shm::Nanoseconds virtual_time() { return now.load(std::memory_order_relaxed); }
 void set_virtual_time(shm::Nanoseconds time) { now.store(time, std::memory_order_relaxed); }
+bool is_rung(const shm::Bell& bell) {
+  return bells.at(bell.read_end())->load(std::memory_order_relaxed) != 0;
+}
+shm::Nanoseconds timer_expires_at() { return timer->load(std::memory_order_relaxed); }
 
 void* real_mmap(void* at, std::size_t size, int protection, int flags, int fd, off_t offset) {
   return __real_mmap(at, size, protection, flags, fd, offset);
@@ -180,6 +189,20 @@ int __wrap_munmap(void* at, std::size_t size) {
 int __wrap_clock_gettime(clockid_t, timespec* time) {
   const auto reading = arbiter::explore::now.fetch_add(1, std::memory_order_relaxed);
   *time = {reading / 1'000'000'000, reading % 1'000'000'000};
+  return 0;
+}
+
+// A real descriptor, which epoll takes, that never expires; and a word in the image.
+int __wrap_timerfd_create(int clock, int flags) {
+  using namespace arbiter;
+  explore::timer = new shm::Atomic<shm::Nanoseconds>(shm::kForever);
+  return __real_timerfd_create(clock, flags);
+}
+
+int __wrap_timerfd_settime(int, int, const itimerspec* at, itimerspec*) {
+  using namespace arbiter;
+  const shm::Nanoseconds time = at->it_value.tv_sec * 1'000'000'000 + at->it_value.tv_nsec;
+  explore::timer->store(time == 0 ? shm::kForever : time, std::memory_order_relaxed);
   return 0;
 }
 

@@ -7,11 +7,15 @@
 #include <cstddef>
 
 #include "shm/activity.hpp"
+#include "shm/bell.hpp"
 
 namespace arbiter::explore {
 
 shm::Nanoseconds virtual_time();
 void set_virtual_time(shm::Nanoseconds time);
+bool is_rung(const shm::Bell& bell);
+// When the timer of the newest descriptor to wait on expires; kForever: never.
+shm::Nanoseconds timer_expires_at();
 
 void* real_mmap(void* at, std::size_t size, int protection, int flags, int fd, off_t offset);
 int real_munmap(void* at, std::size_t size);

@@ -12,11 +12,12 @@ test::TableBuilder everything() {
 
 // A full queue, of which samples have been overtaken already, and no slot to spare.
 Register publish_and_take(const char* name, Limits limits, std::uint32_t samples, int publishes,
-                          int takes) {
+                          int takes, bool are_large = false) {
   return {name, limits, [=](const Explore& explore) {
             explore_anew<Scene>(
                 explore,
                 [=](Scene& scene, Execution& execution) {
+                  if (are_large) scene.a().publish_as_large();
                   for (std::uint32_t i = 0; i <= samples; ++i) scene.a().publish();
                   scene.input->take();
                   scene.a().publish();
@@ -39,6 +40,10 @@ const Register kDepth1 =
     publish_and_take("NoSampleIsWrittenWhileItIsReadWithDepth1", {4, 2}, 1, 2, 2);
 const Register kDepth2 =
     publish_and_take("NoSampleIsWrittenWhileItIsReadWithDepth2", {3, 2}, 2, 3, 2);
+const Register kLarge1 =
+    publish_and_take("NoLargeSampleIsWrittenWhileItIsReadWithDepth1", {4, 2}, 1, 2, 2, true);
+const Register kLarge2 =
+    publish_and_take("NoLargeSampleIsWrittenWhileItIsReadWithDepth2", {3, 2}, 2, 3, 2, true);
 const Register kSlow =
     publish_and_take("ASlowReceiverIsOvertakenAndLosesTheOldest", {3, 2}, 2, 4, 1);
 

@@ -115,15 +115,19 @@ struct Overwriting : Watched {
   }
 };
 
-void overwrite(const Explore& explore) {
-  explore_anew<Overwriting>(explore, [](Overwriting& scene, Execution& execution) {
+void overwrite(const Explore& explore, bool are_large) {
+  explore_anew<Overwriting>(explore, [=](Overwriting& scene, Execution& execution) {
+    if (are_large) scene.a().publish_as_large();
     execution.thread([&scene] {
       for (int i = 0; i < 2; ++i) scene.a().publish();
     });
     execution.mortal_thread([&scene] { scene.watcher->take(); });
   });
 }
-const Register kOverwrite("NoSampleIsWrittenWhileATapOfARealPortReadsIt", {3, 2, 1}, overwrite);
+const Register kOverwrite("NoSampleIsWrittenWhileATapOfARealPortReadsIt", {3, 2, 1},
+                          [](const Explore& explore) { overwrite(explore, false); });
+const Register kOverwriteLarge("NoLargeSampleIsWrittenWhileATapOfARealPortReadsIt", {3, 2, 1},
+                               [](const Explore& explore) { overwrite(explore, true); });
 
 // One that holds a sample closes, or dies and is told of, while the port publishes.
 struct Leaving : Watched {
