@@ -204,6 +204,7 @@ class PortFindings {
     const std::string& by = candidates_[y].rule->source;
     Candidates result = readers_of_[by] & ~inhibited_by_[z] & ~place_of_[z];
     result.reset(y);
+    if (result.none()) return result;
     for (std::size_t x = 0; x < candidates_.size(); ++x) {
       if (result[x] && inhibited_by_[candidates_[x].rule->source][y]) result.reset(x);
     }

@@ -80,6 +80,7 @@ class RuleBuilder {
   Diagram build(const ExpressionPtr& expression);
   Diagram build_new(const Expression& expression);
   Diagram join(Operator op, const std::vector<const ExpressionPtr*>& operands);
+  Diagram join(Operator op, const Expression& literal, const Diagram& rest);
 
   DiagramBuilder& builder_;
   bool joins_as_written_ = false;

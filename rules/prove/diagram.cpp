@@ -46,22 +46,23 @@ extern "C" void leave_buddy(int code) {
   std::longjmp(recovery, 1);
 }
 
-int operator_of(Connective connective) {
+// Bit 2 * left + right.
+int truth_table_of(Connective connective) {
   switch (connective) {
     case Connective::kAnd:
-      return bddop_and;
+      return 0b1000;
     case Connective::kOr:
-      return bddop_or;
+      return 0b1110;
     case Connective::kXor:
-      return bddop_xor;
+      return 0b0110;
     case Connective::kImplies:
-      return bddop_imp;
+      return 0b1011;
     case Connective::kIff:
-      return bddop_biimp;
+      return 0b1001;
     case Connective::kAndNot:
-      return bddop_diff;
+      return 0b0100;
   }
-  return bddop_and;
+  return 0;
 }
 
 // Since BuDDy was started; sifting makes most of those that it moves.
@@ -214,9 +215,9 @@ int DiagramBuilder::node_of(const Diagram& a) {
 Diagram DiagramBuilder::keep(int node) { return {node, current_instance}; }
 
 Diagram DiagramBuilder::combine(Connective connective, const Diagram& a, const Diagram& b) {
-  const int left = node_of(a), right = node_of(b), op = operator_of(connective);
+  const int left = node_of(a), right = node_of(b), truth_table = truth_table_of(connective);
   return operate([=](DiagramOperation& operation, const DiagramOperation::Bounds& bounds) {
-    return operation.apply(left, right, op, bounds);
+    return operation.apply(left, right, truth_table, bounds);
   });
 }
 
@@ -274,22 +275,26 @@ DiagramNodes DiagramBuilder::nodes(const Diagram& a) {
   }
   // By depth, low before high, so that equal functions give equal lists whatever BuDDy numbered.
   index_of_node_.resize(static_cast<std::size_t>(bdd_getallocnum()), shm::kNone);
-  std::vector<int> found;
+  std::vector<std::pair<int, int>> found;  // level, node
   std::vector<int> pending{node_of(a)};
   while (!pending.empty()) {
     const int node = pending.back();
     pending.pop_back();
     if (node < 2 || index_of_node_[static_cast<std::size_t>(node)] != shm::kNone) continue;
     index_of_node_[static_cast<std::size_t>(node)] = 0;
-    found.push_back(node);
+    found.emplace_back(bdd_var2level(bdd_var(node)), node);
     pending.push_back(bdd_high(node));
     pending.push_back(bdd_low(node));
   }
-  const auto level = [](int node) { return bdd_var2level(bdd_var(node)); };
-  std::stable_sort(found.begin(), found.end(),
-                   [&](int left, int right) { return level(left) < level(right); });
+  const auto is_above = [](const auto& left, const auto& right) {
+    return left.first < right.first;
+  };
+  // As those of conjunctions are already, which most are.
+  if (!std::is_sorted(found.begin(), found.end(), is_above)) {
+    std::stable_sort(found.begin(), found.end(), is_above);
+  }
   for (std::size_t i = 0; i < found.size(); ++i) {
-    index_of_node_[static_cast<std::size_t>(found[i])] = static_cast<shm::Word>(i);
+    index_of_node_[static_cast<std::size_t>(found[i].second)] = static_cast<shm::Word>(i);
   }
   const auto successor = [&](int node) {
     if (node < 2) return node == 1 ? shm::table::kTrue : shm::table::kFalse;
@@ -297,11 +302,13 @@ DiagramNodes DiagramBuilder::nodes(const Diagram& a) {
   };
   result.root = 0;
   result.nodes.reserve(found.size());
-  for (const int node : found) {
+  for (const auto& [level, node] : found) {
     result.nodes.push_back(
-        {level(node), bdd_var(node), successor(bdd_low(node)), successor(bdd_high(node))});
+        {level, bdd_var(node), successor(bdd_low(node)), successor(bdd_high(node))});
   }
-  for (const int node : found) index_of_node_[static_cast<std::size_t>(node)] = shm::kNone;
+  for (const auto& [level, node] : found) {
+    index_of_node_[static_cast<std::size_t>(node)] = shm::kNone;
+  }
   budget_.note(found.size());
   return result;
 }

@@ -17,17 +17,6 @@ constexpr std::uint64_t pair_of(int left, int right) {
 constexpr int kConstantLevel = INT32_MAX;
 int level_of(int node) { return node < 2 ? kConstantLevel : bdd_var2level(bdd_var(node)); }
 
-// Bit 2 * left + right.
-int truth_table_of(int op) {
-  int table = 0;
-  for (int left = 0; left < 2; ++left) {
-    for (int right = 0; right < 2; ++right) {
-      table |= bdd_apply(left, right, op) << (2 * left + right);
-    }
-  }
-  return table;
-}
-
 }  // namespace
 
 std::size_t NodePairs::place_of(std::uint64_t pair) const {
@@ -68,8 +57,8 @@ void NodePairs::clear(bool instance_has_gone) {
   if (entries_.size() > kKeptEntries) entries_ = std::vector<Entry>(kFirstEntries);
 }
 
-int DiagramOperation::apply(int left, int right, int op, const Bounds& bounds) {
-  truth_table_ = truth_table_of(op);
+int DiagramOperation::apply(int left, int right, int truth_table, const Bounds& bounds) {
+  truth_table_ = truth_table;
   bounds_ = bounds;
   return apply(left, right);
 }
@@ -86,8 +75,9 @@ int DiagramOperation::apply(int left, int right) {
   if (left == right && outcome(1, 1) == 1) return left;
   if (const int* known = pairs_.find(left, right)) return *known;
   if (pairs_.size() == bounds_.steps) return kTooManySteps;
-  const int level = std::min(level_of(left), level_of(right));
-  const bool split_left = level_of(left) == level, split_right = level_of(right) == level;
+  const int left_level = level_of(left), right_level = level_of(right);
+  const int level = std::min(left_level, right_level);
+  const bool split_left = left_level == level, split_right = right_level == level;
   const int low = apply(split_left ? bdd_low(left) : left, split_right ? bdd_low(right) : right);
   if (low < 0) return low;
   const int high = apply(split_left ? bdd_high(left) : left, split_right ? bdd_high(right) : right);
@@ -105,8 +95,9 @@ int DiagramOperation::restrict(int node, int variable, bool value, const Bounds&
 }
 
 int DiagramOperation::restrict(int node) {
-  if (level_of(node) > level_) return node;
-  if (level_of(node) == level_) return value_ ? bdd_high(node) : bdd_low(node);
+  const int level = level_of(node);
+  if (level > level_) return node;
+  if (level == level_) return value_ ? bdd_high(node) : bdd_low(node);
   if (const int* known = pairs_.find(node, 0)) return *known;
   if (pairs_.size() == bounds_.steps) return kTooManySteps;
   const int low = restrict(bdd_low(node));

@@ -56,7 +56,8 @@ class DiagramOperation {
 
   // The order of the variables must not change while one of these runs. BuDDy's error hook may
   // leave them by a jump: no frame has a destructor. Whatever comes back, end() follows.
-  int apply(int left, int right, int op, const Bounds& bounds);  // op: BuDDy's number of it
+  // The operator's truth table has the outcome as bit 2 * left + right.
+  int apply(int left, int right, int truth_table, const Bounds& bounds);
   int restrict(int node, int variable, bool value, const Bounds& bounds);
 
   // The number of steps that were taken since the last end().
@@ -69,7 +70,7 @@ class DiagramOperation {
 
   NodePairs pairs_;
   Bounds bounds_{};
-  int truth_table_ = 0;  // of the operator: bit 2 * left + right
+  int truth_table_ = 0;  // of the operator
   int level_ = 0;        // of the variable that is restricted
   bool value_ = false;
 };

@@ -26,11 +26,15 @@ void flatten_operands(const ExpressionPtr& expression, Operator op,
   for (const auto& operand : expression->operands) flatten_operands(operand, op, operands);
 }
 
+// Each part once, which only what is shared must be remembered for.
 void visit_sources(const Expression& expression, std::unordered_set<const Expression*>& seen,
                    const std::function<void(const std::string&)>& visit) {
-  if (!seen.insert(&expression).second) return;
   if (expression.op == Operator::kSource) visit(expression.name);
-  for (const auto& operand : expression.operands) visit_sources(*operand, seen, visit);
+  for (const auto& operand : expression.operands) {
+    if (operand.use_count() == 1 || seen.insert(operand.get()).second) {
+      visit_sources(*operand, seen, visit);
+    }
+  }
 }
 
 }  // namespace
@@ -53,7 +57,8 @@ Connective connective_of(Operator op) {
 }
 
 void RuleBuilder::mention(const std::string& source) {
-  if (variables_.emplace(source, static_cast<int>(names_.size())).second) names_.push_back(source);
+  const bool is_new = variables_.try_emplace(source, static_cast<int>(names_.size())).second;
+  if (is_new) names_.push_back(source);
 }
 
 void RuleBuilder::mention_all(const Expression& expression, std::set<std::string>& written) {
@@ -116,37 +121,38 @@ Diagram RuleBuilder::build_new(const Expression& expression) {
 // build the whole list anew each time; and of clauses that lie anywhere, what is built so far does
 // not reach up to those variables that would multiply it.
 Diagram RuleBuilder::join(Operator op, const std::vector<const ExpressionPtr*>& operands) {
-  std::vector<const Expression*> literals;
+  std::vector<std::pair<int, const Expression*>> literals;  // by level
   std::vector<const ExpressionPtr*> others;
   for (const ExpressionPtr* operand : operands) {
     if (is_literal(**operand)) {
-      literals.push_back(operand->get());
+      literals.emplace_back(builder_.level_of(variable(source_of(**operand))), operand->get());
     } else {
       others.push_back(operand);
     }
   }
-  const auto level = [&](const Expression* literal) {
-    return builder_.level_of(variable(source_of(*literal)));
+  const auto is_deeper = [](const auto& left, const auto& right) {
+    return left.first > right.first;
   };
-  std::stable_sort(literals.begin(), literals.end(),
-                   [&](const auto* left, const auto* right) { return level(left) > level(right); });
+  std::stable_sort(literals.begin(), literals.end(), is_deeper);
   std::vector<std::pair<int, const ExpressionPtr*>> by_first;
   by_first.reserve(others.size());
   for (const ExpressionPtr* other : others) {
     by_first.emplace_back(joins_as_written_ ? 0 : first_level(**other), other);
   }
-  std::stable_sort(by_first.begin(), by_first.end(),
-                   [](const auto& left, const auto& right) { return left.first > right.first; });
+  std::stable_sort(by_first.begin(), by_first.end(), is_deeper);
   Diagram result = builder_.constant(op == Operator::kAnd);
-  for (const Expression* literal : literals) {
-    Diagram source = builder_.variable(variable(source_of(*literal)));
-    if (literal->op == Operator::kNot) source = builder_.negate(source);
-    result = builder_.combine(connective_of(op), source, result);
-  }
+  for (const auto& [level, literal] : literals) result = join(op, *literal, result);
   for (const auto& [first, other] : by_first) {
     result = builder_.combine(connective_of(op), result, build(*other));
   }
   return result;
+}
+
+Diagram RuleBuilder::join(Operator op, const Expression& literal, const Diagram& rest) {
+  const Diagram source = builder_.variable(variable(source_of(literal)));
+  if (literal.op == Operator::kSource) return builder_.combine(connective_of(op), source, rest);
+  return op == Operator::kAnd ? builder_.combine(Connective::kAndNot, rest, source)
+                              : builder_.combine(Connective::kImplies, source, rest);
 }
 
 CompiledRule to_compiled_rule(std::string source, const DiagramNodes& function,

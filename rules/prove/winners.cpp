@@ -17,7 +17,7 @@ std::vector<std::string> order_of(const CompiledPort& port) {
   std::vector<std::string> names;
   std::unordered_map<std::string, std::size_t> index;
   const auto index_of = [&](const std::string& name) {
-    const auto [found, is_new] = index.emplace(name, names.size());
+    const auto [found, is_new] = index.try_emplace(name, names.size());
     if (is_new) names.push_back(name);
     return found->second;
   };
@@ -113,10 +113,9 @@ Diagram Winners::holds(const CompiledRule& rule) {
   if (rule.kind == shm::table::kConjunction) {
     condition = constant(true);
     for (std::size_t i = rule.reads.size(); i-- > 0;) {
-      const int variable = variables_.at(rule.reads[i]);
-      const Diagram never = constant(false);
-      condition = rule.expected[i] ? builder_.choose(variable, condition, never)
-                                   : builder_.choose(variable, never, condition);
+      const Diagram read = active(rule.reads[i]);
+      condition = rule.expected[i] ? combine(Connective::kAnd, read, condition)
+                                   : combine(Connective::kAndNot, condition, read);
     }
   } else {
     std::vector<Diagram> built(rule.nodes.size());

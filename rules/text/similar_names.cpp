@@ -4,7 +4,6 @@
 #include <bit>
 #include <functional>
 #include <iterator>
-#include <span>
 #include <utility>
 
 namespace arbiter::rules {
@@ -208,10 +207,17 @@ NameIndex::NameIndex(std::vector<std::string_view> names, std::size_t max_compar
     by_segments_.push_back({hash_of_segments(segments), i, 0});
     for (const auto hash : hashes_of_shortened(segments)) by_shortened_.push_back({hash, i, 0});
   }
-  for (Entries* entries : {&by_pattern_, &by_segments_, &by_shortened_}) {
+  std::sort(by_pattern_.begin(), by_pattern_.end(), [this](const Entry& a, const Entry& b) {
+    return a.hash != b.hash ? a.hash < b.hash : letters_of(a) < letters_of(b);
+  });
+  for (Entries* entries : {&by_segments_, &by_shortened_}) {
     std::sort(entries->begin(), entries->end(),
               [](const Entry& a, const Entry& b) { return a.hash < b.hash; });
   }
+}
+
+const std::string& NameIndex::letters_of(const Entry& entry) const {
+  return words_[entry.name][entry.word].letters;
 }
 
 bool NameIndex::spend(std::size_t bytes) {
@@ -224,16 +230,28 @@ void NameIndex::look_for_slips(std::string_view name, std::map<std::size_t, Rese
   for (std::string& word : words_of(name)) words.emplace_back(std::move(word));
   const auto patterns = hashes_of_patterns(words);
   for (std::size_t at = 0; at < words.size(); ++at) {
-    for (const Entry& entry : entries_of(by_pattern_, patterns[at])) {
-      const NameWord& other = words_[entry.name][entry.word];
-      if (!spend(1)) return;
-      if (words[at].letters == other.letters) continue;  // siblings, of which there may be many
-      if (std::popcount(words[at].characters ^ other.characters) > 4) continue;
-      if (!spend(words[at].text.size() + other.text.size())) return;
-      const Resemblance how = compare_words(words[at], other);
-      if (how == Resemblance::kNone || !have_same_pattern(words, words_[entry.name], at)) continue;
-      found.emplace(entry.name, how);
-    }
+    const std::span<const Entry> entries = entries_of(by_pattern_, patterns[at]);
+    const std::string& letters = words[at].letters;
+    const auto first = std::partition_point(
+        entries.begin(), entries.end(), [&](const Entry& e) { return letters_of(e) < letters; });
+    const auto last = std::partition_point(
+        first, entries.end(), [&](const Entry& e) { return letters_of(e) == letters; });
+    // Siblings are passed over, of which there may be many.
+    compare(words, at, {entries.begin(), first}, found);
+    compare(words, at, {last, entries.end()}, found);
+  }
+}
+
+void NameIndex::compare(const Words& words, std::size_t open, std::span<const Entry> entries,
+                        std::map<std::size_t, Resemblance>& found) {
+  for (const Entry& entry : entries) {
+    const NameWord& other = words_[entry.name][entry.word];
+    if (!spend(1)) return;
+    if (std::popcount(words[open].characters ^ other.characters) > 4) continue;
+    if (!spend(words[open].text.size() + other.text.size())) return;
+    const Resemblance how = compare_words(words[open], other);
+    if (how == Resemblance::kNone || !have_same_pattern(words, words_[entry.name], open)) continue;
+    found.emplace(entry.name, how);
   }
 }
 

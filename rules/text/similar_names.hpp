@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -59,14 +60,18 @@ class NameIndex {
   using Entries = std::vector<Entry>;  // by hash
 
   void look_for_slips(std::string_view name, std::map<std::size_t, Resemblance>& found);
+  // The words, of which one is left open, with what differs from them there at most.
+  void compare(const Words& words, std::size_t open, std::span<const Entry> entries,
+               std::map<std::size_t, Resemblance>& found);
   void look_for_namespaces(std::string_view name, std::map<std::size_t, Resemblance>& found);
+  [[nodiscard]] const std::string& letters_of(const Entry& entry) const;
   bool spend(std::size_t bytes);
 
   const std::vector<std::string_view> names_;
   std::vector<Words> words_;                        // by name
   std::vector<std::vector<std::string>> segments_;  // by name
   std::unordered_map<std::string, std::vector<std::size_t>> by_plain_;
-  Entries by_pattern_;    // by the name with that word left open
+  Entries by_pattern_;    // by the name with that word left open, then by the word's letters
   Entries by_segments_;   // by the whole name
   Entries by_shortened_;  // by the name without a namespace; `word` is of no interest
   std::size_t bytes_left_;

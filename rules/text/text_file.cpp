@@ -83,6 +83,9 @@ class Descriptor {
   int fd_;
 };
 
+// As nearly all are: those of ASCII that print.
+bool is_plain(char byte) { return byte >= ' ' && byte <= '~'; }
+
 std::string in_hex(unsigned value) {
   static constexpr char kDigits[] = "0123456789abcdef";
   return {'0', 'x', kDigits[value >> 4 & 15], kDigits[value & 15]};
@@ -94,8 +97,9 @@ TextFile::TextFile(std::string path, std::string content)
     : path_(std::move(path)), content_(std::move(content)) {
   if (content_.starts_with("\xef\xbb\xbf")) content_.erase(0, 3);
   line_starts_.push_back(0);
-  for (std::size_t i = 0; i < content_.size(); ++i) {
-    if (content_[i] == '\n') line_starts_.push_back(i + 1);
+  for (std::size_t end = content_.find('\n'); end != std::string::npos;
+       end = content_.find('\n', end + 1)) {
+    line_starts_.push_back(end + 1);
   }
 }
 
@@ -135,6 +139,10 @@ bool check_characters(const TextFile& file, Diagnostics& diagnostics, std::size_
   if (!check_size(file, kMaxFileBytes, diagnostics)) return false;
   const std::string_view content = file.content().substr(0, end);
   for (std::size_t i = begin; i < content.size();) {
+    if (is_plain(content[i])) {
+      ++i;
+      continue;
+    }
     const shm::Utf8Character character = shm::decode_utf8(content.substr(i));
     if (character.length == 0) {
       diagnostics.error("invalid-character", file.locate(i),

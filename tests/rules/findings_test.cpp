@@ -147,15 +147,15 @@ TEST(Findings, AQuestionThatOutgrowsItsBoundIsLeftOpenAndSaysSo) {
 using Graph = std::function<std::vector<int>(int source)>;
 
 rules::RuleSet inhibited(int ports, int sources, const Graph& inhibitors, bool first_wins = true) {
+  std::vector<std::pair<std::string, ExpressionPtr>> rules;
+  for (int i = 0; i < sources; ++i) {
+    std::vector<ExpressionPtr> literals;
+    for (const int other : inhibitors(i)) literals.push_back(inactive(numbered(other)));
+    rules.emplace_back(numbered(i), all_of(std::move(literals)));
+  }
   RulesByHand by_hand;
   for (int port = 0; port < ports; ++port) {
-    std::vector<std::pair<std::string, ExpressionPtr>> rules;
-    for (int i = 0; i < sources; ++i) {
-      std::vector<ExpressionPtr> literals;
-      for (const int other : inhibitors(i)) literals.push_back(inactive(numbered(other)));
-      rules.emplace_back(numbered(i), all_of(std::move(literals)));
-    }
-    by_hand.port("/p" + std::to_string(port), std::move(rules), first_wins);
+    by_hand.port("/p" + std::to_string(port), rules, first_wins);
   }
   return by_hand;
 }

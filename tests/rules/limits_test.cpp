@@ -63,7 +63,8 @@ TEST(Limits, APipeThatNeverEndsIsTooLarge) {
     end();
     if (::pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error("pipe2");
     writer = std::thread([pipe = ends[1]] {
-      const std::string text(4096, '\n');
+      std::string text(4096, ' ');
+      text.back() = '\n';
       while (::write(pipe, text.data(), text.size()) > 0) {
       }
       ::close(pipe);

@@ -335,21 +335,19 @@ TEST(ModelDiff, EqualitiesFarApartStayWithinTheBounds) {
 
 TEST(ModelDiff, PortsOfTwoHundredAndFiftySixConnectionsAreCompared) {
   const auto chains = [](std::size_t swapped) {
-    RulesByHand by_hand;
-    for (int port = 0; port < 6; ++port) {
-      std::vector<std::size_t> rank(256);
-      for (std::size_t i = 0; i < rank.size(); ++i) rank[i] = i;
-      std::swap(rank[swapped], rank[255 - swapped]);
-      std::vector<std::pair<std::string, ExpressionPtr>> rules;
-      for (std::size_t i = 0; i < rank.size(); ++i) {
-        std::vector<ExpressionPtr> literals;
-        for (std::size_t j = i + 1; j < rank.size(); ++j) {
-          literals.push_back(inactive("/s" + std::to_string(rank[j])));
-        }
-        rules.emplace_back("/s" + std::to_string(rank[i]), all_of(std::move(literals)));
+    std::vector<std::size_t> rank(256);
+    for (std::size_t i = 0; i < rank.size(); ++i) rank[i] = i;
+    std::swap(rank[swapped], rank[255 - swapped]);
+    std::vector<std::pair<std::string, ExpressionPtr>> rules;
+    for (std::size_t i = 0; i < rank.size(); ++i) {
+      std::vector<ExpressionPtr> literals;
+      for (std::size_t j = i + 1; j < rank.size(); ++j) {
+        literals.push_back(inactive("/s" + std::to_string(rank[j])));
       }
-      by_hand.port("/p" + std::to_string(port), std::move(rules));
+      rules.emplace_back("/s" + std::to_string(rank[i]), all_of(std::move(literals)));
     }
+    RulesByHand by_hand;
+    for (int port = 0; port < 6; ++port) by_hand.port("/p" + std::to_string(port), rules);
     return compiled(by_hand);
   };
   const ModelDiff found = diff(chains(3), chains(4));
