@@ -70,12 +70,12 @@ class Account {
  private:
   [[nodiscard]] std::string state_of_topic() const;  // under mutex_
 
+  std::atomic<std::size_t> last_size_{0};  // here, beside the counts: each sample writes both
   const std::string outside_;
   const std::string other_;
   mutable std::mutex mutex_;
   std::string obstacle_;
   std::string last_reason_;
-  std::atomic<std::size_t> last_size_{0};
   std::int64_t peers_ = -1;  // not known
   bool at_least_ = false;
 };

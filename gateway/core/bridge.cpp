@@ -20,6 +20,7 @@ namespace {
 constexpr shm::Nanoseconds kMillisecond = 1'000'000;
 // Between two looks whether another model is in force, of which nobody tells.
 constexpr shm::Nanoseconds kLookPeriod = 100 * kMillisecond;
+constexpr shm::Nanoseconds kTellPeriod = 500 * kMillisecond;  // how things stand
 constexpr shm::Nanoseconds kSayPeriod = 1000 * kMillisecond;  // of each entry
 constexpr int kRetryPeriod = 500;                             // ms, for the daemon
 constexpr shm::Nanoseconds kOpenPeriod = 1000 * kMillisecond;
@@ -227,10 +228,13 @@ void Bridge::loop(int stop) {
 void Bridge::look_after(shm::Nanoseconds now, bool all) {
   if (now < tend_at_ && !all) return;
   if (now >= open_again_) open_closed();
-  max_ages_.update();
-  watch_news();
   middleware_.tend();
-  look_after_all();
+  if (all || now >= tell_at_) {
+    max_ages_.update();
+    watch_news();
+    look_after_all();
+    tell_at_ = shm::monotonic_now() + kTellPeriod;
+  }
   // From here on: who was held up above serves before the next round.
   tend_at_ = shm::monotonic_now() + (is_any(false) ? kLookPeriod : middleware_.tend_period());
   if (options_.on_round) options_.on_round();

@@ -121,6 +121,7 @@ class Bridge {
   Saying ages_;
   bool has_started_ = false;
   shm::Nanoseconds tend_at_ = 0;
+  shm::Nanoseconds tell_at_ = 0;
   bool watches_news_ = false;  // of the daemon's, for max_ages_
   bool stops_ = false;
 };

@@ -22,6 +22,7 @@
 #include "gateway/mapping/read_mapping.hpp"
 #include "rules/ask/report.hpp"
 #include "rules/text/text_file.hpp"
+#include "shm/clock.hpp"
 #include "shm/file_descriptor.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -45,6 +46,8 @@ struct Arguments {
 };
 
 constexpr unsigned kEndsWithin = 2;  // s
+// A supervisor looks once a second, and gives its worker five (Patience::silence).
+constexpr shm::Nanoseconds kBeatPeriod = 400'000'000;
 
 // Nothing: there are errors, which have been said.
 std::optional<std::vector<Mapping>> read(const Arguments& arguments, const ProgramKind& kind,
@@ -106,13 +109,28 @@ int send_idle_of(const Setup& setup, const ProgramKind& kind) {
   return 0;
 }
 
+// Gives a sign of life with each call, but not more often than kBeatPeriod: each wakes a process.
+class Beat {
+ public:
+  void operator()() {
+    const shm::Nanoseconds now = shm::monotonic_now();
+    if (!beat_ || now < again_) return;
+    again_ = now + kBeatPeriod;
+    beat_();
+  }
+
+ private:
+  const std::function<void()> beat_ = sign_of_life();
+  shm::Nanoseconds again_ = 0;
+};
+
 // Until it is to stop. `asked`: for another mapping; of a worker, its supervisor is.
 void serve(std::unique_ptr<Setup> setup, const ProgramKind& kind, Reload& reload) {
-  const auto beat = sign_of_life();
+  Beat beat;
   for (; setup != nullptr; setup = reload.take()) {
     BridgeOptions options = setup->settings.bridge;
     options.on_round = [&] {
-      if (beat) beat();
+      beat();
       reload.look();
     };
     Bridge bridge(std::move(options), setup->settings.mappings, kind.kind, setup->bell,

@@ -190,13 +190,16 @@ void Session::make_inlet(const Middleware::OpenIn& in) {
 void Session::add(const std::vector<Middleware::OpenIn>& ins) {
   const std::lock_guard lock(adding_);
   for (const Middleware::OpenIn& in : ins) added_.push_back(in);
+  has_added_.store(true, std::memory_order_relaxed);
 }
 
 void Session::make_added() {
+  if (!has_added_.load(std::memory_order_relaxed)) return;
   std::vector<Middleware::OpenIn> added;
   {
     const std::lock_guard lock(adding_);
     added.swap(added_);
+    has_added_.store(false, std::memory_order_relaxed);
   }
   for (const Middleware::OpenIn& in : added) {
     make_inlet(in);

@@ -108,6 +108,9 @@ class Session {
   const std::vector<Middleware::OpenIn> ins_;  // at the beginning
   std::mutex adding_;                          // of the next one
   std::vector<Middleware::OpenIn> added_;      // not made yet
+  // Whether there may be any: a round for each sample need not take the lock. Relaxed is enough:
+  // what is missed is found in the next round, and the lock orders what it guards.
+  std::atomic<bool> has_added_{false};
   std::vector<Outlet> outs_;
   std::vector<std::unique_ptr<iox::popo::UntypedPublisher>> publishers_;
   std::vector<std::unique_ptr<Inlet>> inlets_;

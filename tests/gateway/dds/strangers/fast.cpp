@@ -128,6 +128,8 @@ void set(EndQos& qos, const CommandLine& line) {
   qos.history().depth = line.depth;
   qos.endpoint().history_memory_policy =
       eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  // One that is killed would leave its shared memory behind.
+  qos.data_sharing().off();
   if (line.deadline_ms > 0) {
     qos.deadline().period = Duration(
         line.deadline_ms / 1000, static_cast<std::uint32_t>(line.deadline_ms % 1000) * 1'000'000);
