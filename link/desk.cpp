@@ -25,12 +25,12 @@ constexpr std::size_t kMostToAnswer = 64;
 
 }  // namespace
 
-Desk::Desk(HostCard me)
+Desk::Desk(HostCard me, Neighbours known)
     : me_(std::move(me)),
       began_(shm::monotonic_now()),
       daemon_(me_.instance),
       switching_(me_.host, switch_of_daemon(me_.instance), time_with_sleep),
-      card_(me_),
+      neighbours_(std::move(known)),
       round_trips_(me_.incarnation) {
   add_verbs();
   answering_ = std::thread([this] { answer_questions(); });
@@ -65,8 +65,9 @@ void Desk::join(const Network& network, std::string name, const gateway::Bell& b
     topics_ = std::move(topics);
     const std::lock_guard lock(mutex_);
     network_ = std::move(name);
+    joined_ = shm::monotonic_now();
   }
-  is_card_sent_ = false;
+  sent_ = nullptr;
   pulse_ = std::make_unique<TokenClock>([this] {
     ByteString pulse;
     {
@@ -80,14 +81,16 @@ void Desk::join(const Network& network, std::string name, const gateway::Bell& b
 
 void Desk::leave() {
   pulse_.reset();
-  std::unique_ptr<Topics> gone;  // without locks: it waits for what is being heard
+  std::unique_ptr<Topics> gone;
   {
     const std::unique_lock using_topics(topics_mutex_);
     gone = std::move(topics_);
     const std::lock_guard lock(mutex_);
     network_.clear();
-    neighbours_.keep({}, shm::monotonic_now());
   }
+  gone.reset();  // without locks: it waits for what is being heard
+  const std::lock_guard lock(mutex_);
+  neighbours_.keep({}, shm::monotonic_now());
 }
 
 void Desk::close() {
@@ -100,19 +103,28 @@ void Desk::close() {
   changed_.notify_all();
 }
 
+Neighbours Desk::known() const {
+  const std::lock_guard lock(mutex_);
+  return neighbours_;
+}
+
 void Desk::look(OwnHost own) {
   own.card.host = me_.host;
   own.card.instance = me_.instance;
   own.card.version = me_.version;
   own.card.incarnation = me_.incarnation;
+  auto now_own = std::make_shared<const OwnHost>(std::move(own));
+  if (now_own->card != own_->card) compare_until_ = shm::monotonic_now() + kComparing;
   {
     const std::lock_guard lock(mutex_);
-    if (own.card != own_.card) compare_until_ = shm::monotonic_now() + kComparing;
-    own_ = std::move(own);
+    own_.swap(now_own);
   }
   if (topics_ != nullptr) {
     send_card();
     look_at_others();
+  } else {
+    const std::lock_guard lock(mutex_);
+    neighbours_.keep({}, shm::monotonic_now());  // who has been gone for long is forgotten
   }
   open_socket();
 }
@@ -138,20 +150,14 @@ void Desk::open_socket() {
 void Desk::send_card() {
   const shm::Nanoseconds now = shm::monotonic_now();
   if (now < send_again_) return;
-  ByteString bytes;
-  {
-    const std::lock_guard lock(mutex_);
-    if (is_card_sent_ && card_ == own_.card) return;
-    card_ = own_.card;
-    bytes = write_host_card(card_);
-  }
+  if (sent_ != nullptr && sent_->card == own_->card) return;
   send_again_ = now + kCardPeriod;
-  is_card_sent_ = topics_->cards.send(bytes);
+  sent_ = topics_->cards.send(write_host_card(own_->card)) ? own_ : nullptr;
 }
 
 void Desk::look_at_others() {
+  const shm::Nanoseconds now = shm::monotonic_now();  // before: meanwhile others may come
   const std::vector<std::uint64_t> writers = topics_->cards.writers();
-  const shm::Nanoseconds now = shm::monotonic_now();
   std::vector<Neighbour> neighbours;
   {
     const std::lock_guard lock(mutex_);
@@ -163,12 +169,12 @@ void Desk::look_at_others() {
     neighbours = neighbours_.all();
   }
   // Without the lock, for which samples may wait: what strangers say may be much.
-  std::vector<PresentHost> hosts{{&own_.card, began_}};  // of this thread
+  std::vector<PresentHost> hosts{{&own_->card, began_}};
   for (const Neighbour& each : neighbours) {
     if (each.is_up) hosts.push_back({each.card.get(), each.since});
   }
   const std::vector<Disagreement> news = disagreements_.look(hosts, now);
-  std::vector<Disagreement> standing = disagreements_.standing();
+  auto standing = std::make_shared<const std::vector<Disagreement>>(disagreements_.standing());
   {
     const std::lock_guard lock(mutex_);
     standing_.swap(standing);

@@ -45,8 +45,9 @@ struct OwnHost {
 
 class Desk {
  public:
-  // `me`: who this link is: host, instance, version, incarnation.
-  explicit Desk(HostCard me);
+  // `me`: who this link is: host, instance, version, incarnation. `known`: whom it has known in an
+  // earlier life.
+  Desk(HostCard me, Neighbours known);
   Desk(const Desk&) = delete;
   Desk& operator=(const Desk&) = delete;
   ~Desk();
@@ -62,6 +63,9 @@ class Desk {
   // Takes up what has changed, here and elsewhere, and logs what hosts do not agree upon. Ten times
   // a second.
   void look(OwnHost own);
+
+  // After close(): those that it knew, gone now.
+  [[nodiscard]] Neighbours known() const;
 
   // Of this host, to which verbs may be added before anybody can ask: see add_verbs().
   [[nodiscard]] Answers& answers() noexcept { return answers_; }
@@ -92,6 +96,9 @@ class Desk {
   // On threads of programs.
   std::string serve(const LocalUser& who, const wire::LinkQuestion& question);
   std::vector<wire::HostAnswer> ask_hosts(const wire::LinkQuestion& question);
+  // Waits, for a lease at most, until those that are there have been heard. Throws
+  // std::runtime_error where there is no network.
+  void await_all_hosts();
   // Nobody hears it while there is no network.
   void send_question(const QuestionMessage& message);
   void send_answer(const AnswerMessage& message);
@@ -112,13 +119,16 @@ class Desk {
   std::shared_mutex topics_mutex_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  HostCard card_;  // as it was sent last, or is to be sent
-  OwnHost own_;
+  // Never null, and set by the link's thread alone.
+  std::shared_ptr<const OwnHost> own_ = std::make_shared<OwnHost>();
   std::string network_;  // empty: not joined
+  shm::Nanoseconds joined_ = 0;
   Neighbours neighbours_;
   RoundTrips round_trips_;
-  Disagreements disagreements_;         // of the link's thread
-  std::vector<Disagreement> standing_;  // as that has found last
+  Disagreements disagreements_;  // of the link's thread
+  // As that has found last; never null.
+  std::shared_ptr<const std::vector<Disagreement>> standing_ =
+      std::make_shared<std::vector<Disagreement>>();
   OpenQuestions open_;
   Askers askers_;
   std::deque<Asked> to_answer_;
@@ -126,7 +136,7 @@ class Desk {
   bool ends_ = false;
 
   // Of the link's thread.
-  bool is_card_sent_ = false;
+  std::shared_ptr<const OwnHost> sent_;  // whose card was sent last; null: it has to be sent
   std::uint64_t compared_changes_ = 0;
   shm::Nanoseconds compare_until_ = 0;
   shm::Nanoseconds compare_again_ = 0;

@@ -1,6 +1,7 @@
 // What a desk asks and is asked: by links, and by programs of this host.
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -10,8 +11,15 @@
 #include "link/host_status.hpp"
 #include "shm/clock.hpp"
 #include "wire/document.hpp"
+#include "wire/switch_request.hpp"
 
 namespace arbiter::link {
+namespace {
+
+// A lease: hosts announce themselves six times in it.
+constexpr shm::Nanoseconds kAllAreHeard = 1'500'000'000;
+
+}  // namespace
 
 void Desk::answer_questions() {
   std::unique_lock lock(mutex_);
@@ -53,33 +61,46 @@ std::string Desk::serve(const LocalUser& who, const wire::LinkQuestion& question
   return wire::write_document(to_json(document()));
 }
 
+// Cards are long, and whoever hears one waits for the lock: under it only pointers are copied.
 wire::HostsDocument Desk::document() const {
   wire::HostsDocument document;
-  const std::lock_guard lock(mutex_);
+  std::shared_ptr<const OwnHost> own;
+  std::shared_ptr<const std::vector<Disagreement>> standing;
+  std::vector<Neighbour> neighbours;
+  std::vector<std::optional<shm::Nanoseconds>> round_trips;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!network_.empty()) document.network = network_;
+    own = own_;
+    standing = standing_;
+    neighbours = neighbours_.all();
+    for (const Neighbour& each : neighbours) {
+      round_trips.push_back(round_trips_.of(each.card->incarnation));
+    }
+  }
   document.host = me_.host;
   document.instance = me_.instance;
   document.version = me_.version;
-  if (!network_.empty()) document.network = network_;
-  if (!own_.waits_for.empty()) document.waits_for = own_.waits_for;
-  wire::HostStatus& here = document.hosts.emplace_back(status_of(own_.card));
+  if (!own->waits_for.empty()) document.waits_for = own->waits_for;
+  wire::HostStatus& here = document.hosts.emplace_back(status_of(own->card));
   here.is_this = true;
   here.since = began_;
-  for (const Neighbour& each : neighbours_.all()) {
-    wire::HostStatus& host = document.hosts.emplace_back(status_of(*each.card));
-    host.is_up = each.is_up;
-    host.since = each.since;
-    if (each.is_up) host.round_trip = round_trips_.of(each.card->incarnation);
+  for (std::size_t i = 0; i < neighbours.size(); ++i) {
+    wire::HostStatus& host = document.hosts.emplace_back(status_of(*neighbours[i].card));
+    host.is_up = neighbours[i].is_up;
+    host.since = neighbours[i].since;
+    if (host.is_up) host.round_trip = round_trips[i];
   }
-  document.imports = own_.imports;
-  for (const Disagreement& each : standing_) {
-    document.disagreements.push_back(status_of(each));
-  }
+  document.imports = own->imports;
+  for (const Disagreement& each : *standing) document.disagreements.push_back(status_of(each));
   return document;
 }
 
 std::vector<wire::HostAnswer> Desk::ask_hosts(const wire::LinkQuestion& question) {
   if (question.argument.size() > kMaxArgument) throw std::runtime_error("that is too much to ask");
   const bool is_for_all = question.host == wire::kAllHosts;
+  // No host that is there may be passed over.
+  if (is_for_all && question.verb == wire::kPrepareVerb) await_all_hosts();
   const std::string& wanted = question.host.empty() ? me_.host : question.host;
   std::vector<wire::HostAnswer> answers;
   std::vector<Incarnation> asked;  // of answers, as long as they are not known to be gone
@@ -97,9 +118,7 @@ std::vector<wire::HostAnswer> Desk::ask_hosts(const wire::LinkQuestion& question
         if (is_up) asked.push_back(card.incarnation);
       };
       add(me_, true);
-      if (!network_.empty()) {
-        for (const Neighbour& each : neighbours_.all()) add(*each.card, each.is_up);
-      }
+      for (const Neighbour& each : neighbours_.all()) add(*each.card, each.is_up);
       if (answers.empty()) {
         throw std::runtime_error("no host is called \"" + wanted + "\": see arbiter hosts");
       }
@@ -118,6 +137,21 @@ std::vector<wire::HostAnswer> Desk::ask_hosts(const wire::LinkQuestion& question
     answers[i].text = reply.text;
   }
   return answers;
+}
+
+void Desk::await_all_hosts() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    if (closes_) throw std::runtime_error("the link ends");
+    if (network_.empty()) {
+      throw std::runtime_error(
+          "this link has not joined its network yet, and does not know the other hosts" +
+          (own_->waits_for.empty() ? "" : ": " + own_->waits_for));
+    }
+    const shm::Nanoseconds left = joined_ + kAllAreHeard - shm::monotonic_now();
+    if (left <= 0) return;
+    changed_.wait_for(lock, std::chrono::nanoseconds(left));
+  }
 }
 
 // Our own answer is made here; others get the question.

@@ -7,9 +7,11 @@
 // count it. Where an event cannot be written, the state of its source is said until it is. A sample
 // that all importers can do without stays here, until one of them wants it (core/demand.hpp).
 //
-// Thread safety: look() on the link's thread; sending has a thread of its own, which
-// shares exports_ under mutex_. Taps are opened and closed without that lock. A publisher that
-// never rests keeps the sending thread locking: gate_ gives the link's thread its turn.
+// Thread safety: look() on the link's thread; sending has a thread of its own, which shares
+// exports_ under mutex_. To send takes as long as the network does: an export whose turn it is
+// belongs to the sending thread, without the lock, and the link's thread passes it over until
+// another look. Nor are taps opened and closed under the lock. A publisher that never rests keeps
+// the sending thread locking: gate_ gives the link's thread its turn.
 #pragma once
 
 #include <sys/epoll.h>
@@ -33,6 +35,7 @@
 #include "link/core/held_tokens.hpp"
 #include "link/core/kept_sample.hpp"
 #include "link/core/patience.hpp"
+#include "link/core/rush.hpp"
 #include "link/dds/datagram_train.hpp"
 #include "link/dds/demands.hpp"
 #include "link/dds/event_topic.hpp"
@@ -67,6 +70,7 @@ class Exports {
     std::uint64_t sequence = 0;        // of the last sample
     bool is_deactivated = false;       // by the last event
     bool is_unsaid = false;            // that event was not written
+    bool is_wanted = false;            // by anybody
     Demand demand = Demand::kSamples;  // of those who read it
     std::uint32_t reader_changes = 0;  // that `demand` knows of
     KeptSample kept;                   // the last event's, where it was withheld
@@ -74,22 +78,33 @@ class Exports {
     shm::Nanoseconds tap_again = 0;    // not before
   };
 
-  void withdraw(const HostView::OpenPorts& ports);
+  void withdraw(const HostView::OpenPorts& ports, const Patience& patience);
   void offer(const std::string& source, const shm::TypeInfo& type);
   // Of the export with that id. What is offered again begins a stream of its own, whose numbers and
   // types have nothing to do with those before.
   [[nodiscard]] Incarnation incarnation_of(std::uint64_t id) const noexcept;
   void tap_what_is_wanted(const HostView& view, const Patience& patience);
   void open_tap(Export& one, std::uint64_t id, const HostView& view);
+  void close_tap(Export& one, std::uint64_t id);
+  // Of what epoll_wait() names, beside exports.
+  static constexpr std::uint64_t kWakeId = 0;
+  static constexpr std::uint64_t kReadersId = ~std::uint64_t{0};
+  static constexpr int kMostEvents = 64;  // that are heard at once
   void run();
+  // As epoll_wait(), but stays awake in a rush.
+  int await_events(std::array<epoll_event, kMostEvents>& events, int milliseconds) const noexcept;
   void wake() const noexcept;
   // mutex_, for the link's thread: before the sending thread has it again.
   [[nodiscard]] std::unique_lock<std::mutex> lock_first();
   // Likewise for the sending thread: after the link's.
   [[nodiscard]] std::unique_lock<std::mutex> lock_after();
-  // Takes up what epoll_wait() says; false: it is over.
+  // Takes up what epoll_wait() says, and who has a turn; false: it is over.
   bool take_up(const epoll_event* events, int count);
-  // Under mutex_.
+  void take_turn(std::uint64_t id);
+  // Null: there is nothing to be sent of it. Else it is the sending thread's until end_turn().
+  [[nodiscard]] Export* begin_turn(std::uint64_t id);
+  void end_turn(bool is_left);
+  // From here on: of the export whose turn it is, or under mutex_.
   bool send_some(Export& one);
   void state(Export& one, bool is_deactivated);
   // Says the state of those whose last event was not written. True: one is left.
@@ -97,11 +112,12 @@ class Exports {
   void write(Export& one, Bytes sample);
   // As write(), of an event that has its number already.
   [[nodiscard]] bool put(Export& one, Bytes sample);
-  void send(Export& one, const TapEvent<void>& event);
+  // Returns the bytes of the sample that has been sent.
+  std::size_t send(Export& one, const TapEvent<void>& event);
   // Whose readers have come, gone, or said something else. True: one has come or gone.
   bool hear_readers();
-  void hear_readers(Export& one);
-  void send_again(Export& one);
+  void hear_readers(std::uint64_t id, Export& one);
+  void send_kept(Export& one);
   static void know_type(Export& one, const shm::TypeInfo& type);
 
   Node& node_;
@@ -120,13 +136,17 @@ class Exports {
   std::mutex gate_;
   std::mutex mutex_;
   std::map<std::uint64_t, std::unique_ptr<Export>> exports_;
-  std::set<std::uint64_t> ready_;  // whose taps may have something
-  bool has_unsaid_ = false;        // one of them may be
+  std::set<std::uint64_t> ready_;  // of which something may have to be sent
+  std::uint64_t in_turn_ = 0;      // 0: none
   bool ends_ = false;
-  // Likewise under mutex_: what is sent is made here.
+  // The sending thread's.
+  std::vector<std::uint64_t> turns_;  // who was ready when it looked
+  bool has_unsaid_ = false;           // an event of one of them may not have been written
+  bool has_taken_ = false;            // an event, since it looked
   EventHeader header_;
   std::array<std::byte, kMaxHeaderBytes> buffer_{};
-  DatagramTrain train_;
+  DatagramTrains trains_;
+  Rush rush_;
   std::thread thread_;
 };
 

@@ -56,13 +56,13 @@ HostCard own_card(const LinkOptions& options, Incarnation incarnation) {
 
 }  // namespace
 
-Link::Link(LinkOptions options)
+Link::Link(LinkOptions options, Neighbours known)
     : options_(std::move(options)),
       incarnation_(new_incarnation()),
       view_(options_.instance, options_.max_age),
       interfaces_(options_.network.interfaces.empty() ? std::vector<std::string>{"lo"}
                                                       : options_.network.interfaces),
-      desk_(std::make_unique<Desk>(own_card(options_, incarnation_))) {
+      desk_(std::make_unique<Desk>(own_card(options_, incarnation_), std::move(known))) {
   gateway::dds::hear_cyclone();
 }
 

@@ -2,7 +2,7 @@
 // from them. No host is special, and none asks another before it decides (docs/hosts.md).
 //
 // It is made again where the network has to be joined again: of what it knew of other hosts nothing
-// holds then, and for them it is a link that has been started again.
+// holds then but that they were there, and for them it is a link that has been started again.
 //
 // Thread safety: all of it runs on the thread that calls run(), but for hear() and what its parts
 // say. That thread alone changes imports_, under imports_mutex_; others look there under it.
@@ -20,6 +20,7 @@
 
 #include "gateway/core/bridge.hpp"
 #include "link/core/held_tokens.hpp"
+#include "link/core/neighbours.hpp"
 #include "link/core/patience.hpp"
 #include "link/core/sent_tokens.hpp"
 #include "link/dds/demands.hpp"
@@ -49,7 +50,8 @@ struct LinkOptions {
 
 class Link {
  public:
-  explicit Link(LinkOptions options);
+  // `known`: the hosts that it knew in an earlier life.
+  explicit Link(LinkOptions options, Neighbours known = {});
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
   ~Link();

@@ -8,6 +8,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <condition_variable>
@@ -15,10 +16,15 @@
 #include <exception>
 #include <map>
 #include <mutex>
+#include <set>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
 
+#include "link/say_sparingly.hpp"
+#include "shm/clock.hpp"
+#include "wire/errands.hpp"
+#include "wire/hang_up.hpp"
 #include "wire/link_call.hpp"
 
 namespace arbiter::link {
@@ -26,6 +32,18 @@ namespace {
 
 // For a program to say something, or to take its answer.
 constexpr timeval kPatience{10, 0};
+constexpr int kLookAgain = 1000;                   // ms
+constexpr uid_t kNobody = static_cast<uid_t>(-1);  // in particular
+
+bool is_stuck(uid_t user) { return wire::Errands::of_the_process().is_stuck(user); }
+
+// In milliseconds, rounded up, as poll() wants it.
+int until_errands_are_due() {
+  const shm::Nanoseconds due = wire::Errands::of_the_process().deadline();
+  if (due == shm::kForever) return -1;
+  return static_cast<int>(std::max<shm::Nanoseconds>(due - shm::monotonic_now(), 0) / 1'000'000) +
+         1;
+}
 
 // A file in memory that can only be read.
 shm::FileDescriptor sealed_document(const std::string& text) {
@@ -74,18 +92,30 @@ struct LocalSocket::Shared {
   explicit Shared(Serve with) : serve(std::move(with)) {}
 
   // As many as are let in have a place, which they give back.
-  bool take_place(uid_t user) {
+  bool take_place(uid_t user, int socket) {
     const std::lock_guard lock(mutex);
     const bool is_privileged = user == 0 || user == ::geteuid();
     if (ends || of_user[user] >= kMostOfUser || (count >= kMost && !is_privileged)) return false;
     ++of_user[user];
     ++count;
+    conversations.insert(socket);
     return true;
   }
   void give_back_place(uid_t user) {
     const std::lock_guard lock(mutex);
     --count;
     if (--of_user[user] == 0) of_user.erase(user);
+  }
+  // Before the socket is closed: another one may have its number then.
+  void end_conversation(int socket) {
+    const std::lock_guard lock(mutex);
+    conversations.erase(socket);
+  }
+  // Nobody can ask any more; who has asked is answered.
+  void end_conversations() {
+    const std::lock_guard lock(mutex);
+    ends = true;
+    for (const int socket : conversations) ::shutdown(socket, SHUT_RD);
   }
   // Throws why there is none.
   std::string answer(const LocalUser& who, const std::string& question);
@@ -95,6 +125,7 @@ struct LocalSocket::Shared {
   std::condition_variable changed;
   std::map<uid_t, unsigned> of_user;
   unsigned count = 0;
+  std::set<int> conversations;
   unsigned serving = 0;
   bool ends = false;
 };
@@ -134,10 +165,10 @@ void LocalSocket::close() {
   static_cast<void>(!::write(end_.get(), &one, sizeof one));
   thread_.join();
   ::unlink(listener_.path.c_str());
-  listener_.socket.reset();
+  // Who has connected and was not let in may have sent something, too.
+  wire::Errands::of_the_process().close(::geteuid(), std::move(listener_.socket));
   listener_.lock.reset();
-  const std::lock_guard lock(shared_->mutex);
-  shared_->ends = true;
+  shared_->end_conversations();
 }
 
 LocalSocket::~LocalSocket() {
@@ -148,21 +179,36 @@ LocalSocket::~LocalSocket() {
 
 void LocalSocket::run() {
   for (;;) {
-    std::array<pollfd, 2> ends{{{end_.get(), POLLIN, 0}, {listener_.socket.get(), POLLIN, 0}}};
-    if (::poll(ends.data(), ends.size(), -1) < 0) continue;
+    std::erase_if(stuck_, [](uid_t user) { return !is_stuck(user); });
+    // Each that is turned away would keep a descriptor of the link.
+    const bool is_full = !stuck_.empty();
+    std::array<pollfd, 2> ends{
+        {{end_.get(), POLLIN, 0}, {is_full ? -1 : listener_.socket.get(), POLLIN, 0}}};
+    if (::poll(ends.data(), ends.size(), is_full ? kLookAgain : until_errands_are_due()) < 0) {
+      continue;
+    }
     if (ends[0].revents != 0) return;
-    let_in();
+    const std::string lost = wire::Errands::of_the_process().look_after(shm::monotonic_now());
+    if (!lost.empty()) say_sparingly(gateway::Level::kWarning, lost);
+    if (ends[1].revents != 0) let_in();
   }
+}
+
+// What it has sent may take for ever to close.
+void LocalSocket::turn_away(shm::FileDescriptor socket, uid_t user) {
+  wire::hang_up(std::move(socket), user);
+  if (is_stuck(user)) stuck_.insert(user);
 }
 
 // Until it has gone. May be lost for long in the descriptors that a program has sent: it keeps what
 // it needs, and a place of that user.
-void LocalSocket::serve_program(Shared& shared, const LocalUser& who, shm::FileDescriptor socket) {
+void LocalSocket::serve_program(Shared& shared, const LocalUser& who, shm::FileDescriptor& socket) {
   ::setsockopt(socket.get(), SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
   ::setsockopt(socket.get(), SOL_SOCKET, SO_SNDTIMEO, &kPatience, sizeof kPatience);
   std::string packet(wire::kMaxLinkPacket, '\0');
   for (bool is_sent = true; is_sent;) {
     const ssize_t size = ::recv(socket.get(), packet.data(), packet.size(), 0);
+    if (size < 0 && errno == EINTR) continue;  // the link was stopped
     if (size <= 0) break;
     std::string why_not;
     try {
@@ -174,6 +220,7 @@ void LocalSocket::serve_program(Shared& shared, const LocalUser& who, shm::FileD
     }
     if (!why_not.empty()) is_sent = refuse(socket.get(), why_not);
   }
+  shared.end_conversation(socket.get());
   socket.reset();
   shared.give_back_place(who.user);
 }
@@ -189,18 +236,19 @@ void LocalSocket::let_in() {
   try {
     who = wire::user_at(socket.get());
   } catch (const std::system_error&) {  // it has gone
-    return;
+    return turn_away(std::move(socket), kNobody);
   }
-  if (!shared_->take_place(who.user)) {
+  if (!shared_->take_place(who.user, socket.get())) {
     refuse(socket.get(), "too many programs ask the link at once");
-    return;
+    return turn_away(std::move(socket), who.user);
   }
+  auto one = std::make_shared<shm::FileDescriptor>(std::move(socket));
   try {
-    std::thread([shared = shared_, who, one = std::move(socket)]() mutable {
-      serve_program(*shared, who, std::move(one));
-    }).detach();
+    std::thread([shared = shared_, who, one] { serve_program(*shared, who, *one); }).detach();
   } catch (const std::system_error&) {  // no thread is left
+    shared_->end_conversation(one->get());
     shared_->give_back_place(who.user);
+    turn_away(std::move(*one), who.user);
   }
 }
 

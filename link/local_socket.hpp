@@ -3,13 +3,17 @@
 //
 // Any local user may connect, and may be hostile: say nothing, send too much, not read, or send
 // descriptors that take long to close. So each program is served by a thread of its own, and a user
-// may have kMostOfUser at a time; whatever one of them does holds up nobody but its user.
+// may have kMostOfUser at a time; whatever one of them does holds up nobody but its user. Who is
+// not let in may have sent something, too: that is closed as an errand (wire/errands.hpp). If a
+// user has as many as may wait, nobody is let in until some are done, and the link keeps its
+// descriptors.
 //
 // Thread safety: `serve` is called on many threads at once.
 #pragma once
 
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <thread>
 
@@ -36,7 +40,7 @@ class LocalSocket {
   // As close(); and waits for calls of `serve` that have begun.
   ~LocalSocket();
 
-  // Nobody is let in any more, and another link may listen. Does not wait.
+  // Nobody is let in or heard any more, and another link may listen. Does not wait.
   void close();
 
   [[nodiscard]] const std::string& path() const noexcept { return listener_.path; }
@@ -46,11 +50,13 @@ class LocalSocket {
 
   void run();
   void let_in();
-  static void serve_program(Shared& shared, const LocalUser& who, shm::FileDescriptor socket);
+  void turn_away(shm::FileDescriptor socket, uid_t user);
+  static void serve_program(Shared& shared, const LocalUser& who, shm::FileDescriptor& socket);
 
   wire::Listener listener_;
   shm::FileDescriptor end_;  // readable: it is over
   std::shared_ptr<Shared> shared_;
+  std::set<uid_t> stuck_;  // as many errands of theirs wait as may; of the thread
   std::thread thread_;
 };
 

@@ -8,6 +8,7 @@
 #include <future>
 #include <iostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -96,15 +97,18 @@ int run(int argc, char** argv) {
   options.on_round = [] { sd_notify(0, "WATCHDOG=1"); };
   // A program that waits for an answer does not hold up the next link.
   std::vector<std::future<void>> closing;
+  Neighbours known;
   for (bool is_first = true;; is_first = false) {
-    Link link(options);
+    Link link(options, std::move(known));
     if (is_first) sd_notify(0, "READY=1");
     if (link.run(stop.get()) == Link::End::kStopped) return 0;
     std::erase_if(closing, [](const std::future<void>& each) {
       return each.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
     });
+    auto desk = link.take_desk();
+    known = desk->known();
     closing.push_back(
-        std::async(std::launch::async, [desk = link.take_desk()]() mutable { desk.reset(); }));
+        std::async(std::launch::async, [desk = std::move(desk)]() mutable { desk.reset(); }));
   }
 }
 

@@ -18,6 +18,7 @@ bool Neighbours::note(std::uint64_t key, HostCard card, shm::Nanoseconds now) {
   if (known != all_.end()) {
     if (known->card->incarnation != card.incarnation) known->since = now;
     known->card = std::make_shared<const HostCard>(std::move(card));
+    known->heard = now;
     put_in_order();
     return true;
   }
@@ -27,18 +28,20 @@ bool Neighbours::note(std::uint64_t key, HostCard card, shm::Nanoseconds now) {
     if (gone == all_.end()) return false;
     all_.erase(gone);
   }
-  all_.push_back({key, std::make_shared<const HostCard>(std::move(card)), true, now});
+  all_.push_back({key, std::make_shared<const HostCard>(std::move(card)), true, now, now});
   put_in_order();
   return true;
 }
 
-void Neighbours::keep(const std::vector<std::uint64_t>& keys, shm::Nanoseconds now) {
+void Neighbours::keep(std::vector<std::uint64_t> keys, shm::Nanoseconds then) {
   const std::uint64_t before = changes_;
+  std::sort(keys.begin(), keys.end());
   for (Neighbour& each : all_) {
-    const bool is_there = std::find(keys.begin(), keys.end(), each.key) != keys.end();
-    if (!each.is_up || is_there) continue;
+    if (!each.is_up || each.heard >= then) continue;
+    if (std::binary_search(keys.begin(), keys.end(), each.key)) continue;
     each.is_up = false;
-    each.since = now;
+    each.key = 0;
+    each.since = then;
     ++changes_;
   }
   std::set<std::string_view> up;
@@ -47,7 +50,7 @@ void Neighbours::keep(const std::vector<std::uint64_t>& keys, shm::Nanoseconds n
   }
   changes_ += std::erase_if(all_, [&](const Neighbour& each) {
     // The later: its next life is here already.
-    return !each.is_up && (now - each.since >= kRemembered || up.contains(each.card->host));
+    return !each.is_up && (then - each.since >= kRemembered || up.contains(each.card->host));
   });
   if (changes_ != before) put_in_order();
 }

@@ -15,10 +15,11 @@
 namespace arbiter::link {
 
 struct Neighbour {
-  std::uint64_t key = 0;                 // by which the transport knows its card's writer
+  std::uint64_t key = 0;  // by which the transport knows its card's writer; 0: it is gone
   std::shared_ptr<const HostCard> card;  // never null; copies cost little, however large it is
   bool is_up = true;
   shm::Nanoseconds since = 0;  // that it is up, or gone
+  shm::Nanoseconds heard = 0;  // when its card came
 };
 
 class Neighbours {
@@ -29,8 +30,9 @@ class Neighbours {
 
   // The card of a writer that is there. False: there is no place for another host.
   bool note(std::uint64_t key, HostCard card, shm::Nanoseconds now);
-  // The writers that are there now: whose is not among them is gone.
-  void keep(const std::vector<std::uint64_t>& keys, shm::Nanoseconds now);
+  // All writers that were there at that time, or later: whose is not among them is gone. Who has
+  // been heard since then may have come after they were counted, and is left alone.
+  void keep(std::vector<std::uint64_t> keys, shm::Nanoseconds then);
 
   // In the order of names, those that are up first.
   [[nodiscard]] const std::vector<Neighbour>& all() const noexcept { return all_; }

@@ -31,6 +31,9 @@ class TrainPace {
   static constexpr shm::Nanoseconds kSettles = 10'000'000;
   static constexpr double kDoublesWithin = 256e6;  // bytes
 
+  // `repeated`: as leave() has it, before anything leaves.
+  explicit TrainPace(std::uint64_t repeated = 0) noexcept : repeated_(repeated) {}
+
   // `bytes` leave now; `repeated`: how many datagrams have been repeated so far. How long what
   // follows has to wait.
   [[nodiscard]] shm::Nanoseconds leave(std::size_t bytes, std::uint64_t repeated,
@@ -55,7 +58,7 @@ class TrainPace {
   double pace_ = kFirst;
   shm::Nanoseconds gone_ = 0;  // when all that has left would have left at that pace
   shm::Nanoseconds lowered_ = 0;
-  std::uint64_t repeated_ = 0;
+  std::uint64_t repeated_;
 };
 
 }  // namespace arbiter::link

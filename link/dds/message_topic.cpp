@@ -3,7 +3,6 @@
 #include <dds/ddsi/ddsi_sertype.h>
 
 #include <algorithm>
-#include <array>
 #include <new>
 #include <utility>
 
@@ -18,8 +17,8 @@ namespace {
 constexpr std::int32_t kMostUnheard = 12;
 // Until what was sent before is through, where it is much.
 constexpr dds_duration_t kMessageWait = DDS_MSECS(200);
-// A bound of what is looked at, on a network where anybody may write.
-constexpr std::size_t kMostWriters = 256;
+// Usually enough, so that one question is.
+constexpr std::size_t kUsualWriters = 64;
 
 gateway::dds::CycloneQos qos_of(Delivery delivery) {
   gateway::dds::CycloneQos qos(dds_create_qos());
@@ -72,12 +71,18 @@ bool MessageTopic::send(const ByteString& message) noexcept {
   return payload != nullptr && dds_writecdr(writer_.get(), &payload->cyclone) == DDS_RETCODE_OK;
 }
 
+// A part of them would not do: hosts outside of it would be taken for gone. A number costs next to
+// nothing beside what Cyclone keeps of the writer.
 std::vector<std::uint64_t> MessageTopic::writers() const {
-  std::array<dds_instance_handle_t, kMostWriters> writers{};
-  const dds_return_t found =
-      dds_get_matched_publications(reader_.get(), writers.data(), writers.size());
-  const std::size_t count = found < 0 ? 0 : static_cast<std::size_t>(found);
-  return {writers.begin(), writers.begin() + std::min(count, writers.size())};
+  std::vector<dds_instance_handle_t> writers(kUsualWriters);
+  for (;;) {
+    const dds_return_t found =
+        dds_get_matched_publications(reader_.get(), writers.data(), writers.size());
+    const std::size_t count = found < 0 ? 0 : static_cast<std::size_t>(found);
+    const bool are_all = count <= writers.size();
+    writers.resize(are_all ? count : 2 * count);  // others may be coming
+    if (are_all) return writers;
+  }
 }
 
 void MessageTopic::take(const gateway::dds::Payload& payload,

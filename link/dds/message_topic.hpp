@@ -40,7 +40,7 @@ class MessageTopic : private gateway::dds::SampleTaker {
   // Any thread; waits for 0.2 s at most, and only a message does. False: memory is short, or what
   // was sent before is not through yet.
   bool send(const ByteString& message) noexcept;
-  // The writers of others that are there now.
+  // The writers of others that are there now: all of them, however many.
   [[nodiscard]] std::vector<std::uint64_t> writers() const;
 
  private:

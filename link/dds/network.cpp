@@ -27,15 +27,21 @@ namespace {
 // HeartbeatInterval, AutoReschedNackDelay: what a network has lost is asked for again within that
 // time. By default a writer that is not answered asks less and less often, at last every 8 s, and a
 // reader that is not waits for 3 s; discovery is several such conversations, one after another.
+// WriterLingerDuration: for so long at most the end of a source waits for hosts that do not
+// acknowledge; that it has ended, they learn from discovery.
 constexpr const char* kForAll =
     "<General><MaxMessageSize>1400B</MaxMessageSize><FragmentSize>1300B</FragmentSize></General>"
     "<Internal><SocketReceiveBufferSize max=\"8MiB\"/></Internal>"
     "<Discovery><LeaseDuration>1500ms</LeaseDuration><SPDPInterval>250ms</SPDPInterval></"
     "Discovery><Internal><HeartbeatInterval max=\"500ms\">100ms</HeartbeatInterval>"
-    "<AutoReschedNackDelay>500ms</AutoReschedNackDelay></Internal>";
+    "<AutoReschedNackDelay>500ms</AutoReschedNackDelay>"
+    "<WriterLingerDuration>100ms</WriterLingerDuration></Internal>";
 
 // With its address, Cyclone ends within it, but for samples that nobody acknowledges.
-constexpr std::chrono::seconds kEndsWithin{1};
+constexpr std::chrono::milliseconds kEndsWithin{1000};
+// Without it: for what goes before its threads. Once they are woken they do not rest until they
+// end.
+constexpr std::chrono::milliseconds kEndsCutOffWithin{50};
 
 // This process's, in order. Where they cannot be listed: none.
 std::vector<int> datagram_sockets() {
@@ -84,12 +90,12 @@ Domain::Domain(const NetworkOptions& options) {
 }
 
 Domain::~Domain() {
-  if (is_cut_off_) wake_receivers();
   std::promise<void> deleted;  // the address may go even now
   std::future<void> watch;
   try {
     watch = std::async(std::launch::async, [this, over = deleted.get_future()] {
-      if (over.wait_for(kEndsWithin) == std::future_status::timeout) wake_receivers();
+      const auto within = is_cut_off_ ? kEndsCutOffWithin : kEndsWithin;
+      if (over.wait_for(within) == std::future_status::timeout) wake_receivers();
     });
   } catch (const std::exception&) {  // there is no thread to be had
     wake_receivers();

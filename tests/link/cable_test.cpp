@@ -12,6 +12,7 @@
 #include "tests/client/models.hpp"
 #include "tests/link/cables.hpp"
 #include "tests/link/robot.hpp"
+#include "wire/link_call.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -176,6 +177,37 @@ TEST_F(Cable, AnInterfaceThatGoesAndComesBackIsUsedAgain) {
         robot.cables.connect(robot.head_network, kHead);
       },
       "joining the network again");
+}
+
+// Who switches all hosts is told of one that is gone, whatever this link has been through since.
+TEST_F(Cable, ALinkThatJoinsAgainRemembersWhoIsGone) {
+  CabledRobot robot;
+  Host head("head", robot.runtime, kNoRules, robot.arguments(), robot.head_network.enter());
+  Host base("base", robot.runtime, kNoRules, robot.arguments(), robot.base_network.enter());
+  const auto is_base = [](wire::HostOutcome outcome) {
+    try {
+      for (const auto& each : wire::LinkCall("head").ask_hosts({wire::kAllHosts, "model"})) {
+        if (each.host == "base") return each.outcome == outcome;
+      }
+    } catch (const wire::CallError&) {  // the link joins just now
+    }
+    return false;
+  };
+  await([&] { return is_base(wire::HostOutcome::kAnswered); });
+  base.link().signal(SIGTERM);
+  EXPECT_EQ(base.link().wait(), 0);
+  await([&] { return is_base(wire::HostOutcome::kGone); });
+  robot.head_network.ip("addr del 10.77.0.1/24 dev eth0");
+  head.see("trying again");
+  robot.head_network.ip("addr add 10.77.0.1/24 dev eth0");
+  await([] {
+    try {
+      return wire::read_hosts(wire::LinkCall("head").ask({"", "hosts"})).network.has_value();
+    } catch (const wire::CallError&) {  // the link joins just now
+      return false;
+    }
+  });
+  await([&] { return is_base(wire::HostOutcome::kGone); });
 }
 
 // Cyclone's threads wait for datagrams that cannot come any more.

@@ -40,23 +40,23 @@ TEST_F(FailingHosts, TheImportersLinkThatDiesIsSilenceToo) {
 // A link that was stopped sends what has waited for it. All of it is older than T by then.
 TEST_F(FailingHosts, NothingThatWaitedForAStoppedExporterArrives) {
   body_.drive(planner_);
-  head_.link().signal(SIGSTOP);
+  head_.link().stop();
   for (int i = 0; i < 10; ++i) planner_.publish();
   const std::int64_t waited = planner_.published();
   await([&] { return !head_.daemon().source(kPlanner)["active"]; });
   body_.fall_back();
-  head_.link().signal(SIGCONT);
+  head_.link().resume();
   EXPECT_GT(body_.drive(planner_), waited);
 }
 
 TEST_F(FailingHosts, NothingThatWaitedForAStoppedImporterArrives) {
   body_.drive(planner_);
-  base_.link().signal(SIGSTOP);
+  base_.link().stop();
   for (int i = 0; i < 10; ++i) planner_.publish();
   const std::int64_t waited = planner_.published();
   await([&] { return !head_.daemon().source(kPlanner)["active"]; });
   body_.fall_back();
-  base_.link().signal(SIGCONT);
+  base_.link().resume();
   EXPECT_GT(body_.drive(planner_), waited);
 }
 

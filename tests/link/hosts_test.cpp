@@ -212,9 +212,17 @@ TEST_F(KnownHosts, TheWinnersOfAPortOfAnotherOneAreFollowed) {
   const shm::FileDescriptor seen(::memfd_create("follow", MFD_CLOEXEC));
   ChildProcess follow({std::string(ARBITER_PROGRAMS) + "/arbiter", "why", kMotor, "--follow",
                        "--count", "1", "--instance", "head"},
-                      {}, {-1, seen.get(), -1});
+                      {}, {-1, seen.get(), seen.get()});
   const auto text = [&] { return content_of("/proc/self/fd/" + std::to_string(seen.get())); };
-  await([&] { return text().find("on host base: /Planner/speed:o") != std::string::npos; });
+  const auto await_text = [&](const std::string& what) {
+    await([&] { return text().find(what) != std::string::npos; });
+  };
+  await_text("on host base: /Planner/speed:o");
+  head.link().kill();
+  await_text("no arbiter-link of instance \"head\" runs");
+  head.start_link();
+  await_text("host base answers");
+  body.drive(planner);
   planner.port().deactivate();
   EXPECT_EQ(follow.wait(), 0);
   EXPECT_THAT(text(), HasSubstr("/Planner/speed:o -> idle  because /Planner/speed:o became "
@@ -236,10 +244,10 @@ TEST_F(KnownHosts, AreBoxesInALivePicture) {
   // As its own host knows it, with what this one knows of its age.
   await([&] { return drawn_on_base("● /Planner/speed:o ("); });
   EXPECT_TRUE(drawn_on_base("▶ /Planner/speed:o"));
-  head.daemon().process().signal(SIGSTOP);
+  head.daemon().process().stop();
   await([&] { return !drawn_on_base("● /Planner/speed:o ("); });
   EXPECT_TRUE(drawn_on_base("▶ /Planner/speed:o")) << "decided here";
-  head.daemon().process().signal(SIGCONT);
+  head.daemon().process().resume();
   await([&] { return drawn_on_base("● /Planner/speed:o ("); });
   head.link().signal(SIGKILL);
   await([&] { return drawn_on_base("gone for "); });
@@ -250,9 +258,9 @@ TEST_F(KnownHosts, OneWhoseDaemonIsStoppedIsNamed) {
   Host head("head", runtime_, kNoRules, network());
   Host base("base", runtime_, kNoRules, network());
   await_host("base", "head");
-  head.daemon().process().signal(SIGSTOP);
+  head.daemon().process().stop();
   const ProgramResult all = run_arbiter("base", {"status", "--all"});
-  head.daemon().process().signal(SIGCONT);
+  head.daemon().process().resume();
   EXPECT_EQ(all.exit_code, 1);
   EXPECT_THAT(all.err, HasSubstr("host head "));
   EXPECT_THAT(all.out, HasSubstr("== host base (this one) =="));
@@ -263,10 +271,10 @@ TEST_F(KnownHosts, OneWhoseLinkIsStoppedIsSilent) {
   Host head("head", runtime_, kNoRules, network());
   Host base("base", runtime_, kNoRules, network());
   await_host("base", "head");
-  head.link().signal(SIGSTOP);
+  head.link().stop();
   wire::LinkCall link("base");
   const auto answers = link.ask_hosts({"head", "status"});
-  head.link().signal(SIGCONT);
+  head.link().resume();
   ASSERT_EQ(answers.size(), 1U);
   EXPECT_TRUE(answers[0].outcome == HostOutcome::kSilent ||
               answers[0].outcome == HostOutcome::kGone)

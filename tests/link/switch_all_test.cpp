@@ -106,9 +106,9 @@ TEST_F(SwitchAll, IfOneCannotNoneDoes) {
 }
 
 TEST_F(SwitchAll, AHostThatIsSilentMeansThatNoneDoes) {
-  hosts_.at("cam").link().signal(SIGSTOP);
+  hosts_.at("cam").link().stop();
   const auto result = arbiter({"switch", "rest", "--all", "--instance", "arm"});
-  hosts_.at("cam").link().signal(SIGCONT);
+  hosts_.at("cam").link().resume();
   EXPECT_EQ(result.exit_code, 1) << result.out;
   EXPECT_THAT(result.out, HasSubstr("cam   not switched: it"));
   EXPECT_THAT(in_force(), Each("default"));
@@ -174,6 +174,19 @@ TEST_F(SwitchAll, OfTwoOperatorsOneSwitchesOrNone) {
       EXPECT_EQ(names[0], before);
     }
   }
+}
+
+// It knows nobody at first, and must not go ahead alone.
+TEST_F(SwitchAll, ALinkThatHasJustJoinedItsNetworkPassesOverNobody) {
+  hosts_.at("arm").link().kill();
+  hosts_.at("arm").start_link();
+  ProgramResult result;
+  await([&] {
+    result = arbiter({"switch", "rest", "--all", "--instance", "arm"});
+    return result.err.find("no arbiter-link") == std::string::npos &&
+           result.err.find("has not joined") == std::string::npos;
+  });
+  EXPECT_THAT(result.out, AllOf(HasSubstr("arm "), HasSubstr("base "), HasSubstr("cam ")));
 }
 
 TEST_F(SwitchAll, WithoutALinkItIsAnError) {

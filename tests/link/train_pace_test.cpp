@@ -55,6 +55,13 @@ TEST(TrainPace, RisesWhileNothingIsRepeated) {
   EXPECT_EQ(sender.pace.pace(), TrainPace::kFastest);
 }
 
+// What was repeated before it began says nothing.
+TEST(TrainPace, BeginsWithWhatHasBeenRepeatedBefore) {
+  TrainPace pace(1000);
+  static_cast<void>(pace.leave(kPaceTrain, 1000, kPaceSecond));
+  EXPECT_GE(pace.pace(), TrainPace::kFirst);
+}
+
 // All of a burst that was lost is repeated, which says one thing only.
 TEST(TrainPace, IsLoweredOnceForALoss) {
   TrainPace pace;

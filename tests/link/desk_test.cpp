@@ -1,0 +1,79 @@
+// What a link knows and is asked while it has not joined its network: link/desk.hpp.
+#include "link/desk.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "shm/clock.hpp"
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/link/scene.hpp"
+#include "wire/link_call.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+link::HostCard card_of(const std::string& host, link::Incarnation incarnation) {
+  link::HostCard card;
+  card.host = host;
+  card.instance = host;
+  card.version = "1.2";
+  card.incarnation = incarnation;
+  return card;
+}
+
+// Of a link that waits for its daemon, or for its network.
+class DeskWithoutANetwork : public testing::Test {
+ protected:
+  const TemporaryDirectory runtime_;
+  const ScopedVariable directory_{"RUNTIME_DIRECTORY", runtime_.path()};
+};
+
+TEST_F(DeskWithoutANetwork, ForgetsWhoHasBeenGoneForLong) {
+  const shm::Nanoseconds now = shm::monotonic_now();
+  const shm::Nanoseconds long_ago = now - link::Neighbours::kRemembered;
+  link::Neighbours known;
+  known.note(1, card_of("head", 11), long_ago - 1);
+  known.note(2, card_of("rear", 12), long_ago - 1);
+  known.keep({2}, long_ago);
+  known.keep({}, now - 1);
+  ASSERT_EQ(known.all().size(), 2U);
+  link::Desk desk(card_of("base", 1), known);
+  desk.look({});
+  const link::Neighbours left = desk.known();
+  ASSERT_EQ(left.all().size(), 1U);
+  EXPECT_EQ(left.all()[0].card->host, "rear");
+}
+
+// It would go ahead alone, and say that all have switched.
+TEST_F(DeskWithoutANetwork, DoesNotSwitchAllHosts) {
+  link::Desk desk(card_of("base", 1), {});
+  link::OwnHost own;
+  own.waits_for = "eth0 is down";
+  desk.look(own);
+  const auto result = arbiter({"switch", "rest", "--all", "--instance", "base"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, IsEmpty());
+  EXPECT_THAT(result.err, HasSubstr("this link has not joined its network yet, and does not know "
+                                    "the other hosts: eth0 is down"));
+}
+
+TEST_F(DeskWithoutANetwork, AnswersForItsOwnHost) {
+  link::Desk desk(card_of("base", 1), {});
+  desk.answers().add("where", "observe", [](const link::Question&) {
+    return link::Answer{false, "here"};
+  });
+  desk.look({});
+  wire::LinkCall link("base");
+  const auto answers = link.ask_hosts({wire::kAllHosts, "where"});
+  ASSERT_EQ(answers.size(), 1U);
+  EXPECT_EQ(answers[0].text, "here");
+  const auto result = arbiter({"status", "--all", "--instance", "base"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("the link has not joined its network yet"));
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,167 @@
+// How conversations with programs of this host end: link/local_socket.hpp.
+#include "link/local_socket.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <csignal>
+#include <future>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/link/scene.hpp"
+#include "tests/support/daemon.hpp"
+#include "tests/support/error_of.hpp"
+#include "tests/support/lingering.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "wire/errands.hpp"
+#include "wire/hosts.hpp"
+#include "wire/link_call.hpp"
+#include "wire/rendezvous.hpp"
+
+namespace arbiter::test {
+namespace {
+
+// A program that goes on asking on one connection.
+class Asker {
+ public:
+  Asker() {
+    std::string why_not;
+    auto socket = wire::connect_to_link("here", why_not);
+    if (socket) socket_ = std::move(*socket);
+    EXPECT_TRUE(socket_) << why_not;
+  }
+  void ask() const {
+    const std::string question = wire::write_link_question({"", "hosts"});
+    static_cast<void>(::send(socket_.get(), question.data(), question.size(), MSG_NOSIGNAL));
+  }
+  // False: it has hung up.
+  [[nodiscard]] bool is_answered() const {
+    std::string bytes(wire::kMaxLinkPacket, '\0');
+    return ::recv(socket_.get(), bytes.data(), bytes.size(), 0) > 0;
+  }
+
+ private:
+  shm::FileDescriptor socket_;
+};
+
+class LocalSocketOfALink : public testing::Test {
+ protected:
+  const TemporaryDirectory runtime_;
+  const ScopedVariable directory_{"RUNTIME_DIRECTORY", runtime_.path()};
+};
+
+TEST_F(LocalSocketOfALink, EndsItsConversationsWhenItCloses) {
+  link::LocalSocket socket(
+      "here", [](const link::LocalUser&, const wire::LinkQuestion&) { return std::string("{}"); });
+  const Asker asker;
+  asker.ask();
+  EXPECT_TRUE(asker.is_answered());
+  socket.close();
+  asker.ask();
+  EXPECT_FALSE(asker.is_answered());
+}
+
+// Who knows that may say that nothing has happened.
+TEST_F(LocalSocketOfALink, WhoeverAsksWhenItHasClosedKnowsThatNobodyWasAsked) {
+  link::LocalSocket socket(
+      "here", [](const link::LocalUser&, const wire::LinkQuestion&) { return std::string("{}"); });
+  wire::LinkCall call("here");
+  EXPECT_EQ(call.ask({"", "hosts"}), "{}");
+  socket.close();
+  EXPECT_THROW(static_cast<void>(call.ask({"", "hosts"})), wire::NotAskedError);
+}
+
+TEST_F(LocalSocketOfALink, SaysWhyItTurnsSomebodyAway) {
+  link::LocalSocket socket(
+      "here", [](const link::LocalUser&, const wire::LinkQuestion&) { return std::string("{}"); });
+  std::vector<wire::LinkCall> calls;
+  for (unsigned i = 0; i < link::LocalSocket::kMostOfUser; ++i) {
+    EXPECT_EQ(calls.emplace_back("here").ask({"", "hosts"}), "{}");
+  }
+  wire::LinkCall one_more("here");
+  EXPECT_EQ(error_of([&] {
+              static_cast<void>(one_more.ask({"", "hosts"}));
+            }),
+            "too many programs ask the link at once");
+}
+
+TEST_F(LocalSocketOfALink, AnswersWhoHasAskedBeforeItCloses) {
+  std::promise<void> asked;
+  std::promise<void> closed;
+  link::LocalSocket socket("here", [&](const link::LocalUser&, const wire::LinkQuestion&) {
+    asked.set_value();
+    closed.get_future().wait();
+    return std::string("{}");
+  });
+  const Asker asker;
+  asker.ask();
+  asked.get_future().wait();
+  socket.close();
+  closed.set_value();
+  EXPECT_TRUE(asker.is_answered());
+  EXPECT_FALSE(asker.is_answered());
+}
+
+// Programs of this host send the link what takes for ever to close.
+class LocalSocketAndWhatLingers : public LoopbackHosts {
+ protected:
+  // More than are let in: these keep their places. The link is the last to close what they send,
+  // and has read none of it.
+  LocalSocketAndWhatLingers() {
+    std::optional<shm::FileDescriptor> first;  // once the link can be asked
+    await([&] { return (first = connect()).has_value(); });
+    base_.link().stop();
+    for (Lingering& each : many_) {
+      sent_.push_back(sent_.empty() ? std::move(*first) : connect().value());
+      EXPECT_TRUE(
+          try_to_send_with(sent_.back().get(), std::as_bytes(std::span("?")), {each.get()}));
+      each.close();
+    }
+  }
+  static std::optional<shm::FileDescriptor> connect() {
+    std::string why_not;
+    return wire::connect_to_link("base", why_not);
+  }
+
+  Host base_{"base", runtime_, kNoRules, network()};
+  std::vector<Lingering> many_{link::LocalSocket::kMostOfUser + wire::Errands::kMaxLostOfAUser + 2};
+  std::vector<shm::FileDescriptor> sent_;
+};
+
+TEST_F(LocalSocketAndWhatLingers, OthersAreHeardMeanwhile) {
+  base_.link().resume();
+  base_.see("4 of 4");
+  std::string said(wire::kMaxLinkPacket, '\0');
+  const auto one_more = connect().value();
+  EXPECT_GT(::recv(one_more.get(), said.data(), said.size(), 0), 0);
+  EXPECT_NE(said.find("too many programs"), std::string::npos);
+  for (Lingering& each : many_) each.release();
+  await([] {
+    try {
+      return wire::read_hosts(wire::LinkCall("base").ask({"", "hosts"})).host == "base";
+    } catch (const wire::CallError&) {  // their places are not free yet
+      return false;
+    }
+  });
+}
+
+TEST_F(LocalSocketAndWhatLingers, TheLinkEndsMeanwhile) {
+  base_.link().resume();
+  base_.see("4 of 4");
+  base_.link().signal(SIGTERM);
+  EXPECT_EQ(base_.link().wait(), 0);
+}
+
+// Perhaps before it has let anybody in.
+TEST_F(LocalSocketAndWhatLingers, TheLinkEndsBeforeItHasHeardThem) {
+  base_.link().signal(SIGTERM);
+  base_.link().resume();
+  EXPECT_EQ(base_.link().wait(), 0);
+}
+
+}  // namespace
+}  // namespace arbiter::test

@@ -1,0 +1,158 @@
+// What links ask each other, by injected time: link/core/questions.hpp.
+#include "link/core/questions.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/link/messages_and_times.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using namespace link;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+TEST(QuestionMessages, AreReadAsTheyWereWritten) {
+  const QuestionMessage question{5, 9, {6, 7}, "head", "status", "all of it"};
+  const auto read = read_question(as_bytes(write_question(question)));
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->asker, 5U);
+  EXPECT_EQ(read->number, 9U);
+  EXPECT_THAT(read->asked, ElementsAre(6U, 7U));
+  EXPECT_EQ(read->host, "head");
+  EXPECT_EQ(read->verb, "status");
+  EXPECT_EQ(read->argument, "all of it");
+  const AnswerMessage answer{6, 5, 9, true, std::string(100'000, 'x')};
+  const auto given = read_answer(as_bytes(write_answer(answer)));
+  ASSERT_TRUE(given);
+  EXPECT_TRUE(given->is_refusal);
+  EXPECT_EQ(given->text, answer.text);
+}
+
+TEST(QuestionMessages, AreRefusedWhereTheyExceedTheirBounds) {
+  const auto is_read = [](QuestionMessage question) {
+    return read_question(as_bytes(write_question(question))).has_value();
+  };
+  EXPECT_TRUE(is_read({5, 9, {6}, "head", "status", {}}));
+  EXPECT_FALSE(is_read({0, 9, {6}, "head", "status", {}}));
+  EXPECT_FALSE(is_read({5, 0, {6}, "head", "status", {}}));
+  EXPECT_FALSE(is_read({5, 9, {}, "head", "status", {}}));
+  EXPECT_FALSE(is_read({5, 9, {6}, "he/ad", "status", {}}));
+  EXPECT_FALSE(is_read({5, 9, {6}, "head", "Status", {}}));
+  EXPECT_FALSE(is_read({5, 9, {6}, "head", std::string(kMaxVerb + 1, 'x'), {}}));
+  EXPECT_FALSE(is_read({5, 9, {6}, "head", "status", std::string(kMaxArgument + 1, 'x')}));
+  EXPECT_FALSE(is_read({5, 9, std::vector<Incarnation>(kMaxAsked + 1, 6), "head", "status", {}}));
+}
+
+TEST(OpenQuestion, IsSilentAfterASecond) {
+  OpenQuestions open;
+  const auto number = open.ask({6, 7}, kS);
+  EXPECT_TRUE(open.note({6, 5, number, false, "here"}, kS + 3 * kMs));
+  EXPECT_FALSE(open.is_over(number, kS + OpenQuestions::kPatience - 1));
+  EXPECT_TRUE(open.is_over(number, kS + OpenQuestions::kPatience));
+  const auto replies = open.take(number);
+  EXPECT_EQ(replies.at(6).outcome, OpenQuestions::Outcome::kAnswered);
+  EXPECT_EQ(replies.at(6).took, 3 * kMs);
+  EXPECT_EQ(replies.at(6).text, "here");
+  EXPECT_EQ(replies.at(7).outcome, OpenQuestions::Outcome::kSilent);
+}
+
+TEST(OpenQuestion, HearsOnlyWhoWasAskedAndOnce) {
+  OpenQuestions open;
+  const auto number = open.ask({6}, kS);
+  EXPECT_FALSE(open.note({8, 5, number, false, "a stranger"}, kS));
+  EXPECT_FALSE(open.note({6, 5, number + 1, false, "another question"}, kS));
+  EXPECT_TRUE(open.note({6, 5, number, true, "no"}, kS));
+  EXPECT_FALSE(open.note({6, 5, number, false, "yes after all"}, kS));
+  EXPECT_TRUE(open.is_over(number, kS));
+  EXPECT_EQ(open.take(number).at(6).outcome, OpenQuestions::Outcome::kRefused);
+  EXPECT_FALSE(open.note({6, 5, number, false, "late"}, kS)) << "nobody waits any more";
+}
+
+TEST(OpenQuestion, IsAskedAgainUntilItIsAnswered) {
+  OpenQuestions open;
+  const auto number = open.ask({6, 7}, kS);
+  EXPECT_THAT(open.due(number, kS + OpenQuestions::kAskAgain - 1), IsEmpty());
+  open.note({7, 5, number, false, "here"}, kS);
+  EXPECT_THAT(open.due(number, kS + OpenQuestions::kAskAgain), ElementsAre(6U));
+  EXPECT_THAT(open.due(number, kS + OpenQuestions::kAskAgain + 1), IsEmpty());
+  EXPECT_THAT(open.due(number, kS + 2 * OpenQuestions::kAskAgain), ElementsAre(6U));
+}
+
+TEST(OpenQuestion, WaitsInBoundedNumber) {
+  OpenQuestions open;
+  for (std::size_t i = 0; i < OpenQuestions::kMost; ++i) EXPECT_NE(open.ask({6}, kS), 0U);
+  EXPECT_EQ(open.ask({6}, kS), 0U);
+  static_cast<void>(open.take(1));
+  EXPECT_NE(open.ask({6}, kS), 0U);
+}
+
+TEST(OpenQuestion, KeepsABoundedNumberOfBytesOfAllAnswersTogether) {
+  OpenQuestions open;
+  const std::size_t most = OpenQuestions::kMostBytes / kMaxAnswer;
+  std::vector<Incarnation> asked;
+  for (Incarnation each = 1; each <= most + 1; ++each) asked.push_back(each);
+  const auto number = open.ask(asked, kS);
+  const std::string large(kMaxAnswer, 'x');
+  for (const Incarnation each : asked) EXPECT_TRUE(open.note({each, 5, number, false, large}, kS));
+  const auto replies = open.take(number);
+  EXPECT_EQ(replies.at(most).outcome, OpenQuestions::Outcome::kAnswered);
+  EXPECT_EQ(replies.at(most + 1).outcome, OpenQuestions::Outcome::kRefused);
+  const auto next = open.ask({6}, kS);
+  EXPECT_TRUE(open.note({6, 5, next, false, large}, kS));
+  EXPECT_EQ(open.take(next).at(6).outcome, OpenQuestions::Outcome::kAnswered);
+}
+
+TEST(AskingLinks, AreAnsweredOnceAndNotTooOften) {
+  using Verdict = Askers::Verdict;
+  Askers askers;
+  EXPECT_EQ(askers.judge(5, 5, 1, 10 * kS), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 5, 1, 10 * kS), Verdict::kRepeated);
+  for (std::uint64_t number = 2; number <= Askers::kMostOfOne; ++number) {
+    EXPECT_EQ(askers.judge(5, 5, number, 10 * kS), Verdict::kAnswer);
+  }
+  EXPECT_EQ(askers.judge(5, 5, 100, 10 * kS), Verdict::kTooMany);
+  EXPECT_EQ(askers.judge(6, 6, 1, 10 * kS), Verdict::kAnswer) << "another one";
+  EXPECT_EQ(askers.judge(5, 5, 100, 11 * kS), Verdict::kAnswer)
+      << "what was not answered may come again";
+  EXPECT_EQ(askers.judge(5, 5, 99, 12 * kS), Verdict::kRepeated);
+}
+
+TEST(AskingLinks, AllTogetherHaveAQuota) {
+  Askers askers;
+  std::uint32_t answered = 0;
+  for (Incarnation asker = 1; asker <= 1000; ++asker) {
+    if (askers.judge(asker, asker, 1, 10 * kS) == Askers::Verdict::kAnswer) ++answered;
+  }
+  EXPECT_EQ(answered, Askers::kMostOfAll);
+  EXPECT_EQ(askers.judge(2000, 2000, 1, 11 * kS), Askers::Verdict::kAnswer);
+}
+
+TEST(AskingLinks, NobodyAsksInAnothersName) {
+  Askers askers;
+  using Verdict = Askers::Verdict;
+  EXPECT_EQ(askers.judge(5, 50, 1, 10 * kS), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 66, 1000, 10 * kS), Verdict::kInAnothersName);
+  EXPECT_EQ(askers.judge(5, 50, 2, 11 * kS), Verdict::kAnswer) << "it is heard all the same";
+  EXPECT_EQ(askers.judge(5, 50, 2, 12 * kS), Verdict::kRepeated);
+  EXPECT_EQ(askers.judge(5, 66, 1, 13 * kS), Verdict::kInAnothersName) << "it has just repeated it";
+  EXPECT_EQ(askers.judge(5, 66, 1, 12 * kS + Askers::kOtherWriter), Verdict::kAnswer);
+}
+
+// The transport has lost its writer after a lease, and found it again as another one.
+TEST(AskingLinks, ALinkThatWasCutOffIsAnsweredAsSoonAsItIsFoundAgain) {
+  constexpr shm::Nanoseconds kLease = 1'500'000'000;  // dds/network.cpp
+  Askers askers;
+  using Verdict = Askers::Verdict;
+  EXPECT_EQ(askers.judge(5, 50, 7, 10 * kS), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 51, 8, 10 * kS + kLease), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 50, 9, 10 * kS + kLease), Verdict::kInAnothersName)
+      << "the name is the new writer's";
+}
+
+}  // namespace
+}  // namespace arbiter::test
