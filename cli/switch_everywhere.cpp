@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "shm/utf8.hpp"
-#include "wire/call.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -65,21 +64,28 @@ void note_commit(HostSwitch& host, const HostAnswer& each) {
   }
 }
 
+void note_that_none_switches(SwitchEverywhere& result) {
+  for (HostSwitch& host : result.hosts) {
+    if (host.has_prepared) host.why = "it was prepared, and keeps its model";
+  }
+}
+
 void commit(const wire::SwitchRequest& request, const AskHosts& ask, SwitchEverywhere& result) {
+  std::vector<HostAnswer> answers;
+  std::string why_unknown = "it is not there any longer";
+  try {
+    answers = ask(wire::kCommitVerb, wire::write_switch_request(request));
+  } catch (const wire::NotAskedError& error) {
+    result.why_none = error.what();
+    return note_that_none_switches(result);    // the promises end by themselves
+  } catch (const std::runtime_error& error) {  // or its answers cannot be read
+    why_unknown = error.what();
+  }
   result.is_committed = true;
   for (HostSwitch& host : result.hosts) {
     if (!host.has_prepared) continue;
     host.outcome = SwitchOutcome::kUnknown;
-    host.why = "it is not there any longer";
-  }
-  std::vector<HostAnswer> answers;
-  try {
-    answers = ask(wire::kCommitVerb, wire::write_switch_request(request));
-  } catch (const std::runtime_error& error) {  // or its answers cannot be read
-    for (HostSwitch& host : result.hosts) {
-      if (host.has_prepared) host.why = error.what();
-    }
-    return;
+    host.why = why_unknown;
   }
   for (const HostAnswer& each : answers) {
     const auto host =
@@ -175,9 +181,7 @@ SwitchEverywhere switch_everywhere(const wire::SwitchRequest& request, const Ask
     commit(request, ask, result);
     find_out(request, look, result);
   } else if (has_any) {
-    for (HostSwitch& host : result.hosts) {
-      if (host.has_prepared) host.why = "it was prepared, and keeps its model";
-    }
+    note_that_none_switches(result);
     // Otherwise they would be held for two seconds.
     try {
       static_cast<void>(ask(wire::kReleaseVerb, text));

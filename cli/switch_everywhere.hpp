@@ -37,6 +37,7 @@ struct HostSwitch {
 
 struct SwitchEverywhere {
   bool is_committed = false;      // else none has switched
+  std::string why_none;           // although all have prepared; for people
   std::vector<HostSwitch> hosts;  // in the order of their names
   shm::Nanoseconds interval = 0;  // from the first commit to the last answer, as seen here
 
@@ -45,7 +46,8 @@ struct SwitchEverywhere {
   [[nodiscard]] bool is_whole() const;
 };
 
-// The question of that verb to all hosts: wire::LinkCall::ask_hosts(). May throw wire::CallError.
+// The question of that verb to all hosts: wire::LinkCall::ask_hosts(). May throw wire::CallError;
+// a wire::NotAskedError says that no host has been asked.
 using AskHosts =
     std::function<std::vector<wire::HostAnswer>(const std::string& verb, const std::string& text)>;
 

@@ -46,7 +46,9 @@ void write_text(const SwitchEverywhere& result, const std::string& model) {
   std::cout << std::flush;
   const std::size_t switched = result.count(SwitchOutcome::kSwitched);
   if (!result.is_committed) {
-    const std::string why = result.hosts.empty() ? "there is none" : "all must prepare first";
+    const std::string why = result.hosts.empty()      ? "there is none"
+                            : result.why_none.empty() ? "all must prepare first"
+                                                      : result.why_none;
     std::cerr << "arbiter: no host has switched to \"" + model + "\": " + why + "\n";
     return;
   }

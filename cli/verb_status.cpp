@@ -71,6 +71,12 @@ int status_of_all(const StatusOptions& options) {
   const wire::HostStatus* const here = hosts.find_this();
   nlohmann::json all = nlohmann::json::array();
   int exit_code = 0;
+  if (!hosts.network) {
+    exit_code = 1;
+    std::cerr << "arbiter: the link has not joined its network yet, and does not know the other "
+                 "hosts"
+              << (hosts.waits_for ? ": " + shm::printable(*hosts.waits_for) : "") << '\n';
+  }
   for (const wire::HostAnswer& answer : link.ask_hosts({wire::kAllHosts, "status"})) {
     std::string why_not = answer.why_not();
     const bool is_here = here != nullptr && answer.incarnation == here->incarnation;
@@ -105,9 +111,10 @@ void add_status(CLI::App& app, int& exit_code) {
       "Example:\n"
       "  arbiter status\n"
       "  arbiter status --all\n\n"
-      "Exit codes: 0 shown; 1 no daemon, or you may not observe; with --all: no link, or a host "
-      "is\n"
-      "silent, gone, or refuses; 2 wrong use, or the answer cannot be written");
+      "Exit codes: 0 shown; 1 no daemon, or you may not observe; with --all: no link, one that "
+      "has\n"
+      "not joined its network, or a host is silent, gone, or refuses; 2 wrong use, or the answer "
+      "cannot be written");
   verb->callback([options, &exit_code] {
     exit_code = options->all ? status_of_all(*options) : status_here(*options);
   });

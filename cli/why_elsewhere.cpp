@@ -217,7 +217,7 @@ std::string difference(const SeenPort& before, const SeenPort& now) {
 class FollowerElsewhere {
  public:
   FollowerElsewhere(const WhyOptions& options, std::string host)
-      : options_(options), host_(std::move(host)), link_(options.instance) {
+      : options_(options), host_(std::move(host)) {
     Elsewhere there;
     there.status = status();
     static_cast<void>(require_input(there, options_.port, host_));
@@ -245,7 +245,11 @@ class FollowerElsewhere {
   }
 
  private:
-  wire::Status status() { return wire::read_status(text_from(link_, host_, "status")); }
+  // By a call of its own: a link that joins its network again hangs up.
+  [[nodiscard]] wire::Status status() const {
+    wire::LinkCall link(options_.instance);
+    return wire::read_status(text_from(link, host_, "status"));
+  }
 
   void say(const std::string& text) {
     if (std::exchange(said_, text) == text) return;
@@ -274,7 +278,6 @@ class FollowerElsewhere {
   const WhyOptions& options_;
   const std::string host_;
   const shm::Nanoseconds started_ = shm::monotonic_now();
-  wire::LinkCall link_;
   SeenPort last_;
   std::string said_ = "host " + host_ + " answers";
 };

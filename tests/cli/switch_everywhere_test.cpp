@@ -6,7 +6,7 @@
 
 #include <map>
 
-#include "wire/call.hpp"
+#include "wire/link_call.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -39,11 +39,13 @@ class FakeHosts {
   wire::HostsDocument seen;  // afterwards
   int looks = 0;
   int looks_in_vain = 0;  // at first
+  bool hangs_up = false;  // before it is asked what has no answer
 
   SwitchEverywhere run(const wire::SwitchRequest& request = kRequest) {
     const auto ask = [&](const std::string& verb, const std::string& text) {
       EXPECT_EQ(wire::read_switch_request(text), request);
       asked.push_back(verb);
+      if (!answers.contains(verb) && hangs_up) throw wire::NotAskedError("the link has hung up");
       if (!answers.contains(verb)) throw wire::CallError("the link has gone");
       return answers.at(verb);
     };
@@ -159,6 +161,20 @@ TEST(SwitchEverywhere, IfTheLinkGoesAfterTheCommitAllIsUnknown) {
   EXPECT_THAT(outcomes(result), ElementsAre("a unknown"));
   EXPECT_THAT(result.hosts[0].why, HasSubstr("the link has gone"));
   EXPECT_EQ(exit_code_of(result), 3);
+}
+
+// A link that joins its network again hangs up between the two questions.
+TEST(SwitchEverywhere, IfTheCommitCannotBeAskedNoneHasSwitched) {
+  FakeHosts hosts;
+  hosts.answers = {{"prepare", {yes("a"), yes("b")}}};
+  hosts.hangs_up = true;
+  const auto result = hosts.run();
+  EXPECT_FALSE(result.is_committed);
+  EXPECT_EQ(result.why_none, "the link has hung up");
+  EXPECT_THAT(outcomes(result), ElementsAre("a not switched", "b not switched"));
+  EXPECT_THAT(result.hosts[0].why, HasSubstr("keeps its model"));
+  EXPECT_EQ(hosts.looks, 0);
+  EXPECT_EQ(exit_code_of(result), 1);
 }
 
 TEST(SwitchEverywhere, IfPreparedHostsRefuseNoneHasSwitched) {
