@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "gateway/core/outgoing.hpp"
+#include "gateway/core/second_copy.hpp"
 
 namespace arbiter::gateway {
 namespace {
@@ -34,10 +35,11 @@ OutputPort<void> open(Node& node, const std::string& name, const Entry& entry) {
 }  // namespace
 
 bool ForeignSample::copy_twice(WritableBytes to, WritableBytes also) const noexcept {
-  for (std::size_t at = 0; at < to.size(); at += kCopyBlock) {
-    const WritableBytes block(to.data() + at, std::min(kCopyBlock, to.size() - at));
+  const SecondCopy second(to);
+  for (std::size_t at = 0; at < also.size(); at += SecondCopy::kBlock) {
+    const WritableBytes block(also.data() + at, std::min(SecondCopy::kBlock, also.size() - at));
     if (!copy(at, block)) return false;
-    std::memcpy(also.data() + at, block.data(), block.size());
+    second.add(at, block);
   }
   return true;
 }

@@ -19,11 +19,6 @@
 
 namespace arbiter::gateway {
 
-// What is written to two places is written by blocks of so many bytes: a block is in the cache when
-// it is read again. Not smaller: a copy that gcc knows to be of at most 8 KiB it writes as one
-// instruction, rep movsq, which is slower than the C library (docs/performance.md).
-inline constexpr std::size_t kCopyBlock = std::size_t{16} << 10;
-
 // A sample as the middleware has it. The bytes are those that Arbiter's components get: for DDS
 // the serialised sample with its encapsulation header, for iceoryx user header and payload.
 class ForeignSample {
@@ -37,7 +32,7 @@ class ForeignSample {
   // Copies the bytes from `from` on, to.size() of them, which lie within size(). False: it cannot
   // be read.
   [[nodiscard]] virtual bool copy(std::size_t from, WritableBytes to) const noexcept = 0;
-  // As copy(0, to), and the same bytes to `also`, which is as large, while they are in the cache.
+  // As copy(0, to), and the same bytes to `also`, which is as large and is read next.
   [[nodiscard]] virtual bool copy_twice(WritableBytes to, WritableBytes also) const noexcept;
   // Where its data begin: behind headers. Offsets of fields count from there.
   [[nodiscard]] virtual std::size_t data_begin() const noexcept { return 0; }

@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "gateway/core/second_copy.hpp"
 #include "gateway/dds/fragments.hpp"
 
 namespace arbiter::gateway::dds {
@@ -25,8 +26,9 @@ ArrivedSample::ArrivedSample(const Payload& payload) noexcept : payload_(payload
 }
 
 bool ArrivedSample::copy_twice(WritableBytes to, WritableBytes also) const noexcept {
-  if (payload_.fragments != nullptr) return copy_fragments(payload_.fragments, 0, to, also);
-  return ForeignSample::copy_twice(to, also);
+  if (payload_.fragments == nullptr) return ForeignSample::copy_twice(to, also);
+  const SecondCopy second(to);
+  return copy_fragments(payload_.fragments, 0, also, &second);
 }
 
 bool ArrivedSample::copy(std::size_t from, WritableBytes to) const noexcept {

@@ -6,19 +6,20 @@
 #include <algorithm>
 #include <cstring>
 
-#include "gateway/core/incoming.hpp"
+#include "gateway/core/second_copy.hpp"
 
 namespace arbiter::gateway::dds {
 
 namespace {
 
-// A fragment may have 64 KiB.
-void copy_block(const unsigned char* from, std::byte* to, std::byte* also,
-                std::size_t size) noexcept {
-  for (std::size_t at = 0; at < size; at += kCopyBlock) {
-    const std::size_t length = std::min(kCopyBlock, size - at);
-    std::memcpy(to + at, from + at, length);
-    std::memcpy(also + at, to + at, length);
+// Its place in the sample, and there, too. It may have 64 KiB.
+void copy_fragment(Bytes from, std::size_t place, WritableBytes to,
+                   const SecondCopy* second) noexcept {
+  for (std::size_t at = 0; at < from.size(); at += SecondCopy::kBlock) {
+    const std::size_t length = std::min(SecondCopy::kBlock, from.size() - at);
+    std::byte* const out = to.data() + place + at;
+    std::memcpy(out, from.data() + at, length);
+    if (second != nullptr) second->add(place + at, {out, length});
   }
 }
 
@@ -26,7 +27,7 @@ void copy_block(const unsigned char* from, std::byte* to, std::byte* also,
 
 // They are in the order of their beginnings, and may overlap.
 bool copy_fragments(const nn_rdata* first, std::size_t from, WritableBytes to,
-                    WritableBytes also) noexcept {
+                    const SecondCopy* second) noexcept {
   const std::size_t end = from + to.size();
   std::size_t at = from;
   for (const nn_rdata* fragment = first; fragment != nullptr && at < end;
@@ -36,12 +37,7 @@ bool copy_fragments(const nn_rdata* first, std::size_t from, WritableBytes to,
     const auto* const bytes =
         NN_RMSG_PAYLOADOFF(fragment->rmsg, NN_RDATA_PAYLOAD_OFF(fragment)) + (at - fragment->min);
     const std::size_t length = (fragment->maxp1 < end ? fragment->maxp1 : end) - at;
-    std::byte* const out = to.data() + (at - from);
-    if (also.empty()) {
-      std::memcpy(out, bytes, length);
-    } else {
-      copy_block(bytes, out, also.data() + (at - from), length);
-    }
+    copy_fragment({reinterpret_cast<const std::byte*>(bytes), length}, at - from, to, second);
     at += length;
   }
   return at == end;

@@ -10,11 +10,15 @@
 
 struct nn_rdata;
 
+namespace arbiter::gateway {
+class SecondCopy;
+}
+
 namespace arbiter::gateway::dds {
 
-// Copies the sample's bytes from `from` on; if `also` is not empty, which then is as large as `to`,
-// there, too. False: they are not all there.
+// Copies the sample's bytes from `from` on. With a second copy: these, too, which begin it. False:
+// they are not all there.
 [[nodiscard]] bool copy_fragments(const nn_rdata* first, std::size_t from, WritableBytes to,
-                                  WritableBytes also = {}) noexcept;
+                                  const SecondCopy* second = nullptr) noexcept;
 
 }  // namespace arbiter::gateway::dds

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "gateway/core/second_copy.hpp"
 #include "gateway/dds/arrived_sample.hpp"
 
 namespace arbiter::gateway::dds {
@@ -39,7 +40,8 @@ class Chain {
     std::string twice(count, '?');
     std::string also(count, '?');
     const bool is_copied = copy_fragments(first(), from, writable(once));
-    const bool is_copied_twice = copy_fragments(first(), from, writable(twice), writable(also));
+    const SecondCopy second(writable(also));
+    const bool is_copied_twice = copy_fragments(first(), from, writable(twice), &second);
     EXPECT_EQ(is_copied, is_copied_twice);
     if (!is_copied) return "-";
     EXPECT_EQ(twice, once);
@@ -59,6 +61,18 @@ class Chain {
   std::vector<std::unique_ptr<Buffer>> buffers_;
   std::vector<std::unique_ptr<nn_rdata>> fragments_;
 };
+
+// Its second copy goes past the caches.
+TEST(Fragments, OfALargeSampleAreCopiedTwiceToo) {
+  Chain chain;
+  std::string sample;
+  while (sample.size() <= SecondCopy::kSmallestStream) {
+    const std::string fragment(61'003, static_cast<char>('a' + sample.size() % 26));
+    chain.add(static_cast<std::uint32_t>(sample.size()), fragment);
+    sample += fragment;
+  }
+  EXPECT_TRUE(chain.copy(0, sample.size()) == sample);
+}
 
 TEST(Fragments, OneIsTheWholeSample) {
   Chain chain;
