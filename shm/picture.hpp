@@ -232,9 +232,8 @@ class PortPicture {
     Nanoseconds first = kForever;
     for (const Sight& each : std::span(sights_.data(), count_)) {
       if (!active_.contains(each.source) || !is_finite(each.seen.word)) continue;
-      if (rule.source == each.source || reads(rule, each.source)) {
-        first = std::min(first, each.seen.word);
-      }
+      if (each.seen.word >= first) continue;
+      if (rule.source == each.source || reads(rule, each.source)) first = each.seen.word;
     }
     return first;
   }

@@ -86,12 +86,12 @@ DatagramTrains::Train* DatagramTrains::train_to(int socket, const msghdr& messag
     } catch (const std::exception&) {
       return nullptr;
     }
-    trains_.back()->send_to(socket, message, flags);
+    trains_.back()->assign(socket, message, flags);
     return trains_.back().get();
   }
   for (const auto& train : trains_) {
     if (train->count != 0) continue;
-    train->send_to(socket, message, flags);
+    train->assign(socket, message, flags);
     return train.get();
   }
   return nullptr;
@@ -119,7 +119,7 @@ bool DatagramTrains::Train::is_to(int to_socket, const msghdr& message,
 }
 
 // Nobody is on board.
-void DatagramTrains::Train::send_to(int to_socket, const msghdr& message, int with_flags) noexcept {
+void DatagramTrains::Train::assign(int to_socket, const msghdr& message, int with_flags) noexcept {
   socket = to_socket;
   flags = with_flags;
   address_bytes = message.msg_namelen;
@@ -143,17 +143,22 @@ void DatagramTrains::Train::add(const msghdr& message, std::size_t size) noexcep
   is_closed = size < each;
 }
 
+msghdr DatagramTrains::Train::message_of(iovec& part) noexcept {
+  msghdr message{};
+  message.msg_name = &address;
+  message.msg_namelen = address_bytes;
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  return message;
+}
+
 // False: trains cannot go there. The kernel does not know them; the network interface cannot take
 // them; datagrams do not fit it, so that IP has to cut them; a firewall takes them for too large.
 // Where there is no way at all, single ones would not arrive either.
-bool DatagramTrains::Train::depart_together() const noexcept {
-  iovec all{const_cast<std::byte*>(buffer.data()), bytes};
+bool DatagramTrains::Train::depart_together() noexcept {
+  iovec all{buffer.data(), bytes};
+  msghdr message = message_of(all);
   alignas(cmsghdr) std::array<std::byte, CMSG_SPACE(sizeof(std::uint16_t))> control{};
-  msghdr message{};
-  message.msg_name = const_cast<sockaddr_storage*>(&address);
-  message.msg_namelen = address_bytes;
-  message.msg_iov = &all;
-  message.msg_iovlen = 1;
   message.msg_control = control.data();
   message.msg_controllen = control.size();
   cmsghdr* const segment = CMSG_FIRSTHDR(&message);
@@ -166,15 +171,10 @@ bool DatagramTrains::Train::depart_together() const noexcept {
          errno == EHOSTUNREACH || errno == EHOSTDOWN || errno == ECONNREFUSED;
 }
 
-void DatagramTrains::Train::depart_alone() const noexcept {
+void DatagramTrains::Train::depart_alone() noexcept {
   for (std::size_t at = 0; at < bytes; at += each) {
-    iovec one{const_cast<std::byte*>(buffer.data()) + at, std::min(each, bytes - at)};
-    msghdr message{};
-    message.msg_name = const_cast<sockaddr_storage*>(&address);
-    message.msg_namelen = address_bytes;
-    message.msg_iov = &one;
-    message.msg_iovlen = 1;
-    static_cast<void>(send_at_once(socket, message, flags));
+    iovec one{buffer.data() + at, std::min(each, bytes - at)};
+    static_cast<void>(send_at_once(socket, message_of(one), flags));
   }
 }
 

@@ -70,10 +70,11 @@ class DatagramTrains {
   struct Train {
     [[nodiscard]] bool is_to(int to_socket, const msghdr& message, int with_flags) const noexcept;
     [[nodiscard]] bool fits(std::size_t size) const noexcept;
-    void send_to(int to_socket, const msghdr& message, int with_flags) noexcept;
+    void assign(int to_socket, const msghdr& message, int with_flags) noexcept;
     void add(const msghdr& message, std::size_t size) noexcept;
-    [[nodiscard]] bool depart_together() const noexcept;
-    void depart_alone() const noexcept;
+    [[nodiscard]] bool depart_together() noexcept;
+    void depart_alone() noexcept;
+    [[nodiscard]] msghdr message_of(iovec& part) noexcept;  // to the address
 
     int socket = -1;
     int flags = 0;

@@ -231,23 +231,21 @@ void poll_until_idle(Polling& scene) {
   }
 }
 
-void poll_override(const Explore& explore) {
-  explore_anew<PollingA>(explore, [](PollingA& scene, Execution& execution) {
-    execution.thread([&scene] { scene.b().signal(); });
+template <class Change>
+void poll_change(const Explore& explore, const Change& change) {
+  explore_anew<PollingA>(explore, [&](PollingA& scene, Execution& execution) {
+    execution.thread([&scene, &change] { change(scene); });
     execution.thread([&scene] { poll_until_idle(scene); });
   });
 }
 const Register kPollOverride("ADescriptorThatIsArmedAgainBecomesReadableAtAnOverride", {4, 2},
-                             poll_override);
-
-void poll_end(const Explore& explore) {
-  explore_anew<PollingA>(explore, [](PollingA& scene, Execution& execution) {
-    execution.thread([&scene] { scene.a().deactivate(); });
-    execution.thread([&scene] { poll_until_idle(scene); });
-  });
-}
+                             [](const Explore& explore) {
+                               poll_change(explore, [](PollingA& scene) { scene.b().signal(); });
+                             });
 const Register kPollEnd("ADescriptorThatIsArmedAgainBecomesReadableAtADeactivation", {4, 2},
-                        poll_end);
+                        [](const Explore& explore) {
+                          poll_change(explore, [](PollingA& scene) { scene.a().deactivate(); });
+                        });
 
 // The same where A commands only while B is active, which runs out.
 struct PollingWhileB : Polling {
