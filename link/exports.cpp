@@ -95,7 +95,8 @@ void Exports::withdraw(const HostView::OpenPorts& ports, const Patience& patienc
   for (auto each = ids_.begin(); each != ids_.end();) {
     const auto one = each++;
     if (ports.contains(one->first)) continue;
-    std::unique_ptr<Export> gone;  // its tap is closed without the lock
+    if (!patience.is_left()) return;  // each may wait for readers that acknowledge nothing
+    std::unique_ptr<Export> gone;     // its tap is closed without the lock
     {
       const auto lock = lock_first();
       if (in_turn_ == one->second) continue;

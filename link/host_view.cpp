@@ -148,9 +148,8 @@ void HostView::look_at_model() {
 void HostView::look_at_ports() {
   const shm::Nanoseconds now = shm::monotonic_now();
   if (now < ask_again_ || !instance_->has_daemon()) return;
-  ask_again_ = now + kAskPeriod;
   const shm::Nanoseconds before_it = processor_time();
-  const wire::Status status = instance_->status();
+  const wire::Status status = ask_status(now);
   const shm::Nanoseconds cost = processor_time() - before_it;
   ask_again_ = now + std::clamp(kTimesItsCost * cost, kAskPeriod, kLongestAskPeriod);
   OpenPorts open;
@@ -169,6 +168,17 @@ void HostView::look_at_ports() {
   }
   inputs_here_ = std::move(inputs);
   know_model(status.model);
+}
+
+// Who has waited in vain lets the loop go round for as long before it asks again.
+wire::Status HostView::ask_status(shm::Nanoseconds now) {
+  try {
+    return instance_->status();
+  } catch (...) {
+    const shm::Nanoseconds after = shm::monotonic_now();
+    ask_again_ = after + std::max(after - now, kAskPeriod);
+    throw;
+  }
 }
 
 // Its texts are asked for once. A daemon that is new may have another model of the same generation.

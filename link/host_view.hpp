@@ -67,6 +67,7 @@ class HostView {
   bool join();
   void look_at_model();
   void look_at_ports();
+  wire::Status ask_status(shm::Nanoseconds now);
   void know_model(const wire::ModelStatus& model);
 
   const std::string instance_name_;

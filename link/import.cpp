@@ -52,8 +52,8 @@ Import::Import(Node& node, const Network& network, const SentTokens& tokens, std
 }
 
 Import::~Import() {
+  close();          // first: to end the reader takes longer, and a component may want the name
   reader_.reset();  // it calls take() until then
-  close();
 }
 
 void Import::look(bool is_open_here, SourceUse use) {
@@ -133,6 +133,8 @@ void Import::obey(const Offerer* speaker) {
   // It is noted for its state; its sample no port had.
   const bool is_new = last->exporter == exporter && stream_.note(exporter, last->last);
   if (is_new && last->last.has_sample) ++counts_.too_soon;
+  // The same exporter, which is heard by another writer: the port has stayed open.
+  if (is_new && port_ && stream_.is_deactivated()) port_->deactivate();
   unheard_.erase(last);
 }
 

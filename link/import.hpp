@@ -57,6 +57,8 @@ class Import : private gateway::dds::SampleTaker {
   void open(bool has_daemon, const Patience& patience);
   // Any thread: a component of this host asks for the name. Closes the port at once.
   void yield();
+  // The link's thread: nothing arrives any more. Waits for nobody, as the destructor may.
+  void close();
 
   // For the hosts document, but for what this host has open itself.
   [[nodiscard]] wire::ImportStatus status() const;
@@ -98,7 +100,6 @@ class Import : private gateway::dds::SampleTaker {
   void listen_to_speaker();
   void forget(const std::vector<EventReader::Offer>& offers);
   void open_port(const OfferCard& card);
-  void close();
   // Whether it has yielded, and this host's status may not say yet to whom.
   [[nodiscard]] bool has_just_yielded();
   [[nodiscard]] bool is_open() const;

@@ -67,8 +67,18 @@ Link::Link(LinkOptions options, Neighbours known)
 }
 
 Link::~Link() {
-  const std::lock_guard lock(imports_mutex_);
-  imports_.clear();
+  Imports gone;
+  {
+    const std::lock_guard lock(imports_mutex_);
+    gone.swap(imports_);
+  }
+  end(std::move(gone));
+}
+
+// Each waits for Cyclone where it ends, and a component that wants its name must not.
+void Link::end(Imports gone) {
+  for (const auto& [source, one] : gone) one->close();
+  for (auto each = gone.begin(); each != gone.end(); each = gone.erase(each)) options_.on_round();
 }
 
 std::unique_ptr<Desk> Link::take_desk() {
@@ -218,8 +228,7 @@ Link::End Link::loop(int stop) {
 // What is to be closed is closed before anything waits for the daemon.
 void Link::choose_imports(const Patience& patience) {
   const auto& wanted = view_.wanted();
-  // Each waits for Cyclone where it ends, and a component that wants its name must not.
-  decltype(imports_) gone;
+  Imports gone;
   {
     const std::lock_guard lock(imports_mutex_);
     for (auto each = imports_.begin(); each != imports_.end();) {
@@ -227,7 +236,7 @@ void Link::choose_imports(const Patience& patience) {
       if (!wanted.contains(one->first)) gone.insert(imports_.extract(one));
     }
   }
-  for (auto each = gone.begin(); each != gone.end(); each = gone.erase(each)) options_.on_round();
+  end(std::move(gone));
   for (const auto& [source, one] : imports_) {
     one->set_max_age(wanted.find(source)->second);
     one->look(view_.open_here().contains(source), view_.use_of(source));

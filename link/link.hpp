@@ -77,6 +77,8 @@ class Link {
   // Once, when it is known.
   void say_what_passes();
   void choose_imports(const Patience& patience);
+  using Imports = std::map<std::string, std::unique_ptr<Import>, std::less<>>;
+  void end(Imports gone);
   void add_import(const std::string& source);
   // On the node's thread, which waits for nothing: a component that wants its name does not wait
   // for what the loop is doing.
@@ -101,7 +103,7 @@ class Link {
   InterfaceWatch interfaces_;
   std::mutex imports_mutex_;
   // Empty before what they use goes; the node's thread may look there until the node has gone.
-  std::map<std::string, std::unique_ptr<Import>, std::less<>> imports_;
+  Imports imports_;
 
   // Destroyed in reverse: callers go before what they call.
   std::optional<Node> node_;

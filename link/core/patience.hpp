@@ -1,6 +1,7 @@
-// What one look at things may spend on calls that wait for the daemon: opening ports and taps. A
-// daemon that is stopped answers none of them, and each one waits: after one of these the others
-// have their turn at later looks, so that the loop goes round.
+// What one look at things may spend on calls that wait for others: for the daemon, which opens
+// ports and taps, and for readers, which are to acknowledge before a writer ends. One that is
+// stopped answers none of them, and each one waits: after one of these the others have their turn
+// at later looks, so that the loop goes round.
 //
 // Thread safety: none of its own.
 #pragma once
