@@ -155,5 +155,21 @@ TEST_F(PatientHostileExporter, ASampleThatItSendsAgainAndAgainComesOnce) {
   EXPECT_EQ(taken, 1);
 }
 
+// It may be heard before the link knows that the first writer has gone.
+TEST_F(PatientHostileExporter, ADeactivationByAnotherWriterOfTheSameLifeHolds) {
+  take_the_motor();
+  Stranger same_life(network_);
+  same_life.send(
+      [&](EventHeader& header) {
+        header.kind = EventKind::kDeactivation;
+        header.is_deactivated = true;
+        header.number = header.sequence = number_ + 1;
+        held_.name(shm::monotonic_now(), header.tokens);
+      },
+      0);
+  stranger_.leave();
+  await([&] { return body_.motor().winner() == std::nullopt; });
+}
+
 }  // namespace
 }  // namespace arbiter::test

@@ -52,6 +52,7 @@ class Stranger {
   void write(const link::ByteString& header, Bytes sample = {}) {
     static_cast<void>(writer_->write(Bytes(header.data(), header.size()), sample));
   }
+  void leave() { writer_.reset(); }
 
  private:
   const gateway::Bell bell_;
