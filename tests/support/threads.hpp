@@ -51,11 +51,14 @@ inline long call_of(pid_t process, pid_t task) {
   return word == "running" ? -1 : std::stol(word);
 }
 
+inline bool sleeps_in(long call, pid_t process, pid_t task) {
+  const long now = call_of(process, task);
+  return (now == call || now == -2) && state_of(process, task) == 'S';
+}
+
 // Returns once the task sleeps in that system call.
 inline void wait_until_it_sleeps_in(long call, pid_t process, pid_t task) {
-  for (;;) {
-    const long now = call_of(process, task);
-    if ((now == call || now == -2) && state_of(process, task) == 'S') return;
+  while (!sleeps_in(call, process, task)) {
   }
 }
 inline void wait_until_it_polls(pid_t process, pid_t task) {
@@ -68,6 +71,7 @@ class Watched {
       : thread_([this, run = std::move(run)] {
           task_ = static_cast<pid_t>(::syscall(SYS_gettid));
           run();
+          has_ended_ = true;
         }) {
     while (task_ == 0) {
     }
@@ -76,13 +80,18 @@ class Watched {
     if (thread_.joinable()) thread_.join();
   }
 
-  void wait_until_asleep() const { wait_until_it_polls(::getpid(), task_); }
+  // Returns as well where it has ended, and so will not sleep any more.
+  void wait_until_asleep() const {
+    while (!has_ended_ && !sleeps_in(SYS_ppoll, ::getpid(), task_)) {
+    }
+  }
   [[nodiscard]] std::uint64_t sleeps() const { return sleeps_of(::getpid(), task_); }
   void signal(int number) { ::pthread_kill(thread_.native_handle(), number); }
   void join() { thread_.join(); }
 
  private:
   std::atomic<pid_t> task_{0};
+  std::atomic<bool> has_ended_{false};
   std::thread thread_;
 };
 
