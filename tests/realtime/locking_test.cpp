@@ -16,6 +16,7 @@
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/error_of.hpp"
+#include "tests/support/hear_all.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -107,6 +108,7 @@ TEST(Locking, AllThatANodeUsesIsLocked) {
   auto low = sender.output_port<Number>("/low");
   auto in = receiver.input_port<Number>("/in");
   auto high = sender.output_port<Number>("/high");
+  hear_all(receiver);
   for (int i = 0; i < 100; ++i) {
     EXPECT_EQ(low.publish(Number{i}).delivered, 1u);
     EXPECT_TRUE(in.take());
@@ -132,6 +134,7 @@ TEST(Locking, WhatTapsUseIsLockedToo) {
   auto in = sender.input_port<Number>("/in");
   auto tap = watcher.tap<Number>("/out");
   auto tap_of_input = watcher.tap<Number>("/in", {.of = TapOf::input});
+  hear_all(sender);
   for (int i = 0; i < 100; ++i) out.publish(Number{i});
   EXPECT_TRUE(tap.take());
   EXPECT_TRUE(tap_of_input.take());
@@ -163,6 +166,7 @@ TEST(Locking, MemoryOfANewModelIsLocked) {
   auto in = node.input_port<Number>("/in");
   auto other = node.output_port<Number>("/other");
   daemon.load(rules(arbiter_at("/in", select("/low", "not /other and not /fourth"))));
+  hear_all(node);
   EXPECT_EQ(low.publish(Number{1}).delivered, 1u);
   EXPECT_TRUE(in.take());
   for (const Mapped& each : mapped()) {
@@ -201,6 +205,7 @@ TEST(Locking, APortWhosePeersCannotBeLockedIsToldTheLimitAndLeavesNothingBehind)
   EXPECT_THAT(error, HasSubstr("may lock 256 KiB (RLIMIT_MEMLOCK)"));
   Node unlocked("unlocked");
   auto in = unlocked.input_port<Image>("/in");
+  hear_all(sender);
   EXPECT_EQ(out.publish(std::move(*out.loan())).delivered, 1u);
 }
 
@@ -213,6 +218,7 @@ TEST(Locking, APeerThatComesLaterAndCannotBeLockedIsRefused) {
   Node other("other");
   auto first = other.input_port<std::array<char, 100'000>>("/in0", {.depth = 2});
   auto second = other.input_port<std::array<char, 100'000>>("/in1", {.depth = 16});
+  hear_all(sender);
   EXPECT_EQ(out.publish({}).delivered, 1u);
   EXPECT_TRUE(first.take());
   EXPECT_THAT(daemon.connection("/out", "/in1")["mismatch"].get<std::string>(),

@@ -15,6 +15,7 @@
 #include "tests/client/samples.hpp"
 #include "tests/realtime/data_path_thread.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/hear_all.hpp"
 #include "tests/support/threads.hpp"
 
 namespace arbiter::test {
@@ -187,11 +188,12 @@ TEST_F(RealTimePublish, ActivityThatRunsOutCostsNothing) {
   });
   std::uint32_t lost = 0;
   EXPECT_EQ(thread.costs_of([&] {
-    scene.high.signal();
-    while (scene.low.publish(Number{1}).delivered == 0) ++lost;
+    while (lost == 0) {  // it may not run for longer than T
+      scene.high.signal();
+      while (scene.low.publish(Number{1}).delivered == 0) ++lost;
+    }
   }),
             kNone);
-  EXPECT_GT(lost, 0u);
 }
 
 // 4 MiB, written in place, in every slot of the pool.
@@ -276,6 +278,7 @@ TEST_F(RealTimePublish, AModelThatComesIntoForceFaultsNowhere) {
   const std::string selects[]{select("/low", "not /high"), select("/low", "not /other")};
   for (int i = 0; i < 20; ++i) {
     scene.daemon.load(rules(arbiter_at("/in", selects[i % 2])));
+    hear_all(scene.node);
     const Costs costs = thread.costs_of([&] {
       EXPECT_EQ(scene.low.publish(Number{i}).delivered, 1u);
       EXPECT_TRUE(scene.in.take());
