@@ -83,7 +83,11 @@ TEST_F(ABell, WhichAStrangerFillsHoldsUpNoPublisherAndStillWakes) {
   </behaviors>)");
   static_cast<void>(out.publish(7));
   auto stop = node.output_port<void>("/stop:o");
+  const auto taken = prey.daemon().input("/prey:i")["taken"];
   EXPECT_EQ(out.publish(8).delivered, 1u);
+  // Of what it has not seen it is not told.
+  while (prey.daemon().input("/prey:i")["taken"] == taken) {
+  }
   static_cast<void>(stop.signal());  // overrides without commanding: the port is idle, once
   waiting.join();
 }

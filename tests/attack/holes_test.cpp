@@ -10,6 +10,7 @@
 
 #include "shm/output_segment.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/hear_all.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -50,6 +51,7 @@ class ASampleThatIsAHole : public testing::Test {
       if (received.message.kind == MessageKind::kInputPeer) link_ = received.message.link;
     }
     ASSERT_NE(link_, 0u);
+    hear_all(node_);
     segment_.channel(0).first = 1;
     segment_.channel(0).depth = 1;
     segment_.channel(0).receiver = link_;

@@ -12,6 +12,7 @@
 #include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/hear_all.hpp"
 
 namespace arbiter::test {
 
@@ -75,6 +76,7 @@ class Prey {
     board = std::move(welcome.descriptors[0]);
     registry = std::move(welcome.descriptors[1]);
     open_ports();
+    hear_all(node_);
   }
 
   Daemon& daemon() { return daemon_; }
