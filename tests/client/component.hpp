@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tests/support/child_process.hpp"
+#include "tests/support/hear_all.hpp"
 
 namespace arbiter::test {
 
@@ -73,5 +74,14 @@ class Component {
   std::string heard_;
   ChildProcess process_;
 };
+
+// As hear_all(Node&).
+inline void hear_all(Component& component) {
+  const std::string name = name_of_nobody();
+  for (const std::string verb : {"output ", "close "}) {
+    const std::string answer = component.tell(verb + name);
+    if (answer != "open" && answer != "closed") throw std::runtime_error(answer);
+  }
+}
 
 }  // namespace arbiter::test

@@ -13,6 +13,7 @@
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/hear_all.hpp"
 #include "tests/support/threads.hpp"
 
 namespace arbiter::test {
@@ -26,10 +27,10 @@ TEST(DataPath, AConnectionThatComesBackGivesNothingThatWasTakenBefore) {
   for (int i = 1; i <= 3; ++i) EXPECT_EQ(out.publish(Number{i}).delivered, 1u);
   EXPECT_EQ(take_all(in), (std::vector<std::int64_t>{1, 2, 3}));
   daemon.load(kNoRules);
-  { auto barrier = node.output_port<Number>("/barrier"); }
+  hear_all(node);
   EXPECT_FALSE(in.take());
   daemon.load(single_model());
-  { auto barrier = node.output_port<Number>("/barrier"); }
+  hear_all(node);
   EXPECT_EQ(take_all(in), (std::vector<std::int64_t>{}));
   EXPECT_EQ(out.publish(Number{4}).delivered, 1u);
   EXPECT_EQ(take_all(in), (std::vector<std::int64_t>{4}));
@@ -76,6 +77,7 @@ class Takeover {
   void begin() {
     low.signal();
     high.signal();
+    while (in_.idle()) high.signal();  // of what it has not seen it is not told
   }
   void expect_idle_after(const std::function<void()>& event) {
     Watched waiter(

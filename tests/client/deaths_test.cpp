@@ -76,6 +76,7 @@ TEST(Deaths, AStoppedReceiverHoldsUpNoPublisher) {
   ASSERT_EQ(receiver.tell("input /in 4 1 0"), "open");
   Node node("test");
   auto out = node.output_port<Number>("/out");
+  hear_all(receiver);
   EXPECT_EQ(out.publish(Number{-1}).delivered, 1u);
   EXPECT_EQ(receiver.tell("hold /in"), "-1");
   receiver.process().stop();
@@ -111,6 +112,7 @@ TEST(Deaths, WithoutADaemonDataFlowsOn) {
   Node node("test");
   auto low = node.output_port<Number>("/low");
   auto in = node.input_port<Number>("/in");
+  hear_all(sender);
   daemon.kill();
   EXPECT_EQ(low.publish(Number{1}).delivered, 1u);
   EXPECT_EQ(take_from(in), 1);

@@ -129,6 +129,7 @@ TEST(Holding, ASampleOutlivesItsPublishersProcess) {
   for (int i = 0; i < 2; ++i) {
     Component sender("sender");
     ASSERT_EQ(sender.tell("output /out"), "open");
+    hear_all(node);
     EXPECT_EQ(sender.tell("publish /out " + std::to_string(i)), "1 0 0");
     samples.push_back(std::move(*in.take()));
     sender.kill();

@@ -37,6 +37,7 @@ TEST(Losers, DoNotWakeAReceiverWhileAnotherCommands) {
   auto high = node.output_port<Number>("/high");
   Component arm("arm");
   ASSERT_EQ(arm.tell("input /in 8 1 0"), "open");
+  hear_all(node);
   high.signal();
   const Receiver receiver(arm);
   for (int i = 0; i < kArrivals; ++i) {
@@ -56,6 +57,7 @@ TEST(Losers, WakeItOnceWhereAnOverrideThatOnlySaysStopMakesItsPortIdle) {
   auto stop = node.output_port<Number>("/stop");
   Component arm("arm");
   ASSERT_EQ(arm.tell("input /in 8 1 0"), "open");
+  hear_all(node);
   low.publish(Number{1});
   EXPECT_EQ(arm.tell("wait /in"), "1");
   const Receiver commanded(arm);

@@ -8,6 +8,7 @@
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/error_of.hpp"
+#include "tests/support/hear_all.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -27,6 +28,7 @@ TEST(Opening, TheOutputPortMayComeFirst) {
   Node receiver("receiver");
   auto out = sender.output_port<Number>("/out");
   auto in = receiver.input_port<Number>("/in");
+  hear_all(sender);
   EXPECT_TRUE(delivers(out, in));
 }
 
@@ -36,6 +38,7 @@ TEST(Opening, TheInputPortMayComeFirst) {
   Node receiver("receiver");
   auto in = receiver.input_port<Number>("/in");
   auto out = sender.output_port<Number>("/out");
+  hear_all(receiver);
   EXPECT_TRUE(delivers(out, in));
 }
 
@@ -46,6 +49,7 @@ TEST(Opening, PortsMayComeBeforeTheModelThatConnectsThem) {
   auto in = node.input_port<Number>("/in");
   EXPECT_FALSE(delivers(out, in));
   daemon.load(single_model());
+  hear_all(node);
   EXPECT_TRUE(delivers(out, in));
 }
 
@@ -56,12 +60,14 @@ TEST(Opening, APortMayBeClosedAndOpenedAgainManyTimes) {
   auto in = receiver.input_port<Number>("/in");
   for (int i = 0; i < 100; ++i) {
     auto out = sender.output_port<Number>("/out");
+    hear_all(receiver);
     ASSERT_TRUE(delivers(out, in)) << i;
   }
   auto out = sender.output_port<Number>("/out");
   for (int i = 0; i < 100; ++i) {
     in = {receiver.input_port<Number>("/elsewhere")};
     in = {receiver.input_port<Number>("/in")};
+    hear_all(sender);
     ASSERT_TRUE(delivers(out, in)) << i;
   }
 }

@@ -170,11 +170,12 @@ TEST(Queue, ANewReceiverGetsNothingOfItsPredecessors) {
 
 TEST(Queue, AReceiverThatDiedHoldingSamplesLosesThemNoMemory) {
   Daemon daemon(single_model());
-  Node node("test");
+  Node node("test", {.service_thread = false});  // takes up its receivers when it is told to
   auto out = node.output_port<Number>("/out");
   for (int generation = 0; generation < 20; ++generation) {
     Component receiver("receiver");
     ASSERT_EQ(receiver.tell("input /in 8 1 0"), "open");
+    node.service();
     for (int i = 0; i < 20; ++i) EXPECT_EQ(out.publish(Number{i}).delivered, 1u);
     EXPECT_EQ(receiver.tell("hold /in"), "12");
     receiver.kill();

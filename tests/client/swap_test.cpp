@@ -10,9 +10,16 @@
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/hear_all.hpp"
 
 namespace arbiter::test {
 namespace {
+
+// Puts a model in force, and lets the node hear of it.
+void load(Daemon& daemon, Node& node, const std::string& model) {
+  daemon.load(model);
+  hear_all(node);
+}
 
 TEST(Swap, DeliveriesFollowTheNewModelOnceItIsInForce) {
   Daemon daemon(only("a"));
@@ -25,12 +32,12 @@ TEST(Swap, DeliveriesFollowTheNewModelOnceItIsInForce) {
     EXPECT_EQ(take_from(in), 1);
     EXPECT_EQ(b.publish(Number{2}).delivered, 0u);
     EXPECT_FALSE(in.take());
-    daemon.load(only("b"));
+    load(daemon, node, only("b"));
     EXPECT_EQ(a.publish(Number{3}).delivered, 0u);
     EXPECT_FALSE(in.take());
     EXPECT_EQ(b.publish(Number{4}).delivered, 1u);
     EXPECT_EQ(take_from(in), 4);
-    daemon.load(only("a"));
+    load(daemon, node, only("a"));
   }
 }
 
@@ -40,9 +47,9 @@ TEST(Swap, WhatWaitsForAConnectionThatIsGoneIsNotTaken) {
   auto a = node.output_port<Number>("/a");
   auto in = node.input_port<Number>("/in");
   a.publish(Number{1});
-  daemon.load(only("b"));
+  load(daemon, node, only("b"));
   EXPECT_FALSE(in.take());
-  daemon.load(only("a"));
+  load(daemon, node, only("a"));
   EXPECT_FALSE(in.take()) << "nor when the connection comes again";
   EXPECT_EQ(a.publish(Number{2}).delivered, 1u);
   EXPECT_EQ(take_from(in), 2);
@@ -62,11 +69,11 @@ TEST(Swap, AConnectionThatGoesAndComesAgainUnseenDeliversNothingTwiceAndLosesNot
     sample.reset();
     while (in.take()) {
     }
-    daemon.load(only("b"));
+    load(daemon, node, only("b"));
     if (round % 2 == 1) {
       EXPECT_EQ(a.publish(Number{++value}).delivered, 0u);
     }
-    daemon.load(only("a"));
+    load(daemon, node, only("a"));
     ASSERT_FALSE(in.take()) << round;
     for (int i = 0; i < 6; ++i) {
       ASSERT_EQ(a.publish(Number{++value}).delivered, 1u) << round;
@@ -85,10 +92,10 @@ TEST(Swap, ASampleThatIsHeldSurvivesTheEndOfItsConnection) {
   auto in = node.input_port<Number>("/in", {.depth = 2, .max_held = 3});
   a.publish(Number{-1});
   auto first = in.take();
-  daemon.load(only("b"));
+  load(daemon, node, only("b"));
   b.publish(Number{-2});
   auto second = in.take();
-  daemon.load(only("a"));
+  load(daemon, node, only("a"));
   a.publish(Number{-3});
   auto third = in.take();
   for (int i = 0; i < 1000; ++i) {
@@ -110,8 +117,8 @@ TEST(Swap, APortThatKeepsGetsNothingOverAConnectionThatIsGone) {
   auto a = node.output_port<Number>("/a");
   auto in = node.input_port<Number>("/in", {.keep = true});
   a.publish(Number{1});
-  daemon.load(only("b"));
-  daemon.load(only("a"));
+  load(daemon, node, only("b"));
+  load(daemon, node, only("a"));
   a.publish(Number{2});
   EXPECT_EQ(take_from(in), 2);
 }
@@ -123,7 +130,7 @@ TEST(Swap, ANewModelMayReadSourcesThatNobodyHasSeenBefore) {
   auto in = node.input_port<Number>("/in");
   for (int i = 0; i < 30; ++i) {
     const std::string stop = "/stop" + std::to_string(i);
-    daemon.load(rules(arbiter_at("/in", select("/a", "not " + stop))));
+    load(daemon, node, rules(arbiter_at("/in", select("/a", "not " + stop))));
     auto brake = node.output_port<Number>(stop);
     EXPECT_EQ(a.publish(Number{i}).delivered, 1u);
     brake.signal();
@@ -142,6 +149,7 @@ TEST(Swap, APortThatCannotSeeASourceOfItsRulesDeliversNothingAndCountsIt) {
   auto a = sender.output_port<Number>("/a");
   receiver.service();
   daemon.load(rules(arbiter_at("/in", select("/a", "not /new"))));
+  hear_all(sender);
   EXPECT_EQ(a.publish(Number{1}).delivered, 1u) << "the publisher sees it";
   EXPECT_EQ(take_from(in), kNothing);
   EXPECT_EQ(daemon.input("/in")["blind"], 1);
@@ -176,10 +184,10 @@ TEST(Swap, ASensedSourceMayBecomeAConnectionAndBack) {
     EXPECT_EQ(outcome.delivered + outcome.discarded, 0u);
     EXPECT_EQ(low.publish(Number{2}).discarded, 1u);
     EXPECT_FALSE(in.take());
-    daemon.load(override_model());
+    load(daemon, node, override_model());
     EXPECT_EQ(high.publish(Number{3}).delivered, 1u);
     EXPECT_EQ(take_from(in), 3);
-    daemon.load(sensed);
+    load(daemon, node, sensed);
   }
 }
 
@@ -213,6 +221,8 @@ TEST(Swap, UnderAPublisherAndAReceiverThatRunFlatOut) {
   EXPECT_NE(senders[1].answer(), "dead");
   stop = true;
   receiver.join();
+  hear_all(node);
+  for (Component& sender : senders) hear_all(sender);
   while (in.take()) {
   }
   EXPECT_EQ(senders[0].tell("publish /a 1000000000"), "1 0 0");
@@ -230,7 +240,7 @@ TEST(Swap, APortThatTheNewModelDoesNotMentionStaysOpenAndGetsNothing) {
   auto a = node.output_port<Number>("/a");
   auto in = node.input_port<Number>("/in");
   a.publish(Number{1});
-  daemon.load(rules(arbiter_at("/elsewhere", select("/a"))));
+  load(daemon, node, rules(arbiter_at("/elsewhere", select("/a"))));
   EXPECT_FALSE(in.take());
   const Outcome outcome = a.publish(Number{2});
   EXPECT_EQ(outcome.delivered + outcome.discarded, 0u);
@@ -239,7 +249,7 @@ TEST(Swap, APortThatTheNewModelDoesNotMentionStaysOpenAndGetsNothing) {
   EXPECT_EQ(port["open"], true);
   EXPECT_EQ(port["arbitrated"], false);
   EXPECT_TRUE(port["connections"].empty());
-  daemon.load(only("a"));
+  load(daemon, node, only("a"));
   a.publish(Number{3});
   EXPECT_EQ(take_from(in), 3) << "and is as before when a model mentions it again";
 }
@@ -255,13 +265,13 @@ TEST(Swap, APortThatTheNewModelDoesNotMentionIsNoLongerArbitrated) {
   high.publish(Number{1});
   EXPECT_EQ(low.publish(Number{2}).discarded, 1u);
   EXPECT_EQ(take_from(in), 1);
-  daemon.load("<behaviors/>");
+  load(daemon, node, "<behaviors/>");
   EXPECT_EQ(low.publish(Number{3}).delivered, 1u);
   EXPECT_EQ(high.publish(Number{4}).delivered, 1u);
   EXPECT_EQ(daemon.input("/in")["arbitrated"], false);
   EXPECT_EQ(take_from(in), 3);
   EXPECT_EQ(take_from(in), 4);
-  daemon.load(override_model());
+  load(daemon, node, override_model());
   EXPECT_EQ(low.publish(Number{5}).discarded, 1u);
 }
 
@@ -279,7 +289,7 @@ TEST(Swap, ABadModelChangesNothing) {
   EXPECT_EQ(daemon.generation(), generation);
   EXPECT_EQ(take_from(in), 1);
   EXPECT_EQ(a.publish(Number{2}).delivered, 1u);
-  daemon.load(only("b"));
+  load(daemon, node, only("b"));
   EXPECT_EQ(a.publish(Number{3}).delivered, 0u);
 }
 
@@ -290,7 +300,7 @@ TEST(Swap, ManyReloadsInARowEndWithTheLast) {
   auto in = node.input_port<Number>("/in");
   daemon.write_model(only("b"));
   for (int i = 0; i < 100; ++i) daemon.hang_up();
-  daemon.load(only("b"));
+  load(daemon, node, only("b"));
   EXPECT_EQ(b.publish(Number{1}).delivered, 1u);
   EXPECT_EQ(take_from(in), 1);
 }

@@ -192,7 +192,10 @@ TEST(Tap, GoesOnUnderAnotherDaemon) {
   sender.tell("publish /out 2");
   EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 2) << "without a daemon";
   daemon.restart();
+  while (daemon.source("/out")["open"] != true) {
+  }
   auto other = node.tap<Number>("/out");  // both are back by now
+  hear_all(sender);
   for (int i = 3; i < 10; ++i) {
     sender.tell("publish /out " + std::to_string(i));
     EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, i);

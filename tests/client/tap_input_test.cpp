@@ -71,6 +71,7 @@ TEST(Tap, OfAnInputPortIsToldToTheLastSampleOfAPortThatHasGone) {
   AtTheTake scene;
   Component receiver("receiver");
   ASSERT_EQ(receiver.tell("input /in 2 1 0"), "open");
+  hear_all(scene.node);
   for (int i = 1; i <= 100; ++i) scene.low.publish(Number{i});
   receiver.tell("take /in");
   receiver.kill();

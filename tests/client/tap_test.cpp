@@ -257,6 +257,7 @@ TEST(Tap, IsWokenForEachEventAndByNothingElse) {
   ASSERT_EQ(sender.tell("output /out"), "open");
   Node node("test");
   auto tap = node.tap<Number>("/out");
+  hear_all(sender);
   for (int i = 0; i < 50; ++i) {
     sender.begin("publish /out " + std::to_string(i));
     EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, i);
@@ -324,6 +325,7 @@ TEST(Tap, ItsAccountBalancesUnderAPublisherThatDoesNotStop) {
   ASSERT_EQ(sender.tell("output /low"), "open");
   auto high = node.output_port<Number>("/high");
   auto tap = node.tap<Number>("/low");
+  hear_all(sender);
   constexpr std::uint64_t kPublished = 300'000;
   sender.tell("publish /low 1");
   EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sequence(), 1u);  // from here on all are

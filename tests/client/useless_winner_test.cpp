@@ -9,6 +9,7 @@
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/hear_all.hpp"
 #include "tests/support/threads.hpp"
 
 namespace arbiter::test {
@@ -37,6 +38,12 @@ struct Wrong {
 // /high is of a type that /in does not take. `timeout`: of all sources.
 class Mismatch : public testing::TestWithParam<const char*> {
  protected:
+  void SetUp() override { both_hear_all(); }
+  void both_hear_all() {
+    hear_all(sender);
+    hear_all(receiver);
+  }
+
   Daemon daemon{override_model(GetParam())};
   Node sender{"sender", quiet()};
   Node receiver{"receiver", quiet()};
@@ -51,6 +58,7 @@ TEST_P(Mismatch, MakesItsPortIdleOnceAndLetsNobodyElseThrough) {
   low.publish(Number{1});
   EXPECT_EQ(take_from(in), 1);
   auto high = sender.output_port<Wrong>("/high");
+  both_hear_all();
   Watched waiting([&] { EXPECT_TRUE(in.wait_for(kEver).idle()); });
   waiting.wait_until_asleep();
   const Outcome outcome = high.publish(Wrong{});
@@ -75,6 +83,7 @@ TEST_P(Mismatch, OfAPortThatWasThereFirstIsTheSame) {
   high.publish(Wrong{});
   in = receiver.input_port<Number>("/other");
   in = receiver.input_port<Number>("/in");
+  both_hear_all();
   EXPECT_TRUE(in.idle());
   EXPECT_EQ(high.publish(Wrong{}).refused, 1u);
 }
@@ -82,6 +91,7 @@ TEST_P(Mismatch, OfAPortThatWasThereFirstIsTheSame) {
 TEST_P(Mismatch, IsDiscardedWhereItIsNotTheWinner) {
   auto high = sender.output_port<Wrong>("/high");
   auto stop = sender.output_port<Number>("/stop");
+  both_hear_all();
   stop.signal();
   const Outcome outcome = high.publish(Wrong{});
   EXPECT_EQ(outcome.discarded, 1u);
@@ -95,10 +105,12 @@ TEST_P(Mismatch, IsDiscardedWhereItIsNotTheWinner) {
 TEST_P(Mismatch, IsOverWithASuccessorOfTheRightType) {
   {
     auto high = sender.output_port<Wrong>("/high");
+    both_hear_all();
     high.publish(Wrong{});
     EXPECT_TRUE(in.idle());
   }
   auto high = sender.output_port<Number>("/high");
+  both_hear_all();
   EXPECT_FALSE(in.idle()) << "its activity goes on, and it can deliver";
   EXPECT_EQ(in.winner(), "/high");
   EXPECT_EQ(high.publish(Number{1}).delivered, 1u);
@@ -111,12 +123,14 @@ TEST_P(Mismatch, OfAnotherTypeThanBeforeIsOverWithTheReceiver) {
   EXPECT_EQ(high.publish(Wrong{}).refused, 1u);
   in = receiver.input_port<Number>("/other");
   auto fitting = receiver.input_port<Wrong>("/in");
+  both_hear_all();
   EXPECT_EQ(high.publish(Wrong{}).delivered, 1u);
   EXPECT_EQ(fitting.winner(), "/high");
 }
 
 TEST_P(Mismatch, ShowsInTheStatus) {
   auto high = sender.output_port<Wrong>("/high");
+  both_hear_all();
   EXPECT_TRUE(daemon.input("/in")["cannot_deliver"].is_null());
   high.publish(Wrong{});
   const auto status = daemon.input("/in");
@@ -131,12 +145,15 @@ TEST_P(Mismatch, IsKnownToTheNextDaemonToo) {
   low.publish(Number{1});
   EXPECT_EQ(take_from(in), 1);
   auto high = sender.output_port<Wrong>("/high");
+  both_hear_all();
   high.publish(Wrong{});
   EXPECT_TRUE(in.wait_for(kEver).idle());
   daemon.kill();
   EXPECT_TRUE(in.idle());
   EXPECT_EQ(high.publish(Wrong{}).refused, 1u);
   daemon.restart();
+  while (daemon.input("/in")["away"] == true || daemon.source("/high")["away"] == true) {
+  }
   EXPECT_EQ(daemon.input("/in")["cannot_deliver"]["source"], "/high");
   EXPECT_TRUE(in.idle());
   EXPECT_EQ(high.publish(Wrong{}).refused, 1u);
@@ -150,6 +167,7 @@ TEST_P(Mismatch, ThatEndsWithoutADaemonIsOverWithTheNext) {
   in = receiver.input_port<Number>("/free");
   auto other = receiver.input_port<Wrong>("/in");
   ASSERT_EQ(wrong.tell("output /high"), "open");
+  both_hear_all();
   EXPECT_EQ(wrong.tell("publish /high 1"), "0 0 1");
   EXPECT_TRUE(other.idle());
   daemon.kill();
@@ -158,6 +176,7 @@ TEST_P(Mismatch, ThatEndsWithoutADaemonIsOverWithTheNext) {
   while (daemon.input("/in")["away"] == true || daemon.source("/high")["away"] == true) {
   }
   auto high = sender.output_port<Wrong>("/high");
+  both_hear_all();
   EXPECT_EQ(other.winner(), "/high");
   EXPECT_EQ(high.publish(Wrong{}).delivered, 1u);
 }
@@ -167,6 +186,7 @@ TEST_P(Mismatch, MakesADescriptorReadableOnce) {
   low.publish(Number{1});
   EXPECT_EQ(take_from(in), 1);
   auto high = sender.output_port<Wrong>("/high");
+  both_hear_all();
   EXPECT_FALSE(in.take());
   EXPECT_FALSE(is_readable(fd));
   high.publish(Wrong{});

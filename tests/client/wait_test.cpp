@@ -159,9 +159,17 @@ TEST(Wait, ACommanderThatOnlySignalsMakesThePortIdleWhenItFallsSilent) {
   Node node("test");
   auto out = node.output_port<Number>("/out");
   auto in = node.input_port<Number>("/in");
-  Watched receiver([&] { EXPECT_TRUE(in.wait_for(std::chrono::hours::max()).idle()); });
+  std::atomic<bool> is_told{false};
+  Watched receiver([&] {
+    EXPECT_TRUE(in.wait_for(std::chrono::hours::max()).idle());
+    is_told = true;
+  });
   receiver.wait_until_asleep();
-  out.signal();
+  while (!is_told) {  // of what it has not seen it is not told, and it may not run for 20 ms
+    out.signal();
+    while (daemon.source("/out")["active"] == true) {
+    }
+  }
   receiver.join();
 }
 
