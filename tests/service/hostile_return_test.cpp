@@ -200,6 +200,8 @@ TEST(HostileReturn, ToANewDaemonWithAnOldBoardIsRefusedAndOthersAreTakenBack) {
   impostor.send(return_as(1), {old.board.get(), old.registry.get()});
   EXPECT_EQ(impostor.expect_refusal(), "this daemon's predecessor had other memory");
   component.process().signal(SIGCONT);
+  while (daemon.log().find("is back, with") == std::string::npos) {
+  }
   EXPECT_TRUE(daemon.source("/out")["open"]);
   EXPECT_EQ(daemon.generation(), 2u);
 }

@@ -41,10 +41,29 @@ void wait_until_it_rests(pid_t process) {
   }
 }
 
+// Whether each thread but the loop's, which closes what was a client's, or waits for work, waits.
+bool others_wait(pid_t process) {
+  for (const pid_t task : tasks_of(process)) {
+    if (task == process) continue;
+    const long call = call_of(process, task);
+    if (call >= 0 ? call != SYS_futex : call == -1) return false;
+  }
+  return true;
+}
+
+// Until its loop and all other threads rest: one that has finished may have woken another.
+void wait_until_all_rest(pid_t process) {
+  std::uint64_t before = 0;
+  do {
+    wait_until_it_rests(process);
+    before = sleeps_of(process, process);
+  } while (!others_wait(process) || !rests(process) || sleeps_of(process, process) != before);
+}
+
 // It comes to rest, and none of its threads has been awake since, though much has gone on elsewhere
 // meanwhile.
 void expect_asleep(pid_t process) {
-  wait_until_it_rests(process);
+  wait_until_all_rest(process);
   const auto sleeps = [process] {
     std::map<pid_t, std::uint64_t> result;
     for (const pid_t task : tasks_of(process)) result[task] = sleeps_of(process, task);
@@ -86,25 +105,6 @@ TEST(Idle, ItSleepsAgainWhenEverybodyHasLeft) {
   while (daemon.status()["clients"] != 1) {
   }
   expect_asleep(daemon.process().pid());
-}
-
-// Whether each thread but the loop's, which closes what was a client's, or waits for work, waits.
-bool others_wait(pid_t process) {
-  for (const pid_t task : tasks_of(process)) {
-    if (task == process) continue;
-    const long call = call_of(process, task);
-    if (call >= 0 ? call != SYS_futex : call == -1) return false;
-  }
-  return true;
-}
-
-// Until its loop and all other threads rest: one that has finished may have woken another.
-void wait_until_all_rest(pid_t process) {
-  std::uint64_t before = 0;
-  do {
-    wait_until_it_rests(process);
-    before = sleeps_of(process, process);
-  } while (!others_wait(process) || !rests(process) || sleeps_of(process, process) != before);
 }
 
 // Counts when nobody else is there and the daemon has nothing left to do.

@@ -6,6 +6,7 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "tests/service/impatient.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/run_program.hpp"
 
@@ -71,11 +72,12 @@ TEST(Start, LeavesNoSocketBehind) {
 
 TEST(Start, StopsCleanlyWhileComponentsHavePorts) {
   Daemon daemon("<behaviors><arbiter at='/in'><select from='/out'/></arbiter></behaviors>");
-  Node node("test", {.connect_timeout = std::chrono::milliseconds(50)});
+  Node node("test");
+  Node late = impatient_node("late");
   auto out = node.output_port<int>("/out");
   auto in = node.input_port<int>("/in");
   EXPECT_EQ(daemon.terminate(), 0);
-  EXPECT_THROW({ auto other = node.output_port<int>("/other"); }, Error);
+  EXPECT_THROW({ auto other = late.output_port<int>("/other"); }, Error);
   EXPECT_EQ(out.publish(1).delivered, 1u);
   EXPECT_TRUE(in.take());
 }
