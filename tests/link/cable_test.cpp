@@ -1,4 +1,5 @@
-// Two hosts with networks of their own, and the cable between them pulled.
+// Rules 3, 4 and 5 of docs/hosts.md: two hosts with networks of their own, and the cable between
+// them pulled. That is silence; what has waited is late; and the last state gets through.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sched.h>

@@ -1,4 +1,5 @@
-// Losers stay at home: what an importer wants, and what an exporter keeps.
+// Rule 7 of docs/hosts.md, losers stay at home: what an importer wants, and what an exporter keeps.
+// What is larger than 1 KiB and has lost for 100 ms; headers that are not believed after T.
 #include "link/core/demand.hpp"
 
 #include <gtest/gtest.h>
@@ -15,6 +16,8 @@ using shm::Nanoseconds;
 
 constexpr Nanoseconds kLong = ImportDemand::kLosesFor;
 constexpr Nanoseconds kAge = 5 * kLong;
+
+static_assert(kLong == 100'000'000 && kSmallSample == 1024, "rule 7 says so");
 
 TEST(ImportDemand, ALoserStaysAtHomeOnceItHasLostForAWhile) {
   ImportDemand demand(SourceUse::kFinite, 0);

@@ -1,4 +1,5 @@
-// Links that stop, die and come back: silence, and nothing late.
+// Rules 3 and 4 of docs/hosts.md: links that are stopped, die and come back are silence, and after
+// T the next in command; `forever` ends in an idle port; and nothing that has waited arrives.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,6 @@
-// What strangers on the network send: it is judged, counted, and moves nothing.
+// Rule 9 of docs/hosts.md: what strangers on the network send is judged, counted, and moves
+// nothing. Rule 4: nor does what names no token of this link. Rule 7: nor, after T, who sends
+// headers alone. Rule 6: two machines of one name are named.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

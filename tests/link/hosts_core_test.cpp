@@ -1,5 +1,6 @@
-// What links say of their hosts, by injected time: cards, round trips, who is there, what hosts do
-// not agree upon.
+// Rules 1, 6 and 8 of docs/hosts.md, by injected time: what links say of their hosts (cards, round
+// trips), who is there (256 hosts; 5 min after they are gone), and what they do not agree upon
+// (after 1.5 s; one name of two machines after 3 s).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,6 +18,11 @@ namespace {
 using namespace link;
 using testing::ElementsAre;
 using testing::IsEmpty;
+
+static_assert(Disagreements::kSettles == 1500 * kMs, "rule 1 says so");
+static_assert(Disagreements::kNoEarlierLife == 3 * kS, "rule 6 says so");
+static_assert(Neighbours::kRemembered == 300 * kS, "rule 8 says so");
+static_assert(Neighbours::kMost == 256, "rule 9 says so");
 
 HostCard host_card(const std::string& host, Incarnation incarnation,
                    std::vector<std::string> inputs = {}, std::vector<std::string> outputs = {}) {

@@ -1,5 +1,6 @@
-// What links know of each other and can be asked, and how the tool shows it: real daemons, real
-// links, the real program.
+// Rules 1, 6 and 8 of docs/hosts.md: what links know of each other and can be asked (an input port
+// or a source that is open on two hosts, models, round trips; silent after 1 s), and how the tool
+// shows it: real daemons, real links, the real program.
 #include "wire/hosts.hpp"
 
 #include <gmock/gmock.h>

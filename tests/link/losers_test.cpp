@@ -1,4 +1,5 @@
-// Losers stay at home: samples that win nowhere do not cross, and are there when they win again.
+// Rule 7 of docs/hosts.md, losers stay at home: samples of more than 1 KiB that have won nowhere
+// for 100 ms do not cross, and are there when they win again.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
-// What links send, and what they believe of what they get.
+// Rule 9 of docs/hosts.md: what links send, and what they believe of what they get. Headers name 64
+// importers at most, and samples have 16 MiB at most (rule 2).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -32,6 +33,10 @@ ByteString written(const EventHeader& header) {
   bytes.resize(bytes.size() + header.length, std::byte{0x55});
   return bytes;
 }
+
+static_assert(kMaxImporters == 64, "rule 9 says so");
+static_assert(kMaxSampleBytes == std::size_t{16} << 20, "rule 2 says so");
+static_assert(kFixedHeaderBytes == 44 && kTokenBytes == 16, "docs/hosts.md says so");
 
 bool reads(const ByteString& bytes) {
   EventHeader header;

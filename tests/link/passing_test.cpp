@@ -1,4 +1,5 @@
-// What passes between hosts, and what does not.
+// Rules 2, 4, 5 and 6 of docs/hosts.md: what passes between hosts, and what does not; --max-age;
+// deactivations that nobody has heard; a third host that keeps the speaker that it has.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

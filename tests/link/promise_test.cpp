@@ -1,4 +1,5 @@
-// One host's part in a switch of all: what it promises, to whom, and for how long.
+// Rule 8 of docs/hosts.md: one host's part in a switch of all. What it promises, to whom, and for
+// how long: 2 s, and 2 s of 10 s to who never commits.
 #include "link/core/promise.hpp"
 
 #include <gtest/gtest.h>
@@ -10,6 +11,8 @@ using Verdict = Promise::Verdict;
 
 constexpr shm::Nanoseconds kSecond = 1'000'000'000;
 constexpr SwitchAttempt kOne{7, 100}, kOther{8, 100};
+
+static_assert(Promise::kHolds == 2 * kSecond && Promise::kWithin == 10 * kSecond, "rule 8 says so");
 
 TEST(Promise, IsKeptToWhomItWasMadeAndOnce) {
   Promise promise;

@@ -1,4 +1,5 @@
-// What links ask each other, by injected time: link/core/questions.hpp.
+// What links ask each other, by injected time: link/core/questions.hpp. Rule 8 of docs/hosts.md:
+// who has not answered within 1 s is silent. Rule 9: 20 answers a second to one link, 200 to all.
 #include "link/core/questions.hpp"
 
 #include <gmock/gmock.h>
@@ -15,6 +16,9 @@ namespace {
 using namespace link;
 using testing::ElementsAre;
 using testing::IsEmpty;
+
+static_assert(OpenQuestions::kPatience == kS, "rule 8 says so");
+static_assert(Askers::kMostOfOne == 20 && Askers::kMostOfAll == 200, "rule 9 says so");
 
 TEST(QuestionMessages, AreReadAsTheyWereWritten) {
   const QuestionMessage question{5, 9, {6, 7}, "head", "status", "all of it"};

@@ -1,4 +1,5 @@
-// The recipe of docs/hosts.md for DDS Security: examples/hosts/security, as it is installed.
+// Rule 9 of docs/hosts.md, and its recipe for DDS Security: examples/hosts/security, as it is
+// installed.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
-// Order, doubles, losses; one speaker; and when a source is imported at all.
+// Rules 2, 5 and 6 of docs/hosts.md: when a source is imported at all (three things hold); order,
+// doubles, losses and the present state; one speaker, which is kept until it is gone.
 #include "link/core/stream.hpp"
 
 #include <gmock/gmock.h>

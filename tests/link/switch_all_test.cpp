@@ -1,4 +1,5 @@
-// All hosts switch to another model, or none does; and what is said where neither is so.
+// Rule 8 of docs/hosts.md: all hosts switch to another model, or none does, where one says no or
+// does not answer within 1 s; and what is said where neither is so.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

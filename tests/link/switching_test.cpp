@@ -1,5 +1,6 @@
-// What a host does that is asked to prepare, to commit and to release; beside a daemon that only
-// says what a test wants.
+// Rule 8 of docs/hosts.md: what a host does that is asked to prepare, to commit and to release, and
+// that it keeps its model if it hears no commit for 2 s; beside a daemon that only says what a test
+// wants.
 #include "link/switching.hpp"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,6 @@
-// Never late: how old a sample can be, told by tokens, without comparing the clocks of hosts. The
-// tests say what time it is.
+// Rule 4 of docs/hosts.md, never late: how old a sample can be, told by tokens, without comparing
+// the clocks of hosts. A token every T/8, from 1 ms to 250 ms apart; with a round trip of up to T/4
+// no sample younger than T/2 is late, and none older than T arrives. The tests say what time it is.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -84,6 +85,14 @@ TEST(SentTokens, ASampleIsNoOlderThanTheTokenThatItNames) {
   EXPECT_EQ(sent.time_left(token, 500 * kMs, 1100 * kMs), 400 * kMs);
   EXPECT_EQ(sent.time_left(token, 500 * kMs, 1500 * kMs), 0);
   EXPECT_LT(sent.time_left(token, 500 * kMs, 1500 * kMs + 1), 0);
+}
+
+TEST(SentTokens, AreSentEachEighthOfTWithinBounds) {
+  EXPECT_EQ(token_period(500 * kMs), 500 * kMs / 8);
+  EXPECT_EQ(token_period(8 * kMs), kMs);
+  EXPECT_EQ(token_period(kMs), kMs) << "so with a T below 8 ms fresh samples may be late";
+  EXPECT_EQ(token_period(2'000 * kMs), 250 * kMs);
+  EXPECT_EQ(token_period(100'000 * kMs), 250 * kMs);
 }
 
 TEST(SentTokens, ATokenThatWasNeverSentIsNoEvidence) {
