@@ -1,5 +1,6 @@
 // From a component on one host to one on another, through two links, beside plain Cyclone DDS
-// between the same two networks.
+// between the same two networks: what rules 3 to 5 of docs/hosts.md cost each sample (tokens in its
+// header, its order, an arrival at the importing host).
 #include <poll.h>
 #include <sched.h>
 #include <unistd.h>

@@ -1,4 +1,5 @@
-// What a camera costs the network while it loses at the other host, and what its return costs.
+// Rule 7 of docs/hosts.md: what a camera of 1 MiB at 30 Hz costs the network while it loses at the
+// other host, and what its return costs: at most one period (33 ms) and a round trip.
 #include <poll.h>
 
 #include <array>
@@ -145,13 +146,15 @@ void measure_camera(Measure& measure, bool quick) {
 }  // namespace
 
 Measure measure_hosts_losers(const Effort& effort) {
-  Measure measure{"hosts-losers", "Losers stay at home",
-                  "A camera on one host publishes 1 MiB at 30 Hz; the other host's model shows it, "
-                  "or lets something of its own override it. What crosses the network while it "
-                  "wins and while it loses, both ways, with all headers and the links' own "
-                  "messages; and how old an image is when it is taken: one of those that are "
-                  "always sent, and the first after the camera wins again, which is sent after "
-                  "the other host has seen its header."};
+  Measure measure{
+      "hosts-losers", "Losers stay at home",
+      "A camera on one host publishes 1 MiB at 30 Hz; the other host's model shows it, "
+      "or lets something of its own override it. What crosses the network while it "
+      "wins and while it loses, both ways, with all headers and the links' own "
+      "messages; and how old an image is when it is taken: one of those that are "
+      "always sent, and the first after the camera wins again, which is sent after "
+      "the other host has seen its header (rule 7 of docs/hosts.md: the port waits at most "
+      "one period and a round trip longer)."};
   try {
     measure_camera(measure, effort.quick);
   } catch (const std::exception& error) {

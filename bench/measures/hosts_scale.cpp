@@ -1,10 +1,12 @@
-// How the cost of links grows with sources and with hosts.
+// How the cost of links grows with sources and with hosts: rule 2 of docs/hosts.md (what is offered
+// and imported: 100, 1000 and 4000 sources) and rule 8 (2, 10 and 50 hosts that know each other).
 #include <poll.h>
 
 #include <cstdio>
 #include <deque>
 #include <fstream>
 #include <memory>
+#include <numeric>
 
 #include "bench/harness/hosts.hpp"
 #include "bench/measures/measures.hpp"
@@ -57,18 +59,20 @@ double resident_mib(pid_t pid) {
   return kib / 1024;
 }
 
-// Of a processor, in percent, while nobody publishes.
-double share_of_processor(const std::vector<const LinkedHost*>& hosts, double seconds) {
-  const auto used = [&] {
-    std::int64_t sum = 0;
-    for (const LinkedHost* const each : hosts) sum += processor_time_ns(each->link());
-    return sum;
-  };
-  const std::int64_t before = used();
+// Of a processor, in percent, while nobody publishes: that of each host's link.
+std::vector<double> shares_of_processor(const std::vector<const LinkedHost*>& hosts,
+                                        double seconds) {
+  std::vector<std::int64_t> before;
+  for (const LinkedHost* const each : hosts) before.push_back(processor_time_ns(each->link()));
   const std::int64_t began = now_ns();
   ::poll(nullptr, 0, static_cast<int>(seconds * 1000));
-  return 100.0 * static_cast<double>(used() - before) / static_cast<double>(now_ns() - began) /
-         static_cast<double>(hosts.size());
+  const auto took = static_cast<double>(now_ns() - began);
+  std::vector<double> shares;
+  for (std::size_t i = 0; i < hosts.size(); ++i) {
+    const std::int64_t used = processor_time_ns(hosts[i]->link()) - before[i];
+    shares.push_back(100.0 * static_cast<double>(used) / took);
+  }
+  return shares;
 }
 
 Case one_value(const std::string& name, const char* unit, const char* system, double value) {
@@ -78,10 +82,8 @@ Case one_value(const std::string& name, const char* unit, const char* system, do
   return one;
 }
 
-void measure_sources(Measure& measure, bool quick) {
-  const int sources = quick ? 200 : 1000;
-  const int imports = sources / 10;
-  const double seconds = quick ? 1 : 5;
+// One host has that many, and another imports as many of them as given.
+void measure_sources(Measure& measure, int sources, int imports, double seconds) {
   NetworkSwitch network;
   LinkedHost head("head", model(declared(sources_of(0, sources))), network);
   LinkedHost base("base", model_for(0, imports, {}), network);
@@ -89,7 +91,8 @@ void measure_sources(Measure& measure, bool quick) {
   ::poll(nullptr, 0, 1000);
   const double memory_before = resident_mib(head.link());
   const Worker component = publisher(head, 0, sources);
-  ::poll(nullptr, 0, 1500);  // all are offered
+  // All are offered: the link asks once a second what is open, where much is.
+  ::poll(nullptr, 0, 2000);
   base.start_link();
   const std::int64_t began = now_ns();
   base.await_imported(imports);
@@ -105,15 +108,17 @@ void measure_sources(Measure& measure, bool quick) {
       {"of which its sources", Role::kOurs, {}, resident_mib(head.link()) - memory_before, {}},
       {"importing link", Role::kOurs, {}, resident_mib(base.link()), {}}};
   measure.cases.push_back(std::move(memory));
+  const std::uint64_t before = head.space().bytes();
+  const std::int64_t rested = now_ns();
+  const std::vector<double> shares = shares_of_processor({&head, &base}, seconds);
+  const double wire = static_cast<double>(head.space().bytes() - before) * 1e9 /
+                      static_cast<double>(now_ns() - rested);
   Case rest{of + "share of a processor at rest"};
   rest.unit = "%";
-  rest.results = {{"exporting link", Role::kOurs, {}, share_of_processor({&head}, seconds), {}},
-                  {"importing link", Role::kOurs, {}, share_of_processor({&base}, seconds), {}}};
+  rest.results = {{"exporting link", Role::kOurs, {}, shares[0], {}},
+                  {"importing link", Role::kOurs, {}, shares[1], {}}};
   measure.cases.push_back(std::move(rest));
-  const std::uint64_t before = head.space().bytes();
-  ::poll(nullptr, 0, static_cast<int>(seconds * 1000));
-  measure.cases.push_back(one_value(of + "on the wire at rest", "bytes/s", "exporting link",
-                                    static_cast<double>(head.space().bytes() - before) / seconds));
+  measure.cases.push_back(one_value(of + "on the wire at rest", "bytes/s", "exporting link", wire));
 }
 
 // Each host has ten sources, and takes all of the next one's.
@@ -143,7 +148,9 @@ void measure_hosts(Measure& measure, int count, double seconds) {
   add("until all have imported", "ms", static_cast<double>(now_ns() - began) / 1e6);
   ::poll(nullptr, 0, 2000);
   add("memory", "MiB", resident_mib(hosts.front().link()));
-  add("share of a processor at rest", "%", share_of_processor(all, seconds));
+  const std::vector<double> shares = shares_of_processor(all, seconds);
+  add("share of a processor at rest", "%",
+      std::accumulate(shares.begin(), shares.end(), 0.0) / static_cast<double>(count));
   const std::uint64_t before = hosts.front().space().bytes();
   ::poll(nullptr, 0, static_cast<int>(seconds * 1000));
   add("on the wire at rest", "bytes/s",
@@ -154,16 +161,20 @@ void measure_hosts(Measure& measure, int count, double seconds) {
 
 Measure measure_hosts_scale(const Effort& effort) {
   Measure measure{"hosts-scale", "Links, by sources and by hosts",
-                  "A host with 1000 output ports, of which another imports 100; and so many hosts "
-                  "on this machine, each in a network namespace of its own, with ten sources that "
-                  "the next host imports. Until all are imported, counted from the start of the "
-                  "links; then the links' memory, processor time and traffic while nobody "
-                  "publishes. All hosts share this machine's processors."};
+                  "A host with 100, 1000 and 4000 output ports, of which another imports 100; and "
+                  "so many hosts on this machine, each in a network namespace of its own, with ten "
+                  "sources that the next host imports. Until all are imported, counted from the "
+                  "start of the links; then the links' memory, processor time and traffic while "
+                  "nobody publishes. All hosts share this machine's processors."};
   measure.x_label = "hosts";
+  const bool quick = effort.quick;
+  const double seconds = quick ? 1 : 5;
   try {
-    measure_sources(measure, effort.quick);
-    for (const int hosts : effort.quick ? std::vector<int>{2, 5} : std::vector<int>{2, 10, 50}) {
-      measure_hosts(measure, hosts, effort.quick ? 1 : 5);
+    for (const int sources : quick ? std::vector<int>{200} : std::vector<int>{100, 1000, 4000}) {
+      measure_sources(measure, sources, quick ? 20 : 100, quick ? 1 : 2);
+    }
+    for (const int hosts : quick ? std::vector<int>{2, 5} : std::vector<int>{2, 10, 50}) {
+      measure_hosts(measure, hosts, seconds);
     }
   } catch (const std::exception& error) {
     measure.cases.push_back(
