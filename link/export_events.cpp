@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "gateway/core/say.hpp"
+#include "link/core/said_type.hpp"
 #include "link/exports.hpp"
 #include "shm/clock.hpp"
 
@@ -135,15 +136,15 @@ bool Exports::send_some(Export& one) {
 }
 
 std::size_t Exports::send(Export& one, const TapEvent<void>& event) {
-  know_type(one, info_of(event.type()));
+  const bool is_known = know_type(one, info_of(event.type()));
   one.number += event.lost();  // that the tap has missed
   one.sequence = event.sequence();
   const auto sample =
       event.kind() == TapEventKind::sample ? event.sample() : std::optional<Bytes>();
   header_.kind = kind_of(event.kind());
-  // A sample that was overwritten before it could be sent, or that is too large, is an arrival
-  // nevertheless.
-  const bool has_sample = sample && sample->size() <= kMaxSampleBytes;
+  // A sample that was overwritten before it could be sent, that is too large, or of a type that is
+  // not known there, is an arrival nevertheless.
+  const bool has_sample = sample && is_known && sample->size() <= kMaxSampleBytes;
   if (header_.kind == EventKind::kSample && !has_sample) header_.kind = EventKind::kSignal;
   header_.is_deactivated = header_.kind == EventKind::kDeactivation ||
                            (header_.kind == EventKind::kState && event.is_deactivated());
@@ -241,16 +242,17 @@ bool Exports::put(Export& one, Bytes sample) {
   return one.writer.write(bytes, sample);
 }
 
-void Exports::know_type(Export& one, const shm::TypeInfo& type) {
-  OfferCard& card = one.card;
-  if (card.type == type && card.type.size == type.size) return;
-  ++card.type_revision;
-  card.type = type;
-  one.kept.drop();  // it is of the type before
+bool Exports::know_type(Export& one, const shm::TypeInfo& type) {
   try {
-    one.writer.set_card(card);
-  } catch (const DdsError& error) {
-    say(Level::kError, error.what());
+    const bool is_new =
+        say_type(one.card, type, [&](const OfferCard& card) { one.writer.set_card(card); });
+    if (is_new) one.kept.drop();  // it is of the type before
+    one.has_said_unknown = false;
+    return true;
+  } catch (const DdsError& error) {  // the next sample tries again
+    one.kept.drop();
+    if (!std::exchange(one.has_said_unknown, true)) say(Level::kError, error.what());
+    return false;
   }
 }
 

@@ -115,7 +115,7 @@ void Exports::offer(const std::string& source, const shm::TypeInfo& type) {
     Export& one = *exports_.at(id->second);
     if (one.tap) return;  // which knows it better: how things stand was asked some time ago
     const auto lock = lock_first();
-    know_type(one, type);
+    static_cast<void>(know_type(one, type));
     return;
   }
   OfferCard card;

@@ -75,6 +75,7 @@ class Exports {
     std::uint32_t reader_changes = 0;  // that `demand` knows of
     KeptSample kept;                   // the last event's, where it was withheld
     std::string said;                  // why it cannot be tapped
+    bool has_said_unknown = false;     // that its type cannot be made known
     shm::Nanoseconds tap_again = 0;    // not before
   };
 
@@ -118,7 +119,8 @@ class Exports {
   bool hear_readers();
   void hear_readers(std::uint64_t id, Export& one);
   void send_kept(Export& one);
-  static void know_type(Export& one, const shm::TypeInfo& type);
+  // False: the type cannot be made known now, and importers would take its samples for others.
+  static bool know_type(Export& one, const shm::TypeInfo& type);
 
   Node& node_;
   const Network& network_;

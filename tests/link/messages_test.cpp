@@ -5,10 +5,12 @@
 
 #include <random>
 #include <set>
+#include <stdexcept>
 #include <string>
 
 #include "link/core/cards.hpp"
 #include "link/core/event_header.hpp"
+#include "link/core/said_type.hpp"
 #include "link/core/topic_names.hpp"
 #include "link/core/what_passes.hpp"
 
@@ -151,6 +153,30 @@ TEST(Cards, AnOfferWithoutATypeIsOneWhoseTypeIsNotKnownYet) {
   const auto read = read_offer_card(Bytes(bytes.data(), bytes.size()));
   ASSERT_TRUE(read);
   EXPECT_EQ(read->type_revision, 0U);
+}
+
+// Importers drop samples of a revision that no card of theirs has.
+TEST(Cards, ATypeThatCannotBeSaidIsTriedAgain) {
+  OfferCard card;
+  card.type_revision = 1;
+  card.type.size = 4;
+  const OfferCard before = card;
+  shm::TypeInfo type;
+  type.set_name("arm/Pose");
+  type.size = 8;
+  const auto fail = [](const OfferCard&) { throw std::runtime_error("memory is short"); };
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_THROW(say_type(card, type, fail), std::runtime_error);
+    EXPECT_EQ(card.type_revision, 1U);
+    EXPECT_EQ(card.type, before.type);
+  }
+  std::uint32_t said = 0;
+  const auto note = [&](const OfferCard& now) { said = now.type_revision; };
+  EXPECT_TRUE(say_type(card, type, note));
+  EXPECT_EQ(said, 2U) << "no revision is left out";
+  EXPECT_EQ(card.type_revision, 2U);
+  EXPECT_EQ(card.type, type);
+  EXPECT_FALSE(say_type(card, type, fail)) << "it has been said";
 }
 
 TEST(Cards, NamesThatWouldMisleadAreNobodys) {
