@@ -42,16 +42,22 @@ void include(std::optional<RecordingInfo::Times>& times, McapTime time) {
   times->end = std::max(times->end, time);
 }
 
-// Of a file that only looks like a recording, nothing; nor is a record read that is too large.
+// A record of that kind. Of a file that only looks like a recording, nothing; nor is a record read
+// that is too large.
+nlohmann::json record_of(evidence::RecordKind kind, const recording::McapChannel& channel,
+                         const recording::McapMessage& message) {
+  constexpr std::size_t kMostBytes = std::size_t{64} << 10;
+  const auto& topic = evidence::record_schemas[static_cast<std::size_t>(kind)].topic;
+  if (channel.topic != topic || channel.message_encoding != "json" ||
+      message.data.size() > kMostBytes) {
+    return nullptr;
+  }
+  return nlohmann::json::parse(message.data, nullptr, false);
+}
+
 void count_missed(RecordingInfo& info, const recording::McapChannel& channel,
                   const recording::McapMessage& message) {
-  constexpr std::size_t kMostBytes = std::size_t{64} << 10;
-  constexpr auto kMissed = static_cast<std::size_t>(evidence::RecordKind::kMissed);
-  if (channel.topic != evidence::record_schemas[kMissed].topic ||
-      channel.message_encoding != "json" || message.data.size() > kMostBytes) {
-    return;
-  }
-  const auto record = nlohmann::json::parse(message.data, nullptr, false);
+  const auto record = record_of(evidence::RecordKind::kMissed, channel, message);
   const auto number = [&record](const char* name) -> std::uint64_t {
     if (!record.is_object()) return 0;
     const auto found = record.find(name);
@@ -62,6 +68,24 @@ void count_missed(RecordingInfo& info, const recording::McapChannel& channel,
   info.missed_samples += number("samples");
 }
 
+void note_import(RecordingInfo& info, const recording::McapChannel& channel,
+                 const recording::McapMessage& message) {
+  const auto record = record_of(evidence::RecordKind::kPort, channel, message);
+  const auto text = [&record](const char* name) -> std::string {
+    if (!record.is_object()) return {};
+    const auto found = record.find(name);
+    return found != record.end() && found->is_string() ? found->get<std::string>() : "";
+  };
+  const std::string source = text("port");
+  const std::string host = text("host");
+  const auto known = info.imports.find(source);
+  if (host.empty() || (known != info.imports.end() && known->second.contains(host))) return;
+  if (has_room(info, info.imported, source.size() + host.size())) {
+    info.imports[source].insert(host);
+    ++info.imported;
+  }
+}
+
 void count_message(RecordingInfo& info, const recording::McapMessage& message) {
   ++info.messages;
   include(info.times, message.log_time);
@@ -70,6 +94,7 @@ void count_message(RecordingInfo& info, const recording::McapMessage& message) {
   channel.bytes += message.data.size();
   include(channel.times, message.log_time);
   count_missed(info, channel.channel, message);
+  note_import(info, channel.channel, message);
 }
 
 recording::McapVisitor visitor_for(RecordingInfo& info) {
@@ -184,6 +209,10 @@ nlohmann::json to_json(const RecordingInfo& info) {
   for (const auto& [name, values] : info.metadata) {
     metadata.push_back({{"name", name}, {"values", values}});
   }
+  json imports = json::array();
+  for (const auto& [source, hosts] : info.imports) {
+    imports.push_back({{"source", source}, {"hosts", hosts}});
+  }
   json attachments = json::array();
   for (const auto& each : info.attachments) {
     attachments.push_back({{"name", each.name},
@@ -208,6 +237,7 @@ nlohmann::json to_json(const RecordingInfo& info) {
           {"chunks", std::move(chunks)},
           {"schemas", std::move(schemas)},
           {"channels", std::move(channels)},
+          {"imports", std::move(imports)},
           {"metadata", std::move(metadata)},
           {"attachments", std::move(attachments)},
           {"unlisted", info.unlisted}};

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <ostream>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -57,7 +58,9 @@ struct RecordingInfo {
   std::map<std::uint16_t, Channel> channels;
   std::vector<std::pair<std::string, recording::McapMap>> metadata;
   std::vector<Attachment> attachments;
-  std::uint64_t unlisted = 0;  // metadata and attachments for which there was no room
+  std::map<std::string, std::set<std::string>> imports;  // sources, and from which hosts they came
+  std::size_t imported = 0;                              // of these, each with one host
+  std::uint64_t unlisted = 0;  // imports, metadata and attachments for which there was no room
   std::size_t listed_bytes = 0;
 };
 

@@ -157,6 +157,15 @@ void write_channels(std::ostream& out, const RecordingInfo& info) {
   }
 }
 
+void write_imports(std::ostream& out, const RecordingInfo& info) {
+  if (!info.imports.empty()) out << "\nsources of other hosts\n";
+  for (const auto& [source, hosts] : info.imports) {
+    std::string text;
+    for (const std::string& host : hosts) text += (text.empty() ? "  from " : ", ") + host;
+    out << "  " << shm::printable(source + text) << '\n';
+  }
+}
+
 void write_metadata(std::ostream& out, const RecordingInfo& info) {
   for (const auto& [name, values] : info.metadata) {
     out << "\nmetadata " << shortened(name, kColumns - 9) << '\n';
@@ -175,7 +184,8 @@ void write_attachments(std::ostream& out, const RecordingInfo& info) {
         << '\n';
   }
   if (info.unlisted > 0) {
-    out << "\nand " << info.unlisted << " more attachments and metadata records\n";
+    out << "\nand " << info.unlisted
+        << " more attachments, metadata records and sources of other hosts\n";
   }
 }
 
@@ -209,6 +219,7 @@ void write_text(std::ostream& out, const RecordingInfo& info) {
   }
   write_chunks(out, info);
   write_channels(out, info);
+  write_imports(out, info);
   write_metadata(out, info);
   write_attachments(out, info);
   if (info.end.is_whole || !info.has_header) return;

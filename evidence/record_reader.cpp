@@ -228,6 +228,7 @@ Record read_port(const Fields& in) {
   each.pid = static_cast<std::int64_t>(in.number("pid"));
   each.type = in.text("type");
   each.seen = in.time("seen_ns");
+  if (in.has("host")) each.host = in.text("host");
   return each;
 }
 

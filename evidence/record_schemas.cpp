@@ -53,7 +53,7 @@ const std::array<RecordSchema, kRecordKinds> record_schemas{{
      "source:text time_ns:int seen_ns:int destinations:texts"},
     {"arbiter/port", "arbiter.Port",
      "what:open|opened|closed|died direction:input|output port:text node:text pid:int type:text "
-     "seen_ns:int"},
+     "seen_ns:int host:text?"},
     {"arbiter/model", "arbiter.Model",
      "time_ns:int seen_ns:int generation:int name:text how:text by:text has_texts:bool files:files "
      "application:files"},

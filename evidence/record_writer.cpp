@@ -173,6 +173,7 @@ Written put(JsonLine& out, const PortChange& each) {
   out.add("what", name_of(each.what)).add("direction", each.is_input ? "input" : "output");
   out.add("port", each.port).add("node", each.node).add("pid", each.pid);
   out.add("type", each.type).add("seen_ns", each.seen);
+  if (!each.host.empty()) out.add("host", each.host);
   return {RecordKind::kPort, each.seen};
 }
 

@@ -103,6 +103,7 @@ struct PortChange {
   std::int64_t pid = 0;
   std::string type;  // empty: untyped
   Nanoseconds seen = 0;
+  std::string host{};  // from which a link imports it; empty: a component of this host has it open
 };
 
 struct ModelFile {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "watch/imported.hpp"
+
 namespace arbiter::recorder {
 
 using evidence::PortChange;
@@ -17,7 +19,10 @@ OpenPorts::Ports OpenPorts::ports_of(const wire::Status& status) {
     if (open.type) port.type = open.type->name;
   };
   for (const auto& source : status.sources) {
-    if (source.open) note(false, source.name, *source.open);
+    if (!source.open) continue;
+    note(false, source.name, *source.open);
+    const std::string host = watch::host_of(source);
+    if (host != watch::kUnknownHost) ports[{false, source.name}].host = host;
   }
   for (const auto& input : status.inputs) {
     if (input.open) note(true, input.name, *input.open);
@@ -43,7 +48,10 @@ void OpenPorts::note(const wire::Status& status, Nanoseconds now, Batch& batch) 
   }
   for (const auto& [key, after] : ports) {
     const auto before = ports_.find(key);
-    if (before != ports_.end() && is_same(before->second, after)) continue;
+    // A link says a little later from which host it imports, and may go over to another one.
+    const bool is_known = before != ports_.end() && is_same(before->second, after) &&
+                          before->second.host == after.host;
+    if (is_known) continue;
     tell(after, is_known_ ? PortChange::What::opened : PortChange::What::open);
   }
   is_known_ = true;

@@ -9,7 +9,7 @@ std::string host_of(const wire::SourceStatus& source) {
   constexpr std::string_view kBeginning = "host ";
   if (!source.open || source.open->component.node != "arbiter-link") return {};
   const std::string described = source.open->described.value_or("");
-  if (!described.starts_with(kBeginning)) return "?";
+  if (!described.starts_with(kBeginning)) return kUnknownHost;
   const std::size_t end = described.find(',');
   return described.substr(kBeginning.size(),
                           end == std::string::npos ? end : end - kBeginning.size());

@@ -7,8 +7,11 @@
 
 namespace arbiter::watch {
 
+// The link has not said yet.
+inline constexpr const char* kUnknownHost = "?";
+
 // The host from which the link has this source; empty: a component of this host has it open, or
-// none has; "?": the link has not said yet.
+// none has; or kUnknownHost.
 [[nodiscard]] std::string host_of(const wire::SourceStatus& source);
 
 }  // namespace arbiter::watch

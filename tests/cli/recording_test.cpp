@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <span>
 #include <sstream>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
@@ -215,10 +217,33 @@ TEST_F(RecordingVerb, ExportsNeitherOverTheRecordingNorTwiceIntoOneFile) {
   EXPECT_EQ(content_of(whole_), before);
 }
 
+// Ports as a recorder notes them, and some that it would not.
+std::string with_imports(const TemporaryDirectory& directory) {
+  std::string path = directory.file("imports.mcap");
+  recording::McapWriter writer(path, "arbiter test", {});
+  const auto ports = writer.add_channel({0, "arbiter/port", "json", {}});
+  for (const std::string text :
+       {R"({"port": "/b:o", "host": "rear"})", R"({"port": "/b:o", "host": "head"})",
+        R"({"port": "/b:o", "host": "head"})", R"({"port": "/a:o", "host": "he\u001bad"})",
+        R"({"port": "/here:o"})", R"({"port": 5, "host": 6})", "[", "7"}) {
+    writer.write({ports, 0, kNoon, kNoon, std::as_bytes(std::span(text))});
+  }
+  writer.close();
+  return path;
+}
+
+TEST_F(RecordingVerb, SaysFromWhichHostsSourcesCame) {
+  const auto result = arbiter({"recording", "info", with_imports(directory_)});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("\nsources of other hosts\n  /a:o  from he\\x1bad\n"
+                                    "  /b:o  from head, rear\n"));
+  EXPECT_THAT(arbiter({"recording", "info", whole_}).out, Not(HasSubstr("other hosts")));
+}
+
 // In both directions.
 TEST_F(RecordingVerb, WritesTheDocumentThatThePageDescribes) {
   ObservedFields observed({"metadata[].values", "channels[].metadata"});
-  for (const std::string& path : {whole_, cut()}) {
+  for (const std::string& path : {whole_, cut(), with_imports(directory_)}) {
     observed.see(json::parse(arbiter({"recording", "info", "--json", path}).out));
   }
   const std::string empty = directory_.file("empty.mcap");

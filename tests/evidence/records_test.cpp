@@ -37,6 +37,8 @@ void add_everything(Incident& incident) {
   incident.add(evidence::DestinationsChange{context, 1040, 1041});
   incident.add(
       evidence::PortChange{evidence::PortChange::What::died, true, "/p", "node", 42, "Type", 1050});
+  incident.add(evidence::PortChange{evidence::PortChange::What::opened, false, "/low",
+                                    "arbiter-link", 43, "Type", 1051, "head"});
   incident.add(evidence::WinnerChange{"/p", "/low", "", 1010, evidence::WinnerChange::Why::arrival,
                                       "/low", 1});
   incident.add(evidence::Missed{"/low", 1, 2, 3, 4, evidence::Missed::Why::queue, "why"});
