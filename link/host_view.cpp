@@ -1,8 +1,10 @@
 #include "link/host_view.hpp"
 
 #include <time.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <fstream>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -92,6 +94,24 @@ std::optional<Wanted> read_table(const shm::TableReader& tables,
   return std::nullopt;
 }
 
+// The name of the program that a process runs; empty: it is not to be seen from here.
+std::string program_of(int process) {
+  std::ifstream file("/proc/" + std::to_string(process) + "/comm");
+  std::string name;
+  std::getline(file, name);
+  return name;
+}
+
+// Whether a link has it open. Any component may call itself so. A process that is not to be seen
+// from here (another PID namespace) has nothing but that name; nor has a link that has just died,
+// and one that is ending beside this one is known by its program.
+bool is_link(const wire::Component& component) {
+  if (component.node != kNodeName) return false;
+  if (component.pid == ::getpid()) return true;
+  const std::string program = program_of(component.pid);
+  return program.empty() || program == program_of(::getpid());
+}
+
 // Of what was read, wherever the files lie.
 std::uint64_t digest_of(const wire::ModelDocument& document) {
   if (!document.known) return 0;
@@ -154,7 +174,7 @@ void HostView::look_at_ports() {
   ask_again_ = now + std::clamp(kTimesItsCost * cost, kAskPeriod, kLongestAskPeriod);
   OpenPorts open;
   for (const wire::SourceStatus& source : status.sources) {
-    const bool is_ours = source.open && source.open->component.node == kNodeName;
+    const bool is_ours = source.open && is_link(source.open->component);
     if (source.open && !is_ours) open[source.name] = info_of(*source.open);
     // A component that has not come back to this daemon yet has what it had: samples go on.
     const auto before = open_here_.find(source.name);

@@ -20,7 +20,7 @@
 
 namespace arbiter::link {
 
-// The node of every link has this name: what it has open was imported, and is not exported again.
+// The node of every link has this name. What it has open was imported, and is not exported again.
 inline constexpr const char* kNodeName = "arbiter-link";
 
 class HostView {
