@@ -3,6 +3,7 @@
 //   verb_echo.cpp       its options
 //   echo_loop.cpp       when it looks, and until when
 //   echo_tap.cpp        prints what a tap tells
+//   echo_hosts.cpp     from which hosts arrivals come
 //   echo_rate.cpp       prints how often, how regularly and how much
 //   echo_component.cpp  opens an input port itself, and prints what it takes
 #pragma once
@@ -12,7 +13,6 @@
 #include <string>
 
 #include <arbiter/arbiter.hpp>
-#include <nlohmann/json.hpp>
 
 #include "shm/activity.hpp"
 #include "shm/file_descriptor.hpp"
@@ -49,9 +49,6 @@ TapOf kind_of_port(const EchoOptions& options);
 
 // "01 02 … ", all bytes or the first few.
 std::string hex_of(const Bytes& bytes, std::size_t most);
-// {publisher, sequence} of an arrival that was passed on. The publisher as text: in a number of
-// JSON not all readers keep 64 bits.
-nlohmann::json json_of(const Origin& origin);
 std::string preview(const Bytes& bytes);
 // A line for each 16 bytes, with its offset.
 std::string hex_dump(const Bytes& bytes);

@@ -1,6 +1,5 @@
 // Bytes of samples, for people to read.
 #include <algorithm>
-#include <sstream>
 
 #include "cli/echo.hpp"
 
@@ -21,12 +20,6 @@ std::string hex_of(const Bytes& bytes, std::size_t most) {
     text += kHex[value & 15];
   }
   return text;
-}
-
-nlohmann::json json_of(const Origin& origin) {
-  std::ostringstream publisher;
-  publisher << std::hex << origin.publisher;
-  return {{"publisher", publisher.str()}, {"sequence", origin.sequence}};
 }
 
 std::string preview(const Bytes& bytes) {

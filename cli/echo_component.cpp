@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/echo.hpp"
+#include "cli/echo_hosts.hpp"
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
 #include "shm/clock.hpp"
@@ -56,12 +57,15 @@ class Echo {
                           {"sequence", sample.sequence()},
                           {"stamp_ns", sample.stamp_ns()},
                           {"size", sample.size()}};
-      if (sample.origin().publisher != 0) line["origin"] = json_of(sample.origin());
+      if (sample.origin().publisher != 0) {
+        line["origin"] = hosts_.json_of(std::string(sample.source()), sample.origin());
+      }
       std::cout << line.dump() << '\n';
       return;
     }
     std::cout << seconds_text(sample.stamp_ns() - started_) << "  " << sample.source() << "  #"
-              << sample.sequence() << "  " << sample.size() << " bytes";
+              << sample.sequence() << hosts_.text(std::string(sample.source()), sample.origin())
+              << "  " << sample.size() << " bytes";
     if (options_.hex) {
       std::cout << '\n' << hex_dump(*sample);
     } else {
@@ -92,6 +96,7 @@ class Echo {
 
   const EchoOptions& options_;
   const shm::FileDescriptor& interrupts_;
+  EchoHosts hosts_{options_.instance};
   Node node_;
   InputPort<void> in_;
   const shm::Nanoseconds started_;

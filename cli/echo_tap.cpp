@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/echo.hpp"
+#include "cli/echo_hosts.hpp"
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
 #include "rules/text/names.hpp"
@@ -113,7 +114,7 @@ class TapEcho {
     options_.json ? print_json(event) : print_text(event);
   }
 
-  void print_json(const TapEvent<>& event) const {
+  void print_json(const TapEvent<>& event) {
     nlohmann::json fates = nlohmann::json::object();
     for (const TapDestination& met : event.destinations()) {
       if (met.fate != Fate::none) fates[std::string(met.port)] = name_of(met.fate);
@@ -129,14 +130,16 @@ class TapEcho {
     line["type"] =
         event.type().is_untyped() ? nlohmann::json() : nlohmann::json(event.type().name());
     if (event.count() != 0) line["count"] = event.count();
-    if (event.origin().publisher != 0) line["origin"] = json_of(event.origin());
+    if (event.origin().publisher != 0) {
+      line["origin"] = hosts_.json_of(std::string(event.source()), event.origin());
+    }
     if (options_.hex && event.sample()) {
       line["data"] = hex_of(*event.sample(), event.sample()->size());
     }
     std::cout << line.dump() << '\n';
   }
 
-  void print_text(const TapEvent<>& event) const {
+  void print_text(const TapEvent<>& event) {
     std::cout << seconds_text(event.time().time_since_epoch().count() - started_) << "  "
               << (event.source().empty() ? "(source not known)" : event.source());
     if (event.count() != 0) {
@@ -148,9 +151,9 @@ class TapEcho {
       std::cout << "  " << name_of(event.kind()) << fates_text(event) << '\n';
       return;
     }
-    std::cout << "  #" << event.sequence();
-    if (event.origin().publisher != 0) std::cout << " (there #" << event.origin().sequence << ')';
-    std::cout << "  " << event.size() << " bytes";
+    std::cout << "  #" << event.sequence()
+              << hosts_.text(std::string(event.source()), event.origin()) << "  " << event.size()
+              << " bytes";
     if (!event.sample()) {
       std::cout << "  (overwritten)" << fates_text(event) << '\n';
     } else if (options_.hex) {
@@ -193,6 +196,7 @@ class TapEcho {
   const EchoOptions& options_;
   const bool is_input_;
   const shm::FileDescriptor& interrupts_;
+  EchoHosts hosts_{options_.instance};
   Node node_;
   Tap<> tap_;
   const shm::Nanoseconds started_;

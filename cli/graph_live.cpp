@@ -13,12 +13,12 @@
 
 #include "cli/graph_hosts.hpp"
 #include "cli/live.hpp"
+#include "cli/other_hosts.hpp"
 #include "shm/clock.hpp"
 #include "watch/imported.hpp"
 #include "watch/instance.hpp"
 #include "watch/model_in_force.hpp"
 #include "watch/picture.hpp"
-#include "watch/span.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -57,14 +57,10 @@ LiveSituation look(const watch::Instance& instance, const rules::RuleSet& rules)
   for (;;) {
     const watch::Picture picture = watch::take_picture(memory, watch::all_sources);
     std::set<std::string> active;
-    std::map<std::string, std::string> ages;
     for (const auto& [source, word] : picture.words) {
-      const std::string name = memory.source_name(source);
-      if (picture.is_active(source)) active.insert(name);
-      const shm::Nanoseconds last = shm::time_of(word, picture.snapshot.table.timeout(source));
-      if (last >= 0) ages[name] = watch::span_text(picture.now - last) + " ago";
+      if (picture.is_active(source)) active.insert(memory.source_name(source));
     }
-    LiveSituation seen{drawing::decide(rules, std::move(active)), std::move(ages),
+    LiveSituation seen{drawing::decide(rules, std::move(active)), ages_in(picture, memory),
                        picture.snapshot.generation};
     seen.fits = fits(instance, picture, seen.situation);
     if (memory.tables().is_whole(picture.snapshot)) return seen;

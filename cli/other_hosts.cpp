@@ -3,8 +3,10 @@
 #include <cstdio>
 #include <iostream>
 #include <stdexcept>
+#include <utility>
 
 #include "shm/utf8.hpp"
+#include "watch/span.hpp"
 #include "wire/link_call.hpp"
 
 namespace arbiter::cli {
@@ -37,6 +39,51 @@ std::string round_trip_text(const std::optional<shm::Nanoseconds>& round_trip) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2f ms", static_cast<double>(*round_trip) / 1e6);
   return text;
+}
+
+std::string counts_text(const wire::ImportStatus& import) {
+  std::string text;
+  const auto count = [&](std::uint64_t number, const char* what) {
+    if (number != 0) text += ", " + std::to_string(number) + what;
+  };
+  count(import.lost, " lost");
+  count(import.late, " late");
+  count(import.withheld, " withheld");
+  return text;
+}
+
+Ages ages_in(const watch::Picture& picture, const shm::DecisionMemory& memory) {
+  Ages ages;
+  for (const auto& [source, word] : picture.words) {
+    const auto age = picture.age_of(source);
+    if (age) ages[memory.source_name(source)] = watch::span_text(*age) + " ago";
+  }
+  return ages;
+}
+
+Ages ages_in(const watch::Instance& instance) {
+  const shm::DecisionMemory& memory = *instance.memory();
+  for (;;) {
+    const watch::Picture picture = watch::take_picture(memory, watch::all_sources);
+    Ages ages = ages_in(picture, memory);
+    if (memory.tables().is_whole(picture.snapshot)) return ages;
+  }
+}
+
+void write_imports(std::ostream& out, const std::vector<std::string>& sources,
+                   const wire::HostsDocument& hosts, const Ages& ages) {
+  bool is_first = true;
+  for (const std::string& source : sources) {
+    const wire::ImportStatus* const import = hosts.find_import(source);
+    if (import == nullptr || !import->is_open) continue;
+    const wire::HostStatus* const host = hosts.find_host(import->host);
+    out << (std::exchange(is_first, false) ? "\nFrom other hosts:\n" : "") << "  "
+        << shm::printable(source) << "  from host " << shm::printable(import->host)
+        << ", round trip " << round_trip_text(host == nullptr ? std::nullopt : host->round_trip);
+    const auto age = ages.find(source);
+    if (age != ages.end()) out << ", " << age->second;
+    out << counts_text(*import) << '\n';
+  }
 }
 
 std::string model_text(const wire::HostStatus& host, const wire::HostStatus* here) {

@@ -1,10 +1,14 @@
 // What verbs say of other hosts, as the link of this host knows them.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <ostream>
 #include <string>
+#include <vector>
 
+#include "watch/instance.hpp"
+#include "watch/picture.hpp"
 #include "wire/hosts.hpp"
 
 namespace arbiter::cli {
@@ -18,6 +22,20 @@ void write_port_errors(std::ostream& out, const std::optional<wire::HostsDocumen
 
 // "0.32 ms"; "-": not measured.
 [[nodiscard]] std::string round_trip_text(const std::optional<shm::Nanoseconds>& round_trip);
+
+// ", 3 lost, 412 withheld"; empty: there is nothing to count.
+[[nodiscard]] std::string counts_text(const wire::ImportStatus& import);
+
+// By source "0.2 s ago": since its last arrival or deactivation here; none of those that had none.
+using Ages = std::map<std::string, std::string>;
+[[nodiscard]] Ages ages_in(const watch::Picture& picture, const shm::DecisionMemory& memory);
+// As they are now.
+[[nodiscard]] Ages ages_in(const watch::Instance& instance);
+
+// Those of the sources that the link of this host has open, a line for each: from which host, how
+// far away that is, how old the last event is, and what was lost.
+void write_imports(std::ostream& out, const std::vector<std::string>& sources,
+                   const wire::HostsDocument& hosts, const Ages& ages);
 
 // "default 08056122", "no daemon", …; "differs" where it is not that of `here` (may be null).
 [[nodiscard]] std::string model_text(const wire::HostStatus& host, const wire::HostStatus* here);

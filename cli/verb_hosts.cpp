@@ -71,9 +71,7 @@ void write_imports(const wire::HostsDocument& document) {
     } else {
       std::cout << (each.is_open_here ? "  open here" : "  not imported");
     }
-    if (each.lost != 0) std::cout << ", " << each.lost << " lost";
-    if (each.late != 0) std::cout << ", " << each.late << " late";
-    std::cout << '\n';
+    std::cout << counts_text(each) << '\n';
   }
 }
 

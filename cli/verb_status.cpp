@@ -1,8 +1,11 @@
 // arbiter status: ports, connections, who is active, who wins, and the counters; of this host, or
 // of all that links join.
+#include <algorithm>
 #include <iostream>
 #include <memory>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -37,23 +40,58 @@ int status_here(const StatusOptions& options) {
   return 0;
 }
 
+// By incarnation: several machines may have one name.
+const wire::HostStatus* find_host(const wire::HostsDocument& hosts,
+                                  const wire::HostAnswer& answer) {
+  const auto found = std::find_if(
+      hosts.hosts.begin(), hosts.hosts.end(),
+      [&](const wire::HostStatus& each) { return each.incarnation == answer.incarnation; });
+  return found == hosts.hosts.end() ? nullptr : &*found;
+}
+
+// What this host has of others. Without ages, where they cannot be seen.
+void write_imports_here(const std::string& instance, const wire::HostsDocument& hosts) {
+  std::vector<std::string> sources;
+  for (const wire::ImportStatus& each : hosts.imports) {
+    if (each.is_open) sources.push_back(each.source);
+  }
+  if (sources.empty()) return;
+  Ages ages;
+  try {
+    ages = ages_in(*watch_instance("status", instance));
+  } catch (const std::runtime_error&) {  // the daemon has just gone, or has no room for us
+  }
+  write_imports(std::cout, sources, hosts, ages);
+}
+
 // Writes one host's answer; what is wrong with it stands in `why_not`.
-void write_host(const wire::HostAnswer& answer, bool is_here, std::string& why_not) {
+void write_host(const StatusOptions& options, const wire::HostsDocument& hosts,
+                const wire::HostAnswer& answer, std::string& why_not) {
+  const wire::HostStatus* const host = find_host(hosts, answer);
+  const bool is_here = host != nullptr && host->is_this;
   try {
     const wire::Status status = wire::read_status(answer.text);
-    std::cout << "== host " << answer.host << (is_here ? " (this one)" : "") << " ==\n";
+    const std::string where =
+        is_here ? "this one"
+                : "round trip " + round_trip_text(host ? host->round_trip : std::nullopt);
+    std::cout << "== host " << answer.host << " (" << where << ") ==\n";
     write_status(std::cout, status, is_here ? StatusPlace::kHere : StatusPlace::kElsewhere);
+    if (is_here) write_imports_here(options.instance, hosts);
     std::cout << '\n';
   } catch (const wire::DocumentError& error) {
     why_not = std::string("sent no status that can be read: ") + error.what();
   }
 }
 
-nlohmann::json json_of(const wire::HostAnswer& answer, std::string& why_not) {
+nlohmann::json json_of(const wire::HostsDocument& hosts, const wire::HostAnswer& answer,
+                       std::string& why_not) {
   nlohmann::json host = {{"host", answer.host},
                          {"outcome", wire::outcome_name(answer.outcome)},
                          {"took_ns", answer.took},
+                         {"round_trip_ns", nullptr},
                          {"status", nullptr}};
+  const wire::HostStatus* const known = find_host(hosts, answer);
+  if (known != nullptr && known->round_trip) host["round_trip_ns"] = *known->round_trip;
   if (answer.outcome == wire::HostOutcome::kAnswered) {
     try {
       host["status"] = wire::parse_document(answer.text);
@@ -68,7 +106,6 @@ nlohmann::json json_of(const wire::HostAnswer& answer, std::string& why_not) {
 int status_of_all(const StatusOptions& options) {
   wire::LinkCall link(options.instance);
   const wire::HostsDocument hosts = wire::read_hosts(link.ask({"", "hosts"}));
-  const wire::HostStatus* const here = hosts.find_this();
   nlohmann::json all = nlohmann::json::array();
   int exit_code = 0;
   if (!hosts.network) {
@@ -79,11 +116,10 @@ int status_of_all(const StatusOptions& options) {
   }
   for (const wire::HostAnswer& answer : link.ask_hosts({wire::kAllHosts, "status"})) {
     std::string why_not = answer.why_not();
-    const bool is_here = here != nullptr && answer.incarnation == here->incarnation;
     if (options.json) {
-      all.push_back(json_of(answer, why_not));
+      all.push_back(json_of(hosts, answer, why_not));
     } else if (why_not.empty()) {
-      write_host(answer, is_here, why_not);
+      write_host(options, hosts, answer, why_not);
     }
     if (why_not.empty()) continue;
     exit_code = 1;

@@ -37,7 +37,7 @@ int why(const WhyOptions& options) {
   const auto instance = watch_instance("why", options.instance);
   write_why(std::cout, options, instance);
   if (hosts && !options.json) {
-    write_imports_of(std::cout, options.port, *hosts, instance->status());
+    write_imports_of(std::cout, options.port, *hosts, *instance);
   }
   return 0;
 }

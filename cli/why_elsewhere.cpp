@@ -326,25 +326,14 @@ void write_why_elsewhere(std::ostream& out, const WhyOptions& options, const std
 }
 
 void write_imports_of(std::ostream& out, const std::string& port, const wire::HostsDocument& hosts,
-                      const wire::Status& status) {
+                      watch::Instance& instance) {
+  const wire::Status status = instance.status();
   const wire::InputStatus* const input = status.find_input(port);
   if (input == nullptr) return;
   std::vector<std::string> sources;
   for (const auto& each : input->connections) sources.push_back(each.source);
   for (const auto& each : input->senses) sources.push_back(each.source);
-  bool is_first = true;
-  for (const std::string& source : sources) {
-    const wire::ImportStatus* const import = hosts.find_import(source);
-    if (import == nullptr || !import->is_open) continue;
-    const wire::HostStatus* const host = hosts.find_host(import->host);
-    out << (is_first ? "\nFrom other hosts:\n" : "") << "  " << source << "  from host "
-        << shm::printable(import->host) << ", round trip "
-        << round_trip_text(host == nullptr ? std::nullopt : host->round_trip);
-    if (import->lost != 0) out << ", " << import->lost << " lost";
-    if (import->late != 0) out << ", " << import->late << " late";
-    out << '\n';
-    is_first = false;
-  }
+  write_imports(out, sources, hosts, ages_in(instance));
 }
 
 }  // namespace arbiter::cli

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cli/why_follow.hpp"
+#include "watch/instance.hpp"
 #include "wire/hosts.hpp"
 
 namespace arbiter::cli {
@@ -31,8 +32,9 @@ void write_why_elsewhere(std::ostream& out, const WhyOptions& options, const std
 // write_why_elsewhere() at the beginning.
 int follow_elsewhere(const WhyOptions& options, const std::string& host);
 
-// Of the answer about a port of this host: which of its sources come from other hosts.
+// Of the answer about a port of this host: which of its sources come from other hosts, and
+// how old they are.
 void write_imports_of(std::ostream& out, const std::string& port, const wire::HostsDocument& hosts,
-                      const wire::Status& status);
+                      watch::Instance& instance);
 
 }  // namespace arbiter::cli

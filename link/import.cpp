@@ -275,6 +275,7 @@ wire::ImportStatus Import::status() const {
   status.is_open = port_ != nullptr;
   status.lost = stream_.lost();
   status.late = counts_.late;
+  status.withheld = counts_.withheld;
   return status;
 }
 

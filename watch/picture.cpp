@@ -34,6 +34,14 @@ bool try_once(const shm::DecisionMemory& memory, const SourcesOf& sources_of, Pi
 
 }  // namespace
 
+std::optional<shm::Nanoseconds> Picture::age_of(shm::SourceId source) const {
+  const auto found = words.find(source);
+  if (found == words.end()) return std::nullopt;
+  const shm::Nanoseconds last = shm::time_of(found->second, snapshot.table.timeout(source));
+  if (last < 0) return std::nullopt;
+  return now - last;
+}
+
 bool Picture::is_unseen(shm::SourceId source) const {
   return std::binary_search(unseen.begin(), unseen.end(), source);
 }

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,8 @@ struct Picture {
     const auto found = words.find(source);
     return found != words.end() && shm::is_active(found->second, now);
   }
+  // Since its last arrival or deactivation; nothing: it had none.
+  [[nodiscard]] std::optional<shm::Nanoseconds> age_of(shm::SourceId source) const;
   [[nodiscard]] bool is_unseen(shm::SourceId source) const;
   // The source that the port selects by the rules; kNone: none, or the port is not arbitrated. The
   // picture must be of all sources that the port heeds.

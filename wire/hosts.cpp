@@ -52,6 +52,7 @@ void describe(auto& field, Is<ImportStatus> auto& of) {
   field("hosts", of.hosts);
   field.counter("lost", of.lost);
   field.counter("late", of.late);
+  field.counter("withheld", of.withheld);
 }
 
 void describe(auto& field, Is<HostDisagreement> auto& of) {

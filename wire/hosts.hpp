@@ -49,6 +49,7 @@ struct ImportStatus {
   std::vector<std::string> hosts;  // that offer it
   std::uint64_t lost = 0;
   std::uint64_t late = 0;
+  std::uint64_t withheld = 0;  // samples that stayed at home
 };
 
 enum class DisagreementKind : std::uint8_t { kInputPort, kSource, kHostName, kModel };

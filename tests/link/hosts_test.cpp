@@ -10,7 +10,7 @@
 
 #include <memory>
 
-#include "tests/cli/arbiter_program.hpp"
+#include "tests/link/known_hosts.hpp"
 #include "tests/link/robot.hpp"
 #include "wire/link_call.hpp"
 #include "wire/rendezvous.hpp"
@@ -28,40 +28,10 @@ using wire::HostOutcome;
 
 class KnownHosts : public LoopbackHosts {};
 
-wire::HostsDocument hosts_of(const std::string& instance) {
-  for (;;) {
-    try {
-      return wire::read_hosts(wire::LinkCall(instance).ask({"", "hosts"}));
-    } catch (const wire::NoLinkError&) {  // it has just been started
-      ::poll(nullptr, 0, 1);
-    }
-  }
-}
-// Asks until it is so.
-wire::HostsDocument await_hosts(const std::string& instance,
-                                const std::function<bool(const wire::HostsDocument&)>& is_so) {
-  for (;;) {
-    wire::HostsDocument hosts = hosts_of(instance);
-    if (is_so(hosts)) return hosts;
-    ::poll(nullptr, 0, 5);
-  }
-}
-wire::HostsDocument await_host(const std::string& instance, const std::string& other) {
-  return await_hosts(instance, [&](const wire::HostsDocument& hosts) {
-    const wire::HostStatus* const found = hosts.find_host(other);
-    return found != nullptr && found->is_up;
-  });
-}
-
 std::string text_of_hosts(const wire::HostsDocument& hosts) {
   std::string text;
   for (const auto& each : hosts.disagreements) text += each.text + "\n";
   return text;
-}
-
-ProgramResult run_arbiter(const std::string& instance, std::vector<std::string> arguments) {
-  arguments.insert(arguments.end(), {"--instance", instance});
-  return arbiter(arguments);
 }
 
 TEST_F(KnownHosts, KnowEachOthersModelsPortsAndRoundTrips) {
@@ -155,12 +125,14 @@ TEST_F(KnownHosts, AreAskedForTheirStatus) {
     const ProgramResult all = run_arbiter("base", {"status", "--all"});
     return all.exit_code == 0 && all.out.find(kPlanner) != std::string::npos &&
            all.out.find("== host base (this one) ==") != std::string::npos &&
-           all.out.find("== host head ==") != std::string::npos;
+           all.out.find("== host head (round trip ") != std::string::npos;
   });
   const json document = json::parse(run_arbiter("base", {"status", "--all", "--json"}).out);
   ASSERT_EQ(document["hosts"].size(), 2U);
   EXPECT_EQ(document["hosts"][1]["host"], "head");
   EXPECT_EQ(document["hosts"][1]["outcome"], "answered");
+  EXPECT_TRUE(document["hosts"][0]["round_trip_ns"].is_null());
+  EXPECT_TRUE(document["hosts"][1].contains("round_trip_ns"));
   EXPECT_EQ(document["hosts"][1]["status"]["instance"], "head");
 }
 

@@ -13,6 +13,7 @@
 #include "link/dds/event_topic.hpp"
 #include "link/dds/network.hpp"
 #include "shm/clock.hpp"
+#include "tests/cli/arbiter_program.hpp"
 #include "tests/link/cables.hpp"
 #include "tests/link/camera.hpp"
 
@@ -155,6 +156,24 @@ TEST_F(Losers, OnlyHeadersCrossAndTheNewestImageIsThereWhenItWinsAgain) {
   EXPECT_EQ(ear.seen(EventKind::kAgain), 1);
   EXPECT_THAT(base.described(kCamera), Not(HasSubstr("lost")));
   EXPECT_THAT(base.described(kCamera), Not(HasSubstr("twice")));
+}
+
+TEST_F(Losers, AreCountedByTheirImporter) {
+  Host base("base", runtime_, view_model("500s"), network());
+  Camera camera(head_);
+  View view(base);
+  view.watch(camera);
+  view.pause();
+  lose(base, camera);
+  const auto hosts = [](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"hosts", "--instance", "base"});
+    return arbiter(arguments).out;
+  };
+  await([&] { return hosts({}).find(" withheld\n") != std::string::npos; });
+  const auto imports = nlohmann::json::parse(hosts({"--json"}))["imports"];
+  ASSERT_EQ(imports.size(), 1U);
+  EXPECT_EQ(imports[0]["source"], kCamera);
+  EXPECT_GT(imports[0]["withheld"], 0);
 }
 
 // A header that is on its way when its source wins again asks for samples before the next image is

@@ -36,10 +36,8 @@ inline std::string source_model(const std::string& timeout) {
 class Planner {
  public:
   // `published`: where its numbers go on, if it was there before.
-  explicit Planner(const Host& host, std::int64_t published = 0)
-      : node_(host.node("brain")),
-        port_(node_.output_port<Speed>(kPlanner)),
-        published_(published) {}
+  explicit Planner(const Host& host, std::int64_t published = 0, const std::string& node = "brain")
+      : node_(host.node(node)), port_(node_.output_port<Speed>(kPlanner)), published_(published) {}
   // Returns the number of the sample.
   std::int64_t publish() {
     port_.publish(Speed{++published_});
