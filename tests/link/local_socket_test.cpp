@@ -140,13 +140,7 @@ TEST_F(LocalSocketAndWhatLingers, OthersAreHeardMeanwhile) {
   EXPECT_GT(::recv(one_more.get(), said.data(), said.size(), 0), 0);
   EXPECT_NE(said.find("too many programs"), std::string::npos);
   for (Lingering& each : many_) each.release();
-  await([] {
-    try {
-      return wire::read_hosts(wire::LinkCall("base").ask({"", "hosts"})).host == "base";
-    } catch (const wire::CallError&) {  // their places are not free yet
-      return false;
-    }
-  });
+  await_answer("base", [](const auto& hosts) { return hosts.host == "base"; });
 }
 
 TEST_F(LocalSocketAndWhatLingers, TheLinkEndsMeanwhile) {

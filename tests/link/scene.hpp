@@ -23,6 +23,8 @@
 #include "tests/support/daemon.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/text_files.hpp"
+#include "wire/hosts.hpp"
+#include "wire/link_call.hpp"
 
 namespace arbiter::test {
 
@@ -31,6 +33,19 @@ using namespace std::chrono_literals;
 // Asks until it holds. That it never does shows as the test's time limit.
 inline void await(const std::function<bool()>& holds) {
   while (!holds()) ::poll(nullptr, 0, 1);
+}
+
+// Asks the link of that instance until it answers so. A link that joins its network, or whose
+// places are all taken, does not answer yet.
+inline void await_answer(const std::string& instance,
+                         const std::function<bool(const wire::HostsDocument&)>& is_so) {
+  await([&] {
+    try {
+      return is_so(wire::read_hosts(wire::LinkCall(instance).ask({"", "hosts"})));
+    } catch (const wire::CallError&) {
+      return false;
+    }
+  });
 }
 
 class Host {
