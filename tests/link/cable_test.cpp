@@ -201,13 +201,7 @@ TEST_F(Cable, ALinkThatJoinsAgainRemembersWhoIsGone) {
   robot.head_network.ip("addr del 10.77.0.1/24 dev eth0");
   head.see("trying again");
   robot.head_network.ip("addr add 10.77.0.1/24 dev eth0");
-  await([] {
-    try {
-      return wire::read_hosts(wire::LinkCall("head").ask({"", "hosts"})).network.has_value();
-    } catch (const wire::CallError&) {  // the link joins just now
-      return false;
-    }
-  });
+  await_answer("head", [](const auto& hosts) { return hosts.network.has_value(); });
   await([&] { return is_base(wire::HostOutcome::kGone); });
 }
 
@@ -244,6 +238,49 @@ TEST_F(Cable, ANetworkEndsThoughItsAddressGoesJustThen) {
     place.ip("addr flush dev eth0");
   });
   thread.join();
+}
+
+void drive_by_peers(const CabledRobot& robot, const std::vector<int>& peers_of_head,
+                    const std::vector<int>& peers_of_base) {
+  const auto arguments_to = [](const std::vector<int>& peers) {
+    std::vector<std::string> all = CabledRobot::arguments();
+    for (const int peer : peers) {
+      all.insert(all.end(), {"--peer", "10.77.0." + std::to_string(peer)});
+    }
+    return all;
+  };
+  Host head("head", robot.runtime, source_model("300ms"), arguments_to(peers_of_head),
+            robot.head_network.enter());
+  Host base("base", robot.runtime, motor_model("300ms"), arguments_to(peers_of_base),
+            robot.base_network.enter());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  base.await_described(kPlanner, "host head");
+}
+
+// The interfaces could do multicast, but the switch passes none on.
+TEST_F(Cable, PeersThatNameEachOtherNeedNoMulticast) {
+  CabledRobot robot;
+  for (const int each : {kHead, kBase}) robot.cables.drop_multicast_to(each);
+  drive_by_peers(robot, {kBase}, {kHead});
+}
+
+// A link whose interface cannot do multicast listens where peers look for it, though it names none.
+void drive_by_one_peer(const std::vector<int>& of_head, const std::vector<int>& of_base) {
+  CabledRobot robot;
+  for (const NetworkNamespace* each : {&robot.head_network, &robot.base_network}) {
+    each->ip("link set eth0 multicast off");
+  }
+  drive_by_peers(robot, of_head, of_base);
+}
+
+TEST_F(Cable, WhereInterfacesHaveNoMulticastTheExporterMayNameItsPeer) {
+  drive_by_one_peer({kBase}, {});
+}
+
+TEST_F(Cable, WhereInterfacesHaveNoMulticastTheImporterMayNameItsPeer) {
+  drive_by_one_peer({}, {kHead});
 }
 
 }  // namespace

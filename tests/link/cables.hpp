@@ -68,6 +68,11 @@ class Switch {
   // Pulls the cable, and puts it back.
   void cut(int number) const { place_.ip("link set " + port_of(number) + " down"); }
   void heal(int number) const { place_.ip("link set " + port_of(number) + " up"); }
+  // From now on no multicast gets to that host; broadcasts, of which addresses are resolved by, do.
+  void drop_multicast_to(int number) const {
+    place_.ip("link set switch0 type bridge mcast_snooping 0");
+    place_.ip("link set " + port_of(number) + " type bridge_slave mcast_flood off");
+  }
 
  private:
   static std::string port_of(int number) { return "port" + std::to_string(number); }
