@@ -83,7 +83,7 @@ void check_cuts(const HostEvidence& importer, const std::string& source,
 [[nodiscard]] bool was_there(const HostEvidence& importer, const std::string& source,
                              Nanoseconds time);
 
-// Whether the source commands again after a time; how long that took.
+// Whether what was awaited came after a time; how long that took.
 struct Recovery {
   bool is_there = false;
   Nanoseconds took = 0;
