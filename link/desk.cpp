@@ -21,7 +21,6 @@ constexpr shm::Nanoseconds kCompareEvery = 250'000'000;
 constexpr shm::Nanoseconds kComparing =
     Disagreements::kSettles + Disagreements::kNoEarlierLife + 4 * kCompareEvery;
 constexpr shm::Nanoseconds kSocketPeriod = 1'000'000'000;
-constexpr std::size_t kMostToAnswer = 64;
 
 }  // namespace
 
@@ -214,11 +213,7 @@ void Desk::hear_question(Bytes message, std::uint64_t writer) {
   if (!is_for_us) return;
   const std::lock_guard lock(mutex_);
   if (network_.empty()) return;  // join() has not returned yet
-  const shm::Nanoseconds now = shm::monotonic_now();
-  const auto verdict = askers_.judge(question->asker, writer, question->number, now);
-  if (verdict != Askers::Verdict::kAnswer || to_answer_.size() >= kMostToAnswer) return;
-  to_answer_.push_back({std::move(*question), false, now});
-  changed_.notify_all();
+  if (asked_.hear(std::move(*question), writer, shm::monotonic_now())) changed_.notify_all();
 }
 
 void Desk::hear_answer(Bytes message) {

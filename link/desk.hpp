@@ -12,7 +12,6 @@
 #pragma once
 
 #include <condition_variable>
-#include <deque>
 #include <memory>
 #include <mutex>
 #include <shared_mutex>
@@ -22,6 +21,7 @@
 
 #include "gateway/core/bridge.hpp"
 #include "link/answers.hpp"
+#include "link/core/asked_questions.hpp"
 #include "link/core/disagreements.hpp"
 #include "link/core/neighbours.hpp"
 #include "link/core/pulse.hpp"
@@ -71,11 +71,6 @@ class Desk {
   [[nodiscard]] Answers& answers() noexcept { return answers_; }
 
  private:
-  struct Asked {
-    QuestionMessage message;
-    bool is_ours = false;  // a program of this host asks through this link
-    shm::Nanoseconds came = 0;
-  };
   struct Topics;
 
   void add_verbs();
@@ -91,7 +86,7 @@ class Desk {
 
   // On the answering thread.
   void answer_questions();
-  void answer(const Asked& asked);
+  void answer(Asked asked);
 
   // On threads of programs.
   std::string serve(const LocalUser& who, const wire::LinkQuestion& question);
@@ -101,7 +96,8 @@ class Desk {
   void await_all_hosts();
   // Nobody hears it while there is no network.
   void send_question(const QuestionMessage& message);
-  void send_answer(const AnswerMessage& message);
+  // False: it could not be sent now.
+  bool send_answer(const AnswerMessage& message);
   // Under send_mutex_ alone.
   void put_question(const QuestionMessage& message);
   // Asks again those who do not answer, until their time is over.
@@ -130,8 +126,7 @@ class Desk {
   std::shared_ptr<const std::vector<Disagreement>> standing_ =
       std::make_shared<std::vector<Disagreement>>();
   OpenQuestions open_;
-  Askers askers_;
-  std::deque<Asked> to_answer_;
+  AskedQuestions asked_;
   bool closes_ = false;  // answers of others are not awaited any more
   bool ends_ = false;
 

@@ -24,29 +24,30 @@ constexpr shm::Nanoseconds kAllAreHeard = 1'500'000'000;
 void Desk::answer_questions() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    changed_.wait(lock, [this] { return ends_ || !to_answer_.empty(); });
+    changed_.wait(lock, [this] { return ends_ || !asked_.is_empty(); });
     if (ends_) return;
-    const Asked asked = std::move(to_answer_.front());
-    to_answer_.pop_front();
-    // Nobody waits for it any more: a daemon that is stopped holds up whoever asks after it.
-    if (shm::monotonic_now() - asked.came >= OpenQuestions::kPatience) continue;
+    std::optional<Asked> asked = asked_.next(shm::monotonic_now());
+    if (!asked) continue;
     lock.unlock();
-    answer(asked);
+    answer(*std::move(asked));
     lock.lock();
   }
 }
 
-void Desk::answer(const Asked& asked) {
+void Desk::answer(Asked asked) {
   const QuestionMessage& message = asked.message;
-  Answer given = answers_.answer({message.host, message.asker, message.verb, message.argument});
-  AnswerMessage reply{me_.incarnation, message.asker, message.number, given.is_refusal,
-                      std::move(given.text)};
+  if (!asked.answer) {
+    Answer given = answers_.answer({message.host, message.asker, message.verb, message.argument});
+    asked.answer = {me_.incarnation, message.asker, message.number, given.is_refusal,
+                    std::move(given.text)};
+  }
+  if (!asked.is_ours && send_answer(*asked.answer)) return;
+  const std::lock_guard lock(mutex_);
   if (!asked.is_ours) {
-    send_answer(reply);
+    asked_.keep(std::move(asked));
     return;
   }
-  const std::lock_guard lock(mutex_);
-  open_.note(std::move(reply), shm::monotonic_now());
+  open_.note(*std::move(asked.answer), shm::monotonic_now());
   changed_.notify_all();
 }
 
@@ -160,7 +161,7 @@ void Desk::put_question(const QuestionMessage& message) {
   const bool is_for_us = std::erase(others.asked, me_.incarnation) != 0;
   if (is_for_us) {
     const std::lock_guard lock(mutex_);
-    to_answer_.push_back({message, true, shm::monotonic_now()});
+    asked_.add(message, shm::monotonic_now());
     changed_.notify_all();
   }
   if (!others.asked.empty()) send_question(others);
@@ -171,9 +172,10 @@ void Desk::send_question(const QuestionMessage& message) {
   if (topics_ != nullptr) topics_->questions.send(write_question(message));
 }
 
-void Desk::send_answer(const AnswerMessage& message) {
+bool Desk::send_answer(const AnswerMessage& message) {
   const std::shared_lock using_topics(topics_mutex_);
-  if (topics_ != nullptr) topics_->answers.send(write_answer(message));
+  // Without a network nobody hears it, and nobody asks again.
+  return topics_ == nullptr || topics_->answers.send(write_answer(message));
 }
 
 OpenQuestions::Replies Desk::await_replies(QuestionMessage& message) {

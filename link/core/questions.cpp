@@ -136,13 +136,9 @@ OpenQuestions::Replies OpenQuestions::take(std::uint64_t number) {
 
 Askers::Verdict Askers::judge(Incarnation asker, std::uint64_t writer, std::uint64_t number,
                               shm::Nanoseconds now) {
-  auto found = askers_.find(asker);
-  if (found != askers_.end() && found->second.writer != writer) {
-    if (now - found->second.heard < kOtherWriter) return Verdict::kInAnothersName;
-    askers_.erase(found);
-    found = askers_.end();
-  }
-  if (found != askers_.end() && number <= found->second.last) {
+  if (!may_be_called(asker, writer, now)) return Verdict::kInAnothersName;
+  const auto found = askers_.find(writer);
+  if (found != askers_.end() && found->second.numbers.have(number)) {
     found->second.heard = now;
     return Verdict::kRepeated;
   }
@@ -152,18 +148,55 @@ Askers::Verdict Askers::judge(Incarnation asker, std::uint64_t writer, std::uint
   }
   if (count_ >= kMostOfAll) return Verdict::kTooMany;
   if (found == askers_.end()) make_place();
-  Asker& one = askers_[asker];
+  Asker& one = askers_[writer];
   if (now - one.since >= kSecond) {
     one.since = now;
     one.count = 0;
   }
-  one.writer = writer;
+  one.name = asker;
   one.heard = now;
   if (one.count >= kMostOfOne) return Verdict::kTooMany;
-  one.last = number;
+  one.numbers.add(number);
   ++one.count;
   ++count_;
   return Verdict::kAnswer;
+}
+
+void Askers::forget(std::uint64_t writer, std::uint64_t number) {
+  const auto found = askers_.find(writer);
+  if (found != askers_.end()) found->second.numbers.remove(number);
+}
+
+// Who had the name, and has been silent for long, loses it.
+bool Askers::may_be_called(Incarnation name, std::uint64_t writer, shm::Nanoseconds now) {
+  const auto known = askers_.find(writer);
+  if (known != askers_.end()) return known->second.name == name;
+  const auto other = std::find_if(askers_.begin(), askers_.end(),
+                                  [&](const auto& each) { return each.second.name == name; });
+  if (other == askers_.end()) return true;
+  if (now - other->second.heard < kOtherWriter) return false;
+  askers_.erase(other);
+  return true;
+}
+
+bool Askers::Numbers::have(std::uint64_t number) const noexcept {
+  if (number > last_) return false;
+  const std::uint64_t back = last_ - number;
+  return back >= kKnownNumbers || (known_ >> back & 1) != 0;
+}
+
+void Askers::Numbers::add(std::uint64_t number) noexcept {
+  if (number > last_) {
+    const std::uint64_t further = number - last_;
+    known_ = further < kKnownNumbers ? known_ << further : 0;
+    last_ = number;
+  }
+  known_ |= std::uint64_t{1} << (last_ - number);
+}
+
+void Askers::Numbers::remove(std::uint64_t number) noexcept {
+  if (number > last_ || last_ - number >= kKnownNumbers) return;
+  known_ &= ~(std::uint64_t{1} << (last_ - number));
 }
 
 // Forgets who has been silent for the longest. Its next question is one of a newcomer; so a

@@ -95,10 +95,11 @@ class OpenQuestions {
 
 // Those who ask this link: each question is answered once, and not too many in a second.
 //
-// Askers are strangers: each has a quota, all together have one, and their number is bounded. The
-// name of an asker is that of the first writer who uses it, and another one's as soon as that has
-// been silent for kOtherWriter: a link that was cut off comes back in the same life, and the
-// transport takes its writer for another one (held_tokens.hpp).
+// Askers are strangers: each has a quota, all together have one, and their number is bounded. An
+// asker is a writer: it has the first name that it uses, and no other, so its quota does not grow
+// with the names that it makes up. Nobody else has that name, until its writer has been silent for
+// kOtherWriter: a link that was cut off comes back in the same life, and the transport takes its
+// writer for another one (held_tokens.hpp).
 //
 // Thread safety: none of its own.
 class Askers {
@@ -106,6 +107,8 @@ class Askers {
   static constexpr std::uint32_t kMostOfOne = 20;   // questions within a second
   static constexpr std::uint32_t kMostOfAll = 200;  // likewise
   static constexpr std::size_t kMostAskers = 256;
+  // What is known of an asker's numbers: what lies further back counts as answered.
+  static constexpr std::uint64_t kKnownNumbers = 64;
   static constexpr shm::Nanoseconds kOtherWriter = HeldTokens::kOtherWriter;
 
   enum class Verdict : std::uint8_t {
@@ -117,18 +120,32 @@ class Askers {
   // `asker`: one of its lives. `writer`: by which the transport knows who sent it.
   Verdict judge(Incarnation asker, std::uint64_t writer, std::uint64_t number,
                 shm::Nanoseconds now);
+  // What was to be answered is not: it may come again. The quota stays used.
+  void forget(std::uint64_t writer, std::uint64_t number);
 
  private:
+  // Those that were taken up.
+  class Numbers {
+   public:
+    [[nodiscard]] bool have(std::uint64_t number) const noexcept;
+    void add(std::uint64_t number) noexcept;
+    void remove(std::uint64_t number) noexcept;
+
+   private:
+    std::uint64_t last_ = 0;
+    std::uint64_t known_ = 0;  // bit n: whether last_ - n is among them
+  };
   struct Asker {
-    std::uint64_t writer = 0;
-    std::uint64_t last = 0;
+    Incarnation name = 0;
+    Numbers numbers;
     shm::Nanoseconds since = 0;  // of the second that is counted
     std::uint32_t count = 0;
     shm::Nanoseconds heard = 0;
   };
+  bool may_be_called(Incarnation name, std::uint64_t writer, shm::Nanoseconds now);
   void make_place();
 
-  std::map<Incarnation, Asker> askers_;
+  std::map<std::uint64_t, Asker> askers_;  // by their writers
   shm::Nanoseconds since_ = 0;
   std::uint32_t count_ = 0;
 };

@@ -1,5 +1,5 @@
-// What links ask each other, by injected time: link/core/questions.hpp. Rule 8 of docs/hosts.md:
-// who has not answered within 1 s is silent. Rule 9: 20 answers a second to one link, 200 to all.
+// What links ask each other, by injected time: link/core/questions.hpp,
+// asked_questions.hpp. Rule 8 of docs/hosts.md: who has not answered within 1 s is silent. Rule 9: 20 answers a second to one link, 200 to all.
 #include "link/core/questions.hpp"
 
 #include <gmock/gmock.h>
@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "link/core/asked_questions.hpp"
 #include "tests/link/messages_and_times.hpp"
 
 namespace arbiter::test {
@@ -123,7 +124,45 @@ TEST(AskingLinks, AreAnsweredOnceAndNotTooOften) {
   EXPECT_EQ(askers.judge(6, 6, 1, 10 * kS), Verdict::kAnswer) << "another one";
   EXPECT_EQ(askers.judge(5, 5, 100, 11 * kS), Verdict::kAnswer)
       << "what was not answered may come again";
-  EXPECT_EQ(askers.judge(5, 5, 99, 12 * kS), Verdict::kRepeated);
+  EXPECT_EQ(askers.judge(5, 5, 100, 12 * kS), Verdict::kRepeated);
+}
+
+// Several programs of a host ask at once: of two questions, the first may find no place, and the
+// second one.
+TEST(AskingLinks, AreAnsweredWhatWasNotYetAlsoAfterALaterQuestion) {
+  using Verdict = Askers::Verdict;
+  Askers askers;
+  EXPECT_EQ(askers.judge(5, 5, 100, 10 * kS), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 5, 99, 10 * kS), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 5, 99, 10 * kS), Verdict::kRepeated);
+  EXPECT_EQ(askers.judge(5, 5, 100, 10 * kS), Verdict::kRepeated);
+  askers.forget(5, 99);
+  EXPECT_EQ(askers.judge(5, 5, 100, 10 * kS), Verdict::kRepeated);
+  EXPECT_EQ(askers.judge(5, 5, 99, 10 * kS), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 5, 100 - Askers::kKnownNumbers, 10 * kS), Verdict::kRepeated)
+      << "nobody knows any more";
+  EXPECT_EQ(askers.judge(5, 5, 1000, 11 * kS), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(5, 5, 99, 11 * kS), Verdict::kRepeated) << "likewise";
+}
+
+TEST(AskingLinks, HaveNoMoreQuestionsForBeingForgotten) {
+  using Verdict = Askers::Verdict;
+  Askers askers;
+  for (std::uint32_t i = 0; i < Askers::kMostOfOne; ++i) {
+    EXPECT_EQ(askers.judge(5, 5, 1, 10 * kS), Verdict::kAnswer);
+    askers.forget(5, 1);
+  }
+  EXPECT_EQ(askers.judge(5, 5, 1, 10 * kS), Verdict::kTooMany);
+}
+
+// Each name would have a quota of its own.
+TEST(AskingLinks, HaveOneNameEach) {
+  using Verdict = Askers::Verdict;
+  Askers askers;
+  EXPECT_EQ(askers.judge(5, 66, 1, 10 * kS), Verdict::kAnswer);
+  EXPECT_EQ(askers.judge(6, 66, 2, 10 * kS), Verdict::kInAnothersName);
+  EXPECT_EQ(askers.judge(6, 67, 1, 10 * kS), Verdict::kAnswer) << "whose it is";
+  EXPECT_EQ(askers.judge(5, 66, 2, 11 * kS), Verdict::kAnswer);
 }
 
 TEST(AskingLinks, AllTogetherHaveAQuota) {
@@ -156,6 +195,101 @@ TEST(AskingLinks, ALinkThatWasCutOffIsAnsweredAsSoonAsItIsFoundAgain) {
   EXPECT_EQ(askers.judge(5, 51, 8, 10 * kS + kLease), Verdict::kAnswer);
   EXPECT_EQ(askers.judge(5, 50, 9, 10 * kS + kLease), Verdict::kInAnothersName)
       << "the name is the new writer's";
+}
+
+QuestionMessage question_of(Incarnation asker, std::uint64_t number) {
+  return {asker, number, {1}, "head", "commit", {}};
+}
+
+AnswerMessage answer_to(const Asked& asked, std::size_t size = 1) {
+  return {1, asked.message.asker, asked.message.number, false, std::string(size, 'x')};
+}
+
+// An asker has 20 a second, and all together more than find a place.
+std::size_t fill(AskedQuestions& asked) {
+  std::size_t count = 0;
+  for (Incarnation asker = 100; count < AskedQuestions::kMost; ++asker) {
+    for (std::uint64_t number = 1; number <= 10 && count < AskedQuestions::kMost; ++number) {
+      count += asked.hear(question_of(asker, number), asker, 10 * kS) ? 1 : 0;
+    }
+  }
+  return count;
+}
+
+TEST(AskedQuestion, ThatFoundNoPlaceIsAnsweredWhenItIsRepeated) {
+  AskedQuestions asked;
+  ASSERT_EQ(fill(asked), AskedQuestions::kMost);
+  EXPECT_FALSE(asked.hear(question_of(5, 1), 5, 10 * kS));
+  ASSERT_TRUE(asked.next(10 * kS));
+  EXPECT_TRUE(asked.hear(question_of(5, 1), 5, 10 * kS)) << "a place has become free";
+  EXPECT_FALSE(asked.hear(question_of(5, 1), 5, 10 * kS)) << "it has one";
+  std::size_t found = 0;
+  while (const auto next = asked.next(10 * kS)) found += next->message.asker == 5 ? 1 : 0;
+  EXPECT_EQ(found, 1U);
+  EXPECT_TRUE(asked.is_empty());
+  EXPECT_FALSE(asked.hear(question_of(5, 1), 5, 10 * kS)) << "it is being answered";
+}
+
+TEST(AskedQuestion, IsNotAnsweredOnceNobodyWaits) {
+  AskedQuestions asked;
+  ASSERT_TRUE(asked.hear(question_of(5, 1), 5, 10 * kS));
+  asked.add(question_of(1, 1), 11 * kS);
+  const auto next = asked.next(10 * kS + OpenQuestions::kPatience);
+  ASSERT_TRUE(next);
+  EXPECT_TRUE(next->is_ours);
+  EXPECT_TRUE(asked.is_empty());
+}
+
+// To ask again would be to switch twice.
+TEST(AskedQuestion, WhoseAnswerDidNotGetThroughIsAnsweredTheSameWhenItIsRepeated) {
+  AskedQuestions asked;
+  ASSERT_TRUE(asked.hear(question_of(5, 1), 5, 10 * kS));
+  auto next = asked.next(10 * kS);
+  ASSERT_TRUE(next);
+  EXPECT_FALSE(next->answer);
+  next->answer = answer_to(*next, 7);
+  asked.keep(*std::move(next));
+  EXPECT_TRUE(asked.is_empty()) << "it is not repeated yet";
+  EXPECT_FALSE(asked.hear(question_of(5, 1), 66, 10 * kS)) << "by a stranger";
+  EXPECT_TRUE(asked.hear(question_of(5, 1), 5, 10 * kS));
+  EXPECT_FALSE(asked.hear(question_of(5, 1), 5, 10 * kS)) << "once is enough";
+  const auto again = asked.next(10 * kS);
+  ASSERT_TRUE(again);
+  ASSERT_TRUE(again->answer);
+  EXPECT_EQ(again->answer->text.size(), 7U);
+  EXPECT_FALSE(asked.next(10 * kS));
+  EXPECT_FALSE(asked.hear(question_of(5, 1), 5, 10 * kS)) << "it is sent";
+}
+
+TEST(AskedQuestion, WhoseAnswerDidNotGetThroughIsForgottenWhenNobodyWaits) {
+  AskedQuestions asked;
+  ASSERT_TRUE(asked.hear(question_of(5, 1), 5, 10 * kS));
+  auto next = asked.next(10 * kS);
+  ASSERT_TRUE(next);
+  next->answer = answer_to(*next);
+  asked.keep(*std::move(next));
+  EXPECT_TRUE(asked.hear(question_of(5, 1), 5, 10 * kS));
+  EXPECT_FALSE(asked.next(10 * kS + OpenQuestions::kPatience));
+  EXPECT_TRUE(asked.is_empty());
+}
+
+TEST(AskedQuestion, OfWhichAnswersAreKeptInBoundedNumberAndSize) {
+  AskedQuestions asked;
+  const auto keep = [&](std::uint64_t number, std::size_t size) {
+    ASSERT_TRUE(asked.hear(question_of(5, number), 5, 10 * kS));
+    auto next = asked.next(10 * kS);
+    ASSERT_TRUE(next);
+    next->answer = answer_to(*next, size);
+    asked.keep(*std::move(next));
+  };
+  for (std::uint64_t number = 1; number <= 3; ++number) keep(number, kMaxAnswer);
+  EXPECT_FALSE(asked.hear(question_of(5, 1), 5, 10 * kS)) << "the first made room";
+  EXPECT_TRUE(asked.hear(question_of(5, 2), 5, 10 * kS));
+  EXPECT_TRUE(asked.hear(question_of(5, 3), 5, 10 * kS));
+  EXPECT_EQ(asked.next(10 * kS)->message.number, 2U);
+  EXPECT_EQ(asked.next(10 * kS)->message.number, 3U);
+  for (std::uint64_t number = 4; number <= 5; ++number) keep(number, kMaxAnswer);
+  EXPECT_TRUE(asked.hear(question_of(5, 4), 5, 10 * kS)) << "there was room for both";
 }
 
 }  // namespace
