@@ -8,15 +8,22 @@ bool HeldTokens::note(Incarnation importer, std::uint64_t number, std::uint64_t 
                       shm::Nanoseconds now) {
   const std::lock_guard lock(mutex_);
   const auto found = held_.find(importer);
-  if (found == held_.end() && !make_place(now)) return false;
-  const bool is_anothers = found != held_.end() && found->second.writer != writer &&
-                           now - found->second.heard < kOtherWriter;
-  if (is_anothers) return false;
+  if (found == held_.end() || found->second.writer != writer) {
+    const bool is_anothers = found != held_.end() && now - found->second.heard < kOtherWriter;
+    if (is_anothers || has_other_name(writer)) return false;
+    if (found == held_.end() && !make_place(now)) return false;
+  }
   Held& held = found != held_.end() ? found->second : held_[importer];
   held.writer = writer;
   held.heard = now;
   held.times.note(number, now);
   return true;
+}
+
+// Of one that writes in its own name this is not asked: it costs a look at all.
+bool HeldTokens::has_other_name(std::uint64_t writer) const {
+  return std::any_of(held_.begin(), held_.end(),
+                     [&](const auto& each) { return each.second.writer == writer; });
 }
 
 bool HeldTokens::make_place(shm::Nanoseconds now) {

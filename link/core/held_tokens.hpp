@@ -5,7 +5,8 @@
 // token that came after it was published, although the link holds newer ones when it sends it.
 //
 // Senders of tokens are strangers: their number is bounded, and one that falls silent is forgotten
-// if another one needs its place.
+// if another one needs its place. Each writer speaks for one importer, so it has one place, however
+// many names it makes up.
 //
 // Units: nanoseconds of CLOCK_MONOTONIC, by which samples are stamped.
 //
@@ -49,8 +50,8 @@ class HeldTokens {
   static constexpr shm::Nanoseconds kOtherWriter = 1'200'000'000;
 
   // `writer`: whose token the transport says it is. False: there is no place for another importer
-  // now, or another writer speaks for this one. A token that is older than one that came before
-  // changes nothing.
+  // now, or another writer speaks for this one, or this writer for another. A token that is older
+  // than one that came before changes nothing.
   bool note(Incarnation importer, std::uint64_t number, std::uint64_t writer, shm::Nanoseconds now);
 
   // Of each importer the newest that had come at `published`, into `named`, of which nothing else
@@ -64,6 +65,7 @@ class HeldTokens {
     shm::Nanoseconds heard = 0;
   };
 
+  [[nodiscard]] bool has_other_name(std::uint64_t writer) const;
   bool make_place(shm::Nanoseconds now);
 
   mutable std::mutex mutex_;

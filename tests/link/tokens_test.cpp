@@ -138,16 +138,31 @@ TEST(HeldTokens, AnImporterThatWasLostMayComeBackByAnotherWriter) {
 TEST(HeldTokens, StrangersCannotTakeThePlacesOfThoseWhoAreThere) {
   HeldTokens held;
   for (Incarnation importer = 1; importer <= kMaxImporters; ++importer) {
-    ASSERT_TRUE(held.note(importer, 1, kWriter, 0));
+    ASSERT_TRUE(held.note(importer, 1, importer, 0));
   }
-  EXPECT_FALSE(held.note(1000, 1, kWriter, 1)) << "all places are taken";
-  EXPECT_TRUE(held.note(1, 2, kWriter, 1));
+  EXPECT_FALSE(held.note(1000, 1, 1000, 1)) << "all places are taken";
+  EXPECT_TRUE(held.note(1, 2, 1, 1));
   // Importer 1 spoke last of all: of the silent ones one gives way.
-  EXPECT_TRUE(held.note(1000, 1, kWriter, HeldTokens::kSilence));
+  EXPECT_TRUE(held.note(1000, 1, 1000, HeldTokens::kSilence));
   std::vector<NamedToken> named;
   held.name(HeldTokens::kSilence, named);
   EXPECT_EQ(named.size(), kMaxImporters);
   EXPECT_NE(std::find(named.begin(), named.end(), NamedToken{1, 2}), named.end());
+}
+
+// A link that is started again needs a place beside that of its earlier life.
+TEST(HeldTokens, OneWriterHasOnePlaceHoweverManyItNames) {
+  HeldTokens held;
+  EXPECT_TRUE(held.note(1, 1, kWriter, 0));
+  for (Incarnation importer = 2; importer <= 2 * kMaxImporters; ++importer) {
+    EXPECT_FALSE(held.note(importer, 1, kWriter, 0));
+  }
+  EXPECT_TRUE(held.note(1000, 1, kWriter + 1, 0));
+  EXPECT_FALSE(held.note(1000, 2, kWriter, HeldTokens::kOtherWriter)) << "though it is silent";
+  EXPECT_TRUE(held.note(1, 2, kWriter, HeldTokens::kOtherWriter));
+  std::vector<NamedToken> named;
+  held.name(HeldTokens::kOtherWriter, named);
+  EXPECT_EQ(named, (std::vector<NamedToken>{{1, 2}, {1000, 1}}));
 }
 
 // Two hosts and a network between them, which delays and loses. Time of both is one here, for the
