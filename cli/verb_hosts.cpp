@@ -104,7 +104,10 @@ int hosts(const HostsOptions& options) {
   std::cout << '\n';
   write_table(rows);
   write_imports(document);
-  if (!document.disagreements.empty()) std::cout << '\n';
+  if (!document.disagreements.empty() || document.without_place != 0) std::cout << '\n';
+  if (document.without_place != 0) {
+    std::cout << "warning: " << wire::without_place_text(document.without_place) << '\n';
+  }
   write_versions(document);
   for (const wire::HostDisagreement& each : document.disagreements) {
     std::cout << (each.is_error ? "ERROR: " : "warning: ") << shown(each.text) << '\n';

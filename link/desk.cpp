@@ -157,10 +157,16 @@ void Desk::send_card() {
 void Desk::look_at_others() {
   const shm::Nanoseconds now = shm::monotonic_now();  // before: meanwhile others may come
   const std::vector<std::uint64_t> writers = topics_->cards.writers();
-  std::vector<Neighbour> neighbours;
+  std::size_t without_place = 0;
   {
     const std::lock_guard lock(mutex_);
     neighbours_.keep(writers, now);
+    without_place = neighbours_.without_place();
+  }
+  say_without_place(without_place);
+  std::vector<Neighbour> neighbours;
+  {
+    const std::lock_guard lock(mutex_);
     if (compared_changes_ != neighbours_.changes()) compare_until_ = now + kComparing;
     compared_changes_ = neighbours_.changes();
     if (now > compare_until_ || now < compare_again_) return;
@@ -183,6 +189,14 @@ void Desk::look_at_others() {
   }
 }
 
+// When it begins, and not for each card: strangers may send many.
+void Desk::say_without_place(std::size_t count) {
+  if (count != 0 && !is_without_place_said_) {
+    say_sparingly(gateway::Level::kWarning, wire::without_place_text(count));
+  }
+  is_without_place_said_ = count != 0;
+}
+
 void Desk::hear_card(Bytes message, std::uint64_t writer) {
   auto card = read_host_card(message);
   if (!card) {
@@ -194,7 +208,8 @@ void Desk::hear_card(Bytes message, std::uint64_t writer) {
     return;
   }
   const std::lock_guard lock(mutex_);
-  neighbours_.note(writer, std::move(*card), shm::monotonic_now());
+  // One that finds no place is counted there, and said by look().
+  static_cast<void>(neighbours_.note(writer, std::move(*card), shm::monotonic_now()));
 }
 
 void Desk::hear_pulse(Bytes message) {

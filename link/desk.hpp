@@ -77,6 +77,7 @@ class Desk {
   void open_socket();
   void send_card();
   void look_at_others();
+  void say_without_place(std::size_t count);
 
   // On Cyclone's threads.
   void hear_card(Bytes message, std::uint64_t writer);
@@ -92,7 +93,7 @@ class Desk {
   std::string serve(const LocalUser& who, const wire::LinkQuestion& question);
   std::vector<wire::HostAnswer> ask_hosts(const wire::LinkQuestion& question);
   // Waits, for a lease at most, until those that are there have been heard. Throws
-  // std::runtime_error where there is no network.
+  // std::runtime_error where there is no network, or not all are known.
   void await_all_hosts();
   // Nobody hears it while there is no network.
   void send_question(const QuestionMessage& message);
@@ -133,6 +134,7 @@ class Desk {
   // Of the link's thread.
   std::shared_ptr<const OwnHost> sent_;  // whose card was sent last; null: it has to be sent
   std::uint64_t compared_changes_ = 0;
+  bool is_without_place_said_ = false;
   shm::Nanoseconds compare_until_ = 0;
   shm::Nanoseconds compare_again_ = 0;
   shm::Nanoseconds send_again_ = 0;

@@ -75,6 +75,7 @@ wire::HostsDocument Desk::document() const {
     own = own_;
     standing = standing_;
     neighbours = neighbours_.all();
+    document.without_place = neighbours_.without_place();
     for (const Neighbour& each : neighbours) {
       round_trips.push_back(round_trips_.of(each.card->incarnation));
     }
@@ -150,9 +151,11 @@ void Desk::await_all_hosts() {
           (own_->waits_for.empty() ? "" : ": " + own_->waits_for));
     }
     const shm::Nanoseconds left = joined_ + kAllAreHeard - shm::monotonic_now();
-    if (left <= 0) return;
+    if (left <= 0) break;
     changed_.wait_for(lock, std::chrono::nanoseconds(left));
   }
+  const std::size_t without_place = neighbours_.without_place();
+  if (without_place != 0) throw std::runtime_error(wire::without_place_text(without_place));
 }
 
 // Our own answer is made here; others get the question.

@@ -70,6 +70,7 @@ void describe(auto& field, Is<HostsDocument> auto& of) {
   field("network", of.network);
   field("waits_for", of.waits_for);
   field("hosts", of.hosts);
+  field.counter("without_place", of.without_place);
   field("imports", of.imports);
   field("disagreements", of.disagreements);
 }
@@ -106,6 +107,12 @@ const ImportStatus* HostsDocument::find_import(std::string_view source) const {
   const auto found = std::find_if(imports.begin(), imports.end(),
                                   [&](const ImportStatus& each) { return each.source == source; });
   return found == imports.end() ? nullptr : &*found;
+}
+
+std::string without_place_text(std::uint64_t hosts) {
+  return "there is no place in the link's list for " + std::to_string(hosts) +
+         " of the hosts that were heard, which cannot be asked: give each group of hosts a "
+         "--domain of its own";
 }
 
 nlohmann::json to_json(const HostsDocument& document) { return FieldWriter::json_of(document); }

@@ -69,6 +69,7 @@ struct HostsDocument {
   std::optional<std::string> network;    // the link is not on a network yet
   std::optional<std::string> waits_for;  // why it cannot do its work now
   std::vector<HostStatus> hosts;
+  std::uint64_t without_place = 0;  // hosts that are missing there because they are too many
   std::vector<ImportStatus> imports;
   std::vector<HostDisagreement> disagreements;
 
@@ -77,6 +78,9 @@ struct HostsDocument {
   [[nodiscard]] const HostStatus* find_this() const;
   [[nodiscard]] const ImportStatus* find_import(std::string_view source) const;
 };
+
+// As a sentence without its end: so many hosts, which is not 0, are without a place.
+[[nodiscard]] std::string without_place_text(std::uint64_t hosts);
 
 [[nodiscard]] nlohmann::json to_json(const HostsDocument& document);
 // Throws DocumentError.

@@ -11,6 +11,7 @@ namespace arbiter::link {
 bool Neighbours::note(std::uint64_t key, HostCard card, shm::Nanoseconds now) {
   ++changes_;
   // A host that has come back, with the same life or another, is not gone any more.
+  gone_unlisted_.erase(card.host);
   std::erase_if(all_,
                 [&](const Neighbour& each) { return !each.is_up && each.card->host == card.host; });
   const auto known = std::find_if(all_.begin(), all_.end(),
@@ -22,15 +23,39 @@ bool Neighbours::note(std::uint64_t key, HostCard card, shm::Nanoseconds now) {
     put_in_order();
     return true;
   }
-  if (all_.size() >= kMost) {
-    const auto gone =
-        std::find_if(all_.begin(), all_.end(), [](const Neighbour& each) { return !each.is_up; });
-    if (gone == all_.end()) return false;
-    all_.erase(gone);
+  if (!make_place()) {
+    turn_away(key, card.host, now);
+    return false;
   }
+  turned_away_.erase(key);
   all_.push_back({key, std::make_shared<const HostCard>(std::move(card)), true, now, now});
   put_in_order();
   return true;
+}
+
+// Where one that is gone gives way: the one that has been so for the longest time.
+bool Neighbours::make_place() {
+  if (all_.size() < kMost) return true;
+  const auto longest_gone =
+      std::min_element(all_.begin(), all_.end(), [](const Neighbour& a, const Neighbour& b) {
+        return std::tuple(a.is_up, a.since) < std::tuple(b.is_up, b.since);
+      });
+  if (longest_gone->is_up) return false;
+  remember(longest_gone->card->host, longest_gone->since);
+  all_.erase(longest_gone);
+  return true;
+}
+
+void Neighbours::turn_away(std::uint64_t key, const std::string& host, shm::Nanoseconds now) {
+  if (turned_away_.size() < kMostWithoutPlace || turned_away_.contains(key)) {
+    turned_away_[key] = {host, now};
+  }
+}
+
+void Neighbours::remember(const std::string& host, shm::Nanoseconds gone_since) {
+  if (gone_unlisted_.size() < kMostWithoutPlace || gone_unlisted_.contains(host)) {
+    gone_unlisted_[host] = gone_since;
+  }
 }
 
 void Neighbours::keep(std::vector<std::uint64_t> keys, shm::Nanoseconds then) {
@@ -52,7 +77,26 @@ void Neighbours::keep(std::vector<std::uint64_t> keys, shm::Nanoseconds then) {
     // The later: its next life is here already.
     return !each.is_up && (then - each.since >= kRemembered || up.contains(each.card->host));
   });
+  keep_count(keys, then);
   if (changes_ != before) put_in_order();
+}
+
+// As for those that have a place.
+void Neighbours::keep_count(const std::vector<std::uint64_t>& keys, shm::Nanoseconds then) {
+  std::erase_if(turned_away_, [&](const auto& each) {
+    const auto& [key, card] = each;
+    if (card.heard >= then || std::binary_search(keys.begin(), keys.end(), key)) return false;
+    remember(card.host, then);
+    return true;
+  });
+  std::set<std::string_view> up;
+  for (const Neighbour& each : all_) {
+    if (each.is_up) up.insert(each.card->host);
+  }
+  for (const auto& [key, card] : turned_away_) up.insert(card.host);
+  std::erase_if(gone_unlisted_, [&](const auto& each) {
+    return then - each.second >= kRemembered || up.contains(each.first);
+  });
 }
 
 void Neighbours::put_in_order() {

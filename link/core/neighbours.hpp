@@ -3,11 +3,17 @@
 // A link is there while its card's writer is: the transport says when that is lost (a lease). A
 // link that is started again has another incarnation; its earlier life is then not listed as gone.
 //
+// Their number is bounded. Whoever has all hosts do something must not pass over one that has no
+// place, so those are counted: hosts that are there and found none, and those that are gone and
+// found none, or gave way to others before their minutes were over.
+//
 // Units: nanoseconds of a monotonic clock. Thread safety: none of its own.
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "link/core/host_card.hpp"
@@ -26,9 +32,12 @@ class Neighbours {
  public:
   // Of all, whoever pretends to be one.
   static constexpr std::size_t kMost = 256;
+  // Of each kind that has no place; more are not counted.
+  static constexpr std::size_t kMostWithoutPlace = 1024;
   static constexpr shm::Nanoseconds kRemembered = 300'000'000'000;
 
-  // The card of a writer that is there. False: there is no place for another host.
+  // The card of a writer that is there. False: there is no place for another host. Its card does
+  // not come again by itself, so it stays without one until it has something new to say.
   bool note(std::uint64_t key, HostCard card, shm::Nanoseconds now);
   // All writers that were there at that time, or later: whose is not among them is gone. Who has
   // been heard since then may have come after they were counted, and is left alone.
@@ -36,13 +45,27 @@ class Neighbours {
 
   // In the order of names, those that are up first.
   [[nodiscard]] const std::vector<Neighbour>& all() const noexcept { return all_; }
+  // Hosts that are not among them because they are too many.
+  [[nodiscard]] std::size_t without_place() const noexcept {
+    return turned_away_.size() + gone_unlisted_.size();
+  }
   // Grows with each change of them.
   [[nodiscard]] std::uint64_t changes() const noexcept { return changes_; }
 
  private:
+  struct TurnedAway {
+    std::string host;
+    shm::Nanoseconds heard = 0;
+  };
+  bool make_place();
+  void turn_away(std::uint64_t key, const std::string& host, shm::Nanoseconds now);
+  void keep_count(const std::vector<std::uint64_t>& keys, shm::Nanoseconds then);
+  void remember(const std::string& host, shm::Nanoseconds gone_since);
   void put_in_order();
 
   std::vector<Neighbour> all_;
+  std::map<std::uint64_t, TurnedAway> turned_away_;        // by their keys
+  std::map<std::string, shm::Nanoseconds> gone_unlisted_;  // by their names: since when
   std::uint64_t changes_ = 0;
 };
 

@@ -1,4 +1,5 @@
-// What a link knows and is asked while it has not joined its network: link/desk.hpp.
+// What a link knows and is asked while it has not joined its network, or does not know all that are
+// there: link/desk.hpp.
 #include "link/desk.hpp"
 
 #include <gmock/gmock.h>
@@ -73,6 +74,33 @@ TEST_F(DeskWithoutANetwork, AnswersForItsOwnHost) {
   const auto result = arbiter({"status", "--all", "--instance", "base"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("the link has not joined its network yet"));
+}
+
+class DeskWithTooManyHosts : public DeskWithoutANetwork {};
+
+// One more than there are places for: it would be passed over.
+TEST_F(DeskWithTooManyHosts, DoesNotSwitchAll) {
+  const shm::Nanoseconds now = shm::monotonic_now();
+  link::Neighbours known;
+  for (std::uint64_t key = 1; key <= link::Neighbours::kMost + 1; ++key) {
+    known.note(key, card_of("host" + std::to_string(key), key), now);
+  }
+  const OwnDomain domain;
+  const gateway::Bell bell;
+  const link::Network network({domain.number(), {}, {}});
+  link::Desk desk(card_of("base", 1), known);
+  desk.join(network, "lo", bell);
+  desk.look({});
+  const std::string what =
+      "there is no place in the link's list for 1 of the hosts that were heard, which cannot be";
+  const auto result = arbiter({"switch", "rest", "--all", "--instance", "base"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, IsEmpty());
+  EXPECT_THAT(result.err, HasSubstr(what));
+  const auto hosts = wire::read_hosts(wire::LinkCall("base").ask({"", "hosts"}));
+  EXPECT_EQ(hosts.hosts.size(), 1 + link::Neighbours::kMost);
+  EXPECT_EQ(hosts.without_place, 1U);
+  desk.close();
 }
 
 }  // namespace

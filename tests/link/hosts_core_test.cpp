@@ -225,6 +225,79 @@ TEST(NeighbouringHosts, AreBoundedInNumberAndThoseThatAreGoneGiveWay) {
   EXPECT_EQ(neighbours.all().size(), Neighbours::kMost);
 }
 
+// As many as there are places for. Returns their keys.
+std::vector<std::uint64_t> fill(Neighbours& neighbours) {
+  std::vector<std::uint64_t> keys;
+  for (std::uint64_t key = 1; key <= Neighbours::kMost; ++key) {
+    neighbours.note(key, host_card("host" + std::to_string(key), key), kS);
+    keys.push_back(key);
+  }
+  return keys;
+}
+
+// Whoever has all hosts switch would pass over them.
+TEST(NeighbouringHosts, ThatFindNoPlaceAreCountedWhileTheyAreThereAndForSomeMinutes) {
+  Neighbours neighbours;
+  std::vector<std::uint64_t> keys = fill(neighbours);
+  EXPECT_EQ(neighbours.without_place(), 0U);
+  EXPECT_FALSE(neighbours.note(999, host_card("more", 999), 2 * kS));
+  EXPECT_FALSE(neighbours.note(999, host_card("more", 999), 2 * kS));
+  EXPECT_EQ(neighbours.without_place(), 1U) << "each once";
+  keys.push_back(999);
+  neighbours.keep(keys, 3 * kS);
+  EXPECT_EQ(neighbours.without_place(), 1U);
+  keys.pop_back();
+  neighbours.keep(keys, 4 * kS);
+  neighbours.keep(keys, 4 * kS + Neighbours::kRemembered - 1);
+  EXPECT_EQ(neighbours.without_place(), 1U) << "it is gone, and may come back";
+  neighbours.keep(keys, 4 * kS + Neighbours::kRemembered);
+  EXPECT_EQ(neighbours.without_place(), 0U);
+}
+
+TEST(NeighbouringHosts, ThatFindAPlaceLaterAreCountedNoMore) {
+  Neighbours neighbours;
+  std::vector<std::uint64_t> keys = fill(neighbours);
+  EXPECT_FALSE(neighbours.note(999, host_card("more", 999), 2 * kS));
+  keys.back() = 999;
+  neighbours.keep(keys, 3 * kS);
+  EXPECT_TRUE(neighbours.note(999, host_card("more", 999), 4 * kS));
+  EXPECT_EQ(neighbours.without_place(), 1U) << "who gave way to it is missed";
+  EXPECT_FALSE(neighbours.note(256, host_card("host256", 256), 5 * kS));
+  EXPECT_EQ(neighbours.without_place(), 1U) << "it is the same host";
+  keys.push_back(256);
+  keys.front() = keys.back();
+  neighbours.keep(keys, 6 * kS);
+  EXPECT_TRUE(neighbours.note(256, host_card("host256", 256), 7 * kS));
+  neighbours.note(1, host_card("host1", 1000), 8 * kS);
+  EXPECT_EQ(neighbours.without_place(), 1U);
+}
+
+TEST(NeighbouringHosts, ThatAreGoneForTheLongestTimeGiveWayAndAreMissed) {
+  Neighbours neighbours;
+  std::vector<std::uint64_t> keys = fill(neighbours);
+  keys.pop_back();
+  neighbours.keep(keys, 2 * kS);  // host256
+  keys.erase(keys.begin());
+  neighbours.keep(keys, 3 * kS);  // host1
+  EXPECT_TRUE(neighbours.note(999, host_card("more", 999), 4 * kS));
+  EXPECT_THAT(names_of(neighbours), testing::Contains("host1 gone"));
+  EXPECT_THAT(names_of(neighbours), testing::Not(testing::Contains("host256 gone")));
+  EXPECT_EQ(neighbours.without_place(), 1U);
+  keys.push_back(999);
+  neighbours.keep(keys, 2 * kS + Neighbours::kRemembered);
+  EXPECT_EQ(neighbours.without_place(), 0U) << "nobody would miss it any more";
+}
+
+TEST(NeighbouringHosts, WithoutAPlaceAreBoundedInNumber) {
+  Neighbours neighbours;
+  fill(neighbours);
+  constexpr std::uint64_t kMany = 1000 + 2 * Neighbours::kMostWithoutPlace;
+  for (std::uint64_t key = 1000; key < kMany; ++key) {
+    neighbours.note(key, host_card("more" + std::to_string(key), key), 2 * kS);
+  }
+  EXPECT_EQ(neighbours.without_place(), Neighbours::kMostWithoutPlace);
+}
+
 // Returns what stands once it has settled.
 std::vector<std::string> texts_of(const std::vector<HostCard>& cards,
                                   std::vector<shm::Nanoseconds> since = {}) {
