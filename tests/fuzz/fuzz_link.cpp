@@ -1,5 +1,6 @@
-// What another host's link sends: whatever it is, what is accepted is within bounds, and is written
-// again as the same.
+// What another host's link sends, or a program of this host asks: whatever it is, what is accepted
+// is within bounds, and is written again as the same. Also what becomes of it one after another:
+// link_sequences.hpp.
 #include <algorithm>
 
 #include "link/core/cards.hpp"
@@ -10,7 +11,9 @@
 #include "link/core/questions.hpp"
 #include "link/core/topic_names.hpp"
 #include "tests/fuzz/fuzz.hpp"
+#include "tests/fuzz/link_sequences.hpp"
 #include "wire/document.hpp"
+#include "wire/hosts.hpp"
 #include "wire/switch_request.hpp"
 
 namespace arbiter::fuzz {
@@ -103,6 +106,19 @@ void check_switch(std::string_view text) {
   }
 }
 
+// What programs ask through the local socket.
+void check_local_question(std::string_view text) {
+  try {
+    const wire::LinkQuestion question = wire::read_link_question(text);
+    const std::string written = wire::write_link_question(question);
+    const wire::LinkQuestion again = wire::read_link_question(written);
+    require(again.host == question.host && again.verb == question.verb &&
+                again.argument == question.argument,
+            "a program's question is read as it is written");
+  } catch (const wire::DocumentError&) {
+  }
+}
+
 }  // namespace
 }  // namespace arbiter::fuzz
 
@@ -113,5 +129,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   arbiter::fuzz::check_hosts(bytes);
   arbiter::fuzz::check_questions(bytes);
   arbiter::fuzz::check_switch(arbiter::fuzz::text_of(data, size));
+  arbiter::fuzz::check_local_question(arbiter::fuzz::text_of(data, size));
+  arbiter::fuzz::check_sequences(data, size);
   return 0;
 }
