@@ -1,5 +1,6 @@
-// What links ask each other, by injected time: link/core/questions.hpp,
-// asked_questions.hpp. Rule 8 of docs/hosts.md: who has not answered within 1 s is silent. Rule 9: 20 answers a second to one link, 200 to all.
+// What links ask each other, by injected time: link/core/questions.hpp, asked_questions.hpp. Rule 8
+// of docs/hosts.md: who has not answered within 1 s is silent. Rule 9: 20 answers a second to one
+// link, 200 to all.
 #include "link/core/questions.hpp"
 
 #include <gmock/gmock.h>
