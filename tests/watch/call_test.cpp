@@ -58,9 +58,9 @@ TEST(Call, OfNoDaemonSaysWhichSocketsWereTriedAndWhichInstancesRun) {
 TEST(Call, OfADaemonThatIsStoppedSaysSo) {
   Daemon daemon;
   wire::Caller caller = caller_of(daemon);
+  wire::Call before(caller);
   caller.answer_time = milliseconds(50);
   caller.patience = milliseconds(1);
-  wire::Call before(caller);
   daemon.process().stop();
   const std::string who =
       "arbiterd (pid " + std::to_string(daemon.process().pid()) + ") of instance \"test\"";

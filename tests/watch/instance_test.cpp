@@ -184,9 +184,9 @@ TEST(Instance, SaysThatTheDaemonHasGoneWhereNoneComes) {
   Daemon daemon(kModel);
   wire::Caller caller = caller_of(daemon);
   caller.answer_time = std::chrono::milliseconds(100);
-  watch::Instance instance(caller);
+  const auto instance = watched_by(caller);
   daemon.kill();
-  EXPECT_EQ(error_of([&] { static_cast<void>(instance.status()); }),
+  EXPECT_EQ(error_of([&] { static_cast<void>(instance->status()); }),
             "the daemon has gone, and no other has come");
 }
 

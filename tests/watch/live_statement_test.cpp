@@ -50,6 +50,14 @@ std::vector<std::string> faults(const std::shared_ptr<watch::Instance>& instance
   return codes;
 }
 
+// Where the daemon is given so little time that it may miss it once.
+Truth known_truth(watch::LiveStatement& statement) {
+  for (;;) {
+    const Truth truth = statement.look().truth;
+    if (truth != Truth::kUnknown) return truth;
+  }
+}
+
 // Each operand in each of the states that two sources can be in.
 TEST(LiveStatement, IsTrueOfTheStateThatDecisionsSee) {
   Daemon daemon(kTwoPortsModel);
@@ -172,14 +180,14 @@ TEST(LiveStatement, IsUnknownWhileNobodyTellsTheNamesOfAnotherModel) {
   Daemon daemon(kTwoPortsModel);
   wire::Caller caller = caller_of(daemon);
   caller.answer_time = std::chrono::milliseconds(300);
-  const auto instance = std::make_shared<watch::Instance>(std::move(caller));
+  const auto instance = watched_by(caller);
   auto statement = live(instance, "idle(/p)");
-  EXPECT_EQ(statement.look().truth, Truth::kTrue);
+  EXPECT_EQ(known_truth(statement), Truth::kTrue);
   daemon.load(kTwoPortsModel);
   daemon.process().stop();
   EXPECT_EQ(statement.look().truth, Truth::kUnknown);
   daemon.process().resume();
-  EXPECT_EQ(statement.look().truth, Truth::kTrue);
+  EXPECT_EQ(known_truth(statement), Truth::kTrue);
 }
 
 // What the old one's components do is seen no more: they are strangers there.

@@ -23,6 +23,18 @@ inline std::shared_ptr<watch::Instance> watched(const Daemon& daemon) {
   return std::make_shared<watch::Instance>(caller_of(daemon));
 }
 
+// For a caller who gives the daemon little time: on a busy machine it may need more at first.
+inline std::shared_ptr<watch::Instance> watched_by(const wire::Caller& caller) {
+  for (;;) {
+    try {
+      return std::make_shared<watch::Instance>(caller);
+    } catch (const wire::RefusedError&) {
+      throw;
+    } catch (const wire::CallError&) {  // it did not answer in time
+    }
+  }
+}
+
 // Takes up what comes until it is so.
 inline void update_until(watch::Instance& instance, const std::function<bool()>& is_so) {
   while (!is_so()) {
