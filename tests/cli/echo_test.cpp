@@ -142,13 +142,14 @@ TEST(Echo, WithLosersShowsWhatIsOvertaken) {
   Daemon daemon(kOverrideModel);
   Publishing publishing;
   publishing.takes = true;
-  const auto result = publishing.during({"echo", "/p", "--losers", "--for", "300ms", "--json"});
   std::map<std::string, std::uint64_t> counts;
-  for (const json& each : objects(result.out)) {
-    counts[each["kind"].get<std::string>()] += each.value("count", std::uint64_t{0});
-  }
-  EXPECT_GT(counts["overtaken"], 0u);
-  EXPECT_EQ(counts["sample"], 0u);
+  do {  // on a busy machine too little may be published within that time
+    const auto result = publishing.during({"echo", "/p", "--losers", "--for", "300ms", "--json"});
+    for (const json& each : objects(result.out)) {
+      counts[each["kind"].get<std::string>()] += each.value("count", std::uint64_t{0});
+    }
+    ASSERT_EQ(counts["sample"], 0u);
+  } while (counts["overtaken"] == 0);
 }
 
 TEST(Echo, OfAnOutputPortShowsEachArrivalWithItsBytes) {
@@ -168,11 +169,14 @@ TEST(Echo, OfAnOutputPortShowsEachArrivalWithItsBytes) {
 TEST(Echo, TellsTheRate) {
   Daemon daemon(kOverrideModel);
   Publishing publishing;
-  const auto result =
-      publishing.during({"echo", "/p", "--losers", "--rate", "--for", "30ms", "--json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto all = objects(result.out);
-  ASSERT_EQ(all.size(), 2u);
+  std::vector<json> all;
+  do {  // on a busy machine nothing may be published within that time
+    const auto result =
+        publishing.during({"echo", "/p", "--losers", "--rate", "--for", "30ms", "--json"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    all = objects(result.out);
+    ASSERT_LE(all.size(), 2u);
+  } while (all.size() < 2 || all[0]["samples"] == 0 || all[1]["samples"] == 0);
   for (const json& each : all) {
     EXPECT_GT(each["samples"], 0);
     EXPECT_GT(each["hz"], 0);
@@ -180,8 +184,13 @@ TEST(Echo, TellsTheRate) {
     const double bytes = each["bytes_per_second"];
     EXPECT_NEAR(bytes, 4 * each["hz"].get<double>(), bytes / 1000);
   }
-  EXPECT_THAT(publishing.during({"echo", "/low", "--rate", "--for", "30ms"}).out,
-              AllOf(HasSubstr("/low  "), HasSubstr(" Hz  jitter "), HasSubstr("B/s\n")));
+  std::string out;
+  do {
+    const auto result = publishing.during({"echo", "/low", "--rate", "--for", "30ms"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    out = result.out;
+  } while (out.find("/low  ") == std::string::npos);
+  EXPECT_THAT(out, AllOf(HasSubstr(" Hz  jitter "), HasSubstr("B/s\n")));
 }
 
 TEST(Echo, AsAComponentTakesThePort) {

@@ -106,7 +106,10 @@ TEST(MetricsProgram, WritesWhatHappens) {
   auto gaze = node.input_port<int>("/gaze");
   for (int i = 0; i < 3; ++i) face.publish(i);
   ASSERT_TRUE(gaze.take());
-  const auto result = arbiter({"metrics"});
+  ProgramResult result;
+  do {  // it gives the daemon one second
+    result = arbiter({"metrics"});
+  } while (result.err.find("did not answer within") != std::string::npos);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.err, "");
   auto metrics = read_metrics(result.out);
@@ -143,7 +146,8 @@ TEST(MetricsServer, FollowsTheDaemonsThatComeAndGo) {
   Daemon daemon(kGazeModel);
   Served served(daemon.directory());
   const auto is_up = [&] { return metrics_in(served.ask(kGet))["arbiter_up"].samples[{}]; };
-  EXPECT_EQ(is_up(), 1);
+  while (is_up() != 1) {
+  }
   daemon.kill();
   while (is_up() != 0) {
   }

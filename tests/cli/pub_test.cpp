@@ -30,7 +30,7 @@ using testing::Not;
 using testing::StartsWith;
 
 const std::string kPubModel =
-    "<behaviors><arbiter at='/in'><select from='/out'>not /stop</select></arbiter>"
+    "<behaviors timeout='1000s'><arbiter at='/in'><select from='/out'>not /stop</select></arbiter>"
     "<arbiter at='/in2'><select from='/both'/></arbiter>"
     "<arbiter at='/in3'><select from='/both'/></arbiter></behaviors>";
 const std::string kNumber = "arbiter::test::PubNumber:8:8";
