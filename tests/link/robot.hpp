@@ -66,9 +66,13 @@ class Body {
   // one is larger than all before.
   std::int64_t drive(Planner& planner) {
     for (;;) {
-      planner.publish();
-      if (const auto number = commanded()) return *number;
+      if (const auto number = commanded_by(planner)) return *number;
     }
+  }
+  // Whether the motor has a sample of it once it has published another.
+  std::optional<std::int64_t> commanded_by(Planner& planner) {
+    planner.publish();
+    return commanded();
   }
   // Until nothing is left to take, and nobody commands the motor.
   void await_idle() {
