@@ -281,12 +281,12 @@ TEST_F(RingTest, BeginsWithTheStateOfAllThatHasLeft) {
 }
 
 TEST_F(RingTest, ATimeInTheFutureForgetsNothing) {
-  recorder::Ring ring(options(1'000'000'000, 1 << 20));
+  constexpr evidence::Nanoseconds kHour = 3600'000'000'000;
+  recorder::Ring ring(options(kHour, 1 << 20));
   const evidence::Nanoseconds now = shm::monotonic_now();
   Incident incident;
   incident.arrive("/low", now - 1'000'000, now - 999'999, Incident::Fate::accepted);
-  incident.arrive("/high", now + 3600'000'000'000, now + 3600'000'000'000,
-                  Incident::Fate::accepted);
+  incident.arrive("/high", now + 2 * kHour, now + 2 * kHour, Incident::Fate::accepted);
   EXPECT_THAT(dump(ring, incident).runs.at(0).decisions, SizeIs(2));
 }
 
