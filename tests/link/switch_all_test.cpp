@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <string>
@@ -12,6 +13,7 @@
 
 #include "cli/switch_everywhere.hpp"
 #include "tests/cli/arbiter_program.hpp"
+#include "tests/link/known_hosts.hpp"
 #include "tests/link/scene.hpp"
 #include "wire/link_call.hpp"
 #include "wire/switch_request.hpp"
@@ -23,6 +25,9 @@ using cli::HostSwitch;
 using testing::AllOf;
 using testing::Each;
 using testing::HasSubstr;
+
+// After a link has joined its network, as it promises.
+constexpr shm::Nanoseconds kAllAreHeard = 1'500'000'000;
 
 // Three hosts. Each has the models "default" and "rest", and two have "dance", too.
 class SwitchAll : public LoopbackHosts {
@@ -38,17 +43,19 @@ class SwitchAll : public LoopbackHosts {
           std::forward_as_tuple(name, runtime_, kNoRules, network(), std::vector<std::string>(),
                                 name == "cam" ? rest : both));
     }
-    // A release of what was never prepared harms nobody: who answers it is there.
+    for (const auto& [name, host] : hosts_) await_all(name);
+  }
+
+  // A release of what was never prepared harms nobody: who answers it is there.
+  void await_all(const std::string& asking) const {
     const std::string nothing = wire::write_switch_request({1, "rest", {}});
-    for (const auto& [name, host] : hosts_) {
-      await([&, &asking = name] {
-        try {
-          return answered(ask(asking, wire::kReleaseVerb, nothing)) == hosts_.size();
-        } catch (const wire::CallError&) {  // its link is not there yet
-          return false;
-        }
-      });
-    }
+    await([&] {
+      try {
+        return answered(ask(asking, wire::kReleaseVerb, nothing)) == hosts_.size();
+      } catch (const wire::CallError&) {  // its link is not there yet
+        return false;
+      }
+    });
   }
 
   static std::vector<wire::HostAnswer> ask(const std::string& at, const std::string& verb,
@@ -60,16 +67,46 @@ class SwitchAll : public LoopbackHosts {
     for (const auto& each : answers) count += each.outcome == wire::HostOutcome::kAnswered ? 1 : 0;
     return count;
   }
-  // Again where somebody was merely too slow: a second goes by on a machine that is busy.
+  static bool says(const ProgramResult& result, const std::string& text) {
+    return (result.out + result.err).find(text) != std::string::npos;
+  }
+  // A second goes by on a machine that is busy, and so does a promise.
+  static bool was_too_slow(const ProgramResult& result) {
+    const auto texts = {"does not answer", "did not answer", "is gone, and was there within",
+                        "it is not prepared for this switch",
+                        "it has come after the others had prepared"};
+    return std::any_of(texts.begin(), texts.end(),
+                       [&](const char* text) { return says(result, text); });
+  }
+  // Again where somebody was merely too slow.
   static ProgramResult switch_all(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "switch");
     arguments.emplace_back("--all");
     for (;;) {
       ProgramResult result = arbiter(arguments);
-      const auto says = [&](const char* text) {
-        return result.out.find(text) != std::string::npos;
-      };
-      if (!says("does not answer") && !says("did not answer") && !says("busy")) return result;
+      if (!was_too_slow(result) && !says(result, "busy")) return result;
+    }
+  }
+  // Those that the link of arm knows, once all are up.
+  wire::HostsDocument hosts_at_arm() const {
+    wire::HostsDocument hosts;
+    await([&] {
+      hosts = hosts_known_at("arm");
+      return std::all_of(hosts_.begin(), hosts_.end(), [&](const auto& each) {
+        const auto* const known = hosts.find_host(each.first);
+        return known != nullptr && known->is_up;
+      });
+    });
+    return hosts;
+  }
+  static ProgramResult switch_at_arm_once_it_has_joined() {
+    for (;;) {
+      ProgramResult result = arbiter({"switch", "rest", "--all", "--instance", "arm"});
+      if (result.err.find("no arbiter-link") == std::string::npos &&
+          result.err.find("has not joined") == std::string::npos &&
+          result.err.find("did not answer within") == std::string::npos) {
+        return result;
+      }
     }
   }
   std::vector<std::string> in_force() {
@@ -117,26 +154,38 @@ TEST_F(SwitchAll, AHostThatIsSilentMeansThatNoneDoes) {
 
 TEST_F(SwitchAll, ALinkThatDiesBetweenPrepareAndCommitIsUnknownAndItsHostKeepsItsModel) {
   cli::SwitchEverywhere result;
-  std::uint64_t attempt = 76;
-  await([&] {
-    const wire::SwitchRequest request{++attempt, "rest", {}};
-    const auto ask_arm = [&](const std::string& verb, const std::string& text) {
-      if (verb == wire::kCommitVerb) hosts_.at("cam").link().kill();
-      return ask("arm", verb, text);
-    };
-    result = cli::switch_everywhere(request, ask_arm, [] {
-      return wire::read_hosts(wire::LinkCall("arm").ask({"", "hosts"}));
-    });
-    return result.is_committed;
-  });
+  wire::SwitchRequest request{76, "rest", {}};
+  bool is_killed = false;
+  const auto ask_arm = [&](const std::string& verb, const std::string& text) {
+    if (verb == wire::kCommitVerb) {
+      hosts_.at("cam").link().kill();
+      is_killed = true;
+    }
+    return ask("arm", verb, text);
+  };
+  for (;;) {
+    ++request.attempt;
+    try {
+      result = cli::switch_everywhere(request, ask_arm, [] {
+        return wire::read_hosts(wire::LinkCall("arm").ask({"", "hosts"}));
+      });
+    } catch (const wire::CallError&) {  // the link of arm was too slow
+      result = {};
+    }
+    if (result.count(HostSwitch::Outcome::kSwitched) == 2) break;
+    // On a busy machine an answer, or a commit, may have come too late.
+    if (is_killed) hosts_.at("cam").start_link();
+    is_killed = false;
+    await_all("arm");
+  }
   ASSERT_EQ(result.hosts.size(), 3u);
   EXPECT_EQ(result.hosts[2].outcome, HostSwitch::Outcome::kUnknown) << result.hosts[2].why;
   EXPECT_EQ(cli::exit_code_of(result), 3);
   await([&] { return in_force() == std::vector<std::string>{"rest", "rest", "default"}; });
   // Its next life was promised nothing.
   hosts_.at("cam").start_link();
-  await([&] { return answered(ask("arm", wire::kReleaseVerb, "000000000000004d\nrest")) == 3; });
-  EXPECT_EQ(answered(ask("arm", wire::kCommitVerb, "000000000000004d\nrest")), 0u);
+  await_all("arm");
+  EXPECT_EQ(answered(ask("arm", wire::kCommitVerb, wire::write_switch_request(request))), 0u);
   EXPECT_EQ(in_force()[2], "default");
 }
 
@@ -146,8 +195,10 @@ TEST_F(SwitchAll, AnOperatorWhoGoesAwayHoldsNobodyForLong) {
   const auto second = arbiter({"switch", "rest", "--all", "--instance", "base"});
   // On a machine that stood still for two seconds, the promise is over.
   if (second.exit_code != 0) {
-    EXPECT_THAT(second.out, HasSubstr("not switched: busy: it is prepared for another switch"));
-    EXPECT_THAT(in_force(), Each("default"));
+    if (second.exit_code != 3 && !was_too_slow(second)) {
+      EXPECT_THAT(second.out, HasSubstr("not switched: busy: it is prepared for another switch"));
+      EXPECT_THAT(in_force(), Each("default"));
+    }
     await([] { return arbiter({"switch", "rest", "--all", "--instance", "base"}).exit_code == 0; });
   }
   EXPECT_THAT(in_force(), Each("rest"));
@@ -179,15 +230,26 @@ TEST_F(SwitchAll, OfTwoOperatorsOneSwitchesOrNone) {
 
 // It knows nobody at first, and must not go ahead alone.
 TEST_F(SwitchAll, ALinkThatHasJustJoinedItsNetworkPassesOverNobody) {
-  hosts_.at("arm").link().kill();
-  hosts_.at("arm").start_link();
-  ProgramResult result;
-  await([&] {
-    result = arbiter({"switch", "rest", "--all", "--instance", "arm"});
-    return result.err.find("no arbiter-link") == std::string::npos &&
-           result.err.find("has not joined") == std::string::npos;
-  });
-  EXPECT_THAT(result.out, AllOf(HasSubstr("arm "), HasSubstr("base "), HasSubstr("cam ")));
+  bool are_all_in_time = false;
+  while (!are_all_in_time && !HasFailure()) {
+    hosts_.at("arm").link().kill();
+    hosts_.at("arm").start_link();
+    const ProgramResult result = switch_at_arm_once_it_has_joined();
+    EXPECT_THAT(result.out, HasSubstr("arm "));
+    // The others may be heard later than that on a busy machine.
+    const wire::HostsDocument hosts = hosts_at_arm();
+    const auto must_be_heard = [&](const char* host) {
+      return hosts.find_host(host)->since <= hosts.find_this()->since + kAllAreHeard;
+    };
+    are_all_in_time = true;
+    for (const char* host : {"base", "cam"}) {
+      const bool is_asked = result.out.find(host + std::string(" ")) != std::string::npos;
+      if (must_be_heard(host)) {
+        EXPECT_TRUE(is_asked) << host << ": " << result.out << result.err;
+      }
+      are_all_in_time = are_all_in_time && is_asked;
+    }
+  }
 }
 
 TEST_F(SwitchAll, WithoutALinkItIsAnError) {
