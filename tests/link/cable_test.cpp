@@ -12,6 +12,7 @@
 #include "shm/file_descriptor.hpp"
 #include "tests/client/models.hpp"
 #include "tests/link/cables.hpp"
+#include "tests/link/known_hosts.hpp"
 #include "tests/link/robot.hpp"
 #include "wire/link_call.hpp"
 
@@ -201,7 +202,7 @@ TEST_F(Cable, ALinkThatJoinsAgainRemembersWhoIsGone) {
   robot.head_network.ip("addr del 10.77.0.1/24 dev eth0");
   head.see("trying again");
   robot.head_network.ip("addr add 10.77.0.1/24 dev eth0");
-  await_answer("head", [](const auto& hosts) { return hosts.network.has_value(); });
+  await_hosts("head", [](const auto& hosts) { return hosts.network.has_value(); });
   await([&] { return is_base(wire::HostOutcome::kGone); });
 }
 

@@ -330,7 +330,7 @@ TEST_F(KnownHosts, ProgramsThatSayNothingHoldUpNobodyButTheirUser) {
   await([] { return Nuisance("base").answer().find("too many programs") != std::string::npos; });
   base.see("host base, on");
   silent.clear();
-  await_answer("base", [](const auto& hosts) { return hosts.host == "base"; });
+  await_hosts("base", [](const auto& hosts) { return hosts.host == "base"; });
 }
 
 TEST_F(KnownHosts, APolicyThatForbidsToObserveHoldsForTheLinkToo) {

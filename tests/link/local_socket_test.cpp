@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/link/known_hosts.hpp"
 #include "tests/link/scene.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/error_of.hpp"
@@ -140,7 +141,7 @@ TEST_F(LocalSocketAndWhatLingers, OthersAreHeardMeanwhile) {
   EXPECT_GT(::recv(one_more.get(), said.data(), said.size(), 0), 0);
   EXPECT_NE(said.find("too many programs"), std::string::npos);
   for (Lingering& each : many_) each.release();
-  await_answer("base", [](const auto& hosts) { return hosts.host == "base"; });
+  await_hosts("base", [](const auto& hosts) { return hosts.host == "base"; });
 }
 
 TEST_F(LocalSocketAndWhatLingers, TheLinkEndsMeanwhile) {

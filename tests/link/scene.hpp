@@ -35,19 +35,6 @@ inline void await(const std::function<bool()>& holds) {
   while (!holds()) ::poll(nullptr, 0, 1);
 }
 
-// Asks the link of that instance until it answers so. A link that joins its network, or whose
-// places are all taken, does not answer yet.
-inline void await_answer(const std::string& instance,
-                         const std::function<bool(const wire::HostsDocument&)>& is_so) {
-  await([&] {
-    try {
-      return is_so(wire::read_hosts(wire::LinkCall(instance).ask({"", "hosts"})));
-    } catch (const wire::CallError&) {
-      return false;
-    }
-  });
-}
-
 class Host {
  public:
   // `model`: empty, and the host has none. `by`: what starts the link, such as in a network

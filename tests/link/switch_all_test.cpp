@@ -89,15 +89,12 @@ class SwitchAll : public LoopbackHosts {
   }
   // Those that the link of arm knows, once all are up.
   wire::HostsDocument hosts_at_arm() const {
-    wire::HostsDocument hosts;
-    await([&] {
-      hosts = hosts_known_at("arm");
+    return await_hosts("arm", [&](const wire::HostsDocument& hosts) {
       return std::all_of(hosts_.begin(), hosts_.end(), [&](const auto& each) {
         const auto* const known = hosts.find_host(each.first);
         return known != nullptr && known->is_up;
       });
     });
-    return hosts;
   }
   static ProgramResult switch_at_arm_once_it_has_joined() {
     for (;;) {
