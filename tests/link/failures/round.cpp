@@ -83,6 +83,8 @@ void Round::work() {
     const Nanoseconds time = now() - begin_;
     if (is_late && time >= 2 * kSecond) {
       plug_in(plan_.late_host);
+      // Nobody comes back before it.
+      history_.troubled.push_back({plan_.late_host, Trouble::unplugged, {begin_, now()}});
       is_late = false;
     }
     for (std::size_t i = 0; i < ongoing_.size();) {
