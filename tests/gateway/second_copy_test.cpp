@@ -43,7 +43,8 @@ TEST(SecondCopy, IsTheSampleAndNoByteMore) {
   constexpr std::size_t kLarge = SecondCopy::kSmallestStream;
   for (const std::size_t size : {std::size_t{0}, std::size_t{1}, kLarge - 1, kLarge, kLarge + 77}) {
     for (const std::size_t block : {SecondCopy::kBlock, std::size_t{1471}, std::size_t{63}}) {
-      for (const std::size_t behind_line : {0, 1, 8, 63}) expect_copied(size, block, behind_line);
+      for (const std::size_t behind_line : {0U, 1U, 8U, 63U})
+        expect_copied(size, block, behind_line);
     }
   }
 }
