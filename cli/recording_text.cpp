@@ -157,7 +157,7 @@ void write_channels(std::ostream& out, const RecordingInfo& info) {
   }
 }
 
-void write_imports(std::ostream& out, const RecordingInfo& info) {
+void write_imported_sources(std::ostream& out, const RecordingInfo& info) {
   if (!info.imports.empty()) out << "\nsources of other hosts\n";
   for (const auto& [source, hosts] : info.imports) {
     std::string text;
@@ -219,7 +219,7 @@ void write_text(std::ostream& out, const RecordingInfo& info) {
   }
   write_chunks(out, info);
   write_channels(out, info);
-  write_imports(out, info);
+  write_imported_sources(out, info);
   write_metadata(out, info);
   write_attachments(out, info);
   if (info.end.is_whole || !info.has_header) return;

@@ -61,7 +61,7 @@ void write_table(const std::vector<Row>& rows) {
   }
 }
 
-void write_imports(const wire::HostsDocument& document) {
+void write_wanted_sources(const wire::HostsDocument& document) {
   if (document.imports.empty()) return;
   std::cout << "\nsources of other hosts that the model here wants\n";
   for (const wire::ImportStatus& each : document.imports) {
@@ -103,7 +103,7 @@ int hosts(const HostsOptions& options) {
   for (const wire::HostStatus& host : document.hosts) rows.push_back(row_of(document, host));
   std::cout << '\n';
   write_table(rows);
-  write_imports(document);
+  write_wanted_sources(document);
   if (!document.disagreements.empty() || document.without_place != 0) std::cout << '\n';
   if (document.without_place != 0) {
     std::cout << "warning: " << wire::without_place_text(document.without_place) << '\n';
