@@ -160,6 +160,17 @@ TEST(Checker, KnowsWhichModelWasInForce) {
   EXPECT_THAT(found, testing::SizeIs(1));
 }
 
+TEST(Checker, DoesNotTakeOneModelForAnotherThatTheRecordingDoesNotHave) {
+  HostEvidence host;
+  host.models = {{5 * kMs, 1, "default", "start"}, {40 * kMs, 3, "other", "switch"}};
+  EXPECT_FALSE(had_model(host, "default", 30 * kMs, 35 * kMs)) << "model 2 may have come before";
+  EXPECT_TRUE(had_model(host, "other", 50 * kMs, 51 * kMs));
+  host.models[1].generation = 2;
+  EXPECT_TRUE(had_model(host, "default", 30 * kMs, 35 * kMs));
+  EXPECT_FALSE(had_model(host, "default", 39 * kMs, 40 * kMs));
+  EXPECT_FALSE(had_model(host, "default", 4 * kMs, 4 * kMs));
+}
+
 TEST(Checker, DoesNotMissWhatNobodyWasThereToCount) {
   const Recorded gap = Recorded().arrives(1, 10, 9).arrives(4, 20, 19).arrives(6, 30, 29);
   EXPECT_THAT(gap.losses(1, {{15 * kMs, 16 * kMs}}), IsEmpty());

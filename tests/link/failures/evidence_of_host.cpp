@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <iterator>
 #include <stdexcept>
 #include <variant>
 
@@ -105,12 +106,14 @@ void add(HostEvidence& evidence, const std::string& motor, const evidence::Recor
 
 bool had_model(const HostEvidence& evidence, const std::string& name, Nanoseconds from,
                Nanoseconds to) {
-  const ModelInForce* before = nullptr;
-  for (const ModelInForce& each : evidence.models) {
-    if (each.time <= from) before = &each;
-    if (each.time > from && each.time <= to) return false;
-  }
-  return before != nullptr && before->name == name;
+  const auto after = std::find_if(evidence.models.begin(), evidence.models.end(),
+                                  [&](const ModelInForce& each) { return each.time > from; });
+  if (after == evidence.models.begin()) return false;
+  const ModelInForce& before = *std::prev(after);
+  if (before.name != name) return false;
+  if (after == evidence.models.end()) return true;
+  // A model that was in force for a few milliseconds may not be in the recording.
+  return after->time > to && after->generation <= before.generation + 1;
 }
 
 HostEvidence said_by(const HostEvidence& evidence, const std::string& source, unsigned host) {
