@@ -1,12 +1,10 @@
-// What a node calls back: on which thread, under no lock, and what becomes of what is thrown.
+// NodeOptions::on_notice: what it tells, to whom and how often, and what becomes of what it throws.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <atomic>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -26,128 +24,6 @@
 
 namespace arbiter::test {
 namespace {
-
-using namespace std::chrono_literals;
-
-struct Cancelled : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-// on_waiting is called as well where a daemon that runs is slow to answer: of that it hears nothing
-// here, but of what is waited for once `is_killed`.
-NodeOptions patient(const std::atomic<bool>& is_killed,
-                    std::function<void(const std::string&)> on_waiting) {
-  NodeOptions options;
-  options.connect_timeout = 1h;
-  options.on_waiting = [&is_killed, on_waiting = std::move(on_waiting)](const std::string& whom) {
-    if (is_killed) on_waiting(whom);
-  };
-  return options;
-}
-
-TEST(OnWaiting, IsCalledOnTheThreadThatWaits) {
-  Daemon daemon(single_model());
-  std::thread::id called_on;
-  std::atomic<bool> is_killed{false};
-  Node node("test", patient(is_killed, [&](const std::string&) {
-              called_on = std::this_thread::get_id();
-              daemon.restart();
-            }));
-  is_killed = true;
-  daemon.kill();
-  auto out = node.output_port<Number>("/out");
-  EXPECT_EQ(called_on, std::this_thread::get_id());
-}
-
-// Under a lock of the node's this would never return.
-TEST(OnWaiting, MayOpenAndClosePortsOfTheSameNode) {
-  Daemon daemon(override_model());
-  Node* self = nullptr;
-  auto held = std::make_unique<std::optional<OutputPort<Number>>>();
-  int calls = 0;
-  std::atomic<bool> is_killed{false};
-  Node node("test", patient(is_killed, [&](const std::string&) {
-              ++calls;
-              held->reset();
-              daemon.restart();
-              held->emplace(self->output_port<Number>("/high"));
-            }));
-  self = &node;
-  held->emplace(node.output_port<Number>("/stop"));
-  is_killed = true;
-  daemon.kill();
-  auto out = node.output_port<Number>("/low");
-  EXPECT_EQ(calls, 1);
-  EXPECT_EQ((*held)->name(), "/high");
-  EXPECT_TRUE(daemon.source("/high")["open"]);
-  EXPECT_TRUE(daemon.source("/low")["open"]);
-  EXPECT_FALSE(daemon.source("/stop")["open"]);
-}
-
-// A call of its own that waits as well does not call it again.
-TEST(OnWaiting, IsNotCalledFromWithinItself) {
-  Daemon daemon(override_model());
-  Node* self = nullptr;
-  int calls = 0;
-  std::atomic<bool> is_killed{false};
-  NodeOptions options = patient(is_killed, [&](const std::string&) {
-    ++calls;
-    EXPECT_THROW(static_cast<void>(self->output_port<Number>("/high")), Error);
-    daemon.restart();
-  });
-  options.connect_timeout = 1500ms;
-  Node node("test", options);
-  self = &node;
-  is_killed = true;
-  daemon.kill();
-  try {
-    static_cast<void>(node.output_port<Number>("/low"));
-  } catch (const Error&) {  // the call within has used up its time
-  }
-  EXPECT_EQ(calls, 1);
-}
-
-TEST(OnWaiting, WhatItThrowsLeavesTheOpeningOfThePortWhichHasNotHappened) {
-  Daemon daemon(single_model());
-  std::atomic<bool> is_killed{false};
-  Node node("test", patient(is_killed, [](const std::string&) { throw Cancelled("enough"); }));
-  is_killed = true;
-  daemon.kill();
-  EXPECT_THROW(static_cast<void>(node.output_port<Number>("/out")), Cancelled);
-  EXPECT_THROW(static_cast<void>(node.input_port<Number>("/in")), Cancelled);
-  is_killed = false;
-  daemon.restart();
-  auto out = node.output_port<Number>("/out");
-  auto in = node.input_port<Number>("/in");
-  EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
-  EXPECT_EQ(take_from(in), 1);
-}
-
-TEST(OnWaiting, WhatItThrowsLeavesTheMakingOfTheNode) {
-  Daemon daemon(single_model());
-  const std::atomic<bool> is_killed{true};
-  daemon.kill();
-  EXPECT_THROW(
-      Node("test", patient(is_killed, [](const std::string&) { throw Cancelled("enough"); })),
-      Cancelled);
-  EXPECT_THROW(Node("test", patient(is_killed, [](const std::string&) { throw 7; })), int);
-  daemon.restart();
-}
-
-// The name stays another's, of whoever comes first.
-TEST(OnWaiting, APortWhoseOpeningWasCancelledHasItsNameFree) {
-  Daemon daemon(single_model());
-  std::atomic<bool> is_killed{false};
-  Node node("test", patient(is_killed, [](const std::string&) { throw Cancelled("enough"); }));
-  auto in = node.input_port<Number>("/in");
-  is_killed = true;
-  daemon.kill();
-  EXPECT_THROW(static_cast<void>(node.output_port<Number>("/out")), Cancelled);
-  daemon.restart();
-  Node other("other");
-  auto out = other.output_port<Number>("/out");
-  EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
-}
 
 // Notices, as they were given.
 class Notices {
@@ -294,7 +170,7 @@ TEST(OnNotice, MayOpenAndClosePortsOfTheSameNode) {
 TEST(OnNotice, WhatItThrowsIsWrittenDownAndHasNoOtherEffect) {
   Daemon daemon(single_model());
   NodeOptions options;
-  options.on_notice = [](const Notice&) { throw Cancelled("no more"); };
+  options.on_notice = [](const Notice&) { throw std::runtime_error("no more"); };
   options.on_waiting = [](const std::string&) {};  // where the machine is slow
   testing::internal::CaptureStderr();
   Node node("test", options);
