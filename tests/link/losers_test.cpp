@@ -126,6 +126,20 @@ class Losers : public LoopbackHosts {
   Host head_{"head", runtime_, kNoRules, network()};
 };
 
+// The camera of the head, which the base has shown, and which loses there now.
+class ALoser : public Losers {
+ protected:
+  ALoser() {
+    view_.watch(camera_);
+    view_.pause();
+    lose(base_, camera_);
+  }
+
+  Host base_{"base", runtime_, view_model("500s"), network()};
+  Camera camera_{head_};
+  View view_{base_};
+};
+
 TEST_F(Losers, OnlyHeadersCrossAndTheNewestImageIsThereWhenItWinsAgain) {
   Host base("base", runtime_, view_model("500s"), network());
   Camera camera(head_);
@@ -169,13 +183,7 @@ TEST_F(Losers, OnlyHeadersCrossAndTheNewestImageIsThereWhenItWinsAgain) {
   EXPECT_THAT(base.described(kCamera), Not(HasSubstr("twice")));
 }
 
-TEST_F(Losers, AreCountedByTheirImporter) {
-  Host base("base", runtime_, view_model("500s"), network());
-  Camera camera(head_);
-  View view(base);
-  view.watch(camera);
-  view.pause();
-  lose(base, camera);
+TEST_F(ALoser, IsCountedByItsImporter) {
   const auto hosts = [](std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"hosts", "--instance", "base"});
     return arbiter(arguments).out;
@@ -206,34 +214,22 @@ TEST_F(Losers, TheNewestImageIsThereThoughHeadersWereOnTheirWay) {
   EXPECT_THAT(base.described(kCamera), Not(HasSubstr("twice")));
 }
 
-TEST_F(Losers, AHeaderIsAnArrivalAtOnce) {
-  Host base("base", runtime_, view_model("500s"), network());
-  Camera camera(head_);
-  View view(base);
-  view.watch(camera);
-  view.pause();
-  lose(base, camera);
-  camera.port().deactivate();
-  await([&] { return !base.daemon().source(kCamera)["active"]; });
-  camera.publish();
-  await([&] { return base.daemon().source(kCamera)["active"].get<bool>(); });
+TEST_F(ALoser, AHeaderIsAnArrivalAtOnce) {
+  camera_.port().deactivate();
+  await([&] { return !base_.daemon().source(kCamera)["active"]; });
+  camera_.publish();
+  await([&] { return base_.daemon().source(kCamera)["active"].get<bool>(); });
 }
 
 // What was kept at home is not sent after a deactivation: nothing of it is wanted any more.
-TEST_F(Losers, ADeactivationEndsWhatWasKept) {
-  Host base("base", runtime_, view_model("500s"), network());
-  Camera camera(head_);
-  View view(base);
-  view.watch(camera);
-  view.pause();
-  lose(base, camera);
-  camera.port().deactivate();
-  await([&] { return !base.daemon().source(kCamera)["active"]; });
-  view.go_on();
-  camera.port().signal();
-  await([&] { return view.in().winner() == kCamera; });
-  EXPECT_FALSE(view.seen(20ms));
-  view.watch(camera);
+TEST_F(ALoser, ADeactivationEndsWhatWasKept) {
+  camera_.port().deactivate();
+  await([&] { return !base_.daemon().source(kCamera)["active"]; });
+  view_.go_on();
+  camera_.port().signal();
+  await([&] { return view_.in().winner() == kCamera; });
+  EXPECT_FALSE(view_.seen(20ms));
+  view_.watch(camera_);
 }
 
 TEST_F(Losers, AHostWhereItWinsHasItAll) {
@@ -253,16 +249,10 @@ TEST_F(Losers, AHostWhereItWinsHasItAll) {
   other.watch(camera);
 }
 
-TEST_F(Losers, ATapThatReadsSamplesHasThem) {
-  Host base("base", runtime_, view_model("500s"), network());
-  Camera camera(head_);
-  View view(base);
-  view.watch(camera);
-  view.pause();
-  lose(base, camera);
-  auto tap = view.node().tap(kCamera);
+TEST_F(ALoser, ATapThatReadsSamplesHasThem) {
+  auto tap = view_.node().tap(kCamera);
   await([&] {
-    camera.publish();
+    camera_.publish();
     while (const auto event = tap.take()) {
       if (event->sample()) return true;
     }
