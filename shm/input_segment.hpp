@@ -53,7 +53,7 @@ struct InputCounters {
 
 struct InputHeader {
   static constexpr std::uint64_t kMagic = 0x31706e69'74696272;
-  static constexpr std::uint32_t kVersion = 1;
+  static constexpr std::uint32_t kVersion = 2;
 
   std::uint64_t magic;
   std::uint32_t version;
@@ -69,6 +69,10 @@ struct InputHeader {
   // winner, or kNone: publishers whose activity begins or ends ring when that is not so any more.
   alignas(kCacheLine) Atomic<std::uint64_t> wait;
   Atomic<SourceId> believed;
+  // The newest link that its process has taken up. Numbers of links grow, and the daemon tells of
+  // them in that order. If the port keeps all, or is not arbitrated, no publisher begins the queue
+  // of a link before.
+  Atomic<std::uint64_t> newest_link;
 
   alignas(kCacheLine) Atomic<Hold> holds[kMaxHeld];
   alignas(kCacheLine) InputCounters counters;

@@ -123,6 +123,7 @@ class InputCore {
 
   void offer_view();
   bool offer_links();
+  void take_up(std::uint64_t link) noexcept;
   void accept_view();
   shm::Lane* free_lane() noexcept;
   void retire_queue(Queue& queue, const InputView& next);
@@ -136,6 +137,7 @@ class InputCore {
   bool look_at(std::size_t index) noexcept;
   bool look_closely(Queue& queue) noexcept;
   void join(Queue& queue) noexcept;
+  void drop_missed(Queue& queue) noexcept;
   void yield_to_successor(Queue& queue) noexcept;
   enum class Choice : std::uint8_t { kTake, kNothing, kAgain, kLoses };
   Choice choose(Queue*& oldest) noexcept;
@@ -205,6 +207,7 @@ class InputCore {
   std::vector<Queue*> waiting_;  // those in which the take under way found a head
   static constexpr std::size_t kNoQueue = SIZE_MAX;
   std::size_t last_taken_ = kNoQueue;  // of queues_, the last sample's
+  shm::Nanoseconds last_stamp_ = 0;    // the last sample's
   bool selects_one_ = false;           // at most, under snapshot_: the port is arbitrated
   shm::TableSnapshot snapshot_;
   shm::Epoch bound_epoch_ = UINT64_MAX;

@@ -119,6 +119,24 @@ void InputCore::join(Queue& queue) noexcept {
   if (queue.reader.state() != shm::ChannelReader::State::kUnjoined) return;
   if (!queue.reader.join()) return;
   queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_relaxed);
+  if (!keep_) drop_missed(queue);
+}
+
+// Our process may have been late to take up the publisher: what waited in its queue when a later
+// sample was taken lost then. At a port that is not arbitrated, or keeps, nothing is there yet.
+void InputCore::drop_missed(Queue& queue) noexcept {
+  for (auto left = queue.reader.backlog(queue.reader.backlog_end()); left != 0; --left) {
+    std::uint64_t lost = 0;
+    const shm::Entry entry = queue.reader.peek(lost);
+    count_overtaken(queue, lost);
+    shm::Nanoseconds stamp = 0;
+    if (entry == 0) return;
+    if (!queue.reader.peek_stamp(entry, stamp)) continue;  // overtaken just now
+    if (stamp >= last_stamp_) return;
+    consume(queue);
+    count(queue.lane->dropped);
+    count(segment_->header.counters.dropped);
+  }
 }
 
 bool InputCore::look_at(std::size_t index) noexcept {
@@ -307,6 +325,7 @@ bool InputCore::hold(Queue& queue, HeldSample& sample) noexcept {
   count(queue.lane->taken);
   count(segment_->header.counters.taken);
   last_taken_ = static_cast<std::size_t>(&queue - queues_.data());
+  last_stamp_ = sample.stamp_ns;
   held_from_[index] = queue.peer.get();
   ++queue.peer->held;
   ++held_;

@@ -147,9 +147,12 @@ class OutputCore {
   struct Destination {
     const InputPeer* peer = nullptr;  // kept alive by view_
     bool joined = false;   // it has a queue of ours; else it senses, or holds old samples
+    bool awaited = false;  // it is to have one (join_awaited())
     bool refused = false;  // it would have, but for its type
     std::uint64_t link = 0;
     std::uint32_t channel = shm::kNone;
+    std::uint32_t depth = 1;   // of the queue
+    std::uint64_t missed = 0;  // samples that were discarded before the queue began
     shm::ChannelWriter writer;
     bool has_rule = false;  // the connection, under bound_epoch_
     std::uint32_t decision = 0;
@@ -166,6 +169,11 @@ class OutputCore {
   void offer_view();
   void accept_view() noexcept;
   void leave_all_but(const OutputView& view) noexcept;
+  static void join(Destination& destination) noexcept;
+  void join_awaited() noexcept;
+  // All is taken up: the view, the rules in force, and what they decide for each destination.
+  [[nodiscard]] bool is_settled() const noexcept;
+  void settle() noexcept;
   [[nodiscard]] bool rules_are_bound() const noexcept;
   void bind_rules() noexcept;
   void bind_rules_and_view() noexcept;
@@ -184,6 +192,7 @@ class OutputCore {
   void tell_arrival(std::uint32_t slot) noexcept;
   void tell_deactivation() noexcept;
   [[nodiscard]] Counts refuse(const Destination& destination, bool is_sample) const noexcept;
+  [[nodiscard]] Counts pass_over(Destination& destination, bool is_sample) noexcept;
   [[nodiscard]] const shm::Lane* lane_of(Destination& destination) const noexcept;
   [[nodiscard]] bool is_full(Destination& destination) const noexcept;
   static void ring_if_waiting(Destination& destination) noexcept;
@@ -244,6 +253,8 @@ class OutputCore {
   shm::ActivityWord own_word_ = shm::kNeverActive;
   shm::Nanoseconds last_ = kUnknown;  // time of the last arrival or deactivation
   shm::Epoch bound_epoch_ = UINT64_MAX;
+  shm::Epoch settled_epoch_ = UINT64_MAX;  // the same, unless a destination is awaited
+  bool has_awaited_ = false;
   std::uint64_t bound_pages_ = 0;
   shm::TableSnapshot snapshot_;
   shm::Nanoseconds timeout_ = shm::kDefaultTimeout;

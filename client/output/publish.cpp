@@ -78,7 +78,7 @@ void OutputCore::stamp(shm::ActivityWord word) noexcept {
 
 Counts OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
-  if (!rules_are_bound()) bind_rules_and_view();
+  if (!is_settled()) settle();
   const bool begins = !shm::is_active(own_word_, now);
   stamp(shm::arrival(now, timeout_));
   last_ = now;
@@ -104,6 +104,7 @@ void OutputCore::bind_rules_and_view() noexcept {
     accept_view();
     bind_rules();
   }
+  if (has_awaited_) join_awaited();
 }
 
 void OutputCore::decide_all(shm::Nanoseconds now) noexcept {
@@ -132,10 +133,11 @@ Counts OutputCore::hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseco
   std::uint64_t unsettled = 0;
   for (Destination& destination : destinations_) {
     if (!destination.joined) {
-      if (!destination.refused) continue;
-      const Counts refusal = refuse(destination, is_sample);
-      outcome.discarded += refusal.discarded;
-      outcome.refused += refusal.refused;
+      if (!destination.refused && !destination.awaited) continue;
+      const Counts missed =
+          destination.refused ? refuse(destination, is_sample) : pass_over(destination, is_sample);
+      outcome.discarded += missed.discarded;
+      outcome.refused += missed.refused;
       continue;
     }
     if (!destination.has_rule) {
@@ -195,6 +197,27 @@ Counts OutputCore::refuse(const Destination& destination, bool is_sample) const 
   const bool wins = decisions_[destination.decision].verdict == shm::Verdict::kWins;
   outcome.discarded = wins ? 0 : 1;
   outcome.refused = wins && is_sample ? 1 : 0;
+  return outcome;
+}
+
+// What becomes of it at a port whose process has not taken up the connection yet.
+Counts OutputCore::pass_over(Destination& destination, bool is_sample) noexcept {
+  Counts outcome;
+  if (!destination.has_rule) return outcome;
+  outcome.discarded = 1;
+  if (is_sample) ++destination.missed;
+  auto& counters = segment_.header().counters;
+  switch (decisions_[destination.decision].verdict) {
+    case shm::Verdict::kWins:
+    case shm::Verdict::kBlind:
+      count(counters.blind);
+      break;
+    case shm::Verdict::kUnsettled:
+      count(counters.unsettled);
+      break;
+    case shm::Verdict::kLoses:
+      break;
+  }
   return outcome;
 }
 
@@ -290,7 +313,7 @@ Counts OutputCore::publish_copy(const void* data, std::size_t size, shm::Nanosec
 Counts OutputCore::signal(shm::Nanoseconds now) noexcept { return arrive(shm::kNoSlot, 0, now); }
 
 bool OutputCore::wants_samples() const noexcept {
-  if (!rules_are_bound()) return true;
+  if (!is_settled()) return true;
   const bool is_read = std::any_of(teller_.seats().begin(), teller_.seats().end(),
                                    [](const TapSeat& seat) { return seat.peer->max_held != 0; });
   return is_read ||

@@ -21,10 +21,13 @@ shm::Masks OutputCore::masks() noexcept {
   shm::Masks masks;
   masks.refused = teller_.refusals();
   for (const Destination& destination : destinations_) {
-    if (!destination.has_rule || (!destination.joined && !destination.refused)) continue;
+    const bool is_met = destination.joined || destination.refused || destination.awaited;
+    if (!destination.has_rule || !is_met) continue;
     switch (decisions_[destination.decision].verdict) {
       case shm::Verdict::kWins:
-        (destination.joined ? masks.accepted : masks.refused) |= destination.mask;
+        (destination.joined    ? masks.accepted
+         : destination.awaited ? masks.blind
+                               : masks.refused) |= destination.mask;
         break;
       case shm::Verdict::kLoses:
         masks.discarded |= destination.mask;

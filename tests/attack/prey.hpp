@@ -114,6 +114,7 @@ class Prey {
     input_header.depth = 1;
     input_header.max_held = 1;
     input_header.refuse_new = 1;
+    input_header.newest_link.store(UINT64_MAX, std::memory_order_relaxed);
     input_header.type = type;
     shm::seal(own_input_, shm::Seals::kOneWriter);
     auto open_input = RawClient::message(wire::MessageKind::kOpenInput, "/attacker:i");

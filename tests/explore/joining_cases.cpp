@@ -1,7 +1,7 @@
 // Ports that come and go while others work: views, queues that begin and end, lanes, pages.
 #include "tests/explore/components.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::joining_cases {
 namespace {
 
 test::TableBuilder everything() {
@@ -79,6 +79,53 @@ void join_amid_a_take(const Explore& explore) {
 }
 const Register kOvertaking("ATakeReturnsNothingLaterThanWhatAPublisherThatJoinedHasDelivered",
                            {3, 2}, join_amid_a_take);
+
+// The publisher knows of the receiver before the receiver knows of it.
+struct Introduced : Scene {
+  explicit Introduced(const InputPortOptions& options) : Scene(everything(), options, {kB}) {
+    Instance::tell_output(a(), *input, 9);
+  }
+};
+
+// Nothing comes behind what was published later; all that is accepted is taken or counted.
+void take_up_amid_takes(const Explore& explore, const InputPortOptions& options) {
+  const auto scenario = [keep = options.keep](Introduced& scene, Execution& execution) {
+    execution.thread([&scene] { Instance::tell_input(*scene.input, scene.a(), 9); });
+    execution.thread([&scene] {
+      scene.a().publish();
+      scene.b().publish();
+    });
+    execution.thread([&scene] {
+      for (int i = 0; i < 2; ++i) {
+        const bool is_late = scene.input->last[kB] != 0 && scene.input->taken[kA] == 0;
+        scene.input->take();
+        require(!is_late || scene.input->taken[kA] == 0,
+                "a sample came behind one that was published later");
+      }
+    });
+    execution.finally([&scene, keep] {
+      const auto blind = scene.a().counters().blind.load(std::memory_order_relaxed);
+      require(scene.a().delivered + blind == 1 && scene.a().discarded == blind,
+              "a sample was neither accepted nor counted as discarded");
+      require(keep || blind == 0, "an arbitrated port is awaited");
+      scene.a().publish();
+      require(scene.a().delivered + blind == 2, "a link that was taken up has no queue");
+      scene.drain();
+    });
+  };
+  explore_anew<Introduced>(explore, scenario, options);
+}
+const Register kTakeUp("APublisherThatIsTakenUpLateComesNotBehindWhatIsPublishedLater", {3, 2},
+                       [](const Explore& explore) { take_up_amid_takes(explore, depth(1)); });
+InputPortOptions keeping() {
+  InputPortOptions options = depth(2);
+  options.keep = true;
+  return options;
+}
+const Register kTakeUpKeeping("APortThatKeepsAllIsHandedNothingOfAPublisherThatItHasNotTakenUp",
+                              {3, 2}, [](const Explore& explore) {
+                                take_up_amid_takes(explore, keeping());
+                              });
 
 InputPortOptions refusing() {
   InputPortOptions options = depth(1);
@@ -300,4 +347,4 @@ void attach_under_a_bound_rule(const Explore& explore) {
 const Register kChanges("WhoSeesThatPagesHaveChangedFindsThem", {6, 4}, attach_under_a_bound_rule);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::joining_cases

@@ -38,6 +38,7 @@ inline shm::FileDescriptor raw_input_segment() {
     header.version = shm::InputHeader::kVersion;
     header.depth = 1;
     header.max_held = 1;
+    header.newest_link.store(UINT64_MAX, std::memory_order_relaxed);  // takes up whatever comes
   }
   shm::seal(segment, shm::Seals::kOneWriter);
   return segment;

@@ -68,7 +68,8 @@ enum class Fate : std::uint8_t {
   accepted,   // the connection was the winner: the sample was queued; a signal has no sample
   discarded,  // another connection was the winner, or none
   refused,    // the winner, but its queue was full (refuse_new) or its connection is refused
-  blind,      // no decision: not all sources that the rules read could be seen
+  blind,      // no decision: not all sources that the rules read could be seen, or the component at
+              // a port that keeps all, or is not arbitrated, has not taken up the connection yet
 };
 
 struct TapDestination {

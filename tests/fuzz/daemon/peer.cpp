@@ -51,6 +51,7 @@ void write_header(shm::InputHeader& header, std::uint32_t depth) {
   header.version = shm::InputHeader::kVersion;
   header.depth = depth;
   header.max_held = 1;
+  header.newest_link.store(UINT64_MAX, std::memory_order_relaxed);
 }
 
 template <class Header>

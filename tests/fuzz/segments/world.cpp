@@ -241,8 +241,10 @@ void World::introduce_input(const std::vector<Patch>& patches) {
   received.message.peer = ++last_instance_;
   received.message.id = kX;
   received.message.flags = wire::kIsConnected;
+  // It takes up whatever comes; what a step writes there later may say otherwise.
   received.descriptors[0] =
-      make_hostile(sizeof(shm::InputSegment), &header, offsetof(shm::InputHeader, wait), patches);
+      make_hostile(sizeof(shm::InputSegment), &header, offsetof(shm::InputHeader, wait), patches,
+                   {{offsetof(shm::InputHeader, newest_link), UINT64_MAX}});
   received.descriptors[1] = copy_of(x.bell().write_end().get());
   try {
     p.add_peer(detail::map_input_peer(received, type()), ++last_link_);
