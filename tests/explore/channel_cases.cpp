@@ -2,7 +2,7 @@
 #include "tests/explore/case.hpp"
 #include "tests/explore/scenario.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::channel_cases {
 namespace {
 
 constexpr shm::PortInstance kPublisher = 3, kReceiver = 4;
@@ -149,4 +149,4 @@ const Register kJoining("AReceiverFindsItsQueueWholeOrNotAtAll", {3, 2},
                         });
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::channel_cases

@@ -3,7 +3,7 @@
 #include "tests/explore/components.hpp"
 #include "tests/explore/kernel.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::death_cases {
 namespace {
 
 test::TableBuilder b_overrides_a() {
@@ -195,4 +195,4 @@ const Register kDaemon("ADaemonThatDiesAmidAModelLeavesTheOldOneOrTheNewOne", {2
                        lose_daemon);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::death_cases

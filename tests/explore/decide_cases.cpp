@@ -1,7 +1,7 @@
 // Arbitration at both ends: overrides, deactivation, other models, while ports publish and take.
 #include "tests/explore/components.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::decide_cases {
 namespace {
 
 test::TableBuilder b_overrides_a() {
@@ -236,4 +236,4 @@ const Register kSwapDeactivation("NoModelDecidesOnADeactivationUnderTheNext", {4
                                  swap_before_a_deactivation);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::decide_cases

@@ -6,7 +6,7 @@
 #include "tests/explore/case.hpp"
 #include "tests/explore/components.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::decision_cases {
 namespace {
 
 constexpr shm::Nanoseconds kNow = 1000;
@@ -131,4 +131,4 @@ const Register kBrokenAndOld(
     "AnActivityThatWasBrokenOffDoesNotCountAsRenewedThoughOldValuesAreSeen", {2, 5}, break_off);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::decision_cases

@@ -8,7 +8,7 @@
 #include "tests/explore/case.hpp"
 #include "tests/explore/scenario.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::event_cases {
 namespace {
 
 constexpr shm::PortInstance kPublisher = 3;
@@ -210,4 +210,4 @@ const Register kDestinations("AListOfDestinationsThatIsOverwrittenIsNeverTakenFo
                              change_destinations);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::event_cases

@@ -4,7 +4,7 @@
 #include "gateway/core/run_record.hpp"
 #include "tests/explore/components.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::gateway_cases {
 namespace {
 
 using gateway::Announced;
@@ -58,4 +58,4 @@ void announce(const Explore& explore) {
 const Register kAnnounced("WhatIsAnnouncedIsFoundMade", {4, 3}, announce);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::gateway_cases

@@ -2,7 +2,7 @@
 // What the service thread learns of peers that have gone, come, or are refused comes by views.
 #include "tests/explore/components.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::idle_cases {
 namespace {
 
 using detail::Waited;
@@ -144,4 +144,4 @@ void dies(const Explore& explore) {
 const Register kDies("ACommanderThatDiesMakesItsPortIdleOnceAllIsTaken", {1, 1, 1}, dies);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::idle_cases

@@ -2,7 +2,7 @@
 // owner goes on writing to the old one.
 #include "tests/explore/components.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::page_cases {
 namespace {
 
 // A's sample waits; B, which overrides it, passes to another user.
@@ -114,4 +114,4 @@ void go_over(const Explore& explore) {
 const Register kGoesOver("WhoIsBoundToAPageThatIsReplacedGoesOverToTheNext", {4, 2}, go_over);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::page_cases

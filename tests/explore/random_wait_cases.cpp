@@ -9,7 +9,7 @@
 #include "tests/explore/components.hpp"
 #include "tests/explore/kernel.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::random_wait_cases {
 namespace {
 
 using detail::Waited;
@@ -208,4 +208,4 @@ const Register kRandom("AnArmedDescriptorTellsOfAllThatRandomSequencesDo", {0, 0
                        random_sequences);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::random_wait_cases

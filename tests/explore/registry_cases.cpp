@@ -3,7 +3,7 @@
 #include "service/kept/registry_entry.hpp"
 #include "tests/explore/components.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::registry_cases {
 namespace {
 
 using service::Owner;
@@ -45,4 +45,4 @@ void change_owner(const Explore& explore) {
 const Register kOwners("AnOwnerIsReadWholeOrNotAtAll", {3, 3, 1}, change_owner);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::registry_cases

@@ -3,7 +3,7 @@
 #include "service/ports/pending_ring.hpp"
 #include "tests/explore/components.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::ring_cases {
 namespace {
 
 struct Asked {
@@ -32,4 +32,4 @@ void ask_again(const Explore& explore) {
 const Register kAskAgain("ARingThatIsPendingTellsOfAllThatCameBefore", {2, 2}, ask_again);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::ring_cases

@@ -4,7 +4,7 @@
 #include "shm/table_ring.hpp"
 #include "tests/explore/case.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::table_ring_cases {
 namespace {
 
 class Tables {
@@ -56,4 +56,4 @@ const Register kSwaps("ATableThatIsOverwrittenWhileItIsReadIsNeverTakenForWhole"
                       });
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::table_ring_cases

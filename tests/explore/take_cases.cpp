@@ -1,7 +1,7 @@
 // publish() and take(): slots, order, accounts (shm/channel.hpp, shm/slot_pool.hpp, client/).
 #include "tests/explore/components.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::take_cases {
 namespace {
 
 test::TableBuilder everything() {
@@ -128,4 +128,4 @@ void refuse(const Explore& explore) {
 const Register kRefuse("APortThatRefusesLosesNothingThatItHasAccepted", {4, 2}, refuse);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::take_cases

@@ -1,7 +1,7 @@
 // Taps of the real ports: they see each arrival once, and change nothing for anybody else.
 #include "tests/explore/components.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::tap_cases {
 namespace {
 
 test::TableBuilder a_alone() { return forever().connect({kA, kPort, shm::table::kAlways, {}, {}}); }
@@ -153,4 +153,4 @@ void leave(const Explore& explore) {
 const Register kLeave("ATapThatLeavesGivesAllSlotsBack", {3, 2}, leave);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::tap_cases

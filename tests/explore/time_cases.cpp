@@ -2,7 +2,7 @@
 #include "tests/explore/components.hpp"
 #include "tests/explore/kernel.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::time_cases {
 namespace {
 
 using detail::Waited;
@@ -117,4 +117,4 @@ const Register kBeginsAgain("AReceiverThatWaitsIsWokenWhereAnArrivalAtAGivenTime
                             begins_again);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::time_cases

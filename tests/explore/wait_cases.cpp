@@ -2,7 +2,7 @@
 #include "tests/explore/components.hpp"
 #include "tests/explore/kernel.hpp"
 
-namespace arbiter::explore {
+namespace arbiter::explore::wait_cases {
 namespace {
 
 using detail::Waited;
@@ -280,4 +280,4 @@ const Register kPollRunOut("ADescriptorThatIsArmedAgainBecomesReadableWhenActivi
                            poll_run_out);
 
 }  // namespace
-}  // namespace arbiter::explore
+}  // namespace arbiter::explore::wait_cases
