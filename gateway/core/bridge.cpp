@@ -23,6 +23,9 @@ constexpr shm::Nanoseconds kLookPeriod = 100 * kMillisecond;
 constexpr shm::Nanoseconds kTellPeriod = 500 * kMillisecond;  // how things stand
 constexpr shm::Nanoseconds kSayPeriod = 1000 * kMillisecond;  // of each entry
 constexpr int kRetryPeriod = 500;                             // ms, for the daemon
+// One lost datagram must not leave a robot driving, nor a gateway end late.
+constexpr int kLeaves = 3;
+constexpr int kLeavePeriod = 20;  // ms
 constexpr shm::Nanoseconds kOpenPeriod = 1000 * kMillisecond;
 // A daemon refuses at once, unless it waits for somebody to yield.
 constexpr shm::Nanoseconds kNoAnswer = 100 * kMillisecond;
@@ -79,7 +82,22 @@ void Bridge::run(int stop) {
   }
   make_node(stop);
   if (!stops_) loop(stop);
+  take_leave();
   middleware_.stop();
+}
+
+void Bridge::take_leave() {
+  std::vector<Outgoing*> outs;
+  for (const auto& part : parts_) {
+    if (part->outgoing && part->entry.idle.kind != Idle::Kind::kNothing) {
+      outs.push_back(part->outgoing.get());
+    }
+  }
+  if (outs.empty()) return;
+  for (int i = 0; i < kLeaves; ++i) {
+    if (i != 0) ::poll(nullptr, 0, kLeavePeriod);
+    for (Outgoing* const out : outs) out->end();
+  }
 }
 
 bool Bridge::waits(int stop, int milliseconds) {

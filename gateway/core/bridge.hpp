@@ -98,6 +98,8 @@ class Bridge {
   void watch_news();
   void start(const std::vector<Part*>& opened);
   void loop(int stop);
+  // To whoever obeys an `out` entry. An entry whose port was not opened is somebody else's.
+  void take_leave();
   void look_after(shm::Nanoseconds now, bool all);
   [[nodiscard]] shm::Nanoseconds next_round(shm::Nanoseconds now) const;
   // False: `stop` is readable.

@@ -81,6 +81,10 @@ void Outgoing::send_idle(shm::Nanoseconds now) {
   }
   if (idle_again_ && now < *idle_again_ && !has_matched) return;
   idle_again_ = now + kIdlePeriod;
+  send_idle_sample();
+}
+
+void Outgoing::send_idle_sample() noexcept {
   if (entry_.idle.kind == Idle::Kind::kNothing) return;
   if (sender_.send({entry_.idle.sample.data(), entry_.idle.sample.size()}) ==
       Sender::Result::kSent) {
@@ -88,10 +92,19 @@ void Outgoing::send_idle(shm::Nanoseconds now) {
   }
 }
 
+void Outgoing::end() noexcept {
+  loop_waits_.store(true, std::memory_order_relaxed);
+  const std::lock_guard lock(turn_);
+  has_ended_ = true;
+  has_turn = true;
+  send_idle_sample();
+  has_turn = false;
+}
+
 bool Outgoing::begin_turn(std::size_t bytes) noexcept {
   if (bytes > sender_.largest_at_once()) return false;
   if (has_turn || loop_waits_.load(std::memory_order_relaxed) || !turn_.try_lock()) return false;
-  if (left_ || has_more_) {
+  if (left_ || has_more_ || has_ended_) {
     turn_.unlock();
     return false;
   }

@@ -105,6 +105,10 @@ class Outgoing {
   // Sends what of `source` waits and ends the turn; calls the loop for what is left, and for the
   // idle sample if the port has become idle meanwhile. False: nothing of it has come here.
   bool end_turn(std::string_view source, shm::Nanoseconds max_age) noexcept;
+  // The gateway ends: sends the idle sample, whoever commands, and nothing of the port's from then
+  // on, because whoever obeys would go on with the last command for ever. May be called again, lest
+  // the one sample be lost. Nothing where there is no idle sample. The loop.
+  void end() noexcept;
   // When run() is to be called again even if the descriptor is not readable; shm::kForever: never.
   [[nodiscard]] shm::Nanoseconds next() const noexcept {
     // Relaxed is enough: who leaves something to the loop calls it afterwards.
@@ -121,6 +125,7 @@ class Outgoing {
   void send_waiting(shm::Nanoseconds now);
   void send_idle(shm::Nanoseconds now);
   [[nodiscard]] Sender::Result send_in_turn(const Sample<void>& sample) noexcept;
+  void send_idle_sample() noexcept;
   [[nodiscard]] bool is_drafted(const Sample<void>& sample) const noexcept;
   void account_for(Sender::Result result, std::size_t size) noexcept;
   [[nodiscard]] shm::Nanoseconds when_next() const noexcept;
@@ -144,7 +149,8 @@ class Outgoing {
   std::atomic<bool> matched_{false};
   std::atomic<shm::Nanoseconds> next_{shm::kForever};  // when_next()
   bool has_more_ = false;                              // run() has left samples to the next one
-  std::optional<shm::Nanoseconds> idle_again_;         // when; empty: the port was not idle
+  bool has_ended_ = false;
+  std::optional<shm::Nanoseconds> idle_again_;  // when; empty: the port was not idle
 };
 
 }  // namespace arbiter::gateway

@@ -10,6 +10,7 @@
 #include <map>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include <arbiter/arbiter.hpp>
 
@@ -51,11 +52,17 @@ class PlayedMiddleware : public Middleware {
     for (const OpenIn& in : ins) ins_[in.incoming.entry().ports().front()->name] = &in.incoming;
     outs_ += outs.size();
   }
-  void stop() noexcept override {}
+  void stop() noexcept override {
+    if (const auto call = std::exchange(at_stop, {})) call();
+  }
   // In each round of the loop.
   void tend() override { ++tends_; }
 
   [[nodiscard]] int tends() const { return tends_; }
+  [[nodiscard]] std::vector<std::string> sent() {
+    const std::lock_guard lock(mutex_);
+    return sender_.sent;
+  }
   [[nodiscard]] bool serves(const std::string& source) {
     const std::lock_guard lock(mutex_);
     return ins_.count(source) != 0;
@@ -73,15 +80,26 @@ class PlayedMiddleware : public Middleware {
     return in->deliver(BytesSample(bytes), Time::max());
   }
 
+  std::function<void()> at_stop{};  // once
+
  private:
-  // Counts what is sent, on the loop's thread and the test's.
-  class NoSender : public Sender {
+  // On the loop's thread and the test's.
+  class LockedSender : public Sender {
    public:
-    [[nodiscard]] Result send(Bytes) noexcept override { return Result::kSent; }
+    explicit LockedSender(std::mutex& mutex) : mutex_(mutex) {}
+    [[nodiscard]] Result send(Bytes sample) noexcept override {
+      const std::lock_guard lock(mutex_);
+      sent.emplace_back(reinterpret_cast<const char*>(sample.data()), sample.size());
+      return Result::kSent;
+    }
+    std::vector<std::string> sent;
+
+   private:
+    std::mutex& mutex_;
   };
 
-  NoSender sender_;
   std::mutex mutex_;
+  LockedSender sender_{mutex_};
   std::map<std::string, Incoming*> ins_;
   std::size_t outs_ = 0;
   std::atomic<int> tends_{0};
@@ -100,6 +118,9 @@ class Running {
   Running(const Running&) = delete;
   Running& operator=(const Running&) = delete;
   ~Running() {
+    if (thread_.joinable()) end();
+  }
+  void end() {
     const std::uint64_t one = 1;
     EXPECT_EQ(::write(stop_.get(), &one, sizeof one), static_cast<ssize_t>(sizeof one));
     thread_.join();
@@ -324,6 +345,37 @@ TEST_F(Refused, TwoGatewaysOfTheSameMappingShareItAndOneTakesUpWhatTheOtherHad) 
     return two.middleware.serves("/Nav/cmd:o") && two.middleware.serves("/Joy/cmd:o") &&
            two.middleware.outs() == 1;
   });
+}
+
+// Nobody else tells the robot, where no service manager does; and its last command would stay.
+TEST(Ending, SaysStopWhoeverCommandsAndNothingBehindIt) {
+  test::Daemon daemon{kDriving};
+  Running gateway;
+  await([&] { return gateway.middleware.serves("/Nav/cmd:o") && gateway.middleware.outs() == 1; });
+  const auto is_driving = [&] {
+    return !gateway.middleware.sent().empty() && gateway.middleware.sent().back() == "drive";
+  };
+  gateway.middleware.deliver("/Nav/cmd:o", "drive");
+  await(is_driving);
+  std::vector<std::string> sent;
+  gateway.middleware.at_stop = [&] {  // until then a middleware's threads deliver
+    gateway.middleware.deliver("/Nav/cmd:o", "drive");
+    sent = gateway.middleware.sent();
+  };
+  gateway.end();
+  ASSERT_GE(sent.size(), 2u);
+  EXPECT_EQ(sent.back(), kZeros);
+}
+
+// Where another gateway serves the entry, a stop would be a command of its own.
+TEST(Ending, SaysNothingWhereSomebodyElseHasThePort) {
+  test::Daemon daemon{kDriving};
+  Node node("other");
+  const auto taken = node.input_port("/Base/cmd:i");
+  Running gateway;
+  await([&] { return gateway.middleware.serves("/Nav/cmd:o"); });
+  gateway.end();
+  EXPECT_THAT(gateway.middleware.sent(), testing::IsEmpty());
 }
 
 }  // namespace

@@ -61,6 +61,18 @@ TEST_P(DdsComingAndGoing, AGatewayThatIsKilledIsSilenceAndTheNextOneGoesOn) {
   publish_until_heard(navigation, base, "2 0");
 }
 
+// Without a service manager nobody else would tell the robot.
+TEST_P(DdsComingAndGoing, AGatewayThatBeginsAnewOrEndsStopsTheRobotThatItDrove) {
+  Drive drive("1000s", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
+  publish_until_heard(navigation, base, "1 0");
+  gateway.process().signal(SIGUSR1);
+  base.await("sample 0 0");
+  publish_until_heard(navigation, base, "2 0");
+  EXPECT_EQ(gateway.end(), 0);
+  base.await("sample 0 0");
+}
+
 // ExecStopPost= of its unit. Not even a daemon is needed.
 TEST_P(DdsComingAndGoing, ForAGatewayThatIsKilledTheRobotIsStoppedByAnother) {
   Drive drive("1000s", GetParam(), GetParam());

@@ -18,6 +18,8 @@ namespace {
 
 using testing::HasSubstr;
 
+const std::string kZeros = "size='4' idle='zero'";
+
 const auto* const machine = testing::AddGlobalTestEnvironment(new PrivateMachine);
 
 TEST_F(Iceoryx, SamplesOfAnySizeGoThroughWithTheirHeaders) {
@@ -40,8 +42,8 @@ TEST_F(Iceoryx, SamplesOfAnySizeGoThroughWithTheirHeaders) {
 
 TEST_F(Iceoryx, TwoPublishersAreArbitratedIntoOneSubscriber) {
   const Roudi roudi(directory_);
-  Spoken gate = gateway(directory_, in("low", "/Low:o") + in("high", "/High:o") +
-                                        out("/Base:i", "base", "size='4' idle='zero'"));
+  Spoken gate = gateway(
+      directory_, in("low", "/Low:o") + in("high", "/High:o") + out("/Base:i", "base", kZeros));
   Spoken low = plain_publisher("low");
   Spoken high = plain_publisher("high");
   Spoken subscriber = plain_subscriber("base");
@@ -164,6 +166,27 @@ TEST_F(Iceoryx, AGatewayIsEndedWhetherRouDiRunsOrNot) {
   EXPECT_FALSE(daemon_.source("/Low:o")["open"]);
 }
 
+// Without a service manager nobody else would tell the robot.
+TEST_F(Iceoryx, AGatewayThatBeginsAnewOrEndsStopsTheRobotThatItDrove) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base", kZeros));
+  Spoken publisher = plain_publisher("low");
+  Spoken subscriber = plain_subscriber("base");
+  wait_for_description("/Low:o", "1 publisher matched");
+  publisher.say("drive");
+  ASSERT_TRUE(subscriber.hear("|drive"));
+  const pid_t worker = worker_of("/Low:o");
+  gate.process.signal(SIGUSR1);
+  EXPECT_TRUE(subscriber.hear("|zeros 4"));
+  wait_for_another_worker("/Low:o", worker);
+  wait_for_description("/Low:o", "1 publisher matched");
+  publisher.say("drive");
+  ASSERT_TRUE(subscriber.hear("|drive"));
+  gate.process.signal(SIGTERM);
+  EXPECT_TRUE(subscriber.hear("|zeros 4"));
+  EXPECT_EQ(gate.process.wait(), 0);
+}
+
 Spoken idle_sender(const TemporaryDirectory& directory, const std::string& entries) {
   const std::string mapping =
       directory.write("idle.xml", "<gateway kind='iceoryx'>" + entries + "</gateway>");
@@ -172,7 +195,7 @@ Spoken idle_sender(const TemporaryDirectory& directory, const std::string& entri
 
 TEST_F(Iceoryx, ForAGatewayThatHasDiedTheIdleSampleIsSent) {
   const Roudi roudi(directory_);
-  const std::string entries = in("low", "/Low:o") + out("/Base:i", "base", "size='4' idle='zero'");
+  const std::string entries = in("low", "/Low:o") + out("/Base:i", "base", kZeros);
   Spoken gate = gateway(directory_, entries);
   Spoken publisher = plain_publisher("low");
   Spoken subscriber = plain_subscriber("base");
@@ -187,7 +210,7 @@ TEST_F(Iceoryx, ForAGatewayThatHasDiedTheIdleSampleIsSent) {
 }
 
 TEST_F(Iceoryx, TheIdleSampleIsNotWaitedForWithoutRouDi) {
-  Spoken after = idle_sender(directory_, out("/Base:i", "base", "size='4' idle='zero'"));
+  Spoken after = idle_sender(directory_, out("/Base:i", "base", kZeros));
   EXPECT_EQ(after.process.wait(), 0);
 }
 
