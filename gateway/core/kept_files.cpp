@@ -1,32 +1,45 @@
 #include "gateway/core/kept_files.hpp"
 
+#include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <charconv>
+#include <cstdio>
 #include <string_view>
 #include <system_error>
 
 namespace arbiter::gateway {
 namespace {
 
-[[noreturn]] void fail(const char* what) {
+// Of save()d files.
+constexpr std::size_t kMaxSaved = std::size_t{64} << 20;
+
+[[noreturn]] void fail(const std::string& what) {
   throw std::system_error(errno, std::generic_category(), what);
+}
+
+void write_whole(int file, std::string_view content, const std::string& what) {
+  for (std::string_view rest = content; !rest.empty();) {
+    const ssize_t count = ::write(file, rest.data(), rest.size());
+    if (count <= 0) fail(what);
+    rest.remove_prefix(static_cast<std::size_t>(count));
+  }
 }
 
 std::string whole_of(int descriptor) {
   struct stat is {};
   if (::fstat(descriptor, &is) != 0 || is.st_size < 0) {
-    throw rules::FileError("the supervisor's copy of the mapping cannot be read");
+    throw rules::FileError("the copy of the mapping cannot be read");
   }
   std::string content(static_cast<std::size_t>(is.st_size), '\0');
   std::size_t at = 0;
   while (at < content.size()) {
     const ssize_t count =
         ::pread(descriptor, content.data() + at, content.size() - at, static_cast<off_t>(at));
-    if (count <= 0) throw rules::FileError("the supervisor's copy of the mapping is cut short");
+    if (count <= 0) throw rules::FileError("the copy of the mapping is cut short");
     at += static_cast<std::size_t>(count);
   }
   return content;
@@ -34,7 +47,7 @@ std::string whole_of(int descriptor) {
 
 // Takes a part off that ends with a NUL, or has that many bytes.
 std::string_view take(std::string_view& rest, std::size_t size) {
-  if (size >= rest.size()) throw rules::FileError("the supervisor's copy of the mapping is cut");
+  if (size >= rest.size()) throw rules::FileError("the copy of the mapping is cut");
   const std::string_view part = rest.substr(0, size);
   rest.remove_prefix(size + 1);
   return part;
@@ -42,8 +55,9 @@ std::string_view take(std::string_view& rest, std::size_t size) {
 
 }  // namespace
 
-KeptFiles::KeptFiles(int descriptor) {
-  const std::string content = whole_of(descriptor);
+KeptFiles::KeptFiles(int descriptor) : KeptFiles(std::string_view(whole_of(descriptor))) {}
+
+KeptFiles::KeptFiles(std::string_view content) {
   for (std::string_view rest = content; !rest.empty();) {
     const std::string path(take(rest, rest.find('\0')));
     const std::string_view number = take(rest, rest.find('\0'));
@@ -51,6 +65,12 @@ KeptFiles::KeptFiles(int descriptor) {
     std::from_chars(number.data(), number.data() + number.size(), size);
     by_path_[path] = take(rest, size);
   }
+}
+
+KeptFiles KeptFiles::saved(const std::string& path) {
+  const std::string content = rules::read_bytes(path, kMaxSaved, rules::Accept::kRegularFile);
+  if (content.size() > kMaxSaved) throw rules::FileError(path + " is too large for a copy");
+  return KeptFiles(std::string_view(content));
 }
 
 ReadFile KeptFiles::from_disk(bool only_regular) {
@@ -61,28 +81,37 @@ ReadFile KeptFiles::from_disk(bool only_regular) {
 }
 
 ReadFile KeptFiles::kept() const {
-  return [this](const std::string& path, std::size_t /*limit*/, rules::Accept /*accept*/) {
+  return [this](const std::string& path, std::size_t limit, rules::Accept /*accept*/) {
     const auto found = by_path_.find(path);
-    if (found == by_path_.end()) throw rules::FileError(path + ": the supervisor has no copy");
-    return found->second;
+    if (found == by_path_.end()) throw rules::FileError(path + ": there is no copy");
+    return found->second.substr(0, limit + 1);  // more is too large, however much more
   };
 }
 
-shm::FileDescriptor KeptFiles::in_memory() const {
+std::string KeptFiles::content() const {
   std::string content;
   for (const auto& [path, bytes] : by_path_) {
     for (const std::string& part : {path, std::to_string(bytes.size()), bytes}) {
       content.append(part).push_back('\0');
     }
   }
+  return content;
+}
+
+shm::FileDescriptor KeptFiles::in_memory() const {
   shm::FileDescriptor file(::memfd_create("arbiter-mapping", 0));
   if (!file) fail("no memory for a copy of the mapping");
-  for (std::string_view rest = content; !rest.empty();) {
-    const ssize_t count = ::write(file.get(), rest.data(), rest.size());
-    if (count <= 0) fail("no memory for a copy of the mapping");
-    rest.remove_prefix(static_cast<std::size_t>(count));
-  }
+  write_whole(file.get(), content(), "no memory for a copy of the mapping");
   return file;
+}
+
+void KeptFiles::save(const std::string& path) const {
+  const std::string next = path + ".new";
+  const shm::FileDescriptor file(
+      ::open(next.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0600));
+  if (!file) fail(next);
+  write_whole(file.get(), content(), next);
+  if (::rename(next.c_str(), path.c_str()) != 0) fail(path);
 }
 
 }  // namespace arbiter::gateway

@@ -39,6 +39,7 @@ constexpr shm::Nanoseconds kSendIdle = 1'000'000'000;
 struct Arguments {
   std::vector<std::string> mappings;
   std::string instance;
+  std::string copy;  // file, empty: none is kept
   bool check = false;
   bool send_idle = false;
   bool is_worker = false;  // of a supervised program
@@ -74,6 +75,32 @@ std::optional<std::vector<Mapping>> read(const Arguments& arguments, const Progr
   return mappings;
 }
 
+// What the gateway that has died went by, if it has left that.
+std::optional<std::vector<Mapping>> read_for_idle(const Arguments& arguments,
+                                                  const ProgramKind& kind) {
+  if (!arguments.copy.empty()) {
+    try {
+      const KeptFiles copy = KeptFiles::saved(arguments.copy);
+      if (auto mappings = read(arguments, kind, copy.kept())) return mappings;
+    } catch (const rules::FileError& error) {
+      say(Level::kWarning, error.what());
+    }
+    say(Level::kWarning, "no copy of the mapping is good: the mapping itself is read");
+  }
+  KeptFiles files;
+  return read(arguments, kind, files.from_disk(false));
+}
+
+// For --send-idle. A gateway that cannot leave it is one all the same.
+void leave_copy(const Arguments& arguments, const KeptFiles& files) {
+  if (arguments.copy.empty()) return;
+  try {
+    files.save(arguments.copy);
+  } catch (const std::exception& error) {
+    say(Level::kWarning, std::string("no copy of the mapping is kept: ") + error.what());
+  }
+}
+
 std::function<void()> sign_of_life() {
   if (auto beat = heartbeat()) return std::move(*beat);
   if (sd_watchdog_enabled(0, nullptr) <= 0) return {};
@@ -95,7 +122,11 @@ std::unique_ptr<Setup> read_again(const Arguments& arguments, const ProgramKind&
   try {
     KeptFiles files;
     auto mappings = read(arguments, kind, files.from_disk(true));
-    if (mappings) return setup_of(arguments, kind, std::move(*mappings), make);
+    if (mappings) {
+      auto setup = setup_of(arguments, kind, std::move(*mappings), make);
+      leave_copy(arguments, files);
+      return setup;
+    }
   } catch (const std::exception& error) {
     say(Level::kError, error.what());
   }
@@ -139,12 +170,16 @@ void serve(std::unique_ptr<Setup> setup, const ProgramKind& kind, Reload& reload
   }
 }
 
+// `files`: what the mappings were read from.
 int serve(const Arguments& arguments, const ProgramKind& kind, std::vector<Mapping> mappings,
-          const MakeMiddleware& make, int stop) {
+          const KeptFiles& files, const MakeMiddleware& make, int stop) {
   auto setup = setup_of(arguments, kind, std::move(mappings), make);
   if (arguments.send_idle) return send_idle_of(*setup, kind);
   shm::FileDescriptor asked;
-  if (!arguments.is_worker) asked = catch_reload_signal();
+  if (!arguments.is_worker) {
+    asked = catch_reload_signal();
+    leave_copy(arguments, files);
+  }
   Reload reload(asked.get(), stop, [&] { return read_again(arguments, kind, make); });
   if (!arguments.is_worker) sd_notify(0, "READY=1");
   try {
@@ -165,6 +200,7 @@ int serve(const Arguments& arguments, const ProgramKind& kind, std::vector<Mappi
 int supervise_workers(const Arguments& arguments, const ProgramKind& kind, const KeptFiles& files,
                       std::vector<std::string> worker, int stop) {
   const shm::FileDescriptor copy = files.in_memory();
+  leave_copy(arguments, files);
   worker.insert(worker.begin() + 1,  // behind a "--" they would be mappings
                 {"--worker", "--files=" + std::to_string(copy.get())});
   const shm::FileDescriptor asked = catch_reload_signal();
@@ -175,6 +211,7 @@ int supervise_workers(const Arguments& arguments, const ProgramKind& kind, const
       if (read(arguments, kind, again.from_disk(true))) {
         const shm::FileDescriptor another = again.in_memory();
         if (::dup2(another.get(), copy.get()) >= 0) {
+          leave_copy(arguments, again);
           say(Level::kInfo, "the mapping was read again: the gateway begins anew with it");
           return true;
         }
@@ -207,6 +244,10 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
   app.add_flag("--send-idle", arguments.send_idle,
                "Only send, for a second, what is sent while nobody commands (idle=): for a gateway "
                "that has died. Needs no daemon");
+  app.add_option("--copy", arguments.copy,
+                 "File for a copy of the mapping that it has taken up, which --send-idle then goes "
+                 "by: MAPPING may have become bad")
+      ->type_name("FILE");
   app.add_flag("--worker", arguments.is_worker)->group("");
   app.add_option("--files", arguments.files)->group("");
   app.footer(kind.more + kExitCodes);
@@ -224,13 +265,15 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
   KeptFiles files;
   if (arguments.files >= 0) files = KeptFiles(arguments.files);
   auto mappings =
-      read(arguments, kind, arguments.files >= 0 ? files.kept() : files.from_disk(false));
+      arguments.send_idle
+          ? read_for_idle(arguments, kind)
+          : read(arguments, kind, arguments.files >= 0 ? files.kept() : files.from_disk(false));
   if (!mappings) return 2;
   if (arguments.check) return 0;
   const shm::FileDescriptor stop = catch_stop_signals();
   if (arguments.is_worker) end_with_supervisor(kind.clean_up);
   if (!kind.is_supervised || arguments.is_worker || arguments.send_idle) {
-    return serve(arguments, kind, std::move(*mappings), make, stop.get());
+    return serve(arguments, kind, std::move(*mappings), files, make, stop.get());
   }
   return supervise_workers(arguments, kind, files, {argv, argv + argc}, stop.get());
 }

@@ -84,6 +84,34 @@ TEST_P(DdsComingAndGoing, ForAGatewayThatIsKilledTheRobotIsStoppedByAnother) {
   EXPECT_NE(gateway.log().find("DDS topic rt/cmd_vel, 1 subscriber matched"), std::string::npos);
 }
 
+// Nobody can be sure that a mapping which is being edited is good at that moment.
+TEST_P(DdsComingAndGoing, AMistakeInTheMappingKeepsNobodyFromStoppingTheRobot) {
+  Drive drive("1000s", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
+  publish_until_heard(navigation, base, "1 0");
+  gateway.write_mapping("<in topic='/cmd_vel_nav'/>");
+  gateway.process().signal(SIGUSR1);
+  gateway.see("the one before stays");
+  gateway.process().kill();
+  EXPECT_EQ(gateway.send_idle(), 0);
+  base.await("sample 0 0");
+}
+
+// Nor is a copy that is none believed.
+TEST_P(DdsComingAndGoing, ABadCopyOfTheMappingIsPassedOver) {
+  Drive drive("1000s", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
+  publish_until_heard(navigation, base, "1 0");
+  gateway.process().kill();
+  const std::string of_another_file = std::string("a") + '\0' + "10" + '\0' + "<gateway/>" + '\0';
+  for (const std::string& copy : {std::string("mapping"), of_another_file}) {
+    std::ofstream(gateway.copy(), std::ios::trunc) << copy;
+    EXPECT_EQ(gateway.send_idle(), 0);
+    base.await("sample 0 0");
+    gateway.see("no copy of the mapping is good");
+  }
+}
+
 // What waited for it meanwhile is older than T: it must not move the robot.
 TEST_P(DdsComingAndGoing, WhatWaitedWhileTheGatewayWasStoppedIsNotObeyed) {
   Drive drive("200ms", GetParam(), GetParam());

@@ -115,9 +115,11 @@ class DdsGateway {
                             << interface << "\" " << more << ">\n"
                             << entries << "</gateway>\n";
   }
-  void start() { process_ = program({mapping_}); }
+  void start() { process_ = program({"--copy", copy(), mapping_}); }
   // For one that has died: its exit code.
-  int send_idle() { return program({"--send-idle", mapping_}).wait(); }
+  int send_idle() { return program({"--send-idle", "--copy", copy(), mapping_}).wait(); }
+  // Of the mapping that it has taken up.
+  [[nodiscard]] std::string copy() const { return mapping_ + ".copy"; }
   // Returns once it has said so.
   void see(const std::string& text) const {
     pollfd ended{process_.descriptor(), POLLIN, 0};

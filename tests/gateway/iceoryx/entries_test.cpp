@@ -98,6 +98,25 @@ TEST_F(Iceoryx, AnIdleSampleWhoseFileHasGoneIsSentAllTheSame) {
   EXPECT_TRUE(subscriber.hear("|stop"));
 }
 
+// Nobody can be sure that a mapping which is being edited is good at that moment.
+TEST_F(Iceoryx, AMistakeInTheMappingKeepsNobodyFromStoppingTheRobot) {
+  const Roudi roudi(directory_);
+  const std::string mapping = write_mapping(
+      directory_, in("low", "/Low:o") + out("/Base:i", "base", "size='4' idle='zero'"));
+  const std::string program = ARBITER_PROGRAMS "/arbiter-gateway-iceoryx";
+  const std::string copy = directory_.file("copy");
+  Spoken gate({program, "--copy", copy, mapping});
+  wait_for_description("/Low:o", "no publisher matched");
+  gate.process.signal(SIGKILL);
+  gate.process.wait();
+  write_mapping(directory_, "<in service='Test'/>");
+  Spoken subscriber = plain_subscriber("base");
+  ASSERT_TRUE(subscriber.hear("ready"));
+  Spoken after({program, "--send-idle", "--copy", copy, mapping});
+  EXPECT_TRUE(subscriber.hear("|zeros 4"));
+  EXPECT_EQ(after.process.wait(), 0);
+}
+
 // As many files as are there now, and that many more.
 void leave_room_for(unsigned files) {
   struct statvfs room {};
