@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <iostream>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "cli/progress.hpp"
 #include "cli/verbs.hpp"
 #include "gateway/mapping/check_mapping.hpp"
+#include "gateway/mapping/check_owners.hpp"
 #include "gateway/mapping/read_mapping.hpp"
 #include "rules/ask/across_hosts.hpp"
 #include "rules/ask/findings.hpp"
@@ -66,6 +68,7 @@ const std::vector<std::string_view> silenceable{"behaviour-on-two-hosts",
                                                 "no-children",
                                                 "no-config",
                                                 "no-idle",
+                                                "no-owner",
                                                 "no-rule-at-port",
                                                 "nobody-wins",
                                                 "not-arbitrated",
@@ -78,6 +81,7 @@ const std::vector<std::string_view> silenceable{"behaviour-on-two-hosts",
                                                 "statement-on-two-hosts",
                                                 "two-configurations",
                                                 "two-outs",
+                                                "two-owners",
                                                 "unmentioned-port",
                                                 "unreachable-children",
                                                 "wrong-end"};
@@ -128,15 +132,40 @@ Statements judge_statements(const CheckOptions& options, const rules::CompiledMo
   return result;
 }
 
+std::set<std::string> published_by(const std::vector<gateway::Mapping>& mappings) {
+  std::set<std::string> sources;
+  for (const gateway::Mapping& mapping : mappings) {
+    for (const gateway::Gateway& gateway : mapping.gateways) {
+      for (const gateway::Entry& entry : gateway.entries) {
+        if (!entry.is_in()) continue;
+        for (const gateway::Port* port : entry.ports()) sources.insert(port->name);
+      }
+    }
+  }
+  return sources;
+}
+
 // As statements: they are read in any case, and judged by a model that can be run.
 void check_gateways(const CheckOptions& options, const rules::RuleSet* model,
                     rules::Diagnostics& diagnostics) {
+  if (options.gateways.empty()) return;
   rules::Diagnostics of_mappings;
   std::vector<gateway::Mapping> mappings;
   for (const auto& path : options.gateways) {
     mappings.push_back(gateway::read_mapping_file(path, of_mappings));
   }
-  if (!of_mappings.has_errors()) gateway::check_mappings(mappings, model, of_mappings);
+  if (!of_mappings.has_errors()) {
+    diagnostics.silence_about("never-published", published_by(mappings));
+    gateway::check_mappings(mappings, model, of_mappings);
+    if (model != nullptr && model->texts->application) {
+      const rules::FileText& text = *model->texts->application;
+      rules::Diagnostics found_before;
+      gateway::check_owners(
+          mappings, *model,
+          rules::read_application(rules::TextFile(text.path, text.content), found_before),
+          of_mappings);
+    }
+  }
   diagnostics.add(std::move(of_mappings));
 }
 

@@ -65,6 +65,15 @@ void Diagnostics::silence(const std::vector<std::string>& codes) {
   });
 }
 
+void Diagnostics::silence_about(const std::string& code, const std::set<std::string>& sources) {
+  std::erase_if(items_, [&](const Diagnostic& item) {
+    const bool is_silenced = item.severity != Severity::kError && item.code == code &&
+                             sources.contains(item.about.source);
+    if (is_silenced) --tallies_[{item.severity, code}].found;
+    return is_silenced;
+  });
+}
+
 void Diagnostics::drop_notes() {
   std::erase_if(items_, [](const Diagnostic& item) { return item.severity == Severity::kNote; });
   std::erase_if(tallies_, [](const auto& each) { return each.first.first == Severity::kNote; });

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -84,6 +85,8 @@ class Diagnostics {
   void add(Diagnostics other);
   // Without those of these codes; errors stay.
   void silence(const std::vector<std::string>& codes);
+  // Without warnings and notes of this code that are about one of these sources.
+  void silence_about(const std::string& code, const std::set<std::string>& sources);
   // Notes are true of many good models. Who asks what there is to say of a model gets them, and
   // nobody who wants it drawn, replayed or compiled.
   void drop_notes();

@@ -210,6 +210,27 @@ TEST(Check, ACodeThatThereIsNotCannotBeSilenced) {
               HasSubstr("did you mean \"starved\"?"));
 }
 
+TEST(Check, WhatAMappingFeedsIsPublished) {
+  TemporaryDirectory directory;
+  const auto model =
+      directory.write("m.xml",
+                      "<behaviors><behavior name='Drive'><config at='/Base:i'>/Nav:o</config>"
+                      "<condition>not /EStop/pressed:o</condition></behavior></behaviors>");
+  const auto application = directory.write(
+      "a.xml",
+      "<application><module><name>/Nav</name></module><module><name>/Base</name></module>"
+      "<connection><from>/Nav:o</from><to>/Base:i</to></connection></application>");
+  const auto mapping = directory.write(
+      "g.xml",
+      "<gateway kind='dds'><in topic='/stop' type='std_msgs/msg/Bool' true='/EStop/pressed:o' "
+      "false='/EStop/released:o'/></gateway>");
+  const std::vector<std::string> alone{"check", model, "--application", application};
+  EXPECT_THAT(arbiter(alone).err, HasSubstr("never-published"));
+  auto beside = alone;
+  beside.insert(beside.end(), {"--gateway", mapping});
+  EXPECT_THAT(arbiter(beside).err, testing::Not(HasSubstr("never-published")));
+}
+
 // Whatever reading and checking may find, by the text of the program.
 TEST(Check, EachCodeOfAWarningOrANoteIsOnThePageAndCanBeSilenced) {
   TemporaryDirectory directory;

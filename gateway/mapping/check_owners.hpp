@@ -1,0 +1,20 @@
+// Who has the ports of a model, beside an application that says which modules there are: one module
+// or one entry of a mapping has each.
+#pragma once
+
+#include <vector>
+
+#include "gateway/mapping/mapping.hpp"
+#include "rules/model/model.hpp"
+#include "rules/model/rule_set.hpp"
+#include "rules/text/diagnostic.hpp"
+
+namespace arbiter::gateway {
+
+// Of mappings that were read without an error. An application without modules says nothing of it,
+// nor does one that could not be read as a whole. A module that is called as a gateway's program is
+// that gateway.
+void check_owners(const std::vector<Mapping>& mappings, const rules::RuleSet& model,
+                  const rules::Application& application, rules::Diagnostics& diagnostics);
+
+}  // namespace arbiter::gateway
