@@ -8,6 +8,9 @@
 // Units: nanoseconds of CLOCK_MONOTONIC, given by the caller, so that tests say what time it is.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -21,17 +24,30 @@
 
 namespace arbiter::gateway {
 
-// The longest that a sample of a source may have waited: its T, or less (MaxAges). One writer, the
+// The longest that a sample of an entry may have waited: T of its source, or less (MaxAges). Of an
+// entry with two sources, the shorter one; a sample of the other may be older. One writer, the
 // gateway's loop; any thread reads.
 class MaxAge {
  public:
-  void set(shm::Nanoseconds age, bool is_forever = false) noexcept {
-    age_.store(age, std::memory_order_relaxed);
+  using OfPorts = std::array<shm::Nanoseconds, 2>;  // in the order of Entry::ports()
+
+  void set(shm::Nanoseconds age, bool is_forever = false) noexcept { set({age, age}, is_forever); }
+  void set(const OfPorts& ages, bool is_forever) noexcept {
+    const shm::Nanoseconds shortest = std::min(ages[0], ages[1]);
+    age_.store(shortest, std::memory_order_relaxed);
+    for (std::size_t i = 0; i < ages.size(); ++i) {
+      more_[i].store(ages[i] - shortest, std::memory_order_relaxed);
+    }
     is_forever_.store(is_forever, std::memory_order_relaxed);
   }
   // Relaxed is enough: a sample may be judged by the T that held when it came or by the next one.
   [[nodiscard]] shm::Nanoseconds get() const noexcept {
     return age_.load(std::memory_order_relaxed);
+  }
+  // How much older than get() a sample may be that is for that port. Where another model comes into
+  // force between the two loads, together they are no more than T of both.
+  [[nodiscard]] shm::Nanoseconds more_of(std::size_t port) const noexcept {
+    return more_[port].load(std::memory_order_relaxed);
   }
   // Whether the model in force gives it a T of forever, and the entry no max_age: what was said
   // before still holds.
@@ -41,6 +57,7 @@ class MaxAge {
 
  private:
   shm::Atomic<shm::Nanoseconds> age_{shm::kDefaultTimeout};
+  std::array<shm::Atomic<shm::Nanoseconds>, 2> more_{};
   shm::Atomic<bool> is_forever_{false};
 };
 

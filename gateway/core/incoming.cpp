@@ -23,6 +23,11 @@ std::optional<Side> compare(const Choice& choice, const std::byte* bytes) noexce
   return static_cast<long double>(number) > choice.threshold ? Side::kYes : Side::kNo;
 }
 
+Time later(Time time, shm::Nanoseconds by) noexcept {
+  const std::chrono::nanoseconds more(by);
+  return time > Time::max() - more ? Time::max() : time + more;
+}
+
 OutputPort<void> open(Node& node, const std::string& name, const Entry& entry) {
   OutputPortOptions options;
   options.max_size = entry.max_size;
@@ -107,7 +112,8 @@ Incoming::Fate Incoming::deliver(const ForeignSample& sample, Time deadline) noe
   }
   OutputPort<void>& chosen = *side == Side::kYes ? *yes_ : *no_;
   OutputPort<void>& other = *side == Side::kYes ? *no_ : *yes_;
-  const Fate fate = pass_to(chosen, sample, deadline);
+  const Fate fate =
+      pass_to(chosen, sample, later(deadline, max_age_.more_of(*side == Side::kYes ? 0 : 1)));
   // Whatever has become of it: the topic's last word is not the other side. A late one makes
   // nothing active, but deactivations are never late.
   other.deactivate();

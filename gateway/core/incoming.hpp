@@ -56,9 +56,9 @@ class Incoming {
   // does not open the other in vain.
   Incoming(Node& node, const Entry& entry, Account& account, std::size_t* first = nullptr);
 
-  // One copy into Arbiter's memory, and an arrival, unless `deadline` has passed by then. With a
-  // choice: an arrival at the source that the field chooses, and then the end of the other's
-  // activity; where nothing can be chosen, of both.
+  // One copy into Arbiter's memory, and an arrival, unless `deadline` has passed by then: that of
+  // max_age().get(). With a choice: an arrival at the source that the field chooses, whose own age
+  // counts, and then the end of the other's activity; where nothing can be chosen, of both.
   // publish() throws for another port's loan, and this one is its own.
   Fate deliver(const ForeignSample& sample,  // NOLINT(bugprone-exception-escape)
                Time deadline) noexcept;

@@ -55,15 +55,15 @@ void MaxAges::update() {
   // Before they are read: what comes in between is found the next time.
   if (instance_ != nullptr) epoch_ = instance_->memory()->tables().epoch();
   for (const Watched& each : watched_) {
-    // Both sources of a choice come from one topic: the shorter T holds for its samples.
-    shm::Nanoseconds age = shm::kForever;
+    const auto ports = each.entry->ports();
+    MaxAge::OfPorts ages{};
     bool is_forever = !each.entry->max_age;
-    for (const Port* port : each.entry->ports()) {
-      const Timeouts timeouts = timeouts_of(port->name);
-      age = std::min(age, max_age_of(timeouts.own, timeouts.of_model, each.entry->max_age));
+    for (std::size_t i = 0; i < ages.size(); ++i) {
+      const Timeouts timeouts = timeouts_of(ports[std::min(i, ports.size() - 1)]->name);
+      ages[i] = max_age_of(timeouts.own, timeouts.of_model, each.entry->max_age);
       is_forever = is_forever && timeouts.own == shm::kForever;
     }
-    each.age->set(age, is_forever);
+    each.age->set(ages, is_forever);
   }
 }
 

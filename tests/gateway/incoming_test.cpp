@@ -1,11 +1,13 @@
 // Samples from outside become arrivals: at one source, or at the one of two that a field chooses.
 #include <gmock/gmock.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 
 #include <arbiter/arbiter.hpp>
 
+#include "gateway/core/max_ages.hpp"
 #include "tests/gateway/foreign.hpp"
 #include "tests/gateway/mapping_text.hpp"
 #include "tests/realtime/allocations.hpp"
@@ -157,6 +159,30 @@ TEST_F(ArrivingBoolean, ALateSampleMakesNothingActiveAndEndsTheOther) {
   say(false);
   EXPECT_EQ(say(true, kPassed), Fate::kLate);
   EXPECT_FALSE(is_active("/pressed:o"));
+  EXPECT_FALSE(is_active("/released:o"));
+}
+
+// A lock that is pressed once, and holds until it is released: the T of the other source, which
+// nobody reads, must not make its one press late.
+TEST_F(ArrivingBoolean, ALatePressCountsAsLongAsItsOwnSourceAllows) {
+  daemon_.load(
+      "<behaviors timeout='500ms'><source port='/pressed:o' timeout='forever'/>"
+      "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config>"
+      "<condition>not /pressed:o</condition></behavior></behaviors>");
+  Read lock = read_dds(
+      "<in topic='/lock' type='std_msgs/msg/Bool' true='/pressed:o' false='/released:o' "
+      "max_age='3600s'/>");
+  MaxAges ages("");
+  ages.add(lock.entry(), incoming_.max_age());
+  EXPECT_EQ(incoming_.max_age().get(), 500'000'000);
+  const Time a_minute_ago =
+      std::chrono::time_point_cast<Time::duration>(std::chrono::steady_clock::now()) -
+      std::chrono::minutes(1);
+  const Time deadline = a_minute_ago + std::chrono::milliseconds(500);
+  EXPECT_EQ(say(true, deadline), Fate::kPassed);
+  EXPECT_TRUE(is_active("/pressed:o"));
+  EXPECT_EQ(say(false, deadline), Fate::kLate);
+  EXPECT_FALSE(is_active("/pressed:o")) << "a deactivation is never late";
   EXPECT_FALSE(is_active("/released:o"));
 }
 
