@@ -195,7 +195,8 @@ void add_names(CLI::App& verb, ImportVerbOptions& options) {
                   "do), or auto: zero if the type is geometry_msgs/msg/Twist")
       ->type_name("WHAT")
       ->check(CLI::IsMember({"auto", "zero", "none"}));
-  verb.add_option("--domain", options.import.domain, "DDS domain of the topics (default 0)")
+  verb.add_option("--domain", options.import.domain,
+                  "DDS domain of the topics; without it, ROS_DOMAIN_ID says, as for the nodes")
       ->type_name("NUMBER")
       ->check(number_between(0, kMaxDomain));
 }

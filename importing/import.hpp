@@ -25,7 +25,8 @@ struct ImportOptions {
   std::string output_topic;  // empty: the multiplexer's own
   std::string type;          // empty: Twist, or what the file says
   IdleChoice idle = IdleChoice::kByType;
-  std::uint32_t domain = 0;
+  std::optional<std::uint32_t>
+      domain;  // none: that of the environment, as the multiplexers have it
 };
 
 // Both report all problems in one go, and return nothing where one is an error. Warnings name what

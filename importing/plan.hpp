@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,9 +54,10 @@ struct Plan {
   std::vector<Command> commands;     // the most important first
   std::vector<LeftOut> left_out;
   std::string output_port, output_topic;
-  std::string type;  // of all topics but locks
-  std::string idle;  // "zero", or empty: nothing is sent
-  std::uint32_t domain = 0;
+  std::string type;                     // of all topics but locks
+  std::string idle;                     // "zero", or empty: nothing is sent
+  std::string qos;                      // of the topics that come in; empty: ROS 2's default
+  std::optional<std::uint32_t> domain;  // none: that of the environment
 };
 
 }  // namespace arbiter::importing

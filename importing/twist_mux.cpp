@@ -71,7 +71,10 @@ class TwistMuxImport {
     const rules::Location where = topics_.empty() ? rules::Location{} : topics_.front().topic.where;
     assembly_.set_output(plan_, "cmd_vel_out", where);
     if (diagnostics_.has_errors()) return {};
+    note_unsaid_stamp();
     assembly_.set_types(plan_, stamped_, where);
+    // SystemDefaultsQoS(); what crosses from ROS 1 is reliable.
+    if (parameters_.is_ros2()) plan_.qos = "system_default";
     plan_.timeout_remark =
         "A message counts until it is older than its timeout, not as old: hence the nanosecond.";
     return std::move(plan_);
@@ -90,6 +93,7 @@ class TwistMuxImport {
         const std::string& key = entry.key.text;
         if (key == "topics" || key == "locks") continue;
         if (key == "use_stamped") {
+          says_whether_stamped_ = true;
           if (read_boolean(entry, diagnostics_).value_or(false)) stamped_ = entry.key.where;
         } else if (key == "use_sim_time") {
           if (!read_boolean(entry, diagnostics_).value_or(false)) continue;
@@ -104,6 +108,14 @@ class TwistMuxImport {
         }
       }
     }
+  }
+
+  void note_unsaid_stamp() {
+    if (says_whether_stamped_ || !parameters_.is_ros2()) return;
+    diagnostics_.note("no-use-stamped", parameters_.sets().front().parameters->where,
+                      "twist_mux since 4.4 (Jazzy) does not start without use_stamped; the import "
+                      "takes the commands for geometry_msgs/msg/Twist, as older ones do; write "
+                      "use_stamped: false, or true for TwistStamped");
   }
 
   void clamp(MuxEntry& entry) {
@@ -273,6 +285,7 @@ class TwistMuxImport {
   std::vector<Chosen> chosen_;              // the most important first
   std::vector<std::size_t> lock_indices_;   // in the plan, of each of locks_
   std::optional<rules::Location> stamped_;  // where the file says so
+  bool says_whether_stamped_ = false;
 };
 
 }  // namespace

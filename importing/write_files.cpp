@@ -12,6 +12,8 @@ namespace arbiter::importing {
 namespace {
 
 constexpr std::size_t kWidth = 100;
+// A day: a lock that was pressed holds until it is released, however long a gateway was held up.
+constexpr const char* kOldestPress = "86400s";
 constexpr const char* kDeclaration = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
 
 std::string escape(std::string_view text) {
@@ -174,19 +176,26 @@ std::string write_mapping(const Plan& plan, const std::string& model_name) {
   text += "<!--\n";
   text += fill(in_comment(heading("The topics of the model " + model_name, plan)), "  ");
   text += "\n" + fill(in_comment(plan.mapping_remark), "  ") + "-->\n";
-  text += "<gateway" + attribute("kind", "dds") + attribute("domain", std::to_string(plan.domain)) +
-          ">\n\n";
+  text += "<gateway" + attribute("kind", "dds") +
+          (plan.domain ? attribute("domain", std::to_string(*plan.domain)) : "") + ">\n\n";
+  const std::string qos = plan.qos.empty() ? "" : attribute("qos", plan.qos);
   for (const Command& command : plan.commands) {
     text += comment(command.name + ": " + line_of(command.where), "  ");
     text += "  <in" + attribute("topic", command.topic) + attribute("type", plan.type) +
-            attribute("port", command.port) + "/>\n";
+            attribute("port", command.port) + qos + "/>\n";
   }
   if (!plan.locks.empty()) text += '\n';
   for (const Lock& lock : plan.locks) {
     text += comment("lock " + lock.name + ": " + line_of(lock.where), "  ");
+    if (!lock.has_heartbeat) {
+      text += comment(
+          "It is said once, and counts however late it comes: hence max_age. What is said while no "
+          "gateway runs, or while it is stopped, may be lost.",
+          "  ");
+    }
     text += "  <in" + attribute("topic", lock.topic) + attribute("type", "std_msgs/msg/Bool") +
-            "\n     " + attribute("true", lock.pressed) + attribute("false", lock.released) +
-            "/>\n";
+            "\n     " + attribute("true", lock.pressed) + attribute("false", lock.released) + qos +
+            (lock.has_heartbeat ? "" : attribute("max_age", kOldestPress)) + "/>\n";
   }
   text += '\n';
   text += "  <out" + attribute("port", plan.output_port) + attribute("topic", plan.output_topic) +

@@ -77,7 +77,7 @@ TEST(TwistMux, AModelIsWrittenForPeople) {
 
   Correct the topics if the launch file remaps them. Those of ROS 1 come and go through ros1_bridge.
 -->
-<gateway kind="dds" domain="0">
+<gateway kind="dds">
 
   <!-- joy: a.yaml:3 -->
   <in topic="/joy_vel" type="geometry_msgs/msg/Twist" port="/joy/cmd_vel:o"/>
@@ -88,8 +88,10 @@ TEST(TwistMux, AModelIsWrittenForPeople) {
   <in topic="/e_stop" type="std_msgs/msg/Bool"
       true="/e_stop/pressed:o" false="/e_stop/released:o"/>
   <!-- lock pause: a.yaml:6 -->
+  <!-- It is said once, and counts however late it comes: hence max_age. What is said while no
+       gateway runs, or while it is stopped, may be lost. -->
   <in topic="/pause" type="std_msgs/msg/Bool"
-      true="/pause/pressed:o" false="/pause/released:o"/>
+      true="/pause/pressed:o" false="/pause/released:o" max_age="86400s"/>
 
   <out port="/base/cmd_vel:i" topic="/cmd_vel_out" type="geometry_msgs/msg/Twist" idle="zero"/>
 
@@ -143,7 +145,8 @@ TEST(TwistMux, EqualsAreInTheOrderOfNamesInRos2) {
       "      tablet: {topic: tab_vel, timeout: 0.5, priority: 100}\n"
       "      joystick: {topic: joy_vel, timeout: 0.5, priority: 100}\n");
   EXPECT_THAT(imported.topics(), ElementsAre("/joy_vel", "/tab_vel"));
-  EXPECT_THAT(imported.findings(), ElementsAre("4:56 warning equal-priorities"));
+  EXPECT_THAT(imported.findings(),
+              ElementsAre("4:56 warning equal-priorities", "3:5 note no-use-stamped"));
   EXPECT_THAT(imported.message("equal-priorities"), HasSubstr("first one by name, \"joystick\""));
 }
 
@@ -211,6 +214,20 @@ TEST(TwistMux, TheOutputIsWhatTheUserSays) {
   options.idle = importing::IdleChoice::kNothing;
   EXPECT_THAT(importing::write_mapping(*import_mux(topics({kNavigation}), options).plan, "m.xml"),
               Not(HasSubstr("idle=")));
+}
+
+// SystemDefaultsQoS(): with Fast DDS it hears publishers of both kinds.
+TEST(TwistMux, WhoeverItHearsTheGatewayHears) {
+  const std::string ros2 =
+      "m: {ros__parameters: {use_stamped: false, topics: {a: {topic: a, timeout: 0.5, priority: "
+      "5}}, locks: {l: {topic: l, timeout: 0.5, priority: 9}}}}\n";
+  const auto imported = import_mux(ros2);
+  EXPECT_THAT(imported.findings(), IsEmpty());
+  const std::string mapping = importing::write_mapping(*imported.plan, "m.xml");
+  EXPECT_THAT(mapping, HasSubstr("port=\"/a/cmd_vel:o\" qos=\"system_default\"/>"));
+  EXPECT_THAT(mapping, HasSubstr("false=\"/l/released:o\" qos=\"system_default\"/>"));
+  EXPECT_THAT(importing::write_mapping(*import_mux(topics({kNavigation})).plan, "m.xml"),
+              Not(HasSubstr("qos=")));
 }
 
 TEST(TwistMux, StampedTwistsAreTakenFromTheFile) {
