@@ -1,6 +1,8 @@
 #include "gateway/core/account.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 
 #include "shm/utf8.hpp"
@@ -10,6 +12,17 @@ namespace {
 
 // Of a reason: it comes from a middleware, or from far away.
 constexpr std::size_t kMaxReason = 200;
+
+constexpr std::int64_t kOneSecond = 1'000'000'000;
+constexpr std::int64_t kRatePeriod = 2 * kOneSecond;
+
+// Since the last sample; the longest first.
+constexpr std::array<std::pair<std::int64_t, const char*>, 5> kAges{
+    {{24 * 3600 * kOneSecond, "a day"},
+     {3600 * kOneSecond, "an hour"},
+     {600 * kOneSecond, "10 min"},
+     {60 * kOneSecond, "a minute"},
+     {10 * kOneSecond, "10 s"}}};
 
 std::string fitting(std::string_view text, std::size_t most) {
   std::string result = shm::printable(text);
@@ -53,6 +66,38 @@ std::string Account::state_of_topic() const {
   return text;
 }
 
+void Account::look(std::int64_t now) noexcept {
+  const std::lock_guard lock(mutex_);
+  const std::uint64_t count = passed.value();
+  if (count != passed_before_) passed_at_ = now;
+  passed_before_ = count;
+  looked_at_ = now;
+  if (rate_since_ != 0 && now - rate_since_ < kRatePeriod) return;
+  const double rate = rate_since_ == 0 ? 0
+                                       : static_cast<double>(count - passed_since_) * 1e9 /
+                                             static_cast<double>(now - rate_since_);
+  // A period more or less of a steady publisher, or a little jitter, is no news.
+  if (rate == 0 || std::abs(rate - rate_) > std::max(0.2 * rate_, 1e9 / kRatePeriod)) rate_ = rate;
+  rate_since_ = now;
+  passed_since_ = count;
+}
+
+std::string Account::traffic() const {
+  if (passed.value() == 0) return "";
+  const std::size_t size = last_size_.load(std::memory_order_relaxed);
+  const std::string bytes = std::to_string(size) + (size == 1 ? " byte" : " bytes");
+  if (rate_ >= 1) {
+    const auto whole = static_cast<std::uint64_t>(std::llround(rate_));
+    return ", " + std::to_string(whole) + (whole == 1 ? " sample" : " samples") +
+           " a second, the last one has " + bytes;
+  }
+  std::string text = ", the last sample has " + bytes;
+  for (const auto& [age, in_words] : kAges) {
+    if (looked_at_ - passed_at_ >= age) return text + " and is over " + in_words + " old";
+  }
+  return text;
+}
+
 std::string Account::state() const {
   const std::lock_guard lock(mutex_);
   std::string text = state_of_topic();
@@ -62,10 +107,12 @@ std::string Account::state() const {
 
 std::string Account::text() const {
   const std::lock_guard lock(mutex_);
-  std::string text = state_of_topic();
-  const std::size_t size = last_size_.load(std::memory_order_relaxed);
-  if (passed.value() != 0) {
-    text += ", the last sample has " + std::to_string(size) + (size == 1 ? " byte" : " bytes");
+  std::string text = state_of_topic() + traffic();
+  // Ten more in a second would be ten texts.
+  if (const std::uint64_t count = idle.value(); count != 0) {
+    std::uint64_t step = 1;
+    while (count / step >= 10) step *= 10;
+    text += ", at least " + std::to_string(step) + (step == 1 ? " idle sample" : " idle samples");
   }
   std::string counts;
   const auto add = [&](const Count& count, const char* what) {

@@ -46,6 +46,10 @@ class Account {
   Count refused;     // by the middleware, when it was sent
   Count idle;        // idle samples sent
 
+  // Twice a second, with CLOCK_MONOTONIC: how many samples pass in a second, and since when none
+  // has, in steps, so that text() changes seldom. The gateway's loop.
+  void look(std::int64_t now) noexcept;
+
   // Of the last sample that passed, in bytes. The thread that delivers or sends.
   void set_last_size(std::size_t size) noexcept {
     last_size_.store(size, std::memory_order_relaxed);
@@ -60,15 +64,17 @@ class Account {
   // entry asks for reliable (reliability=\"best_effort\")". Kept, with the counts, until the next.
   void set_last_reason(std::string_view text);
 
-  // "DDS topic rt/cmd_vel_nav, no publisher matched; 3 late, 1 too large (70000 bytes)". Control
-  // characters are escaped; at most kMaxDescription bytes.
+  // "DDS topic rt/cmd_vel_nav, 1 publisher matched, 20 samples a second, the last one has 52 bytes;
+  // 3 late". Control characters are escaped; at most kMaxDescription bytes.
   [[nodiscard]] std::string text() const;
   // The same without counts: what is worth a line in the log when it changes.
   [[nodiscard]] std::string state() const;
   [[nodiscard]] const std::string& outside() const noexcept { return outside_; }
 
  private:
-  [[nodiscard]] std::string state_of_topic() const;  // under mutex_
+  // Under mutex_.
+  [[nodiscard]] std::string state_of_topic() const;
+  [[nodiscard]] std::string traffic() const;
 
   std::atomic<std::size_t> last_size_{0};  // here, beside the counts: each sample writes both
   const std::string outside_;
@@ -78,6 +84,12 @@ class Account {
   std::string last_reason_;
   std::int64_t peers_ = -1;  // not known
   bool at_least_ = false;
+  // As look() has found.
+  std::int64_t looked_at_ = 0;
+  std::int64_t passed_at_ = 0;   // the last look at which another sample had passed
+  std::int64_t rate_since_ = 0;  // the begin of what rate_ is counted in
+  std::uint64_t passed_before_ = 0, passed_since_ = 0;
+  double rate_ = 0;  // of samples in a second; 0: not known
 };
 
 }  // namespace arbiter::gateway

@@ -297,6 +297,7 @@ void Bridge::look_after_all() {
   const shm::Nanoseconds now = shm::monotonic_now();
   for (const auto& part : parts_) {
     if (!part->is_open()) continue;
+    part->account.look(now);
     std::string text = part->account.text();
     if (text != part->described) {
       if (part->incoming) part->incoming->describe(text);

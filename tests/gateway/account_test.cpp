@@ -3,6 +3,10 @@
 
 #include <gmock/gmock.h>
 
+#include <cstdint>
+#include <set>
+#include <string>
+
 namespace arbiter::gateway {
 namespace {
 
@@ -40,6 +44,45 @@ TEST(Account, SaysHowLargeTheLastSampleWas) {
   EXPECT_EQ(account.text(),
             "DDS topic rt/image, 1 publisher matched, the last sample has 921632 bytes");
   EXPECT_EQ(account.state(), "DDS topic rt/image, 1 publisher matched");
+}
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+// Half a second later, and as many samples.
+void pass(Account& account, std::int64_t& now, int samples) {
+  for (int i = 0; i < samples; ++i) account.passed.add();
+  account.look(now += kSecond / 2);
+}
+
+TEST(Account, SaysHowManySamplesPassInASecondAndSinceWhenNone) {
+  Account account("DDS topic rt/cmd_vel", "publisher");
+  account.set_last_size(52);
+  std::int64_t now = 100 * kSecond;
+  for (int i = 0; i < 9; ++i) pass(account, now, 10);
+  EXPECT_EQ(account.text(), "DDS topic rt/cmd_vel, 20 samples a second, the last one has 52 bytes");
+  for (int i = 0; i < 9; ++i) pass(account, now, 0);
+  EXPECT_EQ(account.text(), "DDS topic rt/cmd_vel, the last sample has 52 bytes");
+  account.look(now += 6 * kSecond);
+  EXPECT_EQ(account.text(),
+            "DDS topic rt/cmd_vel, the last sample has 52 bytes and is over 10 s old");
+  account.look(now += 3600 * kSecond);
+  EXPECT_EQ(account.text(),
+            "DDS topic rt/cmd_vel, the last sample has 52 bytes and is over an hour old");
+}
+
+// Each text that is another one goes to the daemon, and to all who look.
+TEST(Account, ASteadyTopicDoesNotChangeItsText) {
+  Account account("DDS topic rt/cmd_vel", "subscriber");
+  std::int64_t now = 100 * kSecond;
+  std::set<std::string> texts;
+  for (int i = 0; i < 1000; ++i) {
+    pass(account, now, 4 + i % 3);
+    account.idle.add();
+    if (i >= 8) texts.insert(account.text());
+  }
+  EXPECT_THAT(texts, testing::SizeIs(testing::Le(4u))) << testing::PrintToString(texts);
+  EXPECT_THAT(account.text(), HasSubstr("10 samples a second"));
+  EXPECT_THAT(account.text(), HasSubstr("at least 1000 idle samples"));
 }
 
 TEST(Account, AnObstacleStandsInThePlaceOfPeers) {
