@@ -3,6 +3,10 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <fstream>
+#include <string>
+
+#include <arbiter/arbiter.hpp>
 
 #include "tests/gateway/dds/scene.hpp"
 
@@ -35,6 +39,51 @@ TEST_P(DdsPassing, ATwistOfRos2PassesWithAllItsNumbers) {
     drive.from.publish(numbers);
     EXPECT_EQ(drive.to.next_line(), std::string("sample ") + numbers);
   }
+}
+
+std::string twist_bytes(char encoding, double forward) {
+  std::string bytes{'\0', encoding, '\0', '\0'};
+  for (const double number : {forward, 0.0, 0.0, 0.0, 0.0, 0.0}) {
+    bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
+  }
+  return bytes;
+}
+
+TEST_P(DdsPassing, WhileNobodyCommandsTheSampleOfAFileIsSent) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1000s"));
+  std::ofstream(daemon.directory() + "/crawl.bin") << twist_bytes('\1', 0.125);
+  const DdsGateway gateway(daemon, domain, kBaseOut + R"( idle="file:crawl.bin"/>)");
+  Stranger base(GetParam().to, domain, {"sub", "twist", "rt/cmd_vel"});
+  base.await("sample 0.125 0");
+}
+
+TEST_P(DdsPassing, WhoComesLaterIsGivenTheLastSampleOfALatchedTopic) {
+  Drive drive("1000s", GetParam().from, GetParam().to, R"( qos="latched")");
+  publish_until_heard(drive.from, drive.to, "1 0");
+  Stranger late(GetParam().to, drive.domain,
+                {"sub", "twist", "rt/cmd_vel", "durability=transient_local"});
+  late.await("sample 1 0");
+}
+
+// As a component of ours writes it; Fast DDS 2.9 does not read it.
+TEST(DdsRepresentation, ASampleOfXcdr2GoesOutAndOneOfXcdr1IsRefused) {
+  const OwnDomain domain;
+  Daemon daemon(base_model("1000s"));
+  const DdsGateway gateway(daemon, domain, kBaseOut + R"( representation="xcdr2"/>)");
+  Stranger base("cyclone", domain, {"sub", "twist", "rt/cmd_vel"});
+  base.await("matched 1");
+  gateway.see("1 subscriber matched");
+  Node node("navigation");
+  auto navigation =
+      node.output_port("/Nav/cmd_vel:o", Type::variable("geometry_msgs/msg/Twist", 64));
+  const auto publish = [&](const std::string& bytes) {
+    navigation.publish(Bytes(reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()));
+  };
+  publish(twist_bytes('\1', 1));
+  await_described(daemon, "/Base/cmd_vel:i", "1 refused");
+  publish(twist_bytes('\7', 2));
+  EXPECT_EQ(base.next_line(), "sample 2 0");
 }
 
 TEST_P(DdsPassing, TheOneWhoOverridesIsObeyed) {
