@@ -197,7 +197,7 @@ void Desk::say_without_place(std::size_t count) {
   is_without_place_said_ = count != 0;
 }
 
-void Desk::hear_card(Bytes message, std::uint64_t writer) {
+void Desk::hear_card(Bytes message, const gateway::dds::SampleWriter& writer) {
   auto card = read_host_card(message);
   if (!card) {
     if (is_of_other_version(message)) {
@@ -209,15 +209,16 @@ void Desk::hear_card(Bytes message, std::uint64_t writer) {
   }
   const std::lock_guard lock(mutex_);
   // One that finds no place is counted there, and said by look().
-  static_cast<void>(neighbours_.note(writer, std::move(*card), shm::monotonic_now()));
+  static_cast<void>(
+      neighbours_.note(writer.handle, std::move(*card), shm::monotonic_now(), writer.participant));
 }
 
-void Desk::hear_pulse(Bytes message) {
+void Desk::hear_pulse(Bytes message, const Participant& from) {
   const shm::Nanoseconds now = shm::monotonic_now();
   const auto pulse = read_pulse(message);
   if (!pulse) return;
   const std::lock_guard lock(mutex_);
-  round_trips_.note(*pulse, now);
+  round_trips_.note(*pulse, from, now);
 }
 
 void Desk::hear_question(Bytes message, std::uint64_t writer) {
@@ -231,11 +232,12 @@ void Desk::hear_question(Bytes message, std::uint64_t writer) {
   if (asked_.hear(std::move(*question), writer, shm::monotonic_now())) changed_.notify_all();
 }
 
-void Desk::hear_answer(Bytes message) {
+// Nobody else answers for this host.
+void Desk::hear_answer(Bytes message, const Participant& from) {
   auto answer = read_answer(message);
-  if (!answer || answer->asker != me_.incarnation) return;
+  if (!answer || answer->asker != me_.incarnation || answer->answerer == me_.incarnation) return;
   const std::lock_guard lock(mutex_);
-  if (open_.note(std::move(*answer), shm::monotonic_now())) changed_.notify_all();
+  if (open_.note(std::move(*answer), from, shm::monotonic_now())) changed_.notify_all();
 }
 
 }  // namespace arbiter::link

@@ -80,10 +80,10 @@ class Desk {
   void say_without_place(std::size_t count);
 
   // On Cyclone's threads.
-  void hear_card(Bytes message, std::uint64_t writer);
-  void hear_pulse(Bytes message);
+  void hear_card(Bytes message, const gateway::dds::SampleWriter& writer);
+  void hear_pulse(Bytes message, const Participant& from);
   void hear_question(Bytes message, std::uint64_t writer);
-  void hear_answer(Bytes message);
+  void hear_answer(Bytes message, const Participant& from);
 
   // On the answering thread.
   void answer_questions();

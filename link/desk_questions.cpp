@@ -47,7 +47,7 @@ void Desk::answer(Asked asked) {
     asked_.keep(std::move(asked));
     return;
   }
-  open_.note(*std::move(asked.answer), shm::monotonic_now());
+  open_.note(*std::move(asked.answer), {}, shm::monotonic_now());
   changed_.notify_all();
 }
 
@@ -77,7 +77,7 @@ wire::HostsDocument Desk::document() const {
     neighbours = neighbours_.all();
     document.without_place = neighbours_.without_place();
     for (const Neighbour& each : neighbours) {
-      round_trips.push_back(round_trips_.of(each.card->incarnation));
+      round_trips.push_back(round_trips_.of(each.participant));
     }
   }
   document.host = me_.host;
@@ -105,26 +105,29 @@ std::vector<wire::HostAnswer> Desk::ask_hosts(const wire::LinkQuestion& question
   if (is_for_all && question.verb == wire::kPrepareVerb) await_all_hosts();
   const std::string& wanted = question.host.empty() ? me_.host : question.host;
   std::vector<wire::HostAnswer> answers;
-  std::vector<Incarnation> asked;  // of answers, as long as they are not known to be gone
+  // Of answers, as long as they are not known to be gone.
+  std::vector<OpenQuestions::Host> asked;
   QuestionMessage message{me_.incarnation, 0, {}, me_.host, question.verb, question.argument};
   {
     const std::lock_guard sending(send_mutex_);
     {
       const std::lock_guard lock(mutex_);
-      const auto add = [&](const HostCard& card, bool is_up) {
+      const auto add = [&](const HostCard& card, bool is_up, const Participant& participant) {
         if (!is_for_all && card.host != wanted) return;
         wire::HostAnswer& one = answers.emplace_back();
         one.host = card.host;
         one.incarnation = hexadecimal(card.incarnation);
         one.outcome = is_up ? wire::HostOutcome::kSilent : wire::HostOutcome::kGone;
-        if (is_up) asked.push_back(card.incarnation);
+        if (is_up) asked.push_back({card.incarnation, participant});
       };
-      add(me_, true);
-      for (const Neighbour& each : neighbours_.all()) add(*each.card, each.is_up);
+      add(me_, true, {});
+      for (const Neighbour& each : neighbours_.all()) {
+        add(*each.card, each.is_up, each.participant);
+      }
       if (answers.empty()) {
         throw std::runtime_error("no host is called \"" + wanted + "\": see arbiter hosts");
       }
-      message.asked = asked;
+      for (const OpenQuestions::Host& each : asked) message.asked.push_back(each.life);
       message.number = open_.ask(asked, shm::monotonic_now());
       if (message.number == 0) throw std::runtime_error("too many questions wait for an answer");
     }
@@ -133,7 +136,7 @@ std::vector<wire::HostAnswer> Desk::ask_hosts(const wire::LinkQuestion& question
   const OpenQuestions::Replies replies = await_replies(message);
   for (std::size_t i = 0, next = 0; i < answers.size(); ++i) {
     if (answers[i].outcome == wire::HostOutcome::kGone) continue;
-    const OpenQuestions::Reply& reply = replies.at(asked.at(next++));
+    const OpenQuestions::Reply& reply = replies.at(asked.at(next++).life);
     answers[i].outcome = outcome_of(reply.outcome);
     answers[i].took = reply.took;
     answers[i].text = reply.text;

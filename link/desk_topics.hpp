@@ -18,20 +18,29 @@ inline constexpr std::size_t kMostQuestionBytes = 8192;
 inline constexpr std::size_t kMostAnswerBytes = kMaxAnswer + 64;
 
 struct Desk::Topics {
+  using Writer = gateway::dds::SampleWriter;
   Topics(Desk& desk, const Network& network, const gateway::Bell& bell)
       : cards(
             network, kHostTopic, Delivery::kState, kMaxCardBytes,
-            [&desk](Bytes bytes, std::uint64_t writer) { desk.hear_card(bytes, writer); }, bell),
+            [&desk](Bytes bytes, const Writer& writer) { desk.hear_card(bytes, writer); }, bell),
         pulses(
             network, kPulseTopic, Delivery::kPulse, kMostPulseBytes,
-            [&desk](Bytes bytes, std::uint64_t) { desk.hear_pulse(bytes); }, bell),
+            [&desk](Bytes bytes, const Writer& writer) {
+              desk.hear_pulse(bytes, writer.participant);
+            },
+            bell),
         questions(
             network, kQuestionTopic, Delivery::kMessage, kMostQuestionBytes,
-            [&desk](Bytes bytes, std::uint64_t writer) { desk.hear_question(bytes, writer); },
+            [&desk](Bytes bytes, const Writer& writer) {
+              desk.hear_question(bytes, writer.handle);
+            },
             bell),
         answers(
             network, kAnswerTopic, Delivery::kMessage, kMostAnswerBytes,
-            [&desk](Bytes bytes, std::uint64_t) { desk.hear_answer(bytes); }, bell) {}
+            [&desk](Bytes bytes, const Writer& writer) {
+              desk.hear_answer(bytes, writer.participant);
+            },
+            bell) {}
 
   MessageTopic cards;
   MessageTopic pulses;

@@ -76,7 +76,7 @@ class Import : private gateway::dds::SampleTaker {
   // publish() throws for another port's loan, and this one is its own; what is remembered here has
   // its memory from the beginning.
   void take(const gateway::dds::Payload& payload,  // NOLINT(bugprone-exception-escape)
-            dds_instance_handle_t writer) noexcept override;
+            const gateway::dds::SampleWriter& writer) noexcept override;
   // Whom to obey from now on; null: nobody.
   void obey(const Offerer* speaker);
   // Under the lock, by header_.

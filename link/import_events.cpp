@@ -18,7 +18,7 @@ shm::Nanoseconds time_with_sleep() noexcept {
 }
 
 void Import::take(const gateway::dds::Payload& payload,  // NOLINT(bugprone-exception-escape)
-                  dds_instance_handle_t writer) noexcept {
+                  const gateway::dds::SampleWriter& writer) noexcept {
   const std::size_t before = encapsulation().size();
   const std::lock_guard lock(mutex_);
   std::array<std::byte, kMaxHeaderBytes> bytes;
@@ -36,8 +36,8 @@ void Import::take(const gateway::dds::Payload& payload,  // NOLINT(bugprone-exce
                           header_.is_deactivated,
                           header_.kind == EventKind::kWithheld,
                           header_.token_of(me_) == 0};
-  if (writer != writer_) {  // one speaker: others are not heard
-    remember(writer, event);
+  if (writer.handle != writer_) {  // one speaker: others are not heard
+    remember(writer.handle, event);
     return;
   }
   if (header_.exporter != obeyed_) {

@@ -42,7 +42,7 @@ std::uint32_t InTopic::matched() const {
 
 // Whatever waited for Cyclone's thread, such as datagrams in the socket while the process was
 // stopped, comes through here: the guard knows how long that can have been.
-void InTopic::take(const Payload& payload, dds_instance_handle_t /*writer*/) noexcept {
+void InTopic::take(const Payload& payload, const SampleWriter& /*writer*/) noexcept {
   const ArrivedSample sample(payload);
   const auto& choice = entry().choice;
   if (!sample.is_readable() || (choice && !sample.has_field_at(choice->offset))) {

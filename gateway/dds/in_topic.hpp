@@ -21,7 +21,7 @@ class InTopic : public EndPoint, private SampleTaker {
   [[nodiscard]] Durability durability() const override;
   [[nodiscard]] std::uint32_t matched() const override;
   // On Cyclone's threads.
-  void take(const Payload& payload, dds_instance_handle_t /*writer*/) noexcept override;
+  void take(const Payload& payload, const SampleWriter& /*writer*/) noexcept override;
 
   Incoming& incoming_;
   const StallGuard& guard_;

@@ -1,8 +1,27 @@
 #include "gateway/dds/reader_cache.hpp"
 
+#include <arpa/inet.h>
 #include <dds/ddsi/ddsi_tkmap.h>
 
+#include <cstring>
+
 namespace arbiter::gateway::dds {
+namespace {
+
+// Cyclone has GUIDs in this machine's order, and in that of the wire where it tells them.
+SampleWriter writer_of(const ddsi_writer_info& info) noexcept {
+  SampleWriter writer;
+  writer.handle = info.iid;
+  std::uint8_t* to = writer.participant.data();
+  for (const std::uint32_t each : info.guid.prefix.u) {
+    const std::uint32_t word = htonl(each);
+    std::memcpy(to, &word, sizeof word);
+    to += sizeof word;
+  }
+  return writer;
+}
+
+}  // namespace
 
 struct ReaderCache::Calls {
   static ReaderCache& of(void* cache) noexcept { return *static_cast<Hook*>(cache)->self; }
@@ -15,7 +34,7 @@ struct ReaderCache::Calls {
   // True: it has been taken; false would have Cyclone try it again.
   static bool store(ddsi_rhc* cache, const ddsi_writer_info* writer, ddsi_serdata* data,
                     ddsi_tkmap_instance* instance) {
-    of(cache).store(*data, instance, writer->iid);
+    of(cache).store(*data, instance, writer_of(*writer));
     return true;
   }
   static void unregister_writer(ddsi_rhc* /*cache*/, const ddsi_writer_info* /*writer*/) {}
@@ -64,7 +83,7 @@ ReaderCache::ReaderCache(SampleTaker& taker) : hook_{}, taker_(taker) {
 // Cyclone's locks: that of the readers of one writer is held here, as in a listener. Nothing that
 // takes the same one is called from here on; a writer of ours that writes takes its own.
 void ReaderCache::store(const ddsi_serdata& data, ddsi_tkmap_instance* instance,
-                        dds_instance_handle_t writer) noexcept {
+                        const SampleWriter& writer) noexcept {
   const std::lock_guard lock(mutex_);
   if (instance_ == nullptr) {
     ddsi_tkmap_instance_ref(instance);

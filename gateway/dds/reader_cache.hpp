@@ -15,11 +15,21 @@
 #include <dds/dds.h>
 #include <dds/ddsc/dds_rhc.h>
 
+#include <array>
+#include <cstdint>
 #include <mutex>
 
 #include "gateway/dds/payload.hpp"
 
 namespace arbiter::gateway::dds {
+
+// Who has written a sample.
+struct SampleWriter {
+  dds_instance_handle_t handle = 0;  // by which dds_get_matched_publications() names it
+  // Of its participant: with what GUIDs of all that this has begin, as on the wire. Nobody else's
+  // writer has it, as far as the network can be believed.
+  std::array<std::uint8_t, 12> participant{};
+};
 
 class SampleTaker {
  public:
@@ -28,10 +38,9 @@ class SampleTaker {
   SampleTaker& operator=(const SampleTaker&) = delete;
   virtual ~SampleTaker() = default;
 
-  // `writer`: the handle by which dds_get_matched_publications() names who has written it. The
-  // payload is valid until it returns. Must not wait. As in a listener of Cyclone's, which is
+  // The payload is valid until it returns. Must not wait. As in a listener of Cyclone's, which is
   // called with the same locks, samples may be written, and nothing may be opened or closed.
-  virtual void take(const Payload& payload, dds_instance_handle_t writer) noexcept = 0;
+  virtual void take(const Payload& payload, const SampleWriter& writer) noexcept = 0;
 };
 
 // Outlives the reader that has it.
@@ -55,7 +64,7 @@ class ReaderCache {
   struct Calls;
 
   void store(const ddsi_serdata& data, ddsi_tkmap_instance* instance,
-             dds_instance_handle_t writer) noexcept;
+             const SampleWriter& writer) noexcept;
   void let_go() noexcept;
 
   Hook hook_;

@@ -8,7 +8,8 @@
 
 namespace arbiter::link {
 
-bool Neighbours::note(std::uint64_t key, HostCard card, shm::Nanoseconds now) {
+bool Neighbours::note(std::uint64_t key, HostCard card, shm::Nanoseconds now,
+                      const Participant& participant) {
   ++changes_;
   // A host that has come back, with the same life or another, is not gone any more.
   gone_unlisted_.erase(card.host);
@@ -20,6 +21,7 @@ bool Neighbours::note(std::uint64_t key, HostCard card, shm::Nanoseconds now) {
     if (known->card->incarnation != card.incarnation) known->since = now;
     known->card = std::make_shared<const HostCard>(std::move(card));
     known->heard = now;
+    known->participant = participant;
     put_in_order();
     return true;
   }
@@ -28,7 +30,8 @@ bool Neighbours::note(std::uint64_t key, HostCard card, shm::Nanoseconds now) {
     return false;
   }
   turned_away_.erase(key);
-  all_.push_back({key, std::make_shared<const HostCard>(std::move(card)), true, now, now});
+  all_.push_back(
+      {key, std::make_shared<const HostCard>(std::move(card)), true, now, now, participant});
   put_in_order();
   return true;
 }

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "link/core/host_card.hpp"
+#include "link/core/participant.hpp"
 
 namespace arbiter::link {
 
@@ -26,6 +27,7 @@ struct Neighbour {
   bool is_up = true;
   shm::Nanoseconds since = 0;  // that it is up, or gone
   shm::Nanoseconds heard = 0;  // when its card came
+  Participant participant{};   // whose writer that is
 };
 
 class Neighbours {
@@ -38,7 +40,8 @@ class Neighbours {
 
   // The card of a writer that is there. False: there is no place for another host. Its card does
   // not come again by itself, so it stays without one until it has something new to say.
-  bool note(std::uint64_t key, HostCard card, shm::Nanoseconds now);
+  bool note(std::uint64_t key, HostCard card, shm::Nanoseconds now,
+            const Participant& participant = {});
   // All writers that were there at that time, or later: whose is not among them is gone. Who has
   // been heard since then may have come after they were counted, and is left alone.
   void keep(std::vector<std::uint64_t> keys, shm::Nanoseconds then);

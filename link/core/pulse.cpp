@@ -42,18 +42,19 @@ Pulse RoundTrips::next(shm::Nanoseconds now) {
   std::erase_if(others_, [&](const auto& each) { return now - each.second.came >= kSilence; });
   Pulse pulse{me_, ++last_, {}};
   sent_.at(last_ % kKept) = now;
-  for (const auto& [incarnation, other] : others_) {
+  for (const auto& [participant, other] : others_) {
     pulse.echoes.push_back(
-        {incarnation, other.number, static_cast<std::uint64_t>(now - other.came)});
+        {other.life, other.number, static_cast<std::uint64_t>(now - other.came)});
   }
   return pulse;
 }
 
-void RoundTrips::note(const Pulse& pulse, shm::Nanoseconds now) {
+void RoundTrips::note(const Pulse& pulse, const Participant& from, shm::Nanoseconds now) {
   if (pulse.sender == me_) return;
-  if (others_.size() >= kMaxEchoes && !others_.contains(pulse.sender)) return;
-  Other& other = others_[pulse.sender];
-  if (pulse.number <= other.number) return;
+  if (others_.size() >= kMaxEchoes && !others_.contains(from)) return;
+  Other& other = others_[from];
+  if (other.life == 0) other.life = pulse.sender;
+  if (pulse.sender != other.life || pulse.number <= other.number) return;
   other.number = pulse.number;
   other.came = now;
   for (const Echo& echo : pulse.echoes) {
@@ -67,7 +68,7 @@ void RoundTrips::note(const Pulse& pulse, shm::Nanoseconds now) {
   }
 }
 
-std::optional<shm::Nanoseconds> RoundTrips::of(Incarnation other) const {
+std::optional<shm::Nanoseconds> RoundTrips::of(const Participant& other) const {
   const auto found = others_.find(other);
   return found == others_.end() ? std::nullopt : found->second.round_trip;
 }

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "link/core/cards.hpp"
+#include "link/core/participant.hpp"
 
 namespace arbiter::link {
 
@@ -34,7 +35,8 @@ struct Pulse {
 [[nodiscard]] ByteString write_pulse(const Pulse& pulse);
 [[nodiscard]] std::optional<Pulse> read_pulse(Bytes bytes);
 
-// What a link knows of round trips.
+// What a link knows of round trips. Others are known by whose writers their pulses come from, and
+// each has one life: nobody spoils another's round trip, or has more than one place.
 //
 // Units: nanoseconds of a monotonic clock. Thread safety: none of its own.
 class RoundTrips {
@@ -47,13 +49,14 @@ class RoundTrips {
   // The next pulse, which is sent after this call.
   [[nodiscard]] Pulse next(shm::Nanoseconds now);
   // One that has come. Senders that find no place are passed over.
-  void note(const Pulse& pulse, shm::Nanoseconds now);
+  void note(const Pulse& pulse, const Participant& from, shm::Nanoseconds now);
   // The last that was measured; nothing: none.
-  [[nodiscard]] std::optional<shm::Nanoseconds> of(Incarnation other) const;
+  [[nodiscard]] std::optional<shm::Nanoseconds> of(const Participant& other) const;
 
  private:
   static constexpr std::size_t kKept = 16;  // of the pulses that were sent
   struct Other {
+    Incarnation life = 0;
     std::uint64_t number = 0;
     shm::Nanoseconds came = 0;
     std::optional<shm::Nanoseconds> round_trip;
@@ -62,7 +65,7 @@ class RoundTrips {
   const Incarnation me_;
   std::uint64_t last_ = 0;
   std::array<shm::Nanoseconds, kKept> sent_{};  // by number
-  std::map<Incarnation, Other> others_;
+  std::map<Participant, Other> others_;
 };
 
 }  // namespace arbiter::link

@@ -73,20 +73,25 @@ std::optional<AnswerMessage> read_answer(Bytes bytes) {
   return message;
 }
 
-std::uint64_t OpenQuestions::ask(const std::vector<Incarnation>& asked, shm::Nanoseconds now) {
+std::uint64_t OpenQuestions::ask(const std::vector<Host>& asked, shm::Nanoseconds now) {
   if (open_.size() >= kMost) return 0;
   Open& open = open_[++last_];
   open.since = now;
   open.ask_again = now + kAskAgain;
-  for (const Incarnation each : asked) open.replies[each];
+  for (const Host& each : asked) {
+    const auto [reply, is_new] = open.replies.try_emplace(each.life);
+    if (is_new) reply->second.from = each.participant;
+    if (reply->second.from != each.participant) reply->second.from.reset();
+  }
   return last_;
 }
 
-bool OpenQuestions::note(AnswerMessage answer, shm::Nanoseconds now) {
+bool OpenQuestions::note(AnswerMessage answer, const Participant& from, shm::Nanoseconds now) {
   const auto open = open_.find(answer.number);
   if (open == open_.end()) return false;
   const auto reply = open->second.replies.find(answer.answerer);
-  if (reply == open->second.replies.end() || reply->second.outcome != Outcome::kWaiting) {
+  if (reply == open->second.replies.end() || reply->second.from != from ||
+      reply->second.outcome != Outcome::kWaiting) {
     return false;
   }
   if (answer.text.size() > kMostBytes - bytes_) {

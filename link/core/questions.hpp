@@ -19,6 +19,7 @@
 
 #include "link/core/cards.hpp"
 #include "link/core/held_tokens.hpp"
+#include "link/core/participant.hpp"
 
 namespace arbiter::link {
 
@@ -64,7 +65,14 @@ class OpenQuestions {
   static constexpr std::size_t kMostBytes = 8 * kMaxAnswer;
 
   enum class Outcome : std::uint8_t { kWaiting, kAnswered, kRefused, kSilent };
+  // A link: which life it says it is, and whose writer has said so. Zeros: this link.
+  struct Host {
+    Incarnation life = 0;
+    Participant participant{};
+  };
   struct Reply {
+    // From whom it is heard; nobody, where several say that they are this one.
+    std::optional<Participant> from{};
     Outcome outcome = Outcome::kWaiting;
     shm::Nanoseconds took = 0;  // until it came
     std::string text;
@@ -72,9 +80,10 @@ class OpenQuestions {
   using Replies = std::map<Incarnation, Reply>;
 
   // Its number, from 1 upwards; 0: too many wait.
-  std::uint64_t ask(const std::vector<Incarnation>& asked, shm::Nanoseconds now);
-  // False: nobody waits for it. One that finds no room is a refusal, which says so.
-  bool note(AnswerMessage answer, shm::Nanoseconds now);
+  std::uint64_t ask(const std::vector<Host>& asked, shm::Nanoseconds now);
+  // False: nobody waits for it, or it is another's. One that finds no room is a refusal, which says
+  // so.
+  bool note(AnswerMessage answer, const Participant& from, shm::Nanoseconds now);
   // Whether all have an outcome. Who has not answered for kPatience is silent from now on.
   [[nodiscard]] bool is_over(std::uint64_t number, shm::Nanoseconds now);
   // Those to be asked again now.

@@ -86,7 +86,7 @@ std::vector<std::uint64_t> MessageTopic::writers() const {
 }
 
 void MessageTopic::take(const gateway::dds::Payload& payload,
-                        dds_instance_handle_t writer) noexcept {
+                        const gateway::dds::SampleWriter& writer) noexcept {
   const std::size_t before = encapsulation().size();
   // RTPS counts in fours.
   if (payload.size < before || payload.size - before > most_ + 3) return;

@@ -25,8 +25,8 @@ enum class Delivery {
 
 class MessageTopic : private gateway::dds::SampleTaker {
  public:
-  // `writer`: by which links that are there are known.
-  using Heard = std::function<void(Bytes message, std::uint64_t writer)>;
+  // `writer`: its handle is that by which links that are there are known.
+  using Heard = std::function<void(Bytes message, const gateway::dds::SampleWriter& writer)>;
 
   // `heard` is called on Cyclone's threads, one at a time, and must not wait. Messages of more than
   // `most` bytes are passed over. `bell` rings when writers() change, and outlives this. Throws
@@ -44,7 +44,8 @@ class MessageTopic : private gateway::dds::SampleTaker {
   [[nodiscard]] std::vector<std::uint64_t> writers() const;
 
  private:
-  void take(const gateway::dds::Payload& payload, dds_instance_handle_t writer) noexcept override;
+  void take(const gateway::dds::Payload& payload,
+            const gateway::dds::SampleWriter& writer) noexcept override;
 
   const std::size_t most_;
   const Heard heard_;

@@ -48,14 +48,15 @@ void TokenTopic::send(const TokenMessage& message) noexcept {
   if (payload != nullptr) static_cast<void>(dds_writecdr(writer_.get(), &payload->cyclone));
 }
 
-void TokenTopic::take(const gateway::dds::Payload& payload, dds_instance_handle_t writer) noexcept {
+void TokenTopic::take(const gateway::dds::Payload& payload,
+                      const gateway::dds::SampleWriter& writer) noexcept {
   const std::size_t before = encapsulation().size();
   std::array<std::byte, kTokenMessageBytes> bytes{};
   if (payload.size < before + bytes.size()) return;
   const gateway::dds::ArrivedSample sample(payload);
   if (!sample.copy(before, WritableBytes(bytes.data(), bytes.size()))) return;
   if (const auto message = read_token_message(Bytes(bytes.data(), bytes.size())))
-    heard_(*message, writer);
+    heard_(*message, writer.handle);
 }
 
 }  // namespace arbiter::link

@@ -25,7 +25,8 @@ class TokenTopic : private gateway::dds::SampleTaker {
   void send(const TokenMessage& message) noexcept;
 
  private:
-  void take(const gateway::dds::Payload& payload, dds_instance_handle_t writer) noexcept override;
+  void take(const gateway::dds::Payload& payload,
+            const gateway::dds::SampleWriter& writer) noexcept override;
 
   const Heard heard_;
   gateway::dds::ReaderCache cache_;

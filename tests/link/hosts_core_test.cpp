@@ -115,37 +115,61 @@ TEST(ModelDigest, DiffersWhereTextsDo) {
 TEST(RoundTrip, IsMeasuredWithoutComparingClocks) {
   RoundTrips head(1);
   RoundTrips base(2);
-  base.note(head.next(1000 * kS), 5 * kS);            // 2 ms on the way, let us say
-  head.note(base.next(6 * kS), 1001 * kS + 5 * kMs);  // it lay there for a second
-  EXPECT_EQ(head.of(2), 5 * kMs);
-  EXPECT_EQ(base.of(1), std::nullopt);
-  base.note(head.next(1002 * kS), 7 * kS + 3 * kMs);
-  EXPECT_EQ(base.of(1), kS + 3 * kMs - (1002 * kS - 1001 * kS - 5 * kMs));
+  const Participant of_head = participant(1);
+  const Participant of_base = participant(2);
+  base.note(head.next(1000 * kS), of_head, 5 * kS);            // 2 ms on the way, let us say
+  head.note(base.next(6 * kS), of_base, 1001 * kS + 5 * kMs);  // it lay there for a second
+  EXPECT_EQ(head.of(of_base), 5 * kMs);
+  EXPECT_EQ(base.of(of_head), std::nullopt);
+  base.note(head.next(1002 * kS), of_head, 7 * kS + 3 * kMs);
+  EXPECT_EQ(base.of(of_head), kS + 3 * kMs - (1002 * kS - 1001 * kS - 5 * kMs));
 }
 
 TEST(RoundTrip, IsNotTakenFromEchoesThatCannotBe) {
   RoundTrips me(1);
+  const Participant other = participant(2);
   static_cast<void>(me.next(100 * kS));
-  me.note({2, 1, {{1, 1, static_cast<std::uint64_t>(2 * kS)}}}, 101 * kS);  // lay for longer
-  EXPECT_EQ(me.of(2), std::nullopt);
-  me.note({2, 2, {{1, 9, 0}}}, 101 * kS);  // never sent
-  me.note({2, 3, {{1, 0, 0}}}, 101 * kS);
-  me.note({2, 4, {{3, 1, 0}}}, 101 * kS);  // another's
-  EXPECT_EQ(me.of(2), std::nullopt);
-  me.note({1, 5, {{1, 1, 0}}}, 101 * kS);  // pretends to be me
-  EXPECT_EQ(me.of(1), std::nullopt);
-  me.note({2, 5, {{1, 1, 0}}}, 101 * kS);
-  EXPECT_EQ(me.of(2), kS);
-  me.note({2, 4, {{1, 1, 5}}}, 102 * kS);  // overtaken
-  EXPECT_EQ(me.of(2), kS);
+  me.note({2, 1, {{1, 1, static_cast<std::uint64_t>(2 * kS)}}}, other, 101 * kS);  // lay for longer
+  EXPECT_EQ(me.of(other), std::nullopt);
+  me.note({2, 2, {{1, 9, 0}}}, other, 101 * kS);  // never sent
+  me.note({2, 3, {{1, 0, 0}}}, other, 101 * kS);
+  me.note({2, 4, {{3, 1, 0}}}, other, 101 * kS);  // another's
+  EXPECT_EQ(me.of(other), std::nullopt);
+  me.note({1, 5, {{1, 1, 0}}}, other, 101 * kS);  // pretends to be me
+  EXPECT_EQ(me.of(other), std::nullopt);
+  me.note({2, 5, {{1, 1, 0}}}, other, 101 * kS);
+  EXPECT_EQ(me.of(other), kS);
+  me.note({2, 4, {{1, 1, 5}}}, other, 102 * kS);  // overtaken
+  EXPECT_EQ(me.of(other), kS);
   for (int i = 0; i < 20; ++i) static_cast<void>(me.next(103 * kS));
-  me.note({2, 6, {{1, 1, 0}}}, 104 * kS);  // too long ago to be known
-  EXPECT_EQ(me.of(2), kS);
+  me.note({2, 6, {{1, 1, 0}}}, other, 104 * kS);  // too long ago to be known
+  EXPECT_EQ(me.of(other), kS);
+}
+
+TEST(RoundTrip, IsNotSpoiltByWhoPulsesInTheNameOfAnother) {
+  RoundTrips me(1);
+  const Participant head = participant(2);
+  const Participant forger = participant(3);
+  static_cast<void>(me.next(100 * kS));
+  me.note({2, ~std::uint64_t{0}, {}}, forger, 100 * kS);
+  me.note({2, 1, {{1, 1, 0}}}, head, 101 * kS);
+  EXPECT_EQ(me.of(head), kS);
+  me.note({7, 2, {{1, 1, 0}}}, head, 102 * kS);  // it was another one before
+  EXPECT_EQ(me.of(head), kS);
+}
+
+TEST(RoundTrip, GivesOneWhoTakesManyNamesOnePlace) {
+  RoundTrips me(1);
+  for (Incarnation name = 2; name < 1000; ++name) me.note({name, 1, {}}, participant(2), kS);
+  EXPECT_EQ(me.next(2 * kS).echoes.size(), 1U);
 }
 
 TEST(RoundTrip, KnowsABoundedNumberOfOthersAndForgetsThoseThatAreSilent) {
   RoundTrips me(1);
-  for (Incarnation other = 2; other < 1000; ++other) me.note({other, 1, {}}, kS);
+  for (std::uint16_t other = 2; other < 1000; ++other) {
+    const Participant from{static_cast<std::uint8_t>(other >> 8), static_cast<std::uint8_t>(other)};
+    me.note({other, 1, {}}, from, kS);
+  }
   EXPECT_EQ(me.next(2 * kS).echoes.size(), kMaxEchoes);
   const ByteString largest = write_pulse(me.next(2 * kS));
   EXPECT_TRUE(read_pulse(as_bytes(largest)));

@@ -49,7 +49,7 @@ class Eavesdropper : private gateway::dds::SampleTaker {
 
  private:
   void take(const gateway::dds::Payload& payload,
-            dds_instance_handle_t /*writer*/) noexcept override {
+            const gateway::dds::SampleWriter& /*writer*/) noexcept override {
     const std::lock_guard lock(mutex_);
     std::array<std::byte, link::kMaxHeaderBytes> bytes;
     const std::size_t before = link::encapsulation().size();

@@ -40,7 +40,8 @@ TEST(MessageTopic, NamesAllWritersHoweverMany) {
   const link::Network network({domain.number(), {}, {}});
   const gateway::Bell bell;
   const link::MessageTopic cards(
-      network, link::kHostTopic, link::Delivery::kState, 100, [](Bytes, std::uint64_t) {}, bell);
+      network, link::kHostTopic, link::Delivery::kState, 100,
+      [](Bytes, const gateway::dds::SampleWriter&) {}, bell);
   const ManyWriters many(domain.number(), kMany);
   await([&] { return cards.writers().size() == kMany; });
 }

@@ -54,10 +54,13 @@ TEST(QuestionMessages, AreRefusedWhereTheyExceedTheirBounds) {
   EXPECT_FALSE(is_read({5, 9, std::vector<Incarnation>(kMaxAsked + 1, 6), "head", "status", {}}));
 }
 
+OpenQuestions::Host six() { return {6, participant(6)}; }
+OpenQuestions::Host seven() { return {7, participant(7)}; }
+
 TEST(OpenQuestion, IsSilentAfterASecond) {
   OpenQuestions open;
-  const auto number = open.ask({6, 7}, kS);
-  EXPECT_TRUE(open.note({6, 5, number, false, "here"}, kS + 3 * kMs));
+  const auto number = open.ask({six(), seven()}, kS);
+  EXPECT_TRUE(open.note({6, 5, number, false, "here"}, participant(6), kS + 3 * kMs));
   EXPECT_FALSE(open.is_over(number, kS + OpenQuestions::kPatience - 1));
   EXPECT_TRUE(open.is_over(number, kS + OpenQuestions::kPatience));
   const auto replies = open.take(number);
@@ -69,21 +72,42 @@ TEST(OpenQuestion, IsSilentAfterASecond) {
 
 TEST(OpenQuestion, HearsOnlyWhoWasAskedAndOnce) {
   OpenQuestions open;
-  const auto number = open.ask({6}, kS);
-  EXPECT_FALSE(open.note({8, 5, number, false, "a stranger"}, kS));
-  EXPECT_FALSE(open.note({6, 5, number + 1, false, "another question"}, kS));
-  EXPECT_TRUE(open.note({6, 5, number, true, "no"}, kS));
-  EXPECT_FALSE(open.note({6, 5, number, false, "yes after all"}, kS));
+  const auto number = open.ask({six()}, kS);
+  EXPECT_FALSE(open.note({8, 5, number, false, "a stranger"}, participant(8), kS));
+  EXPECT_FALSE(open.note({6, 5, number + 1, false, "another question"}, participant(6), kS));
+  EXPECT_TRUE(open.note({6, 5, number, true, "no"}, participant(6), kS));
+  EXPECT_FALSE(open.note({6, 5, number, false, "yes after all"}, participant(6), kS));
   EXPECT_TRUE(open.is_over(number, kS));
   EXPECT_EQ(open.take(number).at(6).outcome, OpenQuestions::Outcome::kRefused);
-  EXPECT_FALSE(open.note({6, 5, number, false, "late"}, kS)) << "nobody waits any more";
+  EXPECT_FALSE(open.note({6, 5, number, false, "late"}, participant(6), kS))
+      << "nobody waits any more";
+}
+
+// Everybody hears the question, and could answer it first.
+TEST(OpenQuestion, HearsNobodyInTheNameOfAnother) {
+  OpenQuestions open;
+  const auto number = open.ask({six(), seven()}, kS);
+  EXPECT_FALSE(open.note({6, 5, number, false, "prepared"}, participant(7), kS));
+  EXPECT_FALSE(open.note({6, 5, number, false, "prepared"}, participant(8), kS));
+  EXPECT_TRUE(open.note({6, 5, number, true, "no"}, participant(6), kS));
+  EXPECT_EQ(open.take(number).at(6).outcome, OpenQuestions::Outcome::kRefused);
+}
+
+TEST(OpenQuestion, HearsNobodyWhereSeveralSayThatTheyAreTheOne) {
+  OpenQuestions open;
+  const auto number = open.ask({six(), {6, participant(8)}, six()}, kS);
+  for (const auto& each : {participant(6), participant(8), participant(0)}) {
+    EXPECT_FALSE(open.note({6, 5, number, false, "prepared"}, each, kS));
+  }
+  EXPECT_TRUE(open.is_over(number, kS + OpenQuestions::kPatience));
+  EXPECT_EQ(open.take(number).at(6).outcome, OpenQuestions::Outcome::kSilent);
 }
 
 TEST(OpenQuestion, IsAskedAgainUntilItIsAnswered) {
   OpenQuestions open;
-  const auto number = open.ask({6, 7}, kS);
+  const auto number = open.ask({six(), seven()}, kS);
   EXPECT_THAT(open.due(number, kS + OpenQuestions::kAskAgain - 1), IsEmpty());
-  open.note({7, 5, number, false, "here"}, kS);
+  open.note({7, 5, number, false, "here"}, participant(7), kS);
   EXPECT_THAT(open.due(number, kS + OpenQuestions::kAskAgain), ElementsAre(6U));
   EXPECT_THAT(open.due(number, kS + OpenQuestions::kAskAgain + 1), IsEmpty());
   EXPECT_THAT(open.due(number, kS + 2 * OpenQuestions::kAskAgain), ElementsAre(6U));
@@ -91,25 +115,27 @@ TEST(OpenQuestion, IsAskedAgainUntilItIsAnswered) {
 
 TEST(OpenQuestion, WaitsInBoundedNumber) {
   OpenQuestions open;
-  for (std::size_t i = 0; i < OpenQuestions::kMost; ++i) EXPECT_NE(open.ask({6}, kS), 0U);
-  EXPECT_EQ(open.ask({6}, kS), 0U);
+  for (std::size_t i = 0; i < OpenQuestions::kMost; ++i) EXPECT_NE(open.ask({six()}, kS), 0U);
+  EXPECT_EQ(open.ask({six()}, kS), 0U);
   static_cast<void>(open.take(1));
-  EXPECT_NE(open.ask({6}, kS), 0U);
+  EXPECT_NE(open.ask({six()}, kS), 0U);
 }
 
 TEST(OpenQuestion, KeepsABoundedNumberOfBytesOfAllAnswersTogether) {
   OpenQuestions open;
   const std::size_t most = OpenQuestions::kMostBytes / kMaxAnswer;
-  std::vector<Incarnation> asked;
-  for (Incarnation each = 1; each <= most + 1; ++each) asked.push_back(each);
+  std::vector<OpenQuestions::Host> asked;
+  for (Incarnation each = 1; each <= most + 1; ++each) asked.push_back({each, {}});
   const auto number = open.ask(asked, kS);
   const std::string large(kMaxAnswer, 'x');
-  for (const Incarnation each : asked) EXPECT_TRUE(open.note({each, 5, number, false, large}, kS));
+  for (const auto& each : asked) {
+    EXPECT_TRUE(open.note({each.life, 5, number, false, large}, {}, kS));
+  }
   const auto replies = open.take(number);
   EXPECT_EQ(replies.at(most).outcome, OpenQuestions::Outcome::kAnswered);
   EXPECT_EQ(replies.at(most + 1).outcome, OpenQuestions::Outcome::kRefused);
-  const auto next = open.ask({6}, kS);
-  EXPECT_TRUE(open.note({6, 5, next, false, large}, kS));
+  const auto next = open.ask({six()}, kS);
+  EXPECT_TRUE(open.note({6, 5, next, false, large}, participant(6), kS));
   EXPECT_EQ(open.take(next).at(6).outcome, OpenQuestions::Outcome::kAnswered);
 }
 

@@ -19,7 +19,7 @@ using ::testing::ElementsAre;
 
 class Collected : public SampleTaker {
  public:
-  void take(const Payload& payload, dds_instance_handle_t /*writer*/) noexcept override {
+  void take(const Payload& payload, const SampleWriter& /*writer*/) noexcept override {
     const ArrivedSample sample(payload);
     std::string bytes(sample.size(), '?');
     EXPECT_TRUE(
