@@ -2,7 +2,9 @@
 
 #include <dds/ddsi/ddsi_sertype.h>
 
+#include <algorithm>
 #include <array>
+#include <iterator>
 #include <memory>
 
 #include "gateway/dds/opaque_type.hpp"
@@ -18,8 +20,13 @@ constexpr const char* kEventType = "arbiter::Event";
 // A writer that keeps the last event alone need not wait for readers that do not keep up, and in
 // Cyclone it does not: no reader holds up the one thread that sends.
 constexpr dds_duration_t kMaxBlocking = 0;
-// A bound of what a reader looks at, on a network where anybody may write.
-constexpr std::size_t kMaxOffers = 64;
+// Bounds of what a reader looks at each time and keeps, on a network where anybody may write. A
+// participant has one offer of a source, or two for a moment: nobody hides others by making many.
+constexpr std::size_t kMostLooks = 64;
+constexpr std::size_t kMostOffers = 256;
+constexpr std::ptrdiff_t kMostOffersOfOne = 2;
+// Usually enough, so that one question is.
+constexpr std::size_t kUsualWriters = 64;
 
 CycloneQos event_qos() {
   CycloneQos qos(dds_create_qos());
@@ -49,7 +56,7 @@ struct FreeEndpoint {
   }
 };
 
-std::optional<OfferCard> card_of(dds_entity_t reader, dds_instance_handle_t writer) {
+std::optional<EventReader::Offer> offer_of(dds_entity_t reader, dds_instance_handle_t writer) {
   const std::unique_ptr<dds_builtintopic_endpoint_t, FreeEndpoint> endpoint(
       dds_get_matched_publication_data(reader, writer));
   if (endpoint == nullptr || endpoint->qos == nullptr) return std::nullopt;
@@ -58,7 +65,11 @@ std::optional<OfferCard> card_of(dds_entity_t reader, dds_instance_handle_t writ
   if (!dds_qget_userdata(endpoint->qos, &data, &size) || data == nullptr) return std::nullopt;
   auto card = read_offer_card(Bytes(static_cast<const std::byte*>(data), size));
   dds_free(data);
-  return card;
+  if (!card) return std::nullopt;
+  EventReader::Offer offer{writer, std::move(*card), {}};
+  std::copy_n(std::begin(endpoint->participant_key.v), offer.participant.size(),
+              offer.participant.begin());
+  return offer;
 }
 
 }  // namespace
@@ -133,21 +144,46 @@ EventReader::EventReader(const Network& network, const std::string& source,
                    "a reader of " + topic_of_source(source));
 }
 
-std::vector<EventReader::Offer> EventReader::offers(std::uint64_t current) const {
-  std::array<dds_instance_handle_t, kMaxOffers> writers{};
-  const dds_return_t found =
-      dds_get_matched_publications(reader_.get(), writers.data(), writers.size());
-  std::vector<Offer> offers;
-  if (current != 0) {
-    if (auto card = card_of(reader_.get(), current)) offers.push_back({current, std::move(*card)});
+std::vector<EventReader::Offer> EventReader::offers(std::uint64_t current) {
+  std::vector<std::uint64_t> writers = writers_of(reader_.get());
+  std::sort(writers.begin(), writers.end());
+  std::erase_if(offers_, [&](const auto& each) {
+    return !std::binary_search(writers.begin(), writers.end(), each.first);
+  });
+  if (std::binary_search(writers.begin(), writers.end(), current)) look_at(current);
+  // Those after the last one, and then from the beginning.
+  std::rotate(writers.begin(), std::upper_bound(writers.begin(), writers.end(), looked_at_),
+              writers.end());
+  for (std::size_t i = 0; i < std::min(writers.size(), kMostLooks); ++i) {
+    looked_at_ = writers[i];
+    if (looked_at_ != current) look_at(looked_at_);
   }
-  for (std::size_t i = 0; i < writers.size() && static_cast<dds_return_t>(i) < found; ++i) {
-    if (writers.at(i) == current) continue;
-    if (auto card = card_of(reader_.get(), writers.at(i))) {
-      offers.push_back({writers.at(i), std::move(*card)});
-    }
+  std::vector<Offer> offers;
+  for (const auto& [key, offer] : offers_) {
+    offers.insert(key == current ? offers.begin() : offers.end(), offer);
   }
   return offers;
+}
+
+void EventReader::look_at(std::uint64_t writer) {
+  offers_.erase(writer);
+  auto offer = offer_of(reader_.get(), writer);
+  if (!offer || offers_.size() >= kMostOffers) return;
+  const auto of_it = std::count_if(offers_.begin(), offers_.end(), [&](const auto& each) {
+    return each.second.participant == offer->participant;
+  });
+  if (of_it < kMostOffersOfOne) offers_.emplace(writer, std::move(*offer));
+}
+
+std::vector<std::uint64_t> writers_of(dds_entity_t reader) {
+  std::vector<dds_instance_handle_t> writers(kUsualWriters);
+  for (;;) {
+    const dds_return_t found = dds_get_matched_publications(reader, writers.data(), writers.size());
+    const std::size_t count = found < 0 ? 0 : static_cast<std::size_t>(found);
+    const bool are_all = count <= writers.size();
+    writers.resize(are_all ? count : 2 * count);  // others may be coming
+    if (are_all) return writers;
+  }
 }
 
 }  // namespace arbiter::link

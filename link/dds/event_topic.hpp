@@ -11,6 +11,7 @@
 #include <dds/dds.h>
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,7 @@
 #include "gateway/dds/reader_cache.hpp"
 #include "link/core/cards.hpp"
 #include "link/core/demand.hpp"
+#include "link/core/participant.hpp"
 #include "link/dds/network.hpp"
 
 namespace arbiter::link {
@@ -58,18 +60,26 @@ class EventReader {
   struct Offer {
     std::uint64_t key = 0;
     OfferCard card;
+    Participant participant{};  // whose writer it is
   };
   // By which DemandTeller knows it.
   [[nodiscard]] dds_entity_t handle() const { return reader_.get(); }
-  // Who offers the source now. Malformed cards are passed over. Of very many not all are looked at,
-  // but `current` is, if it is there.
-  [[nodiscard]] std::vector<Offer> offers(std::uint64_t current) const;
+  // Who offers the source now. Malformed cards are passed over. Of very many some are looked at
+  // each time, in turn, but `current` always, if it is there.
+  [[nodiscard]] std::vector<Offer> offers(std::uint64_t current);
 
  private:
+  void look_at(std::uint64_t writer);
+
   gateway::dds::ReaderCache cache_;
   Entity topic_;
   Entity reader_;
+  std::map<std::uint64_t, Offer> offers_;  // by their keys; of writers that have been looked at
+  std::uint64_t looked_at_ = 0;            // the last one
 };
+
+// All writers that a reader has, however many.
+[[nodiscard]] std::vector<std::uint64_t> writers_of(dds_entity_t reader);
 
 // The header of encapsulation that stands before everything that links send.
 [[nodiscard]] Bytes encapsulation() noexcept;

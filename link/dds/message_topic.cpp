@@ -17,8 +17,6 @@ namespace {
 constexpr std::int32_t kMostUnheard = 12;
 // Until what was sent before is through, where it is much.
 constexpr dds_duration_t kMessageWait = DDS_MSECS(200);
-// Usually enough, so that one question is.
-constexpr std::size_t kUsualWriters = 64;
 
 gateway::dds::CycloneQos qos_of(Delivery delivery) {
   gateway::dds::CycloneQos qos(dds_create_qos());
@@ -73,17 +71,7 @@ bool MessageTopic::send(const ByteString& message) noexcept {
 
 // A part of them would not do: hosts outside of it would be taken for gone. A number costs next to
 // nothing beside what Cyclone keeps of the writer.
-std::vector<std::uint64_t> MessageTopic::writers() const {
-  std::vector<dds_instance_handle_t> writers(kUsualWriters);
-  for (;;) {
-    const dds_return_t found =
-        dds_get_matched_publications(reader_.get(), writers.data(), writers.size());
-    const std::size_t count = found < 0 ? 0 : static_cast<std::size_t>(found);
-    const bool are_all = count <= writers.size();
-    writers.resize(are_all ? count : 2 * count);  // others may be coming
-    if (are_all) return writers;
-  }
-}
+std::vector<std::uint64_t> MessageTopic::writers() const { return writers_of(reader_.get()); }
 
 void MessageTopic::take(const gateway::dds::Payload& payload,
                         const gateway::dds::SampleWriter& writer) noexcept {

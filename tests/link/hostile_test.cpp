@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <deque>
+
 #include "link/core/cards.hpp"
 #include "link/core/event_header.hpp"
 #include "link/core/held_tokens.hpp"
@@ -77,6 +79,20 @@ TEST_F(HostileHost, NobodySpeaksInTheNameOfAnother) {
     EXPECT_THAT(now, testing::Not(testing::HasSubstr("twice")));
     return now != before || HasFailure();
   });
+}
+
+// Which writers are looked at first is by chance, in each life of the head's link.
+TEST_F(HostileHost, ManyWritersOfOneHideNoHost) {
+  std::deque<Stranger> many;
+  for (link::Incarnation each = 1000; each < 1100; ++each)
+    many.emplace_back(network_, each, "many");
+  for (int life = 0; life < 5; ++life) {
+    Host head("head", runtime_, kNoRules, network());
+    const Planner planner(head);
+    base_.await_described(kPlanner, "open on several hosts: head, ");
+    head.link().kill();
+    await([&] { return base_.described(kPlanner).find("head") == std::string::npos; });
+  }
 }
 
 // The second one is taken for the next life of the first, until both are there for too long.
