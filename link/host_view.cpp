@@ -126,11 +126,12 @@ std::uint64_t digest_of(const wire::ModelDocument& document) {
 HostView::HostView(std::string instance, std::optional<shm::Nanoseconds> max_age)
     : instance_name_(std::move(instance)), max_age_(max_age) {}
 
-void HostView::update() {
+void HostView::update(const std::function<void()>& model_is_known) {
   try {
     if (instance_ == nullptr && !join()) return;
     instance_->update();
     look_at_model();
+    model_is_known();
     look_at_ports();
     obstacle_.clear();
   } catch (const std::exception& error) {  // no daemon, a policy, memory that is short

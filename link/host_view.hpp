@@ -30,8 +30,9 @@ class HostView {
   HostView(std::string instance, std::optional<shm::Nanoseconds> max_age);
 
   // Takes up what has changed. Asks the daemon at most four times a second, and waits for its
-  // answer for a second at most. What was known stays where there is no daemon.
-  void update();
+  // answer for a second at most. What was known stays where there is no daemon. `model_is_known` is
+  // called once wanted() is that of the model in force, before the daemon is asked what is open.
+  void update(const std::function<void()>& model_is_known);
 
   // The sources that the model in force connects or reads, with how old their samples may be when
   // they arrive: T, or max_age where that is shorter; for `forever` max_age, or without one the

@@ -210,7 +210,7 @@ Link::End Link::loop(int stop) {
   for (; !stops_; stops_ = waits(stop, kLookPeriod)) {
     if (has_network_changed()) return End::kNetworkChanged;
     options_.on_round();
-    view_.update();
+    view_.update([this] { set_max_ages(); });
     say_once(said_of_view_, view_.obstacle());
     say_what_passes();
     options_.on_round();
@@ -225,6 +225,14 @@ Link::End Link::loop(int stop) {
   return End::kStopped;
 }
 
+// What the model before would have let in is late from now on.
+void Link::set_max_ages() {
+  for (const auto& [source, one] : imports_) {
+    const auto age = view_.wanted().find(source);
+    if (age != view_.wanted().end()) one->set_max_age(age->second);
+  }
+}
+
 // What is to be closed is closed before anything waits for the daemon.
 void Link::choose_imports(const Patience& patience) {
   const auto& wanted = view_.wanted();
@@ -237,8 +245,8 @@ void Link::choose_imports(const Patience& patience) {
     }
   }
   end(std::move(gone));
+  set_max_ages();
   for (const auto& [source, one] : imports_) {
-    one->set_max_age(wanted.find(source)->second);
     one->look(view_.open_here().contains(source), view_.use_of(source));
   }
   shm::Nanoseconds shortest = 0;  // no import

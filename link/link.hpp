@@ -76,6 +76,7 @@ class Link {
   [[nodiscard]] bool has_network_changed();
   // Once, when it is known.
   void say_what_passes();
+  void set_max_ages();
   void choose_imports(const Patience& patience);
   using Imports = std::map<std::string, std::unique_ptr<Import>, std::less<>>;
   void end(Imports gone);
