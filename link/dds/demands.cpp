@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <memory>
 #include <new>
 #include <optional>
@@ -12,6 +13,9 @@ namespace {
 
 // A bound of what is looked at for one writer: where there are more readers, all samples are sent.
 constexpr std::size_t kMaxReaders = 64;
+
+// What could not be said is said again after it: memory is short.
+constexpr std::chrono::milliseconds kTellAgain{100};
 
 struct FreeReader {
   void operator()(dds_builtintopic_endpoint_t* endpoint) const {
@@ -33,7 +37,7 @@ Demand demand_of(dds_entity_t writer, dds_instance_handle_t reader) {
 
 }  // namespace
 
-DemandTeller::DemandTeller() : thread_([this] { run(); }) {}
+DemandTeller::DemandTeller(Set set) : set_(std::move(set)), thread_([this] { run(); }) {}
 
 DemandTeller::~DemandTeller() {
   {
@@ -55,19 +59,35 @@ bool DemandTeller::tell(dds_entity_t reader, const DemandCard& card) noexcept {
   return true;
 }
 
+dds_return_t DemandTeller::set_user_data(dds_entity_t reader, const ByteString& data) {
+  const gateway::dds::CycloneQos qos(dds_create_qos());
+  dds_qset_userdata(qos.get(), data.data(), data.size());
+  return dds_set_qos(reader, qos.get());
+}
+
 void DemandTeller::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
     changed_.wait(lock, [&] { return ends_ || !untold_.empty(); });
     if (ends_) return;
-    const auto next = untold_.extract(untold_.begin());
+    auto next = untold_.extract(untold_.begin());
     lock.unlock();
-    const gateway::dds::CycloneQos qos(dds_create_qos());
-    const ByteString data = write_demand_card(next.mapped());
-    dds_qset_userdata(qos.get(), data.data(), data.size());
-    // It fails where the reader is gone.
-    static_cast<void>(dds_set_qos(next.key(), qos.get()));
+    const bool is_said = say(next.key(), next.mapped());
     lock.lock();
+    if (is_said) continue;
+    untold_.insert(std::move(next));  // unless there is a newer word
+    changed_.wait_for(lock, kTellAgain, [&] { return ends_; });
+  }
+}
+
+bool DemandTeller::say(dds_entity_t reader, const DemandCard& card) const noexcept {
+  try {
+    const dds_return_t set = set_(reader, write_demand_card(card));
+    // The reader is gone.
+    return set == DDS_RETCODE_OK || set == DDS_RETCODE_BAD_PARAMETER ||
+           set == DDS_RETCODE_ALREADY_DELETED;
+  } catch (const std::bad_alloc&) {
+    return false;
   }
 }
 

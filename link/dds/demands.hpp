@@ -7,6 +7,7 @@
 #include <dds/dds.h>
 
 #include <condition_variable>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <string>
@@ -24,18 +25,26 @@ namespace arbiter::link {
 // which must not wait for its locks, and the link's own thread may wait for a daemon.
 class DemandTeller {
  public:
-  DemandTeller();
+  // Sets the user data of a reader, and returns what Cyclone does.
+  using Set = std::function<dds_return_t(dds_entity_t reader, const ByteString& data)>;
+
+  explicit DemandTeller(Set set = set_user_data);
   DemandTeller(const DemandTeller&) = delete;
   DemandTeller& operator=(const DemandTeller&) = delete;
   ~DemandTeller();
 
-  // Soon; the last word of several. A reader that is gone by then is passed over. Any thread.
+  // Soon; the last word of several, and again until it is said. A reader that is gone by then is
+  // passed over. Any thread.
   // False: it will not be said, because memory is short.
   [[nodiscard]] bool tell(dds_entity_t reader, const DemandCard& card) noexcept;
 
  private:
+  static dds_return_t set_user_data(dds_entity_t reader, const ByteString& data);
   void run();
+  // False: it has to be said again.
+  [[nodiscard]] bool say(dds_entity_t reader, const DemandCard& card) const noexcept;
 
+  const Set set_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<dds_entity_t, DemandCard> untold_;
