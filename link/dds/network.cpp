@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "gateway/dds/domain.hpp"
+#include "link/core/event_header.hpp"
 #include "link/dds/security.hpp"
 
 namespace arbiter::link {
@@ -29,6 +30,12 @@ namespace {
 // reader that is not waits for 3 s; discovery is several such conversations, one after another.
 // WriterLingerDuration: for so long at most the end of a source waits for hosts that do not
 // acknowledge; that it has ended, they learn from discovery.
+// MaxSampleSize: what a stranger says that it sends is not held until it is whole and can be
+// judged. The largest sample crosses, with its header (core/event_header.hpp) and what DDS adds;
+// answers and cards are smaller.
+constexpr std::size_t kMaxBytes = kMaxSampleBytes + 4096;
+static_assert(kMaxSampleBytes + kMaxHeaderBytes < kMaxBytes);
+
 constexpr const char* kForAll =
     "<General><MaxMessageSize>1400B</MaxMessageSize><FragmentSize>1300B</FragmentSize></General>"
     "<Internal><SocketReceiveBufferSize max=\"8MiB\"/></Internal>"
@@ -68,7 +75,9 @@ std::string configuration_of(const NetworkOptions& options) {
   gateway.interfaces = options.interfaces;
   if (gateway.interfaces.empty()) gateway.interfaces.emplace_back("lo");
   gateway.peers = options.peers;
-  std::string all = std::string(kForAll) + "," + gateway::dds::configuration_of(gateway);
+  std::string all = kForAll;
+  all += "<Internal><MaxSampleSize>" + std::to_string(kMaxBytes) + "B</MaxSampleSize></Internal>,";
+  all += gateway::dds::configuration_of(gateway);
   if (!options.security.empty()) {
     all += "," + security_configuration(options.security, options.name);
   }

@@ -1,4 +1,4 @@
-// Who writes on a topic of links: link/dds/message_topic.hpp.
+// Who writes on a topic of links: link/dds/message_topic.hpp. What is too large to be written.
 #include "link/dds/message_topic.hpp"
 
 #include <dds/ddsi/ddsi_sertype.h>
@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "gateway/dds/opaque_type.hpp"
+#include "link/core/event_header.hpp"
 #include "link/core/topic_names.hpp"
+#include "link/dds/event_topic.hpp"
 #include "tests/link/scene.hpp"
 
 namespace arbiter::test {
@@ -44,6 +46,25 @@ TEST(MessageTopic, NamesAllWritersHoweverMany) {
       [](Bytes, const gateway::dds::SampleWriter&) {}, bell);
   const ManyWriters many(domain.number(), kMany);
   await([&] { return cards.writers().size() == kMany; });
+}
+
+// In either direction: what is larger is not put together, however much of it comes.
+TEST(NetworkOfLinks, CarriesTheLargestSampleAndNothingMuchLarger) {
+  const OwnDomain domain;
+  const link::Network network({domain.number(), {}, {}});
+  const gateway::Bell bell;
+  link::OfferCard card;
+  card.incarnation = 1;
+  card.host = "head";
+  card.source = "/Camera/image:o";
+  link::EventWriter writer(network, card, bell);
+  const link::ByteString header(link::kMaxHeaderBytes);
+  const std::vector<std::byte> sample(link::kMaxSampleBytes + 4096);
+  const auto writes = [&](std::size_t size) {
+    return writer.write(Bytes(header.data(), header.size()), Bytes(sample.data(), size));
+  };
+  EXPECT_TRUE(writes(link::kMaxSampleBytes));
+  EXPECT_FALSE(writes(sample.size()));
 }
 
 }  // namespace

@@ -50,6 +50,22 @@ TEST_F(Hosts, ASampleSaysWhichOneItWasThere) {
             static_cast<std::uint64_t>(later_number - number));
 }
 
+TEST_F(Hosts, ASampleOf16MiBCrosses) {
+  constexpr std::size_t kLargest = std::size_t{16} << 20;
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Node brain = head.node("brain");
+  auto planner = brain.output_port(kPlanner, Type::variable("robot/Cloud", kLargest));
+  Node body = base.node("body");
+  auto motor = body.input_port(kMotor);
+  const std::vector<std::byte> cloud(kLargest, std::byte{7});
+  await([&] {
+    planner.publish(Bytes(cloud.data(), cloud.size()));
+    const auto got = motor.wait_for(500ms);
+    return got && got->size() == kLargest && (**got)[kLargest - 1] == std::byte{7};
+  });
+}
+
 TEST_F(Hosts, ADeactivationEndsTheActivityOnTheOtherHost) {
   Host head("head", runtime_, kNoRules, network());
   Host base("base", runtime_, motor_model("1000s"), network());
