@@ -184,6 +184,11 @@ void Exports::hear_readers(std::uint64_t id, Export& one) {
   one.reader_changes = one.writer.changes_of_readers();
   one.is_wanted = one.writer.is_wanted();
   one.demand = one.writer.demand();
+  // Its state is said in its place: who comes later would have the sample without wanting it.
+  if (one.written != 0 && is_withheld(one.demand, one.written)) {
+    one.is_unsaid = true;
+    ready_.insert(id);
+  }
   if (one.kept.is_there()) {
     ready_.insert(id);
   } else if (one.demand == Demand::kSamples) {
@@ -212,14 +217,23 @@ void Exports::state(Export& one, bool is_deactivated) {
 }
 
 bool Exports::say_unsaid() {
-  if (!has_unsaid_) return false;
+  if (!std::exchange(has_closed_, false) && !has_unsaid_) return false;
   bool is_left = false;
   for (const auto& [id, one] : exports_) {
     if (one->is_unsaid) state(*one, one->is_deactivated);
-    is_left = is_left || one->is_unsaid;
+    if (!one->tap && one->written != 0) drop_sample(*one);
+    is_left = is_left || one->is_unsaid || (!one->tap && one->written != 0);
   }
   has_unsaid_ = is_left;
   return is_left;
+}
+
+// It is no other event: where nobody reads it, nobody has missed one.
+void Exports::drop_sample(Export& one) {
+  header_.kind = EventKind::kState;
+  header_.is_deactivated = one.is_deactivated;
+  header_.tokens.clear();
+  static_cast<void>(put(one, {}));
 }
 
 // Sends header_, which says what has happened, and the sample.
@@ -239,7 +253,9 @@ bool Exports::put(Export& one, Bytes sample) {
   header_.length = static_cast<std::uint32_t>(sample.size());
   const WritableBytes bytes(buffer_.data(), header_bytes(header_));
   write_header(header_, bytes);
-  return one.writer.write(bytes, sample);
+  const bool is_written = one.writer.write(bytes, sample);
+  if (is_written) one.written = sample.size();
+  return is_written;
 }
 
 bool Exports::know_type(Export& one, const shm::TypeInfo& type) {

@@ -158,6 +158,8 @@ void Exports::close_tap(Export& one, std::uint64_t id) {
   if (in_turn_ == id) return;
   gone.swap(one.tap);
   one.kept.end();
+  has_closed_ = true;
+  wake();
 }
 
 // The other thread uses a tap once it is in the export, and not before.

@@ -70,6 +70,7 @@ class Exports {
     std::uint64_t sequence = 0;        // of the last sample
     bool is_deactivated = false;       // by the last event
     bool is_unsaid = false;            // that event was not written
+    std::size_t written = 0;           // bytes of the sample that the writer keeps
     bool is_wanted = false;            // by anybody
     Demand demand = Demand::kSamples;  // of those who read it
     std::uint32_t reader_changes = 0;  // that `demand` knows of
@@ -108,8 +109,11 @@ class Exports {
   // From here on: of the export whose turn it is, or under mutex_.
   bool send_some(Export& one);
   void state(Export& one, bool is_deactivated);
-  // Says the state of those whose last event was not written. True: one is left.
+  // Says the state of those whose last event was not written, and of those whose last sample nobody
+  // reads any more. True: one is left.
   bool say_unsaid();
+  // In the place of the sample that the writer keeps for who comes later.
+  void drop_sample(Export& one);
   void write(Export& one, Bytes sample);
   // As write(), of an event that has its number already.
   [[nodiscard]] bool put(Export& one, Bytes sample);
@@ -140,6 +144,7 @@ class Exports {
   std::map<std::uint64_t, std::unique_ptr<Export>> exports_;
   std::set<std::uint64_t> ready_;  // of which something may have to be sent
   std::uint64_t in_turn_ = 0;      // 0: none
+  bool has_closed_ = false;        // a tap, since the sending thread has looked
   bool ends_ = false;
   // The sending thread's.
   std::vector<std::uint64_t> turns_;  // who was ready when it looked

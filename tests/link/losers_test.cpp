@@ -140,6 +140,47 @@ class ALoser : public Losers {
   View view_{base_};
 };
 
+// Once nobody wants samples any more, none is kept for who comes later, and need not want any.
+TEST_F(Losers, WhoOnlySensesTheSourceGetsNoSampleAtJoining) {
+  Host base("base", runtime_, view_model("500s"), network());
+  Camera camera(head_);
+  View view(base);
+  view.watch(camera);
+  const Eavesdropper first(here_, Demand::kHeaders);
+  await([&] {
+    camera.publish();
+    return first.seen(EventKind::kSample) > 0;
+  });
+  const int states = first.seen(EventKind::kState);
+  base.link().signal(SIGTERM);
+  EXPECT_EQ(base.link().wait(), 0);
+  await([&] { return first.seen(EventKind::kState) > states; });
+  const Eavesdropper second(here_, Demand::kHeaders);
+  await([&] { return second.seen(EventKind::kState) > 0; });
+  EXPECT_EQ(second.seen(EventKind::kSample), 0);
+}
+
+// The head may not have come to it when the next one joins.
+TEST_F(Losers, NobodyGetsASampleFromBeforeEverybodyHadLeft) {
+  Host base("base", runtime_, view_model("500s"), network());
+  Camera camera(head_);
+  View view(base);
+  await([&] {
+    view.watch(camera);
+    base.link().signal(SIGTERM);
+    EXPECT_EQ(base.link().wait(), 0);
+    await([&] { return head_.daemon().source(kCamera)["taps"].empty(); });
+    bool has_sample = false;
+    {
+      const Eavesdropper ear(here_, Demand::kSamples);
+      await([&] { return ear.seen(EventKind::kState) > 0; });
+      has_sample = ear.seen(EventKind::kSample) > 0;
+    }
+    base.start_link();
+    return !has_sample;
+  });
+}
+
 TEST_F(Losers, OnlyHeadersCrossAndTheNewestImageIsThereWhenItWinsAgain) {
   Host base("base", runtime_, view_model("500s"), network());
   Camera camera(head_);
