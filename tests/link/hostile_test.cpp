@@ -12,6 +12,7 @@
 #include "link/dds/network.hpp"
 #include "link/dds/token_topic.hpp"
 #include "shm/clock.hpp"
+#include "tests/gateway/dds/noise.hpp"
 #include "tests/link/robot.hpp"
 #include "tests/link/stranger.hpp"
 
@@ -20,6 +21,23 @@ namespace {
 
 using link::EventHeader;
 using link::EventKind;
+
+using NoisyHosts = LoopbackHosts;
+
+TEST_F(NoisyHosts, LiveThroughDatagramsThatAreNoneOfRtps) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  send_noise(domain_);
+  body.drive(planner);
+  for (Host* const each : {&head, &base}) {
+    each->link().signal(SIGTERM);
+    EXPECT_EQ(each->link().wait(), 0) << each->log();
+    EXPECT_LT(each->log().size(), 100'000U);
+  }
+}
 
 class HostileHost : public LoopbackHosts {
  protected:

@@ -1,18 +1,15 @@
 // Strangers that send what no honest program would: the gateway counts it, and passes on what the
 // honest ones send.
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 
 #include <cstdlib>
 #include <cstring>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "gateway/dds/entity.hpp"
 #include "gateway/dds/opaque_type.hpp"
+#include "tests/gateway/dds/noise.hpp"
 #include "tests/gateway/dds/scene.hpp"
 
 namespace arbiter::test {
@@ -161,7 +158,6 @@ TEST(DdsHostile, ANumberThatStandsElsewhereEndsBothSources) {
   EXPECT_EQ(battery.published("/no:o"), 0);
 }
 
-// Datagrams to all ports on which the gateway may listen: noise, and RTPS with bytes changed.
 TEST(DdsHostile, ItLivesThroughDatagramsThatAreNoneOfRtps) {
   const OwnDomain domain;
   const Daemon daemon(base_model("1000s"));
@@ -172,30 +168,7 @@ TEST(DdsHostile, ItLivesThroughDatagramsThatAreNoneOfRtps) {
   navigation.await("matched 1");
   gateway.see("1 publisher matched");
   publish_until_heard(navigation, base, "1 0");
-  std::mt19937 random(1);
-  const shm::FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  for (int i = 0; i < 20'000; ++i) {
-    std::string datagram(random() % 200 + 4, '\0');
-    for (char& byte : datagram) byte = static_cast<char>(random());
-    if (i % 2 == 0) {  // a header, and submessages of known kinds
-      datagram.replace(0, 4, "RTPS");
-      datagram.resize(std::max<std::size_t>(datagram.size(), 24));
-      datagram.replace(4, 4, std::string("\2\1\1\x10", 4));
-      constexpr const char kKinds[] = {0x01, 0x06, 0x07, 0x08, 0x09, 0x0e, 0x12, 0x13, 0x15, 0x16};
-      datagram[20] = kKinds[random() % sizeof kKinds];
-      datagram[21] = static_cast<char>(random() % 8);
-      datagram[22] = static_cast<char>(random() % 2 == 0 ? datagram.size() - 24 : random());
-      datagram[23] = '\0';
-    }
-    sockaddr_in to{};
-    to.sin_family = AF_INET;
-    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    // Of participants 0 to 2: discovery, then data (RTPS 2.5, 9.6.2).
-    to.sin_port =
-        htons(static_cast<std::uint16_t>(7400 + 250 * domain.number() + 10 + random() % 6));
-    ::sendto(socket.get(), datagram.data(), datagram.size(), 0,
-             reinterpret_cast<const sockaddr*>(&to), sizeof to);
-  }
+  send_noise(domain);
   publish_until_heard(navigation, base, "2 0");
   EXPECT_EQ(gateway.end(), 0) << gateway.log();
   EXPECT_LT(gateway.log().size(), 100'000U);
