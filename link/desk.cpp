@@ -13,7 +13,6 @@
 namespace arbiter::link {
 namespace {
 
-constexpr shm::Nanoseconds kPulsePeriod = 1'000'000'000;
 // Cards are whole: while ports come and go, not each change is sent.
 constexpr shm::Nanoseconds kCardPeriod = 500'000'000;
 // Cards may be long. After a change they are compared until all that it can lead to has settled.
@@ -75,7 +74,7 @@ void Desk::join(const Network& network, std::string name, const gateway::Bell& b
     }
     topics_->pulses.send(pulse);
   });
-  pulse_->set_period(kPulsePeriod);
+  pulse_->set_period(RoundTrips::kPulsePeriod);
 }
 
 void Desk::leave() {
@@ -90,6 +89,7 @@ void Desk::leave() {
   gone.reset();  // without locks: it waits for what is being heard
   const std::lock_guard lock(mutex_);
   neighbours_.keep({}, shm::monotonic_now());
+  round_trips_.keep({});
 }
 
 void Desk::close() {
@@ -100,6 +100,11 @@ void Desk::close() {
     closes_ = true;
   }
   changed_.notify_all();
+}
+
+std::set<Participant> Desk::deaf() const {
+  const std::lock_guard lock(mutex_);
+  return round_trips_.deaf();
 }
 
 Neighbours Desk::known() const {
@@ -158,12 +163,23 @@ void Desk::look_at_others() {
   const shm::Nanoseconds now = shm::monotonic_now();  // before: meanwhile others may come
   const std::vector<std::uint64_t> writers = topics_->cards.writers();
   std::size_t without_place = 0;
+  std::set<std::string> deaf_hosts;
   {
     const std::lock_guard lock(mutex_);
     neighbours_.keep(writers, now);
     without_place = neighbours_.without_place();
+    std::set<Participant> there;
+    for (const Neighbour& each : neighbours_.all()) {
+      if (each.is_up) there.insert(each.participant);
+    }
+    round_trips_.keep(there);
+    const std::set<Participant> deaf = round_trips_.deaf();
+    for (const Neighbour& each : neighbours_.all()) {
+      if (each.is_up && deaf.contains(each.participant)) deaf_hosts.insert(each.card->host);
+    }
   }
   say_without_place(without_place);
+  say_deaf(std::move(deaf_hosts));
   std::vector<Neighbour> neighbours;
   {
     const std::lock_guard lock(mutex_);
@@ -195,6 +211,17 @@ void Desk::say_without_place(std::size_t count) {
     say_sparingly(gateway::Level::kWarning, wire::without_place_text(count));
   }
   is_without_place_said_ = count != 0;
+}
+
+void Desk::say_deaf(std::set<std::string> hosts) {
+  for (const std::string& host : hosts) {
+    if (deaf_said_.contains(host)) continue;
+    say_sparingly(gateway::Level::kWarning,
+                  "host " + host +
+                      " is there, and has not heard this one for 2 s: nothing is imported from it "
+                      "until it does");
+  }
+  deaf_said_ = std::move(hosts);
 }
 
 void Desk::hear_card(Bytes message, const gateway::dds::SampleWriter& writer) {

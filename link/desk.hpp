@@ -14,6 +14,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <shared_mutex>
 #include <string>
 #include <thread>
@@ -64,6 +65,8 @@ class Desk {
   // a second.
   void look(OwnHost own);
 
+  // Of those that are there, who does not hear this link.
+  [[nodiscard]] std::set<Participant> deaf() const;
   // After close(): those that it knew, gone now.
   [[nodiscard]] Neighbours known() const;
 
@@ -78,6 +81,7 @@ class Desk {
   void send_card();
   void look_at_others();
   void say_without_place(std::size_t count);
+  void say_deaf(std::set<std::string> hosts);
 
   // On Cyclone's threads.
   void hear_card(Bytes message, const gateway::dds::SampleWriter& writer);
@@ -135,6 +139,7 @@ class Desk {
   std::shared_ptr<const OwnHost> sent_;  // whose card was sent last; null: it has to be sent
   std::uint64_t compared_changes_ = 0;
   bool is_without_place_said_ = false;
+  std::set<std::string> deaf_said_;
   shm::Nanoseconds compare_until_ = 0;
   shm::Nanoseconds compare_again_ = 0;
   shm::Nanoseconds send_again_ = 0;

@@ -56,9 +56,9 @@ Import::~Import() {
   reader_.reset();  // it calls take() until then
 }
 
-void Import::look(bool is_open_here, SourceUse use) {
+void Import::look(bool is_open_here, SourceUse use, const std::set<Participant>& deaf) {
   is_open_here = has_just_yielded() || is_open_here;
-  listen_to_speaker();
+  listen_to_speaker(deaf);
   {
     const std::lock_guard lock(mutex_);
     demand_.set_use(is_open_here ? SourceUse::kNone : use, shm::monotonic_now());
@@ -138,9 +138,13 @@ void Import::obey(const Offerer* speaker) {
   unheard_.erase(last);
 }
 
-void Import::listen_to_speaker() {
-  const std::vector<EventReader::Offer> offers =
+void Import::listen_to_speaker(const std::set<Participant>& deaf) {
+  std::vector<EventReader::Offer> offers =
       reader_->offers(speaker_.current() == nullptr ? 0 : speaker_.current()->key);
+  forget(offers);
+  // It sends nothing any more, and we would wait for it as long as its announcements come.
+  std::erase_if(offers,
+                [&](const EventReader::Offer& each) { return deaf.contains(each.participant); });
   for (auto each = offers_.begin(); each != offers_.end();) {
     const bool is_there =
         std::any_of(offers.begin(), offers.end(), [&](const EventReader::Offer& offer) {
@@ -156,7 +160,6 @@ void Import::listen_to_speaker() {
     known.card = offer.card;
     speaker_.add({offer.key, offer.card.host, offer.card.incarnation});
   }
-  forget(offers);
   find_shared_name();
   say_who_speaks();
 }

@@ -13,6 +13,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@
 #include "link/core/demand.hpp"
 #include "link/core/event_header.hpp"
 #include "link/core/import_choice.hpp"
+#include "link/core/participant.hpp"
 #include "link/core/patience.hpp"
 #include "link/core/sent_tokens.hpp"
 #include "link/core/speaker.hpp"
@@ -51,8 +53,8 @@ class Import : private gateway::dds::SampleTaker {
     max_age_.store(age, std::memory_order_relaxed);
   }
   // Who speaks now, and whether the port is to be open: closes it if it is not. `use`: by the model
-  // in force.
-  void look(bool is_open_here, SourceUse use);
+  // in force. `deaf`: who does not hear this link, and so does not speak to it.
+  void look(bool is_open_here, SourceUse use, const std::set<Participant>& deaf);
   // After look(): opens the port if it is to be open and is not.
   void open(bool has_daemon, const Patience& patience);
   // Any thread: a component of this host asks for the name. Closes the port at once.
@@ -97,7 +99,7 @@ class Import : private gateway::dds::SampleTaker {
   // Of one that finds no place the state is not known before its next event.
   void remember(std::uint64_t writer, const StreamEvent& event) noexcept;
 
-  void listen_to_speaker();
+  void listen_to_speaker(const std::set<Participant>& deaf);
   void forget(const std::vector<EventReader::Offer>& offers);
   void open_port(const OfferCard& card);
   // Whether it has yielded, and this host's status may not say yet to whom.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -246,8 +247,9 @@ void Link::choose_imports(const Patience& patience) {
   }
   end(std::move(gone));
   set_max_ages();
+  const std::set<Participant> deaf = desk_->deaf();
   for (const auto& [source, one] : imports_) {
-    one->look(view_.open_here().contains(source), view_.use_of(source));
+    one->look(view_.open_here().contains(source), view_.use_of(source), deaf);
   }
   shm::Nanoseconds shortest = 0;  // no import
   for (const auto& [source, age] : wanted) {

@@ -1,5 +1,7 @@
 #include "link/core/pulse.hpp"
 
+#include <algorithm>
+
 #include "link/core/card_bytes.hpp"
 
 namespace arbiter::link {
@@ -39,10 +41,13 @@ std::optional<Pulse> read_pulse(Bytes bytes) {
 }
 
 Pulse RoundTrips::next(shm::Nanoseconds now) {
-  std::erase_if(others_, [&](const auto& each) { return now - each.second.came >= kSilence; });
+  const auto is_silent = [&](const Other& other) { return now - other.came >= kSilence; };
+  std::erase_if(others_,
+                [&](const auto& each) { return !each.second.is_there && is_silent(each.second); });
   Pulse pulse{me_, ++last_, {}};
   sent_.at(last_ % kKept) = now;
   for (const auto& [participant, other] : others_) {
+    if (is_silent(other)) continue;
     pulse.echoes.push_back(
         {other.life, other.number, static_cast<std::uint64_t>(now - other.came)});
   }
@@ -53,7 +58,10 @@ void RoundTrips::note(const Pulse& pulse, const Participant& from, shm::Nanoseco
   if (pulse.sender == me_) return;
   if (others_.size() >= kMaxEchoes && !others_.contains(from)) return;
   Other& other = others_[from];
-  if (other.life == 0) other.life = pulse.sender;
+  if (other.life == 0) {
+    other.life = pulse.sender;
+    other.echoed = last_;
+  }
   if (pulse.sender != other.life || pulse.number <= other.number) return;
   other.number = pulse.number;
   other.came = now;
@@ -61,11 +69,27 @@ void RoundTrips::note(const Pulse& pulse, const Participant& from, shm::Nanoseco
     if (echo.of != me_ || echo.number == 0 || echo.number > last_ || last_ - echo.number >= kKept) {
       continue;
     }
+    other.echoed = std::max(other.echoed, echo.number);
     const shm::Nanoseconds passed = now - sent_.at(echo.number % kKept);
     // It cannot have lain there for longer than that.
     if (passed < 0 || echo.lay > static_cast<std::uint64_t>(passed)) continue;
     other.round_trip = passed - static_cast<shm::Nanoseconds>(echo.lay);
   }
+}
+
+void RoundTrips::keep(const std::set<Participant>& there) {
+  std::erase_if(others_, [&](const auto& each) {
+    return each.second.is_there && !there.contains(each.first);
+  });
+  for (auto& [participant, other] : others_) other.is_there = there.contains(participant);
+}
+
+std::set<Participant> RoundTrips::deaf() const {
+  std::set<Participant> deaf;
+  for (const auto& [participant, other] : others_) {
+    if (last_ - other.echoed >= kUnechoed) deaf.insert(participant);
+  }
+  return deaf;
 }
 
 std::optional<shm::Nanoseconds> RoundTrips::of(const Participant& other) const {

@@ -1,7 +1,7 @@
 // Round trips between links, without comparing clocks: each link numbers the pulses that it sends,
-// once a second, and each pulse names the newest one of every other link, and for how long it has
-// been here. Who finds its own number in it knows the round trip: the time since it sent that, less
-// the time that it lay there.
+// four times a second, and each pulse names the newest one of every other link, and for how long it
+// has been here. Who finds its own number in it knows the round trip: the time since it sent that,
+// less the time that it lay there. Who does not find its newest ones is not heard there.
 //
 //   pulse  "ARBP", version 1, incarnation of the sender, number (8), how many echoes (2); each:
 //          incarnation (8), number (8), nanoseconds since it came (8)
@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "link/core/cards.hpp"
@@ -41,8 +42,12 @@ struct Pulse {
 // Units: nanoseconds of a monotonic clock. Thread safety: none of its own.
 class RoundTrips {
  public:
-  // Others are forgotten who have been silent for so long.
+  static constexpr shm::Nanoseconds kPulsePeriod = 250'000'000;
+  // Others are not echoed any more who have been silent for so long.
   static constexpr shm::Nanoseconds kSilence = 10'000'000'000;
+  // Who has echoed none of so many pulses in a row does not hear this link. That is two seconds in
+  // which this link ran: while it is held up it sends none.
+  static constexpr std::uint64_t kUnechoed = 8;
 
   explicit RoundTrips(Incarnation me) : me_(me) {}
 
@@ -50,6 +55,11 @@ class RoundTrips {
   [[nodiscard]] Pulse next(shm::Nanoseconds now);
   // One that has come. Senders that find no place are passed over.
   void note(const Pulse& pulse, const Participant& from, shm::Nanoseconds now);
+  // Who is there, of all others: those who were and are no more are forgotten at once, and who has
+  // not come yet after kSilence.
+  void keep(const std::set<Participant>& there);
+  // Those that have pulsed, and do not hear this link, as far as it can know.
+  [[nodiscard]] std::set<Participant> deaf() const;
   // The last that was measured; nothing: none.
   [[nodiscard]] std::optional<shm::Nanoseconds> of(const Participant& other) const;
 
@@ -59,6 +69,8 @@ class RoundTrips {
     Incarnation life = 0;
     std::uint64_t number = 0;
     shm::Nanoseconds came = 0;
+    std::uint64_t echoed = 0;  // our newest; before the first one that which it could not hear
+    bool is_there = false;
     std::optional<shm::Nanoseconds> round_trip;
   };
 

@@ -1,6 +1,7 @@
 // Which host a source is taken from, of those that have it open.
 //
-// One at a time: the one that is obeyed stays so until it is gone, whoever comes meanwhile. Only
+// One at a time: the one that is obeyed stays so until it is gone, or does not hear this link any
+// more (pulse.hpp), whoever comes meanwhile. Only
 // a link that has been started again takes the place of its earlier life, which may be believed to
 // live for a while yet (a lease): they are one host.
 //

@@ -90,6 +90,42 @@ TEST_F(Cable, APulledOneIsSilenceAndNothingOfItComesLate) { cut_and_heal(false);
 
 TEST_F(Cable, AHostThatWasGoneIsFoundAgain) { cut_and_heal(true); }
 
+// The head hears nobody, and sends to nobody any more; but the base hears its announcements.
+TEST_F(Cable, AForeverWinnerThatDoesNotHearUsCommandsNoMore) {
+  CabledRobot robot;
+  Host head("head", robot.runtime, source_model("forever"), robot.arguments(),
+            robot.head_network.enter());
+  Host base("base", robot.runtime, motor_model("forever"), robot.arguments(),
+            robot.base_network.enter());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  robot.cables.cut_to(kHead);
+  base.see("host head is there, and has not heard this one for 2 s");
+  body.await_idle();
+  robot.cables.heal_to(kHead);
+  body.drive(planner);
+}
+
+TEST_F(Cable, ASpeakerThatDoesNotHearUsGivesWay) {
+  CabledRobot robot;
+  const NetworkNamespace rear_network;
+  robot.cables.connect(rear_network, 3);
+  Host head("head", robot.runtime, source_model("300ms"), robot.arguments(),
+            robot.head_network.enter());
+  Host base("base", robot.runtime, motor_model("300ms"), robot.arguments(),
+            robot.base_network.enter());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  Host rear("rear", robot.runtime, source_model("300ms"), robot.arguments(), rear_network.enter());
+  Planner other(rear, planner.published());
+  base.await_described(kPlanner, "open on several hosts: head, rear");
+  robot.cables.cut_to(kHead);
+  base.await_described(kPlanner, "host rear");
+  body.drive(other);
+}
+
 // The large sample waits for a receipt that does not come; what is said after it must not be lost.
 TEST_F(Cable, ADeactivationBehindALargeSampleOutlivesACut) {
   CabledRobot robot;

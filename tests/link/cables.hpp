@@ -68,6 +68,17 @@ class Switch {
   // Pulls the cable, and puts it back.
   void cut(int number) const { place_.ip("link set " + port_of(number) + " down"); }
   void heal(int number) const { place_.ip("link set " + port_of(number) + " up"); }
+  // From now on nothing gets to that host, and what it sends gets to others.
+  void cut_to(int number) const {
+    place_.ip("link set switch0 type bridge mcast_snooping 0");
+    place_.ip("link set " + port_of(number) + " type bridge_slave learning off flood off " +
+              "mcast_flood off bcast_flood off");
+    place_.ip("link set " + port_of(number) + " type bridge_slave fdb_flush");
+  }
+  void heal_to(int number) const {
+    place_.ip("link set " + port_of(number) + " type bridge_slave learning on flood on " +
+              "mcast_flood on bcast_flood on");
+  }
   // From now on no multicast gets to that host; broadcasts, of which addresses are resolved by, do.
   void drop_multicast_to(int number) const {
     place_.ip("link set switch0 type bridge mcast_snooping 0");

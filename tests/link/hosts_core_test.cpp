@@ -158,6 +158,76 @@ TEST(RoundTrip, IsNotSpoiltByWhoPulsesInTheNameOfAnother) {
   EXPECT_EQ(me.of(head), kS);
 }
 
+static_assert(RoundTrips::kUnechoed * RoundTrips::kPulsePeriod == 2 * kS, "rules 3 and 6 say so");
+
+// Two links whose pulses are sent by turns, and come where they are not lost.
+class Pulsing : public testing::Test {
+ protected:
+  void pulse(bool is_lost_there = false, bool is_lost_here = false) {
+    now_ += RoundTrips::kPulsePeriod / 2;
+    const Pulse ours = me_.next(now_);
+    if (!is_lost_there) other_.note(ours, participant(1), now_);
+    now_ += RoundTrips::kPulsePeriod / 2;
+    const Pulse theirs = other_.next(now_);
+    if (!is_lost_here) me_.note(theirs, participant(2), now_);
+  }
+
+  RoundTrips me_{1};
+  RoundTrips other_{2};
+  shm::Nanoseconds now_ = kS;
+};
+
+TEST_F(Pulsing, OneThatEchoesHearsUsThoughPulsesAreLost) {
+  for (int i = 0; i < 100; ++i) {
+    pulse(i % 8 < 5, i % 8 == 6);  // not two or more of eight are lost
+    EXPECT_THAT(me_.deaf(), IsEmpty()) << i;
+  }
+}
+
+TEST_F(Pulsing, OneThatHearsNoneOfOursForTwoSecondsIsDeafAlthoughWeHearIt) {
+  pulse();
+  for (std::uint64_t i = 1; i < RoundTrips::kUnechoed; ++i) {
+    pulse(true);
+    EXPECT_THAT(me_.deaf(), IsEmpty());
+  }
+  pulse(true);
+  EXPECT_THAT(me_.deaf(), ElementsAre(participant(2)));
+  for (int i = 0; i < 100; ++i) pulse(true);
+  EXPECT_THAT(me_.deaf(), ElementsAre(participant(2)));
+  pulse();
+  EXPECT_THAT(me_.deaf(), IsEmpty());
+}
+
+// Once it has lost us it sends no pulses, though it still announces itself.
+TEST_F(Pulsing, OneThatIsThereAndDoesNotPulseAnyMoreStaysDeaf) {
+  pulse();
+  me_.keep({participant(2)});
+  for (int i = 0; i < 100; ++i) pulse(true, true);
+  EXPECT_THAT(me_.deaf(), ElementsAre(participant(2)));
+  me_.keep({});
+  EXPECT_THAT(me_.deaf(), IsEmpty()) << "it is gone, and comes back as another";
+}
+
+TEST_F(Pulsing, OneThatHasJustComeHasTwoSecondsToHearUs) {
+  for (int i = 0; i < 100; ++i) pulse(true, true);
+  EXPECT_THAT(me_.deaf(), IsEmpty()) << "nothing is known of it";
+  for (std::uint64_t i = 0; i < RoundTrips::kUnechoed; ++i) {
+    EXPECT_THAT(me_.deaf(), IsEmpty());
+    pulse(true);
+  }
+  pulse(true);
+  EXPECT_THAT(me_.deaf(), ElementsAre(participant(2)));
+}
+
+// It has sent nothing that could be echoed.
+TEST_F(Pulsing, ALinkThatWasHeldUpTakesNobodyForDeaf) {
+  pulse();
+  now_ += 100 * kS;
+  EXPECT_THAT(me_.deaf(), IsEmpty());
+  pulse();
+  EXPECT_THAT(me_.deaf(), IsEmpty());
+}
+
 TEST(RoundTrip, GivesOneWhoTakesManyNamesOnePlace) {
   RoundTrips me(1);
   for (Incarnation name = 2; name < 1000; ++name) me.note({name, 1, {}}, participant(2), kS);
