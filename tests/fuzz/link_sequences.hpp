@@ -14,6 +14,7 @@
 #include "link/core/speaker.hpp"
 #include "link/core/stream.hpp"
 #include "tests/fuzz/fuzz.hpp"
+#include "tests/fuzz/question_sequences.hpp"
 #include "tests/fuzz/script.hpp"
 
 namespace arbiter::fuzz {
@@ -259,7 +260,7 @@ inline void check_sequences(const std::uint8_t* data, std::size_t size) {
   constexpr std::size_t kMost = 512;  // longer ones show nothing new, and take their time
   if (size == 0) return;
   const Script script(data + 1, std::min(size - 1, kMost));
-  switch (data[0] % 32) {
+  switch (data[0] % 10) {
     case 0:
       return StreamSequence(script).run();
     case 1:
@@ -270,8 +271,16 @@ inline void check_sequences(const std::uint8_t* data, std::size_t size) {
       return crowd_held_tokens(script);
     case 4:
       return NeighbourSequence(script).run();
+    case 5:
+      return OpenQuestionSequence(script).run();
+    case 6:
+      return drive_askers(script);
+    case 7:
+      return drive_asked_questions(script);
+    case 8:
+      return drive_promise(script);
     default:
-      return;
+      return drive_round_trips(script);
   }
 }
 
