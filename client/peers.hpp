@@ -9,7 +9,7 @@
 
 #include <arbiter/type.hpp>
 
-#include "client/output/events.hpp"
+#include "client/tap_peer.hpp"
 #include "shm/atomic.hpp"
 #include "shm/bell.hpp"
 #include "shm/descendants.hpp"

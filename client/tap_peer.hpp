@@ -1,4 +1,4 @@
-// A tap, as an output port sees it.
+// A tap, as an output port sees it, and the taps that its port's thread knows.
 #pragma once
 
 #include <sys/types.h>
@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "shm/bell.hpp"
 #include "shm/descendants.hpp"
@@ -16,6 +17,8 @@
 #include "wire/messages.hpp"
 
 namespace arbiter::detail {
+
+class EventMemory;  // client/output/events.hpp
 
 // What the foreign segment says of itself is read once, when it is mapped.
 struct TapPeer {
@@ -38,6 +41,13 @@ struct TapSeat {
   bool has_ended = false;    // service thread: it reads us no more, but may hold samples
   bool is_doubtful = false;  // service thread: no daemon says that it lives
   std::uint64_t rung = 0;    // port's thread: the wait that we rang for last
+};
+
+// The taps in a view.
+struct TapView {
+  std::shared_ptr<const EventMemory> memory;  // null: there has been no tap yet
+  std::vector<TapSeat> seats;
+  std::uint64_t revision = 0;  // of the list of destinations
 };
 
 // Maps what the daemon has announced, and checks it. Throws std::runtime_error saying what is

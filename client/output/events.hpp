@@ -47,13 +47,6 @@ class EventMemory {
   std::optional<shm::Bequest> bequest_;
 };
 
-// The taps in a view.
-struct TapView {
-  std::shared_ptr<const EventMemory> memory;  // null: there has been no tap yet
-  std::vector<TapSeat> seats;
-  std::uint64_t revision = 0;  // of the list of destinations
-};
-
 class TapSeats {
  public:
   // Takes a tap in, or finds the one that it is already, by its segment: a daemon that has taken

@@ -14,6 +14,7 @@
 
 #include "client/handover.hpp"
 #include "client/memory.hpp"
+#include "client/output/events.hpp"
 #include "client/peers.hpp"
 #include "shm/channel.hpp"
 #include "shm/clock.hpp"

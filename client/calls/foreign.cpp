@@ -1,4 +1,4 @@
-#include "client/foreign.hpp"
+#include "client/calls/foreign.hpp"
 
 #include <unistd.h>
 

@@ -1,10 +1,10 @@
 // The compiled side of the public headers: from plain calls to the cores. Here it is seen whether
-// the caller is the process that made them (client/foreign.hpp).
+// the caller is the process that made them (client/calls/foreign.hpp).
 #include <algorithm>
 
 #include <arbiter/detail/cores.hpp>
 
-#include "client/foreign.hpp"
+#include "client/calls/foreign.hpp"
 #include "client/node/node_core.hpp"
 #include "shm/assertion.hpp"
 
