@@ -125,7 +125,9 @@ void InputCore::join(Queue& queue) noexcept {
 // Our process may have been late to take up the publisher: what waited in its queue when a later
 // sample was taken lost then. At a port that is not arbitrated, or keeps, nothing is there yet.
 void InputCore::drop_missed(Queue& queue) noexcept {
-  for (auto left = queue.reader.backlog(queue.reader.backlog_end()); left != 0; --left) {
+  auto left = queue.reader.backlog(queue.reader.backlog_end());
+  if (left == 0 || last_stamp_ > shm::monotonic_now()) return;  // then that publisher has lied
+  for (; left != 0; --left) {
     std::uint64_t lost = 0;
     const shm::Entry entry = queue.reader.peek(lost);
     count_overtaken(queue, lost);
