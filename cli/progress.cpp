@@ -45,6 +45,13 @@ rules::Budget::Watch ProgressLine::watch() {
   };
 }
 
+std::function<void(std::uint64_t, std::uint64_t)> ProgressLine::watch(std::string stage) {
+  return [this, stage = std::move(stage)](std::uint64_t done, std::uint64_t all) {
+    if (all == 0) return;
+    show([&] { return stage + ": " + std::to_string(done * 100 / all) + " %"; });
+  };
+}
+
 void ProgressLine::show(const std::function<std::string()>& text) {
   const Clock::time_point now = now_();
   if (now < next_) return;

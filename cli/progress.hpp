@@ -6,6 +6,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <ostream>
 #include <string>
@@ -27,6 +28,8 @@ class ProgressLine {
 
   // Must not outlive this.
   rules::Budget::Watch watch();
+  // Must not outlive this: "STAGE: 42 %".
+  std::function<void(std::uint64_t done, std::uint64_t all)> watch(std::string stage);
   // Shows the line if it is time for it; to be called often. `text` is called only then.
   void show(const std::function<std::string()>& text);
   // Since this was made.

@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/output_file.hpp"
+#include "cli/progress.hpp"
 #include "cli/recording_compile.hpp"
 #include "cli/simulate_recording.hpp"
 #include "evidence/export.hpp"
@@ -31,7 +32,9 @@ int export_recording(const ExportOptions& options) {
   if (!options.trace.empty() && !options.csv.empty()) {
     require_two_files("--trace", options.trace, "--csv", options.csv);
   }
-  const auto recorded = evidence::load_recording(options.file);
+  ProgressLine line;
+  const auto recorded = evidence::load_recording(options.file, line.watch("reading the recording"));
+  line.clear();
   if (!recorded.about.end.is_whole) {
     std::cerr << "arbiter: " << options.file << ": " << recorded.about.end.problem
               << "; what comes before is exported\n";
@@ -62,9 +65,9 @@ void add_export(CLI::App& parent, int& exit_code) {
                    "What was decided live, in the form that `arbiter simulate` prints")
       ->type_name("FILE");
   verb->footer(
+      "Example:\n  arbiter recording export incident.mcap --trace trace.csv --csv decisions.csv\n\n"
       "Exit codes: 0 written; 1 a model of the recording cannot be loaded; 2 wrong use, or a file "
-      "that\ncannot be opened or written\n\n"
-      "Example:\n  arbiter recording export incident.mcap --trace trace.csv --csv decisions.csv");
+      "that\ncannot be opened or written");
   verb->callback([options, &exit_code] { exit_code = export_recording(*options); });
 }
 

@@ -126,13 +126,6 @@ recording::McapVisitor visitor_for(RecordingInfo& info) {
   return visitor;
 }
 
-void show_progress(ProgressLine& line, std::uint64_t offset, std::uint64_t size) {
-  line.show([&] {
-    return "reading the recording: " +
-           std::to_string(offset * 100 / std::max<std::uint64_t>(size, 1)) + " %";
-  });
-}
-
 nlohmann::json time_json(const std::optional<RecordingInfo::Times>& times, bool begin) {
   if (!times) return nullptr;
   return begin ? times->begin : times->end;
@@ -163,15 +156,13 @@ RecordingInfo inspect_recording(const std::string& path) {
   RecordingInfo info;
   info.path = path;
   ProgressLine line;
-  std::error_code unknown;  // then reading says it
-  const std::uint64_t size = std::filesystem::file_size(path, unknown);
   recording::McapVisitor visitor = visitor_for(info);
+  visitor.watch = line.watch("reading the recording");
   visitor.chunk = [&](const recording::McapChunkInfo& chunk) {
     auto& sum = info.chunks[chunk.compression];
     ++sum.count;
     sum.compressed += chunk.compressed;
     sum.uncompressed += chunk.uncompressed;
-    show_progress(line, chunk.offset, size);
   };
   info.end = recording::read_mcap(path, visitor);
   return info;
@@ -260,7 +251,10 @@ int repair_recording(const std::string& path, const std::string& output) {
     return 0;
   }
   const std::string to = output.empty() ? name_for(path) : output;
-  const auto end = recording::repair_mcap(path, to, "arbiter " ARBITER_VERSION);
+  ProgressLine line;
+  const auto end = recording::repair_mcap(path, to, "arbiter " ARBITER_VERSION,
+                                          recording::kMaxChunkBytes, line.watch("repairing"));
+  line.clear();
   std::cout << "wrote " << to << ": " << before.messages
             << (before.messages == 1 ? " message" : " messages") << ", from the first "
             << end.whole_bytes << " of " << end.file_bytes << " bytes\n";

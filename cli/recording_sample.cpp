@@ -19,6 +19,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/output_file.hpp"
+#include "cli/progress.hpp"
 #include "cli/recording_times.hpp"
 #include "evidence/record_reader.hpp"
 #include "rules/text/names.hpp"
@@ -62,17 +63,19 @@ std::string source_of(const SampleOptions& options) { return shm::printable(opti
 
 Found look_for(const SampleOptions& options) {
   Found found;
-  found.about = evidence::read_recording(
-      options.file, evidence::Payloads::pass_over, [&](evidence::Record&& record) {
-        const auto* const arrival = std::get_if<Arrival>(&record);
-        if (arrival == nullptr) return;
-        found.begin = std::min(found.begin, arrival->time);
-        found.end = std::max(found.end, arrival->time);
-        found.sources.insert(arrival->context->source);
-        if (arrival->is_sample && arrival->context->source == options.source) {
-          found.samples.push_back({arrival->sequence, arrival->time, arrival->has_payload});
-        }
-      });
+  const auto use = [&](evidence::Record&& record) {
+    const auto* const arrival = std::get_if<Arrival>(&record);
+    if (arrival == nullptr) return;
+    found.begin = std::min(found.begin, arrival->time);
+    found.end = std::max(found.end, arrival->time);
+    found.sources.insert(arrival->context->source);
+    if (arrival->is_sample && arrival->context->source == options.source) {
+      found.samples.push_back({arrival->sequence, arrival->time, arrival->has_payload});
+    }
+  };
+  ProgressLine line;
+  found.about = evidence::read_recording(options.file, evidence::Payloads::pass_over, use,
+                                         line.watch("looking for the sample"));
   return found;
 }
 
@@ -137,13 +140,17 @@ std::size_t choose(const SampleOptions& options, const Found& found) {
 // Of the sample of that number, from 0.
 Arrival read_sample(const SampleOptions& options, std::size_t number) {
   std::optional<Arrival> result;
-  evidence::read_recording(options.file, evidence::Payloads::read, [&](evidence::Record&& record) {
+  const auto use = [&](evidence::Record&& record) {
     auto* const arrival = std::get_if<Arrival>(&record);
     if (arrival == nullptr || !arrival->is_sample || arrival->context->source != options.source) {
       return;
     }
     if (number-- == 0) result = std::move(*arrival);
-  });
+  };
+  ProgressLine line;
+  evidence::read_recording(options.file, evidence::Payloads::read, use,
+                           line.watch("reading the sample"));
+  line.clear();
   if (!result || !result->payload) refuse_sample(options, "it has changed while it was read");
   return std::move(*result);
 }
@@ -197,12 +204,12 @@ void add_recorded_sample(CLI::App& parent, int& exit_code) {
       ->type_name("TIME");
   verb->add_option("-o,--output", options->output, kOutputHelp)->type_name("FILE");
   verb->footer(
+      "Example:\n  arbiter recording sample incident.mcap --source /Nav/cmd_vel:o --at 14:03:07 | "
+      "xxd\n\n"
       "The bytes are written as they were published, and nothing else; standard error says which "
       "sample\nit is, and its type.\n\n"
       "Exit codes: 0 written; 2 wrong use, a file that cannot be read or written, or a sample that "
-      "is not\nin it\n\n"
-      "Example:\n  arbiter recording sample incident.mcap --source /Nav/cmd_vel:o --at 14:03:07 | "
-      "xxd");
+      "is not\nin it");
   verb->callback([options, &exit_code] { exit_code = write_sample(*options); });
 }
 

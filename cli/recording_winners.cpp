@@ -138,9 +138,9 @@ void add_recorded_winners(CLI::App& parent, int& exit_code) {
   verb->add_flag("--json", options->json,
                  "A list of {from, from_ns, to_ns, port, winner, why, by, generation}");
   verb->footer(
+      "Example:\n  arbiter recording winners incident.mcap --at 14:03:07\n\n"
       "Exit codes: 0 shown; 2 wrong use, a time that is not in the recording, or a file that\n"
-      "cannot be read\n\n"
-      "Example:\n  arbiter recording winners incident.mcap --at 14:03:07");
+      "cannot be read");
   verb->callback([options, &exit_code] { exit_code = show_winners(*options); });
 }
 

@@ -16,6 +16,7 @@
 #include "cli/live.hpp"
 #include "cli/model_files.hpp"
 #include "cli/numbers.hpp"
+#include "cli/progress.hpp"
 #include "cli/recording_compile.hpp"
 #include "cli/recording_times.hpp"
 #include "evidence/comparison.hpp"
@@ -247,10 +248,19 @@ void warn_of_other_ports(const Recorded& recorded, const evidence::Judge& judge)
             << shm::printable(rules::enumerate({ports.begin(), ports.end()})) << '\n';
 }
 
+// A model that is compiled meanwhile has a line of its own.
+template <class Take>
+auto take_again(const Take& take) {
+  ProgressLine line;
+  return take(line.watch("taking the decisions again"));
+}
+
 }  // namespace
 
 Recorded load_for_simulation(const std::string& path) {
-  Recorded recorded = evidence::load_recording(path);
+  ProgressLine line;
+  Recorded recorded = evidence::load_recording(path, line.watch("reading the recording"));
+  line.clear();
   if (!recorded.about.end.is_whole) {
     std::cerr << "arbiter: " << shm::printable(path) << ": "
               << shm::printable(recorded.about.end.problem) << "; what comes before is used\n";
@@ -263,14 +273,16 @@ void warn_of_missed(const Recorded& recorded) {
   const std::string missed = evidence::missed_text(recorded);
   if (missed.empty()) return;
   std::cerr << "arbiter: the recorder missed " << missed
-            << ": what is told around the gaps may be wrong\n";
+            << ": statements about the time around the gaps may be wrong\n";
 }
 
 int simulate_recording(const SimulateRecordingOptions& options) {
   const Recorded recorded = load_for_simulation(options.recording);
   evidence::Models models(recording_compiler(options.effort));
   if (options.other.models.empty()) {
-    return write_verification(recorded, evidence::verify(recorded, models), options.json);
+    const auto result = take_again(
+        [&](const recording::Watch& watch) { return evidence::verify(recorded, models, watch); });
+    return write_verification(recorded, result, options.json);
   }
   rules::Diagnostics diagnostics;
   const auto other = load_model(options.other, diagnostics, options.effort);
@@ -278,7 +290,10 @@ int simulate_recording(const SimulateRecordingOptions& options) {
   if (!other) return 1;
   evidence::Judge judge(other->compiled, true);
   warn_of_other_ports(recorded, judge);
-  return write_comparison(recorded, evidence::compare(recorded, models, judge), options);
+  const auto result = take_again([&](const recording::Watch& watch) {
+    return evidence::compare(recorded, models, judge, watch);
+  });
+  return write_comparison(recorded, result, options);
 }
 
 }  // namespace arbiter::cli

@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/live.hpp"
+#include "cli/progress.hpp"
 #include "cli/verbs.hpp"
 #include "rules/text/names.hpp"
 #include "shm/utf8.hpp"
@@ -87,7 +88,10 @@ int examine(const DoctorOptions& options) {
   add(watch::examine_daemon(who, status));
   if (status) {
     add(watch::examine_processes(machine, *status));
-    add(watch::examine_publishers(who, *status));
+    ProgressLine line;
+    add(watch::examine_publishers(who, *status, [&line] {
+      line.show([] { return "watching how often sources arrive, for 2.5 s at most"; });
+    }));
   }
   const std::size_t before = findings.size();
   const auto& silenced = options.silenced;

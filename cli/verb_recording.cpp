@@ -26,9 +26,9 @@ void add_info(CLI::App& parent, int& exit_code) {
   verb->add_option("FILE", options->file, "An MCAP file, of whatever program")->required();
   verb->add_flag("--json", options->json, "Write it as one JSON object");
   verb->footer(
+      "Example:\n  arbiter recording info incident.mcap\n\n"
       "Exit codes: 0 the file is whole; 1 it is not: what is whole of it is shown; 2 wrong use, or "
-      "a file\nthat cannot be opened or is not an MCAP file\n\n"
-      "Example:\n  arbiter recording info incident.mcap");
+      "a file\nthat cannot be opened or is not an MCAP file");
   verb->callback(
       [options, &exit_code] { exit_code = show_recording(options->file, options->json); });
 }
@@ -42,10 +42,10 @@ void add_repair(CLI::App& parent, int& exit_code) {
                    "The new file; without it, one beside FILE: a.repaired.mcap for a.mcap")
       ->type_name("FILE");
   verb->footer(
+      "Example:\n  arbiter recording repair incident.mcap -o whole.mcap\n\n"
       "Exit codes: 0 written, or nothing to repair; 2 wrong use, or a file that cannot be opened "
       "or\n"
-      "written, is there already, or of which nothing is whole\n\n"
-      "Example:\n  arbiter recording repair incident.mcap -o whole.mcap");
+      "written, is there already, or of which nothing is whole");
   verb->callback(
       [options, &exit_code] { exit_code = repair_recording(options->file, options->output); });
 }

@@ -8,6 +8,7 @@
 
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
+#include "cli/progress.hpp"
 #include "cli/verbs.hpp"
 #include "recorder/replayer.hpp"
 
@@ -31,8 +32,14 @@ int replay(const ReplayVerb& verb) {
   options.rate = verb.is_fast ? 0 : verb.rate;
   options.sources = verb.sources;
   options.ports = verb.ports;
-  options.say = [](const std::string& text) { std::cerr << "arbiter: " + text + '\n'; };
+  ProgressLine line;
+  options.watch = line.watch("looking for what the recording has");
+  options.say = [&line](const std::string& text) {
+    line.clear();
+    std::cerr << "arbiter: " + text + '\n';
+  };
   recorder::Replayer replayer(options);
+  line.clear();
   const auto replayed = replayer.run(interrupts);
   std::cout << counted(replayed.samples, "sample") << ", " << counted(replayed.signals, "signal")
             << " and " << counted(replayed.deactivations, "deactivation") << " of "

@@ -151,11 +151,13 @@ std::vector<WinnerChange> winners_of(const Run& run, const Judge& other) {
       });
 }
 
-Comparison compare(const Recorded& recorded, Models& models, Judge& other) {
+Comparison compare(const Recorded& recorded, Models& models, Judge& other,
+                   const recording::Watch& watch) {
   Comparison comparison;
   for (const Run& run : recorded.runs) {
     Decisions decisions(other, comparison);
-    for_each_decision(run, [&](const LiveDecision& live) { decisions.take(live); });
+    for_each_decision(
+        run, [&](const LiveDecision& live) { decisions.take(live); }, watch);
     auto intervals = differing(run, winners_of(run, models), winners_of(run, other));
     std::move(intervals.begin(), intervals.end(), std::back_inserter(comparison.intervals));
   }

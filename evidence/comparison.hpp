@@ -40,7 +40,8 @@ struct Comparison {
 };
 
 // `other`: a judge that makes activities last as its model says.
-[[nodiscard]] Comparison compare(const Recorded& recorded, Models& models, Judge& other);
+[[nodiscard]] Comparison compare(const Recorded& recorded, Models& models, Judge& other,
+                                 const recording::Watch& watch = {});
 
 // Every change of winner in a run, by the recorded models, or by another.
 [[nodiscard]] std::vector<WinnerChange> winners_of(const Run& run, Models& models);

@@ -303,8 +303,9 @@ class Reading {
   Reading(const std::string& path, Payloads payloads, const std::function<void(Record&&)>& use)
       : path_(path), reads_payloads_(payloads == Payloads::read), use_(use) {}
 
-  ReadRecording run() {
+  ReadRecording run(const recording::Watch& watch) {
     recording::McapVisitor visitor;
+    visitor.watch = watch;
     visitor.channel = [this](std::uint16_t id, const recording::McapChannel& channel) {
       add(id, channel);
     };
@@ -395,8 +396,9 @@ class Reading {
 }  // namespace
 
 ReadRecording read_recording(const std::string& path, Payloads payloads,
-                             const std::function<void(Record&&)>& use) {
-  return Reading(path, payloads, use).run();
+                             const std::function<void(Record&&)>& use,
+                             const recording::Watch& watch) {
+  return Reading(path, payloads, use).run(watch);
 }
 
 }  // namespace arbiter::evidence

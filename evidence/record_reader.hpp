@@ -32,6 +32,7 @@ enum class Payloads : std::uint8_t { pass_over, read };
 // Calls `use` for each record, in the file's order, which for those of one source is the order in
 // which they happened. Throws McapError, RecordError.
 ReadRecording read_recording(const std::string& path, Payloads payloads,
-                             const std::function<void(Record&&)>& use);
+                             const std::function<void(Record&&)>& use,
+                             const recording::Watch& watch = {});
 
 }  // namespace arbiter::evidence

@@ -136,11 +136,11 @@ std::string missed_text(const Recorded& recorded) {
   return missed_text(events, samples);
 }
 
-Recorded load_recording(const std::string& path) {
+Recorded load_recording(const std::string& path, const recording::Watch& watch) {
   Recorded recorded;
   Loader loader;
-  recorded.about = read_recording(path, Payloads::pass_over,
-                                  [&](Record&& record) { loader.take(std::move(record)); });
+  const auto use = [&](Record&& record) { loader.take(std::move(record)); };
+  recorded.about = read_recording(path, Payloads::pass_over, use, watch);
   recorded.runs = loader.finish();
   return recorded;
 }

@@ -67,6 +67,6 @@ struct Recorded {
 [[nodiscard]] std::string missed_text(const Recorded& recorded);
 
 // Throws McapError, RecordError.
-[[nodiscard]] Recorded load_recording(const std::string& path);
+[[nodiscard]] Recorded load_recording(const std::string& path, const recording::Watch& watch = {});
 
 }  // namespace arbiter::evidence

@@ -112,16 +112,20 @@ void for_each_outcome(const Run& run, const Decision& decision,
   }
 }
 
-void for_each_decision(const Run& run, const std::function<void(const LiveDecision&)>& use) {
+void for_each_decision(const Run& run, const std::function<void(const LiveDecision&)>& use,
+                       const recording::Watch& watch) {
+  std::uint64_t done = 0;
   for (const Decision& decision : run.decisions) {
+    if (watch) watch(done++, run.decisions.size());
     if (decision.arrival().time >= run.start) for_each_outcome(run, decision, use);
   }
 }
 
-Verification verify(const Recorded& recorded, Models& models) {
+Verification verify(const Recorded& recorded, Models& models, const recording::Watch& watch) {
   Verifier verifier(models);
   for (const Run& run : recorded.runs) {
-    for_each_decision(run, [&](const LiveDecision& live) { verifier.take(live); });
+    for_each_decision(
+        run, [&](const LiveDecision& live) { verifier.take(live); }, watch);
   }
   return verifier.finish();
 }

@@ -27,8 +27,9 @@ struct LiveDecision {
 // Calls `use` for what was decided of an arrival at chosen ports.
 void for_each_outcome(const Run& run, const Decision& decision,
                       const std::function<void(const LiveDecision&)>& use);
-// The same for all arrivals from the run's start on, by time.
-void for_each_decision(const Run& run, const std::function<void(const LiveDecision&)>& use);
+// The same for all arrivals from the run's start on, by time. `watch` counts arrivals of the run.
+void for_each_decision(const Run& run, const std::function<void(const LiveDecision&)>& use,
+                       const recording::Watch& watch = {});
 
 // The first that differs.
 struct Difference {
@@ -52,6 +53,7 @@ struct Verification {
   }
 };
 
-[[nodiscard]] Verification verify(const Recorded& recorded, Models& models);
+[[nodiscard]] Verification verify(const Recorded& recorded, Models& models,
+                                  const recording::Watch& watch = {});
 
 }  // namespace arbiter::evidence

@@ -62,8 +62,9 @@ Replayer::Replayer(const ReplayOptions& options) : options_(options) {
 }
 
 void Replayer::survey() {
-  const auto about = evidence::read_recording(options_.file, evidence::Payloads::pass_over,
-                                              [this](Record&& record) { survey(record); });
+  const auto about = evidence::read_recording(
+      options_.file, evidence::Payloads::pass_over, [this](Record&& record) { survey(record); },
+      options_.watch);
   if (!about.end.is_whole) {
     options_.say(options_.file + ": " + about.end.problem + "; what comes before is published");
   }

@@ -16,6 +16,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "evidence/records.hpp"
+#include "recording/mcap.hpp"
 #include "shm/file_descriptor.hpp"
 
 namespace arbiter::recorder {
@@ -27,6 +28,7 @@ struct ReplayOptions {
   std::vector<std::string> sources;  // patterns; empty: all
   std::vector<std::string> ports;    // patterns of input ports; empty: all
   std::function<void(const std::string&)> say;
+  recording::Watch watch{};  // of the first reading
 };
 
 struct Replayed {

@@ -25,6 +25,9 @@ class McapError : public std::runtime_error {
 };
 
 using McapTime = std::uint64_t;
+// Called often, so that whoever waits can be shown how far it is: `done` of `all`, in bytes of the
+// file unless something else is said. Empty: nobody waits.
+using Watch = std::function<void(std::uint64_t done, std::uint64_t all)>;
 using McapMap = std::map<std::string, std::string>;
 
 enum class Compression : std::uint8_t { none, lz4, zstd };
@@ -134,6 +137,7 @@ struct McapVisitor {
   std::function<void(const McapAttachment&)> attachment{};
   std::function<void(const std::string& profile, const std::string& library)> header{};
   std::function<void(const McapChunkInfo&)> chunk{};
+  Watch watch{};  // before each record
 };
 
 struct McapEnd {
@@ -158,6 +162,6 @@ McapEnd read_mcap(const std::string& path, const McapVisitor& visitor,
 // summary, and a metadata record "repaired" that says what was lost, and by which `library` it was
 // repaired. Returns how `from` ends.
 McapEnd repair_mcap(const std::string& from, const std::string& to, std::string_view library,
-                    std::size_t max_chunk_bytes = kMaxChunkBytes);
+                    std::size_t max_chunk_bytes = kMaxChunkBytes, const Watch& watch = {});
 
 }  // namespace arbiter::recording

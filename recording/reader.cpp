@@ -64,9 +64,10 @@ void visit(const Record& record, std::string_view records, const McapVisitor& vi
 
 McapEnd read_mcap(const std::string& path, const McapVisitor& visitor,
                   std::size_t max_chunk_bytes) {
-  return walk_mcap(path, max_chunk_bytes, [&](const Record& record, std::string_view records) {
+  const auto on_record = [&](const Record& record, std::string_view records) {
     visit(record, records, visitor);
-  });
+  };
+  return walk_mcap(path, max_chunk_bytes, on_record, visitor.watch);
 }
 
 }  // namespace arbiter::recording

@@ -108,15 +108,15 @@ McapMap account_of(const McapEnd& end, std::string_view library) {
 }  // namespace
 
 McapEnd repair_mcap(const std::string& from, const std::string& to, std::string_view library,
-                    std::size_t max_chunk_bytes) {
+                    std::size_t max_chunk_bytes, const Watch& watch) {
   std::optional<OutputFile> out;
   std::optional<Copy> copy;
-  McapEnd end =
-      walk_mcap(from, max_chunk_bytes, [&](const Record& record, std::string_view records) {
-        // All that it has is in `from` as well.
-        if (!copy) copy.emplace(out.emplace(to, Unfinished::discard));
-        copy->add(record, records);
-      });
+  const auto on_record = [&](const Record& record, std::string_view records) {
+    // All that it has is in `from` as well.
+    if (!copy) copy.emplace(out.emplace(to, Unfinished::discard));
+    copy->add(record, records);
+  };
+  McapEnd end = walk_mcap(from, max_chunk_bytes, on_record, watch);
   if (!copy) throw McapError("cannot repair " + from + ": nothing of it is whole: " + end.problem);
   copy->add_metadata("repaired", account_of(end, library));
   copy->close();

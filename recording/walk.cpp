@@ -18,7 +18,7 @@ class Walk {
   Walk(const std::string& path, std::size_t max_bytes)
       : path_(path), file_(path), max_bytes_(max_bytes), declarations_(max_bytes) {}
 
-  McapEnd run(const OnRecord& on_record);
+  McapEnd run(const OnRecord& on_record, const Watch& watch);
 
  private:
   void read_magic();
@@ -27,7 +27,7 @@ class Walk {
   void judge(const Record& record);
   std::string_view open_chunk(const Record& record);
   void pass(const Record& record);
-  void read_data(const OnRecord& on_record);
+  void read_data(const OnRecord& on_record, const Watch& watch);
   void read_data_end(const Record& record);
   void read_summary();
   void read_footer(const Record& record, std::uint64_t summary_at, std::uint32_t crc);
@@ -157,8 +157,9 @@ void Walk::pass(const Record& record) {
   end_.whole_bytes = offset_;
 }
 
-void Walk::read_data(const OnRecord& on_record) {
+void Walk::read_data(const OnRecord& on_record, const Watch& watch) {
   while (true) {
+    if (watch) watch(offset_, file_.size());
     const Record record = read_record();
     if (record.offset == kMagic.size() && record.opcode != Opcode::header) {
       throw Damage{"a file begins with a header"};
@@ -223,11 +224,11 @@ void Walk::read_footer(const Record& record, std::uint64_t summary_at, std::uint
   end_.has_summary = has_summary && says_summary_at != 0;
 }
 
-McapEnd Walk::run(const OnRecord& on_record) {
+McapEnd Walk::run(const OnRecord& on_record, const Watch& watch) {
   end_.file_bytes = file_.size();
   try {
     read_magic();
-    read_data(on_record);
+    read_data(on_record, watch);
     read_summary();
   } catch (const Damage& damage) {
     end_.is_whole = false;
@@ -238,8 +239,9 @@ McapEnd Walk::run(const OnRecord& on_record) {
 
 }  // namespace
 
-McapEnd walk_mcap(const std::string& path, std::size_t max_bytes, const OnRecord& on_record) {
-  return Walk(path, max_bytes).run(on_record);
+McapEnd walk_mcap(const std::string& path, std::size_t max_bytes, const OnRecord& on_record,
+                  const Watch& watch) {
+  return Walk(path, max_bytes).run(on_record, watch);
 }
 
 }  // namespace arbiter::recording

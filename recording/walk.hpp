@@ -17,6 +17,7 @@ namespace arbiter::recording {
 using OnRecord = std::function<void(const Record& record, std::string_view records)>;
 
 // As read_mcap().
-McapEnd walk_mcap(const std::string& path, std::size_t max_bytes, const OnRecord& on_record);
+McapEnd walk_mcap(const std::string& path, std::size_t max_bytes, const OnRecord& on_record,
+                  const Watch& watch);
 
 }  // namespace arbiter::recording

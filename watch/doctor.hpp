@@ -5,6 +5,7 @@
 // Nothing is changed. The daemon is asked for its status, once.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,8 +38,9 @@ using Findings = std::vector<Finding>;
 
 // Sources that are inactive between their arrivals, because their publishers are slower than T. The
 // daemon is asked for its memory, and activities are watched for some seconds where components have
-// sources open.
-[[nodiscard]] Findings examine_publishers(const wire::Caller& caller, const wire::Status& status);
+// sources open; meanwhile `while_looking` is called often.
+[[nodiscard]] Findings examine_publishers(const wire::Caller& caller, const wire::Status& status,
+                                          const std::function<void()>& while_looking);
 
 // All codes, in the order in which they are looked for.
 [[nodiscard]] const std::vector<std::string>& finding_codes();

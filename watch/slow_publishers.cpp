@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -44,7 +45,8 @@ bool may_be_slow(const wire::SourceStatus& source) {
 
 // The sources' paces, once all are known or the time is over.
 std::map<shm::SourceId, Pace> watch_paces(Instance& instance,
-                                          const std::vector<shm::SourceId>& sources) {
+                                          const std::vector<shm::SourceId>& sources,
+                                          const std::function<void()>& while_looking) {
   std::map<shm::SourceId, Pace> paces;
   for (const shm::SourceId source : sources) paces[source];
   const shm::Nanoseconds end = shm::monotonic_now() + kLongestLook;
@@ -59,6 +61,7 @@ std::map<shm::SourceId, Pace> watch_paces(Instance& instance,
     const bool are_known = std::all_of(paces.begin(), paces.end(),
                                        [](const auto& each) { return each.second.is_known(); });
     if (are_known || picture.now >= end) return paces;
+    while_looking();
     sleep_for_a_look();
   }
 }
@@ -112,7 +115,8 @@ void add_gaps(const Port& port, Look& look, const wire::Status& status) {
   }
 }
 
-Findings examine_publishers(const wire::Caller& caller, const wire::Status& status) {
+Findings examine_publishers(const wire::Caller& caller, const wire::Status& status,
+                            const std::function<void()>& while_looking) {
   Findings found;
   if (std::none_of(status.sources.begin(), status.sources.end(), may_be_slow)) return found;
   try {
@@ -125,7 +129,7 @@ Findings examine_publishers(const wire::Caller& caller, const wire::Status& stat
       if (id && known.emplace(*id, &each).second) sources.push_back(*id);
     }
     std::sort(sources.begin(), sources.end());
-    for (const auto& [source, pace] : watch_paces(instance, sources)) {
+    for (const auto& [source, pace] : watch_paces(instance, sources, while_looking)) {
       const auto period = pace.slow_period();
       if (period) found.push_back(slowness(*known.at(source), *period, known.at(source)->timeout));
     }

@@ -4,17 +4,20 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <stdexcept>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "service/log/log.hpp"
 #include "service/models/comparison.hpp"
 
 namespace arbiter::service {
 namespace {
 
 constexpr std::chrono::seconds kEvery{1};
+constexpr std::chrono::seconds kEveryInLog{2};
 // Longer than reading and extracting take, during which nothing is told.
 constexpr int kAtMost = 30;
 
@@ -51,8 +54,11 @@ std::string changes_between(const Model& before, const Model& after, std::uint64
   return changes.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-StatusLine::StatusLine(std::string instance)
-    : instance_(std::move(instance)), next_(Clock::now() + kEvery) {}
+StatusLine::StatusLine(std::string instance, std::function<Clock::time_point()> now)
+    : instance_(std::move(instance)),
+      now_(std::move(now)),
+      has_manager_(std::getenv("NOTIFY_SOCKET") != nullptr),
+      next_(now_() + (has_manager_ ? kEvery : kEveryInLog)) {}
 
 StatusLine::~StatusLine() {
   if (has_told_) sd_notifyf(0, "STATUS=instance %s", instance_.c_str());
@@ -60,8 +66,13 @@ StatusLine::~StatusLine() {
 
 rules::Budget::Watch StatusLine::watch() {
   return [this](const rules::Progress& progress) {
-    if (Clock::now() < next_) return;
-    next_ = Clock::now() + kEvery;
+    if (now_() < next_ || (!has_manager_ && progress.of == 0)) return;
+    next_ = now_() + (has_manager_ ? kEvery : kEveryInLog);
+    if (!has_manager_) {
+      log::info("{}: {} of {} ports ({})", progress.stage, progress.done, progress.of,
+                progress.name);
+      return;
+    }
     has_told_ = true;
     sd_notifyf(0, "STATUS=%s: %zu of %zu ports (%s)\nEXTEND_TIMEOUT_USEC=%d000000",
                progress.stage.c_str(), progress.done, progress.of, progress.name.c_str(), kAtMost);

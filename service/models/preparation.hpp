@@ -25,12 +25,15 @@ namespace arbiter::service {
 [[nodiscard]] std::string changes_between(const Model& before, const Model& after,
                                           std::uint64_t steps, const std::stop_token& stop);
 
-// Tells the service manager how far a model is, and that it is worth waiting for; once a second,
-// and nothing of what takes less. At the end it shows the instance again. To be used in the
-// compiler's thread: a manager that does not listen holds up who tells it.
+// Says how far a model is: to the service manager once a second, with the request to wait; or, if
+// none listens, in the log every two seconds. Of what takes less it says nothing. At the end the
+// manager is shown the instance again. To be used in the compiler's thread: a manager that does not
+// read holds up the thread that writes to it.
 class StatusLine {
  public:
-  explicit StatusLine(std::string instance);
+  using Clock = std::chrono::steady_clock;
+
+  explicit StatusLine(std::string instance, std::function<Clock::time_point()> now = Clock::now);
   StatusLine(const StatusLine&) = delete;
   StatusLine& operator=(const StatusLine&) = delete;
   ~StatusLine();
@@ -39,9 +42,9 @@ class StatusLine {
   [[nodiscard]] rules::Budget::Watch watch();
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   const std::string instance_;
+  const std::function<Clock::time_point()> now_;
+  const bool has_manager_;
   Clock::time_point next_;
   bool has_told_ = false;
 };

@@ -250,8 +250,8 @@ TEST(SimulateRecording, SaysWhereTheRecorderMissedSomething) {
   incident.arrive("/low", 3000, 3001, Incident::Fate::accepted);
   const std::string file = incident.file();
   const char* const warning =
-      "arbiter: the recorder missed 3 events and the payloads of 2 samples: what is told around "
-      "the gaps may be wrong\n";
+      "arbiter: the recorder missed 3 events and the payloads of 2 samples: statements about "
+      "the time around the gaps may be wrong\n";
   const auto why = arbiter({"simulate", "--recording", file, "--why=/p"});
   EXPECT_EQ(why.exit_code, 0) << why.err;
   EXPECT_EQ(why.err, warning);
