@@ -66,6 +66,14 @@ int run(int argc, char** argv) {
       "arbiter");
   app.set_version_flag("--version", "arbiter " ARBITER_VERSION);
   app.require_subcommand(1);
+  app.footer(
+      "Examples:\n"
+      "  arbiter check search_and_track.xml\n"
+      "  arbiter why /Arm/pos:i\n"
+      "  arbiter why --help\n\n"
+      "Exit codes: 0 done; 1 an error in what you asked about, or no daemon; 2 wrong use, or a "
+      "file\n"
+      "that cannot be opened or written. Each verb's help has its own.");
   int exit_code = 0;
   arbiter::cli::add_check(app, exit_code);
   arbiter::cli::add_diff(app, exit_code);

@@ -42,7 +42,7 @@ std::string file_advice(FileNow::State state, bool is_older) {
                     "arbiter reload would replace it by the file's (arbiter reload --dry-run shows "
                     "what that changes)"
                   : " has changed since; arbiter reload puts it in force, unless it has errors "
-                    "(arbiter reload --dry-run tells)";
+                    "(arbiter reload --dry-run checks it)";
 }
 
 json model_json(const ModelInForce& model) {

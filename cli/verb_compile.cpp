@@ -95,13 +95,13 @@ void add_compile(CLI::App& app, int& exit_code) {
       "holds\nthe rules of each input port. You can use it as an application, and as a model that "
       "decides in\nthe same way. Without --application, the result is a new application with the "
       "connections that\nthe model configures.\n\n"
-      "Exit codes: 0 written; 1 an error in the model, or rules too large to be read again; 2 "
-      "wrong use, a file\n"
-      "that cannot be opened or written, or an output that is one of the inputs\n\n"
       "Examples:\n"
       "  arbiter compile search_and_track.xml --application application.xml -o merged.xml\n"
       "  arbiter check merged.xml\n"
-      "  arbiterd --model merged.xml");
+      "  arbiterd --model merged.xml\n\n"
+      "Exit codes: 0 written; 1 an error in the model, or rules too large to be read again; 2 "
+      "wrong use, a file\n"
+      "that cannot be opened or written, or an output that is one of the inputs");
   verb->callback([options, &exit_code] { exit_code = compile(*options); });
 }
 

@@ -81,10 +81,10 @@ void add_diff(CLI::App& app, int& exit_code) {
   add_effort_option(*verb, options->effort);
   verb->add_flag("--json", options->json, "Write the differences as JSON");
   verb->footer(
+      "Example:\n  arbiter diff search_and_track.xml new.xml\n\n"
       "Exit codes: 0 they decide alike in every state; 1 they differ; 2 diff cannot tell, wrong "
       "use,\n"
-      "or a file that cannot be opened or written\n\n"
-      "Example:\n  arbiter diff search_and_track.xml new.xml");
+      "or a file that cannot be opened or written");
   verb->callback([options, &exit_code] { exit_code = diff(*options); });
 }
 

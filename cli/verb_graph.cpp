@@ -23,7 +23,7 @@ int draw_still(const GraphOptions& options) {
 
 int graph(const GraphOptions& options) {
   if (options.follow && options.output.empty()) {
-    throw CLI::RequiredError("--output, the file that --follow writes anew,");
+    throw CLI::RequiredError("--output, the file that --follow writes again at each change,");
   }
   if (options.follow) return draw_and_follow(options);
   if (options.live) return draw_live(options);
@@ -75,18 +75,18 @@ void add_graph(CLI::App& app, int& exit_code) {
       "A model of many connections is drawn port by port, each with its own sources beside it.\n\n"
       "Pictures are made by Graphviz (apt install graphviz); --format dot does without it.\n"
       "Rules that contradict each other are drawn all the same.\n\n"
-      "Exit codes: 0 drawn; 1 an error in the model, a port that it lacks or that is on no host, "
-      "no\n"
-      "daemon, no Graphviz,\n"
-      "or a model that is not the one in force; 2 wrong use, or a file cannot be opened or "
-      "written\n\n"
       "Examples:\n"
       "  arbiter graph search_and_track.xml -o behaviours.svg\n"
       "  arbiter graph search_and_track.xml --view connections --application application.xml \\\n"
       "      -o ports.png --dpi 200\n"
       "  arbiter graph search_and_track.xml --port /Gaze/pos:i -o gaze.svg\n"
       "  arbiter graph search_and_track.xml --hosts two_hosts.xml -o hosts.svg\n"
-      "  arbiter graph --follow -o now.svg");
+      "  arbiter graph --follow -o now.svg\n\n"
+      "Exit codes: 0 drawn; 1 an error in the model, a port that it lacks or that is on no host, "
+      "no\n"
+      "daemon, no Graphviz,\n"
+      "or a model that is not the one in force; 2 wrong use, or a file cannot be opened or "
+      "written");
   verb->callback([options, &exit_code] { exit_code = graph(*options); });
 }
 

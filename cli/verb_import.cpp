@@ -222,12 +222,12 @@ void add_import(CLI::App& app, int& exit_code) {
       "The model decides as the multiplexer does. What is dangerous in the file, and what cannot "
       "be kept,\nis reported with its line. Remapping in launch files is not read: correct the "
       "topics in the mapping.\n\n"
-      "Exit codes: 0 written; 1 an error in the files; 2 wrong use, or a file that cannot be "
-      "opened or\nwritten, or is there already\n\n"
       "Examples:\n"
       "  arbiter import twist_mux twist_mux_topics.yaml twist_mux_locks.yaml --out-dir mux\n"
       "  arbiter import cmd_vel_mux cmd_vel_mux_params.yaml -o model.xml --mapping mapping.xml\n"
-      "  arbiter check mux/model.xml");
+      "  arbiter check mux/model.xml\n\n"
+      "Exit codes: 0 written; 1 an error in the files; 2 wrong use, or a file that cannot be "
+      "opened or\nwritten, or is there already");
   verb->callback([options, &exit_code] {
     options->import.idle = idle_of(options->idle);
     exit_code = import(*options);

@@ -280,7 +280,7 @@ void add_record(CLI::App& app, int& exit_code) {
       "--when 'winner(/Arm/pos:i) = /Teleop/pos:o and not /Deadman:o'\n"
       "  arbiter record --dump -o /var/lib/robot/flight\n\n"
       "Ends at Ctrl-C, SIGTERM or SIGHUP (the terminal has gone; `nohup` keeps it running), with a "
-      "whole\nfile. Whoever records needs the policy's `tap`.");
+      "whole\nfile. To record, you need the policy's `tap`.");
   verb->callback([options, &exit_code] { exit_code = record(*options); });
 }
 

@@ -41,9 +41,13 @@ SIGHUP and `arbiter reload` read all again; a bad one changes nothing.
 SIGTERM, SIGINT and `arbiter stop` stop it. Without --policy every user may open ports and observe,
 and only root and the daemon's own user may reload, switch and stop.
 Components go on without it. The next daemon of the instance takes them over, and puts its own model
-in force, of several the one of the name that was; without --model it keeps the one that is.
-It listens in $RUNTIME_DIRECTORY, else $XDG_RUNTIME_DIR/arbiter, else /run/arbiter if it may write
-there, else arbiter-UID in the temporary directory.)";
+in force: if it has several, the one with the name that was in force. Without --model it keeps the
+model in force.
+It listens in the first of these that it can use: $RUNTIME_DIRECTORY, $XDG_RUNTIME_DIR/arbiter,
+/run/arbiter, arbiter-UID in the temporary directory.
+
+Exit codes: 0 stopped by a signal or by `arbiter stop`; 1 the files have errors, or it cannot serve;
+2 wrong use)";
 
 // Components and sources take a few descriptors each.
 void raise_descriptor_limit() {

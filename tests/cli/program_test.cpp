@@ -38,14 +38,25 @@ std::vector<std::string> verbs() {
   return result;
 }
 
+// First the example, then the codes.
+void expect_explained(std::vector<std::string> verb) {
+  std::string name = "arbiter";
+  for (const std::string& word : verb) name += " " + word;
+  SCOPED_TRACE(name);
+  verb.emplace_back("--help");
+  const auto result = arbiter(verb);
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err, "");
+  EXPECT_THAT(result.out, ContainsRegex("\nExamples?:\n  " + name));
+  const auto example = result.out.find("\nExample");
+  EXPECT_NE(result.out.find("\nExit codes: 0 ", example), std::string::npos) << result.out;
+}
+
 TEST(Program, ExplainsEachVerbWithAnExampleAndItsExitCodes) {
-  for (const std::string& verb : verbs()) {
-    SCOPED_TRACE(verb);
-    const auto result = arbiter({verb, "--help"});
-    EXPECT_EQ(result.exit_code, 0);
-    EXPECT_EQ(result.err, "");
-    EXPECT_THAT(result.out, ContainsRegex("Examples?:\n  arbiter " + verb));
-    EXPECT_THAT(result.out, HasSubstr("Exit codes: 0 "));
+  expect_explained({});
+  for (const std::string& verb : verbs()) expect_explained({verb});
+  for (const char* verb : {"info", "winners", "sample", "repair", "export"}) {
+    expect_explained({"recording", verb});
   }
 }
 

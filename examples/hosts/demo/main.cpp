@@ -257,9 +257,12 @@ class Demo {
 int run(int argc, char** argv) {
   CLI::App app("The paper's robot on two hosts, whose cable is pulled and put back", "hosts-demo");
   app.footer(
-      "\nExits with 0 if the arm did what the page says. Somebody else than root gets networks of "
-      "his own\nwhere the machine allows user namespaces; where it does not, both hosts use the "
-      "loopback interface.");
+      "Example:\n  hosts-demo --seconds 60\n\n"
+      "If you are not root, the hosts have networks of their own only where the machine allows "
+      "user\n"
+      "namespaces; elsewhere both use the loopback interface.\n\n"
+      "Exit codes: 0 the arm obeyed those that it should obey; 1 it did not, or an error; 2 wrong "
+      "use");
   Options options;
   app.add_option("--seconds", options.seconds, "How long the scene lasts")
       ->capture_default_str()

@@ -160,7 +160,11 @@ class Demo {
 int run(int argc, char** argv) {
   CLI::App app("Nodes with ROS 2's names drive a base through Arbiter, and one through a mux",
                "ros2-demo");
-  app.footer("\nExits with 0 if both bases were told what they should be. Needs no ROS 2.");
+  app.footer(
+      "Example:\n  ros2-demo --seconds 30\n\nIt needs no ROS 2.\n\n"
+      "Exit codes: 0 both bases got the commands that they should get; 1 they did not, or an "
+      "error;\n"
+      "2 wrong use");
   Options options;
   app.add_option("--seconds", options.seconds, "How long the scene lasts")
       ->capture_default_str()

@@ -127,8 +127,11 @@ int run(int argc, char** argv) {
   CLI::App app("Runs the paper's Search and Track with real processes, and shows who wins",
                "search-and-track-demo");
   app.footer(
-      "\nExits with 0 if the winners were those of the paper's model, in its order; with another\n"
-      "model, always. Without a terminal it prints a line for each change of winner.");
+      "Example:\n  search-and-track-demo --seconds 60\n\n"
+      "Without a terminal it prints a line for each change of winner.\n\n"
+      "Exit codes: 0 the winners were those of the paper's model, in its order, or the model is "
+      "another;\n"
+      "1 they were not, or an error; 2 wrong use");
   Options options;
   app.add_option("--seconds", options.seconds, "How long the scene lasts")
       ->capture_default_str()
