@@ -107,7 +107,7 @@ void NodeCore::tidy_taps(
     tap->tidy();
     for (const std::string& source : tap->misbehaving()) {
       note(NoticeKind::refused, instance, source,
-           source + " cannot be watched: it tells an event that no honest publisher does");
+           source + " cannot be watched: it writes an event that no honest publisher writes");
     }
     for (auto& peer : tap->copied_from()) copied_from.emplace_back(instance, std::move(peer));
   }

@@ -129,10 +129,10 @@ class PortFindings {
                           " connected there and active";
     const std::size_t told = std::min(causes.size(), kMaxCausesTold);
     if (causes.size() > 1 || !are_all) {
-      message += " (one of " + std::string(are_all ? "" : "more than ") +
-                 std::to_string(causes.size()) + " such causes" +
-                 (told < causes.size() ? ", of which " + std::to_string(told) + " are told" : "") +
-                 ")";
+      message +=
+          " (one of " + std::string(are_all ? "" : "more than ") + std::to_string(causes.size()) +
+          " such causes" +
+          (told < causes.size() ? ", of which " + std::to_string(told) + " are listed" : "") + ")";
     }
     diagnostics_.note("nobody-wins", where_of(losers.empty() ? "" : losers.front()),
                       message +

@@ -96,10 +96,10 @@ TEST(Findings, OfManyCausesSomeAreToldAndTheirNumberIsSaid) {
   };
   EXPECT_THAT(causes(8).message, HasSubstr("(one of 8 such causes);"));
   EXPECT_EQ(causes(8).more_witnesses.size(), 7u);
-  EXPECT_THAT(causes(11).message, HasSubstr("(one of 11 such causes, of which 8 are told);"));
+  EXPECT_THAT(causes(11).message, HasSubstr("(one of 11 such causes, of which 8 are listed);"));
   EXPECT_EQ(causes(11).more_witnesses.size(), 7u);
   EXPECT_THAT(causes(17).message,
-              HasSubstr("(one of more than 16 such causes, of which 8 are told);"));
+              HasSubstr("(one of more than 16 such causes, of which 8 are listed);"));
 }
 
 TEST(Findings, ASourceThatWinsNowhereIsToldOnce) {

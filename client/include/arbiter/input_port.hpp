@@ -99,7 +99,7 @@ enum class WaitStatus : std::uint8_t {
   timeout,  // neither happened in time
 };
 
-// What wait_for() returns: converts to bool and dereferences as take()'s result.
+// The result of wait_for(): converts to bool and dereferences as take()'s result.
 template <class T>
 class WaitResult {
  public:
@@ -170,9 +170,9 @@ class InputPort {
   [[nodiscard]] int fd() { return detail::wait_descriptor(*core_); }
   // For a thread that is about to publish what this port may get, and then takes from it itself,
   // until take() returns nothing, and then looks at idle(): publishers meanwhile save the system
-  // call that makes the descriptor readable, and whoever waits for that is not woken, not even when
-  // the port becomes idle. Without those takes a sample may wait unnoticed; without that look, the
-  // end of all commands. Wait-free.
+  // call that makes the descriptor readable, and a thread that waits for that is not woken, not
+  // even when the port becomes idle. Without those takes a sample may wait unnoticed; without that
+  // look, the end of all commands. Wait-free.
   void disarm() noexcept { detail::disarm(*core_); }
 
   // The source of the connection that is selected now, unless the port is idle. At a port that is
@@ -181,7 +181,7 @@ class InputPort {
   // True if no connection is selected now; at a port that is not arbitrated, if none is active.
   // Also true while the selected connection cannot deliver: it is refused (NoticeKind::refused); or
   // its source stays active for ever, or for longer than T, no component has it open, and none of
-  // its samples waits. What it inhibits stays inhibited. Wait-free.
+  // its samples waits. Behaviours that it inhibits stay inhibited. Wait-free.
   [[nodiscard]] bool idle() noexcept { return detail::is_idle(*core_); }
   // Says where what is taken goes, for people: "/Base/cmd:i goes to …". As
   // OutputPort::describe().

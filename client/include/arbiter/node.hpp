@@ -98,8 +98,8 @@ class Node {
   // Blocks as the opening of a port. The port need not be there yet. Throws arbiter::Error: the
   // name is malformed, an option is out of bounds, the policy does not allow this user to `tap` it,
   // the component that has the port open refuses because the tap does not fit or T is not what its
-  // samples are, or no daemon has answered within NodeOptions::connect_timeout. A source that comes
-  // later and refuses is told by a notice (NoticeKind::refused).
+  // samples are, or no daemon has answered within NodeOptions::connect_timeout. A notice
+  // (NoticeKind::refused) reports a source that comes later and refuses.
   template <class T>
   [[nodiscard]] Tap<T> tap(std::string_view name, const TapOptions& options = {}) {
     if constexpr (std::is_void_v<T>) {

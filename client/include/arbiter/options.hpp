@@ -98,7 +98,7 @@ struct InputPortOptions {
   std::uint32_t max_held = 1;
 };
 
-// What a tap watches.
+// The kind of port that a tap watches.
 enum class TapOf : std::uint8_t {
   output,  // an output port: one source
   input,   // an input port: all sources that the model in force connects to it

@@ -70,7 +70,7 @@ class Loan<void> {
   WritableBytes bytes_;
 };
 
-// What typed and untyped output ports have in common. Movable; closing it (by its destructor)
+// The common part of typed and untyped output ports. Movable; closing it (by its destructor)
 // leaves its source active until its T has passed, and leaves what it has delivered to be taken.
 class OutputPortBase {
  public:
@@ -181,7 +181,7 @@ class OutputPort : public OutputPortBase {
     return detail::publish_copy(*core_, &sample, sizeof(T), deadline);
   }
   // The same, for a component that passes on samples from elsewhere: Sample::origin() and
-  // TapEvent::origin() tell where this one began, and recordings contain it. It is the component's
+  // TapEvent::origin() say where this one began, and recordings contain it. It is the component's
   // word, which nobody checks, and no decision depends on it.
   Outcome publish(Loan<T> loan, Time deadline, Origin origin) {
     require_own(loan);
@@ -210,8 +210,8 @@ class OutputPort : public OutputPortBase {
   // this source, or at the time of a deactivation; or if the daemon's policy did not allow this
   // user to `replay` this source when the port was opened. Then there is no arrival, and a loan is
   // free again. The policy protects against mistakes only: a component writes the activity of its
-  // own source, so whoever may open it can pretend any arrival. Wait-free; but each call binds the
-  // rules again, which publish() does only after another model has come into force.
+  // own source, so a user who may open it can pretend any arrival. Wait-free; but each call binds
+  // the rules again, which publish() does only after another model has come into force.
   Outcome publish_at(Time at, Loan<T> loan) {
     require_own(loan);
     return detail::publish_at(*core_, at, release(loan), sizeof(T));

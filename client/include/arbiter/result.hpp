@@ -1,4 +1,4 @@
-// What calls answer: errors that are thrown, outcomes that are returned; and how they tell time.
+// The answers of calls: errors that are thrown, and outcomes that are returned; and the time.
 #pragma once
 
 #include <chrono>
@@ -7,19 +7,19 @@
 
 namespace arbiter {
 
-// What went wrong, as a sentence that says what to do where that is known. Thrown by what opens
-// nodes and ports, and by what each call names.
+// A sentence that says what went wrong, and what to do if that is known. The functions that open
+// nodes and ports throw it, and those whose comments say so.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// A point of time by this host's CLOCK_MONOTONIC, in nanoseconds: what std::chrono::steady_clock
-// tells. Clocks of other hosts, and of this one before it was started, have nothing to do with it.
+// A point of time by this host's CLOCK_MONOTONIC, in nanoseconds, as std::chrono::steady_clock has
+// it. Clocks of other hosts, and of this one before it was started, have nothing to do with it.
 using Time = std::chrono::time_point<std::chrono::steady_clock, std::chrono::nanoseconds>;
 
 // Where an arrival began that a component passes on, as a link does with what comes from another
-// host. Whoever has recorded both hosts can tell by it which sample became which.
+// host. With recordings of both hosts, you can see by it which sample became which.
 struct Origin {
   // One life of the source's output port there, as the component that passes it on numbers them.
   // 0: the arrival began here.
@@ -28,7 +28,7 @@ struct Origin {
   std::uint64_t sequence = 0;
 };
 
-// What became of one arrival (paper, section III.A), counted in input ports that are open and
+// The outcome of one arrival (paper, section III.A), counted in input ports that are open and
 // connected.
 struct Outcome {
   std::uint32_t delivered = 0;  // accepted: the connection is the winner there

@@ -18,7 +18,7 @@
 //
 // A publisher keeps its last 1024 events and its last 64 samples for its taps (fewer samples where
 // they are large: 32 MiB of them). A tap that is slower loses its own oldest events, which are
-// counted; then it is told, first of all, what the source is like where it goes on.
+// counted; the next event is then a `state`, with the activity that the source has from there on.
 //
 // Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC. Threads: use a tap, and its
 // events, from one thread at a time. Blocking: only wait_for() blocks. Cost: take() needs no lock
@@ -62,7 +62,7 @@ enum class TapEventKind : std::uint8_t {
   overtaken,     // there, too: samples gave way to newer ones in a full queue
 };
 
-// What became of an arrival at one input port.
+// The outcome of an arrival at one input port.
 enum class Fate : std::uint8_t {
   none,       // not an arrival, or not connected there
   accepted,   // the connection was the winner: the sample was queued; a signal has no sample
@@ -104,7 +104,7 @@ class TapEventBase {
   [[nodiscard]] Origin origin() const noexcept { return data_.origin; }
   // How many events of this source were lost immediately before this one, which is of kind `state`
   // then; or `closed`, where a component was killed during an arrival or deactivation that others
-  // may have seen, before it told of it.
+  // may have seen, before its taps learnt of it.
   [[nodiscard]] std::uint64_t lost() const noexcept { return data_.lost; }
   // How many samples were dropped or overtaken; of other kinds 0.
   [[nodiscard]] std::uint64_t count() const noexcept { return data_.count; }
@@ -206,8 +206,8 @@ class Tap {
   }
   ~Tap() { detail::close_tap(std::move(core_)); }
 
-  // The next event, or empty. Events of one source come in its order; of those of several sources
-  // that have been told by now, the oldest comes first. Wait-free. Throws arbiter::Error if the
+  // The next event, or empty. Events of one source come in its order; of those that several
+  // sources have written by now, the oldest comes first. Wait-free. Throws arbiter::Error if the
   // next event has a sample, and max_held of them are held already.
   [[nodiscard]] std::optional<TapEvent<T>> take() {
     detail::TapEventData data;

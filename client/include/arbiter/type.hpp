@@ -1,4 +1,4 @@
-// What a port carries: a name, a size and an alignment.
+// The type of what a port carries: a name, a size and an alignment.
 //
 //   struct Twist { double linear[3], angular[3]; };
 //   ARBITER_TYPE(Twist, "geometry/Twist");               // beside its definition, in no namespace
@@ -99,7 +99,7 @@ namespace detail {
 
 Type type_of_cpp(const char* mangled_name, std::size_t size, std::size_t alignment);
 
-// What can be checked while compiling; Type() checks the rest.
+// Checks as much as can be checked while compiling; Type() checks the rest.
 constexpr bool may_be_type_name(std::string_view name) noexcept {
   for (const char byte : name) {
     if ((static_cast<unsigned char>(byte) < 0x20) || byte == 0x7f) return false;

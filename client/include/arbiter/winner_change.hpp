@@ -1,4 +1,4 @@
-// What `arbiter winners` publishes: who commands an input port, and who did before.
+// The samples that `arbiter winners` publishes: who commands an input port, and who did before.
 //
 //   auto in = node.input_port<arbiter::WinnerChange>("/Lights/winner:i");
 //   if (auto news = in.take()) show((*news)->port, (*news)->winner);
@@ -25,7 +25,7 @@ enum class WinnerNews : std::uint32_t {
 };
 
 struct WinnerChange {
-  std::int64_t time_ns;      // since when, as far as activities tell
+  std::int64_t time_ns;      // since when, as far as activities show
   std::int64_t seen_ns;      // when it was noticed, or of `unchanged`: looked at
   std::uint64_t generation;  // of the model in force then
   std::uint64_t changes;     // counts the samples of kind `change`: one that is missing was lost
