@@ -115,10 +115,10 @@ class Document {
     }
     status.deaths.assign(of_.deaths.all().begin(), of_.deaths.all().end());
     status.refusals.assign(of_.refusals.all().begin(), of_.refusals.all().end());
-    for (const auto& each : of_.directory.sources()) {
+    for (const auto& each : of_.names.sources()) {
       if (is_worth_showing(*each)) status.sources.push_back(source(*each));
     }
-    for (const auto& each : of_.directory.inputs()) {
+    for (const auto& each : of_.names.inputs()) {
       if (each->open != 0 || each->away != 0 || snapshot_.table.knows_port(each->id)) {
         status.inputs.push_back(input(*each));
       }
@@ -192,10 +192,10 @@ class Document {
     result.in_order = is_decided_in_order(name.id);
     result.idle = command.commander.source == shm::kNone;
     if (result.arbitrated && !result.idle) {
-      result.winner = of_.directory.sources()[command.commander.source]->name;
+      result.winner = of_.names.sources()[command.commander.source]->name;
     }
     if (result.idle && command.selected.source != shm::kNone) {
-      result.cannot_deliver = {of_.directory.sources()[command.selected.source]->name, why_not};
+      result.cannot_deliver = {of_.names.sources()[command.selected.source]->name, why_not};
     }
     result.away_pid = away_pid(name.away, of_.registry.input(name.id));
     if (input != nullptr) result.open = open_input(*input);
@@ -226,7 +226,7 @@ class Document {
     for (auto index = range.first; index != range.first + range.count; ++index) {
       const shm::SourceId id = snapshot_.table.rule(index).source;
       const auto* source =
-          id < of_.directory.sources().size() ? of_.directory.sources()[id].get() : nullptr;
+          id < of_.names.sources().size() ? of_.names.sources()[id].get() : nullptr;
       if (source == nullptr) continue;
       connected.insert(id);
       const OutputPort* output = of_.switchboard.output(source->open);
@@ -244,8 +244,8 @@ class Document {
     }
     const auto senses = snapshot_.table.sources_read(name.id);
     for (shm::Word i = 0; i < senses.count; ++i) {
-      if (connected.count(senses[i]) != 0 || senses[i] >= of_.directory.sources().size()) continue;
-      const Source& source = *of_.directory.sources()[senses[i]];
+      if (connected.count(senses[i]) != 0 || senses[i] >= of_.names.sources().size()) continue;
+      const Source& source = *of_.names.sources()[senses[i]];
       result.senses.push_back({source.name, is_active(source)});
     }
   }
@@ -269,7 +269,7 @@ class Document {
                                         std::string& why_not) const {
     shm::DecisionClock clock(now_, true);
     shm::PortPicture picture;
-    picture.bind(snapshot_.table, port, of_.directory.pages());
+    picture.bind(snapshot_.table, port, of_.names.pages());
     static_cast<void>(picture.take(clock));  // else nobody is active in it
     return picture.command([&](const shm::Rule& rule) {
       std::string why = why_nothing_can_come(rule.source, input);
@@ -281,7 +281,7 @@ class Document {
 
   // Of an active source. Empty: something can.
   [[nodiscard]] std::string why_nothing_can_come(shm::SourceId id, const InputPort* input) const {
-    const Source& source = *of_.directory.sources()[id];
+    const Source& source = *of_.names.sources()[id];
     const Link* link = link_between(of_.switchboard.output(source.open), input);
     if (link != nullptr && link->is_refused()) return link->mismatch;
     if (source.open != 0 || source.away != 0) return {};

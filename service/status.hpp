@@ -19,7 +19,7 @@ struct StatusOf {
   const Library& library;
   const ModelPointer& model;  // in force; null: none, or a predecessor's
   const History& history;
-  const PortNames& directory;
+  const PortNames& names;
   const Registry& registry;
   const Switchboard& switchboard;
   const Strangers& strangers;
