@@ -63,10 +63,10 @@ void InputCore::add_peer(std::shared_ptr<const OutputPeer> peer) {
   take_up(link);
 }
 
-// From here on a publisher that waits for it may begin its queue. Who finds a sample in another queue that was
-// published after one in this finds the view that has this one offered, too. Relaxed is enough: the
-// fence of offer_view() stands between the offer and this store, and the publisher's fence (a)
-// between its look and its first sample.
+// From here on a publisher that waits for it may begin its queue. Who finds a sample in another
+// queue that was published after one in this finds the view that has this one offered, too. Relaxed
+// is enough: the fence of offer_view() stands between the offer and this store, and the publisher's
+// fence (a) between its look and its first sample.
 void InputCore::take_up(std::uint64_t link) noexcept {
   shm::Atomic<std::uint64_t>& newest = segment_->header.newest_link;
   newest.store(std::max(link, newest.load(std::memory_order_relaxed)), std::memory_order_relaxed);

@@ -97,7 +97,8 @@ TEST_F(WhyOfTwoModels, TellsThatAFileSaysSomethingElseByNow) {
   files_.write("first.xml", model_of("/arm", "/b"));
   EXPECT_THAT(why({"/arm"}), HasSubstr("! " + first_ + " has changed since; arbiter reload"));
   EXPECT_EQ(why_json({"/arm"})["model"]["changed_files"], json::array({first_}));
-  EXPECT_THAT(why({"/arm"}), HasSubstr("unless it has errors (arbiter reload --dry-run checks it)"));
+  EXPECT_THAT(why({"/arm"}),
+              HasSubstr("unless it has errors (arbiter reload --dry-run checks it)"));
   std::filesystem::remove(first_);
   EXPECT_EQ(why_json({"/arm"})["model"]["changed_files"], json::array({first_}));
   EXPECT_EQ(why_json({"/arm"})["model"]["missing_files"], json::array({first_}));
