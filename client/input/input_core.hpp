@@ -206,9 +206,9 @@ class InputCore {
   std::vector<shm::ChannelReader::Watch> watches_;  // by queue: what says that nothing is new
   std::vector<Queue*> waiting_;  // those in which the take under way found a head
   static constexpr std::size_t kNoQueue = SIZE_MAX;
-  std::size_t last_taken_ = kNoQueue;  // of queues_, the last sample's
-  shm::Nanoseconds last_stamp_ = 0;    // the last sample's
-  bool selects_one_ = false;           // at most, under snapshot_: the port is arbitrated
+  std::size_t last_taken_ = kNoQueue;        // of queues_, the last sample's
+  shm::Nanoseconds last_stamp_ = INT64_MIN;  // the last sample's
+  bool selects_one_ = false;                 // at most, under snapshot_: the port is arbitrated
   shm::TableSnapshot snapshot_;
   shm::Epoch bound_epoch_ = UINT64_MAX;
   std::uint64_t bound_pages_ = 0;
