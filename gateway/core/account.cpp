@@ -17,12 +17,11 @@ constexpr std::int64_t kOneSecond = 1'000'000'000;
 constexpr std::int64_t kRatePeriod = 2 * kOneSecond;
 
 // Since the last sample; the longest first.
-constexpr std::array<std::pair<std::int64_t, const char*>, 5> kAges{
-    {{24 * 3600 * kOneSecond, "a day"},
-     {3600 * kOneSecond, "an hour"},
-     {600 * kOneSecond, "10 min"},
-     {60 * kOneSecond, "a minute"},
-     {10 * kOneSecond, "10 s"}}};
+constexpr std::array<std::pair<std::int64_t, const char*>, 5> kAges{{{86400 * kOneSecond, "a day"},
+                                                                     {3600 * kOneSecond, "an hour"},
+                                                                     {600 * kOneSecond, "10 min"},
+                                                                     {60 * kOneSecond, "a minute"},
+                                                                     {10 * kOneSecond, "10 s"}}};
 
 std::string fitting(std::string_view text, std::size_t most) {
   std::string result = shm::printable(text);
