@@ -137,6 +137,7 @@ class InputCore {
   bool look_at(std::size_t index) noexcept;
   bool look_closely(Queue& queue) noexcept;
   void join(Queue& queue) noexcept;
+  void look_for_queue(Queue& queue) noexcept;
   void drop_missed(Queue& queue) noexcept;
   void yield_to_successor(Queue& queue) noexcept;
   enum class Choice : std::uint8_t { kTake, kNothing, kAgain, kLoses };

@@ -53,6 +53,7 @@ HeldSample InputCore::take_once() {
     if (choice == Choice::kNothing) return sample;
     if (choice == Choice::kTake && hold(*oldest, sample)) {
       commanded_ = true;
+      last_stamp_ = sample.stamp_ns;
       if (is_measured_.load(std::memory_order_relaxed)) measure(sample.stamp_ns);
       return sample;
     }
@@ -116,7 +117,10 @@ InputCore::Queue* InputCore::scan(bool& again) noexcept {
 }
 
 void InputCore::join(Queue& queue) noexcept {
-  if (queue.reader.state() != shm::ChannelReader::State::kUnjoined) return;
+  if (queue.reader.state() == shm::ChannelReader::State::kUnjoined) look_for_queue(queue);
+}
+
+[[gnu::noinline, gnu::cold]] void InputCore::look_for_queue(Queue& queue) noexcept {
   if (!queue.reader.join()) return;
   queue.lane->consumed.store(queue.reader.consumed(), std::memory_order_relaxed);
   if (!keep_) drop_missed(queue);
@@ -327,7 +331,6 @@ bool InputCore::hold(Queue& queue, HeldSample& sample) noexcept {
   count(queue.lane->taken);
   count(segment_->header.counters.taken);
   last_taken_ = static_cast<std::size_t>(&queue - queues_.data());
-  last_stamp_ = sample.stamp_ns;
   held_from_[index] = queue.peer.get();
   ++queue.peer->held;
   ++held_;
