@@ -41,9 +41,9 @@ HeldSample InputCore::take_once() {
     Queue* oldest = look();
     if (oldest == nullptr) return sample;
     // A publisher that joined since may have delivered before this head was published: look again,
-    // with its queue. SYNC POINT: entry-stored. Relaxed is enough in has_offer(): a view is offered
-    // before its publisher delivers, and who publishes after that passes it on with the head, which
-    // peek() has acquired.
+    // with its queue. SYNC POINT: entry-stored. Relaxed is enough in has_offer(): who publishes
+    // after the one that joined passes the offer on with the head, which peek() has acquired. A
+    // view that is offered later than its publisher delivered, drop_missed() is for.
     if (handover_.has_offer()) continue;
     if (held_ == max_held_) {
       throw Error(name_ + ": " + std::to_string(max_held_) +
