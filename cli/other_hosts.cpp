@@ -47,6 +47,7 @@ std::string counts_text(const wire::ImportStatus& import) {
     if (number != 0) text += ", " + std::to_string(number) + what;
   };
   count(import.lost, " lost");
+  count(import.without_sample, " without their samples");
   count(import.late, " late");
   count(import.withheld, " withheld");
   return text;

@@ -259,6 +259,7 @@ std::string Import::text() const {
     if (number != 0) text += ", " + std::to_string(number) + what;
   };
   count(stream_.lost(), " lost");
+  count(stream_.without_sample(), " without their samples");
   count(counts_.late, " late");
   count(counts_.withheld, " withheld");
   count(counts_.unbelieved, " withheld though they were wanted");
@@ -277,6 +278,7 @@ wire::ImportStatus Import::status() const {
   const std::lock_guard lock(mutex_);
   status.is_open = port_ != nullptr;
   status.lost = stream_.lost();
+  status.without_sample = stream_.without_sample();
   status.late = counts_.late;
   status.withheld = counts_.withheld;
   return status;

@@ -35,7 +35,8 @@ void Import::take(const gateway::dds::Payload& payload,  // NOLINT(bugprone-exce
                           has_sample(header_.kind),
                           header_.is_deactivated,
                           header_.kind == EventKind::kWithheld,
-                          header_.token_of(me_) == 0};
+                          header_.token_of(me_) == 0,
+                          header_.kind == EventKind::kSignal};
   if (writer.handle != writer_) {  // one speaker: others are not heard
     remember(writer.handle, event);
     return;

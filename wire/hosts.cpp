@@ -51,6 +51,7 @@ void describe(auto& field, Is<ImportStatus> auto& of) {
   field("open_here", of.is_open_here);
   field("hosts", of.hosts);
   field.counter("lost", of.lost);
+  field.counter("without_sample", of.without_sample);
   field.counter("late", of.late);
   field.counter("withheld", of.withheld);
 }
