@@ -1,12 +1,15 @@
 // What a user's project sees: the package that `cmake --install` installs, found by find_package(),
 // linked by arbiter::client alone, in C++17 and in C++20.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <regex>
 #include <set>
+#include <sstream>
 
 #include "tests/support/daemon.hpp"
 #include "tests/support/run_program.hpp"
@@ -29,30 +32,72 @@ void install(const std::string& prefix) {
   run({CONSUMER_CMAKE, "--install", CONSUMER_BUILD, "--prefix", prefix});
 }
 
-// The files that a page links to, as it names them.
-std::vector<std::string> links_of(const fs::path& page) {
+// What a page links to, as it names it: a file, a heading of one, or of the page itself.
+struct Link {
+  std::string file;
+  std::string heading;
+};
+
+std::string text_of(const fs::path& page) {
   std::ifstream in(page);
-  const std::string text(std::istreambuf_iterator<char>(in), {});
-  const std::regex link(R"(\]\(([^)#]+)[^)]*\))");
-  std::vector<std::string> links;
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::vector<Link> links_of(const fs::path& page) {
+  const std::string text = text_of(page);
+  const std::regex link(R"(\]\(([^)#]*)#?([^)]*)\))");
+  std::vector<Link> links;
   for (std::sregex_iterator it(text.begin(), text.end(), link), end; it != end; ++it) {
-    if (const std::string to = (*it)[1]; to.find("://") == std::string::npos) links.push_back(to);
+    if ((*it)[1].str().find("://") == std::string::npos) links.push_back({(*it)[1], (*it)[2]});
   }
   return links;
+}
+
+// As web sites of repositories name a heading: in small letters, without marks, with "-" between
+// words.
+std::string name_of(const std::string& heading) {
+  std::string name;
+  for (const char c : heading) {
+    const bool is_mark = std::ispunct(static_cast<unsigned char>(c)) != 0 && c != '-' && c != '_';
+    if (!is_mark) name += c == ' ' ? '-' : static_cast<char>(std::tolower(c));
+  }
+  return name;
+}
+
+// A second one of the same name has a number.
+std::set<std::string> headings_of(const fs::path& page) {
+  std::istringstream in(text_of(page));
+  std::set<std::string> names;
+  bool is_code = false;
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("```")) is_code = !is_code;
+    if (is_code || !line.starts_with('#')) continue;
+    const std::string name = name_of(line.substr(line.find_first_not_of("# ")));
+    for (int i = 0; !names.insert(i == 0 ? name : name + "-" + std::to_string(i)).second;) ++i;
+  }
+  return names;
 }
 
 TEST(Consumer, FindsWhatTheInstalledPagesLinkTo) {
   const TemporaryDirectory directory;
   ASSERT_NO_FATAL_FAILURE(install(directory.path()));
-  std::size_t links = 0;
+  std::size_t files = 0;
+  std::size_t headings = 0;
   for (const auto& entry : fs::recursive_directory_iterator(directory.path() + "/share/doc")) {
-    if (entry.path().extension() != ".md") continue;
-    for (const auto& to : links_of(entry.path())) {
-      ++links;
-      EXPECT_TRUE(fs::exists(entry.path().parent_path() / to)) << entry.path() << ": " << to;
+    const fs::path page = entry.path();
+    if (page.extension() != ".md") continue;
+    for (const Link& to : links_of(page)) {
+      const fs::path file = to.file.empty() ? page : page.parent_path() / to.file;
+      files += to.file.empty() ? 0 : 1;
+      EXPECT_TRUE(fs::exists(file)) << page << ": " << to.file;
+      if (to.heading.empty()) continue;
+      ++headings;
+      EXPECT_TRUE(headings_of(file).contains(to.heading))
+          << page << ": " << file << "#" << to.heading;
     }
   }
-  EXPECT_GT(links, 40u);
+  EXPECT_GT(files, 40u);
+  EXPECT_GT(headings, 100u);
 }
 
 std::set<std::string> first_of_each(const fs::path& file, const std::regex& line) {
@@ -79,6 +124,21 @@ TEST(Consumer, FindsTheUsersOfServicesInTheListOfThoseToBeMade) {
   // Its last field goes into a file whose fields end with colons.
   const std::regex line(R"re(u (\S+) +- "[^:]+")re");
   EXPECT_EQ(first_of_each(lib / "sysusers.d/arbiter.conf", line), users);
+}
+
+TEST(Consumer, IsHelpedByEachProgram) {
+  const TemporaryDirectory directory;
+  ASSERT_NO_FATAL_FAILURE(install(directory.path()));
+  std::size_t programs = 0;
+  for (const auto& program : fs::directory_iterator(directory.path() + "/bin")) {
+    ++programs;
+    const ProgramResult help = run_program({program.path(), "--help"});
+    EXPECT_EQ(help.exit_code, 0) << program;
+    EXPECT_EQ(help.err, "") << program;
+    EXPECT_THAT(help.out, testing::ContainsRegex("\nExamples?:\n  [^\n]+")) << program;
+    EXPECT_THAT(help.out, testing::ContainsRegex("\nExit codes: 0 [^\n]+")) << program;
+  }
+  EXPECT_EQ(programs, 8u);
 }
 
 TEST(Consumer, NeedsAtMost15Megabytes) {
