@@ -132,7 +132,7 @@ void Import::obey(const Offerer* speaker) {
   if (last == unheard_.end()) return;
   // It is noted for its state; its sample no port had.
   const bool is_new = last->exporter == exporter && stream_.note(exporter, last->last);
-  if (is_new && last->last.has_sample) ++counts_.too_soon;
+  if (is_new && last->last.is_arrival()) ++counts_.too_soon;
   // The same exporter, which is heard by another writer: the port has stayed open.
   if (is_new && port_ && stream_.is_deactivated()) port_->deactivate();
   unheard_.erase(last);

@@ -71,7 +71,7 @@ shm::Nanoseconds Import::time_left() const {
 void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
   if (header_.kind == EventKind::kWithheld) ++counts_.withheld;
   if (!port_) {
-    if (has_sample(header_.kind)) ++counts_.too_soon;
+    if (has_sample(header_.kind) || header_.kind == EventKind::kSignal) ++counts_.too_soon;
     return;
   }
   if (header_.is_deactivated) {

@@ -40,8 +40,8 @@ bool Stream::completes(Incarnation from, std::uint64_t number) noexcept {
 std::uint64_t Stream::missed(const Exporter& exporter, const StreamEvent& event) noexcept {
   const std::uint64_t events = event.number - exporter.last - 1;
   if (exporter.sequence == 0) return events;
-  const bool may_be_next = event.has_sample || event.is_signal;
-  const std::uint64_t next = exporter.sequence + (may_be_next ? 1 : 0);
+  // A signal may be there for the next sample.
+  const std::uint64_t next = exporter.sequence + (event.is_arrival() ? 1 : 0);
   return std::max(events, event.sequence > next ? event.sequence - next : 0);
 }
 

@@ -25,6 +25,8 @@ struct StreamEvent {
   bool is_withheld = false;     // the sample may come later, with the number of the last event
   bool is_unasked = false;      // its exporter had heard nothing of this importer when it happened
   bool is_signal = false;       // of its publisher, or in the place of a sample that was not sent
+
+  [[nodiscard]] constexpr bool is_arrival() const noexcept { return has_sample || is_signal; }
 };
 
 class Stream {

@@ -10,6 +10,7 @@
 #include <regex>
 #include <set>
 #include <sstream>
+#include <string_view>
 
 #include "tests/support/daemon.hpp"
 #include "tests/support/run_program.hpp"
@@ -64,13 +65,17 @@ std::string name_of(const std::string& heading) {
   return name;
 }
 
-// A second one of the same name has a number.
+// A second one of the same name has a number. A place may be named beside its heading.
 std::set<std::string> headings_of(const fs::path& page) {
   std::istringstream in(text_of(page));
   std::set<std::string> names;
   bool is_code = false;
   for (std::string line; std::getline(in, line);) {
     if (line.starts_with("```")) is_code = !is_code;
+    constexpr std::string_view kPlace = "<a id=\"";
+    if (line.starts_with(kPlace)) {
+      names.insert(line.substr(kPlace.size(), line.find('"', kPlace.size()) - kPlace.size()));
+    }
     if (is_code || !line.starts_with('#')) continue;
     const std::string name = name_of(line.substr(line.find_first_not_of("# ")));
     for (int i = 0; !names.insert(i == 0 ? name : name + "-" + std::to_string(i)).second;) ++i;
