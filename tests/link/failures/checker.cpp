@@ -12,6 +12,8 @@ using Pair = std::pair<std::uint32_t, std::uint64_t>;
 
 // A publisher that was started again has published no more by the time at which it is heard of.
 constexpr std::uint64_t kFirstOfALife = 1000;
+// A recorder that begins again with a new daemon may not have all that happened around that.
+constexpr Nanoseconds kBegins = 2 * kSecond;
 
 const std::vector<Happened>& of(const HostEvidence& host, const std::string& source) {
   static const std::vector<Happened> kNone;
@@ -27,6 +29,12 @@ std::string ms(Nanoseconds time) {
 
 bool is_arrival(const Happened& event) {
   return event.kind == Kind::sample || event.kind == Kind::signal;
+}
+
+// What was withheld may follow its signal, once.
+bool is_completed_by(const Happened& before, const Happened& event) {
+  return before.kind == Kind::signal && event.kind == Kind::sample &&
+         before.exporter == event.exporter && before.sequence == event.sequence;
 }
 
 // Of the publisher. A signal does not say.
@@ -119,7 +127,8 @@ void check_winners(const HostEvidence& host, const std::string& model,
 }
 
 void check_age(const HostEvidence& importer, const HostEvidence& exporter,
-               const std::string& source, Nanoseconds most, Findings& found, Checked& checked) {
+               const std::string& source, const MostAge& most_at, Findings& found,
+               Checked& checked) {
   // A successor of the publisher counts from 1 again.
   std::map<std::uint64_t, std::vector<Nanoseconds>> published;
   for (const Happened& event : of(exporter, source)) {
@@ -128,6 +137,7 @@ void check_age(const HostEvidence& importer, const HostEvidence& exporter,
   for (const Happened& event : of(importer, source)) {
     if (!is_arrival(event)) continue;
     ++checked.arrivals;
+    const Nanoseconds most = most_at(event.time);
     const Nanoseconds least = event.command ? event.command->made : 0;
     if (event.command && 2 * (event.time - least) > most) ++checked.old;
     if (event.command && event.time - least <= most) continue;  // it was published after that
@@ -150,7 +160,9 @@ void check_order(const HostEvidence& importer, const std::string& source, Findin
   std::map<std::uint64_t, const Happened*> before;  // by exporter
   for (const Happened& event : of(importer, source)) {
     if (!is_arrival(event)) continue;
-    if (event.command) {
+    const Happened*& its = before[event.exporter];
+    const bool completes = its != nullptr && event.exporter != 0 && is_completed_by(*its, event);
+    if (event.command && !completes) {
       const Pair current{event.command->life, event.command->number};
       if (current <= last) {
         found.push_back(importer.name + ": " + source + " " + number_of(event) + " arrived after " +
@@ -158,10 +170,6 @@ void check_order(const HostEvidence& importer, const std::string& source, Findin
       }
       last = std::max(last, current);
     }
-    const Happened*& its = before[event.exporter];
-    // What was withheld may follow its signal, once.
-    const bool completes = its != nullptr && event.sequence == its->sequence &&
-                           its->kind == Kind::signal && event.kind == Kind::sample;
     const bool follows = its == nullptr || event.exporter == 0 || completes ||
                          event.sequence > its->sequence || is_other_life(*its, event);
     if (!follows) {
@@ -170,6 +178,71 @@ void check_order(const HostEvidence& importer, const std::string& source, Findin
     }
     its = &event;
   }
+}
+
+void check_ends(const HostEvidence& importer, const HostEvidence& exporter,
+                const std::string& source, Findings& found, Checked& checked) {
+  std::vector<Nanoseconds> ends;
+  std::vector<Span> unknown;
+  for (const Happened& event : of(exporter, source)) {
+    if (event.kind == Kind::deactivation) ends.push_back(event.time);
+    if (event.kind == Kind::gap) unknown.push_back({event.time, event.seen});
+  }
+  for (const Nanoseconds each : exporter.beginnings) {
+    unknown.push_back({each - kBegins, each + kBegins});
+  }
+  const Happened* before = nullptr;
+  const Happened* end = nullptr;
+  for (const Happened& event : of(importer, source)) {
+    if (event.kind == Kind::deactivation && end == nullptr) end = &event;
+    if (!event.command) continue;
+    const bool is_told = end != nullptr && before != nullptr && !is_other_life(*before, event) &&
+                         !overlaps(unknown, before->command->made, event.command->made);
+    if (is_told) {
+      ++checked.ends;
+      const auto its = std::upper_bound(ends.begin(), ends.end(), before->command->made);
+      if (its == ends.end() || *its > event.command->made) {
+        found.push_back(importer.name + ": " + source + " was deactivated at " + ms(end->time) +
+                        ", between " + number_of(*before) + " and " + number_of(event) +
+                        ", but not so at its exporter");
+      }
+    }
+    before = &event;
+    end = nullptr;
+  }
+}
+
+std::vector<Asked> asked_for(const HostEvidence& importer, const std::string& source) {
+  std::vector<Asked> result;
+  const auto& events = of(importer, source);
+  for (auto each = events.begin(); each != events.end(); ++each) {
+    if (each->kind != Kind::signal || !each->won || each->exporter == 0) continue;
+    const auto next = std::next(each);
+    if (next == events.end()) break;
+    result.push_back({each->time, is_completed_by(*each, *next)});
+  }
+  return result;
+}
+
+std::vector<End> ends_of(const HostEvidence& exporter, const std::string& source) {
+  std::vector<End> result;
+  const auto& events = of(exporter, source);
+  for (auto each = events.begin(); each != events.end(); ++each) {
+    if (each->kind != Kind::deactivation) continue;
+    const auto next = std::next(each);
+    result.push_back({each->time, next == events.end() ? kEnd : next->time});
+  }
+  return result;
+}
+
+Recovery first_end_after(const HostEvidence& importer, const std::string& source,
+                         Nanoseconds time) {
+  for (const Happened& event : of(importer, source)) {
+    const bool is_it = event.kind == Kind::deactivation ||
+                       (is_arrival(event) && event.command && event.command->made >= time);
+    if (is_it && event.time >= time) return {true, event.time - time};
+  }
+  return {};
 }
 
 void check_losses(const HostEvidence& importer, const std::string& source, std::uint64_t counted,
@@ -212,10 +285,13 @@ void check_counts(const HostEvidence& importer, const HostEvidence& exporter,
     }
   }
   for (const auto& [life, last] : lives) published += last.second - last.first;
+  // The sample of a signal that wins is asked for, and may be counted as late.
   const auto& events = of(importer, source);
   const auto arrived = static_cast<std::uint64_t>(
       std::count_if(events.begin(), events.end(), [&](const Happened& event) {
-        return event.kind == Kind::sample && event.command && event.command->made >= since;
+        const bool is_one =
+            event.kind == Kind::sample || (event.kind == Kind::signal && !event.won);
+        return is_one && event.command && event.command->made >= since;
       }));
   if (counted + arrived <= published + joins) return;
   found.push_back(importer.name + ": of " + source + " " + std::to_string(published) +
@@ -235,11 +311,12 @@ void check_cuts(const HostEvidence& importer, const std::string& source,
   }
 }
 
-bool is_closed_in(const HostEvidence& importer, const std::string& source, const Span& cut) {
+Recovery closed_after(const HostEvidence& importer, const std::string& source, Nanoseconds time) {
   const auto its = importer.closures.find(source);
-  return its != importer.closures.end() &&
-         std::any_of(its->second.begin(), its->second.end(),
-                     [&](Nanoseconds time) { return time >= cut.from && time <= cut.to; });
+  if (its == importer.closures.end()) return {};
+  const auto first = std::find_if(its->second.begin(), its->second.end(),
+                                  [&](Nanoseconds each) { return each >= time; });
+  return first == its->second.end() ? Recovery{} : Recovery{true, *first - time};
 }
 
 bool was_there(const HostEvidence& importer, const std::string& source, Nanoseconds time) {
@@ -252,7 +329,7 @@ bool was_there(const HostEvidence& importer, const std::string& source, Nanoseco
 Recovery first_arrival_after(const HostEvidence& host, const std::string& source,
                              Nanoseconds time) {
   for (const Happened& event : of(host, source)) {
-    if (event.time >= time && event.kind == Kind::sample) return {true, event.time - time};
+    if (event.time >= time && is_arrival(event)) return {true, event.time - time};
   }
   return {};
 }

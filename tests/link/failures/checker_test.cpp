@@ -17,6 +17,10 @@ using Kind = Happened::Kind;
 constexpr const char* kSource = "/Host1/cmd:o";
 constexpr const char* kLower = "/Hold2/cmd:o";
 
+MostAge always(Nanoseconds most) {
+  return [most](Nanoseconds) { return most * kMs; };
+}
+
 // The source of host1, as host2 has recorded it; times are in milliseconds.
 class Recorded {
  public:
@@ -38,6 +42,13 @@ class Recorded {
     event.time = event.seen = at * kMs;
     event.command = Command{1, 1, number, at * kMs};
     event.sequence = number;
+    exporter.sources[kSource].push_back(event);
+    return *this;
+  }
+  Recorded& deactivated(Nanoseconds at) {
+    Happened event;
+    event.kind = Kind::deactivation;
+    event.time = event.seen = at * kMs;
     exporter.sources[kSource].push_back(event);
     return *this;
   }
@@ -64,12 +75,18 @@ class Recorded {
   [[nodiscard]] Findings age(Nanoseconds most) const {
     Findings found;
     Checked checked;
-    check_age(importer, exporter, kSource, most * kMs, found, checked);
+    check_age(importer, exporter, kSource, always(most), found, checked);
     return found;
   }
   [[nodiscard]] Findings order() const {
     Findings found;
     check_order(importer, kSource, found);
+    return found;
+  }
+  [[nodiscard]] Findings ends() const {
+    Findings found;
+    Checked checked;
+    check_ends(importer, exporter, kSource, found, checked);
     return found;
   }
   [[nodiscard]] Findings losses(std::uint64_t counted, const std::vector<Span>& spans = {}) const {
@@ -102,7 +119,7 @@ TEST(Checker, TakesTheTimeOfPublishingFromTheExporter) {
   Findings found;
   Checked checked;
   const Recorded unknown = Recorded().arrives(1, 120, 10);
-  check_age(unknown.importer, unknown.exporter, kSource, 100 * kMs, found, checked);
+  check_age(unknown.importer, unknown.exporter, kSource, always(100), found, checked);
   EXPECT_THAT(found, IsEmpty());
   EXPECT_EQ(checked.unsure, 1U);
 }
@@ -129,6 +146,55 @@ TEST(Checker, KnowsWhatStaysAtHome) {
               ElementsAre(HasSubstr("number 1 arrived when it was 101.000 ms old")));
   EXPECT_THAT(Recorded().signals(1, 10).signals(4, 20).losses(1),
               ElementsAre(HasSubstr("2 samples are missing, but only 1")));
+}
+
+TEST(Checker, NamesWhatTheRecorderDidNotTake) {
+  Recorded home = Recorded().published(1, 10).published(2, 20).published(1, 60).signals(1, 11);
+  for (Happened& event : home.exporter.sources[kSource]) event.command.reset();
+  name_own(home.exporter, kSource, 1, {5 * kMs, 50 * kMs});
+  const auto& own = home.exporter.sources[kSource];
+  EXPECT_EQ(own[1].command->life, 1U);
+  EXPECT_EQ(own[1].command->number, 2U);
+  EXPECT_EQ(own[2].command->life, 2U);
+  home.signals(1, 70).signals(1, 5000);
+  name_imported(home.importer, home.exporter, kSource);
+  const auto& imported = home.importer.sources[kSource];
+  EXPECT_EQ(imported[0].command->made, 10 * kMs);
+  EXPECT_FALSE(imported[1].command) << "it may be that of either life";
+  EXPECT_EQ(imported[2].command->life, 2U);
+  EXPECT_THAT(home.order(), testing::Not(IsEmpty())) << "it arrived before";
+}
+
+TEST(Checker, KnowsWhatWasAskedFor) {
+  Recorded wins = Recorded().published(1, 10).published(2, 20).published(3, 30);
+  wins.signals(1, 11).signals(2, 21).arrives(2, 21, 20).signals(3, 31).arrives(4, 41, 40);
+  for (Happened& event : wins.importer.sources[kSource]) event.won = event.sequence > 1;
+  name_imported(wins.importer, wins.exporter, kSource);
+  EXPECT_THAT(wins.order(), IsEmpty());
+  const auto asked = asked_for(wins.importer, kSource);
+  ASSERT_THAT(asked, testing::SizeIs(2));
+  EXPECT_TRUE(asked[0].is_completed);
+  EXPECT_FALSE(asked[1].is_completed);
+}
+
+TEST(Checker, SeesADeactivationInTheWrongPlace) {
+  const auto ended = [](Nanoseconds at_exporter) {
+    Recorded one = Recorded().published(1, 10).published(2, 30).deactivated(at_exporter);
+    return one.arrives(1, 11, 10).happens(Kind::deactivation, 21).arrives(2, 31, 30).ends();
+  };
+  EXPECT_THAT(ended(20), IsEmpty());
+  EXPECT_THAT(ended(40), ElementsAre(HasSubstr("between 1.1 and 1.2, but not so at its exporter")));
+  EXPECT_THAT(ended(5), testing::SizeIs(1));
+}
+
+TEST(Checker, MeasuresWhenADeactivationComes) {
+  const Recorded one =
+      Recorded().published(1, 10).deactivated(20).published(2, 900).happens(Kind::deactivation, 23);
+  const auto ends = ends_of(one.exporter, kSource);
+  ASSERT_THAT(ends, testing::SizeIs(1));
+  EXPECT_EQ(ends[0].until, 900 * kMs);
+  EXPECT_EQ(first_end_after(one.importer, kSource, ends[0].when).took, 3 * kMs);
+  EXPECT_FALSE(first_end_after(Recorded().arrives(1, 25, 10).importer, kSource, 20 * kMs).is_there);
 }
 
 TEST(Checker, SeesLossesThatNobodyCounted) {

@@ -14,16 +14,22 @@ struct Command {
   std::int64_t made = 0;     // immediately before it was published: CLOCK_MONOTONIC, nanoseconds
 };
 
-// Of every other host samples are so large that losers stay at home.
+// Of every other host samples are so large that losers stay at home, unless a recorder of another
+// host takes them.
 inline constexpr std::size_t kLarge = 4096;
+[[nodiscard]] inline bool is_large(unsigned host) { return host % 2 == 0; }
 [[nodiscard]] inline std::size_t sample_size(unsigned host) {
-  return host % 2 == 0 ? kLarge : sizeof(Command);
+  return is_large(host) ? kLarge : sizeof(Command);
 }
+// What a recorder takes that takes no large ones.
+inline constexpr const char* kSmallOnly = "*/cmd:o";
 
 // Of one name on several hosts at once.
 inline constexpr const char* kShared = "/Shared/cmd:o";
 inline std::string instance_of(unsigned host) { return "host" + std::to_string(host); }
-inline std::string source_of(unsigned host) { return "/Host" + std::to_string(host) + "/cmd:o"; }
+inline std::string source_of(unsigned host) {
+  return "/Host" + std::to_string(host) + (is_large(host) ? "/large:o" : "/cmd:o");
+}
 inline std::string hold_of(unsigned host) { return "/Hold" + std::to_string(host) + "/cmd:o"; }
 inline std::string motor_of(unsigned host) { return "/Motor" + std::to_string(host) + "/cmd:i"; }
 

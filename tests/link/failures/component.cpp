@@ -128,7 +128,9 @@ class Component {
     const Nanoseconds time = now();
     if (!is_steady_ && time >= until_) {
       is_silent_ = !is_silent_;
-      until_ = time + Nanoseconds{100 + random_.below(is_silent_ ? 700 : 2500)} * 1'000'000;
+      // Now and then so long that whoever has lost the deactivation has been told again.
+      const std::uint32_t most = !is_silent_ ? 2500 : random_.one_in(4) ? 3000 : 700;
+      until_ = time + (100 + random_.below(most)) * kMs;
       if (is_silent_ && random_.one_in(2)) port_.deactivate();
     }
     if (is_steady_ || !is_silent_) publish(port_, ++published_);
@@ -151,6 +153,24 @@ class Component {
                    last.first, static_cast<unsigned long long>(last.second));
     }
     last = current;
+    look_at_origin(sample, command);
+  }
+
+  // What its publisher has published while nobody was there to have it, it has not counted: a
+  // sample is never an earlier one than that of its number.
+  void look_at_origin(const Sample<void>& sample, const Command& command) {
+    const Origin origin = sample.origin();
+    if (origin.publisher == 0) return;
+    std::uint64_t& before =
+        uncounted_[{std::string(sample.source()), {command.host, command.life}}];
+    const std::uint64_t uncounted = command.number - origin.sequence;
+    if (origin.sequence > command.number || uncounted < before) {
+      std::fprintf(stderr, "FOUND %s took %u.%llu of %s as number %llu\n",
+                   motor_of(options_.host).c_str(), command.life,
+                   static_cast<unsigned long long>(command.number), sample.source().c_str(),
+                   static_cast<unsigned long long>(origin.sequence));
+    }
+    before = uncounted;
   }
 
   const ComponentOptions options_;
@@ -167,6 +187,8 @@ class Component {
   bool is_over_ = false;
   Nanoseconds until_ = 0;
   std::map<std::pair<std::string, std::uint32_t>, Pair> last_;  // of each speaker
+  // Of each life of each speaker.
+  std::map<std::pair<std::string, Pair>, std::uint64_t> uncounted_;
 };
 
 }  // namespace

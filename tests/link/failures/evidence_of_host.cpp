@@ -15,6 +15,9 @@
 namespace arbiter::failures {
 namespace {
 
+// No sample arrives that is older.
+constexpr Nanoseconds kOfAnotherLife = 2 * kSecond;
+
 bool won_at(const evidence::Arrival& arrival, const std::string& motor) {
   const auto& ports = arrival.context->destinations;
   const auto found = std::find(ports.begin(), ports.end(), motor);
@@ -94,8 +97,17 @@ void add(HostEvidence& evidence, const std::string& motor, const evidence::Recor
     result.events = missed->events + missed->samples;
     evidence.sources[missed->source].push_back(result);
   } else if (const auto* state = std::get_if<evidence::SourceState>(&record)) {
-    if (state->why != evidence::SourceState::Why::gap) return;
+    using Why = evidence::SourceState::Why;
+    const bool is_end = state->why == Why::joined && shm::is_deactivation(state->word);
+    if (state->why != Why::gap && !is_end) return;
     Happened result;
+    if (is_end) {  // by a port that was deactivated before the recorder joined it
+      result.kind = Happened::Kind::deactivation;
+      result.time = state->time;
+      result.seen = state->seen;
+      evidence.sources[state->context->source].push_back(result);
+      return;
+    }
     result.kind = Happened::Kind::gap;
     result.time = state->time;
     result.seen = state->seen;
@@ -125,6 +137,39 @@ HostEvidence said_by(const HostEvidence& evidence, const std::string& source, un
     if (event.command && event.command->host == host) result.sources[source].push_back(event);
   }
   return result;
+}
+
+void name_own(HostEvidence& evidence, const std::string& source, unsigned host,
+              const std::vector<Nanoseconds>& lives) {
+  for (Happened& event : evidence.sources[source]) {
+    if (event.kind != Happened::Kind::sample || event.command || event.exporter != 0) continue;
+    const auto begun = std::upper_bound(lives.begin(), lives.end(), event.time) - lives.begin();
+    event.command = Command{host, static_cast<std::uint32_t>(begun), event.sequence, event.time};
+  }
+}
+
+void name_imported(HostEvidence& evidence, const HostEvidence& exporter,
+                   const std::string& source) {
+  const auto its = exporter.sources.find(source);
+  if (its == exporter.sources.end()) return;
+  std::map<std::uint64_t, std::vector<Command>> published;  // by number, by time
+  for (const Happened& event : its->second) {
+    if (event.command && event.exporter == 0) {
+      published[event.sequence].push_back(*event.command);
+    }
+  }
+  for (Happened& event : evidence.sources[source]) {
+    if (event.command || event.exporter == 0) continue;
+    const std::vector<Command>& all = published[event.sequence];
+    const auto after = std::upper_bound(
+        all.begin(), all.end(), event.time,
+        [](Nanoseconds time, const Command& command) { return time < command.made; });
+    if (after == all.begin()) continue;
+    const auto last = std::prev(after);
+    const bool may_be_other =
+        last != all.begin() && std::prev(last)->made > event.time - kOfAnotherLife;
+    if (!may_be_other) event.command = *last;
+  }
 }
 
 HostEvidence read_evidence(const std::string& name, const std::string& motor,

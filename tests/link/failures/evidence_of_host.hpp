@@ -55,6 +55,13 @@ struct HostEvidence {
 [[nodiscard]] HostEvidence said_by(const HostEvidence& evidence, const std::string& source,
                                    unsigned host);
 
+// Where a recorder does not take a source's samples, tells whose they are: of the host's own, by
+// when its component's lives began; of others, by what their exporter has published with that
+// number before, unless a life shortly before had the number as well.
+void name_own(HostEvidence& evidence, const std::string& source, unsigned host,
+              const std::vector<Nanoseconds>& lives);
+void name_imported(HostEvidence& evidence, const HostEvidence& exporter, const std::string& source);
+
 // Adds what happened at `motor`.
 void add(HostEvidence& evidence, const std::string& motor, const evidence::Record& record);
 // Of one recording, with all its decisions taken again. Throws.

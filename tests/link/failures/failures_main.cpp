@@ -6,6 +6,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <initializer_list>
 #include <random>
 #include <string>
 
@@ -20,6 +21,8 @@ namespace {
 using namespace arbiter::failures;
 
 constexpr int kSkipped = 77;
+// Of samples that are asked for: a few may come behind the next one.
+constexpr std::uint64_t kEnoughAsked = 20;
 
 unsigned long long number(std::uint64_t value) { return value; }
 
@@ -38,6 +41,56 @@ void report_troubles(const Totals& totals) {
   }
 }
 
+std::uint64_t all_of(const Totals& totals, std::initializer_list<Trouble> troubles) {
+  std::uint64_t sum = 0;
+  for (const Trouble each : troubles) {
+    const auto its = totals.troubles.find(each);
+    if (its == totals.troubles.end()) continue;
+    for (const std::uint64_t count : its->second.lasting) sum += count;
+  }
+  return sum;
+}
+
+void report_in_short(const Totals& totals) {
+  Happenings cuts;
+  for (const auto& [trouble, its] : totals.troubles) {
+    if (!is_cut(trouble)) continue;
+    for (std::size_t i = 0; i < cuts.lasting.size(); ++i) cuts.lasting[i] += its.lasting[i];
+  }
+  std::printf(
+      "cuts of less than 1 s: %llu, of 1 s and a little more: %llu, of 10 s: %llu, of 60 s: %llu; "
+      "%llu of these one way, %llu of a network in two\n%llu kills, %llu times stopped\n",
+      number(cuts.lasting[0]), number(cuts.lasting[1]), number(cuts.lasting[2]),
+      number(cuts.lasting[3]), number(all_of(totals, {Trouble::mute, Trouble::deaf})),
+      number(all_of(totals, {Trouble::split})),
+      number(all_of(totals, {Trouble::link_kill, Trouble::daemon_kill, Trouble::component_kill,
+                             Trouble::host_kill, Trouble::switch_death})),
+      number(all_of(totals, {Trouble::host_stop, Trouble::link_stop})));
+}
+
+void report_losers_and_ends(const Totals& totals) {
+  const Checked& checked = totals.checked;
+  std::printf(
+      "%llu rounds in which large samples that lose stay at home: %llu did, by what links counted "
+      "in the end; %llu won in quiet times, and came before the next one: %llu\n%llu deactivations "
+      "came between the right samples; deactivations, where nothing follows: %s\n",
+      number(totals.rounds_with_losers), number(checked.withheld), number(checked.asked),
+      number(checked.completed), number(checked.ends), totals.ends.text().c_str());
+}
+
+// What a run must have seen, else it has proved less than it says.
+Findings missing_in(const Totals& totals) {
+  const Checked& checked = totals.checked;
+  Findings found;
+  if (totals.rounds_with_losers != 0 && checked.withheld == 0) {
+    found.emplace_back("no sample has stayed at home");
+  }
+  if (checked.asked >= kEnoughAsked && 2 * checked.completed < checked.asked) {
+    found.emplace_back("of samples that stayed at home and won, most did not come");
+  }
+  return found;
+}
+
 void report(const Totals& totals, double seconds) {
   const Checked& checked = totals.checked;
   std::printf("%llu rounds, %.0f s:", number(totals.rounds), seconds);
@@ -51,6 +104,7 @@ void report(const Totals& totals, double seconds) {
       number(totals.passed.doubled), number(totals.passed.delayed), number(totals.passed.overtaken),
       number(totals.passed.cut));
   report_troubles(totals);
+  report_in_short(totals);
   std::printf(
       "%llu samples from other hosts arrived, %llu of them older than T/2, none older than T (of "
       "%llu the age is not known exactly)\n%llu never arrived, between others that did; counted as "
@@ -63,16 +117,16 @@ void report(const Totals& totals, double seconds) {
       "%llu samples of a source that several hosts have open arrived at others, which changed the "
       "speaker %llu times\n%llu models came into force by switches of all hosts; of these %llu "
       "were "
-      "made by none, %llu not by all\n%llu ports of sources that are active for ever were closed "
-      "in "
-      "cuts\n",
+      "made by none, %llu not by all\n",
       number(checked.shared), number(checked.speakers), number(checked.switched),
-      number(checked.refused), number(checked.partly), number(checked.closed));
+      number(checked.refused), number(checked.partly));
+  report_losers_and_ends(totals);
   std::printf(
       "the last in command, when nothing else is active: %s\nthe next speaker, when one is gone: "
-      "%s\nall back after all: %s\n",
+      "%s\nthe port of a source that is active for ever, closed in a cut: %s\nall back after all: "
+      "%s\n",
       totals.fallbacks.text().c_str(), totals.successions.text().c_str(),
-      totals.flows.text().c_str());
+      totals.closings.text().c_str(), totals.flows.text().c_str());
 }
 
 int run(const Options& options) {
@@ -86,24 +140,25 @@ int run(const Options& options) {
   sigaddset(&kept, SIGUSR1);
   sigaddset(&kept, SIGUSR2);
   sigprocmask(SIG_BLOCK, &kept, nullptr);
-  std::printf("seed %llu\n", number(options.seed));
+  std::printf("seed %llu, commit %s\n", number(options.seed), options.commit.c_str());
   const Nanoseconds begin = now();
   const auto seconds = [&] { return static_cast<double>(now() - begin) / 1e9; };
   Totals totals;
-  for (std::uint64_t i = 0; i == 0 || seconds() < options.seconds; ++i) {
+  for (std::uint64_t i = 0;; ++i) {
     const Plan plan = make_plan(options, options.seed + i);
     std::printf("round %llu, seed %llu: %s", number(i + 1), number(plan.seed), plan.text().c_str());
     std::fflush(stdout);
     Round round(options, plan, totals);
-    const Findings found = round.run();
-    if (found.empty()) continue;
+    Findings found = round.run();
+    const bool is_last = !found.empty() || seconds() >= options.seconds;
+    if (!is_last) continue;
+    if (found.empty()) found = missing_in(totals);
     report(totals, seconds());
+    if (found.empty()) return 0;
     for (const std::string& each : found) std::printf("FOUND: %s\n", each.c_str());
     std::printf("FAILED; --seed %llu makes the same plan again\n", number(plan.seed));
     return 1;
   }
-  report(totals, seconds());
-  return 0;
 }
 
 }  // namespace
@@ -122,8 +177,12 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--keep", options.keep,
                  "Where recordings and logs are left if something is found");
+  app.add_option("--commit", options.commit, "Of what is tested, for the report")
+      ->capture_default_str();
   app.add_flag("--bounds", options.has_bounds,
                "Who is to command again does so in time, where processes had a processor");
+  app.add_flag("--deaf-is-gone", options.is_deaf_gone,
+               "A speaker that does not hear a host is gone there, too");
   std::vector<std::string> names;
   for (unsigned i = 0; i < kTroubles; ++i) names.emplace_back(name_of(static_cast<Trouble>(i)));
   app.add_option("--only", options.only, "A trouble that happens, such as \"noise\"; repeatable")

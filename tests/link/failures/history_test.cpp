@@ -98,6 +98,28 @@ TEST(Speakers, AreFollowedByThoseThatAreLeft) {
   EXPECT_EQ(all[0].recovery.took, 2 * kSecond);
 }
 
+TEST(Speakers, AreFollowedWhereTheyAreNotHeardAnyMore) {
+  Shared cut;
+  cut.history.cuts[{1, 3}] = {{10 * kSecond, 20 * kSecond}};
+  cut.history.troubled = {{1, Trouble::mute, {10 * kSecond, 20 * kSecond}}};
+  cut.hears(1, 1, 10).hears(2, 1, 12);
+  const auto all = successions(cut.host, 3, cut.history);
+  ASSERT_THAT(all, testing::SizeIs(1));
+  EXPECT_EQ(all[0].recovery.took, 2 * kSecond);
+  cut.history.cuts[{1, 3}][0].to = 12 * kSecond;
+  EXPECT_THAT(successions(cut.host, 3, cut.history), IsEmpty()) << "it may not have been gone";
+}
+
+TEST(Troubles, CountForThoseWhomTheyBefall) {
+  History history;
+  history.troubled = {{1, Trouble::cut, {1, 9}},
+                      {2, Trouble::rival, {1, 9}},
+                      {0, Trouble::split, {1, 9}},
+                      {3, Trouble::cut, {1, 9}}};
+  EXPECT_EQ(history.troubles_of(1, 2, 5), 2U);
+  EXPECT_EQ(history.troubles_of(1, 2, 9), 0U);
+}
+
 class Switched {
  public:
   Switched() {
@@ -177,6 +199,8 @@ TEST(Waits, AreCountedAroundATime) {
 TEST(Counts, AreReadFromTheStatus) {
   EXPECT_EQ(counted_in("host head, 3 lost, 2 late, 7 withheld"), 5U);
   EXPECT_EQ(counted_in("host head"), 0U);
+  EXPECT_EQ(withheld_in("host head, 7 withheld, 2 withheld though they were wanted"), 7U);
+  EXPECT_EQ(withheld_in("host head, 2 withheld though they were wanted"), 0U);
 }
 
 }  // namespace

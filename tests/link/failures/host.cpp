@@ -39,9 +39,10 @@ FailingHost::FailingHost(const Plan& plan, unsigned number, const std::string& r
       directory_(std::move(directory)),
       network_(number),
       daemon_(plan.model_text(number, 0), daemon_options(plan, number, runtime, directory_)) {
-  recorder_ = start({program("arbiter"), "record", "--instance", name(), "-o", recording(),
-                     "--payloads", "all", "--compression", "lz4", "--period", "5ms"},
-                    "recorder");
+  recorder_ =
+      start({program("arbiter"), "record", "--instance", name(), "-o", recording(), "--payloads",
+             plan.has_losers ? kSmallOnly : "all", "--compression", "lz4", "--period", "5ms"},
+            "recorder");
   start_link();
   start_component();
   if (plan.speakers.count(number) != 0) start_rival();
@@ -85,7 +86,10 @@ test::ChildProcess FailingHost::start_component(std::uint32_t life, bool is_riva
   return start(std::move(command), "component");
 }
 
-void FailingHost::start_component() { component_ = start_component(++life_, false); }
+void FailingHost::start_component() {
+  lives_.push_back(now());
+  component_ = start_component(static_cast<std::uint32_t>(lives_.size()), false);
+}
 
 void FailingHost::start_rival() {
   rivals_.push_back({static_cast<std::uint32_t>(rivals_.size() + 1), {now(), 0}, false});
@@ -113,7 +117,9 @@ std::vector<pid_t> FailingHost::pids() const {
   return result;
 }
 
-HostHistory FailingHost::history() { return {link_since_, without_link_, rivals_, imports()}; }
+HostHistory FailingHost::history() {
+  return {link_since_, without_link_, rivals_, imports(), lives_};
+}
 
 std::vector<Import> FailingHost::imports() {
   std::vector<Import> result(plan_.hosts.size());
@@ -121,8 +127,9 @@ std::vector<Import> FailingHost::imports() {
   for (const auto& source : status["sources"]) {
     for (unsigned other = 1; other <= result.size(); ++other) {
       if (other == number_ || source["name"] != source_of(other)) continue;
-      result[other - 1] = {source.value("published", std::uint64_t{0}),
-                           source.value("described", "")};
+      const std::uint64_t arrived =
+          source.value("published", std::uint64_t{0}) + source.value("signals", std::uint64_t{0});
+      result[other - 1] = {arrived, source.value("described", "")};
     }
   }
   return result;

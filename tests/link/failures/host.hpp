@@ -69,7 +69,7 @@ class FailingHost {
   test::ChildProcess component_;
   test::ChildProcess rival_;
   std::vector<test::ChildProcess> former_rivals_;  // were told to end
-  std::uint32_t life_ = 0;
+  std::vector<Nanoseconds> lives_;
   Nanoseconds link_since_ = 0;
   std::vector<Span> without_link_;
   std::vector<RivalLife> rivals_;

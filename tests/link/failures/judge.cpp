@@ -13,7 +13,8 @@ namespace {
 constexpr Nanoseconds kPromised = kSecond;
 // The next in command publishes every period; this is for its process, beside what it waited.
 constexpr Nanoseconds kNextCommand = 100 * kMs;
-// Each trouble may make an exporter join a source again: what it says then, and what its tap does.
+// Each trouble of the two may make an exporter join a source again: what it says then, and what its
+// tap does.
 constexpr std::uint64_t kStatesOfAJoin = 2;
 // A time in which nothing else may be active, and is looked at.
 constexpr Nanoseconds kIdle = 300 * kMs;
@@ -24,8 +25,22 @@ constexpr Nanoseconds kSettling = 20 * kMs;
 // What a link's earlier life has sent may come so long after the next one has begun: no sample
 // arrives that is older than its T.
 constexpr Nanoseconds kAfterRestart = kSecond;
-// After which a silent speaker of a `forever` source is surely gone: the lease, and much more.
-constexpr Nanoseconds kSurelyGone = 5 * kSecond;
+
+// Processes that have begun anew know each other by then.
+constexpr Nanoseconds kNotTroubled = 3 * kSecond;
+
+// A link asks its daemon four times a second which model is in force.
+constexpr Nanoseconds kKnowsItsModel = 250 * kMs;
+
+// The shortest and the longest of all models.
+std::pair<Nanoseconds, Nanoseconds> timeouts_of(const HostPlan& plan, unsigned other) {
+  std::pair<Nanoseconds, Nanoseconds> result{kLong, 0};
+  for (const auto& timeouts : plan.timeouts) {
+    const Nanoseconds its = timeouts[other - 1] == kForever ? kLong : timeouts[other - 1];
+    result = {std::min(result.first, its), std::max(result.second, its)};
+  }
+  return result;
+}
 
 bool is_over(const Span& span) { return span.to < now(); }
 
@@ -49,6 +64,7 @@ std::string Times::text() const {
 }
 
 void Happenings::add(Nanoseconds lasts) {
+  // As they are drawn, and as far as a short round lets them last.
   const std::size_t place = lasts < kSecond        ? 0
                             : lasts < 5 * kSecond  ? 1
                             : lasts < 30 * kSecond ? 2
@@ -69,11 +85,13 @@ Findings Judge::judge(const std::vector<HostEvidence>& hosts) {
       check_order(importer, source_of(other), found_);
       check_order(said_by(importer, kShared, other), kShared, found_);
       if (other == number) continue;
-      const Pair pair{importer, hosts[other - 1], number,
-                      other,    source_of(other), plan_.hosts[number - 1].timeouts[other - 1]};
+      const Pair pair{importer, hosts[other - 1], number, other, source_of(other)};
       judge_import(pair);
+      if (plan_.has_losers && is_large(other)) judge_losers(pair);
+      judge_ends(pair);
       judge_shared(pair);
-      judge_closing(pair);
+      judge_closing(pair, {other, number});
+      if (options_.is_deaf_gone) judge_closing(pair, {number, other});
       measure(pair);
     }
   }
@@ -87,13 +105,17 @@ void Judge::judge_commands(const HostEvidence& host, unsigned number) {
   std::map<std::string, Ranked> ranks;
   for (unsigned model = 0; model < kModels.size(); ++model) {
     const std::vector<unsigned>& order = plan.orders[model];
-    for (unsigned rank = 0; rank < order.size(); ++rank) {
-      const Nanoseconds timeout = plan.timeouts[order[rank] - 1];
-      ranks[source_of(order[rank])] = {rank, timeout == kForever ? kLong : timeout};
-    }
     ranks[kShared] = {static_cast<unsigned>(order.size()), kModelTimeout};
     ranks[hold_of(number)] = {static_cast<unsigned>(order.size()) + 1, kModelTimeout};
+    const auto rank_all = [&](auto timeout_of) {
+      for (unsigned rank = 0; rank < order.size(); ++rank) {
+        ranks[source_of(order[rank])] = {rank, timeout_of(order[rank])};
+      }
+    };
+    // What has arrived under one model is active for that one's T, also under the next.
+    rank_all([&](unsigned other) { return std::get<0>(timeouts_of(plan, other)); });
     check_winners(host, kModels[model], ranks, found_, totals_.checked);
+    rank_all([&](unsigned other) { return std::get<1>(timeouts_of(plan, other)); });
   }
   judge_fallbacks(host, number, ranks, hold_of(number));
   // Where its own component has the source open.
@@ -118,8 +140,9 @@ void Judge::judge_fallbacks(const HostEvidence& host, unsigned number,
 }
 
 void Judge::judge_import(const Pair& pair) {
-  check_age(pair.importer, pair.exporter, pair.source,
-            pair.timeout == kForever ? kModelTimeout : pair.timeout, found_, totals_.checked);
+  check_age(
+      pair.importer, pair.exporter, pair.source,
+      [&](Nanoseconds time) { return most_age(pair, time); }, found_, totals_.checked);
   const auto cuts = history_.cuts.find({pair.other, pair.number});
   if (cuts != history_.cuts.end()) check_cuts(pair.importer, pair.source, cuts->second, found_);
   // The link that counts is the last one.
@@ -132,41 +155,105 @@ void Judge::judge_import(const Pair& pair) {
   check_losses(pair.importer, pair.source, counted, spans, found_, totals_.checked);
   const std::size_t before = found_.size();
   check_counts(pair.importer, pair.exporter, pair.source, counted,
-               kStatesOfAJoin * history_.troubled.size(), its.link_since, found_);
+               kStatesOfAJoin * history_.troubles_of(pair.number, pair.other, its.link_since),
+               its.link_since, found_);
   if (found_.size() != before) found_.back() += ": " + its.imports[pair.other - 1].described;
+}
+
+// Of what stays at home and wins, the sample comes before the next one has, in quiet times.
+void Judge::judge_losers(const Pair& pair) {
+  totals_.checked.withheld +=
+      withheld_in(history_.hosts[pair.number - 1].imports[pair.other - 1].described);
+  for (const Asked& each : asked_for(pair.importer, pair.source)) {
+    const Span when{each.when - kPromised, each.when + plan_.period};
+    const bool is_told = history_.is_quiet(pair.number, pair.other, when, History::Of::anything) &&
+                         waited(pair.number, pair.other, {each.when, when.to}) < plan_.period;
+    if (!is_told) continue;
+    ++totals_.checked.asked;
+    totals_.checked.completed += each.is_completed ? 1 : 0;
+  }
+}
+
+// The last event gets through, also where it was lost first.
+void Judge::judge_ends(const Pair& pair) {
+  check_ends(pair.importer, pair.exporter, pair.source, found_, totals_.checked);
+  for (const End& end : ends_of(pair.exporter, pair.source)) {
+    Nanoseconds since = end.when;
+    for (const Troubled& each : history_.troubled) {
+      const bool is_of_them = each.host == 0 || each.host == pair.number || each.host == pair.other;
+      const bool is_of_it = is_of_them && is_of_frames(each.trouble) &&
+                            each.span.from < end.until && end.when < each.span.to + kSettling;
+      if (is_of_it) since = std::max(since, each.span.to + kSettling);
+    }
+    const Span when{since, since + kPromised};
+    const bool is_told =
+        end.until >= when.to && when.to < history_.until &&
+        history_.is_quiet(pair.number, pair.other, {end.when - kNotTroubled, when.to},
+                          History::Of::processes) &&
+        history_.is_quiet(pair.number, pair.other, when, History::Of::anything);
+    if (!is_told) continue;
+    Recovery told = first_end_after(pair.importer, pair.source, end.when);
+    told.took = std::max<Nanoseconds>(told.took - (since - end.when), 0);
+    hold_to(totals_.ends, told, kPromised, waited(pair.number, pair.other, when),
+            pair.importer.name + ": the deactivation of " + pair.source + " at " +
+                std::to_string(end.when / kMs) + " ms came");
+  }
 }
 
 void Judge::judge_shared(const Pair& pair) {
   const HostEvidence said = said_by(pair.importer, kShared, pair.other);
   const HostEvidence spoken = said_by(pair.exporter, kShared, pair.other);
-  check_age(said, spoken, kShared, kModelTimeout, found_, totals_.checked);
+  check_age(
+      said, spoken, kShared, [](Nanoseconds) { return kModelTimeout; }, found_, totals_.checked);
   const auto cuts = history_.cuts.find({pair.other, pair.number});
   if (cuts != history_.cuts.end()) check_cuts(said, kShared, cuts->second, found_);
 }
 
-// A dead speaker of a source that is active for ever is not kept.
-void Judge::judge_closing(const Pair& pair) {
-  const auto cuts = history_.cuts.find({pair.other, pair.number});
-  if (pair.timeout != kForever || cuts == history_.cuts.end()) return;
+// A speaker of a source that is active for ever is not kept where one of the two does not hear the
+// other.
+void Judge::judge_closing(const Pair& pair, const Direction& direction) {
+  const auto cuts = history_.cuts.find(direction);
+  if (cuts == history_.cuts.end()) return;
   for (const Span& cut : cuts->second) {
-    const bool is_told = cut.to - cut.from > kSurelyGone && is_over(cut) &&
+    const Span when{cut.from, cut.from + kSurelyGone};
+    const bool is_told = cut.to > when.to && is_over(cut) && timeout_in(pair, when) == kForever &&
                          was_there(pair.importer, pair.source, cut.from) &&
-                         history_.is_quiet(pair.number, pair.number, cut, History::Of::processes);
-    if (!is_told ||
-        waited(pair.number, pair.number, {cut.from, cut.from + kSurelyGone}) > kSurelyGone / 2) {
-      continue;
-    }
-    ++totals_.checked.closed;
-    if (is_closed_in(pair.importer, pair.source, cut)) continue;
-    found_.push_back(pair.importer.name + ": " + pair.source +
-                     ", whose T is forever, was kept for " +
-                     std::to_string((cut.to - cut.from) / kMs) + " ms of a cut");
+                         history_.is_quiet(pair.number, pair.number, when, History::Of::processes);
+    if (!is_told) continue;
+    Recovery closed = closed_after(pair.importer, pair.source, cut.from);
+    if (closed.took > cut.to - cut.from) closed = {};
+    hold_to(totals_.closings, closed, kSurelyGone, waited(pair.number, pair.number, when),
+            pair.importer.name + ": the port of " + pair.source + ", whose T is forever, was " +
+                "closed in a cut of " + std::to_string((cut.to - cut.from) / kMs) + " ms from " +
+                instance_of(direction.first) + " to " + instance_of(direction.second));
   }
+}
+
+std::optional<Nanoseconds> Judge::timeout_in(const Pair& pair, const Span& when) const {
+  const HostPlan& plan = plan_.hosts[pair.number - 1];
+  for (unsigned model = 0; model < kModels.size(); ++model) {
+    if (had_model(pair.importer, kModels[model], when.from, when.to)) {
+      return plan.timeouts[model][pair.other - 1];
+    }
+  }
+  return std::nullopt;
+}
+
+Nanoseconds Judge::most_age(const Pair& pair, Nanoseconds time) const {
+  const auto most = [](Nanoseconds timeout) {
+    return timeout == kForever ? kModelTimeout : timeout;
+  };
+  if (const auto known = timeout_in(pair, {time - kKnowsItsModel, time})) return most(*known);
+  Nanoseconds result = 0;
+  for (const auto& timeouts : plan_.hosts[pair.number - 1].timeouts) {
+    result = std::max(result, most(timeouts[pair.other - 1]));
+  }
+  return result;
 }
 
 void Judge::judge_successions(const HostEvidence& host, unsigned number) {
   for (const Succession& each : successions(host, number, history_)) {
-    hold_to(totals_.successions, each.recovery, kPromised,
+    hold_to(totals_.successions, each.recovery, each.when.to - each.when.from,
             waited(number, each.from, each.when) + waited(each.to, each.to, each.when),
             host.name + ": " + kShared + " of " + instance_of(each.to) + " came after that of " +
                 instance_of(each.from));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,18 +24,21 @@ struct Happenings {
   std::array<std::uint64_t, 4> lasting{};
   std::uint64_t skipped = 0;  // something else befell the host's processes
   void add(Nanoseconds lasts);
-  static constexpr std::array<const char*, 4> kNames{"< 1 s", "1 to 5 s", "5 to 30 s", "> 30 s"};
+  static constexpr std::array<const char*, 4> kNames{"< 1 s", "1 s", "10 s", "60 s"};
 };
 
 struct Totals {
   std::uint64_t rounds = 0;
   std::map<unsigned, std::uint64_t> rounds_of;  // by the number of hosts
+  std::uint64_t rounds_with_losers = 0;
   std::uint64_t late_interfaces = 0;
   std::map<Trouble, Happenings> troubles;
   Checked checked;
   Passed passed;
   Times fallbacks;    // from when nothing else could be active to the last one's command
+  Times ends;         // from a deactivation, or the end of the trouble, to its coming elsewhere
   Times flows;        // from the end of all troubles until all sources came to all hosts
+  Times closings;     // from a cut until the port of a source whose T is forever was closed
   Times successions;  // from when a speaker went to another one's first sample
   // From the trouble's end, or the first sample after it, to the first arrival.
   std::map<Trouble, Times> recoveries;
@@ -53,14 +57,19 @@ class Judge {
     unsigned number;  // of the importer
     unsigned other;   // of the exporter
     std::string source;
-    Nanoseconds timeout;
   };
   void judge_commands(const HostEvidence& host, unsigned number);
   void judge_fallbacks(const HostEvidence& host, unsigned number,
                        const std::map<std::string, Ranked>& ranks, const std::string& last);
   void judge_import(const Pair& pair);
+  void judge_losers(const Pair& pair);
+  void judge_ends(const Pair& pair);
   void judge_shared(const Pair& pair);
-  void judge_closing(const Pair& pair);
+  void judge_closing(const Pair& pair, const Direction& direction);
+  // T of its source at the importer; nothing: more than one model may have been in force.
+  [[nodiscard]] std::optional<Nanoseconds> timeout_in(const Pair& pair, const Span& when) const;
+  // How old a sample may be that arrives then.
+  [[nodiscard]] Nanoseconds most_age(const Pair& pair, Nanoseconds time) const;
   void judge_successions(const HostEvidence& host, unsigned number);
   void measure(const Pair& pair);
   void measure_one(const Pair& pair, Trouble trouble, const Span& span);

@@ -17,6 +17,20 @@ Nanoseconds timeout(stress::Random& random) {
   return kTimeouts[random.below(kTimeouts.size())];
 }
 
+// Large samples lose where a small source is first, and cross where T is forever.
+void have_losers(HostPlan& plan) {
+  const auto is_small = [](unsigned host) { return !is_large(host); };
+  for (std::vector<unsigned>& order : plan.orders) {
+    std::iter_swap(order.begin(), std::find_if(order.begin(), order.end() - 1, is_small));
+  }
+  for (std::vector<Nanoseconds>& timeouts : plan.timeouts) {
+    for (unsigned other = 1; other <= timeouts.size(); ++other) {
+      Nanoseconds& its = timeouts[other - 1];
+      if (is_large(other) && its == kForever) its = kModelTimeout;
+    }
+  }
+}
+
 // Mostly short, for then there are many; now and then longer than the lease, and much longer.
 Nanoseconds duration(const Options& options, stress::Random& random) {
   const std::uint32_t which = random.below(20);
@@ -97,7 +111,7 @@ std::string Plan::model_text(unsigned host, unsigned model) const {
   std::string text = "<behaviors timeout='" + timeout_text(kModelTimeout) + "'>\n";
   for (unsigned other = 1; other <= hosts.size(); ++other) {
     text += "<source port='" + source_of(other) + "' timeout='" +
-            timeout_text(plan.timeouts[other - 1]) + "'/>\n";
+            timeout_text(plan.timeouts[model][other - 1]) + "'/>\n";
   }
   std::string lower = "Hold, Shared";
   text += "<behavior name='Hold'>" + at + hold_of(host) + "</config></behavior>\n";
@@ -115,6 +129,7 @@ std::string Plan::model_text(unsigned host, unsigned model) const {
 
 std::string Plan::text() const {
   std::string text = std::to_string(hosts.size()) + " hosts, " + text_of(lasts);
+  if (has_losers) text += "; large samples that lose stay at home";
   if (late_host != 0) {
     text += "; the interface of host" + std::to_string(late_host) + " comes after its link";
   }
@@ -132,15 +147,19 @@ Plan make_plan(const Options& options, std::uint64_t seed) {
   plan.seed = seed;
   plan.period = kSecond / options.rate;
   const unsigned hosts = options.hosts != 0 ? options.hosts : 3 + random.below(3);
+  plan.has_losers = random.one_in(2);
   for (unsigned host = 1; host <= hosts; ++host) {
     HostPlan one;
-    for (unsigned other = 1; other <= hosts; ++other) one.timeouts.push_back(timeout(random));
+    for (std::vector<Nanoseconds>& timeouts : one.timeouts) {
+      for (unsigned other = 1; other <= hosts; ++other) timeouts.push_back(timeout(random));
+    }
     // Its own source last: it would hide what the others do.
     for (unsigned i = 0; i < hosts; ++i) one.orders[0].push_back((host + i) % hosts + 1);
     std::swap(one.orders[0][0], one.orders[0][random.below(hosts - 1)]);
     one.orders[1] = one.orders[0];
     std::reverse(one.orders[1].begin(), one.orders[1].end() - 1);
     one.orders[2] = one.orders[0];
+    if (plan.has_losers) have_losers(one);
     plan.hosts.push_back(std::move(one));
   }
   if (random.one_in(3)) plan.late_host = 1 + random.below(hosts);

@@ -18,9 +18,11 @@ struct Options {
   unsigned hosts = 0;   // 3 to 5; 0: each round another number
   unsigned rate = 100;  // samples of each source, a second
   std::string keep;     // where recordings and logs of a round with findings are left
+  std::string commit = "unknown";
   bool has_bounds =
-      false;              // who comes back must do so in time, where the machine let it (waits.hpp)
-  bool is_short = false;  // one round for a test: its troubles last for less
+      false;  // who comes back must do so in time, where the machine let it (waits.hpp)
+  bool is_deaf_gone = false;   // a speaker that does not hear a host, for that host
+  bool is_short = false;       // one round for a test: its troubles last for less
   std::set<std::string> only;  // the names of the troubles that happen; empty: all
 };
 
@@ -30,7 +32,8 @@ inline constexpr std::array<const char*, 3> kModels{"default", "other", "rare"};
 // How long sources are active after a sample, at one host.
 inline constexpr Nanoseconds kForever = 0;
 struct HostPlan {
-  std::vector<Nanoseconds> timeouts;  // by the number of the host whose source it is
+  // By model, and by the number of the host whose source it is.
+  std::array<std::vector<Nanoseconds>, kModels.size()> timeouts;
   // The sources that the motor obeys, the first of them that is active; by model.
   std::array<std::vector<unsigned>, kModels.size()> orders;
 };
@@ -90,6 +93,7 @@ struct Plan {
   std::vector<HostPlan> hosts;  // by number - 1
   unsigned late_host = 0;       // whose interface comes after its link; 0: none
   unsigned host_without = 0;    // which has not the last of the models
+  bool has_losers = false;      // large samples that lose stay at home: no recorder takes them
   std::set<unsigned> speakers;  // hosts that have the shared source open from the beginning
   std::vector<Event> events;    // by time
 

@@ -58,12 +58,14 @@ Findings Round::run() {
   heal();
   await_flow(found);
   await_rest();
+  history_.until = now();
   history_.switches = operators_.end();
   for (const auto& each : hosts_) history_.hosts.push_back(each->history());
   for (const auto& each : hosts_) each->end(found);
   check(found);
   ++totals_.rounds;
   ++totals_.rounds_of[static_cast<unsigned>(hosts_.size())];
+  totals_.rounds_with_losers += plan_.has_losers ? 1 : 0;
   totals_.late_interfaces += plan_.late_host != 0 ? 1 : 0;
   const Passed passed = relay_.passed();
   totals_.passed.frames += passed.frames;
@@ -294,8 +296,8 @@ void Round::await_flow(Findings& found) {
     bool flows = true;
     for (std::size_t j = 0; j < imports.size(); ++j) {
       // A port that was opened again since counts from 0.
-      const bool goes_on = imports[j].published >= before[i][j].published + kFlowing;
-      if (imports[j].published < before[i][j].published) before[i][j].published = 0;
+      const bool goes_on = imports[j].arrived >= before[i][j].arrived + kFlowing;
+      if (imports[j].arrived < before[i][j].arrived) before[i][j].arrived = 0;
       flows = flows && (i == j || goes_on);
     }
     if (flows) {
@@ -307,8 +309,8 @@ void Round::await_flow(Findings& found) {
       for (std::size_t j = 0; j < imports.size(); ++j) {
         if (i == j) continue;
         text += " " + source_of(static_cast<unsigned>(j + 1)) + " " +
-                std::to_string(before[i][j].published) + " then " +
-                std::to_string(imports[j].published) + " (" + imports[j].described + ")";
+                std::to_string(before[i][j].arrived) + " then " +
+                std::to_string(imports[j].arrived) + " (" + imports[j].described + ")";
       }
       found.push_back(text);
       return;
@@ -331,6 +333,18 @@ void Round::await_rest() {
   }
 }
 
+// No recorder has taken them.
+void Round::name_large(std::vector<HostEvidence>& evidence) const {
+  for (const auto& exporter : hosts_) {
+    const unsigned number = exporter->number();
+    if (!is_large(number)) continue;
+    const std::string source = source_of(number);
+    HostEvidence& its = evidence[number - 1];
+    name_own(its, source, number, history_.hosts[number - 1].component_lives);
+    for (HostEvidence& importer : evidence) name_imported(importer, its, source);
+  }
+}
+
 void Round::check(Findings& found) {
   std::vector<HostEvidence> evidence;
   for (const auto& each : hosts_) {
@@ -341,6 +355,7 @@ void Round::check(Findings& found) {
       return;
     }
   }
+  if (plan_.has_losers) name_large(evidence);
   const Findings judged = Judge(options_, plan_, history_, totals_).judge(evidence);
   found.insert(found.end(), judged.begin(), judged.end());
   for (const auto& each : hosts_) each->add_seen_by_component(found);

@@ -43,6 +43,7 @@ class Round {
   void heal();
   void await_flow(Findings& found);
   void await_rest();
+  void name_large(std::vector<HostEvidence>& evidence) const;
   void check(Findings& found);
   void pass(Nanoseconds time);
   void change_shared(const Event& event, bool begins);

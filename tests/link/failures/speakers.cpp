@@ -56,6 +56,22 @@ bool may_have_gone(const History& history, unsigned number, unsigned speaker, co
          history.waits.waited(speaker, before.from, before.to) > kStarved;
 }
 
+bool was_obeyed(const HostEvidence& host, unsigned speaker, Nanoseconds time) {
+  const Happened* last = nullptr;
+  for (const Happened& event : shared_at(host)) {
+    if (event.command && event.time <= time) last = &event;
+  }
+  return last != nullptr && last->command->host == speaker && last->time > time - kSecond / 5;
+}
+
+Recovery next_speaker(const HostEvidence& host, unsigned gone, Nanoseconds time) {
+  for (const Happened& event : shared_at(host)) {
+    const bool is_other = event.command && event.command->host != gone;
+    if (is_other && event.time > time) return {true, event.time - time};
+  }
+  return {};
+}
+
 }  // namespace
 
 void check_speakers(const HostEvidence& host, unsigned number, const History& history,
@@ -79,33 +95,30 @@ void check_speakers(const HostEvidence& host, unsigned number, const History& hi
 std::vector<Succession> successions(const HostEvidence& host, unsigned number,
                                     const History& history) {
   std::vector<Succession> result;
-  const auto& events = shared_at(host);
   const auto hosts = static_cast<unsigned>(history.hosts.size());
+  const auto add = [&](unsigned gone, const Span& when, History::Of unless) {
+    const Span quiet{when.from - kStillTroubled, when.to};
+    if (is_there_at_all(history, number, quiet) || !was_obeyed(host, gone, when.from)) return;
+    for (unsigned other = 1; other <= hosts; ++other) {
+      const bool is_next = other != gone && other != number && is_there(history, other, quiet) &&
+                           history.is_quiet(number, gone, quiet, unless) &&
+                           history.is_quiet(number, other, quiet, History::Of::anything);
+      if (!is_next) continue;
+      result.push_back({when, gone, other, next_speaker(host, gone, when.from)});
+      break;  // which of them is obeyed, their names say
+    }
+  };
   for (unsigned gone = 1; gone <= hosts; ++gone) {
+    if (gone == number) continue;
     for (const RivalLife& life : history.hosts[gone - 1].rivals) {
       const Span when{life.span.to, life.span.to + kSecond};
-      const Span quiet{when.from - kStillTroubled, when.to};
-      if (gone == number || life.span.to == 0 || is_there_at_all(history, number, quiet)) continue;
-      const Happened* last = nullptr;
-      const Happened* next = nullptr;
-      for (const Happened& event : events) {
-        if (!event.command) continue;
-        if (event.time <= when.from) last = &event;
-        if (event.time > when.from && event.command->host != gone && next == nullptr) next = &event;
-      }
-      const bool was_obeyed =
-          last != nullptr && last->command->host == gone && last->time > when.from - kSecond / 5;
-      if (!was_obeyed) continue;
-      for (unsigned other = 1; other <= hosts; ++other) {
-        const bool is_next = other != gone && other != number && is_there(history, other, quiet) &&
-                             history.is_quiet(number, gone, quiet, History::Of::anything) &&
-                             history.is_quiet(number, other, quiet, History::Of::anything);
-        if (!is_next) continue;
-        const Recovery recovery =
-            next == nullptr ? Recovery{} : Recovery{true, next->time - when.from};
-        result.push_back({when, gone, other, recovery});
-        break;  // which of them is obeyed, their names say
-      }
+      if (life.span.to != 0) add(gone, when, History::Of::anything);
+    }
+    const auto cuts = history.cuts.find({gone, number});
+    if (cuts == history.cuts.end()) continue;
+    for (const Span& cut : cuts->second) {
+      const Span when{cut.from, cut.from + kSurelyGone};
+      if (cut.to > when.to) add(gone, when, History::Of::processes);
     }
   }
   return result;

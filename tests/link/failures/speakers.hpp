@@ -10,10 +10,10 @@ namespace arbiter::failures {
 void check_speakers(const HostEvidence& host, unsigned number, const History& history,
                     Findings& found, Checked& checked);
 
-// A speaker that was obeyed at this host went although nothing befell it, and another one was there
-// all the time: how long after that the other one was heard.
+// A speaker that was obeyed at this host went although nothing befell it, or could not be heard any
+// more, and another one was there all the time: how long after that the other one was heard.
 struct Succession {
-  Span when;  // from when the first one went to a second later
+  Span when;  // from when the first one went until the other one must be heard
   unsigned from = 0;
   unsigned to = 0;
   Recovery recovery;
