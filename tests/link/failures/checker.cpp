@@ -194,7 +194,7 @@ void check_ends(const HostEvidence& importer, const HostEvidence& exporter,
   const Happened* before = nullptr;
   const Happened* end = nullptr;
   for (const Happened& event : of(importer, source)) {
-    if (event.kind == Kind::deactivation && end == nullptr) end = &event;
+    if (event.kind == Kind::deactivation && !event.is_state && end == nullptr) end = &event;
     if (!event.command) continue;
     const bool is_told = end != nullptr && before != nullptr && !is_other_life(*before, event) &&
                          !overlaps(unknown, before->command->made, event.command->made);
@@ -235,11 +235,12 @@ std::vector<End> ends_of(const HostEvidence& exporter, const std::string& source
   return result;
 }
 
-Recovery first_end_after(const HostEvidence& importer, const std::string& source,
-                         Nanoseconds time) {
+Recovery first_end_after(const HostEvidence& importer, const std::string& source, Nanoseconds time,
+                         bool or_newer) {
   for (const Happened& event : of(importer, source)) {
-    const bool is_it = event.kind == Kind::deactivation ||
-                       (is_arrival(event) && event.command && event.command->made >= time);
+    const bool is_it =
+        event.kind == Kind::deactivation ||
+        (or_newer && is_arrival(event) && event.command && event.command->made >= time);
     if (is_it && event.time >= time) return {true, event.time - time};
   }
   return {};

@@ -86,9 +86,10 @@ struct End {
   Nanoseconds until = 0;
 };
 [[nodiscard]] std::vector<End> ends_of(const HostEvidence& exporter, const std::string& source);
-// The first deactivation at an importer that is not older, or arrival of what is newer.
+// The first deactivation at an importer that is not older; or arrival of what is newer, if that is
+// enough.
 [[nodiscard]] Recovery first_end_after(const HostEvidence& importer, const std::string& source,
-                                       Nanoseconds time);
+                                       Nanoseconds time, bool or_newer);
 
 // Samples that did not arrive, between others that did, were counted, to the last one. `spans`:
 // times in which the process that counts was not there, or was another one; what is missing there

@@ -193,8 +193,11 @@ TEST(Checker, MeasuresWhenADeactivationComes) {
   const auto ends = ends_of(one.exporter, kSource);
   ASSERT_THAT(ends, testing::SizeIs(1));
   EXPECT_EQ(ends[0].until, 900 * kMs);
-  EXPECT_EQ(first_end_after(one.importer, kSource, ends[0].when).took, 3 * kMs);
-  EXPECT_FALSE(first_end_after(Recorded().arrives(1, 25, 10).importer, kSource, 20 * kMs).is_there);
+  EXPECT_EQ(first_end_after(one.importer, kSource, ends[0].when, false).took, 3 * kMs);
+  const Recorded newer = Recorded().arrives(1, 25, 22);
+  EXPECT_TRUE(first_end_after(newer.importer, kSource, 20 * kMs, true).is_there);
+  EXPECT_FALSE(first_end_after(newer.importer, kSource, 20 * kMs, false).is_there);
+  EXPECT_FALSE(first_end_after(newer.importer, kSource, 23 * kMs, true).is_there);
 }
 
 TEST(Checker, SeesLossesThatNobodyCounted) {

@@ -103,6 +103,7 @@ void add(HostEvidence& evidence, const std::string& motor, const evidence::Recor
     Happened result;
     if (is_end) {  // by a port that was deactivated before the recorder joined it
       result.kind = Happened::Kind::deactivation;
+      result.is_state = true;
       result.time = state->time;
       result.seen = state->seen;
       evidence.sources[state->context->source].push_back(result);

@@ -25,6 +25,8 @@ struct Happened {
   std::uint64_t exporter = 0;
   std::uint64_t sequence = 0;
   std::uint64_t events = 0;  // gap: that the recorder does not have
+  // Deactivation: a port had ended before the recorder joined it; why, it does not say.
+  bool is_state = false;
 };
 
 // That a model came into force.

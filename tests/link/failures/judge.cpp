@@ -166,15 +166,14 @@ void Judge::judge_losers(const Pair& pair) {
       withheld_in(history_.hosts[pair.number - 1].imports[pair.other - 1].described);
   for (const Asked& each : asked_for(pair.importer, pair.source)) {
     const Span when{each.when - kPromised, each.when + plan_.period};
-    const bool is_told = history_.is_quiet(pair.number, pair.other, when, History::Of::anything) &&
-                         waited(pair.number, pair.other, {each.when, when.to}) < plan_.period;
-    if (!is_told) continue;
+    if (!history_.is_quiet(pair.number, pair.other, when, History::Of::anything)) continue;
     ++totals_.checked.asked;
     totals_.checked.completed += each.is_completed ? 1 : 0;
   }
 }
 
-// The last event gets through, also where it was lost first.
+// The last event gets through, also where it was lost first. Where nothing has been lost, one that
+// is soon followed does, too.
 void Judge::judge_ends(const Pair& pair) {
   check_ends(pair.importer, pair.exporter, pair.source, found_, totals_.checked);
   for (const End& end : ends_of(pair.exporter, pair.source)) {
@@ -185,14 +184,20 @@ void Judge::judge_ends(const Pair& pair) {
                             each.span.from < end.until && end.when < each.span.to + kSettling;
       if (is_of_it) since = std::max(since, each.span.to + kSettling);
     }
-    const Span when{since, since + kPromised};
+    const bool is_undisturbed =
+        since == end.when &&
+        history_.is_quiet(pair.number, pair.other, {end.when - kPromised, end.when},
+                          History::Of::anything) &&
+        was_there(pair.importer, pair.source, end.when);
+    const Span when{since,
+                    is_undisturbed ? std::min(end.until, since + kPromised) : since + kPromised};
     const bool is_told =
         end.until >= when.to && when.to < history_.until &&
         history_.is_quiet(pair.number, pair.other, {end.when - kNotTroubled, when.to},
                           History::Of::processes) &&
         history_.is_quiet(pair.number, pair.other, when, History::Of::anything);
     if (!is_told) continue;
-    Recovery told = first_end_after(pair.importer, pair.source, end.when);
+    Recovery told = first_end_after(pair.importer, pair.source, end.when, !is_undisturbed);
     told.took = std::max<Nanoseconds>(told.took - (since - end.when), 0);
     hold_to(totals_.ends, told, kPromised, waited(pair.number, pair.other, when),
             pair.importer.name + ": the deactivation of " + pair.source + " at " +

@@ -9,7 +9,8 @@
 namespace arbiter::failures {
 namespace {
 
-constexpr Nanoseconds kBeginning = kSecond;  // without trouble
+constexpr Nanoseconds kBeginning = kSecond;        // without trouble
+constexpr Nanoseconds kAfterwards = 12 * kSecond;  // likewise
 
 Nanoseconds timeout(stress::Random& random) {
   constexpr std::array<Nanoseconds, 5> kTimeouts{120 * kMs, 200 * kMs, 300 * kMs, 500 * kMs,
@@ -177,6 +178,7 @@ Plan make_plan(const Options& options, std::uint64_t seed) {
   }
   plan.lasts = until;
   for (const Event& event : plan.events) plan.lasts = std::max(plan.lasts, event.at + event.lasts);
+  plan.lasts += options.is_short ? kAfterwards / 2 : kAfterwards;
   return plan;
 }
 
