@@ -187,6 +187,15 @@ TEST(Checker, SeesADeactivationInTheWrongPlace) {
   EXPECT_THAT(ended(5), testing::SizeIs(1));
 }
 
+TEST(Checker, TakesTheEndOfAPortForNoDeactivation) {
+  Recorded one = Recorded().published(1, 10).published(2, 30).arrives(1, 11, 10);
+  one.happens(Kind::deactivation, 21).arrives(2, 31, 30);
+  one.importer.closures[kSource] = {22 * kMs};
+  EXPECT_THAT(one.ends(), IsEmpty());
+  one.importer.closures[kSource] = {9 * kMs, 32 * kMs};
+  EXPECT_THAT(one.ends(), testing::SizeIs(1));
+}
+
 TEST(Checker, MeasuresWhenADeactivationComes) {
   const Recorded one =
       Recorded().published(1, 10).deactivated(20).published(2, 900).happens(Kind::deactivation, 23);
