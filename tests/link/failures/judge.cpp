@@ -288,16 +288,16 @@ void Judge::measure_one(const Pair& pair, Trouble trouble, const Span& span) {
   Recovery arrived = first_arrival_after(pair.importer, pair.source, span.to);
   if (!arrived.is_there) return;
   arrived.took = std::max<Nanoseconds>(arrived.took - published.took, 0);
+  const Nanoseconds its_waits = waited(pair.number, pair.other, when);
   // Else something else delayed it.
-  const Nanoseconds until = when.from + std::min(arrived.took, kPromised);
+  const Nanoseconds until = when.from + std::min(arrived.took, kPromised + its_waits);
   if (!history_.is_quiet(pair.number, pair.other, {span.to + kSettling, until},
                          History::Of::anything)) {
     return;
   }
   // Where processes begin anew, nothing is promised.
   const bool is_promised = is_of_frames(trouble);
-  hold_to(totals_.recoveries[trouble], arrived, is_promised ? kPromised : kLong,
-          waited(pair.number, pair.other, when),
+  hold_to(totals_.recoveries[trouble], arrived, is_promised ? kPromised : kLong, its_waits,
           pair.importer.name + ": " + pair.source + " came back after \"" + name_of(trouble) +
               "\" of " + std::to_string((span.to - span.from) / kMs) + " ms, ended at " +
               std::to_string(span.to / kMs) + " ms,");
