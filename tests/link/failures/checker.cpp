@@ -98,8 +98,8 @@ bool overlaps(const std::vector<Span>& spans, Nanoseconds from, Nanoseconds to) 
                      [&](const Span& span) { return span.from <= to && from <= span.to; });
 }
 
-// A link that closes the port ends the activity by itself. The recorder knows of that before it knows
-// of what comes next.
+// A link that closes the port ends the activity by itself. The recorder knows of that before it
+// knows of what comes next.
 bool is_closed_in(const HostEvidence& importer, const std::string& source, const Span& span) {
   const Recovery closed = closed_after(importer, source, span.from);
   return closed.is_there && closed.took <= span.to - span.from;
@@ -198,6 +198,7 @@ void check_ends(const HostEvidence& importer, const HostEvidence& exporter,
   for (const Nanoseconds each : exporter.beginnings) {
     unknown.push_back({each - kBegins, each + kBegins});
   }
+  std::sort(ends.begin(), ends.end());  // what a recorder finds when it joins may be older
   const Happened* before = nullptr;
   const Happened* end = nullptr;
   for (const Happened& event : of(importer, source)) {
@@ -235,7 +236,7 @@ std::vector<End> ends_of(const HostEvidence& exporter, const std::string& source
   std::vector<End> result;
   const auto& events = of(exporter, source);
   for (auto each = events.begin(); each != events.end(); ++each) {
-    if (each->kind != Kind::deactivation) continue;
+    if (each->kind != Kind::deactivation || each->is_state) continue;
     const auto next = std::next(each);
     result.push_back({each->time, next == events.end() ? kEnd : next->time});
   }

@@ -187,6 +187,14 @@ TEST(Checker, SeesADeactivationInTheWrongPlace) {
   EXPECT_THAT(ended(5), testing::SizeIs(1));
 }
 
+// What a recorder finds when it joins may be of any time.
+TEST(Checker, FindsADeactivationBesideWhatWasThereBefore) {
+  Recorded one = Recorded().published(1, 10).published(2, 30).deactivated(20).deactivated(0);
+  one.exporter.sources[kSource].back().is_state = true;
+  one.arrives(1, 11, 10).happens(Kind::deactivation, 21).arrives(2, 31, 30);
+  EXPECT_THAT(one.ends(), IsEmpty());
+}
+
 TEST(Checker, TakesTheEndOfAPortForNoDeactivation) {
   Recorded one = Recorded().published(1, 10).published(2, 30).arrives(1, 11, 10);
   one.happens(Kind::deactivation, 21).arrives(2, 31, 30);

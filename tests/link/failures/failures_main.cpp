@@ -182,8 +182,6 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--bounds", options.has_bounds,
                "Who is to command again does so in time, where processes had a processor");
-  app.add_flag("--deaf-is-gone", options.is_deaf_gone,
-               "A speaker that does not hear a host is gone there, too");
   std::vector<std::string> names;
   for (unsigned i = 0; i < kTroubles; ++i) names.emplace_back(name_of(static_cast<Trouble>(i)));
   app.add_option("--only", options.only, "A trouble that happens, such as \"noise\"; repeatable")

@@ -91,7 +91,7 @@ Findings Judge::judge(const std::vector<HostEvidence>& hosts) {
       judge_ends(pair);
       judge_shared(pair);
       judge_closing(pair, {other, number});
-      if (options_.is_deaf_gone) judge_closing(pair, {number, other});
+      judge_closing(pair, {number, other});
       measure(pair);
     }
   }

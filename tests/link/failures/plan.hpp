@@ -20,9 +20,8 @@ struct Options {
   std::string keep;     // where recordings and logs of a round with findings are left
   std::string commit = "unknown";
   bool has_bounds =
-      false;  // who comes back must do so in time, where the machine let it (waits.hpp)
-  bool is_deaf_gone = false;   // a speaker that does not hear a host, for that host
-  bool is_short = false;       // one round for a test: its troubles last for less
+      false;              // who comes back must do so in time, where the machine let it (waits.hpp)
+  bool is_short = false;  // one round for a test: its troubles last for less
   std::set<std::string> only;  // the names of the troubles that happen; empty: all
 };
 
