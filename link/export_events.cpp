@@ -145,7 +145,7 @@ std::size_t Exports::send(Export& one, const TapEvent<void>& event) {
   // A sample that was overwritten before it could be sent, that is too large, or of a type that is
   // not known there, is an arrival nevertheless.
   const bool has_sample = sample && is_known && sample->size() <= kMaxSampleBytes;
-  if (header_.kind == EventKind::kSample && !has_sample) header_.kind = EventKind::kSignal;
+  if (header_.kind == EventKind::kSample && !has_sample) header_.kind = EventKind::kUnsent;
   header_.is_deactivated = header_.kind == EventKind::kDeactivation ||
                            (header_.kind == EventKind::kState && event.is_deactivated());
   const bool stays = has_sample && is_withheld(one.demand, sample->size());

@@ -132,7 +132,7 @@ void Import::obey(const Offerer* speaker) {
   if (last == unheard_.end()) return;
   // It is noted for its state; its sample no port had.
   const bool is_new = last->exporter == exporter && stream_.note(exporter, last->last);
-  if (is_new && last->last.is_arrival()) ++counts_.too_soon;
+  if (is_new && last->last.has_sample) ++counts_.too_soon;
   // The same exporter, which is heard by another writer: the port has stayed open.
   if (is_new && port_ && stream_.is_deactivated()) port_->deactivate();
   unheard_.erase(last);
@@ -259,7 +259,7 @@ std::string Import::text() const {
     if (number != 0) text += ", " + std::to_string(number) + what;
   };
   count(stream_.lost(), " lost");
-  count(stream_.without_sample(), " without their samples");
+  count(counts_.without_sample, " without their samples");
   count(counts_.late, " late");
   count(counts_.withheld, " withheld");
   count(counts_.unbelieved, " withheld though they were wanted");
@@ -278,7 +278,7 @@ wire::ImportStatus Import::status() const {
   const std::lock_guard lock(mutex_);
   status.is_open = port_ != nullptr;
   status.lost = stream_.lost();
-  status.without_sample = stream_.without_sample();
+  status.without_sample = counts_.without_sample;
   status.late = counts_.late;
   status.withheld = counts_.withheld;
   return status;

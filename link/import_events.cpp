@@ -35,8 +35,7 @@ void Import::take(const gateway::dds::Payload& payload,  // NOLINT(bugprone-exce
                           has_sample(header_.kind),
                           header_.is_deactivated,
                           header_.kind == EventKind::kWithheld,
-                          header_.token_of(me_) == 0,
-                          header_.kind == EventKind::kSignal};
+                          header_.token_of(me_) == 0};
   if (writer.handle != writer_) {  // one speaker: others are not heard
     remember(writer.handle, event);
     return;
@@ -83,6 +82,7 @@ void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
   // Read first: if this thread is held up before the other clock is read, less is left, not more.
   const shm::Nanoseconds now = shm::monotonic_now();
   const bool is_alone = header_.kind == EventKind::kWithheld;
+  const bool is_unsent = header_.kind == EventKind::kUnsent;
   if (is_alone && !demand_.believes_header(max_age_.load(std::memory_order_relaxed), now)) {
     ++counts_.unbelieved;
     return;
@@ -90,7 +90,7 @@ void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
   const shm::Nanoseconds left = time_left();
   // A deadline that has passed, where nothing is left: the port counts it, too.
   const Time deadline(std::chrono::nanoseconds(left < 0 ? -1 : now + left));
-  const bool brings_sample = has_sample(header_.kind) && !is_alone && left >= 0;
+  const bool brings_sample = has_sample(header_.kind) && !is_alone && !is_unsent && left >= 0;
   const std::optional<Outcome> outcome =
       brings_sample ? publish(payload, before, deadline) : port_->signal(deadline, origin());
   if (!outcome) return;
@@ -98,6 +98,7 @@ void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
     ++counts_.late;
     return;
   }
+  if (is_unsent) ++counts_.without_sample;
   if (has_sample(header_.kind)) awaits_sample_ = is_alone;
   demand_.note_arrival(port_->wants_samples(), now);
   say_demand();

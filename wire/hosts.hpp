@@ -48,7 +48,7 @@ struct ImportStatus {
   bool is_open_here = false;       // by a component of this host, which has precedence
   std::vector<std::string> hosts;  // that offer it
   std::uint64_t lost = 0;
-  std::uint64_t without_sample = 0;  // signals that came in the place of samples
+  std::uint64_t without_sample = 0;  // arrivals whose samples could not be sent
   std::uint64_t late = 0;
   std::uint64_t withheld = 0;  // samples that stayed at home
 };

@@ -17,6 +17,7 @@ bool is_consistent(const EventHeader& header) noexcept {
       return !header.is_deactivated && header.type_revision != 0;
     case EventKind::kSignal:
     case EventKind::kWithheld:
+    case EventKind::kUnsent:
       return !header.is_deactivated && header.length == 0;
     case EventKind::kDeactivation:
       return header.is_deactivated && header.length == 0;

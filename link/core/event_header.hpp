@@ -31,18 +31,20 @@ namespace arbiter::link {
 
 enum class EventKind : std::uint8_t {
   kSample = 1,
-  kSignal,        // an arrival without a sample, or one whose sample could not be sent
+  kSignal,        // an arrival without a sample
   kDeactivation,  // the source's activity was ended
   kState,         // nothing has happened: what the source is like
   kWithheld,      // an arrival whose sample stays at home (demand.hpp)
   // The sample of the last arrival, which was withheld, with the tokens of that: for importers that
   // have had that event it is no other event. Its number is that of the exporter's last event.
   kAgain,
+  kUnsent,  // an arrival whose sample could not be sent, and never will be
 };
 
 // Whether there is a sample that the event's sequence counts, be it with it or not.
 [[nodiscard]] constexpr bool has_sample(EventKind kind) noexcept {
-  return kind == EventKind::kSample || kind == EventKind::kWithheld || kind == EventKind::kAgain;
+  return kind == EventKind::kSample || kind == EventKind::kWithheld || kind == EventKind::kAgain ||
+         kind == EventKind::kUnsent;
 }
 
 struct EventHeader {

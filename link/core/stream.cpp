@@ -18,7 +18,6 @@ bool Stream::note(Incarnation from, const StreamEvent& event) noexcept {
     return false;
   }
   if (has_begun_) lost_ += missed(exporter, event);
-  if (has_begun_ && lacks_sample(exporter, event)) ++without_sample_;
   has_begun_ = has_begun_ || !event.is_unasked;
   exporter.last = event.number;
   exporter.sequence = event.sequence;
@@ -40,16 +39,8 @@ bool Stream::completes(Incarnation from, std::uint64_t number) noexcept {
 std::uint64_t Stream::missed(const Exporter& exporter, const StreamEvent& event) noexcept {
   const std::uint64_t events = event.number - exporter.last - 1;
   if (exporter.sequence == 0) return events;
-  // A signal may be there for the next sample.
-  const std::uint64_t next = exporter.sequence + (event.is_arrival() ? 1 : 0);
-  return std::max(events, event.sequence > next ? event.sequence - next : 0);
-}
-
-// More samples have been published than events have been missed: one of them was this one.
-bool Stream::lacks_sample(const Exporter& exporter, const StreamEvent& event) noexcept {
-  const std::uint64_t events = event.number - exporter.last - 1;
-  return event.is_signal && exporter.sequence != 0 && event.sequence > exporter.sequence &&
-         event.sequence - exporter.sequence > events;
+  if (event.sequence <= exporter.sequence) return events;
+  return std::max(events, event.sequence - exporter.sequence - (event.has_sample ? 1 : 0));
 }
 
 // In the place of the one that has not been obeyed for the longest time, where it is not among

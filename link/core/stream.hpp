@@ -24,9 +24,6 @@ struct StreamEvent {
   bool is_deactivated = false;  // the source is, from here on
   bool is_withheld = false;     // the sample may come later, with the number of the last event
   bool is_unasked = false;      // its exporter had heard nothing of this importer when it happened
-  bool is_signal = false;       // of its publisher, or in the place of a sample that was not sent
-
-  [[nodiscard]] constexpr bool is_arrival() const noexcept { return has_sample || is_signal; }
 };
 
 class Stream {
@@ -48,8 +45,6 @@ class Stream {
   // while another one was obeyed or nobody listened, is not missed.
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
   [[nodiscard]] std::uint64_t doubled() const noexcept { return doubled_; }
-  // Signals that have come in the place of samples, and so are not lost.
-  [[nodiscard]] std::uint64_t without_sample() const noexcept { return without_sample_; }
   // By the last event of the one that is obeyed: it ended the source's activity, and nothing has
   // come since.
   [[nodiscard]] bool is_deactivated() const noexcept { return exporters_.front().is_deactivated; }
@@ -68,15 +63,12 @@ class Stream {
   void move_to_front(Incarnation from) noexcept;
   [[nodiscard]] static std::uint64_t missed(const Exporter& exporter,
                                             const StreamEvent& event) noexcept;
-  [[nodiscard]] static bool lacks_sample(const Exporter& exporter,
-                                         const StreamEvent& event) noexcept;
 
   std::array<Exporter, kRemembered> exporters_{};  // the one that is obeyed first
   // An event of that one was taken up since it is, which happened when it knew this importer.
   bool has_begun_ = false;
   std::uint64_t lost_ = 0;
   std::uint64_t doubled_ = 0;
-  std::uint64_t without_sample_ = 0;
 };
 
 }  // namespace arbiter::link

@@ -86,8 +86,9 @@ TEST(EventHeader, IsNobodysWhereItContradictsItself) {
            [](EventHeader& header) { header.kind = EventKind::kDeactivation; },
            [](EventHeader& header) { header.kind = EventKind::kState; },
            [](EventHeader& header) { header.kind = EventKind::kWithheld; },
+           [](EventHeader& header) { header.kind = EventKind::kUnsent; },
            [](EventHeader& header) { header.kind = static_cast<EventKind>(0); },
-           [](EventHeader& header) { header.kind = static_cast<EventKind>(5); },
+           [](EventHeader& header) { header.kind = static_cast<EventKind>(8); },
        }) {
     EventHeader header = some_header();
     spoil(header);
