@@ -98,13 +98,6 @@ bool overlaps(const std::vector<Span>& spans, Nanoseconds from, Nanoseconds to) 
                      [&](const Span& span) { return span.from <= to && from <= span.to; });
 }
 
-// A link that closes the port ends the activity by itself. The recorder knows of that before it
-// knows of what comes next.
-bool is_closed_in(const HostEvidence& importer, const std::string& source, const Span& span) {
-  const Recovery closed = closed_after(importer, source, span.from);
-  return closed.is_there && closed.took <= span.to - span.from;
-}
-
 }  // namespace
 
 void check_decisions(const HostEvidence& host, Findings& found, Checked& checked) {
@@ -206,7 +199,7 @@ void check_ends(const HostEvidence& importer, const HostEvidence& exporter,
     if (!event.command) continue;
     const bool is_told = end != nullptr && before != nullptr && !is_other_life(*before, event) &&
                          !overlaps(unknown, before->command->made, event.command->made);
-    if (is_told && !is_closed_in(importer, source, {before->time, event.seen})) {
+    if (is_told) {
       ++checked.ends;
       const auto its = std::upper_bound(ends.begin(), ends.end(), before->command->made);
       if (its == ends.end() || *its > event.command->made) {
@@ -246,10 +239,10 @@ std::vector<End> ends_of(const HostEvidence& exporter, const std::string& source
 Recovery first_end_after(const HostEvidence& importer, const std::string& source, Nanoseconds time,
                          bool or_newer) {
   for (const Happened& event : of(importer, source)) {
-    const bool is_it =
-        event.kind == Kind::deactivation ||
-        (or_newer && is_arrival(event) && event.command && event.command->made >= time);
-    if (is_it && event.time >= time) return {true, event.time - time};
+    const bool is_newer = is_arrival(event) && event.command && event.command->made >= time;
+    if (event.time < time || (!is_newer && event.kind != Kind::deactivation)) continue;
+    if (is_newer && !or_newer) return {};
+    return {true, event.time - time};
   }
   return {};
 }

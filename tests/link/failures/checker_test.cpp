@@ -195,15 +195,6 @@ TEST(Checker, FindsADeactivationBesideWhatWasThereBefore) {
   EXPECT_THAT(one.ends(), IsEmpty());
 }
 
-TEST(Checker, TakesTheEndOfAPortForNoDeactivation) {
-  Recorded one = Recorded().published(1, 10).published(2, 30).arrives(1, 11, 10);
-  one.happens(Kind::deactivation, 21).arrives(2, 31, 30);
-  one.importer.closures[kSource] = {22 * kMs};
-  EXPECT_THAT(one.ends(), IsEmpty());
-  one.importer.closures[kSource] = {9 * kMs, 32 * kMs};
-  EXPECT_THAT(one.ends(), testing::SizeIs(1));
-}
-
 TEST(Checker, MeasuresWhenADeactivationComes) {
   const Recorded one =
       Recorded().published(1, 10).deactivated(20).published(2, 900).happens(Kind::deactivation, 23);
@@ -215,6 +206,9 @@ TEST(Checker, MeasuresWhenADeactivationComes) {
   EXPECT_TRUE(first_end_after(newer.importer, kSource, 20 * kMs, true).is_there);
   EXPECT_FALSE(first_end_after(newer.importer, kSource, 20 * kMs, false).is_there);
   EXPECT_FALSE(first_end_after(newer.importer, kSource, 23 * kMs, true).is_there);
+  const Recorded late = Recorded().arrives(1, 25, 22).happens(Kind::deactivation, 40);
+  EXPECT_FALSE(first_end_after(late.importer, kSource, 20 * kMs, false).is_there)
+      << "another one, behind what follows";
 }
 
 TEST(Checker, SeesLossesThatNobodyCounted) {

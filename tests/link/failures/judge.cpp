@@ -29,8 +29,9 @@ constexpr Nanoseconds kAfterRestart = kSecond;
 // Processes that have begun anew know each other by then.
 constexpr Nanoseconds kNotTroubled = 3 * kSecond;
 
-// A link asks its daemon four times a second which model is in force.
-constexpr Nanoseconds kKnowsItsModel = 250 * kMs;
+// A link asks its daemon ten times a second which model is in force, and waits up to a second for
+// its answer.
+constexpr Nanoseconds kKnowsItsModel = 1500 * kMs;
 
 // The shortest and the longest of all models.
 std::pair<Nanoseconds, Nanoseconds> timeouts_of(const HostPlan& plan, unsigned other) {
@@ -295,8 +296,11 @@ void Judge::measure_one(const Pair& pair, Trouble trouble, const Span& span) {
                          History::Of::anything)) {
     return;
   }
-  // Where processes begin anew, nothing is promised.
-  const bool is_promised = is_of_frames(trouble);
+  // Where processes begin anew, or have just begun, nothing is promised.
+  const bool is_promised =
+      is_of_frames(trouble) &&
+      history_.is_quiet(pair.number, pair.other, {span.to - kNotTroubled, until},
+                        History::Of::processes);
   hold_to(totals_.recoveries[trouble], arrived, is_promised ? kPromised : kLong, its_waits,
           pair.importer.name + ": " + pair.source + " came back after \"" + name_of(trouble) +
               "\" of " + std::to_string((span.to - span.from) / kMs) + " ms, ended at " +

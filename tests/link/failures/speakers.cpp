@@ -1,6 +1,7 @@
 #include "tests/link/failures/speakers.hpp"
 
 #include <algorithm>
+#include <optional>
 
 namespace arbiter::failures {
 namespace {
@@ -99,14 +100,16 @@ std::vector<Succession> successions(const HostEvidence& host, unsigned number,
   const auto add = [&](unsigned gone, const Span& when, History::Of unless) {
     const Span quiet{when.from - kStillTroubled, when.to};
     if (is_there_at_all(history, number, quiet) || !was_obeyed(host, gone, when.from)) return;
+    std::optional<unsigned> next;  // which of several is obeyed, their names say
     for (unsigned other = 1; other <= hosts; ++other) {
-      const bool is_next = other != gone && other != number && is_there(history, other, quiet) &&
+      if (other == gone || other == number || !is_there_at_all(history, other, quiet)) continue;
+      const bool is_sure = is_there(history, other, quiet) &&
                            history.is_quiet(number, gone, quiet, unless) &&
                            history.is_quiet(number, other, quiet, History::Of::anything);
-      if (!is_next) continue;
-      result.push_back({when, gone, other, next_speaker(host, gone, when.from)});
-      break;  // which of them is obeyed, their names say
+      if (!is_sure) return;  // it may be obeyed first
+      if (!next) next = other;
     }
+    if (next) result.push_back({when, gone, *next, next_speaker(host, gone, when.from)});
   };
   for (unsigned gone = 1; gone <= hosts; ++gone) {
     if (gone == number) continue;
