@@ -231,6 +231,7 @@ std::vector<End> ends_of(const HostEvidence& exporter, const std::string& source
   for (auto each = events.begin(); each != events.end(); ++each) {
     if (each->kind != Kind::deactivation || each->is_state) continue;
     const auto next = std::next(each);
+    if (next != events.end() && next->kind == Kind::gap) continue;  // what followed is not known
     result.push_back({each->time, next == events.end() ? kEnd : next->time});
   }
   return result;

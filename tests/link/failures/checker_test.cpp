@@ -206,6 +206,10 @@ TEST(Checker, MeasuresWhenADeactivationComes) {
   EXPECT_TRUE(first_end_after(newer.importer, kSource, 20 * kMs, true).is_there);
   EXPECT_FALSE(first_end_after(newer.importer, kSource, 20 * kMs, false).is_there);
   EXPECT_FALSE(first_end_after(newer.importer, kSource, 23 * kMs, true).is_there);
+  Recorded unknown = Recorded().deactivated(20).published(2, 900);
+  std::vector<Happened>& events = unknown.exporter.sources[kSource];
+  events.insert(events.end() - 1, Happened{Kind::gap, 20 * kMs, 30 * kMs});
+  EXPECT_THAT(ends_of(unknown.exporter, kSource), IsEmpty()) << "what followed is not known";
   const Recorded late = Recorded().arrives(1, 25, 22).happens(Kind::deactivation, 40);
   EXPECT_FALSE(first_end_after(late.importer, kSource, 20 * kMs, false).is_there)
       << "another one, behind what follows";

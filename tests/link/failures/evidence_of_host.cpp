@@ -90,12 +90,14 @@ void add(HostEvidence& evidence, const std::string& motor, const evidence::Recor
       std::erase_if(events, [&](const Happened& event) { return event.time >= model->time; });
     }
   } else if (const auto* missed = std::get_if<evidence::Missed>(&record)) {
+    std::vector<Happened>& events = evidence.sources[missed->source];
     Happened result;
     result.kind = Happened::Kind::gap;
-    result.time = missed->from;
+    result.time = missed->from;  // 0: the recorder does not know
+    if (result.time == 0 && !events.empty()) result.time = events.back().time;
     result.seen = missed->to;
     result.events = missed->events + missed->samples;
-    evidence.sources[missed->source].push_back(result);
+    events.push_back(result);
   } else if (const auto* state = std::get_if<evidence::SourceState>(&record)) {
     using Why = evidence::SourceState::Why;
     const bool is_end = state->why == Why::joined && shm::is_deactivation(state->word);
