@@ -230,7 +230,8 @@ std::vector<End> ends_of(const HostEvidence& exporter, const std::string& source
   const auto& events = of(exporter, source);
   for (auto each = events.begin(); each != events.end(); ++each) {
     if (each->kind != Kind::deactivation || each->is_state) continue;
-    const auto next = std::next(each);
+    const auto next = std::find_if(std::next(each), events.end(),
+                                   [](const Happened& event) { return !event.is_state; });
     if (next != events.end() && next->kind == Kind::gap) continue;  // what followed is not known
     result.push_back({each->time, next == events.end() ? kEnd : next->time});
   }

@@ -210,6 +210,10 @@ TEST(Checker, MeasuresWhenADeactivationComes) {
   std::vector<Happened>& events = unknown.exporter.sources[kSource];
   events.insert(events.end() - 1, Happened{Kind::gap, 20 * kMs, 30 * kMs});
   EXPECT_THAT(ends_of(unknown.exporter, kSource), IsEmpty()) << "what followed is not known";
+  Recorded again = Recorded().deactivated(20).deactivated(5).published(2, 900);
+  again.exporter.sources[kSource][1].is_state = true;
+  ASSERT_THAT(ends_of(again.exporter, kSource), testing::SizeIs(1));
+  EXPECT_EQ(ends_of(again.exporter, kSource)[0].until, 900 * kMs) << "nothing has happened there";
   const Recorded late = Recorded().arrives(1, 25, 22).happens(Kind::deactivation, 40);
   EXPECT_FALSE(first_end_after(late.importer, kSource, 20 * kMs, false).is_there)
       << "another one, behind what follows";
