@@ -72,8 +72,8 @@ class Import : private gateway::dds::SampleTaker {
     std::uint64_t too_soon = 0;    // arrivals that came while the port was not open
     std::uint64_t no_memory = 0;
     std::uint64_t without_sample = 0;  // arrivals whose samples could not be sent
-    std::uint64_t withheld = 0;    // samples that stayed at home
-    std::uint64_t unbelieved = 0;  // of them, headers alone, long after samples were asked for
+    std::uint64_t withheld = 0;        // samples that stayed at home
+    std::uint64_t unbelieved = 0;      // of them, headers alone, long after samples were asked for
   };
 
   // publish() throws for another port's loan, and this one is its own; what is remembered here has
