@@ -69,7 +69,7 @@ class Import : private gateway::dds::SampleTaker {
   struct Counts {
     std::uint64_t late = 0;
     std::uint64_t unreadable = 0;  // no event, or a sample that its type cannot have
-    std::uint64_t too_soon = 0;    // arrivals that came while the port was not open
+    std::uint64_t too_soon = 0;    // samples, sent or not, that came while the port was not open
     std::uint64_t no_memory = 0;
     std::uint64_t without_sample = 0;  // arrivals whose samples could not be sent
     std::uint64_t withheld = 0;        // samples that stayed at home

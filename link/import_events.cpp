@@ -70,7 +70,7 @@ shm::Nanoseconds Import::time_left() const {
 void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
   if (header_.kind == EventKind::kWithheld) ++counts_.withheld;
   if (!port_) {
-    if (has_sample(header_.kind) || header_.kind == EventKind::kSignal) ++counts_.too_soon;
+    if (has_sample(header_.kind)) ++counts_.too_soon;
     return;
   }
   if (header_.is_deactivated) {
@@ -82,7 +82,6 @@ void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
   // Read first: if this thread is held up before the other clock is read, less is left, not more.
   const shm::Nanoseconds now = shm::monotonic_now();
   const bool is_alone = header_.kind == EventKind::kWithheld;
-  const bool is_unsent = header_.kind == EventKind::kUnsent;
   if (is_alone && !demand_.believes_header(max_age_.load(std::memory_order_relaxed), now)) {
     ++counts_.unbelieved;
     return;
@@ -90,15 +89,15 @@ void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
   const shm::Nanoseconds left = time_left();
   // A deadline that has passed, where nothing is left: the port counts it, too.
   const Time deadline(std::chrono::nanoseconds(left < 0 ? -1 : now + left));
-  const bool brings_sample = has_sample(header_.kind) && !is_alone && !is_unsent && left >= 0;
-  const std::optional<Outcome> outcome =
-      brings_sample ? publish(payload, before, deadline) : port_->signal(deadline, origin());
+  const std::optional<Outcome> outcome = brings_sample(header_.kind) && left >= 0
+                                             ? publish(payload, before, deadline)
+                                             : port_->signal(deadline, origin());
   if (!outcome) return;
   if (outcome->late) {
     ++counts_.late;
     return;
   }
-  if (is_unsent) ++counts_.without_sample;
+  if (header_.kind == EventKind::kUnsent) ++counts_.without_sample;
   if (has_sample(header_.kind)) awaits_sample_ = is_alone;
   demand_.note_arrival(port_->wants_samples(), now);
   say_demand();

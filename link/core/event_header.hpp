@@ -47,6 +47,11 @@ enum class EventKind : std::uint8_t {
          kind == EventKind::kUnsent;
 }
 
+// Whether it comes with the event.
+[[nodiscard]] constexpr bool brings_sample(EventKind kind) noexcept {
+  return kind == EventKind::kSample || kind == EventKind::kAgain;
+}
+
 struct EventHeader {
   EventKind kind = EventKind::kState;
   bool is_deactivated = false;

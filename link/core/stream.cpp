@@ -38,8 +38,7 @@ bool Stream::completes(Incarnation from, std::uint64_t number) noexcept {
 // yet how far its publisher is: what was published before is not missed.
 std::uint64_t Stream::missed(const Exporter& exporter, const StreamEvent& event) noexcept {
   const std::uint64_t events = event.number - exporter.last - 1;
-  if (exporter.sequence == 0) return events;
-  if (event.sequence <= exporter.sequence) return events;
+  if (exporter.sequence == 0 || event.sequence <= exporter.sequence) return events;
   return std::max(events, event.sequence - exporter.sequence - (event.has_sample ? 1 : 0));
 }
 
