@@ -14,6 +14,8 @@ using Pair = std::pair<std::uint32_t, std::uint64_t>;
 constexpr std::uint64_t kFirstOfALife = 1000;
 // A recorder that begins again with a new daemon may not have all that happened around that.
 constexpr Nanoseconds kBegins = 2 * kSecond;
+// Of a publisher that pauses.
+constexpr Nanoseconds kSilence = 100 * kMs;
 
 const std::vector<Happened>& of(const HostEvidence& host, const std::string& source) {
   static const std::vector<Happened> kNone;
@@ -336,6 +338,25 @@ Recovery first_arrival_after(const HostEvidence& host, const std::string& source
     if (event.time >= time && is_arrival(event)) return {true, event.time - time};
   }
   return {};
+}
+
+Recovery recovery_after(const HostEvidence& importer, const HostEvidence& exporter,
+                        const std::string& source, Nanoseconds time) {
+  const auto& arrivals = of(importer, source);
+  const auto arrival = std::find_if(arrivals.begin(), arrivals.end(), [&](const Happened& event) {
+    return event.time >= time && is_arrival(event);
+  });
+  if (arrival == arrivals.end()) return {};
+  const Nanoseconds made = arrival->command ? arrival->command->made : arrival->time;
+  Nanoseconds first = made;
+  Nanoseconds last = made;
+  for (const Happened& event : of(exporter, source)) {
+    if (event.time < time || event.time >= made) continue;
+    first = std::min(first, event.time);
+    last = event.time;
+  }
+  const Nanoseconds silent = made - last > kSilence ? made - last : 0;
+  return {true, std::max<Nanoseconds>(arrival->time - first - silent, 0)};
 }
 
 std::vector<Fallback> fallbacks(const HostEvidence& host,

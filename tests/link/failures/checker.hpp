@@ -120,6 +120,10 @@ void check_cuts(const HostEvidence& importer, const std::string& source,
 
 [[nodiscard]] Recovery first_arrival_after(const HostEvidence& host, const std::string& source,
                                            Nanoseconds time);
+// Likewise, from the first event that its exporter published after that time; a silence of the
+// exporter just before what arrived first does not count: the way may have been free in it.
+[[nodiscard]] Recovery recovery_after(const HostEvidence& importer, const HostEvidence& exporter,
+                                      const std::string& source, Nanoseconds time);
 // Since when no source but `last` can have been active any more, and how long after that `last`
 // commanded. Where nobody's rule holds `last` up for less than `least`, there is none.
 struct Fallback {

@@ -335,6 +335,28 @@ TEST(Checker, MeasuresWhenTheLastInCommandCommands) {
   EXPECT_EQ(first_arrival_after(fell.importer, kLower, 100 * kMs).took, 13 * kMs);
 }
 
+TEST(Checker, DoesNotCountTheSilenceBeforeWhatArrivesFirst) {
+  const auto took = [](const Recorded& recorded) {
+    const Recovery recovery =
+        recovery_after(recorded.importer, recorded.exporter, kSource, 100 * kMs);
+    EXPECT_TRUE(recovery.is_there);
+    return recovery.took / kMs;
+  };
+  // Heard late, though something was published all the time.
+  Recorded late = Recorded().published(1, 90);
+  for (std::uint64_t number = 2; number <= 30; ++number) {
+    late.published(number, 100 + static_cast<Nanoseconds>(number) * 50);
+  }
+  EXPECT_EQ(took(late.arrives(28, 1503, 1500)), 1303);
+  // Two were not heard, and nothing followed them for long.
+  Recorded silent = Recorded().published(1, 110).published(2, 150).published(3, 1500);
+  EXPECT_EQ(took(silent.arrives(3, 1503, 1500)), 43);
+  // Nothing was published before.
+  EXPECT_EQ(took(Recorded().published(1, 90).published(2, 1500).arrives(2, 1503, 1500)), 3);
+  const Recorded never = Recorded().arrives(1, 92, 90);
+  EXPECT_FALSE(recovery_after(never.importer, never.exporter, kSource, 100 * kMs).is_there);
+}
+
 TEST(Checker, FindsNothingWhereNothingIsWrong) {
   const Recorded good =
       Recorded().published(1, 10).published(2, 20).arrives(1, 12, 10).arrives(2, 22, 20).happens(

@@ -288,9 +288,8 @@ void Judge::measure_one(const Pair& pair, Trouble trouble, const Span& span) {
   const Recovery published = first_arrival_after(pair.exporter, pair.source, span.to);
   if (!published.is_there) return;
   const Span when{span.to + published.took, span.to + published.took + kPromised};
-  Recovery arrived = first_arrival_after(pair.importer, pair.source, span.to);
+  const Recovery arrived = recovery_after(pair.importer, pair.exporter, pair.source, span.to);
   if (!arrived.is_there) return;
-  arrived.took = std::max<Nanoseconds>(arrived.took - published.took, 0);
   const Nanoseconds its_waits = waited(pair.number, pair.other, when);
   // Else something else delayed it.
   const Nanoseconds until = when.from + std::min(arrived.took, kPromised + its_waits);
