@@ -31,7 +31,7 @@ struct Checked {
   std::uint64_t refused = 0;    // switches that no host made
   std::uint64_t partly = 0;     // switches that not all hosts made, or of which that is not known
   std::uint64_t withheld = 0;   // samples that stayed at home, as the last link of each host counts
-  std::uint64_t asked = 0;      // of them that won, in quiet times: they are asked for
+  std::uint64_t asked = 0;      // of them that won: they are asked for
   std::uint64_t completed = 0;  // of these that came before the next one
   std::uint64_t ends = 0;       // deactivations that came, by what their exporter did
 };

@@ -73,7 +73,7 @@ void report_losers_and_ends(const Totals& totals) {
   const Checked& checked = totals.checked;
   std::printf(
       "%llu rounds in which large samples that lose stay at home: %llu did, by what links counted "
-      "in the end; %llu won in quiet times, and came before the next one: %llu\n%llu deactivations "
+      "in the end; %llu won, of which %llu came before the next one\n%llu deactivations "
       "came between the right samples; deactivations, where nothing follows: %s\n",
       number(totals.rounds_with_losers), number(checked.withheld), number(checked.asked),
       number(checked.completed), number(checked.ends), totals.ends.text().c_str());

@@ -161,15 +161,14 @@ void Judge::judge_import(const Pair& pair) {
   if (found_.size() != before) found_.back() += ": " + its.imports[pair.other - 1].described;
 }
 
-// Of what stays at home and wins, the sample comes before the next one has, in quiet times, and
-// where no process waited for a processor for so long.
+// Of what stays at home and wins, the sample comes before the next one has, unless a process waited
+// for a processor for so long. Something is nearly always troubled: then some come too late.
 void Judge::judge_losers(const Pair& pair) {
   totals_.checked.withheld +=
       withheld_in(history_.hosts[pair.number - 1].imports[pair.other - 1].described);
   for (const Asked& each : asked_for(pair.importer, pair.source)) {
-    const Span when{each.when - kPromised, each.when + plan_.period};
-    if (!history_.is_quiet(pair.number, pair.other, when, History::Of::anything)) continue;
-    if (waited(pair.number, pair.other, {each.when, when.to}) > plan_.period) continue;
+    const Span when{each.when, each.when + plan_.period};
+    if (waited(pair.number, pair.other, when) > plan_.period) continue;
     ++totals_.checked.asked;
     totals_.checked.completed += each.is_completed ? 1 : 0;
   }
