@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <string_view>
 
+#include "rules/text/names.hpp"
+#include "shm/clock.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::cli {
@@ -78,6 +81,9 @@ void commit(const wire::SwitchRequest& request, const AskHosts& ask, SwitchEvery
   } catch (const wire::NotAskedError& error) {
     result.why_none = error.what();
     return note_that_none_switches(result);    // the promises end by themselves
+  } catch (const wire::RefusedError& error) {  // by the link of this host, which asks nobody then
+    result.why_none = error.what();
+    return note_that_none_switches(result);
   } catch (const std::runtime_error& error) {  // or its answers cannot be read
     why_unknown = error.what();
   }
@@ -132,7 +138,7 @@ void look_at(HostSwitch& host, const wire::HostsDocument& hosts, const std::stri
   host.why = "it did not answer, and has the model in force";
 }
 
-void find_out(const wire::SwitchRequest& request, const LookAtHosts& look,
+void find_out(const wire::SwitchRequest& request, const LookAtHosts& look, shm::Nanoseconds since,
               SwitchEverywhere& result) {
   for (int i = 0; i < kMostLooks && result.count(SwitchOutcome::kUnknown) != 0; ++i) {
     wire::HostsDocument hosts;
@@ -142,9 +148,26 @@ void find_out(const wire::SwitchRequest& request, const LookAtHosts& look,
       continue;
     }
     for (HostSwitch& each : result.hosts) {
-      if (each.outcome == SwitchOutcome::kUnknown) look_at(each, hosts, request.model);
+      if (each.outcome != SwitchOutcome::kUnknown) continue;
+      look_at(each, hosts, request.model);
+      if (each.outcome == SwitchOutcome::kSwitched)
+        result.interval = std::max(result.interval, shm::monotonic_now() - since);
     }
   }
+}
+
+// Whoever misspells it would switch the very host that was to keep its model.
+std::string unknown_among_left_out(const wire::SwitchRequest& request,
+                                   const std::vector<HostSwitch>& hosts) {
+  std::vector<std::string_view> known;
+  for (const HostSwitch& each : hosts) known.push_back(each.host);
+  for (const std::string& host : request.without) {
+    if (std::find(known.begin(), known.end(), host) != known.end()) continue;
+    return "--without " + shm::printable(host) + ": no host of that name is known" +
+           rules::advise(host, known,
+                         "arbiter hosts names them; one that is not there needs no leaving out");
+  }
+  return "";
 }
 
 void put_in_order(std::vector<HostSwitch>& hosts) {
@@ -177,9 +200,11 @@ SwitchEverywhere switch_everywhere(const wire::SwitchRequest& request, const Ask
       std::all_of(result.hosts.begin(), result.hosts.end(), [](const HostSwitch& each) {
         return each.has_prepared || each.outcome == SwitchOutcome::kLeftOut;
       });
-  if (has_any && have_all) {
+  result.why_none = unknown_among_left_out(request, result.hosts);
+  if (has_any && have_all && result.why_none.empty()) {
+    const shm::Nanoseconds since = shm::monotonic_now();
     commit(request, ask, result);
-    find_out(request, look, result);
+    find_out(request, look, since, result);
   } else if (has_any) {
     note_that_none_switches(result);
     // Otherwise they would be held for two seconds.

@@ -37,9 +37,11 @@ struct HostSwitch {
 
 struct SwitchEverywhere {
   bool is_committed = false;      // else none has switched
-  std::string why_none;           // although all have prepared; for people
+  std::string why_none;           // although all may have prepared; for people
   std::vector<HostSwitch> hosts;  // in the order of their names
-  shm::Nanoseconds interval = 0;  // from the first commit to the last answer, as seen here
+  // From the first commit to the last answer, as seen here; or until a host that did not answer was
+  // seen to have switched.
+  shm::Nanoseconds interval = 0;
 
   [[nodiscard]] std::size_t count(HostSwitch::Outcome outcome) const;
   // All that were not left out have switched.

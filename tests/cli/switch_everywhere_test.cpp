@@ -115,6 +115,23 @@ TEST(SwitchEverywhere, AHostThatIsLeftOutDoesNotMatter) {
   EXPECT_EQ(exit_code_of(result), 0);
 }
 
+// Else the host that was meant would switch.
+TEST(SwitchEverywhere, AHostThatIsNotKnownCannotBeLeftOut) {
+  for (const std::vector<std::string>& without :
+       {std::vector<std::string>{"heda"}, {"base", "x"}}) {
+    FakeHosts hosts;
+    hosts.answers = {{"prepare", {yes("base"), yes("head")}}, {"release", {}}};
+    const auto result = hosts.run({42, "dance", without});
+    EXPECT_THAT(hosts.asked, ElementsAre("prepare", "release"));
+    EXPECT_FALSE(result.is_committed);
+    EXPECT_THAT(result.why_none, HasSubstr("--without " + without.back()));
+    EXPECT_EQ(exit_code_of(result), 1);
+    if (without.size() == 1) {
+      EXPECT_THAT(result.why_none, testing::EndsWith("did you mean \"head\"?"));
+    }
+  }
+}
+
 // It would be the one that does not switch, and nobody has asked for that.
 TEST(SwitchEverywhere, AHostThatLeavesItselfOutIsANo) {
   FakeHosts hosts;
