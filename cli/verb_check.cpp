@@ -103,6 +103,17 @@ std::string summary_of(const rules::CompiledModel& model) {
          counted(model.sources.size(), "source");
 }
 
+// Whoever gives a statement in place of a file is told so.
+std::string read_statements_at(const std::string& path) {
+  try {
+    return rules::read_bytes(path);
+  } catch (const rules::FileError& error) {
+    if (path.find("->") == std::string::npos && path.find('(') == std::string::npos) throw;
+    throw rules::FileError(std::string(error.what()) +
+                           "; --assert takes a file, with a statement on each line");
+  }
+}
+
 // Statements are read even where there is no model that they could be true of: all problems are
 // reported in one go.
 Statements judge_statements(const CheckOptions& options, const rules::CompiledModel* model,
@@ -110,7 +121,7 @@ Statements judge_statements(const CheckOptions& options, const rules::CompiledMo
   Statements result;
   std::vector<rules::Statement> statements;  // of all files: they share the budget
   for (const auto& path : options.statements) {
-    const rules::TextFile file(path, rules::read_bytes(path));
+    const rules::TextFile file(path, read_statements_at(path));
     std::size_t malformed = 0;
     for (auto& statement : rules::read_statements(file, diagnostics, &malformed)) {
       statements.push_back(std::move(statement));
@@ -178,8 +189,9 @@ std::string check_hosts(const CheckOptions& options, const Model* model,
   rules::Diagnostics of_file;
   const rules::Application application = rules::read_application(file, of_file);
   const auto& models = options.files.models;
-  const bool was_read = options.files.application == options.hosts ||
+  const bool is_model = of_file.count(rules::Severity::kError, "not-an-application") == 0 &&
                         std::find(models.begin(), models.end(), options.hosts) != models.end();
+  const bool was_read = options.files.application == options.hosts || is_model;
   const bool is_fine = !of_file.has_errors();
   if (!was_read) diagnostics.add(std::move(of_file));
   if (!is_fine || model == nullptr) return "";

@@ -70,8 +70,11 @@ bool TraceParser::read_header() {
     is_header = (*record)[i].value == kColumns[i];
   }
   if (!is_header) {
+    const bool is_recording = record->front().value.find("MCAP") == 1;
     error("trace-header", record->front(),
-          std::string("this is not the header of a trace; ") + kHint);
+          is_recording ? "this is a recording, not a trace; arbiter replay takes it, and arbiter "
+                         "simulate --recording"
+                       : std::string("this is not the header of a trace; ") + kHint);
   }
   return is_header;
 }

@@ -199,6 +199,22 @@ TEST(Check, NotesAndWarningsCanBeSilencedAndErrorsCannot) {
   }
 }
 
+TEST(Check, AModelIsNoApplicationThatSaysWhereModulesRun) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  const auto result = arbiter({"check", model, "--hosts", model});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("[not-an-application]"));
+}
+
+TEST(Check, AStatementInPlaceOfAFileIsToldApart) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kTrackModel);
+  const auto result = arbiter({"check", model, "--assert", "/object -> winner(/arm) = /object"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("; --assert takes a file, with a statement on each line"));
+}
+
 TEST(Check, ACodeThatThereIsNotCannotBeSilenced) {
   TemporaryDirectory directory;
   const auto model = directory.write("m.xml", kTrackModel);
