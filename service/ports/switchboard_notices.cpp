@@ -67,11 +67,22 @@ std::string Switchboard::unmentioned_text(const shm::TableSnapshot& in_force,
   const std::string what = is_output ? "none of these samples is delivered" : "no sample arrives";
   if (in_force.generation == 0) return "no model is in force, so " + what;
   std::vector<std::string_view> mentioned;
+  bool is_other_end = false;
   for (const auto& source : names_.sources()) {
-    if (is_output && in_force.table.knows_source(source->id)) mentioned.push_back(source->name);
+    if (!in_force.table.knows_source(source->id)) continue;
+    if (is_output) mentioned.push_back(source->name);
+    is_other_end = is_other_end || (!is_output && source->name == name);
   }
   for (const auto& input : names_.inputs()) {
-    if (!is_output && in_force.table.knows_port(input->id)) mentioned.push_back(input->name);
+    if (!in_force.table.knows_port(input->id)) continue;
+    if (!is_output) mentioned.push_back(input->name);
+    is_other_end = is_other_end || (is_output && input->name == name);
+  }
+  if (is_other_end) {
+    return "in the model in force " + name +
+           (is_output ? " is an input port, and here it is open as an output port"
+                      : " is an output port, and here it is open as an input port") +
+           ", so " + what + "; `arbiter status` shows both";
   }
   if (mentioned.size() > kMaxCompared) mentioned.clear();
   return "the model in force does not mention " + name + ", so " + what +
