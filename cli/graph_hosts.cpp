@@ -72,7 +72,7 @@ void look_at(const wire::HostAnswer& answer, SeenHosts& seen) {
   std::string why_not = answer.why_not();
   if (why_not.empty()) {
     try {
-      seen.elsewhere[answer.host] = situation_of(wire::read_status(answer.text));
+      seen.elsewhere[answer.host] = situation_of(read_status_of_host(answer.text));
       return;
     } catch (const wire::DocumentError& error) {
       why_not = std::string("sent no status that can be read: ") + error.what();

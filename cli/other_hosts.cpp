@@ -5,14 +5,26 @@
 #include <stdexcept>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
 #include "shm/utf8.hpp"
 #include "watch/span.hpp"
+#include "wire/document.hpp"
 #include "wire/link_call.hpp"
 
 namespace arbiter::cli {
 namespace {
 
 constexpr std::chrono::milliseconds kPatience{1000};
+
+// Documents are not nested deeply: wire::parse_document() sees to it.
+void make_printable(nlohmann::json& value) {
+  if (value.is_string()) {
+    value = shm::printable(value.get_ref<const std::string&>());
+  } else if (value.is_structured()) {
+    for (nlohmann::json& each : value) make_printable(each);
+  }
+}
 
 }  // namespace
 
@@ -25,6 +37,12 @@ std::optional<wire::HostsDocument> hosts_if_linked(const std::string& instance) 
     std::cerr << "arbiter: nothing is known of other hosts: " << error.what() << '\n';
     return std::nullopt;
   }
+}
+
+wire::Status read_status_of_host(const std::string& text) {
+  nlohmann::json document = wire::parse_document(text);
+  make_printable(document);
+  return wire::read_status(document.dump());
 }
 
 void write_port_errors(std::ostream& out, const std::optional<wire::HostsDocument>& hosts) {
@@ -76,11 +94,17 @@ void write_imports(std::ostream& out, const std::vector<std::string>& sources,
   bool is_first = true;
   for (const std::string& source : sources) {
     const wire::ImportStatus* const import = hosts.find_import(source);
-    if (import == nullptr || !import->is_open) continue;
-    const wire::HostStatus* const host = hosts.find_host(import->host);
+    if (import == nullptr || !(import->is_open || import->is_gone())) continue;
     out << (std::exchange(is_first, false) ? "\nFrom other hosts:\n" : "") << "  "
-        << shm::printable(source) << "  from host " << shm::printable(import->host)
-        << ", round trip " << round_trip_text(host == nullptr ? std::nullopt : host->round_trip);
+        << shm::printable(source);
+    if (import->is_gone()) {
+      out << "  came from host " << shm::printable(import->host)
+          << ", which does not offer it now, or is not heard (arbiter hosts)\n";
+      continue;
+    }
+    const wire::HostStatus* const host = hosts.find_host(import->host);
+    out << "  from host " << shm::printable(import->host) << ", round trip "
+        << round_trip_text(host == nullptr ? std::nullopt : host->round_trip);
     const auto age = ages.find(source);
     if (age != ages.end()) out << ", " << age->second;
     out << counts_text(*import) << '\n';

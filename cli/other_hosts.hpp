@@ -10,12 +10,17 @@
 #include "watch/instance.hpp"
 #include "watch/picture.hpp"
 #include "wire/hosts.hpp"
+#include "wire/status.hpp"
 
 namespace arbiter::cli {
 
 // For verbs that are about this host: nothing where no link runs here, or it does not answer, which
 // standard error says. Waits for a second at most.
 [[nodiscard]] std::optional<wire::HostsDocument> hosts_if_linked(const std::string& instance);
+
+// The status document of another host. What it says is made printable: it goes to a terminal.
+// Throws wire::DocumentError.
+[[nodiscard]] wire::Status read_status_of_host(const std::string& text);
 
 // The input ports that are open on several hosts, a line for each.
 void write_port_errors(std::ostream& out, const std::optional<wire::HostsDocument>& hosts);

@@ -70,6 +70,7 @@ void write_wanted_sources(const wire::HostsDocument& document) {
       std::cout << "  from host " << shown(each.host);
     } else {
       std::cout << (each.is_open_here ? "  open here" : "  not imported");
+      if (each.is_gone()) std::cout << ": it came from host " << shown(each.host);
     }
     std::cout << counts_text(each) << '\n';
   }

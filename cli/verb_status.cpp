@@ -53,7 +53,7 @@ const wire::HostStatus* find_host(const wire::HostsDocument& hosts,
 void write_imports_here(const std::string& instance, const wire::HostsDocument& hosts) {
   std::vector<std::string> sources;
   for (const wire::ImportStatus& each : hosts.imports) {
-    if (each.is_open) sources.push_back(each.source);
+    if (each.is_open || each.is_gone()) sources.push_back(each.source);
   }
   if (sources.empty()) return;
   Ages ages;
@@ -70,7 +70,7 @@ void write_host(const StatusOptions& options, const wire::HostsDocument& hosts,
   const wire::HostStatus* const host = find_host(hosts, answer);
   const bool is_here = host != nullptr && host->is_this;
   try {
-    const wire::Status status = wire::read_status(answer.text);
+    const wire::Status status = read_status_of_host(answer.text);
     const std::string where =
         is_here ? "this one"
                 : "round trip " + round_trip_text(host ? host->round_trip : std::nullopt);

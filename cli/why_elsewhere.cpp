@@ -57,7 +57,7 @@ Elsewhere ask(const std::string& instance, const std::string& host) {
   Elsewhere there;
   there.hosts = wire::read_hosts(link.ask({"", "hosts", {}}));
   for (int tries = 0; tries < kTries; ++tries) {
-    there.status = wire::read_status(text_from(link, host, "status"));
+    there.status = read_status_of_host(text_from(link, host, "status"));
     there.model = watch::ModelInForce(wire::read_model_document(text_from(link, host, "model")));
     if (there.status.model.generation == there.model.generation()) return there;
   }
@@ -248,7 +248,7 @@ class FollowerElsewhere {
   // By a call of its own: a link that joins its network again hangs up.
   [[nodiscard]] wire::Status status() const {
     wire::LinkCall link(options_.instance);
-    return wire::read_status(text_from(link, host_, "status"));
+    return read_status_of_host(text_from(link, host_, "status"));
   }
 
   void say(const std::string& text) {

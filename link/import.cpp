@@ -75,6 +75,7 @@ void Import::look(bool is_open_here, SourceUse use, const std::set<Participant>&
   if (choice == ImportChoice::kSpokenHere) {
     const std::lock_guard lock(mutex_);
     stream_.pause();
+    is_anothers_ = true;
   }
   obey(choice == ImportChoice::kImport ? speaker : nullptr);
 }
@@ -126,6 +127,7 @@ void Import::obey(const Offerer* speaker) {
   writer_ = writer;
   if (exporter == 0) return;
   stream_.obey(exporter);
+  is_anothers_ = is_anothers_ || (!last_host_.empty() && speaker->host != last_host_);
   demand_.begin_exporter(shm::monotonic_now());
   const auto last = std::find_if(unheard_.begin(), unheard_.end(),
                                  [&](const Unheard& each) { return each.writer == writer; });
@@ -134,7 +136,7 @@ void Import::obey(const Offerer* speaker) {
   const bool is_new = last->exporter == exporter && stream_.note(exporter, last->last);
   if (is_new && last->last.has_sample) ++counts_.too_soon;
   // The same exporter, which is heard by another writer: the port has stayed open.
-  if (is_new && port_ && stream_.is_deactivated()) port_->deactivate();
+  if (is_new && port_ && stream_.is_deactivated() && !is_anothers_) port_->deactivate();
   unheard_.erase(last);
 }
 
@@ -222,7 +224,7 @@ void Import::open_port(const OfferCard& card) {
     awaits_sample_ = false;
     revision_ = card.type_revision;
     // What came before the port was there.
-    if (stream_.is_deactivated()) port_->deactivate();
+    if (stream_.is_deactivated() && !is_anothers_) port_->deactivate();
   } catch (const Error& error) {
     say_once(source_ + " of host " + card.host + " is not imported: " + error.what());
     return;
@@ -230,6 +232,7 @@ void Import::open_port(const OfferCard& card) {
   described_.clear();
   describe_again_ = 0;
   said_.clear();
+  last_host_ = card.host;
   say_sparingly(Level::kInfo, source_ + " comes from host " + card.host);
 }
 
@@ -273,7 +276,8 @@ std::string Import::text() const {
 wire::ImportStatus Import::status() const {
   wire::ImportStatus status;
   status.source = source_;
-  if (const Offerer* const speaker = speaker_.current()) status.host = speaker->host;
+  const Offerer* const speaker = speaker_.current();
+  status.host = speaker == nullptr ? last_host_ : speaker->host;
   status.hosts = speaker_.hosts();
   const std::lock_guard lock(mutex_);
   status.is_open = port_ != nullptr;

@@ -127,6 +127,7 @@ class Import : private gateway::dds::SampleTaker {
     shm::Nanoseconds since = 0;
   };
   std::map<std::uint64_t, Offered> offers_;
+  std::string last_host_;  // that it was taken from; empty: none yet
   std::string said_;
   std::string described_;
   std::string hosts_said_;
@@ -157,6 +158,9 @@ class Import : private gateway::dds::SampleTaker {
   ImportDemand demand_;
   Demand said_demand_;
   dds_entity_t demanding_ = 0;  // the reader that says so; 0: there is none yet
+  // The last arrival may be of a component here, or of another host: that the one that is obeyed
+  // was deactivated before does not end it.
+  bool is_anothers_ = false;
   bool awaits_sample_ = false;  // the port's last arrival was a signal for one that was withheld
 
   std::optional<EventReader> reader_;

@@ -75,6 +75,8 @@ void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
   }
   if (header_.is_deactivated) {
     awaits_sample_ = false;
+    if (header_.kind == EventKind::kState && is_anothers_) return;
+    is_anothers_ = false;
     port_->deactivate();  // never too late
     return;
   }
@@ -97,6 +99,7 @@ void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
     ++counts_.late;
     return;
   }
+  is_anothers_ = false;
   if (header_.kind == EventKind::kUnsent) ++counts_.without_sample;
   if (has_sample(header_.kind)) awaits_sample_ = is_alone;
   demand_.note_arrival(port_->wants_samples(), now);

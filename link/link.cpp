@@ -288,7 +288,7 @@ void Link::tell_desk(const std::string& obstacle) {
     wire::ImportStatus status = one->status();
     status.is_open_here = view_.open_here().contains(source);
     if (status.is_open) ++card.imports;
-    if (!status.hosts.empty() || status.is_open) own.imports.push_back(std::move(status));
+    if (!status.hosts.empty() || !status.host.empty()) own.imports.push_back(std::move(status));
   }
   desk_->look(std::move(own));
 }

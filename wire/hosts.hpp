@@ -43,7 +43,7 @@ struct HostStatus {
 // A source that the model here connects or reads, and that another host has, or had.
 struct ImportStatus {
   std::string source;
-  std::string host;                // that it is taken from, or would be
+  std::string host;                // that it is taken from, would be, or was last
   bool is_open = false;            // here, by the link
   bool is_open_here = false;       // by a component of this host, which has precedence
   std::vector<std::string> hosts;  // that offer it
@@ -51,6 +51,11 @@ struct ImportStatus {
   std::uint64_t without_sample = 0;  // arrivals whose samples could not be sent
   std::uint64_t late = 0;
   std::uint64_t withheld = 0;  // samples that stayed at home
+
+  // It came from `host`, and nobody offers it now.
+  [[nodiscard]] bool is_gone() const {
+    return !is_open && !is_open_here && hosts.empty() && !host.empty();
+  }
 };
 
 enum class DisagreementKind : std::uint8_t { kInputPort, kSource, kHostName, kModel };

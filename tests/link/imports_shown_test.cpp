@@ -36,6 +36,23 @@ TEST_F(ShownImports, TheAgeOfWhatOneImportsIsShownBesideTheRoundTrip) {
   }
 }
 
+TEST_F(ShownImports, FromWhereASourceCameIsShownOnceItIsGone) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Body body(base);
+  {
+    Planner planner(head);
+    body.drive(planner);
+  }
+  const std::string came = "/Planner/speed:o  came from host head, which does not offer it now";
+  for (const std::vector<std::string>& verb :
+       {std::vector<std::string>{"why", kMotor}, {"status", "--all"}}) {
+    await([&] { return run_arbiter("base", verb).out.find(came) != std::string::npos; });
+  }
+  EXPECT_THAT(run_arbiter("base", {"hosts"}).out,
+              HasSubstr("/Planner/speed:o  not imported: it came from host head\n"));
+}
+
 // What `arbiter echo` prints until it has printed that.
 std::string await_echo(Planner& planner, const std::string& what, const std::string& instance,
                        std::vector<std::string> arguments) {

@@ -201,6 +201,33 @@ TEST_F(Hosts, AComponentHasItsNameThoughItIsImportedAndTheImportComesBackAfterIt
   EXPECT_THAT(base.log(), Not(HasSubstr("is not imported: ")));
 }
 
+// The other one says what the source there is like, when it is imported again.
+TEST_F(Hosts, AnOldDeactivationDoesNotEndWhatAComponentHereHasBegun) {
+  constexpr std::int64_t kNear = 1'000'000;
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Planner far(head);
+  Body body(base);
+  body.drive(far);
+  far.port().deactivate();
+  body.fall_back();
+  Node watcher = base.node("watcher");
+  Tap<void> tap = watcher.tap(kPlanner);
+  body.drive(*planner_where_it_is_imported(base, kNear));
+  await([&] { return base.described(kPlanner).find("host head") != std::string::npos; });
+  await([&] {  // what is sent before has come by then
+    far.publish();
+    const auto sample = body.motor().take();
+    return sample && (*sample)->number < kNear;
+  });
+  bool was_heard = false;
+  while (const auto event = tap.take()) {
+    EXPECT_NE(event->kind(), TapEventKind::deactivation);
+    was_heard = was_heard || event->kind() == TapEventKind::sample;
+  }
+  EXPECT_TRUE(was_heard);
+}
+
 // Its offer is whole before it has sent anything.
 TEST_F(Hosts, AnUntypedSourceThatIsSilentIsImported) {
   Host head("head", runtime_, kNoRules, network());
