@@ -1,6 +1,7 @@
 #include "link/core/disagreements.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <set>
 #include <string_view>
@@ -39,22 +40,21 @@ std::vector<PresentHost> without_earlier_lives(const std::vector<PresentHost>& h
 
 using HostsOfName = std::map<std::string_view, std::vector<std::string>>;
 
-void add_shared(DisagreementKind kind, const HostsOfName& by_name,
-                std::set<Disagreement>& disagreements) {
+using Subject = std::pair<DisagreementKind, std::string>;
+using Found = std::map<Subject, std::vector<std::string>>;  // hosts in byte order
+
+void add_shared(DisagreementKind kind, const HostsOfName& by_name, Found& found) {
   for (const auto& [name, hosts] : by_name) {
-    if (hosts.size() < 2) continue;
-    Disagreement one{kind, std::string(name), hosts};
-    std::sort(one.hosts.begin(), one.hosts.end());
-    disagreements.insert(std::move(one));
+    if (hosts.size() >= 2) found[{kind, std::string(name)}] = hosts;
   }
 }
 
-std::set<Disagreement> compare(const std::vector<PresentHost>& hosts) {
+Found compare(const std::vector<PresentHost>& hosts) {
   HostsOfName inputs;
   HostsOfName outputs;
   HostsOfName names;
   std::set<std::uint64_t> digests;
-  Disagreement models{DisagreementKind::kModel, {}, {}};
+  std::vector<std::string> with_models;
   for (const PresentHost& host : hosts) {
     const HostCard& card = *host.card;
     names[card.host].push_back(card.host);
@@ -62,15 +62,23 @@ std::set<Disagreement> compare(const std::vector<PresentHost>& hosts) {
     for (const std::string& port : card.outputs) outputs[port].push_back(card.host);
     if (card.digest == 0) continue;
     digests.insert(card.digest);
-    models.hosts.push_back(card.host);
+    with_models.push_back(card.host);
   }
-  std::set<Disagreement> disagreements;
-  add_shared(DisagreementKind::kInputPort, inputs, disagreements);
-  add_shared(DisagreementKind::kSource, outputs, disagreements);
-  add_shared(DisagreementKind::kHostName, names, disagreements);
-  std::sort(models.hosts.begin(), models.hosts.end());
-  if (digests.size() > 1) disagreements.insert(std::move(models));
-  return disagreements;
+  Found found;
+  add_shared(DisagreementKind::kInputPort, inputs, found);
+  add_shared(DisagreementKind::kSource, outputs, found);
+  add_shared(DisagreementKind::kHostName, names, found);
+  if (digests.size() > 1) found[{DisagreementKind::kModel, {}}] = std::move(with_models);
+  for (auto& each : found) std::sort(each.second.begin(), each.second.end());
+  return found;
+}
+
+bool have_two_in_common(const std::vector<std::string>& some,
+                        const std::vector<std::string>& others) {
+  std::vector<std::string> both;
+  std::set_intersection(some.begin(), some.end(), others.begin(), others.end(),
+                        std::back_inserter(both));
+  return both.size() >= 2;
 }
 
 }  // namespace
@@ -93,24 +101,36 @@ std::string Disagreement::text() const {
 
 std::vector<Disagreement> Disagreements::look(const std::vector<PresentHost>& hosts,
                                               shm::Nanoseconds now) {
-  const std::set<Disagreement> there = compare(without_earlier_lives(hosts, now));
+  Found there = compare(without_earlier_lives(hosts, now));
   std::erase_if(found_, [&](const auto& each) { return !there.contains(each.first); });
-  for (const Disagreement& each : there) found_.try_emplace(each, Standing{now, false});
+  for (auto& [subject, its] : there) update(subject, std::move(its), now);
   std::vector<Disagreement> news;
-  std::size_t reported = standing().size();
-  for (auto& [disagreement, standing] : found_) {
-    if (standing.is_reported || now - standing.since < kSettles || reported >= kMost) continue;
-    standing.is_reported = true;
-    ++reported;
-    news.push_back(disagreement);
+  std::size_t standing = 0;
+  for (const auto& each : found_) standing += each.second.stands ? 1 : 0;
+  for (auto& [subject, each] : found_) {
+    if (!each.stands && (now - each.since < kSettles || standing >= kMost)) continue;
+    standing += each.stands ? 0 : 1;
+    each.stands = true;
+    if (each.is_reported || now - each.of_these < kSettles) continue;
+    each.is_reported = true;
+    news.push_back({subject.first, subject.second, each.hosts});
   }
   return news;
 }
 
+void Disagreements::update(Subject subject, std::vector<std::string> hosts, shm::Nanoseconds now) {
+  Standing& known = found_[std::move(subject)];
+  if (known.hosts == hosts) return;
+  if (!have_two_in_common(known.hosts, hosts)) known = {{}, now, now, false, false};
+  known.hosts = std::move(hosts);
+  known.of_these = now;
+  known.is_reported = false;
+}
+
 std::vector<Disagreement> Disagreements::standing() const {
   std::vector<Disagreement> result;
-  for (const auto& [disagreement, standing] : found_) {
-    if (standing.is_reported) result.push_back(disagreement);
+  for (const auto& [subject, each] : found_) {
+    if (each.stands) result.push_back({subject.first, subject.second, each.hosts});
   }
   return result;
 }

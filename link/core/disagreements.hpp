@@ -10,7 +10,7 @@
 
 #include <map>
 #include <string>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "link/core/host_card.hpp"
@@ -28,10 +28,6 @@ struct Disagreement {
   [[nodiscard]] std::string text() const;
   // Else it is a warning.
   [[nodiscard]] bool is_error() const noexcept { return kind == DisagreementKind::kInputPort; }
-
-  friend bool operator<(const Disagreement& one, const Disagreement& other) {
-    return std::tie(one.kind, one.name, one.hosts) < std::tie(other.kind, other.name, other.hosts);
-  }
 };
 
 // A host whose link is there.
@@ -48,17 +44,25 @@ class Disagreements {
   // Reported at once; a host may say that it has thousands of ports.
   static constexpr std::size_t kMost = 64;
 
-  // Returns those that were not reported before, errors first.
+  // Returns those that were not reported before, of these hosts, errors first.
   std::vector<Disagreement> look(const std::vector<PresentHost>& hosts, shm::Nanoseconds now);
   // Those that stand now, errors first.
   [[nodiscard]] std::vector<Disagreement> standing() const;
 
  private:
+  // One that some host joins or leaves goes on for the others.
   struct Standing {
-    shm::Nanoseconds since = 0;
-    bool is_reported = false;
+    std::vector<std::string> hosts;
+    shm::Nanoseconds since = 0;     // two of them have disagreed
+    shm::Nanoseconds of_these = 0;  // it has been about exactly these hosts
+    bool stands = false;
+    bool is_reported = false;  // of these hosts
   };
-  std::map<Disagreement, Standing> found_;
+  using Subject = std::pair<DisagreementKind, std::string>;  // with its name
+
+  void update(Subject subject, std::vector<std::string> hosts, shm::Nanoseconds now);
+
+  std::map<Subject, Standing> found_;
 };
 
 }  // namespace arbiter::link

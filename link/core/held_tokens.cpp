@@ -7,6 +7,7 @@ namespace arbiter::link {
 bool HeldTokens::note(Incarnation importer, std::uint64_t number, std::uint64_t writer,
                       shm::Nanoseconds now) {
   const std::lock_guard lock(mutex_);
+  forget_silent(now);
   const auto found = held_.find(importer);
   if (found == held_.end() || found->second.writer != writer) {
     const bool is_anothers = found != held_.end() && now - found->second.heard < kOtherWriter;
@@ -24,6 +25,13 @@ bool HeldTokens::note(Incarnation importer, std::uint64_t number, std::uint64_t 
 bool HeldTokens::has_other_name(std::uint64_t writer) const {
   return std::any_of(held_.begin(), held_.end(),
                      [&](const auto& each) { return each.second.writer == writer; });
+}
+
+// Else each event would name the lives of all links that ever imported.
+void HeldTokens::forget_silent(shm::Nanoseconds now) {
+  if (now < sweep_again_) return;
+  sweep_again_ = now + kSilence;
+  std::erase_if(held_, [&](const auto& each) { return now - each.second.heard > kForgotten; });
 }
 
 bool HeldTokens::make_place(shm::Nanoseconds now) {

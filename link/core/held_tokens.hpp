@@ -44,6 +44,10 @@ class HeldTokens {
   // An importer that is silent for this long may lose its place to another.
   static constexpr shm::Nanoseconds kSilence = 5'000'000'000;
 
+  // An importer that is silent for this long, longer than a cut that somebody waits for, is
+  // forgotten.
+  static constexpr shm::Nanoseconds kForgotten = 600'000'000'000;
+
   // An importer that is silent for this long may go on by another writer: the transport takes one
   // that it has lost for another when it finds it again. Until then others are not heard in its
   // name. Tokens come more often.
@@ -66,10 +70,12 @@ class HeldTokens {
   };
 
   [[nodiscard]] bool has_other_name(std::uint64_t writer) const;
+  void forget_silent(shm::Nanoseconds now);
   bool make_place(shm::Nanoseconds now);
 
   mutable std::mutex mutex_;
   std::map<Incarnation, Held> held_;
+  shm::Nanoseconds sweep_again_ = 0;
 };
 
 }  // namespace arbiter::link

@@ -19,8 +19,8 @@ void KeptSample::drop() noexcept { is_there_ = false; }
 
 void KeptSample::end() noexcept {
   is_there_ = false;
-  tokens_ = {};
-  sample_ = {};
+  std::vector<NamedToken>().swap(tokens_);
+  std::vector<std::byte>().swap(sample_);  // an assignment of nothing would keep the memory
 }
 
 }  // namespace arbiter::link

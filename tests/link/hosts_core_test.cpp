@@ -319,6 +319,30 @@ TEST(HostDisagreement, IsNewsAgainWhenItHasBeenSettled) {
   EXPECT_EQ(disagreements.look(both, 16 * kS).size(), 1U);
 }
 
+TEST(HostDisagreement, GoesOnForTheOthersWhenOneJoinsOrLeaves) {
+  const HostCard a = host_card("a", 1, {"/p"});
+  const HostCard b = host_card("b", 2, {"/p"});
+  const HostCard c = host_card("c", 3, {"/p"});
+  Disagreements disagreements;
+  const std::vector<PresentHost> two{{&a, 0}, {&b, 0}};
+  const std::vector<PresentHost> three{{&a, 0}, {&b, 0}, {&c, 0}};
+  disagreements.look(two, 10 * kS);
+  EXPECT_EQ(disagreements.look(two, 12 * kS).size(), 1U);
+  for (int i = 0; i < 5; ++i) {  // its component is started again and again
+    EXPECT_THAT(disagreements.look(three, (13 + 2 * i) * kS), IsEmpty());
+    EXPECT_EQ(disagreements.standing().size(), 1U);
+    EXPECT_EQ(disagreements.standing().front().hosts.size(), 3U);
+    EXPECT_THAT(disagreements.look(two, (14 + 2 * i) * kS), IsEmpty());
+    EXPECT_EQ(disagreements.standing().size(), 1U);
+  }
+  disagreements.look(three, 30 * kS);
+  EXPECT_EQ(disagreements.look(three, 32 * kS).size(), 1U) << "of these it is news";
+  // The others have nothing to do with it.
+  const HostCard d = host_card("d", 4, {"/p"});
+  EXPECT_THAT(disagreements.look({{&c, 0}, {&d, 0}}, 33 * kS), IsEmpty());
+  EXPECT_THAT(disagreements.standing(), IsEmpty());
+}
+
 TEST(HostDisagreement, IsBoundedInNumber) {
   std::vector<std::string> ports;
   for (int i = 0; i < 1000; ++i) ports.push_back("/" + std::to_string(10'000 + i));

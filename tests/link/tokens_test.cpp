@@ -116,6 +116,20 @@ TEST(HeldTokens, ASampleThatWaitedNamesNoTokenThatCameAfterIt) {
   EXPECT_TRUE(named.empty());
 }
 
+// Each restart of a link is another importer.
+TEST(HeldTokens, AnImporterThatIsSilentForLongIsNamedNoMore) {
+  HeldTokens held;
+  for (Incarnation life = 1; life <= 5; ++life) ASSERT_TRUE(held.note(life, 1, life, 0));
+  ASSERT_TRUE(held.note(5, 2, 5, HeldTokens::kForgotten));
+  std::vector<NamedToken> named;
+  held.name(HeldTokens::kForgotten, named);
+  EXPECT_EQ(named.size(), 5u);
+  const shm::Nanoseconds later = HeldTokens::kForgotten + HeldTokens::kSilence;
+  ASSERT_TRUE(held.note(5, 3, 5, later));
+  held.name(later, named);
+  EXPECT_EQ(named, (std::vector<NamedToken>{{5, 3}}));
+}
+
 // With a number that the importer has not reached, a stranger would have samples named that are
 // taken for young later, or all of them for late.
 TEST(HeldTokens, NobodyElseSpeaksInAnImportersName) {
