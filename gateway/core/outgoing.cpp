@@ -86,9 +86,15 @@ void Outgoing::send_idle(shm::Nanoseconds now) {
 
 void Outgoing::send_idle_sample() noexcept {
   if (entry_.idle.kind == Idle::Kind::kNothing) return;
-  if (sender_.send({entry_.idle.sample.data(), entry_.idle.sample.size()}) ==
-      Sender::Result::kSent) {
-    account_.idle.add();
+  switch (sender_.send({entry_.idle.sample.data(), entry_.idle.sample.size()})) {
+    case Sender::Result::kSent:
+      account_.idle.add();
+      break;
+    case Sender::Result::kRefused:
+      account_.refused.add();
+      break;
+    default:
+      break;  // nobody is there yet, or for the moment no memory is
   }
 }
 

@@ -9,6 +9,7 @@
 namespace arbiter::gateway::dds {
 namespace {
 
+constexpr std::size_t kBatch = 32;
 constexpr std::size_t kMaxName = 256;  // of what strangers say
 // Of an owner's name, so that a status has room for what the owner does.
 constexpr std::size_t kMaxOwner = 80;
@@ -99,12 +100,30 @@ void Peers::note_own(dds_entity_t participant) {
 }
 
 void Peers::update() {
+  forget_gone_participants();
   update(readers_, End::kReader);
   update(writers_, End::kWriter);
 }
 
+// Cyclone keeps each one until somebody takes it. Those that are there stay: owner_of() reads them.
+void Peers::forget_gone_participants() {
+  constexpr std::uint32_t kGone =
+      DDS_NOT_ALIVE_DISPOSED_INSTANCE_STATE | DDS_NOT_ALIVE_NO_WRITERS_INSTANCE_STATE;
+  for (;;) {
+    // Into memory of ours: to give such a loan back ends in "free(): invalid pointer" (0.10.2).
+    std::array<dds_builtintopic_participant_t, kBatch> gone{};
+    std::array<void*, kBatch> samples{};
+    for (std::size_t i = 0; i < kBatch; ++i) samples[i] = &gone[i];
+    std::array<dds_sample_info_t, kBatch> infos{};
+    const dds_return_t taken =
+        dds_take_mask(participants_.get(), samples.data(), infos.data(), kBatch, kBatch,
+                      kGone | DDS_ANY_SAMPLE_STATE | DDS_ANY_VIEW_STATE);
+    for (const auto& each : gone) dds_delete_qos(each.qos);  // null: it was told nothing of it
+    if (taken <= 0) return;
+  }
+}
+
 void Peers::update(const Entity& reader, End end) {
-  constexpr std::size_t kBatch = 32;
   for (;;) {
     std::array<void*, kBatch> samples{};
     std::array<dds_sample_info_t, kBatch> infos{};

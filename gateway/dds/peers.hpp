@@ -67,6 +67,7 @@ class Peers {
   };
 
   void update(const Entity& reader, End end);
+  void forget_gone_participants();
   void add(const dds_builtintopic_endpoint_t& endpoint, End end, dds_instance_handle_t handle);
   [[nodiscard]] std::string owner_of(const dds_builtintopic_endpoint_t& endpoint) const;
 

@@ -13,9 +13,12 @@
 namespace arbiter::gateway {
 namespace {
 
-constexpr std::size_t kEncapsulation = 4;     // bytes of DDS's header
-constexpr unsigned kLastPlainCdr = 1;         // big-endian and little-endian
-constexpr unsigned kLastEncapsulation = 0xb;  // of those that DDS-XTypes knows
+constexpr std::size_t kEncapsulation = 4;  // bytes of DDS's header
+// Encapsulations that DDS-XTypes knows.
+constexpr unsigned kLastPlainCdr = 1;  // big-endian and little-endian
+constexpr unsigned kLastXcdr1 = 3;
+constexpr unsigned kFirstXcdr2 = 6;
+constexpr unsigned kLastXcdr2 = 0xb;
 
 // An attribute that another one needs, or excludes, means a mistake; to pass it over would hide it.
 class EntryReader {
@@ -316,11 +319,20 @@ class EntryReader {
       if (size_ == 0 || bytes.size() == header() + size_) return {};
       return counted(size_) + ", or correct the size";
     }
-    if (bytes[0] != 0 || static_cast<unsigned char>(bytes[1]) > kLastEncapsulation) {
+    const auto encapsulation = static_cast<unsigned char>(bytes[1]);
+    const bool is_xcdr1 = encapsulation <= kLastXcdr1;
+    const bool is_xcdr2 = encapsulation >= kFirstXcdr2 && encapsulation <= kLastXcdr2;
+    if (bytes[0] != 0 || !(is_xcdr1 || is_xcdr2)) {
       return "does not begin with the encapsulation header of DDS, such as 00 01 00 00 for "
              "little-endian CDR; write it before the sample";
     }
-    const auto encapsulation = static_cast<unsigned char>(bytes[1]);
+    // The writer sends nothing else.
+    if (is_xcdr2 != (entry_.dds->qos.representation == Representation::kXcdr2)) {
+      return is_xcdr2 ? "is XCDR2, by its encapsulation header, and the entry sends XCDR1; write "
+                        "another file, or representation=\"xcdr2\""
+                      : "is XCDR1, by its encapsulation header, and the entry sends XCDR2; write "
+                        "another file, or leave out the representation";
+    }
     if (encapsulation > kLastPlainCdr) return {};  // other encodings add bytes of their own
     const auto known = fixed_size_of(entry_.type->name);
     const std::size_t own = bytes.size() - header();

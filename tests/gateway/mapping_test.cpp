@@ -240,6 +240,27 @@ TEST(Mapping, AnIdleSampleComesFromAFileBesideTheMapping) {
   EXPECT_THAT(with("stop.bin").message(), HasSubstr("write none, zero, or file:"));
 }
 
+// Else nothing would stop the robot, and nobody would know before.
+TEST(Mapping, AnIdleSampleOfAFileIsAsTheEntrySendsIt) {
+  const test::TemporaryDirectory directory;
+  directory.write("one.bin", std::string("\0\1\0\0stop", 8));
+  directory.write("two.bin", std::string("\0\7\0\0stop", 8));
+  directory.write("xml.bin", std::string("\0\4\0\0stop", 8));
+  const std::string path = directory.path();
+  const auto with = [&](const std::string& file, const std::string& more) {
+    return read_text(
+        "<gateway kind='dds'><out port='/a:i' topic='/a' type='my_msgs/msg/Drive' "
+        "idle='file:" +
+            file + "' " + more + "/></gateway>",
+        &path);
+  };
+  EXPECT_THAT(with("one.bin", "").findings(), IsEmpty());
+  EXPECT_THAT(with("two.bin", "representation='xcdr2'").findings(), IsEmpty());
+  EXPECT_THAT(with("two.bin", "").message(), HasSubstr("is XCDR2"));
+  EXPECT_THAT(with("one.bin", "representation='xcdr2'").message(), HasSubstr("is XCDR1"));
+  EXPECT_THAT(with("xml.bin", "").message(), HasSubstr("encapsulation header"));
+}
+
 // Before the robot moves, and not when the gateway starts.
 TEST(Mapping, AConfigurationThatCannotBeReadIsReported) {
   const test::TemporaryDirectory directory;
@@ -264,11 +285,11 @@ TEST(Mapping, AnIdleSampleOfAFileHasTheSizeOfItsType) {
   directory.write("padded.bin", header + "0000");
   directory.write("long.bin", header + "00000");
   directory.write("plain.bin", "00000000");
-  const auto dds = [&](const std::string& file) {
+  const auto dds = [&](const std::string& file, const std::string& more = "") {
     return read_text(
         "<gateway kind='dds'><out port='/a:i' topic='/a' type='std_msgs/msg/Bool' "
         "idle='file:" +
-            file + "'/></gateway>",
+            file + "' " + more + "/></gateway>",
         &path);
   };
   EXPECT_THAT(dds("bool.bin").findings(), IsEmpty());
@@ -279,7 +300,7 @@ TEST(Mapping, AnIdleSampleOfAFileHasTheSizeOfItsType) {
   directory.write("delimited.bin", std::string("\0\x9\0\0\1\0\0\0"
                                                "0",
                                                9));  // XCDR2, appendable
-  EXPECT_THAT(dds("delimited.bin").findings(), IsEmpty());
+  EXPECT_THAT(dds("delimited.bin", "representation='xcdr2'").findings(), IsEmpty());
   const auto iceoryx = [&](const std::string& size) {
     return read_text(
         "<gateway kind='iceoryx'><out port='/a:i' service='a' instance='b' event='c' "
