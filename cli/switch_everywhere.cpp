@@ -81,9 +81,6 @@ void commit(const wire::SwitchRequest& request, const AskHosts& ask, SwitchEvery
   } catch (const wire::NotAskedError& error) {
     result.why_none = error.what();
     return note_that_none_switches(result);    // the promises end by themselves
-  } catch (const wire::RefusedError& error) {  // by the link of this host, which asks nobody then
-    result.why_none = error.what();
-    return note_that_none_switches(result);
   } catch (const std::runtime_error& error) {  // or its answers cannot be read
     why_unknown = error.what();
   }

@@ -75,7 +75,6 @@ void Import::look(bool is_open_here, SourceUse use, const std::set<Participant>&
   if (choice == ImportChoice::kSpokenHere) {
     const std::lock_guard lock(mutex_);
     stream_.pause();
-    is_anothers_ = true;
   }
   obey(choice == ImportChoice::kImport ? speaker : nullptr);
 }
@@ -127,7 +126,6 @@ void Import::obey(const Offerer* speaker) {
   writer_ = writer;
   if (exporter == 0) return;
   stream_.obey(exporter);
-  is_anothers_ = is_anothers_ || (!last_host_.empty() && speaker->host != last_host_);
   demand_.begin_exporter(shm::monotonic_now());
   const auto last = std::find_if(unheard_.begin(), unheard_.end(),
                                  [&](const Unheard& each) { return each.writer == writer; });
@@ -136,7 +134,7 @@ void Import::obey(const Offerer* speaker) {
   const bool is_new = last->exporter == exporter && stream_.note(exporter, last->last);
   if (is_new && last->last.has_sample) ++counts_.too_soon;
   // The same exporter, which is heard by another writer: the port has stayed open.
-  if (is_new && port_ && stream_.is_deactivated() && !is_anothers_) port_->deactivate();
+  if (is_new && port_ && stream_.take_end()) port_->deactivate();
   unheard_.erase(last);
 }
 
@@ -224,7 +222,7 @@ void Import::open_port(const OfferCard& card) {
     awaits_sample_ = false;
     revision_ = card.type_revision;
     // What came before the port was there.
-    if (stream_.is_deactivated() && !is_anothers_) port_->deactivate();
+    if (stream_.take_end()) port_->deactivate();
   } catch (const Error& error) {
     say_once(source_ + " of host " + card.host + " is not imported: " + error.what());
     return;

@@ -158,9 +158,6 @@ class Import : private gateway::dds::SampleTaker {
   ImportDemand demand_;
   Demand said_demand_;
   dds_entity_t demanding_ = 0;  // the reader that says so; 0: there is none yet
-  // The last arrival may be of a component here, or of another host: that the one that is obeyed
-  // was deactivated before does not end it.
-  bool is_anothers_ = false;
   bool awaits_sample_ = false;  // the port's last arrival was a signal for one that was withheld
 
   std::optional<EventReader> reader_;

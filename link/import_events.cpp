@@ -75,9 +75,9 @@ void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
   }
   if (header_.is_deactivated) {
     awaits_sample_ = false;
-    if (header_.kind == EventKind::kState && is_anothers_) return;
-    is_anothers_ = false;
-    port_->deactivate();  // never too late
+    // A state that says it once more would end what another one has begun since.
+    const bool is_due = stream_.take_end();
+    if (is_due || header_.kind == EventKind::kDeactivation) port_->deactivate();  // never too late
     return;
   }
   if (header_.kind == EventKind::kState) return;
@@ -99,7 +99,6 @@ void Import::arrive(const gateway::dds::Payload& payload, std::size_t before) {
     ++counts_.late;
     return;
   }
-  is_anothers_ = false;
   if (header_.kind == EventKind::kUnsent) ++counts_.without_sample;
   if (has_sample(header_.kind)) awaits_sample_ = is_alone;
   demand_.note_arrival(port_->wants_samples(), now);

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 #include <string_view>
+#include <utility>
 
 namespace arbiter::link {
 namespace {
@@ -109,9 +110,10 @@ std::vector<Disagreement> Disagreements::look(const std::vector<PresentHost>& ho
   for (const auto& each : found_) standing += each.second.stands ? 1 : 0;
   for (auto& [subject, each] : found_) {
     if (!each.stands && (now - each.since < kSettles || standing >= kMost)) continue;
-    standing += each.stands ? 0 : 1;
-    each.stands = true;
-    if (each.is_reported || now - each.of_these < kSettles) continue;
+    const bool is_new = !std::exchange(each.stands, true);
+    standing += is_new ? 1 : 0;
+    // Other hosts are news once they are the same for a while.
+    if (!is_new && (each.is_reported || now - each.of_these < kSettles)) continue;
     each.is_reported = true;
     news.push_back({subject.first, subject.second, each.hosts});
   }

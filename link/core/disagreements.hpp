@@ -53,10 +53,10 @@ class Disagreements {
   // One that some host joins or leaves goes on for the others.
   struct Standing {
     std::vector<std::string> hosts;
-    shm::Nanoseconds since = 0;     // two of them have disagreed
+    shm::Nanoseconds since = 0;     // it has been about two of them, or more
     shm::Nanoseconds of_these = 0;  // it has been about exactly these hosts
-    bool stands = false;
-    bool is_reported = false;  // of these hosts
+    bool stands = false;            // and has been reported
+    bool is_reported = false;       // of these hosts
   };
   using Subject = std::pair<DisagreementKind, std::string>;  // with its name
 

@@ -21,6 +21,7 @@ bool Stream::note(Incarnation from, const StreamEvent& event) noexcept {
   has_begun_ = has_begun_ || !event.is_unasked;
   exporter.last = event.number;
   exporter.sequence = event.sequence;
+  if (event.is_deactivated != exporter.is_deactivated) exporter.is_end_due = event.is_deactivated;
   exporter.is_deactivated = event.is_deactivated;
   // A signal that follows leaves it what it was: the newest sample.
   if (event.has_sample || event.is_deactivated) exporter.is_awaited = event.is_withheld;
@@ -49,7 +50,8 @@ void Stream::move_to_front(Incarnation from) noexcept {
                             [&](const Exporter& each) { return each.incarnation == from; });
   if (found == exporters_.end()) {
     found = exporters_.end() - 1;
-    *found = {from, 0, 0, false, false};
+    *found = Exporter{};
+    found->incarnation = from;
   }
   std::rotate(exporters_.begin(), found, found + 1);
 }

@@ -12,6 +12,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include "link/core/held_tokens.hpp"
 
@@ -48,6 +49,10 @@ class Stream {
   // By the last event of the one that is obeyed: it ended the source's activity, and nothing has
   // come since.
   [[nodiscard]] bool is_deactivated() const noexcept { return exporters_.front().is_deactivated; }
+  // Whether such an end is to be applied here: not if it has been, and is only said once more.
+  [[nodiscard]] bool take_end() noexcept {
+    return std::exchange(exporters_.front().is_end_due, false);
+  }
 
  private:
   // The exporters that were obeyed last: one that comes back goes on where it was, and what it
@@ -58,6 +63,7 @@ class Stream {
     std::uint64_t last = 0;       // number
     std::uint64_t sequence = 0;   // likewise
     bool is_deactivated = false;  // likewise
+    bool is_end_due = false;      // it is, and take_end() has not said so
     bool is_awaited = false;      // the sample of the last arrival
   };
   void move_to_front(Incarnation from) noexcept;

@@ -137,6 +137,32 @@ TEST(Stream, TheLastEventSaysWhatTheSourceIsLike) {
   EXPECT_FALSE(stream.is_deactivated());
 }
 
+// Said again, it would end what others have begun since.
+TEST(Stream, AnEndIsToBeAppliedOnce) {
+  Stream stream;
+  EXPECT_FALSE(stream.take_end());
+  stream.note(1, event(1, true));
+  stream.note(1, event(2, true));
+  EXPECT_TRUE(stream.take_end());
+  EXPECT_FALSE(stream.take_end());
+  stream.note(1, event(3, true));
+  EXPECT_FALSE(stream.take_end()) << "it is the same one";
+  stream.note(1, event(4, false));
+  stream.note(1, event(5, true));
+  EXPECT_TRUE(stream.take_end()) << "it is another one";
+  stream.note(1, event(6, false));
+  stream.note(1, event(7, true));
+  stream.note(1, event(8, false));
+  EXPECT_FALSE(stream.take_end()) << "it is over";
+  stream.note(2, event(1, true));
+  EXPECT_TRUE(stream.take_end()) << "nothing is known of what was before";
+  stream.obey(1);
+  stream.note(1, event(9, true));
+  EXPECT_TRUE(stream.take_end());
+  stream.obey(2);
+  EXPECT_FALSE(stream.take_end());
+}
+
 TEST(Stream, ALinkThatWasStartedAgainBeginsAgain) {
   Stream stream;
   stream.note(1, event(100, false));

@@ -347,10 +347,16 @@ Recovery recovery_after(const HostEvidence& importer, const HostEvidence& export
     return event.time >= time && is_arrival(event);
   });
   if (arrival == arrivals.end()) return {};
-  const Nanoseconds made = arrival->command ? arrival->command->made : arrival->time;
+  // Of a signal: the latest with its number.
+  const auto& published = of(exporter, source);
+  const auto its = std::find_if(published.rbegin(), published.rend(), [&](const Happened& event) {
+    return is_arrival(event) && event.sequence == arrival->sequence && event.time <= arrival->time;
+  });
+  if (!arrival->command && its == published.rend()) return {true, arrival->time - time};
+  const Nanoseconds made = arrival->command ? arrival->command->made : its->time;
   Nanoseconds first = made;
   Nanoseconds last = made;
-  for (const Happened& event : of(exporter, source)) {
+  for (const Happened& event : published) {
     if (event.time < time || event.time >= made) continue;
     first = std::min(first, event.time);
     last = event.time;

@@ -353,6 +353,9 @@ TEST(Checker, DoesNotCountTheSilenceBeforeWhatArrivesFirst) {
   EXPECT_EQ(took(silent.arrives(3, 1503, 1500)), 43);
   // Nothing was published before.
   EXPECT_EQ(took(Recorded().published(1, 90).published(2, 1500).arrives(2, 1503, 1500)), 3);
+  // A signal is as old as the event of its number.
+  Recorded signal = Recorded().published(1, 110);
+  EXPECT_EQ(took(signal.signals(1, 3000)), 2890);
   const Recorded never = Recorded().arrives(1, 92, 90);
   EXPECT_FALSE(recovery_after(never.importer, never.exporter, kSource, 100 * kMs).is_there);
 }
