@@ -157,6 +157,7 @@ void find_out(const wire::SwitchRequest& request, const LookAtHosts& look, shm::
 std::string unknown_among_left_out(const wire::SwitchRequest& request,
                                    const std::vector<HostSwitch>& hosts) {
   std::vector<std::string_view> known;
+  known.reserve(hosts.size());
   for (const HostSwitch& each : hosts) known.push_back(each.host);
   for (const std::string& host : request.without) {
     if (std::find(known.begin(), known.end(), host) != known.end()) continue;
