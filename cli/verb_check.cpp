@@ -188,10 +188,12 @@ std::string check_hosts(const CheckOptions& options, const Model* model,
   const rules::TextFile file(options.hosts, rules::read_bytes(options.hosts));
   rules::Diagnostics of_file;
   const rules::Application application = rules::read_application(file, of_file);
+  // load_model() has reported what is wrong with an application: one that is given as that, or that
+  // has its model in it.
   const auto& models = options.files.models;
-  const bool is_model = of_file.count(rules::Severity::kError, "not-an-application") == 0 &&
-                        std::find(models.begin(), models.end(), options.hosts) != models.end();
-  const bool was_read = options.files.application == options.hosts || is_model;
+  const bool was_read = options.files.application == options.hosts ||
+                        (std::find(models.begin(), models.end(), options.hosts) != models.end() &&
+                         of_file.count(rules::Severity::kError, "not-an-application") == 0);
   const bool is_fine = !of_file.has_errors();
   if (!was_read) diagnostics.add(std::move(of_file));
   if (!is_fine || model == nullptr) return "";

@@ -86,16 +86,9 @@ void Outgoing::send_idle(shm::Nanoseconds now) {
 
 void Outgoing::send_idle_sample() noexcept {
   if (entry_.idle.kind == Idle::Kind::kNothing) return;
-  switch (sender_.send({entry_.idle.sample.data(), entry_.idle.sample.size()})) {
-    case Sender::Result::kSent:
-      account_.idle.add();
-      break;
-    case Sender::Result::kRefused:
-      account_.refused.add();
-      break;
-    default:
-      break;  // nobody is there yet, or for the moment no memory is
-  }
+  const auto result = sender_.send({entry_.idle.sample.data(), entry_.idle.sample.size()});
+  if (result == Sender::Result::kSent) account_.idle.add();
+  if (result == Sender::Result::kRefused) account_.refused.add();  // else it is sent again soon
 }
 
 void Outgoing::end() noexcept {

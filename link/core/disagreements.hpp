@@ -44,7 +44,8 @@ class Disagreements {
   // Reported at once; a host may say that it has thousands of ports.
   static constexpr std::size_t kMost = 64;
 
-  // Returns those that were not reported before, of these hosts, errors first.
+  // Returns those that were not reported before, and those that others have joined or left since,
+  // errors first.
   std::vector<Disagreement> look(const std::vector<PresentHost>& hosts, shm::Nanoseconds now);
   // Those that stand now, errors first.
   [[nodiscard]] std::vector<Disagreement> standing() const;
@@ -53,10 +54,10 @@ class Disagreements {
   // One that some host joins or leaves goes on for the others.
   struct Standing {
     std::vector<std::string> hosts;
-    shm::Nanoseconds since = 0;     // it has been about two of them, or more
-    shm::Nanoseconds of_these = 0;  // it has been about exactly these hosts
-    bool stands = false;            // and has been reported
-    bool is_reported = false;       // of these hosts
+    shm::Nanoseconds since = 0;     // it has gone on, whoever came and went
+    shm::Nanoseconds of_these = 0;  // since when it is about exactly these hosts
+    bool stands = false;            // it has settled, and was reported
+    bool is_reported = false;       // with these hosts
   };
   using Subject = std::pair<DisagreementKind, std::string>;  // with its name
 

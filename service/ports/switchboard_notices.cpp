@@ -1,5 +1,6 @@
 // What components should know of their ports, and the log too: connections that are refused, ports
 // that the model does not mention, ports that cannot see.
+#include <algorithm>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -66,24 +67,22 @@ std::string Switchboard::unmentioned_text(const shm::TableSnapshot& in_force,
                                           const std::string& name, bool is_output) const {
   const std::string what = is_output ? "none of these samples is delivered" : "no sample arrives";
   if (in_force.generation == 0) return "no model is in force, so " + what;
-  std::vector<std::string_view> mentioned;
-  bool is_other_end = false;
+  std::vector<std::string_view> sources;
+  std::vector<std::string_view> inputs;
   for (const auto& source : names_.sources()) {
-    if (!in_force.table.knows_source(source->id)) continue;
-    if (is_output) mentioned.push_back(source->name);
-    is_other_end = is_other_end || (!is_output && source->name == name);
+    if (in_force.table.knows_source(source->id)) sources.push_back(source->name);
   }
   for (const auto& input : names_.inputs()) {
-    if (!in_force.table.knows_port(input->id)) continue;
-    if (!is_output) mentioned.push_back(input->name);
-    is_other_end = is_other_end || (is_output && input->name == name);
+    if (in_force.table.knows_port(input->id)) inputs.push_back(input->name);
   }
-  if (is_other_end) {
+  const auto& others = is_output ? inputs : sources;
+  if (std::find(others.begin(), others.end(), name) != others.end()) {
     return "in the model in force " + name +
            (is_output ? " is an input port, and here it is open as an output port"
                       : " is an output port, and here it is open as an input port") +
            ", so " + what + "; `arbiter status` shows both";
   }
+  auto& mentioned = is_output ? sources : inputs;
   if (mentioned.size() > kMaxCompared) mentioned.clear();
   return "the model in force does not mention " + name + ", so " + what +
          rules::advise(name, mentioned, "`arbiter status` shows the ports that it mentions");
