@@ -49,8 +49,9 @@ TEST_F(ShownImports, FromWhereASourceCameIsShownOnceItIsGone) {
        {std::vector<std::string>{"why", kMotor}, {"status", "--all"}}) {
     await([&] { return run_arbiter("base", verb).out.find(came) != std::string::npos; });
   }
+  // On a busy machine counts follow, such as ", 43 late".
   EXPECT_THAT(run_arbiter("base", {"hosts"}).out,
-              HasSubstr("/Planner/speed:o  not imported: it came from host head\n"));
+              HasSubstr("/Planner/speed:o  not imported: it came from host head"));
 }
 
 // What `arbiter echo` prints until it has printed that.
