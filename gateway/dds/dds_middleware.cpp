@@ -115,8 +115,8 @@ void DdsMiddleware::tend() {
   const bool was_stopped = std::exchange(stops_, stops) != stops;
   for (auto& [id, site] : sites_) {
     if (!site.domain && !open(site)) continue;
-    site.domain->peers().update();
     try {
+      site.domain->peers().update();
       if (was_stopped) subscribe_again(site);
       for (EndPoint* const end : site.ends)
         end->look_at(site.domain->peers().of(end->topic().name));

@@ -151,7 +151,7 @@ void EndPoint::find_obstacles(const PeersOfTopic& peers) {
   if (topic_.qos.durability != entry_.dds->qos.durability) {
     obstacles_.emplace_back("samples published before are not taken, because T is not forever");
   }
-  if (peers.has_more) obstacles_.emplace_back("there are more ends than the gateway looks at");
+  if (peers.has_more()) obstacles_.emplace_back("there are more ends than the gateway looks at");
   obstacles_.insert(obstacles_.end(), std::make_move_iterator(others.begin()),
                     std::make_move_iterator(others.end()));
 }

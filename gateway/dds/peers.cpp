@@ -1,6 +1,7 @@
 #include "gateway/dds/peers.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <iterator>
 #include <string_view>
@@ -9,6 +10,7 @@
 namespace arbiter::gateway::dds {
 namespace {
 
+constexpr std::array kEnds{End::kReader, End::kWriter};
 constexpr std::size_t kBatch = 32;
 constexpr std::size_t kMaxName = 256;  // of what strangers say
 // Of an owner's name, so that a status has room for what the owner does.
@@ -82,16 +84,24 @@ std::string type_hash_in(const std::string& user_data) {
   return {};
 }
 
-Peers::Peers(dds_entity_t participant, const std::set<std::string>& topics, const Bell& bell) {
+Peers::Peers(dds_entity_t participant, const std::set<std::string>& topics, const Bell& bell)
+    : participant_(participant), bell_(bell) {
   for (const std::string& topic : topics) topics_.try_emplace(topic);
   note_own(participant);
-  const Listener listener = on_data(bell);
-  const auto reader = [&](dds_entity_t topic, const dds_listener_t* calls, const char* what) {
-    return Entity(dds_create_reader(participant, topic, nullptr, calls), what);
-  };
-  participants_ = reader(DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, "the reader of participants");
-  readers_ = reader(DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, listener.get(), "the reader of readers");
-  writers_ = reader(DDS_BUILTIN_TOPIC_DCPSPUBLICATION, listener.get(), "the reader of writers");
+  participants_ =
+      Entity(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
+             "the reader of participants");
+  for (const End end : kEnds) lookouts_[end] = lookout(end);
+}
+
+Entity Peers::lookout(End end) const {
+  const Listener listener = on_data(bell_);
+  const bool of_readers = end == End::kReader;
+  return {dds_create_reader(
+              participant_,
+              of_readers ? DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION : DDS_BUILTIN_TOPIC_DCPSPUBLICATION,
+              nullptr, listener.get()),
+          of_readers ? "the reader of readers" : "the reader of writers"};
 }
 
 void Peers::note_own(dds_entity_t participant) {
@@ -101,8 +111,34 @@ void Peers::note_own(dds_entity_t participant) {
 
 void Peers::update() {
   forget_gone_participants();
-  update(readers_, End::kReader);
-  update(writers_, End::kWriter);
+  for (const End end : kEnds) {
+    update(lookouts_[end], end);
+    if (has_thinned(end)) look_again(end);
+  }
+}
+
+// Each look costs as much as there are ends: it needs many that have gone, so that a stranger
+// cannot ask for one by a single end that comes and goes.
+bool Peers::has_thinned(End end) const {
+  const auto is_thin = [](std::size_t count, std::size_t most) { return count <= most / 4 * 3; };
+  const auto count = counts_.find(end);
+  if (count == counts_.end() || !is_thin(count->second, kMaxPeers)) return false;
+  return std::any_of(topics_.begin(), topics_.end(), [&](const auto& each) {
+    const auto crowd = each.second.crowds.find(end);
+    return crowd != each.second.crowds.end() && crowd->second.has_more &&
+           is_thin(crowd->second.count, kMaxOfTopic);
+  });
+}
+
+// Cyclone tells a reader once of each end, and a new reader of all that are there. What has gone
+// before there was the new one, only the old one knows.
+void Peers::look_again(End end) {
+  const Entity old = std::exchange(lookouts_[end], lookout(end));
+  update(old, end);
+  for (auto& [name, topic] : topics_) {
+    if (std::exchange(topic.crowds[end].has_more, false)) ++topic.revision;
+  }
+  update(lookouts_[end], end);
 }
 
 // Cyclone keeps each one until somebody takes it. Those that are there stay: owner_of() reads them.
@@ -134,7 +170,8 @@ void Peers::update(const Entity& reader, End end) {
         if (const auto gone = handles_.find(infos[i].instance_handle); gone != handles_.end()) {
           const Place& place = gone->second;
           place.topic->ends.erase(place.guid);
-          --place.topic->counts[place.end];
+          --place.topic->crowds[place.end].count;
+          --counts_[place.end];
           ++place.topic->revision;
           handles_.erase(gone);
         }
@@ -156,12 +193,13 @@ void Peers::add(const dds_builtintopic_endpoint_t& endpoint, End end,
   PeersOfTopic& topic = found->second;
   ++topic.revision;
   if (!handles_.contains(handle)) {
-    // Readers must not hide a writer that goes past Arbiter.
-    if (handles_.size() >= kMaxPeers || topic.counts[end] >= kMaxOfTopic) {
-      topic.has_more = true;
+    Crowd& crowd = topic.crowds[end];
+    if (counts_[end] >= kMaxPeers || crowd.count >= kMaxOfTopic) {
+      crowd.has_more = true;
       return;
     }
-    ++topic.counts[end];
+    ++crowd.count;
+    ++counts_[end];
   }
   const Guid guid = guid_of(endpoint.key);
   Peer peer;

@@ -5,6 +5,7 @@
 
 #include <dds/dds.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -35,12 +36,23 @@ struct Peer {
 using Guid = std::array<std::uint8_t, 16>;
 using PeerMap = std::map<Guid, Peer>;
 
-// All that is known of one topic. Strangers may be any number: what does not fit is not looked at.
+// Readers or writers: how many are looked at, and whether there were more.
+struct Crowd {
+  std::size_t count = 0;
+  bool has_more = false;
+};
+
+// All that is known of one topic. Strangers may be any number: what does not fit is not looked at
+// until others have gone.
 struct PeersOfTopic {
   PeerMap ends;
-  std::map<End, std::size_t> counts;  // of readers, of writers
-  bool has_more = false;              // than are looked at
-  std::uint64_t revision = 0;         // another one: something has changed
+  std::map<End, Crowd> crowds;
+  std::uint64_t revision = 0;  // another one: something has changed
+
+  [[nodiscard]] bool has_more() const {
+    return std::any_of(crowds.begin(), crowds.end(),
+                       [](const auto& each) { return each.second.has_more; });
+  }
 };
 
 class Peers {
@@ -52,9 +64,13 @@ class Peers {
   Peers& operator=(const Peers&) = delete;
   ~Peers() = default;
 
+  // Readers, and as many writers: who reads must not hide a writer that goes past Arbiter.
+  static constexpr std::size_t kMaxPeers = 4096;
+  static constexpr std::size_t kMaxOfTopic = 512;
+
   // A further participant of ours. Before it has ends.
   void note_own(dds_entity_t participant);
-  // Takes in what has come. Does not wait.
+  // Takes in what has come. Does not wait. Throws DdsError.
   void update();
   // Of one of `topics`.
   [[nodiscard]] const PeersOfTopic& of(const std::string& topic) const { return topics_.at(topic); }
@@ -66,20 +82,22 @@ class Peers {
     End end;
   };
 
+  [[nodiscard]] Entity lookout(End end) const;
   void update(const Entity& reader, End end);
+  [[nodiscard]] bool has_thinned(End end) const;
+  void look_again(End end);
   void forget_gone_participants();
   void add(const dds_builtintopic_endpoint_t& endpoint, End end, dds_instance_handle_t handle);
   [[nodiscard]] std::string owner_of(const dds_builtintopic_endpoint_t& endpoint) const;
 
-  static constexpr std::size_t kMaxPeers = 4096;
-  static constexpr std::size_t kMaxOfTopic = 512;  // readers, and as many writers
-
+  dds_entity_t participant_;
+  const Bell& bell_;
   std::map<std::string, PeersOfTopic, std::less<>> topics_;
   std::set<Guid> own_;  // our participants, those that have left, too
   std::map<dds_instance_handle_t, Place> handles_;
+  std::map<End, std::size_t> counts_;  // of all topics
   Entity participants_;
-  Entity readers_;
-  Entity writers_;
+  std::map<End, Entity> lookouts_;  // what Cyclone tells of readers, and of writers
 };
 
 // The kind of an end by the last byte of its GUID (RTPS 2.5, table 9.1).

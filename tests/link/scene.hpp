@@ -8,7 +8,6 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <functional>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -19,6 +18,7 @@
 
 #include "shm/file_descriptor.hpp"
 #include "tests/gateway/dds/own_domain.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -29,11 +29,6 @@
 namespace arbiter::test {
 
 using namespace std::chrono_literals;
-
-// Asks until it holds. That it never does shows as the test's time limit.
-inline void await(const std::function<bool()>& holds) {
-  while (!holds()) ::poll(nullptr, 0, 1);
-}
 
 class Host {
  public:
