@@ -1,10 +1,24 @@
 // Strangers that come late, go, and are killed; a gateway that is stopped or killed.
 #include <gtest/gtest.h>
 
+#include <string>
+
 #include "tests/gateway/dds/scene.hpp"
 
 namespace arbiter::test {
 namespace {
+
+// Runs what a service manager runs after a gateway that has died, until the robot has heard it: on
+// a busy machine its second may end before the two have found each other.
+void stop_afterwards(DdsGateway& gateway, Stranger& base) {
+  base.lines_so_far();  // what was said before does not count
+  for (bool has_stopped = false; !has_stopped;) {
+    EXPECT_EQ(gateway.send_idle(), 0);
+    for (const std::string& line : base.lines_so_far()) {
+      has_stopped = has_stopped || line == "sample 0 0";
+    }
+  }
+}
 
 class DdsComingAndGoing : public ::testing::TestWithParam<const char*> {};
 
@@ -79,8 +93,7 @@ TEST_P(DdsComingAndGoing, ForAGatewayThatIsKilledTheRobotIsStoppedByAnother) {
   auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
   publish_until_heard(navigation, base, "1 0");
   gateway.process().kill();
-  EXPECT_EQ(gateway.send_idle(), 0);
-  base.await("sample 0 0");
+  stop_afterwards(gateway, base);
   EXPECT_NE(gateway.log().find("DDS topic rt/cmd_vel, 1 subscriber matched"), std::string::npos);
 }
 
@@ -93,8 +106,7 @@ TEST_P(DdsComingAndGoing, AMistakeInTheMappingKeepsNobodyFromStoppingTheRobot) {
   gateway.process().signal(SIGUSR1);
   gateway.see("the one before stays");
   gateway.process().kill();
-  EXPECT_EQ(gateway.send_idle(), 0);
-  base.await("sample 0 0");
+  stop_afterwards(gateway, base);
 }
 
 // Nor is a copy that is none believed.
@@ -106,8 +118,7 @@ TEST_P(DdsComingAndGoing, ABadCopyOfTheMappingIsPassedOver) {
   const std::string of_another_file = std::string("a") + '\0' + "10" + '\0' + "<gateway/>" + '\0';
   for (const std::string& copy : {std::string("mapping"), of_another_file}) {
     std::ofstream(gateway.copy(), std::ios::trunc) << copy;
-    EXPECT_EQ(gateway.send_idle(), 0);
-    base.await("sample 0 0");
+    stop_afterwards(gateway, base);
     gateway.see("no copy of the mapping is good");
   }
 }
