@@ -121,12 +121,10 @@ void Peers::update() {
 // cannot ask for one by a single end that comes and goes.
 bool Peers::has_thinned(End end) const {
   const auto is_thin = [](std::size_t count, std::size_t most) { return count <= most / 4 * 3; };
-  const auto count = counts_.find(end);
-  if (count == counts_.end() || !is_thin(count->second, kMaxPeers)) return false;
+  if (!is_thin(counts_.at(end), kMaxPeers)) return false;
   return std::any_of(topics_.begin(), topics_.end(), [&](const auto& each) {
-    const auto crowd = each.second.crowds.find(end);
-    return crowd != each.second.crowds.end() && crowd->second.has_more &&
-           is_thin(crowd->second.count, kMaxOfTopic);
+    const Crowd& crowd = each.second.crowds.at(end);
+    return crowd.has_more && is_thin(crowd.count, kMaxOfTopic);
   });
 }
 

@@ -46,7 +46,7 @@ struct Crowd {
 // until others have gone.
 struct PeersOfTopic {
   PeerMap ends;
-  std::map<End, Crowd> crowds;
+  std::map<End, Crowd> crowds{{End::kReader, {}}, {End::kWriter, {}}};
   std::uint64_t revision = 0;  // another one: something has changed
 
   [[nodiscard]] bool has_more() const {
@@ -95,7 +95,7 @@ class Peers {
   std::map<std::string, PeersOfTopic, std::less<>> topics_;
   std::set<Guid> own_;  // our participants, those that have left, too
   std::map<dds_instance_handle_t, Place> handles_;
-  std::map<End, std::size_t> counts_;  // of all topics
+  std::map<End, std::size_t> counts_{{End::kReader, 0}, {End::kWriter, 0}};  // of all topics
   Entity participants_;
   std::map<End, Entity> lookouts_;  // what Cyclone tells of readers, and of writers
 };
