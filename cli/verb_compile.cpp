@@ -1,7 +1,4 @@
 // arbiter compile: the application with the rules of its arbiters merged in.
-#include <sys/mman.h>
-#include <unistd.h>
-
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -16,7 +13,7 @@
 #include "rules/ask/report.hpp"
 #include "rules/model/application_writer.hpp"
 #include "rules/text/xml.hpp"
-#include "shm/file_descriptor.hpp"
+#include "shm/memory_file.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -49,12 +46,7 @@ std::string merge(const rules::RuleSet& rules) {
 
 // What was written is read as anybody will read it, before anybody does.
 void check_by_reading_back(const std::string& content, const rules::RuleSet& rules) {
-  const shm::FileDescriptor memory(memfd_create("arbiter-compile", MFD_CLOEXEC));
-  for (std::size_t at = 0; at < content.size();) {
-    const ssize_t written = write(memory.get(), content.data() + at, content.size() - at);
-    if (written <= 0) throw std::runtime_error("there is no memory to read the result back from");
-    at += static_cast<std::size_t>(written);
-  }
+  const shm::FileDescriptor memory = shm::memory_file("arbiter-compile", content);
   rules::Diagnostics diagnostics;
   const rules::RuleSet read =
       rules::load({{"/proc/self/fd/" + std::to_string(memory.get())}, {}}, diagnostics);

@@ -23,6 +23,7 @@
 
 #include "link/say_sparingly.hpp"
 #include "shm/clock.hpp"
+#include "shm/memory_file.hpp"
 #include "wire/errands.hpp"
 #include "wire/hang_up.hpp"
 #include "wire/link_call.hpp"
@@ -47,15 +48,11 @@ int until_errands_are_due() {
 
 // A file in memory that can only be read.
 shm::FileDescriptor sealed_document(const std::string& text) {
-  const shm::FileDescriptor file(::memfd_create("arbiter-hosts", MFD_CLOEXEC | MFD_ALLOW_SEALING));
-  for (std::size_t at = 0; file && at < text.size();) {
-    const ssize_t written = ::write(file.get(), text.data() + at, text.size() - at);
-    if (written <= 0) throw std::runtime_error("no memory for the answer");
-    at += static_cast<std::size_t>(written);
-  }
-  if (!file || ::fcntl(file.get(), F_ADD_SEALS,
-                       F_SEAL_WRITE | F_SEAL_GROW | F_SEAL_SHRINK | F_SEAL_SEAL) != 0) {
-    throw std::system_error(errno, std::generic_category(), "no memory for the answer");
+  const shm::FileDescriptor file =
+      shm::memory_file("arbiter-hosts", text, MFD_CLOEXEC | MFD_ALLOW_SEALING);
+  if (::fcntl(file.get(), F_ADD_SEALS, F_SEAL_WRITE | F_SEAL_GROW | F_SEAL_SHRINK | F_SEAL_SEAL) !=
+      0) {
+    throw std::system_error(errno, std::generic_category(), "the answer cannot be sealed");
   }
   const std::string path = "/proc/self/fd/" + std::to_string(file.get());
   shm::FileDescriptor readable(::open(path.c_str(), O_RDONLY | O_CLOEXEC));

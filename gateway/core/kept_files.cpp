@@ -1,7 +1,6 @@
 #include "gateway/core/kept_files.hpp"
 
 #include <fcntl.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -11,6 +10,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "shm/memory_file.hpp"
+
 namespace arbiter::gateway {
 namespace {
 
@@ -19,14 +20,6 @@ constexpr std::size_t kMaxSaved = std::size_t{64} << 20;
 
 [[noreturn]] void fail(const std::string& what) {
   throw std::system_error(errno, std::generic_category(), what);
-}
-
-void write_whole(int file, std::string_view content, const std::string& what) {
-  for (std::string_view rest = content; !rest.empty();) {
-    const ssize_t count = ::write(file, rest.data(), rest.size());
-    if (count <= 0) fail(what);
-    rest.remove_prefix(static_cast<std::size_t>(count));
-  }
 }
 
 std::string whole_of(int descriptor) {
@@ -99,10 +92,7 @@ std::string KeptFiles::content() const {
 }
 
 shm::FileDescriptor KeptFiles::in_memory() const {
-  shm::FileDescriptor file(::memfd_create("arbiter-mapping", 0));
-  if (!file) fail("no memory for a copy of the mapping");
-  write_whole(file.get(), content(), "no memory for a copy of the mapping");
-  return file;
+  return shm::memory_file("arbiter-mapping", content(), 0);
 }
 
 void KeptFiles::save(const std::string& path) const {
@@ -110,7 +100,12 @@ void KeptFiles::save(const std::string& path) const {
   const shm::FileDescriptor file(
       ::open(next.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0600));
   if (!file) fail(next);
-  write_whole(file.get(), content(), next);
+  const std::string bytes = content();
+  for (std::string_view rest = bytes; !rest.empty();) {
+    const ssize_t count = ::write(file.get(), rest.data(), rest.size());
+    if (count <= 0) fail(next);
+    rest.remove_prefix(static_cast<std::size_t>(count));
+  }
   if (::rename(next.c_str(), path.c_str()) != 0) fail(path);
 }
 
