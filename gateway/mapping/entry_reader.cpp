@@ -307,8 +307,10 @@ class EntryReader {
   // sample of its type, and may read as many bytes as that has.
   [[nodiscard]] std::string fault_of_idle(const std::string& bytes) const {
     const std::string has = "has " + std::to_string(bytes.size()) + " bytes; ";
-    if (bytes.size() > kMaxIdleBytes || bytes.size() < header()) {
-      return has + "a sample to be sent while the port is idle has " + std::to_string(header()) +
+    // Nobody means to send a chunk of iceoryx that has nothing in it.
+    const std::size_t least = header() + (entry_.dds ? 0 : 1);
+    if (bytes.size() > kMaxIdleBytes || bytes.size() < least) {
+      return has + "a sample to be sent while the port is idle has " + std::to_string(least) +
              " to " + std::to_string(kMaxIdleBytes);
     }
     const auto counted = [&](std::size_t size) {

@@ -276,6 +276,22 @@ TEST(Mapping, AConfigurationThatCannotBeReadIsReported) {
   EXPECT_THAT(with(".").findings(), ElementsAre("1:36 error configuration-file"));
 }
 
+// Before a reload closes what is open.
+TEST(Mapping, AConfigurationThatIsCutIsReportedAtItsPlaceAndAGoodOneIsKept) {
+  const test::TemporaryDirectory directory;
+  directory.write("good.xml", "\xef\xbb\xbf<CycloneDDS>\n</CycloneDDS>");  // a byte order mark
+  directory.write("cut.xml", "<CycloneDDS>\n  <Domain></CycloneDDS>");
+  directory.write("large.xml", std::string((1 << 20) + 1, ' '));
+  const std::string path = directory.path();
+  const auto with = [&](const std::string& file) {
+    return read_text("<gateway kind='dds' configuration='" + file + "'/>", &path);
+  };
+  EXPECT_EQ(with("good.xml").mapping.gateways.at(0).configuration_text,
+            "<CycloneDDS>\n</CycloneDDS>");
+  EXPECT_THAT(with("cut.xml").findings(), ElementsAre("2:11 error malformed-xml"));
+  EXPECT_THAT(with("large.xml").findings(), ElementsAre(HasSubstr("error limit-exceeded")));
+}
+
 // A subscriber takes it for a sample of its type, and may read past its end.
 TEST(Mapping, AnIdleSampleOfAFileHasTheSizeOfItsType) {
   const test::TemporaryDirectory directory;
@@ -311,6 +327,12 @@ TEST(Mapping, AnIdleSampleOfAFileHasTheSizeOfItsType) {
   EXPECT_THAT(iceoryx("").findings(), IsEmpty());
   EXPECT_THAT(iceoryx("size='4'").findings(), IsEmpty());
   EXPECT_THAT(iceoryx("size='8'").findings(), ElementsAre("1:113 error idle-size"));
+  directory.write("empty.bin", "");
+  EXPECT_THAT(read_text("<gateway kind='iceoryx'><out port='/a:i' service='a' instance='b' "
+                        "event='c' idle='file:empty.bin'/></gateway>",
+                        &path)
+                  .message(),
+              HasSubstr("has 0 bytes; a sample to be sent while the port is idle has 1 to"));
 }
 
 TEST(Mapping, WhatContradictsItselfIsAnError) {
