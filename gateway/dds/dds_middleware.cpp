@@ -3,14 +3,15 @@
 #include <utility>
 
 #include "gateway/core/say.hpp"
-#include "gateway/dds/mismatch.hpp"
+#include "gateway/mapping/partitions.hpp"
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::gateway::dds {
 namespace {
 
-constexpr shm::Nanoseconds kOpenAgain = 1'000'000'000;
+// Often enough for who sends idle samples for a second.
+constexpr shm::Nanoseconds kOpenAgain = 200'000'000;
 // Cyclone needs some ten for each domain.
 constexpr std::size_t kDescriptorsOfDomain = 32;
 
@@ -24,7 +25,7 @@ DdsMiddleware::DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& b
       Site& site = sites_[domain_of(gateway)];
       if (site.gateway == nullptr) {
         site.gateway = &gateway;
-      } else if (configuration_of(*site.gateway) != configuration_of(gateway)) {
+      } else if (!have_one_configuration(*site.gateway, gateway)) {
         throw DdsError("two gateways of DDS domain " + std::to_string(domain_of(gateway)) +
                        " name different interfaces, peers or configurations; a program has one "
                        "configuration for each domain: give both the same");

@@ -1,14 +1,15 @@
 #include "gateway/dds/domain.hpp"
 
 #include <dds/ddsrt/log.h>
+#include <dds/features.h>
 
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
-#include <string_view>
 
 #include "gateway/core/say.hpp"
 #include "gateway/dds/quota.hpp"
+#include "shm/memory_file.hpp"
 
 namespace arbiter::gateway::dds {
 namespace {
@@ -28,6 +29,57 @@ constexpr std::size_t kMaxKept = 32;
 
 bool is_loopback(const std::string& interface) {
   return interface == "lo" || interface.starts_with("127.") || interface == "::1";
+}
+
+// The mapping's own configuration, as it was when the mapping was read: Cyclone reads it when the
+// domain is joined, perhaps long after, and would go by what stands there then.
+class ConfigurationFile {
+ public:
+  explicit ConfigurationFile(const Gateway& gateway) : name_(gateway.configuration) {
+    if (name_.empty()) return;
+    memory_ = shm::memory_file("arbiter-cyclonedds", gateway.configuration_text);
+    path_ = "/proc/self/fd/" + std::to_string(memory_.get());
+    handed_over = this;
+  }
+  ConfigurationFile(const ConfigurationFile&) = delete;
+  ConfigurationFile& operator=(const ConfigurationFile&) = delete;
+  ~ConfigurationFile() { handed_over = nullptr; }
+
+  // Empty: there is none.
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+  // In what Cyclone says while this thread hands it such a file, the file has its own name.
+  static void name_in(std::string& words) {
+    if (handed_over == nullptr) return;
+    const std::size_t at = words.find(handed_over->path_);
+    if (at != words.npos) words.replace(at, handed_over->path_.size(), handed_over->name_);
+  }
+
+ private:
+  static thread_local const ConfigurationFile* handed_over;
+
+  const std::string name_;
+  std::string path_;
+  shm::FileDescriptor memory_;
+};
+
+thread_local const ConfigurationFile* ConfigurationFile::handed_over = nullptr;
+
+// Cyclone waits a minute for RouDi, which need not run, and then ends the process. Nodes that use
+// its shared memory are reached by the network, too.
+#ifdef DDS_HAS_SHM
+constexpr const char* kNoSharedMemory = "<SharedMemory><Enable>false</Enable></SharedMemory>";
+#else
+constexpr const char* kNoSharedMemory = "";
+#endif
+
+Entity open_domain(dds_domainid_t id, const Gateway& gateway) {
+  const ConfigurationFile file(gateway);
+  std::string text = configuration_of(gateway, file.path());
+  if (!text.empty()) text += ",";
+  text += kNoSharedMemory;
+  return {dds_create_domain(id, text.c_str()),
+          "domain " + std::to_string(id)};
 }
 
 Entity join(dds_domainid_t domain) {
@@ -77,9 +129,9 @@ dds_domainid_t domain_of(const Gateway& gateway) {
   return domain;
 }
 
-std::string configuration_of(const Gateway& gateway) {
+std::string configuration_of(const Gateway& gateway, const std::string& file) {
   std::string result;
-  if (!gateway.configuration.empty()) result = "file://" + gateway.configuration;
+  if (!file.empty()) result = "file://" + file;
   if (gateway.interfaces.empty() && gateway.peers.empty()) {
     const char* const uri = std::getenv("CYCLONEDDS_URI");
     return result.empty() && uri != nullptr ? uri : result;
@@ -114,8 +166,7 @@ std::string configuration_of(const Gateway& gateway) {
 
 Domain::Domain(const Gateway& gateway, const std::set<std::string>& topics, const Bell& bell)
     : id_(domain_of(gateway)),
-      domain_(dds_create_domain(id_, configuration_of(gateway).c_str()),
-              "domain " + std::to_string(id_)),
+      domain_(open_domain(id_, gateway)),
       participant_(join(id_)),
       peers_(participant_.get(), topics, bell) {}
 
@@ -141,16 +192,17 @@ void hear_cyclone() {
   dds_set_log_mask(DDS_LC_FATAL | DDS_LC_ERROR | DDS_LC_WARNING);
   dds_set_log_sink(
       [](void* /*argument*/, const dds_log_data_t* line) {
-        std::string_view text(line->message, line->size);
-        while (text.ends_with('\n') || text.ends_with('.')) text.remove_suffix(1);
+        std::string text(line->message, line->size);
+        while (text.ends_with('\n') || text.ends_with('.')) text.pop_back();
+        ConfigurationFile::name_in(text);
         if (kept_words != nullptr) {
           if (kept_words->size() == kMaxKept) kept_words->erase(kept_words->begin());
-          kept_words->emplace_back(text);
+          kept_words->push_back(text);
           return;
         }
         if (const auto passed = quota.take(); passed) {
           const bool error = (line->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0;
-          std::string said = "Cyclone DDS: " + std::string(text);
+          std::string said = "Cyclone DDS: " + text;
           if (*passed > 0) said += " (" + std::to_string(*passed) + " lines were left out before)";
           say(error ? Level::kError : Level::kWarning, said);
         }

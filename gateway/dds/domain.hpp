@@ -16,9 +16,10 @@ namespace arbiter::gateway::dds {
 // no number.
 [[nodiscard]] dds_domainid_t domain_of(const Gateway& gateway);
 
-// Cyclone's configuration for it: what the mapping's own file says, and what the mapping says;
-// where it says nothing, what CYCLONEDDS_URI says. Not both: Cyclone adds up interfaces and peers.
-[[nodiscard]] std::string configuration_of(const Gateway& gateway);
+// Cyclone's configuration for it: what `file` says, the mapping's own if there is one, and what the
+// mapping says; where it says nothing, what CYCLONEDDS_URI says. Not both: Cyclone adds up
+// interfaces and peers.
+[[nodiscard]] std::string configuration_of(const Gateway& gateway, const std::string& file);
 
 // As text of that configuration.
 [[nodiscard]] std::string escaped(const std::string& text);

@@ -9,6 +9,7 @@
 #include "gateway/core/say.hpp"
 #include "gateway/dds/opaque_type.hpp"
 #include "gateway/dds/quota.hpp"
+#include "shm/clock.hpp"
 
 namespace arbiter::gateway::dds {
 namespace {
@@ -84,17 +85,19 @@ void EndPoint::look_at(const PeersOfTopic& peers) {
   }
   account_.set_peers(matched());
   tell_obstacles();
+  warn();
 }
 
 // Where the mapping does not say whether the type has a key, who is there says it: without this,
 // they would never match, and nothing in DDS says why. As long as one peer has the kind that this
-// end has, it stays.
+// end has, it stays. Who is in another partition is not meant.
 void EndPoint::choose_kind(const PeerMap& peers) {
   if (topic_.qos.keyed) return;
   bool like_us = false;
   bool other = false;
   for (const auto& [guid, peer] : peers) {
     if (peer.end == which_ || peer.type != topic_.type) continue;
+    if (!may_meet(topic_.qos, peer.qos)) continue;
     (peer.keyed == keyed_ ? like_us : other) = true;
   }
   if (like_us || !other) return;
@@ -129,9 +132,9 @@ void EndPoint::adopt_type_hash(const PeerMap& peers) {
 
 void EndPoint::find_obstacles(const PeersOfTopic& peers) {
   obstacles_.clear();
-  std::erase_if(warned_, [&](const auto& one) { return !peers.ends.contains(one.first); });
   // Those that go past Arbiter come first: a status has room for a few sentences alone.
   std::vector<std::string> others;
+  Warnings::Sentences warnings;
   for (const auto& [guid, peer] : peers.ends) {
     const bool meet = may_meet(topic_.qos, peer.qos);
     if (peer.end != which_) {
@@ -140,14 +143,15 @@ void EndPoint::find_obstacles(const PeersOfTopic& peers) {
       others.push_back("the " + std::string(which_ == End::kReader ? "publisher" : "subscriber") +
                        " of " + peer.owner + " does not match: " + joined(reasons));
       // Whoever is in another partition is probably meant to be.
-      if (meet) warn(guid, others.back());
+      if (meet) warnings.emplace_back(guid, others.back());
     } else if (which_ == End::kWriter && meet) {
       obstacles_.push_back(peer.owner +
                            " publishes there, too: what it sends reaches the subscribers past "
                            "Arbiter");
-      warn(guid, obstacles_.back());
+      warnings.emplace_back(guid, obstacles_.back());
     }
   }
+  warnings_.set(std::move(warnings), peers.ends);
   if (topic_.qos.durability != entry_.dds->qos.durability) {
     obstacles_.emplace_back("samples published before are not taken, because T is not forever");
   }
@@ -171,18 +175,12 @@ void EndPoint::tell_obstacles() {
   account_.set_obstacle(text + joined(obstacles_));
 }
 
-void EndPoint::warn(const Guid& guid, const std::string& sentence) {
-  constexpr std::size_t kMaxWarnings = 16;  // of one end, which may change without an end
+void EndPoint::warn() {
   // Ends that come and go make warnings: their number must not fill a disk.
   static Quota& quota = *new Quota(20, 10'000'000'000);
-  std::set<std::string>& said = warned_[guid];
-  if (said.contains(sentence) || said.size() >= kMaxWarnings) return;
-  const auto passed = quota.take();
-  if (!passed) return;
-  said.insert(sentence);
-  std::string text = account_.outside() + ": " + sentence;
-  if (*passed > 0) text += " (" + std::to_string(*passed) + " warnings were left out before)";
-  say(Level::kWarning, text);
+  for (const std::string& sentence : warnings_.take(quota, shm::monotonic_now())) {
+    say(Level::kWarning, account_.outside() + ": " + sentence);
+  }
 }
 
 }  // namespace arbiter::gateway::dds

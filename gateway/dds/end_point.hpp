@@ -4,10 +4,8 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -16,6 +14,7 @@
 #include "gateway/dds/entity.hpp"
 #include "gateway/dds/mismatch.hpp"
 #include "gateway/dds/peers.hpp"
+#include "gateway/dds/warnings.hpp"
 #include "gateway/mapping/mapping.hpp"
 
 namespace arbiter::gateway::dds {
@@ -65,8 +64,7 @@ class EndPoint {
   void adopt_type_hash(const PeerMap& peers);
   void find_obstacles(const PeersOfTopic& peers);
   void tell_obstacles();
-  // Once for each peer and sentence, and not too often.
-  void warn(const Guid& guid, const std::string& sentence);
+  void warn();
 
   const End which_;
   const Entry& entry_;
@@ -77,7 +75,7 @@ class EndPoint {
   std::string type_hash_;
   std::optional<std::uint64_t> seen_;   // the peers' revision; empty: look at them
   std::vector<std::string> obstacles_;  // who does not match, and who goes past Arbiter
-  std::map<Guid, std::set<std::string>> warned_;
+  Warnings warnings_;
   Entity topic_entity_;
   mutable std::mutex in_use_;
   Entity end_;

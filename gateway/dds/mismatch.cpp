@@ -3,42 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <string_view>
+
+#include "gateway/mapping/partitions.hpp"
 
 namespace arbiter::gateway::dds {
 namespace {
-
-bool is_pattern(std::string_view name) { return name.find_first_of("*?") != name.npos; }
-
-// `*`: any characters; `?`: any one. Without recursion: the pattern is a stranger's.
-bool fits(std::string_view pattern, std::string_view name) {
-  std::size_t p = 0;
-  std::size_t n = 0;
-  std::size_t star = pattern.npos;
-  std::size_t resume = 0;
-  while (n < name.size()) {
-    if (p < pattern.size() && (pattern[p] == '?' || pattern[p] == name[n]) && pattern[p] != '*') {
-      ++p;
-      ++n;
-    } else if (p < pattern.size() && pattern[p] == '*') {
-      star = p++;
-      resume = n;
-    } else if (star != pattern.npos) {
-      p = star + 1;
-      n = ++resume;
-    } else {
-      return false;
-    }
-  }
-  while (p < pattern.size() && pattern[p] == '*') ++p;
-  return p == pattern.size();
-}
-
-// Two patterns never fit each other.
-bool fits_either(const std::string& a, const std::string& b) {
-  if (is_pattern(a)) return !is_pattern(b) && fits(a, b);
-  return is_pattern(b) ? fits(b, a) : a == b;
-}
 
 template <std::size_t N>
 const char* word(const std::array<const char*, N>& words, int kind) {
@@ -167,16 +136,6 @@ void compare_others(Comparison& pair) {
 }
 
 }  // namespace
-
-bool share_partition(const std::vector<std::string>& a, const std::vector<std::string>& b) {
-  static const std::vector<std::string> default_partition = {""};
-  const auto& ours = a.empty() ? default_partition : a;
-  const auto& theirs = b.empty() ? default_partition : b;
-  return std::any_of(ours.begin(), ours.end(), [&](const std::string& one) {
-    return std::any_of(theirs.begin(), theirs.end(),
-                       [&](const std::string& other) { return fits_either(one, other); });
-  });
-}
 
 bool may_meet(const Qos& ours, const AnnouncedQos& theirs) {
   return theirs.has_more_partitions || share_partition(ours.partitions, theirs.partitions);

@@ -25,8 +25,4 @@ struct OurEnd {
 // Whether they have a partition in common, or may have one.
 [[nodiscard]] bool may_meet(const Qos& ours, const AnnouncedQos& theirs);
 
-// Whether two ends have a partition in common, by DDS' rules: names, `*` and `?`.
-[[nodiscard]] bool share_partition(const std::vector<std::string>& a,
-                                   const std::vector<std::string>& b);
-
 }  // namespace arbiter::gateway::dds

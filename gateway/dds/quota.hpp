@@ -22,21 +22,31 @@ class Quota {
   [[nodiscard]] std::optional<std::uint64_t> take() noexcept { return take(shm::monotonic_now()); }
   [[nodiscard]] std::optional<std::uint64_t> take(shm::Nanoseconds now) noexcept {
     const std::lock_guard lock(mutex_);
-    if (taken_ == 0 || now - begin_ >= period_) {
-      begin_ = now;
-      taken_ = 0;
-    }
-    if (taken_ >= most_) {
+    if (!take_one(now)) {
       ++refused_;
       return std::nullopt;
     }
-    ++taken_;
     const std::uint64_t refused = refused_;
     refused_ = 0;
     return refused;
   }
+  // For what is tried again where it was not let through: it takes one, and counts nothing.
+  [[nodiscard]] bool take_without_count(shm::Nanoseconds now) noexcept {
+    const std::lock_guard lock(mutex_);
+    return take_one(now);
+  }
 
  private:
+  bool take_one(shm::Nanoseconds now) noexcept {
+    if (taken_ == 0 || now - begin_ >= period_) {
+      begin_ = now;
+      taken_ = 0;
+    }
+    if (taken_ >= most_) return false;
+    ++taken_;
+    return true;
+  }
+
   const std::uint32_t most_;
   const shm::Nanoseconds period_;
   std::mutex mutex_;

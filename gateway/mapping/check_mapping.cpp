@@ -1,7 +1,5 @@
 #include "gateway/mapping/check_mapping.hpp"
 
-#include <fnmatch.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cstdlib>
@@ -12,6 +10,7 @@
 #include <string_view>
 #include <utility>
 
+#include "gateway/mapping/partitions.hpp"
 #include "gateway/mapping/ros_names.hpp"
 #include "rules/model/polarity.hpp"
 #include "rules/model/print_rules.hpp"
@@ -24,20 +23,6 @@ struct Placed {
   const Gateway* gateway;
   const Entry* entry;
 };
-
-// Partitions may be patterns; no partition is the one without a name.
-bool share_a_partition(const std::vector<std::string>& one, const std::vector<std::string>& other) {
-  static const std::vector<std::string> no_partition{""};
-  const auto matches = [](const std::string& a, const std::string& b) {
-    return fnmatch(a.c_str(), b.c_str(), 0) == 0 || fnmatch(b.c_str(), a.c_str(), 0) == 0;
-  };
-  for (const std::string& a : one.empty() ? no_partition : one) {
-    for (const std::string& b : other.empty() ? no_partition : other) {
-      if (matches(a, b)) return true;
-    }
-  }
-  return false;
-}
 
 // A domain that is not named is the environment's, as it is here. What cannot be read there, the
 // gateway says when it starts.
@@ -54,7 +39,7 @@ bool are_one_topic(const Placed& one, const Placed& other) {
   const Entry& b = *other.entry;
   if (a.dds && b.dds) {
     return domain_of(*one.gateway) == domain_of(*other.gateway) && a.dds->name == b.dds->name &&
-           share_a_partition(a.dds->qos.partitions, b.dds->qos.partitions);
+           share_partition(a.dds->qos.partitions, b.dds->qos.partitions);
   }
   if (a.iceoryx && b.iceoryx) {
     return a.iceoryx->service == b.iceoryx->service && a.iceoryx->instance == b.iceoryx->instance &&
@@ -101,10 +86,7 @@ class MappingCheck {
       if (gateway->kind != Kind::kDds) continue;
       const auto [found, is_new] = known.try_emplace(domain_of(*gateway), gateway);
       const Gateway& first = *found->second;
-      if (is_new || (first.interfaces == gateway->interfaces && first.peers == gateway->peers &&
-                     first.configuration == gateway->configuration)) {
-        continue;
-      }
+      if (is_new || have_one_configuration(first, *gateway)) continue;
       const bool is_one_file = first.where.file == gateway->where.file;
       const std::string text =
           "the gateway at " + rules::describe(first.where) + " joins domain " +

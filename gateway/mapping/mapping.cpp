@@ -38,4 +38,8 @@ std::string Entry::outside() const {
   return {};
 }
 
+bool have_one_configuration(const Gateway& a, const Gateway& b) {
+  return a.interfaces == b.interfaces && a.peers == b.peers && a.configuration == b.configuration;
+}
+
 }  // namespace arbiter::gateway

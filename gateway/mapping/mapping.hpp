@@ -142,8 +142,12 @@ struct Gateway {
   std::vector<std::string> interfaces;  // names or addresses of network interfaces
   std::vector<std::string> peers;       // addresses of hosts that multicast does not reach
   std::string configuration;            // a file of Cyclone's, beside the mapping
+  std::string configuration_text;       // what stood there when the mapping was read
   std::vector<Entry> entries;           // in document order
 };
+
+// Whether they join a domain in the same way, if they join the same.
+[[nodiscard]] bool have_one_configuration(const Gateway& a, const Gateway& b);
 
 struct Mapping {
   std::string path;

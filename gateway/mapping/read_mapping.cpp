@@ -88,7 +88,7 @@ class MappingReader {
       gateway.peers = attributes.list("peers", 255);
       if (const auto file = attributes.text("configuration", 4096)) {
         gateway.configuration = path_of(*file);
-        check_configuration(attributes, gateway.configuration);
+        gateway.configuration_text = read_configuration(attributes, gateway.configuration);
       }
     } else {
       reader_.check_attributes(element, {"kind"});
@@ -115,16 +115,23 @@ class MappingReader {
     mapping_.gateways.push_back(std::move(gateway));
   }
 
-  // What stands in it is Cyclone's business, which says what it does not like.
-  void check_configuration(Attributes& attributes, const std::string& path) const {
-    if (directory_ == nullptr) return;
+  // Its elements are Cyclone's business, which says what it does not like when a domain is joined.
+  std::string read_configuration(Attributes& attributes, const std::string& path) const {
+    if (directory_ == nullptr) return {};
     try {
-      read_file_(path, kMaxConfigurationBytes, rules::Accept::kRegularFile);
+      const rules::TextFile file(
+          path, read_file_(path, kMaxConfigurationBytes, rules::Accept::kRegularFile));
+      if (!rules::check_size(file, kMaxConfigurationBytes, diagnostics_) ||
+          !rules::check_readable(file, diagnostics_) || !rules::parse_xml(file, diagnostics_)) {
+        return {};
+      }
+      return std::string(file.content());
     } catch (const rules::FileError& error) {
       attributes.error("configuration-file", "configuration",
                        std::string(error.what()) +
                            "; write the name of a configuration file of Cyclone DDS, as seen from "
                            "the mapping");
+      return {};
     }
   }
 

@@ -77,7 +77,7 @@ std::string configuration_of(const NetworkOptions& options) {
   gateway.peers = options.peers;
   std::string all = kForAll;
   all += "<Internal><MaxSampleSize>" + std::to_string(kMaxBytes) + "B</MaxSampleSize></Internal>,";
-  all += gateway::dds::configuration_of(gateway);
+  all += gateway::dds::configuration_of(gateway, "");  // no file
   if (!options.security.empty()) {
     all += "," + security_configuration(options.security, options.name);
   }

@@ -109,6 +109,26 @@ TEST_P(DdsComingAndGoing, AMistakeInTheMappingKeepsNobodyFromStoppingTheRobot) {
   stop_afterwards(gateway, base);
 }
 
+// Cyclone's own configuration belongs to the mapping, and to the copy of it.
+TEST_P(DdsComingAndGoing, NorDoesOneInTheConfigurationOfCyclone) {
+  Drive drive("1000s", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
+  const std::string configuration = daemon.directory() + "/cyclonedds.xml";
+  std::ofstream(configuration) << "<CycloneDDS/>";
+  gateway.write_mapping(kNavIn + kBaseOut + R"( idle="zero"/>)", "lo",
+                        "configuration=\"cyclonedds.xml\"");
+  gateway.process().signal(SIGUSR1);
+  gateway.see("the mapping was read again");
+  publish_until_heard(navigation, base, "1 0");
+  std::ofstream(configuration) << "<CycloneDDS><Domain>";
+  gateway.process().signal(SIGUSR1);
+  gateway.see("cyclonedds.xml:1:");
+  gateway.see("the one before stays");
+  publish_until_heard(navigation, base, "2 0");
+  gateway.process().kill();
+  stop_afterwards(gateway, base);
+}
+
 // Nor is a copy that is none believed.
 TEST_P(DdsComingAndGoing, ABadCopyOfTheMappingIsPassedOver) {
   Drive drive("1000s", GetParam(), GetParam());

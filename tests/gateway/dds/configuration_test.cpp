@@ -1,8 +1,10 @@
 // What Cyclone is configured with.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "gateway/dds/dds_middleware.hpp"
 #include "gateway/dds/domain.hpp"
+#include "tests/gateway/dds/own_domain.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/error_of.hpp"
 
@@ -13,26 +15,23 @@ using test::ScopedVariable;
 
 TEST(DdsConfiguration, IsCyclonesOwnWhereTheMappingSaysNothing) {
   const ScopedVariable uri("CYCLONEDDS_URI", "file:///etc/robot.xml");
-  EXPECT_EQ(configuration_of({}), "file:///etc/robot.xml");
+  EXPECT_EQ(configuration_of({}, ""), "file:///etc/robot.xml");
   const ScopedVariable none("CYCLONEDDS_URI", std::nullopt);
-  EXPECT_EQ(configuration_of({}), "");
+  EXPECT_EQ(configuration_of({}, ""), "");
 }
 
 TEST(DdsConfiguration, AFileOfTheMappingTakesThePlaceOfTheEnvironments) {
   const ScopedVariable uri("CYCLONEDDS_URI", "file:///etc/robot.xml");
-  Gateway gateway;
-  gateway.configuration = "/etc/arbiter/dds.xml";
-  EXPECT_EQ(configuration_of(gateway), "file:///etc/arbiter/dds.xml");
+  EXPECT_EQ(configuration_of({}, "/etc/arbiter/dds.xml"), "file:///etc/arbiter/dds.xml");
 }
 
 // Cyclone would listen on those of the environment, too.
 TEST(DdsConfiguration, InterfacesAndPeersTakeThePlaceOfTheEnvironmentsAndStandBehindTheFiles) {
   const ScopedVariable uri("CYCLONEDDS_URI", "file:///etc/other.xml");
   Gateway gateway;
-  gateway.configuration = "/etc/robot.xml";
   gateway.interfaces = {"eth0", "10.0.0.2"};
   gateway.peers = {"10.0.0.7"};
-  EXPECT_EQ(configuration_of(gateway),
+  EXPECT_EQ(configuration_of(gateway, "/etc/robot.xml"),
             "file:///etc/robot.xml,<General><Interfaces><NetworkInterface name=\"eth0\"/>"
             "<NetworkInterface address=\"10.0.0.2\"/></Interfaces></General><Discovery>"
             "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32"
@@ -43,7 +42,7 @@ TEST(DdsConfiguration, OnTheLoopbackInterfaceParticipantsAreLookedForAtItsAddres
   const ScopedVariable uri("CYCLONEDDS_URI", std::nullopt);
   Gateway gateway;
   gateway.interfaces = {"lo"};
-  const std::string text = configuration_of(gateway);
+  const std::string text = configuration_of(gateway, "");
   EXPECT_NE(text.find("<AllowMulticast>false</AllowMulticast>"), std::string::npos);
   EXPECT_NE(text.find("<Peer address=\"127.0.0.1\"/>"), std::string::npos);
 }
@@ -52,8 +51,44 @@ TEST(DdsConfiguration, NoNameBreaksOutOfItsPlace) {
   const ScopedVariable uri("CYCLONEDDS_URI", std::nullopt);
   Gateway gateway;
   gateway.interfaces = {R"(x"/><a b="${HOME})"};
-  EXPECT_NE(configuration_of(gateway).find(R"(name="x&quot;/&gt;&lt;a b=&quot;&#36;{HOME}")"),
+  EXPECT_NE(configuration_of(gateway, "").find(R"(name="x&quot;/&gt;&lt;a b=&quot;&#36;{HOME}")"),
             std::string::npos);
+}
+
+// It is judged with the mapping; a gateway that joins later, or sends idle samples for one that has
+// died, must not go by what somebody has written since.
+TEST(DdsConfiguration, IsWhatStoodInTheFileWhenTheMappingWasRead) {
+  const test::OwnDomain number;
+  const Bell bell;
+  Gateway gateway;
+  gateway.domain = number.number();
+  gateway.interfaces = {"lo"};
+  gateway.configuration = "/nowhere/dds.xml";
+  gateway.configuration_text = "<CycloneDDS/>";
+  EXPECT_NO_THROW(Domain(gateway, {}, bell));
+  gateway.configuration_text = "<CycloneDDS><Domain><Nonsense/></Domain></CycloneDDS>";
+  hear_cyclone();
+  const CycloneWords words;
+  EXPECT_THROW(Domain(gateway, {}, bell), DdsError);
+  EXPECT_THAT(words.last(),
+              ::testing::AllOf(::testing::HasSubstr("Nonsense: unknown element"),
+                               ::testing::HasSubstr("file:///nowhere/dds.xml line 1")));
+}
+
+// With it Cyclone would wait for iceoryx's RouDi, and end the gateway when none comes.
+TEST(DdsConfiguration, WhateverItSaysCyclonesSharedMemoryStaysOff) {
+  const test::OwnDomain number;
+  const Bell bell;
+  const char* const with_it =
+      "<CycloneDDS><Domain><SharedMemory><Enable>true</Enable></SharedMemory></Domain></CycloneDDS>";
+  const ScopedVariable uri("CYCLONEDDS_URI", with_it);
+  Gateway gateway;
+  gateway.domain = number.number();
+  EXPECT_NO_THROW(Domain(gateway, {}, bell));
+  gateway.interfaces = {"lo"};
+  gateway.configuration = "/nowhere/dds.xml";
+  gateway.configuration_text = with_it;
+  EXPECT_NO_THROW(Domain(gateway, {}, bell));
 }
 
 TEST(DdsDomain, IsTheMappingsOrThatOfRos2) {

@@ -97,6 +97,18 @@ TEST_P(DdsMatching, PartitionsKeepTopicsApartAndJoinThem) {
   EXPECT_THAT(gateway.log(), ::testing::Not(::testing::HasSubstr("past Arbiter")));
 }
 
+// Nor does one of another partition decide whether the entry's end has a key.
+TEST_P(DdsMatching, AKeyIsThatOfWhoMayMatch) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(
+      daemon, domain, R"(<in topic="robots" type="strangers::Robot" port="/Fleet/robot:o"/>)");
+  const Stranger other(GetParam(), domain, {"pub", "robot", "robots", "partition=raw"});
+  gateway.see("does not match: key: its type has a key, this entry's has none");
+  const Stranger robot(GetParam(), domain, {"pub", "robot", "robots"});
+  gateway.see("1 publisher matched");
+}
+
 TEST_P(DdsMatching, WhoeverPublishesPastArbiterIsWarnedOfAtOnce) {
   const OwnDomain domain;
   const Daemon daemon(base_model("1s"));

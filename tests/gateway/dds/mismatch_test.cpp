@@ -99,20 +99,6 @@ TEST(Mismatch, TypesAndKeysAreCompared) {
               ElementsAre("type: it has U, this entry has T", HasSubstr("write keyed=\"true\"")));
 }
 
-TEST(Partition, NamesPatternsAndTheDefaultOne) {
-  using Names = std::vector<std::string>;
-  EXPECT_TRUE(share_partition({}, {}));
-  EXPECT_TRUE(share_partition({}, Names{""}));
-  EXPECT_TRUE(share_partition({}, Names{"*"}));
-  EXPECT_FALSE(share_partition({}, Names{"a"}));
-  EXPECT_TRUE(share_partition(Names{"a", "b"}, Names{"b", "c"}));
-  EXPECT_FALSE(share_partition(Names{"a"}, Names{"A"}));
-  EXPECT_TRUE(share_partition(Names{"robot?"}, Names{"robot1"}));
-  EXPECT_FALSE(share_partition(Names{"robot?"}, Names{"robot"}));
-  EXPECT_TRUE(share_partition(Names{"front/left"}, Names{"f*/*t"}));
-  EXPECT_FALSE(share_partition(Names{"a*"}, Names{"*a"}));  // two patterns
-}
-
 // Names without end are not all looked at: any may be among the others.
 TEST(Partition, AmongVeryManyAnyMayBe) {
   const CycloneQos qos(dds_create_qos());
@@ -129,12 +115,6 @@ TEST(Partition, AmongVeryManyAnyMayBe) {
   EXPECT_TRUE(may_meet(ours, announced(100)));
   EXPECT_FALSE(may_meet(ours, announced(64)));
   EXPECT_LE(announced(100).partitions.size(), 64U);
-}
-
-TEST(Partition, APatternThatIsMadeToBeSlowIsNot) {
-  std::string pattern;
-  for (int i = 0; i < 60; ++i) pattern += "a*";
-  EXPECT_FALSE(share_partition({pattern + "b"}, {std::string(200, 'a')}));
 }
 
 TEST(Peers, TheLastByteOfAGuidSaysWhetherThereIsAKey) {
@@ -179,6 +159,14 @@ TEST(Quota, LetsSoManyThroughAndCountsTheOthers) {
   EXPECT_EQ(quota.take(1100), 2U);
   EXPECT_EQ(quota.take(1101), 0U);
   EXPECT_FALSE(quota.take(1102));
+}
+
+TEST(Quota, DoesNotCountWhatIsTriedAgain) {
+  Quota quota(1, 100);
+  EXPECT_TRUE(quota.take_without_count(1000));
+  EXPECT_FALSE(quota.take_without_count(1001));
+  EXPECT_FALSE(quota.take(1002));
+  EXPECT_EQ(quota.take(1100), 1U);
 }
 
 }  // namespace

@@ -1,0 +1,72 @@
+// What is warned of is said once, and later where there is no room for it now.
+#include "gateway/dds/warnings.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace arbiter::gateway::dds {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+constexpr Guid kOne = {1};
+constexpr Guid kTwo = {2};
+const PeerMap kBoth = {{kOne, {}}, {kTwo, {}}};
+
+TEST(Warnings, AreSaidOnce) {
+  Quota quota(10, 100);
+  Warnings warnings;
+  warnings.set({{kOne, "a"}, {kTwo, "a"}}, kBoth);
+  EXPECT_THAT(warnings.take(quota, 0), ElementsAre("a", "a"));
+  EXPECT_THAT(warnings.take(quota, 1), IsEmpty());
+  warnings.set({{kOne, "a"}, {kTwo, "b"}}, kBoth);
+  EXPECT_THAT(warnings.take(quota, 2), ElementsAre("b"));
+  warnings.set({}, kBoth);             // it has been mended,
+  warnings.set({{kTwo, "b"}}, kBoth);  // and broken again
+  EXPECT_THAT(warnings.take(quota, 3), IsEmpty());
+}
+
+TEST(Warnings, WaitForRoom) {
+  Quota quota(1, 100);
+  Warnings warnings;
+  warnings.set({{kOne, "a"}, {kTwo, "b"}}, kBoth);
+  EXPECT_THAT(warnings.take(quota, 0), ElementsAre("a"));
+  EXPECT_THAT(warnings.take(quota, 99), IsEmpty());
+  warnings.set({{kOne, "a"}, {kTwo, "b"}}, kBoth);  // somebody else has come
+  EXPECT_THAT(warnings.take(quota, 100), ElementsAre("b"));
+  EXPECT_EQ(quota.take(200), 0U);  // nothing was left out
+}
+
+TEST(Warnings, ThatAreNoLongerTrueAreNotSaid) {
+  Quota quota(1, 100);
+  Warnings warnings;
+  warnings.set({{kOne, "a"}, {kTwo, "b"}}, kBoth);
+  EXPECT_THAT(warnings.take(quota, 0), ElementsAre("a"));
+  warnings.set({{kOne, "a"}}, kBoth);
+  EXPECT_THAT(warnings.take(quota, 100), IsEmpty());
+}
+
+TEST(Warnings, OfOneThatCameBackAreSaidAgain) {
+  Quota quota(10, 100);
+  Warnings warnings;
+  warnings.set({{kOne, "a"}}, kBoth);
+  EXPECT_THAT(warnings.take(quota, 0), ElementsAre("a"));
+  warnings.set({}, {});
+  warnings.set({{kOne, "a"}}, kBoth);
+  EXPECT_THAT(warnings.take(quota, 1), ElementsAre("a"));
+}
+
+TEST(Warnings, OfAPeerThatChangesForEverHaveAnEnd) {
+  Quota quota(1000, 100);
+  Warnings warnings;
+  std::size_t said = 0;
+  for (int i = 0; i < 100; ++i) {
+    warnings.set({{kOne, std::to_string(i)}}, kBoth);
+    said += warnings.take(quota, i).size();
+  }
+  EXPECT_EQ(said, 16U);
+}
+
+}  // namespace
+}  // namespace arbiter::gateway::dds
