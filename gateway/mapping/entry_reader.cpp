@@ -1,5 +1,6 @@
 #include "gateway/mapping/entry_reader.hpp"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "gateway/mapping/attributes.hpp"
@@ -14,6 +15,8 @@ namespace arbiter::gateway {
 namespace {
 
 constexpr std::size_t kEncapsulation = 4;  // bytes of DDS's header
+// Of a field in CDR: XCDR2 aligns to four bytes at most, XCDR1 to eight.
+constexpr std::size_t kMostAligned = 4;
 // Encapsulations that DDS-XTypes knows.
 constexpr unsigned kLastPlainCdr = 1;  // big-endian and little-endian
 constexpr unsigned kLastXcdr1 = 3;
@@ -96,6 +99,8 @@ class EntryReader {
   void read_type() {
     if (entry_.dds) {
       entry_.type = PortType{readable_type(entry_.dds->type), 0, 1};
+      known_size_ = fixed_size_of(entry_.type->name);
+      if (known_size_) make_room_for(header() + *known_size_, "type");
       return;
     }
     const auto size = attributes_.bytes("size", 1, kMaxSampleBytes);
@@ -151,11 +156,7 @@ class EntryReader {
     } else {
       read_number(choice);
     }
-    if (header() + choice.offset + size_of(choice.field) > entry_.max_size) {
-      attributes_.error("invalid-value", "offset",
-                        "the field lies beyond max_size, " + std::to_string(entry_.max_size) +
-                            " bytes; correct one of the two");
-    }
+    check_place(choice);
     if (!yes || !no) return;
     if (yes->name == no->name) {
       reader_.error("duplicate-port", no->where,
@@ -167,23 +168,58 @@ class EntryReader {
     entry_.choice = std::move(choice);
   }
 
+  // A field that no sample has would leave both sources silent for ever.
+  void check_place(const Choice& choice) {
+    const std::size_t size = size_of(choice.field);
+    const std::size_t end = choice.offset + size;
+    const std::string at = attributes_.has("offset") ? "offset" : "field";
+    if (header() + end > entry_.max_size) {
+      attributes_.error("invalid-value", at,
+                        "the field lies beyond max_size, " + std::to_string(entry_.max_size) +
+                            " bytes; correct one of the two");
+    } else if (known_size_ && end > *known_size_) {
+      attributes_.error("invalid-value", at,
+                        "a " + entry_.type->name + " has " + std::to_string(*known_size_) +
+                            " bytes, and the field would end at " + std::to_string(end) +
+                            "; correct the offset or the field");
+    } else if (entry_.dds && choice.offset % std::min(size, kMostAligned) != 0) {
+      attributes_.error("invalid-value", at,
+                        "DDS stores a field of " + std::to_string(size) +
+                            " bytes at a multiple of " +
+                            std::to_string(std::min(size, kMostAligned)) + ", and " +
+                            std::to_string(choice.offset) + " is none; correct the offset");
+    }
+  }
+
   void read_number(Choice& choice) {
-    attributes_.required("threshold", 100);
-    if (const auto threshold = attributes_.real("threshold")) choice.threshold = *threshold;
     attributes_.required("field", 100);
     using enum Field;
-    if (const auto field = attributes_.word<Field>("field", {{"f32", kF32},
-                                                             {"f64", kF64},
-                                                             {"i8", kI8},
-                                                             {"u8", kU8},
-                                                             {"i16", kI16},
-                                                             {"u16", kU16},
-                                                             {"i32", kI32},
-                                                             {"u32", kU32},
-                                                             {"i64", kI64},
-                                                             {"u64", kU64}})) {
-      choice.field = *field;
-    }
+    const auto field = attributes_.word<Field>("field", {{"f32", kF32},
+                                                         {"f64", kF64},
+                                                         {"i8", kI8},
+                                                         {"u8", kU8},
+                                                         {"i16", kI16},
+                                                         {"u16", kU16},
+                                                         {"i32", kI32},
+                                                         {"u32", kU32},
+                                                         {"i64", kI64},
+                                                         {"u64", kU64}});
+    if (field) choice.field = *field;
+    attributes_.required("threshold", 100);
+    const auto threshold = attributes_.real("threshold");
+    if (threshold) choice.threshold = *threshold;
+    if (field && threshold) check_threshold(choice);
+  }
+
+  void check_threshold(const Choice& choice) {
+    const Range range = range_of(choice.field);
+    const bool is_always = choice.threshold < range.least;
+    if (!is_always && choice.threshold < range.greatest) return;
+    attributes_.error("invalid-value", "threshold",
+                      std::string("each number of this field is ") +
+                          (is_always ? "above it" : "at or below it") +
+                          ", so one of the two sources would never be active; write another "
+                          "threshold, or correct the field");
   }
 
   void refuse_without(std::string_view name, std::string_view other) {
@@ -251,7 +287,7 @@ class EntryReader {
   std::optional<std::size_t> size_of_zero() {
     const std::string& type = entry_.type->name;
     const auto said = attributes_.bytes("size", 1, kMaxIdleBytes);
-    const auto known = fixed_size_of(type);
+    const auto known = known_size_;
     if (has_strings(type)) {
       attributes_.error("idle-size", "idle",
                         rules::quote(type) +
@@ -336,7 +372,7 @@ class EntryReader {
                         "another file, or leave out the representation";
     }
     if (encapsulation > kLastPlainCdr) return {};  // other encodings add bytes of their own
-    const auto known = fixed_size_of(entry_.type->name);
+    const auto known = known_size_;
     const std::size_t own = bytes.size() - header();
     // It may be padded to a multiple of four, as DDS sends it.
     if (!known || own == *known || own == (*known + 3) / 4 * 4) return {};
@@ -348,7 +384,8 @@ class EntryReader {
   const EntryContext& context_;
   Attributes attributes_;
   Entry entry_;
-  std::size_t size_ = 0;  // of iceoryx: of a sample's payload; 0: any
+  std::optional<std::size_t> known_size_;  // of a sample's data; absent: it may vary
+  std::size_t size_ = 0;                   // of iceoryx: of a sample's payload; 0: any
 };
 
 }  // namespace

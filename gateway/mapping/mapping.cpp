@@ -1,6 +1,17 @@
 #include "gateway/mapping/mapping.hpp"
 
+#include <limits>
+
 namespace arbiter::gateway {
+namespace {
+
+template <class Number>
+Range range_of_type() {
+  return {static_cast<long double>(std::numeric_limits<Number>::lowest()),
+          static_cast<long double>(std::numeric_limits<Number>::max())};
+}
+
+}  // namespace
 
 const char* name_of(Kind kind) { return kind == Kind::kDds ? "dds" : "iceoryx"; }
 
@@ -23,6 +34,34 @@ std::size_t size_of(Field field) {
       break;
   }
   return 8;
+}
+
+Range range_of(Field field) {
+  switch (field) {
+    case Field::kBoolean:
+      return range_of_type<bool>();
+    case Field::kI8:
+      return range_of_type<std::int8_t>();
+    case Field::kU8:
+      return range_of_type<std::uint8_t>();
+    case Field::kI16:
+      return range_of_type<std::int16_t>();
+    case Field::kU16:
+      return range_of_type<std::uint16_t>();
+    case Field::kI32:
+      return range_of_type<std::int32_t>();
+    case Field::kU32:
+      return range_of_type<std::uint32_t>();
+    case Field::kI64:
+      return range_of_type<std::int64_t>();
+    case Field::kU64:
+      return range_of_type<std::uint64_t>();
+    case Field::kF32:
+      return range_of_type<float>();
+    case Field::kF64:
+      break;
+  }
+  return range_of_type<double>();
 }
 
 std::vector<const Port*> Entry::ports() const {

@@ -39,6 +39,12 @@ struct Port {
 // How a field of a sample is stored.
 enum class Field { kBoolean, kI8, kU8, kI16, kU16, kI32, kU32, kI64, kU64, kF32, kF64 };
 [[nodiscard]] std::size_t size_of(Field field);
+// Of a number: the least and the greatest finite value.
+struct Range {
+  long double least = 0;
+  long double greatest = 0;
+};
+[[nodiscard]] Range range_of(Field field);
 
 // A topic that is two sources: one is published, and the other deactivated, by what a field of the
 // sample says. So a Boolean, or a number on one side of a threshold, can be read by a condition.

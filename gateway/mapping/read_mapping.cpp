@@ -1,5 +1,6 @@
 #include "gateway/mapping/read_mapping.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <utility>
 
@@ -85,6 +86,7 @@ class MappingReader {
         gateway.domain = static_cast<std::uint32_t>(*domain);
       }
       gateway.interfaces = attributes.list("interface", 255);
+      refuse_twice(attributes, gateway.interfaces);
       gateway.peers = attributes.list("peers", 255);
       if (const auto file = attributes.text("configuration", 4096)) {
         gateway.configuration = path_of(*file);
@@ -113,6 +115,14 @@ class MappingReader {
       }
     }
     mapping_.gateways.push_back(std::move(gateway));
+  }
+
+  static void refuse_twice(Attributes& attributes, std::vector<std::string> interfaces) {
+    std::sort(interfaces.begin(), interfaces.end());
+    const auto twice = std::adjacent_find(interfaces.begin(), interfaces.end());
+    if (twice == interfaces.end()) return;
+    attributes.error("invalid-value", "interface",
+                     rules::quote(*twice) + " is named twice, which Cyclone refuses; name it once");
   }
 
   // Its elements are Cyclone's business, which says what it does not like when a domain is joined.

@@ -1,5 +1,7 @@
 #include "gateway/mapping/topic_reader.hpp"
 
+#include <algorithm>
+
 #include "gateway/mapping/ros_names.hpp"
 #include "rules/text/names.hpp"
 
@@ -75,6 +77,15 @@ Qos read_qos(Attributes& attributes, bool is_in, bool is_ros) {
   return qos;
 }
 
+// What Cyclone takes for the name of a topic; its own topics it lets nobody have.
+bool is_dds_topic(const std::string& name) {
+  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  return !is_digit(name.front()) && !name.starts_with("DCPS") &&
+         std::all_of(name.begin(), name.end(),
+                     [&](char c) { return is_letter(c) || is_digit(c) || c == '_' || c == '/'; });
+}
+
 // A ROS 2 name goes with a ROS 2 type, and a name of DDS with one of DDS: a topic that is written
 // half in one and half in the other would be found by neither.
 void check_names(Attributes& attributes, DdsTopic& topic) {
@@ -109,6 +120,11 @@ void check_names(Attributes& attributes, DdsTopic& topic) {
                          " is not; write \"/" + topic.written +
                          "\", or for a topic that is no node's, its type as DDS has it, " +
                          rules::quote(dds_type_of(topic.type_written)));
+  } else if (!is_dds_topic(topic.written)) {
+    attributes.error("invalid-topic", "topic",
+                     "DDS has no topic " + rules::quote(topic.written) +
+                         "; write letters, digits, '_' and '/', not a digit first, and not a "
+                         "name that begins with DCPS, which are those of DDS itself");
   }
 }
 
