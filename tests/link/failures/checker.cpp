@@ -147,7 +147,8 @@ void check_age(const HostEvidence& importer, const HostEvidence& exporter,
     for (const Nanoseconds time : published[event.sequence]) {
       if (time <= event.time && time >= least) latest = std::max(latest, time);
     }
-    if (latest == 0) {
+    const bool may_be_later = !event.command && began_between(exporter, latest, event.time);
+    if (latest == 0 || may_be_later) {
       ++checked.unsure;
     } else if (event.time - latest > most) {
       found.push_back(importer.name + ": " + source + " " + number_of(event) +

@@ -151,18 +151,29 @@ TEST(Checker, KnowsWhatStaysAtHome) {
 TEST(Checker, NamesWhatTheRecorderDidNotTake) {
   Recorded home = Recorded().published(1, 10).published(2, 20).published(1, 60).signals(1, 11);
   for (Happened& event : home.exporter.sources[kSource]) event.command.reset();
-  name_own(home.exporter, kSource, 1, {5 * kMs, 50 * kMs});
+  home.exporter.lives = {5 * kMs, 50 * kMs};
+  name_own(home.exporter, kSource, 1);
   const auto& own = home.exporter.sources[kSource];
   EXPECT_EQ(own[1].command->life, 1U);
   EXPECT_EQ(own[1].command->number, 2U);
   EXPECT_EQ(own[2].command->life, 2U);
-  home.signals(1, 70).signals(1, 5000);
+  home.signals(1, 70).signals(1, 5000).signals(2, 5010);
   name_imported(home.importer, home.exporter, kSource);
   const auto& imported = home.importer.sources[kSource];
   EXPECT_EQ(imported[0].command->made, 10 * kMs);
   EXPECT_FALSE(imported[1].command) << "it may be that of either life";
   EXPECT_EQ(imported[2].command->life, 2U);
+  EXPECT_FALSE(imported[3].command) << "the later life may have published it, too";
   EXPECT_THAT(home.order(), testing::Not(IsEmpty())) << "it arrived before";
+}
+
+// What a life publishes before the recorder has joined its port is in no recording.
+TEST(Checker, DoesNotTakeANewLifesNumbersForThoseOfTheOldOne) {
+  Recorded home = Recorded().published(1, 10).published(2, 20).signals(1, 5000);
+  home.exporter.lives = {5 * kMs};
+  EXPECT_THAT(home.age(100), testing::SizeIs(1));
+  home.exporter.lives.push_back(4990 * kMs);
+  EXPECT_THAT(home.age(100), IsEmpty());
 }
 
 TEST(Checker, KnowsWhatWasAskedFor) {

@@ -142,8 +142,13 @@ HostEvidence said_by(const HostEvidence& evidence, const std::string& source, un
   return result;
 }
 
-void name_own(HostEvidence& evidence, const std::string& source, unsigned host,
-              const std::vector<Nanoseconds>& lives) {
+bool began_between(const HostEvidence& host, Nanoseconds earlier, Nanoseconds later) {
+  return std::any_of(host.lives.begin(), host.lives.end(),
+                     [&](Nanoseconds life) { return earlier < life && life <= later; });
+}
+
+void name_own(HostEvidence& evidence, const std::string& source, unsigned host) {
+  const std::vector<Nanoseconds>& lives = evidence.lives;
   for (Happened& event : evidence.sources[source]) {
     if (event.kind != Happened::Kind::sample || event.command || event.exporter != 0) continue;
     const auto begun = std::upper_bound(lives.begin(), lives.end(), event.time) - lives.begin();
@@ -170,7 +175,8 @@ void name_imported(HostEvidence& evidence, const HostEvidence& exporter,
     if (after == all.begin()) continue;
     const auto last = std::prev(after);
     const bool may_be_other =
-        last != all.begin() && std::prev(last)->made > event.time - kOfAnotherLife;
+        (last != all.begin() && std::prev(last)->made > event.time - kOfAnotherLife) ||
+        began_between(exporter, last->made, event.time);
     if (!may_be_other) event.command = *last;
   }
 }

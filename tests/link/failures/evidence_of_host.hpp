@@ -43,6 +43,8 @@ struct HostEvidence {
   std::vector<ModelInForce> models;                      // by time
   // When ports of a source were closed, or whoever had them died, by the daemon.
   std::map<std::string, std::vector<Nanoseconds>> closures;
+  // When the component began that publishes the host's source, each time.
+  std::vector<Nanoseconds> lives;
   // When daemons began that knew nothing of any activity before.
   std::vector<Nanoseconds> beginnings;
   std::uint64_t decisions = 0;
@@ -57,11 +59,14 @@ struct HostEvidence {
 [[nodiscard]] HostEvidence said_by(const HostEvidence& evidence, const std::string& source,
                                    unsigned host);
 
+// Whether the component had another life before the later time. Of what that published first, its
+// recorder has nothing.
+[[nodiscard]] bool began_between(const HostEvidence& host, Nanoseconds earlier, Nanoseconds later);
+
 // Where a recorder does not take a source's samples, tells whose they are: of the host's own, by
 // when its component's lives began; of others, by what their exporter has published with that
-// number before, unless a life shortly before had the number as well.
-void name_own(HostEvidence& evidence, const std::string& source, unsigned host,
-              const std::vector<Nanoseconds>& lives);
+// number before, unless another life may have published it as well.
+void name_own(HostEvidence& evidence, const std::string& source, unsigned host);
 void name_imported(HostEvidence& evidence, const HostEvidence& exporter, const std::string& source);
 
 // Adds what happened at `motor`.

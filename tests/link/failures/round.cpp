@@ -340,7 +340,7 @@ void Round::name_large(std::vector<HostEvidence>& evidence) const {
     if (!is_large(number)) continue;
     const std::string source = source_of(number);
     HostEvidence& its = evidence[number - 1];
-    name_own(its, source, number, history_.hosts[number - 1].component_lives);
+    name_own(its, source, number);
     for (HostEvidence& importer : evidence) name_imported(importer, its, source);
   }
 }
@@ -350,6 +350,7 @@ void Round::check(Findings& found) {
   for (const auto& each : hosts_) {
     try {
       evidence.push_back(read_evidence(each->name(), motor_of(each->number()), each->recording()));
+      evidence.back().lives = history_.hosts[each->number() - 1].component_lives;
     } catch (const std::exception& error) {
       found.push_back(each->name() + ": its recording: " + error.what());
       return;
