@@ -102,9 +102,13 @@ void Desk::close() {
   changed_.notify_all();
 }
 
-std::set<Participant> Desk::deaf() const {
+OtherLinks Desk::others() const {
   const std::lock_guard lock(mutex_);
-  return round_trips_.deaf();
+  OtherLinks others{round_trips_.deaf(), {}};
+  for (const Neighbour& each : neighbours_.all()) {
+    if (each.is_up) others.cards.emplace(each.participant, each.card);
+  }
+  return others;
 }
 
 Neighbours Desk::known() const {

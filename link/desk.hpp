@@ -25,6 +25,7 @@
 #include "link/core/asked_questions.hpp"
 #include "link/core/disagreements.hpp"
 #include "link/core/neighbours.hpp"
+#include "link/core/offers.hpp"
 #include "link/core/pulse.hpp"
 #include "link/core/questions.hpp"
 #include "link/dds/message_topic.hpp"
@@ -65,8 +66,8 @@ class Desk {
   // a second.
   void look(OwnHost own);
 
-  // Of those that are there, who does not hear this link.
-  [[nodiscard]] std::set<Participant> deaf() const;
+  // Of those that are there: who does not hear this link, and what each has said last.
+  [[nodiscard]] OtherLinks others() const;
   // After close(): those that it knew, gone now.
   [[nodiscard]] Neighbours known() const;
 

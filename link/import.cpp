@@ -1,7 +1,6 @@
 #include "link/import.hpp"
 
 #include <algorithm>
-#include <map>
 #include <string_view>
 #include <utility>
 
@@ -16,8 +15,6 @@ using gateway::Level;
 constexpr shm::Nanoseconds kOpenAgain = 1'000'000'000;
 // Counts go up with each event, and each description is a message to the daemon.
 constexpr shm::Nanoseconds kDescribeAgain = 1'000'000'000;
-// Twice the lease: an earlier life of a host is not believed to live for so long.
-constexpr shm::Nanoseconds kNoEarlierLife = 3'000'000'000;
 
 Type type_of(const shm::TypeInfo& info) {
   if (!info.is_typed()) return Type::untyped(static_cast<std::size_t>(info.size));
@@ -40,6 +37,7 @@ Import::Import(Node& node, const Network& network, const SentTokens& tokens, std
       source_(std::move(source)),
       me_(me),
       demands_(demands),
+      offers_(source_),
       demand_(use, shm::monotonic_now()),
       said_demand_(demand_.demand()) {
   unheard_.reserve(kMaxUnheard);
@@ -56,20 +54,19 @@ Import::~Import() {
   reader_.reset();  // it calls take() until then
 }
 
-void Import::look(bool is_open_here, SourceUse use, const std::set<Participant>& deaf) {
+void Import::look(bool is_open_here, SourceUse use, const OtherLinks& others) {
   is_open_here = has_just_yielded() || is_open_here;
-  listen_to_speaker(deaf);
+  listen_to_speaker(others);
   {
     const std::lock_guard lock(mutex_);
     demand_.set_use(is_open_here ? SourceUse::kNone : use, shm::monotonic_now());
     say_demand();
   }
-  const Offerer* const speaker = speaker_.current();
+  const Offer* const speaker = offers_.speaker();
   // The model wants it, or there would be no import.
   const ImportChoice choice = choose_import({true, is_open_here, speaker != nullptr});
-  const OfferCard* const card = speaker == nullptr ? nullptr : &offers_.at(speaker->key).card;
-  const bool is_other_type = card != nullptr && card->type_revision != revision_;
-  const bool is_other_host = speaker == nullptr || speaker->incarnation != obeyed_;
+  const bool is_other_type = speaker != nullptr && speaker->card.type_revision != revision_;
+  const bool is_other_host = speaker == nullptr || speaker->card.incarnation != obeyed_;
   const bool is_open_otherwise = (is_other_type || is_other_host) && is_open();
   if (choice != ImportChoice::kImport || is_open_otherwise) close();
   if (choice == ImportChoice::kSpokenHere) {
@@ -80,11 +77,11 @@ void Import::look(bool is_open_here, SourceUse use, const std::set<Participant>&
 }
 
 void Import::open(bool has_daemon, const Patience& patience) {
-  const Offerer* const speaker = speaker_.current();
+  const Offer* const speaker = offers_.speaker();
   const bool is_wanted = obeyed_ != 0 && speaker != nullptr && !is_open();
   const bool may_open = has_daemon && shm::monotonic_now() >= open_again_ && patience.is_left();
-  if (is_wanted && may_open && offers_.at(speaker->key).card.type_revision != 0) {
-    open_port(offers_.at(speaker->key).card);
+  if (is_wanted && may_open && speaker->card.type_revision != 0) {
+    open_port(speaker->card);
     // Not before, whether it is open or not: strangers may have it opened again and again.
     open_again_ = shm::monotonic_now() + kOpenAgain;
     patience.note_call();
@@ -117,9 +114,9 @@ bool Import::has_just_yielded() {
   return shm::monotonic_now() < spoken_here_until_;
 }
 
-void Import::obey(const Offerer* speaker) {
+void Import::obey(const Offer* speaker) {
   const std::lock_guard lock(mutex_);
-  const Incarnation exporter = speaker == nullptr ? 0 : speaker->incarnation;
+  const Incarnation exporter = speaker == nullptr ? 0 : speaker->card.incarnation;
   const std::uint64_t writer = speaker == nullptr ? 0 : speaker->key;
   if (exporter == obeyed_ && writer == writer_) return;
   obeyed_ = exporter;
@@ -138,69 +135,44 @@ void Import::obey(const Offerer* speaker) {
   unheard_.erase(last);
 }
 
-void Import::listen_to_speaker(const std::set<Participant>& deaf) {
-  std::vector<EventReader::Offer> offers =
-      reader_->offers(speaker_.current() == nullptr ? 0 : speaker_.current()->key);
+void Import::listen_to_speaker(const OtherLinks& others) {
+  const Offer* const before = offers_.speaker();
+  const std::vector<Offer> offers = reader_->offers(before == nullptr ? 0 : before->key);
   forget(offers);
-  // It sends nothing any more, and we would wait for it as long as its announcements come.
-  std::erase_if(offers,
-                [&](const EventReader::Offer& each) { return deaf.contains(each.participant); });
-  for (auto each = offers_.begin(); each != offers_.end();) {
-    const bool is_there =
-        std::any_of(offers.begin(), offers.end(), [&](const EventReader::Offer& offer) {
-          return offer.key == each->first && offer.card.source == source_;
-        });
-    if (!is_there) speaker_.remove(each->first);
-    each = is_there ? std::next(each) : offers_.erase(each);
-  }
-  for (const EventReader::Offer& offer : offers) {
-    if (offer.card.source != source_) continue;
-    Offered& known = offers_[offer.key];
-    if (known.since == 0) known.since = shm::monotonic_now();
-    known.card = offer.card;
-    speaker_.add({offer.key, offer.card.host, offer.card.incarnation});
-  }
-  find_shared_name();
+  offers_.look(offers, others, shm::monotonic_now());
+  say_shared_name();
   say_who_speaks();
 }
 
 // Forgets exporters that offer nothing any more, if others need their places.
-void Import::forget(const std::vector<EventReader::Offer>& offers) {
+void Import::forget(const std::vector<Offer>& offers) {
   const std::lock_guard lock(mutex_);
   if (unheard_.size() < kMaxUnheard) return;
   std::erase_if(unheard_, [&](const Unheard& each) {
     return std::none_of(offers.begin(), offers.end(),
-                        [&](const EventReader::Offer& offer) { return offer.key == each.writer; });
+                        [&](const Offer& offer) { return offer.key == each.writer; });
   });
 }
 
-// One host has the source open once: who offers it beside its like for long is another machine.
-void Import::find_shared_name() {
-  shared_name_.clear();
-  const shm::Nanoseconds now = shm::monotonic_now();
-  std::map<std::string_view, Incarnation> first;
-  for (const auto& [key, offer] : offers_) {
-    if (now - offer.since < kNoEarlierLife) continue;
-    const auto [one, is_new] = first.emplace(offer.card.host, offer.card.incarnation);
-    if (!is_new && one->second != offer.card.incarnation) shared_name_ = offer.card.host;
-  }
-  if (shared_name_ == shared_name_said_) return;
+void Import::say_shared_name() {
+  const std::string& name = offers_.shared_name();
+  if (name == shared_name_said_) return;
   const bool is_said =
-      shared_name_.empty() ||
+      name.empty() ||
       say_sparingly(Level::kWarning,
-                    source_ + " is open on several machines that are all called " + shared_name_ +
+                    source_ + " is open on several machines that are all called " + name +
                         ", and is taken from the one that came last: give each its own --host");
-  if (is_said) shared_name_said_ = shared_name_;
+  if (is_said) shared_name_said_ = name;
 }
 
 void Import::say_who_speaks() {
-  const std::vector<std::string> hosts = speaker_.hosts();
+  const std::vector<std::string> hosts = offers_.hosts();
   const std::string text = hosts.size() < 2 ? "" : joined(hosts);
   if (text == hosts_said_) return;
   const bool is_said =
       text.empty() ||
       say_sparingly(Level::kWarning, source_ + " is open on several hosts: " + text +
-                                         "; it is taken from " + speaker_.current()->host +
+                                         "; it is taken from " + offers_.speaker()->card.host +
                                          " until that one is gone");
   if (is_said) hosts_said_ = text;
 }
@@ -250,11 +222,13 @@ void Import::say_once(const std::string& text) {
 }
 
 std::string Import::text() const {
-  const Offerer* const speaker = speaker_.current();
-  std::string text = "host " + (speaker == nullptr ? std::string("unknown") : speaker->host);
-  const std::vector<std::string> hosts = speaker_.hosts();
+  const Offer* const speaker = offers_.speaker();
+  std::string text = "host " + (speaker == nullptr ? std::string("unknown") : speaker->card.host);
+  const std::vector<std::string> hosts = offers_.hosts();
   if (hosts.size() > 1) text += ", open on several hosts: " + joined(hosts);
-  if (!shared_name_.empty()) text += ", several machines are called " + shared_name_;
+  if (const std::string& name = offers_.shared_name(); !name.empty()) {
+    text += ", several machines are called " + name;
+  }
   const std::lock_guard lock(mutex_);
   const auto count = [&](std::uint64_t number, const char* what) {
     if (number != 0) text += ", " + std::to_string(number) + what;
@@ -274,9 +248,9 @@ std::string Import::text() const {
 wire::ImportStatus Import::status() const {
   wire::ImportStatus status;
   status.source = source_;
-  const Offerer* const speaker = speaker_.current();
-  status.host = speaker == nullptr ? last_host_ : speaker->host;
-  status.hosts = speaker_.hosts();
+  const Offer* const speaker = offers_.speaker();
+  status.host = speaker == nullptr ? last_host_ : speaker->card.host;
+  status.hosts = offers_.hosts();
   const std::lock_guard lock(mutex_);
   status.is_open = port_ != nullptr;
   status.lost = stream_.lost();

@@ -9,11 +9,9 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -23,10 +21,9 @@
 #include "link/core/demand.hpp"
 #include "link/core/event_header.hpp"
 #include "link/core/import_choice.hpp"
-#include "link/core/participant.hpp"
+#include "link/core/offers.hpp"
 #include "link/core/patience.hpp"
 #include "link/core/sent_tokens.hpp"
-#include "link/core/speaker.hpp"
 #include "link/core/stream.hpp"
 #include "link/dds/demands.hpp"
 #include "link/dds/event_topic.hpp"
@@ -53,8 +50,8 @@ class Import : private gateway::dds::SampleTaker {
     max_age_.store(age, std::memory_order_relaxed);
   }
   // Who speaks now, and whether the port is to be open: closes it if it is not. `use`: by the model
-  // in force. `deaf`: who does not hear this link, and so does not speak to it.
-  void look(bool is_open_here, SourceUse use, const std::set<Participant>& deaf);
+  // in force.
+  void look(bool is_open_here, SourceUse use, const OtherLinks& others);
   // After look(): opens the port if it is to be open and is not.
   void open(bool has_daemon, const Patience& patience);
   // Any thread: a component of this host asks for the name. Closes the port at once.
@@ -81,7 +78,7 @@ class Import : private gateway::dds::SampleTaker {
   void take(const gateway::dds::Payload& payload,  // NOLINT(bugprone-exception-escape)
             const gateway::dds::SampleWriter& writer) noexcept override;
   // Whom to obey from now on; null: nobody.
-  void obey(const Offerer* speaker);
+  void obey(const Offer* speaker);
   // Under the lock, by header_.
   void arrive(const gateway::dds::Payload& payload, std::size_t before);
   // Of the event in header_.
@@ -100,14 +97,14 @@ class Import : private gateway::dds::SampleTaker {
   // Of one that finds no place the state is not known before its next event.
   void remember(std::uint64_t writer, const StreamEvent& event) noexcept;
 
-  void listen_to_speaker(const std::set<Participant>& deaf);
-  void forget(const std::vector<EventReader::Offer>& offers);
+  void listen_to_speaker(const OtherLinks& others);
+  void forget(const std::vector<Offer>& offers);
   void open_port(const OfferCard& card);
   // Whether it has yielded, and this host's status may not say yet to whom.
   [[nodiscard]] bool has_just_yielded();
   [[nodiscard]] bool is_open() const;
   void say_who_speaks();
-  void find_shared_name();
+  void say_shared_name();
   void say_once(const std::string& text);
   void describe();
   // "host head, 3 lost, 2 late".
@@ -121,17 +118,11 @@ class Import : private gateway::dds::SampleTaker {
   std::atomic<shm::Nanoseconds> max_age_{shm::kDefaultTimeout};
 
   // The link's thread.
-  Speaker speaker_;
-  struct Offered {
-    OfferCard card;
-    shm::Nanoseconds since = 0;
-  };
-  std::map<std::uint64_t, Offered> offers_;
+  Offers offers_;
   std::string last_host_;  // that it was taken from; empty: none yet
   std::string said_;
   std::string described_;
   std::string hosts_said_;
-  std::string shared_name_;  // of several machines; empty: there is none
   std::string shared_name_said_;
   shm::Nanoseconds open_again_ = 0;
   shm::Nanoseconds describe_again_ = 0;

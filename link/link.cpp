@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <set>
 #include <system_error>
 #include <utility>
 
@@ -247,9 +246,9 @@ void Link::choose_imports(const Patience& patience) {
   }
   end(std::move(gone));
   set_max_ages();
-  const std::set<Participant> deaf = desk_->deaf();
+  const OtherLinks others = desk_->others();
   for (const auto& [source, one] : imports_) {
-    one->look(view_.open_here().contains(source), view_.use_of(source), deaf);
+    one->look(view_.open_here().contains(source), view_.use_of(source), others);
   }
   shm::Nanoseconds shortest = 0;  // no import
   for (const auto& [source, age] : wanted) {

@@ -20,11 +20,10 @@ constexpr const char* kEventType = "arbiter::Event";
 // A writer that keeps the last event alone need not wait for readers that do not keep up, and in
 // Cyclone it does not: no reader holds up the one thread that sends.
 constexpr dds_duration_t kMaxBlocking = 0;
-// Bounds of what a reader looks at each time and keeps, on a network where anybody may write. A
-// participant has one offer of a source, or two for a moment: nobody hides others by making many.
+// Bounds of what a reader looks at each time and keeps, on a network where anybody may write. Of a
+// participant it keeps one: nobody hides others by making many.
 constexpr std::size_t kMostLooks = 64;
 constexpr std::size_t kMostOffers = 256;
-constexpr std::ptrdiff_t kMostOffersOfOne = 2;
 // Usually enough, so that one question is.
 constexpr std::size_t kUsualWriters = 64;
 
@@ -56,7 +55,7 @@ struct FreeEndpoint {
   }
 };
 
-std::optional<EventReader::Offer> offer_of(dds_entity_t reader, dds_instance_handle_t writer) {
+std::optional<Offer> offer_of(dds_entity_t reader, dds_instance_handle_t writer) {
   const std::unique_ptr<dds_builtintopic_endpoint_t, FreeEndpoint> endpoint(
       dds_get_matched_publication_data(reader, writer));
   if (endpoint == nullptr || endpoint->qos == nullptr) return std::nullopt;
@@ -66,7 +65,7 @@ std::optional<EventReader::Offer> offer_of(dds_entity_t reader, dds_instance_han
   auto card = read_offer_card(Bytes(static_cast<const std::byte*>(data), size));
   dds_free(data);
   if (!card) return std::nullopt;
-  EventReader::Offer offer{writer, std::move(*card), {}};
+  Offer offer{writer, std::move(*card), {}};
   std::copy_n(std::begin(endpoint->participant_key.v), offer.participant.size(),
               offer.participant.begin());
   return offer;
@@ -144,7 +143,7 @@ EventReader::EventReader(const Network& network, const std::string& source,
                    "a reader of " + topic_of_source(source));
 }
 
-std::vector<EventReader::Offer> EventReader::offers(std::uint64_t current) {
+std::vector<Offer> EventReader::offers(std::uint64_t current) {
   std::vector<std::uint64_t> writers = writers_of(reader_.get());
   std::sort(writers.begin(), writers.end());
   std::erase_if(offers_, [&](const auto& each) {
@@ -168,11 +167,15 @@ std::vector<EventReader::Offer> EventReader::offers(std::uint64_t current) {
 void EventReader::look_at(std::uint64_t writer) {
   offers_.erase(writer);
   auto offer = offer_of(reader_.get(), writer);
-  if (!offer || offers_.size() >= kMostOffers) return;
-  const auto of_it = std::count_if(offers_.begin(), offers_.end(), [&](const auto& each) {
+  if (!offer) return;
+  const auto other = std::find_if(offers_.begin(), offers_.end(), [&](const auto& each) {
     return each.second.participant == offer->participant;
   });
-  if (of_it < kMostOffersOfOne) offers_.emplace(writer, std::move(*offer));
+  if (other != offers_.end()) {
+    if (!is_newer(offer->card.incarnation, other->second.card.incarnation)) return;
+    offers_.erase(other);
+  }
+  if (offers_.size() < kMostOffers) offers_.emplace(writer, std::move(*offer));
 }
 
 std::vector<std::uint64_t> writers_of(dds_entity_t reader) {

@@ -21,7 +21,7 @@
 #include "gateway/dds/reader_cache.hpp"
 #include "link/core/cards.hpp"
 #include "link/core/demand.hpp"
-#include "link/core/participant.hpp"
+#include "link/core/offers.hpp"
 #include "link/dds/network.hpp"
 
 namespace arbiter::link {
@@ -57,15 +57,10 @@ class EventReader {
   EventReader(const Network& network, const std::string& source, gateway::dds::SampleTaker& taker,
               const gateway::Bell& bell, const DemandCard& demand);
 
-  struct Offer {
-    std::uint64_t key = 0;
-    OfferCard card;
-    Participant participant{};  // whose writer it is
-  };
   // By which DemandTeller knows it.
   [[nodiscard]] dds_entity_t handle() const { return reader_.get(); }
-  // Who offers the source now. Malformed cards are passed over. Of very many some are looked at
-  // each time, in turn, but `current` always, if it is there.
+  // Who offers the source now, of each participant the newest. Malformed cards are passed over. Of
+  // very many some are looked at each time, in turn, but `current` always, if it is there.
   [[nodiscard]] std::vector<Offer> offers(std::uint64_t current);
 
  private:

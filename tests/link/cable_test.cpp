@@ -5,6 +5,7 @@
 #include <sched.h>
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -123,6 +124,72 @@ TEST_F(Cable, ASpeakerThatDoesNotHearUsGivesWay) {
   base.await_described(kPlanner, "open on several hosts: head, rear");
   robot.cables.cut_to(kHead);
   base.await_described(kPlanner, "host rear");
+  body.drive(other);
+}
+
+// While the head hears nobody, nobody hears of the ends of its sources: DDS repeats them only to
+// those whose announcements come.
+class UnheardEnds : public Cable {
+ protected:
+  void SetUp() override {
+    Cable::SetUp();
+    if (!IsSkipped()) robot_.emplace();
+  }
+  [[nodiscard]] Host host(const std::string& name, const std::string& model,
+                          const NetworkNamespace& network) const {
+    return {name, robot_->runtime, model, CabledRobot::arguments(), network.enter()};
+  }
+  // Whether components of the head have the planner's port open, as its link knows.
+  static void await_offer(bool is_open) {
+    await_hosts("head", [&](const wire::HostsDocument& hosts) {
+      return (hosts.find_this()->output_count != 0) == is_open;
+    });
+  }
+  void let_head_hear_nobody(const Host& base) {
+    robot_->cables.cut_to(kHead);
+    base.see("host head is there, and has not heard this one for 2 s");
+    await_hosts("head",
+                [](const wire::HostsDocument& hosts) { return !hosts.find_host("base")->is_up; });
+  }
+
+  std::optional<CabledRobot> robot_;
+};
+
+TEST_F(UnheardEnds, OfAPublisherThatIsStartedAgainDoNotSpeakInItsPlace) {
+  const Host head = host("head", source_model("300ms"), robot_->head_network);
+  const Host base = host("base", motor_model("300ms"), robot_->base_network);
+  std::optional<Planner> planner(head);
+  Body body(base);
+  body.drive(*planner);
+  let_head_hear_nobody(base);
+  for (int life = 0; life < 5; ++life) {
+    const std::int64_t published = planner->published();
+    planner.reset();
+    await_offer(false);
+    planner.emplace(head, published);
+    await_offer(true);
+  }
+  robot_->cables.heal_to(kHead);
+  body.drive(*planner);
+}
+
+TEST_F(UnheardEnds, LeaveTheSourceToAnotherHost) {
+  const NetworkNamespace rear_network;
+  robot_->cables.connect(rear_network, 3);
+  const Host head = host("head", source_model("300ms"), robot_->head_network);
+  const Host base = host("base", motor_model("300ms"), robot_->base_network);
+  std::optional<Planner> planner(head);
+  Body body(base);
+  body.drive(*planner);
+  let_head_hear_nobody(base);
+  const std::int64_t published = planner->published();
+  planner.reset();
+  await_offer(false);
+  robot_->cables.heal_to(kHead);
+  const std::string taken = "comes from host head";
+  await([&] { return base.log().find(taken) != base.log().rfind(taken); });
+  const Host rear = host("rear", source_model("300ms"), rear_network);
+  Planner other(rear, published);
   body.drive(other);
 }
 

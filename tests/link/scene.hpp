@@ -33,11 +33,12 @@ using namespace std::chrono_literals;
 class Host {
  public:
   // `model`: empty, and the host has none. `by`: what starts the link, such as in a network
-  // namespace. `arguments`: more of the daemon's.
+  // namespace. `arguments`: more of the daemon's. `called`: otherwise than its instance.
   Host(std::string name, const TemporaryDirectory& runtime, const std::string& model,
        std::vector<std::string> network, std::vector<std::string> by = {},
-       std::vector<std::string> arguments = {})
+       std::vector<std::string> arguments = {}, std::string called = "")
       : name_(std::move(name)),
+        called_(called.empty() ? name_ : std::move(called)),
         daemon_(model, options_of(name_, runtime, model.empty(), std::move(arguments))),
         log_(daemon_.directory() + "/link.log"),
         by_(std::move(by)),
@@ -57,7 +58,7 @@ class Host {
   void start_link() {
     std::vector<std::string> arguments = by_;
     arguments.insert(arguments.end(), {std::string(ARBITER_PROGRAMS) + "/arbiter-link",
-                                       "--instance", name_, "--host", name_});
+                                       "--instance", name_, "--host", called_});
     arguments.insert(arguments.end(), network_.begin(), network_.end());
     const shm::FileDescriptor log(
         ::open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600));
@@ -94,6 +95,7 @@ class Host {
   }
 
   const std::string name_;
+  const std::string called_;
   Daemon daemon_;
   const std::string log_;
   const std::vector<std::string> by_;

@@ -52,6 +52,8 @@ class Stranger {
   void write(const link::ByteString& header, Bytes sample = {}) {
     static_cast<void>(writer_->write(Bytes(header.data(), header.size()), sample));
   }
+  // Somebody reads it.
+  [[nodiscard]] bool is_wanted() const { return writer_->is_wanted(); }
   void leave() { writer_.reset(); }
 
  private:
