@@ -12,6 +12,7 @@
 
 #include "cli/broken_pipe.hpp"
 #include "cli/verbs.hpp"
+#include "cli/wrong_use.hpp"
 #include "recording/mcap.hpp"
 #include "rules/model/load.hpp"
 #include "rules/text/names.hpp"
@@ -104,7 +105,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_stop(app, exit_code);
   add_exit_codes(app);
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
-    return arbiter::shm::printable(CLI::FailureMessage::simple(failed, error), "\n\t");
+    return arbiter::cli::wrong_use_text(*failed, error);
   });
   if (argc > 1 && !knows_verb(app, argv[1])) return kWrongUse;
   try {

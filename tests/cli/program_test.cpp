@@ -97,6 +97,27 @@ TEST(Program, SuggestsTheVerbThatWasMeant) {
   EXPECT_THAT(arbiter({"frobnicate"}).err, HasSubstr("`arbiter --help` lists"));
 }
 
+TEST(Program, SaysWhichArgumentItDoesNotKnowAndWhatWasMeant) {
+  const auto error = [](const std::vector<std::string>& arguments) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 2);
+    return result.err;
+  };
+  EXPECT_EQ(error({"why", "/a", "--folow"}),
+            "arbiter why has no option \"--folow\"; did you mean \"--follow\"?\n"
+            "Run `arbiter why --help` for more information.\n");
+  EXPECT_THAT(error({"recording", "winers", "x.mcap"}),
+              HasSubstr("arbiter recording has no verb \"winers\"; did you mean \"winners\"?"));
+  EXPECT_THAT(
+      error({"recording"}),
+      HasSubstr("arbiter recording needs a verb: info, repair, export, winners and sample"));
+  EXPECT_THAT(error({"recording", "winners", "x.mcap", "--prot", "/a"}),
+              HasSubstr("arbiter recording winners has no option \"--prot\"; did you mean "
+                        "\"--port\"?"));
+  EXPECT_THAT(error({"pub", "/a", "one", "two"}),
+              HasSubstr("arbiter pub has no place for \"one\" and \"two\""));
+}
+
 TEST(Program, ShowsControlCharactersInsteadOfSendingThem) {
   for (const auto& arguments :
        std::vector<std::vector<std::string>>{{"\x1b[31mred"},
