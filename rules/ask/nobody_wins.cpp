@@ -42,6 +42,8 @@ class PortFindings {
     find_states();
     leave_out_stated();
     if (!nobody_.is_false()) {
+      index_inhibitions();
+      warn_of_circle();
       note_states();
       if (port_.in_order) throw DiagramLimit("a diagram of each winner, and those are too large");
       note_chains();
@@ -163,11 +165,63 @@ class PortFindings {
     return states;
   }
 
+  // Each of them wins only while the next one is inactive, the last while the first is. With all of
+  // them active they shut each other out, which nobody means who gives priorities. One for a port.
+  void warn_of_circle() {
+    for (std::size_t first = 0; first < candidates_.size(); ++first) {
+      const std::vector<std::size_t> circle = shortest_circle(first);
+      if (circle.empty()) continue;
+      Diagram states = nobody_;
+      std::vector<std::string> names;
+      for (const std::size_t each : circle) {
+        names.push_back(candidates_[each].rule->source);
+        states = winners_->combine(Connective::kAnd, states, winners_->active(names.back()));
+      }
+      if (states.is_false()) continue;  // or conditions let some of them be active alone
+      const Witness witness = winners_->witness(states);
+      std::string message = "at " + port_.port;
+      for (std::size_t i = 0; i < names.size(); ++i) {
+        message += (i == 0 ? ", " : " and ") + names[i] + " is kept out by " +
+                   names[(i + 1) % names.size()];
+      }
+      message += ", in a circle: with " + in_words(witness) +
+                 ", nobody wins; remove one of these inhibitions, or if that is meant, say so in a "
+                 "statement (--assert)";
+      diagnostics_.warning("inhibition-circle", where_of(names.front()), message,
+                           {.ports = {port_.port}, .source = names.front()});
+      return;
+    }
+  }
+
+  // From a candidate to those that keep it out, breadth first, and back to it. Empty: there is
+  // none.
+  [[nodiscard]] std::vector<std::size_t> shortest_circle(std::size_t first) const {
+    std::vector<std::size_t> from(candidates_.size(), candidates_.size());
+    std::vector<std::size_t> reached{first};
+    for (std::size_t at = 0; at < reached.size(); ++at) {
+      for (std::size_t next = 0; next < candidates_.size(); ++next) {
+        if (!keeps_out_[next][reached[at]]) continue;
+        if (next == first) return way_to(reached[at], first, from);
+        if (from[next] != candidates_.size()) continue;
+        from[next] = reached[at];
+        reached.push_back(next);
+      }
+    }
+    return {};
+  }
+
+  static std::vector<std::size_t> way_to(std::size_t last, std::size_t first,
+                                         const std::vector<std::size_t>& from) {
+    std::vector<std::size_t> way{last};
+    while (way.back() != first) way.push_back(from[way.back()]);
+    std::reverse(way.begin(), way.end());
+    return way;
+  }
+
   // x is silenced by y, which is silenced by z: all three are active, nobody wins, x would win if
   // y alone were inactive, and y would win if z alone were. Those that share y and z make one
   // finding.
   void note_chains() {
-    index_inhibitions();
     std::size_t chains = 0;
     for (std::size_t y = 0; y < candidates_.size(); ++y) {
       const auto& reads = candidates_[y].rule->reads;
@@ -195,6 +249,8 @@ class PortFindings {
         if (implied.inactive[i]) inhibited_by_[winners_->sources()[i]].set(x);
       }
     }
+    for (const Candidate& each : candidates_)
+      keeps_out_.push_back(inhibited_by_[each.rule->source]);
   }
 
   // The x of chains x, y, z as far as single literals tell: x reads y, and neither do x or y
@@ -258,6 +314,7 @@ class PortFindings {
   std::unordered_map<std::string, Candidates> place_of_;      // by source: the candidate that it is
   std::unordered_map<std::string, Candidates> readers_of_;    // by source: whose rules read it
   std::unordered_map<std::string, Candidates> inhibited_by_;  // by source: that win only without it
+  std::vector<Candidates> keeps_out_;                         // of each candidate's source
 };
 
 }  // namespace

@@ -9,7 +9,7 @@
 
 namespace arbiter::rules {
 
-// Notes "nobody-wins" and "starved". `statements`: those that speak of the port; states of which
+// Warnings "inhibition-circle", notes "nobody-wins" and "starved". `statements`: those that speak of the port; states of which
 // they say that nobody wins are not noted. Throws DiagramLimit; what has been found until then
 // holds.
 void find_where_nobody_wins(const PortRules& rules, const CompiledPort& port,

@@ -60,11 +60,32 @@ std::size_t Hierarchy::look_up(const Mention& mention) const {
   if (diagnostics_.items().size() < kMaxSuggestions) {
     for (const Behaviour& behaviour : model_.behaviours) known.push_back(behaviour.name);
   }
-  diagnostics_.error("unknown-name", mention.where,
-                     "no behaviour has the name " + quote(mention.name) +
-                         advise(mention.name, known, "define it, or correct the name"),
-                     {.behaviour = mention.name});
+  const std::string list = known.empty() ? "" : as_list(mention.name);
+  diagnostics_.error(
+      "unknown-name", mention.where,
+      "no behaviour has the name " + quote(mention.name) +
+          (list.empty() ? advise(mention.name, known, "define it, or correct the name")
+                        : "; names are separated by commas: write " + quote(list)),
+      {.behaviour = mention.name});
   return kNobody;
+}
+
+// "Rest, Look Around" for "Rest; Look Around", or without a comma; empty: these are not all names.
+std::string Hierarchy::as_list(std::string_view text) const {
+  constexpr std::string_view kSeparators = " ;\t\n";
+  std::string list;
+  while (!text.empty()) {
+    std::size_t length = text.size();  // of the longest name that it begins with
+    while (length > 0 && by_name_.count(std::string(trim(text.substr(0, length)))) == 0) {
+      length = text.substr(0, length).find_last_of(kSeparators);
+      if (length == std::string_view::npos) return {};
+    }
+    if (length == 0) return {};
+    list += (list.empty() ? "" : ", ") + std::string(trim(text.substr(0, length)));
+    const std::size_t next = text.find_first_not_of(kSeparators, length);
+    text = next == std::string_view::npos ? std::string_view() : text.substr(next);
+  }
+  return list;
 }
 
 void Hierarchy::adopt_children() {

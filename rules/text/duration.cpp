@@ -1,6 +1,8 @@
 #include "rules/text/duration.hpp"
 
+#include <algorithm>
 #include <array>
+#include <string>
 #include <utility>
 
 #include "rules/text/names.hpp"
@@ -10,6 +12,36 @@ namespace {
 
 constexpr std::array<std::pair<std::string_view, shm::Nanoseconds>, 4> kUnits{
     {{"ns", 1}, {"us", 1'000}, {"ms", 1'000'000}, {"s", 1'000'000'000}}};
+
+// "500ms" for "0.5s"; empty: it is no such fraction, or no whole number of nanoseconds.
+std::string without_fraction(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789";
+  constexpr std::size_t kMostDigits = 9;  // of each part, so that the product fits
+  const std::size_t point = text.find_first_not_of(kDigits);
+  const std::size_t end = text.find_first_not_of(kDigits, point + 1);
+  if (end == std::string_view::npos || end == point + 1) return {};
+  if (point > kMostDigits || end - point - 1 > kMostDigits) return {};
+  shm::Nanoseconds scale = 1;
+  shm::Nanoseconds number = 0;
+  for (std::size_t i = 0; i < end; ++i) {
+    if (i == point) continue;
+    number = number * 10 + (text[i] - '0');
+    if (i > point) scale *= 10;
+  }
+  const auto* const unit = std::find_if(kUnits.begin(), kUnits.end(), [&](const auto& each) {
+    return each.first == text.substr(end);
+  });
+  if (unit == kUnits.end() || number == 0) return {};
+  // In the largest of the smaller units in which it is whole.
+  for (const auto* smaller = unit; smaller-- != kUnits.begin();) {
+    const shm::Nanoseconds factor = unit->second / smaller->second;
+    if (number > shm::kMaxTime / factor) return {};
+    if (number * factor % scale == 0) {
+      return std::to_string(number * factor / scale) + std::string(smaller->first);
+    }
+  }
+  return {};
+}
 
 }  // namespace
 
@@ -27,9 +59,11 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
   const auto* known = kUnits.begin();
   while (known != kUnits.end() && known->first != unit) ++known;
   if (known == kUnits.end()) {
-    const bool fraction = unit.starts_with('.') || unit.starts_with(',');
-    return refuse(fraction ? "is a fraction" : "has an unknown unit",
-                  fraction ? "take a smaller unit" : words.advice);
+    const bool is_fraction = unit.starts_with('.') || unit.starts_with(',');
+    if (!is_fraction) return refuse("has an unknown unit", words.advice);
+    const std::string whole = without_fraction(text);
+    return refuse("is a fraction",
+                  whole.empty() ? "take a smaller unit" : "write " + whole + " in its place");
   }
   // A finite end of activity, arrival + T, must stay below what the activity word holds.
   const shm::Nanoseconds most = shm::kMaxTime / known->second;

@@ -316,7 +316,9 @@ bool decode(const TextFile& file, std::string_view written, Text& text, Diagnost
     if (written.empty()) break;
     const std::size_t end = written.substr(0, kLongestReference).find(';');
     if (end == std::string_view::npos) {
-      return report(file, start, "'&' must begin a reference such as &amp;; write &amp; for '&'",
+      return report(file, start,
+                    "'&' must begin a reference such as &amp;; write &amp; for '&', and in a "
+                    "condition the word and",
                     diagnostics);
     }
     const std::string bytes = resolve_reference(written.substr(1, end - 1));

@@ -61,5 +61,20 @@ TEST(Duration, IsRefusedWithAReason) {
   }
 }
 
+TEST(Duration, OfAFractionTheWholeNumberIsTold) {
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"0.5s", "write 500ms in"},   {"1,5s", "write 1500ms in"},
+      {"0.25ms", "write 250us in"}, {"0.000001s", "write 1us in"},
+      {"2.0s", "write 2000ms in"},  {"1.000000001s", "write 1000000001ns in"},
+  };
+  for (const auto& [text, advice] : cases) {
+    EXPECT_THAT(parse_duration(text).problem, HasSubstr(advice)) << text;
+  }
+  for (const char* const text : {"0.5ns", "0.0000000001s", "0.5", "0.s", "0.5min", "0.0s",
+                                 "999999999.5s1", "0.5.5s", ".5s", "9999999999.5s"}) {
+    EXPECT_THAT(parse_duration(text).problem, testing::Not(HasSubstr("in its place"))) << text;
+  }
+}
+
 }  // namespace
 }  // namespace arbiter::rules

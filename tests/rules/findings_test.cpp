@@ -76,6 +76,25 @@ TEST(Findings, NameAShortestStateWithoutAWinnerAndItsPlace) {
   EXPECT_EQ(found.items[1].where.line, 3u);
 }
 
+TEST(Findings, SourcesThatKeepEachOtherOutAreACircle) {
+  const auto found = found_in(RulesByHand().port("/p", {{"/a", inactive("/b")},
+                                                        {"/b", inactive("/c")},
+                                                        {"/c", inactive("/a")}}));
+  ASSERT_THAT(found.codes(), testing::Contains("inhibition-circle"));
+  EXPECT_EQ(found.items[0].severity, rules::Severity::kWarning);
+  EXPECT_EQ(found.items[0].message,
+            "at /p, /a is kept out by /b and /b is kept out by /c and /c is kept out by /a, in a "
+            "circle: with /a, /b and /c active, nobody wins; remove one of these inhibitions, or "
+            "if that is meant, say so in a statement (--assert)");
+}
+
+TEST(Findings, ACircleThatAConditionBreaksIsNone) {
+  const auto found =
+      found_in(RulesByHand().port("/p", {{"/a", any_of({inactive("/b"), active("/first")})},
+                                         {"/b", all_of({inactive("/a"), inactive("/first")})}}));
+  EXPECT_THAT(found.codes(), testing::Not(testing::Contains("inhibition-circle")));
+}
+
 TEST(Findings, EachCauseOfNobodyIsToldWhereverItLies) {
   const auto found =
       found_in(RulesByHand().port("/p", {{"/low", all_of({inactive("/mid"), inactive("/top")})},

@@ -262,7 +262,7 @@ TEST(ModelReader, WrongValuesAreErrors) {
       {"<source port='/a' timeout='99999999999s'/>", "1:28 error invalid-timeout",
        "the limit of 2305843009213693951ns"},
       {"<define name='t'>1.5s</define>\n<source port='/a' timeout='${t}'/>",
-       "2:28 error invalid-timeout", "a fraction; take a smaller unit (in the text of ${t})"},
+       "2:28 error invalid-timeout", "a fraction; write 1500ms in its place (in the text of ${t})"},
       {"<arbiter at='/p' conflict='last'><select from='/s'/></arbiter>",
        "1:28 error invalid-conflict", "write conflict=\"first\""},
       {"<arbiter at='/p' conflict=''><select from='/s'/></arbiter>", "1:28 error invalid-conflict",
