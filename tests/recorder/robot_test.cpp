@@ -101,7 +101,13 @@ TEST(Robot, OfTwentyComponentsIsTappedRecordedKilledDumpedReplayedAndSimulated) 
   for (const std::string& file : recordings) {
     const auto simulated = arbiter({"simulate", "--recording", file});
     EXPECT_EQ(simulated.exit_code, 0) << simulated.out << simulated.err;
-    EXPECT_NE(simulated.out.find(" 0 behind a gap\n"), std::string::npos) << simulated.out;
+    // Before the recorder has joined a source it does not know it, so decisions of just then may
+    // depend on what it could not see. Of what came afterwards it has all.
+    const auto info = arbiter({"recording", "info", "--json", file});
+    EXPECT_EQ(info.exit_code, 0) << info.err;
+    const auto said = nlohmann::json::parse(info.out);
+    EXPECT_EQ(said["missed_events"], 0) << info.out << simulated.out;
+    EXPECT_EQ(said["missed_samples"], 0) << info.out << simulated.out;
   }
   const auto replayed = arbiter({"replay", recording.file(), "--rate", "4"});
   EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
