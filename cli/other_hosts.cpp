@@ -1,5 +1,6 @@
 #include "cli/other_hosts.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <stdexcept>
@@ -43,6 +44,36 @@ wire::Status read_status_of_host(const std::string& text) {
   nlohmann::json document = wire::parse_document(text);
   make_printable(document);
   return wire::read_status(document.dump());
+}
+
+std::vector<std::string> names_of_other_hosts(const std::string& instance) {
+  std::vector<std::string> names;
+  const auto hosts = hosts_if_linked(instance);
+  if (!hosts) return names;
+  for (const wire::HostStatus& each : hosts->hosts) {
+    if (each.is_up && !each.is_this) names.push_back(shm::printable(each.host));
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::vector<OtherHost> statuses_of_other_hosts(const std::string& instance) {
+  std::vector<OtherHost> others;
+  const std::vector<std::string> names = names_of_other_hosts(instance);
+  if (names.empty()) return others;
+  try {
+    for (const auto& answer : wire::LinkCall(instance).ask_hosts({wire::kAllHosts, "status"})) {
+      const std::string name = shm::printable(answer.host);
+      if (answer.outcome != wire::HostOutcome::kAnswered ||
+          !std::binary_search(names.begin(), names.end(), name)) {
+        continue;
+      }
+      others.push_back({name, read_status_of_host(answer.text)});
+    }
+  } catch (const std::runtime_error&) {
+    // Of those that say nothing that can be read, nothing is known.
+  }
+  return others;
 }
 
 void write_port_errors(std::ostream& out, const std::optional<wire::HostsDocument>& hosts) {

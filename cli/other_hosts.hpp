@@ -22,6 +22,18 @@ namespace arbiter::cli {
 // Throws wire::DocumentError.
 [[nodiscard]] wire::Status read_status_of_host(const std::string& text);
 
+// The names of those whose links are there now, in byte order; empty: no link runs here. Waits
+// likewise.
+[[nodiscard]] std::vector<std::string> names_of_other_hosts(const std::string& instance);
+
+struct OtherHost {
+  std::string name;
+  wire::Status status;
+};
+// Of those that answer: the others are passed over. Takes little more than two seconds at most, and
+// no time where no link runs here.
+[[nodiscard]] std::vector<OtherHost> statuses_of_other_hosts(const std::string& instance);
+
 // The input ports that are open on several hosts, a line for each.
 void write_port_errors(std::ostream& out, const std::optional<wire::HostsDocument>& hosts);
 

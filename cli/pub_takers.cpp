@@ -85,4 +85,20 @@ Takers find_takers(const wire::Status& status, const std::string& port, const Ty
   return takers;
 }
 
+std::string takers_elsewhere(const std::vector<OtherHost>& others, const std::string& port,
+                             const Type& type) {
+  std::vector<std::string> takers;
+  for (const OtherHost& other : others) {
+    for (const wire::InputStatus& input : other.status.inputs) {
+      const bool is_connected = std::any_of(input.connections.begin(), input.connections.end(),
+                                            [&](const auto& each) { return each.source == port; });
+      const bool fits = input.open && (!input.open->type || is_same(*input.open->type, type));
+      if (is_connected && fits) takers.push_back(input.name + " of host " + other.name);
+    }
+  }
+  if (takers.empty()) return {};
+  return "samples cross to " + rules::enumerate(takers) +
+         "; what is delivered there is not counted here";
+}
+
 }  // namespace arbiter::cli

@@ -9,6 +9,7 @@
 
 #include <arbiter/type.hpp>
 
+#include "cli/other_hosts.hpp"
 #include "wire/status.hpp"
 
 namespace arbiter::cli {
@@ -35,5 +36,10 @@ struct Takers {
 // again: for the former there is advice.
 [[nodiscard]] Takers find_takers(const wire::Status& status, const std::string& port,
                                  const Type& type, const PubCommand& command);
+
+// What other hosts take of it, a sentence; empty: nothing. Samples cross to them by the links, and
+// are not counted as delivered here.
+[[nodiscard]] std::string takers_elsewhere(const std::vector<OtherHost>& others,
+                                           const std::string& port, const Type& type);
 
 }  // namespace arbiter::cli

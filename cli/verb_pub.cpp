@@ -50,14 +50,36 @@ OutputPort<void> open(Node& node, const PubOptions& options, const Type& type) {
   return node.output_port(options.port, port_options);
 }
 
+void tell(const std::string& message) {
+  std::cerr << "arbiter: " << shm::printable(message) << '\n';
+}
+
+// Links find a port within about a second, and one that is closed by then they never hear of: a
+// source that is to stop all hosts for ever would stop this one.
+void tell_of_short_stay(const PubOptions& options, const wire::Status& status) {
+  constexpr double kFound = 2;  // seconds
+  const wire::SourceStatus* const source = status.find_source(options.port);
+  const bool is_forever = source != nullptr && source->timeout == shm::kForever;
+  const bool is_short =
+      options.count != 0 && static_cast<double>(options.count - 1) / options.rate_hz < kFound;
+  if (!is_forever || !is_short) return;
+  tell("T of " + options.port +
+       " is forever, and other hosts hear of it only if its port stays open for a second or two, "
+       "until they have found it: leave out --count, and stop this program once `arbiter status "
+       "--all` shows it active there");
+}
+
 // Says what keeps samples from being taken. False: nobody can take any.
 bool check_takers(const PubOptions& options, const Type& type) try {
-  const Takers takers = find_takers(fetch_status("pub-status", options.instance), options.port,
-                                    type, options.command);
-  for (const std::string& message : takers.messages) {
-    std::cerr << "arbiter: " << shm::printable(message) << '\n';
-  }
-  return takers.is_any;
+  const wire::Status status = fetch_status("pub-status", options.instance);
+  const Takers takers = find_takers(status, options.port, type, options.command);
+  for (const std::string& message : takers.messages) tell(message);
+  const std::vector<OtherHost> others = statuses_of_other_hosts(options.instance);
+  if (others.empty()) return takers.is_any;
+  const std::string elsewhere = takers_elsewhere(others, options.port, type);
+  if (!elsewhere.empty()) tell(elsewhere);
+  tell_of_short_stay(options, status);
+  return takers.is_any || !elsewhere.empty();
 } catch (const std::exception& error) {
   // It is not allowed, or the daemon has gone meanwhile: that is no reason not to publish, unless
   // the user wants to be sure.
@@ -180,7 +202,8 @@ void add_pub(CLI::App& app, int& exit_code) {
 Standard error says at once if nobody can take the samples: no component has an input port open that
 the model connects to PORT, the types differ or the connection is refused for another reason, or the
 model does not mention PORT. Without --strict they are published all the same: they make the source
-active, and somebody may come who takes them.
+active, and somebody may come who takes them. Where arbiter-link runs, it says which ports of other
+hosts take them.
 
 Exit codes: 0 published, whoever took it; 1 no daemon, a port that cannot be opened, no type for
 --like, or with --strict nobody who can take it; 2 wrong use, a payload that does not fit the type,

@@ -136,6 +136,29 @@ TEST_F(KnownHosts, AreAskedForTheirStatus) {
   EXPECT_EQ(document["hosts"][1]["status"]["instance"], "head");
 }
 
+TEST_F(KnownHosts, WhoPublishesByHandIsToldWhoTakesItElsewhere) {
+  Host head("head", runtime_, source_model("forever"), network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Body body(base);
+  const Type type = type_of<Speed>();
+  const std::vector<std::string> pub{
+      "pub",     kPlanner, "--count",
+      "1",       "--type", type.name() + ":" + std::to_string(type.size()) + ":8",
+      "--strict"};
+  await_host("head", "base");
+  await([&] {
+    const ProgramResult told = run_arbiter("head", pub);
+    return told.exit_code == 0 &&
+           told.err.find(
+               "samples cross to /Motor/speed:i of host base; what is delivered there is "
+               "not counted here") != std::string::npos;
+  });
+  EXPECT_THAT(run_arbiter("head", pub).err,
+              HasSubstr("is forever, and other hosts hear of it only if its port stays open"));
+  EXPECT_THAT(run_arbiter("head", {"deactivate", kPlanner}).out,
+              HasSubstr("each host keeps its own activity of it"));
+}
+
 TEST_F(KnownHosts, WhyIsAskedOfTheOneThatDecides) {
   Host head("head", runtime_, kNoRules, network());
   Host base("base", runtime_, motor_model("1000s"), network());
