@@ -93,6 +93,7 @@ int examine(const DoctorOptions& options) {
       line.show([] { return "watching how often sources arrive, for 2.5 s at most"; });
     }));
   }
+  add(watch::examine_link(who.instance));
   const std::size_t before = findings.size();
   const auto& silenced = options.silenced;
   std::erase_if(findings, [&](const watch::Finding& finding) {
@@ -128,9 +129,12 @@ void add_doctor(CLI::App& app, int& exit_code) {
       "Examples:\n"
       "  arbiter doctor\n"
       "  arbiter doctor --silence governor,realtime-priority\n\n"
-      "It changes nothing, and asks the daemon for its status once. Where components have sources\n"
-      "open, it watches their arrivals for 2.5 s at most. It reports the limits of the shell that\n"
-      "starts it: run it as the same user, and in the same place, as your components.\n\n"
+      "It changes nothing. It asks the daemon for its status once and, where it runs, "
+      "arbiter-link\n"
+      "for what hosts do not agree upon. Where components have sources open, it watches their\n"
+      "arrivals for 2.5 s at most. It reports the limits of the shell that starts it: run it as "
+      "the\n"
+      "same user, and in the same place, as your components.\n\n"
       "Exit codes: 0 nothing found; 1 findings; 2 wrong use, or it cannot look, or standard output "
       "cannot "
       "be\nwritten");

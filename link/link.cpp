@@ -164,6 +164,8 @@ void Link::join_network(int stop) {
       leave_network();
       say_once(said_,
                (words.last().empty() ? error.what() : "DDS: " + words.last()) + "; trying again");
+      view_.update([] {});  // for whoever asks what is wrong
+      options_.on_round();
       tell_desk(said_);
       stops_ = waits(stop, kRetryPeriod);
     }

@@ -322,7 +322,12 @@ const std::vector<std::string>& finding_codes() {
                                               "replaced-program",
                                               "time-namespace",
                                               "stranger",
-                                              "slow-publisher"};
+                                              "slow-publisher",
+                                              "silent-link",
+                                              "link-waits",
+                                              "port-on-two-hosts",
+                                              "source-on-two-hosts",
+                                              "shared-host-name"};
   return codes;
 }
 

@@ -2,7 +2,7 @@
 // meet, and the processes that take part. For each finding what it is, why it matters, and what to
 // type to mend it.
 //
-// Nothing is changed. The daemon is asked for its status, once.
+// Nothing is changed. The daemon is asked for its status, once, and the link for its hosts.
 #pragma once
 
 #include <functional>
@@ -12,6 +12,7 @@
 
 #include "watch/machine.hpp"
 #include "wire/call.hpp"
+#include "wire/hosts.hpp"
 #include "wire/status.hpp"
 
 namespace arbiter::watch {
@@ -41,6 +42,11 @@ using Findings = std::vector<Finding>;
 // sources open; meanwhile `while_looking` is called often.
 [[nodiscard]] Findings examine_publishers(const wire::Caller& caller, const wire::Status& status,
                                           const std::function<void()>& while_looking);
+
+// What the link of this host waits for, and what it knows that hosts do not agree upon.
+[[nodiscard]] Findings examine_hosts(const wire::HostsDocument& hosts);
+// The same of the link of that instance; nothing where none runs. Waits for a second at most.
+[[nodiscard]] Findings examine_link(const std::string& instance);
 
 // All codes, in the order in which they are looked for.
 [[nodiscard]] const std::vector<std::string>& finding_codes();

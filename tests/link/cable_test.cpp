@@ -228,6 +228,7 @@ TEST_F(Cable, AnInterfaceMayComeAfterTheLink) {
             robot.base_network.enter());
   Host rear("rear", robot.runtime, kNoRules, robot.arguments(), late.enter());
   rear.see("trying again");
+  await_hosts("rear", [](const auto& hosts) { return hosts.find_this()->has_daemon; });
   robot.cables.connect(late, 3);
   Planner planner(rear);
   Body body(base);

@@ -80,6 +80,7 @@ TEST_F(KnownHosts, AnInputPortThatIsOpenOnTwoIsAnErrorThatAllOfThemName) {
     await([&] {  // a link that is slow today is left out, and that is said
       return run_arbiter(instance, {"status"}).out.find("ERROR: " + error) != std::string::npos;
     });
+    await([&] { return run_arbiter(instance, {"doctor"}).out.find(error) != std::string::npos; });
   }
   same.reset();
   await_hosts("base", [](const auto& hosts) { return hosts.disagreements.empty(); });

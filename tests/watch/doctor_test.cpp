@@ -93,6 +93,25 @@ TEST(Doctor, HasAllOfItsCodesOnThePage) {
   EXPECT_EQ(codes, watch::finding_codes());
 }
 
+TEST(Doctor, FindsWhatHostsDoNotAgreeUpon) {
+  wire::HostsDocument hosts;
+  EXPECT_THAT(codes_of(watch::examine_hosts(hosts)), IsEmpty());
+  hosts.waits_for = "there is no interface eth7";
+  using enum wire::DisagreementKind;
+  for (const auto kind : {kInputPort, kSource, kHostName, kModel}) {
+    hosts.disagreements.push_back({kind, "/Motor/speed:i", {"base", "head"}, false, "is on two"});
+  }
+  const Findings found = watch::examine_hosts(hosts);
+  EXPECT_THAT(codes_of(found), ElementsAre("link-waits", "port-on-two-hosts", "source-on-two-hosts",
+                                           "shared-host-name"));
+  EXPECT_THAT(found[0].what, HasSubstr("eth7"));
+  EXPECT_EQ(found[1].what, "is on two");
+}
+
+TEST(Doctor, LooksForNoOtherHostsWhereNoLinkRuns) {
+  EXPECT_THAT(watch::examine_link("no-link-of-this-name"), IsEmpty());
+}
+
 TEST(Doctor, FindsNothingOnAMachineThatIsWell) {
   EXPECT_THAT(codes_of(MadeUpMachine().findings()), IsEmpty());
 }
