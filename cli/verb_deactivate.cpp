@@ -1,7 +1,9 @@
 // arbiter deactivate: ends the activity of a source whose process is gone.
 #include <iostream>
 #include <memory>
+#include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -9,6 +11,7 @@
 #include "cli/live.hpp"
 #include "cli/other_hosts.hpp"
 #include "cli/verbs.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -18,12 +21,29 @@ struct DeactivateOptions {
   std::string instance;
 };
 
-int deactivate(const DeactivateOptions& options) {
+// "; did you mean "/Lock:o"?" of a name that nobody has; empty: there is nothing to advise.
+std::string advice(const DeactivateOptions& options) try {
+  const wire::Status status = fetch_status("deactivate", options.instance);
+  if (status.find_source(options.source) != nullptr) return {};
+  std::vector<std::string_view> names;
+  for (const wire::SourceStatus& source : status.sources) names.push_back(source.name);
+  return rules::advise(options.source, names, "`arbiter status` lists all sources");
+} catch (const wire::CallError&) {
+  return {};  // who may end an activity need not be allowed to see all
+}
+
+bool end_activity(const DeactivateOptions& options) try {
   wire::Call daemon(caller("deactivate", options.instance));
   wire::Message question;
   question.kind = wire::MessageKind::kDeactivate;
   question.set_name(options.source);
-  const bool was_active = daemon.ask(question).message.value != 0;
+  return daemon.ask(question).message.value != 0;
+} catch (const wire::RefusedError& error) {
+  throw std::runtime_error(error.what() + advice(options));
+}
+
+int deactivate(const DeactivateOptions& options) {
+  const bool was_active = end_activity(options);
   std::cout << options.source << (was_active ? " is inactive now\n" : " was not active\n");
   const std::vector<std::string> others = names_of_other_hosts(options.instance);
   if (!others.empty()) {

@@ -23,6 +23,7 @@
 #include "cli/verbs.hpp"
 #include "recorder/recorder.hpp"
 #include "rules/model/quantifiers.hpp"
+#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "shm/utf8.hpp"
 
@@ -64,21 +65,35 @@ std::string typed_command() {
 }
 
 // A pattern that matches nothing may be meant for what is yet to come, or be misspelt.
-void warn_of_patterns_without_port(const RecordOptions& options) {
-  if (options.ports.empty()) return;
-  std::vector<wire::InputStatus> inputs;
-  try {
-    inputs = fetch_status("record", options.instance).inputs;
-  } catch (const wire::CallError&) {
-    return;  // what is wrong, recording will say
+template <class Port>
+void warn_without_match(const std::string& option, const std::string& pattern,
+                        const std::vector<Port>& ports, const std::string& what) {
+  std::vector<std::string_view> names;
+  for (const Port& port : ports) {
+    if (rules::matches(pattern, port.name)) return;
+    names.push_back(port.name);
   }
-  for (const std::string& pattern : options.ports) {
-    const bool has_port = std::any_of(inputs.begin(), inputs.end(), [&](const auto& input) {
-      return rules::matches(pattern, input.name);
-    });
-    if (has_port) continue;
-    std::cerr << "arbiter: warning: --port " + shm::printable(shell_word(pattern)) +
-                     " matches no input port that is open or in the model in force\n";
+  const auto similar = rules::find_similar(pattern, names);
+  std::cerr << "arbiter: warning: " + option + ' ' + shm::printable(shell_word(pattern)) +
+                   " matches no " + what + " that is open or in the model in force" +
+                   (similar ? "; did you mean " + rules::quote(shm::printable(*similar)) + '?'
+                            : "") +
+                   '\n';
+}
+
+void warn_of_patterns_without_port(const RecordOptions& options) {
+  const bool has_pattern = options.payloads != "all" && options.payloads != "none";
+  if (options.ports.empty() && !has_pattern) return;
+  try {
+    const wire::Status status = fetch_status("record", options.instance);
+    for (const std::string& pattern : options.ports) {
+      warn_without_match("--port", pattern, status.inputs, "input port");
+    }
+    if (has_pattern) {
+      warn_without_match("--payloads", options.payloads, status.sources, "output port");
+    }
+  } catch (const wire::CallError&) {
+    // What is wrong, recording will say.
   }
 }
 

@@ -85,6 +85,12 @@ TEST(RecordedIncident, SaysWhatWasTyped) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, AllOf(HasSubstr(R"(warning: --port '/don'\''t*' matches no input port)"),
                                 Not(HasSubstr("--port '/p*' matches"))));
+  EXPECT_THAT(arbiter({"record", "-o", file + "2", "--duration", "20ms", "--port", "/pp",
+                       "--payloads", "/hihg*"})
+                  .err,
+              AllOf(HasSubstr("--port /pp matches no input port that is open or in the model in "
+                              "force; did you mean \"/p\"?"),
+                    HasSubstr("--payloads '/hihg*' matches no output port")));
   const auto info =
       nlohmann::json::parse(arbiter({"recording", "info", "--json", file}).out)["metadata"];
   ASSERT_EQ(info.size(), 1U) << info;

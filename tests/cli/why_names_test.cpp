@@ -108,6 +108,16 @@ TEST(WhyNames, DeactivationOfWhatIsNotActiveLeavesItsRecord) {
   EXPECT_THAT(why({"/base", "/b"}), HasSubstr("it has never arrived"));
 }
 
+TEST(WhyNames, DeactivationOfWhatNobodyHasSaysWhatWasMeant) {
+  Daemon daemon(R"(<behaviors><arbiter at="/base"><select from="/stop:o"/></arbiter></behaviors>)");
+  const auto result = arbiter({"deactivate", "/stpo:o"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err,
+              HasSubstr("no model and no component has named the source /stpo:o; did you mean "
+                        "\"/stop:o\"?"));
+}
+
 TEST(WhyNames, SaysOnTheFirstLineThatNothingOfTheWinnerArrives) {
   Daemon daemon(kMisnamed);
   Node node("test");
