@@ -168,6 +168,7 @@ void Desk::look_at_others() {
   const std::vector<std::uint64_t> writers = topics_->cards.writers();
   std::size_t without_place = 0;
   std::set<std::string> deaf_hosts;
+  std::set<std::string> hosts_there;
   {
     const std::lock_guard lock(mutex_);
     neighbours_.keep(writers, now);
@@ -179,10 +180,12 @@ void Desk::look_at_others() {
     round_trips_.keep(there);
     const std::set<Participant> deaf = round_trips_.deaf();
     for (const Neighbour& each : neighbours_.all()) {
+      if (each.is_up) hosts_there.insert(each.card->host);
       if (each.is_up && deaf.contains(each.participant)) deaf_hosts.insert(each.card->host);
     }
   }
   say_without_place(without_place);
+  say_who_is_there(std::move(hosts_there));
   say_deaf(std::move(deaf_hosts));
   std::vector<Neighbour> neighbours;
   {
@@ -226,6 +229,21 @@ void Desk::say_deaf(std::set<std::string> hosts) {
                       "until it does");
   }
   deaf_said_ = std::move(hosts);
+}
+
+// A host whose link is started again goes on being there.
+void Desk::say_who_is_there(std::set<std::string> hosts) {
+  for (const std::string& host : hosts) {
+    if (!there_said_.contains(host))
+      say_sparingly(gateway::Level::kInfo, "host " + host + " is there");
+  }
+  for (const std::string& host : there_said_) {
+    if (hosts.contains(host)) continue;
+    say_sparingly(
+        gateway::Level::kWarning,
+        "host " + host + " is gone: its link has ended, or nothing has been heard of it for 1.5 s");
+  }
+  there_said_ = std::move(hosts);
 }
 
 void Desk::hear_card(Bytes message, const gateway::dds::SampleWriter& writer) {

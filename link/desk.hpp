@@ -83,6 +83,7 @@ class Desk {
   void look_at_others();
   void say_without_place(std::size_t count);
   void say_deaf(std::set<std::string> hosts);
+  void say_who_is_there(std::set<std::string> hosts);
 
   // On Cyclone's threads.
   void hear_card(Bytes message, const gateway::dds::SampleWriter& writer);
@@ -141,6 +142,7 @@ class Desk {
   std::uint64_t compared_changes_ = 0;
   bool is_without_place_said_ = false;
   std::set<std::string> deaf_said_;
+  std::set<std::string> there_said_;
   shm::Nanoseconds compare_until_ = 0;
   shm::Nanoseconds compare_again_ = 0;
   shm::Nanoseconds send_again_ = 0;

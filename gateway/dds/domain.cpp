@@ -9,6 +9,8 @@
 
 #include "gateway/core/say.hpp"
 #include "gateway/dds/quota.hpp"
+#include "gateway/dds/repeats.hpp"
+#include "shm/clock.hpp"
 #include "shm/memory_file.hpp"
 
 namespace arbiter::gateway::dds {
@@ -78,8 +80,7 @@ Entity open_domain(dds_domainid_t id, const Gateway& gateway) {
   std::string text = configuration_of(gateway, file.path());
   if (!text.empty()) text += ",";
   text += kNoSharedMemory;
-  return {dds_create_domain(id, text.c_str()),
-          "domain " + std::to_string(id)};
+  return {dds_create_domain(id, text.c_str()), "domain " + std::to_string(id)};
 }
 
 Entity join(dds_domainid_t domain) {
@@ -189,6 +190,8 @@ void CycloneWords::tell() const {
 void hear_cyclone() {
   // What strangers send may make it write: their number must not fill a disk.
   static Quota& quota = *new Quota(20, 10'000'000'000);
+  // While an interface is down, each datagram is one.
+  static Repeats& repeats = *new Repeats(60'000'000'000);
   dds_set_log_mask(DDS_LC_FATAL | DDS_LC_ERROR | DDS_LC_WARNING);
   dds_set_log_sink(
       [](void* /*argument*/, const dds_log_data_t* line) {
@@ -200,12 +203,14 @@ void hear_cyclone() {
           kept_words->push_back(text);
           return;
         }
-        if (const auto passed = quota.take(); passed) {
-          const bool error = (line->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0;
-          std::string said = "Cyclone DDS: " + text;
-          if (*passed > 0) said += " (" + std::to_string(*passed) + " lines were left out before)";
-          say(error ? Level::kError : Level::kWarning, said);
-        }
+        const auto again = repeats.take(text, shm::monotonic_now());
+        const auto passed = again ? quota.take() : std::nullopt;
+        if (!passed) return;
+        const bool error = (line->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0;
+        std::string said = "Cyclone DDS: " + text;
+        if (*again > 0) said += " (" + std::to_string(*again) + " times more since it was said)";
+        if (*passed > 0) said += " (" + std::to_string(*passed) + " lines were left out before)";
+        say(error ? Level::kError : Level::kWarning, said);
       },
       nullptr);
 }

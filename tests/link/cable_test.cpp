@@ -69,6 +69,7 @@ void cut_and_heal(bool until_gone) {
   for (int i = 0; i < kUnheard; ++i) planner.publish();
   const std::int64_t unheard = planner.published();
   if (until_gone) {
+    base.see("host head is gone: ");
     base.see("is not imported any more");
     await([&] { return head.daemon().source(kPlanner)["taps"].empty(); });
   } else {

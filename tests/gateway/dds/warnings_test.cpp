@@ -4,6 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <optional>
+#include <string>
+
+#include "gateway/dds/repeats.hpp"
+
 namespace arbiter::gateway::dds {
 namespace {
 
@@ -66,6 +71,23 @@ TEST(Warnings, OfAPeerThatChangesForEverHaveAnEnd) {
     said += warnings.take(quota, i).size();
   }
   EXPECT_EQ(said, 16U);
+}
+
+TEST(Repeats, AreCountedAndSaidOnceAWhile) {
+  Repeats repeats(100);
+  EXPECT_EQ(repeats.take("a", 1), 0U);
+  EXPECT_EQ(repeats.take("a", 2), std::nullopt);
+  EXPECT_EQ(repeats.take("b", 2), 0U);
+  EXPECT_EQ(repeats.take("a", 100), std::nullopt);
+  EXPECT_EQ(repeats.take("a", 101), 2U);
+  EXPECT_EQ(repeats.take("a", 201), 0U);
+}
+
+TEST(Repeats, OfMoreThanAreRememberedAreSaid) {
+  Repeats repeats(1000);
+  for (int i = 0; i < 17; ++i) EXPECT_EQ(repeats.take(std::to_string(i), 1 + i), 0U);
+  EXPECT_EQ(repeats.take("16", 20), std::nullopt);
+  EXPECT_EQ(repeats.take("0", 20), 0U);
 }
 
 }  // namespace
