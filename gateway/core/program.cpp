@@ -155,6 +155,14 @@ class Beat {
   shm::Nanoseconds again_ = 0;
 };
 
+// What the middleware would do at the end may never return, or end the process in another way. So
+// nothing is destroyed: ports are closed as those of a program that dies are, by the daemon, at
+// once.
+[[noreturn]] void begin_anew(const NeedsNewProcess& why) {
+  say(Level::kWarning, std::string(why.what()) + "; the gateway begins anew");
+  std::_Exit(kBeginsAnew);
+}
+
 // Until it is to stop. `asked`: for another mapping; of a worker, its supervisor is.
 void serve(std::unique_ptr<Setup> setup, const ProgramKind& kind, Reload& reload) {
   Beat beat;
@@ -166,7 +174,11 @@ void serve(std::unique_ptr<Setup> setup, const ProgramKind& kind, Reload& reload
     };
     Bridge bridge(std::move(options), setup->settings.mappings, kind.kind, setup->bell,
                   *setup->middleware);
-    bridge.run(reload.ends());
+    try {
+      bridge.run(reload.ends());
+    } catch (const NeedsNewProcess& why) {  // while the bridge and its middleware still stand
+      begin_anew(why);
+    }
   }
 }
 
@@ -182,14 +194,7 @@ int serve(const Arguments& arguments, const ProgramKind& kind, std::vector<Mappi
   }
   Reload reload(asked.get(), stop, [&] { return read_again(arguments, kind, make); });
   if (!arguments.is_worker) sd_notify(0, "READY=1");
-  try {
-    serve(std::move(setup), kind, reload);
-  } catch (const NeedsNewProcess& why) {
-    // What the middleware would do at the end may never return, or end the process in another way.
-    // Its ports are closed as those of a program that dies are: by the daemon, at once.
-    say(Level::kWarning, std::string(why.what()) + "; the gateway begins anew");
-    std::_Exit(kBeginsAnew);
-  }
+  serve(std::move(setup), kind, reload);
   // What the middleware does when the process ends may wait for ever, for a daemon of its own that
   // has gone; and the supervisor, who would see to it, may be gone as well.
   if (arguments.is_worker) ::alarm(kEndsWithin);
