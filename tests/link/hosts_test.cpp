@@ -12,6 +12,7 @@
 
 #include "tests/link/known_hosts.hpp"
 #include "tests/link/robot.hpp"
+#include "tests/support/page_tables.hpp"
 #include "wire/link_call.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -181,6 +182,20 @@ TEST_F(KnownHosts, WhyIsAskedOfTheOneThatDecides) {
   const json document = json::parse(why("head", {"--json"}).out);
   EXPECT_EQ(document["host"], "base");
   EXPECT_EQ(document["winner"], kPlanner);
+  std::vector<std::string> fields;  // as the page has them
+  for (const PageRow& row :
+       rows_of(content_of(ARBITER_SOURCE "/docs/hosts.md"), {"field of `why`", "value"})) {
+    const std::string field = quoted(row.cells.at(0)).at(0);
+    EXPECT_TRUE(document.contains(field)) << field;
+    fields.push_back(field);
+    if (field != "connections") continue;
+    const json& connection = document[field].at(0);
+    for (const std::string& part : quoted(row.cells.at(1))) {
+      EXPECT_TRUE(connection.contains(part)) << part;
+    }
+    EXPECT_EQ(connection.size(), quoted(row.cells.at(1)).size());
+  }
+  EXPECT_EQ(fields.size(), document.size());
   await([&] {  // the link says a little later what it has opened
     return why("base").out.find("From other hosts:\n  /Planner/speed:o  from host head") !=
            std::string::npos;
