@@ -44,12 +44,21 @@ void copy(char (&to)[Size], const std::string& from) {
 // How often ports that could not be opened are tried again.
 constexpr shm::Nanoseconds kOpenEvery = 1'000'000'000;
 
+// Nobody's rules need mention what is told of winners.
+NodeOptions announcer_options(const std::string& instance) {
+  NodeOptions options = live_options(instance);
+  options.on_notice = [say = options.on_notice](const Notice& notice) {
+    if (notice.kind != NoticeKind::unmentioned) say(notice);
+  };
+  return options;
+}
+
 class Announcer {
  public:
   Announcer(const WinnersOptions& options, shm::FileDescriptor interrupts)
       : options_(options),
         interrupts_(std::move(interrupts)),
-        node_("arbiter-winners", live_options(options.instance)),
+        node_("arbiter-winners", announcer_options(options.instance)),
         instance_(follow_instance("winners", options.instance)),
         winners_(instance_, [this](std::string_view port) { return is_wanted(port); }) {}
 

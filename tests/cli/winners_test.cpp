@@ -151,6 +151,8 @@ TEST_F(Winners, AreAnnouncedWhereOnePortCannotBeOpened) {
     err = content_of(err_path());
   }
   EXPECT_EQ(err.find("trying again"), err.rfind("trying again")) << err;
+  EXPECT_EQ(err.find("does not mention"), std::string::npos)
+      << "nobody need mention these: " << err;
   program_.signal(SIGINT);
   EXPECT_EQ(program_.wait(), 0);
 }
