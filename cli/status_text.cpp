@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cli/live.hpp"
+#include "cli/numbers.hpp"
 #include "shm/clock.hpp"
 #include "shm/utf8.hpp"
 #include "watch/process.hpp"
@@ -66,7 +67,8 @@ void print_model(std::ostream& out, const wire::Status& status) {
   if (model.application) out << ", application " << *model.application;
   out << '\n';
   if (model.reloads_refused != 0) {
-    out << "  " << model.reloads_refused << " reloads refused: the daemon's log says why\n";
+    out << "  " << counted(model.reloads_refused, "reload")
+        << " refused: the daemon's log says why\n";
   }
 }
 

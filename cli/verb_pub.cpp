@@ -112,8 +112,9 @@ int publish(const PubOptions& options, OutputPort<void>& out, const std::vector<
     }
     next += period;
   }
-  std::cout << "published " << published << " samples of " << payload.size() << " bytes: delivered "
-            << delivered << ", discarded " << discarded << ", refused " << refused << '\n';
+  std::cout << "published " << counted(published, "sample") << " of "
+            << counted(payload.size(), "byte") << ": delivered " << delivered << ", discarded "
+            << discarded << ", refused " << refused << '\n';
   return 0;
 }
 

@@ -54,7 +54,7 @@ TEST(Pub, FeedsATypedPortWithATypeAndHex) {
   const auto result = pub({"/out", "--type", kNumber, "--hex", "0102 03\t04\n0506070a"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.err, "");
-  EXPECT_THAT(result.out, HasSubstr("published 1 samples of 8 bytes: delivered 1"));
+  EXPECT_THAT(result.out, HasSubstr("published 1 sample of 8 bytes: delivered 1"));
   const auto sample = in.take();
   ASSERT_TRUE(sample);
   EXPECT_EQ((*sample)->value, 0x0a07060504030201u);
