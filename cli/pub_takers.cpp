@@ -5,6 +5,7 @@
 #include "cli/pub_type.hpp"
 #include "cli/shell_word.hpp"
 #include "rules/text/names.hpp"
+#include "watch/imported.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -17,7 +18,9 @@ std::string advice(const PubCommand& command, const wire::InputStatus& input) {
   const std::size_t size = input.open->type->size;
   std::string text =
       "to send what " + input.name + " takes, run: " + command.like(input.name, size);
-  if (command.payload_size != size) {
+  if (input.open->type->alignment == 0) {  // variable
+    text += "  (add a sample of that type by --hex, --file or --text)";
+  } else if (command.payload_size != size) {
     text += "  (samples of " + std::to_string(size) + (size == 1 ? " byte" : " bytes") +
             ": add them by --hex, --file or --text, or they are zeros)";
   }
@@ -42,7 +45,7 @@ std::string PubCommand::like(const std::string& port, std::size_t size) const {
 }
 
 Takers find_takers(const wire::Status& status, const std::string& port, const Type& type,
-                   const PubCommand& command) {
+                   const PubCommand& command, const TakersElsewhere& elsewhere) {
   Takers takers;
   std::vector<std::string> closed, away;
   std::vector<const wire::InputStatus*> refused;
@@ -61,6 +64,7 @@ Takers find_takers(const wire::Status& status, const std::string& port, const Ty
     }
   }
   if (!has_connections) takers.is_any = source != nullptr && source->mentioned;
+  takers.is_any |= elsewhere.is_any();
   if (!takers.is_any && !closed.empty()) {
     takers.messages.push_back("no component has " + rules::enumerate(closed) +
                               " open, which the model connects to " + port +
@@ -85,20 +89,47 @@ Takers find_takers(const wire::Status& status, const std::string& port, const Ty
   return takers;
 }
 
-std::string takers_elsewhere(const std::vector<OtherHost>& others, const std::string& port,
-                             const Type& type) {
-  std::vector<std::string> takers;
+TakersElsewhere find_elsewhere(const std::vector<OtherHost>& others, const std::string& port,
+                               const Type& type) {
+  TakersElsewhere found;
+  const auto is_it = [&](const auto& each) { return each.source == port; };
   for (const OtherHost& other : others) {
+    const std::size_t before = found.takers.size();
+    bool reads = false;
     for (const wire::InputStatus& input : other.status.inputs) {
-      const bool is_connected = std::any_of(input.connections.begin(), input.connections.end(),
-                                            [&](const auto& each) { return each.source == port; });
+      const bool is_connected =
+          std::any_of(input.connections.begin(), input.connections.end(), is_it);
       const bool fits = input.open && (!input.open->type || is_same(*input.open->type, type));
-      if (is_connected && fits) takers.push_back(input.name + " of host " + other.name);
+      if (is_connected && fits) found.takers.push_back(input.name + " of host " + other.name);
+      reads = reads || std::any_of(input.senses.begin(), input.senses.end(), is_it);
     }
+    const bool takes = found.takers.size() != before;
+    if (reads && !takes) found.readers.push_back(other.name);
+    const wire::SourceStatus* const source = other.status.find_source(port);
+    const bool is_imported = source != nullptr && source->open;
+    found.is_imported = found.is_imported && (is_imported || !(takes || reads));
   }
-  if (takers.empty()) return {};
-  return "samples cross to " + rules::enumerate(takers) +
-         "; what is delivered there is not counted here";
+  return found;
+}
+
+std::string TakersElsewhere::text(const std::string& port) const {
+  std::string text;
+  if (!takers.empty()) {
+    text = "samples cross to " + rules::enumerate(takers) +
+           "; what is delivered there is not counted here";
+  }
+  if (readers.empty()) return text;
+  return text + (text.empty() ? "" : ". ") + "The rules of " +
+         (readers.size() == 1 ? "host " : "the hosts ") + rules::enumerate(readers) + " read " +
+         port;
+}
+
+bool is_sent_to_others(const wire::Status& status, const std::string& port) {
+  const wire::SourceStatus* const source = status.find_source(port);
+  if (source == nullptr || !source->open) return false;
+  const auto& taps = source->open->taps;
+  return std::any_of(taps.begin(), taps.end(),
+                     [](const wire::Component& each) { return each.node == watch::kLinkNode; });
 }
 
 }  // namespace arbiter::cli

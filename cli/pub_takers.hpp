@@ -32,14 +32,25 @@ struct Takers {
   std::vector<std::string> messages;  // what else a user should know, a sentence each
 };
 
+// What other hosts do with the source: samples cross to them by the links.
+struct TakersElsewhere {
+  std::vector<std::string> takers;   // "/Motor/speed:i of host base"
+  std::vector<std::string> readers;  // hosts whose rules read it, and which take no samples
+  bool is_imported = true;           // by all of them
+
+  [[nodiscard]] bool is_any() const { return !takers.empty() || !readers.empty(); }
+  // A sentence; empty: there are none.
+  [[nodiscard]] std::string text(const std::string& port) const;
+};
+[[nodiscard]] TakersElsewhere find_elsewhere(const std::vector<OtherHost>& others,
+                                             const std::string& port, const Type& type);
+// Whether the link of this host sends the source to others.
+[[nodiscard]] bool is_sent_to_others(const wire::Status& status, const std::string& port);
+
 // Refused connections and ports that the model does not mention come as notices, and are not said
 // again: for the former there is advice.
 [[nodiscard]] Takers find_takers(const wire::Status& status, const std::string& port,
-                                 const Type& type, const PubCommand& command);
-
-// What other hosts take of it, a sentence; empty: nothing. Samples cross to them by the links, and
-// are not counted as delivered here.
-[[nodiscard]] std::string takers_elsewhere(const std::vector<OtherHost>& others,
-                                           const std::string& port, const Type& type);
+                                 const Type& type, const PubCommand& command,
+                                 const TakersElsewhere& elsewhere = {});
 
 }  // namespace arbiter::cli

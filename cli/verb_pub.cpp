@@ -50,36 +50,44 @@ OutputPort<void> open(Node& node, const PubOptions& options, const Type& type) {
   return node.output_port(options.port, port_options);
 }
 
-void tell(const std::string& message) {
+// Waits until those on other hosts who want the source have it, or it is plain that they do not get
+// it: of a port that closes before, they would never hear.
+TakersElsewhere await_elsewhere(const PubOptions& options, const Type& type,
+                                const shm::FileDescriptor& interrupts) {
+  constexpr shm::Nanoseconds kLongest = 3'000'000'000;
+  constexpr shm::Nanoseconds kLookAgain = 50'000'000;
+  const shm::Nanoseconds until = shm::monotonic_now() + kLongest;
+  for (;;) {
+    TakersElsewhere found =
+        find_elsewhere(statuses_of_other_hosts(options.instance), options.port, type);
+    if (!found.is_any()) return found;
+    const shm::Nanoseconds now = shm::monotonic_now();
+    found.is_imported =
+        found.is_imported &&
+        is_sent_to_others(fetch_status("pub-status", options.instance), options.port);
+    if (found.is_imported || now >= until || sleep_until(now + kLookAgain, interrupts))
+      return found;
+  }
+}
+
+void report(const std::string& message) {
   std::cerr << "arbiter: " << shm::printable(message) << '\n';
 }
 
-// Links find a port within about a second, and one that is closed by then they never hear of: a
-// source that is to stop all hosts for ever would stop this one.
-void tell_of_short_stay(const PubOptions& options, const wire::Status& status) {
-  constexpr double kFound = 2;  // seconds
-  const wire::SourceStatus* const source = status.find_source(options.port);
-  const bool is_forever = source != nullptr && source->timeout == shm::kForever;
-  const bool is_short =
-      options.count != 0 && static_cast<double>(options.count - 1) / options.rate_hz < kFound;
-  if (!is_forever || !is_short) return;
-  tell("T of " + options.port +
-       " is forever, and other hosts hear of it only if its port stays open for a second or two, "
-       "until they have found it: leave out --count, and stop this program once `arbiter status "
-       "--all` shows it active there");
-}
-
 // Says what keeps samples from being taken. False: nobody can take any.
-bool check_takers(const PubOptions& options, const Type& type) try {
-  const wire::Status status = fetch_status("pub-status", options.instance);
-  const Takers takers = find_takers(status, options.port, type, options.command);
-  for (const std::string& message : takers.messages) tell(message);
-  const std::vector<OtherHost> others = statuses_of_other_hosts(options.instance);
-  if (others.empty()) return takers.is_any;
-  const std::string elsewhere = takers_elsewhere(others, options.port, type);
-  if (!elsewhere.empty()) tell(elsewhere);
-  tell_of_short_stay(options, status);
-  return takers.is_any || !elsewhere.empty();
+bool check_takers(const PubOptions& options, const Type& type,
+                  const shm::FileDescriptor& interrupts) try {
+  TakersElsewhere elsewhere = await_elsewhere(options, type, interrupts);
+  if (!elsewhere.is_imported) {
+    report("other hosts want " + options.port +
+           ", and have not opened it within 3 s: what is published before they do, they never get");
+    elsewhere = {};
+  }
+  const Takers takers = find_takers(fetch_status("pub-status", options.instance), options.port,
+                                    type, options.command, elsewhere);
+  for (const std::string& message : takers.messages) report(message);
+  if (elsewhere.is_any()) report(elsewhere.text(options.port));
+  return takers.is_any;
 } catch (const std::exception& error) {
   // It is not allowed, or the daemon has gone meanwhile: that is no reason not to publish, unless
   // the user wants to be sure.
@@ -128,7 +136,7 @@ int pub(PubOptions& options) {
   const auto interrupts = catch_interrupts();
   Node node("arbiter-pub", live_options(options.instance));
   auto out = open(node, options, type);
-  if (!check_takers(options, type) && options.strict) {
+  if (!check_takers(options, type, interrupts) && options.strict) {
     std::cerr << "arbiter: nobody can take what " << options.port
               << " sends, so nothing was published (--strict)\n";
     return 1;
@@ -204,7 +212,7 @@ Standard error says at once if nobody can take the samples: no component has an 
 the model connects to PORT, the types differ or the connection is refused for another reason, or the
 model does not mention PORT. Without --strict they are published all the same: they make the source
 active, and somebody may come who takes them. Where arbiter-link runs, it says which ports of other
-hosts take them.
+hosts take them, and waits until they can, for 3 s at most.
 
 Exit codes: 0 published, whoever took it; 1 no daemon, a port that cannot be opened, no type for
 --like, or with --strict nobody who can take it; 2 wrong use, a payload that does not fit the type,

@@ -7,6 +7,9 @@
 
 namespace arbiter::watch {
 
+// What arbiter-link is called as a component.
+inline constexpr const char* kLinkNode = "arbiter-link";
+
 // The link has not said yet.
 inline constexpr const char* kUnknownHost = "?";
 

@@ -138,27 +138,36 @@ TEST_F(KnownHosts, AreAskedForTheirStatus) {
   EXPECT_EQ(document["hosts"][1]["status"]["instance"], "head");
 }
 
+// One sample is enough, however soon the program ends: it waits for the links.
 TEST_F(KnownHosts, WhoPublishesByHandIsToldWhoTakesItElsewhere) {
   Host head("head", runtime_, source_model("forever"), network());
-  Host base("base", runtime_, motor_model("1000s"), network());
+  Host base("base", runtime_, motor_model("forever"), network());
   Body body(base);
   const Type type = type_of<Speed>();
-  const std::vector<std::string> pub{
-      "pub",     kPlanner, "--count",
-      "1",       "--type", type.name() + ":" + std::to_string(type.size()) + ":8",
-      "--strict"};
   await_host("head", "base");
-  await([&] {
-    const ProgramResult told = run_arbiter("head", pub);
-    return told.exit_code == 0 &&
-           told.err.find(
-               "samples cross to /Motor/speed:i of host base; what is delivered there is "
-               "not counted here") != std::string::npos;
-  });
-  EXPECT_THAT(run_arbiter("head", pub).err,
-              HasSubstr("is forever, and other hosts hear of it only if its port stays open"));
+  const ProgramResult told =
+      run_arbiter("head", {"pub", kPlanner, "--count", "1", "--strict", "--type",
+                           type.name() + ":" + std::to_string(type.size()) + ":8"});
+  EXPECT_EQ(told.exit_code, 0) << told.err;
+  EXPECT_THAT(told.err, HasSubstr("samples cross to /Motor/speed:i of host base; what is delivered "
+                                  "there is not counted here"));
+  await([&] { return body.motor().take().has_value(); });
   EXPECT_THAT(run_arbiter("head", {"deactivate", kPlanner}).out,
               HasSubstr("each host keeps its own activity of it"));
+}
+
+TEST_F(KnownHosts, WhoPublishesByHandIsToldWhoseRulesReadIt) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_,
+            "<behaviors timeout='forever'><behavior name='Drive'><config at='/Motor/speed:i'>"
+            "/Joystick/speed:o</config><condition>not /Planner/speed:o</condition></behavior>"
+            "</behaviors>",
+            network());
+  await_host("head", "base");
+  const ProgramResult told = run_arbiter("head", {"pub", kPlanner, "--count", "1", "--strict"});
+  EXPECT_EQ(told.exit_code, 0) << told.err;
+  EXPECT_THAT(told.err, HasSubstr("The rules of host base read /Planner/speed:o"));
+  await([&] { return base.daemon().source(kPlanner)["active"] == true; });
 }
 
 TEST_F(KnownHosts, WhyIsAskedOfTheOneThatDecides) {
