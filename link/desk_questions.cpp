@@ -125,7 +125,10 @@ std::vector<wire::HostAnswer> Desk::ask_hosts(const wire::LinkQuestion& question
         add(*each.card, each.is_up, each.participant);
       }
       if (answers.empty()) {
-        throw std::runtime_error("no host is called \"" + wanted + "\": see arbiter hosts");
+        throw std::runtime_error(network_.empty()
+                                     ? "the link of this host is not on a network yet: see arbiter "
+                                       "hosts"
+                                     : "no host is called \"" + wanted + "\": see arbiter hosts");
       }
       for (const OpenQuestions::Host& each : asked) message.asked.push_back(each.life);
       message.number = open_.ask(asked, shm::monotonic_now());

@@ -68,6 +68,20 @@ std::uint32_t local_address(const ifaddrmsg* message, std::size_t size) {
 InterfaceWatch::InterfaceWatch(std::vector<std::string> interfaces)
     : interfaces_(std::move(interfaces)), netlink_(open_netlink()) {}
 
+std::string InterfaceWatch::missing() const {
+  const auto lost = std::find_if(places_.begin(), places_.end(),
+                                 [](const auto& each) { return each.second.index == 0; });
+  if (lost == places_.end()) return {};
+  std::string there;
+  const std::unique_ptr<struct if_nameindex, void (*)(struct if_nameindex*)> all(
+      ::if_nameindex(), [](struct if_nameindex* each) { ::if_freenameindex(each); });
+  for (const auto* each = all.get(); each != nullptr && each->if_index != 0; ++each) {
+    there += (there.empty() ? "" : ", ") + std::string(each->if_name);
+  }
+  return "this machine has no interface " + lost->first + " (--interface), but " +
+         (there.empty() ? "none at all" : there);
+}
+
 void InterfaceWatch::begin() {
   bool was_gone = false;
   while (hear(was_gone)) {

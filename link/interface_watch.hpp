@@ -25,6 +25,8 @@ class InterfaceWatch {
   // They are what they are now. Call it before joining: nothing that happens from then on is
   // missed.
   void begin();
+  // Which of them was not there then, and which there are instead, as a sentence; empty: all were.
+  [[nodiscard]] std::string missing() const;
   // What has changed since, as a sentence for people; empty: nothing that matters. Does not wait.
   [[nodiscard]] std::string change();
 

@@ -160,10 +160,12 @@ void Link::join_network(int stop) {
     interfaces_.begin();
     try {
       enter_network();
+      words.tell();  // of peers that have no address, for example
     } catch (const DdsError& error) {
       leave_network();
-      say_once(said_,
-               (words.last().empty() ? error.what() : "DDS: " + words.last()) + "; trying again");
+      std::string why = interfaces_.missing();
+      if (why.empty()) why = words.last().empty() ? error.what() : "DDS: " + words.last();
+      say_once(said_, why + "; trying again");
       view_.update([] {});  // for whoever asks what is wrong
       options_.on_round();
       tell_desk(said_);

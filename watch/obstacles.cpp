@@ -246,7 +246,8 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
   } else {
     result.push_back(
         {"output-not-open",
-         "no component has the output port open any longer: its component closed it, or died"});
+         "no component has the output port open any longer: its component closed it or died, or "
+         "the host that it came from is gone"});
   }
   if (is_latched) {
     result.push_back(

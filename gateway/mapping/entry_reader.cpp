@@ -23,6 +23,10 @@ constexpr unsigned kLastXcdr1 = 3;
 constexpr unsigned kFirstXcdr2 = 6;
 constexpr unsigned kLastXcdr2 = 0xb;
 
+std::string bytes_text(std::size_t count) {
+  return std::to_string(count) + (count == 1 ? " byte" : " bytes");
+}
+
 // An attribute that another one needs, or excludes, means a mistake; to pass it over would hide it.
 class EntryReader {
  public:
@@ -170,6 +174,7 @@ class EntryReader {
 
   // A field that no sample has would leave both sources silent for ever.
   void check_place(const Choice& choice) {
+    if (!check_kind(choice)) return;
     const std::size_t size = size_of(choice.field);
     const std::size_t end = choice.offset + size;
     const std::string at = attributes_.has("offset") ? "offset" : "field";
@@ -179,16 +184,34 @@ class EntryReader {
                             " bytes; correct one of the two");
     } else if (known_size_ && end > *known_size_) {
       attributes_.error("invalid-value", at,
-                        "a " + entry_.type->name + " has " + std::to_string(*known_size_) +
-                            " bytes, and the field would end at " + std::to_string(end) +
+                        "a " + entry_.type->name + " has " + bytes_text(*known_size_) +
+                            ", and the field would end at " + std::to_string(end) +
                             "; correct the offset or the field");
     } else if (entry_.dds && choice.offset % std::min(size, kMostAligned) != 0) {
       attributes_.error("invalid-value", at,
-                        "DDS stores a field of " + std::to_string(size) +
-                            " bytes at a multiple of " +
+                        "DDS stores a field of " + bytes_text(size) + " at a multiple of " +
                             std::to_string(std::min(size, kMostAligned)) + ", and " +
                             std::to_string(choice.offset) + " is none; correct the offset");
     }
+  }
+
+  // The common types of ROS 2 have fields of one kind each.
+  bool check_kind(const Choice& choice) {
+    const bool is_boolean = choice.field == Field::kBoolean;
+    if (is_boolean && attributes_.has("above")) return false;  // the field was refused
+    const Field known =
+        entry_.dds ? field_of(entry_.type->name).value_or(choice.field) : choice.field;
+    if (known == choice.field) return true;
+    attributes_.error(
+        "invalid-value", is_boolean ? "type" : "field",
+        "the fields of a " + entry_.type->name + " are " + name_of(known) + ", not " +
+            name_of(choice.field) +
+            (known == Field::kBoolean ? std::string("; write true=\"…\" and false=\"…\"")
+             : is_boolean ? std::string("; write above=\"…\", below=\"…\", a threshold and "
+                                        "field=\"") +
+                                name_of(known) + '"'
+                          : std::string("; write field=\"") + name_of(known) + '"'));
+    return false;
   }
 
   void read_number(Choice& choice) {
@@ -296,9 +319,9 @@ class EntryReader {
       return {};
     }
     if (said && known && *said != *known) {
-      attributes_.error("idle-size", "size",
-                        "a " + type + " has " + std::to_string(*known) +
-                            " bytes; correct the size, or leave it out");
+      attributes_.error(
+          "idle-size", "size",
+          "a " + type + " has " + bytes_text(*known) + "; correct the size, or leave it out");
       return {};
     }
     if (!said && !known) {
@@ -342,7 +365,7 @@ class EntryReader {
   // What is wrong with a sample of a file; empty: nothing. A subscriber takes what it gets for a
   // sample of its type, and may read as many bytes as that has.
   [[nodiscard]] std::string fault_of_idle(const std::string& bytes) const {
-    const std::string has = "has " + std::to_string(bytes.size()) + " bytes; ";
+    const std::string has = "has " + bytes_text(bytes.size()) + "; ";
     // Nobody means to send a chunk of iceoryx that has nothing in it.
     const std::size_t least = header() + (entry_.dds ? 0 : 1);
     if (bytes.size() > kMaxIdleBytes || bytes.size() < least) {

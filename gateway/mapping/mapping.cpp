@@ -1,5 +1,6 @@
 #include "gateway/mapping/mapping.hpp"
 
+#include <array>
 #include <limits>
 
 namespace arbiter::gateway {
@@ -34,6 +35,12 @@ std::size_t size_of(Field field) {
       break;
   }
   return 8;
+}
+
+const char* name_of(Field field) {
+  constexpr std::array<const char*, 11> kNames{"Boolean", "i8",  "u8",  "i16", "u16", "i32",
+                                               "u32",     "i64", "u64", "f32", "f64"};
+  return kNames.at(static_cast<std::size_t>(field));
 }
 
 Range range_of(Field field) {

@@ -39,6 +39,8 @@ struct Port {
 // How a field of a sample is stored.
 enum class Field { kBoolean, kI8, kU8, kI16, kU16, kI32, kU32, kI64, kU64, kF32, kF64 };
 [[nodiscard]] std::size_t size_of(Field field);
+// "f32", as a mapping has it; of a Boolean "Boolean".
+[[nodiscard]] const char* name_of(Field field);
 // Of a number: the least and the greatest finite value.
 struct Range {
   long double least = 0;

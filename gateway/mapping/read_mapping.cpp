@@ -117,6 +117,18 @@ class MappingReader {
     mapping_.gateways.push_back(std::move(gateway));
   }
 
+  // In Cyclone capitals do not count.
+  static bool is_of_cyclone(const rules::XmlDocument& document) {
+    const Elements top(document.first());
+    Elements::Iterator behind = top.begin();
+    if (behind == top.end()) return false;
+    const std::string_view root = (*behind).text;
+    constexpr std::string_view kRoot = "cyclonedds";
+    const bool is_root = std::equal(root.begin(), root.end(), kRoot.begin(), kRoot.end(),
+                                    [](char a, char b) { return (a | 0x20) == b; });
+    return is_root && ++behind == top.end();
+  }
+
   static void refuse_twice(Attributes& attributes, std::vector<std::string> interfaces) {
     std::sort(interfaces.begin(), interfaces.end());
     const auto twice = std::adjacent_find(interfaces.begin(), interfaces.end());
@@ -132,7 +144,14 @@ class MappingReader {
       const rules::TextFile file(
           path, read_file_(path, kMaxConfigurationBytes, rules::Accept::kRegularFile));
       if (!rules::check_size(file, kMaxConfigurationBytes, diagnostics_) ||
-          !rules::check_readable(file, diagnostics_) || !rules::parse_xml(file, diagnostics_)) {
+          !rules::check_readable(file, diagnostics_)) {
+        return {};
+      }
+      const auto document = rules::parse_xml(file, diagnostics_);
+      if (!document) return {};
+      if (!is_of_cyclone(*document)) {
+        diagnostics_.error("configuration-file", file.locate(0),
+                           "this is no configuration of Cyclone DDS; its one root is <CycloneDDS>");
         return {};
       }
       return std::string(file.content());

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <utility>
 
 namespace arbiter::gateway {
 namespace {
@@ -13,35 +12,41 @@ bool is_lower(char c) { return c >= 'a' && c <= 'z'; }
 bool is_upper(char c) { return c >= 'A' && c <= 'Z'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-// Of CDR as ROS 2 sends it (XCDR1: each number aligned to its own size, up to 8).
-constexpr std::array<std::pair<std::string_view, std::size_t>, 27> kFixedSizes{{
-    {"geometry_msgs/msg/Accel", 48},
-    {"geometry_msgs/msg/Point", 24},
-    {"geometry_msgs/msg/Point32", 12},
-    {"geometry_msgs/msg/Pose", 56},
-    {"geometry_msgs/msg/Pose2D", 24},
-    {"geometry_msgs/msg/PoseWithCovariance", 344},
-    {"geometry_msgs/msg/Quaternion", 32},
-    {"geometry_msgs/msg/Transform", 56},
-    {"geometry_msgs/msg/Twist", 48},
-    {"geometry_msgs/msg/TwistWithCovariance", 336},
-    {"geometry_msgs/msg/Vector3", 24},
-    {"geometry_msgs/msg/Wrench", 48},
-    {"std_msgs/msg/Bool", 1},
-    {"std_msgs/msg/Byte", 1},
-    {"std_msgs/msg/Char", 1},
-    {"std_msgs/msg/ColorRGBA", 16},
-    {"std_msgs/msg/Empty", 1},
-    {"std_msgs/msg/Float32", 4},
-    {"std_msgs/msg/Float64", 8},
-    {"std_msgs/msg/Int16", 2},
-    {"std_msgs/msg/Int32", 4},
-    {"std_msgs/msg/Int64", 8},
-    {"std_msgs/msg/Int8", 1},
-    {"std_msgs/msg/UInt16", 2},
-    {"std_msgs/msg/UInt32", 4},
-    {"std_msgs/msg/UInt64", 8},
-    {"std_msgs/msg/UInt8", 1},
+// Of CDR as ROS 2 sends it (XCDR1: each number aligned to its own size, up to 8). All fields of one
+// type are alike.
+struct FixedType {
+  std::string_view name;
+  std::size_t size;
+  Field field;
+};
+constexpr std::array<FixedType, 27> kFixedTypes{{
+    {"geometry_msgs/msg/Accel", 48, Field::kF64},
+    {"geometry_msgs/msg/Point", 24, Field::kF64},
+    {"geometry_msgs/msg/Point32", 12, Field::kF32},
+    {"geometry_msgs/msg/Pose", 56, Field::kF64},
+    {"geometry_msgs/msg/Pose2D", 24, Field::kF64},
+    {"geometry_msgs/msg/PoseWithCovariance", 344, Field::kF64},
+    {"geometry_msgs/msg/Quaternion", 32, Field::kF64},
+    {"geometry_msgs/msg/Transform", 56, Field::kF64},
+    {"geometry_msgs/msg/Twist", 48, Field::kF64},
+    {"geometry_msgs/msg/TwistWithCovariance", 336, Field::kF64},
+    {"geometry_msgs/msg/Vector3", 24, Field::kF64},
+    {"geometry_msgs/msg/Wrench", 48, Field::kF64},
+    {"std_msgs/msg/Bool", 1, Field::kBoolean},
+    {"std_msgs/msg/Byte", 1, Field::kU8},
+    {"std_msgs/msg/Char", 1, Field::kU8},
+    {"std_msgs/msg/ColorRGBA", 16, Field::kF32},
+    {"std_msgs/msg/Empty", 1, Field::kU8},
+    {"std_msgs/msg/Float32", 4, Field::kF32},
+    {"std_msgs/msg/Float64", 8, Field::kF64},
+    {"std_msgs/msg/Int16", 2, Field::kI16},
+    {"std_msgs/msg/Int32", 4, Field::kI32},
+    {"std_msgs/msg/Int64", 8, Field::kI64},
+    {"std_msgs/msg/Int8", 1, Field::kI8},
+    {"std_msgs/msg/UInt16", 2, Field::kU16},
+    {"std_msgs/msg/UInt32", 4, Field::kU32},
+    {"std_msgs/msg/UInt64", 8, Field::kU64},
+    {"std_msgs/msg/UInt8", 1, Field::kU8},
 }};
 
 constexpr std::array<std::string_view, 12> kWithStrings{{
@@ -58,6 +63,13 @@ constexpr std::array<std::string_view, 12> kWithStrings{{
     "std_msgs/msg/String",
     "trajectory_msgs/msg/JointTrajectory",
 }};
+
+const FixedType* find_fixed(std::string_view ros_type) {
+  const auto* const found =
+      std::find_if(kFixedTypes.begin(), kFixedTypes.end(),
+                   [&](const FixedType& each) { return each.name == ros_type; });
+  return found == kFixedTypes.end() ? nullptr : found;
+}
 
 }  // namespace
 
@@ -112,10 +124,13 @@ std::string readable_type(std::string_view dds_type) {
 }
 
 std::optional<std::size_t> fixed_size_of(std::string_view ros_type) {
-  for (const auto& [name, size] : kFixedSizes) {
-    if (name == ros_type) return size;
-  }
-  return {};
+  const FixedType* const known = find_fixed(ros_type);
+  return known == nullptr ? std::nullopt : std::optional(known->size);
+}
+
+std::optional<Field> field_of(std::string_view ros_type) {
+  const FixedType* const known = find_fixed(ros_type);
+  return known == nullptr ? std::nullopt : std::optional(known->field);
 }
 
 bool has_strings(std::string_view ros_type) {

@@ -9,6 +9,8 @@
 #include <string>
 #include <string_view>
 
+#include "gateway/mapping/mapping.hpp"
+
 namespace arbiter::gateway {
 
 // "/a/b_c": tokens of letters, digits and underscores, each behind a '/'.
@@ -26,6 +28,8 @@ namespace arbiter::gateway {
 // How many bytes of CDR a sample has behind its encapsulation header, for those of ROS 2's common
 // types that have the same number always: they contain no string, no sequence. By their ROS name.
 [[nodiscard]] std::optional<std::size_t> fixed_size_of(std::string_view ros_type);
+// What each of their fields is.
+[[nodiscard]] std::optional<Field> field_of(std::string_view ros_type);
 // Common ones of which zero bytes are no sample, since they contain a string.
 [[nodiscard]] bool has_strings(std::string_view ros_type);
 

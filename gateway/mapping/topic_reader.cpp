@@ -1,6 +1,8 @@
 #include "gateway/mapping/topic_reader.hpp"
 
 #include <algorithm>
+#include <string>
+#include <string_view>
 
 #include "gateway/mapping/ros_names.hpp"
 #include "rules/text/names.hpp"
@@ -86,6 +88,16 @@ bool is_dds_topic(const std::string& name) {
                      [&](char c) { return is_letter(c) || is_digit(c) || c == '_' || c == '/'; });
 }
 
+// As ROS 2 would write it: "/cmd_vel" for "rt/cmd_vel", which is its name in DDS, for "cmd_vel",
+// and for "~/cmd_vel", which only a node can complete.
+std::string ros_topic_like(std::string_view written) {
+  for (const std::string_view beginning : {"rt/", "~/"}) {
+    if (written.starts_with(beginning)) written.remove_prefix(beginning.size());
+  }
+  const std::string name = "/" + std::string(written);
+  return is_ros_topic(name) ? name : "/base/cmd_vel";
+}
+
 // A ROS 2 name goes with a ROS 2 type, and a name of DDS with one of DDS: a topic that is written
 // half in one and half in the other would be found by neither.
 void check_names(Attributes& attributes, DdsTopic& topic) {
@@ -94,8 +106,8 @@ void check_names(Attributes& attributes, DdsTopic& topic) {
   if (has_ros_topic && !is_ros_topic(topic.written)) {
     attributes.error("invalid-topic", "topic",
                      "the topic " + rules::quote(topic.written) +
-                         " is no name of ROS 2; write tokens of letters, digits and '_', each "
-                         "behind a '/', such as \"/base/cmd_vel\"");
+                         " is no name of ROS 2; write tokens of letters, digits and '_', not a "
+                         "digit first, each behind a '/', such as \"/base/cmd_vel\"");
     return;
   }
   if (has_ros_type && !is_ros_type(topic.type_written)) {
@@ -117,8 +129,8 @@ void check_names(Attributes& attributes, DdsTopic& topic) {
   } else if (has_ros_type) {
     attributes.error("invalid-topic", "topic",
                      "the type is one of ROS 2, but the topic " + rules::quote(topic.written) +
-                         " is not; write \"/" + topic.written +
-                         "\", or for a topic that is no node's, its type as DDS has it, " +
+                         " is not; write " + rules::quote(ros_topic_like(topic.written)) +
+                         ", or for a topic that is no node's, its type as DDS has it, " +
                          rules::quote(dds_type_of(topic.type_written)));
   } else if (!is_dds_topic(topic.written)) {
     attributes.error("invalid-topic", "topic",

@@ -185,8 +185,9 @@ class PortFindings {
                    names[(i + 1) % names.size()];
       }
       message += ", in a circle: with " + in_words(witness) +
-                 ", nobody wins; remove one of these inhibitions, or if that is meant, say so in a "
-                 "statement (--assert)";
+                 ", nobody wins; let one of them win then, by an inhibition or a condition less, "
+                 "or if that is "
+                 "meant, say so in a statement (--assert)";
       diagnostics_.warning("inhibition-circle", where_of(names.front()), message,
                            {.ports = {port_.port}, .source = names.front()});
       return;

@@ -165,7 +165,7 @@ TEST(Why, TellsOfComponentsThatAreStoppedAndThatHaveDied) {
   const json random = connection(why_json({"/gaze"}), "/random");
   EXPECT_EQ(random["winner"], true) << "activity belongs to the source, not to the process";
   EXPECT_THAT(texts(random["obstacles"]),
-              ElementsAre(HasSubstr("its component closed it, or died"),
+              ElementsAre(HasSubstr("its component closed it or died, or"),
                           HasSubstr("arbiter deactivate /random ends it")));
 }
 

@@ -201,8 +201,10 @@ TEST(Mapping, AnEntryHasOnePortOrTwoThatAFieldChooses) {
               ElementsAre("1:80 error duplicate-port"));
   EXPECT_THAT(read_dds(topic + "above='/a:o' below='/b:o'/>").findings(),
               ElementsAre("1:21 error missing-attribute", "1:21 error missing-attribute"));
-  EXPECT_THAT(read_dds(topic + "above='/a:o' below='/b:o' threshold='nan' field='u8'/>").findings(),
-              ElementsAre("1:98 error invalid-value"));
+  EXPECT_THAT(read_dds("<in topic='/a' type='my/msg/State' above='/a:o' below='/b:o' "
+                       "threshold='nan' field='u8'/>")
+                  .findings(),
+              ElementsAre("1:93 error invalid-value"));
   EXPECT_THAT(read_dds(topic + "port='/a:o' offset='3'/>").findings(),
               ElementsAre("1:81 error misplaced-attribute"));
   EXPECT_THAT(read_dds(topic + "true='/a:o' false='/b:o' offset='65536'/>").findings(),
@@ -215,8 +217,17 @@ TEST(Mapping, AFieldIsOneThatASampleHas) {
     return read_dds("<in topic='/a' type='" + type + "' above='/a:o' below='/b:o' " + more + "/>");
   };
   EXPECT_THAT(read("std_msgs/msg/Float32", "threshold='1' field='f32'").findings(), IsEmpty());
-  EXPECT_THAT(read("std_msgs/msg/Float32", "threshold='1' field='f64'").message(),
+  EXPECT_THAT(read("std_msgs/msg/Float32", "threshold='1' field='f32' offset='4'").message(),
               HasSubstr("a std_msgs/msg/Float32 has 4 bytes, and the field would end at 8"));
+  EXPECT_THAT(
+      read("std_msgs/msg/Float32", "threshold='1' field='u32'").message(),
+      HasSubstr("the fields of a std_msgs/msg/Float32 are f32, not u32; write field=\"f32\""));
+  EXPECT_THAT(read("std_msgs/msg/Bool", "threshold='1' field='u8'").message(),
+              HasSubstr("are Boolean, not u8; write true=\"…\" and false=\"…\""));
+  EXPECT_THAT(read_dds("<in topic='/a' type='geometry_msgs/msg/Twist' true='/a:o' false='/b:o'/>")
+                  .message(),
+              HasSubstr("are f64, not Boolean; write above=\"…\", below=\"…\", a threshold and "
+                        "field=\"f64\""));
   EXPECT_THAT(read("my/msg/State", "threshold='1' field='f32' offset='6'").message(),
               HasSubstr("DDS stores a field of 4 bytes at a multiple of 4, and 6 is none"));
   EXPECT_THAT(read("my/msg/State", "threshold='1' field='f64' offset='4'").findings(), IsEmpty());
@@ -252,6 +263,14 @@ TEST(Mapping, NamesAreOnesThatCycloneTakes) {
   for (const char* const name : {"a b", "rt/a%41", "2nd", "a-b", "a::b", "DCPSParticipant"}) {
     EXPECT_THAT(topic(name).findings(), ElementsAre("1:32 error invalid-topic")) << name;
   }
+  const auto of_ros = [](const std::string& name) {
+    return read_dds("<in topic='" + name + "' type='my/msg/State' port='/a:o'/>").message();
+  };
+  EXPECT_THAT(of_ros("rt/state"), HasSubstr("write \"/state\","));
+  EXPECT_THAT(of_ros("~/state"), HasSubstr("write \"/state\","));
+  EXPECT_THAT(of_ros("state"), HasSubstr("write \"/state\","));
+  EXPECT_THAT(of_ros("~//"), HasSubstr("write \"/base/cmd_vel\","));
+  EXPECT_THAT(of_ros("/2nd"), HasSubstr("not a digit first"));
   EXPECT_THAT(read_text("<gateway kind='dds' interface='lo,eth0, lo'/>").message(),
               HasSubstr("\"lo\" is named twice"));
 }
@@ -281,7 +300,7 @@ TEST(Mapping, AnIdleSampleComesFromAFileBesideTheMapping) {
         &path);
   };
   EXPECT_EQ(with("file:stop.bin").entry().idle.sample.size(), 8u);
-  EXPECT_THAT(with("file:short.bin").message(), HasSubstr("has 1 bytes"));
+  EXPECT_THAT(with("file:short.bin").message(), HasSubstr("has 1 byte;"));
   EXPECT_THAT(with("file:none.bin").message(), HasSubstr("none.bin"));
   EXPECT_THAT(with("stop.bin").message(), HasSubstr("write none, zero, or file:"));
 }
@@ -336,6 +355,13 @@ TEST(Mapping, AConfigurationThatIsCutIsReportedAtItsPlaceAndAGoodOneIsKept) {
             "<CycloneDDS>\n</CycloneDDS>");
   EXPECT_THAT(with("cut.xml").findings(), ElementsAre("2:11 error malformed-xml"));
   EXPECT_THAT(with("large.xml").findings(), ElementsAre(HasSubstr("error limit-exceeded")));
+  for (const char* const other :
+       {"", "hello", "<behaviors/>", "<General/>", "<CycloneDDS/><CycloneDDS/>"}) {
+    directory.write("other.xml", other);
+    EXPECT_THAT(with("other.xml").message(), HasSubstr("its one root is <CycloneDDS>")) << other;
+  }
+  directory.write("small.xml", "<?xml version='1.0'?><cyclonedds/>");
+  EXPECT_THAT(with("small.xml").findings(), IsEmpty());
 }
 
 // A subscriber takes it for a sample of its type, and may read past its end.

@@ -228,7 +228,7 @@ TEST_F(Cable, AnInterfaceMayComeAfterTheLink) {
   Host base("base", robot.runtime, motor_model("300ms"), robot.arguments(),
             robot.base_network.enter());
   Host rear("rear", robot.runtime, kNoRules, robot.arguments(), late.enter());
-  rear.see("trying again");
+  rear.see("this machine has no interface eth0 (--interface), but lo; trying again");
   await_hosts("rear", [](const auto& hosts) { return hosts.find_this()->has_daemon; });
   robot.cables.connect(late, 3);
   Planner planner(rear);

@@ -77,15 +77,15 @@ TEST(Findings, NameAShortestStateWithoutAWinnerAndItsPlace) {
 }
 
 TEST(Findings, SourcesThatKeepEachOtherOutAreACircle) {
-  const auto found = found_in(RulesByHand().port("/p", {{"/a", inactive("/b")},
-                                                        {"/b", inactive("/c")},
-                                                        {"/c", inactive("/a")}}));
+  const auto found = found_in(RulesByHand().port(
+      "/p", {{"/a", inactive("/b")}, {"/b", inactive("/c")}, {"/c", inactive("/a")}}));
   ASSERT_THAT(found.codes(), testing::Contains("inhibition-circle"));
   EXPECT_EQ(found.items[0].severity, rules::Severity::kWarning);
   EXPECT_EQ(found.items[0].message,
             "at /p, /a is kept out by /b and /b is kept out by /c and /c is kept out by /a, in a "
-            "circle: with /a, /b and /c active, nobody wins; remove one of these inhibitions, or "
-            "if that is meant, say so in a statement (--assert)");
+            "circle: with /a, /b and /c active, nobody wins; let one of them win then, by an "
+            "inhibition or a condition less, or if that is meant, say so in a statement "
+            "(--assert)");
 }
 
 TEST(Findings, ACircleThatAConditionBreaksIsNone) {
