@@ -25,6 +25,9 @@ struct DeactivateOptions {
 std::string advice(const DeactivateOptions& options) try {
   const wire::Status status = fetch_status("deactivate", options.instance);
   if (status.find_source(options.source) != nullptr) return {};
+  if (status.find_input(options.source) != nullptr) {
+    return "; it is an input port: name the output port that is to be inactive";
+  }
   std::vector<std::string_view> names;
   for (const wire::SourceStatus& source : status.sources) names.push_back(source.name);
   return rules::advise(options.source, names, "`arbiter status` lists all sources");

@@ -37,17 +37,20 @@ std::string advice(const std::string& word, const std::vector<std::string>& know
   return similar ? "; did you mean " + quote(*similar) + '?' : "";
 }
 
-std::string text_of_extras(const CLI::App& verb, const std::string& name) {
-  const std::vector<std::string> words = verb.remaining();
+// Empty: there are none.
+std::string text_of_options(const CLI::App& verb, const std::string& name) {
   std::string text;
-  // What stands behind an unknown option is probably its value.
-  for (const std::string& word : words) {
+  for (const std::string& word : verb.remaining()) {
     if (!word.starts_with('-')) continue;
     const std::string option = word.substr(0, word.find('='));
     text += (text.empty() ? "" : "\n") + name + " has no option " + quote(option) +
             advice(option, options_of(verb));
   }
-  if (!text.empty()) return text;
+  return text;
+}
+
+std::string text_of_words(const CLI::App& verb, const std::string& name) {
+  const std::vector<std::string> words = verb.remaining();
   std::vector<std::string> quoted;
   for (const std::string& word : words) quoted.push_back(quote(word));
   return name + " has no place for " + rules::enumerate(quoted);
@@ -68,17 +71,24 @@ std::string text_of_missing_verb(const CLI::App& verb, const std::string& name) 
          rules::advise(*word, {names.begin(), names.end()}, "it has " + rules::enumerate(names));
 }
 
+std::string text_of(const CLI::Error& error, const CLI::App& verb, const std::string& name) {
+  const auto is = [&](CLI::ExitCodes code) {
+    return error.get_exit_code() == static_cast<int>(code);
+  };
+  if (is(CLI::ExitCodes::ExtrasError)) return text_of_words(verb, name);
+  const bool lacks_verb = verb.get_require_subcommand_min() > 0 && verb.get_subcommands().empty();
+  if (is(CLI::ExitCodes::RequiredError) && lacks_verb) return text_of_missing_verb(verb, name);
+  return error.what();
+}
+
 }  // namespace
 
 std::string wrong_use_text(const CLI::App& app, const CLI::Error& error) {
   const auto [verb, name] = typed_verb(app);
-  std::string text = error.what();
-  if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError)) {
-    text = text_of_extras(*verb, name);
-  } else if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError) &&
-             verb->get_require_subcommand_min() > 0 && verb->get_subcommands().empty()) {
-    text = text_of_missing_verb(*verb, name);
-  }
+  // What stands behind an unknown option is probably its value, and what is missing may be meant by
+  // it.
+  std::string text = text_of_options(*verb, name);
+  if (text.empty()) text = text_of(error, *verb, name);
   return shm::printable(text + "\nRun `" + name + " --help` for more information.\n", "\n\t");
 }
 

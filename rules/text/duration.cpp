@@ -51,6 +51,8 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
         0, std::string(words.subject) + quote(text) + " " + why + "; " + std::string(advice)};
   };
   if (text == "forever") return {shm::kForever, {}};
+  const bool lacks_zero = text.starts_with('.') || text.starts_with(',');
+  if (lacks_zero) return parse_duration("0" + std::string(text), words);
   const std::size_t digits = text.find_first_not_of("0123456789");
   if (text.empty() || digits == 0) return refuse("is not a whole number with a unit", words.advice);
   if (digits == std::string_view::npos) return refuse("has no unit", words.advice);
@@ -59,6 +61,10 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
   const auto* known = kUnits.begin();
   while (known != kUnits.end() && known->first != unit) ++known;
   if (known == kUnits.end()) {
+    if (unit.find_first_not_of("0123456789.,") == std::string_view::npos)
+      return refuse("has no unit", words.advice);
+    if (unit.front() == ' ')
+      return refuse("has a blank", "write the unit right behind the number, as in 500ms");
     const bool is_fraction = unit.starts_with('.') || unit.starts_with(',');
     if (!is_fraction) return refuse("has an unknown unit", words.advice);
     const std::string whole = without_fraction(text);

@@ -114,6 +114,10 @@ TEST(Program, SaysWhichArgumentItDoesNotKnowAndWhatWasMeant) {
   EXPECT_THAT(error({"recording", "winners", "x.mcap", "--prot", "/a"}),
               HasSubstr("arbiter recording winners has no option \"--prot\"; did you mean "
                         "\"--port\"?"));
+  EXPECT_THAT(error({"wait", "--util", "idle(/a)"}),
+              HasSubstr("arbiter wait has no option \"--util\"; did you mean \"--until\"?"));
+  EXPECT_THAT(error({"--hlep"}), HasSubstr("arbiter has no option \"--hlep\""));
+  EXPECT_THAT(error({"wait"}), HasSubstr("--until is required"));
   EXPECT_THAT(error({"pub", "/a", "one", "two"}),
               HasSubstr("arbiter pub has no place for \"one\" and \"two\""));
 }
