@@ -39,7 +39,8 @@ std::vector<std::string> abandoned_sockets(const std::string& directory) {
        entry.increment(error)) {
     std::error_code unknown;
     const bool is_socket = entry->symlink_status(unknown).type() == fs::file_type::socket;
-    if (is_socket && entry->path().extension() == ".sock")
+    const std::string extension = entry->path().extension();
+    if (is_socket && (extension == ".sock" || extension == ".link"))
       sockets.push_back(entry->path().string());
     if (sockets.size() == kMost) break;
   }

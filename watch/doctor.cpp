@@ -217,6 +217,13 @@ Findings examine_meeting_places() {
       continue;
     }
     for (const std::string& path : abandoned_sockets(directory)) {
+      if (path.ends_with(".link")) {
+        found.push_back(
+            {"stale-socket", "nobody listens at " + path,
+             "a link was killed there: nothing crosses between this host and others",
+             "start arbiter-link of that instance, or if it is not needed any more: rm " + path});
+        continue;
+      }
       found.push_back(
           {"stale-socket", "nobody listens at " + path,
            "a daemon was killed there; until the next one comes, components of that "
@@ -327,7 +334,8 @@ const std::vector<std::string>& finding_codes() {
                                               "link-waits",
                                               "port-on-two-hosts",
                                               "source-on-two-hosts",
-                                              "shared-host-name"};
+                                              "shared-host-name",
+                                              "host-gone"};
   return codes;
 }
 

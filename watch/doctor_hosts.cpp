@@ -1,7 +1,11 @@
 // What is wrong among hosts, as the link of this one knows it.
 #include <chrono>
+#include <map>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
+#include "rules/text/names.hpp"
 #include "watch/doctor.hpp"
 #include "wire/link_call.hpp"
 
@@ -33,6 +37,22 @@ void add_disagreement(const wire::HostDisagreement& each, Findings& found) {
   }
 }
 
+// Of hosts that are gone, those from which something came that the model here wants.
+void add_gone(const wire::HostsDocument& hosts, Findings& found) {
+  std::map<std::string, std::vector<std::string>> sources;
+  for (const wire::ImportStatus& each : hosts.imports) {
+    const wire::HostStatus* const host = hosts.find_host(each.host);
+    const bool is_up = host != nullptr && host->is_up;
+    if (each.is_gone() && !is_up) sources[each.host].push_back(each.source);
+  }
+  for (const auto& [host, of_it] : sources) {
+    found.push_back({"host-gone",
+                     "host " + host + " is gone, from which came " + rules::enumerate(of_it),
+                     "these sources are silent here until it is heard again",
+                     "look at its cable, and there at arbiter-link and arbiterd (arbiter doctor)"});
+  }
+}
+
 }  // namespace
 
 Findings examine_hosts(const wire::HostsDocument& hosts) {
@@ -44,6 +64,7 @@ Findings examine_hosts(const wire::HostsDocument& hosts) {
                      "mend what it says; it tries again by itself"});
   }
   for (const wire::HostDisagreement& each : hosts.disagreements) add_disagreement(each, found);
+  add_gone(hosts, found);
   return found;
 }
 

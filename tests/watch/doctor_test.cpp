@@ -108,6 +108,20 @@ TEST(Doctor, FindsWhatHostsDoNotAgreeUpon) {
   EXPECT_EQ(found[1].what, "is on two");
 }
 
+TEST(Doctor, FindsHostsThatAreGoneWithWhatIsWanted) {
+  wire::HostsDocument hosts;
+  wire::ImportStatus gone;
+  gone.source = "/Planner/speed:o";
+  gone.host = "head";
+  hosts.imports = {gone};
+  EXPECT_THAT(codes_of(watch::examine_hosts(hosts)), ElementsAre("host-gone"));
+  EXPECT_THAT(watch::examine_hosts(hosts)[0].what, HasSubstr("head is gone, from which came /Pl"));
+  wire::HostStatus head;
+  head.host = "head";
+  hosts.hosts = {head};
+  EXPECT_THAT(codes_of(watch::examine_hosts(hosts)), IsEmpty()) << "it is there, without the port";
+}
+
 TEST(Doctor, LooksForNoOtherHostsWhereNoLinkRuns) {
   EXPECT_THAT(watch::examine_link("no-link-of-this-name"), IsEmpty());
 }
@@ -214,8 +228,10 @@ TEST(Doctor, FindsSocketsWhereNobodyListens) {
   const std::string dead = wire::listen_at(directory.path(), "dead").path;
   const auto alive = wire::listen_at(directory.path(), "alive");
   directory.write("file.sock", "");
+  const std::string link = directory.path() + "/a.link";
+  fs::rename(wire::listen_at(directory.path(), "was-a-link").path, link);
   fs::create_symlink(dead, directory.path() + "/link.sock");
-  EXPECT_THAT(watch::abandoned_sockets(directory.path()), ElementsAre(dead));
+  EXPECT_THAT(watch::abandoned_sockets(directory.path()), ElementsAre(link, dead));
   EXPECT_THAT(watch::abandoned_sockets(directory.path() + "/none"), IsEmpty());
 }
 
