@@ -222,7 +222,8 @@ void Bridge::start(const std::vector<Part*>& opened) {
   }
   for (const auto& out : outs) out.outgoing.lead(ins_, [this] { bell_.ring(); });
   if (!has_started_) {
-    say(Level::kInfo, "serves " + std::to_string(ins.size()) + " topics in, " +
+    say(Level::kInfo, "serves " + std::to_string(ins.size()) +
+                          (ins.size() == 1 ? " topic in, " : " topics in, ") +
                           std::to_string(outs.size()) + " out");
   }
   has_started_ = true;
