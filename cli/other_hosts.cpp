@@ -46,32 +46,28 @@ wire::Status read_status_of_host(const std::string& text) {
   return wire::read_status(document.dump());
 }
 
-std::vector<std::string> names_of_other_hosts(const std::string& instance) {
-  std::vector<std::string> names;
-  const auto hosts = hosts_if_linked(instance);
-  if (!hosts) return names;
-  for (const wire::HostStatus& each : hosts->hosts) {
-    if (each.is_up && !each.is_this) names.push_back(shm::printable(each.host));
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-std::vector<OtherHost> statuses_of_other_hosts(const std::string& instance) {
-  std::vector<OtherHost> others;
-  const std::vector<std::string> names = names_of_other_hosts(instance);
-  if (names.empty()) return others;
+OtherHosts look_at_other_hosts(const std::string& instance, std::chrono::milliseconds patience,
+                               bool with_status) {
+  OtherHosts others;
   try {
-    for (const auto& answer : wire::LinkCall(instance).ask_hosts({wire::kAllHosts, "status"})) {
+    const auto hosts = wire::read_hosts(wire::LinkCall(instance, patience).ask({"", "hosts"}));
+    others.here = shm::printable(hosts.host);
+    for (const wire::HostStatus& each : hosts.hosts) {
+      if (each.is_up && !each.is_this) others.there.push_back(shm::printable(each.host));
+    }
+    std::sort(others.there.begin(), others.there.end());
+    if (!with_status || others.there.empty()) return others;
+    for (const auto& answer :
+         wire::LinkCall(instance, patience).ask_hosts({wire::kAllHosts, "status"})) {
       const std::string name = shm::printable(answer.host);
       if (answer.outcome != wire::HostOutcome::kAnswered ||
-          !std::binary_search(names.begin(), names.end(), name)) {
+          !std::binary_search(others.there.begin(), others.there.end(), name)) {
         continue;
       }
-      others.push_back({name, read_status_of_host(answer.text)});
+      others.answered.push_back({name, read_status_of_host(answer.text)});
     }
   } catch (const std::runtime_error&) {
-    // Of those that say nothing that can be read, nothing is known.
+    // What is not known of other hosts, nothing is said of.
   }
   return others;
 }

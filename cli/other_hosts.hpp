@@ -1,6 +1,7 @@
 // What verbs say of other hosts, as the link of this host knows them.
 #pragma once
 
+#include <chrono>
 #include <map>
 #include <optional>
 #include <ostream>
@@ -22,17 +23,19 @@ namespace arbiter::cli {
 // Throws wire::DocumentError.
 [[nodiscard]] wire::Status read_status_of_host(const std::string& text);
 
-// The names of those whose links are there now, in byte order; empty: no link runs here. Waits
-// likewise.
-[[nodiscard]] std::vector<std::string> names_of_other_hosts(const std::string& instance);
-
 struct OtherHost {
   std::string name;
   wire::Status status;
 };
-// Of those that answer: the others are passed over. Takes little more than two seconds at most, and
-// no time where no link runs here.
-[[nodiscard]] std::vector<OtherHost> statuses_of_other_hosts(const std::string& instance);
+struct OtherHosts {
+  std::string here;                // what this one is called; empty: no link runs here
+  std::vector<std::string> there;  // whose links are up, in byte order
+  std::vector<OtherHost> answered;
+};
+// Of those that answer within `patience`, their statuses: if one does not, of none. No link takes
+// no time.
+[[nodiscard]] OtherHosts look_at_other_hosts(const std::string& instance,
+                                             std::chrono::milliseconds patience, bool with_status);
 
 // The input ports that are open on several hosts, a line for each.
 void write_port_errors(std::ostream& out, const std::optional<wire::HostsDocument>& hosts);

@@ -89,11 +89,15 @@ Takers find_takers(const wire::Status& status, const std::string& port, const Ty
   return takers;
 }
 
-TakersElsewhere find_elsewhere(const std::vector<OtherHost>& others, const std::string& port,
+TakersElsewhere find_elsewhere(const OtherHosts& others, const std::string& port,
                                const Type& type) {
   TakersElsewhere found;
   const auto is_it = [&](const auto& each) { return each.source == port; };
-  for (const OtherHost& other : others) {
+  for (const OtherHost& other : others.answered) {
+    const wire::SourceStatus* const source = other.status.find_source(port);
+    const bool has_it = source != nullptr && source->open;
+    const std::string from = has_it ? watch::host_of(*source) : watch::kUnknownHost;
+    if (from != others.here && from != watch::kUnknownHost) continue;
     const std::size_t before = found.takers.size();
     bool reads = false;
     for (const wire::InputStatus& input : other.status.inputs) {
@@ -105,8 +109,7 @@ TakersElsewhere find_elsewhere(const std::vector<OtherHost>& others, const std::
     }
     const bool takes = found.takers.size() != before;
     if (reads && !takes) found.readers.push_back(other.name);
-    const wire::SourceStatus* const source = other.status.find_source(port);
-    const bool is_imported = source != nullptr && source->open;
+    const bool is_imported = has_it && from == others.here;
     found.is_imported = found.is_imported && (is_imported || !(takes || reads));
   }
   return found;

@@ -42,8 +42,9 @@ struct TakersElsewhere {
   // A sentence; empty: there are none.
   [[nodiscard]] std::string text(const std::string& port) const;
 };
-[[nodiscard]] TakersElsewhere find_elsewhere(const std::vector<OtherHost>& others,
-                                             const std::string& port, const Type& type);
+// A host that has the source from somewhere else, or has it open itself, takes nothing from here.
+[[nodiscard]] TakersElsewhere find_elsewhere(const OtherHosts& others, const std::string& port,
+                                             const Type& type);
 // Whether the link of this host sends the source to others.
 [[nodiscard]] bool is_sent_to_others(const wire::Status& status, const std::string& port);
 

@@ -1,4 +1,5 @@
 // arbiter deactivate: ends the activity of a source whose process is gone.
+#include <chrono>
 #include <iostream>
 #include <memory>
 #include <stdexcept>
@@ -48,8 +49,8 @@ bool end_activity(const DeactivateOptions& options) try {
 int deactivate(const DeactivateOptions& options) {
   const bool was_active = end_activity(options);
   std::cout << options.source << (was_active ? " is inactive now\n" : " was not active\n");
-  const std::vector<std::string> others = names_of_other_hosts(options.instance);
-  if (!others.empty()) {
+  const auto others = look_at_other_hosts(options.instance, std::chrono::milliseconds(500), false);
+  if (!others.there.empty()) {
     std::cout << "each host keeps its own activity of it: where it is still active (arbiter status "
                  "--all), run this there, too\n";
   }

@@ -1,4 +1,5 @@
 // arbiter pub: publishes on an output port, to try things out.
+#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <iostream>
@@ -50,16 +51,22 @@ OutputPort<void> open(Node& node, const PubOptions& options, const Type& type) {
   return node.output_port(options.port, port_options);
 }
 
+void report(const std::string& message) {
+  std::cerr << "arbiter: " << shm::printable(message) << '\n';
+}
+
 // Waits until those on other hosts who want the source have it, or it is plain that they do not get
-// it: of a port that closes before, they would never hear.
+// it: of a port that closes before, they would never hear. Where one does not answer at once,
+// nobody is waited for: what is published here may be urgent.
 TakersElsewhere await_elsewhere(const PubOptions& options, const Type& type,
                                 const shm::FileDescriptor& interrupts) {
   constexpr shm::Nanoseconds kLongest = 3'000'000'000;
   constexpr shm::Nanoseconds kLookAgain = 50'000'000;
+  constexpr std::chrono::milliseconds kPatience{300};
   const shm::Nanoseconds until = shm::monotonic_now() + kLongest;
   for (;;) {
     TakersElsewhere found =
-        find_elsewhere(statuses_of_other_hosts(options.instance), options.port, type);
+        find_elsewhere(look_at_other_hosts(options.instance, kPatience, true), options.port, type);
     if (!found.is_any()) return found;
     const shm::Nanoseconds now = shm::monotonic_now();
     found.is_imported =
@@ -68,10 +75,6 @@ TakersElsewhere await_elsewhere(const PubOptions& options, const Type& type,
     if (found.is_imported || now >= until || sleep_until(now + kLookAgain, interrupts))
       return found;
   }
-}
-
-void report(const std::string& message) {
-  std::cerr << "arbiter: " << shm::printable(message) << '\n';
 }
 
 // Says what keeps samples from being taken. False: nobody can take any.
@@ -127,8 +130,8 @@ int publish(const PubOptions& options, OutputPort<void>& out, const std::vector<
 }
 
 int pub(PubOptions& options) {
-  // All that may fail or block comes before the port opens, and before Ctrl-C is only heard by the
-  // loop: standard input may never end.
+  // All that may fail, or block for ever, comes before the port opens, and before Ctrl-C is only
+  // heard by the loop: standard input may never end.
   auto given = read_payload(options.payload);
   const Type type = type_of(options, given ? given->size() : kDefaultSize);
   const auto payload = payload_of(std::move(given), options.payload, type);

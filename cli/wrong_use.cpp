@@ -75,7 +75,8 @@ std::string text_of(const CLI::Error& error, const CLI::App& verb, const std::st
   const auto is = [&](CLI::ExitCodes code) {
     return error.get_exit_code() == static_cast<int>(code);
   };
-  if (is(CLI::ExitCodes::ExtrasError)) return text_of_words(verb, name);
+  const bool has_words = !verb.remaining().empty();
+  if (is(CLI::ExitCodes::ExtrasError) && has_words) return text_of_words(verb, name);
   const bool lacks_verb = verb.get_require_subcommand_min() > 0 && verb.get_subcommands().empty();
   if (is(CLI::ExitCodes::RequiredError) && lacks_verb) return text_of_missing_verb(verb, name);
   return error.what();

@@ -185,8 +185,8 @@ void Desk::look_at_others() {
     }
   }
   say_without_place(without_place);
-  say_who_is_there(std::move(hosts_there));
-  say_deaf(std::move(deaf_hosts));
+  say_who_is_there(hosts_there);
+  say_deaf(deaf_hosts);
   std::vector<Neighbour> neighbours;
   {
     const std::lock_guard lock(mutex_);
@@ -220,30 +220,41 @@ void Desk::say_without_place(std::size_t count) {
   is_without_place_said_ = count != 0;
 }
 
-void Desk::say_deaf(std::set<std::string> hosts) {
+// What there is no room for is said later.
+void Desk::say_deaf(const std::set<std::string>& hosts) {
+  std::erase_if(deaf_said_, [&](const std::string& host) { return !hosts.contains(host); });
   for (const std::string& host : hosts) {
     if (deaf_said_.contains(host)) continue;
-    say_sparingly(gateway::Level::kWarning,
-                  "host " + host +
-                      " is there, and has not heard this one for 2 s: nothing is imported from it "
-                      "until it does");
+    const bool is_said =
+        say_sparingly(gateway::Level::kWarning,
+                      "host " + host +
+                          " is there, and has not heard this one for 2 s: nothing is imported from "
+                          "it until it does");
+    if (is_said) deaf_said_.insert(host);
   }
-  deaf_said_ = std::move(hosts);
 }
 
-// A host whose link is started again goes on being there.
-void Desk::say_who_is_there(std::set<std::string> hosts) {
+// A host whose link is started again goes on being there. Hosts that come and go must not keep
+// other messages from being said.
+void Desk::say_who_is_there(const std::set<std::string>& hosts) {
+  const shm::Nanoseconds now = shm::monotonic_now();
   for (const std::string& host : hosts) {
-    if (!there_said_.contains(host))
-      say_sparingly(gateway::Level::kInfo, "host " + host + " is there");
+    if (there_said_.contains(host)) continue;
+    if (!presences_.take_without_count(now)) return;
+    gateway::say(gateway::Level::kInfo, "host " + host + " is there");
+    there_said_.insert(host);
   }
-  for (const std::string& host : there_said_) {
-    if (hosts.contains(host)) continue;
-    say_sparingly(
-        gateway::Level::kWarning,
-        "host " + host + " is gone: its link has ended, or nothing has been heard of it for 1.5 s");
+  for (auto each = there_said_.begin(); each != there_said_.end();) {
+    if (hosts.contains(*each)) {
+      ++each;
+      continue;
+    }
+    if (!presences_.take_without_count(now)) return;
+    gateway::say(gateway::Level::kWarning,
+                 "host " + *each +
+                     " is gone: its link has ended, or nothing has been heard of it for 1.5 s");
+    each = there_said_.erase(each);
   }
-  there_said_ = std::move(hosts);
 }
 
 void Desk::hear_card(Bytes message, const gateway::dds::SampleWriter& writer) {

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "gateway/core/bridge.hpp"
+#include "gateway/dds/quota.hpp"
 #include "link/answers.hpp"
 #include "link/core/asked_questions.hpp"
 #include "link/core/disagreements.hpp"
@@ -82,8 +83,8 @@ class Desk {
   void send_card();
   void look_at_others();
   void say_without_place(std::size_t count);
-  void say_deaf(std::set<std::string> hosts);
-  void say_who_is_there(std::set<std::string> hosts);
+  void say_deaf(const std::set<std::string>& hosts);
+  void say_who_is_there(const std::set<std::string>& hosts);
 
   // On Cyclone's threads.
   void hear_card(Bytes message, const gateway::dds::SampleWriter& writer);
@@ -143,6 +144,7 @@ class Desk {
   bool is_without_place_said_ = false;
   std::set<std::string> deaf_said_;
   std::set<std::string> there_said_;
+  gateway::dds::Quota presences_{100, 100'000'000'000};  // of lines about who comes and goes
   shm::Nanoseconds compare_until_ = 0;
   shm::Nanoseconds compare_again_ = 0;
   shm::Nanoseconds send_again_ = 0;

@@ -34,6 +34,7 @@ Incarnation new_incarnation() {
     if (::getrandom(&incarnation, sizeof incarnation, 0) != sizeof incarnation && errno != EINTR) {
       throw std::system_error(errno, std::generic_category(), "no random number");
     }
+    incarnation >>= 1;  // exports count up from it, and must not come round (offers.hpp)
   }
   return incarnation;
 }

@@ -6,6 +6,8 @@
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
+#include <string_view>
+#include <system_error>
 
 #include "gateway/core/say.hpp"
 #include "gateway/dds/quota.hpp"
@@ -70,17 +72,25 @@ thread_local const ConfigurationFile* ConfigurationFile::handed_over = nullptr;
 // Cyclone waits a minute for RouDi, which need not run, and then ends the process. Nodes that use
 // its shared memory are reached by the network, too.
 #ifdef DDS_HAS_SHM
-constexpr const char* kNoSharedMemory = "<SharedMemory><Enable>false</Enable></SharedMemory>";
+constexpr std::string_view kNoSharedMemory = "<SharedMemory><Enable>false</Enable></SharedMemory>";
 #else
-constexpr const char* kNoSharedMemory = "";
+constexpr std::string_view kNoSharedMemory;
 #endif
 
-Entity open_domain(dds_domainid_t id, const Gateway& gateway) {
+// Only where a file may say otherwise, or the text does: Cyclone closes elements that the end of a
+// text leaves open, and what stands behind them would be in them.
+bool may_have_shared_memory(const std::string& configuration) {
+  return configuration.find("file://") != std::string::npos ||
+         configuration.find("SharedMemory") != std::string::npos;
+}
+
+Entity open_domain(dds_domainid_t id, const Gateway& gateway) try {
   const ConfigurationFile file(gateway);
   std::string text = configuration_of(gateway, file.path());
-  if (!text.empty()) text += ",";
-  text += kNoSharedMemory;
+  if (may_have_shared_memory(text)) text += "," + std::string(kNoSharedMemory);
   return {dds_create_domain(id, text.c_str()), "domain " + std::to_string(id)};
+} catch (const std::system_error& error) {  // no memory for the file
+  throw DdsError(error.what());
 }
 
 Entity join(dds_domainid_t domain) {
@@ -203,12 +213,14 @@ void hear_cyclone() {
           kept_words->push_back(text);
           return;
         }
-        const auto again = repeats.take(text, shm::monotonic_now());
-        const auto passed = again ? quota.take() : std::nullopt;
+        const shm::Nanoseconds now = shm::monotonic_now();
+        if (!repeats.is_due(text, now)) return;
+        const auto passed = quota.take();
         if (!passed) return;
+        const std::uint64_t again = repeats.note(text, now);
         const bool error = (line->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0;
         std::string said = "Cyclone DDS: " + text;
-        if (*again > 0) said += " (" + std::to_string(*again) + " times more since it was said)";
+        if (again > 0) said += " (" + std::to_string(again) + " times more since it was said)";
         if (*passed > 0) said += " (" + std::to_string(*passed) + " lines were left out before)";
         say(error ? Level::kError : Level::kWarning, said);
       },

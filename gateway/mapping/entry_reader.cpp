@@ -1,6 +1,5 @@
 #include "gateway/mapping/entry_reader.hpp"
 
-#include <algorithm>
 #include <filesystem>
 
 #include "gateway/mapping/attributes.hpp"
@@ -15,8 +14,6 @@ namespace arbiter::gateway {
 namespace {
 
 constexpr std::size_t kEncapsulation = 4;  // bytes of DDS's header
-// Of a field in CDR: XCDR2 aligns to four bytes at most, XCDR1 to eight.
-constexpr std::size_t kMostAligned = 4;
 // Encapsulations that DDS-XTypes knows.
 constexpr unsigned kLastPlainCdr = 1;  // big-endian and little-endian
 constexpr unsigned kLastXcdr1 = 3;
@@ -108,7 +105,7 @@ class EntryReader {
       return;
     }
     const auto size = attributes_.bytes("size", 1, kMaxSampleBytes);
-    if (size) size_ = *size;
+    if (size) known_size_ = size_ = *size;
     const auto name = attributes_.text("type", shm::kMaxTypeName);
     if (size) make_room_for(header() + *size, "size");
     if (!name) {
@@ -184,14 +181,9 @@ class EntryReader {
                             " bytes; correct one of the two");
     } else if (known_size_ && end > *known_size_) {
       attributes_.error("invalid-value", at,
-                        "a " + entry_.type->name + " has " + bytes_text(*known_size_) +
-                            ", and the field would end at " + std::to_string(end) +
-                            "; correct the offset or the field");
-    } else if (entry_.dds && choice.offset % std::min(size, kMostAligned) != 0) {
-      attributes_.error("invalid-value", at,
-                        "DDS stores a field of " + bytes_text(size) + " at a multiple of " +
-                            std::to_string(std::min(size, kMostAligned)) + ", and " +
-                            std::to_string(choice.offset) + " is none; correct the offset");
+                        (entry_.type ? "a " + entry_.type->name : std::string("a sample")) +
+                            " has " + bytes_text(*known_size_) + ", and the field would end at " +
+                            std::to_string(end) + "; correct the offset or the field");
     }
   }
 
@@ -237,7 +229,11 @@ class EntryReader {
   void check_threshold(const Choice& choice) {
     const Range range = range_of(choice.field);
     const bool is_always = choice.threshold < range.least;
-    if (!is_always && choice.threshold < range.greatest) return;
+    // Of a floating-point number infinity is above all others.
+    const bool is_floating = choice.field == Field::kF32 || choice.field == Field::kF64;
+    const bool is_below =
+        choice.threshold < range.greatest || (is_floating && choice.threshold == range.greatest);
+    if (!is_always && is_below) return;
     attributes_.error("invalid-value", "threshold",
                       std::string("each number of this field is ") +
                           (is_always ? "above it" : "at or below it") +

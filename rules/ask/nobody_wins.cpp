@@ -19,6 +19,8 @@ constexpr std::size_t kMaxCauses = 16;
 constexpr std::size_t kMaxCausesTold = 8;
 // Chains reported for one port; there may be as many as cubes of sources.
 constexpr std::size_t kMaxChains = 4;
+// Circles of which statements say that nobody wins, before no more are looked for.
+constexpr std::size_t kMaxCirclesTried = 64;
 
 class PortFindings {
  public:
@@ -39,11 +41,12 @@ class PortFindings {
       if (wins.is_false()) continue;
       candidates_.push_back({&rule, std::move(wins)});
     }
+    index_inhibitions();
+    if (statements_.empty()) warn_of_circle();  // it needs no states, which may be too large
     find_states();
     leave_out_stated();
     if (!nobody_.is_false()) {
-      index_inhibitions();
-      warn_of_circle();
+      if (!statements_.empty()) warn_of_circle();
       note_states();
       if (port_.in_order) throw DiagramLimit("a diagram of each winner, and those are too large");
       note_chains();
@@ -166,32 +169,47 @@ class PortFindings {
   }
 
   // Each of them wins only while the next one is inactive, the last while the first is. With all of
-  // them active they shut each other out, which nobody means who gives priorities. One for a port.
+  // them active, and nobody else, nobody wins, which nobody means who gives priorities. One for a
+  // port. A circle of which a statement says that nobody wins is passed over with its inhibitions.
   void warn_of_circle() {
+    std::size_t tries = 0;
     for (std::size_t first = 0; first < candidates_.size(); ++first) {
-      const std::vector<std::size_t> circle = shortest_circle(first);
-      if (circle.empty()) continue;
-      Diagram states = nobody_;
-      std::vector<std::string> names;
-      for (const std::size_t each : circle) {
-        names.push_back(candidates_[each].rule->source);
-        states = winners_->combine(Connective::kAnd, states, winners_->active(names.back()));
+      for (;;) {
+        const std::vector<std::size_t> circle = shortest_circle(first);
+        if (circle.empty()) break;
+        if (statements_.empty() || !is_stated(circle)) return warn_of(circle);
+        for (std::size_t i = 0; i < circle.size(); ++i) {
+          keeps_out_[circle[(i + 1) % circle.size()]].reset(circle[i]);
+        }
+        if (++tries == kMaxCirclesTried) return;
       }
-      if (states.is_false()) continue;  // or conditions let some of them be active alone
-      const Witness witness = winners_->witness(states);
-      std::string message = "at " + port_.port;
-      for (std::size_t i = 0; i < names.size(); ++i) {
-        message += (i == 0 ? ", " : " and ") + names[i] + " is kept out by " +
-                   names[(i + 1) % names.size()];
-      }
-      message += ", in a circle: with " + in_words(witness) +
-                 ", nobody wins; let one of them win then, by an inhibition or a condition less, "
-                 "or if that is "
-                 "meant, say so in a statement (--assert)";
-      diagnostics_.warning("inhibition-circle", where_of(names.front()), message,
-                           {.ports = {port_.port}, .source = names.front()});
-      return;
     }
+  }
+
+  bool is_stated(const std::vector<std::size_t>& circle) {
+    Diagram states = nobody_;
+    for (std::size_t i = 0; i < candidates_.size(); ++i) {
+      const bool is_of_it = std::find(circle.begin(), circle.end(), i) != circle.end();
+      states = winners_->combine(is_of_it ? Connective::kAnd : Connective::kAndNot, states,
+                                 winners_->active(candidates_[i].rule->source));
+    }
+    return states.is_false();
+  }
+
+  void warn_of(const std::vector<std::size_t>& circle) {
+    std::vector<std::string> names;
+    for (const std::size_t each : circle) names.push_back(candidates_[each].rule->source);
+    std::string message = "at " + port_.port;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      message +=
+          (i == 0 ? ", " : " and ") + names[i] + " is kept out by " + names[(i + 1) % names.size()];
+    }
+    message +=
+        ", in a circle: while they are active, and nobody else that is connected there, nobody "
+        "wins; let one of them win then, by an inhibition or a condition less, or if that is "
+        "meant, say so in a statement (--assert)";
+    diagnostics_.warning("inhibition-circle", where_of(names.front()), message,
+                         {.ports = {port_.port}, .source = names.front()});
   }
 
   // From a candidate to those that keep it out, breadth first, and back to it. Empty: there is

@@ -73,6 +73,8 @@ std::size_t Hierarchy::look_up(const Mention& mention) const {
 // "Rest, Look Around" for "Rest; Look Around", or without a comma; empty: these are not all names.
 std::string Hierarchy::as_list(std::string_view text) const {
   constexpr std::string_view kSeparators = " ;\t\n";
+  constexpr std::size_t kMost = 1024;  // bytes: all beginnings of each rest are tried
+  if (text.size() > kMost) return {};
   std::string list;
   while (!text.empty()) {
     std::size_t length = text.size();  // of the longest name that it begins with

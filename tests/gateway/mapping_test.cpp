@@ -228,13 +228,13 @@ TEST(Mapping, AFieldIsOneThatASampleHas) {
                   .message(),
               HasSubstr("are f64, not Boolean; write above=\"…\", below=\"…\", a threshold and "
                         "field=\"f64\""));
-  EXPECT_THAT(read("my/msg/State", "threshold='1' field='f32' offset='6'").message(),
-              HasSubstr("DDS stores a field of 4 bytes at a multiple of 4, and 6 is none"));
-  EXPECT_THAT(read("my/msg/State", "threshold='1' field='f64' offset='4'").findings(), IsEmpty());
   EXPECT_THAT(read("std_msgs/msg/Float32", "threshold='1' field='f32' max_size='7'").message(),
               HasSubstr("the sample that type=\"…\" asks for has 8"));
   const std::string topic = "<in service='a' instance='b' event='c' above='/a:o' below='/b:o' ";
   EXPECT_THAT(read_iceoryx(topic + "threshold='1' field='f32' offset='6'/>").findings(), IsEmpty());
+  EXPECT_THAT(
+      read_iceoryx(topic + "type='T' size='8' threshold='1' field='f32' offset='5'/>").message(),
+      HasSubstr("a T has 8 bytes, and the field would end at 9"));
 }
 
 TEST(Mapping, AThresholdHasNumbersOnBothSides) {
@@ -251,6 +251,8 @@ TEST(Mapping, AThresholdHasNumbersOnBothSides) {
   EXPECT_THAT(read("18446744073709551615", "u64").message(), HasSubstr("at or below it"));
   EXPECT_THAT(read("1e39", "f32").message(), HasSubstr("at or below it"));
   EXPECT_THAT(read("1e39", "f64").findings(), IsEmpty());
+  EXPECT_THAT(read("3.40282346638528859811704183484516925e38", "f32").findings(), IsEmpty())
+      << "infinity is above it";
   EXPECT_THAT(read("1e400", "f64").message(), HasSubstr("at or below it"));
 }
 

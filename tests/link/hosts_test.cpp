@@ -170,6 +170,32 @@ TEST_F(KnownHosts, WhoPublishesByHandIsToldWhoseRulesReadIt) {
   await([&] { return base.daemon().source(kPlanner)["active"] == true; });
 }
 
+// A host that has the source open itself obeys its own.
+TEST_F(KnownHosts, WhoPublishesByHandIsNotToldOfAHostThatObeysItsOwn) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1s"), network());
+  Body body(base);
+  const Planner own(base);
+  await_host("head", "base");
+  await([&] { return base.daemon().source(kPlanner)["open"] == true; });
+  const ProgramResult told = run_arbiter("head", {"pub", kPlanner, "--count", "1", "--strict"});
+  EXPECT_EQ(told.exit_code, 1);
+  EXPECT_THAT(told.err, Not(HasSubstr("cross")));
+}
+
+// What is published by hand may be urgent.
+TEST_F(KnownHosts, WhoPublishesByHandWaitsForNoHostThatIsSilent) {
+  Host head("head", runtime_, kNoRules, network());
+  Host base("base", runtime_, motor_model("1s"), network());
+  Body body(base);
+  await_host("head", "base");
+  base.link().stop();
+  const ProgramResult told = run_arbiter("head", {"pub", kPlanner, "--count", "1"});
+  base.link().resume();
+  EXPECT_EQ(told.exit_code, 0);
+  EXPECT_THAT(told.err, Not(HasSubstr("cross")));
+}
+
 TEST_F(KnownHosts, WhyIsAskedOfTheOneThatDecides) {
   Host head("head", runtime_, kNoRules, network());
   Host base("base", runtime_, motor_model("1000s"), network());

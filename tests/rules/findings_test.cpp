@@ -83,9 +83,9 @@ TEST(Findings, SourcesThatKeepEachOtherOutAreACircle) {
   EXPECT_EQ(found.items[0].severity, rules::Severity::kWarning);
   EXPECT_EQ(found.items[0].message,
             "at /p, /a is kept out by /b and /b is kept out by /c and /c is kept out by /a, in a "
-            "circle: with /a, /b and /c active, nobody wins; let one of them win then, by an "
-            "inhibition or a condition less, or if that is meant, say so in a statement "
-            "(--assert)");
+            "circle: while they are active, and nobody else that is connected there, nobody wins; "
+            "let one of them win then, by an inhibition or a condition less, or if that is meant, "
+            "say so in a statement (--assert)");
 }
 
 TEST(Findings, ACircleThatAConditionBreaksIsNone) {

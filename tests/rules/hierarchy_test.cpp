@@ -83,6 +83,16 @@ TEST(Hierarchy, OnlySiblingsMayInhibitEachOther) {
   }
 }
 
+TEST(Hierarchy, NoListIsMadeOfALongText) {
+  std::string many;
+  for (int i = 0; i < 30'000; ++i) many += "B ";
+  const Loaded loaded =
+      load_text("<behaviors><behavior name='A'><config at='/p'>/a</config><inhibition>" + many +
+                "</inhibition></behavior><behavior name='B'><config at='/p'>/b</config></behavior>"
+                "</behaviors>");
+  EXPECT_THAT(loaded.message(), Not(HasSubstr("separated by commas")));
+}
+
 TEST(Hierarchy, NamesMustBeKnownAndUnique) {
   struct Case {
     std::vector<std::string> behaviours;

@@ -80,7 +80,8 @@ TEST(DdsConfiguration, WhateverItSaysCyclonesSharedMemoryStaysOff) {
   const test::OwnDomain number;
   const Bell bell;
   const char* const with_it =
-      "<CycloneDDS><Domain><SharedMemory><Enable>true</Enable></SharedMemory></Domain></CycloneDDS>";
+      "<CycloneDDS><Domain><SharedMemory><Enable>true</Enable></SharedMemory></Domain></"
+      "CycloneDDS>";
   const ScopedVariable uri("CYCLONEDDS_URI", with_it);
   Gateway gateway;
   gateway.domain = number.number();
@@ -88,6 +89,16 @@ TEST(DdsConfiguration, WhateverItSaysCyclonesSharedMemoryStaysOff) {
   gateway.interfaces = {"lo"};
   gateway.configuration = "/nowhere/dds.xml";
   gateway.configuration_text = with_it;
+  EXPECT_NO_THROW(Domain(gateway, {}, bell));
+}
+
+// Cyclone closes what the end leaves open.
+TEST(DdsConfiguration, OfTheEnvironmentMayLeaveElementsOpen) {
+  const test::OwnDomain number;
+  const Bell bell;
+  const ScopedVariable uri("CYCLONEDDS_URI", "<Tracing><Verbosity>warning");
+  Gateway gateway;
+  gateway.domain = number.number();
   EXPECT_NO_THROW(Domain(gateway, {}, bell));
 }
 

@@ -101,8 +101,8 @@ TEST_P(DdsMatching, PartitionsKeepTopicsApartAndJoinThem) {
 TEST_P(DdsMatching, AKeyIsThatOfWhoMayMatch) {
   const OwnDomain domain;
   const Daemon daemon(base_model("1s"));
-  const DdsGateway gateway(
-      daemon, domain, R"(<in topic="robots" type="strangers::Robot" port="/Fleet/robot:o"/>)");
+  const DdsGateway gateway(daemon, domain,
+                           R"(<in topic="robots" type="strangers::Robot" port="/Fleet/robot:o"/>)");
   const Stranger other(GetParam(), domain, {"pub", "robot", "robots", "partition=raw"});
   gateway.see("does not match: key: its type has a key, this entry's has none");
   const Stranger robot(GetParam(), domain, {"pub", "robot", "robots"});

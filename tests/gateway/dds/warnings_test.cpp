@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <optional>
 #include <string>
 
 #include "gateway/dds/repeats.hpp"
@@ -75,19 +74,22 @@ TEST(Warnings, OfAPeerThatChangesForEverHaveAnEnd) {
 
 TEST(Repeats, AreCountedAndSaidOnceAWhile) {
   Repeats repeats(100);
-  EXPECT_EQ(repeats.take("a", 1), 0U);
-  EXPECT_EQ(repeats.take("a", 2), std::nullopt);
-  EXPECT_EQ(repeats.take("b", 2), 0U);
-  EXPECT_EQ(repeats.take("a", 100), std::nullopt);
-  EXPECT_EQ(repeats.take("a", 101), 2U);
-  EXPECT_EQ(repeats.take("a", 201), 0U);
+  EXPECT_TRUE(repeats.is_due("a", 1));
+  EXPECT_TRUE(repeats.is_due("a", 2)) << "it has not been said: there was no room";
+  EXPECT_EQ(repeats.note("a", 2), 0U);
+  EXPECT_FALSE(repeats.is_due("a", 3));
+  EXPECT_TRUE(repeats.is_due("b", 3));
+  EXPECT_FALSE(repeats.is_due("a", 101));
+  EXPECT_TRUE(repeats.is_due("a", 102));
+  EXPECT_EQ(repeats.note("a", 102), 2U);
+  EXPECT_EQ(repeats.note("a", 202), 0U);
 }
 
 TEST(Repeats, OfMoreThanAreRememberedAreSaid) {
   Repeats repeats(1000);
-  for (int i = 0; i < 17; ++i) EXPECT_EQ(repeats.take(std::to_string(i), 1 + i), 0U);
-  EXPECT_EQ(repeats.take("16", 20), std::nullopt);
-  EXPECT_EQ(repeats.take("0", 20), 0U);
+  for (int i = 0; i < 17; ++i) EXPECT_EQ(repeats.note(std::to_string(i), 1 + i), 0U);
+  EXPECT_FALSE(repeats.is_due("16", 20));
+  EXPECT_TRUE(repeats.is_due("0", 20));
 }
 
 }  // namespace
