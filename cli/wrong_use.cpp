@@ -51,8 +51,9 @@ std::string text_of_options(const CLI::App& verb, const std::string& name) {
 
 std::string text_of_words(const CLI::App& verb, const std::string& name) {
   const std::vector<std::string> words = verb.remaining();
-  std::vector<std::string> quoted;
-  for (const std::string& word : words) quoted.push_back(quote(word));
+  std::vector<std::string> quoted(words.size());
+  std::transform(words.begin(), words.end(), quoted.begin(),
+                 [](const std::string& word) { return quote(word); });
   return name + " has no place for " + rules::enumerate(quoted);
 }
 

@@ -17,9 +17,9 @@ struct FindingsAccount {
   std::size_t open = 0;   // of which a question was left open, with a note that says so
 };
 
-// Warnings "never-wins" and "inhibition-circle"; notes "nobody-wins", "starved" and "left-open". States of which proved
-// statements say that nobody wins are known, and not noted: those in which they leave it to nobody.
-// Shares out what is left of the budget among the ports. Throws Stopped.
+// Warnings "never-wins" and "inhibition-circle"; notes "nobody-wins", "starved" and "left-open".
+// States of which proved statements say that nobody wins are known, and not noted: those in which
+// they leave it to nobody. Shares out what is left of the budget among the ports. Throws Stopped.
 FindingsAccount find_more(const RuleSet& rules, const CompiledModel& model,
                           Diagnostics& diagnostics, Budget& budget,
                           const ProvedStatements& statements = {});

@@ -197,8 +197,9 @@ class PortFindings {
   }
 
   void warn_of(const std::vector<std::size_t>& circle) {
-    std::vector<std::string> names;
-    for (const std::size_t each : circle) names.push_back(candidates_[each].rule->source);
+    std::vector<std::string> names(circle.size());
+    std::transform(circle.begin(), circle.end(), names.begin(),
+                   [&](std::size_t each) { return candidates_[each].rule->source; });
     std::string message = "at " + port_.port;
     for (std::size_t i = 0; i < names.size(); ++i) {
       message +=

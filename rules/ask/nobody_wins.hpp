@@ -9,9 +9,9 @@
 
 namespace arbiter::rules {
 
-// Warnings "inhibition-circle", notes "nobody-wins" and "starved". `statements`: those that speak of the port; states of which
-// they say that nobody wins are not noted. Throws DiagramLimit; what has been found until then
-// holds.
+// Warnings "inhibition-circle", notes "nobody-wins" and "starved". `statements`: those that speak
+// of the port; states of which they say that nobody wins are not noted. Throws DiagramLimit; what
+// has been found until then holds.
 void find_where_nobody_wins(const PortRules& rules, const CompiledPort& port,
                             const ProvedStatements& statements, Diagnostics& diagnostics,
                             Budget& budget);
