@@ -87,7 +87,9 @@ bool may_have_shared_memory(const std::string& configuration) {
 Entity open_domain(dds_domainid_t id, const Gateway& gateway) try {
   const ConfigurationFile file(gateway);
   std::string text = configuration_of(gateway, file.path());
-  if (may_have_shared_memory(text)) text += "," + std::string(kNoSharedMemory);
+  if (!kNoSharedMemory.empty() && may_have_shared_memory(text)) {
+    text += "," + std::string(kNoSharedMemory);
+  }
   return {dds_create_domain(id, text.c_str()), "domain " + std::to_string(id)};
 } catch (const std::system_error& error) {  // no memory for the file
   throw DdsError(error.what());
