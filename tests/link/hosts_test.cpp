@@ -144,16 +144,26 @@ TEST_F(KnownHosts, WhoPublishesByHandIsToldWhoTakesItElsewhere) {
   Host base("base", runtime_, motor_model("forever"), network());
   Body body(base);
   const Type type = type_of<Speed>();
+  const std::vector<std::string> pub{"pub",
+                                     kPlanner,
+                                     "--count",
+                                     "1",
+                                     "--strict",
+                                     "--type",
+                                     type.name() + ":" + std::to_string(type.size()) + ":8"};
   await_host("head", "base");
-  const ProgramResult told =
-      run_arbiter("head", {"pub", kPlanner, "--count", "1", "--strict", "--type",
-                           type.name() + ":" + std::to_string(type.size()) + ":8"});
-  EXPECT_EQ(told.exit_code, 0) << told.err;
-  EXPECT_THAT(told.err, HasSubstr("samples cross to /Motor/speed:i of host base; what is delivered "
-                                  "there is not counted here"));
+  await([&] {  // on a busy machine the other host may not answer in time
+    const ProgramResult told = run_arbiter("head", pub);
+    return told.exit_code == 0 &&
+           told.err.find(
+               "samples cross to /Motor/speed:i of host base; what is delivered there is "
+               "not counted here") != std::string::npos;
+  });
   await([&] { return body.motor().take().has_value(); });
-  EXPECT_THAT(run_arbiter("head", {"deactivate", kPlanner}).out,
-              HasSubstr("each host keeps its own activity of it"));
+  await([&] {
+    return run_arbiter("head", {"deactivate", kPlanner}).out.find("each host keeps its own") !=
+           std::string::npos;
+  });
 }
 
 TEST_F(KnownHosts, WhoPublishesByHandIsToldWhoseRulesReadIt) {
@@ -164,9 +174,11 @@ TEST_F(KnownHosts, WhoPublishesByHandIsToldWhoseRulesReadIt) {
             "</behaviors>",
             network());
   await_host("head", "base");
-  const ProgramResult told = run_arbiter("head", {"pub", kPlanner, "--count", "1", "--strict"});
-  EXPECT_EQ(told.exit_code, 0) << told.err;
-  EXPECT_THAT(told.err, HasSubstr("The rules of host base read /Planner/speed:o"));
+  await([&] {
+    const ProgramResult told = run_arbiter("head", {"pub", kPlanner, "--count", "1", "--strict"});
+    return told.exit_code == 0 &&
+           told.err.find("The rules of host base read /Planner/speed:o") != std::string::npos;
+  });
   await([&] { return base.daemon().source(kPlanner)["active"] == true; });
 }
 
