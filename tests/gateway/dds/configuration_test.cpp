@@ -96,7 +96,8 @@ TEST(DdsConfiguration, WhateverItSaysCyclonesSharedMemoryStaysOff) {
 TEST(DdsConfiguration, OfTheEnvironmentMayLeaveElementsOpen) {
   const test::OwnDomain number;
   const Bell bell;
-  const ScopedVariable uri("CYCLONEDDS_URI", "<Tracing><Verbosity>warning");
+  const ScopedVariable uri("CYCLONEDDS_URI",
+                           "<Tracing><OutputFile>stderr</OutputFile><Verbosity>warning");
   Gateway gateway;
   gateway.domain = number.number();
   EXPECT_NO_THROW(Domain(gateway, {}, bell));
