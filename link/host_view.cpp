@@ -15,6 +15,7 @@
 #include "link/core/host_card.hpp"
 #include "shm/clock.hpp"
 #include "shm/picture.hpp"
+#include "watch/imported.hpp"
 #include "watch/picture.hpp"
 #include "wire/document.hpp"
 #include "wire/model_document.hpp"
@@ -106,7 +107,7 @@ std::string program_of(int process) {
 // from here (another PID namespace) has nothing but that name; nor has a link that has just died,
 // and one that is ending beside this one is known by its program.
 bool is_link(const wire::Component& component) {
-  if (component.node != kNodeName) return false;
+  if (component.node != watch::kLinkNode) return false;
   if (component.pid == ::getpid()) return true;
   const std::string program = program_of(component.pid);
   return program.empty() || program == program_of(::getpid());

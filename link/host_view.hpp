@@ -15,14 +15,10 @@
 #include "link/core/demand.hpp"
 #include "shm/activity.hpp"
 #include "shm/type_info.hpp"
-#include "watch/imported.hpp"
 #include "watch/instance.hpp"
 #include "wire/status.hpp"
 
 namespace arbiter::link {
-
-// The node of every link has this name. What it has open was imported, and is not exported again.
-inline constexpr const char* kNodeName = watch::kLinkNode;
 
 class HostView {
  public:

@@ -15,6 +15,7 @@
 #include "link/first_failure.hpp"
 #include "link/say_sparingly.hpp"
 #include "shm/clock.hpp"
+#include "watch/imported.hpp"
 #include "wire/rendezvous.hpp"
 
 namespace arbiter::link {
@@ -144,7 +145,7 @@ void Link::make_node(int stop) {
   while (!node_ && !stops_) {
     options_.on_round();
     try {
-      node_.emplace(kNodeName, options);
+      node_.emplace(watch::kLinkNode, options);
     } catch (const Error& error) {
       say_once(said_, error.what());
       tell_desk(said_);

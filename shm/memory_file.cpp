@@ -8,17 +8,18 @@
 
 namespace arbiter::shm {
 
+bool write_whole(int file, std::string_view content) noexcept {
+  for (std::string_view rest = content; !rest.empty();) {
+    const ssize_t written = ::write(file, rest.data(), rest.size());
+    if (written <= 0) return false;
+    rest.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
 FileDescriptor memory_file(const char* name, std::string_view content, unsigned flags) {
   FileDescriptor file(::memfd_create(name, flags));
-  for (std::string_view rest = content; file && !rest.empty();) {
-    const ssize_t written = ::write(file.get(), rest.data(), rest.size());
-    if (written <= 0) {
-      file.reset();
-    } else {
-      rest.remove_prefix(static_cast<std::size_t>(written));
-    }
-  }
-  if (!file) {
+  if (!file || !write_whole(file.get(), content)) {
     throw std::system_error(errno, std::generic_category(),
                             "no memory for the file " + std::string(name));
   }

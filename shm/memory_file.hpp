@@ -14,4 +14,7 @@ namespace arbiter::shm {
 [[nodiscard]] FileDescriptor memory_file(const char* name, std::string_view content,
                                          unsigned flags = MFD_CLOEXEC);
 
+// Whether all of it has been written there, whatever the file; if not, errno says why.
+[[nodiscard]] bool write_whole(int file, std::string_view content) noexcept;
+
 }  // namespace arbiter::shm

@@ -7,7 +7,8 @@
 
 namespace arbiter::watch {
 
-// What arbiter-link is called as a component.
+// The node of every arbiter-link has this name. What it has open it has imported, and does not
+// export again.
 inline constexpr const char* kLinkNode = "arbiter-link";
 
 // The link has not said yet.

@@ -100,12 +100,7 @@ void KeptFiles::save(const std::string& path) const {
   const shm::FileDescriptor file(
       ::open(next.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0600));
   if (!file) fail(next);
-  const std::string bytes = content();
-  for (std::string_view rest = bytes; !rest.empty();) {
-    const ssize_t count = ::write(file.get(), rest.data(), rest.size());
-    if (count <= 0) fail(next);
-    rest.remove_prefix(static_cast<std::size_t>(count));
-  }
+  if (!shm::write_whole(file.get(), content())) fail(next);
   if (::rename(next.c_str(), path.c_str()) != 0) fail(path);
 }
 

@@ -105,7 +105,7 @@ class EntryReader {
       return;
     }
     const auto size = attributes_.bytes("size", 1, kMaxSampleBytes);
-    if (size) known_size_ = size_ = *size;
+    if (size) known_size_ = *size;
     const auto name = attributes_.text("type", shm::kMaxTypeName);
     if (size) make_room_for(header() + *size, "size");
     if (!name) {
@@ -290,13 +290,13 @@ class EntryReader {
       entry_.idle.sample.resize(kEncapsulation + *size);
       const bool is_xcdr2 = entry_.dds->qos.representation == Representation::kXcdr2;
       entry_.idle.sample[1] = is_xcdr2 ? std::byte{7} : std::byte{1};  // little-endian
-    } else if (size_ == 0) {
+    } else if (!known_size_) {
       attributes_.error("idle-size", "idle",
                         "how large a zero sample is cannot be known; add size=\"BYTES\", or give "
                         "a sample: idle=\"file:…\"");
       return;
     } else {
-      entry_.idle.sample.resize(header() + size_);
+      entry_.idle.sample.resize(header() + *known_size_);
     }
     entry_.idle.kind = Idle::Kind::kZero;
   }
@@ -306,7 +306,6 @@ class EntryReader {
   std::optional<std::size_t> size_of_zero() {
     const std::string& type = entry_.type->name;
     const auto said = attributes_.bytes("size", 1, kMaxIdleBytes);
-    const auto known = known_size_;
     if (has_strings(type)) {
       attributes_.error("idle-size", "idle",
                         rules::quote(type) +
@@ -314,13 +313,13 @@ class EntryReader {
                             "sample: idle=\"file:…\"");
       return {};
     }
-    if (said && known && *said != *known) {
+    if (said && known_size_ && *said != *known_size_) {
       attributes_.error(
           "idle-size", "size",
-          "a " + type + " has " + bytes_text(*known) + "; correct the size, or leave it out");
+          "a " + type + " has " + bytes_text(*known_size_) + "; correct the size, or leave it out");
       return {};
     }
-    if (!said && !known) {
+    if (!said && !known_size_) {
       attributes_.error("idle-size", "idle",
                         "how large a zero " + rules::quote(type) +
                             " is cannot be known; if it has no string and no sequence, add "
@@ -328,7 +327,7 @@ class EntryReader {
                             "idle=\"file:…\"");
       return {};
     }
-    return said ? said : known;
+    return said ? said : known_size_;
   }
 
   void read_idle_file(std::string_view written) {
@@ -373,8 +372,8 @@ class EntryReader {
              std::to_string(size) + " of its own: write another file";
     };
     if (!entry_.dds) {
-      if (size_ == 0 || bytes.size() == header() + size_) return {};
-      return counted(size_) + ", or correct the size";
+      if (!known_size_ || bytes.size() == header() + *known_size_) return {};
+      return counted(*known_size_) + ", or correct the size";
     }
     const auto encapsulation = static_cast<unsigned char>(bytes[1]);
     const bool is_xcdr1 = encapsulation <= kLastXcdr1;
@@ -391,7 +390,7 @@ class EntryReader {
                         "another file, or leave out the representation";
     }
     if (encapsulation > kLastPlainCdr) return {};  // other encodings add bytes of their own
-    const auto known = known_size_;
+    const auto& known = known_size_;
     const std::size_t own = bytes.size() - header();
     // It may be padded to a multiple of four, as DDS sends it.
     if (!known || own == *known || own == (*known + 3) / 4 * 4) return {};
@@ -404,7 +403,6 @@ class EntryReader {
   Attributes attributes_;
   Entry entry_;
   std::optional<std::size_t> known_size_;  // of a sample's data; absent: it may vary
-  std::size_t size_ = 0;                   // of iceoryx: of a sample's payload; 0: any
 };
 
 }  // namespace

@@ -102,6 +102,13 @@ bool is_ros_type(std::string_view name) {
          std::all_of(type.begin(), type.end(), is_word);
 }
 
+bool is_dds_topic(std::string_view name) {
+  return !is_digit(name.front()) && !name.starts_with("DCPS") &&
+         std::all_of(name.begin(), name.end(), [](char c) {
+           return is_lower(c) || is_upper(c) || is_digit(c) || c == '_' || c == '/';
+         });
+}
+
 std::string dds_topic_of(std::string_view ros_topic) { return "rt" + std::string(ros_topic); }
 
 std::string dds_type_of(std::string_view ros_type) {

@@ -18,7 +18,11 @@ namespace arbiter::gateway {
 // "package/msg/Name"; also srv and action, whose parts are types too.
 [[nodiscard]] bool is_ros_type(std::string_view name);
 
-// Of names for which these are true.
+// What Cyclone takes for the name of a topic; its own topics, DCPS…, it lets nobody have. Of a name
+// that is not empty.
+[[nodiscard]] bool is_dds_topic(std::string_view name);
+
+// Of names for which those of ROS 2 are true.
 [[nodiscard]] std::string dds_topic_of(std::string_view ros_topic);
 [[nodiscard]] std::string dds_type_of(std::string_view ros_type);
 

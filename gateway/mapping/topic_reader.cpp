@@ -1,6 +1,5 @@
 #include "gateway/mapping/topic_reader.hpp"
 
-#include <algorithm>
 #include <string>
 #include <string_view>
 
@@ -77,15 +76,6 @@ Qos read_qos(Attributes& attributes, bool is_in, bool is_ros) {
         "representation", {{"xcdr1", Representation::kXcdr1}, {"xcdr2", Representation::kXcdr2}});
   }
   return qos;
-}
-
-// What Cyclone takes for the name of a topic; its own topics it lets nobody have.
-bool is_dds_topic(const std::string& name) {
-  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
-  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-  return !is_digit(name.front()) && !name.starts_with("DCPS") &&
-         std::all_of(name.begin(), name.end(),
-                     [&](char c) { return is_letter(c) || is_digit(c) || c == '_' || c == '/'; });
 }
 
 // As ROS 2 would write it: "/cmd_vel" for "rt/cmd_vel", which is its name in DDS, for "cmd_vel",
