@@ -46,25 +46,23 @@ wire::Status read_status_of_host(const std::string& text) {
   return wire::read_status(document.dump());
 }
 
-OtherHosts look_at_other_hosts(const std::string& instance, std::chrono::milliseconds patience,
-                               bool with_status) {
+bool has_others(const std::optional<wire::HostsDocument>& hosts) {
+  return hosts && std::any_of(hosts->hosts.begin(), hosts->hosts.end(),
+                              [](const auto& each) { return each.is_up && !each.is_this; });
+}
+
+OtherHosts statuses_of_other_hosts(const std::string& instance,
+                                   std::chrono::milliseconds patience) {
   OtherHosts others;
   try {
     const auto hosts = wire::read_hosts(wire::LinkCall(instance, patience).ask({"", "hosts"}));
     others.here = shm::printable(hosts.host);
-    for (const wire::HostStatus& each : hosts.hosts) {
-      if (each.is_up && !each.is_this) others.there.push_back(shm::printable(each.host));
-    }
-    std::sort(others.there.begin(), others.there.end());
-    if (!with_status || others.there.empty()) return others;
+    if (!has_others(hosts)) return others;
     for (const auto& answer :
          wire::LinkCall(instance, patience).ask_hosts({wire::kAllHosts, "status"})) {
-      const std::string name = shm::printable(answer.host);
-      if (answer.outcome != wire::HostOutcome::kAnswered ||
-          !std::binary_search(others.there.begin(), others.there.end(), name)) {
-        continue;
-      }
-      others.answered.push_back({name, read_status_of_host(answer.text)});
+      const bool is_here = answer.host == hosts.host;
+      if (is_here || answer.outcome != wire::HostOutcome::kAnswered) continue;
+      others.answered.push_back({shm::printable(answer.host), read_status_of_host(answer.text)});
     }
   } catch (const std::runtime_error&) {
     // What is not known of other hosts, nothing is said of.

@@ -23,19 +23,21 @@ namespace arbiter::cli {
 // Throws wire::DocumentError.
 [[nodiscard]] wire::Status read_status_of_host(const std::string& text);
 
+// Whether other hosts are there, by such a document.
+[[nodiscard]] bool has_others(const std::optional<wire::HostsDocument>& hosts);
+
 struct OtherHost {
   std::string name;
   wire::Status status;
 };
 struct OtherHosts {
-  std::string here;                // what this one is called; empty: no link runs here
-  std::vector<std::string> there;  // whose links are up, in byte order
+  std::string here;  // what this one is called; empty: no link runs here
   std::vector<OtherHost> answered;
 };
 // Of those that answer within `patience`, their statuses: if one does not, of none. No link takes
 // no time.
-[[nodiscard]] OtherHosts look_at_other_hosts(const std::string& instance,
-                                             std::chrono::milliseconds patience, bool with_status);
+[[nodiscard]] OtherHosts statuses_of_other_hosts(const std::string& instance,
+                                                 std::chrono::milliseconds patience);
 
 // The input ports that are open on several hosts, a line for each.
 void write_port_errors(std::ostream& out, const std::optional<wire::HostsDocument>& hosts);

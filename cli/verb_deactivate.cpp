@@ -1,5 +1,4 @@
 // arbiter deactivate: ends the activity of a source whose process is gone.
-#include <chrono>
 #include <iostream>
 #include <memory>
 #include <stdexcept>
@@ -49,8 +48,7 @@ bool end_activity(const DeactivateOptions& options) try {
 int deactivate(const DeactivateOptions& options) {
   const bool was_active = end_activity(options);
   std::cout << options.source << (was_active ? " is inactive now\n" : " was not active\n");
-  const auto others = look_at_other_hosts(options.instance, std::chrono::milliseconds(500), false);
-  if (!others.there.empty()) {
+  if (has_others(hosts_if_linked(options.instance))) {
     std::cout << "each host keeps its own activity of it: where it is still active (arbiter status "
                  "--all), run this there, too\n";
   }
@@ -65,11 +63,11 @@ void add_deactivate(CLI::App& app, int& exit_code) {
       app.add_subcommand("deactivate", "End the activity of a source whose process is gone");
   verb->add_option("SOURCE", options->source, "An output port's name")->required();
   add_instance_option(*verb, options->instance);
-  verb->footer(
-      "Example:\n  arbiter deactivate /collision:o\n\n"
-      "It is about this host alone: other hosts that have heard the source, by arbiter-link, keep "
-      "it\n"
-      "active until it is deactivated there, too.");
+  verb->footer(R"(Example:
+  arbiter deactivate /collision:o
+
+It is about this host alone: other hosts that have heard the source, by arbiter-link, keep it
+active until it is deactivated there, too.)");
   verb->callback([options, &exit_code] { exit_code = deactivate(*options); });
 }
 

@@ -125,19 +125,17 @@ void add_doctor(CLI::App& app, int& exit_code) {
       ->check(CLI::Validator(problem_of_root, ""));
   verb->add_flag("--json", options->json, "Write the findings as JSON");
   add_instance_option(*verb, options->instance);
-  verb->footer(
-      "Examples:\n"
-      "  arbiter doctor\n"
-      "  arbiter doctor --silence governor,realtime-priority\n\n"
-      "It changes nothing. It asks the daemon for its status once and, where it runs, "
-      "arbiter-link\n"
-      "for what hosts do not agree upon. Where components have sources open, it watches their\n"
-      "arrivals for 2.5 s at most. It reports the limits of the shell that starts it: run it as "
-      "the\n"
-      "same user, and in the same place, as your components.\n\n"
-      "Exit codes: 0 nothing found; 1 findings; 2 wrong use, or it cannot look, or standard output "
-      "cannot "
-      "be\nwritten");
+  verb->footer(R"(Examples:
+  arbiter doctor
+  arbiter doctor --silence governor,realtime-priority
+
+It changes nothing. It asks the daemon for its status once and, where it runs, arbiter-link
+for what hosts do not agree upon. Where components have sources open, it watches their
+arrivals for 2.5 s at most. It reports the limits of the shell that starts it: run it as the
+same user, and in the same place, as your components.
+
+Exit codes: 0 nothing found; 1 findings; 2 wrong use, or it cannot look, or standard output cannot be
+written)");
   // 1 would mean findings.
   verb->callback([options, &exit_code] {
     try {

@@ -66,7 +66,7 @@ TakersElsewhere await_elsewhere(const PubOptions& options, const Type& type,
   const shm::Nanoseconds until = shm::monotonic_now() + kLongest;
   for (;;) {
     TakersElsewhere found =
-        find_elsewhere(look_at_other_hosts(options.instance, kPatience, true), options.port, type);
+        find_elsewhere(statuses_of_other_hosts(options.instance, kPatience), options.port, type);
     if (!found.is_any()) return found;
     const shm::Nanoseconds now = shm::monotonic_now();
     found.is_imported =

@@ -129,16 +129,24 @@ TEST_F(Cable, ASpeakerThatDoesNotHearUsGivesWay) {
 }
 
 // While the head hears nobody, nobody hears of the ends of its sources: DDS repeats them only to
-// those whose announcements come.
-class UnheardEnds : public Cable {
- protected:
-  void SetUp() override {
-    Cable::SetUp();
-    if (!IsSkipped()) robot_.emplace();
+// those whose announcements come. Its planner has driven the motor on the base before.
+struct UnheardEnd {
+  UnheardEnd() {
+    body.drive(*planner);
+    robot.cables.cut_to(kHead);
+    base.see("host head is there, and has not heard this one for 2 s");
+    await_hosts("head", [](const auto& hosts) { return !hosts.find_host("base")->is_up; });
   }
   [[nodiscard]] Host host(const std::string& name, const std::string& model,
                           const NetworkNamespace& network) const {
-    return {name, robot_->runtime, model, CabledRobot::arguments(), network.enter()};
+    return {name, robot.runtime, model, CabledRobot::arguments(), network.enter()};
+  }
+  // Returns the number of its last sample once the head's link knows of the end.
+  std::int64_t end_planner() {
+    const std::int64_t published = planner->published();
+    planner.reset();
+    await_offer(false);
+    return published;
   }
   // Whether components of the head have the planner's port open, as its link knows.
   static void await_offer(bool is_open) {
@@ -146,52 +154,38 @@ class UnheardEnds : public Cable {
       return (hosts.find_this()->output_count != 0) == is_open;
     });
   }
-  void let_head_hear_nobody(const Host& base) {
-    robot_->cables.cut_to(kHead);
-    base.see("host head is there, and has not heard this one for 2 s");
-    await_hosts("head",
-                [](const wire::HostsDocument& hosts) { return !hosts.find_host("base")->is_up; });
-  }
 
-  std::optional<CabledRobot> robot_;
+  CabledRobot robot;
+  const Host head = host("head", source_model("300ms"), robot.head_network);
+  const Host base = host("base", motor_model("300ms"), robot.base_network);
+  std::optional<Planner> planner{head};
+  Body body{base};
 };
 
+using UnheardEnds = Cable;
+
 TEST_F(UnheardEnds, OfAPublisherThatIsStartedAgainDoNotSpeakInItsPlace) {
-  const Host head = host("head", source_model("300ms"), robot_->head_network);
-  const Host base = host("base", motor_model("300ms"), robot_->base_network);
-  std::optional<Planner> planner(head);
-  Body body(base);
-  body.drive(*planner);
-  let_head_hear_nobody(base);
+  UnheardEnd one;
   for (int life = 0; life < 5; ++life) {
-    const std::int64_t published = planner->published();
-    planner.reset();
-    await_offer(false);
-    planner.emplace(head, published);
-    await_offer(true);
+    const std::int64_t published = one.end_planner();
+    one.planner.emplace(one.head, published);
+    UnheardEnd::await_offer(true);
   }
-  robot_->cables.heal_to(kHead);
-  body.drive(*planner);
+  one.robot.cables.heal_to(kHead);
+  one.body.drive(*one.planner);
 }
 
 TEST_F(UnheardEnds, LeaveTheSourceToAnotherHost) {
+  UnheardEnd one;
   const NetworkNamespace rear_network;
-  robot_->cables.connect(rear_network, 3);
-  const Host head = host("head", source_model("300ms"), robot_->head_network);
-  const Host base = host("base", motor_model("300ms"), robot_->base_network);
-  std::optional<Planner> planner(head);
-  Body body(base);
-  body.drive(*planner);
-  let_head_hear_nobody(base);
-  const std::int64_t published = planner->published();
-  planner.reset();
-  await_offer(false);
-  robot_->cables.heal_to(kHead);
+  one.robot.cables.connect(rear_network, 3);
+  const std::int64_t published = one.end_planner();
+  one.robot.cables.heal_to(kHead);
   const std::string taken = "comes from host head";
-  await([&] { return base.log().find(taken) != base.log().rfind(taken); });
-  const Host rear = host("rear", source_model("300ms"), rear_network);
+  await([&] { return one.base.log().find(taken) != one.base.log().rfind(taken); });
+  const Host rear = one.host("rear", source_model("300ms"), rear_network);
   Planner other(rear, published);
-  body.drive(other);
+  one.body.drive(other);
 }
 
 // The large sample waits for a receipt that does not come; what is said after it must not be lost.
