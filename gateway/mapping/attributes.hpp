@@ -14,6 +14,11 @@
 
 namespace arbiter::gateway {
 
+// "1 byte", "48 bytes".
+[[nodiscard]] inline std::string bytes_text(std::size_t count) {
+  return std::to_string(count) + (count == 1 ? " byte" : " bytes");
+}
+
 class Attributes {
  public:
   Attributes(rules::ElementReader& reader, const rules::XmlNode& element)

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "gateway/mapping/attributes.hpp"
+#include "gateway/mapping/field_reader.hpp"
 #include "gateway/mapping/ros_names.hpp"
 #include "gateway/mapping/topic_reader.hpp"
 #include "rules/text/names.hpp"
@@ -19,10 +20,6 @@ constexpr unsigned kLastPlainCdr = 1;  // big-endian and little-endian
 constexpr unsigned kLastXcdr1 = 3;
 constexpr unsigned kFirstXcdr2 = 6;
 constexpr unsigned kLastXcdr2 = 0xb;
-
-std::string bytes_text(std::size_t count) {
-  return std::to_string(count) + (count == 1 ? " byte" : " bytes");
-}
 
 // An attribute that another one needs, or excludes, means a mistake; to pass it over would hide it.
 class EntryReader {
@@ -147,17 +144,13 @@ class EntryReader {
     }
     auto yes = attributes_.port(is_boolean ? "true" : "above");
     auto no = attributes_.port(is_boolean ? "false" : "below");
-    Choice choice;
-    if (const auto offset = attributes_.bytes("offset", 0, kMaxSampleBytes)) {
-      choice.offset = *offset;
-    }
     if (is_boolean) {
       refuse_without("threshold", "above");
       refuse_without("field", "above");
-    } else {
-      read_number(choice);
     }
-    check_place(choice);
+    Choice choice =
+        read_field(attributes_, {entry_.dds.has_value(), entry_.type ? entry_.type->name : "",
+                                 header(), known_size_, entry_.max_size});
     if (!yes || !no) return;
     if (yes->name == no->name) {
       reader_.error("duplicate-port", no->where,
@@ -167,78 +160,6 @@ class EntryReader {
     choice.yes = std::move(*yes);
     choice.no = std::move(*no);
     entry_.choice = std::move(choice);
-  }
-
-  // A field that no sample has would leave both sources silent for ever.
-  void check_place(const Choice& choice) {
-    if (!check_kind(choice)) return;
-    const std::size_t size = size_of(choice.field);
-    const std::size_t end = choice.offset + size;
-    const std::string at = attributes_.has("offset") ? "offset" : "field";
-    if (header() + end > entry_.max_size) {
-      attributes_.error("invalid-value", at,
-                        "the field lies beyond max_size, " + std::to_string(entry_.max_size) +
-                            " bytes; correct one of the two");
-    } else if (known_size_ && end > *known_size_) {
-      attributes_.error("invalid-value", at,
-                        (entry_.type ? "a " + entry_.type->name : std::string("a sample")) +
-                            " has " + bytes_text(*known_size_) + ", and the field would end at " +
-                            std::to_string(end) + "; correct the offset or the field");
-    }
-  }
-
-  // The common types of ROS 2 have fields of one kind each.
-  bool check_kind(const Choice& choice) {
-    const bool is_boolean = choice.field == Field::kBoolean;
-    if (is_boolean && attributes_.has("above")) return false;  // the field was refused
-    const Field known =
-        entry_.dds ? field_of(entry_.type->name).value_or(choice.field) : choice.field;
-    if (known == choice.field) return true;
-    attributes_.error(
-        "invalid-value", is_boolean ? "type" : "field",
-        "the fields of a " + entry_.type->name + " are " + name_of(known) + ", not " +
-            name_of(choice.field) +
-            (known == Field::kBoolean ? std::string("; write true=\"…\" and false=\"…\"")
-             : is_boolean ? std::string("; write above=\"…\", below=\"…\", a threshold and "
-                                        "field=\"") +
-                                name_of(known) + '"'
-                          : std::string("; write field=\"") + name_of(known) + '"'));
-    return false;
-  }
-
-  void read_number(Choice& choice) {
-    attributes_.required("field", 100);
-    using enum Field;
-    const auto field = attributes_.word<Field>("field", {{"f32", kF32},
-                                                         {"f64", kF64},
-                                                         {"i8", kI8},
-                                                         {"u8", kU8},
-                                                         {"i16", kI16},
-                                                         {"u16", kU16},
-                                                         {"i32", kI32},
-                                                         {"u32", kU32},
-                                                         {"i64", kI64},
-                                                         {"u64", kU64}});
-    if (field) choice.field = *field;
-    attributes_.required("threshold", 100);
-    const auto threshold = attributes_.real("threshold");
-    if (threshold) choice.threshold = *threshold;
-    if (field && threshold) check_threshold(choice);
-  }
-
-  void check_threshold(const Choice& choice) {
-    const Range range = range_of(choice.field);
-    const bool is_always = choice.threshold < range.least;
-    // Of a floating-point number infinity is above all others.
-    const bool is_floating = choice.field == Field::kF32 || choice.field == Field::kF64;
-    const bool is_below =
-        choice.threshold < range.greatest || (is_floating && choice.threshold == range.greatest);
-    if (!is_always && is_below) return;
-    attributes_.error("invalid-value", "threshold",
-                      std::string("each number of this field is ") +
-                          (is_always ? "above it" : "at or below it") +
-                          ", so one of the two sources would never be active; write another "
-                          "threshold, or correct the field");
   }
 
   void refuse_without(std::string_view name, std::string_view other) {
