@@ -192,71 +192,6 @@ TEST(Mapping, AFileWithoutAGatewaySaysWhatToWrite) {
               ElementsAre("1:12 error unknown-element"));
 }
 
-TEST(Mapping, AnEntryHasOnePortOrTwoThatAFieldChooses) {
-  const std::string topic = "<in topic='/a' type='std_msgs/msg/Bool' ";
-  EXPECT_THAT(read_dds(topic + "port='/a:o' true='/b:o'/>").findings(),
-              ElementsAre("1:21 error several-ports"));
-  EXPECT_THAT(read_dds(topic + "true='/b:o'/>").findings(),
-              ElementsAre("1:21 error missing-attribute"));
-  EXPECT_THAT(read_dds(topic + "true='/b:o' false='/b:o'/>").findings(),
-              ElementsAre("1:80 error duplicate-port"));
-  EXPECT_THAT(read_dds(topic + "above='/a:o' below='/b:o'/>").findings(),
-              ElementsAre("1:21 error missing-attribute", "1:21 error missing-attribute"));
-  EXPECT_THAT(read_dds("<in topic='/a' type='my/msg/State' above='/a:o' below='/b:o' "
-                       "threshold='nan' field='u8'/>")
-                  .findings(),
-              ElementsAre("1:93 error invalid-value"));
-  EXPECT_THAT(read_dds(topic + "port='/a:o' offset='3'/>").findings(),
-              ElementsAre("1:81 error misplaced-attribute"));
-  EXPECT_THAT(read_dds(topic + "true='/a:o' false='/b:o' offset='65536'/>").findings(),
-              ElementsAre("1:94 error invalid-value"));
-}
-
-// It would pass every check, and its sources would be silent for ever.
-TEST(Mapping, AFieldIsOneThatASampleHas) {
-  const auto read = [](const std::string& type, const std::string& more) {
-    return read_dds("<in topic='/a' type='" + type + "' above='/a:o' below='/b:o' " + more + "/>");
-  };
-  EXPECT_THAT(read("std_msgs/msg/Float32", "threshold='1' field='f32'").findings(), IsEmpty());
-  EXPECT_THAT(read("std_msgs/msg/Float32", "threshold='1' field='f32' offset='4'").message(),
-              HasSubstr("a std_msgs/msg/Float32 has 4 bytes, and the field would end at 8"));
-  EXPECT_THAT(
-      read("std_msgs/msg/Float32", "threshold='1' field='u32'").message(),
-      HasSubstr("the fields of a std_msgs/msg/Float32 are f32, not u32; write field=\"f32\""));
-  EXPECT_THAT(read("std_msgs/msg/Bool", "threshold='1' field='u8'").message(),
-              HasSubstr("are Boolean, not u8; write true=\"…\" and false=\"…\""));
-  EXPECT_THAT(read_dds("<in topic='/a' type='geometry_msgs/msg/Twist' true='/a:o' false='/b:o'/>")
-                  .message(),
-              HasSubstr("are f64, not Boolean; write above=\"…\", below=\"…\", a threshold and "
-                        "field=\"f64\""));
-  EXPECT_THAT(read("std_msgs/msg/Float32", "threshold='1' field='f32' max_size='7'").message(),
-              HasSubstr("the sample that type=\"…\" asks for has 8"));
-  const std::string topic = "<in service='a' instance='b' event='c' above='/a:o' below='/b:o' ";
-  EXPECT_THAT(read_iceoryx(topic + "threshold='1' field='f32' offset='6'/>").findings(), IsEmpty());
-  EXPECT_THAT(
-      read_iceoryx(topic + "type='T' size='8' threshold='1' field='f32' offset='5'/>").message(),
-      HasSubstr("a T has 8 bytes, and the field would end at 9"));
-}
-
-TEST(Mapping, AThresholdHasNumbersOnBothSides) {
-  const auto read = [](const std::string& threshold, const std::string& field) {
-    return read_dds("<in topic='/a' type='my/msg/State' above='/a:o' below='/b:o' threshold='" +
-                    threshold + "' field='" + field + "'/>");
-  };
-  EXPECT_THAT(read("0", "u8").findings(), IsEmpty());
-  EXPECT_THAT(read("254", "u8").findings(), IsEmpty());
-  EXPECT_THAT(read("-1", "u8").message(), HasSubstr("each number of this field is above it"));
-  EXPECT_THAT(read("255", "u8").message(), HasSubstr("is at or below it"));
-  EXPECT_THAT(read("-128", "i8").findings(), IsEmpty());
-  EXPECT_THAT(read("18446744073709551614", "u64").findings(), IsEmpty());
-  EXPECT_THAT(read("18446744073709551615", "u64").message(), HasSubstr("at or below it"));
-  EXPECT_THAT(read("1e39", "f32").message(), HasSubstr("at or below it"));
-  EXPECT_THAT(read("1e39", "f64").findings(), IsEmpty());
-  EXPECT_THAT(read("3.40282346638528859811704183484516925e38", "f32").findings(), IsEmpty())
-      << "infinity is above it";
-  EXPECT_THAT(read("1e400", "f64").message(), HasSubstr("at or below it"));
-}
-
 // Otherwise Cyclone refuses it when the domain is joined, and does not say what it dislikes.
 TEST(Mapping, NamesAreOnesThatCycloneTakes) {
   const auto topic = [](const std::string& name) {
@@ -276,59 +211,6 @@ TEST(Mapping, NamesAreOnesThatCycloneTakes) {
   EXPECT_THAT(of_ros("/2nd"), HasSubstr("not a digit first"));
   EXPECT_THAT(read_text("<gateway kind='dds' interface='lo,eth0, lo'/>").message(),
               HasSubstr("\"lo\" is named twice"));
-}
-
-TEST(Mapping, ZerosAreNoSampleOfATypeWithStrings) {
-  const auto out = [](const std::string& type, const std::string& more) {
-    return read_dds("<out port='/a:i' topic='/a' type='" + type + "' idle='zero' " + more + "/>");
-  };
-  EXPECT_THAT(out("geometry_msgs/msg/TwistStamped", "size='80'").message(),
-              HasSubstr("has a string in it"));
-  EXPECT_THAT(out("my_msgs/msg/Drive", "").message(),
-              AllOf(HasSubstr("a zero \"my_msgs/msg/Drive\" is cannot be known; if it has"),
-                    HasSubstr("add size=\"BYTES\"")));
-  EXPECT_THAT(out("my_msgs/msg/Drive", "size='16'").findings(), IsEmpty());
-  EXPECT_EQ(out("my_msgs/msg/Drive", "size='16'").entry().idle.sample.size(), 20u);
-  EXPECT_THAT(out("geometry_msgs/msg/Twist", "size='44'").message(), HasSubstr("has 48 bytes"));
-}
-
-TEST(Mapping, AnIdleSampleComesFromAFileBesideTheMapping) {
-  const test::TemporaryDirectory directory;
-  directory.write("stop.bin", std::string("\0\1\0\0stop", 8));
-  directory.write("short.bin", "x");
-  const std::string path = directory.path();
-  const auto with = [&](const std::string& idle) {
-    return read_text(
-        "<gateway kind='dds'><out port='/a:i' topic='/a' type='my_msgs/msg/Drive' "
-        "idle='" +
-            idle + "'/></gateway>",
-        &path);
-  };
-  EXPECT_EQ(with("file:stop.bin").entry().idle.sample.size(), 8u);
-  EXPECT_THAT(with("file:short.bin").message(), HasSubstr("has 1 byte;"));
-  EXPECT_THAT(with("file:none.bin").message(), HasSubstr("none.bin"));
-  EXPECT_THAT(with("stop.bin").message(), HasSubstr("write none, zero, or file:"));
-}
-
-// Else nothing would stop the robot, and nobody would know before.
-TEST(Mapping, AnIdleSampleOfAFileIsAsTheEntrySendsIt) {
-  const test::TemporaryDirectory directory;
-  directory.write("one.bin", std::string("\0\1\0\0stop", 8));
-  directory.write("two.bin", std::string("\0\7\0\0stop", 8));
-  directory.write("xml.bin", std::string("\0\4\0\0stop", 8));
-  const std::string path = directory.path();
-  const auto with = [&](const std::string& file, const std::string& more) {
-    return read_text(
-        "<gateway kind='dds'><out port='/a:i' topic='/a' type='my_msgs/msg/Drive' "
-        "idle='file:" +
-            file + "' " + more + "/></gateway>",
-        &path);
-  };
-  EXPECT_THAT(with("one.bin", "").findings(), IsEmpty());
-  EXPECT_THAT(with("two.bin", "representation='xcdr2'").findings(), IsEmpty());
-  EXPECT_THAT(with("two.bin", "").message(), HasSubstr("is XCDR2"));
-  EXPECT_THAT(with("one.bin", "representation='xcdr2'").message(), HasSubstr("is XCDR1"));
-  EXPECT_THAT(with("xml.bin", "").message(), HasSubstr("encapsulation header"));
 }
 
 // Before the robot moves, and not when the gateway starts.
@@ -367,49 +249,6 @@ TEST(Mapping, AConfigurationThatIsCutIsReportedAtItsPlaceAndAGoodOneIsKept) {
   }
   directory.write("small.xml", "<?xml version='1.0'?><cyclonedds/>");
   EXPECT_THAT(with("small.xml").findings(), IsEmpty());
-}
-
-// A subscriber takes it for a sample of its type, and may read past its end.
-TEST(Mapping, AnIdleSampleOfAFileHasTheSizeOfItsType) {
-  const test::TemporaryDirectory directory;
-  const std::string path = directory.path();
-  const std::string header("\0\1\0\0", 4);
-  directory.write("bool.bin", header + "0");
-  directory.write("padded.bin", header + "0000");
-  directory.write("long.bin", header + "00000");
-  directory.write("plain.bin", "00000000");
-  const auto dds = [&](const std::string& file, const std::string& more = "") {
-    return read_text(
-        "<gateway kind='dds'><out port='/a:i' topic='/a' type='std_msgs/msg/Bool' "
-        "idle='file:" +
-            file + "' " + more + "/></gateway>",
-        &path);
-  };
-  EXPECT_THAT(dds("bool.bin").findings(), IsEmpty());
-  EXPECT_THAT(dds("padded.bin").findings(), IsEmpty());
-  EXPECT_THAT(dds("long.bin").message(),
-              HasSubstr("has 9 bytes; a sample has 4 of headers and 1 of its own"));
-  EXPECT_THAT(dds("plain.bin").message(), HasSubstr("encapsulation header of DDS"));
-  directory.write("delimited.bin", std::string("\0\x9\0\0\1\0\0\0"
-                                               "0",
-                                               9));  // XCDR2, appendable
-  EXPECT_THAT(dds("delimited.bin", "representation='xcdr2'").findings(), IsEmpty());
-  const auto iceoryx = [&](const std::string& size) {
-    return read_text(
-        "<gateway kind='iceoryx'><out port='/a:i' service='a' instance='b' event='c' "
-        "user_header='4' alignment='4' idle='file:plain.bin' " +
-            size + "/></gateway>",
-        &path);
-  };
-  EXPECT_THAT(iceoryx("").findings(), IsEmpty());
-  EXPECT_THAT(iceoryx("size='4'").findings(), IsEmpty());
-  EXPECT_THAT(iceoryx("size='8'").findings(), ElementsAre("1:113 error idle-size"));
-  directory.write("empty.bin", "");
-  EXPECT_THAT(read_text("<gateway kind='iceoryx'><out port='/a:i' service='a' instance='b' "
-                        "event='c' idle='file:empty.bin'/></gateway>",
-                        &path)
-                  .message(),
-              HasSubstr("has 0 bytes; a sample to be sent while the port is idle has 1 to"));
 }
 
 TEST(Mapping, WhatContradictsItselfIsAnError) {

@@ -1,0 +1,79 @@
+// Two sources of one entry: which field of a sample chooses, and by which threshold.
+#include <gmock/gmock.h>
+
+#include "tests/gateway/mapping_text.hpp"
+
+namespace arbiter::gateway {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+TEST(Mapping, AnEntryHasOnePortOrTwoThatAFieldChooses) {
+  const std::string topic = "<in topic='/a' type='std_msgs/msg/Bool' ";
+  EXPECT_THAT(read_dds(topic + "port='/a:o' true='/b:o'/>").findings(),
+              ElementsAre("1:21 error several-ports"));
+  EXPECT_THAT(read_dds(topic + "true='/b:o'/>").findings(),
+              ElementsAre("1:21 error missing-attribute"));
+  EXPECT_THAT(read_dds(topic + "true='/b:o' false='/b:o'/>").findings(),
+              ElementsAre("1:80 error duplicate-port"));
+  EXPECT_THAT(read_dds(topic + "above='/a:o' below='/b:o'/>").findings(),
+              ElementsAre("1:21 error missing-attribute", "1:21 error missing-attribute"));
+  EXPECT_THAT(read_dds("<in topic='/a' type='my/msg/State' above='/a:o' below='/b:o' "
+                       "threshold='nan' field='u8'/>")
+                  .findings(),
+              ElementsAre("1:93 error invalid-value"));
+  EXPECT_THAT(read_dds(topic + "port='/a:o' offset='3'/>").findings(),
+              ElementsAre("1:81 error misplaced-attribute"));
+  EXPECT_THAT(read_dds(topic + "true='/a:o' false='/b:o' offset='65536'/>").findings(),
+              ElementsAre("1:94 error invalid-value"));
+}
+
+// It would pass every check, and its sources would be silent for ever.
+TEST(Mapping, AFieldIsOneThatASampleHas) {
+  const auto read = [](const std::string& type, const std::string& more) {
+    return read_dds("<in topic='/a' type='" + type + "' above='/a:o' below='/b:o' " + more + "/>");
+  };
+  EXPECT_THAT(read("std_msgs/msg/Float32", "threshold='1' field='f32'").findings(), IsEmpty());
+  EXPECT_THAT(read("std_msgs/msg/Float32", "threshold='1' field='f32' offset='4'").message(),
+              HasSubstr("a std_msgs/msg/Float32 has 4 bytes, and the field would end at 8"));
+  EXPECT_THAT(
+      read("std_msgs/msg/Float32", "threshold='1' field='u32'").message(),
+      HasSubstr("the fields of a std_msgs/msg/Float32 are f32, not u32; write field=\"f32\""));
+  EXPECT_THAT(read("std_msgs/msg/Bool", "threshold='1' field='u8'").message(),
+              HasSubstr("are Boolean, not u8; write true=\"…\" and false=\"…\""));
+  EXPECT_THAT(read_dds("<in topic='/a' type='geometry_msgs/msg/Twist' true='/a:o' false='/b:o'/>")
+                  .message(),
+              HasSubstr("are f64, not Boolean; write above=\"…\", below=\"…\", a threshold and "
+                        "field=\"f64\""));
+  EXPECT_THAT(read("std_msgs/msg/Float32", "threshold='1' field='f32' max_size='7'").message(),
+              HasSubstr("the sample that type=\"…\" asks for has 8"));
+  const std::string topic = "<in service='a' instance='b' event='c' above='/a:o' below='/b:o' ";
+  EXPECT_THAT(read_iceoryx(topic + "threshold='1' field='f32' offset='6'/>").findings(), IsEmpty());
+  EXPECT_THAT(
+      read_iceoryx(topic + "type='T' size='8' threshold='1' field='f32' offset='5'/>").message(),
+      HasSubstr("a T has 8 bytes, and the field would end at 9"));
+}
+
+TEST(Mapping, AThresholdHasNumbersOnBothSides) {
+  const auto read = [](const std::string& threshold, const std::string& field) {
+    return read_dds("<in topic='/a' type='my/msg/State' above='/a:o' below='/b:o' threshold='" +
+                    threshold + "' field='" + field + "'/>");
+  };
+  EXPECT_THAT(read("0", "u8").findings(), IsEmpty());
+  EXPECT_THAT(read("254", "u8").findings(), IsEmpty());
+  EXPECT_THAT(read("-1", "u8").message(), HasSubstr("each number of this field is above it"));
+  EXPECT_THAT(read("255", "u8").message(), HasSubstr("is at or below it"));
+  EXPECT_THAT(read("-128", "i8").findings(), IsEmpty());
+  EXPECT_THAT(read("18446744073709551614", "u64").findings(), IsEmpty());
+  EXPECT_THAT(read("18446744073709551615", "u64").message(), HasSubstr("at or below it"));
+  EXPECT_THAT(read("1e39", "f32").message(), HasSubstr("at or below it"));
+  EXPECT_THAT(read("1e39", "f64").findings(), IsEmpty());
+  EXPECT_THAT(read("3.40282346638528859811704183484516925e38", "f32").findings(), IsEmpty())
+      << "infinity is above it";
+  EXPECT_THAT(read("1e400", "f64").message(), HasSubstr("at or below it"));
+}
+
+}  // namespace
+}  // namespace arbiter::gateway
