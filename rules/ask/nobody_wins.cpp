@@ -46,8 +46,8 @@ class PortFindings {
     find_states();
     leave_out_stated();
     if (!nobody_.is_false()) {
-      if (!statements_.empty()) warn_of_circle();
       note_states();
+      if (!statements_.empty()) warn_of_circle();  // behind them: it may outgrow a bound
       if (port_.in_order) throw DiagramLimit("a diagram of each winner, and those are too large");
       note_chains();
     }
