@@ -94,6 +94,12 @@ Outcome signal(OutputCore& core, Time deadline, Origin origin) noexcept {
   return core.pass_on_signal({origin.publisher, origin.sequence}, nanoseconds(deadline),
                              shm::monotonic_now());
 }
+Published publish(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline,
+                  const LateBytes& bytes) noexcept {
+  if (!is_own(core)) return {};
+  return core.publish_late_bytes(bytes, bytes.knower->instance(), nanoseconds(deadline), slot, size,
+                                 shm::monotonic_now());
+}
 Outcome publish_signalled(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline,
                           Origin origin) noexcept {
   if (!is_own(core)) return {};

@@ -97,6 +97,10 @@ class OutputCore {
                        std::size_t size, shm::Nanoseconds now) noexcept;
   Outcome pass_on_signal(shm::SampleOrigin origin, shm::Nanoseconds deadline,
                          shm::Nanoseconds now) noexcept;
+  // The same with bytes that are written now, unless `knower` alone is handed them.
+  Published publish_late_bytes(const LateBytes& bytes, shm::PortInstance knower,
+                               shm::Nanoseconds deadline, std::uint32_t slot, std::size_t size,
+                               shm::Nanoseconds now) noexcept;
   // The sample of the last arrival, which was a signal: as OutputPort::publish_signalled().
   Outcome publish_signalled(shm::SampleOrigin origin, shm::Nanoseconds deadline, std::uint32_t slot,
                             std::size_t size, shm::Nanoseconds now) noexcept;
@@ -181,6 +185,8 @@ class OutputCore {
   void bind_decisions() noexcept;
 
   Outcome be_late() noexcept;
+  // Stamps it. True: the source's activity begins with it.
+  inline bool begin_arrival(shm::Nanoseconds now) noexcept;
   // With the sample in `slot`, or without one (kNoSlot).
   Counts arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
   void stamp(shm::ActivityWord word) noexcept;
@@ -196,6 +202,8 @@ class OutputCore {
   [[nodiscard]] Counts pass_over(Destination& destination, bool is_sample) noexcept;
   [[nodiscard]] const shm::Lane* lane_of(Destination& destination) const noexcept;
   [[nodiscard]] bool is_full(Destination& destination) const noexcept;
+  // Whether the arrival under way is handed to anybody but that receiver.
+  [[nodiscard]] bool wins_beside(shm::PortInstance receiver) const noexcept;
   static void ring_if_waiting(Destination& destination) noexcept;
   void ring_where_selection_changed() noexcept;
   [[nodiscard]] bool selection_differs(const Destination& destination) noexcept;

@@ -76,12 +76,17 @@ void OutputCore::stamp(shm::ActivityWord word) noexcept {
   shm::full_fence();
 }
 
-Counts OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
+[[gnu::always_inline]] bool OutputCore::begin_arrival(shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
   if (!is_settled()) settle();
   const bool begins = !shm::is_active(own_word_, now);
   stamp(shm::arrival(now, timeout_));
   last_ = now;
+  return begins;
+}
+
+Counts OutputCore::arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept {
+  const bool begins = begin_arrival(now);
   Counts outcome;
   if (teller_.is_on()) [[unlikely]] {
     outcome = hand_over_and_tell(slot, size, begins);
@@ -295,6 +300,39 @@ Counts OutputCore::publish_loan(std::uint32_t slot, std::size_t size,
   const Counts outcome = arrive(slot, size, now);
   end_loan(slot);
   return outcome;
+}
+
+// Who takes the sample is decided once, and before the bytes are written: whoever joins from here
+// on reads no entry that was there before it (channel.hpp, invariant 4). A tap decides nothing, and
+// is told of each sample.
+Published OutputCore::publish_late_bytes(const LateBytes& bytes, shm::PortInstance knower,
+                                         shm::Nanoseconds deadline, std::uint32_t slot,
+                                         std::size_t size, shm::Nanoseconds now) noexcept {
+  if (now > deadline) {
+    end_loan(slot);
+    return {be_late(), 0};
+  }
+  const bool begins = begin_arrival(now);
+  Counts outcome;
+  if (teller_.is_on()) {
+    bytes.write(bytes.called);
+    outcome = hand_over_and_tell(slot, size, begins);
+  } else if (!destinations_.empty()) {
+    decide_all(now);
+    if (wins_beside(knower)) bytes.write(bytes.called);
+    outcome = hand_over(slot, size, now);
+    if (begins) ring_where_selection_changed();
+  }
+  count(segment_.header().counters.published);
+  end_loan(slot);
+  return {outcome, outcome.delivered == 0 ? 0 : sequence_};
+}
+
+bool OutputCore::wins_beside(shm::PortInstance receiver) const noexcept {
+  return std::any_of(destinations_.begin(), destinations_.end(), [&](const Destination& each) {
+    return each.joined && each.has_rule && each.peer->instance != receiver &&
+           decisions_[each.decision].verdict == shm::Verdict::kWins;
+  });
 }
 
 Counts OutputCore::publish_copy(const void* data, std::size_t size, shm::Nanoseconds now) noexcept {

@@ -192,6 +192,8 @@ class InputPort {
 
  private:
   friend class Node;
+  template <class>
+  friend class OutputPort;
   explicit InputPort(std::shared_ptr<detail::InputCore> core) noexcept : core_(std::move(core)) {}
 
   std::shared_ptr<detail::InputCore> core_;

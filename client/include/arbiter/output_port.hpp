@@ -20,6 +20,7 @@
 
 #include <arbiter/bytes.hpp>
 #include <arbiter/detail/cores.hpp>
+#include <arbiter/input_port.hpp>
 #include <arbiter/result.hpp>
 #include <arbiter/type.hpp>
 
@@ -257,6 +258,21 @@ class OutputPort<void> : public OutputPortBase {
   Outcome publish(Bytes bytes, Time deadline) {
     require_size(bytes.size());
     return detail::publish_copy(*core_, bytes.data(), bytes.size(), deadline);
+  }
+  // The same, for a component that takes its own sample from `own`, has the bytes anyway, and need
+  // not read them here: the loan is written only where anybody else may read it, another component
+  // or a tap. Then publish() calls `write()`, once, before anybody sees the sample. If it does not,
+  // what `own` takes has the sample's size, and whatever bytes were there before; you may write
+  // them where the loan was until the next call on this port, and before another thread takes from
+  // `own`. `write()` must not throw, nor call this port. Costs a look at each connected port more.
+  template <class Write>
+  Published publish(Loan<void> loan, Time deadline, const InputPort<void>& own, Write&& write) {
+    const std::size_t size = size_of(loan);
+    using Called = std::remove_reference_t<Write>;
+    const detail::LateBytes bytes{own.core_.get(),
+                                  [](void* called) noexcept { (*static_cast<Called*>(called))(); },
+                                  const_cast<std::remove_const_t<Called>*>(&write)};
+    return detail::publish(*core_, release(loan), size, deadline, bytes);
   }
   Outcome publish_signalled(Loan<void> loan, Time deadline, Origin origin = {}) {
     const std::size_t size = size_of(loan);

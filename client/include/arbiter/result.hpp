@@ -40,4 +40,10 @@ struct Outcome {
   bool late = false;
 };
 
+// The same of a sample that its publisher wants to know again when it takes it.
+struct Published {
+  Outcome outcome;
+  std::uint64_t sequence = 0;  // its Sample::sequence(); 0: nobody was handed it
+};
+
 }  // namespace arbiter

@@ -36,6 +36,13 @@ struct LoanedSlot {
   std::uint32_t slot = 0;
 };
 
+// Bytes of a sample that are written only where somebody but `knower` may read them.
+struct LateBytes {
+  const InputCore* knower;
+  void (*write)(void* called) noexcept;
+  void* called;
+};
+
 // What became of an arrival that was in time. Smaller than an Outcome by a word, which each publish
 // would have to put together on its way out of several calls.
 struct Counts {
@@ -106,6 +113,9 @@ Outcome signal(OutputCore& core, Time deadline) noexcept;
 Outcome publish(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline,
                 Origin origin) noexcept;
 Outcome signal(OutputCore& core, Time deadline, Origin origin) noexcept;
+// And with bytes that nobody may have to write.
+Published publish(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline,
+                  const LateBytes& bytes) noexcept;
 // For an arrival that was a signal.
 Outcome publish_signalled(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline,
                           Origin origin) noexcept;
