@@ -6,7 +6,6 @@
 #include <cstring>
 
 #include "gateway/core/outgoing.hpp"
-#include "gateway/core/second_copy.hpp"
 
 namespace arbiter::gateway {
 namespace {
@@ -38,16 +37,6 @@ OutputPort<void> open(Node& node, const std::string& name, const Entry& entry) {
 }
 
 }  // namespace
-
-bool ForeignSample::copy_twice(WritableBytes to, WritableBytes also) const noexcept {
-  const SecondCopy second(to);
-  for (std::size_t at = 0; at < also.size(); at += SecondCopy::kBlock) {
-    const WritableBytes block(also.data() + at, std::min(SecondCopy::kBlock, also.size() - at));
-    if (!copy(at, block)) return false;
-    second.add(at, block);
-  }
-  return true;
-}
 
 std::optional<Side> choose(const Choice& choice, const ForeignSample& sample) noexcept {
   std::byte bytes[8];
@@ -154,12 +143,13 @@ Incoming::Fate Incoming::pass_to(OutputPort<void>& port, const ForeignSample& sa
     return Fate::kNoSlot;
   }
   const WritableBytes draft = outgoing == nullptr ? WritableBytes() : outgoing->draft(size);
-  const WritableBytes to(loan->data(), size);
-  if (draft.empty() ? !sample.copy(0, to) : !sample.copy_twice(to, draft)) {
+  if (!sample.copy(0, draft.empty() ? WritableBytes(loan->data(), size) : draft)) {
     account_.unreadable.add();
     return Fate::kUnreadable;
   }
-  if (port.publish(std::move(*loan), deadline).late) {
+  const bool is_late = draft.empty() ? port.publish(std::move(*loan), deadline).late
+                                     : outgoing->publish_draft(port, std::move(*loan), deadline);
+  if (is_late) {
     account_.late.add();
     return Fate::kLate;
   }

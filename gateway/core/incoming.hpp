@@ -32,8 +32,6 @@ class ForeignSample {
   // Copies the bytes from `from` on, to.size() of them, which lie within size(). False: it cannot
   // be read.
   [[nodiscard]] virtual bool copy(std::size_t from, WritableBytes to) const noexcept = 0;
-  // As copy(0, to), and the same bytes to `also`, which is as large and is read next.
-  [[nodiscard]] virtual bool copy_twice(WritableBytes to, WritableBytes also) const noexcept;
   // Where its data begin: behind headers. Offsets of fields count from there.
   [[nodiscard]] virtual std::size_t data_begin() const noexcept { return 0; }
   [[nodiscard]] virtual bool is_big_endian() const noexcept { return false; }
@@ -56,10 +54,10 @@ class Incoming {
   // does not open the other in vain.
   Incoming(Node& node, const Entry& entry, Account& account, std::size_t* first = nullptr);
 
-  // One copy into Arbiter's memory, and an arrival, unless `deadline` has passed by then: that of
-  // max_age().get(). With a choice: an arrival at the source that the field chooses, whose own age
-  // counts, and then the end of the other's activity; where nothing can be chosen, of both.
-  // publish() throws for another port's loan, and this one is its own.
+  // One copy into Arbiter's memory, or to where it is sent from, and an arrival, unless `deadline`
+  // has passed by then: that of max_age().get(). With a choice: an arrival at the source that the
+  // field chooses, whose own age counts, and then the end of the other's activity; where nothing
+  // can be chosen, of both. publish() throws for another port's loan, and this one is its own.
   Fate deliver(const ForeignSample& sample,  // NOLINT(bugprone-exception-escape)
                Time deadline) noexcept;
   // What deliver() publishes is what that `out` entry sends: deliver() then sends it there itself,

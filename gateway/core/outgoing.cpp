@@ -1,6 +1,7 @@
 #include "gateway/core/outgoing.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 #include "gateway/core/incoming.hpp"
@@ -115,20 +116,38 @@ bool Outgoing::begin_turn(std::size_t bytes) noexcept {
 WritableBytes Outgoing::draft(std::size_t bytes) noexcept {
   if (bytes < kSmallestDraft) return {};
   const WritableBytes room = sender_.draft(bytes);
-  if (!room.empty()) draft_ = Draft{bytes, shm::monotonic_now()};
+  if (!room.empty()) draft_ = Draft{room, shm::monotonic_now()};
   return room;
 }
 
-// Of the turn's source: nobody but this thread publishes for it, and what waited before this turn
-// has an older stamp.
-bool Outgoing::is_drafted(const Sample<void>& sample) const noexcept {
-  return draft_ && sample.size() == draft_->bytes && sample.stamp_ns() > draft_->since;
+// Arbiter's memory has the bytes only where they are read: by others, who are handed them in
+// publish(), or by the loop.
+bool Outgoing::publish_draft(OutputPort<void>& port, Loan<void> loan, Time deadline) {
+  draft_->unwritten = {loan.data(), loan.size()};
+  const Published published =
+      port.publish(std::move(loan), deadline, port_, [this] { write_draft(); });
+  draft_->sequence = published.sequence;
+  if (published.sequence == 0) draft_->unwritten = {};
+  return published.outcome.late;
 }
 
-Sender::Result Outgoing::send_in_turn(const Sample<void>& sample) noexcept {
-  if (is_drafted(sample)) {
-    draft_.reset();
-    return sender_.send_draft();
+void Outgoing::write_draft() noexcept {
+  const WritableBytes to = std::exchange(draft_->unwritten, {});
+  if (!to.empty()) std::memcpy(to.data(), draft_->bytes.data(), to.size());
+}
+
+// Of the turn's source: nobody but this thread publishes for it. A port that had its name before
+// counted anew, but earlier.
+bool Outgoing::is_drafted(const Sample<void>& sample, shm::Nanoseconds stamp) const noexcept {
+  return draft_ && sample.sequence() == draft_->sequence && stamp >= draft_->since;
+}
+
+Sender::Result Outgoing::send_in_turn(const Sample<void>& sample,
+                                      shm::Nanoseconds stamp) noexcept {
+  if (is_drafted(sample, stamp)) {
+    const Sender::Result result = sender_.send_draft();
+    if (result != Sender::Result::kBusy) draft_.reset();
+    return result;
   }
   // One that is too large may have come before the turn, and the loop not to it yet.
   if (sample.size() > sender_.largest_at_once()) return Sender::Result::kBusy;
@@ -152,18 +171,23 @@ bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexc
       break;
     }
     has_come = true;
-    if (shm::monotonic_now() - sample->stamp_ns() > max_age) {
+    const shm::Nanoseconds stamp = sample->stamp_ns();  // each call reads the clock
+    if (shm::monotonic_now() - stamp > max_age) {
       account_.late.add();
       continue;
     }
-    const Sender::Result result = send_in_turn(*sample);
+    const Sender::Result result = send_in_turn(*sample, stamp);
     if (result == Sender::Result::kBusy) {
       left_ = std::move(sample);
       break;
     }
     account_for(result, (*sample)->size());
   }
-  if (std::exchange(draft_, {})) sender_.drop_draft();
+  if (draft_) {
+    write_draft();  // the loop may find it in the queue
+    draft_.reset();
+    sender_.drop_draft();
+  }
   if (has_come) idle_again_.reset();  // somebody commands
   // Nobody rings for a port that is disarmed, and the last take may have swallowed a ring and have
   // set a timer again that had expired: what has become idle meanwhile only this look finds. The

@@ -22,6 +22,7 @@
 
 #include <arbiter/input_port.hpp>
 #include <arbiter/node.hpp>
+#include <arbiter/output_port.hpp>
 
 #include "gateway/core/account.hpp"
 #include "gateway/core/freshness.hpp"
@@ -56,12 +57,12 @@ class Sender {
   // that thread delivers next would be held up.
   [[nodiscard]] virtual std::size_t largest_at_once() const noexcept { return SIZE_MAX; }
 
-  // Memory of the middleware's for a sample of that many bytes: who copies it somewhere anyway, and
-  // does not know yet whether it is to be sent, writes it there at the same time, and a large
-  // sample is read once. Empty: not to be had, or not worth it. There is one draft at a time, until
-  // send_draft() or drop_draft(), which come from the same thread.
+  // Memory of the middleware's for a sample of that many bytes: who does not know yet whether it is
+  // to be sent writes it there, and a large sample is copied once. Empty: not to be had, or not
+  // worth it. There is one draft at a time, until send_draft() or drop_draft(), which come from the
+  // same thread.
   [[nodiscard]] virtual WritableBytes draft(std::size_t /*bytes*/) noexcept { return {}; }
-  // As send_at_once().
+  // As send_at_once(). With kBusy the draft is still there, and can still be read.
   [[nodiscard]] virtual Result send_draft() noexcept { return Result::kNotReady; }
   virtual void drop_draft() noexcept {}
 };
@@ -99,9 +100,11 @@ class Outgoing {
   // something is left for the loop, or the sample itself is; publish all the same. Never waits. Any
   // thread.
   [[nodiscard]] bool begin_turn(std::size_t bytes) noexcept;
-  // In a turn: where the sample that is about to be published may also be written, so that the end
-  // of the turn need not copy it. Empty: nowhere.
+  // In a turn: where the sample that is about to be published is to be written, instead of to its
+  // loan, so that the end of the turn need not copy it. Empty: nowhere.
   [[nodiscard]] WritableBytes draft(std::size_t bytes) noexcept;
+  // Publishes what has been written there. True: it is late. Throws for another port's loan.
+  bool publish_draft(OutputPort<void>& port, Loan<void> loan, Time deadline);
   // Sends what of `source` waits and ends the turn; calls the loop for what is left, and for the
   // idle sample if the port has become idle meanwhile. False: nothing of it has come here.
   bool end_turn(std::string_view source, shm::Nanoseconds max_age) noexcept;
@@ -124,9 +127,11 @@ class Outgoing {
  private:
   void send_waiting(shm::Nanoseconds now);
   void send_idle(shm::Nanoseconds now);
-  [[nodiscard]] Sender::Result send_in_turn(const Sample<void>& sample) noexcept;
+  [[nodiscard]] Sender::Result send_in_turn(const Sample<void>& sample,
+                                            shm::Nanoseconds stamp) noexcept;
   void send_idle_sample() noexcept;
-  [[nodiscard]] bool is_drafted(const Sample<void>& sample) const noexcept;
+  [[nodiscard]] bool is_drafted(const Sample<void>& sample, shm::Nanoseconds stamp) const noexcept;
+  void write_draft() noexcept;
   void account_for(Sender::Result result, std::size_t size) noexcept;
   [[nodiscard]] shm::Nanoseconds when_next() const noexcept;
 
@@ -142,8 +147,12 @@ class Outgoing {
   std::optional<Sample<void>> left_;  // taken by a thread that could not send it
   // Of the turn, until it is sent or dropped.
   struct Draft {
-    std::size_t bytes;
-    shm::Nanoseconds since;  // before its sample was published
+    WritableBytes bytes;
+    shm::Nanoseconds since;      // before its sample was published
+    std::uint64_t sequence = 0;  // of that sample; 0: it has not come here
+    // Its bytes in Arbiter's memory, where somebody may find them who needs them there; empty: they
+    // have been written, or nobody will.
+    WritableBytes unwritten{};
   };
   std::optional<Draft> draft_;
   std::atomic<bool> matched_{false};

@@ -2,7 +2,6 @@
 
 #include <cstring>
 
-#include "gateway/core/second_copy.hpp"
 #include "gateway/dds/fragments.hpp"
 
 namespace arbiter::gateway::dds {
@@ -23,12 +22,6 @@ ArrivedSample::ArrivedSample(const Payload& payload) noexcept : payload_(payload
       ArrivedSample::copy(0, WritableBytes(header_.data(), header_.size()))) {
     encapsulation_ = read_encapsulation(Bytes(header_.data(), header_.size()));
   }
-}
-
-bool ArrivedSample::copy_twice(WritableBytes to, WritableBytes also) const noexcept {
-  if (payload_.fragments == nullptr) return ForeignSample::copy_twice(to, also);
-  const SecondCopy second(to);
-  return copy_fragments(payload_.fragments, 0, also, &second);
 }
 
 bool ArrivedSample::copy(std::size_t from, WritableBytes to) const noexcept {

@@ -40,7 +40,6 @@ class ArrivedSample : public ForeignSample {
 
   [[nodiscard]] std::size_t size() const noexcept override { return payload_.size; }
   [[nodiscard]] bool copy(std::size_t from, WritableBytes to) const noexcept override;
-  [[nodiscard]] bool copy_twice(WritableBytes to, WritableBytes also) const noexcept override;
   [[nodiscard]] std::size_t data_begin() const noexcept override { return kEncapsulationBytes; }
   [[nodiscard]] bool is_big_endian() const noexcept override {
     return encapsulation_.is_big_endian;

@@ -10,15 +10,10 @@
 
 struct nn_rdata;
 
-namespace arbiter::gateway {
-class SecondCopy;
-}
-
 namespace arbiter::gateway::dds {
 
-// Copies the sample's bytes from `from` on. With a second copy: these, too, which begin it. False:
-// they are not all there.
-[[nodiscard]] bool copy_fragments(const nn_rdata* first, std::size_t from, WritableBytes to,
-                                  const SecondCopy* second = nullptr) noexcept;
+// Copies the sample's bytes from `from` on. False: they are not all there.
+[[nodiscard]] bool copy_fragments(const nn_rdata* first, std::size_t from,
+                                  WritableBytes to) noexcept;
 
 }  // namespace arbiter::gateway::dds

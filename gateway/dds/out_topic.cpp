@@ -18,6 +18,7 @@ OutTopic::OutTopic(const Entry& entry, Account& account, const Bell& bell)
 Entity OutTopic::make(dds_entity_t participant, dds_entity_t topic, const ddsi_sertype* type,
                       const dds_qos_t* qos) {
   type_ = type;
+  readers_.store(0, std::memory_order_relaxed);
   const Listener listener(dds_create_listener(this));
   dds_lset_publication_matched(
       listener.get(), [](dds_entity_t /*writer*/, const dds_publication_matched_status_t status,
@@ -34,6 +35,7 @@ std::uint32_t OutTopic::matched() const {
 
 // A reader that comes while nobody commands is to be told so at once.
 void OutTopic::on_matched(const dds_publication_matched_status_t& status) noexcept {
+  readers_.store(status.current_count, std::memory_order_relaxed);
   if (Outgoing* const outgoing = outgoing_.get();
       outgoing != nullptr && status.current_count_change > 0) {
     outgoing->peer_matched();
@@ -59,6 +61,7 @@ Sender::Result OutTopic::send_at_once(Bytes sample) noexcept {
   Payload* const draft = draft_payload(sample.size());
   if (draft == nullptr) return Result::kNoMemory;
   std::memcpy(draft->bytes(), sample.data(), sample.size());
+  begin_payload(*draft, type_);
   return write(*draft);
 }
 
@@ -69,16 +72,26 @@ WritableBytes OutTopic::draft(std::size_t bytes) noexcept {
 }
 
 Sender::Result OutTopic::send_draft() noexcept {
-  Payload& draft = *std::exchange(draft_, nullptr);
   const std::lock_guard lock(in_use());
-  const auto result = obstacle({draft.bytes(), draft.size});
-  if (!result) return write(draft);
-  PayloadPool::of_process().give_back(&draft);
-  return *result;
+  if (const auto result = obstacle({draft_->bytes(), draft_->size})) {
+    drop_draft();
+    return *result;
+  }
+  begin_payload(*draft_, type_);
+  ddsi_serdata_ref(&draft_->cyclone);  // Cyclone gives up one that it cannot send at once
+  is_draft_begun_ = true;
+  const Result result = write(*draft_);
+  if (result != Result::kBusy) drop_draft();
+  return result;
 }
 
 void OutTopic::drop_draft() noexcept {
-  PayloadPool::of_process().give_back(std::exchange(draft_, nullptr));
+  Payload* const draft = std::exchange(draft_, nullptr);
+  if (std::exchange(is_draft_begun_, false)) {
+    ddsi_serdata_unref(&draft->cyclone);
+  } else {
+    PayloadPool::of_process().give_back(draft);
+  }
 }
 
 std::optional<Sender::Result> OutTopic::obstacle(Bytes sample) noexcept {
@@ -91,13 +104,12 @@ std::optional<Sender::Result> OutTopic::obstacle(Bytes sample) noexcept {
                 ": who publishes it must send what DDS would (docs/dds.md)");
 }
 
-Sender::Result OutTopic::write(Payload& draft) noexcept {
-  const std::size_t size = draft.size;
+Sender::Result OutTopic::write(Payload& payload) noexcept {
+  const std::size_t size = payload.size;
   // To send it to nobody takes no time, and says nothing.
-  const bool is_measured = size > Pace::kAlways && matched() != 0;
+  const bool is_measured = size > Pace::kAlways && readers_.load(std::memory_order_relaxed) != 0;
   const shm::Nanoseconds begin = is_measured ? shm::monotonic_now() : 0;
-  begin_payload(draft, type_);
-  const dds_return_t written = dds_writecdr(end().get(), &draft.cyclone);
+  const dds_return_t written = dds_writecdr(end().get(), &payload.cyclone);
   if (written == DDS_RETCODE_OK) {
     if (is_measured) pace_.note(size, shm::monotonic_now() - begin);
     return Result::kSent;

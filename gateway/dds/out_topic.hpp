@@ -1,7 +1,9 @@
 // An `out` entry: what an input port takes is published on a topic of DDS.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 
 #include "gateway/core/announced.hpp"
@@ -39,14 +41,19 @@ class OutTopic : public EndPoint, public Sender {
   void on_matched(const dds_publication_matched_status_t& status) noexcept;
   // Why a sample cannot be written; empty: it can. With in_use(), as the next one.
   std::optional<Result> obstacle(Bytes sample) noexcept;
-  // Takes over a draft.
-  Result write(Payload& draft) noexcept;
+  // Takes over a reference.
+  Result write(Payload& payload) noexcept;
   Result refuse(const std::string& why) noexcept;
 
   const Bell& bell_;
   const Representation representation_;
   const ddsi_sertype* type_ = nullptr;
-  Payload* draft_ = nullptr;  // of whoever has the entry's turn, as is note() of the next one
+  // Of whoever has the entry's turn, as is note() of the next one.
+  Payload* draft_ = nullptr;
+  bool is_draft_begun_ = false;  // Cyclone counts references to it
+  // As Cyclone has told last: to ask it takes a few locks. Relaxed is enough: it says only whether a
+  // time is worth noting.
+  std::atomic<std::uint32_t> readers_{0};
   Pace pace_;
   Announced<Outgoing> outgoing_;
 };

@@ -72,6 +72,7 @@ class KeepingSender : public Sender {
     return {reinterpret_cast<std::byte*>(room.data()), bytes};
   }
   [[nodiscard]] Result send_draft() noexcept override {
+    if (would_wait) return Result::kBusy;
     ++sent_drafts;
     return send_at_once({reinterpret_cast<const std::byte*>(room.data()), room.size()});
   }

@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "gateway/core/second_copy.hpp"
 #include "gateway/dds/arrived_sample.hpp"
 
 namespace arbiter::gateway::dds {
@@ -34,19 +33,10 @@ class Chain {
   }
   [[nodiscard]] const nn_rdata* first() const { return fragments_.front().get(); }
 
-  // "-": it cannot be copied. Once and twice must be the same.
+  // "-": it cannot be copied.
   [[nodiscard]] std::string copy(std::size_t from, std::size_t count) const {
-    std::string once(count, '?');
-    std::string twice(count, '?');
-    std::string also(count, '?');
-    const bool is_copied = copy_fragments(first(), from, writable(once));
-    const SecondCopy second(writable(also));
-    const bool is_copied_twice = copy_fragments(first(), from, writable(twice), &second);
-    EXPECT_EQ(is_copied, is_copied_twice);
-    if (!is_copied) return "-";
-    EXPECT_EQ(twice, once);
-    EXPECT_EQ(also, once);
-    return once;
+    std::string copied(count, '?');
+    return copy_fragments(first(), from, writable(copied)) ? copied : "-";
   }
 
  private:
@@ -61,18 +51,6 @@ class Chain {
   std::vector<std::unique_ptr<Buffer>> buffers_;
   std::vector<std::unique_ptr<nn_rdata>> fragments_;
 };
-
-// Its second copy goes past the caches.
-TEST(Fragments, OfALargeSampleAreCopiedTwiceToo) {
-  Chain chain;
-  std::string sample;
-  while (sample.size() <= SecondCopy::kSmallestStream) {
-    const std::string fragment(61'003, static_cast<char>('a' + sample.size() % 26));
-    chain.add(static_cast<std::uint32_t>(sample.size()), fragment);
-    sample += fragment;
-  }
-  EXPECT_TRUE(chain.copy(0, sample.size()) == sample);
-}
 
 TEST(Fragments, OneIsTheWholeSample) {
   Chain chain;
