@@ -142,8 +142,7 @@ bool Outgoing::is_drafted(const Sample<void>& sample, shm::Nanoseconds stamp) co
   return draft_ && sample.sequence() == draft_->sequence && stamp >= draft_->since;
 }
 
-Sender::Result Outgoing::send_in_turn(const Sample<void>& sample,
-                                      shm::Nanoseconds stamp) noexcept {
+Sender::Result Outgoing::send_in_turn(const Sample<void>& sample, shm::Nanoseconds stamp) noexcept {
   if (is_drafted(sample, stamp)) {
     const Sender::Result result = sender_.send_draft();
     if (result != Sender::Result::kBusy) draft_.reset();

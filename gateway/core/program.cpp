@@ -32,7 +32,8 @@ namespace {
 constexpr const char* kExitCodes =
     "\nSIGUSR1 makes it read its mapping again; a bad one changes nothing, and the log says why.\n"
     "Exit codes: 0 ended by SIGINT, SIGTERM or SIGHUP, or the mapping is fine (--check);\n"
-    "1 an error; 2 wrong use, or a mapping that cannot be read or has errors";
+    "1 an error, or an idle sample that could not be sent (--send-idle);\n"
+    "2 wrong use, or a mapping that cannot be read or has errors";
 
 constexpr shm::Nanoseconds kSendIdle = 1'000'000'000;
 
@@ -136,8 +137,8 @@ std::unique_ptr<Setup> read_again(const Arguments& arguments, const ProgramKind&
 int send_idle_of(const Setup& setup, const ProgramKind& kind) {
   // What needs a supervisor may also hang, and here nobody looks after it.
   if (kind.is_supervised) ::alarm(kSendIdle / 1'000'000'000 + kEndsWithin);
-  send_idle(setup.settings.mappings, kind.kind, *setup.middleware, kSendIdle);
-  return 0;
+  return send_idle(setup.settings.mappings, kind.kind, *setup.middleware, kSendIdle) ? 0
+                                                                                     : kHasFailed;
 }
 
 // Gives a sign of life with each call, but not more often than kBeatPeriod: each wakes a process.

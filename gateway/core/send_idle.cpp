@@ -25,7 +25,7 @@ struct Part {
 
 }  // namespace
 
-void send_idle(const std::vector<Mapping>& mappings, Kind kind, Middleware& middleware,
+bool send_idle(const std::vector<Mapping>& mappings, Kind kind, Middleware& middleware,
                shm::Nanoseconds time) {
   std::list<Part> parts;
   for (const Mapping& mapping : mappings) {
@@ -38,7 +38,7 @@ void send_idle(const std::vector<Mapping>& mappings, Kind kind, Middleware& midd
       }
     }
   }
-  if (parts.empty()) return;
+  if (parts.empty()) return true;
   middleware.start({}, {});
   const shm::Nanoseconds end = shm::monotonic_now() + time;
   while (shm::monotonic_now() < end) {
@@ -51,11 +51,17 @@ void send_idle(const std::vector<Mapping>& mappings, Kind kind, Middleware& midd
     }
     std::this_thread::sleep_for(kAgain);
   }
+  bool is_sent = true;
   for (const Part& part : parts) {
-    say(Level::kInfo, "idle sample sent " + std::to_string(part.account.idle.value()) +
-                          " times: " + part.account.state());
+    const std::uint64_t times = part.account.idle.value();
+    say(times == 0 ? Level::kError : Level::kInfo,
+        (times == 0 ? "idle sample not sent: "
+                    : "idle sample sent " + std::to_string(times) + " times: ") +
+            part.account.state());
+    is_sent = is_sent && times != 0;
   }
   middleware.stop();
+  return is_sent;
 }
 
 }  // namespace arbiter::gateway

@@ -13,9 +13,9 @@
 namespace arbiter::gateway {
 
 // Sends the idle sample of each `out` entry that has one every kAgain, for `time`: whoever
-// subscribes has to be found first. Returns at once where there is none. Throws what
-// Middleware::sender() throws.
-void send_idle(const std::vector<Mapping>& mappings, Kind kind, Middleware& middleware,
-               shm::Nanoseconds time);
+// subscribes has to be found first. Returns at once where there is none. False: one of them could
+// never be sent, which has been said. Throws what Middleware::sender() throws.
+[[nodiscard]] bool send_idle(const std::vector<Mapping>& mappings, Kind kind,
+                             Middleware& middleware, shm::Nanoseconds time);
 
 }  // namespace arbiter::gateway

@@ -51,8 +51,8 @@ class OutTopic : public EndPoint, public Sender {
   // Of whoever has the entry's turn, as is note() of the next one.
   Payload* draft_ = nullptr;
   bool is_draft_begun_ = false;  // Cyclone counts references to it
-  // As Cyclone has told last: to ask it takes a few locks. Relaxed is enough: it says only whether a
-  // time is worth noting.
+  // As Cyclone has told last: to ask it takes a few locks. Relaxed is enough: it says only whether
+  // a time is worth noting.
   std::atomic<std::uint32_t> readers_{0};
   Pace pace_;
   Announced<Outgoing> outgoing_;

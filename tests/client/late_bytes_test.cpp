@@ -23,7 +23,8 @@ constexpr const char* kNavModel = R"(
 
 class LateBytes : public testing::Test {
  protected:
-  // Lends memory with kOld in it, as a sample before may have left it, and says what is to be there.
+  // Lends memory with kOld in it, as a sample before may have left it, and says what is to be
+  // there.
   Published publish(Time deadline = Time::max()) {
     auto loan = out_.loan(kNew.size());
     slot_ = {loan->data(), loan->size()};
