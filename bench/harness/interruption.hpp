@@ -2,6 +2,8 @@
 // with it.
 #pragma once
 
+#include <poll.h>
+
 namespace arbiter::bench {
 
 // Not a std::exception: who catches those, to note that a system has failed, must let this pass.
@@ -11,5 +13,7 @@ struct Interrupted {};
 void remember_interruptions();
 // Throws Interrupted if one has come.
 void throw_if_interrupted();
+// As poll() with one descriptor, and throws Interrupted if one comes, be it just before it waits.
+int poll_or_throw(pollfd& polled, int milliseconds);
 
 }  // namespace arbiter::bench

@@ -32,8 +32,7 @@ bool read_all(int fd, void* data, std::size_t size) {
   auto* at = static_cast<char*>(data);
   while (size != 0) {
     pollfd polled{fd, POLLIN, 0};
-    throw_if_interrupted();
-    const int ready = ::poll(&polled, 1, kPatienceMs);
+    const int ready = poll_or_throw(polled, kPatienceMs);
     if (ready < 0 && errno == EINTR) continue;
     if (ready == 0) throw BenchError("does not answer");
     const ssize_t got = ::read(fd, at, size);
