@@ -311,15 +311,16 @@ Explorer::Word* Explorer::visit(const void* address, bool writes, std::uint64_t 
   if (word->execution != execution_) {
     word->execution = execution_;
     word->readers = word->writers = 0;
-    std::fill_n(word->read_at, View::kThreads, 0);
-    std::fill_n(word->written_at, View::kThreads, 0);
-    word->history.clear();
+    if (word->shared) word->begin_history();
   }
   (writes ? word->writers : word->readers) |= 1u << active_;
   if (!word->shared) {
     const std::uint32_t all = word->readers | word->writers;
     word->shared = word->writers != 0 && (all & (all - 1)) != 0;
-    if (word->shared) learned_ = true;
+    if (word->shared) {
+      learned_ = true;
+      word->begin_history();
+    }
     return nullptr;  // from its next visit on it has a history
   }
   take_turns();

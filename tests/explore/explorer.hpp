@@ -24,6 +24,7 @@
 // an error.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -149,6 +150,12 @@ class Explorer {
     std::uint32_t reads[View::kThreads] = {};
     std::size_t writer = 0;
     std::uint32_t write = 0;
+
+    void begin_history() noexcept {
+      std::fill_n(read_at, View::kThreads, 0);
+      std::fill_n(written_at, View::kThreads, 0);
+      history.clear();
+    }
   };
   struct Thread {
     Context context = nullptr;  // while it does not run

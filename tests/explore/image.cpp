@@ -83,7 +83,7 @@ void Image::take() {
 
 void Image::restore() {
   for (std::size_t i = 0; i < memory.dirty_count; ++i) {
-    std::memcpy(memory.base + memory.dirty[i], memory.saved + i * kPage, kPage);
+    real_memcpy(memory.base + memory.dirty[i], memory.saved + i * kPage, kPage);
   }
   memory.heap_used = memory.heap_taken;
   set_virtual_time(memory.time_taken);

@@ -62,6 +62,7 @@ void* real_mmap(void* at, std::size_t size, int protection, int flags, int fd, o
   return __real_mmap(at, size, protection, flags, fd, offset);
 }
 int real_munmap(void* at, std::size_t size) { return __real_munmap(at, size); }
+void real_memcpy(void* to, const void* from, std::size_t size) { __real_memcpy(to, from, size); }
 
 namespace {
 
