@@ -14,6 +14,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "tests/attack/attacker.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/lingering.hpp"
 #include "tests/support/other_user.hpp"
@@ -43,9 +44,10 @@ void expect_that_others_are_served(Daemon& daemon) {
 }
 
 void wait_until_a_thread_is_lost(Daemon& daemon) {
-  while (daemon.log().find("keeps a thread waiting") == std::string::npos) {
+  await([&] {
     daemon.status();  // and it answers
-  }
+    return daemon.log().find("keeps a thread waiting") != std::string::npos;
+  });
 }
 
 class ALingeringSocket : public testing::Test {
@@ -64,6 +66,12 @@ class ALingeringSocket : public testing::Test {
     send(lingering.get());
     lingering.close();
     daemon_.process().signal(SIGCONT);
+  }
+  void await_last_thread() {
+    await([&] {
+      daemon_.status();
+      return daemon_.log().find("4 of 4") != std::string::npos;
+    });
   }
   void expect_no_harm() {
     expect_that_others_are_served(daemon_);
@@ -155,7 +163,7 @@ TEST_F(ALingeringSocket, SentManyTimesHoldsUpNobody) {
   }
   daemon_.process().signal(SIGCONT);
   expect_that_others_are_served(daemon_);
-  while (daemon_.log().find("4 of 4") == std::string::npos) daemon_.status();
+  await_last_thread();
   expect_that_others_are_served(daemon_);
 }
 
@@ -177,7 +185,7 @@ class AUserWhoseThreadsAreLost : public ALingeringSocket {
       each.close();
     }
     daemon_.process().signal(SIGCONT);
-    while (daemon_.log().find("4 of 4") == std::string::npos) daemon_.status();
+    await_last_thread();
   }
 
   std::vector<Lingering> lingering_{wire::Errands::kMaxLostOfAUser};
@@ -204,8 +212,7 @@ TEST_F(AUserWhoseThreadsAreLost, IsGivenUpBeforeItKeepsThoseOfOthers) {
   }
   EXPECT_LT(daemon_.open_descriptors(), before + kMostKept);
   for (Lingering& each : lingering_) each.release();
-  while (daemon_.open_descriptors() > before) {
-  }
+  await([&] { return daemon_.open_descriptors() <= before; });
   expect_that_others_are_served(daemon_);
 }
 

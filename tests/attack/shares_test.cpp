@@ -9,6 +9,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "shm/bell.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/other_user.hpp"
 #include "tests/support/raw_port.hpp"
@@ -102,8 +103,7 @@ TEST(NamesThatNobodyNeeds, AreGivenBack) {
     close_raw(client, opened.message.port);
   }
   client.status();
-  while (daemon.open_descriptors() > before + 8) {  // a thread closes what it was
-  }
+  await([&] { return daemon.open_descriptors() <= before + 8; });  // a thread closes what it was
   EXPECT_EQ(open_one("/another:o"), "opened");
 }
 

@@ -17,6 +17,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "tests/cli/why_program.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/prometheus.hpp"
 #include "tests/support/text_files.hpp"
@@ -146,15 +147,12 @@ TEST(MetricsServer, FollowsTheDaemonsThatComeAndGo) {
   Daemon daemon(kGazeModel);
   Served served(daemon.directory());
   const auto is_up = [&] { return metrics_in(served.ask(kGet))["arbiter_up"].samples[{}]; };
-  while (is_up() != 1) {
-  }
+  await([&] { return is_up() == 1; });
   daemon.kill();
-  while (is_up() != 0) {
-  }
+  await([&] { return is_up() == 0; });
   EXPECT_THAT(served.error(), HasSubstr("no arbiterd of instance"));
   daemon.restart();
-  while (is_up() != 1) {
-  }
+  await([&] { return is_up() == 1; });
   served.process().signal(SIGTERM);
   EXPECT_EQ(served.process().wait(), 0);
 }
@@ -199,8 +197,7 @@ TEST(MetricsServer, SurvivesRequestsThatAreNone) {
     EXPECT_LT(answer.size(), 16384u) << request.substr(0, 60);
   }
   EXPECT_EQ(metrics_in(served.ask(kGet))["arbiter_up"].samples[{}], 0);
-  while (served.descriptors() > before) {
-  }
+  await([&] { return served.descriptors() <= before; });
 }
 
 // Sixty-four who say nothing, or a byte now and then, have all places; one who asks comes after.

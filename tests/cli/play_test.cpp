@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/cli/arbiter_program.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::test {
@@ -52,8 +53,7 @@ TEST(Play, ThatIsStoppedBeforeItsEndSaysBySoMuchOfItsSignal) {
   const auto trace = files.write("trace.csv", "t_ns,source\n0,/low\n3600000000000,/low\n");
   for (const int signal : {SIGINT, SIGTERM}) {
     ChildProcess play({ARBITER_PROGRAMS "/arbiter", "play", trace}, {}, {});
-    while (daemon.source("/low")["component"]["pid"] != play.pid()) {
-    }
+    await([&] { return daemon.source("/low")["component"]["pid"] == play.pid(); });
     play.signal(signal);
     EXPECT_EQ(play.wait(), 128 + signal);
   }

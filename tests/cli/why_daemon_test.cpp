@@ -7,6 +7,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "tests/cli/why_program.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::test {
@@ -48,8 +49,7 @@ TEST(WhyDaemon, OfAComponentThatHasNotComeBackSaysThatWhatIsConnectedGoesOn) {
   Node node("test");
   auto rest = node.output_port<int>("/rest");
   ChildProcess echo({ARBITER_PROGRAMS "/arbiter", "echo", "/arm", "--as-component"}, {}, {});
-  while (daemon.connection("/rest", "/arm")["state"] != "connected") {
-  }
+  await([&] { return daemon.connection("/rest", "/arm")["state"] == "connected"; });
   rest.publish(1);
   echo.stop();
   daemon.kill();
@@ -67,8 +67,7 @@ TEST(WhyDaemon, OfAComponentThatHasNotComeBackSaysThatWhatIsConnectedGoesOn) {
   EXPECT_THAT(status_text(), AllOf(HasSubstr("/arm  [pid " + pid + ", stopped, has not come back"),
                                    HasSubstr("/rest  (input port away)")));
   echo.signal(SIGCONT);
-  while (daemon.input("/arm")["away"] == true) {
-  }
+  await([&] { return daemon.input("/arm")["away"] != true; });
   EXPECT_THAT(texts(why_json({"/arm"})["obstacles"]), IsEmpty());
 }
 
@@ -95,8 +94,7 @@ TEST(WhyDaemon, SaysWhatComponentsSayOfTheirPorts) {
               AllOf(HasSubstr("  comes from DDS topic rt/rest, no publisher matched\n"),
                     HasSubstr("  goes to DDS topic rt/arm, 1 subscriber matched\n")));
   rest.describe("");
-  while (daemon.source("/rest").contains("described")) {
-  }
+  await([&] { return !daemon.source("/rest").contains("described"); });
 }
 
 TEST(WhyDaemon, ThatHasLostItsStateSaysWhoRunsThatItDoesNotKnow) {

@@ -6,6 +6,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "tests/cli/why_program.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::test {
@@ -96,8 +97,7 @@ TEST(WhyNames, DeactivationOfWhatIsNotActiveLeavesItsRecord) {
     auto a = node.output_port<int>("/a");
     auto b = node.output_port<int>("/b");
     a.signal();
-    while (daemon.source("/a")["active"] == true) {
-    }
+    await([&] { return daemon.source("/a")["active"] != true; });
   }
   const json before = connection(why_json({"/base"}), "/a")["last_arrival_ns"];
   EXPECT_NE(before, nullptr);

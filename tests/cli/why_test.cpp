@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/why_program.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::test {
@@ -70,8 +71,7 @@ TEST(Why, TellsHowSomethingCameToBeInactive) {
   over.signal();
   ended.signal();
   ended.deactivate();
-  while (daemon.source("/over")["active"] == true) {
-  }
+  await([&] { return daemon.source("/over")["active"] != true; });
   EXPECT_THAT(why({"/in", "/never"}), HasSubstr("inactive (it has never arrived)"));
   EXPECT_THAT(why({"/in", "/ended"}), HasSubstr("inactive (deactivated "));
   EXPECT_THAT(why({"/in", "/over"}),
@@ -105,8 +105,7 @@ TEST(Why, TellsThatSomethingWentInactiveAndMadeTheWinner) {
   auto high = node.output_port<int>("/high");
   low.signal();
   high.signal();
-  while (daemon.source("/high")["active"] == true) {
-  }
+  await([&] { return daemon.source("/high")["active"] != true; });
   const json since = why_json({"/in"})["since"];
   EXPECT_EQ(since["exact"], true);
   EXPECT_EQ(since["changed"][0]["source"], "/high");
@@ -154,14 +153,12 @@ TEST(Why, TellsOfComponentsThatAreStoppedAndThatHaveDied) {
   Daemon daemon(kGazeModel);
   const std::string program = std::string(ARBITER_PROGRAMS) + "/arbiter";
   ChildProcess component({program, "pub", "/random", "--rate", "1000", "--quiet"}, {}, {});
-  while (daemon.source("/random")["active"] != true) {
-  }
+  await([&] { return daemon.source("/random")["active"] == true; });
   component.stop();
   EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
               ElementsAre(AllOf(HasSubstr("its component arbiter-pub"), HasSubstr("is stopped"))));
   component.kill();
-  while (daemon.source("/random")["open"] != false) {
-  }
+  await([&] { return daemon.source("/random")["open"] == false; });
   const json random = connection(why_json({"/gaze"}), "/random");
   EXPECT_EQ(random["winner"], true) << "activity belongs to the source, not to the process";
   EXPECT_THAT(texts(random["obstacles"]),

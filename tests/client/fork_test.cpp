@@ -25,6 +25,7 @@
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/error_of.hpp"
 
@@ -294,8 +295,7 @@ TEST(Fork, ANodeThatIsDestroyedIsGoneThoughAChildHasItsSocket) {
   }
   EXPECT_EQ(clients(), before + 1);
   node.reset();
-  while (clients() != before) {
-  }
+  await([&] { return clients() == before; });
   ::kill(child, SIGKILL);
   ::waitpid(child, nullptr, 0);
 }

@@ -19,6 +19,7 @@
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/hear_all.hpp"
 
@@ -236,8 +237,7 @@ TEST(OnNotice, TellsAReceiverThatNoDescriptorIsLeftForItsPublisher) {
   EXPECT_EQ(given[0].port, "/in");
   EXPECT_EQ(given[0].peer, "/out");
   EXPECT_NE(given[0].text.find("has no descriptor left"), std::string::npos) << given[0].text;
-  while (sender.tell("publish /out 1") != "0 0 1") {  // once it knows
-  }
+  await([&] { return sender.tell("publish /out 1") == "0 0 1"; });  // once it knows
   EXPECT_TRUE(in.idle());
 }
 

@@ -9,6 +9,7 @@
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/client/tapping.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/error_of.hpp"
 
@@ -192,8 +193,7 @@ TEST(Tap, GoesOnUnderAnotherDaemon) {
   sender.tell("publish /out 2");
   EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 2) << "without a daemon";
   daemon.restart();
-  while (daemon.source("/out")["open"] != true) {
-  }
+  await([&] { return daemon.source("/out")["open"] == true; });
   auto other = node.tap<Number>("/out");  // both are back by now
   hear_all(sender);
   for (int i = 3; i < 10; ++i) {

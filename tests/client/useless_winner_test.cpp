@@ -8,6 +8,7 @@
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/hear_all.hpp"
 #include "tests/support/threads.hpp"
@@ -248,8 +249,7 @@ TEST(UselessWinner, WhatAKilledCommanderHasSentIsTakenFirst) {
   ASSERT_EQ(commander.tell("output /out"), "open");
   ASSERT_EQ(commander.tell("publish /out 1 3"), "1 0 0");
   commander.kill();
-  while (daemon.source("/out")["open"] == true) {
-  }
+  await([&] { return daemon.source("/out")["open"] != true; });
   EXPECT_FALSE(in.idle()) << "there is something to obey";
   EXPECT_EQ(in.winner(), "/out");
   for (int i = 1; i <= 3; ++i) EXPECT_EQ((**in.wait_for(kEver)).value, i);
@@ -283,8 +283,7 @@ TEST(UselessWinner, WithAFiniteTADeadPublisherIsSilence) {
   ASSERT_EQ(commander.tell("output /out"), "open");
   ASSERT_EQ(commander.tell("publish /out 1"), "1 0 0");
   commander.kill();
-  while (daemon.source("/out")["open"] == true) {
-  }
+  await([&] { return daemon.source("/out")["open"] != true; });
   EXPECT_EQ((**in.wait_for(kEver)).value, 1);
   EXPECT_FALSE(in.idle());
   EXPECT_EQ(in.winner(), "/out");

@@ -8,6 +8,7 @@
 #include "tests/gateway/foreign.hpp"
 #include "tests/gateway/mapping_text.hpp"
 #include "tests/realtime/allocations.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::gateway {
@@ -184,15 +185,12 @@ TEST_F(Leaving, ItsDescriptionIsInTheStatusOfEachDaemon) {
     return input.contains("described") ? input["described"].get<std::string>() : std::string();
   };
   const std::string text = "DDS topic rt/cmd, no subscriber matched\\x1b[2J";
-  while (described() != text) {
-  }
+  test::await([&] { return described() == text; });
   daemon_.kill();
   daemon_.restart();
-  while (described() != text) {
-  }
+  test::await([&] { return described() == text; });
   outgoing_.describe("");
-  while (!described().empty()) {
-  }
+  test::await([&] { return described().empty(); });
 }
 
 }  // namespace

@@ -130,9 +130,10 @@ TEST_F(Flight, SaysWhichNameOfAStatementTheModelLacks) {
   ChildProcess recorder = fly({"--when", "/hihg"});
   const std::string file = daemon_.directory() + "/flight.err";
   std::string said;
-  while (said.find("; --when waits for a model that has it\n") == std::string::npos) {
+  await([&] {
     said = content_of(file);
-  }
+    return said.find("; --when waits for a model that has it\n") != std::string::npos;
+  });
   EXPECT_THAT(said, HasSubstr("gives this condition no meaning: "));
   EXPECT_THAT(said, HasSubstr("/hihg"));
   recorder.signal(SIGINT);

@@ -9,6 +9,7 @@
 
 #include "tests/client/component.hpp"
 #include "tests/recorder/recording.hpp"
+#include "tests/support/await.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -324,8 +325,7 @@ TEST(Record, BeginsAgainWhereADaemonKnowsNothing) {
   daemon.lose_state();
   daemon.restart();
   recording.see("recording starts again");
-  while (recording.records<evidence::Start>().size() < 2) {
-  }
+  await([&] { return recording.records<evidence::Start>().size() >= 2; });
   Node node("test");
   auto low = node.output_port<int>("/low");
   auto in = node.input_port<int>("/p");

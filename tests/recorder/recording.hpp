@@ -15,6 +15,7 @@
 
 #include "evidence/record_reader.hpp"
 #include "tests/cli/arbiter_program.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/text_files.hpp"
@@ -85,11 +86,12 @@ class Recording {
   // Returns once a record is in the file for which this is true.
   template <class Kind, class Is>
   void wait_for(const Is& is) const {
-    for (;;) {
-      for (const Kind& each : records<Kind>()) {
-        if (is(each)) return;
-      }
-    }
+    await(
+        [&] {
+          const std::vector<Kind> all = records<Kind>();
+          return std::any_of(all.begin(), all.end(), is);
+        },
+        20);  // it reads the whole file
   }
   // `arbiter simulate --recording`.
   [[nodiscard]] nlohmann::json simulate(std::vector<std::string> more = {}) const {

@@ -8,6 +8,7 @@
 
 #include "evidence/records.hpp"
 #include "tests/recorder/recording.hpp"
+#include "tests/support/await.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -45,8 +46,7 @@ TEST(Robot, OfTwentyComponentsIsTappedRecordedKilledDumpedReplayedAndSimulated) 
     motors.emplace_back(motor, Environment{}, ChildProcess::Streams{});
   }
   for (int i = 0; i < kMotors; ++i) {
-    while (daemon.input("/motor" + std::to_string(i) + ":i")["open"] != true) {
-    }
+    await([&] { return daemon.input("/motor" + std::to_string(i) + ":i")["open"] == true; });
   }
   Recording recording(daemon, {"--payloads", "all"});
   ChildProcess ring({kProgram, "record", "--ring", "60s", "-o", flight}, {}, {});
@@ -64,8 +64,7 @@ TEST(Robot, OfTwentyComponentsIsTappedRecordedKilledDumpedReplayedAndSimulated) 
   publish("/watchdog:o", "5");
   publish("/stop:o", "2");
   ASSERT_EQ(motors.size() + publishers.size(), 20u);
-  while (!std::filesystem::exists(flight + ".sock")) {
-  }
+  await([&] { return std::filesystem::exists(flight + ".sock"); });
   // Each motor has been commanded by both.
   for (int i = 0; i < kMotors; ++i) {
     for (const char* name : {"nav", "tele"}) {
@@ -91,8 +90,7 @@ TEST(Robot, OfTwentyComponentsIsTappedRecordedKilledDumpedReplayedAndSimulated) 
     }
   }
   EXPECT_EQ(recording.end(), 0) << recording.error();
-  while (files_in(files.path()).size() < 2) {
-  }
+  await([&] { return files_in(files.path()).size() >= 2; });
   ring.signal(SIGINT);
   EXPECT_EQ(ring.wait(), 0);
   std::vector<std::string> recordings = files_in(files.path());

@@ -14,6 +14,7 @@
 #include "shm/bell.hpp"
 #include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/raw_port.hpp"
 #include "tests/support/threads.hpp"
@@ -288,8 +289,7 @@ TEST_F(HostileClient, TenThousandThatConnectAndSayNothingHarmNobody) {
     if (i % 1000 == 0) client();
   }
   // Once it has taken up who came last, and threads have closed what was of those who went.
-  while (daemon_.open_descriptors() > 2 * shm::kMaxSilentClients + 64) {
-  }
+  await([&] { return daemon_.open_descriptors() <= 2 * shm::kMaxSilentClients + 64; });
   EXPECT_TRUE(silent.front().is_hung_up_on());
 }
 
@@ -306,8 +306,7 @@ TEST_F(HostileClient, CannotBeMoreThanTheLimitOfItsUser) {
   EXPECT_NE(refusal.find("kMaxClients"), std::string::npos) << refusal;
   EXPECT_EQ(many.size(), shm::kMaxClients / 2);  // with the good one, and without this
   many.clear();
-  while (daemon_.open_descriptors() > 100) {
-  }
+  await([&] { return daemon_.open_descriptors() <= 100; });
 }
 
 TEST_F(HostileClient, ThatRefusesItsPeerIsNotDeliveredTo) {
@@ -389,8 +388,7 @@ TEST(Descriptors, WhenTheyRunOutPortsAreRefusedAndWhoIsConnectedStays) {
   }
   const std::size_t used = daemon.open_descriptors();
   ports.pop_back();
-  while (daemon.open_descriptors() >= used) {  // a thread closes what it was
-  }
+  await([&] { return daemon.open_descriptors() < used; });  // a thread closes what it was
   ports.push_back(node.output_port<int>("/" + std::to_string(most - 1)));
 }
 

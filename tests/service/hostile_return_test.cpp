@@ -15,6 +15,7 @@
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/raw_port.hpp"
 
@@ -118,8 +119,7 @@ TEST(HostileReturn, GetsNoPortOfAnotherProcess) {
     if (is_away) victim.process().signal(SIGCONT);
     EXPECT_EQ(victim.tell("publish /out 5"), "1 0 0");
     EXPECT_EQ(receiver.tell("take /in"), "5");
-    while (daemon.source("/out")["open"] != true) {
-    }
+    await([&] { return daemon.source("/out")["open"] == true; });
   }
 }
 
@@ -200,8 +200,7 @@ TEST(HostileReturn, ToANewDaemonWithAnOldBoardIsRefusedAndOthersAreTakenBack) {
   impostor.send(return_as(1), {old.board.get(), old.registry.get()});
   EXPECT_EQ(impostor.expect_refusal(), "this daemon's predecessor had other memory");
   component.process().signal(SIGCONT);
-  while (daemon.log().find("is back, with") == std::string::npos) {
-  }
+  await([&] { return daemon.log().find("is back, with") != std::string::npos; });
   EXPECT_TRUE(daemon.source("/out")["open"]);
   EXPECT_EQ(daemon.generation(), 2u);
 }
@@ -217,8 +216,7 @@ TEST(HostileReturn, WithANumberOfOtherMemoryCostsNobodyWhatIsKept) {
     const auto segment = raw_output_segment();
     open_raw_output(lost, "/out", segment);
   }
-  while (daemon.source("/out")["away"] != true) {
-  }
+  await([&] { return daemon.source("/out")["away"] == true; });
   auto hello = RawClient::hello_message("another");
   hello.link = welcome.message.link;
   RawClient another(daemon.instance());
@@ -260,8 +258,7 @@ TEST(HostileReturn, OfAComponentThatWasDroppedKeepsWhatItHas) {
     ::send(*of_the_node.begin(), noise, sizeof noise, MSG_NOSIGNAL);
     EXPECT_EQ(sender.tell("publish /out 2 50"), "1 0 0");
     EXPECT_EQ((**held).value, 1);
-    while (daemon.input("/in")["open"] != true) {
-    }
+    await([&] { return daemon.input("/in")["open"] == true; });
     EXPECT_EQ(daemon.connection("/out", "/in")["state"], "connected");
     of_the_node = sockets();
     for (const int fd : before) of_the_node.erase(fd);

@@ -9,6 +9,7 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/threads.hpp"
@@ -37,8 +38,7 @@ bool rests(pid_t process) {
 }
 
 void wait_until_it_rests(pid_t process) {
-  while (!rests(process)) {
-  }
+  await([&] { return rests(process); });
 }
 
 // Whether each thread but the loop's, which closes what was a client's, or waits for work, waits.
@@ -102,15 +102,13 @@ TEST(Idle, ItSleepsAgainWhenEverybodyHasLeft) {
     auto out = node.output_port<int>("/out");
     auto in = node.input_port<int>("/in");
   }
-  while (daemon.status()["clients"] != 1) {
-  }
+  await([&] { return daemon.status()["clients"] == 1; });
   expect_asleep(daemon.process().pid());
 }
 
 // Counts when nobody else is there and the daemon has nothing left to do.
 std::size_t descriptors_at_rest(Daemon& daemon, RawClient& watcher) {
-  while (watcher.status()["clients"] != 1) {
-  }
+  await([&] { return watcher.status()["clients"] == 1; });
   wait_until_all_rest(daemon.process().pid());
   return daemon.open_descriptors();
 }

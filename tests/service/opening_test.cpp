@@ -11,6 +11,7 @@
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/service/impatient.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::test {
@@ -74,8 +75,7 @@ TEST(Takeover, OpeningWhileTheDaemonIsStoppedEndsInTime) {
   daemon.process().signal(SIGCONT);
   // What it opens too late is closed again.
   auto out = at_last([&] { return node.output_port<Number>("/other"); });
-  while (daemon.source("/out")["open"] == true) {
-  }
+  await([&] { return daemon.source("/out")["open"] != true; });
 }
 
 }  // namespace

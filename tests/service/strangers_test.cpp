@@ -4,6 +4,7 @@
 
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::test {
@@ -72,8 +73,7 @@ TEST(Strangers, AreNoneAnyMoreWhenTheyHaveBegunAnew) {
   restart_without_state(daemon);
   stranger(daemon);
   ASSERT_EQ(arm.tell("close /in"), "closed");
-  while (!strangers(daemon).empty()) {
-  }
+  await([&] { return strangers(daemon).empty(); });
   ASSERT_EQ(arm.tell("input /in 8 1 0"), "open");
   EXPECT_TRUE(daemon.input("/in")["open"]);
 }

@@ -10,6 +10,7 @@
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/raw_port.hpp"
 #include "tests/support/threads.hpp"
@@ -81,8 +82,7 @@ TEST(Takeover, UnderLoadLosesAndDelaysNothing) {
   for (int i = 0; i < 8; ++i) {
     daemon.kill();
     daemon.restart();
-    while (daemon.connection("/out", "/in")["state"] != "connected") {
-    }
+    await([&] { return daemon.connection("/out", "/in")["state"] == "connected"; });
   }
   EXPECT_NE(sender.answer(), "dead");
   const auto source = daemon.source("/out");
@@ -147,8 +147,7 @@ TEST(Takeover, ADeathAfterwardsIsNoticed) {
     EXPECT_EQ(receiver.tell("hold /in"), "1");
     daemon.kill();
     daemon.restart();
-    while (daemon.input("/in")["open"] != true) {
-    }
+    await([&] { return daemon.input("/in")["open"] == true; });
     for (int i = 2; i < 20; ++i) EXPECT_EQ(out.publish(Number{i}).delivered, 1u);
     EXPECT_EQ(receiver.tell("held /in"), "1");
   }
@@ -287,8 +286,7 @@ TEST(Takeover, AStoppedComponentIsWaitedForButNotForLong) {
   EXPECT_EQ(stopped.tell("held /in0"), "1");
   stopped.tell("give /in0");
   EXPECT_EQ(stopped.tell("take /in0"), "192");
-  while (daemon.input("/in0")["away"] == true) {
-  }
+  await([&] { return daemon.input("/in0")["away"] != true; });
   EXPECT_EQ(daemon.connection("/out", "/in0")["state"], "connected");
 }
 

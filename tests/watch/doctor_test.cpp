@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/await.hpp"
 #include "tests/support/other_user.hpp"
 #include "tests/support/page_tables.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -256,8 +257,7 @@ TEST(Doctor, DisturbsNoDaemon) {
   EXPECT_THAT(codes_of(watch::examine_daemon(caller_of(daemon), status)), IsEmpty());
   ASSERT_TRUE(status);
   EXPECT_EQ(status->pid, daemon.process().pid());
-  while (daemon.status()["clients"] != before) {
-  }
+  await([&] { return daemon.status()["clients"] == before; });
 }
 
 TEST(Doctor, FindsThatThereIsNoDaemon) {

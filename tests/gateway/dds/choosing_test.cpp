@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/gateway/dds/scene.hpp"
+#include "tests/support/await.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -68,12 +69,10 @@ TEST_P(DdsChoosing, ABatteryChoosesBetweenTwoSources) {
     return status.is_null() ? 0 : status.value("published", 0);
   };
   robot.publish("1 0.5");
-  while (arrivals("/Battery/full:o") != 1) {
-  }
+  await([&] { return arrivals("/Battery/full:o") == 1; });
   EXPECT_EQ(arrivals("/Battery/low:o"), 0);
   robot.publish("1 0.1");
-  while (arrivals("/Battery/low:o") != 1) {
-  }
+  await([&] { return arrivals("/Battery/low:o") == 1; });
   EXPECT_EQ(arrivals("/Battery/full:o"), 1);
   EXPECT_FALSE(daemon.source("/Battery/full:o").value("active", true));
 }

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "tests/gateway/dds/scene.hpp"
+#include "tests/support/await.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -201,8 +202,7 @@ const std::string kLatchedLock = R"(<in topic="/lock" type="std_msgs/msg/Bool" q
 TEST_P(DdsComingAndGoing, ALatchedSampleFromBeforeTheGatewayCameHoldsWhereTIsForever) {
   LatchedLock latched("forever", GetParam());
   const DdsGateway gateway(latched.daemon, latched.domain, kLatchedLock);
-  while (latched.published("/Lock/pressed:o") == 0) {
-  }
+  await([&] { return latched.published("/Lock/pressed:o") != 0; });
   EXPECT_TRUE(latched.daemon.source("/Lock/pressed:o").value("active", false));
   // Once the model says that it ends, what was before is not taken again.
   latched.daemon.load(LatchedLock::model("500ms"));

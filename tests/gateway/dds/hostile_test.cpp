@@ -11,6 +11,7 @@
 #include "gateway/dds/opaque_type.hpp"
 #include "tests/gateway/dds/noise.hpp"
 #include "tests/gateway/dds/scene.hpp"
+#include "tests/support/await.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -98,8 +99,7 @@ struct Choosing {
   void publish_to(const std::string& source, const std::string& bytes) {
     const int before = published(source);
     liar.publish(bytes);
-    while (published(source) != before + 1) {
-    }
+    await([&] { return published(source) == before + 1; });
   }
   // Publishes it, and returns once neither source is active.
   void publish_to_none(const std::string& bytes) {
