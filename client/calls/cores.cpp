@@ -97,8 +97,10 @@ Outcome signal(OutputCore& core, Time deadline, Origin origin) noexcept {
 Published publish(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline,
                   const LateBytes& bytes) noexcept {
   if (!is_own(core)) return {};
-  return core.publish_late_bytes(bytes, bytes.knower->instance(), nanoseconds(deadline), slot, size,
-                                 shm::monotonic_now());
+  // Another node's may be another daemon's, which numbers its ports as this one does.
+  const bool is_here = bytes.knower->node == core.node;
+  return core.publish_late_bytes(bytes, is_here ? bytes.knower->instance() : 0,
+                                 nanoseconds(deadline), slot, size, shm::monotonic_now());
 }
 Outcome publish_signalled(OutputCore& core, std::uint32_t slot, std::size_t size, Time deadline,
                           Origin origin) noexcept {

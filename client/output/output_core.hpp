@@ -97,7 +97,7 @@ class OutputCore {
                        std::size_t size, shm::Nanoseconds now) noexcept;
   Outcome pass_on_signal(shm::SampleOrigin origin, shm::Nanoseconds deadline,
                          shm::Nanoseconds now) noexcept;
-  // The same with bytes that are written now, unless `knower` alone is handed them.
+  // The same with bytes that are written now, unless `knower` alone is handed them. 0: nobody.
   Published publish_late_bytes(const LateBytes& bytes, shm::PortInstance knower,
                                shm::Nanoseconds deadline, std::uint32_t slot, std::size_t size,
                                shm::Nanoseconds now) noexcept;

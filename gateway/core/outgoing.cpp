@@ -34,6 +34,8 @@ Outgoing::Outgoing(Node& node, const Entry& entry, Sender& sender, Account& acco
                    const AgesOfSources& ages)
     : entry_(entry), sender_(sender), account_(account), ages_(ages), port_(open(node, entry)) {}
 
+Outgoing::~Outgoing() { drop_draft(); }
+
 void Outgoing::lead(const InBySource& ins, std::function<void()> call_loop) {
   ins_ = &ins;
   call_loop_ = std::move(call_loop);
@@ -64,9 +66,11 @@ void Outgoing::send_waiting(shm::Nanoseconds now) {
     const shm::Nanoseconds age = std::max(now, shm::monotonic_now()) - sample->stamp_ns();
     if (age > ages_.of(sample->source())) {
       account_.late.add();
+      drop_draft();
       continue;
     }
-    account_for(sender_.send(**sample), (*sample)->size());
+    account_for(sender_.send(bytes_of(*sample)), (*sample)->size());
+    drop_draft();
     idle_again_.reset();  // somebody commanded: the next idle sample must not wait for its period
     if (ins_ == nullptr) continue;
     if (const auto in = ins_->find(sample->source()); in != ins_->end()) in->second->follow(*this);
@@ -121,7 +125,7 @@ WritableBytes Outgoing::draft(std::size_t bytes) noexcept {
 }
 
 // Arbiter's memory has the bytes only where they are read: by others, who are handed them in
-// publish(), or by the loop.
+// publish(), or by the loop, which finds them in the queue.
 bool Outgoing::publish_draft(OutputPort<void>& port, Loan<void> loan, Time deadline) {
   draft_->unwritten = {loan.data(), loan.size()};
   const Published published =
@@ -139,7 +143,19 @@ void Outgoing::write_draft() noexcept {
 // Of the turn's source: nobody but this thread publishes for it. A port that had its name before
 // counted anew, but earlier.
 bool Outgoing::is_drafted(const Sample<void>& sample, shm::Nanoseconds stamp) const noexcept {
-  return draft_ && sample.sequence() == draft_->sequence && stamp >= draft_->since;
+  return draft_ && draft_->sequence != 0 && sample.sequence() == draft_->sequence &&
+         stamp >= draft_->since;
+}
+
+// A draft outlives its turn only with its sample: as left_, whose bytes nobody has written.
+Bytes Outgoing::bytes_of(const Sample<void>& sample) const noexcept {
+  return draft_ ? Bytes(draft_->bytes.data(), draft_->bytes.size()) : *sample;
+}
+
+void Outgoing::drop_draft() noexcept {
+  if (!draft_) return;
+  draft_.reset();
+  sender_.drop_draft();
 }
 
 Sender::Result Outgoing::send_in_turn(const Sample<void>& sample, shm::Nanoseconds stamp) noexcept {
@@ -157,6 +173,7 @@ Sender::Result Outgoing::send_in_turn(const Sample<void>& sample, shm::Nanosecon
 // NOLINTNEXTLINE(bugprone-exception-escape)
 bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexcept {
   bool has_come = false;
+  bool is_draft_left = false;
   has_more_ = true;
   for (std::uint32_t i = 0; i < kMostAtOnce; ++i) {
     auto sample = port_.take();
@@ -177,15 +194,15 @@ bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexc
     }
     const Sender::Result result = send_in_turn(*sample, stamp);
     if (result == Sender::Result::kBusy) {
+      is_draft_left = is_drafted(*sample, stamp);
       left_ = std::move(sample);
       break;
     }
     account_for(result, (*sample)->size());
   }
-  if (draft_) {
+  if (draft_ && !is_draft_left) {
     write_draft();  // the loop may find it in the queue
-    draft_.reset();
-    sender_.drop_draft();
+    drop_draft();
   }
   if (has_come) idle_again_.reset();  // somebody commands
   // Nobody rings for a port that is disarmed, and the last take may have swallowed a ring and have

@@ -40,7 +40,7 @@ class Sender {
     kNoMemory,
     kTooLarge,
     kRefused,
-    kBusy,  // of send_at_once() alone: it would have to wait
+    kBusy,  // of send_at_once() and send_draft(): it would have to wait
   };
 
   Sender() = default;
@@ -59,8 +59,7 @@ class Sender {
 
   // Memory of the middleware's for a sample of that many bytes: who does not know yet whether it is
   // to be sent writes it there, and a large sample is copied once. Empty: not to be had, or not
-  // worth it. There is one draft at a time, until send_draft() or drop_draft(), which come from the
-  // same thread.
+  // worth it. There is one draft at a time, until send_draft() or drop_draft().
   [[nodiscard]] virtual WritableBytes draft(std::size_t /*bytes*/) noexcept { return {}; }
   // As send_at_once(). With kBusy the draft is still there, and can still be read.
   [[nodiscard]] virtual Result send_draft() noexcept { return Result::kNotReady; }
@@ -86,6 +85,9 @@ class Outgoing {
   // Opens the port. Keeps references. Throws arbiter::Error.
   Outgoing(Node& node, const Entry& entry, Sender& sender, Account& account,
            const AgesOfSources& ages);
+  Outgoing(const Outgoing&) = delete;
+  Outgoing& operator=(const Outgoing&) = delete;
+  ~Outgoing();
 
   // Readable when run() has something to do.
   [[nodiscard]] int descriptor() { return port_.fd(); }
@@ -131,7 +133,10 @@ class Outgoing {
                                             shm::Nanoseconds stamp) noexcept;
   void send_idle_sample() noexcept;
   [[nodiscard]] bool is_drafted(const Sample<void>& sample, shm::Nanoseconds stamp) const noexcept;
+  // Of one that the loop is about to send.
+  [[nodiscard]] Bytes bytes_of(const Sample<void>& sample) const noexcept;
   void write_draft() noexcept;
+  void drop_draft() noexcept;
   void account_for(Sender::Result result, std::size_t size) noexcept;
   [[nodiscard]] shm::Nanoseconds when_next() const noexcept;
 
@@ -145,7 +150,7 @@ class Outgoing {
   const InBySource* ins_ = nullptr;
   std::function<void()> call_loop_;
   std::optional<Sample<void>> left_;  // taken by a thread that could not send it
-  // Of the turn, until it is sent or dropped.
+  // Of the turn, until it is sent or dropped; or of left_, which the writer had no room for.
   struct Draft {
     WritableBytes bytes;
     shm::Nanoseconds since;      // before its sample was published

@@ -8,6 +8,7 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::test {
@@ -18,6 +19,7 @@ constexpr const char* kNavModel = R"(
 <behaviors timeout="1000s">
   <behavior name="Go"><config at="/own">/nav</config></behavior>
   <behavior name="Show"><config at="/other">/nav</config></behavior>
+  <behavior name="Point"><config at="/pointer">/point</config></behavior>
   <behavior name="Stop"><config at="/own">/stop</config><inhibition>Go</inhibition></behavior>
 </behaviors>)";
 
@@ -123,11 +125,24 @@ TEST_F(LateBytes, AreNotWrittenOnceTheOtherPortHasGone) {
   static_cast<void>(publish());
   EXPECT_EQ(written_, 1);
   other.reset();
-  while (publish().outcome.delivered != 1) {  // until it is known here
-  }
+  await([&] { return publish().outcome.delivered == 1; });  // it is known here
   written_ = 0;
   static_cast<void>(publish());
   EXPECT_EQ(written_, 0);
+}
+
+// Its number may be that of a port of this daemon, too.
+TEST_F(LateBytes, AreWrittenForAPortOfAnotherNodeWhateverIsSaidOfIt) {
+  Node reader("reader");
+  auto pointer = reader.input_port("/pointer");
+  auto point = node_.output_port("/point", OutputPortOptions{});
+  auto loan = point.loan(kNew.size());
+  slot_ = {loan->data(), loan->size()};
+  write(kOld);
+  const Published published =
+      point.publish(std::move(*loan), Time::max(), pointer, [&] { write(kNew); });
+  EXPECT_EQ(published.outcome.delivered, 1U);
+  EXPECT_EQ(taken_from(pointer), kNew);
 }
 
 // It is published before the other port comes: which reads nothing of it.

@@ -259,12 +259,13 @@ class OutputPort<void> : public OutputPortBase {
     require_size(bytes.size());
     return detail::publish_copy(*core_, bytes.data(), bytes.size(), deadline);
   }
-  // The same, for a component that takes its own sample from `own`, has the bytes anyway, and need
-  // not read them here: the loan is written only where anybody else may read it, another component
-  // or a tap. Then publish() calls `write()`, once, before anybody sees the sample. If it does not,
-  // what `own` takes has the sample's size, and whatever bytes were there before; you may write
-  // them where the loan was until the next call on this port, and before another thread takes from
-  // `own`. `write()` must not throw, nor call this port. Costs a look at each connected port more.
+  // The same, for a component that takes its own sample from `own`, an input port of the same node,
+  // has the bytes anyway, and need not read them here: the loan is written only where anything else
+  // may read it, another input port or a tap. Then publish() calls `write()`, once, before anybody
+  // sees the sample. If it does not, what `own` takes has the sample's size, and whatever bytes
+  // were there before. You may write them where the loan was as long as there has been no other
+  // call on this port, and none has taken from `own`. `write`, such as a lambda, must not throw,
+  // nor call this port. Costs a look at each connected port more.
   template <class Write>
   Published publish(Loan<void> loan, Time deadline, const InputPort<void>& own, Write&& write) {
     const std::size_t size = size_of(loan);

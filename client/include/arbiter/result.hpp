@@ -43,7 +43,7 @@ struct Outcome {
 // The same of a sample that its publisher wants to know again when it takes it.
 struct Published {
   Outcome outcome;
-  std::uint64_t sequence = 0;  // its Sample::sequence(); 0: nobody was handed it
+  std::uint64_t sequence = 0;  // its Sample::sequence(); 0: no input port was handed it
 };
 
 }  // namespace arbiter
