@@ -23,6 +23,27 @@ Outcome Output::publish() {
   return outcome;
 }
 
+Outcome Output::publish_known_to(const Input& own) {
+  struct Bytes {
+    std::byte* to;
+    std::uint64_t sample;
+  } bytes{nullptr, ++published};
+  const detail::LoanedSlot loan = core->loan(sizeof bytes.sample);
+  require(loan.data != nullptr, "no slot was free");
+  bytes.to = loan.data;
+  const auto write = [](void* called) noexcept {
+    const auto* const late = static_cast<const Bytes*>(called);
+    if (Explorer* explorer = Explorer::current()) explorer->write_plain(late->to);
+    std::memcpy(late->to, &late->sample, sizeof late->sample);
+  };
+  const Published outcome =
+      core->publish_late_bytes({own.core.get(), write, &bytes}, own.core->instance(), shm::kForever,
+                               loan.slot, sizeof bytes.sample, shm::monotonic_now());
+  delivered += outcome.outcome.delivered;
+  discarded += outcome.outcome.discarded;
+  return outcome.outcome;
+}
+
 const shm::OutputCounters& Output::counters() const {
   return mapping.as<const shm::OutputHeader>()->counters;
 }
@@ -50,6 +71,13 @@ detail::HeldSample Input::hold() {
 
 bool Input::take() {
   const detail::HeldSample sample = hold();
+  if (sample.data == nullptr) return false;
+  core->give_back(sample.hold);
+  return true;
+}
+
+bool Input::take_unread() {
+  const detail::HeldSample sample = core->take();
   if (sample.data == nullptr) return false;
   core->give_back(sample.hold);
   return true;
@@ -134,11 +162,11 @@ std::shared_ptr<detail::SharedMemory> Instance::make_memory() {
   return memory;
 }
 
-std::unique_ptr<Output> Instance::make_output(std::uint32_t slots) {
+std::unique_ptr<Output> Instance::make_output(std::uint32_t slots, std::uint32_t max_loans) {
   auto output = std::make_unique<Output>();
   output->memory = make_memory();
   OutputPortOptions options;
-  options.max_loans = 0;  // publish() copies; so there is not one slot to spare
+  options.max_loans = max_loans;  // 0: publish() copies; so there is not one slot to spare
   options.max_memory = shm::kCacheLine * std::size_t{slots == 0 ? 64 : slots};
   output->core =
       std::make_unique<detail::OutputCore>("output", sample_type(), options, output->memory);

@@ -24,9 +24,13 @@ using shm::SourceId;
 inline constexpr SourceId kA = 0, kB = 1, kC = 2, kSources = 3;
 inline constexpr shm::PortId kPort = 0, kOther = 1, kPorts = 2;
 
+struct Input;
+
 // An output port. A sample says which it is, counted by the port.
 struct Output {
   Outcome publish();
+  // The same with a loan whose bytes are written where anybody but `own` may read them.
+  Outcome publish_known_to(const Input& own);
   Outcome signal() { return core->signal(shm::monotonic_now()); }
   void deactivate() { core->deactivate(shm::monotonic_now()); }
   // From now on its samples are written where the last one was, as large ones are.
@@ -48,6 +52,8 @@ struct Output {
 struct Input {
   // Takes and reads a sample and gives it back; false: there was none.
   bool take();
+  // The same without reading it.
+  bool take_unread();
   // Takes and reads a sample, and keeps it.
   detail::HeldSample hold();
   // Reads it once more: it must be as it was.
@@ -93,7 +99,7 @@ class Instance {
   explicit Instance(const test::TableBuilder& model);
 
   // With room for `slots` samples; 0: for as many as are needed at worst, and no more.
-  std::unique_ptr<Output> make_output(std::uint32_t slots = 0);
+  std::unique_ptr<Output> make_output(std::uint32_t slots = 0, std::uint32_t max_loans = 0);
   std::unique_ptr<Input> make_input(shm::PortId port, const InputPortOptions& options);
   // The port is open from here on: it may write its source's activity.
   void bind(Output& output, SourceId source);
