@@ -61,6 +61,15 @@ void add_exit_codes(CLI::App& app) {
   }
 }
 
+// `arbiter help VERB` as well as `arbiter VERB --help`.
+std::vector<std::string> words_of(int argc, char** argv) {
+  std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+  if (words.empty() || words.front() != "help") return words;
+  words.erase(words.begin());
+  words.emplace_back("--help");
+  return words;
+}
+
 int run(int argc, char** argv) {
   CLI::App app(
       "Port arbitration for robot components: at each input port, at most one connection wins.",
@@ -71,7 +80,7 @@ int run(int argc, char** argv) {
       "Examples:\n"
       "  arbiter check search_and_track.xml\n"
       "  arbiter why /Arm/pos:i\n"
-      "  arbiter why --help\n\n"
+      "  arbiter help why\n\n"
       "Exit codes: 0 done; 1 an error in what you asked about, or no daemon; 2 wrong use, or a "
       "file\n"
       "that cannot be opened or written. Each verb's help has its own.");
@@ -107,9 +116,11 @@ int run(int argc, char** argv) {
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
     return arbiter::cli::wrong_use_text(*failed, error);
   });
-  if (argc > 1 && !knows_verb(app, argv[1])) return kWrongUse;
+  std::vector<std::string> words = words_of(argc, argv);
+  if (!words.empty() && !knows_verb(app, words.front())) return kWrongUse;
+  std::reverse(words.begin(), words.end());  // as CLI11 wants them
   try {
-    app.parse(argc, argv);  // runs the verb
+    app.parse(std::move(words));  // runs the verb
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kWrongUse;  // --help and --version come this way as well
   } catch (const arbiter::rules::FileError& error) {

@@ -97,6 +97,21 @@ TEST(Program, SuggestsTheVerbThatWasMeant) {
   EXPECT_THAT(arbiter({"frobnicate"}).err, HasSubstr("`arbiter --help` lists"));
 }
 
+TEST(Program, HelpOfAVerbIsTheSameEitherWay) {
+  const auto same = [](std::vector<std::string> words) {
+    words.insert(words.begin(), "help");
+    const auto before = arbiter(words);
+    words.erase(words.begin());
+    words.emplace_back("--help");
+    EXPECT_EQ(before.exit_code, 0);
+    EXPECT_EQ(before.out, arbiter(words).out);
+  };
+  same({});
+  same({"why"});
+  same({"recording", "winners"});
+  EXPECT_THAT(arbiter({"help", "wyh"}).err, HasSubstr("did you mean \"why\"?"));
+}
+
 TEST(Program, SaysWhichArgumentItDoesNotKnowAndWhatWasMeant) {
   const auto error = [](const std::vector<std::string>& arguments) {
     const auto result = arbiter(arguments);
