@@ -1,8 +1,6 @@
 // Mapping files: what is read, and what is said of one that is wrong.
 #include <gmock/gmock.h>
 
-#include <fstream>
-
 #include "gateway/mapping/ros_names.hpp"
 #include "tests/gateway/mapping_text.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -10,7 +8,6 @@
 namespace arbiter::gateway {
 namespace {
 
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
