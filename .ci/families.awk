@@ -4,9 +4,10 @@
 #   awk -f families.awk FAMILIES IMPLIED SOURCES
 #
 # FAMILIES: a name and the headers of others that it precompiles, a line each, the costliest last.
-# IMPLIED: a header of others and all that it includes, a line each. SOURCES: paths, a line each. Prints FILE FAMILY SOURCE for all that is to be read; FAMILY is the last one
-# of whose headers FILE includes each, itself or by what it includes, or `none`; SOURCE is one that
-# includes FILE, and so is compiled with what FILE needs.
+# IMPLIED: a header of others and all that it includes, a line each. SOURCES: paths, a line each.
+# Prints FILE FAMILY SOURCE for all that is to be read; FAMILY is the last one of whose headers FILE
+# includes each, itself or by what it includes, or `none`; SOURCE is one that includes FILE, and so is
+# compiled with what FILE needs.
 
 function folder(file) { return substr(file, 1, match(file, /\/[^\/]*$/)) }
 
