@@ -172,9 +172,9 @@ std::string to_string(const ConnectionRule& rule) {
 
 std::string to_string(shm::Nanoseconds timeout) {
   if (timeout == shm::kForever) return "forever";
-  constexpr std::pair<shm::Nanoseconds, const char*> kUnits[] = {
+  constexpr std::pair<shm::Nanoseconds, const char*> kWholeUnits[] = {
       {1'000'000'000, "s"}, {1'000'000, "ms"}, {1000, "us"}};
-  for (const auto& [length, name] : kUnits) {
+  for (const auto& [length, name] : kWholeUnits) {
     if (timeout % length == 0) return std::to_string(timeout / length) + name;
   }
   return std::to_string(timeout) + "ns";
