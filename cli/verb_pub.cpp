@@ -62,11 +62,11 @@ TakersElsewhere await_elsewhere(const PubOptions& options, const Type& type,
                                 const shm::FileDescriptor& interrupts) {
   constexpr shm::Nanoseconds kLongest = 3'000'000'000;
   constexpr shm::Nanoseconds kLookAgain = 50'000'000;
-  constexpr std::chrono::milliseconds kPatience{300};
+  constexpr std::chrono::milliseconds kBriefPatience{300};
   const shm::Nanoseconds until = shm::monotonic_now() + kLongest;
   for (;;) {
-    TakersElsewhere found =
-        find_elsewhere(statuses_of_other_hosts(options.instance, kPatience), options.port, type);
+    TakersElsewhere found = find_elsewhere(
+        statuses_of_other_hosts(options.instance, kBriefPatience), options.port, type);
     if (!found.is_any()) return found;
     const shm::Nanoseconds now = shm::monotonic_now();
     found.is_imported =

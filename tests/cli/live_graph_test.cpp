@@ -18,7 +18,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kModel = R"(<behaviors timeout="3600s">
+const std::string kLowAndHigh = R"(<behaviors timeout="3600s">
   <behavior name="Low"><config at="/p">/low</config><condition>not /stop</condition></behavior>
   <behavior name="High"><config at="/p">/high</config><inhibition>Low</inhibition></behavior>
 </behaviors>
@@ -32,7 +32,7 @@ std::string live(const std::string& view) {
 }
 
 TEST(LiveGraph, ShowsWhoRunsAndWhoIsOverridden) {
-  Daemon daemon(kModel);
+  Daemon daemon(kLowAndHigh);
   Node node("test");
   auto low = node.output_port<int>("/low");
   auto high = node.output_port<int>("/high");
@@ -46,10 +46,10 @@ TEST(LiveGraph, ShowsWhoRunsAndWhoIsOverridden) {
 }
 
 TEST(LiveGraph, SaysWhichModelOfWhichInstanceItIsOf) {
-  Daemon daemon(kModel);
+  Daemon daemon(kLowAndHigh);
   EXPECT_THAT(live("behaviours"), HasSubstr("model 1 ("));
   EXPECT_THAT(live("behaviours"), HasSubstr(" in force, instance "));
-  daemon.load(kModel + "<!-- the same again -->");
+  daemon.load(kLowAndHigh + "<!-- the same again -->");
   EXPECT_THAT(live("behaviours"), HasSubstr("model 2 ("));
 }
 
@@ -69,7 +69,7 @@ TEST(LiveGraph, DrawsOnePortOfMany) {
 }
 
 TEST(LiveGraph, ShowsActiveSourcesAndTheWinningRule) {
-  Daemon daemon(kModel);
+  Daemon daemon(kLowAndHigh);
   Node node("test");
   auto low = node.output_port<int>("/low");
   auto stop = node.output_port<int>("/stop");
@@ -87,7 +87,7 @@ TEST(LiveGraph, ShowsActiveSourcesAndTheWinningRule) {
 
 // Nobody is active: who wins tells nothing.
 TEST(LiveGraph, TellsOfADaemonThatHasAnotherModel) {
-  Daemon daemon(kModel);
+  Daemon daemon(kLowAndHigh);
   const TemporaryDirectory directory;
   const auto other = directory.write("other.xml", R"(<behaviors>
     <behavior name="Low"><config at="/p">/low</config><condition>/stop</condition></behavior>
@@ -96,14 +96,14 @@ TEST(LiveGraph, TellsOfADaemonThatHasAnotherModel) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("not the text of the model in force, model 1"));
   const auto same =
-      arbiter({"graph", directory.write("same.xml", kModel), "--live", "--format", "dot"});
+      arbiter({"graph", directory.write("same.xml", kLowAndHigh), "--live", "--format", "dot"});
   EXPECT_EQ(same.exit_code, 0);
   EXPECT_EQ(same.err, "");
 }
 
 // The file may be another one by now.
 TEST(LiveGraph, DrawsTheTextThatTheDaemonHasRead) {
-  Daemon daemon(kModel);
+  Daemon daemon(kLowAndHigh);
   daemon.write_model("<behaviors><behavior name=\"Other\"/></behaviors>");
   EXPECT_THAT(live("behaviours"), HasSubstr("○ Low"));
 }
@@ -122,7 +122,7 @@ void wait_for_picture(const std::string& path, const std::string& text) {
 }
 
 TEST(LiveGraph, FollowsEachChangeUntilItIsInterrupted) {
-  Daemon daemon(kModel);
+  Daemon daemon(kLowAndHigh);
   Node node("test");
   auto low = node.output_port<int>("/low");
   auto high = node.output_port<int>("/high");
@@ -149,7 +149,7 @@ TEST(LiveGraph, FollowsEachChangeUntilItIsInterrupted) {
 }
 
 TEST(LiveGraph, SaysThatTheDaemonHasGoneAndFollowsTheNext) {
-  Daemon daemon(kModel);
+  Daemon daemon(kLowAndHigh);
   const TemporaryDirectory directory;
   const auto path = directory.path() + "/now.dot";
   int ends[2];

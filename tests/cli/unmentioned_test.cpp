@@ -14,12 +14,12 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kModel =
+const std::string kFaceUnlessStop =
     "<behaviors><arbiter at='/Gaze/pos:i'><select from='/Face/pos:o'>not /stop</select></arbiter>"
     "</behaviors>";
 
 TEST(Unmentioned, PubAndEchoSayThatNothingPasses) {
-  Daemon daemon(kModel);
+  Daemon daemon(kFaceUnlessStop);
   auto result = arbiter({"pub", "/Fase/pos:o", "--count", "1"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.err,
@@ -35,7 +35,7 @@ TEST(Unmentioned, PubAndEchoSayThatNothingPasses) {
 }
 
 TEST(Unmentioned, APortThatIsOpenTheWrongWayRoundIsNamedAsThat) {
-  Daemon daemon(kModel);
+  Daemon daemon(kFaceUnlessStop);
   const auto result = arbiter({"pub", "/Gaze/pos:i", "--count", "1"});
   EXPECT_THAT(result.err, HasSubstr("in the model in force /Gaze/pos:i is an input port, and here "
                                     "it is open as an output port, so none of these samples is "
@@ -48,7 +48,7 @@ TEST(Unmentioned, APortThatIsOpenTheWrongWayRoundIsNamedAsThat) {
 }
 
 TEST(Unmentioned, AWatcherSaysThatNobodyHasNamedThePort) {
-  Daemon daemon(kModel);
+  Daemon daemon(kFaceUnlessStop);
   const auto result = arbiter({"echo", "/Gaze/po:i", "--for", "1ms"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.err,
@@ -57,7 +57,7 @@ TEST(Unmentioned, AWatcherSaysThatNobodyHasNamedThePort) {
 }
 
 TEST(Unmentioned, NothingIsSaidOfPortsThatTheModelConnectsOrReads) {
-  Daemon daemon(kModel);
+  Daemon daemon(kFaceUnlessStop);
   Node node("test");
   auto in = node.input_port("/Gaze/pos:i");
   EXPECT_EQ(arbiter({"pub", "/Face/pos:o", "--count", "1"}).err, "");
@@ -66,7 +66,7 @@ TEST(Unmentioned, NothingIsSaidOfPortsThatTheModelConnectsOrReads) {
 }
 
 TEST(Unmentioned, PubSaysWhereNobodyHasTheInputPortOpen) {
-  Daemon daemon(kModel);
+  Daemon daemon(kFaceUnlessStop);
   const auto result = arbiter({"pub", "/Face/pos:o", "--count", "1"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.err,
@@ -75,7 +75,7 @@ TEST(Unmentioned, PubSaysWhereNobodyHasTheInputPortOpen) {
 }
 
 TEST(Unmentioned, PubSaysThatTheTypesDiffer) {
-  Daemon daemon(kModel);
+  Daemon daemon(kFaceUnlessStop);
   NodeOptions quiet;
   quiet.on_notice = [](const Notice&) {};
   Node node("test", quiet);
@@ -94,7 +94,7 @@ TEST(Unmentioned, PubSaysThatTheTypesDiffer) {
 
 // Once, however often it is asked of; again for another that has the name.
 TEST(Unmentioned, TheLogWarnsOnceOfEachPort) {
-  Daemon daemon(kModel);
+  Daemon daemon(kFaceUnlessStop);
   const auto count = [&](const std::string& text) {
     const std::string log = daemon.log();
     int found = 0;
@@ -106,8 +106,8 @@ TEST(Unmentioned, TheLogWarnsOnceOfEachPort) {
   Node node("test", quiet);
   auto out = node.output_port<int>("/Fase/pos:o");
   auto in = node.input_port<int>("/Gaze/po:i");
-  daemon.load(kModel);
-  daemon.load(kModel);
+  daemon.load(kFaceUnlessStop);
+  daemon.load(kFaceUnlessStop);
   EXPECT_EQ(count("the model in force does not mention /Fase/pos:o, so none of these samples is "
                   "delivered; did you mean \"/Face/pos:o\"?"),
             1);
@@ -124,7 +124,7 @@ TEST(Unmentioned, WithoutAModelThatIsSaid) {
 }
 
 TEST(Unmentioned, StatusMarksThem) {
-  Daemon daemon(kModel);
+  Daemon daemon(kFaceUnlessStop);
   Node node("test");
   auto out = node.output_port<int>("/Fase/pos:o");
   auto in = node.input_port<int>("/Gaze/po:i");

@@ -24,7 +24,7 @@ const std::string kBehaviours = R"(
 <behavior name="Follow"><config at="/gaze:i">/face</config><inhibition>Look</inhibition></behavior>
 <behavior name="Tell"><config at="/news">/arbiter/winner/gaze:i:o</config></behavior>
 </behaviors>)";
-const std::string kModel = R"(<behaviors timeout="forever">)" + kBehaviours;
+const std::string kWinnersModel = R"(<behaviors timeout="forever">)" + kBehaviours;
 
 class Winners : public testing::Test {
  protected:
@@ -50,7 +50,7 @@ class Winners : public testing::Test {
   }
   [[nodiscard]] std::string err_path() const { return daemon_.directory() + "/winners.err"; }
 
-  Daemon daemon_{kModel};
+  Daemon daemon_{kWinnersModel};
   Node node_{"test"};
   OutputPort<int> random_ = node_.output_port<int>("/random");
   OutputPort<int> face_ = node_.output_port<int>("/face");
@@ -114,7 +114,7 @@ TEST_F(Winners, AreThoseOfTheModelInForce) {
   EXPECT_STREQ(seen.before, "/random");
   EXPECT_EQ(seen.is_arbitrated, 0U);
   EXPECT_EQ(seen.generation, 2U);
-  daemon_.write_model(kModel);
+  daemon_.write_model(kWinnersModel);
   ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
   seen = next();
   EXPECT_STREQ(seen.winner, "/random");

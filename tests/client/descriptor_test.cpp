@@ -12,16 +12,13 @@
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/readable.hpp"
 
 namespace arbiter::test {
 namespace {
 
 using namespace std::chrono_literals;
 
-bool is_readable(int fd) {
-  pollfd polled{fd, POLLIN, 0};
-  return ::poll(&polled, 1, 0) == 1;
-}
 void wait_until_readable(int fd) {
   pollfd polled{fd, POLLIN, 0};
   while (::poll(&polled, 1, -1) != 1) {

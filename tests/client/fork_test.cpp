@@ -91,7 +91,7 @@ std::string in_words(const Outcome& outcome) {
 }
 
 // Two ports of this process, connected.
-struct Pair {
+struct ConnectedPair {
   Daemon daemon{single_model()};
   std::optional<Node> node{std::in_place, "test"};
   std::optional<OutputPort<Number>> out{node->output_port<Number>("/out")};
@@ -115,7 +115,7 @@ struct Pair {
 };
 
 TEST(Fork, AChildThatDestroysPortsAndNodeLeavesItsParentsOpen) {
-  Pair pair;
+  ConnectedPair pair;
   for (auto* const make : {plain_fork, bare_clone}) {
     const Said child = in_child([&] { return pair.destroy_all(); }, make);
     EXPECT_EQ(child.words, "destroyed");
@@ -139,7 +139,7 @@ TEST(Fork, AChildThatReturnsFromMainLeavesItsParentsPortsOpen) {
 
 TEST(Fork, WhatAChildPublishesArrivesNowhereAndItIsToldOnceForEachPort) {
   for (auto* const make : {plain_fork, bare_clone}) {
-    Pair pair;
+    ConnectedPair pair;
     const Said child = in_child(
         [&] {
           std::string answer = in_words(pair.out->publish(Number{1}));
@@ -160,7 +160,7 @@ TEST(Fork, WhatAChildPublishesArrivesNowhereAndItIsToldOnceForEachPort) {
 }
 
 TEST(Fork, AChildsDeactivateEndsNothing) {
-  Pair pair;
+  ConnectedPair pair;
   pair.out->signal();
   EXPECT_EQ(in_child([&] { return pair.out->deactivate(), std::string("done"); }).words, "done");
   EXPECT_EQ(pair.in->winner(), "/out");
@@ -168,7 +168,7 @@ TEST(Fork, AChildsDeactivateEndsNothing) {
 
 TEST(Fork, CallsThatMayThrowSayWhoseThePortIs) {
   for (auto* const make : {plain_fork, bare_clone}) {
-    Pair pair;
+    ConnectedPair pair;
     EXPECT_EQ(pair.out->publish(Number{1}).delivered, 1u);
     const std::vector<std::function<void()>> calls{
         [&] { static_cast<void>(pair.in->take()); },
@@ -197,7 +197,7 @@ TEST(Fork, CallsThatMayThrowSayWhoseThePortIs) {
 }
 
 TEST(Fork, WhatAComponentHeldAtTheForkItsChildMayReadAndDestroy) {
-  Pair pair;
+  ConnectedPair pair;
   pair.out->publish(Number{41});
   pair.out->publish(Number{42});
   auto held = pair.in->take();
@@ -301,7 +301,7 @@ TEST(Fork, ANodeThatIsDestroyedIsGoneThoughAChildHasItsSocket) {
 }
 
 TEST(Fork, WhileAllThreadsAreBusyChildrenNeitherHangNorHarm) {
-  Pair pair;
+  ConnectedPair pair;
   std::atomic<bool> ends{false};
   std::thread publisher([&] {
     while (!ends) pair.out->publish(Number{1});
@@ -336,7 +336,7 @@ TEST(Fork, WhileAllThreadsAreBusyChildrenNeitherHangNorHarm) {
 
 // system(), popen(), posix_spawn() and whatever else calls exec.
 TEST(Fork, AProgramThatIsExecutedInheritsNothing) {
-  Pair pair;
+  ConnectedPair pair;
   EXPECT_GE(pair.in->fd(), 0);
   std::FILE* const listing = ::popen("ls -l /proc/self/fd && exec cat /proc/self/maps", "r");
   ASSERT_NE(listing, nullptr);

@@ -1,7 +1,6 @@
 // A winner that cannot deliver: its port is idle, and what it inhibits stays inhibited.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <poll.h>
 
 #include <arbiter/arbiter.hpp>
 
@@ -11,6 +10,7 @@
 #include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/hear_all.hpp"
+#include "tests/support/readable.hpp"
 #include "tests/support/threads.hpp"
 
 namespace arbiter::test {
@@ -27,12 +27,7 @@ NodeOptions quiet() {
   return options;
 }
 
-bool is_readable(int fd) {
-  pollfd polled{fd, POLLIN, 0};
-  return ::poll(&polled, 1, 0) == 1;
-}
-
-struct Wrong {
+struct OneFloat {
   float x = 0;
 };
 
@@ -58,11 +53,11 @@ INSTANTIATE_TEST_SUITE_P(, Mismatch, testing::Values("3600s", "forever"), [](con
 TEST_P(Mismatch, MakesItsPortIdleOnceAndLetsNobodyElseThrough) {
   low.publish(Number{1});
   EXPECT_EQ(take_from(in), 1);
-  auto high = sender.output_port<Wrong>("/high");
+  auto high = sender.output_port<OneFloat>("/high");
   both_hear_all();
   Watched waiting([&] { EXPECT_TRUE(in.wait_for(kEver).idle()); });
   waiting.wait_until_asleep();
-  const Outcome outcome = high.publish(Wrong{});
+  const Outcome outcome = high.publish(OneFloat{});
   waiting.join();
   EXPECT_EQ(outcome.delivered, 0u);
   EXPECT_EQ(outcome.discarded, 0u);
@@ -80,21 +75,21 @@ TEST_P(Mismatch, MakesItsPortIdleOnceAndLetsNobodyElseThrough) {
 }
 
 TEST_P(Mismatch, OfAPortThatWasThereFirstIsTheSame) {
-  auto high = sender.output_port<Wrong>("/high");
-  high.publish(Wrong{});
+  auto high = sender.output_port<OneFloat>("/high");
+  high.publish(OneFloat{});
   in = receiver.input_port<Number>("/other");
   in = receiver.input_port<Number>("/in");
   both_hear_all();
   EXPECT_TRUE(in.idle());
-  EXPECT_EQ(high.publish(Wrong{}).refused, 1u);
+  EXPECT_EQ(high.publish(OneFloat{}).refused, 1u);
 }
 
 TEST_P(Mismatch, IsDiscardedWhereItIsNotTheWinner) {
-  auto high = sender.output_port<Wrong>("/high");
+  auto high = sender.output_port<OneFloat>("/high");
   auto stop = sender.output_port<Number>("/stop");
   both_hear_all();
   stop.signal();
-  const Outcome outcome = high.publish(Wrong{});
+  const Outcome outcome = high.publish(OneFloat{});
   EXPECT_EQ(outcome.discarded, 1u);
   EXPECT_EQ(outcome.refused, 0u);
   EXPECT_EQ(high.signal().discarded, 1u);
@@ -105,9 +100,9 @@ TEST_P(Mismatch, IsDiscardedWhereItIsNotTheWinner) {
 
 TEST_P(Mismatch, IsOverWithASuccessorOfTheRightType) {
   {
-    auto high = sender.output_port<Wrong>("/high");
+    auto high = sender.output_port<OneFloat>("/high");
     both_hear_all();
-    high.publish(Wrong{});
+    high.publish(OneFloat{});
     EXPECT_TRUE(in.idle());
   }
   auto high = sender.output_port<Number>("/high");
@@ -119,21 +114,21 @@ TEST_P(Mismatch, IsOverWithASuccessorOfTheRightType) {
 }
 
 TEST_P(Mismatch, OfAnotherTypeThanBeforeIsOverWithTheReceiver) {
-  auto high = sender.output_port<Wrong>("/high");
-  high.publish(Wrong{});
-  EXPECT_EQ(high.publish(Wrong{}).refused, 1u);
+  auto high = sender.output_port<OneFloat>("/high");
+  high.publish(OneFloat{});
+  EXPECT_EQ(high.publish(OneFloat{}).refused, 1u);
   in = receiver.input_port<Number>("/other");
-  auto fitting = receiver.input_port<Wrong>("/in");
+  auto fitting = receiver.input_port<OneFloat>("/in");
   both_hear_all();
-  EXPECT_EQ(high.publish(Wrong{}).delivered, 1u);
+  EXPECT_EQ(high.publish(OneFloat{}).delivered, 1u);
   EXPECT_EQ(fitting.winner(), "/high");
 }
 
 TEST_P(Mismatch, ShowsInTheStatus) {
-  auto high = sender.output_port<Wrong>("/high");
+  auto high = sender.output_port<OneFloat>("/high");
   both_hear_all();
   EXPECT_TRUE(daemon.input("/in")["cannot_deliver"].is_null());
-  high.publish(Wrong{});
+  high.publish(OneFloat{});
   const auto status = daemon.input("/in");
   EXPECT_TRUE(status["idle"]);
   EXPECT_TRUE(status["winner"].is_null());
@@ -145,19 +140,19 @@ TEST_P(Mismatch, ShowsInTheStatus) {
 TEST_P(Mismatch, IsKnownToTheNextDaemonToo) {
   low.publish(Number{1});
   EXPECT_EQ(take_from(in), 1);
-  auto high = sender.output_port<Wrong>("/high");
+  auto high = sender.output_port<OneFloat>("/high");
   both_hear_all();
-  high.publish(Wrong{});
+  high.publish(OneFloat{});
   EXPECT_TRUE(in.wait_for(kEver).idle());
   daemon.kill();
   EXPECT_TRUE(in.idle());
-  EXPECT_EQ(high.publish(Wrong{}).refused, 1u);
+  EXPECT_EQ(high.publish(OneFloat{}).refused, 1u);
   daemon.restart();
   while (daemon.input("/in")["away"] == true || daemon.source("/high")["away"] == true) {
   }
   EXPECT_EQ(daemon.input("/in")["cannot_deliver"]["source"], "/high");
   EXPECT_TRUE(in.idle());
-  EXPECT_EQ(high.publish(Wrong{}).refused, 1u);
+  EXPECT_EQ(high.publish(OneFloat{}).refused, 1u);
   EXPECT_TRUE(in.wait_for(1ns).timed_out()) << "it is told once";
   EXPECT_EQ(daemon.input("/in")["idles"], 1);
 }
@@ -166,7 +161,7 @@ TEST_P(Mismatch, IsKnownToTheNextDaemonToo) {
 TEST_P(Mismatch, ThatEndsWithoutADaemonIsOverWithTheNext) {
   Component wrong("wrong");
   in = receiver.input_port<Number>("/free");
-  auto other = receiver.input_port<Wrong>("/in");
+  auto other = receiver.input_port<OneFloat>("/in");
   ASSERT_EQ(wrong.tell("output /high"), "open");
   both_hear_all();
   EXPECT_EQ(wrong.tell("publish /high 1"), "0 0 1");
@@ -176,26 +171,26 @@ TEST_P(Mismatch, ThatEndsWithoutADaemonIsOverWithTheNext) {
   daemon.restart();
   while (daemon.input("/in")["away"] == true || daemon.source("/high")["away"] == true) {
   }
-  auto high = sender.output_port<Wrong>("/high");
+  auto high = sender.output_port<OneFloat>("/high");
   both_hear_all();
   EXPECT_EQ(other.winner(), "/high");
-  EXPECT_EQ(high.publish(Wrong{}).delivered, 1u);
+  EXPECT_EQ(high.publish(OneFloat{}).delivered, 1u);
 }
 
 TEST_P(Mismatch, MakesADescriptorReadableOnce) {
   const int fd = in.fd();
   low.publish(Number{1});
   EXPECT_EQ(take_from(in), 1);
-  auto high = sender.output_port<Wrong>("/high");
+  auto high = sender.output_port<OneFloat>("/high");
   both_hear_all();
   EXPECT_FALSE(in.take());
   EXPECT_FALSE(is_readable(fd));
-  high.publish(Wrong{});
+  high.publish(OneFloat{});
   EXPECT_TRUE(is_readable(fd));
   EXPECT_FALSE(in.take());
   EXPECT_TRUE(in.idle());
   EXPECT_FALSE(is_readable(fd));
-  high.publish(Wrong{});
+  high.publish(OneFloat{});
   low.publish(Number{2});
   EXPECT_FALSE(is_readable(fd)) << "losers wake nobody, and the port is idle already";
 }
@@ -206,9 +201,9 @@ TEST(UselessWinner, OneOfSeveralAtAPortWithoutRulesLeavesTheOthers) {
                                                       connection("/right", "/in"))});
   Node node("test", quiet());
   auto in = node.input_port<Number>("/in");
-  auto wrong = node.output_port<Wrong>("/wrong");
+  auto wrong = node.output_port<OneFloat>("/wrong");
   auto right = node.output_port<Number>("/right");
-  EXPECT_EQ(wrong.publish(Wrong{}).refused, 1u);
+  EXPECT_EQ(wrong.publish(OneFloat{}).refused, 1u);
   EXPECT_TRUE(in.idle());
   EXPECT_EQ(right.publish(Number{1}).delivered, 1u);
   EXPECT_FALSE(in.idle());

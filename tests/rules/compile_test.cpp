@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <random>
 
-#include "tests/rules/rules_by_hand.hpp"
+#include "tests/rules/ordered_rules.hpp"
 #include "tests/support/live_table.hpp"
 
 namespace arbiter::test {
@@ -17,15 +17,13 @@ using rules::Severity;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-std::string source_name(std::size_t i) { return "/s" + std::to_string(1000 + i); }
-
 // s0 is inhibited by s1 and all after it, and so on: the priorities of the paper.
 std::vector<std::pair<std::string, ExpressionPtr>> priority_chain(std::size_t count) {
   std::vector<std::pair<std::string, ExpressionPtr>> rules;
   for (std::size_t i = 0; i < count; ++i) {
     std::vector<ExpressionPtr> literals;
-    for (std::size_t j = i + 1; j < count; ++j) literals.push_back(inactive(source_name(j)));
-    rules.emplace_back(source_name(i), all_of(std::move(literals)));
+    for (std::size_t j = i + 1; j < count; ++j) literals.push_back(inactive(numbered_source(j)));
+    rules.emplace_back(numbered_source(i), all_of(std::move(literals)));
   }
   return rules;
 }
@@ -211,8 +209,8 @@ TEST(Compile, AWholePortOfPrioritiesIsProvedAndCompiled) {
   const auto model = compile(RulesByHand().port("/p", priority_chain(256)), diagnostics);
   EXPECT_TRUE(diagnostics.items().empty());
   LiveTable table(model);
-  table.activate_only({source_name(3), source_name(200), source_name(77)});
-  EXPECT_THAT(table.winners("/p"), ElementsAre(source_name(200)));
+  table.activate_only({numbered_source(3), numbered_source(200), numbered_source(77)});
+  EXPECT_THAT(table.winners("/p"), ElementsAre(numbered_source(200)));
 }
 
 TEST(Compile, SixteenPortsOfTwoHundredAndFiftySixConnectionsAreWithinTheLimits) {
@@ -225,18 +223,18 @@ TEST(Compile, SixteenPortsOfTwoHundredAndFiftySixConnectionsAreWithinTheLimits) 
 }
 
 TEST(Compile, ParityOfAllTheSourcesThatAPortMayHaveIsASmallDiagram) {
-  ExpressionPtr parity = active(source_name(0));
+  ExpressionPtr parity = active(numbered_source(0));
   for (std::size_t i = 1; i < 255; ++i) {
-    parity = binary(Operator::kXor, parity, active(source_name(i)));
+    parity = binary(Operator::kXor, parity, active(numbered_source(i)));
   }
   Diagnostics diagnostics;
   const auto model = compile(RulesByHand().port("/p", {{"/own", parity}}), diagnostics);
   EXPECT_TRUE(diagnostics.items().empty());
   EXPECT_EQ(model.ports.at(0).rules.at(0).nodes.size(), 2 * 255u - 1);
   LiveTable table(model);
-  table.activate_only({"/own", source_name(7), source_name(8), source_name(200)});
+  table.activate_only({"/own", numbered_source(7), numbered_source(8), numbered_source(200)});
   EXPECT_TRUE(table.winner("/p").has_value());
-  table.activate_only({"/own", source_name(7), source_name(8)});
+  table.activate_only({"/own", numbered_source(7), numbered_source(8)});
   EXPECT_FALSE(table.winner("/p").has_value());
 }
 
@@ -245,10 +243,10 @@ TEST(Compile, ParityOfAllTheSourcesThatAPortMayHaveIsASmallDiagram) {
 TEST(Compile, ABadOrderOfTheDocumentIsMendedBySifting) {
   constexpr std::size_t kPairs = 14;
   std::vector<ExpressionPtr> mention, equal;
-  for (std::size_t i = 0; i < kPairs; ++i) mention.push_back(active("/x" + source_name(i)));
+  for (std::size_t i = 0; i < kPairs; ++i) mention.push_back(active("/x" + numbered_source(i)));
   for (std::size_t i = 0; i < kPairs; ++i) {
-    equal.push_back(
-        binary(Operator::kIff, active("/x" + source_name(i)), active("/y" + source_name(i))));
+    equal.push_back(binary(Operator::kIff, active("/x" + numbered_source(i)),
+                           active("/y" + numbered_source(i))));
   }
   Diagnostics diagnostics;
   const auto model = compile(
@@ -257,9 +255,9 @@ TEST(Compile, ABadOrderOfTheDocumentIsMendedBySifting) {
   const auto& rule = model.ports.at(0).rules.at(0);
   EXPECT_LT(rule.nodes.size(), 200u);
   LiveTable table(model);
-  table.activate_only({"/own", "/x" + source_name(2), "/y" + source_name(2)});
+  table.activate_only({"/own", "/x" + numbered_source(2), "/y" + numbered_source(2)});
   EXPECT_TRUE(table.winner("/p").has_value());
-  table.activate_only({"/own", "/x" + source_name(2), "/y" + source_name(3)});
+  table.activate_only({"/own", "/x" + numbered_source(2), "/y" + numbered_source(3)});
   EXPECT_FALSE(table.winner("/p").has_value());
 }
 
@@ -271,7 +269,8 @@ TEST(Compile, ARuleThatExplodesIsAnErrorThatNamesTheLimit) {
     std::vector<ExpressionPtr> carry_free;
     ExpressionPtr carry = rules::make_constant(false);
     for (std::size_t j = 0; j < kBits; ++j) {
-      const auto product = all_of({active("/x" + source_name(i)), active("/y" + source_name(j))});
+      const auto product =
+          all_of({active("/x" + numbered_source(i)), active("/y" + numbered_source(j))});
       const auto old = column[i + j];
       column[i + j] = binary(Operator::kXor, binary(Operator::kXor, old, product), carry);
       carry = any_of({all_of({old, product}), all_of({old, carry}), all_of({product, carry})});
@@ -288,7 +287,7 @@ TEST(Compile, ARuleThatExplodesIsAnErrorThatNamesTheLimit) {
 
 TEST(Compile, MoreSourcesAtAPortThanTheLimitAreAnError) {
   std::vector<ExpressionPtr> literals;
-  for (std::size_t i = 0; i < 256; ++i) literals.push_back(inactive(source_name(i)));
+  for (std::size_t i = 0; i < 256; ++i) literals.push_back(inactive(numbered_source(i)));
   Diagnostics diagnostics;
   compile(RulesByHand().port("/p", {{"/own", all_of(literals)}}), diagnostics);
   ASSERT_THAT(codes(diagnostics), ElementsAre("limit-exceeded"));
@@ -298,7 +297,7 @@ TEST(Compile, MoreSourcesAtAPortThanTheLimitAreAnError) {
 TEST(Compile, ConnectionsWithoutARuleCountAgainstTheLimit) {
   RulesByHand by_hand;
   by_hand.port("/p", {{"/own", always()}});
-  for (std::size_t i = 0; i < 256; ++i) by_hand.other(source_name(i), "/p");
+  for (std::size_t i = 0; i < 256; ++i) by_hand.other(numbered_source(i), "/p");
   Diagnostics diagnostics;
   compile(by_hand, diagnostics);
   EXPECT_THAT(codes(diagnostics), ElementsAre("limit-exceeded"));
@@ -358,7 +357,7 @@ std::vector<ExpressionPtr> random_clauses(std::mt19937& random, std::size_t coun
   while (clauses.size() < count) {
     std::vector<ExpressionPtr> literals;
     while (literals.size() < 3) {
-      const auto source = source_name(random() % sources);
+      const auto source = numbered_source(random() % sources);
       literals.push_back(random() % 2 == 0 ? active(source) : inactive(source));
     }
     clauses.push_back(any_of(std::move(literals)));
@@ -385,8 +384,8 @@ TEST(Compile, JoinsClausesAsTheyAreWrittenWhereTheyAreTooLargeOtherwise) {
   std::mt19937 random(1);
   std::vector<ExpressionPtr> all, none;
   for (std::size_t i = 0; i < 80; ++i) {
-    all.push_back(active(source_name(i)));
-    none.push_back(inactive(source_name(i)));
+    all.push_back(active(numbered_source(i)));
+    none.push_back(inactive(numbered_source(i)));
   }
   std::vector<ExpressionPtr> operands{any_of({all_of(std::move(all)), all_of(std::move(none))})};
   for (auto& clause : random_clauses(random, 80, 80)) operands.push_back(std::move(clause));

@@ -188,7 +188,7 @@ void expect_within_bounds(const Found& found, std::size_t ports) {
 }
 
 constexpr int kMostSources = 256;  // kMaxSourcesPerPort
-constexpr int kPorts = 16;         // 4096 connections
+constexpr int kManyPorts = 16;     // 4096 connections
 
 TEST(FindingsScale, AllInhibitAll) {
   const auto found = found_in(inhibited(
@@ -207,14 +207,14 @@ TEST(FindingsScale, AllInhibitAll) {
 
 TEST(FindingsScale, ChainsOfPriorities) {
   const auto found = found_in(inhibited(
-      kPorts, kMostSources,
+      kManyPorts, kMostSources,
       [](int i) {
         std::vector<int> others;
         for (int j = i + 1; j < kMostSources; ++j) others.push_back(j);
         return others;
       },
       false));
-  expect_within_bounds(found, kPorts);
+  expect_within_bounds(found, kManyPorts);
   EXPECT_EQ(found.account.open, 0u);
   EXPECT_THAT(found.items, IsEmpty());
 }

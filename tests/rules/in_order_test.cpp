@@ -11,7 +11,7 @@
 #include "rules/explain/explain.hpp"
 #include "rules/explain/simulation.hpp"
 #include "rules/prove/table_rules.hpp"
-#include "tests/rules/rules_by_hand.hpp"
+#include "tests/rules/ordered_rules.hpp"
 #include "tests/support/live_table.hpp"
 #include "tests/support/rounds.hpp"
 
@@ -21,55 +21,21 @@ namespace {
 using rules::Diagnostics;
 using testing::Contains;
 
-using Rules = std::vector<std::pair<std::string, ExpressionPtr>>;
-
 const std::vector<std::string> kSixSources = {"/a", "/b", "/c", "/d", "/e", "/f"};
 
-std::string numbered_source(std::size_t i) { return "/s" + std::to_string(1000 + i); }
-
-// `s and not a and not b and not c`, with others at random.
-Rules random_inhibitions(std::size_t count, unsigned seed) {
-  std::mt19937 random(seed);
-  Rules rules;
-  for (std::size_t i = 0; i < count; ++i) {
-    std::vector<ExpressionPtr> literals;
-    while (literals.size() < 3) {
-      const std::size_t other = random() % count;
-      if (other != i) literals.push_back(inactive(numbered_source(other)));
-    }
-    rules.emplace_back(numbered_source(i), all_of(literals));
-  }
-  return rules;
-}
-
-ExpressionPtr random_condition(std::mt19937& random, int depth) {
-  const auto pick = [&](std::size_t n) { return static_cast<std::size_t>(random()) % n; };
-  if (depth == 0 || pick(4) == 0) {
+Rules up_to_six_rules(std::mt19937& random) {
+  const auto leaf = [](const auto& pick) {
     if (pick(12) == 0) return pick(2) == 0 ? always() : negation(always());
     const auto& source = kSixSources[pick(kSixSources.size())];
     return pick(2) == 0 ? active(source) : inactive(source);
-  }
-  static constexpr Operator kOperators[] = {Operator::kAnd, Operator::kOr, Operator::kXor,
-                                            Operator::kImplies, Operator::kIff};
-  auto left = random_condition(random, depth - 1);
-  return binary(kOperators[pick(5)], std::move(left), random_condition(random, depth - 1));
-}
-
-Rules random_rules(std::mt19937& random) {
+  };
   Rules rules;
   const std::size_t count = 1 + random() % kSixSources.size();
   for (std::size_t i = 0; i < count; ++i) {
-    rules.emplace_back(kSixSources[i], random() % 6 == 0 ? always() : random_condition(random, 2));
+    rules.emplace_back(kSixSources[i],
+                       random() % 6 == 0 ? always() : random_condition(random, 2, leaf));
   }
   return rules;
-}
-
-// The first that holds, by the definition.
-std::optional<std::string> first_that_holds(const Rules& rules, const Active& now) {
-  for (const auto& [source, condition] : rules) {
-    if (now.contains(source) && holds(*condition, now)) return source;
-  }
-  return std::nullopt;
 }
 
 bool has(const Diagnostics& diagnostics, const std::string& code) {
@@ -134,7 +100,7 @@ TEST(InOrder, RandomRulesDecideAsTheDefinitionSays) {
   std::mt19937 random(20261122);
   int in_order = 0;
   for (int round = 0; round < rounds(400); ++round) {
-    const Rules rules = random_rules(random);
+    const Rules rules = up_to_six_rules(random);
     const rules::RuleSet set = RulesByHand().port("/p", rules, true);
     Diagnostics diagnostics;
     const auto model = compile(set, diagnostics, 0);
@@ -153,7 +119,7 @@ TEST(InOrder, TheSourcesThatAPortReadsAreThoseThatItsWalksTest) {
   for (int round = 0; round < rounds(100); ++round) {
     Diagnostics diagnostics;
     const auto model =
-        compile(RulesByHand().port("/p", random_rules(random), true), diagnostics, 0);
+        compile(RulesByHand().port("/p", up_to_six_rules(random), true), diagnostics, 0);
     const LiveTable live(model);
     const auto table = live.view();
     const auto read = table.sources_read(live.port_id("/p"));

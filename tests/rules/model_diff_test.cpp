@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "rules/model/load.hpp"
+#include "tests/rules/compiled.hpp"
 #include "tests/rules/random_model.hpp"
 #include "tests/support/live_table.hpp"
 #include "tests/support/rounds.hpp"
@@ -25,13 +26,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
-
-CompiledModel compiled(const rules::RuleSet& set) {
-  Diagnostics diagnostics;
-  auto model = compile(set, diagnostics);
-  EXPECT_FALSE(diagnostics.has_errors());
-  return model;
-}
 
 ModelDiff diff(const CompiledModel& before, const CompiledModel& after,
                std::uint64_t steps = rules::Budget::kSteps) {

@@ -14,7 +14,7 @@ namespace {
 
 using rules::Diagnostics;
 
-std::string text_of(const Diagnostics& diagnostics) {
+std::string printed(const Diagnostics& diagnostics) {
   std::ostringstream out;
   write_text(out, diagnostics);
   return out.str();
@@ -27,7 +27,7 @@ nlohmann::json json_of(const Diagnostics& diagnostics) {
 }
 
 TEST(Report, SaysNothingIfNothingWasFound) {
-  EXPECT_EQ(text_of({}), "");
+  EXPECT_EQ(printed({}), "");
   EXPECT_EQ(json_of({}), nlohmann::json::array());
 }
 
@@ -38,7 +38,7 @@ TEST(Report, WritesAsCompilersDoAndCounts) {
                     rules::Witness{{"/a", "/b"}, {"/c"}, true});
   diagnostics.error("both-can-win", {"m.xml", 10, 1}, "both win", {},
                     rules::Witness{{"/a"}, {}, true});
-  EXPECT_EQ(text_of(diagnostics),
+  EXPECT_EQ(printed(diagnostics),
             "m.xml:9:1: error: both win [both-can-win]\n"
             "  active: /a, /b; inactive: /c\n"
             "m.xml:10:1: error: both win [both-can-win]\n"
@@ -52,7 +52,7 @@ TEST(Report, CallsNoWitnessAShortestThatIsNotKnownToBe) {
   diagnostics.error("both-can-win", {"m.xml", 1, 1}, "both win", {},
                     rules::Witness{{"/a"}, {"/b"}});
   EXPECT_THAT(
-      text_of(diagnostics),
+      printed(diagnostics),
       testing::HasSubstr("inactive: /b (nothing of it can be left out; others may be shorter)\n"));
   EXPECT_EQ(json_of(diagnostics)[0]["witness"]["shortest"], false);
 }
@@ -65,7 +65,7 @@ TEST(Report, DoesNotRepeatAWitnessThatTheMessageHasInWords) {
   for (int i = 0; i < 8; ++i) many.push_back("/s" + std::to_string(i));
   const rules::Witness large{many, {}, true};
   diagnostics.note("n", {"m.xml", 2, 1}, "with " + in_words(large), {}, large);
-  EXPECT_EQ(text_of(diagnostics),
+  EXPECT_EQ(printed(diagnostics),
             "m.xml:1:1: note: with /a active and /b inactive, nobody wins [n]\n"
             "m.xml:2:1: note: with /s0, /s1, /s2, /s3, /s4, /s5 and 2 more active [n]\n"
             "  active: /s0, /s1, /s2, /s3, /s4, /s5, /s6, /s7; inactive: none\n"
@@ -76,7 +76,7 @@ TEST(Report, ShowsTheFirstNotesOfACodeAndCountsTheRest) {
   Diagnostics diagnostics;
   for (std::uint32_t i = 0; i < 25; ++i) diagnostics.note("n", {"m.xml", i + 1, 1}, "a note");
   for (std::uint32_t i = 0; i < 12; ++i) diagnostics.warning("w", {"m.xml", i + 1, 1}, "careful");
-  const std::string text = text_of(diagnostics);
+  const std::string text = printed(diagnostics);
   EXPECT_NE(text.find("m.xml:10:1: note"), std::string::npos);
   EXPECT_EQ(text.find("m.xml:11:1: note"), std::string::npos);
   EXPECT_NE(text.find("m.xml:12:1: warning"), std::string::npos);
@@ -105,7 +105,7 @@ TEST(Report, SaysHowManyMoreThereAreBeyondTheBoundOfACode) {
   }
   diagnostics.error("other", {"m.xml", 1, 1}, "wrong, too");
   EXPECT_EQ(counts(diagnostics), "10004 errors, 10003 notes");
-  EXPECT_TRUE(text_of(diagnostics)
+  EXPECT_TRUE(printed(diagnostics)
                   .ends_with("\n3 more errors [e] were found and are not listed\n"
                              "9993 more notes [n] are not shown; arbiter check --json has the "
                              "first 10000\n10004 errors, 10003 notes\n"));
@@ -140,7 +140,7 @@ TEST(Report, CountsOneAsOne) {
   diagnostics.error("e", {"m.xml", 1, 1}, "one");
   diagnostics.warning("w", {"m.xml", 2, 1}, "two");
   diagnostics.warning("w", {"m.xml", 3, 1}, "three");
-  EXPECT_TRUE(text_of(diagnostics).ends_with("\n1 error, 2 warnings\n"));
+  EXPECT_TRUE(printed(diagnostics).ends_with("\n1 error, 2 warnings\n"));
 }
 
 TEST(Report, GoesThroughEachFileFromTheTop) {

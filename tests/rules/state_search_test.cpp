@@ -11,7 +11,7 @@
 #include "rules/ask/findings.hpp"
 #include "rules/ask/model_diff.hpp"
 #include "rules/prove/winners.hpp"
-#include "tests/rules/rules_by_hand.hpp"
+#include "tests/rules/ordered_rules.hpp"
 #include "tests/support/live_table.hpp"
 #include "tests/support/rounds.hpp"
 
@@ -23,39 +23,21 @@ using rules::Diagnostics;
 using rules::StateSearch;
 using testing::Contains;
 
-using Rules = std::vector<std::pair<std::string, ExpressionPtr>>;
-
 const std::vector<std::string> kFiveSources = {"/a", "/b", "/c", "/d", "/e"};
 
-std::string source_name(std::size_t i) { return "/s" + std::to_string(1000 + i); }
-
-ExpressionPtr random_condition(std::mt19937& random, int depth) {
-  const auto pick = [&](std::size_t n) { return static_cast<std::size_t>(random()) % n; };
-  if (depth == 0 || pick(4) == 0) {
+Rules five_rules(std::mt19937& random) {
+  const auto leaf = [](const auto& pick) {
     const auto& source = kFiveSources[pick(kFiveSources.size())];
     return pick(2) == 0 ? active(source) : inactive(source);
-  }
-  static constexpr Operator kOperators[] = {Operator::kAnd, Operator::kOr, Operator::kXor,
-                                            Operator::kImplies, Operator::kIff};
-  auto left = random_condition(random, depth - 1);
-  return binary(kOperators[pick(5)], std::move(left), random_condition(random, depth - 1));
-}
-
-Rules random_rules(std::mt19937& random) {
+  };
   Rules rules;
-  for (const auto& source : kFiveSources) rules.emplace_back(source, random_condition(random, 2));
+  for (const auto& source : kFiveSources)
+    rules.emplace_back(source, random_condition(random, 2, leaf));
   return rules;
 }
 
 CompiledModel in_order(const Rules& rules, Diagnostics& diagnostics) {
   return compile(RulesByHand().port("/p", rules, true), diagnostics, 0);
-}
-
-std::optional<std::string> first_that_holds(const Rules& rules, const Active& now) {
-  for (const auto& [source, condition] : rules) {
-    if (now.contains(source) && holds(*condition, now)) return source;
-  }
-  return std::nullopt;
 }
 
 bool agrees(const rules::Witness& witness, const Active& now) {
@@ -88,7 +70,7 @@ TEST(StateSearch, FindsWhoCanWinAndStatesOfWhichNothingCanBeLeftOut) {
   std::mt19937 random(20261122);
   for (int round = 0; round < rounds(200); ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
-    const Rules rules = random_rules(random);
+    const Rules rules = five_rules(random);
     Diagnostics diagnostics;
     const auto model = in_order(rules, diagnostics);
     const auto& port = model.ports.at(0);
@@ -145,7 +127,7 @@ TEST(InOrder, WarnsOfTheSameRulesThatCanNeverWin) {
   std::size_t warned = 0;
   for (int round = 0; round < rounds(200); ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
-    const Rules rules = random_rules(random);
+    const Rules rules = five_rules(random);
     std::set<std::string> expected(kFiveSources.begin(), kFiveSources.end());
     for (const auto& now : subsets(kFiveSources)) {
       if (const auto winner = first_that_holds(rules, now)) expected.erase(*winner);
@@ -161,21 +143,6 @@ TEST(InOrder, WarnsOfTheSameRulesThatCanNeverWin) {
     }
   }
   EXPECT_GT(warned, rounds(50u));
-}
-
-// `s and not a and not b and not c`, with others at random.
-Rules random_inhibitions(std::size_t count, unsigned seed) {
-  std::mt19937 random(seed);
-  Rules rules;
-  for (std::size_t i = 0; i < count; ++i) {
-    std::vector<ExpressionPtr> literals;
-    while (literals.size() < 3) {
-      const std::size_t other = random() % count;
-      if (other != i) literals.push_back(inactive(source_name(other)));
-    }
-    rules.emplace_back(source_name(i), all_of(literals));
-  }
-  return rules;
 }
 
 CompiledModel compiled(const Rules& rules) {
@@ -208,7 +175,8 @@ TEST(InOrder, WhereModelsOfManyConnectionsDecideDifferentlyIsFound) {
     SCOPED_TRACE(std::to_string(count));
     const Rules before = random_inhibitions(count, 1);
     Rules after = before;
-    after[count / 2].second = all_of({after[count / 2].second, inactive(source_name(count / 3))});
+    after[count / 2].second =
+        all_of({after[count / 2].second, inactive(numbered_source(count / 3))});
     const auto compared = compared_with(compiled(before), compiled(after));
     ASSERT_EQ(compared.ports.size(), 1u);
     const auto& port = compared.ports[0];
@@ -224,7 +192,7 @@ TEST(InOrder, WhereModelsOfManyConnectionsDecideDifferentlyIsFound) {
       EXPECT_EQ(first_that_holds(after, now), change.after);
       EXPECT_EQ(change.states, "");
     }
-    EXPECT_EQ(port.changes.front().before, source_name(count / 2));
+    EXPECT_EQ(port.changes.front().before, numbered_source(count / 2));
   }
 }
 

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "rules/prove/compile.hpp"
+#include "tests/rules/compiled.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 
 namespace arbiter::test {
@@ -17,13 +18,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Pair;
-
-rules::CompiledModel compiled(const rules::RuleSet& set) {
-  Diagnostics diagnostics;
-  auto model = compile(set, diagnostics);
-  EXPECT_FALSE(diagnostics.has_errors());
-  return model;
-}
 
 // The paper's arm, and a base that navigation drives.
 rules::CompiledModel arm_and_base() {

@@ -33,7 +33,7 @@ std::string show(const XmlNode* node) {
   return result;
 }
 
-std::string parse(const std::string& content) {
+std::string parsed(const std::string& content) {
   const TextFile file("f", content);
   Diagnostics diagnostics;
   const auto document = parse_xml(file, diagnostics);
@@ -62,7 +62,7 @@ TEST(Xml, IsReadAsItStandsInTheFile) {
       {"", ""},
       {"<ä ö='ü'/>", "ä[ö=ü]"},
   };
-  for (const auto& [content, tree] : cases) EXPECT_EQ(parse(content), tree) << content;
+  for (const auto& [content, tree] : cases) EXPECT_EQ(parsed(content), tree) << content;
 }
 
 TEST(Xml, MalformedIsReportedWhereItBeginsToBe) {
@@ -97,8 +97,8 @@ TEST(Xml, MalformedIsReportedWhereItBeginsToBe) {
       {"<a/>\n<!", "2:1", "write &lt;"},
   };
   for (const Case& c : cases) {
-    EXPECT_THAT(parse(c.content), HasSubstr(c.message)) << c.content;
-    EXPECT_EQ(parse(c.content).substr(0, c.place.size() + 1), c.place + " ") << c.content;
+    EXPECT_THAT(parsed(c.content), HasSubstr(c.message)) << c.content;
+    EXPECT_EQ(parsed(c.content).substr(0, c.place.size() + 1), c.place + " ") << c.content;
   }
 }
 

@@ -24,7 +24,7 @@ namespace {
 
 using wire::MessageKind;
 
-const std::string kModel =
+const std::string kOneSource =
     "<behaviors><arbiter at='/in'><select from='/out'/></arbiter></behaviors>";
 
 // A daemon with two components that go on as if nothing were the matter.
@@ -50,7 +50,7 @@ class HostileClient : public testing::Test {
     return hostile.expect_refusal();
   }
 
-  Daemon daemon_{kModel};
+  Daemon daemon_{kOneSource};
   Node node_{"good"};
   OutputPort<int> out_ = node_.output_port<int>("/out");
   InputPort<int> in_ = node_.input_port<int>("/in");
@@ -352,7 +352,7 @@ TEST_F(HostileClient, ThatObservesIsToldEachNameOnce) {
 }
 
 TEST(Descriptors, WhenTheyRunOutClientsAreTurnedAwayAndTheDaemonRests) {
-  Daemon daemon(kModel, {.max_descriptors = 64});
+  Daemon daemon(kOneSource, {.max_descriptors = 64});
   Node node("test");
   {
     std::vector<RawClient> many;

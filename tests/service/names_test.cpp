@@ -14,7 +14,7 @@ namespace {
 
 using wire::MessageKind;
 
-wire::Message open_output(const std::string& name) {
+wire::Message open_untyped(const std::string& name) {
   return RawClient::message(MessageKind::kOpenOutput, name);
 }
 
@@ -28,7 +28,7 @@ TEST(Names, AskedForTwiceByAComponentThatIsDeadByThenAreFree) {
     client.hello("doomed");
     ::kill(daemon.process().pid(), SIGSTOP);
     const auto segment = raw_output_segment();
-    for (int i = 0; i < 2; ++i) client.send(open_output("/twice"), {segment.get(), -1});
+    for (int i = 0; i < 2; ++i) client.send(open_untyped("/twice"), {segment.get(), -1});
     ::_exit(0);
   }
   int status = 0;
@@ -49,7 +49,7 @@ TEST(Names, AreFreeInTheOrderInWhichComponentsSpoke) {
     first.hello("first");
     second.hello("second");
     const auto segment = raw_output_segment();
-    first.send(open_output("/x"), {segment.get(), -1});
+    first.send(open_untyped("/x"), {segment.get(), -1});
     auto close = RawClient::message(MessageKind::kClosePort);
     close.port = first.expect(MessageKind::kOpened).message.port;
     first.expect(MessageKind::kConnected);
@@ -61,7 +61,7 @@ TEST(Names, AreFreeInTheOrderInWhichComponentsSpoke) {
     } else {
       first = RawClient(daemon.instance());  // hangs up
     }
-    second.send(open_output("/x"), {segment.get(), -1});
+    second.send(open_untyped("/x"), {segment.get(), -1});
     daemon.process().signal(SIGCONT);
     EXPECT_NO_THROW(second.expect(MessageKind::kOpened));
   }

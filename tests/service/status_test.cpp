@@ -10,13 +10,13 @@
 namespace arbiter::test {
 namespace {
 
-const std::string kModel =
+const std::string kLowHighAndStop =
     "<behaviors timeout='forever'><arbiter at='/in'>"
     "<select from='/low'>not /high and not /stop</select><select from='/high'/>"
     "</arbiter></behaviors>";
 
 TEST(Status, TellsWhatAModelNamesThoughNobodyIsThere) {
-  Daemon daemon(kModel);
+  Daemon daemon(kLowHighAndStop);
   const auto status = daemon.status();
   EXPECT_EQ(status["instance"], "test");
   EXPECT_EQ(status["pid"], daemon.process().pid());
@@ -68,7 +68,7 @@ TEST(Status, TellsWhereRulesAreTriedInOrderAndTheFirstOfThemWins) {
 }
 
 TEST(Status, TellsWhichEndIsMissing) {
-  Daemon daemon(kModel);
+  Daemon daemon(kLowHighAndStop);
   Node node("test");
   {
     auto low = node.output_port<int>("/low");
@@ -81,7 +81,7 @@ TEST(Status, TellsWhichEndIsMissing) {
 }
 
 TEST(Status, TellsWhoWinsAndWhoIsActive) {
-  Daemon daemon(kModel);
+  Daemon daemon(kLowHighAndStop);
   Node node("test");
   auto low = node.output_port<int>("/low");
   auto high = node.output_port<int>("/high");
@@ -97,7 +97,7 @@ TEST(Status, TellsWhoWinsAndWhoIsActive) {
 }
 
 TEST(Status, TellsWhoHasAPortAndWhatItCarries) {
-  Daemon daemon(kModel);
+  Daemon daemon(kLowHighAndStop);
   Node node("the-node");
   auto low = node.output_port<double>("/low");
   auto in = node.input_port("/in", {.depth = 5, .when_full = refuse_new, .keep = true});
@@ -114,7 +114,7 @@ TEST(Status, TellsWhoHasAPortAndWhatItCarries) {
 }
 
 TEST(Status, CountsWhatBecomesOfSamples) {
-  Daemon daemon(kModel);
+  Daemon daemon(kLowHighAndStop);
   Node node("test");
   auto low = node.output_port<int>("/low");
   auto high = node.output_port<int>("/high");
