@@ -8,6 +8,7 @@
 
 #include "tests/rules/ordered_rules.hpp"
 #include "tests/support/live_table.hpp"
+#include "tests/support/rounds.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -215,11 +216,12 @@ TEST(Compile, AWholePortOfPrioritiesIsProvedAndCompiled) {
 
 TEST(Compile, SixteenPortsOfTwoHundredAndFiftySixConnectionsAreWithinTheLimits) {
   RulesByHand by_hand;
-  for (int i = 0; i < 16; ++i) by_hand.port("/p" + std::to_string(i), priority_chain(256));
+  const int ports = rounds(16);
+  for (int i = 0; i < ports; ++i) by_hand.port("/p" + std::to_string(i), priority_chain(256));
   Diagnostics diagnostics;
   const auto model = compile(by_hand, diagnostics);
   EXPECT_TRUE(diagnostics.items().empty());
-  EXPECT_EQ(model.ports.size(), 16u);
+  EXPECT_EQ(model.ports.size(), static_cast<std::size_t>(ports));
 }
 
 TEST(Compile, ParityOfAllTheSourcesThatAPortMayHaveIsASmallDiagram) {

@@ -10,6 +10,7 @@
 #include "rules/prove/winners.hpp"
 #include "tests/rules/random_model.hpp"
 #include "tests/support/live_table.hpp"
+#include "tests/support/rounds.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::test {
@@ -107,7 +108,7 @@ TEST_P(EvaluatorsAgree, OnRandomModelsInEveryState) {
   const Vocabulary words;
   const bool is_proved = GetParam() == Precedence::kProved;
   int compared = 0;
-  for (unsigned seed = 0; seed < 60 && !HasFailure(); ++seed) {
+  for (unsigned seed = 0; seed < rounds(60u) && !HasFailure(); ++seed) {
     const RandomModel random = Generator(seed).model();
     const std::string xml =
         to_xml(random, is_proved ? std::set<std::string>()
@@ -124,7 +125,7 @@ TEST_P(EvaluatorsAgree, OnRandomModelsInEveryState) {
     Evaluators evaluators(set, model, naive);
     for (const auto& active : subsets(words.sources)) evaluators.check(active);
   }
-  EXPECT_GT(compared, is_proved ? 10 : 50);
+  EXPECT_GT(compared, rounds(is_proved ? 10 : 50));
 }
 
 std::string name_of_case(const testing::TestParamInfo<Precedence>& info) {

@@ -225,9 +225,9 @@ TEST_P(RandomModels, AreExplainedAsTheDefinitionOfARuleSays) {
 }
 
 TEST_P(RandomModels, DecideAsTheDefinitionOfARuleSays) {
-  for (unsigned seed = 0; seed < 300; ++seed) check(seed);
-  EXPECT_GT(decided_, 60);
-  EXPECT_EQ(refused_ > 60, !GetParam());
+  for (unsigned seed = 0; seed < rounds(300u); ++seed) check(seed);
+  EXPECT_GT(decided_, rounds(60));
+  EXPECT_EQ(refused_ > rounds(60), !GetParam());
 }
 
 INSTANTIATE_TEST_SUITE_P(, RandomModels, testing::Bool(), [](const auto& param_info) {
