@@ -8,7 +8,6 @@
 
 #include "tests/rules/ordered_rules.hpp"
 #include "tests/support/live_table.hpp"
-#include "tests/support/rounds.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -216,12 +215,11 @@ TEST(Compile, AWholePortOfPrioritiesIsProvedAndCompiled) {
 
 TEST(Compile, SixteenPortsOfTwoHundredAndFiftySixConnectionsAreWithinTheLimits) {
   RulesByHand by_hand;
-  const int ports = rounds(16);
-  for (int i = 0; i < ports; ++i) by_hand.port("/p" + std::to_string(i), priority_chain(256));
+  for (int i = 0; i < 16; ++i) by_hand.port("/p" + std::to_string(i), priority_chain(256));
   Diagnostics diagnostics;
   const auto model = compile(by_hand, diagnostics);
   EXPECT_TRUE(diagnostics.items().empty());
-  EXPECT_EQ(model.ports.size(), static_cast<std::size_t>(ports));
+  EXPECT_EQ(model.ports.size(), 16u);
 }
 
 TEST(Compile, ParityOfAllTheSourcesThatAPortMayHaveIsASmallDiagram) {

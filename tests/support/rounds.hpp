@@ -1,4 +1,4 @@
-// How often a test does the same with other random inputs, or to another port that is alike.
+// How often a test of random inputs is repeated.
 #pragma once
 
 namespace arbiter::test {
