@@ -56,6 +56,4 @@ inline Attacked run_attack(As who, const std::function<std::string()>& attack) {
   return result;
 }
 
-inline bool may_be_another_user() { return ::geteuid() == 0; }
-
 }  // namespace arbiter::test

@@ -8,6 +8,7 @@
 
 #include "tests/attack/attacker.hpp"
 #include "tests/attack/prey.hpp"
+#include "tests/support/other_user.hpp"
 #include "tests/support/threads.hpp"
 
 namespace {

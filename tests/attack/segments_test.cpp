@@ -16,6 +16,7 @@
 
 #include "tests/attack/attacker.hpp"
 #include "tests/attack/prey.hpp"
+#include "tests/support/other_user.hpp"
 
 namespace {
 

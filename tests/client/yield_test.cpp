@@ -19,6 +19,7 @@
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/other_user.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::test {
@@ -210,7 +211,7 @@ TEST(Yielding, APortOfAProcessThatIsStoppedOrKilledHoldsNobodyUp) {
 
 // The policy decides first: the one that yields does not even hear of it.
 TEST(Yielding, IsNotAskedOfAPortByWhoMayNotOpenItsName) {
-  if (::geteuid() != 0) GTEST_SKIP() << "only root can start processes of other users";
+  if (!may_be_another_user()) GTEST_SKIP() << "only root can start processes of other users";
   const TemporaryDirectory files;
   const std::string policy =
       files.write("policy", "deny user 65534 output /out\nallow everyone all\n");

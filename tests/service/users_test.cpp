@@ -23,7 +23,7 @@ constexpr const char* kOneArm =
 class Users : public testing::Test {
  protected:
   void SetUp() override {
-    if (::geteuid() != 0) GTEST_SKIP() << "only root can start processes of other users";
+    if (!may_be_another_user()) GTEST_SKIP() << "only root can start processes of other users";
   }
 
   // A daemon that processes of other users can reach.

@@ -27,6 +27,8 @@ struct User {
 inline const User kNobody{65534};
 inline const User kStranger{54321};
 
+inline bool may_be_another_user() { return ::geteuid() == 0; }
+
 inline bool become(const User& user) {
   return ::setgroups(user.supplementary.size(), user.supplementary.data()) == 0 &&
          ::setresgid(user.group, user.group, user.group) == 0 &&
