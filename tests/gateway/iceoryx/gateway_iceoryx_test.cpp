@@ -172,14 +172,14 @@ TEST_F(Iceoryx, AGatewayThatBeginsAnewOrEndsStopsTheRobotThatItDrove) {
   Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base", kZeros));
   Spoken publisher = plain_publisher("low");
   Spoken subscriber = plain_subscriber("base");
-  wait_for_description("/Low:o", "1 publisher matched");
+  wait_for_both_ends();
   publisher.say("drive");
   ASSERT_TRUE(subscriber.hear("|drive"));
   const pid_t worker = worker_of("/Low:o");
   gate.process.signal(SIGUSR1);
   EXPECT_TRUE(subscriber.hear("|zeros 4"));
   wait_for_another_worker("/Low:o", worker);
-  wait_for_description("/Low:o", "1 publisher matched");
+  wait_for_both_ends();
   publisher.say("drive");
   ASSERT_TRUE(subscriber.hear("|drive"));
   gate.process.signal(SIGTERM);
@@ -199,7 +199,7 @@ TEST_F(Iceoryx, ForAGatewayThatHasDiedTheIdleSampleIsSent) {
   Spoken gate = gateway(directory_, entries);
   Spoken publisher = plain_publisher("low");
   Spoken subscriber = plain_subscriber("base");
-  wait_for_description("/Low:o", "1 publisher matched");
+  wait_for_both_ends();
   publisher.say("drive");
   ASSERT_TRUE(subscriber.hear("|drive"));
   gate.process.signal(SIGKILL);
@@ -368,9 +368,13 @@ TEST_F(Iceoryx, WhatHasWaitedForLongerThanTNeverArrives) {
   Node node("base");
   auto base = node.input_port("/Base:i");
   std::vector<std::string> taken;
+  const auto say = [&](const std::string& text) {
+    publisher.say(text);
+    ASSERT_TRUE(publisher.hear("published"));
+  };
   const auto say_until_it_arrives = [&](const std::string& text) {
     while (taken.empty() || taken.back() != text) {
-      publisher.say(text);
+      say(text);
       while (auto sample = base.wait_for(std::chrono::milliseconds(100))) {
         taken.emplace_back(reinterpret_cast<const char*>(sample->data()), sample->size());
       }
@@ -380,7 +384,7 @@ TEST_F(Iceoryx, WhatHasWaitedForLongerThanTNeverArrives) {
   const pid_t worker = worker_of("/Low:o");
   stop(worker);
   const auto stopped = shm::monotonic_now();
-  publisher.say("then");
+  say("then");
   wait_until([&] { return shm::monotonic_now() - stopped > 800'000'000; });
   ::kill(worker, SIGCONT);
   say_until_it_arrives("after");

@@ -99,6 +99,13 @@ class Iceoryx : public testing::Test {
   void wait_for_description(const std::string& source, const std::string& text) {
     wait_until([&] { return described(source).find(text) != std::string::npos; });
   }
+  // Who is subscribed to a worker need not be to the next one yet when that knows its publishers.
+  void wait_for_both_ends() {
+    wait_for_description("/Low:o", "1 publisher matched");
+    wait_until([&] {
+      return described_input("/Base:i").find("1 subscriber matched") != std::string::npos;
+    });
+  }
   // From a new publisher to a new subscriber.
   void expect_that_samples_pass() {
     Spoken publisher = plain_publisher("low");
