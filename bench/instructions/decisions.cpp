@@ -7,6 +7,7 @@
 
 #include "bench/instructions/counting.hpp"
 #include "rules/prove/compile.hpp"
+#include "rules/prove/flatten.hpp"
 #include "shm/clock.hpp"
 #include "shm/decision.hpp"
 

@@ -11,6 +11,7 @@
 #include "bench/harness/worker.hpp"
 #include "bench/measures/measures.hpp"
 #include "rules/model/load.hpp"
+#include "rules/prove/flatten.hpp"
 
 namespace arbiter::bench {
 namespace {

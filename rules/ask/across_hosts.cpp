@@ -4,8 +4,9 @@
 #include <set>
 #include <utility>
 
+#include "rules/ask/instants.hpp"
 #include "rules/model/polarity.hpp"
-#include "rules/model/print_rules.hpp"
+#include "rules/text/duration.hpp"
 #include "rules/text/names.hpp"
 
 namespace arbiter::rules {
@@ -68,7 +69,7 @@ class AcrossHosts {
       note_crossing(source, use);
       const auto remote = remote_.find(source);
       if (remote == remote_.end()) continue;
-      const shm::Nanoseconds timeout = timeout_of(source);
+      const shm::Nanoseconds timeout = rules_.timeout_of(source);
       if (timeout == shm::kForever) refuse_forever(source, use, remote->second);
       warn_of_negation(source, use, remote->second, timeout);
     }
@@ -164,11 +165,6 @@ class AcrossHosts {
       diagnostics_.note("behaviour-on-two-hosts", behaviour.where, message,
                         {.ports = std::move(ports), .behaviour = behaviour.name});
     }
-  }
-
-  [[nodiscard]] shm::Nanoseconds timeout_of(const std::string& source) const {
-    const auto own = rules_.timeouts.find(source);
-    return own == rules_.timeouts.end() ? rules_.timeout : own->second;
   }
 
   const RuleSet& rules_;

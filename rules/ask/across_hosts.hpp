@@ -21,8 +21,4 @@ void find_across_hosts(const RuleSet& rules, const CompiledModel& model, const S
                        const HostPlaces& places, const std::vector<Verdict>& verdicts,
                        Diagnostics& diagnostics, Budget& budget);
 
-// Of these the notes "not-at-one-instant", and "left-open".
-void find_instants(const RuleSet& rules, const CompiledModel& model, const HostPlaces& places,
-                   Diagnostics& diagnostics, Budget& budget);
-
 }  // namespace arbiter::rules

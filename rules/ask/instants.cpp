@@ -1,5 +1,5 @@
-// Connections at ports of two hosts that never win together in one state of the sources. One daemon
-// decides both ports by one state; two hosts learn of each change at different times.
+#include "rules/ask/instants.hpp"
+
 #include <algorithm>
 #include <map>
 #include <set>
@@ -7,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "rules/ask/across_hosts.hpp"
 #include "rules/prove/winners.hpp"
 #include "rules/text/names.hpp"
 

@@ -15,15 +15,6 @@ namespace {
 
 using PortDiff = ModelDiff::PortDiff;
 
-bool is_same(const CompiledRule& a, const CompiledRule& b) {
-  const auto same_node = [](const CompiledRule::Node& x, const CompiledRule::Node& y) {
-    return x.position == y.position && x.low == y.low && x.high == y.high;
-  };
-  return a.source == b.source && a.kind == b.kind && a.reads == b.reads &&
-         a.expected == b.expected &&
-         std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(), same_node);
-}
-
 const CompiledRule* find_rule(const CompiledPort& port, const std::string& source) {
   const auto found = std::find_if(port.rules.begin(), port.rules.end(),
                                   [&](const auto& rule) { return rule.source == source; });
@@ -34,9 +25,9 @@ const CompiledRule* find_rule(const CompiledPort& port, const std::string& sourc
 // those before it have a part in that.
 bool wins_alike(const CompiledPort& a, const CompiledRule& of_a, const CompiledPort& b,
                 const CompiledRule& of_b) {
-  if (!a.in_order && !b.in_order) return is_same(of_a, of_b);
+  if (!a.in_order && !b.in_order) return of_a == of_b;
   return a.in_order && b.in_order &&
-         std::equal(a.rules.data(), &of_a + 1, b.rules.data(), &of_b + 1, is_same);
+         std::equal(a.rules.data(), &of_a + 1, b.rules.data(), &of_b + 1);
 }
 
 // The states of one port that both models arbitrate.
@@ -288,11 +279,6 @@ PortDiff port_diff(const std::string& port, const CompiledPort* before, const Co
   return result;
 }
 
-shm::Nanoseconds timeout_of(const CompiledModel& model, const std::string& source) {
-  const auto found = model.timeouts.find(source);
-  return found == model.timeouts.end() ? model.timeout : found->second;
-}
-
 // Of the sources whose activity some decision depends on.
 std::vector<ModelDiff::TimeoutChange> compare_timeouts(const CompiledModel& before,
                                                        const CompiledModel& after) {
@@ -307,7 +293,7 @@ std::vector<ModelDiff::TimeoutChange> compare_timeouts(const CompiledModel& befo
   std::vector<ModelDiff::TimeoutChange> changes;
   bool default_changed = false;
   for (const auto& source : deciding) {
-    const auto was = timeout_of(before, source), is = timeout_of(after, source);
+    const auto was = before.timeout_of(source), is = after.timeout_of(source);
     if (was == is) continue;
     if (before.timeouts.contains(source) || after.timeouts.contains(source)) {
       changes.push_back({source, was, is});

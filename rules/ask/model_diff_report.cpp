@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "rules/ask/model_diff.hpp"
-#include "rules/model/print_rules.hpp"
 #include "rules/prove/winners.hpp"
+#include "rules/text/duration.hpp"
 #include "rules/text/names.hpp"
 
 namespace arbiter::rules {
@@ -13,10 +13,6 @@ namespace {
 using PortDiff = ModelDiff::PortDiff;
 
 constexpr std::size_t kMaxChangesShown = 8;  // of a port, in the text; JSON has them all
-
-std::string counted(std::size_t count, const std::string& thing) {
-  return std::to_string(count) + ' ' + thing + (count == 1 ? "" : "s");
-}
 
 std::string winner_name(const std::optional<std::string>& winner) {
   return winner.value_or("nobody");

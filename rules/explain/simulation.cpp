@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "rules/prove/flatten.hpp"
 #include "rules/text/csv.hpp"
 
 namespace arbiter::rules {

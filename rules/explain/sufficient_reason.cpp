@@ -276,11 +276,6 @@ std::vector<Literal> large_reason(const Expression& expression,
 
 }  // namespace
 
-bool evaluate(const Expression& expression, const IsActive& is_active) {
-  Evaluation evaluation([&](const std::string& source) { return truth(is_active(source)); });
-  return evaluation.of(expression) == Truth::kTrue;
-}
-
 std::vector<Literal> sufficient_reason(const Expression& expression, const IsActive& is_active) {
   std::unordered_set<const Expression*> seen;
   std::set<std::string> sources;

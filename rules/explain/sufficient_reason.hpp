@@ -2,15 +2,13 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <string>
 #include <vector>
 
+#include "rules/model/evaluation.hpp"
 #include "rules/model/expression.hpp"
 
 namespace arbiter::rules {
-
-using IsActive = std::function<bool(const std::string& source)>;
 
 // That a source is active, or that it is not.
 struct Literal {
@@ -19,9 +17,6 @@ struct Literal {
 
   friend bool operator==(const Literal&, const Literal&) = default;
 };
-
-// Of an expression without quantifiers.
-bool evaluate(const Expression& expression, const IsActive& is_active);
 
 // How many sources an expression may have for its reason to be surely of the smallest size.
 inline constexpr std::size_t kMaxSourcesForSmallest = 10;

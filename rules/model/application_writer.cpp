@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rules/model/print_rules.hpp"
+#include "rules/text/duration.hpp"
 #include "rules/text/xml.hpp"
 #include "shm/utf8.hpp"
 

@@ -59,4 +59,9 @@ Truth Evaluation::join(const Expression& expression, Truth decisive) {
   return result;
 }
 
+bool evaluate(const Expression& expression, const IsActive& is_active) {
+  Evaluation evaluation([&](const std::string& source) { return truth(is_active(source)); });
+  return evaluation.of(expression) == Truth::kTrue;
+}
+
 }  // namespace arbiter::rules

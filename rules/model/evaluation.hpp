@@ -37,4 +37,9 @@ class Evaluation {
   std::unordered_map<const Expression*, Truth> known_;
 };
 
+using IsActive = std::function<bool(const std::string& source)>;
+
+// Of an expression without quantifiers, where all is known.
+bool evaluate(const Expression& expression, const IsActive& is_active);
+
 }  // namespace arbiter::rules

@@ -308,9 +308,8 @@ void note_commands_forever(const Model& model, const RuleSet& rules, const Locat
   std::map<std::string, std::vector<std::string>> ports_of;
   for (const PortRules& port : rules.ports) {
     for (const ConnectionRule& rule : port.rules) {
-      const auto own = rules.timeouts.find(rule.source);
-      const auto timeout = own == rules.timeouts.end() ? rules.timeout : own->second;
-      if (timeout == shm::kForever) ports_of[rule.source].push_back(port.port);
+      if (rules.timeout_of(rule.source) == shm::kForever)
+        ports_of[rule.source].push_back(port.port);
     }
   }
   if (ports_of.empty()) return;

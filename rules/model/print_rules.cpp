@@ -9,6 +9,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "rules/text/duration.hpp"
+
 namespace arbiter::rules {
 namespace {
 
@@ -168,16 +170,6 @@ std::string to_string(const ConnectionRule& rule) {
     if (said.insert(conjunct).second) text += " ∧ " + conjunct;
   }
   return text;
-}
-
-std::string to_string(shm::Nanoseconds timeout) {
-  if (timeout == shm::kForever) return "forever";
-  constexpr std::pair<shm::Nanoseconds, const char*> kWholeUnits[] = {
-      {1'000'000'000, "s"}, {1'000'000, "ms"}, {1000, "us"}};
-  for (const auto& [length, name] : kWholeUnits) {
-    if (timeout % length == 0) return std::to_string(timeout / length) + name;
-  }
-  return std::to_string(timeout) + "ns";
 }
 
 void write_rules(std::ostream& out, const RuleSet& rules) {

@@ -15,9 +15,6 @@ std::string to_string(const Expression& expression);
 // "/Face/pos:o ∧ ¬/Object/pos:o": the whole rule, the connection's own activity first.
 std::string to_string(const ConnectionRule& rule);
 
-// The largest unit that has no fraction: "500ms", "forever".
-std::string to_string(shm::Nanoseconds timeout);
-
 // By port:
 //   /Gaze/pos:i
 //     /Face/pos:o ∧ ¬/Object/pos:o ⇒ Select(/Face/pos:o)

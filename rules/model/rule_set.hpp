@@ -67,6 +67,11 @@ struct RuleSet {
   // What it was all made of; null where that was not kept, or the rules were not read from files.
   std::shared_ptr<const Provenance> provenance;
   std::shared_ptr<const ModelTexts> texts;
+
+  [[nodiscard]] shm::Nanoseconds timeout_of(const std::string& source) const {
+    const auto own = timeouts.find(source);
+    return own == timeouts.end() ? timeout : own->second;
+  }
 };
 
 }  // namespace arbiter::rules

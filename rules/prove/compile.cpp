@@ -8,6 +8,7 @@
 
 #include "rules/prove/compile_port.hpp"
 #include "rules/prove/contradiction.hpp"
+#include "rules/prove/flatten.hpp"
 #include "rules/text/names.hpp"
 
 namespace arbiter::rules {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "rules/prove/in_order.hpp"
+#include "rules/prove/rule_builder.hpp"
 #include "rules/prove/winners.hpp"
 #include "rules/text/names.hpp"
 

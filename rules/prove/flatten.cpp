@@ -1,4 +1,5 @@
-// Lays a compiled model out as the words of shm/decision_table.hpp.
+#include "rules/prove/flatten.hpp"
+
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -8,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "rules/prove/compile.hpp"
 #include "rules/prove/in_order.hpp"
 
 namespace arbiter::rules {
@@ -226,9 +226,7 @@ void Flattener::write_sources() {
   for (const auto& source : model_.sources) {
     const Word record = sources_ + source_id(source) * table::kSourceWords;
     words_[record + table::kSourceKnown] = 1;
-    const auto own = model_.timeouts.find(source);
-    write_span(record + table::kTimeoutLow,
-               own != model_.timeouts.end() ? own->second : model_.timeout);
+    write_span(record + table::kTimeoutLow, model_.timeout_of(source));
     const auto& links = links_[source];
     begin_list(record + table::kFirstLink, links.size());
     for (const shm::ConnectionIndex link : links) append(link);

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "rules/prove/compile.hpp"
+#include "rules/prove/compiled_model.hpp"
 
 namespace arbiter::rules {
 

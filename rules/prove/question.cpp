@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "rules/prove/compile_port.hpp"
+#include "rules/prove/rule_builder.hpp"
 
 namespace arbiter::rules {
 

@@ -1,9 +1,9 @@
+#include "rules/prove/rule_builder.hpp"
+
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
 #include <unordered_set>
-
-#include "rules/prove/compile_port.hpp"
 
 namespace arbiter::rules {
 namespace {

@@ -13,7 +13,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "rules/prove/compile.hpp"
+#include "rules/prove/compiled_model.hpp"
 #include "rules/text/diagnostic.hpp"
 
 namespace arbiter::rules {

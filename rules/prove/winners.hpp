@@ -14,7 +14,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "rules/prove/compile.hpp"
+#include "rules/prove/compiled_model.hpp"
 #include "rules/prove/diagram.hpp"
 
 namespace arbiter::rules {

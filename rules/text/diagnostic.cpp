@@ -8,6 +8,10 @@
 
 namespace arbiter::rules {
 
+std::string describe(const Location& where) {
+  return where.file + ':' + std::to_string(where.line) + ':' + std::to_string(where.column);
+}
+
 std::string in_words(const Witness& witness) {
   if (witness.active.empty() && witness.inactive.empty()) return "nothing active";
   std::string text;

@@ -21,6 +21,9 @@ struct Location {
   friend bool operator==(const Location&, const Location&) = default;
 };
 
+// file:line:column, to point at a second place from within a message.
+std::string describe(const Location& where);
+
 enum class Severity { kError, kWarning, kNote };
 
 // An activation of sources that shows a finding: these are active, these are not, the others do not

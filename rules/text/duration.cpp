@@ -87,4 +87,11 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
   return {value * known->second, {}};
 }
 
+std::string to_string(shm::Nanoseconds timeout) {
+  if (timeout == shm::kForever) return "forever";
+  const auto unit = std::find_if(kUnits.rbegin(), kUnits.rend(),
+                                 [&](const auto& each) { return timeout % each.second == 0; });
+  return std::to_string(timeout / unit->second) + std::string(unit->first);
+}
+
 }  // namespace arbiter::rules

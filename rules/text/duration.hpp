@@ -25,4 +25,7 @@ struct DurationWords {
 // A whole number from 1 on with a unit right behind it, or shm::kForever.
 ParsedDuration parse_duration(std::string_view text, const DurationWords& words = {});
 
+// In the largest unit that has no fraction.
+std::string to_string(shm::Nanoseconds timeout);
+
 }  // namespace arbiter::rules

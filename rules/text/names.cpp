@@ -22,20 +22,25 @@ std::optional<NameProblem> find_length_problem(std::string_view name) {
                      0};
 }
 
-// How many single characters must be put in, taken out or replaced.
+// How many single characters must be put in, taken out or replaced; two neighbours in the wrong
+// order are one slip.
 std::size_t count_edits(std::string_view a, std::string_view b) {
-  std::array<std::size_t, kMaxComparedLength + 1> row;
-  std::iota(row.begin(), row.end(), std::size_t{0});
+  std::array<std::array<std::size_t, kMaxComparedLength + 1>, 3> rows;  // by lengths of a, modulo 3
+  std::iota(rows[0].begin(), rows[0].end(), std::size_t{0});
   for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
+    const auto& shorter_by_two = rows[(i + 2) % 3];
+    const auto& shorter = rows[i % 3];
+    auto& row = rows[(i + 1) % 3];
     row[0] = i + 1;
     for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
+      const std::size_t replaced = shorter[j] + (a[i] == b[j] ? 0 : 1);
+      row[j + 1] = std::min({replaced, row[j] + 1, shorter[j + 1] + 1});
+      if (i > 0 && j > 0 && a[i] == b[j - 1] && a[i - 1] == b[j]) {
+        row[j + 1] = std::min(row[j + 1], shorter_by_two[j - 1] + 1);
+      }
     }
   }
-  return row[b.size()];
+  return rows[a.size() % 3][b.size()];
 }
 
 }  // namespace
@@ -64,9 +69,7 @@ std::string collapse_blanks(std::string_view text) {
 std::string quote(std::string_view name) {
   constexpr std::size_t kMaxQuoted = 80;
   if (name.size() <= kMaxQuoted) return '"' + std::string(name) + '"';
-  std::size_t end = kMaxQuoted;
-  while (end > 0 && (static_cast<unsigned char>(name[end]) >> 6) == 0b10) --end;
-  return '"' + std::string(name.substr(0, end)) + "…\"";
+  return '"' + std::string(shm::beginning_of(name, kMaxQuoted)) + "…\"";
 }
 
 std::string enumerate(const std::vector<std::string>& names) {
@@ -85,8 +88,8 @@ std::string comma_list(const std::vector<std::string>& names) {
   return text;
 }
 
-std::string describe(const Location& where) {
-  return where.file + ':' + std::to_string(where.line) + ':' + std::to_string(where.column);
+std::string counted(std::uint64_t count, std::string_view thing) {
+  return std::to_string(count) + ' ' + std::string(thing) + (count == 1 ? "" : "s");
 }
 
 std::optional<NameProblem> find_problem_in_port(std::string_view name) {

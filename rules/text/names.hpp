@@ -2,12 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
-
-#include "rules/text/diagnostic.hpp"
 
 namespace arbiter::rules {
 
@@ -28,8 +27,8 @@ std::string enumerate(const std::vector<std::string>& names);
 // "/a, /b, /c".
 std::string comma_list(const std::vector<std::string>& names);
 
-// file:line:column, to point at a second place from within a message.
-std::string describe(const Location& where);
+// "1 port", "2 ports".
+std::string counted(std::uint64_t count, std::string_view thing);
 
 // What is wrong with a name, and at which byte of it.
 struct NameProblem {

@@ -7,6 +7,7 @@
 #include "rules/model/load.hpp"
 #include "rules/model/print_rules.hpp"
 #include "rules/prove/compile.hpp"
+#include "rules/prove/flatten.hpp"
 #include "rules/text/xml.hpp"
 #include "tests/fuzz/file_in_memory.hpp"
 #include "tests/fuzz/fuzz.hpp"

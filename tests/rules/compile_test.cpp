@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <random>
 
+#include "rules/prove/flatten.hpp"
 #include "tests/rules/ordered_rules.hpp"
 #include "tests/support/live_table.hpp"
 

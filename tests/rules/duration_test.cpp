@@ -30,6 +30,14 @@ TEST(Duration, IsAWholeNumberWithAUnit) {
   }
 }
 
+TEST(Duration, IsWrittenInTheLargestUnitWithoutAFraction) {
+  EXPECT_EQ(to_string(shm::Nanoseconds{500'000'000}), "500ms");
+  EXPECT_EQ(to_string(shm::Nanoseconds{2'000'000'000}), "2s");
+  EXPECT_EQ(to_string(shm::Nanoseconds{1'500}), "1500ns");
+  EXPECT_EQ(to_string(shm::Nanoseconds{7'000}), "7us");
+  EXPECT_EQ(to_string(shm::kForever), "forever");
+}
+
 TEST(Duration, IsRefusedWithAReason) {
   const std::vector<std::pair<std::string, std::string>> cases{
       {"", "not a whole number"},

@@ -1,4 +1,6 @@
 // What flatten() writes, read back through the view that the live code reads it with.
+#include "rules/prove/flatten.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -10,6 +10,7 @@
 
 #include "rules/explain/explain.hpp"
 #include "rules/explain/simulation.hpp"
+#include "rules/prove/flatten.hpp"
 #include "rules/prove/table_rules.hpp"
 #include "tests/rules/ordered_rules.hpp"
 #include "tests/support/live_table.hpp"

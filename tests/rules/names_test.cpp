@@ -76,6 +76,9 @@ TEST(Names, AMisspeltOneIsRecognised) {
   EXPECT_EQ(find_similar("", known), std::nullopt);
   EXPECT_EQ(find_similar("B", {"A"}), std::nullopt) << "one letter is like any other";
   EXPECT_EQ(find_similar("abcd", {"abxy", "abcx"}), "abcx") << "the nearest one";
+  EXPECT_EQ(find_similar("wyh", {"who", "why"}), "why") << "two in the wrong order are one slip";
+  EXPECT_EQ(find_similar("oLko Around", known), "Look Around");
+  EXPECT_EQ(find_similar("hyw", {"why"}), std::nullopt);
   EXPECT_EQ(advise("RestArm", known, "define it"), "; did you mean \"Rest Arm\"?");
   EXPECT_EQ(advise("Fly", known, "define it"), "; define it");
 }

@@ -80,14 +80,6 @@ TEST(PrintRules, MarksWhatIsNotAnOrdinaryRule) {
             "  /x\n");
 }
 
-TEST(PrintRules, WritesTimeoutsInTheLargestUnitWithoutAFraction) {
-  EXPECT_EQ(rules::to_string(shm::Nanoseconds{500'000'000}), "500ms");
-  EXPECT_EQ(rules::to_string(shm::Nanoseconds{2'000'000'000}), "2s");
-  EXPECT_EQ(rules::to_string(shm::Nanoseconds{1'500}), "1500ns");
-  EXPECT_EQ(rules::to_string(shm::Nanoseconds{7'000}), "7us");
-  EXPECT_EQ(rules::to_string(shm::kForever), "forever");
-}
-
 TEST(PrintRules, WritesJson) {
   std::ostringstream out;
   rules::write_rules_json(out, RulesByHand()

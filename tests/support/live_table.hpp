@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "rules/prove/compile.hpp"
+#include "rules/prove/flatten.hpp"
 #include "shm/picture.hpp"
 
 namespace arbiter::test {
