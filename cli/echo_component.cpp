@@ -10,7 +10,7 @@
 #include "cli/echo.hpp"
 #include "cli/echo_hosts.hpp"
 #include "cli/live.hpp"
-#include "cli/numbers.hpp"
+#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {
@@ -77,7 +77,8 @@ class Echo {
   int finish() {
     if (!std::cout) return 0;  // nobody reads it
     std::ostream& out = options_.json ? std::cerr : std::cout;
-    out << counted(samples_, "sample") << " in " << seconds_text(shm::monotonic_now() - started_);
+    out << rules::counted(samples_, "sample") << " in "
+        << seconds_text(shm::monotonic_now() - started_);
     for (const auto& [source, count] : by_source_) out << ", " << count << " from " << source;
     out << '\n';
     if (const auto lost = overtaken(); lost != 0) {

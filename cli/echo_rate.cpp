@@ -10,7 +10,7 @@
 #include "cli/broken_pipe.hpp"
 #include "cli/echo.hpp"
 #include "cli/live.hpp"
-#include "cli/numbers.hpp"
+#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {
@@ -103,7 +103,7 @@ class RateEcho {
       if (is_interrupted || now >= end || ++lines_ == options_.count) break;
     }
     if (tap_.lost() != 0) {
-      std::cerr << "arbiter: " << counted(tap_.lost(), "event")
+      std::cerr << "arbiter: " << rules::counted(tap_.lost(), "event")
                 << " came faster than they could be counted\n";
     }
     return 0;

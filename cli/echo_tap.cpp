@@ -12,7 +12,6 @@
 #include "cli/echo.hpp"
 #include "cli/echo_hosts.hpp"
 #include "cli/live.hpp"
-#include "cli/numbers.hpp"
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "shm/limits.hpp"
@@ -183,7 +182,7 @@ class TapEcho {
   int finish() {
     if (!std::cout) return 0;  // nobody reads it
     std::ostream& out = options_.json ? std::cerr : std::cout;
-    out << counted(printed_, is_input_ && !options_.losers ? "sample" : "event") << " in "
+    out << rules::counted(printed_, is_input_ && !options_.losers ? "sample" : "event") << " in "
         << seconds_text(shm::monotonic_now() - started_);
     for (const auto& [source, count] : by_source_) out << ", " << count << " from " << source;
     out << '\n';

@@ -13,11 +13,11 @@
 
 #include "cli/condition.hpp"
 #include "cli/live.hpp"
-#include "cli/numbers.hpp"
 #include "recorder/dump_socket.hpp"
 #include "recorder/recorder.hpp"
 #include "recorder/ring.hpp"
 #include "recorder/statement_watch.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -60,7 +60,7 @@ class Flight {
     const std::string span = options_.span == shm::kForever ? "records that fit into the memory"
                                                             : seconds_text(options_.span);
     std::cerr << "arbiter: keeping the last " + span + " of " +
-                     counted(recorder_.taps(), "source") + '\n';
+                     rules::counted(recorder_.taps(), "source") + '\n';
     recorder_.run(options_.end, events_.get(), [this] { return take_up_events(); });
     statement_.reset();
     recorder_.finish();

@@ -36,16 +36,9 @@ bool knows_verb(const CLI::App& app, const std::string& word) {
     names.push_back(verb->get_name());
   }
   if (std::find(names.begin(), names.end(), word) != names.end()) return true;
-  // Of a short word an edit is much; letters in the wrong order are one slip all the same.
-  std::string meant = word;
-  for (std::size_t i = 0; i + 1 < word.size(); ++i) {
-    std::string swapped = word;
-    std::swap(swapped[i], swapped[i + 1]);
-    if (std::find(names.begin(), names.end(), swapped) != names.end()) meant = swapped;
-  }
   const std::vector<std::string_view> known(names.begin(), names.end());
   say("there is no verb " + arbiter::rules::quote(word) +
-      arbiter::rules::advise(meant, known, "`arbiter --help` lists them"));
+      arbiter::rules::advise(word, known, "`arbiter --help` lists them"));
   return false;
 }
 

@@ -64,9 +64,4 @@ inline shm::Nanoseconds read_time(const std::string& option, const std::string& 
   return 0;
 }
 
-// "1 port", "2 ports".
-inline std::string counted(std::uint64_t count, const std::string& thing) {
-  return std::to_string(count) + ' ' + thing + (count == 1 ? "" : "s");
-}
-
 }  // namespace arbiter::cli

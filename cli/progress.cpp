@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "shm/utf8.hpp"
+
 namespace arbiter::cli {
 namespace {
 
@@ -15,12 +17,10 @@ constexpr milliseconds kFirstOnTerminal{300}, kFirstInLog{2000};
 constexpr milliseconds kEveryOnTerminal{100}, kEveryInLog{10'000};
 constexpr std::size_t kMaxBytesOfName = 48;
 
-// Of a statement, as much as a line has room for; no character is cut in two.
+// Of a statement, as much as a line has room for.
 std::string shortened(const std::string& name) {
   if (name.size() <= kMaxBytesOfName) return name;
-  std::size_t end = kMaxBytesOfName;
-  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80) --end;
-  return name.substr(0, end) + "…";
+  return std::string(shm::beginning_of(name, kMaxBytesOfName)) + "…";
 }
 
 }  // namespace

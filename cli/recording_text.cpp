@@ -89,9 +89,7 @@ void write_wrapped(std::ostream& out, const std::string& heading, const std::str
 std::string shortened(std::string_view value, std::size_t columns) {
   std::string text = shm::printable(value.substr(0, 4 * columns));
   if (text.size() <= columns && value.size() <= 4 * columns) return text;
-  std::size_t end = std::min(text.size(), columns - 3);
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
-  return text.substr(0, end) + "...";
+  return std::string(shm::beginning_of(text, columns - 3)) + "...";
 }
 
 void write_state(std::ostream& out, const RecordingInfo& info) {

@@ -15,7 +15,6 @@
 
 #include "cli/live.hpp"
 #include "cli/model_files.hpp"
-#include "cli/numbers.hpp"
 #include "cli/progress.hpp"
 #include "cli/recording_compile.hpp"
 #include "cli/recording_times.hpp"
@@ -62,8 +61,8 @@ void write_head(const Recorded& recorded) {
   const shm::Nanoseconds start = recorded.runs.front().start;
   std::cout << "recording of instance \"" << shm::printable(recorded.about.instance) << "\", from "
             << wall_text(recorded, start) << ", " << seconds_text(recorded.runs.back().end - start)
-            << ": " << counted(sources, "source") << ", "
-            << counted(arrivals_of(recorded), "arrival") << '\n';
+            << ": " << rules::counted(sources, "source") << ", "
+            << rules::counted(arrivals_of(recorded), "arrival") << '\n';
   const std::string missed = evidence::missed_text(recorded);
   if (!missed.empty()) std::cout << "the recorder missed " << missed << '\n';
 }
@@ -111,7 +110,7 @@ int write_verification(const Recorded& recorded, const evidence::Verification& r
   }
   write_head(recorded);
   std::ostringstream out;
-  out << counted(result.all(), "decision") << ": " << result.equal << " equal, "
+  out << rules::counted(result.all(), "decision") << ": " << result.equal << " equal, "
       << result.overlapped << " overlapped, " << result.blind << " blind, " << result.behind_gap
       << " behind a gap";
   if (result.without_model != 0) out << ", " << result.without_model << " of unknown models";
@@ -199,7 +198,7 @@ void write_changed(const Recorded& recorded, const evidence::Comparison& result,
     } else {
       std::cout << " to " << time(series.last) << "  "
                 << shm::printable(live.decision->context->source) << ", "
-                << counted(series.count, "arrival") << " (" << arrival_text(live) << " to "
+                << rules::counted(series.count, "arrival") << " (" << arrival_text(live) << " to "
                 << arrival_text(series.last->live) << ") at " << shm::printable(*live.port) << ": ";
     }
     std::cout << outcome(!live.won) << " instead of " << outcome(live.won)
@@ -225,7 +224,7 @@ int write_comparison(const Recorded& recorded, const evidence::Comparison& resul
     return is_same ? 0 : 1;
   }
   write_head(recorded);
-  std::cout << counted(result.decisions, "decision") << ": " << result.same << " the same, "
+  std::cout << rules::counted(result.decisions, "decision") << ": " << result.same << " the same, "
             << result.changed.size() << " changed, " << result.uncertain << " uncertain\n";
   if (result.decisions == 0) std::cout << nothing_to_compare(recorded);
   write_intervals(recorded, result);

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cli/live.hpp"
-#include "cli/numbers.hpp"
+#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "shm/utf8.hpp"
 #include "watch/process.hpp"
@@ -67,7 +67,7 @@ void print_model(std::ostream& out, const wire::Status& status) {
   if (model.application) out << ", application " << *model.application;
   out << '\n';
   if (model.reloads_refused != 0) {
-    out << "  " << counted(model.reloads_refused, "reload")
+    out << "  " << rules::counted(model.reloads_refused, "reload")
         << " refused: the daemon's log says why\n";
   }
 }

@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/numbers.hpp"
 #include "cli/switch_everywhere.hpp"
+#include "rules/text/names.hpp"
 #include "watch/span.hpp"
 #include "wire/document.hpp"
 
@@ -52,10 +52,11 @@ void write_text(const SwitchEverywhere& result, const std::string& model) {
     std::cerr << "arbiter: no host has switched to \"" + model + "\": " + why + "\n";
     return;
   }
-  std::cout << counted(switched, "host") << " switched to \"" << model << "\" one by one, within "
-            << watch::span_text(result.interval) << " of the first commit\n";
+  std::cout << rules::counted(switched, "host") << " switched to \"" << model
+            << "\" one by one, within " << watch::span_text(result.interval)
+            << " of the first commit\n";
   if (result.is_whole()) return;
-  std::cerr << "arbiter: " << counted(result.count(SwitchOutcome::kNotSwitched), "host")
+  std::cerr << "arbiter: " << rules::counted(result.count(SwitchOutcome::kNotSwitched), "host")
             << " not switched, " << result.count(SwitchOutcome::kUnknown)
             << " unknown; arbiter hosts shows which model is in force on each, as soon as it is "
                "heard again: then run arbiter switch \""

@@ -11,7 +11,6 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/model_files.hpp"
-#include "cli/numbers.hpp"
 #include "cli/progress.hpp"
 #include "cli/verbs.hpp"
 #include "gateway/mapping/check_mapping.hpp"
@@ -100,8 +99,9 @@ std::string problem_of_code(std::string& code) {
 std::string summary_of(const rules::CompiledModel& model) {
   std::size_t connections = 0;
   for (const auto& port : model.ports) connections += port.rules.size();
-  return counted(model.ports.size(), "port") + ", " + counted(connections, "connection") + ", " +
-         counted(model.sources.size(), "source");
+  return rules::counted(model.ports.size(), "port") + ", " +
+         rules::counted(connections, "connection") + ", " +
+         rules::counted(model.sources.size(), "source");
 }
 
 // Whoever gives a statement in place of a file is told so.
@@ -204,15 +204,16 @@ std::string check_hosts(const CheckOptions& options, const Model* model,
                            diagnostics, budget);
   std::string summary;
   for (const auto& [host, count] : places.counts()) {
-    summary += (summary.empty() ? "" : ", ") + host + " " + counted(count.ports, "input port") +
-               " and " + counted(count.sources, "source");
+    summary += (summary.empty() ? "" : ", ") + host + " " +
+               rules::counted(count.ports, "input port") + " and " +
+               rules::counted(count.sources, "source");
   }
   return summary;
 }
 
 void write_summary(std::ostream& out, const Statements& statements) {
   const std::size_t judged = statements.proved + statements.refuted + statements.open;
-  out << counted(judged + statements.not_judged, "statement") << ": " << statements.proved
+  out << rules::counted(judged + statements.not_judged, "statement") << ": " << statements.proved
       << " proved, " << statements.refuted << " refuted, " << statements.open << " left open";
   if (statements.not_judged > 0) out << ", " << statements.not_judged << " could not be read";
   out << '\n';

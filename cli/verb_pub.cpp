@@ -16,6 +16,7 @@
 #include "cli/pub_takers.hpp"
 #include "cli/pub_type.hpp"
 #include "cli/verbs.hpp"
+#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "shm/utf8.hpp"
 
@@ -123,9 +124,9 @@ int publish(const PubOptions& options, OutputPort<void>& out, const std::vector<
     }
     next += period;
   }
-  std::cout << "published " << counted(published, "sample") << " of "
-            << counted(payload.size(), "byte") << ": delivered " << delivered << ", discarded "
-            << discarded << ", refused " << refused << '\n';
+  std::cout << "published " << rules::counted(published, "sample") << " of "
+            << rules::counted(payload.size(), "byte") << ": delivered " << delivered
+            << ", discarded " << discarded << ", refused " << refused << '\n';
   return 0;
 }
 

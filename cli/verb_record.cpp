@@ -112,12 +112,13 @@ recorder::RecorderOptions recorder_options(const RecordOptions& options) {
 void write_summary(const recorder::Recorded& recorded, const std::string& file,
                    std::uint64_t bytes) {
   std::ostringstream out;
-  out << counted(recorded.arrivals, "arrival") << " of " << counted(recorded.sources, "source")
-      << " and " << counted(recorded.winner_changes, "change") << " of winner in "
+  out << rules::counted(recorded.arrivals, "arrival") << " of "
+      << rules::counted(recorded.sources, "source") << " and "
+      << rules::counted(recorded.winner_changes, "change") << " of winner in "
       << seconds_text(recorded.time) << ": " << file << ", " << size_text(bytes) << '\n';
   if (recorded.lost_events != 0 || recorded.lost_samples != 0) {
-    out << "missed " << counted(recorded.lost_events, "event") << ", and the payloads of "
-        << counted(recorded.lost_samples, "sample") << "; the file says where\n";
+    out << "missed " << rules::counted(recorded.lost_events, "event") << ", and the payloads of "
+        << rules::counted(recorded.lost_samples, "sample") << "; the file says where\n";
   }
   std::cout << out.str();
 }
@@ -139,7 +140,7 @@ int record_into_file(const RecordOptions& options, const recorder::RecorderOptio
                           info_of(settings.caller.instance));
   try {
     recorder::Recorder recorder(settings, sink);
-    std::cerr << "arbiter: recording " + counted(recorder.taps(), "source") + " into " +
+    std::cerr << "arbiter: recording " + rules::counted(recorder.taps(), "source") + " into " +
                      options.out + '\n';
     recorder.run(end, interrupts.get(), [] { return false; });
     const auto recorded = recorder.finish();

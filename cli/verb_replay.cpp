@@ -11,6 +11,7 @@
 #include "cli/progress.hpp"
 #include "cli/verbs.hpp"
 #include "recorder/replayer.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -41,11 +42,13 @@ int replay(const ReplayVerb& verb) {
   recorder::Replayer replayer(options);
   line.clear();
   const auto replayed = replayer.run(interrupts);
-  std::cout << counted(replayed.samples, "sample") << ", " << counted(replayed.signals, "signal")
-            << " and " << counted(replayed.deactivations, "deactivation") << " of "
-            << counted(replayed.sources, "source") << " in " << seconds_text(replayed.time) << '\n';
+  std::cout << rules::counted(replayed.samples, "sample") << ", "
+            << rules::counted(replayed.signals, "signal") << " and "
+            << rules::counted(replayed.deactivations, "deactivation") << " of "
+            << rules::counted(replayed.sources, "source") << " in " << seconds_text(replayed.time)
+            << '\n';
   if (replayed.without_payload != 0) {
-    std::cout << counted(replayed.without_payload, "sample")
+    std::cout << rules::counted(replayed.without_payload, "sample")
               << " whose payload is not in the recording became signals\n";
   }
   return replayed.was_interrupted ? interrupted_exit_code(interrupts) : 0;

@@ -5,7 +5,7 @@
 #include <optional>
 #include <set>
 
-#include "rules/model/print_rules.hpp"
+#include "rules/text/duration.hpp"
 #include "rules/text/names.hpp"
 
 namespace arbiter::cli {

@@ -5,7 +5,6 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "cli/numbers.hpp"
 #include "rules/explain/change.hpp"
 #include "rules/explain/tenure.hpp"
 #include "rules/text/names.hpp"
@@ -119,8 +118,8 @@ void WhySimulated::lose(const std::string& source, std::uint64_t events, shm::Na
                      {"until_ns", to}});
     return;
   }
-  out << text_of(from) << "  the recorder missed " << counted(events, "event") << " of " << source
-      << " from here until " << text_of(to) << ": what depends on it is not known\n";
+  out << text_of(from) << "  the recorder missed " << rules::counted(events, "event") << " of "
+      << source << " from here until " << text_of(to) << ": what depends on it is not known\n";
 }
 
 // An end that a renewal has put off is looked at in vain.

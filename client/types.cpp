@@ -29,9 +29,8 @@ std::string fitting(std::string name) {
   for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
   char tail[20];
   const int length = std::snprintf(tail, sizeof tail, "...%016llx", 0ULL + hash);
-  std::size_t kept = shm::kMaxTypeName - static_cast<std::size_t>(length);
-  while (kept != 0 && (static_cast<unsigned char>(name[kept]) & 0xc0) == 0x80) --kept;
-  return name.substr(0, kept) + tail;
+  const std::size_t room = shm::kMaxTypeName - static_cast<std::size_t>(length);
+  return std::string(shm::beginning_of(name, room)) + tail;
 }
 
 }  // namespace

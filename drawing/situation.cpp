@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "rules/explain/sufficient_reason.hpp"
+#include "rules/model/evaluation.hpp"
 
 namespace arbiter::drawing {
 

@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include "rules/text/names.hpp"
+
 namespace arbiter::evidence {
 namespace {
 
@@ -114,16 +116,13 @@ class Loader {
   std::vector<Run> runs_;
 };
 
-std::string counted(std::uint64_t count, const std::string& thing) {
-  return std::to_string(count) + ' ' + thing + (count == 1 ? "" : "s");
-}
-
 }  // namespace
 
 std::string missed_text(std::uint64_t events, std::uint64_t samples) {
-  std::string text = events == 0 ? "" : counted(events, "event");
+  std::string text = events == 0 ? "" : rules::counted(events, "event");
   if (samples == 0) return text;
-  return text + (text.empty() ? "" : " and ") + "the payloads of " + counted(samples, "sample");
+  return text + (text.empty() ? "" : " and ") + "the payloads of " +
+         rules::counted(samples, "sample");
 }
 
 std::string missed_text(const Recorded& recorded) {

@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "importing/import.hpp"
-#include "rules/model/print_rules.hpp"
+#include "rules/text/duration.hpp"
 #include "rules/text/names.hpp"
 #include "rules/text/xml.hpp"
 #include "shm/utf8.hpp"

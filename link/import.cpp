@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "link/say_sparingly.hpp"
+#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::link {
@@ -20,12 +21,6 @@ Type type_of(const shm::TypeInfo& info) {
   if (!info.is_typed()) return Type::untyped(static_cast<std::size_t>(info.size));
   return {info.type_name(), static_cast<std::size_t>(info.size),
           static_cast<std::size_t>(info.alignment)};
-}
-
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 }  // namespace
@@ -167,7 +162,7 @@ void Import::say_shared_name() {
 
 void Import::say_who_speaks() {
   const std::vector<std::string> hosts = offers_.hosts();
-  const std::string text = hosts.size() < 2 ? "" : joined(hosts);
+  const std::string text = hosts.size() < 2 ? "" : rules::comma_list(hosts);
   if (text == hosts_said_) return;
   const bool is_said =
       text.empty() ||
@@ -225,7 +220,7 @@ std::string Import::text() const {
   const Offer* const speaker = offers_.speaker();
   std::string text = "host " + (speaker == nullptr ? std::string("unknown") : speaker->card.host);
   const std::vector<std::string> hosts = offers_.hosts();
-  if (hosts.size() > 1) text += ", open on several hosts: " + joined(hosts);
+  if (hosts.size() > 1) text += ", open on several hosts: " + rules::comma_list(hosts);
   if (const std::string& name = offers_.shared_name(); !name.empty()) {
     text += ", several machines are called " + name;
   }

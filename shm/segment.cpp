@@ -90,6 +90,13 @@ SegmentIdentity identity_of(const FileDescriptor& segment) {
   return {file.st_dev, file.st_ino};
 }
 
+bool are_one_segment(const FileDescriptor& one, const FileDescriptor& other) noexcept {
+  struct stat a {};
+  struct stat b {};
+  return fstat(one.get(), &a) == 0 && fstat(other.get(), &b) == 0 && a.st_ino == b.st_ino &&
+         a.st_dev == b.st_dev;
+}
+
 std::size_t allocated_size(const FileDescriptor& segment) noexcept {
   struct stat status {};
   if (fstat(segment.get(), &status) != 0) return 0;

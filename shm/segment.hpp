@@ -57,6 +57,8 @@ struct SegmentIdentity {
   friend bool operator==(const SegmentIdentity&, const SegmentIdentity&) = default;
 };
 SegmentIdentity identity_of(const FileDescriptor& segment);
+// Whether both descriptors are of the same memory.
+[[nodiscard]] bool are_one_segment(const FileDescriptor& one, const FileDescriptor& other) noexcept;
 
 // How much of a foreign segment is allocated, once checked_size() has passed. It never falls where
 // a segment is sealed to its size and its one writer: it can be truncated no more, nor holes be

@@ -37,6 +37,12 @@ std::string encode_utf8(std::uint32_t code) {
   return {static_cast<char>(0xf0 | code >> 18), tail(12), tail(6), tail(0)};
 }
 
+std::string_view beginning_of(std::string_view text, std::size_t most) noexcept {
+  if (text.size() <= most) return text;
+  while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xc0) == 0x80) --most;
+  return text.substr(0, most);
+}
+
 std::optional<NameFault> find_fault_in_name(std::string_view name) {
   for (std::size_t i = 0; i < name.size();) {
     const Utf8Character character = decode_utf8(name.substr(i));

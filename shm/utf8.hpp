@@ -20,6 +20,9 @@ Utf8Character decode_utf8(std::string_view bytes);
 
 std::string encode_utf8(std::uint32_t code);
 
+// As much of `text` as fits into so many bytes without cutting a character in two.
+std::string_view beginning_of(std::string_view text, std::size_t most) noexcept;
+
 // What XML counts as white space.
 constexpr bool is_blank(char byte) {
   return byte == ' ' || byte == '\t' || byte == '\n' || byte == '\r';

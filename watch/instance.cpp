@@ -2,7 +2,6 @@
 
 #include <poll.h>
 #include <sys/epoll.h>
-#include <sys/stat.h>
 #include <sys/timerfd.h>
 #include <unistd.h>
 
@@ -13,6 +12,7 @@
 
 #include "shm/clock.hpp"
 #include "shm/descendants.hpp"
+#include "shm/segment.hpp"
 #include "wire/document.hpp"
 #include "wire/meeting.hpp"
 #include "wire/rendezvous.hpp"
@@ -27,13 +27,6 @@ constexpr milliseconds kLookInterval{50};
 constexpr milliseconds kTurnedAwayInterval{1000};
 // Of those that update() takes up in one go, so that its caller comes to its own work.
 constexpr int kMostMessages = 4096;
-
-bool are_same(const shm::FileDescriptor& one, const shm::FileDescriptor& other) {
-  struct stat a {};
-  struct stat b {};
-  return fstat(one.get(), &a) == 0 && fstat(other.get(), &b) == 0 && a.st_ino == b.st_ino &&
-         a.st_dev == b.st_dev;
-}
 
 wire::Message message_of(wire::MessageKind kind) {
   wire::Message message;
@@ -65,7 +58,7 @@ Instance::Instance(wire::Caller caller) : caller_(std::move(caller)) {
 
 // Nothing is handed on to a daemon's successor: components do that.
 void Instance::take_up_memory(wire::Received& welcome) {
-  if (memory_ != nullptr && are_same(welcome.descriptors[0], memory_->board())) return;
+  if (memory_ != nullptr && shm::are_one_segment(welcome.descriptors[0], memory_->board())) return;
   memory_ = std::make_shared<shm::DecisionMemory>(std::move(welcome.descriptors[0]),
                                                   shm::Residence::kMapped, 0);
   shared_ = memory_;

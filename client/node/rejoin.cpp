@@ -5,7 +5,6 @@
 // (service/takeover/takeover.hpp).
 #include <fcntl.h>
 #include <sys/epoll.h>
-#include <sys/stat.h>
 #include <sys/timerfd.h>
 
 #include <optional>
@@ -14,6 +13,7 @@
 
 #include "client/node/node_core.hpp"
 #include "shm/clock.hpp"
+#include "shm/segment.hpp"
 #include "wire/meeting.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -33,13 +33,6 @@ namespace {
 constexpr std::chrono::milliseconds kRejoinInterval{50};
 // How long until it is tried again with a daemon that does not want us.
 constexpr std::chrono::milliseconds kTurnedAwayInterval{1000};
-
-bool are_same(const shm::FileDescriptor& one, const shm::FileDescriptor& other) {
-  struct stat a {};
-  struct stat b {};
-  return fstat(one.get(), &a) == 0 && fstat(other.get(), &b) == 0 && a.st_ino == b.st_ino &&
-         a.st_dev == b.st_dev;
-}
 
 bool is_sent(const shm::FileDescriptor& socket, const wire::Message& message,
              std::array<int, wire::kMaxDescriptors> descriptors = {-1, -1}) {
@@ -186,7 +179,7 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
     return;
   }
   has_told_of_clock_ = false;
-  if (!are_same(welcome.descriptors[0], memory_->board())) {
+  if (!shm::are_one_segment(welcome.descriptors[0], memory_->board())) {
     try {
       if (!is_anew_) throw std::runtime_error("the daemon has other memory");
       memory_ = std::make_shared<SharedMemory>(std::move(welcome.descriptors[0]),

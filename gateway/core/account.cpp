@@ -26,9 +26,7 @@ constexpr std::array<std::pair<std::int64_t, const char*>, 5> kAges{{{86400 * kO
 std::string fitting(std::string_view text, std::size_t most) {
   std::string result = shm::printable(text);
   if (result.size() <= most) return result;
-  std::size_t length = most - 3;
-  while (length != 0 && (static_cast<unsigned char>(result[length]) & 0xc0) == 0x80) --length;
-  return result.substr(0, length) + "...";
+  return std::string(shm::beginning_of(result, most - 3)) + "...";
 }
 
 }  // namespace

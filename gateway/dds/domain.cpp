@@ -3,9 +3,7 @@
 #include <dds/ddsrt/log.h>
 #include <dds/features.h>
 
-#include <charconv>
 #include <cstdlib>
-#include <cstring>
 #include <string_view>
 #include <system_error>
 
@@ -130,16 +128,10 @@ std::string escaped(const std::string& text) {
 
 dds_domainid_t domain_of(const Gateway& gateway) {
   if (gateway.domain) return *gateway.domain;
-  const char* const text = std::getenv("ROS_DOMAIN_ID");
-  if (text == nullptr || *text == '\0') return 0;
-  std::uint32_t domain = 0;
-  const char* const end = text + std::strlen(text);
-  const auto [rest, error] = std::from_chars(text, end, domain);
-  if (error != std::errc() || rest != end || domain > kMaxDomain) {
-    throw DdsError("ROS_DOMAIN_ID is \"" + std::string(text) +
-                   "\": it must be a number from 0 to " + std::to_string(kMaxDomain));
-  }
-  return domain;
+  const auto domain = domain_of_environment();
+  if (domain) return *domain;
+  throw DdsError("ROS_DOMAIN_ID is \"" + std::string(std::getenv("ROS_DOMAIN_ID")) +
+                 "\": it must be a number from 0 to " + std::to_string(kMaxDomain));
 }
 
 std::string configuration_of(const Gateway& gateway, const std::string& file) {

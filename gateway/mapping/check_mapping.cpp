@@ -1,9 +1,6 @@
 #include "gateway/mapping/check_mapping.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <cstdlib>
-#include <cstring>
 #include <map>
 #include <set>
 #include <string>
@@ -13,7 +10,7 @@
 #include "gateway/mapping/partitions.hpp"
 #include "gateway/mapping/ros_names.hpp"
 #include "rules/model/polarity.hpp"
-#include "rules/model/print_rules.hpp"
+#include "rules/text/duration.hpp"
 #include "rules/text/names.hpp"
 
 namespace arbiter::gateway {
@@ -27,11 +24,7 @@ struct Placed {
 // A domain that is not named is the environment's, as it is here. What cannot be read there, the
 // gateway says when it starts.
 std::uint32_t domain_of(const Gateway& gateway) {
-  if (gateway.domain) return *gateway.domain;
-  const char* const text = std::getenv("ROS_DOMAIN_ID");
-  std::uint32_t domain = 0;
-  if (text != nullptr) std::from_chars(text, text + std::strlen(text), domain);
-  return domain;
+  return gateway.domain.value_or(domain_of_environment().value_or(0));
 }
 
 bool are_one_topic(const Placed& one, const Placed& other) {
@@ -240,7 +233,7 @@ class MappingCheck {
     for (const Placed& each : entries_) {
       if (!each.entry->choice) continue;
       for (const Port* port : each.entry->ports()) {
-        if (timeout_of(port->name) == shm::kForever) forever.emplace(port->name, port);
+        if (model_->timeout_of(port->name) == shm::kForever) forever.emplace(port->name, port);
       }
     }
     if (forever.empty()) return;
@@ -271,7 +264,7 @@ class MappingCheck {
       if (!entry.is_in() || !entry.dds) continue;
       if (entry.dds->qos.durability == Durability::kVolatile) continue;
       for (const Port* port : entry.ports()) {
-        const shm::Nanoseconds timeout = timeout_of(port->name);
+        const shm::Nanoseconds timeout = model_->timeout_of(port->name);
         if (timeout == shm::kForever && !entry.max_age) continue;
         diagnostics_.error(
             "late-history", port->where,
@@ -285,11 +278,6 @@ class MappingCheck {
             {.ports = {}, .source = port->name});
       }
     }
-  }
-
-  [[nodiscard]] shm::Nanoseconds timeout_of(const std::string& source) const {
-    const auto own = model_->timeouts.find(source);
-    return own == model_->timeouts.end() ? model_->timeout : own->second;
   }
 
   void check_types() {

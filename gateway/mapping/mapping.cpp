@@ -1,7 +1,11 @@
 #include "gateway/mapping/mapping.hpp"
 
 #include <array>
+#include <charconv>
+#include <cstdlib>
 #include <limits>
+#include <string_view>
+#include <system_error>
 
 namespace arbiter::gateway {
 namespace {
@@ -15,6 +19,17 @@ Range range_of_type() {
 }  // namespace
 
 const char* name_of(Kind kind) { return kind == Kind::kDds ? "dds" : "iceoryx"; }
+
+std::optional<std::uint32_t> domain_of_environment() {
+  const char* const value = std::getenv("ROS_DOMAIN_ID");
+  if (value == nullptr || *value == '\0') return 0;
+  const std::string_view text = value;
+  const char* const end = text.data() + text.size();
+  std::uint32_t domain = 0;
+  const auto [rest, error] = std::from_chars(text.data(), end, domain);
+  if (error != std::errc() || rest != end || domain > kMaxDomain) return {};
+  return domain;
+}
 
 std::size_t size_of(Field field) {
   switch (field) {

@@ -154,6 +154,10 @@ struct Gateway {
   std::vector<Entry> entries;           // in document order
 };
 
+// What ROS_DOMAIN_ID says to a gateway that names no domain: 0 where it is not set or empty;
+// nothing where it is no number from 0 to kMaxDomain.
+[[nodiscard]] std::optional<std::uint32_t> domain_of_environment();
+
 // Whether they join a domain in the same way, if they join the same.
 [[nodiscard]] bool have_one_configuration(const Gateway& a, const Gateway& b);
 

@@ -13,10 +13,6 @@
 namespace arbiter::service {
 namespace {
 
-std::string place(const rules::Location& where) {
-  return where.file + ":" + std::to_string(where.line) + ":" + std::to_string(where.column);
-}
-
 // Of one code, in one model. What is true of a thousand ports need not fill the log.
 constexpr std::size_t kMaxLogged = 20;
 
@@ -30,7 +26,7 @@ void log_findings(const rules::Diagnostics& diagnostics) {
   std::map<std::pair<rules::Severity, std::string>, std::size_t> logged;
   for (const rules::Diagnostic& finding : diagnostics.items()) {
     if (++logged[{finding.severity, finding.code}] > kMaxLogged) continue;
-    log::log(level_of(finding.severity), "{}: {} [{}]", place(finding.where), finding.message,
+    log::log(level_of(finding.severity), "{}: {} [{}]", describe(finding.where), finding.message,
              finding.code);
   }
   for (const auto& [kind, kept] : logged) {
@@ -73,7 +69,7 @@ std::string Findings::first_error() const {
     const auto found = std::find_if(items.begin(), items.end(), is_error);
     if (found == items.end()) continue;
     if (count == 0) {
-      first = part.of + " has errors: " + place(found->where) + ": " + found->message;
+      first = part.of + " has errors: " + describe(found->where) + ": " + found->message;
     }
     count += part.diagnostics.count(rules::Severity::kError);
   }

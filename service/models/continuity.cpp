@@ -10,28 +10,14 @@ using rules::CompiledModel;
 using rules::CompiledPort;
 using rules::CompiledRule;
 
-bool is_same_rule(const CompiledRule& a, const CompiledRule& b) {
-  const auto is_same_node = [](const CompiledRule::Node& x, const CompiledRule::Node& y) {
-    return x.position == y.position && x.low == y.low && x.high == y.high;
-  };
-  return a.source == b.source && a.kind == b.kind && a.reads == b.reads &&
-         a.expected == b.expected &&
-         std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(), is_same_node);
-}
-
 bool is_same_port(const CompiledPort& a, const CompiledPort& b) {
   return a.arbitrated == b.arbitrated && a.in_order == b.in_order && a.reads == b.reads &&
-         std::equal(a.rules.begin(), a.rules.end(), b.rules.begin(), b.rules.end(), is_same_rule);
-}
-
-shm::Nanoseconds timeout_of(const CompiledModel& model, const std::string& source) {
-  const auto own = model.timeouts.find(source);
-  return own == model.timeouts.end() ? model.timeout : own->second;
+         a.rules == b.rules;
 }
 
 bool are_timeouts_same(const CompiledPort& port, const CompiledModel& a, const CompiledModel& b) {
   const auto is_same = [&](const std::string& source) {
-    return timeout_of(a, source) == timeout_of(b, source);
+    return a.timeout_of(source) == b.timeout_of(source);
   };
   return std::all_of(port.reads.begin(), port.reads.end(), is_same) &&
          std::all_of(port.rules.begin(), port.rules.end(),

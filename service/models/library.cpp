@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "rules/model/load.hpp"
+#include "rules/prove/flatten.hpp"
 #include "shm/assertion.hpp"
 
 namespace arbiter::service {
