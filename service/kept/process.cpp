@@ -9,21 +9,40 @@
 
 namespace arbiter::service {
 
-// The 22nd field of /proc/PID/stat. The 2nd is a name in brackets, of any characters.
-std::uint64_t start_of_process(pid_t pid) {
+namespace {
+
+struct ProcessStatus {
+  char state = 0;
+  int threads = 0;
+  std::uint64_t started = 0;
+};
+
+// Fields 3, 20 and 22 of /proc/PID/stat. The 2nd is a name in brackets, of any characters.
+ProcessStatus status_of(pid_t pid) {
   std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   const auto name_end = text.rfind(')');
-  if (name_end == std::string::npos) return 0;
+  if (name_end == std::string::npos) return {};
   std::istringstream fields(text.substr(name_end + 1));
+  ProcessStatus status;
   std::string field;
-  for (int i = 3; i <= 21; ++i) fields >> field;
-  std::uint64_t started = 0;
-  fields >> started;
-  return started;
+  fields >> status.state;
+  for (int i = 4; i <= 19; ++i) fields >> field;
+  fields >> status.threads >> field >> status.started;
+  return status;
 }
 
-bool Process::lives() const { return pid > 0 && start_of_process(pid) == started; }
+}  // namespace
+
+std::uint64_t start_of_process(pid_t pid) { return status_of(pid).started; }
+
+// What has ended stays until its parent asks how; so does a first thread that ended before others.
+bool Process::lives() const {
+  if (pid <= 0 || started == 0) return false;
+  const ProcessStatus status = status_of(pid);
+  const bool has_ended = status.state == 'Z' || status.state == 'X';
+  return status.started == started && (!has_ended || status.threads > 1);
+}
 
 bool has_ended(const shm::FileDescriptor& process) {
   pollfd polled{process.get(), POLLIN, 0};

@@ -12,11 +12,15 @@ void Introductions::introduce(const Switchboard::Told& told, std::function<void(
   barriers_.raise(told, deadline, [this, deadline, passed = std::move(passed)] {
     const auto receivers = switchboard_.show_segments();
     at_step("segments-shown");
-    if (switchboard_.has_growth_to_show() && show_growth_at_ == shm::kForever) {
-      show_growth_at_ = shm::monotonic_now() + kShowGrowthAfter;
-    }
+    show_growth_soon();
     barriers_.raise(receivers, deadline, passed);
   });
+}
+
+void Introductions::show_growth_soon() {
+  if (switchboard_.has_growth_to_show() && show_growth_at_ == shm::kForever) {
+    show_growth_at_ = shm::monotonic_now() + kShowGrowthAfter;
+  }
 }
 
 void Introductions::advance(shm::Nanoseconds now) {

@@ -24,6 +24,8 @@ class Introductions {
 
   // Calls `passed` once clients have taken up what they were told, or have had the time for it.
   void introduce(const Switchboard::Told& told, std::function<void()> passed);
+  // That publishers use more memory is told within kShowGrowthAfter.
+  void show_growth_soon();
   // Tells receivers what is not urgent, when it is time for that.
   void advance(shm::Nanoseconds now);
   [[nodiscard]] shm::Nanoseconds deadline() const { return show_growth_at_; }

@@ -110,9 +110,23 @@ bool PortNames::take_page(const shm::FileDescriptor& page) {
                      [&](const auto& source) { return take_page(source->id, page); });
 }
 
-void PortNames::forget_lost_pages() {
+bool PortNames::has_lost_page(const Source& source) {
+  return !source.has_page() && source.away == 0 && !source.name.empty();
+}
+
+bool PortNames::replace_lost_pages(const shm::TableView& table) {
+  bool any = false;
   for (const auto& source : sources_) {
-    if (!source->has_page() && source->away == 0 && !source->name.empty()) forget(*source);
+    if (!has_lost_page(*source) || !table.knows_source(source->id)) continue;
+    replace_lost_page(*source);
+    any = true;
+  }
+  return any;
+}
+
+void PortNames::forget_lost_pages(const shm::TableView& table) {
+  for (const auto& source : sources_) {
+    if (has_lost_page(*source) && !table.knows_source(source->id)) forget(*source);
   }
 }
 

@@ -88,14 +88,15 @@ class PortNames {
   // Throws std::runtime_error where it is none that a daemon of ours has made.
   bool take_page(shm::SourceId id, const shm::FileDescriptor& page);
   bool take_page(const shm::FileDescriptor& page);  // of whichever source
-  // Gives up the names of sources whose page nobody has, and whose publisher is gone: used again,
-  // they get another id, so that who might still look at the old page sees nothing at all.
-  void forget_lost_pages();
-
-  // The same of a source that somebody is about to open, and that a table names by its id: another
-  // page takes the place of the lost one, under the next number, which no old page has. Nobody's
-  // activity is on it. Throws std::system_error.
+  // Of a source whose page nobody has, and whose publisher is gone: another page takes the place of
+  // the lost one, under the next number, which no old page has. Nobody's activity is on it. Throws
+  // std::system_error.
   void replace_lost_page(Source& source);
+  // Does so for the sources that the table in force names by their ids, so that they go on being
+  // the same. True: for one at least. Throws std::system_error.
+  bool replace_lost_pages(const shm::TableView& table);
+  // Gives up the names of the others: used again, they get another id.
+  void forget_lost_pages(const shm::TableView& table);
 
   // Whether a user may be given the page in force, to write it: if no other has ever been.
   [[nodiscard]] static bool may_be_given(const Source& source, uid_t user) {
@@ -149,6 +150,7 @@ class PortNames {
  private:
   [[nodiscard]] Page make_page() const;
   [[nodiscard]] Page use_page(shm::FileDescriptor writable) const;
+  [[nodiscard]] static bool has_lost_page(const Source& source);
   Source& unused_source();
   InputName& unused_input();
   void forget(Source& source);

@@ -188,15 +188,14 @@ Switchboard::Told Switchboard::add_tap(std::unique_ptr<Tap> tap, Client& client,
 
 void Switchboard::tell_tap(const wire::Received& answer) {
   const auto output = outputs_.find(answer.message.port);
-  if (output == outputs_.end()) return;
-  taps_.tell(*output->second, answer);
-  // The publisher uses more of its segment from now on. One that does not read is passed over.
-  const shm::PortInstance grown = output->first;
-  for (auto link = links_.lower_bound({grown, 0});
-       link != links_.end() && link->first.first == grown; ++link) {
-    Client& receiver = client_of(link->first.second);
-    if (!link->second.is_mutual() || receiver.has_queue()) continue;
-    receiver.send(message_to(wire::MessageKind::kOutputGrown, link->first.second, grown));
+  // The publisher uses more of its segment from now on.
+  if (output != outputs_.end() && taps_.tell(*output->second, answer)) note_growth(output->first);
+}
+
+void Switchboard::note_growth(shm::PortInstance output) {
+  for (auto link = links_.lower_bound({output, 0});
+       link != links_.end() && link->first.first == output; ++link) {
+    growth_.insert(link->first);
   }
 }
 
@@ -262,10 +261,8 @@ Switchboard::Told Switchboard::show_segments() {
     Client& receiver = client_of(key.second);
     receiver.send(message_to(wire::MessageKind::kOutputGrown, key.second, key.first));
     told.insert(&receiver);
-    for (auto link = links_.lower_bound({key.first, 0});
-         link != links_.end() && link->first.first == key.first; ++link) {
-      if (link->first != key) growth_.insert(link->first);
-    }
+    note_growth(key.first);
+    growth_.erase(key);
   }
   return told;
 }

@@ -117,6 +117,7 @@ class Switchboard {
   void make_link(const OutputPort& output, const InputPort& input, LinkKind kind, Told& told);
   void send_pages(Client& client, shm::PortId port, const shm::TableView& table, Told& told);
   [[nodiscard]] bool is_connected(const LinkKey& key) const;
+  void note_growth(shm::PortInstance output);
   // Whoever claims a link with that port is told that it has gone.
   void end_claims_on(shm::PortInstance port);
   void tell_refusal(const LinkKey& key, shm::PortInstance to, const std::string& why) const;

@@ -1,6 +1,7 @@
 #include "service/ports/taps.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "service/ports/foreign_parts.hpp"
 #include "service/ports/switchboard.hpp"
@@ -92,6 +93,7 @@ bool Taps::ask(const Tap& tap, const OutputPort& output) {
   const auto [link, is_new] = links_.try_emplace({output.instance, tap.instance});
   if (!is_new && !link->second.is_away) return false;
   link->second.is_away = false;
+  link->second.is_asked = true;
   auto message = message_to(wire::MessageKind::kTap, output.instance, tap.instance);
   message.value = tap.is_privileged ? 0 : tap.user;
   message.flags = tap.is_privileged ? wire::kIsPrivileged : 0u;
@@ -115,9 +117,9 @@ void Taps::unlink(const shm::TableView& table, const Outputs& outputs) {
   });
 }
 
-void Taps::tell(const OutputPort& output, const wire::Received& answer) {
+bool Taps::tell(const OutputPort& output, const wire::Received& answer) {
   const auto link = links_.find({output.instance, answer.message.peer});
-  if (link == links_.end()) return;  // it has closed meanwhile
+  if (link == links_.end() || !std::exchange(link->second.is_asked, false)) return false;
   require_descriptors(answer, 1);
   if (own_segment(answer.descriptors[0], output.user, sizeof(shm::EventSegment)) !=
       sizeof(shm::EventSegment)) {
@@ -131,10 +133,12 @@ void Taps::tell(const OutputPort& output, const wire::Received& answer) {
   message.set_name(output.source->name);
   link->second.is_told = true;
   tap.client->send(message, {output.segment.get(), answer.descriptors[0].get()});
+  return true;
 }
 
 void Taps::refuse(const OutputPort& output, shm::PortInstance tap, const std::string& why) {
-  if (links_.count({output.instance, tap}) == 0) return;
+  const auto link = links_.find({output.instance, tap});
+  if (link == links_.end() || !std::exchange(link->second.is_asked, false)) return;
   auto message =
       message_to(wire::MessageKind::kConnectionRefused, tap, output.instance, output.source->id);
   message.set_name(output.source->name);
@@ -153,7 +157,7 @@ void Taps::set_away(shm::PortInstance output) {
 void Taps::tell_end(const Tap& tap, const Source& source) {
   if (source.open != 0) return;
   if (source.away != 0) {
-    links_[{source.away, tap.instance}] = {true, true};
+    links_[{source.away, tap.instance}] = {.is_told = true, .is_away = true};
     return;
   }
   tap.client->send(message_to(wire::MessageKind::kPeerGone, tap.instance, 0, source.id));

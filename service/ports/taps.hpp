@@ -80,8 +80,8 @@ class Taps {
   void tell_ends(const Tap& tap, const shm::TableView& table);
   // Taps of an input port give up what a table does not connect to it any more.
   void unlink(const shm::TableView& table, const Outputs& outputs);
-  // A component answers.
-  void tell(const OutputPort& output, const wire::Received& answer);
+  // A component answers. False: it was not asked, or the tap has closed meanwhile.
+  bool tell(const OutputPort& output, const wire::Received& answer);
   void refuse(const OutputPort& output, shm::PortInstance tap, const std::string& why);
   // Its component is lost for a while: when it is back it is asked again.
   void set_away(shm::PortInstance output);
@@ -99,7 +99,8 @@ class Taps {
   static void measure(const InputPort& input, bool is_tapped);
   // A tap and an output port whose component has been asked.
   struct Link {
-    bool is_told = false;  // the tap has been told what it answered
+    bool is_asked = false;  // and has not answered; it answers once
+    bool is_told = false;   // the tap has been told what it answered
     bool is_away = false;
   };
   using LinkKey = std::pair<shm::PortInstance, shm::PortInstance>;  // output, tap

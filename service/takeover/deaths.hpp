@@ -1,6 +1,7 @@
 // The last components that ended without closing their ports, for the status document.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <string>
@@ -23,11 +24,24 @@ class Deaths {
                         shm::monotonic_now(),
                         {event.sources.begin(), event.sources.end()},
                         {event.ports.begin(), event.ports.end()}});
-    if (deaths_.size() > kMost) deaths_.pop_back();
+    if (deaths_.size() > kMost) make_room();
   }
   [[nodiscard]] const std::deque<wire::DeathStatus>& all() const { return deaths_; }
 
  private:
+  // The user who has most gives way, and the earliest of these: nobody pushes out what others miss.
+  void make_room() {
+    const auto count = [&](const wire::DeathStatus& death) {
+      return std::count_if(deaths_.begin(), deaths_.end(),
+                           [&](const auto& each) { return each.user == death.user; });
+    };
+    // From the earliest on; of equals the first one.
+    const auto most = std::max_element(
+        deaths_.rbegin(), deaths_.rend(),
+        [&](const auto& one, const auto& other) { return count(one) < count(other); });
+    deaths_.erase(std::next(most).base());
+  }
+
   std::deque<wire::DeathStatus> deaths_;  // the latest first
 };
 

@@ -198,6 +198,7 @@ void Takeover::give_up(NodeId node) {
   const Absentee absentee = std::move(absentees_.at(node));
   absentees_.erase(node);
   for (const shm::PortInstance port : absentee.ports) switchboard_.forget_away(port);
+  if (is_over()) replace_lost_pages();
   host_.try_postponed();
 }
 

@@ -1,6 +1,7 @@
 #include "service/takeover/strangers.hpp"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 namespace arbiter::service {
@@ -69,9 +70,13 @@ void Strangers::make_room() {
   if (known_.size() < kMax) return;
   std::erase_if(known_, [](const Known& each) { return !each.stranger.process.lives(); });
   if (known_.size() < kMax) return;
-  known_.erase(std::min_element(known_.begin(), known_.end(), [](const auto& a, const auto& b) {
-    return a.stranger.seen < b.stranger.seen;
-  }));
+  std::map<uid_t, std::size_t> counts;
+  for (const Known& each : known_) ++counts[each.stranger.user];
+  const auto rank = [&](const Known& each) {
+    return std::pair(counts.at(each.stranger.user), -each.stranger.seen);
+  };
+  known_.erase(std::max_element(known_.begin(), known_.end(),
+                                [&](const auto& a, const auto& b) { return rank(a) < rank(b); }));
 }
 
 std::vector<const Stranger*> Strangers::living() const {

@@ -29,7 +29,8 @@ struct Stranger {
 
 class Strangers {
  public:
-  static constexpr std::size_t kMax = 64;       // then whoever has been silent longest gives way
+  // Then the user who has most of them gives way, and of these the one that was silent longest.
+  static constexpr std::size_t kMax = 64;
   static constexpr std::size_t kMaxPorts = 64;  // of one of them, in each direction
 
   // A client has not been taken back. False: it is as it was the last time, and not worth telling.

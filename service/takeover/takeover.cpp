@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <system_error>
 #include <utility>
 
 #include "service/kept/descriptor_store.hpp"
@@ -150,9 +151,21 @@ void Takeover::finish() {
   }
   phase_ = Phase::kServing;
   host_.try_postponed();
-  names_.forget_lost_pages();
+  replace_lost_pages();
+  names_.forget_lost_pages(board_.in_force().table);
   at_step("about-to-serve");
   host_.begin_to_serve(is_fresh);
+}
+
+// The table in force goes on, perhaps for good: what it names by an id must stay what it was.
+void Takeover::replace_lost_pages() {
+  const auto table = board_.in_force().table;
+  try {
+    if (names_.replace_lost_pages(table)) switchboard_.link_all(table);
+  } catch (const std::system_error& error) {
+    log::warn("not each source that was lost with the last daemon has an activity page again: {}",
+              error.what());
+  }
 }
 
 shm::Nanoseconds Takeover::deadline() const {

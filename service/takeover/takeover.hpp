@@ -139,6 +139,7 @@ class Takeover {
   void give_up(NodeId node);
   void finish();
   void remember_components();
+  void replace_lost_pages();
 
   const Gate& gate_;
   Shares& shares_;

@@ -259,6 +259,43 @@ TEST(Takeover, WithoutAModelKeepsTheOneInForce) {
   EXPECT_EQ(take_from(in), 1);
 }
 
+// Nobody has the page of a source that nobody has open; the table names it by its id all the same.
+TEST(Takeover, WithoutAModelTheOneInForceGoesOnForThoseWhoComeLater) {
+  Daemon daemon(
+      "<behaviors><behavior name='A'><config at='/in'>/a</config></behavior>"
+      "<behavior name='B'><config at='/other'>/b</config><condition>not /c</condition>"
+      "</behavior></behaviors>");
+  Node node("test");
+  auto a = node.output_port<Number>("/a");
+  daemon.kill();
+  daemon.restart_without_model();
+  auto other = node.input_port<Number>("/other");
+  auto b = node.output_port<Number>("/b");
+  EXPECT_EQ(b.publish(Number{1}).delivered, 1u);
+  EXPECT_EQ(take_from(other), 1);
+  node.output_port<Number>("/c").signal();
+  EXPECT_EQ(b.publish(Number{2}).delivered, 0u);
+}
+
+// The same where its publisher lived on, and died without coming back.
+TEST(Takeover, TheSourceOfOneThatDiesWhileItIsAwayIsReadAllTheSame) {
+  Daemon daemon(override_model());
+  Component stopped("stopped");
+  ASSERT_EQ(stopped.tell("output /stop"), "open");
+  Node node("test");
+  auto other = node.output_port<Number>("/other");
+  daemon.kill();
+  stopped.process().stop();
+  daemon.restart_without_model();
+  ASSERT_TRUE(daemon.source("/stop")["away"]);
+  stopped.kill();
+  await([&] { return daemon.source("/stop")["away"] != true; });
+  auto low = node.output_port<Number>("/low");
+  auto in = node.input_port<Number>("/in");
+  EXPECT_EQ(low.publish(Number{1}).delivered, 1u);
+  EXPECT_EQ(take_from(in), 1);
+}
+
 TEST(Takeover, AStoppedComponentIsWaitedForButNotForLong) {
   Daemon daemon(fan_out_model(2));
   Component stopped("stopped");
