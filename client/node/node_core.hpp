@@ -1,9 +1,10 @@
 // A node: the conversation with the daemon, and the registry of the ports that it concerns.
 //
 //   node_core.cpp     connecting; opening and closing ports; questions and answers
-//   node_notices.cpp  what the component should know
-//   node_service.cpp  what the daemon says, and the thread that hears it
-//   node_rejoin.cpp   losing the daemon, and coming back to another
+//   notices.cpp       what the component should know
+//   service.cpp       what the daemon says, and the thread that hears it
+//   links.cpp         what it says of the ports at the other end
+//   rejoin.cpp        losing the daemon, and coming back to another
 //   descriptions.cpp  what components say of their ports
 //   taps.cpp          taps that this node opens, and taps of its output ports
 //
@@ -153,7 +154,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void say_not_locked(shm::PortInstance port, const std::string& why);
   void say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
 
-  // Notices (node_notices.cpp). Under mutex_:
+  // Notices (notices.cpp). Under mutex_:
   void note(NoticeKind kind, shm::PortInstance port, const std::string& peer,
             const std::string& text);
   void note_refusal(const wire::Message& about, const std::string& why);
