@@ -340,7 +340,19 @@ class Reading {
     has_metadata_ = true;
     result_.instance = value("instance");
     result_.host = value("host");
-    result_.wall_offset = std::strtoll(value("wall_offset_ns").c_str(), nullptr, 10);
+    result_.wall_offset = wall_offset_of(value("wall_offset_ns"));
+  }
+
+  // It can be added to any time of a recording. A file that says nothing of it is read all the
+  // same.
+  std::int64_t wall_offset_of(const std::string& text) const {
+    std::int64_t offset = 0;
+    const char* const end = text.data() + text.size();
+    const auto read = std::from_chars(text.data(), end, offset);
+    const bool is_one = read.ec == std::errc() && read.ptr == end && offset > -shm::kForeverFlag &&
+                        offset < shm::kForeverFlag;
+    if (text.empty() || is_one) return offset;
+    throw RecordError(path_ + " does not say how far its times are from those of the wall clock");
   }
 
   void take(const recording::McapMessage& message) {

@@ -10,9 +10,13 @@
 
 #include "evidence/activity_json.hpp"
 #include "shm/clock.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::evidence {
 namespace {
+
+// In the place of a byte that is not UTF-8: U+FFFD.
+constexpr std::string_view kNoCharacter = "\xef\xbf\xbd";
 
 // One object. Arrivals come by the ten thousand: each is put together in memory that is there.
 class JsonLine {
@@ -77,24 +81,33 @@ class JsonLine {
     out_ += name;
     out_ += "\":";
   }
-  // The daemon lets only UTF-8 pass.
+  // One text that is not UTF-8, such as what was typed, must not make a file unreadable.
   void quote(std::string_view text) {
-    constexpr std::string_view kHex = "0123456789abcdef";
     out_ += '"';
-    for (const char byte : text) {
-      const auto code = static_cast<unsigned char>(byte);
-      if (byte == '"' || byte == '\\') {
-        out_ += '\\';
-        out_ += byte;
-      } else if (code < 0x20) {
-        out_ += "\\u00";
-        out_ += kHex[code >> 4];
-        out_ += kHex[code & 15];
+    while (!text.empty()) {
+      std::size_t length = 1;
+      if (static_cast<unsigned char>(text.front()) < 0x80) {
+        add_ascii(text.front());
       } else {
-        out_ += byte;
+        length = shm::decode_utf8(text).length;
+        out_ += length == 0 ? kNoCharacter : text.substr(0, length);
       }
+      text.remove_prefix(std::max<std::size_t>(length, 1));
     }
     out_ += '"';
+  }
+  void add_ascii(char byte) {
+    constexpr std::string_view kHex = "0123456789abcdef";
+    if (byte == '"' || byte == '\\') {
+      out_ += '\\';
+      out_ += byte;
+    } else if (byte < 0x20) {
+      out_ += "\\u00";
+      out_ += kHex[static_cast<std::size_t>(byte) >> 4];
+      out_ += kHex[static_cast<std::size_t>(byte) & 15];
+    } else {
+      out_ += byte;
+    }
   }
 
   std::string& out_;
@@ -202,7 +215,7 @@ Written put(JsonLine& out, const Missed& each) {
 }
 
 recording::McapTime as_wall(Nanoseconds time, std::int64_t offset) {
-  const std::int64_t wall = time + offset;
+  const std::int64_t wall = std::clamp(time, Nanoseconds{0}, shm::kMaxTime) + offset;
   return wall < 0 ? 0 : static_cast<recording::McapTime>(wall);
 }
 

@@ -27,6 +27,14 @@ constexpr Nanoseconds kTryAgainAfter = 1'000'000'000;
 // A model that is replaced while it is asked for is asked for again.
 constexpr int kTries = 100;
 
+// What a component writes into its page may be anything. Only a kind of activity and a time that
+// has come are written down: by the kind the others decide.
+ActivityWord believable(ActivityWord word, Nanoseconds now) {
+  if (shm::is_finite(word)) return word;
+  const ActivityWord flag = shm::is_deactivation(word) ? shm::kDeactivatedFlag : shm::kForeverFlag;
+  return flag | std::min(word & ~flag, now);
+}
+
 std::vector<evidence::ModelFile> files_of(const std::vector<rules::FileText>& texts) {
   std::vector<evidence::ModelFile> files;
   files.reserve(texts.size());
@@ -318,7 +326,7 @@ void Watcher::add_page_state(const std::string& source, ActivityWord word, Batch
   state.context = std::move(context);
   state.seen = shm::monotonic_now();
   state.generation = generation_;
-  state.word = word;
+  state.word = believable(word, state.seen);
   batch.add(std::move(state));
 }
 

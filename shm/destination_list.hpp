@@ -58,7 +58,7 @@ inline void write_destinations(EventSegment& segment, std::uint64_t revision,
 }
 
 // False: the list of that revision is gone, or never was. Bounded by kMaxDestinations names of
-// kMaxNameLength bytes, whatever the segment says.
+// kMaxNameLength bytes, whatever the segment says. The names may be any bytes.
 [[nodiscard]] inline bool read_destinations(const EventSegment& segment, const EventShape& shape,
                                             std::uint64_t revision, Destinations& destinations) {
   constexpr std::size_t kWords = DestinationList::kNameWords;

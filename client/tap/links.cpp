@@ -175,7 +175,10 @@ std::vector<std::string> TapCore::misbehaving() {
 void TapCore::tidy() {
   handover_.collect();
   const auto sources = std::erase_if(links_, [](const auto& link) {
-    return link.second.source->drained.load(std::memory_order_relaxed);
+    const TapSource& source = *link.second.source;
+    // What has yet to be said of it, misbehaving() says first.
+    const bool is_said = link.second.reported || !source.misbehaved.load(std::memory_order_relaxed);
+    return is_said && source.drained.load(std::memory_order_relaxed);
   });
   const auto inputs = std::erase_if(inputs_, [](const auto& link) {
     return link.second.input->drained.load(std::memory_order_relaxed);

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "client/tap/tap_core.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -25,6 +26,17 @@ constexpr shm::Nanoseconds kLookIntervalAsleep = 100'000'000;
 // So many are kept until they are taken; then nothing is looked at.
 constexpr std::size_t kMaxTakes = 1024;
 
+// The daemon lets no input port have another name: whoever uses a tap may write names to a terminal
+// or into a document.
+bool can_be_ports(const shm::Destinations& destinations) {
+  return std::all_of(destinations.begin(), destinations.end(),
+                     [](const shm::Destination& destination) {
+                       const std::string& name = destination.name;
+                       return !name.empty() && name.size() <= shm::kMaxNameLength &&
+                              name.front() == '/' && !shm::find_fault_in_name(name);
+                     });
+}
+
 }  // namespace
 
 void TapCore::accept_view() {
@@ -41,6 +53,7 @@ void TapCore::accept_view() {
     if (known != streams_.end()) {
       known->gone = link.gone;
       known->end = link.end;
+      if (known->ended && known->gone) let_go(*known);  // it was given up before
       continue;
     }
     Stream stream;
@@ -68,11 +81,59 @@ bool TapCore::is_honest(const Stream& stream) const noexcept {
          shm::slot_of(head.sample) < stream.source->output->segment.layout().slot_count;
 }
 
+// No honest publisher tells of what came before the event before it, or is yet to come. The clock
+// is read after the event has been, and only where the last reading does not do.
+bool TapCore::has_credible_time(const Stream& stream) noexcept {
+  const shm::Nanoseconds time = stream.head.time;
+  if (time > reading_) reading_ = shm::monotonic_now();
+  return time >= stream.last.time && time <= reading_;
+}
+
+// Nor of an arrival that has not made its source active, or of a deactivation that has not ended
+// that.
+bool TapCore::has_credible_activity(const shm::EventRecord& head) noexcept {
+  switch (head.kind) {
+    case shm::EventKind::kSample:
+    case shm::EventKind::kSignal:
+      return shm::is_active(head.activity, head.time);
+    case shm::EventKind::kDeactivation:
+      return shm::is_deactivation(head.activity);
+    case shm::EventKind::kState:  // the activity may be one that a predecessor has left
+    case shm::EventKind::kDestinations:
+      break;
+  }
+  return true;
+}
+
+// Something has happened, and nobody knows what: it is lost, as if it had been overtaken.
+void TapCore::disbelieve(Stream& stream) noexcept {
+  shm::EventRecord& head = stream.head;
+  const bool has_happened =
+      head.kind != shm::EventKind::kState && head.kind != shm::EventKind::kDestinations;
+  if (has_happened) ++stream.head_lost;
+  be_state(head);
+  if (!has_credible_time(stream)) head.time = stream.last.time;
+}
+
+// What the source is like where it goes on.
+void TapCore::be_state(shm::EventRecord& head) noexcept {
+  head.kind = shm::EventKind::kState;
+  head.masks = {};
+}
+
+// Nothing is read from it any more, and of that, at least, its users shall know.
+void TapCore::give_up(Stream& stream, std::uint64_t lost) noexcept {
+  stream.source->misbehaved.store(true, std::memory_order_relaxed);
+  service_bell_->ring();
+  end(stream);
+  stream.head_lost = lost;
+}
+
 // True: the stream has a next event.
 bool TapCore::look_at(Stream& stream) noexcept {
   using Found = shm::EventReader::Found;
   if (stream.has_head) return true;
-  if (stream.ended || stream.source->misbehaved.load(std::memory_order_relaxed)) return false;
+  if (stream.ended) return false;
   const bool gone = stream.gone;  // before the look: what it has told comes before its end
   for (int passed = 0; stream.reader.join(); ++passed) {
     if (passed == kMaxPassedOver) return false;
@@ -81,17 +142,14 @@ bool TapCore::look_at(Stream& stream) noexcept {
     if (found == Found::kNothing) break;
     stream.head_lost = lost;
     if (!is_honest(stream)) {
-      stream.source->misbehaved.store(true, std::memory_order_relaxed);
-      service_bell_->ring();
-      return false;
+      give_up(stream, found == Found::kGap ? lost : lost + 1);
+      return stream.has_head = true;
     }
     const bool is_anothers = found == Found::kEvent && stream.head.kind == shm::EventKind::kState &&
                              stream.head.joined != stream.source->link;
     if (is_anothers) continue;
-    if (found == Found::kGap) {  // what the source is like where it goes on
-      stream.head.kind = shm::EventKind::kState;
-      stream.head.masks = {};
-    }
+    if (found == Found::kGap) be_state(stream.head);
+    if (!has_credible_time(stream) || !has_credible_activity(stream.head)) disbelieve(stream);
     return stream.has_head = true;
   }
   if (!gone) return false;
@@ -197,12 +255,19 @@ void TapCore::fill(Stream& stream, TapEventData& event) {
   stream.has_head = false;
   if (stream.head_is_end) {
     stream.ended = true;
-    stream.source->drained.store(true, std::memory_order_relaxed);
-    service_bell_->ring();
+    // One that was given up stays while its port is there: the next daemon tells of it again, and
+    // it would be taken for another.
+    if (stream.gone) let_go(stream);
   }
 }
 
-// A list that is gone leaves the names unknown.
+void TapCore::let_go(const Stream& stream) noexcept {
+  if (stream.source->drained.load(std::memory_order_relaxed)) return;
+  stream.source->drained.store(true, std::memory_order_relaxed);
+  service_bell_->ring();
+}
+
+// A list that is gone leaves the names unknown, and so does one that no honest publisher writes.
 void TapCore::give_context(Stream& stream) {
   if (stream.context != nullptr && stream.revision == stream.head.revision) return;
   auto context = std::make_shared<TapContext>();
@@ -210,7 +275,8 @@ void TapCore::give_context(Stream& stream) {
   context->type = stream.source->output->type;
   shm::Destinations destinations;
   if (shm::read_destinations(*stream.source->events, stream.source->shape, stream.head.revision,
-                             destinations)) {
+                             destinations) &&
+      can_be_ports(destinations)) {
     for (shm::Destination& destination : destinations) {
       context->destinations.push_back(std::move(destination.name));
     }

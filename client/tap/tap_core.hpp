@@ -46,7 +46,7 @@ struct TapSource {
   std::uint64_t link = 0;
   // Set by the tap's thread once a publisher that is gone has told all that it had to tell.
   mutable shm::Atomic<bool> drained{false};
-  // And once it has told what no honest publisher does: nothing is read from it any more.
+  // And once it has told what cannot be read as an event: nothing is read from it any more.
   mutable shm::Atomic<bool> misbehaved{false};
 };
 
@@ -172,9 +172,15 @@ class TapCore {
   void accept_view();
   bool look_at(Stream& stream) noexcept;
   void end(Stream& stream) noexcept;
+  void let_go(const Stream& stream) noexcept;
   void look_at_inputs();
   void fill(const Take& take, TapEventData& event);
   [[nodiscard]] bool is_honest(const Stream& stream) const noexcept;
+  [[nodiscard]] bool has_credible_time(const Stream& stream) noexcept;
+  [[nodiscard]] static bool has_credible_activity(const shm::EventRecord& head) noexcept;
+  void disbelieve(Stream& stream) noexcept;
+  static void be_state(shm::EventRecord& head) noexcept;
+  void give_up(Stream& stream, std::uint64_t lost) noexcept;
   Stream* oldest() noexcept;
   void fill(Stream& stream, TapEventData& event);
   void give_context(Stream& stream);
@@ -205,6 +211,7 @@ class TapCore {
   // Tap's thread.
   std::unique_ptr<TapSourceView> view_;
   std::vector<Stream> streams_;
+  shm::Nanoseconds reading_ = 0;       // of the clock, by which events are judged
   shm::Nanoseconds looked_ = 0;        // at the input port, the last time
   std::vector<TakeWatch::News> news_;  // of one look
   std::deque<Take> takes_;

@@ -13,6 +13,8 @@
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/raw_publisher.hpp"
+#include "tests/support/text_files.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -236,6 +238,30 @@ TEST(Echo, CountsOneEventInTheSingular) {
   Publishing publishing;
   EXPECT_THAT(publishing.during({"echo", "/low", "--count", "1"}).out, HasSubstr("\n1 event in "));
   EXPECT_THAT(publishing.during({"echo", "/p", "--count", "1"}).out, HasSubstr("\n1 sample in "));
+}
+
+// A publisher writes the names of its destinations into memory of its own.
+TEST(Echo, PrintsNoNameThatCannotBeAPort) {
+  Daemon daemon(kOverrideModel);
+  RawPublisher publisher(daemon.instance(), "/low");
+  std::uint64_t revision = 0;
+  for (const std::string name : {"/\x1b[2J\x1b]0;owned\x07/P:i\nforged line", "/\xff"}) {
+    for (const bool is_json : {false, true}) {
+      std::vector<std::string> arguments{std::string(ARBITER_PROGRAMS) + "/arbiter", "echo", "/low",
+                                         "--count", "1"};
+      if (is_json) arguments.emplace_back("--json");
+      const std::string out = daemon.directory() + "/out";
+      const shm::FileDescriptor file(::open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600));
+      ChildProcess program(arguments, {}, {-1, file.get(), -1});
+      publisher.admit();
+      shm::write_destinations(publisher.events(), ++revision, {{1, name}});
+      publisher.signal_at(shm::monotonic_now(), revision);
+      EXPECT_EQ(program.wait(), 0);
+      const std::string text = content_of(out);
+      EXPECT_THAT(text, AllOf(HasSubstr("signal"), Not(HasSubstr("forged"))));
+      EXPECT_EQ(text.find_first_of("\x1b\x07\xff"), std::string::npos) << text;
+    }
+  }
 }
 
 TEST(Echo, SaysThatThePolicyForbidsIt) {

@@ -3,14 +3,18 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <random>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <arbiter/arbiter.hpp>
 
 #include "client/tap/tap_core.hpp"
 #include "shm/event_ring.hpp"
+#include "shm/utf8.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
@@ -111,12 +115,16 @@ class HostilePublisher {
     events_->places[0].link.store(9);
   }
 
-  std::unique_ptr<detail::TapCore> tap(std::uint32_t max_held) {
+  // A tap that has not been told of it.
+  static std::unique_ptr<detail::TapCore> lone_tap(std::uint32_t max_held) {
     TapOptions options;
     options.max_held = max_held;
-    auto core = std::make_unique<detail::TapCore>("tap", Type::untyped(0), options,
-                                                  std::make_shared<const detail::ServiceBell>(),
-                                                  shm::Residence::kMapped);
+    return std::make_unique<detail::TapCore>("tap", Type::untyped(0), options,
+                                             std::make_shared<const detail::ServiceBell>(),
+                                             shm::Residence::kMapped);
+  }
+  std::unique_ptr<detail::TapCore> tap(std::uint32_t max_held) {
+    auto core = lone_tap(max_held);
     core->add_source(map());
     return core;
   }
@@ -136,6 +144,10 @@ class HostilePublisher {
   shm::FileDescriptor output_;
   Written<shm::EventSegment> events_;
 };
+
+TapEventKind kind_of(const detail::TapEventData& data) {
+  return static_cast<TapEventKind>(data.kind);
+}
 
 TEST(AHostilePublisher, WhateverItTellsATapEndsEachLookAndGivesNothingOutsideOfItsMemory) {
   HostilePublisher publisher;
@@ -186,12 +198,147 @@ TEST(AHostilePublisher, IsGivenUpOnceItTellsWhatNoHonestOneDoes) {
   record.kind = static_cast<shm::EventKind>(99);
   writer.write(record);
   detail::TapEventData data;
-  EXPECT_FALSE(tap->take(data));
+  ASSERT_TRUE(tap->take(data));
+  EXPECT_EQ(kind_of(data), TapEventKind::closed);
+  EXPECT_EQ(data.lost, 1u);
   EXPECT_EQ(tap->misbehaving().size(), 1u);
   EXPECT_TRUE(tap->misbehaving().empty()) << "it is told once";
   record.kind = shm::EventKind::kSignal;
   writer.write(record);
   EXPECT_FALSE(tap->take(data));
+  tap->tidy();
+  tap->add_source(publisher.map());  // a daemon that has taken over tells of it
+  EXPECT_FALSE(tap->take(data)) << "it is read once more";
+}
+
+// Such a one may come again and again: what was mapped of it must not stay.
+TEST(AHostilePublisher, ThatIsGivenUpIsForgottenOnceItHasGone) {
+  HostilePublisher publisher;
+  const auto tap = HostilePublisher::lone_tap(1);
+  auto source = publisher.map();
+  const std::weak_ptr<const detail::TapSource> mapped = source;
+  tap->add_source(std::move(source));
+  shm::EventRecord record;
+  record.kind = static_cast<shm::EventKind>(99);
+  shm::EventWriter(publisher.events()).write(record);
+  detail::TapEventData data;
+  ASSERT_TRUE(tap->take(data));
+  tap->lose_source(5, {});
+  EXPECT_FALSE(tap->take(data));
+  tap->tidy();
+  EXPECT_EQ(tap->misbehaving().size(), 1u) << "it is forgotten before it is named";
+  tap->tidy();
+  EXPECT_FALSE(tap->take(data));
+  tap->tidy();
+  EXPECT_TRUE(mapped.expired());
+}
+
+// What the tap gives of a publisher that tells this between two signals.
+TapEventKind told_between(const shm::EventRecord& lie, shm::Nanoseconds before,
+                          std::uint64_t lost) {
+  HostilePublisher publisher;
+  const auto tap = publisher.tap(1);
+  shm::EventWriter writer(publisher.events());
+  shm::EventRecord honest;
+  honest.kind = shm::EventKind::kSignal;
+  honest.time = before;
+  honest.activity = shm::kForeverFlag | before;
+  writer.write(honest);
+  writer.write(lie);
+  honest.time = shm::monotonic_now();
+  writer.write(honest);
+  detail::TapEventData data;
+  EXPECT_TRUE(tap->take(data));
+  EXPECT_EQ(kind_of(data), TapEventKind::signal);
+  EXPECT_TRUE(tap->take(data));
+  const TapEventKind kind = kind_of(data);
+  EXPECT_GE(data.time_ns, before);
+  EXPECT_LE(data.time_ns, shm::monotonic_now());
+  EXPECT_EQ(data.lost, lost);
+  EXPECT_TRUE(tap->take(data));
+  EXPECT_EQ(kind_of(data), TapEventKind::signal) << "it goes on behind the lie";
+  EXPECT_EQ(tap->lost_events(), lost);
+  return kind;
+}
+
+constexpr shm::Nanoseconds kMost = std::numeric_limits<shm::Nanoseconds>::max();
+
+TEST(AHostilePublisher, IsNotBelievedATimeThatNoClockHasShown) {
+  using shm::EventKind;
+  const shm::Nanoseconds before = shm::monotonic_now();
+  for (const shm::Nanoseconds time :
+       {-kMost - 1, shm::Nanoseconds{-5}, before - 1, shm::kForeverFlag - 1, kMost}) {
+    for (const EventKind kind : {EventKind::kSample, EventKind::kSignal, EventKind::kDeactivation,
+                                 EventKind::kState, EventKind::kDestinations}) {
+      shm::EventRecord lie;
+      lie.kind = kind;
+      lie.time = time;
+      lie.activity = kind == EventKind::kDeactivation ? shm::deactivation(1) : kMost;
+      lie.joined = 9;  // of a state
+      const bool has_happened = kind != EventKind::kState && kind != EventKind::kDestinations;
+      EXPECT_EQ(told_between(lie, before, has_happened ? 1 : 0), TapEventKind::state);
+    }
+  }
+}
+
+TEST(AHostilePublisher, IsNotBelievedAnActivityThatItsEventHasNotMade) {
+  using shm::EventKind;
+  const shm::Nanoseconds now = shm::monotonic_now();
+  const auto told = [&](EventKind kind, shm::ActivityWord activity, std::uint64_t lost) {
+    shm::EventRecord record;
+    record.kind = kind;
+    record.time = now;
+    record.activity = activity;
+    return told_between(record, now, lost);
+  };
+  for (const EventKind arrives : {EventKind::kSample, EventKind::kSignal}) {
+    for (const shm::ActivityWord word : {shm::kNeverActive, shm::deactivation(now), now}) {
+      EXPECT_EQ(told(arrives, word, 1), TapEventKind::state);
+    }
+    EXPECT_NE(told(arrives, now + 1, 0), TapEventKind::state);
+    EXPECT_NE(told(arrives, shm::kForeverFlag | now, 0), TapEventKind::state);
+  }
+  EXPECT_EQ(told(EventKind::kDeactivation, now + 1, 1), TapEventKind::state);
+  EXPECT_EQ(told(EventKind::kDeactivation, shm::deactivation(now), 0), TapEventKind::deactivation);
+}
+
+// They would go to terminals and into documents.
+TEST(AHostilePublisher, NamesNoDestinationThatCannotBeAPort) {
+  for (const std::string name :
+       {"/P:i", "", "P:i", "/\x1b[2J\x1b]0;owned\x07/P:i", "/P:i\nforged line", "/\xff",
+        "/\xe2\x80\xaeP", "/a b", "/\"P\""}) {
+    HostilePublisher publisher;
+    const auto tap = publisher.tap(1);
+    shm::write_destinations(publisher.events(), 1, {{1, "/fine"}, {2, name}});
+    shm::EventRecord record;
+    record.kind = shm::EventKind::kSignal;
+    record.activity = kMost;
+    record.revision = 1;
+    record.masks.accepted = 1;
+    shm::EventWriter(publisher.events()).write(record);
+    detail::TapEventData data;
+    ASSERT_TRUE(tap->take(data));
+    const bool is_fine = name == "/P:i";
+    EXPECT_EQ(data.context->destinations.size(), is_fine ? 2u : 0u) << shm::printable(name);
+  }
+}
+
+// One byte more than the longest has no end.
+TEST(AHostilePublisher, NamesNoDestinationWithoutAnEnd) {
+  HostilePublisher publisher;
+  const auto tap = publisher.tap(1);
+  shm::write_destinations(publisher.events(), 1,
+                          {{1, "/" + std::string(shm::kMaxNameLength - 1, 'a')}});
+  constexpr std::size_t kWords = shm::DestinationList::kNameWords;
+  publisher.events().lists[1].destinations[0].name[kWords - 1].store(0x6161'6161'6161'6161);
+  shm::EventRecord record;
+  record.kind = shm::EventKind::kSignal;
+  record.activity = kMost;
+  record.revision = 1;
+  shm::EventWriter(publisher.events()).write(record);
+  detail::TapEventData data;
+  ASSERT_TRUE(tap->take(data));
+  EXPECT_TRUE(data.context->destinations.empty());
 }
 
 // Killed between stamping and telling: others may have seen the arrival.
@@ -224,6 +371,7 @@ TEST(AKilledPublisher, IsReadToItsEnd) {
   shm::EventRecord record;
   for (int i = 0; i < 200; ++i) writer.write(record);  // states, of other taps
   record.kind = shm::EventKind::kSignal;
+  record.activity = 70;
   writer.write(record);
   tap->lose_source(5, {});
   std::vector<int> kinds;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <limits>
 #include <set>
 #include <string>
 
@@ -239,6 +241,49 @@ TEST(Records, ThatNobodyCouldHaveWrittenAreRefused) {
             ": record 1, of topic arbiter/start: its field \"time_ns\" is not a time");
   EXPECT_EQ(error("arbiter/deactivation", R"({"source":7})"),
             ": record 1, of topic arbiter/deactivation: its field \"source\" is not a text");
+}
+
+// What was typed, for example, may be any bytes.
+TEST(Records, AreReadableWhateverTheirTextsAre) {
+  Incident incident;
+  incident.add(evidence::Missed{"/low", 1, 2, 3, 4, evidence::Missed::Why::refused,
+                                "\xff\xc3\xa9\xe2\x82\"\x80\n"});
+  const auto records = read_all(incident.file()).records;
+  ASSERT_EQ(records.size(), incident.records().size());
+  EXPECT_EQ(std::get<evidence::Missed>(records.back()).text,
+            "\xef\xbf\xbd\xc3\xa9\xef\xbf\xbd\xef\xbf\xbd\"\xef\xbf\xbd\n");
+}
+
+TEST(Records, StandInTheFileByATimeThatAClockMayShow) {
+  Incident incident;
+  incident.add(evidence::Missed{"/low", 1, std::numeric_limits<shm::Nanoseconds>::max(), 3, 4,
+                                evidence::Missed::Why::queue, ""});
+  std::uint64_t latest = 0;
+  recording::McapVisitor visitor;
+  visitor.message = [&](const recording::McapMessage& message) {
+    latest = std::max(latest, message.log_time);
+  };
+  read_mcap(incident.file(), visitor);
+  EXPECT_EQ(latest, static_cast<std::uint64_t>(shm::kMaxTime) + 5'000'000);
+}
+
+// To be added to times that may be as late as there are any.
+TEST(Records, AreNoFurtherFromTheWallClockThanTimesMayBe) {
+  const TemporaryDirectory directory;
+  const auto error = [&](const std::string& offset) {
+    const std::string path = directory.path() + "/" + offset + ".mcap";
+    recording::McapWriter file(path, "test", {});
+    file.write_metadata("arbiter.recording", {{"format", "1"}, {"wall_offset_ns", offset}});
+    file.close();
+    const std::string what = error_of_reading(path);
+    return what.substr(std::min(what.size(), path.size()));
+  };
+  const std::string refused = " does not say how far its times are from those of the wall clock";
+  for (const char* offset : {"9223372036854775807", "-9223372036854775808", "4611686018427387904",
+                             "99999999999999999999", "later", "1s"}) {
+    EXPECT_EQ(error(offset), refused) << offset;
+  }
+  for (const char* offset : {"0", "-5", "1790000000000000000"}) EXPECT_EQ(error(offset), "");
 }
 
 TEST(Records, AreThoseOfARecording) {

@@ -20,6 +20,13 @@
 // they are large: 32 MiB of them). A tap that is slower loses its own oldest events, which are
 // counted; the next event is then a `state`, with the activity that the source has from there on.
 //
+// A publisher writes its events into memory of its own, where it may write anything. What no honest
+// one writes does not come: an event whose time is before that of the event before it, or has not
+// come yet, an arrival that leaves the source inactive, or a deactivation that does not, counts as
+// lost, and a `state` stands in its place; a list of destinations with a name that no port can have
+// is not known. After what cannot be read as an event at all, the source is `closed`, one event is
+// lost, and a notice (NoticeKind::refused) says so.
+//
 // Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC. Threads: use a tap, and its
 // events, from one thread at a time. Blocking: only wait_for() blocks. Cost: take() needs no lock
 // and no system call, and allocates only where a source's destinations have changed, or an input
@@ -89,7 +96,8 @@ class TapEventBase {
   [[nodiscard]] const Type& type() const noexcept { return data_.context->type; }
   // When it happened: the arrival time, or the time of the deactivation, as the publisher has
   // written it. When it was seen: `dropped` and `overtaken`, which happened some milliseconds
-  // before. Of other kinds: of the last arrival or deactivation before, or 0.
+  // before. Of other kinds: of the last arrival or deactivation before, or 0. Never below 0, nor
+  // later than now, nor before that of an earlier event of the same output port.
   [[nodiscard]] Time time() const noexcept { return Time(std::chrono::nanoseconds(data_.time_ns)); }
   // Of the source's samples, as Sample::sequence(); of other events than samples, that of the last
   // sample before. Of `dropped` and `overtaken`: the input port has done with the source's samples
@@ -104,7 +112,8 @@ class TapEventBase {
   [[nodiscard]] Origin origin() const noexcept { return data_.origin; }
   // How many events of this source were lost immediately before this one, which is of kind `state`
   // then; or `closed`, where a component was killed during an arrival or deactivation that others
-  // may have seen, before its taps learnt of it.
+  // may have seen, before its taps learnt of it. Those that no honest publisher writes are lost,
+  // too.
   [[nodiscard]] std::uint64_t lost() const noexcept { return data_.lost; }
   // How many samples were dropped or overtaken; of other kinds 0.
   [[nodiscard]] std::uint64_t count() const noexcept { return data_.count; }
@@ -122,7 +131,8 @@ class TapEventBase {
   [[nodiscard]] bool is_deactivated() const noexcept { return data_.activity < 0; }
 
   // What became of an arrival at each of the source's destinations. Empty where their names are not
-  // known any more because the list has changed often since. Allocates.
+  // known any more because the list has changed often since, or where one of them cannot be a
+  // port's. Allocates.
   [[nodiscard]] std::vector<TapDestination> destinations() const {
     std::vector<TapDestination> all;
     const std::vector<std::string>& names = data_.context->destinations;

@@ -318,6 +318,7 @@ void World::introduce_events(const std::vector<Patch>& patches) {
       {offsetof(shm::EventSegment, places) + offsetof(shm::TapPlace, first), 1},
       {offsetof(shm::EventSegment, kept) + sizeof(shm::Entry), shm::make_entry(1, 0)},
       {event + offsetof(shm::Event, sample), shm::make_entry(1, 0)},
+      {event + offsetof(shm::Event, activity), shm::kForeverFlag},
       {event + offsetof(shm::Event, revision_and_kind),
        static_cast<std::uint64_t>(shm::EventKind::kSample)},
       {event + offsetof(shm::Event, number), 2}};
