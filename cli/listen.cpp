@@ -13,6 +13,7 @@
 #include <memory>
 #include <system_error>
 
+#include <CLI/CLI.hpp>
 #include <arbiter/arbiter.hpp>
 
 namespace arbiter::cli {
@@ -28,6 +29,11 @@ using Addresses = std::unique_ptr<addrinfo, decltype(&freeaddrinfo)>;
 }
 [[noreturn]] void fail(const std::string& address, int error) {
   fail(address, std::generic_category().message(error));
+}
+
+// It is no address.
+[[noreturn]] void refuse(const std::string& address, const std::string& advice) {
+  throw CLI::ValidationError("--listen", "cannot listen on " + address + ": " + advice);
 }
 
 shm::FileDescriptor make_socket(int family) {
@@ -48,12 +54,12 @@ Addresses resolve(const std::string& text) {
   const std::string advice =
       "write ADDRESS:PORT, such as 127.0.0.1:9180 or [::1]:9180, or a "
       "socket's path, such as ./metrics or metrics.sock";
-  if (colon == std::string::npos) fail(text, advice);
+  if (colon == std::string::npos) refuse(text, advice);
   std::string host = text.substr(0, colon);
   const std::string port = text.substr(colon + 1);
   const bool in_brackets = host.size() > 2 && host.front() == '[' && host.back() == ']';
   if (in_brackets) host = host.substr(1, host.size() - 2);
-  if (!in_brackets && host.find(':') != std::string::npos) fail(text, advice);
+  if (!in_brackets && host.find(':') != std::string::npos) refuse(text, advice);
   if (host == "localhost") host = "127.0.0.1";
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;
@@ -64,7 +70,7 @@ Addresses resolve(const std::string& text) {
                        port.find_first_not_of("0123456789") == std::string::npos &&
                        std::stoi(port) <= 65535;
   if (host.empty() || !is_port || getaddrinfo(host.c_str(), port.c_str(), &hints, &found) != 0) {
-    fail(text, advice);
+    refuse(text, advice);
   }
   return {found, &freeaddrinfo};
 }

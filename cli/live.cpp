@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
+#include <stdexcept>
 #include <utility>
 
 #include <CLI/CLI.hpp>
@@ -29,19 +30,31 @@ std::string status_text(wire::Caller caller, std::chrono::milliseconds answer_ti
   return wire::read_document(daemon.ask(question, answer_time).descriptors[0]);
 }
 
+std::string problem_of_instance(std::string& name) try {
+  static_cast<void>(wire::instance_name(name));
+  return "";
+} catch (const std::invalid_argument& error) {
+  return error.what();
+}
+
 }  // namespace
 
 void add_instance_option(CLI::App& verb, std::string& instance) {
   verb.add_option(
           "--instance", instance,
           "Which daemon to use; by default $ARBITER_INSTANCE, or \"default\" if that is not set")
-      ->type_name("NAME");
+      ->type_name("NAME")
+      ->check(CLI::Validator(problem_of_instance, ""));
 }
 
 NodeOptions live_options(const std::string& instance) {
   NodeOptions options;
-  options.instance = instance;
+  options.instance = wire::instance_name(instance);
   options.connect_timeout = kConnectTimeout;
+  // Longer than that it waits only for a daemon that is there: for that it has a time of its own.
+  options.on_waiting = [whom = options.instance](const std::string&) {
+    std::cerr << "arbiter: waiting for the arbiterd of instance \"" + whom + "\" to answer\n";
+  };
   options.on_notice = [](const Notice& notice) { std::cerr << "arbiter: " << notice.text << '\n'; };
   return options;
 }

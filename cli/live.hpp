@@ -26,7 +26,8 @@ void add_instance_option(CLI::App& verb, std::string& instance);
 // How long a verb looks for a daemon before it says that there is none.
 inline constexpr std::chrono::milliseconds kConnectTimeout{300};
 
-// Of a component. Notices go to standard error.
+// Of a component. Notices go to standard error. Throws std::invalid_argument where that is no name
+// for an instance, as caller() does.
 NodeOptions live_options(const std::string& instance);
 
 // Says hello as "arbiter-VERB", and on standard error whom it waits for.

@@ -3,6 +3,7 @@
 #include <csignal>
 #include <exception>
 #include <iostream>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -12,7 +13,7 @@
 
 #include "cli/broken_pipe.hpp"
 #include "cli/verbs.hpp"
-#include "cli/wrong_use.hpp"
+#include "command_line/wrong_use.hpp"
 #include "recording/mcap.hpp"
 #include "rules/model/load.hpp"
 #include "rules/text/names.hpp"
@@ -106,9 +107,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_history(app, exit_code);
   arbiter::cli::add_stop(app, exit_code);
   add_exit_codes(app);
-  app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
-    return arbiter::cli::wrong_use_text(*failed, error);
-  });
+  app.failure_message(arbiter::command_line::wrong_use_text);
   std::vector<std::string> words = words_of(argc, argv);
   if (!words.empty() && !knows_verb(app, words.front())) return kWrongUse;
   std::reverse(words.begin(), words.end());  // as CLI11 wants them
@@ -120,6 +119,9 @@ int run(int argc, char** argv) {
     say(error.what());
     return kWrongUse;
   } catch (const arbiter::recording::McapError& error) {
+    say(error.what());
+    return kWrongUse;
+  } catch (const std::invalid_argument& error) {  // $ARBITER_INSTANCE is no name for an instance
     say(error.what());
     return kWrongUse;
   }

@@ -3,7 +3,6 @@
 
 #include <charconv>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <sstream>
 #include <string>
@@ -11,7 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "rules/text/duration.hpp"
+#include "command_line/durations.hpp"
 
 namespace arbiter::cli {
 
@@ -43,25 +42,8 @@ inline CLI::Validator number_between(double least, double most) {
           ""};
 }
 
-inline constexpr const char* kTimeAdvice =
-    "write a whole number with a unit (ns, us, ms or s), such as 500ms or 2s";
-
-// Throws CLI::ValidationError, which names the option. `advice`: how to write a time there.
-inline shm::Nanoseconds read_time_above_zero(const std::string& option, const std::string& text,
-                                             const char* advice = kTimeAdvice) {
-  const auto parsed = rules::parse_duration(text, {"", "is zero", "shorten it", advice});
-  if (!parsed.problem.empty()) throw CLI::ValidationError(option, parsed.problem);
-  return parsed.value;
-}
-
-// 0s, 250ns, 10us, 500ms, 2s, forever. Throws CLI::ValidationError.
-inline shm::Nanoseconds read_time(const std::string& option, const std::string& text,
-                                  const char* advice = kTimeAdvice) {
-  const std::size_t unit = text.find_first_not_of('0');
-  const bool is_zero = unit != 0 && unit != std::string::npos && text[unit] > '9';
-  if (!is_zero) return read_time_above_zero(option, text, advice);
-  read_time_above_zero(option, "1" + text.substr(unit), advice);  // the unit is looked at
-  return 0;
-}
+// Times are the same for all programs.
+using command_line::read_time;
+using command_line::read_time_above_zero;
 
 }  // namespace arbiter::cli

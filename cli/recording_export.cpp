@@ -66,8 +66,8 @@ void add_export(CLI::App& parent, int& exit_code) {
       ->type_name("FILE");
   verb->footer(
       "Example:\n  arbiter recording export incident.mcap --trace trace.csv --csv decisions.csv\n\n"
-      "Exit codes: 0 written; 1 a model of the recording cannot be loaded; 2 wrong use, or a file "
-      "that\ncannot be opened or written");
+      "Exit codes: 0 written; 1 a file that `arbiter record` has not made, or a model of the "
+      "recording cannot\nbe loaded; 2 wrong use, or a file that cannot be opened or written");
   verb->callback([options, &exit_code] { exit_code = export_recording(*options); });
 }
 

@@ -208,8 +208,9 @@ void add_recorded_sample(CLI::App& parent, int& exit_code) {
       "xxd\n\n"
       "The bytes are written as they were published, and nothing else; standard error says which "
       "sample\nit is, and its type.\n\n"
-      "Exit codes: 0 written; 2 wrong use, a file that cannot be read or written, or a sample that "
-      "is not\nin it");
+      "Exit codes: 0 written; 1 a file that `arbiter record` has not made; 2 wrong use, a file "
+      "that "
+      "cannot\nbe read or written, or a sample that is not in it");
   verb->callback([options, &exit_code] { exit_code = write_sample(*options); });
 }
 

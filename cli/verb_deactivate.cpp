@@ -10,6 +10,7 @@
 
 #include "cli/live.hpp"
 #include "cli/other_hosts.hpp"
+#include "cli/port_name.hpp"
 #include "cli/verbs.hpp"
 #include "rules/text/names.hpp"
 
@@ -61,7 +62,9 @@ void add_deactivate(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<DeactivateOptions>();
   CLI::App* verb =
       app.add_subcommand("deactivate", "End the activity of a source whose process is gone");
-  verb->add_option("SOURCE", options->source, "An output port's name")->required();
+  verb->add_option("SOURCE", options->source, "An output port's name")
+      ->required()
+      ->check(name_of_port());
   add_instance_option(*verb, options->instance);
   verb->footer(R"(Example:
   arbiter deactivate /collision:o

@@ -12,6 +12,7 @@
 
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
+#include "cli/port_name.hpp"
 #include "cli/pub_payload.hpp"
 #include "cli/pub_takers.hpp"
 #include "cli/pub_type.hpp"
@@ -187,7 +188,9 @@ void add_payload_options(CLI::App& verb, PayloadOptions& payload) {
 void add_pub(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<PubOptions>();
   CLI::App* verb = app.add_subcommand("pub", "Publish on an output port");
-  verb->add_option("PORT", options->port, "The output port's name")->required();
+  verb->add_option("PORT", options->port, "The output port's name")
+      ->required()
+      ->check(name_of_port());
   verb->add_option("--rate", options->rate_hz, "Samples in a second (default 1)")
       ->type_name("HZ")
       ->check(number_between(1e-3, 1e6));

@@ -9,7 +9,6 @@
 #include <memory>
 #include <sstream>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -18,14 +17,13 @@
 #include "cli/flight_recorder.hpp"
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
+#include "cli/port_patterns.hpp"
 #include "cli/recording_info.hpp"
 #include "cli/shell_word.hpp"
 #include "cli/verbs.hpp"
 #include "recorder/recorder.hpp"
-#include "rules/model/quantifiers.hpp"
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
-#include "shm/utf8.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -64,34 +62,13 @@ std::string typed_command() {
   return text;
 }
 
-// A pattern that matches nothing may be meant for what is yet to come, or be misspelt.
-template <class Port>
-void warn_without_match(const std::string& option, const std::string& pattern,
-                        const std::vector<Port>& ports, const std::string& what) {
-  std::vector<std::string_view> names;
-  for (const Port& port : ports) {
-    if (rules::matches(pattern, port.name)) return;
-    names.push_back(port.name);
-  }
-  const auto similar = rules::find_similar(pattern, names);
-  std::cerr << "arbiter: warning: " + option + ' ' + shm::printable(shell_word(pattern)) +
-                   " matches no " + what + " that is open or in the model in force" +
-                   (similar ? "; did you mean " + rules::quote(shm::printable(*similar)) + '?'
-                            : "") +
-                   '\n';
-}
-
 void warn_of_patterns_without_port(const RecordOptions& options) {
   const bool has_pattern = options.payloads != "all" && options.payloads != "none";
   if (options.ports.empty() && !has_pattern) return;
   try {
     const wire::Status status = fetch_status("record", options.instance);
-    for (const std::string& pattern : options.ports) {
-      warn_without_match("--port", pattern, status.inputs, "input port");
-    }
-    if (has_pattern) {
-      warn_without_match("--payloads", options.payloads, status.sources, "output port");
-    }
+    PatternCheck("--port", status).inputs(options.ports);
+    if (has_pattern) PatternCheck("--payloads", status).outputs({options.payloads});
   } catch (const wire::CallError&) {
     // What is wrong, recording will say.
   }
@@ -169,21 +146,6 @@ int record(RecordOptions& options) {
              info_of(settings.caller.instance));
 }
 
-// A time, which may be in minutes: 5min.
-shm::Nanoseconds read_span(const std::string& option, const std::string& text) {
-  constexpr std::string_view kMinutes = "min";
-  constexpr const char* kAdvice =
-      "write a whole number with a unit (ns, us, ms, s or min), such as 500ms, 30s or 5min";
-  const std::size_t digits = text.find_first_not_of("0123456789");
-  const std::string number = text.substr(0, digits);
-  if (number.empty() || number.size() == text.size() || text.substr(digits) != kMinutes) {
-    return read_time(option, text, kAdvice);
-  }
-  const shm::Nanoseconds seconds = read_time(option, number + "s", kAdvice);
-  if (seconds > shm::kMaxTime / 60) throw CLI::ValidationError(option, "is too long");
-  return seconds * 60;
-}
-
 // 64MiB, 500KiB, 1GiB.
 std::size_t read_size(const std::string& text) {
   std::size_t used = 0;
@@ -208,7 +170,7 @@ void add_flight_options(CLI::App& verb, const std::shared_ptr<RecordOptions>& op
       verb.add_option_function<std::string>(
               "--ring",
               [options](const std::string& text) {
-                options->flight.span = read_span("--ring", text);
+                options->flight.span = read_time("--ring", text);
                 if (options->flight.span < 1) {
                   throw CLI::ValidationError("--ring", "must be more than 0s");
                 }
@@ -272,7 +234,7 @@ void add_record(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember({"zstd", "lz4", "none"}));
   verb->add_option_function<std::string>(
           "--duration",
-          [options](const std::string& text) { options->duration = read_span("--duration", text); },
+          [options](const std::string& text) { options->duration = read_time("--duration", text); },
           "End after this time, such as 30s; by default, when interrupted")
       ->type_name("DURATION");
   verb->add_option_function<std::string>(

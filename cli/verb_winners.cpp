@@ -17,6 +17,7 @@
 
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
+#include "cli/port_patterns.hpp"
 #include "cli/verbs.hpp"
 #include "rules/model/quantifiers.hpp"
 #include "rules/text/names.hpp"
@@ -189,7 +190,21 @@ class Announcer {
   DaemonNews news_{"announcing"};
 };
 
-int winners(const WinnersOptions& options) { return Announcer(options, catch_interrupts()).run(); }
+void warn_of_patterns_without_winners(const WinnersOptions& options) {
+  if (options.patterns == WinnersOptions().patterns) return;
+  try {
+    const wire::Status status = fetch_status("winners", options.instance);
+    PatternCheck("--port", status).arbitrated_inputs(options.patterns);
+  } catch (const wire::CallError&) {
+    // It has gone since: when it is there again, the announcer goes on.
+  }
+}
+
+int winners(const WinnersOptions& options) {
+  Announcer announcer(options, catch_interrupts());
+  warn_of_patterns_without_winners(options);
+  return announcer.run();
+}
 
 }  // namespace
 

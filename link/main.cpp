@@ -1,4 +1,6 @@
 // arbiter-link: joins this host's daemon with those of other hosts (docs/hosts.md).
+#include <netdb.h>
+#include <sys/socket.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
@@ -6,24 +8,28 @@
 #include <chrono>
 #include <exception>
 #include <future>
-#include <iostream>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "command_line/durations.hpp"
+#include "command_line/wrong_use.hpp"
 #include "gateway/core/say.hpp"
 #include "gateway/core/stop_signals.hpp"
 #include "link/core/cards.hpp"
 #include "link/link.hpp"
-#include "rules/text/duration.hpp"
+#include "rules/text/names.hpp"
 #include "shm/file_descriptor.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::link {
 namespace {
 
 constexpr std::uint32_t kMaxDomain = 230;  // above it there are no ports
+constexpr int kWrongUse = 2;
 
 std::string host_name() {
   std::array<char, 256> name{};
@@ -33,20 +39,68 @@ std::string host_name() {
 
 // Throws CLI::ValidationError.
 shm::Nanoseconds read_max_age(const std::string& text) {
-  constexpr const char* kAdvice =
-      "write a whole number with a unit (ns, us, ms or s), such as 100ms or 2s";
-  const auto parsed = rules::parse_duration(text, {"", "is zero", "shorten it", kAdvice});
-  if (!parsed.problem.empty()) throw CLI::ValidationError("--max-age", parsed.problem);
-  if (parsed.value == shm::kForever) {
-    throw CLI::ValidationError("--max-age", std::string("may not be forever; ") + kAdvice);
+  const shm::Nanoseconds age = command_line::read_time_above_zero("--max-age", text);
+  if (age == shm::kForever) {
+    throw CLI::ValidationError("--max-age",
+                               std::string("may not be forever; ") + command_line::kTimeAdvice);
   }
-  return parsed.value;
+  return age;
+}
+
+// Throws CLI::ValidationError.
+void require_host_name(const std::string& host) {
+  if (is_host_name(host)) return;
+  throw CLI::ValidationError("--host", "\"" + host + "\" is not a host name: use 1 to " +
+                                           std::to_string(kMaxHostName) +
+                                           " letters, digits, dots, hyphens and underscores");
+}
+
+// Why no address of it is known: an error of getaddrinfo(); 0: one is. DDS takes ADDRESS:PORT, too.
+int find_no_address(const std::string& peer) {
+  const std::size_t colon = peer.find(':');
+  const bool has_port = colon != std::string::npos && colon == peer.rfind(':');
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_DGRAM;
+  addrinfo* found = nullptr;
+  const std::string host = has_port ? peer.substr(0, colon) : peer;
+  const int error = host.empty() ? EAI_NONAME : getaddrinfo(host.c_str(), nullptr, &hints, &found);
+  if (error == 0) freeaddrinfo(found);
+  return error;
+}
+
+// Throws CLI::ValidationError. A name server that cannot be asked now is no wrong use: the network
+// may come later than the link.
+void require_peers(const NetworkOptions& network) {
+  if (network.peers.empty()) return;
+  if (network.interfaces.empty()) {
+    throw CLI::ValidationError("--peer",
+                               "leads nowhere without an --interface, for then nothing leaves this "
+                               "machine; name the network interface that leads to " +
+                                   network.peers.front() + ", such as --interface eth0");
+  }
+  for (const std::string& peer : network.peers) {
+    const int error = find_no_address(peer);
+    if (error == 0) continue;
+    const std::string about = rules::quote(peer);
+    if (error == EAI_NONAME) {
+      throw CLI::ValidationError("--peer", about +
+                                               " is neither an address nor the name of a host that "
+                                               "this machine knows; write its address, such as "
+                                               "192.168.1.12, or put the name into /etc/hosts");
+    }
+    gateway::say(gateway::Level::kWarning,
+                 "the address of --peer " + about + " cannot be found out now (" +
+                     gai_strerror(error) +
+                     "), so that this host is not looked for there; write its address, or put the "
+                     "name into /etc/hosts, and start the link again");
+  }
 }
 
 int run(int argc, char** argv) {
   LinkOptions options;
   options.host = host_name();
   options.version = ARBITER_VERSION;
+  gateway::set_program_name("arbiter-link");
   CLI::App app("Joins the Arbiter of this host with those of other hosts.", "arbiter-link");
   app.set_version_flag("--version", std::string("arbiter-link ") + ARBITER_VERSION);
   app.add_option(
@@ -59,7 +113,8 @@ int run(int argc, char** argv) {
       "A network interface, by name or IPv4 address (repeatable); without it nothing leaves "
       "this machine");
   app.add_option("--peer", options.network.peers,
-                 "The address of a host that multicast does not reach (repeatable)");
+                 "The address of a host that multicast does not reach (repeatable); it needs an "
+                 "--interface");
   app.add_option("--domain", options.network.domain, "The domain of DDS, the same on all hosts")
       ->check(CLI::Range(0U, kMaxDomain))
       ->capture_default_str();
@@ -76,23 +131,23 @@ int run(int argc, char** argv) {
   app.footer(
       "Example:\n  arbiter-link --interface eth0\n\n"
       "Exit codes: 0 ended by SIGINT or SIGTERM; 1 an error; 2 wrong use");
+  app.failure_message(command_line::wrong_use_text);
   try {
     app.parse(argc, argv);
-    if (!is_host_name(options.host)) {
-      throw CLI::ValidationError("--host", "\"" + options.host +
-                                               "\" is not a host name: use 1 to " +
-                                               std::to_string(kMaxHostName) +
-                                               " letters, digits, dots, hyphens and underscores");
-    }
+    options.instance = wire::instance_name(options.instance);
+    require_host_name(options.host);
+    require_peers(options.network);
     if (!max_age.empty()) options.max_age = read_max_age(max_age);
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
     app.exit(error);
-    return 2;
+    return kWrongUse;
+  } catch (const std::invalid_argument& error) {
+    gateway::say(gateway::Level::kError, error.what());
+    return kWrongUse;
   }
   options.network.name = options.host;
-  gateway::set_program_name("arbiter-link");
   const shm::FileDescriptor stop = gateway::catch_stop_signals();
   options.on_round = [] { sd_notify(0, "WATCHDOG=1"); };
   // A program that waits for an answer does not hold up the next link.

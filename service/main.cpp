@@ -15,6 +15,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "command_line/wrong_use.hpp"
 #include "service/daemon.hpp"
 #include "service/log/event.hpp"
 #include "service/log/journal.hpp"
@@ -159,6 +160,7 @@ int run(int argc, char** argv) {
       });
   app.add_option("--log-level", level, "trace, debug, info, warn or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error"}));
+  app.failure_message(arbiter::command_line::wrong_use_text);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

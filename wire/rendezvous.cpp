@@ -217,7 +217,8 @@ std::string instance_name(const std::string& given) {
                       return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.';
                     });
   if (!fine) {
-    throw std::invalid_argument("\"" + name +
+    throw std::invalid_argument(std::string(given.empty() ? "$ARBITER_INSTANCE: " : "") + '"' +
+                                name +
                                 "\" is not a name for an instance: use 1 to 64 letters, digits, "
                                 "'_', '-' or '.', not beginning with '.'");
   }

@@ -10,11 +10,31 @@
 namespace arbiter::rules {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, shm::Nanoseconds>, 4> kUnits{
+constexpr std::string_view kForever = "forever";
+
+// "Forever", "for ever".
+bool is_meant_as_forever(std::string_view text) {
+  std::string small(text);
+  std::transform(small.begin(), small.end(), small.begin(),
+                 [](char each) { return each >= 'A' && each <= 'Z' ? char(each + 32) : each; });
+  return find_similar(small, {kForever}).has_value();
+}
+
+using Unit = std::pair<std::string_view, shm::Nanoseconds>;
+constexpr std::array<Unit, 4> kUnits{
     {{"ns", 1}, {"us", 1'000}, {"ms", 1'000'000}, {"s", 1'000'000'000}}};
+constexpr Unit kMinutes{"min", 60'000'000'000};
+
+// Null: there is none of that name.
+const Unit* find_unit(std::string_view name, bool takes_minutes) {
+  if (takes_minutes && name == kMinutes.first) return &kMinutes;
+  const auto* const unit = std::find_if(kUnits.begin(), kUnits.end(),
+                                        [&](const Unit& each) { return each.first == name; });
+  return unit == kUnits.end() ? nullptr : unit;
+}
 
 // "500ms" for "0.5s"; empty: it is no such fraction, or no whole number of nanoseconds.
-std::string without_fraction(std::string_view text) {
+std::string without_fraction(std::string_view text, bool takes_minutes) {
   constexpr std::string_view kDigits = "0123456789";
   constexpr std::size_t kMostDigits = 9;  // of each part, so that the product fits
   const std::size_t point = text.find_first_not_of(kDigits);
@@ -28,12 +48,11 @@ std::string without_fraction(std::string_view text) {
     number = number * 10 + (text[i] - '0');
     if (i > point) scale *= 10;
   }
-  const auto* const unit = std::find_if(kUnits.begin(), kUnits.end(), [&](const auto& each) {
-    return each.first == text.substr(end);
-  });
-  if (unit == kUnits.end() || number == 0) return {};
+  const Unit* const unit = find_unit(text.substr(end), takes_minutes);
+  if (unit == nullptr || number == 0) return {};
   // In the largest of the smaller units in which it is whole.
-  for (const auto* smaller = unit; smaller-- != kUnits.begin();) {
+  for (auto smaller = kUnits.rbegin(); smaller != kUnits.rend(); ++smaller) {
+    if (smaller->second >= unit->second) continue;
     const shm::Nanoseconds factor = unit->second / smaller->second;
     if (number > shm::kMaxTime / factor) return {};
     if (number * factor % scale == 0) {
@@ -50,24 +69,26 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
     return ParsedDuration{
         0, std::string(words.subject) + quote(text) + " " + why + "; " + std::string(advice)};
   };
-  if (text == "forever") return {shm::kForever, {}};
+  if (text == kForever) return {shm::kForever, {}};
   const bool lacks_zero = text.starts_with('.') || text.starts_with(',');
   if (lacks_zero) return parse_duration("0" + std::string(text), words);
   const std::size_t digits = text.find_first_not_of("0123456789");
-  if (text.empty() || digits == 0) return refuse("is not a whole number with a unit", words.advice);
+  if (text.empty() || digits == 0) {
+    return refuse("is not a whole number with a unit",
+                  is_meant_as_forever(text) ? "did you mean \"forever\"?" : words.advice);
+  }
   if (digits == std::string_view::npos) return refuse("has no unit", words.advice);
 
   const std::string_view unit = text.substr(digits);
-  const auto* known = kUnits.begin();
-  while (known != kUnits.end() && known->first != unit) ++known;
-  if (known == kUnits.end()) {
+  const Unit* const known = find_unit(unit, words.takes_minutes);
+  if (known == nullptr) {
     if (unit.find_first_not_of("0123456789.,") == std::string_view::npos)
       return refuse("has no unit", words.advice);
     if (unit.front() == ' ')
       return refuse("has a blank", "write the unit right behind the number, as in 500ms");
     const bool is_fraction = unit.starts_with('.') || unit.starts_with(',');
     if (!is_fraction) return refuse("has an unknown unit", words.advice);
-    const std::string whole = without_fraction(text);
+    const std::string whole = without_fraction(text, words.takes_minutes);
     return refuse("is a fraction",
                   whole.empty() ? "take a smaller unit" : "write " + whole + " in its place");
   }
@@ -88,7 +109,7 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
 }
 
 std::string to_string(shm::Nanoseconds timeout) {
-  if (timeout == shm::kForever) return "forever";
+  if (timeout == shm::kForever) return std::string(kForever);
   const auto unit = std::find_if(kUnits.rbegin(), kUnits.rend(),
                                  [&](const auto& each) { return timeout % each.second == 0; });
   return std::to_string(timeout / unit->second) + std::string(unit->first);

@@ -285,7 +285,7 @@ TEST(MetricsServer, ListensNowhereElseUnlessItMay) {
   for (const char* address : {"9180", "robot:9180", "127.0.0.1:http", "127.0.0.1:", ":9180",
                               "::1:9180", "127.0.0.1:99999"}) {
     const auto result = arbiter({"metrics", "--listen", address});
-    EXPECT_EQ(result.exit_code, 1) << address;
+    EXPECT_EQ(result.exit_code, 2) << address;
     EXPECT_THAT(result.err, HasSubstr("write ADDRESS:PORT")) << address;
   }
   EXPECT_EQ(arbiter({"metrics", "--allow-remote"}).exit_code, 2);

@@ -6,6 +6,7 @@
 
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/support/child_process.hpp"
+#include "tests/support/daemon.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/text_files.hpp"
 
@@ -266,6 +267,57 @@ TEST(Program, ProvesAModelWithTheSameEffortWhateverTheVerb) {
   }
 }
 
+TEST(Program, SaysThatOptionsGoAfterTheVerb) {
+  const auto error = [](const std::vector<std::string>& arguments) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 2);
+    return result.err;
+  };
+  EXPECT_EQ(error({"--instance", "newcomer", "status"}),
+            "the options of a verb go after it; write: arbiter status --instance newcomer\n"
+            "Run `arbiter status --help` for more information.\n");
+  EXPECT_THAT(error({"--instance", "newcomer"}),
+              HasSubstr("write: arbiter VERB --instance newcomer\n"));
+  EXPECT_THAT(error({"--frob", "status"}), testing::Not(HasSubstr("go after it")));
+}
+
+TEST(Program, ExitsWith2WhereANameCannotBeOne) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
+      {{"status", "--instance", "a/b"}, "--instance: \"a/b\" is not a name for an instance"},
+      {{"pub", "Follow"}, "write \"/Follow\" for \"Follow\""},
+      {{"pub", ""}, "PORT: is empty; write a port's name, such as /Arm/pos:o"},
+      {{"deactivate", "Follow"}, "write \"/Follow\" for \"Follow\""}};
+  for (const auto& [arguments, message] : wrong) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments.front();
+    EXPECT_THAT(result.err, HasSubstr(message));
+  }
+  const ScopedVariable instance("ARBITER_INSTANCE", "a/b");
+  for (const auto& arguments : std::vector<std::vector<std::string>>{
+           {"status"}, {"pub", "/x"}, {"metrics"}, {"winners"}, {"deactivate", "/x"}}) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments.front();
+    EXPECT_THAT(result.err, HasSubstr("$ARBITER_INSTANCE: \"a/b\" is not a name for an instance"));
+  }
+}
+
+// Where they can be read, the verb goes on to look for its daemon.
+TEST(Program, TakesMinutesWhereverItTakesATime) {
+  const TemporaryDirectory directory;
+  const std::vector<std::vector<std::string>> timed = {
+      {"echo", "/p", "--for", "5min"},
+      {"wait", "--until", "idle(/p)", "--timeout", "5min", "--for", "1min"},
+      {"winners", "--every", "5min"},
+      {"record", "--duration", "5min", "-o", directory.path() + "/r.mcap"}};
+  for (auto arguments : timed) {
+    arguments.insert(arguments.end(), {"--instance", "nobody-has-this-instance"});
+    const auto result = arbiter(arguments);
+    EXPECT_THAT(result.err, HasSubstr("no arbiterd of instance")) << arguments.front();
+  }
+  EXPECT_THAT(arbiter({"echo", "/p", "--for", "0.5min"}).err, HasSubstr("write 30s in its place"));
+  EXPECT_THAT(arbiter({"echo", "/p", "--for", "0min"}).err, HasSubstr("\"0min\" is zero"));
+}
+
 // What a source's timeout may be is of no use to whoever writes an option.
 TEST(Program, ATimeIsRefusedInTheWordsOfItsOption) {
   const auto problem = [](const std::vector<std::string>& arguments) {
@@ -280,7 +332,7 @@ TEST(Program, ATimeIsRefusedInTheWordsOfItsOption) {
               HasSubstr("--for: \"0s\" is zero; write at least 1ns"));
   EXPECT_THAT(problem({"top", "--interval", "1h"}),
               HasSubstr("--interval: \"1h\" has an unknown unit; write a whole number with a unit "
-                        "(ns, us, ms or s)"));
+                        "(ns, us, ms, s or min)"));
   EXPECT_THAT(problem({"wait", "--until", "idle(/p)", "--timeout", "0h"}),
               HasSubstr("unknown unit"));
   for (const std::string text : {"1h", "5", "min", "1smin"}) {

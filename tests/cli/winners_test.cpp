@@ -10,6 +10,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "tests/cli/why_program.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/text_files.hpp"
@@ -153,6 +154,19 @@ TEST_F(Winners, AreAnnouncedWhereOnePortCannotBeOpened) {
   EXPECT_EQ(err.find("trying again"), err.rfind("trying again")) << err;
   EXPECT_EQ(err.find("does not mention"), std::string::npos)
       << "nobody need mention these: " << err;
+  program_.signal(SIGINT);
+  EXPECT_EQ(program_.wait(), 0);
+}
+
+TEST_F(Winners, OfAPatternThatMatchesNothingAreNoneAndItSaysSo) {
+  start({"--port", "/gase*", "--port", "/face"});
+  const auto said = [&](const char* text) {
+    return content_of(err_path()).find(text) != std::string::npos;
+  };
+  await([&] { return said("/face is an output port: name an input port"); });
+  EXPECT_TRUE(
+      said("warning: --port '/gase*' matches no input port that the model in force "
+           "arbitrates; did you mean \"/gaze*\"?"));
   program_.signal(SIGINT);
   EXPECT_EQ(program_.wait(), 0);
 }

@@ -276,6 +276,22 @@ TEST_F(Hosts, AMaximumAgeThatIsNoneIsWrongUse) {
   }
 }
 
+TEST(LinkOptions, AreRefusedWhereTheyAreWrong) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> wrong{
+      {{"--peer", "192.0.2.1"}, "--peer: leads nowhere without an --interface"},
+      {{"--interface", "lo", "--peer", "no address"},
+       "--peer: \"no address\" is neither an address nor the name of a host"},
+      {{"--instance", "a/b"}, "\"a/b\" is not a name for an instance"},
+      {{"--intrface", "lo"}, "has no option \"--intrface\"; did you mean \"--interface\"?"}};
+  for (const auto& [options, message] : wrong) {
+    std::vector<std::string> typed{std::string(ARBITER_PROGRAMS) + "/arbiter-link"};
+    typed.insert(typed.end(), options.begin(), options.end());
+    const auto result = run_program(typed);
+    EXPECT_EQ(result.exit_code, 2) << options.front();
+    EXPECT_THAT(result.err, HasSubstr(message));
+  }
+}
+
 TEST_F(Hosts, EachLinkSaysWhatItOffersAndWants) {
   Host head("head", runtime_, kNoRules, network());
   head.see("offers what components of this host will open: nothing yet; imports nothing: ");

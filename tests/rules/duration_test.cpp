@@ -30,6 +30,24 @@ TEST(Duration, IsAWholeNumberWithAUnit) {
   }
 }
 
+TEST(Duration, HasMinutesOnACommandLineOnly) {
+  DurationWords words;
+  words.takes_minutes = true;
+  EXPECT_EQ(parse_duration("5min", words).value, 300'000'000'000);
+  EXPECT_EQ(parse_duration("38430716min", words).value, 2'305'842'960'000'000'000);
+  EXPECT_THAT(parse_duration("38430717min", words).problem, HasSubstr("longer than the limit"));
+  EXPECT_THAT(parse_duration("0min", words).problem, HasSubstr("is zero"));
+  EXPECT_THAT(parse_duration("1.5min", words).problem, HasSubstr("write 90s in its place"));
+  EXPECT_THAT(parse_duration("5min").problem, HasSubstr("unknown unit"));
+}
+
+TEST(Duration, ForeverIsRecognisedWhereItIsMisspelt) {
+  for (const char* const text : {"Forever", "FOREVER", "for ever", "foreve"}) {
+    EXPECT_THAT(parse_duration(text).problem, HasSubstr("; did you mean \"forever\"?")) << text;
+  }
+  EXPECT_THAT(parse_duration("soon").problem, testing::Not(HasSubstr("did you mean")));
+}
+
 TEST(Duration, IsWrittenInTheLargestUnitWithoutAFraction) {
   EXPECT_EQ(to_string(shm::Nanoseconds{500'000'000}), "500ms");
   EXPECT_EQ(to_string(shm::Nanoseconds{2'000'000'000}), "2s");

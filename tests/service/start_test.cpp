@@ -56,6 +56,24 @@ TEST(Start, IsRefusedForWarningsIfItIsStrict) {
   EXPECT_NE(log.find("--strict treats warnings as errors"), std::string::npos) << log;
 }
 
+TEST(Start, SaysWhichOptionItDoesNotKnowAndWhatWasMeant) {
+  const auto result = arbiterd({"--modle", "x"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_EQ(result.err,
+            "arbiterd has no option \"--modle\"; did you mean \"--model\"?\n"
+            "Run `arbiterd --help` for more information.\n");
+}
+
+// Everybody may write to it, and nobody makes it a model by that.
+TEST(Start, IsRefusedForADeviceWithoutAWordAboutWhoMayWriteIt) {
+  const TemporaryDirectory directory;
+  const auto [code, log] =
+      start_in_vain({"--model", "/dev/null"}, {{"RUNTIME_DIRECTORY", directory.path()}});
+  EXPECT_EQ(code, 1);
+  EXPECT_NE(log.find("not a regular file but a device"), std::string::npos) << log;
+  EXPECT_EQ(log.find("open-to-all"), std::string::npos) << log;
+}
+
 TEST(Start, StopsOnAnInterruptToo) {
   Daemon daemon;
   daemon.process().signal(SIGINT);

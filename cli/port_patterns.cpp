@@ -1,0 +1,101 @@
+#include "cli/port_patterns.hpp"
+
+#include <algorithm>
+#include <iostream>
+#include <set>
+
+#include "cli/shell_word.hpp"
+#include "rules/model/quantifiers.hpp"
+#include "rules/text/names.hpp"
+#include "shm/utf8.hpp"
+
+namespace arbiter::cli {
+namespace {
+
+template <class Ports>
+std::vector<std::string_view> names_of(const Ports& ports) {
+  std::vector<std::string_view> names;
+  for (const auto& port : ports) names.push_back(port.name);
+  return names;
+}
+
+// The first of them; null: there is none.
+const std::string_view* match_among(const std::vector<std::string_view>& names,
+                                    const std::string& pattern) {
+  const auto found = std::find_if(names.begin(), names.end(), [&](std::string_view each) {
+    return rules::matches(pattern, each);
+  });
+  return found == names.end() ? nullptr : &*found;
+}
+
+// As much of a name as there is of the pattern in front of its first '*': to the same '/', or
+// within a part as many bytes.
+std::string_view same_beginning(std::string_view name, std::string_view before_star) {
+  if (!before_star.ends_with('/')) return name.substr(0, before_star.size());
+  std::size_t at = 0;
+  for (auto left = std::count(before_star.begin(), before_star.end(), '/'); left > 0; --left) {
+    at = name.find('/', at);
+    if (at == std::string_view::npos) return {};
+    ++at;
+  }
+  return name.substr(0, at);
+}
+
+}  // namespace
+
+std::string similar_pattern(const std::string& pattern,
+                            const std::vector<std::string_view>& names) {
+  const std::size_t star = pattern.find('*');
+  if (star == std::string::npos) return rules::find_similar(pattern, names).value_or("");
+  const std::string_view before = std::string_view(pattern).substr(0, star);
+  std::set<std::string> candidates;
+  for (const std::string_view name : names) {
+    std::string candidate(same_beginning(name, before));
+    if (candidate.empty()) continue;
+    candidate += pattern.substr(star);
+    if (rules::matches(candidate, name)) candidates.insert(std::move(candidate));
+  }
+  return rules::find_similar(pattern, {candidates.begin(), candidates.end()}).value_or("");
+}
+
+void PatternCheck::warn(const std::string& pattern, const std::vector<std::string_view>& names,
+                        const std::vector<std::string_view>& others, const std::string& what,
+                        const std::string& other_what) const {
+  if (match_among(names, pattern) != nullptr) return;
+  std::string text = option_ + ' ' + shm::printable(shell_word(pattern)) + " matches no " + what;
+  if (const std::string_view* const other = match_among(others, pattern)) {
+    text += "; " + shm::printable(std::string(*other)) + " is an " + other_what;
+  } else if (const std::string similar = similar_pattern(pattern, names); !similar.empty()) {
+    text += "; did you mean " + rules::quote(shm::printable(similar)) + '?';
+  }
+  std::cerr << "arbiter: warning: " + text + '\n';
+}
+
+void PatternCheck::inputs(const std::vector<std::string>& patterns) const {
+  for (const std::string& pattern : patterns) {
+    warn(pattern, names_of(status_.inputs), names_of(status_.sources),
+         "input port that is open or in the model in force",
+         "output port: name an input port that it is connected to");
+  }
+}
+
+void PatternCheck::arbitrated_inputs(const std::vector<std::string>& patterns) const {
+  std::vector<std::string_view> names;
+  for (const wire::InputStatus& input : status_.inputs) {
+    if (input.arbitrated) names.push_back(input.name);
+  }
+  for (const std::string& pattern : patterns) {
+    warn(pattern, names, names_of(status_.sources), "input port that the model in force arbitrates",
+         "output port: name an input port that it is connected to");
+  }
+}
+
+void PatternCheck::outputs(const std::vector<std::string>& patterns) const {
+  for (const std::string& pattern : patterns) {
+    warn(pattern, names_of(status_.sources), names_of(status_.inputs),
+         "output port that is open or in the model in force",
+         "input port: name an output port that is connected to it");
+  }
+}
+
+}  // namespace arbiter::cli
