@@ -23,6 +23,7 @@
 #include "rules/ask/report.hpp"
 #include "rules/explain/simulation.hpp"
 #include "rules/explain/trace.hpp"
+#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "shm/picture.hpp"
 #include "watch/instance.hpp"
@@ -49,10 +50,82 @@ NodeOptions node_options(const std::string& instance) {
   return options;
 }
 
+// Who has the input ports open that the model connects the trace's sources to. Looked at anew where
+// a source meets another number of them than before.
+class PlayedPorts {
+ public:
+  explicit PlayedPorts(const std::string& instance) : caller_(caller("play", instance)) {}
+
+  void look() {
+    next_look_ = shm::monotonic_now() + kLookAgain;
+    is_stale_ = false;
+    try {
+      status_ = fetch_status(caller_, kPatience);
+    } catch (const wire::CallError&) {
+      // The daemon has gone, or is busy: what was so is taken to be so.
+    }
+  }
+
+  // `met`: at how many input ports something became of an arrival of the source.
+  void note_arrival(const std::string& source, std::uint32_t met) {
+    const auto known = met_.try_emplace(source, open_inputs_of(source)).first;
+    is_stale_ = std::exchange(known->second, met) != met || is_stale_;
+    if (is_stale_ && shm::monotonic_now() >= next_look_) look();
+  }
+
+  // "not open", "refused"; empty: nothing hinders it.
+  [[nodiscard]] std::string hindrance(const std::string& source, const std::string& port) const {
+    const wire::InputStatus* const input = status_.find_input(port);
+    if (input == nullptr || !input->open) return "not open";
+    const auto* const connection = connection_of(*input, source);
+    return connection != nullptr && connection->mismatch ? "refused" : "";
+  }
+
+  // Of these sources. Ports that refuse them, notices name.
+  void say_what_is_not_open(const std::set<std::string>& sources) const {
+    for (const wire::InputStatus& input : status_.inputs) {
+      std::vector<std::string> connected;
+      for (const std::string& source : sources) {
+        if (connection_of(input, source) != nullptr) connected.push_back(source);
+      }
+      if (input.open || connected.empty()) continue;
+      std::cerr << "arbiter: no component has " + input.name +
+                       " open, which the model connects to " + rules::enumerate(connected) +
+                       ", so that nothing is delivered there\n";
+    }
+  }
+
+ private:
+  // The daemon is not asked more often, and does not hold up the trace for longer.
+  static constexpr shm::Nanoseconds kLookAgain = 1'000'000'000;
+  static constexpr std::chrono::milliseconds kPatience{100};
+
+  static const wire::ConnectionStatus* connection_of(const wire::InputStatus& input,
+                                                     const std::string& source) {
+    const auto found = std::find_if(input.connections.begin(), input.connections.end(),
+                                    [&](const auto& each) { return each.source == source; });
+    return found == input.connections.end() ? nullptr : &*found;
+  }
+
+  [[nodiscard]] std::uint32_t open_inputs_of(const std::string& source) const {
+    return static_cast<std::uint32_t>(std::count_if(
+        status_.inputs.begin(), status_.inputs.end(),
+        [&](const auto& input) { return input.open && connection_of(input, source) != nullptr; }));
+  }
+
+  const wire::Caller caller_;
+  wire::Status status_;
+  std::map<std::string, std::uint32_t> met_;  // by source: at its last arrival
+  bool is_stale_ = false;
+  shm::Nanoseconds next_look_ = 0;
+};
+
 class Player {
  public:
   Player(const PlayOptions& options, const std::vector<rules::TraceEvent>& events)
-      : options_(options), node_("arbiter-play", node_options(options.instance)) {
+      : options_(options),
+        node_("arbiter-play", node_options(options.instance)),
+        played_ports_(options.instance) {
     for (const auto& event : events) {
       if (event.kind == rules::TraceKind::kTick || outputs_.count(event.source) != 0) continue;
       outputs_.emplace(event.source, node_.output_port<std::uint64_t>(event.source))
@@ -70,6 +143,13 @@ class Player {
       if (source && table.knows_source(*source)) continue;
       std::cerr << "arbiter: note: the daemon's model does not know " << name << '\n';
     }
+  }
+
+  void note_what_is_not_open() {
+    played_ports_.look();
+    std::set<std::string> sources;
+    for (const auto& [name, output] : outputs_) sources.insert(name);
+    played_ports_.say_what_is_not_open(sources);
   }
 
   // False: interrupted.
@@ -103,13 +183,19 @@ class Player {
   void play(const rules::TraceEvent& event, shm::Nanoseconds at) {
     if (event.kind == rules::TraceKind::kArrival) {
       ++counter_;
-      outputs_.at(event.source).publish_at(Time(std::chrono::nanoseconds(at)), counter_);
+      const Outcome outcome =
+          outputs_.at(event.source).publish_at(Time(std::chrono::nanoseconds(at)), counter_);
+      played_ports_.note_arrival(event.source,
+                                 outcome.delivered + outcome.discarded + outcome.refused);
     } else if (event.kind == rules::TraceKind::kDeactivation) {
       outputs_.at(event.source).deactivate_at(Time(std::chrono::nanoseconds(at)));
     }
     instance_->update();
     for (const auto& [name, port] : ports_of(event)) {
-      rules::write_outcome(std::cout, {event, name, outcome_at(port, event, at)});
+      rules::PortOutcome outcome = outcome_at(port, event, at);
+      if (is_connected(event, port))
+        outcome.hindrance = played_ports_.hindrance(event.source, name);
+      rules::write_outcome(std::cout, {event, name, std::move(outcome)});
     }
   }
 
@@ -129,7 +215,7 @@ class Player {
     return result;
   }
 
-  // By the live tables and activities, whether or not a component has the port open.
+  // By the live tables and activities: who wins, whether or not a component has the port open.
   [[nodiscard]] rules::PortOutcome outcome_at(shm::PortId port, const rules::TraceEvent& event,
                                               shm::Nanoseconds at) const {
     const shm::DecisionMemory& memory = *instance_->memory();
@@ -147,10 +233,19 @@ class Player {
     return outcome;
   }
 
+  // An arrival, by the model in force.
+  [[nodiscard]] bool is_connected(const rules::TraceEvent& event, shm::PortId port) const {
+    if (event.kind != rules::TraceKind::kArrival) return false;
+    const auto own = instance_->find_source(event.source);
+    const auto table = instance_->memory()->tables().snapshot().table;
+    return own && table.find(*own, port) != shm::kNone;
+  }
+
   const PlayOptions& options_;
   Node node_;
   std::map<std::string, OutputPort<std::uint64_t>> outputs_;
   std::shared_ptr<watch::Instance> instance_;
+  PlayedPorts played_ports_;
   std::map<std::string, shm::Nanoseconds> deactivated_;  // when last
   shm::Nanoseconds last_ = 0;                            // time of the last event
   std::uint64_t counter_ = 0;
@@ -164,6 +259,7 @@ int play(const PlayOptions& options) {
   if (diagnostics.has_errors()) return 1;
   Player player(options, events);
   player.note_unknown_sources();
+  player.note_what_is_not_open();
   rules::write_outcome_header(std::cout);
   if (events.empty() || player.run(events, interrupts)) return 0;
   return std::cout ? interrupted_exit_code(interrupts) : 1;
@@ -182,6 +278,9 @@ void add_play(CLI::App& app, int& exit_code) {
   add_instance_option(*verb, options->instance);
   verb->footer(
       "Example:\n  arbiter play trace.csv --speed 2\n\n"
+      "Beside delivered and discarded, as of arbiter simulate, the decision may be `not open`: no "
+      "component\nhas the input port open; or `refused`: the connection is, as where the types "
+      "differ.\n\n"
       "Exit codes: 0 all published; 1 no daemon, or the trace has errors; 2 wrong use, or a file "
       "that "
       "cannot\nbe read; 130 stopped by Ctrl-C before the end (143 by SIGTERM)");

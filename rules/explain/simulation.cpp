@@ -107,7 +107,10 @@ void write_outcome_header(std::ostream& out) { out << "t_ns,source,destination,d
 
 void write_outcome(std::ostream& out, const OutcomeRow& row) {
   const TraceEvent& event = row.event;
-  const char* decision = row.outcome.delivered ? "delivered" : "discarded";
+  const std::string& hindrance = row.outcome.hindrance;
+  const std::string decision = !hindrance.empty()      ? hindrance
+                               : row.outcome.delivered ? "delivered"
+                                                       : "discarded";
   out << event.at << ',' << (event.kind == TraceKind::kTick ? "-" : to_csv(event.source)) << ','
       << to_csv(row.port) << ',' << (event.kind == TraceKind::kArrival ? decision : "-") << ','
       << (row.outcome.winner.empty() ? "-" : to_csv(row.outcome.winner)) << '\n';

@@ -19,6 +19,9 @@ namespace arbiter::rules {
 struct PortOutcome {
   bool delivered = false;  // of an arrival
   std::string winner;      // the source selected afterwards; empty if none is
+  // Of an arrival at a port of a running daemon: why it gets nothing, whatever the rules decide.
+  // Empty: nothing hinders it.
+  std::string hindrance{};
 };
 
 // A line of the result: t_ns,source,destination,decision,winner.

@@ -2,9 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <arbiter/arbiter.hpp>
+
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/text_files.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -34,6 +37,9 @@ const std::string kTrace =
 
 TEST(Play, DecidesAsSimulateSays) {
   Daemon daemon(kPlayedModel, {.application = kApplication});
+  Node node("test");
+  auto p = node.input_port("/p");
+  auto r = node.input_port("/r");
   const TemporaryDirectory files;
   const auto trace = files.write("trace.csv", kTrace);
   const auto simulated = arbiter({"simulate", files.write("m.xml", kPlayedModel), "--application",
@@ -44,6 +50,43 @@ TEST(Play, DecidesAsSimulateSays) {
   EXPECT_EQ(played.exit_code, 0) << played.err;
   EXPECT_EQ(played.err, "");
   EXPECT_EQ(played.out, simulated.out);
+}
+
+TEST(Play, SaysOfAPortThatNobodyHasOpenThatNothingIsDelivered) {
+  Daemon daemon(kPlayedModel);
+  Node node("test");
+  auto r = node.input_port<double>("/r");  // of another type
+  const TemporaryDirectory files;
+  const auto played = arbiter(
+      {"play", files.write("trace.csv", "t_ns,source,event\n0,/low,\n1,/low,deactivate\n")});
+  EXPECT_EQ(played.exit_code, 0);
+  EXPECT_THAT(played.err, HasSubstr("arbiter: no component has /p open, which the model connects "
+                                    "to /low, so that nothing is delivered there\n"));
+  EXPECT_THAT(played.err, testing::Not(HasSubstr("no component has /r open")));
+  EXPECT_EQ(played.out,
+            "t_ns,source,destination,decision,winner\n"
+            "0,/low,/p,not open,/low\n0,/low,/r,refused,/low\n"
+            "1,/low,/p,-,-\n1,/low,/r,-,-\n");
+}
+
+TEST(Play, NoticesThatAComponentOpensAPort) {
+  Daemon daemon(kPlayedModel);
+  const TemporaryDirectory files;
+  std::string trace = "t_ns,source\n";
+  for (int i = 0; i < 100'000; ++i) trace += std::to_string(i * 10'000'000LL) + ",/low\n";
+  const auto out_path = files.write("out", "");
+  const shm::FileDescriptor out(::open(out_path.c_str(), O_WRONLY | O_CLOEXEC));
+  ChildProcess play({ARBITER_PROGRAMS "/arbiter", "play", files.write("trace.csv", trace)}, {},
+                    {-1, out.get(), -1});
+  const auto has = [&](const char* row) {
+    return content_of(out_path).find(row) != std::string::npos;
+  };
+  await([&] { return has("/low,/p,not open,/low"); });
+  Node node("test");
+  auto p = node.input_port("/p");
+  await([&] { return has("/low,/p,delivered,/low"); });
+  play.signal(SIGINT);
+  EXPECT_EQ(play.wait(), 128 + SIGINT);
 }
 
 // As a shell says of a program that a signal has ended.
