@@ -1,10 +1,13 @@
 #include "cli/changes.hpp"
 
 #include <iostream>
+#include <set>
+#include <string_view>
 
 #include <nlohmann/json.hpp>
 
 #include "cli/live.hpp"
+#include "watch/model_in_force.hpp"
 #include "wire/call.hpp"
 #include "wire/document.hpp"
 
@@ -21,6 +24,59 @@ void write_in_force(const wire::ChangeReport& report) {
   if (report.changes) std::cout << "  " << report.changes->summary << '\n';
 }
 
+void add_files(const wire::LoadedModelStatus& model, std::set<std::string>& files) {
+  files.insert(model.files.begin(), model.files.end());
+  if (model.application) files.insert(*model.application);
+}
+
+// The files of which the daemon speaks.
+std::set<std::string> files_in(const nlohmann::json& report) {
+  std::set<std::string> files;
+  for (const auto& part : report.value("findings", nlohmann::json::array())) {
+    for (const auto& finding : part.value("findings", nlohmann::json::array())) {
+      if (finding.contains("file") && finding["file"].is_string()) files.insert(finding["file"]);
+    }
+  }
+  return files;
+}
+
+bool begins_a_path(const std::string& text, std::size_t at) {
+  return at == 0 || std::string_view(" \n(").find(text[at - 1]) != std::string_view::npos;
+}
+
+// "follow.xml:3:5" in a text becomes "d/follow.xml:3:5".
+void replace_path(std::string& text, const std::string& path, const std::string& by) {
+  const std::string place = path + ':';
+  for (std::size_t at = text.find(place); at != std::string::npos; at = text.find(place, at)) {
+    if (!begins_a_path(text, at)) {
+      at += place.size();
+      continue;
+    }
+    text.replace(at, path.size(), by);
+    at += by.size() + 1;
+  }
+}
+
+// The daemon was given its files in a directory of its own: whoever reads this works in another.
+void name_files_from_here(wire::ChangeReport& report, const nlohmann::json& document,
+                          const std::string& verb, const std::string& instance) {
+  if (report.text.empty() && !report.why) return;
+  try {
+    const wire::Status status = fetch_status(verb, instance);
+    if (status.directory.empty()) return;
+    std::set<std::string> files = files_in(document);
+    for (const wire::LoadedModelStatus& each : status.models) add_files(each, files);
+    for (const std::string& file : files) {
+      if (file.starts_with('/')) continue;
+      const std::string path = watch::path_from_here(file, status.directory);
+      replace_path(report.text, file, path);
+      if (report.why) replace_path(*report.why, file, path);
+    }
+  } catch (const wire::CallError&) {
+    // Who may reload need not be allowed to see where the daemon runs.
+  }
+}
+
 }  // namespace
 
 wire::ChangeReport ask_for_change(const std::string& verb, const std::string& instance,
@@ -33,6 +89,7 @@ wire::ChangeReport ask_for_change(const std::string& verb, const std::string& in
     std::cout << wire::write_document(wire::parse_document(text));
     return report;
   }
+  name_files_from_here(report, wire::parse_document(text), verb, instance);
   std::cerr << report.text;
   if (report.has_errors) {
     std::cerr << "arbiter: refused; nothing has changed\n";

@@ -37,6 +37,8 @@ struct RecordedWinners {
 struct Reign {
   const evidence::WinnerChange* change = nullptr;
   shm::Nanoseconds end = 0;
+  bool is_cut_off = false;  // by the end of the run: how long it went on is not known
+  bool is_of_last_run = false;
 };
 
 std::vector<Reign> reigns_of(const Recorded& recorded, const std::string& pattern) {
@@ -51,9 +53,10 @@ std::vector<Reign> reigns_of(const Recorded& recorded, const std::string& patter
       std::stable_sort(changes.begin(), changes.end(),
                        [](const auto* one, const auto* other) { return one->time < other->time; });
       for (std::size_t i = 0; i < changes.size(); ++i) {
+        const bool is_last = i + 1 == changes.size();
         const shm::Nanoseconds end =
-            i + 1 < changes.size() ? changes[i + 1]->time : std::max(run.end, changes[i]->time);
-        all.push_back({changes[i], end});
+            is_last ? std::max(run.end, changes[i]->time) : changes[i + 1]->time;
+        all.push_back({changes[i], end, is_last, &run == &recorded.runs.back()});
       }
     }
   }
@@ -82,6 +85,13 @@ std::string cause_text(const evidence::WinnerChange& change) {
   return "noticed late";
 }
 
+std::string length_text(const Reign& reign) {
+  const std::string length = "for " + seconds_text(reign.end - reign.change->time);
+  if (!reign.is_cut_off) return length;
+  return length + (reign.is_of_last_run ? ", until the end of the recording"
+                                        : ", until the recording began again");
+}
+
 int show_winners(const RecordedWinners& options) {
   const Recorded recorded = load_for_simulation(options.file);
   warn_of_missed(recorded);
@@ -102,6 +112,7 @@ int show_winners(const RecordedWinners& options) {
           {{"from", clock_text(change.time + offset)},
            {"from_ns", change.time},
            {"to_ns", reign.end},
+           {"cut_off", reign.is_cut_off},
            {"port", change.port},
            {"winner", change.winner.empty() ? ordered_json() : ordered_json(change.winner)},
            {"why", evidence::name_of(change.why)},
@@ -115,8 +126,8 @@ int show_winners(const RecordedWinners& options) {
   for (const Reign& reign : reigns) {
     const evidence::WinnerChange& change = *reign.change;
     out << clock_text(change.time + offset) << "  " << shm::printable(change.port) << "  "
-        << (change.winner.empty() ? "idle" : shm::printable(change.winner)) << "  for "
-        << seconds_text(reign.end - change.time) << ": " << cause_text(change) << '\n';
+        << (change.winner.empty() ? "idle" : shm::printable(change.winner)) << "  "
+        << length_text(reign) << ": " << cause_text(change) << '\n';
   }
   if (reigns.empty()) out << "no arbitrated input port of the recording matches\n";
   std::cout << out.str();
@@ -136,11 +147,11 @@ void add_recorded_winners(CLI::App& parent, int& exit_code) {
   verb->add_option("--port", options->port, "Only at input ports that match this pattern")
       ->type_name("PATTERN");
   verb->add_flag("--json", options->json,
-                 "A list of {from, from_ns, to_ns, port, winner, why, by, generation}");
+                 "A list of {from, from_ns, to_ns, cut_off, port, winner, why, by, generation}");
   verb->footer(
       "Example:\n  arbiter recording winners incident.mcap --at 14:03:07\n\n"
-      "Exit codes: 0 shown; 2 wrong use, a time that is not in the recording, or a file that\n"
-      "cannot be read");
+      "Exit codes: 0 shown; 1 a file that `arbiter record` has not made; 2 wrong use, a time that "
+      "is not in\nthe recording, or a file that cannot be read");
   verb->callback([options, &exit_code] { exit_code = show_winners(*options); });
 }
 

@@ -116,9 +116,24 @@ std::string process_name(const wire::Component& component) {
   return component.node + " (pid " + std::to_string(component.pid) + ")";
 }
 
+// systemd's unit is that of the default instance.
+bool has_unit(const std::string& instance) { return instance == wire::kDefaultInstance; }
+
+std::string start_of_daemon(const std::string& instance) {
+  return has_unit(instance) ? "systemctl start arbiterd, or arbiterd --model FILE"
+                            : "arbiterd --model FILE --instance " + instance;
+}
+
+std::string restart_of_daemon(const std::string& instance) {
+  return has_unit(instance)
+             ? "systemctl restart arbiterd, or start the daemon again as it was started"
+             : "end the daemon, and start it again as it was started, with --instance " + instance;
+}
+
 class Processes {
  public:
-  Processes(const Machine& machine, Findings& found) : machine_(machine), found_(found) {}
+  Processes(const Machine& machine, std::string instance, Findings& found)
+      : machine_(machine), instance_(std::move(instance)), found_(found) {}
 
   void examine(const std::string& name, std::int32_t pid, bool is_daemon) {
     const std::string process = std::to_string(pid);
@@ -137,8 +152,7 @@ class Processes {
            "the program of " + name + " has been replaced since it was started: " + *program,
            "it still runs the old version, which programs of the new one may not "
            "understand",
-           is_daemon ? "systemctl restart arbiterd, or start the daemon again as it "
-                       "was started; components go on meanwhile"
+           is_daemon ? restart_of_daemon(instance_) + "; components go on meanwhile"
                      : "start it again"});
     }
     const auto ours = machine_.read_link("/proc/self/ns/time");
@@ -155,6 +169,7 @@ class Processes {
 
  private:
   const Machine& machine_;
+  const std::string instance_;
   Findings& found_;
   std::set<std::int32_t> seen_;
 };
@@ -171,18 +186,22 @@ void add_strangers(const wire::Status& status, Findings& found) {
   }
 }
 
-Finding silence(const std::string& text) {
+Finding silence(const std::string& text, const std::string& instance) {
   if (text.starts_with("no arbiterd of instance")) {
     return {"no-daemon", text, "no port can be opened, and no model changed",
-            "systemctl start arbiterd, or arbiterd --model FILE"};
+            start_of_daemon(instance)};
   }
+  const auto command = text.find("kill -CONT ");  // at the end, where it is seen to be stopped
   return {"silent-daemon", text, "no port can be opened, and no model changed",
-          "kill -CONT its process if it is stopped (ps -o pid,stat,wchan -C arbiterd); otherwise "
-          "systemctl restart arbiterd: components go on meanwhile"};
+          command != std::string::npos
+              ? text.substr(command)
+              : "kill -CONT its process if it is stopped (ps -o pid,stat,wchan -C arbiterd); "
+                "otherwise " +
+                    restart_of_daemon(instance) + ": components go on meanwhile"};
 }
 
 // By what the daemon says when it turns us away.
-Finding refusal(const std::string& text) {
+Finding refusal(const std::string& text, const std::string& instance) {
   if (text.find("speaks version") != std::string::npos) {
     return {"other-version", "this program and the daemon are of different versions: " + text,
             "no version understands another: components of this version cannot join either",
@@ -190,7 +209,8 @@ Finding refusal(const std::string& text) {
   }
   return {"refused", text, "as this user you see nothing of the instance, or nobody does",
           "where a policy keeps you out, add a line to it: allow user NAME observe; otherwise look "
-          "into the daemon's log: journalctl -u arbiterd"};
+          "into the daemon's log" +
+              std::string(has_unit(instance) ? ": journalctl -u arbiterd" : "")};
 }
 
 }  // namespace
@@ -256,9 +276,9 @@ Findings examine_daemon(const wire::Caller& caller, std::optional<wire::Status>&
     const auto answer = call.ask(question, caller.answer_time);
     status = wire::read_status(wire::read_document(answer.descriptors[0]));
   } catch (const wire::RefusedError& error) {
-    found.push_back(refusal(error.what()));
+    found.push_back(refusal(error.what(), caller.instance));
   } catch (const wire::CallError& error) {
-    found.push_back(silence(error.what()));
+    found.push_back(silence(error.what(), caller.instance));
   } catch (const wire::DocumentError& error) {
     found.push_back(
         {"other-version", std::string("the daemon's status cannot be read: ") + error.what(),
@@ -289,7 +309,7 @@ Findings examine_processes(const Machine& machine, const wire::Status& status) {
          "LimitNOFILE=65536 in the daemon's unit, or ulimit -n 65536 before it is "
          "started"});
   }
-  Processes processes(machine, found);
+  Processes processes(machine, status.instance, found);
   processes.examine("arbiterd (pid " + std::to_string(status.pid) + ")", status.pid, true);
   const auto examine = [&](const auto& ports) {
     for (const auto& port : ports) {

@@ -52,9 +52,10 @@ bool wait_readable(const Caller& caller, int descriptor, std::optional<milliseco
 }
 
 std::string silence_text(const shm::FileDescriptor& socket, const Caller& caller,
-                         Clock::time_point asked) {
+                         Clock::time_point asked, const char* more = "") {
   return describe_daemon(socket.get(), caller.instance) + " runs, but did not answer within " +
-         std::to_string(since(asked).count()) + " ms: it is stopped, or busy";
+         std::to_string(since(asked).count()) + " ms" + more + ": " +
+         describe_silence(socket.get());
 }
 
 class Joining {
@@ -97,7 +98,7 @@ class Joining {
         std::clamp(left, std::min(caller_.answer_time, kMaxAnswerTime), kMaxAnswerTime);
     const std::string whom = describe_daemon(welcome.socket.get(), caller_.instance) + " to answer";
     if (!wait_readable(caller_, welcome.socket.get(), limit, whom, has_told_)) {
-      silence_ = silence_text(welcome.socket, caller_, asked) + "; nothing was asked of it";
+      silence_ = silence_text(welcome.socket, caller_, asked, ", so that nothing was asked of it");
       return false;
     }
     if (receive_message(welcome.socket.get(), welcome.received, false) !=

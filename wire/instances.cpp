@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <fstream>
 #include <memory>
 #include <set>
 #include <string_view>
@@ -24,6 +25,22 @@ bool listens(const std::string& instance) {
   } catch (const std::exception&) {  // what is no name of ours is no daemon of ours
     return false;
   }
+}
+
+// 0: not known, or not to be seen from here.
+pid_t pid_at_other_end(int socket) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  return getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 ? peer.pid : 0;
+}
+
+// By a signal. A debugger that holds it ("t") does not let go of it for another.
+bool is_stopped(pid_t pid) {
+  std::ifstream status("/proc/" + std::to_string(pid) + "/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("State:")) return line.find('T') != std::string::npos;
+  }
+  return false;
 }
 
 }  // namespace
@@ -59,12 +76,15 @@ std::string describe_listening_instances() {
 }
 
 std::string describe_daemon(int socket, const std::string& instance) {
-  ucred peer{};
-  socklen_t size = sizeof peer;
-  const bool is_known =
-      getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 && peer.pid > 0;
-  return "arbiterd" + (is_known ? " (pid " + std::to_string(peer.pid) + ")" : std::string()) +
+  const pid_t pid = pid_at_other_end(socket);
+  return "arbiterd" + (pid > 0 ? " (pid " + std::to_string(pid) + ")" : std::string()) +
          " of instance \"" + instance + "\"";
+}
+
+std::string describe_silence(int socket) {
+  const pid_t pid = pid_at_other_end(socket);
+  if (pid > 0 && is_stopped(pid)) return "it is stopped; run: kill -CONT " + std::to_string(pid);
+  return "it is stopped, or busy";
 }
 
 }  // namespace arbiter::wire

@@ -9,6 +9,7 @@
 
 #include "shm/utf8.hpp"
 #include "wire/document.hpp"
+#include "wire/instances.hpp"
 #include "wire/rendezvous.hpp"
 
 namespace arbiter::wire {
@@ -81,7 +82,8 @@ std::string LinkCall::ask(const LinkQuestion& question) {
   } while (ready < 0 && errno == EINTR);
   if (ready == 0) {
     throw CallError("arbiter-link runs, but did not answer within " +
-                    std::to_string(answer_time_.count()) + " ms: it is stopped, or busy");
+                    std::to_string(answer_time_.count()) +
+                    " ms: " + describe_silence(socket_.get()));
   }
   const Packet packet = receive_packet(socket_.get(), is_sent);
   if (!packet.was_asked) throw NotAskedError(shm::printable(packet.bytes));

@@ -60,6 +60,18 @@ TEST(Pub, FeedsATypedPortWithATypeAndHex) {
   EXPECT_EQ((*sample)->value, 0x0a07060504030201u);
 }
 
+TEST(Pub, SaysWhatToDoWhereTheDaemonIsStopped) {
+  Daemon daemon(kPubModel);
+  daemon.process().stop();
+  const auto result = pub({"/out"});
+  daemon.process().resume();
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("waiting for the arbiterd of instance \"test\" to answer\n"));
+  EXPECT_THAT(result.err, Not(HasSubstr("300 ms")));
+  EXPECT_THAT(result.err, EndsWith("it is stopped; run: kill -CONT " +
+                                   std::to_string(daemon.process().pid()) + "\n"));
+}
+
 TEST(Pub, TakesTheTypeOfAnInputPort) {
   Daemon daemon(kPubModel);
   Node node("test");

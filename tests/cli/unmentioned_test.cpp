@@ -47,6 +47,20 @@ TEST(Unmentioned, APortThatIsOpenTheWrongWayRoundIsNamedAsThat) {
   }
 }
 
+// The daemon was given its files in another directory than this one.
+TEST(Unmentioned, AReloadNamesFilesFromHere) {
+  const TemporaryDirectory files;
+  files.write("follow.xml", kFaceUnlessStop);
+  Daemon daemon(kNoRules, {.arguments = {"--model", "follow.xml"},
+                           .without_model = true,
+                           .by = {"/usr/bin/env", "-C", files.path()}});
+  const std::string whole = files.write("follow.xml", "<behaviors><x/></behaviors>");
+  EXPECT_THAT(arbiter({"reload"}).err, testing::StartsWith(whole + ":1:12: error: <x> is not"));
+  ASSERT_EQ(::unlink(whole.c_str()), 0);
+  EXPECT_THAT(arbiter({"reload", "--dry-run"}).err,
+              HasSubstr("cannot open " + whole + ": No such"));
+}
+
 TEST(Unmentioned, AWatcherSaysThatNobodyHasNamedThePort) {
   Daemon daemon(kFaceUnlessStop);
   const auto result = arbiter({"echo", "/Gaze/po:i", "--for", "1ms"});

@@ -91,7 +91,9 @@ TEST(RecordedWinners, SaysWhoCommandedAtATimeOfTheClock) {
   };
   const std::string low = "1970-01-01 00:00:01.005  /p  /low  for 1.500 s: /low arrived\n";
   const std::string high = "1970-01-01 00:00:02.505  /p  /high  for 0.200 s: /high arrived\n";
-  const std::string again = "1970-01-01 00:00:02.705  /p  /low  for 1.300 s: /high went inactive\n";
+  const std::string again =
+      "1970-01-01 00:00:02.705  /p  /low  for 1.300 s, until the end of the recording: /high went "
+      "inactive\n";
   EXPECT_THAT(winners({}).out,
               testing::AllOf(testing::HasSubstr("/p  idle  for 1.000 s: it was so when the "),
                              testing::EndsWith(low + high + again)));
@@ -101,7 +103,9 @@ TEST(RecordedWinners, SaysWhoCommandedAtATimeOfTheClock) {
   EXPECT_EQ(winners({"--at", "00:00:03", "--port", "/q*"}).out,
             "no arbitrated input port of the recording matches\n");
   EXPECT_THAT(winners({"--at", "00:00:02.6", "--json"}).out,
-              testing::HasSubstr("\"winner\": \"/high\""));
+              testing::AllOf(testing::HasSubstr("\"winner\": \"/high\""),
+                             testing::HasSubstr("\"cut_off\": false")));
+  EXPECT_THAT(winners({"--at", "00:00:03", "--json"}).out, testing::HasSubstr("\"cut_off\": true"));
   for (const char* time : {"00:00:09", "1970-01-02 00:00:02", "nine", "00:00:02.", "2"}) {
     const auto result = winners({"--at", time});
     EXPECT_EQ(result.exit_code, 2) << time;

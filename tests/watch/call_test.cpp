@@ -66,7 +66,8 @@ TEST(Call, OfADaemonThatIsStoppedSaysSo) {
       "arbiterd (pid " + std::to_string(daemon.process().pid()) + ") of instance \"test\"";
   EXPECT_THAT(error_of([&] { wire::Call call(caller); }),
               AllOf(HasSubstr(who + " runs, but did not answer within "),
-                    HasSubstr("nothing was asked of it")));
+                    HasSubstr("nothing was asked of it: it is stopped; run: kill -CONT " +
+                              std::to_string(daemon.process().pid()))));
   EXPECT_THAT(error_of([&] { before.ask(question(MessageKind::kStatus), milliseconds(50)); }),
               HasSubstr(who + " runs, but did not answer within "));
   daemon.process().signal(SIGCONT);

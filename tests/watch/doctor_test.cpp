@@ -267,6 +267,8 @@ TEST(Doctor, FindsThatThereIsNoDaemon) {
   std::optional<wire::Status> status;
   EXPECT_THAT(codes_of(watch::examine_daemon(caller, status)), ElementsAre("no-daemon"));
   EXPECT_FALSE(status);
+  EXPECT_EQ(watch::examine_daemon(caller, status)[0].mend,
+            "arbiterd --model FILE --instance nobody-has-this-instance");
 }
 
 TEST(Doctor, FindsADaemonThatDoesNotAnswer) {
@@ -278,7 +280,9 @@ TEST(Doctor, FindsADaemonThatDoesNotAnswer) {
   const Findings findings = watch::examine_daemon(caller, status);
   daemon.process().resume();
   ASSERT_THAT(codes_of(findings), ElementsAre("silent-daemon"));
-  EXPECT_THAT(findings[0].what, HasSubstr("(pid " + std::to_string(daemon.process().pid()) + ")"));
+  const std::string pid = std::to_string(daemon.process().pid());
+  EXPECT_THAT(findings[0].what, HasSubstr("(pid " + pid + ")"));
+  EXPECT_EQ(findings[0].mend, "kill -CONT " + pid);
 }
 
 TEST(Doctor, FindsThatTheDaemonKeepsAUserOut) {
