@@ -1,4 +1,5 @@
 // arbiter import: a model and a mapping from the parameters of another multiplexer.
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -18,6 +19,7 @@
 #include "rules/ask/report.hpp"
 #include "rules/model/load.hpp"
 #include "rules/prove/compile.hpp"
+#include "rules/text/names.hpp"
 #include "rules/text/text_file.hpp"
 
 namespace arbiter::cli {
@@ -108,7 +110,7 @@ int import(ImportVerbOptions options) {
   require_new_files(options);
   rules::Diagnostics diagnostics;
   const auto files = read_files(options);
-  const auto plan = options.kind == "twist_mux"
+  const auto plan = options.kind == importing::kTwistMux.name
                         ? importing::import_twist_mux(files, options.import, diagnostics)
                         : importing::import_cmd_vel_mux(files, options.import, diagnostics);
   rules::write_text(std::cerr, diagnostics);
@@ -126,6 +128,13 @@ int import(ImportVerbOptions options) {
   if (!options.mapping.empty()) write_output(options.mapping, mapping);
   write_output(options.output, model);
   return 0;
+}
+
+std::string problem_of_kind(std::string& kind) {
+  const std::vector<std::string_view> kinds{importing::kTwistMux.name, importing::kCmdVelMux.name};
+  if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) return "";
+  return "no multiplexer is called " + rules::quote(kind) +
+         rules::advise(kind, kinds, "name twist_mux or cmd_vel_mux");
 }
 
 // A value that would make a file that nobody can read.
@@ -210,7 +219,7 @@ void add_import(CLI::App& app, int& exit_code) {
   verb->add_option("KIND", options->kind, "twist_mux, or cmd_vel_mux (kobuki's, or yocs')")
       ->type_name("")
       ->required()
-      ->check(CLI::IsMember({"twist_mux", "cmd_vel_mux"}));
+      ->check(CLI::Validator(problem_of_kind, ""));
   verb->add_option(
           "YAML", options->files,
           "Files of parameters, of ROS 2 or ROS 1; together they configure one multiplexer")

@@ -102,8 +102,8 @@ std::string in_words(const std::set<std::string>& nodes) {
 
 }  // namespace
 
-NodeParameters::NodeParameters(const std::vector<InputFile>& files,
-                               const std::vector<std::string_view>& wanted, const std::string& node,
+NodeParameters::NodeParameters(const std::vector<InputFile>& files, const MultiplexerKind& kind,
+                               const MultiplexerKind& other, const std::string& node,
                                rules::Diagnostics& diagnostics)
     : node_(node.empty() ? "" : join("", node)) {
   documents_.reserve(files.size());  // sets_ points into them
@@ -112,18 +112,18 @@ NodeParameters::NodeParameters(const std::vector<InputFile>& files,
     auto document = parse_yaml(text, diagnostics);
     if (!document) continue;
     documents_.push_back(std::move(*document));
-    Finder(wanted, sets_, diagnostics).look_in(documents_.back(), "");
+    Finder(kind.parameters, sets_, diagnostics).look_in(documents_.back(), "");
   }
   if (diagnostics.has_errors()) {
     sets_.clear();
   } else {
-    choose(files, wanted, diagnostics);
+    choose(files, kind, other, diagnostics);
   }
 }
 
-void NodeParameters::choose(const std::vector<InputFile>& files,
-                            const std::vector<std::string_view>& wanted,
-                            rules::Diagnostics& diagnostics) {
+void NodeParameters::choose(const std::vector<InputFile>& files, const MultiplexerKind& kind,
+                            const MultiplexerKind& other, rules::Diagnostics& diagnostics) {
+  const std::string wanted = in_words(kind.parameters);
   std::set<std::string> names;
   for (ParameterSet& set : sets_) {
     if (is_pattern(set.node)) set.node.clear();
@@ -131,9 +131,9 @@ void NodeParameters::choose(const std::vector<InputFile>& files,
   }
   const rules::Location start{files.empty() ? "" : files.front().path, 1, 1};
   if (node_.empty() && names.size() > 1) {
-    diagnostics.error("several-nodes", sets_.front().parameters->where,
-                      "several nodes have " + in_words(wanted) + ": " + in_words(names) +
-                          "; choose one with --node");
+    diagnostics.error(
+        "several-nodes", sets_.front().parameters->where,
+        "several nodes have " + wanted + ": " + in_words(names) + "; choose one with --node");
     sets_.clear();
     return;
   }
@@ -148,9 +148,8 @@ void NodeParameters::choose(const std::vector<InputFile>& files,
   if (sets_.empty()) {
     diagnostics.error(names.empty() ? "nothing-to-import" : "no-such-node", start,
                       names.empty()
-                          ? "no node has " + in_words(wanted) +
-                                " here; is this the multiplexer's file of parameters?"
-                          : "the node " + rules::quote(node_) + " has no " + in_words(wanted) +
+                          ? "no node has " + wanted + " here" + where_else(other)
+                          : "the node " + rules::quote(node_) + " has no " + wanted +
                                 " here, but " + in_words(names) + " has; choose that with --node");
     return;
   }
@@ -162,6 +161,20 @@ void NodeParameters::choose(const std::vector<InputFile>& files,
     sets_.clear();
     return;
   }
+}
+
+// What to do where nothing of the kind that is wanted was found.
+std::string NodeParameters::where_else(const MultiplexerKind& other) const {
+  rules::Diagnostics passed_over;  // it is not imported as that
+  for (const YamlNode& document : documents_) {
+    std::vector<ParameterSet> found;
+    Finder(other.parameters, found, passed_over).look_in(document, "");
+    if (found.empty()) continue;
+    const std::string kind(other.name);
+    return ", but " + in_words(other.parameters) + ", as a " + kind +
+           " has; write: arbiter import " + kind;
+  }
+  return "; is this the multiplexer's file of parameters?";
 }
 
 std::optional<Parameter> NodeParameters::find(std::string_view name,

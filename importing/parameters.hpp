@@ -17,6 +17,14 @@ struct InputFile {
   std::string content;
 };
 
+// A multiplexer, and what a set of parameters must have at least one of to be that one's.
+struct MultiplexerKind {
+  std::string_view name;
+  std::vector<std::string_view> parameters;
+};
+inline const MultiplexerKind kTwistMux{"twist_mux", {"topics", "locks"}};
+inline const MultiplexerKind kCmdVelMux{"cmd_vel_mux", {"subscribers"}};
+
 // The parameters of one node that a file has.
 struct ParameterSet {
   std::string node;  // "/robot/twist_mux"; empty: the file leaves it open
@@ -33,11 +41,11 @@ struct Parameter {
 // The parameters of one node, from all files.
 class NodeParameters {
  public:
-  // What a set must have at least one of to be a multiplexer's: "topics" and "locks", say. `node`
-  // chooses where there are several; empty: there must be one. Reports what is wrong, and then has
-  // no sets.
-  NodeParameters(const std::vector<InputFile>& files, const std::vector<std::string_view>& wanted,
-                 const std::string& node, rules::Diagnostics& diagnostics);
+  // Those of a multiplexer of that kind. `node` chooses where there are several; empty: there must
+  // be one. Reports what is wrong, such as files of the other kind, and then has no sets.
+  NodeParameters(const std::vector<InputFile>& files, const MultiplexerKind& kind,
+                 const MultiplexerKind& other, const std::string& node,
+                 rules::Diagnostics& diagnostics);
   NodeParameters(const NodeParameters&) = delete;
   NodeParameters& operator=(const NodeParameters&) = delete;
 
@@ -50,8 +58,9 @@ class NodeParameters {
                                               rules::Diagnostics& diagnostics) const;
 
  private:
-  void choose(const std::vector<InputFile>& files, const std::vector<std::string_view>& wanted,
-              rules::Diagnostics& diagnostics);
+  void choose(const std::vector<InputFile>& files, const MultiplexerKind& kind,
+              const MultiplexerKind& other, rules::Diagnostics& diagnostics);
+  [[nodiscard]] std::string where_else(const MultiplexerKind& other) const;
 
   std::vector<YamlNode> documents_;
   std::vector<ParameterSet> sets_;

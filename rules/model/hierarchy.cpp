@@ -61,13 +61,29 @@ std::size_t Hierarchy::look_up(const Mention& mention) const {
     for (const Behaviour& behaviour : model_.behaviours) known.push_back(behaviour.name);
   }
   const std::string list = known.empty() ? "" : as_list(mention.name);
-  diagnostics_.error(
-      "unknown-name", mention.where,
-      "no behaviour has the name " + quote(mention.name) +
-          (list.empty() ? advise(mention.name, known, "define it, or correct the name")
-                        : "; names are separated by commas: write " + quote(list)),
-      {.behaviour = mention.name});
+  std::string advice = known.empty() ? "" : advice_on_source(mention.name);
+  if (!list.empty()) {
+    advice = "; names are separated by commas: write " + quote(list);
+  } else if (advice.empty()) {
+    advice = advise(mention.name, known, "define it, or correct the name");
+  }
+  diagnostics_.error("unknown-name", mention.where,
+                     "no behaviour has the name " + quote(mention.name) + advice,
+                     {.behaviour = mention.name});
   return kNobody;
+}
+
+// Where a source stands in the place of a behaviour's name; empty: it is none.
+std::string Hierarchy::advice_on_source(const std::string& name) const {
+  if (model_.source_uses.find(name) == nullptr) return {};
+  std::vector<std::string> behaviours;
+  for (const Behaviour& each : model_.behaviours) {
+    const bool connects = std::any_of(each.configs.begin(), each.configs.end(),
+                                      [&](const Config& config) { return config.source == name; });
+    if (connects) behaviours.push_back(quote(each.name));
+  }
+  if (behaviours.empty()) return "; it is a source, which no behaviour connects: name a behaviour";
+  return "; it is a source: name the behaviour that connects it, " + enumerate(behaviours);
 }
 
 // "Rest, Look Around" for "Rest; Look Around", or without a comma; empty: these are not all names.

@@ -44,13 +44,8 @@ bool StatementNames::check_term(const WinnerTerm& term) {
 const StatementNames::Port* StatementNames::find_port(const Mention& mention) {
   const auto port = ports_.find(mention.name);
   if (port == ports_.end()) {
-    std::vector<std::string_view> names;
-    if (may_suggest()) {
-      for (const auto& [name, known] : ports_) names.push_back(name);
-    }
     report("unknown-port", mention,
-           "the model has no input port " + mention.name +
-               advise(mention.name, names, "name one that is arbitrated"),
+           "the model has no input port " + mention.name + advice_on_port(mention.name),
            {.ports = {mention.name}});
     return nullptr;
   }
@@ -61,6 +56,24 @@ const StatementNames::Port* StatementNames::find_port(const Mention& mention) {
              "name a port that is arbitrated",
          {.ports = {mention.name}});
   return nullptr;
+}
+
+std::string StatementNames::advice_on_port(const std::string& name) {
+  std::vector<std::string> connected;
+  if (is_source(name)) {
+    for (const auto& [port, known] : ports_) {
+      const auto& sources = known.sources;
+      const bool has_it = std::find(sources.begin(), sources.end(), name) != sources.end();
+      if (has_it && known.is_arbitrated) connected.push_back(port);
+    }
+    return "; it is an output port: name an input port that is arbitrated" +
+           (connected.empty() ? "" : ", as " + enumerate(connected) + ", which it is connected to");
+  }
+  std::vector<std::string_view> names;
+  if (may_suggest()) {
+    for (const auto& [port, known] : ports_) names.push_back(port);
+  }
+  return advise(name, names, "name one that is arbitrated");
 }
 
 bool StatementNames::check_winner(const std::string& port_name, const Port& port,
@@ -89,7 +102,14 @@ void StatementNames::warn_if_none_wins(const std::string& port_name, const Port&
 }
 
 bool StatementNames::check_source(const Mention& source) {
-  if (std::binary_search(sources_.begin(), sources_.end(), source.name)) return true;
+  if (is_source(source.name)) return true;
+  if (ports_.find(source.name) != ports_.end()) {
+    report("unknown-source", source,
+           source.name + " is an input port, which is never active; name a source, or write idle(" +
+               source.name + ") or winner(" + source.name + ") = SOURCE",
+           {.source = source.name});
+    return false;
+  }
   std::vector<std::string_view> names;
   if (may_suggest()) names.assign(sources_.begin(), sources_.end());
   report("unknown-source", source,
@@ -97,6 +117,10 @@ bool StatementNames::check_source(const Mention& source) {
              advise(source.name, names, "name one that it reads or connects"),
          {.source = source.name});
   return false;
+}
+
+bool StatementNames::is_source(const std::string& name) const {
+  return std::binary_search(sources_.begin(), sources_.end(), name);
 }
 
 void StatementNames::warn_if_unmatched(const Mention& glob) {

@@ -32,6 +32,9 @@ class StatementNames {
  private:
   bool check_term(const WinnerTerm& term);
   const Port* find_port(const Mention& mention);
+  // What to write in place of a name that no input port has.
+  std::string advice_on_port(const std::string& name);
+  [[nodiscard]] bool is_source(const std::string& name) const;
   bool check_winner(const std::string& port_name, const Port& port, const Mention& source);
   void warn_if_none_wins(const std::string& port_name, const Port& port, const Mention& pattern);
   bool check_source(const Mention& source);

@@ -23,7 +23,8 @@ std::size_t size_of(const std::vector<std::string>& names) {
 // Whoever may write a model says who commands.
 void warn_if_all_may_write(const std::string& path, rules::Diagnostics& diagnostics) {
   struct stat status {};
-  if (stat(path.c_str(), &status) != 0 || (status.st_mode & S_IWOTH) == 0) return;
+  if (stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return;  // it is refused
+  if ((status.st_mode & S_IWOTH) == 0) return;
   diagnostics.warning("open-to-all", {path, 1, 1},
                       "every user may write this file, and so decide who commands from the next "
                       "reload on; run: chmod o-w " +

@@ -36,6 +36,15 @@ TEST(Import, WritesAModelThatChecksWithoutWarnings) {
   EXPECT_EQ(printed.out, content_of(folder + "/model.xml"));
 }
 
+TEST(Import, SuggestsTheKindThatWasMeant) {
+  const auto result = arbiter({"import", "twistmux", "mux.yaml"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("no multiplexer is called \"twistmux\"; did you mean "
+                                    "\"twist_mux\"?"));
+  EXPECT_THAT(arbiter({"import", "mux", "mux.yaml"}).err,
+              HasSubstr("; name twist_mux or cmd_vel_mux"));
+}
+
 TEST(Import, ErrorsPointIntoTheFileAndNothingIsWritten) {
   TemporaryDirectory directory;
   const auto yaml = directory.write("mux.yaml", kMux + "- {name: x, topic: x, timeout: 0.5}\n");

@@ -35,6 +35,16 @@ TEST(Parameters, ANamespaceMayBeInTheNameOrAboveIt) {
   }
 }
 
+TEST(Parameters, OfTheOtherMultiplexerAreNamedAsThat) {
+  const auto imported = import_texts(Program::kCmdVelMux, {kTopics});
+  EXPECT_THAT(imported.findings(), ElementsAre("1:1 error nothing-to-import"));
+  EXPECT_THAT(imported.message("nothing-to-import"),
+              HasSubstr("but `topics` or `locks`, as a twist_mux has; write: arbiter import "
+                        "twist_mux"));
+  EXPECT_THAT(import_files({"subscribers: {a: {topic: a}}"}).message("nothing-to-import"),
+              HasSubstr("write: arbiter import cmd_vel_mux"));
+}
+
 TEST(Parameters, APatternLeavesTheNamespaceOpen) {
   const std::string file = "/**: {ros__parameters: {" + kTopics + "}}";
   EXPECT_THAT(import_files({file}).topics(), ElementsAre("/a"));

@@ -147,6 +147,19 @@ TEST(Verdict, NamesThatMeanNothingInTheModelAreErrorsWithTheirPlaces) {
   EXPECT_EQ(result.verdicts[0].statement, "/Object -> true");
 }
 
+TEST(Verdict, APortOfTheOtherKindIsNamedAsThat) {
+  const auto result = judged(arm_and_base(),
+                             "idle(/Nav)\n"
+                             "active(/Arm)\n");
+  ASSERT_EQ(result.diagnostics.items().size(), 2u);
+  EXPECT_THAT(result.diagnostics.items()[0].message,
+              HasSubstr("; it is an output port: name an input port that is arbitrated, as /Base, "
+                        "which it is connected to"));
+  EXPECT_THAT(result.diagnostics.items()[1].message,
+              HasSubstr("/Arm is an input port, which is never active; name a source, or write "
+                        "idle(/Arm) or winner(/Arm) = SOURCE"));
+}
+
 TEST(Verdict, APatternThatNothingMatchesIsAWarning) {
   const auto result = judged(arm_and_base(), "none(/Teleop*)\n");
   ASSERT_EQ(result.diagnostics.items().size(), 1u);
