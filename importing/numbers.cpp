@@ -16,6 +16,16 @@ std::string_view without_sign(std::string_view text) {
   return text;
 }
 
+// Of a number with an exponent ROS 1's reader makes a text, but where it has a point and the
+// exponent a sign.
+bool is_read_differently(std::string_view text) {
+  const std::size_t exponent = text.find_first_of("eE");
+  if (exponent == std::string_view::npos) return false;
+  const std::string_view digits = text.substr(exponent + 1);
+  const bool has_sign = digits.starts_with('+') || digits.starts_with('-');
+  return text.substr(0, exponent).find('.') == std::string_view::npos || !has_sign;
+}
+
 bool are_digits(std::string_view text) {
   return !text.empty() && text.find_first_not_of(kDigits) == std::string_view::npos;
 }
@@ -80,6 +90,11 @@ Number<shm::Nanoseconds> read_seconds(const YamlNode& node) {
   }
   if (error != std::errc()) {
     return {{}, rules::quote(node.text) + " is not a number; write seconds, such as 0.5"};
+  }
+  if (is_read_differently(node.text)) {
+    return {{},
+            rules::quote(node.text) +
+                " is a text to some readers; write it without an exponent, or as in 5.0e-1"};
   }
   const shm::Nanoseconds rounded = std::llround(value * 1e9);
   if (rounded == 0 && value != 0) {

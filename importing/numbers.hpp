@@ -1,5 +1,5 @@
 // Numbers as YAML has them. ROS 1 and ROS 2 read some spellings differently (010, 1_000, 0x10,
-// 1e3); those are errors.
+// 1e3, 5.0e1); those are errors.
 #pragma once
 
 #include <cstdint>

@@ -189,13 +189,14 @@ std::string write_mapping(const Plan& plan, const std::string& model_name) {
     text += comment("lock " + lock.name + ": " + line_of(lock.where), "  ");
     if (!lock.has_heartbeat) {
       text += comment(
-          "It is said once, and counts however late it comes: hence max_age. What is said while no "
-          "gateway runs, or while it is stopped, may be lost.",
+          "It is said once, and counts however late it comes: hence max_age, and no qos, so that a "
+          "lost datagram is repeated. What is said while no gateway runs, or while it is stopped, "
+          "may be lost.",
           "  ");
     }
     text += "  <in" + attribute("topic", lock.topic) + attribute("type", "std_msgs/msg/Bool") +
-            "\n     " + attribute("true", lock.pressed) + attribute("false", lock.released) + qos +
-            (lock.has_heartbeat ? "" : attribute("max_age", kOldestPress)) + "/>\n";
+            "\n     " + attribute("true", lock.pressed) + attribute("false", lock.released) +
+            (lock.has_heartbeat ? qos : attribute("max_age", kOldestPress)) + "/>\n";
   }
   text += '\n';
   text += "  <out" + attribute("port", plan.output_port) + attribute("topic", plan.output_topic) +

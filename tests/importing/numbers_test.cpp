@@ -33,7 +33,8 @@ TEST(Numbers, SecondsAreExactToTheNanosecond) {
       {"+2.5", 2'500'000'000},
       {".25", 250'000'000},
       {"1.", 1'000'000'000},
-      {"5e-1", 500'000'000},
+      {"5.0e-1", 500'000'000},
+      {"2.5e+1", 25'000'000'000},
       {"0.000000001", 1},
       {"0.0", 0},
       {"0", 0},
@@ -54,11 +55,14 @@ TEST(Numbers, WhatIsNoNumberOfSecondsSaysWhy) {
         "1:30", "--1", "+-1", "+", "-", ".", "e5", "true"}) {
     EXPECT_THAT(problem_of_seconds(text), HasSubstr("is not a number")) << text;
   }
+  for (const char* text : {"5e-1", "1e3", "1.0e3", "1E+1"}) {
+    EXPECT_THAT(problem_of_seconds(text), HasSubstr("is a text to some readers")) << text;
+  }
   EXPECT_THAT(problem_of_seconds("010"), HasSubstr("octal"));
   EXPECT_THAT(problem_of_seconds("1e999"), HasSubstr("out of range"));
   EXPECT_THAT(problem_of_seconds("-1e999"), HasSubstr("out of range"));
   EXPECT_THAT(problem_of_seconds("1000000001"), HasSubstr("out of range"));
-  EXPECT_THAT(problem_of_seconds("1e-12"), HasSubstr("less than a nanosecond"));
+  EXPECT_THAT(problem_of_seconds("1.0e-12"), HasSubstr("less than a nanosecond"));
   EXPECT_THAT(problem_of_seconds(""), HasSubstr("no value"));
   EXPECT_THAT(problem_of_seconds("~"), HasSubstr("no value"));
   YamlNode quoted = plain("0.5");

@@ -88,8 +88,9 @@ TEST(TwistMux, AModelIsWrittenForPeople) {
   <in topic="/e_stop" type="std_msgs/msg/Bool"
       true="/e_stop/pressed:o" false="/e_stop/released:o"/>
   <!-- lock pause: a.yaml:6 -->
-  <!-- It is said once, and counts however late it comes: hence max_age. What is said while no
-       gateway runs, or while it is stopped, may be lost. -->
+  <!-- It is said once, and counts however late it comes: hence max_age, and no qos, so that a lost
+       datagram is repeated. What is said while no gateway runs, or while it is stopped, may be
+       lost. -->
   <in topic="/pause" type="std_msgs/msg/Bool"
       true="/pause/pressed:o" false="/pause/released:o" max_age="86400s"/>
 
@@ -228,6 +229,16 @@ TEST(TwistMux, WhoeverItHearsTheGatewayHears) {
   EXPECT_THAT(mapping, HasSubstr("false=\"/l/released:o\" qos=\"system_default\"/>"));
   EXPECT_THAT(importing::write_mapping(*import_mux(topics({kNavigation})).plan, "m.xml"),
               Not(HasSubstr("qos=")));
+}
+
+// What is said once must not be lost with one datagram.
+TEST(TwistMux, ALockWithoutATimeoutIsHeardReliably) {
+  const auto imported = import_mux(
+      "m: {ros__parameters: {use_stamped: false, topics: {a: {topic: a, timeout: 0.5, priority: "
+      "5}}, locks: {l: {topic: l, timeout: 0.0, priority: 9}}}}\n");
+  ASSERT_TRUE(imported.plan);
+  EXPECT_THAT(importing::write_mapping(*imported.plan, "m.xml"),
+              HasSubstr("false=\"/l/released:o\" max_age=\"86400s\"/>"));
 }
 
 TEST(TwistMux, StampedTwistsAreTakenFromTheFile) {
