@@ -229,9 +229,10 @@ std::string daemon_directory() {
   const std::string given = environment("RUNTIME_DIRECTORY");
   if (!given.empty()) return make_safe(given.substr(0, given.find(':')));
   const std::string session = environment("XDG_RUNTIME_DIR");
-  // It may be left over from another session: su keeps the variable, not the directory.
-  if (!session.empty() && access(session.c_str(), F_OK) == 0)
-    return make_safe(session + "/arbiter");
+  // It may be left over from another session, or another user's: su keeps the variable.
+  const bool is_ours =
+      !session.empty() && faccessat(AT_FDCWD, session.c_str(), W_OK | X_OK, AT_EACCESS) == 0;
+  if (is_ours) return make_safe(session + "/arbiter");
   if (may_use_system_directory()) return make_safe(kSystemDirectory);
   return make_safe(temporary_directory(geteuid()));
 }

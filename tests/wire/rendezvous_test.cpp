@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/other_user.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace {
@@ -104,6 +105,13 @@ TEST_F(Rendezvous, TheServiceManagersDirectoryGoesBeforeTheSessions) {
   EXPECT_EQ(daemon_directory(), session + "/arbiter");
   setenv("RUNTIME_DIRECTORY", (given + ":" + session).c_str(), 1);
   EXPECT_EQ(daemon_directory(), given);
+}
+
+TEST_F(Rendezvous, TheSessionsDirectoryIsPassedOverWhereItIsAnotherUsers) {
+  if (!test::may_be_another_user()) GTEST_SKIP() << "only root can become another user";
+  ASSERT_EQ(chmod(directory_.c_str(), 01777), 0);
+  setenv("XDG_RUNTIME_DIR", make("session").c_str(), 1);
+  EXPECT_EQ(test::as_user(test::kNobody, daemon_directory), directory_ + "/arbiter-65534");
 }
 
 TEST_F(Rendezvous, AClientLooksInEachPlaceWhereADaemonMayBeInOrder) {
