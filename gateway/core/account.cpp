@@ -40,6 +40,11 @@ void Account::set_peers(std::uint32_t peers, bool at_least) noexcept {
   at_least_ = at_least;
 }
 
+bool Account::may_have_peers() const noexcept {
+  const std::lock_guard lock(mutex_);
+  return peers_ != 0;
+}
+
 void Account::set_obstacle(std::string_view text) {
   const std::lock_guard lock(mutex_);
   obstacle_ = fitting(text, kMaxReason);

@@ -41,7 +41,7 @@ class Account {
   Count passed;
   Count late;        // too old when the gateway could pass it on
   Count too_large;   // for max_size, or of another size than the type's
-  Count unreadable;  // it could not be read, or its field is none
+  Count unreadable;  // it could not be read, its field is none, or it cannot be of its type
   Count no_slot;     // no memory for it, here or outside
   Count refused;     // by the middleware, when it was sent
   Count idle;        // idle samples sent
@@ -58,6 +58,8 @@ class Account {
   // How many at the other end are matched. Nothing is said of them where nobody has called this.
   // `at_least`: there may be more.
   void set_peers(std::uint32_t peers, bool at_least = false) noexcept;
+  // Whether somebody at the other end is matched, or may be: nobody knows.
+  [[nodiscard]] bool may_have_peers() const noexcept;
   // What keeps the topic from working as a whole, such as "RouDi does not run"; empty: nothing.
   void set_obstacle(std::string_view text);
   // Why a sample was passed over, or an end refused, last: "QoS: the publisher is best effort, this

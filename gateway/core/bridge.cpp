@@ -215,7 +215,7 @@ void Bridge::start(const std::vector<Part*>& opened) {
   for (Part* const part : opened) {
     if (part->incoming) {
       ins.push_back({part->gateway, *part->incoming, part->account});
-      ins_.emplace(part->entry.ports().front()->name, part->incoming.get());
+      for (const Port* port : part->entry.ports()) ins_.emplace(port->name, part->incoming.get());
     }
     if (part->outgoing) outs.push_back({part->gateway, *part->outgoing, part->account});
     if (has_started_) say(Level::kInfo, part->entry.ports().front()->name + " is served now");

@@ -32,13 +32,15 @@ class MaxAge {
   using OfPorts = std::array<shm::Nanoseconds, 2>;  // in the order of Entry::ports()
 
   void set(shm::Nanoseconds age, bool is_forever = false) noexcept { set({age, age}, is_forever); }
-  void set(const OfPorts& ages, bool is_forever) noexcept {
+  // `is_known`: a model in force says so, rather than that T is not known.
+  void set(const OfPorts& ages, bool is_forever, bool is_known = true) noexcept {
     const shm::Nanoseconds shortest = std::min(ages[0], ages[1]);
     age_.store(shortest, std::memory_order_relaxed);
     for (std::size_t i = 0; i < ages.size(); ++i) {
       more_[i].store(ages[i] - shortest, std::memory_order_relaxed);
     }
     is_forever_.store(is_forever, std::memory_order_relaxed);
+    is_known_.store(is_known, std::memory_order_relaxed);
   }
   // Relaxed is enough: a sample may be judged by the T that held when it came or by the next one.
   [[nodiscard]] shm::Nanoseconds get() const noexcept {
@@ -54,11 +56,14 @@ class MaxAge {
   [[nodiscard]] bool is_forever() const noexcept {
     return is_forever_.load(std::memory_order_relaxed);
   }
+  // Whether T is that of the daemon. It is not yet, or not at all for a user that may not observe.
+  [[nodiscard]] bool is_known() const noexcept { return is_known_.load(std::memory_order_relaxed); }
 
  private:
   shm::Atomic<shm::Nanoseconds> age_{shm::kDefaultTimeout};
   std::array<shm::Atomic<shm::Nanoseconds>, 2> more_{};
   shm::Atomic<bool> is_forever_{false};
+  shm::Atomic<bool> is_known_{false};
 };
 
 // How old samples of a source may be, by its name: the same as MaxAge says, of any source.

@@ -63,7 +63,7 @@ void MaxAges::update() {
       ages[i] = max_age_of(timeouts.own, timeouts.of_model, each.entry->max_age);
       is_forever = is_forever && timeouts.own == shm::kForever;
     }
-    each.age->set(ages, is_forever);
+    each.age->set(ages, is_forever, instance_ != nullptr);
   }
 }
 

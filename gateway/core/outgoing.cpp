@@ -69,18 +69,39 @@ void Outgoing::send_waiting(shm::Nanoseconds now) {
       drop_draft();
       continue;
     }
+    Incoming* const in = incoming_of(sample->source());
+    if (in != nullptr && !has_right_header(*in, (*sample)->size())) {
+      drop_draft();
+      continue;
+    }
     account_for(sender_.send(bytes_of(*sample)), (*sample)->size());
     drop_draft();
-    idle_again_.reset();  // somebody commanded: the next idle sample must not wait for its period
-    if (ins_ == nullptr) continue;
-    if (const auto in = ins_->find(sample->source()); in != ins_->end()) in->second->follow(*this);
+    if (in != nullptr) in->follow(*this);
   }
+}
+
+Incoming* Outgoing::incoming_of(std::string_view source) const noexcept {
+  if (ins_ == nullptr) return nullptr;
+  const auto found = ins_->find(source);
+  return found == ins_->end() ? nullptr : found->second;
+}
+
+// Which entries are connected only the model says, which a gateway does not read: who has not let
+// `arbiter check` compare the two learns it here. Such samples never go straight on.
+bool Outgoing::has_right_header(const Incoming& in, std::size_t size) {
+  if (have_one_header(in.entry(), entry_)) return true;
+  account_for(Sender::Result::kUnreadable, size);
+  if (std::exchange(told_, &in) != &in) {
+    account_.set_last_reason("the last has " + header_text(in.entry()) + "; " +
+                             header_advice(in.entry(), entry_));
+  }
+  return false;
 }
 
 void Outgoing::send_idle(shm::Nanoseconds now) {
   // Taken before the look at the port: a reader that comes in between is served the next time.
   const bool has_matched = matched_.exchange(false, std::memory_order_relaxed);
-  if (!port_.idle()) {
+  if (!port_.idle() && !is_unheard_) {
     idle_again_.reset();
     return;
   }
@@ -204,12 +225,12 @@ bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexc
     write_draft();  // the loop may find it in the queue
     drop_draft();
   }
-  if (has_come) idle_again_.reset();  // somebody commands
   // Nobody rings for a port that is disarmed, and the last take may have swallowed a ring and have
   // set a timer again that had expired: what has become idle meanwhile only this look finds. The
   // port is armed: what becomes idle from now on rings.
   const bool has_idle_sample = entry_.idle.kind != Idle::Kind::kNothing;
-  const bool became_idle = has_idle_sample && !has_more_ && !idle_again_ && port_.idle();
+  const bool became_idle =
+      has_idle_sample && !has_more_ && !idle_again_ && (port_.idle() || is_unheard_);
   if (became_idle) idle_again_ = 0;  // it is due
   next_.store(when_next(), std::memory_order_relaxed);
   const bool calls_loop = has_more_ || became_idle;
@@ -226,6 +247,9 @@ shm::Nanoseconds Outgoing::when_next() const noexcept {
 }
 
 void Outgoing::account_for(Sender::Result result, std::size_t size) noexcept {
+  is_unheard_ = result != Sender::Result::kSent;
+  // Somebody commands: the next idle sample must not wait for its period.
+  if (!is_unheard_) idle_again_.reset();
   switch (result) {
     case Sender::Result::kSent:
       account_.passed.add();
@@ -235,6 +259,9 @@ void Outgoing::account_for(Sender::Result result, std::size_t size) noexcept {
     case Sender::Result::kRefused:
     case Sender::Result::kBusy:
       account_.refused.add();
+      return;
+    case Sender::Result::kUnreadable:
+      account_.unreadable.add();
       return;
     case Sender::Result::kNoMemory:
       account_.no_slot.add();

@@ -39,6 +39,7 @@ class Sender {
     kNotReady,  // there is nothing to send it to, such as no RouDi; it is passed over
     kNoMemory,
     kTooLarge,
+    kUnreadable,  // it cannot be a sample of the topic's type
     kRefused,
     kBusy,  // of send_at_once() and send_draft(): it would have to wait
   };
@@ -67,7 +68,7 @@ class Sender {
 };
 
 class Incoming;
-// The `in` entries of a gateway by their sources.
+// The `in` entries of a gateway by their sources, of which an entry may have two.
 using InBySource = std::map<std::string, Incoming*, std::less<>>;
 
 // The type with which an entry's ports are opened.
@@ -93,7 +94,8 @@ class Outgoing {
   [[nodiscard]] int descriptor() { return port_.fd(); }
   // Sends what waits, unless it has waited for longer than its source's T: a gateway that was
   // stopped must not bring old commands to life. And the idle sample where it is due: when the port
-  // has become idle, at the start, after peer_matched(), and every kIdlePeriod while it is idle.
+  // has become idle, at the start, after peer_matched(), and every kIdlePeriod while it is idle. A
+  // port whose winner's last sample could not be sent counts as idle until one is sent.
   // A sample's age is that at which it is sent, and not at `now`: others may have waited meanwhile.
   void run(shm::Nanoseconds now);
   // Before run(): whose samples may go straight on, and what lets the loop run() all. The loop.
@@ -129,6 +131,10 @@ class Outgoing {
  private:
   void send_waiting(shm::Nanoseconds now);
   void send_idle(shm::Nanoseconds now);
+  // The entry from which samples of that source come; null: they come from a component.
+  [[nodiscard]] Incoming* incoming_of(std::string_view source) const noexcept;
+  // False: what comes from that entry has another header, and is counted.
+  [[nodiscard]] bool has_right_header(const Incoming& in, std::size_t size);
   [[nodiscard]] Sender::Result send_in_turn(const Sample<void>& sample,
                                             shm::Nanoseconds stamp) noexcept;
   void send_idle_sample() noexcept;
@@ -148,6 +154,7 @@ class Outgoing {
   std::atomic<bool> loop_waits_{false};  // for the turn; a hint, which nothing depends on
   InputPort<void> port_;
   const InBySource* ins_ = nullptr;
+  const Incoming* told_ = nullptr;  // whose samples have another header, last
   std::function<void()> call_loop_;
   std::optional<Sample<void>> left_;  // taken by a thread that could not send it
   // Of the turn, until it is sent or dropped; or of left_, which the writer had no room for.
@@ -164,6 +171,9 @@ class Outgoing {
   std::atomic<shm::Nanoseconds> next_{shm::kForever};  // when_next()
   bool has_more_ = false;                              // run() has left samples to the next one
   bool has_ended_ = false;
+  // The winner's last sample could not be sent. Whoever obeys would go on with the one before, as
+  // if nobody commanded: so until one is sent it is told what an idle port is.
+  bool is_unheard_ = false;
   std::optional<shm::Nanoseconds> idle_again_;  // when; empty: the port was not idle
 };
 

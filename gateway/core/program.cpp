@@ -12,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "command_line/wrong_use.hpp"
 #include "gateway/core/kept_files.hpp"
 #include "gateway/core/reload.hpp"
 #include "gateway/core/say.hpp"
@@ -257,6 +258,7 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
   app.add_flag("--worker", arguments.is_worker)->group("");
   app.add_option("--files", arguments.files)->group("");
   app.footer(kind.more + kExitCodes);
+  app.failure_message(command_line::wrong_use_text);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

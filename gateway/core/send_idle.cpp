@@ -21,7 +21,25 @@ struct Part {
   const Entry& entry;
   Account account;
   Sender* sender = nullptr;
+  bool is_heard = false;  // sent while somebody may have been matched
 };
+
+// False: it could never be sent.
+bool tell(const Part& part) {
+  const std::uint64_t times = part.account.idle.value();
+  say(times == 0 ? Level::kError : Level::kInfo,
+      (times == 0 ? "idle sample not sent: "
+                  : "idle sample sent " + std::to_string(times) + " times: ") +
+          part.account.state());
+  return times != 0;
+}
+
+void send(Part& part) {
+  const std::vector<std::byte>& sample = part.entry.idle.sample;
+  if (part.sender->send({sample.data(), sample.size()}) != Sender::Result::kSent) return;
+  part.account.idle.add();
+  part.is_heard = part.is_heard || part.account.may_have_peers();
+}
 
 }  // namespace
 
@@ -41,24 +59,17 @@ bool send_idle(const std::vector<Mapping>& mappings, Kind kind, Middleware& midd
   if (parts.empty()) return true;
   middleware.start({}, {});
   const shm::Nanoseconds end = shm::monotonic_now() + time;
-  while (shm::monotonic_now() < end) {
+  do {
     middleware.tend();
-    for (Part& part : parts) {
-      const std::vector<std::byte>& sample = part.entry.idle.sample;
-      if (part.sender->send({sample.data(), sample.size()}) == Sender::Result::kSent) {
-        part.account.idle.add();
-      }
-    }
+    for (Part& part : parts) send(part);
     std::this_thread::sleep_for(kAgain);
-  }
+  } while (shm::monotonic_now() < end);
   bool is_sent = true;
+  for (const Part& part : parts) is_sent = tell(part) && is_sent;
+  // Behind all others: in a journal of many lines this is what somebody has to know.
   for (const Part& part : parts) {
-    const std::uint64_t times = part.account.idle.value();
-    say(times == 0 ? Level::kError : Level::kInfo,
-        (times == 0 ? "idle sample not sent: "
-                    : "idle sample sent " + std::to_string(times) + " times: ") +
-            part.account.state());
-    is_sent = is_sent && times != 0;
+    if (part.is_heard || part.account.idle.value() == 0) continue;
+    say(Level::kWarning, "nobody was there to hear it: no subscriber of " + part.entry.outside());
   }
   middleware.stop();
   return is_sent;

@@ -12,9 +12,10 @@
 
 namespace arbiter::gateway {
 
-// Sends the idle sample of each `out` entry that has one every kAgain, for `time`: whoever
-// subscribes has to be found first. Returns at once where there is none. False: one of them could
-// never be sent, which has been said. Throws what Middleware::sender() throws.
+// Sends the idle sample of each `out` entry that has one every kAgain, for `time`, at least once:
+// whoever subscribes has to be found first. Returns at once where there is none. False: one of them
+// could never be sent, which has been said. That nobody was there to hear one is said, too. Throws
+// what Middleware::sender() throws.
 [[nodiscard]] bool send_idle(const std::vector<Mapping>& mappings, Kind kind,
                              Middleware& middleware, shm::Nanoseconds time);
 

@@ -8,19 +8,9 @@
 
 #include "gateway/core/incoming.hpp"
 #include "gateway/dds/payload.hpp"
+#include "gateway/mapping/encapsulation.hpp"
 
 namespace arbiter::gateway::dds {
-
-// How the data behind an encapsulation header are encoded (RTPS 2.5, 10.2; DDS-XTypes 1.3, 7.6.2).
-enum class Encoding { kUnknown, kXcdr1, kXcdr2 };
-struct Encapsulation {
-  Encoding encoding = Encoding::kUnknown;
-  bool is_big_endian = false;
-  // The fields follow each other, without headers between them. An appendable type of XCDR2 begins
-  // with its length, a mutable one has a header before each field.
-  bool is_plain = false;
-};
-[[nodiscard]] Encapsulation read_encapsulation(Bytes header) noexcept;
 
 class ArrivedSample : public ForeignSample {
  public:
@@ -36,6 +26,11 @@ class ArrivedSample : public ForeignSample {
   // that only the first field certainly does.
   [[nodiscard]] bool has_field_at(std::size_t offset) const noexcept {
     return encapsulation_.is_plain && (offset == 0 || encapsulation_.encoding == Encoding::kXcdr1);
+  }
+
+  // Whether it may be one of a type that has so many bytes of data in plain CDR. It is readable.
+  [[nodiscard]] bool may_have(std::size_t data) const noexcept {
+    return gateway::may_have(encapsulation_, payload_.size - kEncapsulationBytes, data);
   }
 
   [[nodiscard]] std::size_t size() const noexcept override { return payload_.size; }

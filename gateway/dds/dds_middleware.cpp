@@ -15,9 +15,21 @@ constexpr shm::Nanoseconds kOpenAgain = 200'000'000;
 // Cyclone needs some ten for each domain.
 constexpr std::size_t kDescriptorsOfDomain = 32;
 
+// Equal: what one has sent last may be sent by the other. No name has a line break.
+std::string name_of_writer(const Gateway& gateway, const Entry& entry) {
+  const DdsTopic& topic = *entry.dds;
+  std::string name = std::to_string(domain_of(gateway)) + '\n' + topic.name + '\n' + topic.type +
+                     '\n' + entry.port->name + '\n' +
+                     (offered_representation(topic.qos) == Representation::kXcdr2 ? "2" : "1");
+  for (const std::string& partition : topic.qos.partitions) name += '\n' + partition;
+  return name;
+}
+
 }  // namespace
 
-DdsMiddleware::DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& bell) : bell_(bell) {
+DdsMiddleware::DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& bell,
+                             LatchedSamples& latched)
+    : bell_(bell), latched_(latched) {
   hear_cyclone();
   for (const Mapping& mapping : mappings) {
     for (const Gateway& gateway : mapping.gateways) {
@@ -62,7 +74,10 @@ void DdsMiddleware::refuse_circle(const Site& site, const Entry& entry) {
   }
 }
 
-DdsMiddleware::~DdsMiddleware() { DdsMiddleware::stop(); }
+DdsMiddleware::~DdsMiddleware() {
+  DdsMiddleware::stop();
+  for (const auto& [name, out] : latching_) latched_.put(name, out->take_last());
+}
 
 DdsMiddleware::Site& DdsMiddleware::site_of(const Gateway& gateway) {
   return sites_.at(domain_of(gateway));
@@ -78,6 +93,11 @@ Sender& DdsMiddleware::sender(const Gateway& gateway, const Entry& entry, Accoun
   OutTopic& out = outs_.emplace_back(entry, account, bell_);
   out_of_[&entry] = &out;
   add(site_of(gateway), out, account);
+  if (out.latches()) {
+    const std::string name = name_of_writer(gateway, entry);
+    out.begin_with(latched_.take(name));
+    latching_.emplace(name, &out);
+  }
   return out;
 }
 
@@ -89,6 +109,7 @@ void DdsMiddleware::start(const std::vector<OpenIn>& ins, const std::vector<Open
     add(site_of(in.gateway), *added.back(), in.account);
   }
   if (!started_) {
+    latched_.clear();
     // One tick before there is a reader: see StallGuard.
     guard_.tick(shm::monotonic_now());
     stall_thread_.emplace(guard_, bell_);

@@ -14,6 +14,7 @@
 #include "gateway/core/stall_thread.hpp"
 #include "gateway/dds/domain.hpp"
 #include "gateway/dds/in_topic.hpp"
+#include "gateway/dds/latched_samples.hpp"
 #include "gateway/dds/low_descriptors.hpp"
 #include "gateway/dds/out_topic.hpp"
 #include "gateway/mapping/mapping.hpp"
@@ -22,11 +23,11 @@ namespace arbiter::gateway::dds {
 
 class DdsMiddleware : public Middleware {
  public:
-  // Keeps references into the mappings. `bell`: rings where tend() has
-  // something to do. Throws DdsError: two
-  // gateways of one domain are configured differently, a topic goes out and comes in again within
-  // the domain that the environment names, ROS_DOMAIN_ID is no number.
-  DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& bell);
+  // Keeps references into the mappings. `bell`: rings where tend() has something to do. `latched`:
+  // of the one before, and for the next one. Throws DdsError: two gateways of one domain are
+  // configured differently, a topic goes out and comes in again within the domain that the
+  // environment names, ROS_DOMAIN_ID is no number.
+  DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& bell, LatchedSamples& latched);
   ~DdsMiddleware() override;
 
   Sender& sender(const Gateway& gateway, const Entry& entry, Account& account) override;
@@ -63,11 +64,13 @@ class DdsMiddleware : public Middleware {
   static void subscribe_again(Site& site);
 
   const Bell& bell_;
+  LatchedSamples& latched_;
   LowDescriptors low_descriptors_;
   StallGuard guard_;
   std::optional<StallThread> stall_thread_;
   std::map<dds_domainid_t, Site> sites_;
   std::list<OutTopic> outs_;
+  std::map<std::string, OutTopic*> latching_;  // as LatchedSamples knows them
   std::map<const Entry*, OutTopic*> out_of_;
   std::list<InTopic> ins_;
   bool started_ = false;

@@ -9,6 +9,7 @@
 #include "gateway/core/say.hpp"
 #include "gateway/dds/opaque_type.hpp"
 #include "gateway/dds/quota.hpp"
+#include "gateway/mapping/encapsulation.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::gateway::dds {
@@ -61,6 +62,7 @@ void EndPoint::open() {
   seen_.reset();
   const std::lock_guard lock(in_use_);
   end_ = std::move(made);
+  begin();
 }
 
 void EndPoint::close() noexcept {
@@ -73,10 +75,16 @@ void EndPoint::close() noexcept {
   topic_entity_ = Entity();
 }
 
+std::string EndPoint::wrong_size(std::size_t bytes) const {
+  return "the last has " + std::to_string(bytes) + (bytes == 1 ? " byte; " : " bytes; ") +
+         entry_.type->name + " has " +
+         std::to_string(padded(kEncapsulationBytes + topic_.size.value_or(0)));
+}
+
 void EndPoint::look_at(const PeersOfTopic& peers) {
   if (is_open()) choose_durability();
   // Strangers may be many, and come and go: each is looked at when something has changed.
-  if (seen_ != peers.revision) {
+  if (seen_ != peers.revision || why_less_durable_ != why_less_durable()) {
     choose_kind(peers.ends);
     if (!is_open()) return;
     adopt_type_hash(peers.ends);
@@ -89,18 +97,19 @@ void EndPoint::look_at(const PeersOfTopic& peers) {
 }
 
 // Where the mapping does not say whether the type has a key, who is there says it: without this,
-// they would never match, and nothing in DDS says why. As long as one peer has the kind that this
-// end has, it stays. Who is in another partition is not meant.
+// they would never match, and nothing in DDS says why. As long as no more peers have the other
+// kind, this end keeps its own. Who is in another partition is not meant. The types of ROS 2 have
+// no keys: one stray end that has one must not keep the gateway from all others.
 void EndPoint::choose_kind(const PeerMap& peers) {
-  if (topic_.qos.keyed) return;
-  bool like_us = false;
-  bool other = false;
+  if (topic_.qos.keyed || topic_.is_ros) return;
+  std::size_t like_us = 0;
+  std::size_t others = 0;
   for (const auto& [guid, peer] : peers) {
     if (peer.end == which_ || peer.type != topic_.type) continue;
     if (!may_meet(topic_.qos, peer.qos)) continue;
-    (peer.keyed == keyed_ ? like_us : other) = true;
+    ++(peer.keyed == keyed_ ? like_us : others);
   }
-  if (like_us || !other) return;
+  if (others <= like_us) return;
   keyed_ = !keyed_;
   close();
   open();
@@ -152,8 +161,10 @@ void EndPoint::find_obstacles(const PeersOfTopic& peers) {
     }
   }
   warnings_.set(std::move(warnings), peers.ends);
-  if (topic_.qos.durability != entry_.dds->qos.durability) {
-    obstacles_.emplace_back("samples published before are not taken, because T is not forever");
+  why_less_durable_ = why_less_durable();
+  if (!why_less_durable_.empty()) {
+    obstacles_.push_back("samples published before are not taken, because " +
+                         std::string(why_less_durable_));
   }
   if (peers.has_more()) obstacles_.emplace_back("there are more ends than the gateway looks at");
   obstacles_.insert(obstacles_.end(), std::make_move_iterator(others.begin()),

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "gateway/core/account.hpp"
@@ -46,8 +47,12 @@ class EndPoint {
   // Makes the reader or the writer. `type`: what Cyclone knows the topic's samples by.
   [[nodiscard]] virtual Entity make(dds_entity_t participant, dds_entity_t topic,
                                     const ddsi_sertype* type, const dds_qos_t* qos) = 0;
+  // It is open, and in use by this call.
+  virtual void begin() noexcept {}
   // What it asks for now; the mapping's, if it may have that.
   [[nodiscard]] virtual Durability durability() const { return entry_.dds->qos.durability; }
+  // Why that is less than the mapping's: "T is not forever".
+  [[nodiscard]] virtual std::string_view why_less_durable() const { return {}; }
   // How many peers Cyclone has matched.
   [[nodiscard]] virtual std::uint32_t matched() const = 0;
 
@@ -56,6 +61,9 @@ class EndPoint {
   [[nodiscard]] std::mutex& in_use() const { return in_use_; }
   [[nodiscard]] const Entry& entry() const { return entry_; }
   [[nodiscard]] Account& account() const { return account_; }
+  // Of a sample of so many bytes that cannot be of a type whose size is known: "the last has 8
+  // bytes; geometry_msgs/msg/Twist has 52".
+  [[nodiscard]] std::string wrong_size(std::size_t bytes) const;
 
  private:
   void open();
@@ -74,6 +82,7 @@ class EndPoint {
   bool keyed_;
   std::string type_hash_;
   std::optional<std::uint64_t> seen_;   // the peers' revision; empty: look at them
+  std::string_view why_less_durable_;   // as it was told last
   std::vector<std::string> obstacles_;  // who does not match, and who goes past Arbiter
   Warnings warnings_;
   Entity topic_entity_;

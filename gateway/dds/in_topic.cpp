@@ -1,10 +1,8 @@
 #include "gateway/dds/in_topic.hpp"
 
 #include <chrono>
-#include <string>
 #include <utility>
 
-#include "gateway/dds/arrived_sample.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::gateway::dds {
@@ -34,6 +32,12 @@ Durability InTopic::durability() const {
                                                          : Durability::kVolatile;
 }
 
+std::string_view InTopic::why_less_durable() const {
+  if (durability() == EndPoint::durability()) return {};
+  if (entry().max_age) return "the entry has a max_age";
+  return std::as_const(incoming_).max_age().is_known() ? "T is not forever" : "T is not known";
+}
+
 std::uint32_t InTopic::matched() const {
   dds_subscription_matched_status_t status{};
   if (dds_get_subscription_matched_status(end().get(), &status) < 0) return 0;
@@ -44,13 +48,56 @@ std::uint32_t InTopic::matched() const {
 // stopped, comes through here: the guard knows how long that can have been.
 void InTopic::take(const Payload& payload, const SampleWriter& /*writer*/) noexcept {
   const ArrivedSample sample(payload);
-  const auto& choice = entry().choice;
-  if (!sample.is_readable() || (choice && !sample.has_field_at(choice->offset))) {
+  Fault fault = fault_of(sample);
+  if (fault != Fault::kNone) {
     incoming_.fail();
-    return;
+  } else {
+    const shm::Nanoseconds deadline = guard_.deadline(watch_, shm::monotonic_now());
+    fault = fault_of(incoming_.deliver(sample, Time(std::chrono::nanoseconds(deadline))));
   }
-  const shm::Nanoseconds deadline = guard_.deadline(watch_, shm::monotonic_now());
-  incoming_.deliver(sample, Time(std::chrono::nanoseconds(deadline)));
+  if (fault != Fault::kNone) tell(fault, sample.size());
+}
+
+// What cannot be of the entry's type must not win: whoever obeys the topic would drop it, and go on
+// with the last command.
+InTopic::Fault InTopic::fault_of(const ArrivedSample& sample) const noexcept {
+  if (!sample.is_readable()) return Fault::kHeader;
+  if (const auto& size = topic().size; size && !sample.may_have(*size)) return Fault::kSize;
+  const auto& choice = entry().choice;
+  return choice && !sample.has_field_at(choice->offset) ? Fault::kEncoding : Fault::kNone;
+}
+
+InTopic::Fault InTopic::fault_of(Incoming::Fate fate) const noexcept {
+  if (fate == Incoming::Fate::kTooLarge) return Fault::kTooLarge;
+  if (fate != Incoming::Fate::kUnreadable) return Fault::kNone;
+  return entry().choice ? Fault::kField : Fault::kCut;
+}
+
+void InTopic::tell(Fault fault, std::size_t size) noexcept {
+  if (fault == told_fault_ && size == told_size_) return;
+  told_fault_ = fault;
+  told_size_ = size;
+  account().set_last_reason(sentence(fault, size));
+}
+
+std::string InTopic::sentence(Fault fault, std::size_t size) const {
+  switch (fault) {
+    case Fault::kNone:
+      return "";
+    case Fault::kHeader:
+      return "the last does not begin with an encapsulation header of DDS";
+    case Fault::kSize:
+      return wrong_size(size);
+    case Fault::kEncoding:
+      return "the last is encoded so that its field may stand elsewhere";
+    case Fault::kField:
+      return "the field of the last chooses neither source";
+    case Fault::kCut:
+      return "the last is not whole";
+    case Fault::kTooLarge:
+      break;
+  }
+  return does_not_fit(entry(), size);
 }
 
 }  // namespace arbiter::gateway::dds

@@ -1,8 +1,13 @@
 // An `in` entry: what is published on a topic of DDS becomes arrivals at output ports.
 #pragma once
 
+#include <cstddef>
+#include <string>
+#include <string_view>
+
 #include "gateway/core/freshness.hpp"
 #include "gateway/core/incoming.hpp"
+#include "gateway/dds/arrived_sample.hpp"
 #include "gateway/dds/end_point.hpp"
 #include "gateway/dds/reader_cache.hpp"
 
@@ -19,14 +24,25 @@ class InTopic : public EndPoint, private SampleTaker {
               const dds_qos_t* qos) override;
   // Samples from before it came are old: they may be arrivals only where T is forever.
   [[nodiscard]] Durability durability() const override;
+  [[nodiscard]] std::string_view why_less_durable() const override;
   [[nodiscard]] std::uint32_t matched() const override;
   // On Cyclone's threads.
   void take(const Payload& payload, const SampleWriter& /*writer*/) noexcept override;
+  // Why a sample is passed over.
+  enum class Fault { kNone, kHeader, kSize, kEncoding, kField, kCut, kTooLarge };
+  [[nodiscard]] Fault fault_of(const ArrivedSample& sample) const noexcept;
+  [[nodiscard]] Fault fault_of(Incoming::Fate fate) const noexcept;
+  void tell(Fault fault, std::size_t size) noexcept;
+  [[nodiscard]] std::string sentence(Fault fault, std::size_t size) const;
 
   Incoming& incoming_;
   const StallGuard& guard_;
   const StallGuard::Watch& watch_;
   const Bell& bell_;
+  // Told last: whoever sends many bad samples has one sentence made, and not one for each. Of
+  // take(), which Cyclone calls for one sample at a time.
+  Fault told_fault_ = Fault::kNone;
+  std::size_t told_size_ = 0;
   ReaderCache cache_;
 };
 

@@ -4,6 +4,7 @@
 #include "gateway/core/program.hpp"
 #include "gateway/dds/dds_middleware.hpp"
 #include "gateway/dds/freed_memory.hpp"
+#include "gateway/dds/latched_samples.hpp"
 
 int main(int argc, char** argv) {
   using namespace arbiter;
@@ -14,8 +15,9 @@ int main(int argc, char** argv) {
       "The domain is the mapping's, or ROS_DOMAIN_ID, or 0. Cyclone DDS reads CYCLONEDDS_URI.\n"
       "Example:\n"
       "  arbiter-gateway-dds /etc/arbiter/ros2.xml"};
+  gateway::dds::LatchedSamples latched;
   return gateway::run_program(
-      argc, argv, kind, [](const gateway::Settings& settings, const gateway::Bell& bell) {
-        return std::make_unique<gateway::dds::DdsMiddleware>(settings.mappings, bell);
+      argc, argv, kind, [&](const gateway::Settings& settings, const gateway::Bell& bell) {
+        return std::make_unique<gateway::dds::DdsMiddleware>(settings.mappings, bell, latched);
       });
 }

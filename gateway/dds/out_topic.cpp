@@ -4,8 +4,8 @@
 #include <string>
 #include <utility>
 
-#include "gateway/dds/arrived_sample.hpp"
 #include "gateway/dds/opaque_type.hpp"
+#include "gateway/mapping/encapsulation.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::gateway::dds {
@@ -13,7 +13,21 @@ namespace arbiter::gateway::dds {
 OutTopic::OutTopic(const Entry& entry, Account& account, const Bell& bell)
     : EndPoint(End::kWriter, entry, account),
       bell_(bell),
-      representation_(offered_representation(entry.dds->qos)) {}
+      representation_(offered_representation(entry.dds->qos)),
+      has_idle_sample_(entry.idle.kind != Idle::Kind::kNothing) {}
+
+bool OutTopic::latches() const {
+  return entry().dds->qos.durability == Durability::kTransientLocal;
+}
+
+LastSample OutTopic::take_last() noexcept { return has_idle_sample_ ? nullptr : std::move(last_); }
+
+// A copy: the last one is of the end before.
+void OutTopic::begin() noexcept {
+  if (!last_) return;
+  Payload* const again = make_payload(type_, {last_->bytes(), last_->size});
+  if (again != nullptr) static_cast<void>(write(*again));  // nobody is there yet for it to wait for
+}
 
 Entity OutTopic::make(dds_entity_t participant, dds_entity_t topic, const ddsi_sertype* type,
                       const dds_qos_t* qos) {
@@ -95,22 +109,32 @@ void OutTopic::drop_draft() noexcept {
 }
 
 std::optional<Sender::Result> OutTopic::obstacle(Bytes sample) noexcept {
-  if (!is_open()) return Result::kNotReady;
-  const Encoding encoding = read_encapsulation(sample).encoding;
+  if (!is_open()) {
+    if (has_idle_sample_) last_.reset();  // the idle sample, or the next one, follows
+    return Result::kNotReady;
+  }
+  const Encapsulation encapsulation = read_encapsulation(sample);
   const bool is_xcdr2 = representation_ == Representation::kXcdr2;
-  if (encoding == (is_xcdr2 ? Encoding::kXcdr2 : Encoding::kXcdr1)) return {};
-  return refuse(std::string("a sample does not begin with the encapsulation header of ") +
-                (is_xcdr2 ? "XCDR2" : "XCDR1") +
-                ": who publishes it must send what DDS would (docs/dds.md)");
+  if (encapsulation.encoding != (is_xcdr2 ? Encoding::kXcdr2 : Encoding::kXcdr1)) {
+    return refuse(std::string("a sample does not begin with the encapsulation header of ") +
+                  (is_xcdr2 ? "XCDR2" : "XCDR1") +
+                  ": who publishes it must send what DDS would (docs/dds.md)");
+  }
+  const auto& size = topic().size;
+  if (!size || may_have(encapsulation, sample.size() - kEncapsulationBytes, *size)) return {};
+  account().set_last_reason(wrong_size(sample.size()));
+  return Result::kUnreadable;
 }
 
 Sender::Result OutTopic::write(Payload& payload) noexcept {
   const std::size_t size = payload.size;
+  LastSample sent = latches() ? keep(payload) : nullptr;
   // To send it to nobody takes no time, and says nothing.
   const bool is_measured = size > Pace::kAlways && readers_.load(std::memory_order_relaxed) != 0;
   const shm::Nanoseconds begin = is_measured ? shm::monotonic_now() : 0;
   const dds_return_t written = dds_writecdr(end().get(), &payload.cyclone);
   if (written == DDS_RETCODE_OK) {
+    if (sent) last_ = std::move(sent);
     if (is_measured) pace_.note(size, shm::monotonic_now() - begin);
     return Result::kSent;
   }

@@ -5,11 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "gateway/core/announced.hpp"
 #include "gateway/core/bridge.hpp"
 #include "gateway/core/outgoing.hpp"
 #include "gateway/dds/end_point.hpp"
+#include "gateway/dds/latched_samples.hpp"
 #include "gateway/dds/pace.hpp"
 #include "gateway/dds/payload.hpp"
 
@@ -25,6 +27,14 @@ class OutTopic : public EndPoint, public Sender {
   void tell(Outgoing& outgoing) noexcept { outgoing_.announce(outgoing); }
   void tell_nobody() noexcept { outgoing_.withdraw(); }
 
+  // Whether those who come later are given what was sent last. Each end that is opened later sends
+  // it again, unless the entry has an idle sample and something was to be sent meanwhile.
+  [[nodiscard]] bool latches() const;
+  // Before it is opened.
+  void begin_with(LastSample last) noexcept { last_ = std::move(last); }
+  // For an entry like this. Null: there is none, or whoever begins anew sends the idle sample.
+  [[nodiscard]] LastSample take_last() noexcept;
+
   // Waits a little for subscribers that do not keep up. The gateway's loop.
   [[nodiscard]] Result send(Bytes sample) noexcept override;
   [[nodiscard]] Result send_at_once(Bytes sample) noexcept override;
@@ -37,6 +47,7 @@ class OutTopic : public EndPoint, public Sender {
   Entity make(dds_entity_t participant, dds_entity_t topic, const ddsi_sertype* type,
               const dds_qos_t* qos) override;
   [[nodiscard]] std::uint32_t matched() const override;
+  void begin() noexcept override;
   // On Cyclone's threads.
   void on_matched(const dds_publication_matched_status_t& status) noexcept;
   // Why a sample cannot be written; empty: it can. With in_use(), as the next one.
@@ -48,6 +59,8 @@ class OutTopic : public EndPoint, public Sender {
   const Bell& bell_;
   const Representation representation_;
   const ddsi_sertype* type_ = nullptr;
+  const bool has_idle_sample_;
+  LastSample last_;  // that was sent, if the entry latches; with in_use()
   // Of whoever has the entry's turn, as is note() of the next one.
   Payload* draft_ = nullptr;
   bool is_draft_begun_ = false;  // Cyclone counts references to it

@@ -20,11 +20,11 @@
 #include <cstdint>
 #include <mutex>
 
+#include "gateway/mapping/encapsulation.hpp"
+
 struct nn_rdata;
 
 namespace arbiter::gateway::dds {
-
-inline constexpr std::size_t kEncapsulationBytes = 4;
 
 struct Payload {
   ddsi_serdata cyclone;     // first: Cyclone knows a payload by this
@@ -45,11 +45,6 @@ struct Payload {
 }
 [[nodiscard]] inline const Payload* payload_of(const ddsi_serdata* data) noexcept {
   return reinterpret_cast<const Payload*>(data);
-}
-
-// RTPS counts in fours: Cyclone reads a sample up to there.
-[[nodiscard]] constexpr std::size_t padded(std::size_t size) noexcept {
-  return (size + 3) & ~std::size_t{3};
 }
 
 class PayloadPool {

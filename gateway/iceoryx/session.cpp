@@ -247,7 +247,8 @@ void Session::take_all(Inlet& inlet) {
       if (std::exchange(inlet.last_header, chunk.header_size() + 1) != chunk.header_size() + 1) {
         account.set_last_reason(
             "chunks have a user header of " + std::to_string(chunk.header_size()) +
-            " bytes; write user_header=\"" + std::to_string(chunk.header_size()) + "\"");
+            " bytes; write user_header=\"" + std::to_string(chunk.header_size()) +
+            "\", also where <out> sends them on");
       }
     } else {
       const auto age = inlet.in.incoming.max_age().get();
@@ -255,7 +256,7 @@ void Session::take_all(Inlet& inlet) {
       const auto fate = inlet.in.incoming.deliver(chunk, deadline);
       if (fate == Incoming::Fate::kTooLarge &&
           std::exchange(inlet.last_size, chunk.size()) != chunk.size()) {
-        account.set_last_reason("the last of " + std::to_string(chunk.size()) + " bytes");
+        account.set_last_reason(does_not_fit(inlet.in.incoming.entry(), chunk.size()));
       }
     }
     inlet.subscriber.release(payload);

@@ -298,7 +298,10 @@ class MappingCheck {
 
   void check_type(const Entry& in, const std::string& source, const Entry& out,
                   const std::string& port) {
-    if (!out.type) return;  // takes anything
+    if (!out.type) {  // takes anything
+      check_header(in, source, out, port);
+      return;
+    }
     const auto describe = [](const std::optional<PortType>& type) {
       if (!type) return std::string("samples without a type");
       return type->name + (type->size == 0 ? "" : " of " + std::to_string(type->size) + " bytes");
@@ -306,12 +309,29 @@ class MappingCheck {
     const bool are_equal = in.type && in.type->name == out.type->name &&
                            in.type->size == out.type->size &&
                            (in.type->size == 0 || in.type->alignment == out.type->alignment);
-    if (are_equal) return;
+    if (are_equal) {
+      check_header(in, source, out, port);
+      return;
+    }
     diagnostics_.error("types-differ", out.where,
                        "the model connects " + source + " to " + port + ", but " + in.outside() +
                            " (" + rules::describe(in.where) + ") brings " + describe(in.type) +
                            ", and " + out.outside() + " takes " + describe(out.type) +
                            "; such ports are not connected: correct one of the types",
+                       {.ports = {port}, .source = source});
+  }
+
+  // A type says nothing of where the payload begins.
+  void check_header(const Entry& in, const std::string& source, const Entry& out,
+                    const std::string& port) {
+    if (have_one_header(in, out)) return;
+    diagnostics_.error("headers-differ", out.where,
+                       "the model connects " + source + " to " + port + ", but " + in.outside() +
+                           " (" + rules::describe(in.where) + ") brings samples with " +
+                           header_text(in) + ", and " + out.outside() + " sends samples with " +
+                           header_text(out) +
+                           ": bytes of the header would be sent as data, or data as a header; " +
+                           header_advice(in, out),
                        {.ports = {port}, .source = source});
   }
 

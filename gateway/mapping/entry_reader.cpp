@@ -1,8 +1,10 @@
 #include "gateway/mapping/entry_reader.hpp"
 
 #include <filesystem>
+#include <span>
 
 #include "gateway/mapping/attributes.hpp"
+#include "gateway/mapping/encapsulation.hpp"
 #include "gateway/mapping/field_reader.hpp"
 #include "gateway/mapping/ros_names.hpp"
 #include "gateway/mapping/topic_reader.hpp"
@@ -13,13 +15,6 @@
 
 namespace arbiter::gateway {
 namespace {
-
-constexpr std::size_t kEncapsulation = 4;  // bytes of DDS's header
-// Encapsulations that DDS-XTypes knows.
-constexpr unsigned kLastPlainCdr = 1;  // big-endian and little-endian
-constexpr unsigned kLastXcdr1 = 3;
-constexpr unsigned kFirstXcdr2 = 6;
-constexpr unsigned kLastXcdr2 = 0xb;
 
 // An attribute that another one needs, or excludes, means a mistake; to pass it over would hide it.
 class EntryReader {
@@ -57,9 +52,9 @@ class EntryReader {
     if (is_dds && entry_.is_in()) {
       reader_.check_attributes(
           element_,
-          {"topic",      "type",    "port",   "true",     "false",     "above", "below",
-           "threshold",  "field",   "offset", "max_size", "max_age",   "qos",   "reliability",
-           "durability", "history", "depth",  "deadline", "partition", "keyed"});
+          {"topic",       "type",       "port",    "true",  "false",    "above",     "below",
+           "threshold",   "field",      "offset",  "size",  "max_size", "max_age",   "qos",
+           "reliability", "durability", "history", "depth", "deadline", "partition", "keyed"});
     } else if (is_dds) {
       reader_.check_attributes(
           element_,
@@ -91,14 +86,12 @@ class EntryReader {
 
   // How many bytes stand before a sample's own data.
   [[nodiscard]] std::size_t header() const {
-    return entry_.dds ? kEncapsulation : entry_.iceoryx->padded_header();
+    return entry_.dds ? kEncapsulationBytes : entry_.iceoryx->padded_header();
   }
 
   void read_type() {
     if (entry_.dds) {
-      entry_.type = PortType{readable_type(entry_.dds->type), 0, 1};
-      known_size_ = fixed_size_of(entry_.type->name);
-      if (known_size_) make_room_for(header() + *known_size_, "type");
+      read_dds_type();
       return;
     }
     const auto size = attributes_.bytes("size", 1, kMaxSampleBytes);
@@ -122,6 +115,30 @@ class EntryReader {
           "invalid-type", "type",
           rules::quote(*name) + " cannot be a type: " + *fault + "; write another name");
     }
+  }
+
+  void read_dds_type() {
+    const std::string name = readable_type(entry_.dds->type);
+    entry_.type = PortType{name, 0, 1};
+    known_size_ = fixed_size_of(name);
+    if (known_size_) make_room_for(header() + *known_size_, "type");
+    // Of `out` also a zero sample's.
+    const auto said =
+        attributes_.bytes("size", 1, entry_.is_in() ? kMaxSampleBytes - header() : kMaxIdleBytes);
+    if (said && has_strings(name)) {
+      attributes_.error("invalid-value", "size",
+                        rules::quote(name) +
+                            " has a string in it, so that its samples have not all one size; "
+                            "remove size=\"…\"");
+    } else if (said && known_size_ && *said != *known_size_) {
+      attributes_.error(
+          "invalid-value", "size",
+          "a " + name + " has " + bytes_text(*known_size_) + "; correct the size, or leave it out");
+    } else if (said) {
+      known_size_ = *said;
+      make_room_for(header() + *said, "size");
+    }
+    entry_.dds->size = known_size_;
   }
 
   // One source, or two that a field chooses between.
@@ -171,14 +188,7 @@ class EntryReader {
 
   void read_idle() {
     const auto text = attributes_.text("idle", 4096);
-    if (!text || *text == "none") {
-      if (entry_.dds && attributes_.has("size")) {
-        attributes_.error("misplaced-attribute", "size",
-                          "size=\"…\" says how large a zero sample is; add idle=\"zero\", or "
-                          "remove it");
-      }
-      return;
-    }
+    if (!text || *text == "none") return;
     if (*text == "zero") {
       read_zero();
     } else if (text->starts_with("file:")) {
@@ -206,9 +216,8 @@ class EntryReader {
 
   void read_zero() {
     if (entry_.dds) {
-      const auto size = size_of_zero();
-      if (!size) return;
-      entry_.idle.sample.resize(kEncapsulation + *size);
+      if (!may_be_zero()) return;
+      entry_.idle.sample.resize(header() + *known_size_);
       const bool is_xcdr2 = entry_.dds->qos.representation == Representation::kXcdr2;
       entry_.idle.sample[1] = is_xcdr2 ? std::byte{7} : std::byte{1};  // little-endian
     } else if (!known_size_) {
@@ -224,31 +233,23 @@ class EntryReader {
 
   // Of a type that has strings or sequences zero bytes are no sample: even an empty string has a
   // length of 1, its final zero.
-  std::optional<std::size_t> size_of_zero() {
+  bool may_be_zero() {
     const std::string& type = entry_.type->name;
-    const auto said = attributes_.bytes("size", 1, kMaxIdleBytes);
     if (has_strings(type)) {
       attributes_.error("idle-size", "idle",
                         rules::quote(type) +
                             " has a string in it, of which zero bytes are no sample; give a "
                             "sample: idle=\"file:…\"");
-      return {};
+      return false;
     }
-    if (said && known_size_ && *said != *known_size_) {
-      attributes_.error(
-          "idle-size", "size",
-          "a " + type + " has " + bytes_text(*known_size_) + "; correct the size, or leave it out");
-      return {};
-    }
-    if (!said && !known_size_) {
+    if (!known_size_) {
       attributes_.error("idle-size", "idle",
                         "how large a zero " + rules::quote(type) +
                             " is cannot be known; if it has no string and no sequence, add "
                             "size=\"BYTES\" (of its CDR, without the header), else give a sample: "
                             "idle=\"file:…\"");
-      return {};
     }
-    return said ? said : known_size_;
+    return known_size_.has_value();
   }
 
   void read_idle_file(std::string_view written) {
@@ -296,10 +297,9 @@ class EntryReader {
       if (!known_size_ || bytes.size() == header() + *known_size_) return {};
       return counted(*known_size_) + ", or correct the size";
     }
-    const auto encapsulation = static_cast<unsigned char>(bytes[1]);
-    const bool is_xcdr1 = encapsulation <= kLastXcdr1;
-    const bool is_xcdr2 = encapsulation >= kFirstXcdr2 && encapsulation <= kLastXcdr2;
-    if (bytes[0] != 0 || !(is_xcdr1 || is_xcdr2)) {
+    const Encapsulation encapsulation = read_encapsulation(std::as_bytes(std::span(bytes)));
+    const bool is_xcdr2 = encapsulation.encoding == Encoding::kXcdr2;
+    if (encapsulation.encoding == Encoding::kUnknown) {
       return "does not begin with the encapsulation header of DDS, such as 00 01 00 00 for "
              "little-endian CDR; write it before the sample";
     }
@@ -310,12 +310,8 @@ class EntryReader {
                       : "is XCDR1, by its encapsulation header, and the entry sends XCDR2; write "
                         "another file, or leave out the representation";
     }
-    if (encapsulation > kLastPlainCdr) return {};  // other encodings add bytes of their own
-    const auto& known = known_size_;
-    const std::size_t own = bytes.size() - header();
-    // It may be padded to a multiple of four, as DDS sends it.
-    if (!known || own == *known || own == (*known + 3) / 4 * 4) return {};
-    return counted(*known);
+    if (!known_size_ || may_have(encapsulation, bytes.size() - header(), *known_size_)) return {};
+    return counted(*known_size_);
   }
 
   rules::ElementReader& reader_;

@@ -99,6 +99,31 @@ std::string Entry::outside() const {
   return {};
 }
 
+bool have_one_header(const Entry& in, const Entry& out) {
+  static const IceoryxTopic none;  // DDS has no user headers
+  const IceoryxTopic& a = in.iceoryx ? *in.iceoryx : none;
+  const IceoryxTopic& b = out.iceoryx ? *out.iceoryx : none;
+  return a.user_header == b.user_header && a.padded_header() == b.padded_header();
+}
+
+std::string header_text(const Entry& entry) {
+  if (!entry.iceoryx || entry.iceoryx->user_header == 0) return "no user header";
+  return "a user header of " + std::to_string(entry.iceoryx->user_header) + " bytes" +
+         (entry.iceoryx->padded_header() == entry.iceoryx->user_header
+              ? ""
+              : ", padded to " + std::to_string(entry.iceoryx->padded_header()));
+}
+
+std::string header_advice(const Entry& in, const Entry& out) {
+  if (!out.iceoryx) return "DDS has no user headers: connect a topic without one";
+  if (!in.iceoryx || in.iceoryx->user_header == 0) return "remove user_header=\"…\" at the <out>";
+  std::string advice = "write user_header=\"" + std::to_string(in.iceoryx->user_header) + "\"";
+  if (in.iceoryx->alignment != out.iceoryx->alignment) {
+    advice += " alignment=\"" + std::to_string(in.iceoryx->alignment) + "\"";
+  }
+  return advice + " at the <out>";
+}
+
 bool have_one_configuration(const Gateway& a, const Gateway& b) {
   return a.interfaces == b.interfaces && a.peers == b.peers && a.configuration == b.configuration;
 }

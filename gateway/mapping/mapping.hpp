@@ -91,6 +91,9 @@ struct DdsTopic {
   std::string type_written;  // "geometry_msgs/msg/Twist"
   std::string type;          // in DDS: "geometry_msgs::msg::dds_::Twist_"
   bool is_ros = false;       // the two are written as ROS 2 writes them
+  // Bytes of data that each sample of the type has in plain CDR, behind its encapsulation header;
+  // absent: they vary, or nobody has said.
+  std::optional<std::size_t> size;
   Qos qos;
 };
 
@@ -141,6 +144,15 @@ struct Entry {
   // For people: "DDS topic rt/cmd_vel", "iceoryx Radar/Front/Objects".
   [[nodiscard]] std::string outside() const;
 };
+
+// Whether both have the same user header before the payload in Arbiter's samples, at the same
+// place. An `out` entry whose samples begin otherwise than those that come would send bytes of a
+// header as data, or data as a header.
+[[nodiscard]] bool have_one_header(const Entry& in, const Entry& out);
+// "a user header of 8 bytes", "no user header".
+[[nodiscard]] std::string header_text(const Entry& entry);
+// What `out` must have for samples of `in`: "write user_header=\"8\" at the <out>".
+[[nodiscard]] std::string header_advice(const Entry& in, const Entry& out);
 
 struct Gateway {
   Kind kind = Kind::kDds;

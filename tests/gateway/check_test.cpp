@@ -234,6 +234,59 @@ TEST(CheckMapping, TypesOfConnectedEndsAgree) {
               HasSubstr("brings samples without a type"));
 }
 
+std::string iceoryx(const std::string& entries) {
+  return "<gateway kind='iceoryx'>" + entries + "</gateway>";
+}
+std::string chunks_in(const std::string& more) {
+  return "<in service='a' instance='b' event='nav' port='/Nav/cmd:o' " + more + "/>";
+}
+std::string chunks_out(const std::string& more) {
+  return "<out service='a' instance='b' event='cmd' port='/Base/cmd:i' idle='zero' size='8' " +
+         more + "/>";
+}
+
+// Else bytes of the header would be the command.
+TEST(CheckMapping, HeadersOfConnectedEndsAgree) {
+  const auto codes = [](const std::string& mapping) {
+    std::vector<std::string> result;
+    const Read read = check(mapping);
+    for (const auto& item : read.diagnostics.items()) result.push_back(item.code);
+    return result;
+  };
+  const std::string header = "user_header='8'";
+  EXPECT_THAT(codes(iceoryx(chunks_in("") + chunks_out(""))), IsEmpty());
+  EXPECT_THAT(codes(iceoryx(chunks_in(header) + chunks_out(header))), IsEmpty());
+  EXPECT_THAT(codes(iceoryx(chunks_in("alignment='64'") + chunks_out(""))), IsEmpty());
+  const Read read = check(iceoryx(chunks_in(header) + chunks_out("")));
+  ASSERT_THAT(read.findings(), ElementsAre("1:101 error headers-differ"));
+  EXPECT_THAT(read.message(),
+              HasSubstr("iceoryx a/b/nav (mapping.xml:1:25) brings samples with a user header of 8 "
+                        "bytes, and iceoryx a/b/cmd sends samples with no user header:"));
+  EXPECT_THAT(read.message(), testing::EndsWith("; write user_header=\"8\" at the <out>"));
+  EXPECT_THAT(check(iceoryx(chunks_in("") + chunks_out(header))).message(),
+              testing::EndsWith("; remove user_header=\"…\" at the <out>"));
+  // The payload begins elsewhere.
+  EXPECT_THAT(check(iceoryx(chunks_in(header + " alignment='64'") + chunks_out(header))).message(),
+              testing::EndsWith("; write user_header=\"8\" alignment=\"64\" at the <out>"));
+  // Nor does a type say where it begins: 8 and 8 bytes are as many as 16.
+  EXPECT_THAT(codes(iceoryx(chunks_in(header + " type='T' size='8'") +
+                            "<out service='a' instance='b' event='cmd' port='/Base/cmd:i' "
+                            "idle='zero' type='T' size='16'/>")),
+              ElementsAre("headers-differ"));
+}
+
+TEST(CheckMapping, ASampleOfDdsHasNoUserHeader) {
+  const std::string nav = dds(in("/nav", "/Nav/cmd:o"));
+  EXPECT_THAT(check(nav + iceoryx(chunks_out(""))).findings(), IsEmpty());
+  EXPECT_THAT(check(nav + iceoryx(chunks_out("user_header='4'"))).findings(),
+              ElementsAre(HasSubstr("error headers-differ")));
+  const std::string serialised = "type='geometry_msgs/msg/Twist' max_size='64'";
+  const std::string base = dds(out("/cmd", "/Base/cmd:i"));
+  EXPECT_THAT(check(iceoryx(chunks_in(serialised)) + base).findings(), IsEmpty());
+  EXPECT_THAT(check(iceoryx(chunks_in(serialised + " user_header='4'")) + base).message(),
+              testing::EndsWith("; DDS has no user headers: connect a topic without one"));
+}
+
 // Who has the ports of kModel, beside an application with these modules. Warnings alone.
 Read owners(const std::string& mapping, const std::string& modules) {
   Read read = read_text(mapping);

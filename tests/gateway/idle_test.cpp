@@ -90,6 +90,8 @@ TEST(Mapping, AnIdleSampleOfAFileHasTheSizeOfItsType) {
                                                "0",
                                                9));  // XCDR2, appendable
   EXPECT_THAT(dds("delimited.bin", "representation='xcdr2'").findings(), IsEmpty());
+  directory.write("long2.bin", std::string("\0\7\0\0", 4) + "00000");
+  EXPECT_THAT(dds("long2.bin", "representation='xcdr2'").message(), HasSubstr("has 9 bytes;"));
   const auto iceoryx = [&](const std::string& size) {
     return read_text(
         "<gateway kind='iceoryx'><out port='/a:i' service='a' instance='b' event='c' "

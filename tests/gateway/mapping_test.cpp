@@ -267,6 +267,31 @@ TEST(Mapping, WhatContradictsItselfIsAnError) {
   EXPECT_EQ(large.entry().max_size, std::size_t{1} << 20);
 }
 
+// What is not as large is no sample of the type: it must not win.
+TEST(Mapping, TheSizeOfATypeOfDdsIsKnownOrSaid) {
+  const auto in = [](const std::string& type, const std::string& more = "") {
+    return read_dds("<in port='/a:o' topic='/a' type='" + type + "' " + more + "/>");
+  };
+  EXPECT_EQ(in("geometry_msgs/msg/Twist").entry().dds->size, 48u);
+  EXPECT_EQ(in("my_msgs/msg/Drive").entry().dds->size, std::nullopt);
+  EXPECT_EQ(in("my_msgs/msg/Drive", "size='16'").entry().dds->size, 16u);
+  EXPECT_EQ(in("my_msgs/msg/Drive", "size='128KiB'").entry().max_size, 4u + (128u << 10));
+  EXPECT_THAT(in("geometry_msgs/msg/Twist", "size='44'").message(), HasSubstr("has 48 bytes"));
+  EXPECT_THAT(in("std_msgs/msg/String", "size='44'").message(),
+              HasSubstr("its samples have not all one size"));
+  EXPECT_THAT(in("my_msgs/msg/Drive", "size='8' max_size='11'").message(),
+              HasSubstr("the sample that size=\"…\" asks for has 12"));
+  const Read out =
+      read_dds("<out port='/a:i' topic='/a' type='my_msgs/msg/Drive' size='16' idle='none'/>");
+  EXPECT_THAT(out.findings(), IsEmpty());
+  EXPECT_EQ(out.entry().dds->size, 16u);
+  EXPECT_THAT(
+      read_dds("<in topic='/a' type='my_msgs/msg/Low' above='/a:o' below='/b:o' field='f64' "
+               "threshold='1' size='4'/>")
+          .message(),
+      HasSubstr("a my_msgs/msg/Low has 4 bytes, and the field would end at 8"));
+}
+
 TEST(Mapping, RouDisOwnTopicsCanBeReadAndNotWritten) {
   const std::string topic = " service='Introspection' instance='RouDi_ID' event='Port' ";
   EXPECT_THAT(read_iceoryx("<in port='/a:o'" + topic + "/>").findings(), IsEmpty());

@@ -142,15 +142,52 @@ TEST_F(Leaving, ASampleCostsNoAllocation) {
 
 TEST_F(Leaving, WhatCannotBeSentIsCounted) {
   auto nav = publisher();
-  for (const auto answer : {Sender::Result::kNotReady, Sender::Result::kRefused,
-                            Sender::Result::kNoMemory, Sender::Result::kTooLarge}) {
+  for (const auto answer :
+       {Sender::Result::kNotReady, Sender::Result::kRefused, Sender::Result::kNoMemory,
+        Sender::Result::kTooLarge, Sender::Result::kUnreadable}) {
     sender_.answer = answer;
     publish(nav, "x");
     outgoing_.run(now_);
   }
   EXPECT_EQ(account_.refused.value(), 2u);
+  EXPECT_EQ(account_.unreadable.value(), 1u);
   EXPECT_EQ(account_.no_slot.value(), 1u);
   EXPECT_EQ(account_.too_large.value(), 1u);
+}
+
+// The base would go on with the last command that it has heard.
+TEST_F(Leaving, WhileTheWinnersSamplesCannotBeSentThePortSaysStop) {
+  auto nav = publisher();
+  for (const auto answer :
+       {Sender::Result::kNotReady, Sender::Result::kRefused, Sender::Result::kNoMemory,
+        Sender::Result::kTooLarge, Sender::Result::kUnreadable}) {
+    sender_.answers = {answer};
+    publish(nav, "lost");
+    outgoing_.run(now_);
+    EXPECT_THAT(sender_.sent, ElementsAre(kZeros)) << static_cast<int>(answer);
+    EXPECT_EQ(outgoing_.next(), now_ + Outgoing::kIdlePeriod);
+    sender_.answers = {answer};
+    publish(nav, "lost");
+    outgoing_.run(now_ + 1);
+    EXPECT_THAT(sender_.sent, SizeIs(1)) << "as often as to an idle port";
+    outgoing_.run(now_ + Outgoing::kIdlePeriod);
+    EXPECT_THAT(sender_.sent, ElementsAre(kZeros, kZeros));
+    publish(nav, "drive");
+    outgoing_.run(now_ + Outgoing::kIdlePeriod + 1);
+    EXPECT_THAT(sender_.sent, ElementsAre(kZeros, kZeros, "drive"));
+    EXPECT_EQ(outgoing_.next(), shm::kForever) << "one is sent";
+    sender_.sent.clear();
+  }
+  EXPECT_EQ(account_.idle.value(), 10u);
+}
+
+TEST_F(Leaving, OfSeveralSamplesTheLastOneSaysWhetherTheWinnerIsHeard) {
+  auto nav = publisher();
+  sender_.answers = {Sender::Result::kRefused};
+  publish(nav, "lost");
+  publish(nav, "drive");
+  outgoing_.run(now_);
+  EXPECT_THAT(sender_.sent, ElementsAre("drive"));
 }
 
 TEST_F(Leaving, ItsDescriptorIsReadableWhenThereIsSomethingToDo) {

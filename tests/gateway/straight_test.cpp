@@ -282,6 +282,29 @@ TEST_F(StraightWithALock, APortThatIsCommandedAgainBeforeTheLoopComesIsNotStoppe
   EXPECT_EQ(outgoing_.next(), shm::kForever);
 }
 
+// The loop says stop, at once, and again as to an idle port.
+TEST_F(StraightWithALock, AWinnerWhoseSamplesCannotBeSentInATurnIsLeftToTheLoopOnce) {
+  lead_navigation();
+  sender_.answers = {Sender::Result::kNoMemory};
+  deliver(nav_, "lost");
+  EXPECT_EQ(calls_, 1);
+  EXPECT_EQ(outgoing_.next(), 0);
+  run();
+  EXPECT_THAT(sender_.sent, ElementsAre(kZeros));
+  const shm::Nanoseconds next = outgoing_.next();
+  EXPECT_GT(next, 0);
+  sender_.answers = {Sender::Result::kNoMemory};
+  deliver(nav_, "lost");
+  EXPECT_EQ(calls_, 1) << "the loop knows";
+  EXPECT_EQ(outgoing_.next(), next);
+  outgoing_.run(next);
+  EXPECT_THAT(sender_.sent, ElementsAre(kZeros, kZeros));
+  deliver(nav_, "drive");
+  EXPECT_THAT(sender_.sent, ElementsAre(kZeros, kZeros, "drive"));
+  EXPECT_EQ(outgoing_.next(), shm::kForever);
+  EXPECT_EQ(calls_, 1);
+}
+
 class StraightWithALockThatTimesOut : public StraightWithALock {
  protected:
   static constexpr shm::Nanoseconds kTimeout = 10'000'000;
@@ -332,6 +355,50 @@ TEST_F(Straight, ASampleCostsNoAllocation) {
   }
   EXPECT_EQ(test::allocations_of_this_thread(), before);
   EXPECT_EQ(account_.passed.value(), 101u);
+}
+
+// A mapping whose entries nobody has compared with the model.
+class OtherHeaders : public testing::Test {
+ protected:
+  OtherHeaders() {
+    for (const Port* port : in_.entry().ports()) ins_.emplace(port->name, &in_);
+    outgoing_.lead(ins_, [] {});
+  }
+  Incoming::Fate deliver(const std::string& bytes) {
+    return in_.deliver(BytesSample(bytes, 8), Time::max());
+  }
+
+  test::Daemon daemon_{
+      "<behaviors timeout='1000s'><behavior name='Navigate'><config at='/Base/cmd:i'>/Low:o"
+      "</config></behavior><behavior name='Hurry'><config at='/Base/cmd:i'>/High:o</config>"
+      "<inhibition>Navigate</inhibition></behavior></behaviors>"};
+  Read read_ = read_iceoryx(
+      "<in service='a' instance='b' event='c' above='/High:o' below='/Low:o' field='u8' "
+      "threshold='5' user_header='8'/>"
+      "<out port='/Base/cmd:i' service='a' instance='b' event='d' size='4' idle='zero'/>");
+  Account in_account_{"nav", "publisher"};
+  Account account_{"cmd", "subscriber"};
+  KeepingSender sender_;
+  OneAge ages_;
+  InBySource ins_;
+  Node node_{"gateway"};
+  Incoming in_{node_, read_.entry(0), in_account_};
+  Outgoing outgoing_{node_, read_.entry(1), sender_, account_, ages_};
+};
+
+// Neither of two sources: the header would be the command.
+TEST_F(OtherHeaders, WhatBeginsWithAnotherHeaderIsNotSent) {
+  const std::string zeros(4, '\0');
+  outgoing_.run(shm::monotonic_now());
+  for (const char speed : {'\1', '\7'}) {
+    EXPECT_EQ(deliver(std::string(8, 'h') + speed), Incoming::Fate::kPassed);
+    outgoing_.run(shm::monotonic_now());
+  }
+  EXPECT_THAT(sender_.sent, testing::Each(zeros));
+  EXPECT_EQ(account_.unreadable.value(), 2u);
+  EXPECT_EQ(account_.passed.value(), 0u);
+  EXPECT_THAT(account_.text(), testing::EndsWith("2 unreadable; the last has a user header of 8 "
+                                                 "bytes; write user_header=\"8\" at the <out>"));
 }
 
 // One that delivers and the loop meet at one port: no sample is sent twice, none out of order, and

@@ -43,6 +43,26 @@ TEST(DdsOfAnotherUser, WhatThePolicyForbidsIsLeftOutUntilItAllowsIt) {
   publish_until_heard(teleop, base, "2 0");
 }
 
+// T may be for ever, as the mapping wants it: nobody has told the gateway.
+TEST(DdsOfAnotherUser, WhoMayNotObserveIsToldThatTIsNotKnown) {
+  if (!may_be_another_user()) GTEST_SKIP() << "only root can start processes of other users";
+  const TemporaryDirectory files;
+  const std::string policy = files.write("policy", "allow user nobody output,input *\n");
+  const OwnDomain domain;
+  Daemon daemon(base_model("forever"), {.arguments = {"--policy", policy}});
+  ASSERT_EQ(::chmod(daemon.directory().c_str(), 0711), 0);
+  const std::string nav =
+      R"(<in topic="/cmd_vel_nav" qos="latched" )" + kTwist + R"( port="/Nav/cmd_vel:o"/>)";
+  const DdsGateway gateway(
+      daemon, domain, nav, "lo", "",
+      {"/usr/bin/setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"});
+  const std::string why = "samples published before are not taken, because T is not ";
+  gateway.see(why + "known");
+  files.write("policy", "allow user nobody output,input *\nallow user nobody observe\n");
+  daemon.load(base_model("500ms"));
+  gateway.see(why + "forever");
+}
+
 TEST(DdsMapping, AnotherInterfaceIsTakenUp) {
   const OwnDomain domain;
   Daemon daemon(base_model("60s"));

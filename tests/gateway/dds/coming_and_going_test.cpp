@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include <arbiter/arbiter.hpp>
+
 #include "tests/gateway/dds/scene.hpp"
 #include "tests/support/await.hpp"
 
@@ -96,6 +98,9 @@ TEST_P(DdsComingAndGoing, ForAGatewayThatIsKilledTheRobotIsStoppedByAnother) {
   gateway.process().kill();
   stop_afterwards(gateway, base);
   EXPECT_NE(gateway.log().find("DDS topic rt/cmd_vel, 1 subscriber matched"), std::string::npos);
+  base.process().kill();
+  const std::string nobody = "nobody was there to hear it: no subscriber of DDS topic rt/cmd_vel\n";
+  while (!gateway.log().ends_with(nobody)) EXPECT_EQ(gateway.send_idle(), 0);
 }
 
 // Nobody can be sure that a mapping which is being edited is good at that moment.
@@ -220,6 +225,37 @@ TEST_P(DdsComingAndGoing, ALatchedSampleFromBeforeTheGatewayCameIsNoArrivalWhere
   gateway.see("1 publisher matched");
   latched.release_until_heard();
   EXPECT_EQ(latched.published("/Lock/pressed:o"), 0);
+}
+
+// A base that comes late to a topic that says what stays true, after the gateway has begun anew.
+TEST_P(DdsComingAndGoing, ALatchedTopicHasItsLastSampleAlsoAfterTheGatewayHasBegunAnew) {
+  Drive drive("1000s", GetParam(), GetParam(), R"( qos="latched")");
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
+  publish_until_heard(navigation, base, "1 0");
+  gateway.process().signal(SIGUSR1);
+  const std::string serves = "serves 1 topic in, 1 out";
+  while (gateway.log().find(serves) == gateway.log().rfind(serves)) ::poll(nullptr, 0, 1);
+  Stranger late(GetParam(), domain, {"sub", "twist", "rt/cmd_vel", "durability=transient_local"});
+  late.await("sample 1 0");
+}
+
+// Nor does it forget it when it learns that the type has a key.
+TEST_P(DdsComingAndGoing, ALatchedTopicHasItsLastSampleAlsoForTheFirstWhoHasAKey) {
+  const OwnDomain domain;
+  Daemon daemon(
+      R"(<behaviors><behavior name="Show"><config at="/To:i">/From:o</config></behavior></behaviors>)");
+  const DdsGateway gateway(
+      daemon, domain,
+      R"(<out topic="robots" type="strangers::Robot" port="/To:i" qos="latched"/>)");
+  Node node("fleet");
+  auto robots = node.output_port("/From:o", Type::variable("strangers::Robot", 64));
+  std::string bytes("\0\1\0\0\7", 5);
+  bytes.resize(20);
+  gateway.see("serves 0 topics in, 1 out");
+  robots.publish(Bytes(reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()));
+  await_described(daemon, "/To:i", "the last sample has 20 bytes");
+  Stranger late(GetParam(), domain, {"sub", "robot", "robots", "durability=transient_local"});
+  late.await("sample 7 0");
 }
 
 }  // namespace

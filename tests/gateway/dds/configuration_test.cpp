@@ -133,15 +133,16 @@ TEST(DdsDomain, OfTheEnvironmentIsNoWayPastTheGateway) {
   mapping.gateways[1].domain = 7;
   mapping.gateways[1].entries = {entry(Entry::Direction::kIn, {})};
   const Bell bell;
+  LatchedSamples latched;
   EXPECT_NE(test::error_of([&] {
-              DdsMiddleware({mapping}, bell);
+              DdsMiddleware({mapping}, bell, latched);
             }).find("comes in and goes out within DDS domain 7"),
             std::string::npos);
   mapping.gateways[1].domain = 8;
-  EXPECT_NO_THROW(DdsMiddleware({mapping}, bell));
+  EXPECT_NO_THROW(DdsMiddleware({mapping}, bell, latched));
   mapping.gateways[1].domain = 7;
   mapping.gateways[1].entries = {entry(Entry::Direction::kIn, {"raw"})};
-  EXPECT_NO_THROW(DdsMiddleware({mapping}, bell));
+  EXPECT_NO_THROW(DdsMiddleware({mapping}, bell, latched));
 }
 
 }  // namespace

@@ -83,6 +83,53 @@ TEST(DdsHostile, WhatIsNotEncodedAsDdsEncodesIsPassedOver) {
   gateway.see("malformed packet");
 }
 
+class DdsOfAnotherLayout : public ::testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(Vendors, DdsOfAnotherLayout, ::testing::Values("cyclone", "fast"),
+                         [](const auto& each) { return std::string(each.param); });
+
+// Else it would override navigation, and the base, whose DDS drops it, would obey nobody.
+TEST_P(DdsOfAnotherLayout, ATwistThatCannotBeOneDoesNotWin) {
+  const OwnDomain domain;
+  Daemon daemon(base_model("1000s"));
+  const DdsGateway gateway(daemon, domain, kNavIn + kTeleopIn + kBaseOut + "/>");
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  Stranger navigation(GetParam(), domain, {"pub", "twist", "rt/cmd_vel_nav"});
+  Stranger teleop(GetParam(), domain,
+                  {"pub", "bool", "rt/cmd_vel_teleop", "name=geometry_msgs::msg::dds_::Twist_"});
+  base.await("matched 1");
+  navigation.await("matched 1");
+  teleop.await("matched 1");
+  await_described(daemon, "/Teleop/cmd_vel:o", "1 publisher matched");
+  publish_until_heard(navigation, base, "1 0");
+  while (!is_described(daemon, "/Teleop/cmd_vel:o", "unreadable")) {
+    teleop.publish("1");
+    ::poll(nullptr, 0, 1);
+  }
+  await_described(daemon, "/Teleop/cmd_vel:o",
+                  "unreadable; the last has 8 bytes; geometry_msgs/msg/Twist has 52");
+  EXPECT_EQ(daemon.source("/Teleop/cmd_vel:o")["published"], 0);
+  publish_until_heard(navigation, base, "2 0");
+}
+
+// Of other types the mapping may say it.
+TEST(DdsHostile, ASampleOfAnotherSizeThanTheMappingSaysIsNoArrival) {
+  const OwnDomain domain;
+  Daemon daemon("<behaviors timeout=\"1000s\"><source port=\"/Fleet/robot:o\"/></behaviors>");
+  const DdsGateway gateway(
+      daemon, domain,
+      R"(<in topic="robots" type="strangers::Robot" port="/Fleet/robot:o" size="16"/>)");
+  const Liar liar(domain, "robots", "strangers::Robot");
+  liar.await_reader();
+  gateway.see("1 publisher matched");
+  liar.publish(kLittle + std::string(8, '\0'));
+  await_described(daemon, "/Fleet/robot:o",
+                  "1 unreadable; the last has 12 bytes; strangers::Robot has 20");
+  EXPECT_EQ(daemon.source("/Fleet/robot:o")["published"], 0);
+  liar.publish(kLittle + std::string(16, '\0'));
+  await([&] { return daemon.source("/Fleet/robot:o")["published"] == 1; });
+}
+
 // A liar on a topic that chooses between two sources.
 struct Choosing {
   // `entry`: the rest of the <in>.
@@ -130,6 +177,7 @@ TEST(DdsHostile, ABooleanThatIsNoneEndsBothSources) {
     EXPECT_TRUE(button.is_active("/no:o"));
     button.publish_to_none(kLittle + none);
   }
+  await_described(button.daemon, "/no:o", "the last has 4 bytes; std_msgs/msg/Bool has 8");
 }
 
 // An appendable type of XCDR2 begins with its length, which is 1 for a Boolean; a mutable one has

@@ -109,6 +109,42 @@ TEST_P(DdsMatching, AKeyIsThatOfWhoMayMatch) {
   gateway.see("1 publisher matched");
 }
 
+const std::vector<std::string> kKeyedTwist = {"sub", "robot", "rt/cmd_vel",
+                                              "name=geometry_msgs::msg::dds_::Twist_"};
+
+// One stray end would else keep the base from all that is sent, zeros included.
+TEST_P(DdsMatching, AKeyOfSomebodyElseKeepsNobodyFromATopicOfRos2) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(daemon, domain, kBaseOut + R"( idle="zero"/>)");
+  const Stranger stray(GetParam(), domain, kKeyedTwist);
+  gateway.see("does not match: key: its type has a key, this entry's has none");
+  Stranger base(GetParam(), domain, {"sub", "twist", "rt/cmd_vel"});
+  base.await("sample 0 0");
+}
+
+TEST_P(DdsMatching, ATopicOfRos2HasAKeyIfTheMappingSaysSo) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(daemon, domain, kBaseOut + R"( keyed="true"/>)");
+  Stranger keyed(GetParam(), domain, kKeyedTwist);
+  keyed.await("matched 1");
+}
+
+TEST_P(DdsMatching, AKeyIsThatOfMost) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(daemon, domain,
+                           R"(<in topic="robots" type="strangers::Robot" port="/Fleet/robot:o"/>)");
+  Stranger stray(GetParam(), domain, {"pub", "blob", "robots", "name=strangers::Robot"});
+  stray.await("matched 1");
+  gateway.see("1 publisher matched");
+  const Stranger robot(GetParam(), domain, {"pub", "robot", "robots"});
+  gateway.see("does not match: key: its type has a key, this entry's has none");
+  const Stranger another(GetParam(), domain, {"pub", "robot", "robots"});
+  gateway.see("2 publishers matched");
+}
+
 TEST_P(DdsMatching, WhoeverPublishesPastArbiterIsWarnedOfAtOnce) {
   const OwnDomain domain;
   const Daemon daemon(base_model("1s"));

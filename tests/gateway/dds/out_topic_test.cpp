@@ -1,8 +1,17 @@
-// Which samples the thread that receives them may send.
+// Which samples the thread that receives them may send, and what a latched topic keeps.
 #include "gateway/dds/out_topic.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "gateway/dds/opaque_type.hpp"
+#include "gateway/dds/reader_cache.hpp"
+#include "tests/gateway/dds/own_domain.hpp"
 #include "tests/gateway/mapping_text.hpp"
 
 namespace arbiter::gateway::dds {
@@ -18,6 +27,111 @@ TEST(OutTopic, TakesSamplesOf64KiBAndTheirHeaderAtOnceAndNoLargerOnesAtFirst) {
   const OutTopic topic(read.entry(), account, bell);
   const Sender& sender = topic;
   EXPECT_EQ(sender.largest_at_once(), 4u + 65'536u);
+}
+
+// A topic on its way out, and those who come later and want what was sent before.
+class Latched : public ::testing::Test {
+ protected:
+  // The rest of the entry.
+  void make(const std::string& more) {
+    read_.emplace(read_text(
+        "<gateway kind='dds' interface='lo' domain='" + std::to_string(number_.number()) +
+        "'><out port='/Base/cmd:i' topic='/cmd' type='a/msg/B' " + more + "/></gateway>"));
+    account_.emplace(entry().outside(), "subscriber");
+    domain_.emplace(read_->mapping.gateways.at(0), std::set<std::string>{"rt/cmd"}, bell_);
+    topic_.emplace(entry(), *account_, bell_);
+    topic_->open(*domain_);
+  }
+  [[nodiscard]] const Entry& entry() const { return read_->entry(); }
+  Sender::Result send(const std::string& bytes) {
+    return topic_->send(Bytes(reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()));
+  }
+  void open_again() {
+    topic_->close();
+    topic_->open(*domain_);
+  }
+  // As with another mapping.
+  void begin_anew() {
+    LatchedSamples latched;
+    latched.put("name", topic_->take_last());
+    topic_.emplace(entry(), *account_, bell_);
+    topic_->begin_with(latched.take("name"));
+    topic_->open(*domain_);
+  }
+  // What a reader is given that comes now: within a process at once.
+  std::vector<std::string> given() {
+    const Entity participant(dds_create_participant(number_.number(), nullptr, nullptr),
+                             "participant");
+    ddsi_sertype* type = make_opaque_type(entry().dds->type, false);
+    const Entity topic(
+        dds_create_topic_sertype(participant.get(), "rt/cmd", &type, nullptr, nullptr, nullptr),
+        "topic");
+    Qos qos;
+    qos.durability = Durability::kTransientLocal;
+    Kept kept;
+    ReaderCache cache(kept);
+    const Entity reader(
+        dds_create_reader_rhc(participant.get(), topic.get(), cyclone_qos(qos, End::kReader).get(),
+                              nullptr, cache.cache()),
+        "reader");
+    return kept.all;
+  }
+
+  const std::string one_{"\0\1\0\0one.", 8};
+  const std::string two_{"\0\1\0\0two.", 8};
+  std::optional<OutTopic> topic_;
+
+ private:
+  class Kept : public SampleTaker {
+   public:
+    void take(const Payload& payload, const SampleWriter& /*writer*/) noexcept override {
+      all.emplace_back(reinterpret_cast<const char*>(payload.bytes()), payload.size);
+    }
+    std::vector<std::string> all;
+  };
+
+  const test::OwnDomain number_;
+  const Bell bell_;
+  std::optional<Read> read_;
+  std::optional<Account> account_;
+  std::optional<Domain> domain_;
+};
+
+TEST_F(Latched, WhatWasSentLastIsStillThereWhenTheWriterIsOpenedAgain) {
+  make("qos='latched'");
+  EXPECT_EQ(send(one_), Sender::Result::kSent);
+  EXPECT_EQ(send(two_), Sender::Result::kSent);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_THAT(given(), testing::ElementsAre(two_));
+    open_again();
+  }
+  begin_anew();
+  EXPECT_THAT(given(), testing::ElementsAre(two_));
+  EXPECT_EQ(send(one_), Sender::Result::kSent);
+  EXPECT_THAT(given(), testing::ElementsAre(one_));
+}
+
+TEST_F(Latched, WhatIsNotLatchedIsNot) {
+  make("");
+  EXPECT_EQ(send(one_), Sender::Result::kSent);
+  open_again();
+  EXPECT_FALSE(topic_->latches());
+  EXPECT_FALSE(topic_->take_last());
+}
+
+// A base that comes then must not drive off by a command of before.
+TEST_F(Latched, WhereThereIsAnIdleSampleACommandOfBeforeIsNotSentOnceAnotherWasToBe) {
+  make("qos='latched' idle='zero' size='4'");
+  EXPECT_EQ(send(one_), Sender::Result::kSent);
+  open_again();
+  EXPECT_THAT(given(), testing::ElementsAre(one_)) << "somebody commands still";
+  topic_->close();
+  EXPECT_EQ(send(two_), Sender::Result::kNotReady);
+  open_again();
+  EXPECT_THAT(given(), testing::IsEmpty());
+  EXPECT_EQ(send(one_), Sender::Result::kSent);
+  begin_anew();
+  EXPECT_THAT(given(), testing::IsEmpty());
 }
 
 TEST(Pace, WhatIsSentFastMayBeSentAtOnce) {

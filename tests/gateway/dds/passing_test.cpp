@@ -86,6 +86,31 @@ TEST(DdsRepresentation, ASampleOfXcdr2GoesOutAndOneOfXcdr1IsRefused) {
   EXPECT_EQ(base.next_line(), "sample 2 0");
 }
 
+// A component of ours that makes a mistake: the base's DDS would drop it, and the base go on.
+TEST(DdsSize, WhatCannotBeATwistIsNotSentAndTheBaseIsTold) {
+  const OwnDomain domain;
+  Daemon daemon(base_model("1000s"));
+  const DdsGateway gateway(daemon, domain, kBaseOut + R"( idle="zero"/>)");
+  Stranger base("cyclone", domain, {"sub", "twist", "rt/cmd_vel"});
+  base.await("matched 1");
+  gateway.see("1 subscriber matched");
+  Node node("navigation");
+  auto navigation =
+      node.output_port("/Nav/cmd_vel:o", Type::variable("geometry_msgs/msg/Twist", 64));
+  const auto publish = [&](const std::string& bytes) {
+    navigation.publish(Bytes(reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()));
+  };
+  publish(twist_bytes('\1', 1));
+  base.await("sample 1 0");
+  publish(twist_bytes('\1', 2).substr(0, 44));
+  await_described(daemon, "/Base/cmd_vel:i",
+                  "1 unreadable; the last has 44 bytes; geometry_msgs/msg/Twist has 52");
+  EXPECT_EQ(base.next_line(), "sample 0 0");
+  EXPECT_EQ(base.next_line(), "sample 0 0");
+  publish(twist_bytes('\1', 3));
+  base.await("sample 3 0");
+}
+
 TEST_P(DdsPassing, TheOneWhoOverridesIsObeyed) {
   const OwnDomain domain;
   const Daemon daemon(base_model("1000s"));
@@ -159,9 +184,10 @@ TEST_P(DdsPassing, WhatDoesNotFitIsCountedAndPassedOver) {
   const std::string first = "0 3";
   publish_until_heard(blobs.from, blobs.to, first);
   blobs.from.publish("1 5000");
-  await_described(blobs.daemon, "/From:o", "1 of a size that does not fit");
+  await_described(blobs.daemon, "/From:o",
+                  "1 of a size that does not fit; the last of 5012 bytes; max_size is 1024");
   blobs.from.publish("2 8000");
-  await_described(blobs.daemon, "/From:o", "2 of a size that does not fit");
+  await_described(blobs.daemon, "/From:o", "2 of a size that does not fit; the last of 8012 bytes");
   blobs.from.publish("3 100");
   EXPECT_EQ(line_after(blobs.to, first), "sample 3 100");
 }

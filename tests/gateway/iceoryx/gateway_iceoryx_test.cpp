@@ -69,8 +69,42 @@ TEST_F(Iceoryx, AHeaderThatTheMappingDoesNotNameIsTold) {
   publisher.say("x");
   wait_for_description("/Low:o",
                        "1 unreadable; chunks have a user header of 8 bytes; write "
-                       "user_header=\"8\"");
+                       "user_header=\"8\", also where <out> sends them on");
   EXPECT_EQ(daemon_.source("/Low:o")["published"], 0);
+}
+
+// What the model connects, this program does not know; the subscriber would take the header for the
+// command.
+TEST_F(Iceoryx, WhatBeginsWithAHeaderIsNotSentWithoutOne) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o", "user_header='8'") + in("high", "/High:o") +
+                                        out("/Base:i", "base", kZeros));
+  Spoken low = plain_publisher("low", 8);
+  Spoken high = plain_publisher("high");
+  Spoken subscriber = plain_subscriber("base");
+  ASSERT_TRUE(subscriber.hear("|zeros 4"));
+  wait_for_both_ends();
+  wait_for_description("/High:o", "1 publisher matched");
+  low.say("drive");
+  wait_until([&] {
+    return described_input("/Base:i").find(
+               "1 unreadable; the last has a user header of 8 bytes; "
+               "write user_header=\"8\" at the <out>") != std::string::npos;
+  });
+  high.say("stop");
+  std::optional<std::string> line;
+  while ((line = subscriber.line()) && line != "|stop") EXPECT_EQ(line, "|zeros 4");
+  EXPECT_EQ(line, "|stop");
+}
+
+TEST_F(Iceoryx, AChunkThatIsTooLargeIsToldWithBothSizes) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o", "max_size='8'"));
+  Spoken publisher = plain_publisher("low");
+  wait_for_description("/Low:o", "1 publisher matched");
+  publisher.say("#9");
+  wait_for_description("/Low:o",
+                       "1 of a size that does not fit; the last of 9 bytes; max_size is 8");
 }
 
 TEST_F(Iceoryx, WithoutRouDiTheGatewaySaysSoAndGoesOnLooking) {

@@ -53,7 +53,10 @@ TEST(GatewayProgram, RefusesAMappingThatHasNothingForIt) {
 
 TEST(GatewayProgram, SaysWhatIsWrongWithItsArguments) {
   EXPECT_EQ(run_gateway({}).exit_code, 2);
-  EXPECT_EQ(run_gateway({"--no-such-option"}).exit_code, 2);
+  const auto misspelt = run_gateway({"--isntance", "x"});
+  EXPECT_EQ(misspelt.exit_code, 2);
+  EXPECT_THAT(misspelt.err,
+              HasSubstr("has no option \"--isntance\"; did you mean \"--instance\"?"));
   const auto none = run_gateway({"/no/such/file.xml"});
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("/no/such/file.xml"));
