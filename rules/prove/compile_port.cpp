@@ -1,7 +1,11 @@
 #include "rules/prove/compile_port.hpp"
 
 #include <algorithm>
+#include <set>
+#include <string>
+#include <unordered_map>
 #include <utility>
+#include <vector>
 
 #include "rules/prove/in_order.hpp"
 #include "rules/prove/rule_builder.hpp"

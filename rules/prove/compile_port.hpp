@@ -1,10 +1,10 @@
 // Compiles and proves the rules of one port.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <optional>
-#include <set>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "rules/prove/compiled_model.hpp"
@@ -51,9 +51,5 @@ struct PortResult {
 // Nothing if a limit was met, which is reported. Throws StepLimit; what it has reported until then
 // is of no interest. Throws Stopped.
 std::optional<PortResult> compile_port(CompileContext& context, const PortTask& task);
-
-// The kind, reads and nodes of a rule whose function is given, its own source taken as active.
-CompiledRule to_compiled_rule(std::string source, const DiagramNodes& function,
-                              const std::vector<std::string>& names);
 
 }  // namespace arbiter::rules

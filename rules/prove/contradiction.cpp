@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "rules/model/print_rules.hpp"
-#include "rules/prove/compile_port.hpp"
+#include "rules/prove/rule_builder.hpp"
 
 namespace arbiter::rules {
 namespace {

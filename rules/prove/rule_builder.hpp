@@ -8,6 +8,7 @@
 
 #include "rules/model/expression.hpp"
 #include "rules/model/rule_set.hpp"
+#include "rules/prove/compiled_model.hpp"
 #include "rules/prove/diagram.hpp"
 
 namespace arbiter::rules {
@@ -48,5 +49,9 @@ class RuleBuilder {
   std::unordered_map<std::string, int> variables_;
   std::unordered_map<const Expression*, Diagram> built_;  // shared ones are built once
 };
+
+// The kind, reads and nodes of a rule whose function is given, its own source taken as active.
+CompiledRule to_compiled_rule(std::string source, const DiagramNodes& function,
+                              const std::vector<std::string>& names);
 
 }  // namespace arbiter::rules
