@@ -110,7 +110,7 @@ int import(ImportVerbOptions options) {
   require_new_files(options);
   rules::Diagnostics diagnostics;
   const auto files = read_files(options);
-  const auto plan = options.kind == importing::kTwistMux.name
+  const auto plan = options.kind == importing::twist_mux_kind.name
                         ? importing::import_twist_mux(files, options.import, diagnostics)
                         : importing::import_cmd_vel_mux(files, options.import, diagnostics);
   rules::write_text(std::cerr, diagnostics);
@@ -131,7 +131,8 @@ int import(ImportVerbOptions options) {
 }
 
 std::string problem_of_kind(std::string& kind) {
-  const std::vector<std::string_view> kinds{importing::kTwistMux.name, importing::kCmdVelMux.name};
+  const std::vector<std::string_view> kinds{importing::twist_mux_kind.name,
+                                            importing::cmd_vel_mux_kind.name};
   if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) return "";
   return "no multiplexer is called " + rules::quote(kind) +
          rules::advise(kind, kinds, "name twist_mux or cmd_vel_mux");

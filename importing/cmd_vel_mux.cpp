@@ -30,7 +30,7 @@ class CmdVelMuxImport {
   CmdVelMuxImport(const std::vector<InputFile>& files, const ImportOptions& options,
                   rules::Diagnostics& diagnostics)
       : diagnostics_(diagnostics),
-        parameters_(files, kCmdVelMux, kTwistMux, options.node, diagnostics),
+        parameters_(files, cmd_vel_mux_kind, twist_mux_kind, options.node, diagnostics),
         assembly_(parameters_, options, "cmd_vel_mux",
                   parameters_.is_ros2() ? Relative::kToNamespace : Relative::kToNode, diagnostics) {
     plan_.program = "cmd_vel_mux";

@@ -170,9 +170,9 @@ std::string NodeParameters::where_else(const MultiplexerKind& other) const {
     std::vector<ParameterSet> found;
     Finder(other.parameters, found, passed_over).look_in(document, "");
     if (found.empty()) continue;
-    const std::string kind(other.name);
-    return ", but " + in_words(other.parameters) + ", as a " + kind +
-           " has; write: arbiter import " + kind;
+    std::string text = ", but " + in_words(other.parameters) + ", as a ";
+    text.append(other.name).append(" has; write: arbiter import ").append(other.name);
+    return text;
   }
   return "; is this the multiplexer's file of parameters?";
 }

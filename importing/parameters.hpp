@@ -22,8 +22,8 @@ struct MultiplexerKind {
   std::string_view name;
   std::vector<std::string_view> parameters;
 };
-inline const MultiplexerKind kTwistMux{"twist_mux", {"topics", "locks"}};
-inline const MultiplexerKind kCmdVelMux{"cmd_vel_mux", {"subscribers"}};
+inline const MultiplexerKind twist_mux_kind{"twist_mux", {"topics", "locks"}};
+inline const MultiplexerKind cmd_vel_mux_kind{"cmd_vel_mux", {"subscribers"}};
 
 // The parameters of one node that a file has.
 struct ParameterSet {

@@ -44,7 +44,7 @@ class TwistMuxImport {
   TwistMuxImport(const std::vector<InputFile>& files, const ImportOptions& options,
                  rules::Diagnostics& diagnostics)
       : diagnostics_(diagnostics),
-        parameters_(files, kTwistMux, kCmdVelMux, options.node, diagnostics),
+        parameters_(files, twist_mux_kind, cmd_vel_mux_kind, options.node, diagnostics),
         assembly_(parameters_, options, "twist_mux", Relative::kToNamespace, diagnostics) {
     plan_.program = "twist_mux";
     plan_.files = file_names(files);

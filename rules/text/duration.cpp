@@ -21,8 +21,9 @@ bool is_meant_as_forever(std::string_view text) {
 }
 
 using Unit = std::pair<std::string_view, shm::Nanoseconds>;
+// The largest first.
 constexpr std::array<Unit, 4> kUnits{
-    {{"ns", 1}, {"us", 1'000}, {"ms", 1'000'000}, {"s", 1'000'000'000}}};
+    {{"s", 1'000'000'000}, {"ms", 1'000'000}, {"us", 1'000}, {"ns", 1}}};
 constexpr Unit kMinutes{"min", 60'000'000'000};
 
 // Null: there is none of that name.
@@ -51,12 +52,12 @@ std::string without_fraction(std::string_view text, bool takes_minutes) {
   const Unit* const unit = find_unit(text.substr(end), takes_minutes);
   if (unit == nullptr || number == 0) return {};
   // In the largest of the smaller units in which it is whole.
-  for (auto smaller = kUnits.rbegin(); smaller != kUnits.rend(); ++smaller) {
-    if (smaller->second >= unit->second) continue;
-    const shm::Nanoseconds factor = unit->second / smaller->second;
+  for (const auto& [name, length] : kUnits) {
+    if (length >= unit->second) continue;
+    const shm::Nanoseconds factor = unit->second / length;
     if (number > shm::kMaxTime / factor) return {};
     if (number * factor % scale == 0) {
-      return std::to_string(number * factor / scale) + std::string(smaller->first);
+      return std::to_string(number * factor / scale) + std::string(name);
     }
   }
   return {};
@@ -110,8 +111,8 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
 
 std::string to_string(shm::Nanoseconds timeout) {
   if (timeout == shm::kForever) return std::string(kForever);
-  const auto unit = std::find_if(kUnits.rbegin(), kUnits.rend(),
-                                 [&](const auto& each) { return timeout % each.second == 0; });
+  const auto* const unit = std::find_if(
+      kUnits.begin(), kUnits.end(), [&](const auto& each) { return timeout % each.second == 0; });
   return std::to_string(timeout / unit->second) + std::string(unit->first);
 }
 
