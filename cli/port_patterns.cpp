@@ -15,6 +15,7 @@ namespace {
 template <class Ports>
 std::vector<std::string_view> names_of(const Ports& ports) {
   std::vector<std::string_view> names;
+  names.reserve(ports.size());
   for (const auto& port : ports) names.push_back(port.name);
   return names;
 }

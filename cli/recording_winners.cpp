@@ -86,10 +86,12 @@ std::string cause_text(const evidence::WinnerChange& change) {
 }
 
 std::string length_text(const Reign& reign) {
-  const std::string length = "for " + seconds_text(reign.end - reign.change->time);
-  if (!reign.is_cut_off) return length;
-  return length + (reign.is_of_last_run ? ", until the end of the recording"
-                                        : ", until the recording began again");
+  std::string text = "for " + seconds_text(reign.end - reign.change->time);
+  if (reign.is_cut_off) {
+    text += reign.is_of_last_run ? ", until the end of the recording"
+                                 : ", until the recording began again";
+  }
+  return text;
 }
 
 int show_winners(const RecordedWinners& options) {
