@@ -5,26 +5,22 @@
 #include <fcntl.h>
 
 #include <optional>
-#include <stdexcept>
 #include <string>
 
 #include "shm/clock.hpp"
 #include "shm/destination_list.hpp"
 #include "shm/event_ring.hpp"
 #include "tests/support/raw_port.hpp"
+#include "tests/support/written.hpp"
 
 namespace arbiter::test {
 
 class RawPublisher {
  public:
   RawPublisher(const std::string& instance, const std::string& name)
-      : client_(instance),
-        output_(raw_output_segment()),
-        events_(shm::make_segment("test", sizeof(shm::EventSegment))),
-        mapping_(events_, sizeof(shm::EventSegment), shm::Access::kReadWrite) {
-    if (shm::allocate(events_, 0, sizeof(shm::EventSegment))) throw std::runtime_error("no memory");
+      : client_(instance), output_(raw_output_segment()) {
     events().initialize({});
-    shm::seal(events_, shm::Seals::kOneWriter);
+    shm::seal(events_.descriptor, shm::Seals::kOneWriter);
     writer_.emplace(events());
     client_.hello("raw-publisher");
     const wire::Received opened = open_raw_output(client_, name, output_);
@@ -44,7 +40,7 @@ class RawPublisher {
     shm::EventRecord state;
     state.joined = answer.link;
     writer_->write(state);
-    client_.send(answer, {shm::reopen(events_, O_RDONLY).get(), -1});
+    client_.send(answer, {shm::reopen(events_.descriptor, O_RDONLY).get(), -1});
   }
   // A signal that came at that time, by the list of that revision.
   void signal_at(shm::Nanoseconds time, std::uint64_t revision = 0) {
@@ -58,7 +54,7 @@ class RawPublisher {
   }
   void write(const shm::EventRecord& record) { writer_->write(record); }
 
-  [[nodiscard]] shm::EventSegment& events() const { return *mapping_.as<shm::EventSegment>(); }
+  [[nodiscard]] shm::EventSegment& events() const { return *events_; }
   [[nodiscard]] shm::Activity& activity() const {
     return page_.as<shm::ActivityPage>()->of(source_);
   }
@@ -66,8 +62,7 @@ class RawPublisher {
  private:
   RawClient client_;
   const shm::FileDescriptor output_;
-  const shm::FileDescriptor events_;
-  const shm::Mapping mapping_;
+  const Written<shm::EventSegment> events_;
   std::optional<shm::EventWriter> writer_;
   shm::Mapping page_;
   shm::SourceId source_ = 0;
