@@ -68,8 +68,10 @@ void Daemon::handle(Client& client, wire::Received& received) {
       open_tap(client, received);
       break;
     case wire::MessageKind::kTapped:
-      if (client.ports.count(message.port) != 0) switchboard_.tell_tap(received);
-      introductions_.show_growth_soon();
+      if (client.ports.count(message.port) != 0) {
+        switchboard_.tell_tap(received);
+        introductions_.show_growth_soon();
+      }
       break;
     case wire::MessageKind::kClosePort:
       close_port(client, message.port);

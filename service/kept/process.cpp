@@ -8,7 +8,6 @@
 #include <string>
 
 namespace arbiter::service {
-
 namespace {
 
 struct ProcessStatus {
