@@ -54,8 +54,9 @@ Daemon::Daemon(const DaemonOptions& options)
                  takeover_.welcome_waiting();
                  try_postponed_ = true;
                }) {
-  changes_.read_first(options.stop_descriptor,
-                      [&] { return handle_signal(options.stop_descriptor); });
+  changes_.read_first(
+      options.stop_descriptor, [&] { return handle_signal(options.stop_descriptor); },
+      takeover_.may_inherit());
   listener_ = wire::listen_at(options.directory, instance_);
   if (fcntl(listener_.socket.get(), F_SETFL, O_NONBLOCK) != 0) {
     throw std::system_error(errno, std::generic_category(), "listening");

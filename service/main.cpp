@@ -42,8 +42,8 @@ SIGHUP and `arbiter reload` read all again; a bad one changes nothing.
 SIGTERM, SIGINT and `arbiter stop` stop it. Without --policy every user may open ports and observe,
 and only root and the daemon's own user may reload, switch and stop.
 Components go on without it. The next daemon of the instance takes them over, and puts its own model
-in force: if it has several, the one with the name that was in force. Without --model it keeps the
-model in force.
+in force: if it has several, the one with the name that was in force. Without --model, or if the
+models have errors, it keeps the model in force.
 It listens in the first of these that it can use: $RUNTIME_DIRECTORY, $XDG_RUNTIME_DIR/arbiter,
 /run/arbiter, arbiter-UID in the temporary directory.
 

@@ -15,6 +15,8 @@ void discard_stored(const std::string& name) {
   sd_notify(0, ("FDSTOREREMOVE=1\nFDNAME=" + name).c_str());
 }
 
+bool has_stored() { return sd_listen_fds(0) > 0; }
+
 std::vector<StoredDescriptor> take_stored() {
   char** names = nullptr;
   const int count = sd_listen_fds_with_names(1, &names);

@@ -16,5 +16,7 @@ struct StoredDescriptor {
 void store(const std::string& name, const shm::FileDescriptor& descriptor);
 void discard_stored(const std::string& name);
 std::vector<StoredDescriptor> take_stored();
+// Whether there is anything to take.
+[[nodiscard]] bool has_stored();
 
 }  // namespace arbiter::service

@@ -37,7 +37,8 @@ Compiler::Job ModelChanges::reading_job(
 }
 
 // Nobody is kept waiting by it; but signals are heard.
-void ModelChanges::read_first(int stop_descriptor, const std::function<bool()>& is_to_stop) {
+void ModelChanges::read_first(int stop_descriptor, const std::function<bool()>& is_to_stop,
+                              bool may_inherit) {
   if (options_.files.empty() && !gate_.has_file()) return;
   compiler_.start(reading_job([](Reading&, const std::stop_token&) {}));
   for (bool is_over = false; !is_over;) {
@@ -50,8 +51,11 @@ void ModelChanges::read_first(int stop_descriptor, const std::function<bool()>& 
   }
   Reading reading = compiler_.take();
   if (reading.findings.has_errors()) {
-    throw BadModel(std::string("not started: the files have errors, listed above") +
-                   (options_.is_strict ? "; --strict treats warnings as errors" : ""));
+    not_read_at_start_ = std::string("the files have errors, listed above") +
+                         (options_.is_strict ? "; --strict treats warnings as errors" : "");
+    const bool lacks_policy = gate_.has_file() && !reading.policy;
+    if (lacks_policy || !may_inherit) throw BadModel("not started: " + not_read_at_start_);
+    reading.models.clear();
   }
   if (reading.policy) gate_.put_in_force(*reading.policy);
   read_at_start_ = std::move(reading.models);
@@ -59,6 +63,7 @@ void ModelChanges::read_first(int stop_descriptor, const std::function<bool()>& 
 
 // The model that the last daemon had in force, if this one has it by that name, too.
 Swap ModelChanges::first_swap() {
+  if (!not_read_at_start_.empty()) throw BadModel(not_read_at_start_);
   Library library(std::exchange(read_at_start_, {}), names_);
   const std::string last = board_.name();
   const LoadedModel* next = library.find(last);

@@ -60,6 +60,9 @@ void ModelChanges::start(bool is_fresh) {
   if (inherited != 0) {
     history_.add({inherited, 0, board_.name(), {}, calendar_ms(), "takeover", {}, {}, nullptr});
   }
+  if (is_fresh && !not_read_at_start_.empty()) {
+    throw BadModel("not started: " + not_read_at_start_);
+  }
   if (options_.files.empty()) {
     if (!is_fresh) log::info("no model was given: the one in force stays");
     switchboard_.link_all(board_.in_force().table);
@@ -71,8 +74,11 @@ void ModelChanges::start(bool is_fresh) {
     begin_swap(swap);
   } catch (const std::exception& error) {
     if (is_fresh) throw;
+    ++reloads_refused_;
     log_event({EventKind::kChangeRefused, {}, {}, {}, inherited}, log::level::err,
-              "the model in force stays: {}", error.what());
+              "the last daemon's model stays in force: {}; `arbiter reload` reads the files again",
+              error.what());
+    switchboard_.link_all(board_.in_force().table);
     settle();
   }
 }

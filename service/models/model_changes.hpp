@@ -62,8 +62,9 @@ class ModelChanges {
   ModelChanges(Options options, const Parts& parts, std::function<void()> settled);
 
   // Reads, before anybody is served, what there is to be read. `is_to_stop` is asked where
-  // `stop_descriptor` is readable (-1: nowhere). Throws BadModel; rules::Stopped.
-  void read_first(int stop_descriptor, const std::function<bool()>& is_to_stop);
+  // `stop_descriptor` is readable (-1: nowhere). Throws BadModel, but where only the models have
+  // errors and `may_inherit`: start() knows whether there is a model without them. rules::Stopped.
+  void read_first(int stop_descriptor, const std::function<bool()>& is_to_stop, bool may_inherit);
   // Puts the first model in force, or the one of the name that a predecessor had. `is_fresh`: there
   // was none, and nothing is in force without it. Throws then, if it cannot be.
   void start(bool is_fresh);
@@ -138,6 +139,7 @@ class ModelChanges {
   const std::function<void()> settled_;
   bool has_settled_ = false;
   std::vector<ModelPointer> read_at_start_;  // until they are put into the library
+  std::string not_read_at_start_;            // why there is none
   Library library_;
   LoadedModel in_force_;  // null: none, or a predecessor's
   History history_;

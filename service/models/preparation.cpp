@@ -28,6 +28,7 @@ Reading read_files(const std::vector<NamedFiles>& files, const Gate& gate, const
   Reading reading;
   reading.findings = Findings(proving.is_strict);
   reading.policy = gate.read(reading.findings);
+  if (reading.findings.has_errors()) reading.policy.reset();  // what it warns of, --strict refuses
   reading.models = read_models(files, proving, stop, reading.findings);
   return reading;
 }

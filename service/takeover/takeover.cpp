@@ -52,6 +52,11 @@ Takeover::Takeover(const Parts& parts, Host& host, StateFile state, bool stores)
       state_(std::move(state)),
       stores_(stores) {}
 
+bool Takeover::may_inherit() const {
+  const auto state = state_.read();
+  return (state && state->is_survived) || (stores_ && has_stored());
+}
+
 void Takeover::look_for_predecessor() {
   started_ = shm::monotonic_now();
   predecessor_ = state_.read();

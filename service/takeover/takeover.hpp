@@ -68,6 +68,8 @@ class Takeover {
   // `stores`: whether the service manager keeps descriptors for the next daemon.
   Takeover(const Parts& parts, Host& host, StateFile state, bool stores);
 
+  // Before the beginning: whether a predecessor seems to have left anything.
+  [[nodiscard]] bool may_inherit() const;
   // The beginning: what is there of a predecessor. Without one it is over at once.
   void look_for_predecessor();
   // Only then is our own model put in force, and are others served.

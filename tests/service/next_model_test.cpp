@@ -72,6 +72,46 @@ TEST_F(ChangingModels, ADaemonKilledInTheMiddleOfASwitchLeavesOneOfTheTwo) {
   }
 }
 
+// A robot comes back by itself: what somebody has half written does not keep it from that.
+TEST_F(ChangingModels, OfABrokenFileTheModelInForceStaysWithTheNextDaemon) {
+  Daemon& daemon = start();
+  Node node("test");
+  auto a = node.output_port<Number>("/a");
+  auto in = node.input_port<Number>("/in");
+  daemon.kill();
+  daemon.write_model("<behaviors>");
+  daemon.restart();
+  EXPECT_EQ(daemon.generation(), 1u);
+  EXPECT_EQ(name_in_force(), "default");
+  EXPECT_EQ(a.publish(Number{1}).delivered, 1u);
+  EXPECT_EQ(take_from(in), 1);
+  {
+    Component other("other");  // as one that has been restarted
+    ASSERT_EQ(other.tell("output /b"), "open");
+    EXPECT_EQ(other.tell("publish /b 2"), "0 0 0") << "which the model in force does not mention";
+  }
+  expect_refusal(arbiter({"switch", "other"}), "there is no model \"other\"; none is loaded");
+  EXPECT_EQ(arbiter({"reload"}).exit_code, 1);
+  daemon.write_model(only("c"));
+  EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
+  EXPECT_EQ(source_in_force(), "/c");
+}
+
+// Without its policy, everybody might do what only some may.
+TEST_F(ChangingModels, OfABrokenPolicyThereIsNoNextDaemon) {
+  const std::string policy = files_.write("policy", "allow user root output /a\n");
+  Daemon& daemon = start({"--policy", policy});
+  Node node("test");
+  auto a = node.output_port<Number>("/a");
+  daemon.kill();
+  files_.write("policy", "alow user root output /a\n");
+  const ProgramResult next =
+      run_program({arbiterd_path(), "--instance", daemon.instance(), "--policy", policy, "--model",
+                   files_.write("good.xml", only("a"))});
+  EXPECT_EQ(next.exit_code, 1);
+  EXPECT_NE(next.err.find("not started: the files have errors"), std::string::npos) << next.err;
+}
+
 TEST_F(ChangingModels, TheDescriptorStoreKeepsTheNameToo) {
   Daemon& daemon = start({"--descriptor-store"});
   ASSERT_EQ(arbiter({"switch", "other"}).exit_code, 0);
