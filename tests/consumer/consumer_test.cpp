@@ -83,6 +83,23 @@ std::set<std::string> headings_of(const fs::path& page) {
   return names;
 }
 
+TEST(Consumer, BuildsWithPkgConfigToo) {
+  const TemporaryDirectory directory;
+  ASSERT_NO_FATAL_FAILURE(install(directory.path()));
+  const ProgramResult flags =
+      run_program({"/usr/bin/env", "PKG_CONFIG_PATH=" + directory.path() + "/lib/pkgconfig",
+                   "pkg-config", "--cflags", "--libs", "arbiter"});
+  ASSERT_EQ(flags.exit_code, 0) << flags.err;
+  const std::string source = ARBITER_TEST_DATA "/project/consumer17.cpp";
+  const std::string compile = CONSUMER_COMPILER " " CONSUMER_FLAGS " ";
+  run({"/bin/sh", "-c",
+       compile + "-std=c++17 " + source + " -o " + directory.path() + "/consumer " + flags.out});
+  const ProgramResult older = run_program(
+      {"/bin/sh", "-c", compile + "-std=c++14 -fsyntax-only " + source + " " + flags.out});
+  EXPECT_NE(older.exit_code, 0);
+  EXPECT_THAT(older.err, testing::HasSubstr("arbiter needs C++17 or later"));
+}
+
 TEST(Consumer, FindsWhatTheInstalledPagesLinkTo) {
   const TemporaryDirectory directory;
   ASSERT_NO_FATAL_FAILURE(install(directory.path()));

@@ -6,6 +6,10 @@
 // what lies outside is not looked after. The paper has nothing of it.
 #pragma once
 
+#if __cplusplus < 201703L
+#error "arbiter needs C++17 or later: compile with -std=c++17, or set CXX_STANDARD to 17"
+#endif
+
 #include <cstddef>
 
 #if __cplusplus >= 202002L

@@ -125,7 +125,8 @@ class WaitResult {
   std::optional<Sample<T>> sample_;
 };
 
-// T = void: untyped; accepts anything and gives bytes. Movable.
+// T = void: untyped; accepts anything and gives bytes. Movable; one that has been moved from may be
+// assigned to and destroyed, and nothing else: no call checks for that.
 template <class T = void>
 class InputPort {
  public:
@@ -149,7 +150,8 @@ class InputPort {
   }
 
   // As take(), but blocks, without spinning, until there is a sample, the port becomes idle, or the
-  // time has passed. Losing publishers do not wake it.
+  // time has passed. Losing publishers do not wake it, nor do signals: a component that shall end
+  // at one waits for a while at a time, or for fd() beside what tells it of the signal.
   template <class Rep, class Period>
   [[nodiscard]] WaitResult<T> wait_for(std::chrono::duration<Rep, Period> timeout) {
     detail::HeldSample held;
