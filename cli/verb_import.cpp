@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -21,6 +21,7 @@
 #include "rules/prove/compile.hpp"
 #include "rules/text/names.hpp"
 #include "rules/text/text_file.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -44,32 +45,53 @@ std::vector<importing::InputFile> read_files(const ImportVerbOptions& options) {
   return files;
 }
 
-// What was written is read as anybody will read it, before anybody does. A model that breaks a
+// What is to be written is read as anybody will read it, before anybody does. A model that breaks a
 // limit of Arbiter's is the user's to mend; any other error is ours.
-void check_by_reading_back(const std::string& name, const std::string& model) {
-  rules::Diagnostics diagnostics;
-  const auto rules = rules::load(rules::ModelTexts{{{name, model}}, {}}, diagnostics);
-  rules::compile(rules, diagnostics);
+using Problems = std::vector<std::string>;
+
+void add_problems(const std::string& what, const rules::Diagnostics& diagnostics,
+                  const std::string& of_zeros, Problems& problems) {
   for (const auto& item : diagnostics.items()) {
     if (item.severity != rules::Severity::kError) continue;
-    throw std::runtime_error("the model would be refused, nothing was written: " + item.message +
-                             " [" + item.code + "]");
+    std::string problem = "the " + what +
+                          " would be refused, nothing was written: " + item.message + " [" +
+                          item.code + "]" + (item.code == "idle-size" ? of_zeros : "");
+    // A type that cannot be is that of each topic.
+    if (std::find(problems.begin(), problems.end(), problem) != problems.end()) continue;
+    problems.push_back(std::move(problem));
   }
 }
 
-// The same of the mapping.
-void check_by_reading_back(const rules::TextFile& mapping, bool sends_zeros) {
+void read_back(const rules::ModelTexts& texts, Problems& problems) {
+  rules::Diagnostics diagnostics;
+  rules::compile(rules::load(texts, diagnostics), diagnostics);
+  add_problems("model", diagnostics, "", problems);
+}
+
+void read_back(const rules::TextFile& mapping, Problems& problems) {
   rules::Diagnostics diagnostics;
   gateway::read_mapping(mapping, diagnostics);
-  for (const auto& item : diagnostics.items()) {
-    if (item.severity != rules::Severity::kError) continue;
-    const bool is_by_zeros = sends_zeros && item.code == "idle-size";
-    throw std::runtime_error("the mapping would be refused, nothing was written: " + item.message +
-                             " [" + item.code + "]" +
-                             (is_by_zeros ? "; leave out --idle zero, and name the sample in the "
-                                            "mapping once that is written"
-                                          : ""));
+  // Nothing else sends what has a size.
+  add_problems("mapping", diagnostics,
+               "; leave out --idle zero, and name the sample in the mapping once that is written",
+               problems);
+}
+
+// What can be found in a mapping of which only the way out is known.
+Problems problems_of_way_out(importing::Plan plan, const std::string& mapping) {
+  Problems problems;
+  if (plan.output_topic.empty()) return problems;  // which has been reported
+  plan.commands.clear();
+  plan.locks.clear();
+  read_back(rules::TextFile(mapping, importing::write_mapping(plan, "")), problems);
+  return problems;
+}
+
+int say_problems(const Problems& problems) {
+  for (const std::string& each : problems) {
+    std::cerr << "arbiter: " << shm::printable(each, "\n\t") << '\n';
   }
+  return 1;
 }
 
 void choose_outputs(ImportVerbOptions& options) {
@@ -114,18 +136,22 @@ int import(ImportVerbOptions options) {
                         ? importing::import_twist_mux(files, options.import, diagnostics)
                         : importing::import_cmd_vel_mux(files, options.import, diagnostics);
   rules::write_text(std::cerr, diagnostics);
+  const bool has_mapping = !options.mapping.empty();
   if (!plan) return 1;
+  if (diagnostics.has_errors()) {
+    return say_problems(has_mapping ? problems_of_way_out(*plan, options.mapping) : Problems{});
+  }
   const std::string name = options.output.empty()
                                ? "model.xml"
                                : std::filesystem::path(options.output).filename().string();
   const std::string model = importing::write_model(*plan);
-  check_by_reading_back(name, model);
   const std::string mapping = importing::write_mapping(*plan, name);
-  if (!options.mapping.empty()) {
-    check_by_reading_back(rules::TextFile(options.mapping, mapping), !plan->idle.empty());
-  }
+  Problems problems;
+  read_back(rules::ModelTexts{{{name, model}}, {}}, problems);
+  if (has_mapping) read_back(rules::TextFile(options.mapping, mapping), problems);
+  if (!problems.empty()) return say_problems(problems);
   make_directory(options.directory);
-  if (!options.mapping.empty()) write_output(options.mapping, mapping);
+  if (has_mapping) write_output(options.mapping, mapping);
   write_output(options.output, model);
   return 0;
 }

@@ -11,6 +11,9 @@
 // others. The next message of any input takes it, even where one with a higher priority has
 // published within its timeout, before the owner came or in vain. Arbiter waits until that timeout
 // is over. It passes on nothing that cmd_vel_mux would not.
+//
+// kobuki's refuses equal priorities. In yocs' an input does not take the mux from an equal one,
+// which depends on who came first; in the model the first one in the list does.
 #include <algorithm>
 #include <set>
 #include <utility>
@@ -52,9 +55,8 @@ class CmdVelMuxImport {
     });
     for (std::size_t i = 0; i < inputs_.size(); ++i) plan_input(i);
     set_output(parameter->entry->key.where);
-    if (diagnostics_.has_errors()) return {};
     assembly_.set_types(plan_, {}, parameter->entry->key.where);
-    say_what_is_not_kept();
+    if (!diagnostics_.has_errors()) say_what_is_not_kept();
     return std::move(plan_);
   }
 

@@ -29,8 +29,10 @@ struct ImportOptions {
       domain;  // none: that of the environment, as the multiplexers have it
 };
 
-// Both report all problems in one go, and return nothing where one is an error. Warnings name what
-// is dangerous in the file, notes what cannot be kept.
+// Both report all problems in one go. Warnings name what is dangerous in the file, notes what
+// cannot be kept. The result is to be used as a whole only if no error was reported; else it says
+// which way out and which types were meant, as far as that can be known, for whoever has more to
+// find there. Nothing: the files do not configure such a multiplexer, which is an error.
 std::optional<Plan> import_twist_mux(const std::vector<InputFile>& files,
                                      const ImportOptions& options, rules::Diagnostics& diagnostics);
 std::optional<Plan> import_cmd_vel_mux(const std::vector<InputFile>& files,

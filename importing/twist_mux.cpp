@@ -68,10 +68,10 @@ class TwistMuxImport {
     choose_topics();
     plan_locks();
     for (const Chosen& each : chosen_) plan_.commands.push_back(command_of(each));
-    const rules::Location where = topics_.empty() ? rules::Location{} : topics_.front().topic.where;
+    const rules::Location where = topics_.empty() ? parameters_.sets().front().parameters->where
+                                                  : topics_.front().topic.where;
     assembly_.set_output(plan_, "cmd_vel_out", where);
-    if (diagnostics_.has_errors()) return {};
-    note_unsaid_stamp();
+    if (!diagnostics_.has_errors()) note_unsaid_stamp();
     assembly_.set_types(plan_, stamped_, where);
     // SystemDefaultsQoS(); what crosses from ROS 1 is reliable.
     if (parameters_.is_ros2()) plan_.qos = "system_default";

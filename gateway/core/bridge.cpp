@@ -140,13 +140,14 @@ void Bridge::open_closed() {
   open_again_ = begin + kOpenPeriod;
   if (has_started_ && max_ages_.knows_of_no_daemon()) return;
   shm::Nanoseconds pause = kOpenPeriod;
+  SpareDescriptors spare;
   std::vector<Part*> opened;
   for (std::size_t tried = 0; tried < parts_.size(); ++tried) {
     Part& part = *parts_[open_next_];
     open_next_ = (open_next_ + 1) % parts_.size();
     if (part.is_open()) continue;
     const shm::Nanoseconds before = shm::monotonic_now();
-    if (try_to_open(part)) opened.push_back(&part);
+    if (try_to_open(part, spare)) opened.push_back(&part);
     if (options_.on_round) options_.on_round();
     const shm::Nanoseconds now = shm::monotonic_now();
     if (!part.is_open() && now - before > (has_started_ ? kNoAnswer : kSilence)) {
@@ -159,6 +160,7 @@ void Bridge::open_closed() {
       break;
     }
   }
+  spare.let_go();
   if (!opened.empty() || !has_started_) start(opened);
   open_again_ = shm::monotonic_now() + pause;
 }
@@ -168,8 +170,13 @@ bool Bridge::is_any(bool open) const {
                      [open](const auto& part) { return part->is_open() == open; });
 }
 
-bool Bridge::try_to_open(Part& part) {
+bool Bridge::try_to_open(Part& part, SpareDescriptors& spare) {
   try {
+    if (!spare.leave_room()) {
+      throw Error(
+          "no descriptors are left for it: raise RLIMIT_NOFILE (ulimit -n, LimitNOFILE= in a "
+          "systemd unit)");
+    }
     open(part);
     part.waiting.say_once("");
     return true;

@@ -18,6 +18,7 @@
 #include <arbiter/node.hpp>
 
 #include "gateway/core/account.hpp"
+#include "gateway/core/descriptors.hpp"
 #include "gateway/core/incoming.hpp"
 #include "gateway/core/max_ages.hpp"
 #include "gateway/core/middleware.hpp"
@@ -91,7 +92,7 @@ class Bridge {
   void open_closed();
   [[nodiscard]] bool is_any(bool open) const;
   // False: not now, and the log says why.
-  bool try_to_open(Part& part);
+  bool try_to_open(Part& part, SpareDescriptors& spare);
   void open(Part& part);
   // `whose`: a Part, or what else the loop knows the descriptor by.
   void watch(int descriptor, const void* whose) const;

@@ -100,8 +100,11 @@ void KeptFiles::save(const std::string& path) const {
   const shm::FileDescriptor file(
       ::open(next.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0600));
   if (!file) fail(next);
-  if (!shm::write_whole(file.get(), content())) fail(next);
-  if (::rename(next.c_str(), path.c_str()) != 0) fail(path);
+  if (shm::write_whole(file.get(), content()) && ::rename(next.c_str(), path.c_str()) == 0) return;
+  const int error = errno;
+  ::unlink(next.c_str());  // it takes room, where that is short
+  errno = error;
+  fail(path);
 }
 
 }  // namespace arbiter::gateway

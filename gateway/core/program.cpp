@@ -13,6 +13,7 @@
 #include <CLI/CLI.hpp>
 
 #include "command_line/wrong_use.hpp"
+#include "gateway/core/descriptors.hpp"
 #include "gateway/core/kept_files.hpp"
 #include "gateway/core/reload.hpp"
 #include "gateway/core/say.hpp"
@@ -93,12 +94,14 @@ std::optional<std::vector<Mapping>> read_for_idle(const Arguments& arguments,
   return read(arguments, kind, files.from_disk(false));
 }
 
-// For --send-idle. A gateway that cannot leave it is one all the same.
+// For --send-idle. A gateway that cannot leave it is one all the same; but then one of another
+// mapping must not be found, by which nobody would tell the robot to stop that this one drives.
 void leave_copy(const Arguments& arguments, const KeptFiles& files) {
   if (arguments.copy.empty()) return;
   try {
     files.save(arguments.copy);
   } catch (const std::exception& error) {
+    ::unlink(arguments.copy.c_str());
     say(Level::kWarning, std::string("no copy of the mapping is kept: ") + error.what());
   }
 }
@@ -290,6 +293,7 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
 
 int run_program(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& make) {
   set_program_name(kind.name);
+  raise_descriptor_limit();
   try {
     return run(argc, argv, kind, make);
   } catch (const rules::FileError& error) {

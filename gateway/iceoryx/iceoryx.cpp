@@ -78,7 +78,17 @@ void Iceoryx::set_obstacle(const std::string& text) {
   if (text == obstacle_) return;
   obstacle_ = text;
   for (const OpenIn& in : ins_) in.account.set_obstacle(text);
-  for (const Out& out : outs_) out.sender->account().set_obstacle(text);
+  tell_obstacles();
+}
+
+void Iceoryx::tell_obstacles() {
+  for (Out& out : outs_) {
+    const std::string peers = out.sender->wrong_peers();
+    const std::string text = obstacle_ + (obstacle_.empty() || peers.empty() ? "" : "; ") + peers;
+    if (text == out.obstacle) continue;
+    out.obstacle = text;
+    out.sender->account().set_obstacle(text);
+  }
 }
 
 void Iceoryx::tend() {
@@ -111,6 +121,7 @@ void Iceoryx::tend() {
   }
   set_obstacle(silence > kSilent ? "RouDi does not answer" : "");
   look_after_senders();
+  tell_obstacles();
 }
 
 void Iceoryx::look_after_senders() {

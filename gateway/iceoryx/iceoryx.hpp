@@ -26,7 +26,9 @@ class Iceoryx final : public Middleware {
   void tend() override;
 
  private:
+  // What keeps all topics from working; empty: nothing.
   void set_obstacle(const std::string& text);
+  void tell_obstacles();
   void look_after_senders();
 
   // Of an `out` entry.
@@ -34,6 +36,7 @@ class Iceoryx final : public Middleware {
     std::unique_ptr<ChunkSender> sender;
     Outgoing* outgoing = nullptr;  // while its port is not open, or there is no bridge: null
     bool had_readers = false;
+    std::string obstacle{};  // as its account has it
   };
 
   const std::string name_;

@@ -1,12 +1,16 @@
 #include "gateway/iceoryx/runtime.hpp"
 
+#include <fcntl.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <charconv>
 #include <filesystem>
 
 #include <iceoryx_hoofs/platform/platform_settings.hpp>
+
+#include "shm/file_descriptor.hpp"
 
 namespace arbiter::gateway {
 
@@ -24,6 +28,8 @@ std::optional<pid_t> process_of(const std::string& gateway, const std::string& r
 }
 
 std::string why_no_traces() {
+  const shm::FileDescriptor another(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+  if (!another && errno == EMFILE) return "the process has no descriptor left (RLIMIT_NOFILE)";
   const std::string directory =
       std::filesystem::path(iox::platform::IOX_LOCK_FILE_PATH_PREFIX).parent_path().string();
   struct statvfs room {};

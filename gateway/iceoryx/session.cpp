@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <utility>
@@ -28,6 +29,7 @@ constexpr shm::Nanoseconds kUnwatchedPeriod = 5 * kMillisecond;
 constexpr shm::Nanoseconds kListPeriod = 200 * kMillisecond;
 // RouDi needs a tenth of a second to connect who is in its list.
 constexpr int kLooksUntilRefused = 10;
+constexpr std::size_t kMostNames = 3;
 // RouDi gives up a process that has not been heard of for 1.5 s, whose ends are dead from then on
 // although nothing tells it so. What keeps its keep-alive from running keeps this thread, too.
 constexpr shm::Nanoseconds kGivenUp = 1200 * kMillisecond;
@@ -39,6 +41,17 @@ iox::capro::ServiceDescription service_of(const IceoryxTopic& topic) {
     return iox::capro::IdString_t(iox::cxx::TruncateToCapacity, text);
   };
   return {id(topic.service), id(topic.instance), id(topic.event)};
+}
+
+// A status has room for a few, and so has a log that is to be read.
+std::string some_of(const std::vector<std::string>& names) {
+  std::string text;
+  const std::size_t most = names.size() == kMostNames + 1 ? kMostNames + 1 : kMostNames;
+  for (std::size_t i = 0; i < std::min(names.size(), most); ++i) {
+    text += (i == 0 ? "" : ", ") + names[i];
+  }
+  if (names.size() > most) text += " and " + std::to_string(names.size() - most) + " others";
+  return text;
 }
 
 // The largest alignment that a header of that size may have: iceoryx wants the size to be a
@@ -274,6 +287,7 @@ void Session::look_at_list(shm::Nanoseconds now) {
   for (Outlet& out : outs_) {
     look_for_strangers(out);
     look_for_refused(out);
+    tell_wrong_peers(out);
   }
 }
 
@@ -286,35 +300,39 @@ void Session::count_publishers(const Inlet& inlet) const {
 void Session::look_for_refused(Outlet& out) const {
   const auto subscribers = port_list_->subscribers_of(*out.sender->entry().iceoryx);
   if (subscribers.empty() || out.sender->publisher()->hasSubscribers()) {
-    const bool was_refused = std::exchange(out.looks_without_any, 0) >= kLooksUntilRefused;
-    if (was_refused) out.sender->account().set_last_reason("");
-    return;
+    out.looks_without_any = 0;
+    out.refused.clear();
+  } else if (++out.looks_without_any >= kLooksUntilRefused) {
+    out.refused = subscribers.front();
   }
-  if (++out.looks_without_any != kLooksUntilRefused) return;
-  out.sender->account().set_last_reason(
-      subscribers.front() +
-      " subscribes and is not connected: it asks for history=\"…\", or that publishers wait when "
-      "its queue is full, which no gateway does");
 }
 
 // What does not pass the gateway can bypass it.
 void Session::look_for_strangers(Outlet& out) const {
   const std::string own = runtime_name(gateway_, ::getpid());
-  std::string strangers;
+  std::vector<std::string> strangers;
   for (const std::string& runtime : port_list_->publishers_of(*out.sender->entry().iceoryx)) {
     const auto process = process_of(gateway_, runtime);
     const bool has_ended = process && ::kill(*process, 0) != 0 && errno == ESRCH;
-    if (runtime != own && !has_ended) strangers += (strangers.empty() ? "" : ", ") + runtime;
+    if (runtime != own && !has_ended) strangers.push_back(runtime);
   }
-  const std::string before = std::exchange(out.strangers, strangers);
-  if (strangers.empty() && before.empty()) return;
-  const std::string text =
-      strangers.empty() ? "" : "others publish there too, past all arbitration: " + strangers;
-  // Set each time, because the loop clears it together with what it has said about RouDi.
-  out.sender->account().set_obstacle(text);
-  if (strangers.empty() || strangers == before) return;
+  std::string text;
+  if (!strangers.empty()) {
+    text = "others publish there too, past all arbitration: " + some_of(strangers);
+  }
+  if (text == std::exchange(out.strangers, text) || text.empty()) return;
   say(Level::kWarning, out.sender->entry().outside() + ": " + text +
                            "; let them publish to another topic, and map that one with <in>");
+}
+
+void Session::tell_wrong_peers(const Outlet& out) {
+  std::string text = out.strangers;
+  if (!out.refused.empty()) {
+    text += (text.empty() ? "" : "; ") + ("no subscriber matched; " + out.refused) +
+            " subscribes and is not connected: it asks for history=\"…\", or that publishers wait "
+            "when its queue is full, which no gateway does";
+  }
+  out.sender->set_wrong_peers(std::move(text));
 }
 
 }  // namespace arbiter::gateway

@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <iceoryx_posh/popo/untyped_publisher.hpp>
@@ -39,6 +40,16 @@ class ChunkSender final : public Sender {
   void drop_draft() noexcept override;
   // From the session's thread, once; the loop sees it from then on.
   void use(iox::popo::UntypedPublisher& publisher) noexcept { publisher_.announce(publisher); }
+  // What is wrong with who else is at the topic; empty: nothing. From the session's thread. What
+  // the account says is for the loop to write, which knows what is wrong with RouDi.
+  void set_wrong_peers(std::string text) {
+    const std::lock_guard lock(mutex_);
+    wrong_peers_ = std::move(text);
+  }
+  [[nodiscard]] std::string wrong_peers() const {
+    const std::lock_guard lock(mutex_);
+    return wrong_peers_;
+  }
   [[nodiscard]] iox::popo::UntypedPublisher* publisher() const noexcept { return publisher_.get(); }
   [[nodiscard]] const Entry& entry() const noexcept { return entry_; }
   [[nodiscard]] Account& account() const noexcept { return account_; }
@@ -47,6 +58,8 @@ class ChunkSender final : public Sender {
   const Entry& entry_;
   Account& account_;
   Announced<iox::popo::UntypedPublisher> publisher_;
+  mutable std::mutex mutex_;  // of the next one
+  std::string wrong_peers_;
   void* draft_ = nullptr;  // of whoever has the entry's turn
 };
 
@@ -89,6 +102,7 @@ class Session {
   struct Outlet {
     ChunkSender* sender;
     std::string strangers{};
+    std::string refused{};      // the first of those, or empty
     int looks_without_any = 0;  // at the list, while it has subscribers and the publisher none
   };
 
@@ -102,6 +116,7 @@ class Session {
   void count_publishers(const Inlet& inlet) const;
   void look_for_strangers(Outlet& out) const;
   void look_for_refused(Outlet& out) const;
+  static void tell_wrong_peers(const Outlet& out);
 
   const std::string gateway_;
   const RoudiIdentity roudi_;

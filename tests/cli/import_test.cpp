@@ -134,6 +134,54 @@ TEST(Import, WritesNoMappingThatAGatewayWouldRefuse) {
   EXPECT_THAT(check.err, testing::Not(HasSubstr("idle=\"zero\"")));
 }
 
+// Whoever corrects a file wants to know all that is to be corrected.
+TEST(Import, SaysWhatIsWrongWithTheFileAndWithTheMappingInOneRun) {
+  TemporaryDirectory directory;
+  const std::string folder = directory.path() + "/mux";
+  const auto equals =
+      "cmd_vel_mux: {ros__parameters: {subscribers: {\n"
+      "a: {topic: a, timeout: 0.5, priority: 1, short_desc: A},\n"
+      "b: {topic: b, timeout: 0.5, priority: 1, short_desc: B}}}}\n";
+  auto result = arbiter({"import", "cmd_vel_mux", directory.write("e.yaml", equals), "--out-dir",
+                         folder, "--type", "my_msgs/msg/Command", "--idle", "zero"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("e.yaml:3:39: error: \"a\" and \"b\" have the priority 1"));
+  EXPECT_THAT(result.err,
+              HasSubstr("arbiter: the mapping would be refused, nothing was written: "));
+  EXPECT_THAT(result.err, HasSubstr("[idle-size]; leave out --idle zero"));
+  const auto stamped = kMux + "- {name: x, topic: x, timeout: 0.5}\nuse_stamped: true\n";
+  result = arbiter({"import", "twist_mux", directory.write("s.yaml", stamped), "--out-dir", folder,
+                    "--idle", "zero"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("s.yaml:4:3: error: \"x\" has no `priority`"));
+  EXPECT_THAT(result.err, HasSubstr("[idle-size]; leave out --idle zero"));
+  // Of a mapping that nobody asked for nothing is said.
+  result = arbiter({"import", "twist_mux", directory.path() + "/s.yaml", "--idle", "zero"});
+  EXPECT_THAT(result.err, testing::Not(HasSubstr("the mapping would be refused")));
+  EXPECT_FALSE(std::filesystem::exists(folder));
+}
+
+// Nor is it said once for each topic.
+TEST(Import, ATypeThatCannotBeIsRefusedTogetherWithAModelThatIsTooLarge) {
+  TemporaryDirectory directory;
+  std::string both = "topics:\n";
+  for (int i = 1; i <= 400; ++i) {
+    if (i == 201) both += "locks:\n";
+    const std::string n = "n" + std::to_string(i);
+    both += "- {name: " + n + ", topic: " + n +
+            ", timeout: 0.5, priority: " + std::to_string(1 + i % 255) + "}\n";
+  }
+  const auto result = arbiter({"import", "twist_mux", directory.write("both.yaml", both),
+                               "--out-dir", directory.path() + "/mux", "--type", "a//msg/B"});
+  EXPECT_EQ(result.exit_code, 1);
+  const auto model = result.err.find("arbiter: the model would be refused, nothing was written: ");
+  const auto mapping =
+      result.err.find("arbiter: the mapping would be refused, nothing was written");
+  ASSERT_NE(model, std::string::npos) << result.err;
+  ASSERT_NE(mapping, std::string::npos) << result.err;
+  EXPECT_EQ(result.err.find("the mapping would be refused", mapping + 20), std::string::npos);
+}
+
 std::string entries(const std::string& name, int count) {
   std::string text;
   for (int i = 1; i <= count; ++i) {

@@ -148,6 +148,71 @@ TEST(Consumer, FindsTheUsersOfServicesInTheListOfThoseToBeMade) {
   EXPECT_EQ(first_of_each(lib / "sysusers.d/arbiter.conf", line), users);
 }
 
+std::vector<fs::path> units_in(const std::string& prefix) {
+  std::vector<fs::path> units;
+  for (const auto& each : fs::directory_iterator(prefix + "/lib/systemd/system")) {
+    units.push_back(each.path());
+  }
+  return units;
+}
+
+constexpr const char* kSystemdAnalyze = "/usr/bin/systemd-analyze";
+
+// No service manager is needed for it.
+bool can_analyze() {
+  if (!fs::exists(kSystemdAnalyze)) return false;
+  return run_program({kSystemdAnalyze, "--help"}).out.find("--offline") != std::string::npos;
+}
+
+// What systemd has to say of that unit, and not of others that it looks at as well.
+std::string complaints_about(const fs::path& unit) {
+  const ProgramResult result =
+      run_program({kSystemdAnalyze, "verify", "--man=no", "--recursive-errors=no", unit});
+  std::istringstream lines(result.out + result.err);
+  std::string complaints;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find(unit.filename()) != std::string::npos) complaints += line + "\n";
+  }
+  return result.exit_code == 0 ? complaints : complaints + "refused";
+}
+
+TEST(Consumer, IsGivenUnitsThatSystemdTakesAsTheyAre) {
+  if (!can_analyze()) GTEST_SKIP() << "no systemd-analyze of systemd 250 or later";
+  const TemporaryDirectory directory;
+  ASSERT_NO_FATAL_FAILURE(install(directory.path()));
+  const auto units = units_in(directory.path());
+  EXPECT_EQ(units.size(), 4u);
+  for (const fs::path& unit : units) EXPECT_EQ(complaints_about(unit), "") << unit;
+  // It does find what is wrong.
+  const fs::path misspelt = directory.path() + "/misspelt.service";
+  std::ofstream(misspelt) << text_of(units.front()) << "[Service]\nProtectHom=yes\n";
+  EXPECT_THAT(complaints_about(misspelt), testing::HasSubstr("ProtectHom"));
+}
+
+// A service without any sandbox has 9.6 on systemd's scale, one of systemd's own some 2.
+TEST(Consumer, IsGivenUnitsThatSystemdHoldsForHardened) {
+  if (!can_analyze()) GTEST_SKIP() << "no systemd-analyze of systemd 250 or later";
+  const TemporaryDirectory directory;
+  ASSERT_NO_FATAL_FAILURE(install(directory.path()));
+  for (const fs::path& unit : units_in(directory.path())) {
+    const ProgramResult result =
+        run_program({kSystemdAnalyze, "security", "--offline=true", "--threshold=20", unit});
+    EXPECT_EQ(result.exit_code, 0) << unit << "\n" << result.out << result.err;
+  }
+}
+
+TEST(Consumer, IsGivenUnitsOfWhichTheDaemonsIsStartedFirst) {
+  const TemporaryDirectory directory;
+  ASSERT_NO_FATAL_FAILURE(install(directory.path()));
+  for (const fs::path& unit : units_in(directory.path())) {
+    if (unit.filename() == "arbiterd.service") continue;
+    for (const std::string key : {"After", "Wants"}) {
+      const auto named = first_of_each(unit, std::regex(key + "=(arbiterd\\.service)( .*)?"));
+      EXPECT_EQ(named.size(), 1u) << unit << ": " << key;
+    }
+  }
+}
+
 TEST(Consumer, IsHelpedByEachProgram) {
   const TemporaryDirectory directory;
   ASSERT_NO_FATAL_FAILURE(install(directory.path()));

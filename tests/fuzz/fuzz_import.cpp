@@ -32,8 +32,8 @@ void check(const std::string& text) {
     rules::Diagnostics diagnostics;
     const auto plan = import(files, {}, diagnostics);
     check_findings(diagnostics);
-    require(plan.has_value() != diagnostics.has_errors(), "an error is why there is nothing");
-    if (plan) check_plan(*plan);
+    require(plan.has_value() || diagnostics.has_errors(), "an error is why there is nothing");
+    if (!diagnostics.has_errors()) check_plan(*plan);
   }
 }
 

@@ -9,17 +9,20 @@
 #include <utility>
 #include <vector>
 
+#include "gateway/core/incoming.hpp"
+#include "gateway/mapping/read_mapping.hpp"
 #include "importing/import.hpp"
 #include "rules/explain/simulation.hpp"
 #include "rules/model/load.hpp"
 #include "rules/prove/compile.hpp"
+#include "tests/gateway/foreign.hpp"
 
 namespace arbiter::test {
 
 enum class Program { kTwistMux, kCmdVelMux };
 
 struct Imported {
-  std::optional<importing::Plan> plan;
+  std::optional<importing::Plan> plan;  // a whole one
   rules::Diagnostics diagnostics;
 
   // "2:14 error same-topic", each.
@@ -57,33 +60,57 @@ inline Imported import_texts(Program program, const std::vector<std::string>& te
   result.plan = program == Program::kTwistMux
                     ? importing::import_twist_mux(files, options, result.diagnostics)
                     : importing::import_cmd_vel_mux(files, options, result.diagnostics);
+  if (result.diagnostics.has_errors()) result.plan.reset();
   return result;
 }
 
-// The model of a plan, written, read as any other, and run by the code that decides on the robot.
+// The model and the mapping of a plan, written, read as any other, and run by the code that decides
+// on the robot: that of gateways says which port a message is for, and what a lock's message means.
 class ImportedRobot {
  public:
   explicit ImportedRobot(const importing::Plan& plan)
-      : plan_(plan), model_(compiled(importing::write_model(plan))), simulation_(model_) {}
+      : mapping_(read(importing::write_mapping(plan, "model.xml"))),
+        model_(compiled(importing::write_model(plan))),
+        simulation_(model_) {}
 
   // Whether a message of a topic gets through.
   bool receives(const std::string& topic, shm::Nanoseconds now) {
-    for (const importing::Command& command : plan_.commands) {
-      if (command.topic == topic) return is_delivered(command.port, now);
-    }
-    return false;  // the mapping does not have it: nothing is published
+    const gateway::Entry* const entry = entry_of(topic);
+    // The mapping does not have it: nothing is published.
+    return entry != nullptr && is_delivered(entry->port->name, now);
   }
 
-  // A sample of a lock, as a gateway publishes it.
+  // A message of a lock.
   void receives_lock(const std::string& topic, bool pressed, shm::Nanoseconds now) {
-    for (const importing::Lock& lock : plan_.locks) {
-      if (lock.topic != topic) continue;
-      happen(rules::TraceKind::kArrival, pressed ? lock.pressed : lock.released, now);
-      happen(rules::TraceKind::kDeactivation, pressed ? lock.released : lock.pressed, now);
+    const gateway::Entry* const entry = entry_of(topic);
+    if (entry == nullptr) return;
+    const auto side = gateway::choose(*entry->choice, message_of(pressed));
+    if (!side) {
+      ADD_FAILURE() << topic << ": the gateway does not know what the message means";
+      return;
     }
+    const bool is_yes = *side == gateway::Side::kYes;
+    const gateway::Choice& ports = *entry->choice;
+    happen(rules::TraceKind::kArrival, is_yes ? ports.yes.name : ports.no.name, now);
+    happen(rules::TraceKind::kDeactivation, is_yes ? ports.no.name : ports.yes.name, now);
   }
 
  private:
+  static constexpr std::size_t kEncapsulation = 4;  // bytes
+
+  // A std_msgs/msg/Bool, as DDS has it.
+  static gateway::BytesSample message_of(bool data) {
+    return gateway::BytesSample(std::string("\0\1\0\0", kEncapsulation) + (data ? '\1' : '\0'),
+                                kEncapsulation);
+  }
+
+  static gateway::Mapping read(const std::string& text) {
+    rules::Diagnostics diagnostics;
+    auto mapping = gateway::read_mapping(rules::TextFile("mapping.xml", text), diagnostics);
+    for (const auto& item : diagnostics.items()) ADD_FAILURE() << item.message << "\n" << text;
+    return mapping;
+  }
+
   static rules::CompiledModel compiled(const std::string& text) {
     rules::Diagnostics diagnostics;
     const auto rules = rules::load(rules::ModelTexts{{{"model.xml", text}}, {}}, diagnostics);
@@ -94,10 +121,20 @@ class ImportedRobot {
     return model;
   }
 
+  [[nodiscard]] const gateway::Entry* entry_of(const std::string& topic) const {
+    for (const gateway::Entry& entry : mapping_.gateways.at(0).entries) {
+      if (entry.is_in() && entry.dds->written == topic) return &entry;
+    }
+    return nullptr;
+  }
+  [[nodiscard]] const std::string& way_out() const {
+    return mapping_.gateways.at(0).entries.back().port->name;
+  }
+
   bool is_delivered(const std::string& port, shm::Nanoseconds now) {
     const rules::TraceEvent event{now, rules::TraceKind::kArrival, port};
     for (const auto& row : simulation_.step(event)) {
-      if (row.port == plan_.output_port) return row.outcome.delivered;
+      if (row.port == way_out()) return row.outcome.delivered;
     }
     ADD_FAILURE() << port << " is not connected";
     return false;
@@ -107,7 +144,7 @@ class ImportedRobot {
     if (simulation_.knows(source)) simulation_.step({now, kind, source});
   }
 
-  const importing::Plan& plan_;
+  const gateway::Mapping mapping_;
   const rules::CompiledModel model_;
   rules::Simulation simulation_;
 };

@@ -221,5 +221,24 @@ TEST(DdsDescriptors, AreLeftForCycloneBesideHundredsOfTopics) {
   ::setrlimit(RLIMIT_NOFILE, &before);
 }
 
+// As iceoryx's: whoever has no descriptor for his loop ends.
+TEST(DdsDescriptors, PortsForWhichThereAreNoneAreLeftOutAndTheOthersAreServed) {
+  const OwnDomain domain;
+  const Daemon daemon(model_of("/In:o", "/To:i"));
+  std::string elements = R"(<out port="/To:i" topic="/cmd_vel" )" + kTwist + "/>" +
+                         R"(<in topic="/in" )" + kTwist + R"( port="/In:o"/>)";
+  for (int i = 0; i < 100; ++i) {
+    const std::string number = std::to_string(i);
+    elements += "<in topic=\"/in" + number + "\" " + kTwist + " max_size=\"64\" port=\"/In" +
+                number + ":o\"/>";
+  }
+  DdsGateway gateway(daemon, domain, elements, "lo", "", {"/usr/bin/prlimit", "--nofile=256:256"});
+  gateway.see("/In99:o is not served: no descriptors are left for it: raise RLIMIT_NOFILE");
+  Stranger to("cyclone", domain, {"sub", "twist", "rt/cmd_vel"});
+  const Stranger from("cyclone", domain, {"pub", "twist", "rt/in"});
+  publish_until_heard(from, to, "1 0");
+  EXPECT_EQ(gateway.end(), 0);
+}
+
 }  // namespace
 }  // namespace arbiter::test

@@ -3,6 +3,7 @@
 #include <signal.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
@@ -117,6 +118,32 @@ TEST_F(Iceoryx, AMistakeInTheMappingKeepsNobodyFromStoppingTheRobot) {
   EXPECT_EQ(after.process.wait(), 0);
 }
 
+// By that of the mapping before, the robot would not be told that the gateway has driven since.
+TEST_F(Iceoryx, ACopyThatCannotBeRenewedIsNotGoneBy) {
+  const Roudi roudi(directory_);
+  const std::string zeros = "size='4' idle='zero'";
+  const std::string mapping =
+      write_mapping(directory_, in("low", "/Low:o") + out("/Base:i", "base", zeros));
+  const std::string program = ARBITER_PROGRAMS "/arbiter-gateway-iceoryx";
+  const std::string copy = directory_.file("copy");
+  Spoken gate({program, "--copy", copy, mapping});
+  wait_for_description("/Low:o", "no publisher matched");
+  // Where it is written first.
+  ASSERT_EQ(::mkdir((copy + ".new").c_str(), 0700), 0);
+  write_mapping(directory_, in("low", "/Low:o") + out("/Base:i", "other", zeros));
+  gate.process.signal(SIGUSR1);
+  ASSERT_TRUE(gate.hear("no copy of the mapping is kept: ")) << gate.heard;
+  Spoken subscriber = plain_subscriber("other");
+  ASSERT_TRUE(subscriber.hear("ready"));
+  gate.process.signal(SIGKILL);
+  gate.process.wait();
+  Spoken after({program, "--send-idle", "--copy", copy, mapping});
+  EXPECT_EQ(after.process.wait(), 0);
+  while (const auto line = after.line()) after.heard += *line + "\n";
+  EXPECT_THAT(after.heard, testing::Not(testing::HasSubstr("Test/One/base"))) << after.heard;
+  EXPECT_THAT(after.heard, testing::HasSubstr("no copy of the mapping is good"));
+}
+
 // As many files as are there now, and that many more.
 void leave_room_for(unsigned files) {
   struct statvfs room {};
@@ -136,6 +163,44 @@ TEST_F(Iceoryx, WithoutRoomForFilesTheGatewaySaysSoAndComesBackWhenThereIs) {
   ASSERT_TRUE(gate.hear("another one is started in ")) << gate.heard;
   leave_room_for(1000);
   expect_that_samples_pass();
+}
+
+std::string many_ins(int count) {
+  std::string entries;
+  for (int i = 0; i < count; ++i) {
+    entries += in("e" + std::to_string(i), "/p" + std::to_string(i) + ":o", "max_size='64'");
+  }
+  return entries;
+}
+
+Spoken gateway_with_descriptors(const std::string& limit, const std::string& mapping) {
+  return Spoken({"/usr/bin/prlimit", "--nofile=" + limit,
+                 ARBITER_PROGRAMS "/arbiter-gateway-iceoryx", mapping});
+}
+
+// Each port needs three, and more for its connections; what shells and service managers give is
+// made for less.
+TEST_F(Iceoryx, AGatewayTakesTheDescriptorsThatItIsAllowed) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway_with_descriptors(
+      "256:4096",
+      write_mapping(directory_, many_ins(100) + in("low", "/Low:o") + out("/Base:i", "base")));
+  EXPECT_TRUE(gate.hear("serves 101 topics in, 1 out")) << gate.heard;
+  EXPECT_THAT(gate.heard, testing::Not(testing::HasSubstr("is not served")));
+  expect_that_samples_pass();
+}
+
+// The last one does not go to a port: nothing would pass at all.
+TEST_F(Iceoryx, PortsForWhichThereAreNoDescriptorsAreLeftOutAndTheOthersAreServed) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway_with_descriptors(
+      "256:256",
+      write_mapping(directory_, in("low", "/Low:o") + out("/Base:i", "base") + many_ins(100)));
+  ASSERT_TRUE(
+      gate.hear("/p99:o is not served: no descriptors are left for it: raise RLIMIT_NOFILE"))
+      << gate.heard;
+  expect_that_samples_pass();
+  EXPECT_TRUE(gate.process.runs());
 }
 
 // Such a process may make no memory either, of which ports consist.

@@ -288,6 +288,23 @@ TEST_F(Iceoryx, WhoElsePublishesWhereTheGatewayDoesIsTold) {
   wait_until([&] { return described_input("/Base:i").find(name) == std::string::npos; });
 }
 
+// Neither is said in place of the other.
+TEST_F(Iceoryx, ARouDiThatHangsIsToldBesideAStranger) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
+  wait_for_description("/Low:o", "no publisher matched");
+  const Spoken stranger = plain_publisher("base");
+  const std::string name = "plain-publisher-" + std::to_string(stranger.process.pid());
+  wait_until([&] { return described_input("/Base:i").find(name) != std::string::npos; });
+  roudi.process.stop();
+  wait_until([&] {
+    return described_input("/Base:i").find("RouDi does not answer; others publish there too") !=
+           std::string::npos;
+  });
+  EXPECT_THAT(described_input("/Base:i"), HasSubstr(name));
+  roudi.process.resume();
+}
+
 // RouDi tells nobody.
 TEST_F(Iceoryx, ASubscriberThatAsksForWhatTheGatewayDoesNotOfferIsNamed) {
   const Roudi roudi(directory_);
@@ -301,6 +318,20 @@ TEST_F(Iceoryx, ASubscriberThatAsksForWhatTheGatewayDoesNotOfferIsNamed) {
   });
   subscriber.process.signal(SIGTERM);
   wait_until([&] { return described_input("/Base:i").find(name) == std::string::npos; });
+}
+
+// What is sent all the time, and each time in vain, says nothing in its place.
+TEST_F(Iceoryx, ASubscriberThatIsRefusedIsNamedBesideMemoryThatIsMissing) {
+  const Roudi roudi(directory_, Roudi::kLittle);
+  Spoken gate = gateway(directory_, out("/Base:i", "base", "size='4096' idle='zero'"));
+  const Spoken subscriber(
+      {ARBITER_TESTS "/plain_iceoryx_subscriber", "Test", "One", "base", "blocking"});
+  const std::string name = "plain-subscriber-" + std::to_string(subscriber.process.pid());
+  wait_until([&] {
+    const std::string text = described_input("/Base:i");
+    return text.find(name + " subscribes and is not connected") != std::string::npos &&
+           text.find("no memory pool for chunks of 4096 bytes") != std::string::npos;
+  });
 }
 
 // What it could watch at once is 256.
