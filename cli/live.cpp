@@ -1,11 +1,9 @@
 #include "cli/live.hpp"
 
-#include <poll.h>
 #include <signal.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <stdexcept>
@@ -13,7 +11,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "shm/clock.hpp"
+#include "recorder/sleep.hpp"
 #include "wire/document.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -127,14 +125,7 @@ int interrupted_exit_code(const shm::FileDescriptor& interrupts) {
 }
 
 bool sleep_until(shm::Nanoseconds time, const shm::FileDescriptor& interrupts) {
-  for (;;) {
-    const shm::Nanoseconds left = time - shm::monotonic_now();
-    pollfd interrupt{interrupts.get(), POLLIN, 0};
-    const timespec span{std::max<shm::Nanoseconds>(left, 0) / 1'000'000'000,
-                        std::max<shm::Nanoseconds>(left, 0) % 1'000'000'000};
-    if (ppoll(&interrupt, 1, &span, nullptr) == 1) return true;
-    if (left <= 0) return false;
-  }
+  return recorder::sleep_until(time, {interrupts.get()});
 }
 
 std::string seconds_text(shm::Nanoseconds span) {

@@ -51,7 +51,7 @@ struct Found {
   evidence::ReadRecording about;
   std::set<std::string> sources;
   std::vector<Candidate> samples;
-  shm::Nanoseconds begin = std::numeric_limits<shm::Nanoseconds>::max();  // of all arrivals
+  shm::Nanoseconds begin = std::numeric_limits<shm::Nanoseconds>::max();  // of the recording
   shm::Nanoseconds end = std::numeric_limits<shm::Nanoseconds>::min();
 };
 
@@ -64,6 +64,9 @@ std::string source_of(const SampleOptions& options) { return shm::printable(opti
 Found look_for(const SampleOptions& options) {
   Found found;
   const auto use = [&](evidence::Record&& record) {
+    if (const auto* const start = std::get_if<evidence::Start>(&record)) {
+      found.begin = std::min(found.begin, start->time);
+    }
     const auto* const arrival = std::get_if<Arrival>(&record);
     if (arrival == nullptr) return;
     found.begin = std::min(found.begin, arrival->time);
@@ -76,6 +79,7 @@ Found look_for(const SampleOptions& options) {
   ProgressLine line;
   found.about = evidence::read_recording(options.file, evidence::Payloads::pass_over, use,
                                          line.watch("looking for the sample"));
+  found.end = std::max(found.end, found.about.recorded_until);
   return found;
 }
 

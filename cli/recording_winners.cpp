@@ -35,11 +35,24 @@ struct RecordedWinners {
 
 // From a change to the next, or to the end of the run.
 struct Reign {
-  const evidence::WinnerChange* change = nullptr;
+  evidence::WinnerChange change;
   shm::Nanoseconds end = 0;
   bool is_cut_off = false;  // by the end of the run: how long it went on is not known
   bool is_of_last_run = false;
 };
+
+// Nothing is recorded of a port that is idle when recording begins: what comes first says that it
+// was, if the same model decided.
+std::optional<evidence::WinnerChange> idle_before(const evidence::WinnerChange& first,
+                                                  const evidence::Run& run) {
+  using Why = evidence::WinnerChange::Why;
+  const bool is_beginning = first.why == Why::start || first.why == Why::model ||
+                            !first.before.empty() || first.time <= run.start;
+  if (is_beginning || run.models.empty() || run.models.begin()->first != first.generation) {
+    return std::nullopt;
+  }
+  return evidence::WinnerChange{first.port, "", "", run.start, Why::start, "", first.generation};
+}
 
 std::vector<Reign> reigns_of(const Recorded& recorded, const std::string& pattern) {
   std::vector<Reign> all;
@@ -52,16 +65,20 @@ std::vector<Reign> reigns_of(const Recorded& recorded, const std::string& patter
     for (auto& [port, changes] : by_port) {
       std::stable_sort(changes.begin(), changes.end(),
                        [](const auto* one, const auto* other) { return one->time < other->time; });
+      const bool is_last_run = &run == &recorded.runs.back();
+      if (const auto idle = idle_before(*changes.front(), run)) {
+        all.push_back({*idle, changes.front()->time, false, is_last_run});
+      }
       for (std::size_t i = 0; i < changes.size(); ++i) {
         const bool is_last = i + 1 == changes.size();
         const shm::Nanoseconds end =
             is_last ? std::max(run.end, changes[i]->time) : changes[i + 1]->time;
-        all.push_back({changes[i], end, is_last, &run == &recorded.runs.back()});
+        all.push_back({*changes[i], end, is_last, is_last_run});
       }
     }
   }
   std::stable_sort(all.begin(), all.end(), [](const Reign& one, const Reign& other) {
-    return one.change->time < other.change->time;
+    return one.change.time < other.change.time;
   });
   return all;
 }
@@ -86,12 +103,19 @@ std::string cause_text(const evidence::WinnerChange& change) {
 }
 
 std::string length_text(const Reign& reign) {
-  std::string text = "for " + seconds_text(reign.end - reign.change->time);
+  std::string text = "for " + seconds_text(reign.end - reign.change.time);
   if (reign.is_cut_off) {
     text += reign.is_of_last_run ? ", until the end of the recording"
                                  : ", until the recording began again";
   }
   return text;
+}
+
+std::string nobody_text(const RecordedWinners& options) {
+  return "nobody won" + (options.at.empty() ? "" : " at " + shm::printable(options.at)) + ", at " +
+         (options.port.empty()
+              ? "any input port\n"
+              : "an input port that matches " + shm::printable(options.port) + "\n");
 }
 
 int show_winners(const RecordedWinners& options) {
@@ -102,14 +126,14 @@ int show_winners(const RecordedWinners& options) {
     const TimeSpan span = read_moment(options.at, recorded.runs.front().start,
                                       recorded.runs.back().end, recorded.about.wall_offset);
     std::erase_if(reigns, [&](const Reign& reign) {
-      return reign.change->time >= span.to || reign.end <= span.from;
+      return reign.change.time >= span.to || reign.end <= span.from;
     });
   }
   const shm::Nanoseconds offset = recorded.about.wall_offset;
   if (options.json) {
     ordered_json list = ordered_json::array();
     for (const Reign& reign : reigns) {
-      const evidence::WinnerChange& change = *reign.change;
+      const evidence::WinnerChange& change = reign.change;
       list.push_back(
           {{"from", clock_text(change.time + offset)},
            {"from_ns", change.time},
@@ -126,12 +150,12 @@ int show_winners(const RecordedWinners& options) {
   }
   std::ostringstream out;
   for (const Reign& reign : reigns) {
-    const evidence::WinnerChange& change = *reign.change;
+    const evidence::WinnerChange& change = reign.change;
     out << clock_text(change.time + offset) << "  " << shm::printable(change.port) << "  "
         << (change.winner.empty() ? "idle" : shm::printable(change.winner)) << "  "
         << length_text(reign) << ": " << cause_text(change) << '\n';
   }
-  if (reigns.empty()) out << "no arbitrated input port of the recording matches\n";
+  if (reigns.empty()) out << nobody_text(options);
   std::cout << out.str();
   return 0;
 }

@@ -5,7 +5,6 @@
 // which the scheduler let us run; so what simulate says of a boundary holds here too.
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdint>
 #include <iostream>
 #include <map>
@@ -20,6 +19,7 @@
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
 #include "cli/verbs.hpp"
+#include "recorder/speed.hpp"
 #include "rules/ask/report.hpp"
 #include "rules/explain/simulation.hpp"
 #include "rules/explain/trace.hpp"
@@ -156,11 +156,8 @@ class Player {
   bool run(const std::vector<rules::TraceEvent>& events, const shm::FileDescriptor& interrupts) {
     const shm::Nanoseconds start = shm::monotonic_now() + kLead;
     for (const auto& event : events) {
-      const auto since_first = static_cast<double>(event.at - events.front().at);
-      const shm::Nanoseconds at =
-          start + (options_.speed == 1 ? event.at - events.front().at
-                                       : std::llround(since_first / options_.speed));
-      last_ = time_of(event, at);
+      const shm::Nanoseconds since_first = event.at - events.front().at;
+      last_ = time_of(event, start + recorder::at_speed(since_first, options_.speed));
       if (sleep_until(last_, interrupts)) return false;
       play(event, last_);
       std::cout.flush();
@@ -257,6 +254,9 @@ int play(const PlayOptions& options) {
   const auto events = rules::read_trace(options.trace, diagnostics);
   rules::write_text(std::cerr, diagnostics);
   if (diagnostics.has_errors()) return 1;
+  if (!events.empty()) {
+    recorder::require_end(options.trace, events.back().at - events.front().at, options.speed);
+  }
   Player player(options, events);
   player.note_unknown_sources();
   player.note_what_is_not_open();

@@ -22,8 +22,10 @@
 #include "cli/shell_word.hpp"
 #include "cli/verbs.hpp"
 #include "recorder/recorder.hpp"
+#include "recording/compression.hpp"
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
+#include "watch/machine.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -42,14 +44,9 @@ struct RecordOptions {
   std::string instance;
 };
 
+// As MCAP files name it.
 recording::Compression compression_of(const std::string& name) {
-  if (name == "none") return recording::Compression::none;
-  return name == "lz4" ? recording::Compression::lz4 : recording::Compression::zstd;
-}
-
-std::string host_name() {
-  char name[256] = {};
-  return gethostname(name, sizeof name - 1) == 0 ? name : "";
+  return recording::compression_of(name == "none" ? "" : name);
 }
 
 // What was typed, as far as a shell hands it on.
@@ -104,7 +101,7 @@ evidence::RecordingInfo info_of(const std::string& instance) {
   evidence::RecordingInfo info;
   info.program = "arbiter " ARBITER_VERSION;
   info.instance = instance;
-  info.host = host_name();
+  info.host = watch::host_name();
   info.command = typed_command();
   info.wall_offset = evidence::wall_offset_now();
   return info;

@@ -18,7 +18,7 @@ namespace {
 
 struct ReplayVerb {
   std::string file;
-  double rate = 1;
+  double speed = 1;
   bool is_fast = false;
   std::vector<std::string> sources;
   std::vector<std::string> ports;
@@ -30,7 +30,7 @@ int replay(const ReplayVerb& verb) {
   recorder::ReplayOptions options;
   options.file = verb.file;
   options.node = live_options(verb.instance);
-  options.rate = verb.is_fast ? 0 : verb.rate;
+  options.speed = verb.is_fast ? 0 : verb.speed;
   options.sources = verb.sources;
   options.ports = verb.ports;
   ProgressLine line;
@@ -62,11 +62,17 @@ void add_replay(CLI::App& app, int& exit_code) {
   verb->add_option("FILE", options->file, "A recording with payloads")->required();
   auto* fast = verb->add_flag("--as-fast-as-possible", options->is_fast,
                               "Without waiting; arrivals bear the times of now");
-  verb->add_option("--rate", options->rate,
-                   "How many times faster than it was recorded (default 1); T stays what it is")
-      ->type_name("X")
+  auto* speed =
+      verb->add_option("--speed", options->speed,
+                       "How many times faster than it was recorded (default 1); T stays what it is")
+          ->type_name("X")
+          ->check(number_between(1e-3, 1e6))
+          ->excludes(fast);
+  verb->add_option("--rate", options->speed, "--speed, as it was called before")
       ->check(number_between(1e-3, 1e6))
-      ->excludes(fast);
+      ->excludes(fast)
+      ->excludes(speed)
+      ->group("");
   verb->add_option("--source", options->sources,
                    "Only output ports of this pattern, such as '/Arm/*'; repeatable")
       ->type_name("PATTERN");
@@ -78,7 +84,7 @@ void add_replay(CLI::App& app, int& exit_code) {
   verb->footer(
       "Example:\n"
       "  arbiter replay incident.mcap --instance desk\n"
-      "  arbiter replay incident.mcap --port /Arm/pos:i --rate 2\n\n"
+      "  arbiter replay incident.mcap --port /Arm/pos:i --speed 2\n\n"
       "The ports must be free: stop their components, or use an instance of its own.\n\n"
       "Exit codes: 0 all published; 1 no daemon, or the ports cannot be opened; 2 wrong use, or a "
       "file that\ncannot be read; 130 stopped by Ctrl-C before the end (143 by SIGTERM)");

@@ -119,7 +119,7 @@ class Top {
     while (censuses_ < kCensusesForRates) {
       const shm::Nanoseconds next_look = sampler_.look();
       if (!take_news().empty()) throw wire::CallError(problem_);
-      if (sleep_until(next_look, interrupts_)) return 0;
+      if (sleep_until(next_look, interrupts_)) return interrupted_exit_code(interrupts_);
     }
     sampler_.look();
     view_.add(sampler_.frame(), sampler_.new_takeovers());
@@ -210,7 +210,7 @@ void add_top(CLI::App& app, int& exit_code) {
               throw CLI::ValidationError("--interval", "must be between 20ms and 60s");
             }
           },
-          "How often the screen changes: 20ms to 10s, by default 100ms")
+          "How often the screen changes: 20ms to 60s, by default 100ms")
       ->type_name("DURATION");
   verb->add_flag("--once", options->once,
                  "Print one picture as text, after a second, in which rates are counted");
@@ -223,7 +223,9 @@ void add_top(CLI::App& app, int& exit_code) {
       "  arbiter top\n"
       "  arbiter top --once > picture.txt\n\n"
       "Exit codes: 0 done; 1 no daemon, or you may not observe it; 2 wrong use, no terminal "
-      "that could\nshow it, or standard output cannot be written");
+      "that could\nshow it, or standard output cannot be written; 130 --once was stopped by Ctrl-C "
+      "(143 by "
+      "SIGTERM)");
   verb->callback([options, &exit_code] {
     try {
       exit_code = top_verb(*options);

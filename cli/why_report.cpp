@@ -271,12 +271,6 @@ json connection_json(const rules::ConnectionExplanation& connection, const Sourc
   return result;
 }
 
-shm::Nanoseconds event_time(const SourceState& state, shm::Nanoseconds now) {
-  if (shm::is_deactivation(state.word)) return state.word & ~shm::kDeactivatedFlag;
-  if (shm::is_active(state.word, now)) return state.last_arrival().value_or(now);
-  return state.word;
-}
-
 std::string event_text(const std::string& source, const SourceState& state, shm::Nanoseconds now) {
   if (shm::is_deactivation(state.word)) return source + " was deactivated";
   if (shm::is_active(state.word, now)) return source + " became active";

@@ -51,8 +51,6 @@ std::string event_text(const std::string& source, const SourceState& state, shm:
 // "active", "expired", "deactivated", and when it became so; of a beginning, when it last arrived.
 nlohmann::json event_json(const std::string& source, const SourceState& state,
                           shm::Nanoseconds now);
-// When a source has last changed, as its word tells.
-shm::Nanoseconds event_time(const SourceState& state, shm::Nanoseconds now);
 
 nlohmann::json obstacles_json(const std::vector<watch::Obstacle>& obstacles);
 // One line each. `of`: whose they are, if the reader could not tell.

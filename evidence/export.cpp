@@ -44,12 +44,13 @@ std::vector<TraceRow> trace_of(const Run& run, Models& models) {
   for (const auto& [source, history] : run.sources) {
     for (const Step& step : history.steps) {
       const bool is_initial = step.kind == Step::Kind::state && step.seen <= run.start;
+      // What a publisher finds that opens the port may be of long ago.
+      const bool ends = shm::is_deactivation(step.word) && step.time > run.start;
       if (is_initial && shm::is_active(step.word, run.start)) {
         rows.push_back({arrival_before(source, step, run, models), &source, false});
       } else if (step.kind == Step::Kind::arrival) {
         rows.push_back({step.time, &source, false});
-      } else if (step.kind == Step::Kind::deactivation ||
-                 (!is_initial && shm::is_deactivation(step.word))) {
+      } else if (step.kind == Step::Kind::deactivation || (!is_initial && ends)) {
         rows.push_back({step.time, &source, true});
       }
     }

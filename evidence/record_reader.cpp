@@ -315,11 +315,16 @@ class Reading {
     };
     result_.end = recording::read_mcap(path_, visitor);
     hand_on();
-    if (!has_metadata_) throw RecordError(path_ + " is not a recording that arbiter has made");
+    if (!has_metadata_) refuse();
     return std::move(result_);
   }
 
  private:
+  [[noreturn]] void refuse() const {
+    const std::string damage = result_.end.is_whole ? "" : "; " + result_.end.problem;
+    throw RecordError(path_ + " is not a recording that arbiter has made" + damage);
+  }
+
   void add(std::uint16_t id, const recording::McapChannel& channel) {
     for (std::size_t kind = 0; kind < kRecordKinds; ++kind) {
       if (channel.topic == record_schemas[kind].topic) kinds_[id] = static_cast<RecordKind>(kind);
@@ -328,6 +333,7 @@ class Reading {
   }
 
   void take(const std::string& name, const recording::McapMap& map) {
+    if (name == kEndName) take_end(map);
     if (name != kMetadataName) return;
     const auto value = [&](const char* key) {
       const auto found = map.find(key);
@@ -341,6 +347,18 @@ class Reading {
     result_.instance = value("instance");
     result_.host = value("host");
     result_.wall_offset = wall_offset_of(value("wall_offset_ns"));
+  }
+
+  // A time that is none says nothing.
+  void take_end(const recording::McapMap& map) {
+    const auto found = map.find("time_ns");
+    if (found == map.end()) return;
+    Nanoseconds time = 0;
+    const char* const end = found->second.data() + found->second.size();
+    const auto read = std::from_chars(found->second.data(), end, time);
+    const bool is_one =
+        read.ec == std::errc() && read.ptr == end && time > 0 && time <= shm::kMaxTime;
+    if (is_one) result_.recorded_until = time;
   }
 
   // It can be added to any time of a recording. A file that says nothing of it is read all the

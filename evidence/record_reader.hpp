@@ -23,6 +23,7 @@ struct ReadRecording {
   std::string instance;
   std::string host;
   std::int64_t wall_offset = 0;
+  Nanoseconds recorded_until = 0;  // 0: the file does not say
   std::uint64_t records = 0;
   recording::McapEnd end;  // a file that was cut short is read up to its last whole chunk
 };

@@ -36,5 +36,7 @@ inline constexpr std::string_view kPayloadEncoding = "x-arbiter-bytes";
 // Of the metadata record that each recording begins with.
 inline constexpr std::string_view kMetadataName = "arbiter.recording";
 inline constexpr std::string_view kFormat = "1";
+// Of the metadata record that each whole recording ends with.
+inline constexpr std::string_view kEndName = "arbiter.end";
 
 }  // namespace arbiter::evidence

@@ -254,6 +254,11 @@ void RecordWriter::write(const Record& record) {
   if (arrival != nullptr && arrival->payload) write_payload(*arrival);
 }
 
+void RecordWriter::close(Nanoseconds end) {
+  if (end != 0) file_.write_metadata(std::string(kEndName), {{"time_ns", std::to_string(end)}});
+  file_.close();
+}
+
 void RecordWriter::write_json(RecordKind kind, Nanoseconds time, const std::string& json) {
   const auto index = static_cast<std::size_t>(kind);
   // What was so before, such as the model, is in the recording from its start.

@@ -36,7 +36,8 @@ class RecordWriter {
   // What was written until now survives a kill of this process; with sync(), a power cut.
   void end_chunk() { file_.end_chunk(); }
   void sync() { file_.sync(); }
-  void close() { file_.close(); }
+  // `end`: what had happened by then is in it; 0: that is not known.
+  void close(Nanoseconds end = 0);
   [[nodiscard]] std::uint64_t bytes() const noexcept { return file_.bytes(); }
   [[nodiscard]] std::uint64_t count_of(RecordKind kind) const noexcept {
     return counts_[static_cast<std::size_t>(kind)];

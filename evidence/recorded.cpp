@@ -22,7 +22,9 @@ class Loader {
     std::visit([this](auto&& each) { add(std::forward<decltype(each)>(each)); }, std::move(record));
   }
 
-  std::vector<Run> finish() {
+  // `until`: when recording ended, if that is known.
+  std::vector<Run> finish(Nanoseconds until) {
+    if (!runs_.empty()) run().end = std::max(run().end, until);
     for (std::size_t i = 1; i < runs_.size(); ++i) leave_out_strangers(runs_[i - 1], runs_[i]);
     for (Run& run : runs_) {
       std::stable_sort(run.decisions.begin(), run.decisions.end(),
@@ -91,6 +93,11 @@ class Loader {
                                           : history.steps.back().time;
     } else {
       step.is_behind_gap = true;
+      // A publisher that was killed may have deactivated it after what it told last.
+      if (shm::is_deactivation(each.word)) {
+        const Nanoseconds deactivated = shm::time_of(each.word, shm::kForever);
+        step.time = std::clamp(deactivated, step.time, each.seen);
+      }
     }
     add_step(*each.context, step);
   }
@@ -99,7 +106,10 @@ class Loader {
     run().end = std::max(run().end, each.time);
     run().models.insert_or_assign(each.generation, std::move(each));
   }
-  void add(WinnerChange&& each) { run().winners.push_back(std::move(each)); }
+  void add(WinnerChange&& each) {
+    run().end = std::max(run().end, each.time);
+    run().winners.push_back(std::move(each));
+  }
   void add(Start&& /*taken*/) {}
   void add(DestinationsChange&& /*contexts have it*/) {}
   void add(PortChange&& each) {
@@ -140,7 +150,7 @@ Recorded load_recording(const std::string& path, const recording::Watch& watch) 
   Loader loader;
   const auto use = [&](Record&& record) { loader.take(std::move(record)); };
   recorded.about = read_recording(path, Payloads::pass_over, use, watch);
-  recorded.runs = loader.finish();
+  recorded.runs = loader.finish(recorded.about.recorded_until);
   return recorded;
 }
 

@@ -15,6 +15,7 @@ void WinnerTrack::start(Nanoseconds time) {
   by_id_.clear();
   names_.clear();
   winners_.clear();
+  looked_.clear();
   ends_ = {};
   noted_.clear();
 }
@@ -26,6 +27,7 @@ void WinnerTrack::set_rules(std::shared_ptr<const RuleTable> rules, std::uint64_
   generation_ = generation;
   names_.clear();
   by_id_.clear();
+  looked_.clear();
   if (rules_ != nullptr) {
     for (const auto& [name, id] : rules_->sources) {
       names_[id] = name;
@@ -47,7 +49,13 @@ void WinnerTrack::apply(const std::string& source, ActivityWord word, Nanosecond
   if (id == shm::kNone) return;
   const bool was_active = shm::is_active(by_id_[id], now_);
   by_id_[id] = word;
-  if (was_active != shm::is_active(word, now_)) look_where(id, now_, why, source);
+  if (was_active == shm::is_active(word, now_)) return;
+  if (why == WinnerChange::Why::state && shm::is_deactivation(word)) {
+    const Nanoseconds deactivated = shm::time_of(word, shm::kForever);
+    look_where(id, deactivated, WinnerChange::Why::deactivation, source);
+  } else {
+    look_where(id, now_, why, source);
+  }
 }
 
 // At the moment of its end an activity is over.
@@ -100,9 +108,11 @@ void WinnerTrack::look_where(shm::SourceId source, Nanoseconds time, WinnerChang
   for (shm::Word i = 0; i < ports.count; ++i) look_at(ports[i], time, why, by);
 }
 
-// A port that is not arbitrated has no winner.
+// A port that is not arbitrated has no winner. What is noticed late has changed it at its own time,
+// unless something else has mattered there since.
 void WinnerTrack::look_at(shm::PortId port, Nanoseconds time, WinnerChange::Why why,
                           const std::string& by) {
+  time = std::clamp(time, std::exchange(looked_[port], now_), now_);
   const auto name = rules_->ports.find(port);
   if (name == rules_->ports.end() || !rules_->table.is_arbitrated(port)) return;
   const auto is_active = [this](shm::SourceId source) {

@@ -56,6 +56,7 @@ class WinnerTrack {
   std::vector<ActivityWord> by_id_;
   std::unordered_map<shm::SourceId, std::string> names_;
   std::map<std::string, std::string> winners_;
+  std::unordered_map<shm::PortId, Nanoseconds> looked_;  // when something last mattered there
   // When activities may end. Those in noted_ count, one for each source.
   using End = std::pair<Nanoseconds, std::string>;
   std::priority_queue<End, std::vector<End>, std::greater<>> ends_;

@@ -2,9 +2,7 @@
 #include <netdb.h>
 #include <sys/socket.h>
 #include <systemd/sd-daemon.h>
-#include <unistd.h>
 
-#include <array>
 #include <chrono>
 #include <exception>
 #include <future>
@@ -23,6 +21,7 @@
 #include "link/link.hpp"
 #include "rules/text/names.hpp"
 #include "shm/file_descriptor.hpp"
+#include "watch/machine.hpp"
 #include "wire/rendezvous.hpp"
 
 namespace arbiter::link {
@@ -30,12 +29,6 @@ namespace {
 
 constexpr std::uint32_t kMaxDomain = 230;  // above it there are no ports
 constexpr int kWrongUse = 2;
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  if (::gethostname(name.data(), name.size() - 1) != 0) return {};
-  return name.data();
-}
 
 // Throws CLI::ValidationError.
 shm::Nanoseconds read_max_age(const std::string& text) {
@@ -98,7 +91,7 @@ void require_peers(const NetworkOptions& network) {
 
 int run(int argc, char** argv) {
   LinkOptions options;
-  options.host = host_name();
+  options.host = watch::host_name();
   options.version = ARBITER_VERSION;
   gateway::set_program_name("arbiter-link");
   CLI::App app("Joins the Arbiter of this host with those of other hosts.", "arbiter-link");

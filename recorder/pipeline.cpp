@@ -61,7 +61,7 @@ void Pipeline::work() {
     sink_.tick(shm::monotonic_now(), horizon_);
   }
   order_.take_before(shm::kForever, [this](const RecordPtr& record) { pass_on(record); });
-  sink_.finish();
+  sink_.finish(horizon_);
 }
 
 void Pipeline::take(Batch&& batch) {

@@ -89,7 +89,8 @@ void Recorder::forget_taps() {
 
 Recorded Recorder::finish() {
   watcher_.stop();
-  poll_taps();  // those too that it has opened since
+  last_push_ = 0;  // nothing new is news: that it has been recorded until now
+  poll_taps();     // those too that it has opened since
   forget_taps();
   queue_.close();
   pipeline_.finish();

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <utility>
 
 #include "evidence/models.hpp"
 #include "evidence/record_reader.hpp"
 #include "recorder/sleep.hpp"
+#include "recorder/speed.hpp"
 #include "rules/model/load.hpp"
 #include "rules/model/quantifiers.hpp"
 #include "rules/prove/compile.hpp"
@@ -34,8 +34,10 @@ bool fits(const std::vector<std::string>& patterns, const std::string& name) {
                      [&](const std::string& pattern) { return rules::matches(pattern, name); });
 }
 
-// The daemon says in words why a port cannot be opened.
-std::string advice_for(const std::string& refusal) {
+// The daemon says in words why a port cannot be opened. If it has not answered, other ports are no
+// help.
+std::string advice_for(const std::string& refusal, const std::string& port) {
+  if (refusal.find(port) == std::string::npos) return "";
   const bool is_taken = refusal.find(" is held by ") != std::string::npos;
   return std::string(is_taken ? ". Stop that component, choose" : ". Choose") +
          " other sources with --source, or replay into an instance of its own with --instance";
@@ -58,6 +60,7 @@ Replayer::Replayer(const ReplayOptions& options) : options_(options) {
     throw ReplayError(options_.file + " has no arrival of what you have chosen");
   }
   refuse_without_payloads();
+  if (options_.speed > 0) require_end(options_.file, latest_ - first_, options_.speed);
   open_ports();
 }
 
@@ -68,6 +71,8 @@ void Replayer::survey() {
   if (!about.end.is_whole) {
     options_.say(options_.file + ": " + about.end.problem + "; what comes before is published");
   }
+  std::stable_sort(untold_.begin(), untold_.end(),
+                   [](const auto& one, const auto& other) { return one.time < other.time; });
   const auto model = model_ ? compiled(*model_) : std::nullopt;
   if (!model) return;
   const rules::Simulation simulation(*model);
@@ -108,11 +113,25 @@ void Replayer::survey(const Record& record) {
     source.samples += arrival->is_sample ? 1 : 0;
     source.payloads += arrival->has_payload ? 1 : 0;
     source.largest = std::max(source.largest, arrival->size);
-  } else if (std::holds_alternative<evidence::Deactivation>(record)) {
+    source.word = arrival->word;
+    latest_ = std::max(latest_, arrival->time);
+  } else if (const auto* over = std::get_if<evidence::Deactivation>(&record)) {
     source.has_events = true;
+    source.word = shm::deactivation(over->time);
+    latest_ = std::max(latest_, over->time);
   } else if (const auto* state = std::get_if<evidence::SourceState>(&record)) {
-    if (!source.has_events && state->seen <= first_) source.at_start = state->word;
+    survey(*state, source);
   }
+}
+
+void Replayer::survey(const evidence::SourceState& state, Source& source) {
+  const auto before = std::exchange(source.word, state.word);
+  if (!source.has_events && state.seen <= first_) source.at_start = state.word;
+  if (before == state.word || !shm::is_deactivation(state.word)) return;
+  const Nanoseconds time = shm::time_of(state.word, shm::kForever);
+  if (time <= first_ || time > state.seen) return;
+  source.has_events = true;
+  untold_.push_back({state.context, time, state.seen, state.sequence, state.generation});
 }
 
 void Replayer::choose() {
@@ -158,12 +177,12 @@ void Replayer::open_port(const std::string& name, Source& source) {
 
 void Replayer::open_ports() {
   node_.emplace("arbiter-replay", options_.node);
-  keeps_times_ = options_.rate > 0;
+  keeps_times_ = options_.speed > 0;
   for (auto& [name, source] : sources_) {
     try {
       open_port(name, source);
     } catch (const Error& error) {
-      throw ReplayError(error.what() + advice_for(error.what()));
+      throw ReplayError(error.what() + advice_for(error.what(), name));
     }
     if (!keeps_times_) continue;
     try {
@@ -188,10 +207,11 @@ Replayed Replayer::run(const shm::FileDescriptor& interrupts) {
       const bool is_event = std::holds_alternative<Arrival>(record) ||
                             std::holds_alternative<evidence::Deactivation>(record);
       if (!is_event || sources_.count(context->source) == 0) return;
-      last_ = due(evidence::time_of(record));
-      if (options_.rate > 0 && sleep_until(last_, {interrupts.get()})) throw Interrupted();
+      deactivate_untold(evidence::time_of(record), interrupts, replayed);
+      await(evidence::time_of(record), interrupts);
       publish(record, replayed);
     });
+    deactivate_untold(shm::kForever, interrupts, replayed);
   } catch (const Interrupted&) {
     replayed.was_interrupted = true;
   }
@@ -199,13 +219,27 @@ Replayed Replayer::run(const shm::FileDescriptor& interrupts) {
   return replayed;
 }
 
-// Never backwards, and never at the moment of the source's deactivation, at which it cannot arrive.
-Nanoseconds Replayer::due(Nanoseconds recorded) {
-  if (options_.rate <= 0) return last_;
-  const auto since_first = static_cast<double>(recorded - first_);
-  const Nanoseconds span =
-      options_.rate == 1 ? recorded - first_ : std::llround(since_first / options_.rate);
-  return std::max(last_, start_ + span);
+// Those that came before that time.
+void Replayer::deactivate_untold(Nanoseconds recorded, const shm::FileDescriptor& interrupts,
+                                 Replayed& replayed) {
+  for (; next_untold_ < untold_.size(); ++next_untold_) {
+    const evidence::Deactivation& over = untold_[next_untold_];
+    if (over.time > recorded) return;
+    if (sources_.count(over.context->source) == 0) continue;
+    await(over.time, interrupts);
+    publish(over, replayed);
+  }
+}
+
+void Replayer::await(Nanoseconds recorded, const shm::FileDescriptor& interrupts) {
+  last_ = due(recorded);
+  if (options_.speed > 0 && sleep_until(last_, {interrupts.get()})) throw Interrupted();
+}
+
+// Never backwards.
+Nanoseconds Replayer::due(Nanoseconds recorded) const {
+  if (options_.speed <= 0) return last_;
+  return std::max(last_, start_ + at_speed(recorded - first_, options_.speed));
 }
 
 // A recording begins in the middle of activities. Those that end by themselves end when they did.
@@ -218,7 +252,7 @@ void Replayer::signal_active_ones() {
     const bool is_known = is_forever || (source.timeout != shm::kForever && arrived <= first_);
     if (!is_known) continue;
     try {
-      if (keeps_times_ && options_.rate == 1) {
+      if (keeps_times_ && options_.speed == 1) {
         source.port->signal_at(time_at(start_ - (first_ - arrived)));
         continue;
       }
@@ -234,8 +268,8 @@ void Replayer::publish(const Record& record, Replayed& replayed) {
   Nanoseconds at = last_;
   if (source.deactivated == at) at = ++last_;
   Nanoseconds now = shm::monotonic_now();
-  while (now < at && options_.rate > 0) now = shm::monotonic_now();  // a nanosecond
-  if (options_.rate > 0) replayed.latest = std::max(replayed.latest, now - at);
+  while (now < at && options_.speed > 0) now = shm::monotonic_now();  // a nanosecond
+  if (options_.speed > 0) replayed.latest = std::max(replayed.latest, now - at);
   if (const auto* arrival = std::get_if<Arrival>(&record)) {
     arrive(source, *arrival, at, replayed);
     return;

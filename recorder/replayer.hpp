@@ -24,7 +24,7 @@ namespace arbiter::recorder {
 struct ReplayOptions {
   std::string file;
   NodeOptions node;
-  double rate = 1;                   // of time; 0: as fast as possible
+  double speed = 1;                  // 2: twice as fast as it was; 0: as fast as possible
   std::vector<std::string> sources;  // patterns; empty: all
   std::vector<std::string> ports;    // patterns of input ports; empty: all
   std::function<void(const std::string&)> say;
@@ -70,28 +70,37 @@ class Replayer {
     std::uint64_t payloads = 0;
     bool has_events = false;
     evidence::ActivityWord at_start = shm::kNeverActive;
-    Nanoseconds timeout = shm::kForever;  // T when it was recorded
+    evidence::ActivityWord word = shm::kNeverActive;  // after what has been surveyed
+    Nanoseconds timeout = shm::kForever;              // T when it was recorded
     std::optional<OutputPort<void>> port{};
     Nanoseconds deactivated = 0;
   };
 
   void survey();
   void survey(const evidence::Record& record);
+  void survey(const evidence::SourceState& state, Source& source);
   void choose();
   [[nodiscard]] bool is_at_chosen_port(const std::string& source) const;
   void refuse_without_payloads() const;
   void open_port(const std::string& name, Source& source);
   void open_ports();
   void signal_active_ones();
+  void deactivate_untold(Nanoseconds recorded, const shm::FileDescriptor& interrupts,
+                         Replayed& replayed);
+  void await(Nanoseconds recorded, const shm::FileDescriptor& interrupts);
   void publish(const evidence::Record& record, Replayed& replayed);
   void arrive(Source& source, const evidence::Arrival& arrival, Nanoseconds at, Replayed& replayed);
-  [[nodiscard]] Nanoseconds due(Nanoseconds recorded);
+  [[nodiscard]] Nanoseconds due(Nanoseconds recorded) const;
 
   const ReplayOptions& options_;
   std::map<std::string, Source> sources_;
   std::map<std::string, std::vector<std::string>> sources_of_ports_;
   std::optional<evidence::ModelChange> model_;  // the first
-  Nanoseconds first_ = 0;                       // of the recording
+  // Those that the recorder has only seen in the state that they have left, as an operator's.
+  std::vector<evidence::Deactivation> untold_;
+  std::size_t next_untold_ = 0;
+  Nanoseconds first_ = 0;   // of the recording
+  Nanoseconds latest_ = 0;  // of its arrivals and deactivations
   std::optional<Node> node_;
   bool keeps_times_ = false;
   Nanoseconds start_ = 0;  // of the replay

@@ -140,9 +140,10 @@ void Ring::sum_up(const Record& record) {
   }
 }
 
-void Ring::finish() {
+void Ring::finish(Nanoseconds horizon) {
+  horizon_ = horizon;
   is_ending_ = true;
-  tick(shm::monotonic_now(), shm::kForever);
+  write_due(shm::monotonic_now(), shm::kForever);
 }
 
 bool Ring::is_resting(Cause cause, Nanoseconds now) const {
@@ -152,11 +153,16 @@ bool Ring::is_resting(Cause cause, Nanoseconds now) const {
 }
 
 void Ring::tick(Nanoseconds now, Nanoseconds horizon) {
+  horizon_ = horizon;
+  write_due(now, horizon);
+}
+
+void Ring::write_due(Nanoseconds now, Nanoseconds asked_by) {
   std::map<Cause, std::vector<std::uint64_t>> due;
   {
     const std::lock_guard lock(mutex_);
     std::erase_if(requests_, [&](const Request& request) {
-      if (request.time > horizon || is_resting(request.cause, now)) return false;
+      if (request.time > asked_by || is_resting(request.cause, now)) return false;
       due[request.cause].push_back(request.number);
       return true;
     });
@@ -191,7 +197,7 @@ void Ring::write_file(const std::string& path) const {
   evidence::RecordWriter writer(path, options, options_.info);
   write_base(writer);
   for (const RecordPtr& record : records_) writer.write(*record);
-  writer.close();
+  writer.close(horizon_);
 }
 
 // As a recording begins: its start, the states, the model.

@@ -62,12 +62,13 @@ class Ring : public Sink {
 
   void write(const RecordPtr& record) override;
   void tick(Nanoseconds now, Nanoseconds horizon) override;
-  void finish() override;
+  void finish(Nanoseconds horizon) override;
 
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
   [[nodiscard]] std::uint64_t dumps() const { return dumps_; }
 
  private:
+  void write_due(Nanoseconds now, Nanoseconds asked_by);
   void forget_oldest();
   void sum_up(const Record& record);
   [[nodiscard]] bool is_resting(Cause cause, Nanoseconds now) const;
@@ -80,6 +81,7 @@ class Ring : public Sink {
   OwnFiles own_files_;
   std::map<Cause, Nanoseconds> written_at_;  // the last file that was written of its own accord
   bool is_ending_ = false;
+  Nanoseconds horizon_ = 0;  // what happened before is here
   std::deque<RecordPtr> records_;
   std::size_t bytes_ = 0;
   std::uint64_t dumps_ = 0;

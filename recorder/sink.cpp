@@ -20,6 +20,6 @@ void FileSink::tick(Nanoseconds now, Nanoseconds /*horizon*/) {
   }
 }
 
-void FileSink::finish() { writer_.close(); }
+void FileSink::finish(Nanoseconds horizon) { writer_.close(horizon); }
 
 }  // namespace arbiter::recorder

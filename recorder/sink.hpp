@@ -20,7 +20,8 @@ class Sink {
   virtual void write(const RecordPtr& record) = 0;
   // At least every tenth of a second. `horizon`: what happened before has been written.
   virtual void tick(Nanoseconds now, Nanoseconds horizon) = 0;
-  virtual void finish() = 0;
+  // `horizon`: as above, in the end; 0: not known.
+  virtual void finish(Nanoseconds horizon) = 0;
 };
 
 // What was written survives a kill of this program after a second, and a power cut after five.
@@ -36,7 +37,7 @@ class FileSink : public Sink {
     bytes_ = writer_.bytes();
   }
   void tick(Nanoseconds now, Nanoseconds horizon) override;
-  void finish() override;
+  void finish(Nanoseconds horizon) override;
   [[nodiscard]] const evidence::RecordWriter& writer() const { return writer_; }
 
  private:

@@ -21,11 +21,14 @@ constexpr int kMostEvents = 2048;
 
 Nanoseconds ns(Time time) { return time.time_since_epoch().count(); }
 
+// What a predecessor has left may be older than all that this publisher has told. A time that has
+// not come is made up.
 ActivityWord word_of(const TapEvent<>& event) {
-  if (event.is_deactivated()) return shm::deactivation(ns(event.time()));
   if (const auto until = event.active_until()) return ns(*until);
-  const bool is_forever = event.was_active_at(Time(std::chrono::nanoseconds(shm::kMaxTime)));
-  return is_forever ? shm::kForeverFlag | ns(event.time()) : shm::kNeverActive;
+  const auto since = event.stands_since();
+  if (!since) return shm::kNeverActive;
+  const Nanoseconds time = std::min(ns(*since), shm::monotonic_now());
+  return event.is_deactivated() ? shm::deactivation(time) : shm::kForeverFlag | time;
 }
 
 bool is_same(const SourceContext& context, const TapEvent<>& event,

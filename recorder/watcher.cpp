@@ -327,6 +327,7 @@ void Watcher::add_page_state(const std::string& source, ActivityWord word, Batch
   state.seen = shm::monotonic_now();
   state.generation = generation_;
   state.word = believable(word, state.seen);
+  if (shm::is_deactivation(state.word)) state.time = shm::time_of(state.word, shm::kForever);
   batch.add(std::move(state));
 }
 

@@ -1,6 +1,7 @@
 #include "recording/output_file.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -60,7 +61,8 @@ void OutputFile::require_open(const std::string& what) const {
 
 void OutputFile::fail(const char* what, int error) {
   ended_ = std::strerror(error);
-  if (unfinished_ == Unfinished::keep) {
+  // An empty file would be in the way of the next attempt.
+  if (unfinished_ == Unfinished::keep && bytes_ != 0) {
     // What could be written of a record would end the reading all the same, with a worse message.
     [[maybe_unused]] const int truncated = ::ftruncate(fd_, static_cast<off_t>(bytes_));
     ended_ += ". It ends after the last whole record, at byte " + std::to_string(bytes_);
@@ -74,6 +76,7 @@ void OutputFile::fail(const char* what, int error) {
 
 void OutputFile::write(std::string_view bytes) {
   require_open("write");
+  require_untouched();
   std::string_view left = bytes;
   while (!left.empty()) {
     const ssize_t count = ::write(fd_, left.data(), left.size());
@@ -85,8 +88,24 @@ void OutputFile::write(std::string_view bytes) {
   bytes_ += bytes.size();
 }
 
+// The kernel writes on into a file that has no name any more, and fills one that was cut with
+// zeros, after which it has the size that it should have.
+void OutputFile::require_untouched() {
+  struct stat found {};
+  if (::fstat(fd_, &found) != 0) fail("write", errno);
+  const auto size = static_cast<std::uint64_t>(found.st_size);
+  if (found.st_nlink != 0 && size == bytes_) return;
+  ended_ = found.st_nlink == 0
+               ? "somebody has deleted it meanwhile"
+               : "somebody else has written to it, or cut it: it has " + std::to_string(size) +
+                     " bytes, and " + std::to_string(bytes_) + " were written";
+  if (unfinished_ == Unfinished::discard && found.st_nlink != 0) discard();
+  refuse("write", ended_);
+}
+
 void OutputFile::sync() {
   require_open("write");
+  require_untouched();
   if (::fdatasync(fd_) != 0) fail("write", errno);
   if (std::exchange(is_synced_before_, true)) return;
   // A new file is lost with its directory's entry.
@@ -95,6 +114,7 @@ void OutputFile::sync() {
 
 void OutputFile::close() {
   require_open("write");
+  require_untouched();
   const int fd = std::exchange(fd_, -1);
   // Where the file is another machine's, this is when a quota may be exceeded.
   if (::close(fd) == 0 || errno == EINTR) return;

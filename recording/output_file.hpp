@@ -18,7 +18,8 @@ class OutputFile {
   OutputFile& operator=(const OutputFile&) = delete;
 
   // All or nothing: if it cannot, it takes back what it has written of them, and throws McapError.
-  // It then writes nothing any more.
+  // It then writes nothing any more. This and the next two throw where somebody has deleted the
+  // file meanwhile, or cut it.
   void write(std::string_view bytes);
   // Returns when a power cut cannot take what was written.
   void sync();
@@ -35,6 +36,7 @@ class OutputFile {
   void require_open(const std::string& what) const;
   // Says what could not be done, and ends the file.
   [[noreturn]] void fail(const char* what, int error);
+  void require_untouched();
 
   std::string path_;
   Unfinished unfinished_;

@@ -77,12 +77,7 @@ McapWriter::McapWriter(const std::string& path, std::string_view library,
     : file_(std::make_unique<File>(path, options)) {
   std::string beginning(kMagic);
   append_header(beginning, "", library);
-  try {
-    file_->out.write(beginning);
-  } catch (const McapError&) {
-    file_->out.discard();  // it would be in the way of the next attempt
-    throw;
-  }
+  file_->out.write(beginning);
 }
 
 McapWriter::McapWriter(McapWriter&&) noexcept = default;

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "watch/imported.hpp"
+#include "watch/process.hpp"
 
 namespace arbiter::top {
 namespace {
@@ -14,10 +15,6 @@ std::ptrdiff_t find(const std::vector<Fact>& facts, const std::string& name) {
       facts.begin(), facts.end(), name,
       [](const Fact& fact, const std::string& wanted) { return fact.name < wanted; });
   return found == facts.end() || found->name != name ? -1 : found - facts.begin();
-}
-
-std::string component_text(const wire::Component& component) {
-  return component.node + " (pid " + std::to_string(component.pid) + ")";
 }
 
 // Nothing: the counter has begun again in between.
@@ -67,8 +64,8 @@ PortFact fact_of(const wire::InputStatus& input) {
   PortFact fact;
   fact.name = input.name;
   fact.is_open = input.open.has_value();
-  fact.component =
-      input.open ? component_text(input.open->component) : (input.away_pid ? "away" : "not open");
+  fact.component = input.open ? watch::process_text(input.open->component)
+                              : (input.away_pid ? "away" : "not open");
   fact.is_arbitrated = input.arbitrated;
   for (const wire::ConnectionStatus& each : input.connections) {
     fact.waiting += each.waiting;
@@ -86,7 +83,7 @@ SourceFact fact_of(const wire::SourceStatus& source) {
   SourceFact fact;
   fact.name = source.name;
   fact.is_open = source.open.has_value();
-  fact.component = source.open ? component_text(source.open->component)
+  fact.component = source.open ? watch::process_text(source.open->component)
                                : (source.away_pid ? "away" : "not open");
   fact.host = watch::host_of(source);
   fact.timeout = source.timeout;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "watch/abandoned_sockets.hpp"
+#include "watch/process.hpp"
 #include "wire/document.hpp"
 #include "wire/meeting.hpp"
 #include "wire/rendezvous.hpp"
@@ -110,10 +111,6 @@ void examine_memory(const Machine& machine, Findings& found) {
                    "samples and queues are shared memory: where none is left, ports cannot be "
                    "opened or connected, and the kernel ends processes",
                    "ps -eo pid,rss,comm --sort=-rss | head, and end what need not run"});
-}
-
-std::string process_name(const wire::Component& component) {
-  return component.node + " (pid " + std::to_string(component.pid) + ")";
 }
 
 // systemd's unit is that of the default instance.
@@ -315,7 +312,7 @@ Findings examine_processes(const Machine& machine, const wire::Status& status) {
     for (const auto& port : ports) {
       if (port.open) {
         const wire::Component& component = port.open->component;
-        processes.examine(process_name(component), component.pid, false);
+        processes.examine(process_text(component), component.pid, false);
       } else if (port.away_pid) {
         processes.examine(
             "the component of " + port.name + " (pid " + std::to_string(*port.away_pid) + ")",
@@ -355,7 +352,8 @@ const std::vector<std::string>& finding_codes() {
                                               "port-on-two-hosts",
                                               "source-on-two-hosts",
                                               "shared-host-name",
-                                              "host-gone"};
+                                              "host-gone",
+                                              "deaf-host"};
   return codes;
 }
 

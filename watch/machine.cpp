@@ -1,6 +1,9 @@
 #include "watch/machine.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <filesystem>
 #include <fstream>
@@ -32,6 +35,12 @@ std::optional<std::string_view> rest_of_line(std::string_view text, std::string_
 }
 
 }  // namespace
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  if (::gethostname(name.data(), name.size() - 1) != 0) return {};
+  return name.data();
+}
 
 std::optional<std::string> Machine::read(const std::string& path) const {
   std::ifstream file(root_ + path, std::ios::binary);

@@ -13,6 +13,9 @@ inline constexpr std::uint64_t kUnlimited = std::numeric_limits<std::uint64_t>::
 
 enum class Capability : std::uint8_t { kIpcLock = 14, kSysNice = 23 };
 
+// What this machine calls itself; empty: it cannot say.
+[[nodiscard]] std::string host_name();
+
 class Machine {
  public:
   // `root`: a directory that stands for "/", such as one that a test has filled.

@@ -17,11 +17,6 @@ namespace {
 
 using wire::StrangerStatus;
 
-// Of a component, or a stranger.
-std::string process_text(const auto& process) {
-  return process.node + " (pid " + std::to_string(process.pid) + ")";
-}
-
 // Of a port that is open.
 std::string component_text(const auto& port) { return process_text(port.open->component); }
 

@@ -1,7 +1,14 @@
 // A component's process, as the kernel shows it.
 #pragma once
 
+#include <string>
+
 namespace arbiter::watch {
+
+// "gaze-control (pid 4711)": of a component, or a stranger.
+[[nodiscard]] std::string process_text(const auto& process) {
+  return process.node + " (pid " + std::to_string(process.pid) + ")";
+}
 
 // Whether it lives and does not run: it was sent SIGSTOP, or is being debugged. Reads /proc.
 [[nodiscard]] bool is_stopped(int pid);

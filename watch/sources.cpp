@@ -19,4 +19,10 @@ std::optional<shm::Nanoseconds> SourceState::arrived_by() const {
   return last_arrival() ? std::nullopt : std::optional(timeout_changed);
 }
 
+shm::Nanoseconds event_time(const SourceState& state, shm::Nanoseconds now) {
+  if (shm::is_deactivation(state.word)) return state.word & ~shm::kDeactivatedFlag;
+  if (shm::is_active(state.word, now)) return state.last_arrival().value_or(now);
+  return state.word;
+}
+
 }  // namespace arbiter::watch

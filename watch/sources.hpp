@@ -28,6 +28,10 @@ struct SourceState {
   [[nodiscard]] std::optional<shm::Nanoseconds> arrived_by() const;
 };
 
+// When what happened to a source last did happen, as its word tells: its deactivation, its last
+// arrival while it is active, its end.
+[[nodiscard]] shm::Nanoseconds event_time(const SourceState& state, shm::Nanoseconds now);
+
 class Sources {
  public:
   void set(const std::string& name, const SourceState& state) { states_[name] = state; }

@@ -6,20 +6,9 @@
 
 #include "rules/explain/change.hpp"
 #include "rules/explain/tenure.hpp"
+#include "watch/sources.hpp"
 
 namespace arbiter::watch {
-namespace {
-
-// When what happened to a source last did happen: its deactivation, its last arrival while it is
-// active, its end.
-shm::Nanoseconds event_time(shm::ActivityWord word, shm::Nanoseconds timeout,
-                            shm::Nanoseconds now) {
-  if (shm::is_deactivation(word)) return word & ~shm::kDeactivatedFlag;
-  if (shm::is_active(word, now)) return shm::arrival_of(word, timeout);
-  return word;
-}
-
-}  // namespace
 
 Winners::Winners(std::shared_ptr<Instance> instance, Wanted wanted)
     : instance_(std::move(instance)), wanted_(std::move(wanted)) {}
@@ -93,7 +82,7 @@ shm::Nanoseconds Winners::time_of(const WinnerAt& change, shm::PortId port,
   for (const shm::SourceId source : causes) {
     const auto word = picture.words.find(source);
     if (word == picture.words.end()) continue;
-    time = std::min(time, event_time(word->second, table.timeout(source), picture.now));
+    time = std::min(time, event_time({word->second, table.timeout(source)}, picture.now));
   }
   // One that has been renewed since tells of its last arrival only: it was after the last look.
   return std::max(time, picture_.now);

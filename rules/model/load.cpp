@@ -93,12 +93,19 @@ LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
 }  // namespace
 
 ModelTexts read_texts(const ModelFiles& files, Accept accept) {
-  const auto read = [accept](const std::string& path) {
-    return FileText{path, read_bytes(path, kMaxFileBytes, accept)};
+  std::string problems;
+  const auto read = [&](const std::string& path) -> FileText {
+    try {
+      return {path, read_bytes(path, kMaxFileBytes, accept)};
+    } catch (const FileError& error) {
+      problems += (problems.empty() ? "" : "; ") + std::string(error.what());
+      return {};
+    }
   };
   ModelTexts texts;
   for (const std::string& path : files.models) texts.models.push_back(read(path));
   if (files.application) texts.application = read(*files.application);
+  if (!problems.empty()) throw FileError(problems);
   return texts;
 }
 

@@ -102,6 +102,15 @@ TEST(Play, ThatIsStoppedBeforeItsEndSaysBySoMuchOfItsSignal) {
   }
 }
 
+TEST(Play, RefusesWhatWouldNotEnd) {
+  Daemon daemon(kPlayedModel);
+  const TemporaryDirectory files;
+  const auto trace = files.write("trace.csv", "t_ns,source\n0,/low\n1000000000000000000,/low\n");
+  const auto result = arbiter({"play", trace, "--speed", "0.001"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, testing::HasSubstr("would take more than 70 years at this speed"));
+}
+
 TEST(Play, NotesSourcesThatTheModelDoesNotKnow) {
   Daemon daemon(kPlayedModel);
   const TemporaryDirectory files;

@@ -369,7 +369,7 @@ TEST(Program, NotesAreToldByCheckAndNoOtherVerb) {
 TEST(Program, TakesNoNumberThatIsNone) {
   for (const std::vector<std::string>& arguments :
        std::vector<std::vector<std::string>>{{"pub", "/a", "--count", "1", "--rate"},
-                                             {"replay", "a.mcap", "--rate"},
+                                             {"replay", "a.mcap", "--speed"},
                                              {"play", "a.csv", "--speed"},
                                              {"check", "a.xml", "--effort"}}) {
     for (const char* number : {"nan", "-nan", "inf", "0", "1e9", "2x", "x", ""}) {

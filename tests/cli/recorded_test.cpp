@@ -93,7 +93,8 @@ TEST(RecordedIncident, SaysWhatWasTyped) {
                     HasSubstr("--payloads '/hihg*' matches no output port")));
   const auto info =
       nlohmann::json::parse(arbiter({"recording", "info", "--json", file}).out)["metadata"];
-  ASSERT_EQ(info.size(), 1U) << info;
+  ASSERT_EQ(info.size(), 2U) << info;
+  EXPECT_EQ(info[1]["name"], "arbiter.end");
   EXPECT_EQ(info[0]["values"]["command"],
             std::string(ARBITER_PROGRAMS) + "/arbiter record -o " + file +
                 R"( --duration 20ms --port '/p*' --port '/don'\''t*')");

@@ -97,12 +97,12 @@ class Incident {
     add(evidence::Deactivation{context(source), time, seen, sequences_[source], generation_});
   }
 
-  // Written and read.
-  [[nodiscard]] std::string file() {
+  // Written and read. `end`: what the file says of when recording ended; 0: nothing.
+  [[nodiscard]] std::string file(shm::Nanoseconds end = 0) {
     const std::string path = directory_.path() + "/" + std::to_string(++files_) + ".mcap";
     evidence::RecordWriter writer(path, {}, {"program", "test", "host", "command", 5'000'000});
     for (const auto& record : records_) writer.write(record);
-    writer.close();
+    writer.close(end);
     return path;
   }
   [[nodiscard]] evidence::Recorded read() { return evidence::load_recording(file()); }

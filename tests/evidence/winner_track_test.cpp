@@ -58,6 +58,24 @@ TEST_F(TrackedWinners, ChangeByDeactivation) {
   EXPECT_EQ(told().back(), "250 /low deactivation /high");
 }
 
+// As by an operator, of which the recorder learns by looking.
+TEST_F(TrackedWinners, ChangeWhenADeactivationWasThatIsNoticedLate) {
+  arrive("/low", 100);
+  arrive("/high", 200);
+  track_.advance(290);
+  track_.apply("/high", shm::deactivation(250), 290, Why::state);
+  EXPECT_EQ(told().back(), "250 /low deactivation /high");
+}
+
+// From 250 to 270 nobody may have won.
+TEST_F(TrackedWinners, ChangeNoEarlierThanSomethingElseHasMattered) {
+  arrive("/high", 200);
+  arrive("/low", 270);
+  track_.advance(290);
+  track_.apply("/high", shm::deactivation(250), 290, Why::state);
+  EXPECT_EQ(told().back(), "270 /low deactivation /high");
+}
+
 TEST_F(TrackedWinners, ChangeByTheModel) {
   arrive("/low", 100);
   arrive("/high", 200);

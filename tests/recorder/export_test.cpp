@@ -37,6 +37,20 @@ TEST(Export, WritesATraceThatSimulateReads) {
             "1200,/low,/p,delivered,/low\n");
 }
 
+// A trace that began at 0 would be played for as long as the machine has run.
+TEST(Export, BeginsNoTraceWithWhatAPublisherFinds) {
+  const TemporaryDirectory directory;
+  Incident incident;
+  incident.state("/high", 0, 1050, shm::deactivation(0), evidence::SourceState::Why::joined);
+  incident.state("/low", 0, 1060, shm::deactivation(700), evidence::SourceState::Why::joined);
+  incident.arrive("/low", 1100, 1101, Incident::Fate::accepted);
+  // A publisher was killed before it could tell.
+  incident.state("/low", 1100, 1151, shm::deactivation(1150), evidence::SourceState::Why::closed);
+  const std::string trace = directory.file("trace.csv");
+  ASSERT_EQ(arbiter({"recording", "export", incident.file(), "--trace", trace}).exit_code, 0);
+  EXPECT_EQ(content_of(trace), "t_ns,source,event\n1100,/low,arrive\n1150,/low,deactivate\n");
+}
+
 // As in a simulation: nothing of it is decided there, but it may change who wins.
 TEST(Export, HasRowsForSourcesThatOpenPortsOnlyRead) {
   const TemporaryDirectory directory;
@@ -101,7 +115,7 @@ TEST(RecordedWinners, SaysWhoCommandedAtATimeOfTheClock) {
   EXPECT_EQ(winners({"--at", "00:00:02.600"}).out, high);
   EXPECT_EQ(winners({"--at", "1970-01-01 00:00:03"}).out, again);
   EXPECT_EQ(winners({"--at", "00:00:03", "--port", "/q*"}).out,
-            "no arbitrated input port of the recording matches\n");
+            "nobody won at 00:00:03, at an input port that matches /q*\n");
   EXPECT_THAT(winners({"--at", "00:00:02.6", "--json"}).out,
               testing::AllOf(testing::HasSubstr("\"winner\": \"/high\""),
                              testing::HasSubstr("\"cut_off\": false")));
@@ -111,6 +125,28 @@ TEST(RecordedWinners, SaysWhoCommandedAtATimeOfTheClock) {
     EXPECT_EQ(result.exit_code, 2) << time;
     EXPECT_THAT(result.err, testing::HasSubstr("--at")) << time;
   }
+}
+
+// The recorder writes changes only.
+TEST(RecordedWinners, SaysThatAPortIsIdleUntilSomebodyWins) {
+  using Why = evidence::WinnerChange::Why;
+  Incident incident;
+  incident.add(evidence::WinnerChange{"/p", "/low", "", 2'000'000'000, Why::arrival, "/low", 1});
+  incident.add(evidence::WinnerChange{"/q", "/low", "", 2'000'000'000, Why::model, "", 2});
+  const auto result = run_program({"/usr/bin/env", "TZ=UTC", ARBITER_PROGRAMS "/arbiter",
+                                   "recording", "winners", incident.file(5'000'000'000)});
+  EXPECT_EQ(result.out,
+            "1970-01-01 00:00:00.005  /p  idle  for 2.000 s: it was so when the recording began\n"
+            "1970-01-01 00:00:02.005  /p  /low  for 3.000 s, until the end of the recording: /low "
+            "arrived\n"
+            "1970-01-01 00:00:02.005  /q  /low  for 3.000 s, until the end of the recording: model "
+            "2 came into force\n");
+}
+
+TEST(RecordedWinners, SaysThatNobodyHasWon) {
+  Incident incident;
+  EXPECT_EQ(arbiter({"recording", "winners", incident.file()}).out,
+            "nobody won, at any input port\n");
 }
 
 TEST(Export, NeedsToKnowWhat) {

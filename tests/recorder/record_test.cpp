@@ -7,6 +7,8 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "evidence/recorded.hpp"
+#include "shm/clock.hpp"
 #include "tests/client/component.hpp"
 #include "tests/recorder/recording.hpp"
 #include "tests/support/await.hpp"
@@ -17,6 +19,7 @@ namespace {
 using evidence::Arrival;
 using evidence::WinnerChange;
 using nlohmann::json;
+using testing::AllOf;
 using testing::HasSubstr;
 
 const std::string kReversedModel = R"(<behaviors>
@@ -152,7 +155,36 @@ TEST(Record, SeesWhatAnOperatorDeactivates) {
   recording.wait_for<evidence::SourceState>(
       [](const auto& state) { return shm::is_deactivation(state.word); });
   EXPECT_EQ(recording.end(), 0);
-  EXPECT_EQ(recording.records<WinnerChange>().back().winner, "");
+  const auto change = recording.records<WinnerChange>().back();
+  EXPECT_EQ(change.winner, "");
+  EXPECT_EQ(change.why, WinnerChange::Why::deactivation);
+  EXPECT_EQ(shm::deactivation(change.time), recording.records<evidence::SourceState>().back().word);
+}
+
+// By whose activity the next one begins, nobody has missed anything.
+TEST(Record, HasNoGapWhereASourceIsOpenedAgain) {
+  const std::string forever = R"(<source port="/high" timeout="forever"/></behaviors>)";
+  Daemon daemon(kLasting.substr(0, kLasting.find("</behaviors>")) + forever);
+  Node node("test");
+  auto in = node.input_port<int>("/p");
+  auto low = node.output_port<int>("/low");
+  Recording recording(daemon);
+  std::size_t arrivals = 0;
+  for (const bool is_over : {false, true, false}) {
+    {
+      auto high = node.output_port<int>("/high");
+      high.publish(1);
+      if (is_over) high.deactivate();
+    }
+    low.publish(2);
+    arrivals += 2;
+    await([&] { return recording.records<Arrival>().size() == arrivals; }, 20);
+  }
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  const json result = recording.simulate();
+  EXPECT_EQ(result["decisions"], 6) << result.dump(2);
+  EXPECT_EQ(result["behind_gap"], 0) << result.dump(2);
+  EXPECT_EQ(result["different"], 0) << result.dump(2);
 }
 
 TEST(Record, SaysWhatItMissed) {
@@ -360,6 +392,30 @@ TEST(Record, SaysThatTheDiskIsFullAndLeavesWhatIsWhole) {
   const auto result = arbiter({"simulate", "--recording", file});
   EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
   EXPECT_THAT(result.out, HasSubstr("every decision is reproduced"));
+}
+
+TEST(Record, SaysThatItsFileWasDeletedMeanwhile) {
+  Daemon daemon(kLasting);
+  Recording recording(daemon);
+  std::filesystem::remove(recording.file());
+  EXPECT_EQ(recording.end(), 2);
+  EXPECT_THAT(recording.error(), AllOf(HasSubstr(recording.file()), HasSubstr("deleted it")));
+  EXPECT_EQ(recording.output(), "");
+}
+
+// A lease that was taken long ago still counts when recording ends.
+TEST(Record, SaysUntilWhenItWasRecorded) {
+  Daemon daemon(kLasting);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  Recording recording(daemon);
+  low.publish(1);
+  recording.wait_for<Arrival>([](const auto&) { return true; });
+  const shm::Nanoseconds later = shm::monotonic_now();
+  // The file of one that is killed says nothing of its end.
+  EXPECT_LT(evidence::load_recording(recording.file()).runs.at(0).end, later);
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  EXPECT_GT(evidence::load_recording(recording.file()).runs.at(0).end, later);
 }
 
 TEST(Record, EndsByItselfAfterADuration) {

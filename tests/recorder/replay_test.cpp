@@ -10,6 +10,7 @@
 
 #include "evidence/recorded.hpp"
 #include "tests/client/samples.hpp"
+#include "tests/evidence/incident.hpp"
 #include "tests/recorder/recording.hpp"
 
 namespace arbiter::test {
@@ -81,10 +82,35 @@ TEST_F(Replay, IsDecidedAsTheOriginalWas) {
   Node node("test");
   auto in = node.input_port<Number>("/p", {.depth = 16});
   Recording again(daemon_);
-  EXPECT_EQ(arbiter({"replay", file, "--rate", "10"}).exit_code, 0);
+  EXPECT_EQ(arbiter({"replay", file, "--speed", "10"}).exit_code, 0);
   EXPECT_EQ(again.end(), 0) << again.error();
   EXPECT_EQ(fates(again.file()), fates(file));
   EXPECT_EQ(again.simulate()["different"], 0);
+}
+
+// An operator's, which no publisher tells.
+TEST_F(Replay, DeactivatesWhatTheRecorderSawDeactivated) {
+  Node node("test");
+  auto in = node.input_port<Number>("/p", {.depth = 16});
+  std::string file;
+  {
+    auto low = node.output_port<Number>("/low");
+    Recording recording(daemon_, {"--payloads", "all"});
+    { node.output_port<Number>("/high").publish(Number{1}); }
+    low.publish(Number{2});
+    EXPECT_EQ(arbiter({"deactivate", "/high"}).exit_code, 0);
+    recording.wait_for<evidence::SourceState>(
+        [](const auto& state) { return shm::is_deactivation(state.word); });
+    low.publish(Number{3});
+    EXPECT_EQ(recording.end(), 0) << recording.error();
+    file = daemon_.directory() + "/kept.mcap";
+    std::filesystem::rename(recording.file(), file);
+  }
+  EXPECT_EQ(arbiter({"deactivate", "/low"}).exit_code, 0);
+  take_all(in);
+  const auto result = arbiter({"replay", file, "--speed", "10"});
+  EXPECT_THAT(result.out, HasSubstr("3 samples, 0 signals and 1 deactivation of 2 sources in "));
+  EXPECT_EQ(take_all(in), (std::vector<std::int64_t>{1, 3}));
 }
 
 // What was active at the start arrives first, and what follows does so later, however fast.
@@ -96,7 +122,7 @@ TEST_F(Replay, GoesAsFastAsItIsAsked) {
   for (int i = 0; i < 20; ++i) low.publish(Number{i});
   EXPECT_EQ(recording.end(), 0) << recording.error();
   { const auto closed = std::move(low); }
-  const auto result = arbiter({"replay", recording.file(), "--rate", "10000"});
+  const auto result = arbiter({"replay", recording.file(), "--speed", "10000"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
 }
 
@@ -138,6 +164,25 @@ TEST_F(Replay, RefusesWhatHasNoPayload) {
   EXPECT_THAT(result.err, HasSubstr("does not have what was in the samples of /low, /text"));
   result = arbiter({"replay", file, "--source", "/high", "--as-fast-as-possible"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
+TEST_F(Replay, UnderstandsTheFormerNameOfItsSpeed) {
+  const std::string file = record();
+  EXPECT_EQ(arbiter({"replay", file, "--rate", "10"}).exit_code, 0);
+  EXPECT_EQ(arbiter({"replay", file, "--rate", "10", "--speed", "10"}).exit_code, 2);
+  EXPECT_THAT(arbiter({"replay", "--help"}).out, testing::Not(HasSubstr("--rate")));
+}
+
+// Of a file that anybody has made: its times may be anything.
+TEST_F(Replay, RefusesWhatWouldNotEnd) {
+  for (const auto& [time, speed] : std::map<shm::Nanoseconds, const char*>{
+           {shm::kMaxTime / 100, "0.001"}, {shm::kMaxTime, "1"}}) {
+    Incident incident;
+    incident.deactivate("/low", time, time);
+    const auto result = arbiter({"replay", incident.file(), "--speed", speed});
+    EXPECT_EQ(result.exit_code, 1) << result.err;
+    EXPECT_THAT(result.err, HasSubstr("would take more than 70 years at this speed"));
+  }
 }
 
 TEST_F(Replay, NeedsItsPorts) {

@@ -49,7 +49,7 @@ class RingTest : public testing::Test {
       ring.write(std::make_shared<const evidence::Record>(record));
     }
     ring.request(recorder::Cause::signal);
-    ring.finish();
+    ring.finish(kEnd);
     return evidence::load_recording(written_.back());
   }
 
@@ -58,6 +58,7 @@ class RingTest : public testing::Test {
   [[nodiscard]] std::size_t count_of_files() const { return files_in(directory_.path()).size(); }
 
   static constexpr evidence::Nanoseconds kLater = shm::kForever - 1;
+  static constexpr evidence::Nanoseconds kEnd = 0;  // not known
   static constexpr evidence::Nanoseconds kSecond = 1'000'000'000;
   TemporaryDirectory directory_;
   std::vector<std::string> written_;
@@ -76,6 +77,19 @@ TEST_F(RingTest, AnswersEachRequestWithItsOwnFile) {
   EXPECT_THAT(told_[0].file, HasSubstr("-asked.mcap"));
   EXPECT_EQ(told_[1].requests, (std::vector<std::uint64_t>{death}));
   EXPECT_THAT(told_[1].file, HasSubstr("-death.mcap"));
+}
+
+TEST_F(RingTest, SaysUntilWhenAFileReaches) {
+  recorder::Ring ring(options(60 * kSecond, 1 << 20));
+  const Incident incident;
+  for (const auto& record : incident.records()) {
+    ring.write(std::make_shared<const evidence::Record>(record));
+  }
+  ring.request(recorder::Cause::asked);
+  const evidence::Nanoseconds asked = shm::monotonic_now();
+  ring.tick(asked, asked + 1);
+  ASSERT_THAT(told_, SizeIs(1));
+  EXPECT_EQ(evidence::load_recording(told_[0].file).runs.at(0).end, asked + 1);
 }
 
 // One who asks while another's request waits is not answered with a file of before.
@@ -116,7 +130,7 @@ TEST_F(RingTest, RestsAfterAFileThatNobodyHasAskedFor) {
   ring.request(recorder::Cause::asked);
   tick(ring, 27 * kSecond);
   EXPECT_THAT(told_, SizeIs(5)) << "other causes do not wait";
-  ring.finish();
+  ring.finish(kLater);
   EXPECT_THAT(told_, SizeIs(6)) << "at the end nothing is left out";
 }
 

@@ -107,7 +107,7 @@ TEST(Robot, OfTwentyComponentsIsTappedRecordedKilledDumpedReplayedAndSimulated) 
     EXPECT_EQ(said["missed_events"], 0) << info.out << simulated.out;
     EXPECT_EQ(said["missed_samples"], 0) << info.out << simulated.out;
   }
-  const auto replayed = arbiter({"replay", recording.file(), "--rate", "4"});
+  const auto replayed = arbiter({"replay", recording.file(), "--speed", "4"});
   EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
 }
 

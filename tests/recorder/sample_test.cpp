@@ -97,6 +97,27 @@ TEST_F(RecordedSample, IsTheLastThatHadComeByATime) {
   EXPECT_EQ(sample("/again", {"--at", "00:00:06.5"}).out, "first life");
 }
 
+// The last sample is the last, however long nothing comes behind it.
+TEST_F(RecordedSample, IsTheLastWhileRecordingGoesOn) {
+  file_ = directory_.file("quiet.mcap");
+  {
+    evidence::RecordWriter writer(file_, {}, {"arbiter", "test", "robot", "", 0});
+    writer.write(evidence::Start{kSecond, "test", {}, "all"});
+    evidence::Arrival arrival;
+    auto context = std::make_shared<evidence::SourceContext>();
+    context->source = "/quiet";
+    arrival.context = std::move(context);
+    arrival.time = arrival.seen = 2 * kSecond;
+    arrival.is_sample = arrival.has_payload = true;
+    arrival.payload.emplace(4, std::byte{'x'});
+    writer.write(arrival);
+    writer.close(60 * kSecond);
+  }
+  EXPECT_EQ(sample("/quiet", {"--at", "00:00:59"}).out, "xxxx");
+  expect_refusal(sample("/quiet", {"--at", "00:00:01"}), "by then no sample of /quiet had come");
+  expect_refusal(sample("/quiet", {"--at", "00:01:30"}), "is not in the recording");
+}
+
 TEST_F(RecordedSample, GoesToAFileButNotToTheRecording) {
   const std::string bytes = directory_.file("bytes");
   EXPECT_EQ(sample("/Joy/cmd:o", {"-o", bytes}).exit_code, 0);

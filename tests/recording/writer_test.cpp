@@ -194,8 +194,37 @@ TEST_F(Writer, EndsAfterTheLastChunkForWhichThereIsRoom) {
 
 TEST_F(Writer, LeavesNoFileIfThereIsNoRoomForAnything) {
   const SizeLimit limit(10);
-  EXPECT_THROW(McapWriter(path_, "test", {}), McapError);
+  EXPECT_THAT(message_of([&] { const McapWriter writer(path_, "test", {}); }),
+              HasSubstr("it was deleted"));
   EXPECT_FALSE(std::filesystem::exists(path_));
+}
+
+// The kernel writes on into a file that has no name any more.
+TEST_F(Writer, SaysThatItsFileWasDeleted) {
+  McapWriter writer(path_, "test", {});
+  writer.sync();
+  std::filesystem::remove(path_);
+  EXPECT_THAT(message_of([&] { writer.sync(); }),
+              testing::AllOf(HasSubstr(path_), HasSubstr("deleted it meanwhile")));
+  EXPECT_THAT(message_of([&] { writer.close(); }), HasSubstr("deleted it meanwhile"));
+}
+
+// Behind the cut there would be zeros.
+TEST_F(Writer, SaysThatItsFileWasCut) {
+  McapWriter writer(path_, "test", {});
+  const auto channel = writer.add_channel({0, "/a", "raw", {}});
+  writer.write(message(channel, 1, "lost"));
+  writer.end_chunk();
+  std::filesystem::resize_file(path_, 0);
+  writer.write(message(channel, 2, "behind it"));
+  EXPECT_THAT(message_of([&] { writer.close(); }), HasSubstr("somebody else has written to it"));
+}
+
+TEST_F(Writer, DoesNotMindThatItsFileIsRenamed) {
+  McapWriter writer(path_, "test", {});
+  std::filesystem::rename(path_, path_ + ".moved");
+  writer.close();
+  EXPECT_TRUE(contents_of(path_ + ".moved").end.is_whole);
 }
 
 TEST(Crc32, IsTheOneOfZlib) {

@@ -96,6 +96,14 @@ TEST(Load, AFileThatCannotBeReadIsThrown) {
   EXPECT_THROW(load_files({{folder.file("none.xml")}, {}}), FileError);
   EXPECT_THROW(load_files({{good, folder.file("")}, {}}), FileError);
   EXPECT_THROW(load_files({{good}, folder.file("none.xml")}), FileError);
+  try {
+    load_files({{folder.file("one.xml"), good, folder.file("two.xml")}, folder.file("app.xml")});
+    FAIL();
+  } catch (const FileError& error) {
+    for (const char* name : {"one.xml", "two.xml", "app.xml"}) {
+      EXPECT_THAT(error.what(), testing::HasSubstr("cannot open " + folder.file(name) + ": No"));
+    }
+  }
 }
 
 TEST(Load, AFileBeyondTheLimitIsRefused) {

@@ -1,10 +1,12 @@
 // What arbiter top does to a terminal: which ones it takes, and how it leaves them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 
 #include <arbiter/arbiter.hpp>
 
 #include "tests/cli/arbiter_program.hpp"
+#include "tests/support/child_process.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/top/top_program.hpp"
 
@@ -132,6 +134,19 @@ TEST_F(TopTerminal, IsNotTakenWhereThereIsNoDaemon) {
   EXPECT_EQ(top.wait_for_end(), 1);
   EXPECT_TRUE(top.shows("arbiter: no arbiterd")) << top.text();
   EXPECT_EQ(top.written().find("\x1b[?1049h"), std::string::npos);
+}
+
+// The signal waits for `top`, which has not been started yet.
+TEST_F(TopTerminal, OfOnePictureThatIsNotDrawnSaysTheSignal) {
+  sigset_t interrupt;
+  sigset_t before;
+  sigemptyset(&interrupt);
+  sigaddset(&interrupt, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &interrupt, &before);
+  ChildProcess top({kArbiter, "top", "--once"}, {}, {});
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  top.signal(SIGINT);
+  EXPECT_EQ(top.wait(), 128 + SIGINT);
 }
 
 TEST_F(TopTerminal, IsNotNeededForOnePicture) {

@@ -127,6 +127,14 @@ class TapEventBase {
     if (data_.activity <= 0 || data_.activity >= kForever) return std::nullopt;
     return Time(std::chrono::nanoseconds(data_.activity));
   }
+  // Of a source that was deactivated: when; of one that stays active until it is: when it last
+  // arrived. It may have been before this port was opened. Empty: neither.
+  [[nodiscard]] std::optional<Time> stands_since() const noexcept {
+    constexpr std::int64_t kForever = std::int64_t{1} << 62;
+    if (data_.activity >= 0 && data_.activity < kForever) return std::nullopt;
+    const std::int64_t flags = data_.activity < 0 ? INT64_MIN : kForever;
+    return Time(std::chrono::nanoseconds(data_.activity & ~flags));
+  }
   // Whether the source's last event was its deactivation.
   [[nodiscard]] bool is_deactivated() const noexcept { return data_.activity < 0; }
 
@@ -217,8 +225,9 @@ class Tap {
   ~Tap() { detail::close_tap(std::move(core_)); }
 
   // The next event, or empty. Events of one source come in its order; of those that several
-  // sources have written by now, the oldest comes first. Wait-free. Throws arbiter::Error if the
-  // next event has a sample, and max_held of them are held already.
+  // sources have written by now, the oldest comes first; but a source that goes on writing old
+  // times lets the others come after some 2048 events. Wait-free. Throws arbiter::Error if the next
+  // event has a sample, and max_held of them are held already.
   [[nodiscard]] std::optional<TapEvent<T>> take() {
     detail::TapEventData data;
     if (!detail::take(*core_, data)) return std::nullopt;
