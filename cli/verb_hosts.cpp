@@ -3,6 +3,7 @@
 #include <array>
 #include <iostream>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -29,7 +30,8 @@ struct HostsOptions {
 std::string shown(const std::string& text) { return shm::printable(text); }
 
 std::string link_text(const wire::HostStatus& host) {
-  return (host.is_up ? "up " : "gone ") + seconds_text(shm::monotonic_now() - host.since);
+  return (host.is_up ? "up " : "gone ") + seconds_text(shm::monotonic_now() - host.since) +
+         (host.is_deaf ? ", deaf" : "");
 }
 
 using Row = std::array<std::string, 7>;
@@ -77,13 +79,36 @@ void write_wanted_sources(const wire::HostsDocument& document) {
 }
 
 // Links of several versions may understand each other, and need not.
-void write_versions(const wire::HostsDocument& document) {
+void write_versions(std::ostream& out, const wire::HostsDocument& document) {
   for (const wire::HostStatus& each : document.hosts) {
     if (!each.is_up || each.version == document.version) continue;
-    std::cout << "warning: the link of host " << shown(each.host) << " is version "
-              << shown(each.version) << ", and this one is " << shown(document.version)
-              << ": install the same version on all hosts\n";
+    out << "warning: the link of host " << shown(each.host) << " is version " << shown(each.version)
+        << ", and this one is " << shown(document.version)
+        << ": install the same version on all hosts\n";
   }
+}
+
+// The rest looks as if all were well: it is there, and names what it has open.
+void write_deaf(std::ostream& out, const wire::HostsDocument& document) {
+  for (const wire::HostStatus& each : document.hosts) {
+    if (!each.is_deaf) continue;
+    out << "warning: host " << shown(each.host)
+        << " is there, and has not heard this one for 2 s: nothing is imported from it until it "
+           "does; see whether the network carries words both ways\n";
+  }
+}
+
+std::string warnings_of(const wire::HostsDocument& document) {
+  std::ostringstream out;
+  if (document.without_place != 0) {
+    out << "warning: " << wire::without_place_text(document.without_place) << '\n';
+  }
+  write_versions(out, document);
+  write_deaf(out, document);
+  for (const wire::HostDisagreement& each : document.disagreements) {
+    out << (each.is_error ? "ERROR: " : "warning: ") << shown(each.text) << '\n';
+  }
+  return out.str();
 }
 
 int hosts(const HostsOptions& options) {
@@ -105,14 +130,8 @@ int hosts(const HostsOptions& options) {
   std::cout << '\n';
   write_table(rows);
   write_wanted_sources(document);
-  if (!document.disagreements.empty() || document.without_place != 0) std::cout << '\n';
-  if (document.without_place != 0) {
-    std::cout << "warning: " << wire::without_place_text(document.without_place) << '\n';
-  }
-  write_versions(document);
-  for (const wire::HostDisagreement& each : document.disagreements) {
-    std::cout << (each.is_error ? "ERROR: " : "warning: ") << shown(each.text) << '\n';
-  }
+  const std::string warnings = warnings_of(document);
+  if (!warnings.empty()) std::cout << '\n' << warnings;
   return has_errors ? 1 : 0;
 }
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -69,6 +70,7 @@ wire::HostsDocument Desk::document() const {
   std::shared_ptr<const std::vector<Disagreement>> standing;
   std::vector<Neighbour> neighbours;
   std::vector<std::optional<shm::Nanoseconds>> round_trips;
+  std::set<Participant> deaf;
   {
     const std::lock_guard lock(mutex_);
     if (!network_.empty()) document.network = network_;
@@ -79,6 +81,7 @@ wire::HostsDocument Desk::document() const {
     for (const Neighbour& each : neighbours) {
       round_trips.push_back(round_trips_.of(each.participant));
     }
+    deaf = round_trips_.deaf();
   }
   document.host = me_.host;
   document.instance = me_.instance;
@@ -91,7 +94,9 @@ wire::HostsDocument Desk::document() const {
     wire::HostStatus& host = document.hosts.emplace_back(status_of(*neighbours[i].card));
     host.is_up = neighbours[i].is_up;
     host.since = neighbours[i].since;
-    if (host.is_up) host.round_trip = round_trips[i];
+    host.is_deaf = host.is_up && deaf.contains(neighbours[i].participant);
+    // What was measured before nothing gets there any more is not how far away it is.
+    if (host.is_up && !host.is_deaf) host.round_trip = round_trips[i];
   }
   document.imports = own->imports;
   for (const Disagreement& each : *standing) document.disagreements.push_back(status_of(each));

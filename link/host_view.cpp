@@ -31,6 +31,9 @@ constexpr shm::Nanoseconds kAskPeriod = 250 * kMillisecond;
 // takes one percent of a processor at most.
 constexpr shm::Nanoseconds kLongestAskPeriod = 1000 * kMillisecond;
 constexpr shm::Nanoseconds kTimesItsCost = 100;
+// Another daemon of the instance may be found, elsewhere, while that of this link is restarted: who
+// leaves what it has open does not get it back.
+constexpr shm::Nanoseconds kStaysUnknown = 2000 * kMillisecond;
 // Torn tables are read again; seven models in one reading are nobody's.
 constexpr int kMaxTries = 4;
 
@@ -134,7 +137,6 @@ void HostView::update(const std::function<void()>& model_is_known) {
     look_at_model();
     model_is_known();
     look_at_ports();
-    obstacle_.clear();
   } catch (const std::exception& error) {  // no daemon, a policy, memory that is short
     obstacle_ = error.what();
   }
@@ -169,6 +171,7 @@ void HostView::look_at_model() {
 
 void HostView::look_at_ports() {
   const shm::Nanoseconds now = shm::monotonic_now();
+  if (!instance_->has_daemon()) obstacle_.clear();  // it is no longer that which did not answer
   if (now < ask_again_ || !instance_->has_daemon()) return;
   const shm::Nanoseconds before_it = processor_time();
   const wire::Status status = ask_status(now);
@@ -189,7 +192,14 @@ void HostView::look_at_ports() {
     if (input.open || is_back_soon) inputs.insert(input.name);
   }
   inputs_here_ = std::move(inputs);
+  for (const wire::StrangerStatus& each : status.strangers) {
+    const bool is_ours = each.pid == ::getpid() && each.node == watch::kLinkNode;
+    if (is_ours && each.seen - each.since >= kStaysUnknown) {
+      turned_away_ = std::max(turned_away_, each.seen);
+    }
+  }
   know_model(status.model);
+  obstacle_.clear();
 }
 
 // Who has waited in vain lets the loop go round for as long before it asks again.

@@ -58,6 +58,9 @@ class HostView {
   [[nodiscard]] bool is_deactivated(const std::string& source) const;
   // False: ports cannot be opened now, and an attempt waits for a second.
   [[nodiscard]] bool has_daemon() const { return instance_ != nullptr && instance_->has_daemon(); }
+  // When the daemon turned this link away the last time, as it does for 2 s or longer: it does not
+  // know what the link has open, because the state of the daemon before is lost. 0: it does.
+  [[nodiscard]] shm::Nanoseconds turned_away() const { return turned_away_; }
   // Why nothing is known; empty: it is.
   [[nodiscard]] const std::string& obstacle() const { return obstacle_; }
 
@@ -75,6 +78,7 @@ class HostView {
   std::map<std::string, SourceUse, std::less<>> uses_;
   OpenPorts open_here_;
   std::set<std::string, std::less<>> inputs_here_;
+  shm::Nanoseconds turned_away_ = 0;
   Model model_;
   std::uint64_t model_of_daemon_ = 0;
   std::shared_ptr<const shm::DecisionMemory> memory_;  // of what follows

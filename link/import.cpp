@@ -26,13 +26,15 @@ Type type_of(const shm::TypeInfo& info) {
 }  // namespace
 
 Import::Import(Node& node, const Network& network, const SentTokens& tokens, std::string source,
-               Incarnation me, const gateway::Bell& bell, DemandTeller& demands, SourceUse use)
+               Incarnation me, const gateway::Bell& bell, DemandTeller& demands, SourceUse use,
+               const Stream& stream)
     : node_(node),
       tokens_(tokens),
       source_(std::move(source)),
       me_(me),
       demands_(demands),
       offers_(source_),
+      stream_(stream),
       demand_(use, shm::monotonic_now()),
       said_demand_(demand_.demand()) {
   unheard_.reserve(kMaxUnheard);
@@ -44,9 +46,13 @@ Import::Import(Node& node, const Network& network, const SentTokens& tokens, std
   say_demand();  // what has come meanwhile may have changed it
 }
 
-Import::~Import() {
+Import::~Import() { static_cast<void>(end()); }
+
+Stream Import::end() {
   close();          // first: to end the reader takes longer, and a component may want the name
   reader_.reset();  // it calls take() until then
+  stream_.pause();
+  return stream_;
 }
 
 void Import::look(bool is_open_here, SourceUse use, const OtherLinks& others) {
@@ -210,6 +216,11 @@ void Import::close() {
     gone.swap(port_);
   }
   if (gone) say_sparingly(Level::kInfo, source_ + " is not imported any more");
+}
+
+void Import::begin_again() {
+  close();
+  open_again_ = shm::monotonic_now() + kOpenAgain;
 }
 
 void Import::say_once(const std::string& text) {

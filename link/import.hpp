@@ -38,9 +38,11 @@ namespace arbiter::link {
 class Import : private gateway::dds::SampleTaker {
  public:
   // `me`: of this link, in whose name tokens are sent. `bell` rings where look() has something to
-  // do. Keeps references. Throws DdsError.
+  // do. `stream`: what an earlier import of the source has left, or nothing. Keeps references.
+  // Throws DdsError.
   Import(Node& node, const Network& network, const SentTokens& tokens, std::string source,
-         Incarnation me, const gateway::Bell& bell, DemandTeller& demands, SourceUse use);
+         Incarnation me, const gateway::Bell& bell, DemandTeller& demands, SourceUse use,
+         const Stream& stream = {});
   Import(const Import&) = delete;
   Import& operator=(const Import&) = delete;
   ~Import() override;
@@ -58,6 +60,11 @@ class Import : private gateway::dds::SampleTaker {
   void yield();
   // The link's thread: nothing arrives any more. Waits for nobody, as the destructor may.
   void close();
+  // The same; the port is opened again, but not at once.
+  void begin_again();
+  // The last call: nothing is heard any more. Returns what has come, so that it does not come again
+  // if the source is imported again. Takes longer than close().
+  [[nodiscard]] Stream end();
 
   // For the hosts document, but for what this host has open itself.
   [[nodiscard]] wire::ImportStatus status() const;

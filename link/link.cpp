@@ -15,6 +15,7 @@
 #include "link/first_failure.hpp"
 #include "link/say_sparingly.hpp"
 #include "shm/clock.hpp"
+#include "shm/limits.hpp"
 #include "watch/imported.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -80,7 +81,18 @@ Link::~Link() {
 // Each waits for Cyclone where it ends, and a component that wants its name must not.
 void Link::end(Imports gone) {
   for (const auto& [source, one] : gone) one->close();
-  for (auto each = gone.begin(); each != gone.end(); each = gone.erase(each)) options_.on_round();
+  for (auto each = gone.begin(); each != gone.end(); each = gone.erase(each)) {
+    remember(each->first, each->second->end());
+    options_.on_round();
+  }
+}
+
+// The exporter may still keep the last event for other hosts, and would send it once more.
+void Link::remember(const std::string& source, const Stream& stream) {
+  if (streams_.size() >= shm::kMaxSources && !streams_.contains(source)) {
+    streams_.erase(streams_.begin());  // of models that are long gone
+  }
+  streams_[source] = stream;
 }
 
 std::unique_ptr<Desk> Link::take_desk() {
@@ -219,6 +231,7 @@ Link::End Link::loop(int stop) {
     view_.update([this] { set_max_ages(); });
     say_once(said_of_view_, view_.obstacle());
     say_what_passes();
+    leave_lost_ports();
     options_.on_round();
     const Patience patience([] { return shm::monotonic_now(); }, options_.on_round);
     attempt(said_of_exports, [&] { exports_->look(view_, patience); });
@@ -229,6 +242,17 @@ Link::End Link::loop(int stop) {
   }
   if (!interfaces_.change().empty()) network_->note_cut_off();
   return End::kStopped;
+}
+
+// The components that have them from this link cannot come back either, until they are restarted.
+// What is tapped ends by itself: the daemon names none of its sources as open.
+void Link::leave_lost_ports() {
+  if (view_.turned_away() <= left_) return;
+  left_ = shm::monotonic_now();
+  say_sparingly(Level::kWarning,
+                "the daemon does not know what this link has open, because the state of the last "
+                "daemon is lost: opening it again");
+  for (const auto& [source, one] : imports_) one->begin_again();
 }
 
 // What the model before would have let in is late from now on.
@@ -271,8 +295,10 @@ void Link::choose_imports(const Patience& patience) {
 }
 
 void Link::add_import(const std::string& source) {
+  const auto before = streams_.find(source);
   auto one = std::make_unique<Import>(*node_, *network_, sent_, source, incarnation_, bell_,
-                                      *demands_, view_.use_of(source));
+                                      *demands_, view_.use_of(source),
+                                      before == streams_.end() ? Stream() : before->second);
   const std::lock_guard lock(imports_mutex_);
   imports_.emplace(source, std::move(one));
 }

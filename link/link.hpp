@@ -23,6 +23,7 @@
 #include "link/core/neighbours.hpp"
 #include "link/core/patience.hpp"
 #include "link/core/sent_tokens.hpp"
+#include "link/core/stream.hpp"
 #include "link/dds/demands.hpp"
 #include "link/dds/network.hpp"
 #include "link/dds/token_topic.hpp"
@@ -76,10 +77,14 @@ class Link {
   [[nodiscard]] bool has_network_changed();
   // Once, when it is known.
   void say_what_passes();
+  // Where the daemon does not know what this link has open: closes it. A node that has nothing open
+  // is let in, and what is wanted is opened again.
+  void leave_lost_ports();
   void set_max_ages();
   void choose_imports(const Patience& patience);
   using Imports = std::map<std::string, std::unique_ptr<Import>, std::less<>>;
   void end(Imports gone);
+  void remember(const std::string& source, const Stream& stream);
   void add_import(const std::string& source);
   // On the node's thread, which waits for nothing: a component that wants its name does not wait
   // for what the loop is doing.
@@ -99,9 +104,12 @@ class Link {
   std::string said_;
   std::string said_of_view_;
   shm::Nanoseconds tell_again_ = 0;
+  shm::Nanoseconds left_ = 0;  // the ports of a daemon whose state is lost
   bool has_said_what_passes_ = false;
   bool stops_ = false;
   InterfaceWatch interfaces_;
+  // Of sources that were imported and are not wanted now: the model may want them again.
+  std::map<std::string, Stream, std::less<>> streams_;
   std::mutex imports_mutex_;
   // Empty before what they use goes; the node's thread may look there until the node has gone.
   Imports imports_;

@@ -53,6 +53,18 @@ void add_gone(const wire::HostsDocument& hosts, Findings& found) {
   }
 }
 
+// They look as if they were well.
+void add_deaf(const wire::HostsDocument& hosts, Findings& found) {
+  for (const wire::HostStatus& each : hosts.hosts) {
+    if (!each.is_deaf) continue;
+    found.push_back({"deaf-host",
+                     "host " + each.host + " is there, and has not heard this one for 2 s",
+                     "nothing is imported from it until it does, and it gets nothing from here",
+                     "see whether the network, and the firewall there, let words through both "
+                     "ways"});
+  }
+}
+
 }  // namespace
 
 Findings examine_hosts(const wire::HostsDocument& hosts) {
@@ -65,6 +77,7 @@ Findings examine_hosts(const wire::HostsDocument& hosts) {
   }
   for (const wire::HostDisagreement& each : hosts.disagreements) add_disagreement(each, found);
   add_gone(hosts, found);
+  add_deaf(hosts, found);
   return found;
 }
 

@@ -30,6 +30,7 @@ void describe(auto& field, Is<HostStatus> auto& of) {
   field("host", of.host);
   field("this", of.is_this);
   field("up", of.is_up);
+  field("deaf", of.is_deaf);
   field("since_ns", of.since);
   field("incarnation", of.incarnation);
   field("instance", of.instance);

@@ -26,6 +26,7 @@ struct HostStatus {
   std::string host;
   bool is_this = false;
   bool is_up = true;
+  bool is_deaf = false;        // it is up, and has not heard this host for 2 s
   shm::Nanoseconds since = 0;  // CLOCK_MONOTONIC of this machine: up, or gone
   std::string incarnation;     // of its link: 16 hexadecimal digits
   std::string instance;

@@ -15,6 +15,9 @@ bool HeldTokens::note(Incarnation importer, std::uint64_t number, std::uint64_t 
     if (found == held_.end() && !make_place(now)) return false;
   }
   Held& held = found != held_.end() ? found->second : held_[importer];
+  // One that went on in its own life has sent higher numbers since. If these are lower, the writer
+  // before was a stranger, whose numbers would keep all of its own from being named.
+  if (held.writer != writer && number <= held.times.last()) held.times = {};
   held.writer = writer;
   held.heard = now;
   held.times.note(number, now);

@@ -7,6 +7,13 @@
 #include <utility>
 
 namespace arbiter::link {
+namespace {
+
+std::size_t names_in(const Neighbour& neighbour) {
+  return neighbour.card->inputs.size() + neighbour.card->outputs.size();
+}
+
+}  // namespace
 
 bool Neighbours::note(std::uint64_t key, HostCard card, shm::Nanoseconds now,
                       const Participant& participant) {
@@ -22,6 +29,7 @@ bool Neighbours::note(std::uint64_t key, HostCard card, shm::Nanoseconds now,
     known->card = std::make_shared<const HostCard>(std::move(card));
     known->heard = now;
     known->participant = participant;
+    bound_names();
     put_in_order();
     return true;
   }
@@ -32,6 +40,7 @@ bool Neighbours::note(std::uint64_t key, HostCard card, shm::Nanoseconds now,
   turned_away_.erase(key);
   all_.push_back(
       {key, std::make_shared<const HostCard>(std::move(card)), true, now, now, participant});
+  bound_names();
   put_in_order();
   return true;
 }
@@ -100,6 +109,21 @@ void Neighbours::keep_count(const std::vector<std::uint64_t>& keys, shm::Nanosec
   std::erase_if(gone_unlisted_, [&](const auto& each) {
     return then - each.second >= kRemembered || up.contains(each.first);
   });
+}
+
+void Neighbours::bound_names() {
+  std::size_t names = 0;
+  for (const Neighbour& each : all_) names += names_in(each);
+  while (names > kMostNames) {
+    const auto most = std::max_element(
+        all_.begin(), all_.end(),
+        [](const Neighbour& a, const Neighbour& b) { return names_in(a) < names_in(b); });
+    names -= names_in(*most);
+    HostCard without = *most->card;
+    without.inputs = {};
+    without.outputs = {};
+    most->card = std::make_shared<const HostCard>(std::move(without));
+  }
 }
 
 void Neighbours::put_in_order() {

@@ -7,6 +7,9 @@
 // place, so those are counted: hosts that are there and found none, and those that are gone and
 // found none, or gave way to others before their minutes were over.
 //
+// So is that of the ports that their cards name, for all of them are kept and compared. Where they
+// are too many, whoever names most loses them, and is known as one that has more than it can name.
+//
 // Units: nanoseconds of a monotonic clock. Thread safety: none of its own.
 #pragma once
 
@@ -36,6 +39,8 @@ class Neighbours {
   static constexpr std::size_t kMost = 256;
   // Of each kind that has no place; more are not counted.
   static constexpr std::size_t kMostWithoutPlace = 1024;
+  // Ports that all of them name together: 256 of each host.
+  static constexpr std::size_t kMostNames = 65'536;
   static constexpr shm::Nanoseconds kRemembered = 300'000'000'000;
 
   // The card of a writer that is there. False: there is no place for another host. Its card does
@@ -64,6 +69,7 @@ class Neighbours {
   void turn_away(std::uint64_t key, const std::string& host, shm::Nanoseconds now);
   void keep_count(const std::vector<std::uint64_t>& keys, shm::Nanoseconds then);
   void remember(const std::string& host, shm::Nanoseconds gone_since);
+  void bound_names();
   void put_in_order();
 
   std::vector<Neighbour> all_;

@@ -1,6 +1,7 @@
 // Rules 3, 4 and 5 of docs/hosts.md: two hosts with networks of their own, and the cable between
 // them pulled. That is silence; what has waited is late; and the last state gets through.
 #include <fcntl.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
 
@@ -19,6 +20,8 @@
 
 namespace arbiter::test {
 namespace {
+
+using testing::HasSubstr;
 
 constexpr int kHead = 1;
 constexpr int kBase = 2;
@@ -105,8 +108,18 @@ TEST_F(Cable, AForeverWinnerThatDoesNotHearUsCommandsNoMore) {
   robot.cables.cut_to(kHead);
   base.see("host head is there, and has not heard this one for 2 s");
   body.await_idle();
+  const auto is_head_deaf = [](const wire::HostsDocument& hosts) {
+    const wire::HostStatus* const found = hosts.find_host("head");
+    return found != nullptr && found->is_deaf;
+  };
+  EXPECT_EQ(await_hosts("base", is_head_deaf).find_host("head")->round_trip, std::nullopt);
+  const ProgramResult shown = run_arbiter("base", {"hosts"});
+  EXPECT_EQ(shown.exit_code, 0);
+  EXPECT_THAT(shown.out, HasSubstr(" s, deaf "));
+  EXPECT_THAT(shown.out, HasSubstr("\n\nwarning: host head is there, and has not heard this one"));
   robot.cables.heal_to(kHead);
   body.drive(planner);
+  await_hosts("base", [&](const auto& hosts) { return !is_head_deaf(hosts); });
 }
 
 TEST_F(Cable, ASpeakerThatDoesNotHearUsGivesWay) {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/link/known_hosts.hpp"
 #include "tests/link/robot.hpp"
 
@@ -81,6 +83,24 @@ TEST_F(FailingHosts, ADaemonThatIsRestartedLosesNothingOfTheLink) {
     EXPECT_THAT(log, Not(HasSubstr("not imported")));
     return;
   }
+}
+
+// The link's ports are those of the daemon before, and so are the body's. Whoever starts the body
+// again has not to think of the link.
+TEST_F(FailingHosts, ADaemonThatKnowsNobodyLetsTheLinkInAgain) {
+  body_.drive(planner_);
+  base_.daemon().terminate();
+  base_.daemon().lose_state();
+  base_.daemon().restart();
+  base_.see("the state of the last daemon is lost");
+  Body started_again(base_);
+  started_again.drive(planner_);
+  await([&] {
+    const nlohmann::json strangers = base_.daemon().status()["strangers"];
+    return std::none_of(strangers.begin(), strangers.end(),
+                        [](const nlohmann::json& each) { return each["node"] == "arbiter-link"; });
+  });
+  base_.await_described(kPlanner, "host head");
 }
 
 class ForeverHosts : public FailingHosts {

@@ -33,5 +33,21 @@ TEST(HostView, KnowsAgesOfANewModelBeforeItAsksTheDaemon) {
   EXPECT_TRUE(is_known_first);
 }
 
+// Or the log would say it again every other second.
+TEST(HostView, SaysThatTheDaemonDoesNotAnswerUntilItDoes) {
+  Daemon daemon(motor_model("1000s"));
+  link::HostView view("", std::nullopt);
+  const auto look = [&] {
+    view.update([] {});
+    return view.obstacle().empty();
+  };
+  await(look);
+  daemon.process().stop();
+  await([&] { return !look(); });
+  EXPECT_FALSE(look()) << "between two questions";
+  daemon.process().resume();
+  await(look);
+}
+
 }  // namespace
 }  // namespace arbiter::test

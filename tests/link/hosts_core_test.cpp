@@ -22,6 +22,7 @@ static_assert(Disagreements::kSettles == 1500 * kMs, "rule 1 says so");
 static_assert(Disagreements::kNoEarlierLife == 3 * kS, "rule 6 says so");
 static_assert(Neighbours::kRemembered == 300 * kS, "rule 8 says so");
 static_assert(Neighbours::kMost == 256, "rule 9 says so");
+static_assert(Neighbours::kMostNames == 65'536, "docs/hosts.md says so");
 
 HostCard host_card(const std::string& host, Incarnation incarnation,
                    std::vector<std::string> inputs = {}, std::vector<std::string> outputs = {}) {
@@ -108,6 +109,30 @@ TEST(ModelDigest, DiffersWhereTextsDo) {
   EXPECT_NE(of({"a", "b"}), of({"ab"}));
   EXPECT_NE(of({"a"}), of({"a", ""}));
   EXPECT_EQ(hexadecimal(0x1fU), "000000000000001f");
+}
+
+// Each may have a card of thousands, and all are kept and compared.
+TEST(NeighbouringHosts, ThatNameTheMostPortsLoseThemWhereAllAreTooMany) {
+  std::vector<std::string> many;
+  for (std::size_t i = 0; i < kMaxPortsOfCard; ++i)
+    many.push_back("/" + std::to_string(10'000 + i));
+  Neighbours neighbours;
+  neighbours.note(1, host_card("head", 1, {"/a:i"}, {"/b:o"}), kS);
+  constexpr std::size_t kFitting = Neighbours::kMostNames / kMaxPortsOfCard;
+  for (std::size_t i = 0; i <= kFitting; ++i) {
+    neighbours.note(2 + i, host_card("crowd" + std::to_string(i), 2 + i, {}, many), kS);
+  }
+  std::size_t names = 0;
+  for (const Neighbour& each : neighbours.all()) {
+    names += each.card->inputs.size() + each.card->outputs.size();
+    const bool is_head = each.card->host == "head";
+    EXPECT_EQ(each.card->output_count, is_head ? 1U : kMaxPortsOfCard)
+        << "it has them all the same";
+    if (is_head) EXPECT_TRUE(each.card->names_all());
+  }
+  EXPECT_EQ(neighbours.all().size(), kFitting + 2);
+  EXPECT_LE(names, Neighbours::kMostNames);
+  EXPECT_GT(names, Neighbours::kMostNames - 2 * kMaxPortsOfCard) << "no more than have to";
 }
 
 std::vector<std::string> names_of(const Neighbours& neighbours) {

@@ -149,6 +149,27 @@ TEST(HeldTokens, AnImporterThatWasLostMayComeBackByAnotherWriter) {
   EXPECT_FALSE(held.note(7, 3, kWriter, HeldTokens::kOtherWriter + 1));
 }
 
+// A stranger who names the last of all numbers in an importer's name would have all samples taken
+// for late there, for as long as the exporter runs.
+TEST(HeldTokens, WhoSpokeInAnImportersNameLeavesNothingBehind) {
+  HeldTokens held;
+  ASSERT_TRUE(held.note(7, ~std::uint64_t{0}, kWriter + 1, 0));
+  EXPECT_TRUE(held.note(7, 5, kWriter, HeldTokens::kOtherWriter));
+  std::vector<NamedToken> named;
+  held.name(HeldTokens::kOtherWriter, named);
+  EXPECT_EQ(named, (std::vector<NamedToken>{{7, 5}}));
+}
+
+// What waits in the exporter while an importer is lost names the tokens from before.
+TEST(HeldTokens, AnImporterThatComesBackIsNamedByItsEarlierTokens) {
+  HeldTokens held;
+  ASSERT_TRUE(held.note(7, 1, kWriter, 0));
+  ASSERT_TRUE(held.note(7, 2, kWriter + 1, HeldTokens::kOtherWriter));
+  std::vector<NamedToken> named;
+  held.name(HeldTokens::kOtherWriter - 1, named);
+  EXPECT_EQ(named, (std::vector<NamedToken>{{7, 1}}));
+}
+
 TEST(HeldTokens, StrangersCannotTakeThePlacesOfThoseWhoAreThere) {
   HeldTokens held;
   for (Incarnation importer = 1; importer <= kMaxImporters; ++importer) {

@@ -123,6 +123,17 @@ TEST(Doctor, FindsHostsThatAreGoneWithWhatIsWanted) {
   EXPECT_THAT(codes_of(watch::examine_hosts(hosts)), IsEmpty()) << "it is there, without the port";
 }
 
+TEST(Doctor, FindsHostsThatDoNotHearThisOne) {
+  wire::HostsDocument hosts;
+  wire::HostStatus head;
+  head.host = "head";
+  head.is_deaf = true;
+  hosts.hosts = {head};
+  const Findings found = watch::examine_hosts(hosts);
+  EXPECT_THAT(codes_of(found), ElementsAre("deaf-host"));
+  EXPECT_THAT(found[0].what, HasSubstr("host head is there, and has not heard this one"));
+}
+
 TEST(Doctor, LooksForNoOtherHostsWhereNoLinkRuns) {
   EXPECT_THAT(watch::examine_link("no-link-of-this-name"), IsEmpty());
 }
