@@ -47,7 +47,8 @@ HeldSample InputCore::take_once() {
     if (handover_.has_offer()) continue;
     if (held_ == max_held_) {
       throw Error(name_ + ": " + std::to_string(max_held_) +
-                  " samples are held already; give one back first, or raise max_held");
+                  (max_held_ == 1 ? " sample is" : " samples are") +
+                  " held already; give one back first, or raise max_held");
     }
     const Choice choice = keep_ ? Choice::kTake : choose(oldest);
     if (choice == Choice::kNothing) return sample;

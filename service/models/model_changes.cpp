@@ -64,7 +64,8 @@ void ModelChanges::start(bool is_fresh) {
     throw BadModel("not started: " + not_read_at_start_);
   }
   if (options_.files.empty()) {
-    if (!is_fresh) log::info("no model was given: the one in force stays");
+    log::info("no model was given: {}", is_fresh ? "no port is connected to another (--model FILE)"
+                                                 : "the one in force stays");
     switchboard_.link_all(board_.in_force().table);
     settle();
     return;
