@@ -314,6 +314,7 @@ void Daemon::log_refusal(const Client& client, const wire::Message& request,
 void Daemon::handle_or_refuse(Client& client, wire::Received& received, shm::Nanoseconds deadline) {
   const LogAccount account(client.user());
   std::string why;
+  bool is_ours = received.lost_descriptors;
   try {
     handle(client, received);
     return;
@@ -335,9 +336,13 @@ void Daemon::handle_or_refuse(Client& client, wire::Received& received, shm::Nan
   } catch (const RefusedAgain& again) {  // every second: one line for each component is enough
     refuse(client, received.message.request, again.what());
     return;
+  } catch (const LimitExceeded& limit) {
+    why = limit.what();
+    is_ours = true;
   } catch (const std::exception& error) {
     why = error.what();
   }
+  Takeover::note_refusal(client, received.message, is_ours);
   log_refusal(client, received.message, why);
   refuse(client, received.message.request, why);
 }

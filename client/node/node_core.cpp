@@ -120,7 +120,10 @@ wire::Caller NodeCore::caller() const {
   caller.patience = options_.connect_timeout;
   caller.answer_time = kMinAnswerTime;
   caller.quiet = kQuietWait;
-  caller.on_waiting = [this](const std::string&) { say_that_we_wait(); };
+  // One that comes at the last moment has its time to answer, too.
+  caller.on_waiting = [this](const std::string& whom) {
+    say_that_we_wait(whom, std::min(options_.connect_timeout, kMaxConnectTimeout) + kMinAnswerTime);
+  };
   return caller;
 }
 
@@ -131,13 +134,12 @@ wire::Message NodeCore::hello() const {
 }
 
 // Not under a lock: a callback may do what it likes, and throw.
-void NodeCore::say_that_we_wait() const {
+void NodeCore::say_that_we_wait(const std::string& whom, milliseconds most) const {
   static thread_local bool is_inside = false;
   if (std::exchange(is_inside, true)) return;
   const std::unique_ptr<bool, void (*)(bool*)> leave(&is_inside, [](bool* is) { *is = false; });
-  const std::string text = "\"" + name_ + "\" waits for an arbiterd of instance \"" + instance_ +
-                           "\", at most " + std::to_string(options_.connect_timeout.count()) +
-                           " ms";
+  const std::string text =
+      "\"" + name_ + "\" waits for " + whom + ", at most " + std::to_string(most.count()) + " ms";
   if (!options_.on_waiting) {
     std::fprintf(stderr, "arbiter: %s\n", text.c_str());
     return;
@@ -212,10 +214,11 @@ void NodeCore::give_up_on(std::uint64_t request) {
   if (unanswered.mapped().opened != 0) forget_port(unanswered.mapped().opened);
 }
 
-void NodeCore::say_that_we_wait(std::unique_lock<std::mutex>& lock, std::uint64_t request) {
+void NodeCore::say_that_we_wait(std::unique_lock<std::mutex>& lock, std::uint64_t request,
+                                milliseconds most) {
   lock.unlock();
   try {
-    say_that_we_wait();
+    say_that_we_wait("an arbiterd of instance \"" + instance_ + '"', most);
   } catch (...) {
     lock.lock();
     give_up_on(request);
@@ -229,8 +232,9 @@ wire::Received NodeCore::converse(const wire::Message& question,
                                   const SharedMemory* memory,
                                   std::function<void(wire::Received&)> on_opened) {
   const auto begin = Clock::now();
-  const auto give_up =
-      begin + std::clamp(options_.connect_timeout, kMinAnswerTime, kMaxConnectTimeout);
+  const milliseconds most =
+      std::clamp(options_.connect_timeout, kMinAnswerTime, kMaxConnectTimeout);
+  const auto give_up = begin + most;
   bool said = false;
   wire::Message numbered = question;
   std::unique_lock lock(mutex_);
@@ -246,7 +250,8 @@ wire::Received NodeCore::converse(const wire::Message& question,
       reply.asked_in = conversation_;
       // A port that another daemon has opened was handed back to this one: what is left is to be
       // connected.
-      if (reply.opened != 0 && question.kind != wire::MessageKind::kOpenTap) {
+      if (question.kind == wire::MessageKind::kOpenTap) reply.opened = 0;
+      if (reply.opened != 0) {
         numbered = message_of(wire::MessageKind::kConnect);
         numbered.request = request;
         numbered.port = reply.opened;
@@ -257,7 +262,7 @@ wire::Received NodeCore::converse(const wire::Message& question,
     }
     if (!said && standing_ != Standing::kMember && Clock::now() - begin >= kQuietWait) {
       said = true;
-      say_that_we_wait(lock, request);
+      say_that_we_wait(lock, request, most);
       continue;
     }
     const auto until = said ? give_up : std::min(give_up, Clock::now() + kQuietWait);

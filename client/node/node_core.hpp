@@ -100,9 +100,10 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
 
   void connect();
   // May throw what a callback throws, as ThrownByCallback.
-  void say_that_we_wait() const;
+  void say_that_we_wait(const std::string& whom, std::chrono::milliseconds most) const;
   // The same, without the lock meanwhile. If it throws, the request is given up.
-  void say_that_we_wait(std::unique_lock<std::mutex>& lock, std::uint64_t request);
+  void say_that_we_wait(std::unique_lock<std::mutex>& lock, std::uint64_t request,
+                        std::chrono::milliseconds most);
   void give_up_on(std::uint64_t request);
   void note_second_daemons(const std::string& met_in);
   [[nodiscard]] wire::Message hello() const;
@@ -125,6 +126,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   [[nodiscard]] shm::Nanoseconds next_description() const noexcept;
   void describe_again() noexcept;
   void handle(wire::Received& received);
+  [[nodiscard]] static std::string no_descriptor_left(const char* what_for);
   void handle_without_descriptors(const wire::Message& message);
   void handle_reply(wire::Received& received);
   void wake_inputs();
@@ -138,6 +140,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void add_tap_input(const wire::Received& received);
   void refuse_tap(const wire::Message& announced, const std::string& why);
   [[nodiscard]] bool note_tap_refusal(const wire::Message& refusal);
+  void forget_numbers_of_taps();
   void reopen_taps();
   bool handle_tap_reopened(const wire::Message& message);
   void end_peer(const wire::Message& message);
@@ -172,6 +175,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void be_alone(Clock::duration look_again_in);
   void ring_timer_every(Clock::duration time) const;
   void rejoin();
+  [[nodiscard]] bool hand_back_memory(const shm::FileDescriptor& socket) const;
   [[nodiscard]] bool hand_back(const shm::FileDescriptor& socket,
                                const std::vector<PortAtHand>& ports) const;
   void be_welcomed(wire::Received& welcome);

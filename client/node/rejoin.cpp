@@ -7,6 +7,7 @@
 #include <sys/epoll.h>
 #include <sys/timerfd.h>
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -125,6 +126,17 @@ void NodeCore::rejoin() {
                                    core->bell().for_publishers()));
     }
   }
+  // What is handed back without its memory is lost: the daemon would give its name to another. So
+  // it is kept for us, as for one that is stopped, until we come another time.
+  const bool are_whole = std::all_of(
+      ports.begin(), ports.end(), [](const PortAtHand& port) { return port.first && port.second; });
+  if (!are_whole) {
+    static_cast<void>(hand_back_memory(*socket));
+    const std::lock_guard lock(mutex_);
+    turned_away_ = no_descriptor_left("its ports");
+    ring_timer_every(kTurnedAwayInterval);
+    return;
+  }
   // With nothing to hand back there is nothing to keep of the old memory either. But the hello says
   // which node this was, and of which memory, lest the daemon keep names for it that it has closed
   // or never got.
@@ -148,8 +160,7 @@ void NodeCore::rejoin() {
   }
 }
 
-bool NodeCore::hand_back(const shm::FileDescriptor& socket,
-                         const std::vector<PortAtHand>& ports) const {
+bool NodeCore::hand_back_memory(const shm::FileDescriptor& socket) const {
   wire::Message message = hello();
   message.flags |= wire::kRejoins;
   if (!is_sent(socket, message, {memory_->board().get(), memory_->registry().get()})) return false;
@@ -160,10 +171,16 @@ bool NodeCore::hand_back(const shm::FileDescriptor& socket,
     message.value = page.number;
     if (!is_sent(socket, message, {page.descriptor, -1})) return false;
   }
+  return true;
+}
+
+bool NodeCore::hand_back(const shm::FileDescriptor& socket,
+                         const std::vector<PortAtHand>& ports) const {
+  if (!hand_back_memory(socket)) return false;
   for (const PortAtHand& port : ports) {
     if (!is_handed_back(socket, port)) return false;
   }
-  message = {};
+  wire::Message message;
   message.kind = wire::MessageKind::kHandedBack;
   return is_sent(socket, message);
 }

@@ -2,6 +2,8 @@
 //
 // A tap is no port: nothing of it is handed back to a daemon that takes over. The node asks again,
 // and whoever has been told of the tap before knows it by its segment.
+#include <algorithm>
+#include <memory>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -113,9 +115,22 @@ void NodeCore::tidy_taps(
   }
 }
 
+// A daemon that has begun anew may give one of them the number that another had before: until they
+// have theirs, they have numbers that no daemon gives.
+void NodeCore::forget_numbers_of_taps() {
+  std::map<shm::PortInstance, std::shared_ptr<TapCore>> taps;
+  shm::PortInstance none = UINT64_MAX;
+  for (auto& [instance, tap] : taps_) {
+    tap->bind(none);
+    taps.emplace(none--, std::move(tap));
+  }
+  taps_.swap(taps);
+}
+
 // Those whose opening is under way are asked for again by who waits for it.
 void NodeCore::reopen_taps() {
   reopened_.clear();
+  forget_numbers_of_taps();
   for (const auto& [instance, tap] : taps_) {
     if (!tap->is_open) continue;
     wire::Message question;
@@ -130,24 +145,30 @@ void NodeCore::reopen_taps() {
   }
 }
 
+// The tap is not taken hold of: its program may let go of it just now, and whoever has it last ends
+// it, and with it, it may be, this node.
 bool NodeCore::handle_tap_reopened(const wire::Message& message) {
   const auto found = reopened_.find(message.request);
   if (found == reopened_.end()) return false;
-  const std::shared_ptr<TapCore> tap = found->second.lock();
-  const bool is_known = tap != nullptr && taps_.count(tap->instance()) != 0;
+  const auto known = std::find_if(taps_.begin(), taps_.end(), [&](const auto& each) {
+    const std::shared_ptr<TapCore>& tap = each.second;
+    return !found->second.owner_before(tap) && !tap.owner_before(found->second);
+  });
   if (message.kind == wire::MessageKind::kOpened) {
-    if (!is_known) {  // closed meanwhile
+    if (known == taps_.end()) {  // closed meanwhile
       say_closed(message.port);
       return true;
     }
-    taps_.erase(tap->instance());
-    tap->bind(message.port);
-    taps_[message.port] = tap;
+    auto tap = taps_.extract(known);
+    tap.key() = message.port;
+    tap.mapped()->bind(message.port);
+    taps_.insert(std::move(tap));
     return true;
   }
-  if (message.kind == wire::MessageKind::kRefused && is_known) {
-    note(NoticeKind::refused, tap->instance(), tap->name(),
-         tap->name() + " is not watched any more: " + std::string(message.text_view()));
+  if (message.kind == wire::MessageKind::kRefused && known != taps_.end()) {
+    const TapCore& tap = *known->second;
+    note(NoticeKind::refused, tap.instance(), tap.name(),
+         tap.name() + " is not watched any more: " + std::string(message.text_view()));
   }
   reopened_.erase(found);
   return true;

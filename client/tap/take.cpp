@@ -4,6 +4,7 @@
 // whose next event is the oldest comes first. What an input port has dropped comes when that was
 // seen.
 #include <algorithm>
+#include <utility>
 
 #include "client/tap/tap_core.hpp"
 #include "shm/utf8.hpp"
@@ -193,11 +194,24 @@ void TapCore::fill(const Take& take, TapEventData& event) {
   event.context = source == known_.end() ? nobody : source->second;
 }
 
+// By when it comes among the events of several sources: by its time. But a publisher that writes
+// old times as fast as they are taken would come first for ever, and the others would be overtaken.
+// A ring's length behind an event comes none that was there when that was read; so each counts as
+// no older than the beginning of the round before its own.
+shm::Nanoseconds TapCore::order_of_head(const Stream& stream) noexcept {
+  return std::max(stream.head.time, stream.since);
+}
+
+void TapCore::count_round(Stream& stream) noexcept {
+  if (stream.taken == 0) stream.since = std::exchange(stream.round, shm::monotonic_now());
+  if (++stream.taken == stream.source->shape.events) stream.taken = 0;
+}
+
 TapCore::Stream* TapCore::oldest() noexcept {
   Stream* oldest = nullptr;
   for (Stream& stream : streams_) {
     if (!look_at(stream)) continue;
-    if (oldest == nullptr || stream.head.time < oldest->head.time) oldest = &stream;
+    if (oldest == nullptr || order_of_head(stream) < order_of_head(*oldest)) oldest = &stream;
   }
   return oldest;
 }
@@ -206,7 +220,7 @@ bool TapCore::take_once(TapEventData& event) {
   if (handover_.has_offer()) accept_view();
   if (view_ != nullptr && !view_->inputs.empty()) look_at_inputs();
   Stream* const stream = oldest();
-  if (!takes_.empty() && (stream == nullptr || stream->head.time > takes_.front().seen)) {
+  if (!takes_.empty() && (stream == nullptr || order_of_head(*stream) > takes_.front().seen)) {
     fill(takes_.front(), event);
     takes_.pop_front();
     return true;
@@ -253,6 +267,7 @@ void TapCore::fill(Stream& stream, TapEventData& event) {
   stream.has_begun = true;
   stream.last = head;
   stream.has_head = false;
+  count_round(stream);
   if (stream.head_is_end) {
     stream.ended = true;
     // One that was given up stays while its port is there: the next daemon tells of it again, and

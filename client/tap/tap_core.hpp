@@ -158,6 +158,9 @@ class TapCore {
     shm::EventRecord head;
     std::uint64_t head_lost = 0;
     shm::EventRecord last;       // that was taken
+    std::uint32_t taken = 0;     // of the round under way; a round is as many as the ring has
+    shm::Nanoseconds round = 0;  // when it began
+    shm::Nanoseconds since = 0;  // the round before: no live event of this one is older
     std::uint64_t revision = 0;  // of the list that context_ has
     std::shared_ptr<const TapContext> context;
   };
@@ -182,6 +185,8 @@ class TapCore {
   static void be_state(shm::EventRecord& head) noexcept;
   void give_up(Stream& stream, std::uint64_t lost) noexcept;
   Stream* oldest() noexcept;
+  [[nodiscard]] static shm::Nanoseconds order_of_head(const Stream& stream) noexcept;
+  static void count_round(Stream& stream) noexcept;
   void fill(Stream& stream, TapEventData& event);
   void give_context(Stream& stream);
   [[nodiscard]] bool hold(Stream& stream, TapEventData& event) noexcept;

@@ -103,6 +103,7 @@ class Client {
   bool comes_back = false;    // if the conversation is lost: then its ports are kept for it
   bool is_returning = false;  // and has not handed back all yet:
   std::set<shm::PortInstance> to_hand_back;        // these are missing
+  bool has_failed_to_return = false;               // one came, and we could not take it
   bool has_turn = false;                           // waits for its turn to be served
   bool is_last_turn = false;                       // for its process has ended
   Charge charge;                                   // as one of so many clients

@@ -134,14 +134,18 @@ void PortNames::replace_lost_page(Source& source) {
   Page page = make_page();
   const shm::PageNumber number = source.page_number + 1;
   registry_.source(source.id).set_page(number, FileIdentity::of(page.writable).inode, {});
+  at_step("lost-page-registered");
   board_.give_page(source.id, number);
+  at_step("lost-page-numbered");
   board_.renew_pages();
+  at_step("lost-page-replaced");
   source.page = std::move(page);
   source.page_number = number;
   source.page_user.reset();
   pages_->attach(source.id, &source.activity());
   announce(source);
   store_page(source, source.page, number);
+  at_step("lost-page-stored");
 }
 
 void PortNames::give_page(Source& source, uid_t user) {

@@ -136,8 +136,21 @@ void Takeover::take_back_link(const Client& client, const wire::Message& message
   switchboard_.claim(message.port, message.peer, {message.link, std::move(charge)});
 }
 
+// A port that it has, and will go on to have: its name must not become another's.
+void Takeover::note_refusal(Client& client, const wire::Message& message, bool is_ours) {
+  const bool is_port = message.kind == wire::MessageKind::kHandBackOutput ||
+                       message.kind == wire::MessageKind::kHandBackInput;
+  if (is_ours && is_port && client.to_hand_back.contains(message.port)) {
+    client.has_failed_to_return = true;
+  }
+}
+
 void Takeover::finish_return(Client& client) {
   if (!client.is_returning) return;
+  if (client.has_failed_to_return) {  // it comes again
+    host_.drop(client.id());
+    return;
+  }
   client.is_returning = false;
   for (const shm::PortInstance port : std::exchange(client.to_hand_back, {})) {
     switchboard_.forget_away(port);  // closed meanwhile
@@ -153,8 +166,8 @@ void Takeover::finish_return(Client& client) {
   switchboard_.link_all(table);
   switchboard_.unlink(table);
   host_.try_postponed();
-  log_event({EventKind::kBack, {client.name}}, log::level::info, "{} is back, with {} ports",
-            client.description(), client.ports.size());
+  log_event({EventKind::kBack, {client.name}}, log::level::info, "{} is back, with {} port{}",
+            client.description(), client.ports.size(), client.ports.size() == 1 ? "" : "s");
 }
 
 void Takeover::set_away(Client& client) {

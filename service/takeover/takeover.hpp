@@ -94,6 +94,8 @@ class Takeover {
   void take_back_output(Client& client, const wire::Received& received);
   void take_back_input(Client& client, const wire::Received& received);
   void take_back_link(const Client& client, const wire::Message& message);
+  // Something that it has said was not taken. `is_ours`: for want of what we would need for it.
+  static void note_refusal(Client& client, const wire::Message& message, bool is_ours);
   void finish_return(Client& client);
   // One that is not taken back says what it has, all the same.
   void hear_stranger(const Client& client, const wire::Message& message) noexcept;

@@ -46,9 +46,10 @@ class HostilePublisher {
     core->add_source(map());
     return core;
   }
-  std::shared_ptr<const detail::TapSource> map(std::uint32_t place = 0) {
+  std::shared_ptr<const detail::TapSource> map(std::uint32_t place = 0,
+                                               shm::PortInstance instance = 5) {
     wire::Received announced;
-    announced.message.peer = 5;
+    announced.message.peer = instance;
     announced.message.link = 9;
     announced.message.value = place;
     announced.message.set_name("/hostile");
@@ -218,6 +219,37 @@ TEST(AHostilePublisher, IsNotBelievedAnActivityThatItsEventHasNotMade) {
   }
   EXPECT_EQ(told(EventKind::kDeactivation, now + 1, 1), TapEventKind::state);
   EXPECT_EQ(told(EventKind::kDeactivation, shm::deactivation(now), 0), TapEventKind::deactivation);
+}
+
+// Each of its events is older than what the other has told.
+TEST(AHostilePublisher, DoesNotCrowdOutTheOthersOfATapByOldTimes) {
+  HostilePublisher hostile;
+  HostilePublisher other;
+  const auto tap = HostilePublisher::lone_tap(1);
+  tap->add_source(hostile.map());
+  tap->add_source(other.map(0, 6));
+  shm::EventWriter flood(hostile.events());
+  shm::EventRecord old;
+  old.kind = shm::EventKind::kSignal;
+  old.time = 1;
+  old.activity = shm::kForeverFlag | 1;
+  shm::EventWriter writer(other.events());
+  constexpr int kRounds = 10;
+  for (int round = 1; round <= kRounds; ++round) {
+    shm::EventRecord record = old;
+    record.time = shm::monotonic_now();
+    record.generation = static_cast<std::uint64_t>(round);
+    writer.write(record);
+    detail::TapEventData data;
+    int before = 0;
+    do {
+      flood.write(old);
+      ASSERT_TRUE(tap->take(data));
+      ASSERT_LE(++before, 16) << "four times what its ring has";
+    } while (data.generation == 0);
+    EXPECT_EQ(data.generation, static_cast<std::uint64_t>(round));
+    EXPECT_EQ(data.lost, 0u);
+  }
 }
 
 // They would go to terminals and into documents.

@@ -1,5 +1,6 @@
 // NodeOptions::on_waiting: on which thread it is called, under no lock, and what becomes of what it
 // throws.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -51,6 +52,36 @@ TEST(OnWaiting, IsCalledOnTheThreadThatWaits) {
   daemon.kill();
   auto out = node.output_port<Number>("/out");
   EXPECT_EQ(called_on, std::this_thread::get_id());
+}
+
+// It may be stopped, or busy: how long it is waited for is not the time that one is looked for.
+TEST(OnWaiting, SaysForWhomItWaitsAndForHowLongAtMost) {
+  Daemon daemon(single_model());
+  daemon.process().stop();
+  std::string said;
+  NodeOptions options;
+  options.connect_timeout = 100ms;
+  options.on_waiting = [&said](const std::string& text) { said = text; };
+  EXPECT_THROW(Node("test", options), Error);
+  EXPECT_THAT(said, testing::MatchesRegex("\"test\" waits for arbiterd.* of instance \"test\" to "
+                                          "answer, at most 1100 ms"));
+  daemon.kill();
+  options.connect_timeout = 600ms;
+  EXPECT_THROW(Node("test", options), Error);
+  EXPECT_EQ(said, "\"test\" waits for an arbiterd of instance \"test\", at most 1600 ms");
+}
+
+TEST(OnWaiting, OfAPortThatIsOpenedSaysForHowLongAtMost) {
+  Daemon daemon(single_model());
+  std::string said;
+  std::atomic<bool> is_killed{false};
+  NodeOptions options = patient(is_killed, [&said](const std::string& text) { said = text; });
+  options.connect_timeout = 600ms;
+  Node node("test", options);
+  is_killed = true;
+  daemon.kill();
+  EXPECT_THROW(static_cast<void>(node.output_port<Number>("/out")), Error);
+  EXPECT_EQ(said, "\"test\" waits for an arbiterd of instance \"test\", at most 1000 ms");
 }
 
 // Under a lock of the node's this would never return.

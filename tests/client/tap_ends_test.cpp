@@ -2,6 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cstdint>
+#include <map>
+#include <string>
 
 #include <arbiter/arbiter.hpp>
 
@@ -62,6 +65,40 @@ TEST(Tap, IsToldTheActivityOfASourceThatHasToldNothing) {
   const auto closed = wait_for_kind(tap, TapEventKind::closed);
   EXPECT_TRUE(closed.was_active_at(std::chrono::steady_clock::now()));
   EXPECT_EQ(closed.lost(), 0u) << "nothing was told that could be lost";
+}
+
+// It gives each of them the number that the next one had before.
+TEST(Tap, GoesOnBesideOthersUnderADaemonThatHasBegunAnew) {
+  Daemon daemon(override_model());
+  NodeOptions options;
+  options.service_thread = false;
+  Node watcher("watcher", options);
+  std::map<std::string, Tap<Number>> taps;
+  for (const std::string name : {"/low", "/high", "/stop"}) {
+    taps.emplace(name, watcher.tap<Number>(name));
+  }
+  daemon.terminate();
+  daemon.restart();
+  Node node("test");
+  std::map<std::string, OutputPort<Number>> outputs;
+  outputs.emplace("/low", node.output_port<Number>("/low"));
+  await([&] {
+    watcher.service();
+    return daemon.source("/low").value("taps", nlohmann::json::array()).size() == 1;
+  });
+  for (const std::string name : {"/high", "/stop"}) {
+    outputs.emplace(name, node.output_port<Number>(name));
+  }
+  std::int64_t value = 0;
+  for (auto& [name, output] : outputs) {
+    ++value;
+    Tap<Number>& tap = taps.at(name);
+    await([&watcher, &tap, &port = output, value] {
+      watcher.service();
+      port.publish(Number{value});
+      return next_of(tap).has_value();
+    });
+  }
 }
 
 TEST(Tap, HearsThatASourceHasEndedThoughNoDaemonWasThere) {

@@ -2,9 +2,14 @@
 #include <dirent.h>
 #include <gtest/gtest.h>
 #include <sys/eventfd.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 
+#include <filesystem>
+#include <iterator>
 #include <set>
+#include <string>
+#include <vector>
 
 #include <arbiter/arbiter.hpp>
 
@@ -184,6 +189,68 @@ TEST(HostileReturn, HandsBackNoOutputWithoutThePageInForce) {
   auto out = node.output_port<Number>("/out");
   EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
   EXPECT_EQ(take_from(in), 1);
+}
+
+// It is no lie, and the component goes on publishing: nobody else may have the name.
+TEST(HostileReturn, WithWhatTheDaemonHasNoDescriptorForCostsNobodyItsPort) {
+  Daemon daemon(single_model());
+  RawClient former(daemon.instance());
+  const wire::Received welcome = former.hello("poor", wire::kComesBack);
+  const auto segment = raw_output_segment();
+  const wire::Received opened = open_raw_output(former, "/out", segment);
+  daemon.kill();
+  daemon.restart();
+  auto output = RawClient::message(MessageKind::kHandBackOutput, "/out");
+  output.port = opened.message.port;
+  output.id = opened.message.id;
+  const auto come_back = [&] {
+    RawClient poor(daemon.instance());
+    poor.send(return_as(welcome.message.link),
+              {welcome.descriptors[0].get(), welcome.descriptors[1].get()});
+    poor.expect(MessageKind::kWelcome);
+    return poor;
+  };
+  const auto hand_back = [&](RawClient& poor) {
+    poor.send(output, {segment.get(), opened.descriptors[0].get()});
+  };
+  {
+    RawClient memory = come_back();  // from here on the daemon serves
+    const pid_t process = daemon.process().pid();
+    const std::string descriptors = "/proc/" + std::to_string(process) + "/fd/";
+    const auto first_free = [&] {
+      rlim_t number = 0;
+      while (std::filesystem::is_symlink(descriptors + std::to_string(number))) ++number;
+      return number;
+    };
+    const auto count = [&] {
+      const std::filesystem::directory_iterator all(descriptors);
+      return std::distance(begin(all), end(all));
+    };
+    const auto before = count();
+    std::vector<RawClient> others;
+    const auto connect = [&] { others.emplace_back(daemon.instance()).hello(); };
+    for (int i = 0; i < 32; ++i) connect();
+    RawClient poor = come_back();
+    for (int i = 0; i < 4; ++i) connect();  // in place of the conversation that this has ended
+    const rlim_t used = first_free();
+    const rlimit none{used, used};  // where it receives, it raises the soft one
+    ASSERT_EQ(::prlimit(process, RLIMIT_NOFILE, &none, nullptr), 0);
+    hand_back(poor);
+    EXPECT_NE(poor.expect_refusal().find("no descriptor left"), std::string::npos);
+    others.clear();
+    await([&] { return count() <= before + 2; });  // those of the one that is left
+    poor.send(RawClient::message(MessageKind::kHandedBack));
+    EXPECT_TRUE(poor.is_hung_up_on());
+  }
+  EXPECT_TRUE(daemon.source("/out")["away"]);
+  {
+    Node thief("thief");
+    EXPECT_THROW(static_cast<void>(thief.output_port<Number>("/out")), Error);
+  }
+  RawClient poor = come_back();
+  hand_back(poor);
+  poor.send(RawClient::message(MessageKind::kHandedBack));
+  await([&] { return daemon.source("/out")["open"] == true; });
 }
 
 TEST(HostileReturn, ToANewDaemonWithAnOldBoardIsRefusedAndOthersAreTakenBack) {

@@ -1,8 +1,10 @@
 // A daemon dies, or is stopped, and another takes over: components notice nothing.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <thread>
 
 #include <arbiter/arbiter.hpp>
@@ -325,6 +327,32 @@ TEST(Takeover, AStoppedComponentIsWaitedForButNotForLong) {
   EXPECT_EQ(stopped.tell("take /in0"), "192");
   await([&] { return daemon.input("/in0")["away"] != true; });
   EXPECT_EQ(daemon.connection("/out", "/in0")["state"], "connected");
+}
+
+// The one of the lost conversation is all that it has left.
+TEST(Takeover, WhoHasNoDescriptorForItsPortsKeepsThemAndComesLater) {
+  Daemon daemon(single_model());
+  Component poor("poor");
+  ASSERT_EQ(poor.tell("output /out"), "open");
+  const pid_t process = poor.process().pid();
+  const std::string descriptors = "/proc/" + std::to_string(process) + "/fd/";
+  rlimit all{};
+  ASSERT_EQ(::prlimit(process, RLIMIT_NOFILE, nullptr, &all), 0);
+  rlimit few{0, all.rlim_max};
+  while (std::filesystem::is_symlink(descriptors + std::to_string(few.rlim_cur))) ++few.rlim_cur;
+  ASSERT_EQ(::prlimit(process, RLIMIT_NOFILE, &few, nullptr), 0);
+  daemon.kill();
+  daemon.restart();
+  EXPECT_TRUE(daemon.source("/out")["away"]);
+  Node node("test");
+  auto in = node.input_port<Number>("/in");
+  EXPECT_THROW(static_cast<void>(node.output_port<Number>("/out")), Error);
+  ASSERT_EQ(::prlimit(process, RLIMIT_NOFILE, &all, nullptr), 0);
+  await([&] { return daemon.source("/out")["open"] == true; });
+  EXPECT_EQ(poor.tell("publish /out 1"), "1 0 0");
+  const auto sample = in.wait_for(kForEver);  // which hears of its publisher after that of it
+  ASSERT_TRUE(sample);
+  EXPECT_EQ((**sample).value, 1);
 }
 
 TEST(Takeover, TheNameOfOneThatDiesWhileItIsAwayIsFree) {
