@@ -13,8 +13,8 @@
 //     daemon while nobody has.
 //  2. A value stands for one write: each kind carries its own time, so a reader that sees the same
 //     value twice knows that nothing happened in between (decision.hpp rests on this).
-//  3. Between two values that are not deactivations there was
-//     none, if `breaks` is the same for both.
+//  3. Between two values that are not deactivations the source was active all the time, if `breaks`
+//     is the same for both: the writer knows when its activity ends, whatever T it has come from.
 #pragma once
 
 #include <cstdint>
@@ -76,16 +76,15 @@ constexpr Nanoseconds time_of(ActivityWord word, Nanoseconds timeout) noexcept {
 
 struct Activity {
   Atomic<ActivityWord> word{kNeverActive};
-  Atomic<std::uint64_t> breaks{0};  // how often an arrival has followed a deactivation
+  Atomic<std::uint64_t> breaks{0};  // how often an arrival has found the source inactive
 
-  // By the one writer; what the word must come before, a fence of its orders.
+  // By the one writer; what the word must come before, a fence of its orders. `begins`: it is an
+  // arrival that finds the source inactive.
   // SYNC POINT: activity-written. The release, and the order of the two stores, pair with the
   // acquires in SeenActivity::of(): who sees the word sees the break before it, and the model that
   // was in force for its writer.
-  void write(ActivityWord before, ActivityWord next) noexcept {
-    if (is_deactivation(before) && !is_deactivation(next)) {
-      breaks.store(breaks.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-    }
+  void write(ActivityWord next, bool begins) noexcept {
+    if (begins) breaks.store(breaks.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     word.store(next, std::memory_order_release);
   }
 

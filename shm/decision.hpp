@@ -13,7 +13,9 @@
 //
 // Time. `now` is a reading of the clock that the caller took before. Where a word was written after
 // that reading, an activity that ended in between would be combined with one that began later; so
-// the clock is read again once all were seen, and they are looked at again.
+// the clock is read again once all were seen, and they are looked at again. T tells when a word was
+// written, but for an arrival under a model before, which may have had another. Such an arrival was
+// before the model in force; so a reading that may be older than that is passed as an old one.
 //
 // A caller may pass an old reading (`Clock::is_fresh` false): what ended before it is over whatever
 // the time is, what never ends holds, and only a word between the two makes us read the clock. This
@@ -52,13 +54,11 @@ struct SeenActivity {
   }
 
   // Whether the source has stood as it was seen, at `now`, until a later look: nothing was written,
-  // or it was active and has been renewed since without a gap.
-  [[nodiscard]] bool stands(const SeenActivity& later, Nanoseconds timeout,
-                            Nanoseconds now) const noexcept {
+  // or it was active and has been renewed since without a gap. No T is asked: the words may have
+  // come from models of which each had its own.
+  [[nodiscard]] bool stands(const SeenActivity& later, Nanoseconds now) const noexcept {
     if (later.word == word) return true;
-    if (!is_active(word, now) || is_deactivation(later.word) || later.breaks_until != breaks)
-      return false;
-    return !is_finite(word) || arrival_of(later.word, timeout) < word;
+    return is_active(word, now) && is_active(later.word, now) && later.breaks_until == breaks;
   }
 };
 
@@ -159,7 +159,7 @@ class BoundRule {
     if (count_ == 0) return verdict_;
     if (is_blind_) return Verdict::kBlind;
     for (int i = 0; i < kMaxPictures; ++i) {
-      if (was_collected_ && stands(table, clock)) return verdict_;
+      if (was_collected_ && stands(clock)) return verdict_;
       collect(table, clock);
     }
     return Verdict::kUnsettled;
@@ -222,16 +222,20 @@ class BoundRule {
   // The second pass, and the only one where nothing has changed: whether all sources have stood as
   // they were collected until now, and the verdict holds at this time. The loads are relaxed: the
   // acquires of the first pass put them behind it, and it does not matter in which order they come.
+  // Where something has ended by a clock that is read after them, they must be looked at again.
   template <class Clock>
-  bool stands(const TableView& table, Clock& clock) noexcept {
+  bool stands(Clock& clock) noexcept {
     if (denied_by_ != kNobody && still_denies(reads_[denied_by_], clock)) return true;
     ActivityWord differences = 0;
     for (Word i = 0; i < count_; ++i) {
       differences |= reads_[i].activity->word.load(std::memory_order_relaxed) ^ reads_[i].word;
     }
-    if (differences != 0 && !were_renewed(table, clock)) return false;
+    if (differences != 0 && !were_renewed(clock)) return false;
     if (until_ == kForever) return true;
-    if (!clock.is_fresh()) clock.read();
+    if (!clock.is_fresh()) {
+      clock.read();
+      return clock.reading() < until_;
+    }
     if (clock.reading() >= until_) evaluate(clock.reading());
     return true;
   }
@@ -245,13 +249,13 @@ class BoundRule {
 
   // Whether those that have changed were active, and still are without a break.
   template <class Clock>
-  bool were_renewed(const TableView& table, const Clock& clock) noexcept {
+  bool were_renewed(const Clock& clock) noexcept {
     for (Word i = 0; i < count_; ++i) {
       Read& read = reads_[i];
       const SeenActivity now = SeenActivity::of(*read.activity);
       if (now.word == read.word) continue;
       const SeenActivity before{read.word, read.breaks, read.breaks};
-      if (!before.stands(now, table.timeout(read.source), clock.reading())) return false;
+      if (!before.stands(now, clock.reading())) return false;
       read.word = now.word;
       read.breaks = now.breaks;
       if (is_finite(now.word) && now.word < until_) until_ = now.word;

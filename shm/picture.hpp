@@ -31,21 +31,19 @@ struct Sight {
   void look() noexcept {
     if (activity != nullptr) seen = SeenActivity::of(*activity);
   }
-  [[nodiscard]] bool stands(Nanoseconds timeout, Nanoseconds now) const noexcept {
-    return activity == nullptr || seen.stands(SeenActivity::of(*activity), timeout, now);
+  [[nodiscard]] bool stands(Nanoseconds now) const noexcept {
+    return activity == nullptr || seen.stands(SeenActivity::of(*activity), now);
   }
 };
 
 // Takes a picture of these sources. False: one of them has changed meanwhile, so that it mixes
 // moments.
 template <class Clock>
-[[nodiscard]] bool take_picture(std::span<Sight> sights, const TableView& table,
-                                Clock& clock) noexcept {
+[[nodiscard]] bool take_picture(std::span<Sight> sights, Clock& clock) noexcept {
   for (Sight& each : sights) each.look();
   clock.read();
-  return std::all_of(sights.begin(), sights.end(), [&](const Sight& each) {
-    return each.stands(table.timeout(each.source), clock.reading());
-  });
+  return std::all_of(sights.begin(), sights.end(),
+                     [&](const Sight& each) { return each.stands(clock.reading()); });
 }
 
 // Whether the rule holds where the connection's own source is active. `is_active(source)`.
@@ -170,7 +168,7 @@ class PortPicture {
     const std::span<Sight> sights(sights_.data(), count_);
     active_.clear();
     for (int i = 0; i < tries; ++i) {
-      if (!take_picture(sights, table_, clock)) continue;
+      if (!take_picture(sights, clock)) continue;
       for (const Sight& each : sights) {
         if (is_active(each.seen.word, clock.reading())) active_.insert(each.source);
       }

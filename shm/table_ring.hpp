@@ -38,7 +38,7 @@ constexpr std::uint64_t generation_of(Epoch epoch) noexcept {
 
 struct Board {
   static constexpr std::uint64_t kMagic = 0x31647262'74696272;  // "rbitbrd1"
-  static constexpr std::uint32_t kVersion = 2;
+  static constexpr std::uint32_t kVersion = 3;
 
   std::uint64_t magic;
   std::uint32_t version;

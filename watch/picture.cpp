@@ -22,7 +22,7 @@ bool try_once(const shm::DecisionMemory& memory, const SourcesOf& sources_of, Pi
     }
   }
   shm::DecisionClock clock(0, false);
-  picture.is_settled = shm::take_picture(sights, table, clock);
+  picture.is_settled = shm::take_picture(sights, clock);
   picture.now = clock.reading();
   for (const shm::Sight& each : sights) {
     const bool is_seen = each.activity != nullptr;

@@ -63,8 +63,9 @@ class Table {
     shm::Activity& changed = activities_[1].of(1);
     const bool was_active = !shm::is_deactivation(changed.word);
     ++changes_;
-    changed.write(changed.word, was_active ? shm::deactivation(kNow - 1 - changes_)
-                                           : shm::arrival(kNow - 1 - changes_, kHour));
+    changed.write(was_active ? shm::deactivation(kNow - 1 - changes_)
+                             : shm::arrival(kNow - 1 - changes_, kHour),
+                  !was_active);
     return decide();
   }
 

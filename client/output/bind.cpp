@@ -99,7 +99,7 @@ void OutputCore::settle() noexcept {
   if (rules_are_bound()) {
     join_awaited();
   } else {
-    bind_rules_and_view();
+    rebind_view();
   }
   settled_epoch_ = has_awaited_ ? UINT64_MAX : bound_epoch_;
 }
@@ -111,13 +111,24 @@ bool OutputCore::rules_are_bound() const noexcept {
 // Again where seven models were loaded meanwhile, for T is used before a decision checks the table.
 void OutputCore::bind_rules() noexcept {
   for (int tries = 0; tries <= kMaxTableRetries; ++tries) {
-    bound_pages_ = memory_->pages().changes();
-    snapshot_ = memory_->tables().snapshot();
-    bound_epoch_ = snapshot_.epoch;
-    timeout_ = snapshot_.table.timeout(source_);
+    read_table();
     bind_decisions();
     if (memory_->tables().is_whole(snapshot_)) return;
   }
+}
+
+void OutputCore::bind_table() noexcept {
+  for (int tries = 0; tries <= kMaxTableRetries; ++tries) {
+    read_table();
+    if (memory_->tables().is_whole(snapshot_)) return;
+  }
+}
+
+void OutputCore::read_table() noexcept {
+  bound_pages_ = memory_->pages().changes();
+  snapshot_ = memory_->tables().snapshot();
+  bound_epoch_ = snapshot_.epoch;
+  timeout_ = snapshot_.table.timeout(source_);
 }
 
 void OutputCore::bind_decisions() noexcept {

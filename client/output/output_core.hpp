@@ -145,6 +145,9 @@ class OutputCore {
   // How often a decision is taken anew because seven models were loaded during it.
   static constexpr int kMaxTableRetries = 3;
 
+  // As an epoch, of a table by which no decision counts.
+  static constexpr shm::Epoch kNotInForce = UINT64_MAX;
+
   // As last_, before this port's first arrival: a predecessor's.
   static constexpr shm::Nanoseconds kUnknown = -1;
 
@@ -182,6 +185,9 @@ class OutputCore {
   [[nodiscard]] bool rules_are_bound() const noexcept;
   void bind_rules() noexcept;
   void bind_rules_and_view() noexcept;
+  void rebind_view() noexcept;
+  void bind_table() noexcept;
+  void read_table() noexcept;
   void bind_decisions() noexcept;
 
   Outcome be_late() noexcept;
@@ -189,8 +195,10 @@ class OutputCore {
   inline bool begin_arrival(shm::Nanoseconds now) noexcept;
   // With the sample in `slot`, or without one (kNoSlot).
   Counts arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
-  void stamp(shm::ActivityWord word) noexcept;
+  void stamp(shm::ActivityWord word, bool begins) noexcept;
   void decide_all(shm::Nanoseconds now) noexcept;
+  void decide_anew(shm::Nanoseconds now) noexcept;
+  void decide_by(shm::DecisionClock clock) noexcept;
   Counts hand_over(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
   [[nodiscard]] shm::EventRecord state() const noexcept;
   [[nodiscard]] shm::Masks masks() noexcept;

@@ -70,8 +70,8 @@ void OutputCore::end_loan(std::uint32_t slot) noexcept {
 // before publish() returns. It pairs with fence (a) of other publishers (of two that override each
 // other, at least one sees the other), with fence (d) of a receiver about to wait, and gives the
 // guarantee that no take() which begins after publish() has returned misses the stamp.
-void OutputCore::stamp(shm::ActivityWord word) noexcept {
-  activity_->write(own_word_, word);
+void OutputCore::stamp(shm::ActivityWord word, bool begins) noexcept {
+  activity_->write(word, begins);
   own_word_ = word;
   shm::full_fence();
 }
@@ -80,7 +80,7 @@ void OutputCore::stamp(shm::ActivityWord word) noexcept {
   if (handover_.has_offer()) accept_view();
   if (!is_settled()) settle();
   const bool begins = !shm::is_active(own_word_, now);
-  stamp(shm::arrival(now, timeout_));
+  stamp(shm::arrival(now, timeout_), begins);
   last_ = now;
   return begins;
 }
@@ -112,15 +112,37 @@ void OutputCore::bind_rules_and_view() noexcept {
   if (has_awaited_) join_awaited();
 }
 
-void OutputCore::decide_all(shm::Nanoseconds now) noexcept {
-  for (int tries = 0;; ++tries) {
-    shm::DecisionClock clock(now, true);
-    for (SharedDecision& decision : decisions_) {
-      decision.verdict = decision.bound.decide(snapshot_.table, clock);
-    }
-    if (memory_->tables().is_in_force(snapshot_)) return;
-    if (tries == kMaxTableRetries) break;
+// The same, where the clock may have been read before that model came into force: then a decision
+// at that time would combine it with what was so under another, and T would not tell when a word
+// was written (shm/decision.hpp). So no rule is bound yet, and the decision that comes next is made
+// not to count: it is taken anew, with them and by a later reading.
+void OutputCore::rebind_view() noexcept {
+  bind_table();
+  while (handover_.has_offer()) {
+    accept_view();
+    bind_table();
+  }
+  decisions_.clear();
+  snapshot_.epoch = kNotInForce;
+}
+
+[[gnu::always_inline]] inline void OutputCore::decide_by(shm::DecisionClock clock) noexcept {
+  for (SharedDecision& decision : decisions_) {
+    decision.verdict = decision.bound.decide(snapshot_.table, clock);
+  }
+}
+
+// Flat, for two callers of a rule's decision are one too many for the compiler to inline it.
+[[gnu::flatten]] void OutputCore::decide_all(shm::Nanoseconds now) noexcept {
+  decide_by(shm::DecisionClock(now, true));
+  if (!memory_->tables().is_in_force(snapshot_)) decide_anew(now);
+}
+
+[[gnu::noinline, gnu::cold]] void OutputCore::decide_anew(shm::Nanoseconds now) noexcept {
+  for (int tries = 0; tries < kMaxTableRetries; ++tries) {
     bind_rules_and_view();
+    decide_by(shm::DecisionClock(now, false));
+    if (memory_->tables().is_in_force(snapshot_)) return;
   }
   for (SharedDecision& decision : decisions_) decision.verdict = shm::Verdict::kUnsettled;
 }
@@ -365,7 +387,7 @@ void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
   if (!rules_are_bound()) bind_rules();
   const bool ends = shm::is_active(own_word_, now);
-  stamp(shm::deactivation(now));
+  stamp(shm::deactivation(now), false);
   last_ = now;
   if (teller_.is_on()) tell_deactivation();
   if (ends) ring_where_selection_changed();

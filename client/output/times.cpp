@@ -58,7 +58,7 @@ Outcome OutputCore::publish_signalled(shm::SampleOrigin origin, shm::Nanoseconds
     outcome.late = true;
   } else {
     if (handover_.has_offer()) accept_view();
-    bind_rules_and_view();
+    rules_are_bound() ? bind_rules_and_view() : rebind_view();
     if (origin.publisher != 0) segment_.slot_header(slot).set_origin(sequence_ + 1, origin);
     origin_ = origin;
     if (teller_.is_on()) {

@@ -70,10 +70,12 @@ void Simulation::apply(const TraceEvent& event) {
   clock_.now = event.at;
   if (event.kind == TraceKind::kTick || !knows(event.source)) return;
   const shm::SourceId source = ids_.at(event.source);
-  auto& activity = activity_[source];
-  activity.write(activity.word, event.kind == TraceKind::kDeactivation
-                                    ? shm::deactivation(event.at)
-                                    : shm::arrival(event.at, table_.timeout(source)));
+  shm::Activity& activity = activity_[source];
+  if (event.kind == TraceKind::kDeactivation) {
+    activity.write(shm::deactivation(event.at), false);
+  } else {
+    activity.write(shm::arrival(event.at, table_.timeout(source)), !is_active(source));
+  }
 }
 
 PortOutcome Simulation::outcome_at(shm::PortId port, const TraceEvent& event) {

@@ -1,5 +1,6 @@
 // Arbitration at both ends: overrides, deactivation, other models, while ports publish and take.
 #include "tests/explore/components.hpp"
+#include "tests/explore/kernel.hpp"
 
 namespace arbiter::explore::decide_cases {
 namespace {
@@ -234,6 +235,31 @@ void swap_before_a_deactivation(const Explore& explore) {
 }
 const Register kSwapDeactivation("NoModelDecidesOnADeactivationUnderTheNext", {4, 2},
                                  swap_before_a_deactivation);
+
+// C ends, and B arrives after that, with the T of the model before, while A publishes under the
+// next, by which B's T is longer: never are B and C active together.
+void swap_for_a_longer_timeout(const Explore& explore) {
+  const auto model = [](shm::Nanoseconds timeout) {
+    return forever().timeout(kB, timeout).timeout(kC, 1'000).conjunction(kA, kPort, {kB, kC}, {});
+  };
+  explore_anew<Scene>(
+      explore,
+      [model](Scene& scene, Execution& execution) {
+        scene.c().signal();
+        scene.instance.prepare(model(100'000'000));
+        const shm::Nanoseconds end = virtual_time() + 1'000;
+        execution.thread([&scene] { scene.instance.put_in_force(); });
+        execution.thread([&scene, end] {
+          set_virtual_time(end);
+          scene.b().signal();
+        });
+        execution.thread(
+            [&scene] { require(scene.a().publish().delivered == 0, "two moments were mixed"); });
+      },
+      model(100'000), depth(1), std::initializer_list<SourceId>{kA});
+}
+const Register kSwapTimeout("NoDecisionTakesALongerTimeoutForThatOfAnArrivalBefore", {4, 1},
+                            swap_for_a_longer_timeout);
 
 }  // namespace
 }  // namespace arbiter::explore::decide_cases

@@ -5,6 +5,7 @@
 #include "shm/decision.hpp"
 #include "tests/explore/case.hpp"
 #include "tests/explore/components.hpp"
+#include "tests/explore/kernel.hpp"
 
 namespace arbiter::explore::decision_cases {
 namespace {
@@ -17,8 +18,9 @@ struct World {
       : words(builder.words(kSources, 1)), view(words.view()) {
     for (SourceId id = 0; id < kSources; ++id) pages->attach(id, &activities[id]);
   }
-  void reset() {
-    time = 1;
+  // `at`: when the first of its events may be; not before what the clock shows, where it is read.
+  void reset(shm::Nanoseconds at = 1) {
+    time = at;
     for (SourceId id = 0; id < kSources; ++id) {
       activities[id].word.store(shm::kNeverActive);
       activities[id].breaks.store(0);
@@ -28,15 +30,15 @@ struct World {
 
   // As OutputCore::stamp(), for each source by its one publisher.
   void stamp_fence() { shm::full_fence(); }  // (a)
-  void arrive(SourceId id) {
-    const shm::ActivityWord next = shm::arrival(++time, shm::kForever);
-    activities[id].write(own[id], next);
+  void arrive(SourceId id, shm::Nanoseconds timeout = shm::kForever) {
+    const shm::ActivityWord next = shm::arrival(++time, timeout);
+    activities[id].write(next, !shm::is_active(own[id], time));
     own[id] = next;
     stamp_fence();
   }
   void deactivate(SourceId id) {
     const shm::ActivityWord next = shm::deactivation(++time);
-    activities[id].write(own[id], next);
+    activities[id].write(next, false);
     own[id] = next;
     stamp_fence();
   }
@@ -129,6 +131,66 @@ void break_off(const Explore& explore) {
 const Register kBroken("AnActivityThatWasBrokenOffDoesNotCountAsRenewed", {6, 0}, break_off);
 const Register kBrokenAndOld(
     "AnActivityThatWasBrokenOffDoesNotCountAsRenewedThoughOldValuesAreSeen", {2, 5}, break_off);
+
+// B's activity had no end until a model came under which it has; so it runs out. C arrives in that
+// gap, and A is deactivated before B comes back: never are all three active.
+void run_out_under_another_model(const Explore& explore) {
+  constexpr shm::Nanoseconds kT = 10;
+  World world(test::TableBuilder()
+                  .timeout(kA, shm::kForever)
+                  .timeout(kB, kT)
+                  .timeout(kC, shm::kForever)
+                  .conjunction(kA, 0, {kB, kC}, {}));
+  const shm::Nanoseconds start = virtual_time();
+  explore([&](Execution& execution) {
+    world.reset(start);
+    set_virtual_time(start);
+    world.arrive(kA);
+    world.arrive(kB);
+    execution.thread([&] {
+      world.arrive(kB, kT);
+      set_virtual_time(world.time += kT);
+      world.arrive(kC);
+      world.deactivate(kA);
+      world.arrive(kB, kT);
+    });
+    execution.thread([&] {
+      shm::DecisionClock clock(0, false);
+      shm::Decider decider(world.view, *world.pages, clock);
+      require(decider.decide_with_own(world.view.rule(0)) != shm::Verdict::kWins,
+              "two moments were mixed");
+    });
+  });
+}
+const Register kRunOut("AnActivityThatRanOutUnderAnotherModelDoesNotCountAsRenewed", {6, 4},
+                       run_out_under_another_model);
+
+// B ends, and C has arrived before that: never are both inactive. The clock says that B has ended
+// only after C was looked at.
+void end_while_it_is_looked_at(const Explore& explore) {
+  World world(forever().timeout(kB, 100).conjunction(kA, 0, {}, {kC, kB}));
+  shm::Read reads[2];
+  shm::BoundRule rule;
+  const shm::Nanoseconds start = virtual_time();
+  explore([&](Execution& execution) {
+    world.reset(start);
+    set_virtual_time(start);
+    world.arrive(kB, 100);
+    rule.bind(world.view.rule(0), *world.pages, reads, false);
+    shm::DecisionClock before(0, false);
+    require(rule.decide(world.view, before) == shm::Verdict::kLoses, "B is active");
+    execution.thread([&] {
+      world.arrive(kC);
+      set_virtual_time(start + 101);
+    });
+    execution.thread([&, last = before.reading()] {
+      shm::DecisionClock clock(last, false);
+      require(rule.decide(world.view, clock) != shm::Verdict::kWins, "two moments were mixed");
+    });
+  });
+}
+const Register kEnds("AnActivityThatEndsDuringADecisionIsNotCombinedWithWhatWasBefore", {8, 0},
+                     end_while_it_is_looked_at);
 
 }  // namespace
 }  // namespace arbiter::explore::decision_cases

@@ -250,7 +250,7 @@ TEST_F(Decision, ASourceThatChangesAtEveryLookLeavesItUnsettledAfterABoundedTime
   ScriptedClock clock{0, true, 0, 0, [] {}};
   clock.on_read = [&] {  // always one step behind an activity that is deactivated in between
     time += 1000;
-    activities_[kC].write(deactivation(time), arrival(time + 10, kShortT));
+    activities_[kC].write(arrival(time + 10, kShortT), true);
     clock.next = time;
   };
   clock.on_read();
@@ -300,7 +300,11 @@ TEST_F(KeptBound, ItDecidesAsOneThatIsBoundAnewWhateverHappensInBetween) {
         for (unsigned changes = draw(3); changes != 0; --changes) {
           Activity& activity = activities_[draw(kFour)];
           const Nanoseconds timeout = draw(5) == 0 ? kForever : kShortT;
-          activity.write(activity.word, draw(3) == 0 ? deactivation(now) : arrival(now, timeout));
+          if (draw(3) == 0) {
+            activity.write(deactivation(now), false);
+          } else {
+            activity.write(arrival(now, timeout), !is_active(activity.word, now));
+          }
           now += 1 + draw(5);
         }
         now += draw(2) == 0 ? draw(150) : 0;
