@@ -349,7 +349,7 @@ TEST(Takeover, WhoHasNoDescriptorForItsPortsKeepsThemAndComesLater) {
   EXPECT_THROW(static_cast<void>(node.output_port<Number>("/out")), Error);
   ASSERT_EQ(::prlimit(process, RLIMIT_NOFILE, &all, nullptr), 0);
   await([&] { return daemon.source("/out")["open"] == true; });
-  EXPECT_EQ(poor.tell("publish /out 1"), "1 0 0");
+  await([&] { return poor.tell("publish /out 1") == "1 0 0"; });  // once they are connected again
   const auto sample = in.wait_for(kForEver);  // which hears of its publisher after that of it
   ASSERT_TRUE(sample);
   EXPECT_EQ((**sample).value, 1);
