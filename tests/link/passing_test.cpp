@@ -132,60 +132,6 @@ TEST_F(Hosts, OnlyWhatAnotherHostsModelWantsIsTapped) {
   await([&] { return head.daemon().source(kPlanner)["taps"].empty(); });
 }
 
-// Until the base's link has not got the planner, which keeps its T, and then until it has it again.
-void import_anew(
-    Host& base, const std::function<void()>& meanwhile = [] {}) {
-  base.daemon().load(source_model("1000s"));
-  await([&] { return base.described(kPlanner).empty(); });
-  meanwhile();
-  base.daemon().load(motor_model("1000s"));
-  base.await_described(kPlanner, "host head");
-}
-
-// The head has said its last event once more, and it was known.
-bool has_come_twice(Host& base) {
-  return base.described(kPlanner).find("that came twice") != std::string::npos;
-}
-
-// The head still keeps the last event, for the rear, and says it to whoever begins to read.
-TEST_F(Hosts, ASampleThatHasComeDoesNotComeAgainWhenTheModelWantsItsSourceAgain) {
-  Host head("head", runtime_, kNoRules, network());
-  Host base("base", runtime_, motor_model("1000s"), network());
-  Host rear("rear", runtime_, motor_model("1000s"), network());
-  Planner planner(head);
-  Body front(base);
-  Body back(rear);
-  back.drive(planner);
-  std::int64_t taken = front.drive(planner);
-  await([&] {
-    if (const auto got = front.motor().take()) taken = (*got)->number;
-    return taken == planner.published();
-  });
-  import_anew(base);
-  await([&] {
-    EXPECT_FALSE(front.motor().take());
-    return has_come_twice(base) || HasFailure();
-  });
-}
-
-// It would end what a component of this host has begun since.
-TEST_F(Hosts, ADeactivationIsNotAppliedAgainWhenTheModelWantsItsSourceAgain) {
-  Host head("head", runtime_, kNoRules, network());
-  Host base("base", runtime_, motor_model("1000s"), network());
-  Host rear("rear", runtime_, motor_model("1000s"), network());
-  Planner planner(head);
-  Body body(base);
-  const std::int64_t number = body.drive(planner);
-  rear.await_described(kPlanner, "host head");
-  planner.port().deactivate();
-  await([&] { return body.motor().winner() == std::nullopt; });
-  import_anew(base, [&] { Planner(base, number, "near").publish(); });
-  await([&] {
-    EXPECT_EQ(body.motor().winner(), kPlanner);
-    return has_come_twice(base) || HasFailure();
-  });
-}
-
 TEST_F(Hosts, WhatIsImportedIsNotExported) {
   Host head("head", runtime_, kNoRules, network());
   Host base("base", runtime_, motor_model("1000s"), network());

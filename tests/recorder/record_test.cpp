@@ -19,7 +19,6 @@ namespace {
 using evidence::Arrival;
 using evidence::WinnerChange;
 using nlohmann::json;
-using testing::AllOf;
 using testing::HasSubstr;
 
 const std::string kReversedModel = R"(<behaviors>
@@ -217,48 +216,6 @@ TEST(Record, SaysWhatItMissed) {
   EXPECT_EQ(recording.simulate()["different"], 0);
 }
 
-TEST(Record, HasAWholeFileAfterAHangup) {
-  ::signal(SIGHUP, SIG_DFL);  // what a test was started with, the program has too
-  Daemon daemon(kOverrideModel);
-  Node node("test");
-  auto low = node.output_port<int>("/low");
-  Recording recording(daemon);
-  low.publish(1);
-  EXPECT_EQ(recording.end(SIGHUP), 0) << recording.error();
-  EXPECT_THAT(recording.output(), HasSubstr("1 arrival of "));
-  const auto read = evidence::read_recording(recording.file(), evidence::Payloads::pass_over,
-                                             [](evidence::Record&& /*any*/) {});
-  EXPECT_TRUE(read.end.is_whole) << read.end.problem;
-}
-
-TEST(Record, GoesOnAfterAHangupThatIsIgnored) {
-  Daemon daemon(kOverrideModel);
-  Node node("test");
-  auto low = node.output_port<int>("/low");
-  ::signal(SIGHUP, SIG_IGN);  // as nohup does
-  Recording recording(daemon);
-  ::signal(SIGHUP, SIG_DFL);
-  recording.process().signal(SIGHUP);
-  low.publish(1);
-  recording.wait_for<Arrival>([](const auto&) { return true; });
-  EXPECT_EQ(recording.end(), 0) << recording.error();
-}
-
-TEST(Record, IsReadUpToTheLastChunkAfterAKill) {
-  Daemon daemon(kOverrideModel);
-  Node node("test");
-  auto low = node.output_port<int>("/low");
-  auto in = node.input_port<int>("/p");
-  Recording recording(daemon);
-  for (int i = 0; i < 10; ++i) low.publish(i);
-  recording.wait_for<Arrival>([](const auto& each) { return each.sequence == 10; });
-  recording.process().kill();
-  const auto result = arbiter({"simulate", "--recording", recording.file()});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("what comes before is used"));
-  EXPECT_THAT(result.out, HasSubstr("10 decisions: 10 equal"));
-}
-
 TEST(Record, GoesOnWhereADaemonTakesOver) {
   Daemon daemon(kOverrideModel);
   Node node("test");
@@ -367,63 +324,6 @@ TEST(Record, BeginsAgainWhereADaemonKnowsNothing) {
   EXPECT_EQ(recording.end(), 0) << recording.error();
   const json result = recording.simulate();
   EXPECT_EQ(result["equal"], recording.records<Arrival>().size()) << result.dump(2);
-}
-
-TEST(Record, SaysThatTheDiskIsFullAndLeavesWhatIsWhole) {
-  Daemon daemon(kLasting);
-  Node node("test");
-  auto low = node.output_port("/low", OutputPortOptions{.max_size = 4096});
-  auto in = node.input_port("/p");
-  const std::string file = daemon.directory() + "/full.mcap";
-  const std::string err = daemon.directory() + "/full.err";
-  const shm::FileDescriptor errors(
-      ::open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
-  const std::string command = std::string("ulimit -f 4000 && exec ") + ARBITER_PROGRAMS +
-                              "/arbiter record --payloads all --compression none -o " + file;
-  ChildProcess recorder({"/bin/bash", "-c", command}, {}, {-1, -1, errors.get()});
-  pollfd ended{recorder.descriptor(), POLLIN, 0};
-  const std::vector<std::byte> sample(4096);
-  while (::poll(&ended, 1, 0) == 0) {
-    low.publish(Bytes(sample.data(), sample.size()));
-    ::usleep(100);
-  }
-  EXPECT_EQ(recorder.wait(), 2);
-  EXPECT_THAT(content_of(err), HasSubstr(file));
-  const auto result = arbiter({"simulate", "--recording", file});
-  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
-  EXPECT_THAT(result.out, HasSubstr("every decision is reproduced"));
-}
-
-TEST(Record, SaysThatItsFileWasDeletedMeanwhile) {
-  Daemon daemon(kLasting);
-  Recording recording(daemon);
-  std::filesystem::remove(recording.file());
-  EXPECT_EQ(recording.end(), 2);
-  EXPECT_THAT(recording.error(), AllOf(HasSubstr(recording.file()), HasSubstr("deleted it")));
-  EXPECT_EQ(recording.output(), "");
-}
-
-// A lease that was taken long ago still counts when recording ends.
-TEST(Record, SaysUntilWhenItWasRecorded) {
-  Daemon daemon(kLasting);
-  Node node("test");
-  auto low = node.output_port<int>("/low");
-  Recording recording(daemon);
-  low.publish(1);
-  recording.wait_for<Arrival>([](const auto&) { return true; });
-  const shm::Nanoseconds later = shm::monotonic_now();
-  // The file of one that is killed says nothing of its end.
-  EXPECT_LT(evidence::load_recording(recording.file()).runs.at(0).end, later);
-  EXPECT_EQ(recording.end(), 0) << recording.error();
-  EXPECT_GT(evidence::load_recording(recording.file()).runs.at(0).end, later);
-}
-
-TEST(Record, EndsByItselfAfterADuration) {
-  Daemon daemon(kOverrideModel);
-  const std::string file = daemon.directory() + "/short.mcap";
-  const auto result = arbiter({"record", "-o", file, "--duration", "20ms"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("0 arrivals of 0 sources and 0 changes of winner"));
 }
 
 TEST(Record, SaysWhatIsWrong) {
