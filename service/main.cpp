@@ -1,6 +1,5 @@
 // arbiterd: the daemon of one instance, in the foreground.
 #include <signal.h>
-#include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <sys/stat.h>
 #include <systemd/sd-daemon.h>
@@ -21,6 +20,7 @@
 #include "service/log/journal.hpp"
 #include "service/log/log.hpp"
 #include "service/log/log_sink.hpp"
+#include "shm/descriptor_limit.hpp"
 #include "wire/rendezvous.hpp"
 
 namespace {
@@ -49,14 +49,6 @@ It listens in the first of these that it can use: $RUNTIME_DIRECTORY, $XDG_RUNTI
 
 Exit codes: 0 stopped by a signal or by `arbiter stop`; 1 the files have errors, or it cannot serve;
 2 wrong use)";
-
-// Components and sources take a few descriptors each.
-void raise_descriptor_limit() {
-  rlimit limit{};
-  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
-  limit.rlim_cur = limit.rlim_max;
-  setrlimit(RLIMIT_NOFILE, &limit);
-}
 
 arbiter::shm::FileDescriptor catch_signals() {
   sigset_t caught;
@@ -97,7 +89,7 @@ class Log {
 
 int serve(const arbiter::service::DaemonOptions& options, const std::string& instance,
           const arbiter::shm::FileDescriptor& signals) {
-  raise_descriptor_limit();
+  arbiter::shm::raise_descriptor_limit();  // components and sources take a few each
   Daemon daemon(options);
   log_event({EventKind::kReady}, log::level::info, "instance \"{}\" is ready at {}", instance,
             daemon.path());

@@ -18,11 +18,11 @@
 #include <arbiter/node.hpp>
 
 #include "gateway/core/account.hpp"
-#include "gateway/core/descriptors.hpp"
 #include "gateway/core/incoming.hpp"
 #include "gateway/core/max_ages.hpp"
 #include "gateway/core/middleware.hpp"
 #include "gateway/core/outgoing.hpp"
+#include "gateway/core/spare_descriptors.hpp"
 #include "gateway/mapping/mapping.hpp"
 #include "shm/file_descriptor.hpp"
 

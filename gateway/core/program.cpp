@@ -13,7 +13,6 @@
 #include <CLI/CLI.hpp>
 
 #include "command_line/wrong_use.hpp"
-#include "gateway/core/descriptors.hpp"
 #include "gateway/core/kept_files.hpp"
 #include "gateway/core/reload.hpp"
 #include "gateway/core/say.hpp"
@@ -25,6 +24,7 @@
 #include "rules/ask/report.hpp"
 #include "rules/text/text_file.hpp"
 #include "shm/clock.hpp"
+#include "shm/descriptor_limit.hpp"
 #include "shm/file_descriptor.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -38,6 +38,10 @@ constexpr const char* kExitCodes =
     "2 wrong use, or a mapping that cannot be read or has errors";
 
 constexpr shm::Nanoseconds kSendIdle = 1'000'000'000;
+
+// More than a file of the most entries, all with two ports, needs. The kernel keeps a table of
+// them.
+constexpr rlim_t kMostDescriptors = 32768;
 
 struct Arguments {
   std::vector<std::string> mappings;
@@ -293,7 +297,7 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
 
 int run_program(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& make) {
   set_program_name(kind.name);
-  raise_descriptor_limit();
+  shm::raise_descriptor_limit(kMostDescriptors);
   try {
     return run(argc, argv, kind, make);
   } catch (const rules::FileError& error) {

@@ -1,29 +1,11 @@
-#include "gateway/core/descriptors.hpp"
+#include "gateway/core/spare_descriptors.hpp"
 
 #include <fcntl.h>
-#include <sys/resource.h>
 
-#include <algorithm>
 #include <new>
 #include <utility>
 
 namespace arbiter::gateway {
-namespace {
-
-// More than a file of the most entries, all with two ports, needs. The kernel keeps a table of
-// them.
-constexpr rlim_t kMost = 32768;
-
-}  // namespace
-
-void raise_descriptor_limit() noexcept {
-  rlimit limit{};
-  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
-  const rlim_t wanted = std::min(limit.rlim_max, kMost);
-  if (limit.rlim_cur >= wanted) return;
-  limit.rlim_cur = wanted;
-  static_cast<void>(::setrlimit(RLIMIT_NOFILE, &limit));  // if it may not, there are fewer
-}
 
 SpareDescriptors::SpareDescriptors() noexcept : is_any_left_(take(kSpare, held_)) {}
 

@@ -9,10 +9,6 @@
 
 namespace arbiter::gateway {
 
-// The limit that a shell or a service manager gives is one for programs that wait by select(): this
-// process, and those that it starts, may have as many as they are allowed, within reason.
-void raise_descriptor_limit() noexcept;
-
 // Held while ports are opened, so that not the last descriptor goes to a port.
 //
 // Thread safety: one thread. Other threads may want some meanwhile.
