@@ -55,7 +55,8 @@ class HeldTokens {
 
   // `writer`: whose token the transport says it is. False: there is no place for another importer
   // now, or another writer speaks for this one, or this writer for another. A token that is older
-  // than one that came before changes nothing.
+  // than one that came before from the same writer changes nothing. Where another writer goes on
+  // with an older one, what the writer before had sent is forgotten: it was a stranger's.
   bool note(Incarnation importer, std::uint64_t number, std::uint64_t writer, shm::Nanoseconds now);
 
   // Of each importer the newest that had come at `published`, into `named`, of which nothing else

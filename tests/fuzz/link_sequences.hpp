@@ -156,9 +156,8 @@ inline void drive_held_tokens(Script script) {
             "a writer speaks for one importer, and nobody else does");
     if (is_heard) {
       Known& one = known[importer];
-      // Whoever went on in the same life has sent higher numbers since: these are another's.
-      const bool is_new_life = one.writer != writer && number <= one.last;
-      one = {writer, is_new_life ? number : std::max(one.last, number), now};
+      // Another writer's numbers count, even where they are lower than those before.
+      one = {writer, is_its_own ? std::max(one.last, number) : number, now};
     }
     held.name(now, named);
     require(named.size() <= known.size(), "nobody is named who was not heard");
