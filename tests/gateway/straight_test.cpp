@@ -1,99 +1,19 @@
 // A sample that goes straight on: whoever delivers it sends what becomes of it, and the loop is
 // neither woken nor needed, unless there is something that it alone can do.
 #include <gmock/gmock.h>
-#include <poll.h>
 
 #include <atomic>
 #include <string>
 #include <thread>
 
-#include <arbiter/arbiter.hpp>
-
-#include "gateway/core/incoming.hpp"
-#include "gateway/core/outgoing.hpp"
-#include "shm/clock.hpp"
-#include "tests/gateway/foreign.hpp"
-#include "tests/gateway/mapping_text.hpp"
+#include "tests/gateway/straight_scene.hpp"
 #include "tests/realtime/allocations.hpp"
-#include "tests/support/daemon.hpp"
 
 namespace arbiter::gateway {
 namespace {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
-
-// Navigation and teleoperation come from outside. A component of this host overrides both.
-constexpr const char* kModel =
-    "<behaviors timeout='1000s'>"
-    "<behavior name='Navigate'><config at='/Base/cmd:i'>/Nav/cmd:o</config></behavior>"
-    "<behavior name='Teleoperate'><config at='/Base/cmd:i'>/Teleop/cmd:o</config>"
-    "<inhibition>Navigate</inhibition></behavior>"
-    "<behavior name='Stop'><config at='/Base/cmd:i'>/Stop/cmd:o</config>"
-    "<inhibition>Navigate</inhibition><inhibition>Teleoperate</inhibition></behavior>"
-    "</behaviors>";
-
-// Navigation commands while a lock is released.
-std::string locked(const std::string& timeout) {
-  return "<behaviors timeout='" + timeout +
-         "'><behavior name='Navigate'><config at='/Base/cmd:i'>/Nav/cmd:o</config>"
-         "<condition>/EStop/released:o</condition></behavior></behaviors>";
-}
-
-class Straight : public testing::Test {
- protected:
-  explicit Straight(const std::string& model = kModel, const std::string& idle = "")
-      : daemon_(model),
-        read_(read_dds("<in topic='/nav' type='a/msg/B' port='/Nav/cmd:o' max_size='64'/>"
-                       "<in topic='/teleop' type='a/msg/B' port='/Teleop/cmd:o' max_size='64'/>"
-                       "<out port='/Base/cmd:i' topic='/cmd' type='a/msg/B' " +
-                       idle + "/>")) {
-    ins_.emplace("/Nav/cmd:o", &nav_);
-    ins_.emplace("/Teleop/cmd:o", &teleop_);
-    outgoing_.lead(ins_, [this] { ++calls_; });
-    outgoing_.run(shm::monotonic_now());
-  }
-
-  Incoming::Fate deliver(Incoming& in, const std::string& bytes) {
-    return in.deliver(BytesSample(bytes), Time::max());
-  }
-  [[nodiscard]] bool calls_loop() const {
-    pollfd polled{descriptor_, POLLIN, 0};
-    return ::poll(&polled, 1, 0) == 1;
-  }
-  OutputPort<void> stop() {
-    return node_.output_port("/Stop/cmd:o", Type::variable("a/msg/B", 64));
-  }
-  static void publish(OutputPort<void>& port, const std::string& bytes) {
-    port.publish(Bytes(reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()));
-  }
-  // The loop, where it is called.
-  void run() {
-    if (calls_loop() || outgoing_.next() == 0) outgoing_.run(shm::monotonic_now());
-  }
-  // From now on navigation's samples go straight on.
-  void lead_navigation() {
-    deliver(nav_, "first");
-    run();
-    ASSERT_THAT(sender_.sent, ElementsAre("first"));
-    sender_.sent.clear();
-  }
-
-  test::Daemon daemon_;
-  Read read_;
-  Account nav_account_{"nav", "publisher"};
-  Account teleop_account_{"teleop", "publisher"};
-  Account account_{"cmd", "subscriber"};
-  KeepingSender sender_;
-  OneAge ages_;
-  InBySource ins_;
-  int calls_ = 0;
-  Node node_{"gateway"};
-  Incoming nav_{node_, read_.entry(0), nav_account_};
-  Incoming teleop_{node_, read_.entry(1), teleop_account_};
-  Outgoing outgoing_{node_, read_.entry(2), sender_, account_, ages_};
-  const int descriptor_ = outgoing_.descriptor();
-};
 
 TEST_F(Straight, WhoeverDeliversASampleSendsItAndTheLoopSleeps) {
   lead_navigation();
@@ -216,132 +136,6 @@ TEST_F(Straight, NobodySendsALargeSampleThatTheLoopHasNotComeToYetNorOvertakesIt
   EXPECT_EQ(calls_, 1);
   run();
   EXPECT_THAT(sender_.sent, ElementsAre("123456", "small", "next"));
-}
-
-class StraightWithALock : public Straight {
- protected:
-  explicit StraightWithALock(const std::string& timeout = "1000s",
-                             const std::string& idle = "idle='zero' size='4'")
-      : Straight(locked(timeout), idle) {}
-
-  void lead_navigation() {
-    sender_.sent.clear();
-    lock_.signal();
-    Straight::lead_navigation();
-  }
-
-  OutputPort<void> lock_ = node_.output_port("/EStop/released:o", Type::untyped(1));
-};
-
-// While a thread has the turn the port rings for nobody.
-TEST_F(StraightWithALock, APortThatBecomesIdleInATurnIsLeftToTheLoop) {
-  lead_navigation();
-  sender_.meanwhile = [this] { lock_.deactivate(); };
-  deliver(nav_, "drive");
-  sender_.meanwhile = {};
-  EXPECT_THAT(sender_.sent, ElementsAre("drive"));
-  EXPECT_EQ(calls_, 1);
-  EXPECT_EQ(outgoing_.next(), 0);
-  run();
-  EXPECT_THAT(sender_.sent, ElementsAre("drive", kZeros));
-  EXPECT_EQ(account_.idle.value(), 2u) << "at the start, and now";
-  deliver(nav_, "loses");
-  EXPECT_EQ(calls_, 1) << "the loop knows that it is idle";
-}
-
-TEST_F(StraightWithALock, APortThatBecomesIdleInATurnWithoutASampleIsLeftToTheLoop) {
-  lead_navigation();
-  ASSERT_TRUE(outgoing_.begin_turn(1));
-  lock_.deactivate();
-  EXPECT_FALSE(outgoing_.end_turn("/Nav/cmd:o", shm::kForever));
-  EXPECT_EQ(calls_, 1);
-  run();
-  EXPECT_THAT(sender_.sent, ElementsAre(kZeros));
-}
-
-TEST_F(StraightWithALock, APortThatBecomesIdleAfterATurnRings) {
-  lead_navigation();
-  deliver(nav_, "drive");
-  EXPECT_FALSE(calls_loop());
-  lock_.deactivate();
-  EXPECT_TRUE(calls_loop());
-  EXPECT_EQ(calls_, 0);
-  run();
-  EXPECT_THAT(sender_.sent, ElementsAre("drive", kZeros));
-}
-
-// Released again before the loop has come: there is nothing to be sent.
-TEST_F(StraightWithALock, APortThatIsCommandedAgainBeforeTheLoopComesIsNotStopped) {
-  lead_navigation();
-  ASSERT_TRUE(outgoing_.begin_turn(1));
-  lock_.deactivate();
-  outgoing_.end_turn("/Nav/cmd:o", shm::kForever);
-  lock_.signal();
-  run();
-  EXPECT_THAT(sender_.sent, IsEmpty());
-  EXPECT_EQ(outgoing_.next(), shm::kForever);
-}
-
-// The loop says stop, at once, and again as to an idle port.
-TEST_F(StraightWithALock, AWinnerWhoseSamplesCannotBeSentInATurnIsLeftToTheLoopOnce) {
-  lead_navigation();
-  sender_.answers = {Sender::Result::kNoMemory};
-  deliver(nav_, "lost");
-  EXPECT_EQ(calls_, 1);
-  EXPECT_EQ(outgoing_.next(), 0);
-  run();
-  EXPECT_THAT(sender_.sent, ElementsAre(kZeros));
-  const shm::Nanoseconds next = outgoing_.next();
-  EXPECT_GT(next, 0);
-  sender_.answers = {Sender::Result::kNoMemory};
-  deliver(nav_, "lost");
-  EXPECT_EQ(calls_, 1) << "the loop knows";
-  EXPECT_EQ(outgoing_.next(), next);
-  outgoing_.run(next);
-  EXPECT_THAT(sender_.sent, ElementsAre(kZeros, kZeros));
-  deliver(nav_, "drive");
-  EXPECT_THAT(sender_.sent, ElementsAre(kZeros, kZeros, "drive"));
-  EXPECT_EQ(outgoing_.next(), shm::kForever);
-  EXPECT_EQ(calls_, 1);
-}
-
-class StraightWithALockThatTimesOut : public StraightWithALock {
- protected:
-  static constexpr shm::Nanoseconds kTimeout = 10'000'000;
-  StraightWithALockThatTimesOut() : StraightWithALock("10ms") {}
-};
-
-// The turn sets the port's timer anew, which has expired and of which the loop has not heard yet.
-TEST_F(StraightWithALockThatTimesOut, ATurnBetweenTheTimerAndTheLoopHidesNoIdlePort) {
-  shm::Nanoseconds released = 0;
-  while (outgoing_.next() != shm::kForever) {
-    lock_.signal();
-    deliver(nav_, "drive");
-    released = shm::monotonic_now();
-    outgoing_.run(released);
-  }
-  while (shm::monotonic_now() <= released + kTimeout) std::this_thread::yield();
-  calls_ = 0;
-  sender_.sent.clear();
-  ASSERT_TRUE(outgoing_.begin_turn(1));
-  EXPECT_FALSE(outgoing_.end_turn("/Nav/cmd:o", shm::kForever));
-  EXPECT_EQ(calls_, 1);
-  run();
-  EXPECT_THAT(sender_.sent, ElementsAre(kZeros));
-}
-
-class StraightWithALockAndNoIdleSample : public StraightWithALock {
- protected:
-  StraightWithALockAndNoIdleSample() : StraightWithALock("1000s", "idle='none'") {}
-};
-
-TEST_F(StraightWithALockAndNoIdleSample, APortThatBecomesIdleConcernsNobody) {
-  lead_navigation();
-  sender_.meanwhile = [this] { lock_.deactivate(); };
-  deliver(nav_, "drive");
-  EXPECT_EQ(calls_, 0);
-  EXPECT_EQ(outgoing_.next(), shm::kForever);
-  EXPECT_THAT(sender_.sent, ElementsAre("drive"));
 }
 
 TEST_F(Straight, ASampleCostsNoAllocation) {
