@@ -25,4 +25,12 @@ inline const std::string kConflictModel = R"(<behaviors>
 </behaviors>
 )";
 
+// The paper's arm: with object and collision both active nobody wins, on purpose.
+inline const std::string kTrackModel = R"(<behaviors>
+  <behavior name="Rest"><config at="/arm">/rest</config></behavior>
+  <behavior name="Track"><config at="/arm">/object</config>
+    <condition>not /collision</condition><inhibition>Rest</inhibition></behavior>
+</behaviors>
+)";
+
 }  // namespace arbiter::test
