@@ -14,7 +14,7 @@
 #include "link/dds/network.hpp"
 #include "shm/clock.hpp"
 #include "tests/cli/arbiter_program.hpp"
-#include "tests/link/cables.hpp"
+#include "tests/link/cabled_robot.hpp"
 #include "tests/link/camera.hpp"
 #include "tests/link/known_hosts.hpp"
 
@@ -346,32 +346,28 @@ TEST_F(Losers, OfASourceThatIsOnlySensedNoSampleCrosses) {
   view.watch(camera);
 }
 
+using CutLosers = Cable;
+
 // Who is cut off while it loses, and wins meanwhile, has the newest image after the cut, and none
 // from before.
-TEST(CutLosers, AChangeDuringACutIsMadeUpFor) {
-  if (const std::string why = why_no_networks(); !why.empty()) GTEST_SKIP() << why;
-  Switch cables;
-  const NetworkNamespace head_network;
-  const NetworkNamespace base_network;
-  cables.connect(head_network, 1);
-  cables.connect(base_network, 2);
-  const TemporaryDirectory runtime;
-  const std::vector<std::string> network = {"--interface", "eth0"};
-  Host head("head", runtime, kCameraOnly, network, head_network.enter());
-  Host base("base", runtime, view_model("500ms"), network, base_network.enter());
+TEST_F(CutLosers, AChangeDuringACutIsMadeUpFor) {
+  CabledRobot robot;
+  Host head("head", robot.runtime, kCameraOnly, robot.arguments(), robot.head_network.enter());
+  Host base("base", robot.runtime, view_model("500ms"), robot.arguments(),
+            robot.base_network.enter());
   Camera camera(head);
   View view(base);
   view.watch(camera);
   view.pause();
   lose(base, camera);
-  cables.cut(1);
+  robot.cables.cut(kHead);
   for (int i = 0; i < 20; ++i) camera.publish();
   const std::int64_t unseen = camera.published();
   view.go_on();
   await([&] { return !base.daemon().source(kCamera)["active"].get<bool>(); });
   // What was published is too old by now: not even the last of it is sent after the cut.
   await([&] { return !head.daemon().source(kCamera)["active"].get<bool>(); });
-  cables.heal(1);
+  robot.cables.heal(kHead);
   await([&] {
     camera.publish();
     const auto number = view.seen(5ms);
