@@ -30,10 +30,8 @@ int count_in(const std::string& description, const std::string& what) {
 // meanwhile.
 void cut_and_heal(bool until_gone) {
   CabledRobot robot;
-  Host head("head", robot.runtime, source_model("300ms"), robot.arguments(),
-            robot.head_network.enter());
-  Host base("base", robot.runtime, motor_model("300ms"), robot.arguments(),
-            robot.base_network.enter());
+  Host head = robot.head(source_model("300ms"));
+  Host base = robot.base(motor_model("300ms"));
   Planner planner(head);
   Body body(base);
   body.drive(planner);
@@ -68,10 +66,8 @@ TEST_F(Cable, AHostThatWasGoneIsFoundAgain) { cut_and_heal(true); }
 // The head hears nobody, and sends to nobody any more; but the base hears its announcements.
 TEST_F(Cable, AForeverWinnerThatDoesNotHearUsCommandsNoMore) {
   CabledRobot robot;
-  Host head("head", robot.runtime, source_model("forever"), robot.arguments(),
-            robot.head_network.enter());
-  Host base("base", robot.runtime, motor_model("forever"), robot.arguments(),
-            robot.base_network.enter());
+  Host head = robot.head(source_model("forever"));
+  Host base = robot.base(motor_model("forever"));
   Planner planner(head);
   Body body(base);
   body.drive(planner);
@@ -96,14 +92,12 @@ TEST_F(Cable, ASpeakerThatDoesNotHearUsGivesWay) {
   CabledRobot robot;
   const NetworkNamespace rear_network;
   robot.cables.connect(rear_network, 3);
-  Host head("head", robot.runtime, source_model("300ms"), robot.arguments(),
-            robot.head_network.enter());
-  Host base("base", robot.runtime, motor_model("300ms"), robot.arguments(),
-            robot.base_network.enter());
+  Host head = robot.head(source_model("300ms"));
+  Host base = robot.base(motor_model("300ms"));
   Planner planner(head);
   Body body(base);
   body.drive(planner);
-  Host rear("rear", robot.runtime, source_model("300ms"), robot.arguments(), rear_network.enter());
+  Host rear = robot.host("rear", source_model("300ms"), rear_network);
   Planner other(rear, planner.published());
   base.await_described(kPlanner, "open on several hosts: head, rear");
   robot.cables.cut_to(kHead);
@@ -128,10 +122,6 @@ struct UnheardEnd {
       return (known != nullptr && known->is_up) == is_up;
     });
   }
-  [[nodiscard]] Host host(const std::string& name, const std::string& model,
-                          const NetworkNamespace& network) const {
-    return {name, robot.runtime, model, CabledRobot::arguments(), network.enter()};
-  }
   // Returns the number of its last sample once the head's link knows of the end.
   std::int64_t end_planner() {
     const std::int64_t published = planner->published();
@@ -147,8 +137,8 @@ struct UnheardEnd {
   }
 
   CabledRobot robot;
-  const Host head = host("head", source_model("300ms"), robot.head_network);
-  const Host base = host("base", motor_model("300ms"), robot.base_network);
+  const Host head = robot.head(source_model("300ms"));
+  const Host base = robot.base(motor_model("300ms"));
   std::optional<Planner> planner{head};
   Body body{base};
 };
@@ -174,7 +164,7 @@ TEST_F(UnheardEnds, LeaveTheSourceToAnotherHost) {
   one.robot.cables.heal_to(kHead);
   const std::string taken = "comes from host head";
   await([&] { return one.base.log().find(taken) != one.base.log().rfind(taken); });
-  const Host rear = one.host("rear", source_model("300ms"), rear_network);
+  const Host rear = one.robot.host("rear", source_model("300ms"), rear_network);
   Planner other(rear, published);
   one.body.drive(other);
 }
@@ -182,10 +172,8 @@ TEST_F(UnheardEnds, LeaveTheSourceToAnotherHost) {
 // The large sample waits for a receipt that does not come; what is said after it must not be lost.
 TEST_F(Cable, ADeactivationBehindALargeSampleOutlivesACut) {
   CabledRobot robot;
-  Host head("head", robot.runtime, source_model("forever"), robot.arguments(),
-            robot.head_network.enter());
-  Host base("base", robot.runtime, motor_model("forever"), robot.arguments(),
-            robot.base_network.enter());
+  Host head = robot.head(source_model("forever"));
+  Host base = robot.base(motor_model("forever"));
   Node brain = head.node("brain");
   auto planner = brain.output_port(kPlanner, Type::variable("robot/Cloud", 200'000));
   Node body = base.node("body");

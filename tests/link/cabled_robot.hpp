@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/link/cables.hpp"
+#include "tests/link/scene.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::test {
@@ -29,6 +30,16 @@ struct CabledRobot {
     cables.connect(base_network, kBase);
   }
   [[nodiscard]] static std::vector<std::string> arguments() { return {"--interface", "eth0"}; }
+  [[nodiscard]] Host head(const std::string& model) const {
+    return host("head", model, head_network);
+  }
+  [[nodiscard]] Host base(const std::string& model) const {
+    return host("base", model, base_network);
+  }
+  [[nodiscard]] Host host(const std::string& name, const std::string& model,
+                          const NetworkNamespace& network) const {
+    return {name, runtime, model, arguments(), network.enter()};
+  }
 
   Switch cables;
   NetworkNamespace head_network;

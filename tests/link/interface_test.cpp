@@ -23,9 +23,8 @@ namespace {
 TEST_F(Cable, AnInterfaceMayComeAfterTheLink) {
   CabledRobot robot;
   const NetworkNamespace late;
-  Host base("base", robot.runtime, motor_model("300ms"), robot.arguments(),
-            robot.base_network.enter());
-  Host rear("rear", robot.runtime, kNoRules, robot.arguments(), late.enter());
+  Host base = robot.base(motor_model("300ms"));
+  Host rear = robot.host("rear", kNoRules, late);
   rear.see("this machine has no interface eth0 (--interface), but lo; trying again");
   await_hosts("rear", [](const auto& hosts) { return hosts.find_this()->has_daemon; });
   robot.cables.connect(late, 3);
@@ -39,10 +38,8 @@ TEST_F(Cable, AnInterfaceMayComeAfterTheLink) {
 // it commands again.
 void change_network(const std::function<void(CabledRobot&)>& change, const std::string& said) {
   CabledRobot robot;
-  Host head("head", robot.runtime, source_model("300ms"), robot.arguments(),
-            robot.head_network.enter());
-  Host base("base", robot.runtime, motor_model("300ms"), robot.arguments(),
-            robot.base_network.enter());
+  Host head = robot.head(source_model("300ms"));
+  Host base = robot.base(motor_model("300ms"));
   Planner planner(head);
   Body body(base);
   body.drive(planner);
@@ -87,8 +84,8 @@ TEST_F(Cable, AnInterfaceThatGoesAndComesBackIsUsedAgain) {
 // Who switches all hosts is told of one that is gone, whatever this link has been through since.
 TEST_F(Cable, ALinkThatJoinsAgainRemembersWhoIsGone) {
   CabledRobot robot;
-  Host head("head", robot.runtime, kNoRules, robot.arguments(), robot.head_network.enter());
-  Host base("base", robot.runtime, kNoRules, robot.arguments(), robot.base_network.enter());
+  Host head = robot.head(kNoRules);
+  Host base = robot.base(kNoRules);
   const auto is_base = [](wire::HostOutcome outcome) {
     try {
       for (const auto& each : wire::LinkCall("head").ask_hosts({wire::kAllHosts, "model"})) {
@@ -112,8 +109,7 @@ TEST_F(Cable, ALinkThatJoinsAgainRemembersWhoIsGone) {
 // Cyclone's threads wait for datagrams that cannot come any more.
 TEST_F(Cable, ALinkWhoseAddressIsGoneEndsAllTheSame) {
   CabledRobot robot;
-  Host base("base", robot.runtime, motor_model("300ms"), robot.arguments(),
-            robot.base_network.enter());
+  Host base = robot.base(motor_model("300ms"));
   base.see("host base, on eth0");
   robot.base_network.ip("addr del 10.77.0.2/24 dev eth0");
   base.link().signal(SIGTERM);

@@ -352,9 +352,8 @@ using CutLosers = Cable;
 // from before.
 TEST_F(CutLosers, AChangeDuringACutIsMadeUpFor) {
   CabledRobot robot;
-  Host head("head", robot.runtime, kCameraOnly, robot.arguments(), robot.head_network.enter());
-  Host base("base", robot.runtime, view_model("500ms"), robot.arguments(),
-            robot.base_network.enter());
+  Host head = robot.head(kCameraOnly);
+  Host base = robot.base(view_model("500ms"));
   Camera camera(head);
   View view(base);
   view.watch(camera);
