@@ -25,6 +25,8 @@ class Victim {
   // Returns when it is about to begin.
   void prepare();
   void go();
+  // Returns when it has done so, true, or has ended.
+  bool has_opened() { return read_line() == "open"; }
   // True if it has come through unharmed; then it lives still.
   bool is_unharmed();
   // It has ended, one way or the other, or sleeps in wait_for().

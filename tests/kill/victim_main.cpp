@@ -144,7 +144,14 @@ class Victim {
            while (v.in_->take()) {
            }
          }},
-        {"open-tap", [](Victim& v) { v.begin(true), v.open_tap(); }},
+        // Until the service thread has mapped and offered what it heard of.
+        {"open-tap",
+         [](Victim& v) {
+           v.begin(true);
+           v.open_tap();
+           say("open");
+           static_cast<void>(v.tap_->wait_for(10s));
+         }},
         {"close-tap",
          [](Victim& v) {
            v.open_tap();

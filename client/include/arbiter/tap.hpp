@@ -12,9 +12,10 @@
 // on over closing and opening, over the death of the port's component, and over another daemon.
 // The daemon's policy must allow this user to `tap` the port (docs/policy.md).
 //
-// The first event of a source is its `state`: from there on nothing is missed. A component takes a
-// tap in before Node::tap() returns, unless it needs more than 0.2 s for that: it is stopped, or
-// makes memory for large samples.
+// The first event of a source is its `state`: from there on nothing is missed. The port's thread
+// tells it at its next call, so a source at rest has none yet. A component takes a tap in before
+// Node::tap() returns, unless it needs more than 0.2 s for that: it is stopped, or makes memory for
+// large samples.
 //
 // A publisher keeps its last 1024 events and its last 64 samples for its taps (fewer samples where
 // they are large: 32 MiB of them). A tap that is slower loses its own oldest events, which are
