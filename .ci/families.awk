@@ -1,13 +1,13 @@
 # Which precompiled headers each source and each header of ours may be read with: see read_product in
 # .ci/lint.
 #
-#   awk -f families.awk FAMILIES IMPLIED SOURCES
+#   awk -f families.awk IMPLIED FAMILIES SOURCES
 #
-# FAMILIES: a name and the headers of others that it precompiles, a line each, the costliest last.
-# IMPLIED: a header of others and all that it includes, a line each. SOURCES: paths, a line each.
-# Prints FILE FAMILY SOURCE for all that is to be read; FAMILY is the last one of whose headers FILE
-# includes each, itself or by what it includes, or `none`; SOURCE is one that includes FILE, and so is
-# compiled with what FILE needs.
+# IMPLIED: a header of others and all that it includes, a line each. FAMILIES: paths of files, which include
+# what is precompiled, the costliest last. SOURCES: paths, a line each.
+# Prints FILE FAMILY SOURCE for all that is to be read and, of the families, all that is needed for it:
+# FAMILY is the last one of whose headers FILE includes each, itself or by what it includes, or `none`;
+# SOURCE is one that includes FILE, and so is compiled with what FILE needs.
 
 function folder(file) { return substr(file, 1, match(file, /\/[^\/]*$/)) }
 
@@ -65,31 +65,37 @@ function family_of(file,    best, i, j, fits) {
   best = "none"
   for (i = 1; i <= families; ++i) {
     fits = 1
-    for (j = 1; j <= sizes[i] && fits; ++j) fits = ("<" members[i, j] ">") in reached
+    for (j = 1; j <= counts[names[i]] && fits; ++j) fits = included[names[i], j] in reached
     if (fits) best = names[i]
   }
   return family[file] = best
 }
 
+# That FILE is to be read, as `source` is compiled.
+function plan(file, source) {
+  print file, family_of(file), source
+  if (!(family[file] in compiled_as)) compiled_as[family[file]] = source
+}
+
 FNR == 1 { ++input }
 
 input == 1 {
-  names[++families] = $1
-  sizes[families] = NF - 1
-  for (i = 2; i <= NF; ++i) members[families, i - 1] = $i
-  next
-}
-
-input == 2 {
   header = $1
   $1 = ""
   implied["<" header ">"] = $0
   next
 }
 
+input == 2 {
+  names[++families] = $1
+  scan($1)
+  family[$1] = "none"  # clang 14 does not bear one upon another
+  next
+}
+
 # What a source includes first is read on its own there, if with the same family.
 {
-  print $1, family_of($1), $1
+  plan($1, $1)
   delete reached
   reach($1)
   for (file in reached) if (file !~ /^</ && !(file in user)) user[file] = $1
@@ -98,5 +104,6 @@ input == 2 {
 }
 
 END {
-  for (file in user) if (!(file in on_its_own)) print file, family_of(file), user[file]
+  for (file in user) if (!(file in on_its_own)) plan(file, user[file])
+  for (i = 1; i <= families; ++i) if (names[i] in compiled_as) plan(names[i], compiled_as[names[i]])
 }
