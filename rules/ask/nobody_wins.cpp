@@ -173,8 +173,9 @@ class PortFindings {
   // port. A circle of which a statement says that nobody wins is passed over with its inhibitions.
   void warn_of_circle() {
     std::size_t tries = 0;
+    const Candidates in_circles = those_in_circles();
     for (std::size_t first = 0; first < candidates_.size(); ++first) {
-      for (;;) {
+      while (in_circles[first]) {
         const std::vector<std::size_t> circle = shortest_circle(first);
         if (circle.empty()) break;
         if (statements_.empty() || !is_stated(circle)) return warn_of(circle);
@@ -184,6 +185,20 @@ class PortFindings {
         if (++tries == kMaxCirclesTried) return;
       }
     }
+  }
+
+  // All of them, and some between two circles: without those that keep nobody out, without those
+  // that keep out nobody but them, and so on.
+  [[nodiscard]] Candidates those_in_circles() const {
+    Candidates left;
+    for (std::size_t i = 0; i < candidates_.size(); ++i) left.set(i);
+    for (Candidates before; before != left;) {
+      before = left;
+      for (std::size_t i = 0; i < candidates_.size(); ++i) {
+        if ((keeps_out_[i] & left).none()) left.reset(i);
+      }
+    }
+    return left;
   }
 
   bool is_stated(const std::vector<std::size_t>& circle) {
