@@ -3,7 +3,9 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -40,6 +42,16 @@ std::optional<RoudiIdentity> find_roudi(const std::string& socket_path) {
   return RoudiIdentity{
       before.st_dev, before.st_ino,
       std::int64_t{before.st_ctim.tv_sec} * 1'000'000'000 + before.st_ctim.tv_nsec};
+}
+
+bool is_closed_to_us(const std::string& socket_path) {
+  return ::access(socket_path.c_str(), W_OK) != 0 && errno == EACCES;
+}
+
+bool are_ours_closed_to(const std::string& socket_path) {
+  struct stat roudi {};
+  if (::stat(socket_path.c_str(), &roudi) != 0 || roudi.st_uid == 0) return false;
+  return roudi.st_uid != ::geteuid() && roudi.st_gid != ::getegid();
 }
 
 // It holds a lock as long as it lives. A line of /proc/locks:

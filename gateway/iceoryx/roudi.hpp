@@ -25,6 +25,11 @@ struct RoudiIdentity {
 // Nothing: none runs. A stopped one does. Sends it nothing.
 [[nodiscard]] std::optional<RoudiIdentity> find_roudi(const std::string& socket_path);
 
+// Users and groups may be in the way: of this user to RouDi's socket, or of RouDi's to those that
+// iceoryx makes for this process, which are of its user and group.
+[[nodiscard]] bool is_closed_to_us(const std::string& socket_path);
+[[nodiscard]] bool are_ours_closed_to(const std::string& socket_path);
+
 // Whether somebody has stopped it (SIGSTOP); false where that cannot be known.
 [[nodiscard]] bool is_roudi_stopped();
 
