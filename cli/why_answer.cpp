@@ -118,7 +118,10 @@ void WhyAnswer::write_rest(const std::vector<const ConnectionExplanation*>& rest
   write_summary(out_, rest);
   std::vector<std::string> obstructed;
   for (const auto* each : rest) {
-    if (!obstacles_.of_connection(each->source).empty()) obstructed.push_back(each->source);
+    const auto obstacles = obstacles_.of_connection(each->source);
+    const bool is_obstructed = std::any_of(obstacles.begin(), obstacles.end(),
+                                           [](const auto& one) { return one.is_wrong; });
+    if (is_obstructed) obstructed.push_back(each->source);
   }
   if (!obstructed.empty()) {
     out_ << "  ! there is more to say about " << rules::enumerate(obstructed) << '\n';

@@ -309,7 +309,8 @@ void write_obstacles(std::ostream& out, const std::vector<watch::Obstacle>& obst
   for (const auto& each : obstacles) {
     // Some texts begin with the name already.
     const bool is_named = !of.empty() && each.text.starts_with(of + ' ');
-    out << "  ! " << (of.empty() || is_named ? "" : of + ": ") << each.text << '\n';
+    out << (each.is_wrong ? "  ! " : "  ") << (of.empty() || is_named ? "" : of + ": ") << each.text
+        << '\n';
   }
 }
 

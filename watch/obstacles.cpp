@@ -41,11 +41,13 @@ void add_unknown(const StrangerStatus& stranger, std::vector<Obstacle>& result) 
   add_stopped(stranger.pid, who, result);
 }
 
-// What the component says of its port: how things stand outside is what keeps samples out, or
-// nothing.
+// What the component says of its port, in words of its own: how things stand outside may be what
+// keeps samples out.
 void add_outside(const std::string& name, const char* how, const auto& open,
                  std::vector<Obstacle>& result) {
-  if (open.described) result.push_back({"outside", name + how + shm::printable(*open.described)});
+  if (open.described) {
+    result.push_back({"outside", name + how + shm::printable(*open.described), false});
+  }
 }
 
 // Who has asked for the port in vain last; null: nobody.
@@ -178,25 +180,33 @@ std::vector<Obstacle> Obstacles::of_connection(const std::string& source) const 
         {"type-mismatch", "not connected, the two ports do not fit: " + *connection.mismatch});
     return result;
   }
-  const auto say = [&](std::uint64_t count, const char* code, const std::string& what) {
-    if (count != 0) result.push_back({code, std::to_string(count) + what});
+  const auto say = [&](std::uint64_t count, const char* code, const std::string& one,
+                       const std::string& several, bool is_wrong) {
+    if (count == 0) return;
+    result.push_back(
+        {code, rules::counted(count, "sample") + (count == 1 ? one : several), is_wrong});
   };
   const std::string component =
       is_open() ? "component " + component_text(*input_) : "the component";
   // Counted from the opening of the ports on: it may be long ago.
-  say(connection.refused, "refused",
-      " samples have been refused since the ports were opened, because the queue was full "
-      "(refuse_new)");
-  say(connection.overtaken, "overtaken",
-      " samples have been lost to newer ones since the ports were opened, because " + component +
-          " took them too slowly");
-  say(connection.dropped, "dropped",
-      " samples that had been accepted were dropped at the take since the ports were opened, "
-      "because this connection no longer won");
-  say(connection.waiting, "waiting", " samples wait to be taken");
+  const std::string full =
+      " been refused since the ports were opened, because the queue was full (refuse_new)";
+  say(connection.refused, "refused", " has" + full, " have" + full, true);
+  const std::string slow = " been lost to newer ones since the ports were opened, because " +
+                           component + " took them too slowly";
+  say(connection.overtaken, "overtaken", " has" + slow, " have" + slow, true);
+  // Arbitration at both ends is no fault, nor is a component that takes when it wants to.
+  const std::string lost =
+      " dropped at the take since the ports were opened, because this connection no longer won";
+  say(connection.dropped, "dropped", " that had been accepted was" + lost,
+      " that had been accepted were" + lost, false);
+  say(connection.waiting, "waiting", " waits to be taken", " wait to be taken", false);
   if (connection.accepted != 0 && connection.taken + connection.dropped == 0) {
-    result.push_back({"none-taken", component + " has not taken any of the " +
-                                        std::to_string(connection.accepted) + " accepted samples"});
+    result.push_back({"none-taken", component + " has not taken " +
+                                        (connection.accepted == 1
+                                             ? "the accepted sample"
+                                             : "any of the " + std::to_string(connection.accepted) +
+                                                   " accepted samples")});
   }
   return result;
 }

@@ -11,8 +11,9 @@
 namespace arbiter::watch {
 
 struct Obstacle {
-  const char* code;  // docs/explaining.md has them
-  std::string text;  // for people
+  const char* code;      // docs/explaining.md has them
+  std::string text;      // for people
+  bool is_wrong = true;  // else it is worth knowing, and may be as it should be
 };
 
 class Obstacles {

@@ -247,7 +247,11 @@ TEST(WhyNames, CountsAsWaitingNoMoreThanThereIsRoomFor) {
   EXPECT_EQ(before["waiting"], 2);
   EXPECT_EQ(before["overtaken"], 3);
   EXPECT_EQ(daemon.input("/base")["overtaken"], 3);
+  std::string text = why({"/base", "/wander"});
+  EXPECT_THAT(text, HasSubstr("\n  2 samples wait to be taken\n")) << "which is no fault";
+  EXPECT_THAT(text, HasSubstr("\n  ! 3 samples have been lost to newer ones since"));
   EXPECT_TRUE(in.take());
+  EXPECT_THAT(why({"/base", "/wander"}), HasSubstr("\n  1 sample waits to be taken\n"));
   const json after = daemon.connection("/wander", "/base");
   EXPECT_EQ(after["waiting"], 1);
   EXPECT_EQ(after["overtaken"], 3);
