@@ -42,6 +42,8 @@ std::string_view same_beginning(std::string_view name, std::string_view before_s
   return name.substr(0, at);
 }
 
+constexpr const char* kIsOutput = "output port: name an input port that it is connected to";
+
 }  // namespace
 
 std::string similar_pattern(const std::string& pattern,
@@ -59,44 +61,39 @@ std::string similar_pattern(const std::string& pattern,
   return rules::find_similar(pattern, {candidates.begin(), candidates.end()}).value_or("");
 }
 
-void PatternCheck::warn(const std::string& pattern, const std::vector<std::string_view>& names,
-                        const std::vector<std::string_view>& others, const std::string& what,
-                        const std::string& other_what) const {
-  if (match_among(names, pattern) != nullptr) return;
-  std::string text = option_ + ' ' + shm::printable(shell_word(pattern)) + " matches no " + what;
-  if (const std::string_view* const other = match_among(others, pattern)) {
-    text += "; " + shm::printable(std::string(*other)) + " is an " + other_what;
-  } else if (const std::string similar = similar_pattern(pattern, names); !similar.empty()) {
+void warn_without_match(const std::string& option, const std::string& pattern,
+                        const PatternNames& known) {
+  if (match_among(known.names, pattern) != nullptr) return;
+  std::string text =
+      option + ' ' + shm::printable(shell_word(pattern)) + " matches no " + known.what;
+  if (const std::string_view* const other = match_among(known.others, pattern)) {
+    text += "; " + shm::printable(std::string(*other)) + " is an " + known.other_what;
+  } else if (const std::string similar = similar_pattern(pattern, known.names); !similar.empty()) {
     text += "; did you mean " + rules::quote(shm::printable(similar)) + '?';
   }
   std::cerr << "arbiter: warning: " + text + '\n';
 }
 
 void PatternCheck::inputs(const std::vector<std::string>& patterns) const {
-  for (const std::string& pattern : patterns) {
-    warn(pattern, names_of(status_.inputs), names_of(status_.sources),
-         "input port that is open or in the model in force",
-         "output port: name an input port that it is connected to");
-  }
+  const PatternNames known{names_of(status_.inputs), names_of(status_.sources),
+                           "input port that is open or in the model in force", kIsOutput};
+  for (const std::string& pattern : patterns) warn_without_match(option_, pattern, known);
 }
 
 void PatternCheck::arbitrated_inputs(const std::vector<std::string>& patterns) const {
-  std::vector<std::string_view> names;
+  PatternNames known{
+      {}, names_of(status_.sources), "input port that the model in force arbitrates", kIsOutput};
   for (const wire::InputStatus& input : status_.inputs) {
-    if (input.arbitrated) names.push_back(input.name);
+    if (input.arbitrated) known.names.push_back(input.name);
   }
-  for (const std::string& pattern : patterns) {
-    warn(pattern, names, names_of(status_.sources), "input port that the model in force arbitrates",
-         "output port: name an input port that it is connected to");
-  }
+  for (const std::string& pattern : patterns) warn_without_match(option_, pattern, known);
 }
 
 void PatternCheck::outputs(const std::vector<std::string>& patterns) const {
-  for (const std::string& pattern : patterns) {
-    warn(pattern, names_of(status_.sources), names_of(status_.inputs),
-         "output port that is open or in the model in force",
-         "input port: name an output port that is connected to it");
-  }
+  const PatternNames known{names_of(status_.sources), names_of(status_.inputs),
+                           "output port that is open or in the model in force",
+                           "input port: name an output port that is connected to it"};
+  for (const std::string& pattern : patterns) warn_without_match(option_, pattern, known);
 }
 
 }  // namespace arbiter::cli

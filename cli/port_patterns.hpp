@@ -24,13 +24,20 @@ class PatternCheck {
   void outputs(const std::vector<std::string>& patterns) const;
 
  private:
-  void warn(const std::string& pattern, const std::vector<std::string_view>& names,
-            const std::vector<std::string_view>& others, const std::string& what,
-            const std::string& other_what) const;
-
   const std::string option_;
   const wire::Status& status_;
 };
+
+// Ports that a pattern may match, and those at the other end, which it does not mean.
+struct PatternNames {
+  std::vector<std::string_view> names, others;
+  std::string what;        // "input port that is open"
+  std::string other_what;  // "output port: name an input port that it is connected to"
+};
+
+// Says so on standard error where the pattern matches none of the names.
+void warn_without_match(const std::string& option, const std::string& pattern,
+                        const PatternNames& known);
 
 // What a pattern that matches none of the names was probably meant to be: "/Base/*" for "/Bse/*".
 // Empty: nothing like it is there.

@@ -5,20 +5,24 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "cli/live.hpp"
+#include "cli/port_patterns.hpp"
 #include "cli/recording_times.hpp"
 #include "cli/simulate_recording.hpp"
 #include "evidence/recorded.hpp"
 #include "rules/model/quantifiers.hpp"
 #include "rules/text/names.hpp"
 #include "shm/utf8.hpp"
+#include "watch/process.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -39,6 +43,7 @@ struct Reign {
   shm::Nanoseconds end = 0;
   bool is_cut_off = false;  // by the end of the run: how long it went on is not known
   bool is_of_last_run = false;
+  const evidence::Run* run = nullptr;
 };
 
 // Nothing is recorded of a port that is idle when recording begins: what comes first says that it
@@ -67,13 +72,13 @@ std::vector<Reign> reigns_of(const Recorded& recorded, const std::string& patter
                        [](const auto* one, const auto* other) { return one->time < other->time; });
       const bool is_last_run = &run == &recorded.runs.back();
       if (const auto idle = idle_before(*changes.front(), run)) {
-        all.push_back({*idle, changes.front()->time, false, is_last_run});
+        all.push_back({*idle, changes.front()->time, false, is_last_run, &run});
       }
       for (std::size_t i = 0; i < changes.size(); ++i) {
         const bool is_last = i + 1 == changes.size();
         const shm::Nanoseconds end =
             is_last ? std::max(run.end, changes[i]->time) : changes[i + 1]->time;
-        all.push_back({*changes[i], end, is_last, is_last_run});
+        all.push_back({*changes[i], end, is_last, is_last_run, &run});
       }
     }
   }
@@ -81,6 +86,74 @@ std::vector<Reign> reigns_of(const Recorded& recorded, const std::string& patter
     return one.change.time < other.change.time;
   });
   return all;
+}
+
+// A component has an output port open. It is seen a little later than it happens.
+struct Ownership {
+  const evidence::PortChange* opening = nullptr;
+  shm::Nanoseconds until = shm::kForever;
+
+  [[nodiscard]] shm::Nanoseconds since() const { return opening->seen; }
+};
+
+std::vector<Ownership> ownerships_of(const evidence::Run& run, const std::string& source) {
+  using What = evidence::PortChange::What;
+  std::vector<Ownership> all;
+  const auto changes = run.output_changes.find(source);
+  if (changes == run.output_changes.end()) return all;
+  for (const evidence::PortChange& each : changes->second) {
+    const bool is_opening = each.what == What::open || each.what == What::opened;
+    const bool ends_last = !all.empty() && all.back().until == shm::kForever &&
+                           (is_opening || all.back().opening->pid == each.pid);
+    if (ends_last) all.back().until = each.seen;
+    // One that nobody saw open may have died all the same.
+    if (is_opening || (!ends_last && each.what == What::died)) {
+      all.push_back({&each, is_opening ? shm::kForever : each.seen});
+    }
+  }
+  return all;
+}
+
+// Who published what won. A source may win after its component has gone.
+std::vector<const evidence::PortChange*> components_of(const Reign& reign) {
+  const evidence::WinnerChange& change = reign.change;
+  const bool begins_itself =
+      change.why == evidence::WinnerChange::Why::arrival && change.by == change.winner;
+  const evidence::PortChange* before = nullptr;
+  std::vector<const evidence::PortChange*> found;
+  for (const Ownership& each : ownerships_of(*reign.run, change.winner)) {
+    if (each.until <= change.time) {
+      before = each.opening;
+    } else if (each.since() < reign.end || (found.empty() && begins_itself)) {
+      if (found.empty() && each.since() > change.time && !begins_itself && before != nullptr) {
+        found.push_back(before);
+      }
+      found.push_back(each.opening);
+    }
+  }
+  if (found.empty() && before != nullptr) found.push_back(before);
+  return found;
+}
+
+// " of nav (pid 4711)", " from host base"; empty: not known.
+std::string components_text(const Reign& reign) {
+  std::string text;
+  for (const evidence::PortChange* each : components_of(reign)) {
+    const std::string one = shm::printable(each->host.empty() ? "of " + watch::process_text(*each)
+                                                              : "from host " + each->host);
+    text += (text.empty() ? " " : ", then ") + one;
+  }
+  return text;
+}
+
+ordered_json components_json(const Reign& reign) {
+  ordered_json list = ordered_json::array();
+  for (const evidence::PortChange* each : components_of(reign)) {
+    list.push_back({{"node", each->node},
+                    {"pid", each->pid},
+                    {"host", each->host.empty() ? ordered_json() : ordered_json(each->host)}});
+  }
+  return list;
 }
 
 std::string cause_text(const evidence::WinnerChange& change) {
@@ -118,9 +191,26 @@ std::string nobody_text(const RecordedWinners& options) {
               : "an input port that matches " + shm::printable(options.port) + "\n");
 }
 
+// A pattern may be misspelt: nobody has won there then.
+void warn_of_pattern_without_match(const Recorded& recorded, const std::string& pattern) {
+  std::set<std::string_view> ports;
+  std::set<std::string_view> sources;
+  for (const evidence::Run& run : recorded.runs) {
+    for (const evidence::WinnerChange& each : run.winners) ports.insert(each.port);
+    for (const evidence::PortChange& each : run.port_changes) ports.insert(each.port);
+    for (const auto& [source, history] : run.sources) sources.insert(source);
+  }
+  warn_without_match("--port", pattern,
+                     {{ports.begin(), ports.end()},
+                      {sources.begin(), sources.end()},
+                      "input port of which the recording tells",
+                      "output port: name an input port that it is connected to"});
+}
+
 int show_winners(const RecordedWinners& options) {
   const Recorded recorded = load_for_simulation(options.file);
   warn_of_missed(recorded);
+  if (!options.port.empty()) warn_of_pattern_without_match(recorded, options.port);
   std::vector<Reign> reigns = reigns_of(recorded, options.port);
   if (!options.at.empty()) {
     const TimeSpan span = read_moment(options.at, recorded.runs.front().start,
@@ -141,6 +231,7 @@ int show_winners(const RecordedWinners& options) {
            {"cut_off", reign.is_cut_off},
            {"port", change.port},
            {"winner", change.winner.empty() ? ordered_json() : ordered_json(change.winner)},
+           {"components", components_json(reign)},
            {"why", evidence::name_of(change.why)},
            {"by", change.by},
            {"generation", change.generation}});
@@ -152,8 +243,9 @@ int show_winners(const RecordedWinners& options) {
   for (const Reign& reign : reigns) {
     const evidence::WinnerChange& change = reign.change;
     out << clock_text(change.time + offset) << "  " << shm::printable(change.port) << "  "
-        << (change.winner.empty() ? "idle" : shm::printable(change.winner)) << "  "
-        << length_text(reign) << ": " << cause_text(change) << '\n';
+        << (change.winner.empty() ? "idle" : shm::printable(change.winner))
+        << components_text(reign) << "  " << length_text(reign) << ": " << cause_text(change)
+        << '\n';
   }
   if (reigns.empty()) out << nobody_text(options);
   std::cout << out.str();
@@ -173,7 +265,8 @@ void add_recorded_winners(CLI::App& parent, int& exit_code) {
   verb->add_option("--port", options->port, "Only at input ports that match this pattern")
       ->type_name("PATTERN");
   verb->add_flag("--json", options->json,
-                 "A list of {from, from_ns, to_ns, cut_off, port, winner, why, by, generation}");
+                 "A list of {from, from_ns, to_ns, cut_off, port, winner, components, why, by, "
+                 "generation}");
   verb->footer(
       "Example:\n  arbiter recording winners incident.mcap --at 14:03:07\n\n"
       "Exit codes: 0 shown; 1 a file that `arbiter record` has not made; 2 wrong use, a time that "

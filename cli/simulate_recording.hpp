@@ -14,6 +14,7 @@ struct SimulateRecordingOptions {
   double effort = 1;
   bool each = false;  // with another model: a line for each changed decision
   bool json = false;
+  std::string at{};  // with --why: only at that time of day; empty: throughout
 };
 
 // Says on standard error where it is not whole. Throws McapError, RecordError.

@@ -29,6 +29,7 @@ struct SimulateOptions {
   std::string trace;
   std::string recording;
   std::string why;  // all_ports, or the port; empty: no
+  std::string at;
   double effort = 1;
   bool each = false;
   bool json = false;
@@ -146,6 +147,13 @@ void add_simulate(CLI::App& app, int& exit_code) {
                              "Instead of the CSV, or of what is compared, show each change of a "
                              "winner and each discarded arrival, with its cause; --why=PORT: for "
                              "this port only");
+  verb->add_option("--at", options->at,
+                   "With --recording and --why: only at this time of day, and what led to it, in "
+                   "your time zone (TZ): 14:03:07 (all of that second), 14:03:07.250, "
+                   "'2026-11-22 14:03:07'")
+      ->type_name("TIME")
+      ->needs(recording)
+      ->needs(why);
   add_effort_option(*verb, options->effort);
   verb->add_flag("--each", options->each,
                  "With --recording and a model: a line for each decision that changes, also where "
@@ -160,7 +168,8 @@ void add_simulate(CLI::App& app, int& exit_code) {
       "  arbiter simulate search_and_track.xml --trace trace.csv --why=/Gaze/pos:i\n"
       "  arbiter simulate --recording incident.mcap\n"
       "  arbiter simulate --recording incident.mcap --model corrected.xml\n"
-      "  arbiter simulate --recording incident.mcap --why=/Gaze/pos:i\n\n"
+      "  arbiter simulate --recording incident.mcap --why=/Gaze/pos:i\n"
+      "  arbiter simulate --recording incident.mcap --why --at 14:03:07\n\n"
       "Exit codes: 0 done; with --recording, unless with --why: all is as it was; 1 an error in "
       "the model or\ntrace; with --recording: something differs, or it has no decision; 2 wrong "
       "use, or a file that\ncannot be opened");
@@ -168,7 +177,7 @@ void add_simulate(CLI::App& app, int& exit_code) {
     require_no_port_among_files(*options);
     if (!options->recording.empty()) {
       const SimulateRecordingOptions simulated{options->recording, options->files, options->effort,
-                                               options->each, options->json};
+                                               options->each,      options->json,  options->at};
       exit_code = options->why.empty() ? simulate_recording(simulated)
                                        : explain_recording(simulated, port_of(options->why));
       return;

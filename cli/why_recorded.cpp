@@ -15,6 +15,7 @@
 #include "evidence/cues.hpp"
 #include "evidence/judge.hpp"
 #include "rules/ask/report.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -64,18 +65,27 @@ class Explaining {
         if (tenure_ == nullptr) continue;
         tenure_->why.lose(*gap->source, gap->events, gap->from, gap->to, std::cout);
       }
+      if (cue.time >= options_.to) break;
       if (cue.model != nullptr) {
         put_in_force(*cue.model, cue.time);
       } else {
         take(run, cue);
       }
     }
-    if (tenure_ != nullptr) tenure_->why.run_out_until(run.end, std::cout);
+    if (tenure_ == nullptr) return;
+    tenure_->why.end(run.end, std::cout);
+    has_told_ = has_told_ || tenure_->why.has_told();
   }
+
+  // Whether there was anything to tell.
+  [[nodiscard]] bool has_told() const { return has_told_; }
 
  private:
   void put_in_force(const evidence::ModelChange& change, shm::Nanoseconds time) {
-    if (tenure_ != nullptr) tenure_->why.run_out_until(time, std::cout);
+    if (tenure_ != nullptr) {
+      tenure_->why.run_out_until(time, std::cout);
+      has_told_ = has_told_ || tenure_->why.has_told();
+    }
     if (other_ != nullptr && tenure_ != nullptr) return;
     tenure_.reset();
     if (other_ == nullptr && change.generation == 0) return;  // no model
@@ -127,6 +137,7 @@ class Explaining {
   std::map<std::string, std::map<shm::Nanoseconds, Gap>> gaps_;
   std::unique_ptr<Tenure> tenure_;
   bool is_first_ = true;  // no model of this run has come into force
+  bool has_told_ = false;
 };
 
 }  // namespace
@@ -142,9 +153,27 @@ int explain_recording(const SimulateRecordingOptions& options, const std::string
     if (!model) return 1;
     other = std::make_shared<const Model>(std::move(*model));
   }
-  const auto time = [&](shm::Nanoseconds at) { return since_first(recorded, at); };
-  Explaining explaining(std::move(other), options.effort, {port, options.json, time});
+  const auto clock = [&](shm::Nanoseconds at) {
+    return clock_text(at + recorded.about.wall_offset);
+  };
+  WhySimulated::Options told;
+  told.port = port;
+  told.json = options.json;
+  told.clock = clock;
+  told.time = [&](shm::Nanoseconds at) {
+    return clock(at) + " (" + since_first(recorded, at) + ")";
+  };
+  if (!options.at.empty()) {
+    const TimeSpan span = read_moment(options.at, recorded.runs.front().start,
+                                      recorded.runs.back().end, recorded.about.wall_offset);
+    told.from = span.from;
+    told.to = span.to;
+  }
+  Explaining explaining(std::move(other), options.effort, std::move(told));
   for (const Run& run : recorded.runs) explaining.explain(run);
+  if (!options.at.empty() && !options.json && !explaining.has_told()) {
+    std::cout << "nobody won at " << shm::printable(options.at) << ", and nothing happened\n";
+  }
   return 0;
 }
 

@@ -25,10 +25,6 @@ std::string time_text(shm::Nanoseconds time) {
   return result + " s";
 }
 
-void write_line(std::ostream& out, const json& line) {
-  out << line.dump(-1, ' ', false, json::error_handler_t::replace) << '\n';
-}
-
 }  // namespace
 
 WhySimulated::WhySimulated(const rules::RuleSet& rules, rules::Simulation& simulation,
@@ -64,6 +60,32 @@ void WhySimulated::run_out_until(shm::Nanoseconds time, std::ostream& out) {
     while (!ends_.empty() && ends_.begin()->first == simulation_.now()) ends_.erase(ends_.begin());
     tell_changes(out);
   }
+  if (time > options_.from) tell_held(out);
+}
+
+void WhySimulated::end(shm::Nanoseconds time, std::ostream& out) {
+  run_out_until(time, out);
+  if (time >= options_.from) tell_held(out);
+}
+
+std::string WhySimulated::line_of(json event, shm::Nanoseconds time) const {
+  if (options_.clock) event["time"] = options_.clock(time);
+  return event.dump(-1, ' ', false, json::error_handler_t::replace) + '\n';
+}
+
+void WhySimulated::tell(shm::PortId port, std::string line, std::ostream& out) {
+  const shm::Nanoseconds now = simulation_.now();
+  if (now >= options_.to) return;
+  if (now > options_.from) tell_held(out);
+  std::erase_if(held_, [&](const Held& each) { return each.port == port; });
+  held_.push_back({port, std::move(line)});
+  if (now >= options_.from) tell_held(out);
+}
+
+void WhySimulated::tell_held(std::ostream& out) {
+  for (const Held& each : held_) out << each.line;
+  has_told_ = has_told_ || !held_.empty();
+  held_.clear();
 }
 
 void WhySimulated::begin(std::ostream& out) {
@@ -78,13 +100,15 @@ void WhySimulated::begin(std::ostream& out) {
     const bool is_wanted = options_.port.empty() || options_.port == name;
     if (winners_[port] == shm::kNone || !is_wanted) continue;
     if (options_.json) {
-      write_line(out, {{"t_ns", simulation_.now()},
+      const json event{{"t_ns", simulation_.now()},
                        {"port", name},
                        {"event", "begin"},
-                       {"winner", name_of(winners_[port])}});
+                       {"winner", name_of(winners_[port])}};
+      tell(port, line_of(event, simulation_.now()), out);
     } else {
-      out << time_of_now() << "  " << name << "  " << name_of(winners_[port])
-          << " wins as this begins\n";
+      tell(port,
+           time_of_now() + "  " + name + "  " + name_of(winners_[port]) + " wins as this begins\n",
+           out);
     }
   }
 }
@@ -109,17 +133,21 @@ void WhySimulated::lose(const std::string& source, std::uint64_t events, shm::Na
   for (shm::Word i = 0; i < ports.count; ++i) {
     is_wanted |= options_.port.empty() || options_.port == simulation_.port_name(ports[i]);
   }
-  if (!is_wanted) return;
+  if (!is_wanted || to <= options_.from || from >= options_.to) return;
+  std::string line;
   if (options_.json) {
-    write_line(out, {{"t_ns", from},
-                     {"event", "missed"},
-                     {"source", source},
-                     {"events", events},
-                     {"until_ns", to}});
-    return;
+    line = line_of({{"t_ns", from},
+                    {"event", "missed"},
+                    {"source", source},
+                    {"events", events},
+                    {"until_ns", to}},
+                   from);
+  } else {
+    line = text_of(from) + "  the recorder missed " + rules::counted(events, "event") + " of " +
+           source + " from here until " + text_of(to) + ": what depends on it is not known\n";
   }
-  out << text_of(from) << "  the recorder missed " << rules::counted(events, "event") << " of "
-      << source << " from here until " << text_of(to) << ": what depends on it is not known\n";
+  held_.push_back({shm::kNone, std::move(line)});
+  if (from >= options_.from) tell_held(out);
 }
 
 // An end that a renewal has put off is looked at in vain.
@@ -186,6 +214,7 @@ void WhySimulated::tell_change(shm::PortId port, shm::SourceId before, shm::Sour
                                std::ostream& out) {
   const std::string& name = simulation_.port_name(port);
   if (!options_.port.empty() && options_.port != name) return;
+  if (simulation_.now() >= options_.to) return;
   const Sources sources = sources_at(port);
   const auto causes = rules::causes_of_change(
       simulation_.table(), port, [this](shm::SourceId source) { return was_active_[source]; },
@@ -199,27 +228,31 @@ void WhySimulated::tell_change(shm::PortId port, shm::SourceId before, shm::Sour
       if (is_in_gap(source)) event["is_in_gap"] = true;
       because.push_back(std::move(event));
     }
-    write_line(out, {{"t_ns", simulation_.now()},
+    const json event{{"t_ns", simulation_.now()},
                      {"port", name},
                      {"event", "change"},
                      {"old", before == shm::kNone ? json(nullptr) : json(name_of(before))},
                      {"winner", now == shm::kNone ? json(nullptr) : json(name_of(now))},
                      {"because", std::move(because)},
-                     {"old_loses", loss.empty() ? json(nullptr) : json(loss)}});
+                     {"old_loses", loss.empty() ? json(nullptr) : json(loss)}};
+    tell(port, line_of(event, simulation_.now()), out);
     return;
   }
-  out << time_of_now() << "  " << name << "  " << name_of(before) << " -> " << name_of(now)
-      << "  because ";
+  std::string line =
+      time_of_now() + "  " + name + "  " + name_of(before) + " -> " + name_of(now) + "  because ";
   for (std::size_t i = 0; i < causes.size(); ++i) {
     const std::string& source = simulation_.source_name(causes[i]);
-    out << (i == 0 ? "" : " and ") << cause_text(source, sources);
+    line += (i == 0 ? "" : " and ") + cause_text(source, sources);
   }
-  if (!loss.empty()) out << "; " << name_of(before) << " is " << loss;
-  out << '\n';
+  if (!loss.empty()) line += "; " + name_of(before) + " is " + loss;
+  tell(port, line + '\n', out);
 }
 
 void WhySimulated::tell_discarded(const rules::OutcomeRow& row, std::ostream& out) {
   if (!options_.port.empty() && options_.port != row.port) return;
+  if (row.event.at < options_.from || row.event.at >= options_.to) return;
+  tell_held(out);
+  has_told_ = true;
   const auto& ports = simulation_.port_names();
   const auto port = static_cast<shm::PortId>(
       std::lower_bound(ports.begin(), ports.end(), row.port) - ports.begin());
@@ -228,10 +261,11 @@ void WhySimulated::tell_discarded(const rules::OutcomeRow& row, std::ostream& ou
   for (const auto& connection : explanation.connections) {
     if (connection.source != row.event.source) continue;
     if (options_.json) {
-      write_line(out, {{"t_ns", row.event.at},
+      const json event{{"t_ns", row.event.at},
                        {"port", row.port},
                        {"event", "discarded"},
-                       {"connection", connection_json(connection, sources)}});
+                       {"connection", connection_json(connection, sources)}};
+      out << line_of(event, row.event.at);
     } else {
       out << time_of_now() << "  " << row.port << "  " << connection.source
           << " discarded: " << first_cause(connection, sources) << '\n';

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "cli/why_report.hpp"
 #include "rules/explain/explain.hpp"
 #include "rules/explain/simulation.hpp"
@@ -26,8 +28,13 @@ class WhySimulated {
     bool json = false;
     // How a time is told; empty: in seconds.
     std::function<std::string(shm::Nanoseconds)> time{};
+    // The time of day, which JSON then has too; empty: it is not known.
+    std::function<std::string(shm::Nanoseconds)> clock{};
     // Whether what a source did just then is not in the recording; empty: all is known.
     std::function<bool(const std::string& source, shm::Nanoseconds)> is_in_gap{};
+    // Only from the first moment to before the second, and what held as it began.
+    shm::Nanoseconds from = 0;
+    shm::Nanoseconds to = shm::kForever;
   };
 
   // Keeps references. Throws std::runtime_error where the model does not know the port.
@@ -47,13 +54,27 @@ class WhySimulated {
             shm::Nanoseconds to, std::ostream& out);
   // Tells what ends by itself until then.
   void run_out_until(shm::Nanoseconds time, std::ostream& out);
+  // The same, where nothing follows.
+  void end(shm::Nanoseconds time, std::ostream& out);
+  // Whether it has told anything yet.
+  [[nodiscard]] bool has_told() const { return has_told_; }
 
  private:
+  // What was so before the moment that was asked for.
+  struct Held {
+    shm::PortId port = shm::kNone;  // whose winner it tells
+    std::string line;
+  };
+
   void schedule(shm::SourceId source);
   [[nodiscard]] std::string text_of(shm::Nanoseconds time) const;
   [[nodiscard]] std::string time_of_now() const { return text_of(simulation_.now()); }
   [[nodiscard]] bool is_in_gap(const std::string& source) const;
   [[nodiscard]] std::string cause_text(const std::string& source, const Sources& sources) const;
+  [[nodiscard]] std::string line_of(nlohmann::json event, shm::Nanoseconds time) const;
+  // Of a winner, now.
+  void tell(shm::PortId port, std::string line, std::ostream& out);
+  void tell_held(std::ostream& out);
   void tell_changes(std::ostream& out);
   void tell_change(shm::PortId port, shm::SourceId before, shm::SourceId now, std::ostream& out);
   void tell_discarded(const rules::OutcomeRow& row, std::ostream& out);
@@ -67,6 +88,8 @@ class WhySimulated {
   std::vector<shm::SourceId> winners_;                         // by port
   std::vector<bool> was_active_;                               // by source, when last told
   std::set<std::pair<shm::Nanoseconds, shm::SourceId>> ends_;  // of activity, as it was scheduled
+  std::vector<Held> held_;
+  bool has_told_ = false;
 };
 
 }  // namespace arbiter::cli

@@ -113,7 +113,8 @@ class Loader {
   void add(Start&& /*taken*/) {}
   void add(DestinationsChange&& /*contexts have it*/) {}
   void add(PortChange&& each) {
-    if (each.is_input) run().port_changes.push_back(std::move(each));
+    (each.is_input ? run().port_changes : run().output_changes[each.port])
+        .push_back(std::move(each));
   }
   // Of what was overtaken a state says where it goes on.
   void add(Missed&& each) {

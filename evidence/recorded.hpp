@@ -53,8 +53,10 @@ struct Run {
   std::map<std::uint64_t, ModelChange> models;  // by generation
   std::vector<WinnerChange> winners;            // as they were recorded
   std::vector<PortChange> port_changes;         // of input ports, as they were recorded
-  std::uint64_t lost = 0;                       // events
-  std::uint64_t lost_samples = 0;               // whose arrival is there, but not what was in them
+  // Of output ports, by name, as they were recorded.
+  std::map<std::string, std::vector<PortChange>> output_changes;
+  std::uint64_t lost = 0;          // events
+  std::uint64_t lost_samples = 0;  // whose arrival is there, but not what was in them
 };
 
 struct Recorded {

@@ -2,6 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/evidence/incident.hpp"
 #include "tests/support/text_files.hpp"
@@ -116,6 +120,12 @@ TEST(RecordedWinners, SaysWhoCommandedAtATimeOfTheClock) {
   EXPECT_EQ(winners({"--at", "1970-01-01 00:00:03"}).out, again);
   EXPECT_EQ(winners({"--at", "00:00:03", "--port", "/q*"}).out,
             "nobody won at 00:00:03, at an input port that matches /q*\n");
+  EXPECT_EQ(winners({"--port", "/p"}).err, "");
+  EXPECT_EQ(winners({"--port", "/pp"}).err,
+            "arbiter: warning: --port /pp matches no input port of which the recording tells; did "
+            "you mean \"/p\"?\n");
+  EXPECT_THAT(winners({"--port", "/lo*"}).err,
+              testing::HasSubstr("; /low is an output port: name an input port that"));
   EXPECT_THAT(winners({"--at", "00:00:02.6", "--json"}).out,
               testing::AllOf(testing::HasSubstr("\"winner\": \"/high\""),
                              testing::HasSubstr("\"cut_off\": false")));
@@ -141,6 +151,52 @@ TEST(RecordedWinners, SaysThatAPortIsIdleUntilSomebodyWins) {
             "arrived\n"
             "1970-01-01 00:00:02.005  /q  /low  for 3.000 s, until the end of the recording: model "
             "2 came into force\n");
+}
+
+// Of /low: a component that is there at the start dies, and another one opens the port, which the
+// recorder sees after the first arrival.
+TEST(RecordedWinners, SaysWhoseTheWinnerWas) {
+  using Why = evidence::WinnerChange::Why;
+  using What = evidence::PortChange::What;
+  constexpr shm::Nanoseconds kSecond = 1'000'000'000;
+  Incident incident(kOverride, {"/low", "/high"});
+  const auto tell = [&](What what, const char* port, const char* node, std::int64_t pid,
+                        shm::Nanoseconds seen, const char* host = "") {
+    incident.add(evidence::PortChange{what, false, port, node, pid, "", seen, host});
+  };
+  const auto win = [&](const char* winner, shm::Nanoseconds time, Why why, const char* by) {
+    incident.add(evidence::WinnerChange{"/p", winner, "/other", time, why, by, 1});
+  };
+  tell(What::open, "/low", "nav", 11, 1000);
+  tell(What::open, "/high", "arbiter-link", 12, 1000, "base");
+  win("/low", 1 * kSecond, Why::arrival, "/low");
+  win("/high", 2 * kSecond, Why::arrival, "/high");
+  tell(What::died, "/low", "nav", 11, 3 * kSecond);
+  win("/low", 4 * kSecond, Why::expiry, "/high");
+  win("", 5 * kSecond, Why::expiry, "/low");
+  win("/low", 6 * kSecond, Why::arrival, "/low");
+  win("/high", 6 * kSecond + 1, Why::arrival, "/high");
+  tell(What::opened, "/low", "nav", 22, 6 * kSecond + 2);
+  win("/low", 7 * kSecond, Why::expiry, "/high");
+  tell(What::closed, "/low", "nav", 22, 8 * kSecond);
+  tell(What::opened, "/low", "nav", 33, 8 * kSecond);
+  win("/unknown", 9 * kSecond, Why::expiry, "/low");
+  const std::string file = incident.file(10 * kSecond);
+  std::vector<std::string> words;
+  std::istringstream lines(arbiter({"recording", "winners", file}).out);
+  for (std::string line; std::getline(lines, line);) {
+    words.push_back(
+        line.substr(line.find("/p  ") + 4, line.find("  for ") - line.find("/p  ") - 4));
+  }
+  EXPECT_THAT(words, testing::ElementsAre(
+                         "/low of nav (pid 11)", "/high from host base", "/low of nav (pid 11)",
+                         "idle", "/low of nav (pid 22)", "/high from host base",
+                         "/low of nav (pid 22), then of nav (pid 33)", "/unknown"));
+  const auto found = nlohmann::json::parse(arbiter({"recording", "winners", "--json", file}).out);
+  EXPECT_EQ(found[0]["components"],
+            nlohmann::json::parse(R"([{"node": "nav", "pid": 11, "host": null}])"));
+  EXPECT_EQ(found[1]["components"][0]["host"], "base");
+  EXPECT_EQ(found[3]["components"], nlohmann::json::array());
 }
 
 TEST(RecordedWinners, SaysThatNobodyHasWon) {

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <thread>
 #include <vector>
@@ -150,6 +151,11 @@ std::string overridden_for_a_while(Incident& incident) {
   return incident.file();
 }
 
+ProgramResult in_utc(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), {"/usr/bin/env", "TZ=UTC", ARBITER_PROGRAMS "/arbiter"});
+  return run_program(arguments);
+}
+
 // What matters first; and a thousand arrivals that change alike are one line.
 TEST(SimulateRecording, SaysThatAForeignModelHasNoneOfThePorts) {
   Incident incident;
@@ -204,16 +210,21 @@ TEST(SimulateRecording, TellsWhyWinnersChangedAndArrivalsWereDiscarded) {
   const TemporaryDirectory directory;
   Incident incident;
   const std::string file = overridden_for_a_while(incident);
-  const auto result = arbiter({"simulate", "--recording", file, "--why=/p"});
+  const auto result = in_utc({"simulate", "--recording", file, "--why=/p"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  for (const char* line :
-       {"0.000000100 s before the first arrival  /p  /high wins as this begins\n",
-        "\n0.000000050 s before the first arrival  /p  /high -> idle  because /high went inactive",
-        "\n+0.000000000 s  /p  idle -> /low  because /low became active\n",
-        "\n+0.000000100 s  /p  /low -> /high  because /high became active; /low is inhibited by "
-        "behaviour \"High\" (model.xml:",
-        "\n+0.000000230 s  /p  /low discarded: inhibited by behaviour \"High\" (model.xml:",
-        "\n+0.000000300 s  /p  /high -> /low  because /high was deactivated"}) {
+  for (const char* line : {"1970-01-01 00:00:00.005 (0.000000100 s before the first arrival)  /p  "
+                           "/high wins as this begins\n",
+                           "\n1970-01-01 00:00:00.005 (0.000000050 s before the first arrival)  /p "
+                           " /high -> idle  because /high went inactive",
+                           "\n1970-01-01 00:00:00.005 (+0.000000000 s)  /p  idle -> /low  because "
+                           "/low became active\n",
+                           "\n1970-01-01 00:00:00.005 (+0.000000100 s)  /p  /low -> /high  because "
+                           "/high became active; /low is inhibited by "
+                           "behaviour \"High\" (model.xml:",
+                           "\n1970-01-01 00:00:00.005 (+0.000000230 s)  /p  /low discarded: "
+                           "inhibited by behaviour \"High\" (model.xml:",
+                           "\n1970-01-01 00:00:00.005 (+0.000000300 s)  /p  /high -> /low  because "
+                           "/high was deactivated"}) {
     EXPECT_THAT("\n" + result.out, HasSubstr(line));
   }
   const std::string other = directory.write("other.xml", kReversed);
@@ -224,6 +235,47 @@ TEST(SimulateRecording, TellsWhyWinnersChangedAndArrivalsWereDiscarded) {
   EXPECT_EQ(arbiter({"simulate", "--recording", file, "--why=/q"}).exit_code, 1);
 }
 
+// What held as it began, and what happened then. The wall clock is 5 ms ahead.
+TEST(SimulateRecording, TellsWhyAtATimeOfDay) {
+  constexpr shm::Nanoseconds kMs = 1'000'000;
+  std::string model = kOverride;
+  Incident incident(model.replace(model.find("500ns"), 5, "500ms"));
+  incident.arrive("/low", 1000 * kMs, 1000 * kMs, Incident::Fate::accepted, 500 * kMs);
+  incident.arrive("/high", 2000 * kMs, 2000 * kMs, Incident::Fate::accepted, 500 * kMs);
+  incident.arrive("/low", 2200 * kMs, 2200 * kMs, Incident::Fate::discarded, 500 * kMs);
+  const std::string file = incident.file(3000 * kMs);
+  const auto at = [&](const std::string& time, const std::string& more = "--why=/p") {
+    return in_utc({"simulate", "--recording", file, more, "--at", time});
+  };
+  const std::string low =
+      "1970-01-01 00:00:01.005 (+0.000000000 s)  /p  idle -> /low  because /low became active\n";
+  const std::string idle =
+      "1970-01-01 00:00:01.505 (+0.500000000 s)  /p  /low -> idle  because /low went inactive, 500 "
+      "ms after its last arrival\n";
+  EXPECT_EQ(at("00:00:01.250").out, low);
+  EXPECT_EQ(at("00:00:01").out, low + idle);
+  EXPECT_EQ(at("00:00:01.600").out, idle);
+  EXPECT_EQ(at("00:00:00").out, "nobody won at 00:00:00, and nothing happened\n");
+  const auto second = at("00:00:02");
+  EXPECT_EQ(second.exit_code, 0) << second.err;
+  EXPECT_THAT(
+      second.out,
+      testing::StartsWith(idle + "1970-01-01 00:00:02.005 (+1.000000000 s)  /p  idle -> /high "));
+  EXPECT_THAT(second.out,
+              HasSubstr("\n1970-01-01 00:00:02.205 (+1.200000000 s)  /p  /low discarded: "));
+  EXPECT_THAT(second.out,
+              HasSubstr("\n1970-01-01 00:00:02.505 (+1.500000000 s)  /p  /high -> /low "));
+  EXPECT_THAT(second.out,
+              HasSubstr("\n1970-01-01 00:00:02.705 (+1.700000000 s)  /p  /low -> idle "));
+  EXPECT_EQ(std::count(second.out.begin(), second.out.end(), '\n'), 5) << second.out;
+  EXPECT_THAT(at("00:00:02.600").out, testing::StartsWith("1970-01-01 00:00:02.505 (+1.5"));
+  const auto lines =
+      in_utc({"simulate", "--recording", file, "--why", "--json", "--at", "00:00:02.6"});
+  EXPECT_EQ(json::parse(lines.out)["time"], "1970-01-01 00:00:02.505");
+  EXPECT_EQ(at("00:00:09").exit_code, 2) << "not in the recording";
+  EXPECT_EQ(at("00:00:02", "--json").exit_code, 2) << "without --why";
+}
+
 // Each by what it says; what was active stays so.
 TEST(SimulateRecording, TellsWhyByTheModelThatWasInForce) {
   Incident incident;
@@ -231,11 +283,17 @@ TEST(SimulateRecording, TellsWhyByTheModelThatWasInForce) {
   incident.arrive("/high", 1200, 1201, Incident::Fate::accepted);
   incident.put_in_force(kReversed, 2, 1300);
   incident.arrive("/high", 1310, 1311, Incident::Fate::discarded);
-  const auto result = arbiter({"simulate", "--recording", incident.file(), "--why"});
+  const auto result = in_utc({"simulate", "--recording", incident.file(), "--why"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("arbiter: +0.000000200 s, model 2 comes into force\n"));
-  EXPECT_THAT(result.out, HasSubstr("\n+0.000000200 s  /p  /low wins as this begins\n"));
-  EXPECT_THAT(result.out, HasSubstr("\n+0.000000210 s  /p  /high discarded: inhibited by "));
+  EXPECT_THAT(
+      result.err,
+      HasSubstr("arbiter: 1970-01-01 00:00:00.005 (+0.000000200 s), model 2 comes into force\n"));
+  EXPECT_THAT(
+      result.out,
+      HasSubstr("\n1970-01-01 00:00:00.005 (+0.000000200 s)  /p  /low wins as this begins\n"));
+  EXPECT_THAT(
+      result.out,
+      HasSubstr("\n1970-01-01 00:00:00.005 (+0.000000210 s)  /p  /high discarded: inhibited by "));
 }
 
 // What lies between is not made up: neither by --why, nor silently by an export.
@@ -252,20 +310,30 @@ TEST(SimulateRecording, SaysWhereTheRecorderMissedSomething) {
   const char* const warning =
       "arbiter: the recorder missed 3 events and the payloads of 2 samples: statements about "
       "the time around the gaps may be wrong\n";
-  const auto why = arbiter({"simulate", "--recording", file, "--why=/p"});
+  const auto why = in_utc({"simulate", "--recording", file, "--why=/p"});
   EXPECT_EQ(why.exit_code, 0) << why.err;
   EXPECT_EQ(why.err, warning);
   for (const char* line :
-       {"\n+0.000000100 s  the recorder missed 3 events of /high from here until +0.000001300 s: "
+       {"\n1970-01-01 00:00:00.005 (+0.000000100 s)  the recorder missed 3 events of /high from "
+        "here until 1970-01-01 00:00:00.005 (+0.000001300 s): "
         "what depends on it is not known\n",
-        "\n+0.000000600 s  /p  /high -> idle  because /high went inactive, unless it arrived in "
+        "\n1970-01-01 00:00:00.005 (+0.000000600 s)  /p  /high -> idle  because /high went "
+        "inactive, unless it arrived in "
         "what "
         "was missed\n",
-        "\n+0.000001300 s  /p  idle -> /high  because /high is active behind what was missed\n",
-        "\n+0.000001800 s  /p  /high -> /low  because /high went inactive, 0 us after its "
+        "\n1970-01-01 00:00:00.005 (+0.000001300 s)  /p  idle -> /high  because /high is active "
+        "behind what was missed\n",
+        "\n1970-01-01 00:00:00.005 (+0.000001800 s)  /p  /high -> /low  because /high went "
+        "inactive, 0 us after its "
         "last "}) {
     EXPECT_THAT(why.out, HasSubstr(line));
   }
+  // One moment within the gap: the gap, and who wins by what is known. Both began before.
+  const auto moment =
+      in_utc({"simulate", "--recording", file, "--why=/p", "--at", "00:00:00.005002"});
+  EXPECT_THAT(
+      moment.out,
+      testing::ContainsRegex("^[^\n]* the recorder missed [^\n]*\n[^\n]* /high -> idle [^\n]*\n$"));
   const auto lines = arbiter({"simulate", "--recording", file, "--why", "--json"});
   EXPECT_THAT(lines.out, HasSubstr(R"({"event":"missed","events":3,"source":"/high",)"));
   EXPECT_THAT(lines.out, HasSubstr(R"("is_in_gap":true)"));
