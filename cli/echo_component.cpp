@@ -65,7 +65,7 @@ class Echo {
     }
     std::cout << seconds_text(sample.stamp_ns() - started_) << "  " << sample.source() << "  #"
               << sample.sequence() << hosts_.text(std::string(sample.source()), sample.origin())
-              << "  " << sample.size() << " bytes";
+              << "  " << rules::counted(sample.size(), "byte");
     if (options_.hex) {
       std::cout << '\n' << hex_dump(*sample);
     } else {

@@ -142,8 +142,8 @@ class TapEcho {
     std::cout << seconds_text(event.time().time_since_epoch().count() - started_) << "  "
               << (event.source().empty() ? "(source not known)" : event.source());
     if (event.count() != 0) {
-      std::cout << "  " << event.count() << (event.count() == 1 ? " sample " : " samples ")
-                << name_of(event.kind()) << '\n';
+      std::cout << "  " << rules::counted(event.count(), "sample") << ' ' << name_of(event.kind())
+                << '\n';
       return;
     }
     if (event.kind() != TapEventKind::sample) {
@@ -151,8 +151,8 @@ class TapEcho {
       return;
     }
     std::cout << "  #" << event.sequence()
-              << hosts_.text(std::string(event.source()), event.origin()) << "  " << event.size()
-              << " bytes";
+              << hosts_.text(std::string(event.source()), event.origin()) << "  "
+              << rules::counted(event.size(), "byte");
     if (!event.sample()) {
       std::cout << "  (overwritten)" << fates_text(event) << '\n';
     } else if (options_.hex) {

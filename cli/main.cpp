@@ -29,6 +29,13 @@ void say(const std::string& what) {
   std::cerr << "arbiter: " << arbiter::shm::printable(what, "\n\t") << '\n';
 }
 
+// What other programs call a verb; empty: none.
+std::string_view verb_for(std::string_view word) {
+  if (word == "explain") return "why";
+  if (word == "validate") return "check";
+  return {};
+}
+
 // CLI11 would say that a verb is missing.
 bool knows_verb(const CLI::App& app, const std::string& word) {
   if (word.empty() || word.front() == '-') return true;
@@ -38,6 +45,11 @@ bool knows_verb(const CLI::App& app, const std::string& word) {
   }
   if (std::find(names.begin(), names.end(), word) != names.end()) return true;
   const std::vector<std::string_view> known(names.begin(), names.end());
+  if (const std::string_view meant = verb_for(word); !meant.empty()) {
+    say("there is no verb " + arbiter::rules::quote(word) + "; did you mean " +
+        arbiter::rules::quote(meant) + "?");
+    return false;
+  }
   say("there is no verb " + arbiter::rules::quote(word) +
       arbiter::rules::advise(word, known, "`arbiter --help` lists them"));
   return false;

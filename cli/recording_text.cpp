@@ -9,6 +9,7 @@
 
 #include "cli/recording_info.hpp"
 #include "evidence/recorded.hpp"
+#include "rules/text/names.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::cli {
@@ -190,7 +191,7 @@ void write_attachments(std::ostream& out, const RecordingInfo& info) {
 }  // namespace
 
 std::string size_text(std::uint64_t bytes) {
-  if (bytes < 10'000) return std::to_string(bytes) + " bytes";
+  if (bytes < 10'000) return rules::counted(bytes, "byte");
   double size = static_cast<double>(bytes) / 1024;
   std::string_view unit = "KiB";
   for (const std::string_view larger : {"MiB", "GiB", "TiB"}) {

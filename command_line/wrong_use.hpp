@@ -92,10 +92,21 @@ inline std::string text_of_early_options(const CLI::App& app) {
   return {};
 }
 
+inline bool takes_words(const CLI::App& verb) {
+  const auto options = verb.get_options();
+  return std::any_of(options.begin(), options.end(),
+                     [](const CLI::Option* each) { return each->get_positional(); });
+}
+
+// A model is a plain argument of some programs, and not of others.
 inline std::string text_of_words(const CLI::App& verb, const std::string& name) {
+  const std::vector<std::string> words = verb.remaining();
   std::vector<std::string> quoted;
-  for (const std::string& word : verb.remaining()) quoted.push_back(rules::quote(word));
-  return name + " has no place for " + rules::enumerate(quoted);
+  for (const std::string& word : words) quoted.push_back(rules::quote(word));
+  const std::string text = name + " has no place for " + rules::enumerate(quoted);
+  const bool is_model =
+      words.front().ends_with(".xml") && has_option(verb, "--model") && !takes_words(verb);
+  return is_model ? text + "; did you mean --model " + words.front() + '?' : text;
 }
 
 inline std::string text_of_missing_verb(const CLI::App& verb, const std::string& name) {

@@ -118,7 +118,7 @@ std::vector<Accepted> Tapper::collect() {
     }
     if (tap.lost() != 0) {
       problem_ = "of " + port + ", " + std::to_string(tap.lost()) +
-                 " events came faster than they could be read";
+                 (tap.lost() == 1 ? " event" : " events") + " came faster than they could be read";
     }
   }
   std::stable_sort(result.begin(), result.end(),

@@ -34,6 +34,12 @@ const Unit* find_unit(std::string_view name, bool takes_minutes) {
   return unit == kUnits.end() ? nullptr : unit;
 }
 
+// "300s" for "5min", where minutes are not taken; empty: it is no such duration, or too long.
+std::string without_minutes(std::string_view text) {
+  const ParsedDuration parsed = parse_duration(text, {.takes_minutes = true});
+  return parsed.problem.empty() ? to_string(parsed.value) : std::string();
+}
+
 // "500ms" for "0.5s"; empty: it is no such fraction, or no whole number of nanoseconds.
 std::string without_fraction(std::string_view text, bool takes_minutes) {
   constexpr std::string_view kDigits = "0123456789";
@@ -88,6 +94,11 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
     if (unit.front() == ' ')
       return refuse("has a blank", "write the unit right behind the number, as in 500ms");
     const bool is_fraction = unit.starts_with('.') || unit.starts_with(',');
+    if (unit == kMinutes.first) {
+      const std::string seconds = without_minutes(text);
+      if (!seconds.empty())
+        return refuse("has an unknown unit", "write " + seconds + " in its place");
+    }
     if (!is_fraction) return refuse("has an unknown unit", words.advice);
     const std::string whole = without_fraction(text, words.takes_minutes);
     return refuse("is a fraction",
@@ -99,8 +110,9 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
   for (const char digit : text.substr(0, digits)) {
     value = value <= most / 10 ? value * 10 + (digit - '0') : most + 1;
     if (value > most) {
-      return refuse("is longer than the limit of " + std::to_string(shm::kMaxTime) + "ns",
-                    words.shorten);
+      return refuse(
+          "is longer than the limit of " + std::to_string(shm::kMaxTime) + "ns, about 73 years",
+          words.shorten);
     }
   }
   if (value == 0) {

@@ -20,7 +20,7 @@ struct DurationWords {
   std::string_view shorten = "shorten it, or write forever";
   std::string_view advice =
       "write a whole number with a unit, such as 250ns, 10us, 500ms or 2s, or forever";
-  bool takes_minutes = false;  // 5min, on a command line: a model has none
+  bool takes_minutes = false;  // 5min, on a command line: a model has none, and is told 300s
 };
 
 // A whole number from 1 on with a unit right behind it, or shm::kForever.

@@ -71,6 +71,20 @@ std::vector<json> objects(const std::string& text) {
   return all;
 }
 
+TEST(EchoOfOneByte, SaysByte) {
+  Daemon daemon(kOverrideModel);
+  Node node("test");
+  auto low = node.output_port<std::uint8_t>("/low");
+  const std::string out = daemon.directory() + "/out";
+  const shm::FileDescriptor file(::open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600));
+  ChildProcess program({std::string(ARBITER_PROGRAMS) + "/arbiter", "echo", "/low", "--count", "1"},
+                       {}, {-1, file.get(), file.get()});
+  pollfd end{program.descriptor(), POLLIN, 0};
+  while (::poll(&end, 1, 1) == 0) low.publish(std::uint8_t{7});
+  EXPECT_EQ(program.wait(), 0);
+  EXPECT_THAT(content_of(out), HasSubstr("  1 byte  "));
+}
+
 TEST(Echo, OfAnInputPortShowsWhatItAcceptsThoughAComponentHasItOpen) {
   Daemon daemon(kOverrideModel);
   Publishing publishing;

@@ -95,6 +95,9 @@ TEST(Program, SuggestsTheVerbThatWasMeant) {
   const auto wrong = arbiter({"wyh", "/p"});
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_EQ(wrong.err, "arbiter: there is no verb \"wyh\"; did you mean \"why\"?\n");
+  const auto other = arbiter({"explain", "/Arm/pos:i"});
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_EQ(other.err, "arbiter: there is no verb \"explain\"; did you mean \"why\"?\n");
   EXPECT_THAT(arbiter({"frobnicate"}).err, HasSubstr("`arbiter --help` lists"));
 }
 

@@ -78,6 +78,15 @@ TEST_F(RecordingVerb, ShowsWhatAFileHas) {
   EXPECT_THAT(result.err, IsEmpty());
 }
 
+TEST_F(RecordingVerb, CountsOneByteAsOne) {
+  const std::string path = directory_.file("byte.mcap");
+  recording::McapWriter writer(path, "arbiter test", {});
+  writer.write_attachment({"note", "text/plain", kNoon, "x"});
+  writer.close();
+  EXPECT_THAT(arbiter({"recording", "info", path}).out,
+              ContainsRegex(" 1 byte  text/plain +note\n"));
+}
+
 // A type is what one looks for, and records are no samples.
 TEST_F(RecordingVerb, CutsNoNameAndTellsTheFrequencyOfSamplesOnly) {
   const std::string path = directory_.file("types.mcap");

@@ -38,7 +38,8 @@ TEST(Duration, HasMinutesOnACommandLineOnly) {
   EXPECT_THAT(parse_duration("38430717min", words).problem, HasSubstr("longer than the limit"));
   EXPECT_THAT(parse_duration("0min", words).problem, HasSubstr("is zero"));
   EXPECT_THAT(parse_duration("1.5min", words).problem, HasSubstr("write 90s in its place"));
-  EXPECT_THAT(parse_duration("5min").problem, HasSubstr("unknown unit"));
+  EXPECT_THAT(parse_duration("5min").problem, HasSubstr("unknown unit; write 300s in its place"));
+  EXPECT_THAT(parse_duration("38430717min").problem, HasSubstr("unknown unit; write a whole"));
 }
 
 TEST(Duration, ForeverIsRecognisedWhereItIsMisspelt) {

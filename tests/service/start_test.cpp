@@ -62,6 +62,9 @@ TEST(Start, SaysWhichOptionItDoesNotKnowAndWhatWasMeant) {
   EXPECT_EQ(result.err,
             "arbiterd has no option \"--modle\"; did you mean \"--model\"?\n"
             "Run `arbiterd --help` for more information.\n");
+  EXPECT_NE(arbiterd({"m.xml"}).err.find("no place for \"m.xml\"; did you mean --model m.xml?\n"),
+            std::string::npos);
+  EXPECT_EQ(arbiterd({"start"}).err.find("did you mean"), std::string::npos);
 }
 
 // Everybody may write to it, and nobody makes it a model by that.

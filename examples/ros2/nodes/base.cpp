@@ -6,7 +6,18 @@
 
 #include "node.hpp"
 
+namespace {
+
+constexpr const char* kHelp =
+    "A simulated base, which drives by the last command for ever.\n"
+    "Usage: base [TOPIC]\n\n"
+    "TOPIC is that of the commands, as DDS calls it; by default rt/cmd_vel.\n"
+    "It prints 20 times a second: x, y, direction, speed, rate of turning.";
+
+}  // namespace
+
 int main(int argc, char** argv) {
+  if (ros2_demo::printed_help(argc, argv, kHelp)) return 0;
   ros2_demo::Node node;
   std::mutex mutex;
   ros2_demo::Twist command{};

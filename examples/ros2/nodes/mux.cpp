@@ -16,9 +16,15 @@ struct Heard {
   [[nodiscard]] bool expired() const { return !at || Clock::now() - *at > kTimeout; }
 };
 
+constexpr const char* kHelp =
+    "What twist_mux does with rt/cmd_vel_nav, rt/cmd_vel_teleop and the lock rt/e_stop.\n"
+    "Usage: mux\n\n"
+    "It publishes rt/mux/cmd_vel.";
+
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  if (ros2_demo::printed_help(argc, argv, kHelp)) return 0;
   ros2_demo::Node node;
   std::mutex mutex;
   Heard navigation;  // priority 10

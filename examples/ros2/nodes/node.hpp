@@ -36,6 +36,18 @@ inline Twist twist(double forwards, double turning) {
   return result;
 }
 
+// Whether it was asked for, and has been printed.
+inline bool printed_help(int argc, char** argv, const char* help) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word != "--help" && word != "-h") continue;
+    std::printf("%s\nIts domain is that of ROS_DOMAIN_ID, or 0. It goes on until you stop it.\n",
+                help);
+    return true;
+  }
+  return false;
+}
+
 class Node {
  public:
   Node() {

@@ -61,6 +61,14 @@ TEST(Ros2Demo, TheBaseBehindArbiterStandsWhereTheOtherDrivesOn) {
   EXPECT_EQ(mux.stood, 0) << result.out;
 }
 
+TEST(Ros2Demo, EachNodeHasAHelp) {
+  for (const std::string node : {"base", "e_stop", "mux", "navigation", "teleop"}) {
+    const auto result = run_program({std::string(ARBITER_PROGRAMS) + "/ros2/" + node, "--help"});
+    EXPECT_EQ(result.exit_code, 0) << node << result.err;
+    EXPECT_NE(result.out.find("Usage: " + node), std::string::npos) << result.out;
+  }
+}
+
 TEST(Ros2Demo, ATimeThatIsNoneIsRefused) {
   for (const char* const seconds : {"nan", "-nan", "inf", "0", "-20", "", "20s", "1e400"}) {
     const auto result =
