@@ -6,6 +6,7 @@
 #include <chrono>
 #include <exception>
 #include <future>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -46,6 +47,22 @@ void require_host_name(const std::string& host) {
   throw CLI::ValidationError("--host", "\"" + host + "\" is not a host name: use 1 to " +
                                            std::to_string(kMaxHostName) +
                                            " letters, digits, dots, hyphens and underscores");
+}
+
+// Throws CLI::ValidationError.
+void require_interfaces(const std::vector<std::string>& interfaces) {
+  std::set<std::string> seen;
+  for (const std::string& each : interfaces) {
+    if (each.empty()) {
+      throw CLI::ValidationError("--interface",
+                                 "is empty: name a network interface, such as eth0, or leave it "
+                                 "out, so that nothing leaves this machine");
+    }
+    if (!seen.insert(each).second) {
+      throw CLI::ValidationError("--interface",
+                                 "names " + rules::quote(each) + " twice: once is enough");
+    }
+  }
 }
 
 // Why no address of it is known: an error of getaddrinfo(); 0: one is. DDS takes ADDRESS:PORT, too.
@@ -129,6 +146,7 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
     options.instance = wire::instance_name(options.instance);
     require_host_name(options.host);
+    require_interfaces(options.network.interfaces);
     require_peers(options.network);
     if (!max_age.empty()) options.max_age = read_max_age(max_age);
   } catch (const CLI::Success& success) {

@@ -342,8 +342,9 @@ void Daemon::handle_or_refuse(Client& client, wire::Received& received, shm::Nan
   } catch (const std::exception& error) {
     why = error.what();
   }
-  Takeover::note_refusal(client, received.message, is_ours);
-  log_refusal(client, received.message, why);
+  if (Takeover::note_refusal(client, received.message, why, is_ours)) {
+    log_refusal(client, received.message, why);
+  }
   refuse(client, received.message.request, why);
 }
 

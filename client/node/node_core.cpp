@@ -15,6 +15,7 @@
 #include "client/node/names.hpp"
 #include "client/types.hpp"
 #include "wire/call.hpp"
+#include "wire/instances.hpp"
 #include "wire/meeting.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -53,6 +54,10 @@ wire::Message message_of(wire::MessageKind kind, std::string_view name = {}) {
 NodeCore::NodeCore(std::string_view name, const NodeOptions& options)
     : name_(name), options_(options) {
   check_name(name, "a node");
+  if (options.connect_timeout < milliseconds::zero()) {
+    throw Error("connect_timeout is " + std::to_string(options.connect_timeout.count()) +
+                " ms, but must not be below 0");
+  }
   try {
     service_bell_ = std::make_shared<const ServiceBell>();
     instance_ = wire::instance_name(options.instance);
@@ -216,9 +221,13 @@ void NodeCore::give_up_on(std::uint64_t request) {
 
 void NodeCore::say_that_we_wait(std::unique_lock<std::mutex>& lock, std::uint64_t request,
                                 milliseconds most) {
+  const Socket asked = standing_ == Standing::kMember ? socket_ : nullptr;
   lock.unlock();
   try {
-    say_that_we_wait("an arbiterd of instance \"" + instance_ + '"', most);
+    say_that_we_wait(asked == nullptr
+                         ? "an arbiterd of instance \"" + instance_ + '"'
+                         : wire::describe_daemon(asked->get(), instance_) + " to answer",
+                     most);
   } catch (...) {
     lock.lock();
     give_up_on(request);
@@ -260,7 +269,7 @@ wire::Received NodeCore::converse(const wire::Message& question,
       // If it cannot be sent the conversation is over, and the next one asks again.
       static_cast<void>(wire::send_message(socket_->get(), numbered, descriptors));
     }
-    if (!said && standing_ != Standing::kMember && Clock::now() - begin >= kQuietWait) {
+    if (!said && Clock::now() - begin >= kQuietWait) {
       said = true;
       say_that_we_wait(lock, request, most);
       continue;

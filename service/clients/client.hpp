@@ -104,6 +104,7 @@ class Client {
   bool is_returning = false;  // and has not handed back all yet:
   std::set<shm::PortInstance> to_hand_back;        // these are missing
   bool has_failed_to_return = false;               // one came, and we could not take it
+  std::string why_not_returned;                    // as the log has it; empty: nothing stood there
   bool has_turn = false;                           // waits for its turn to be served
   bool is_last_turn = false;                       // for its process has ended
   Charge charge;                                   // as one of so many clients

@@ -62,6 +62,7 @@ void Takeover::take_back(Client& client, const wire::Received& hello) {
   if (absentee != absentees_.end() && is_that(client, absentee->second)) {
     client.node = node;
     client.to_hand_back = std::move(absentee->second.ports);
+    client.why_not_returned = std::move(absentee->second.why_not_returned);
     absentees_.erase(absentee);
   }
   client.is_returning = true;
@@ -137,12 +138,15 @@ void Takeover::take_back_link(const Client& client, const wire::Message& message
 }
 
 // A port that it has, and will go on to have: its name must not become another's.
-void Takeover::note_refusal(Client& client, const wire::Message& message, bool is_ours) {
+bool Takeover::note_refusal(Client& client, const wire::Message& message, const std::string& why,
+                            bool is_ours) {
   const bool is_port = message.kind == wire::MessageKind::kHandBackOutput ||
                        message.kind == wire::MessageKind::kHandBackInput;
   if (is_ours && is_port && client.to_hand_back.contains(message.port)) {
     client.has_failed_to_return = true;
   }
+  if (!is_ours || !client.is_returning) return true;
+  return std::exchange(client.why_not_returned, why) != why;
 }
 
 void Takeover::finish_return(Client& client) {
@@ -152,6 +156,7 @@ void Takeover::finish_return(Client& client) {
     return;
   }
   client.is_returning = false;
+  client.why_not_returned.clear();
   for (const shm::PortInstance port : std::exchange(client.to_hand_back, {})) {
     switchboard_.forget_away(port);  // closed meanwhile
   }
@@ -180,6 +185,7 @@ void Takeover::set_away(Client& client) {
   absentee.ports.insert(client.ports.begin(), client.ports.end());
   while (!client.ports.empty()) switchboard_.set_away(*client.ports.begin());
   absentee.process = client.release_process();
+  absentee.why_not_returned = std::move(client.why_not_returned);
   absentee.charge = std::move(client.charge);
   host_.watch_absentee(absentee.process, client.node);
 }

@@ -95,7 +95,9 @@ class Takeover {
   void take_back_input(Client& client, const wire::Received& received);
   void take_back_link(const Client& client, const wire::Message& message);
   // Something that it has said was not taken. `is_ours`: for want of what we would need for it.
-  static void note_refusal(Client& client, const wire::Message& message, bool is_ours);
+  // Whether the log is to have it: one who comes again all the time is refused for the same reason.
+  [[nodiscard]] static bool note_refusal(Client& client, const wire::Message& message,
+                                         const std::string& why, bool is_ours);
   void finish_return(Client& client);
   // One that is not taken back says what it has, all the same.
   void hear_stranger(const Client& client, const wire::Message& message) noexcept;
@@ -126,6 +128,7 @@ class Takeover {
     std::optional<uid_t> user;  // empty: it cannot be told
     shm::FileDescriptor process;
     std::set<shm::PortInstance> ports;
+    std::string why_not_returned;  // Client::why_not_returned
     Charge charge;
   };
 

@@ -84,6 +84,24 @@ TEST(OnWaiting, OfAPortThatIsOpenedSaysForHowLongAtMost) {
   EXPECT_EQ(said, "\"test\" waits for an arbiterd of instance \"test\", at most 1000 ms");
 }
 
+TEST(OnWaiting, OfADaemonThatIsStoppedSaysThatItHasNotAnswered) {
+  Daemon daemon(single_model());
+  std::string said;
+  NodeOptions options;
+  options.connect_timeout = 600ms;
+  options.on_waiting = [&said](const std::string& text) { said = text; };
+  Node node("test", options);
+  said.clear();
+  daemon.process().stop();
+  EXPECT_THROW(static_cast<void>(node.output_port<Number>("/out")), Error);
+  EXPECT_THAT(said, testing::MatchesRegex("\"test\" waits for arbiterd.* of instance \"test\" to "
+                                          "answer, at most 1000 ms"));
+  said.clear();
+  EXPECT_THROW(node.switch_model("other"), Error);
+  EXPECT_THAT(said, testing::HasSubstr("to answer, at most 1000 ms"));
+  daemon.kill();
+}
+
 // Under a lock of the node's this would never return.
 TEST(OnWaiting, MayOpenAndClosePortsOfTheSameNode) {
   Daemon daemon(override_model());

@@ -223,6 +223,12 @@ TEST(Opening, ANodeWaitsForItsDaemon) {
   late.join();
 }
 
+TEST(Opening, ATimeoutBelowZeroIsRefused) {
+  const Daemon daemon;
+  EXPECT_EQ(error_of([] { Node("test", {.connect_timeout = -1ms}); }),
+            "connect_timeout is -1 ms, but must not be below 0");
+}
+
 TEST(Opening, TheInstanceMayBeGivenOrComeFromTheEnvironment) {
   Daemon daemon(kNoRules, {.instance = "robot-1"});
   Node by_environment("a");

@@ -282,6 +282,8 @@ TEST(LinkOptions, AreRefusedWhereTheyAreWrong) {
       {{"--peer", "192.0.2.1"}, "--peer: leads nowhere without an --interface"},
       {{"--interface", "lo", "--peer", "no address"},
        "--peer: \"no address\" is neither an address nor the name of a host"},
+      {{"--interface", ""}, "--interface: is empty: name a network interface"},
+      {{"--interface", "lo", "--interface", "lo"}, "--interface: names \"lo\" twice"},
       {{"--instance", "a/b"}, "\"a/b\" is not a name for an instance"},
       {{"--intrface", "lo"}, "has no option \"--intrface\"; did you mean \"--interface\"?"}};
   for (const auto& [options, message] : wrong) {

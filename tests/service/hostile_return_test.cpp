@@ -213,7 +213,7 @@ TEST(HostileReturn, WithWhatTheDaemonHasNoDescriptorForCostsNobodyItsPort) {
   const auto hand_back = [&](RawClient& poor) {
     poor.send(output, {segment.get(), opened.descriptors[0].get()});
   };
-  {
+  for (const int many : {32, 24}) {  // fewer, for the limit cannot be raised again
     RawClient memory = come_back();  // from here on the daemon serves
     const pid_t process = daemon.process().pid();
     const std::string descriptors = "/proc/" + std::to_string(process) + "/fd/";
@@ -229,7 +229,7 @@ TEST(HostileReturn, WithWhatTheDaemonHasNoDescriptorForCostsNobodyItsPort) {
     const auto before = count();
     std::vector<RawClient> others;
     const auto connect = [&] { others.emplace_back(daemon.instance()).hello(); };
-    for (int i = 0; i < 32; ++i) connect();
+    for (int i = 0; i < many; ++i) connect();
     RawClient poor = come_back();
     for (int i = 0; i < 4; ++i) connect();  // in place of the conversation that this has ended
     const rlim_t used = first_free();
@@ -251,6 +251,13 @@ TEST(HostileReturn, WithWhatTheDaemonHasNoDescriptorForCostsNobodyItsPort) {
   hand_back(poor);
   poor.send(RawClient::message(MessageKind::kHandedBack));
   await([&] { return daemon.source("/out")["open"] == true; });
+  // A component comes again twenty times a second: the log has it once, and when it is over.
+  const std::string log = daemon.log();
+  const std::string refusal = "no descriptor left";
+  const auto said = log.find(refusal);
+  ASSERT_NE(said, std::string::npos) << log;
+  EXPECT_EQ(log.find(refusal, said + 1), std::string::npos) << log;
+  EXPECT_NE(log.find("is back, with 1 port", said), std::string::npos) << log;
 }
 
 TEST(HostileReturn, ToANewDaemonWithAnOldBoardIsRefusedAndOthersAreTakenBack) {

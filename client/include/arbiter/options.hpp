@@ -20,15 +20,15 @@ struct NodeOptions {
   // Which daemon; empty: $ARBITER_INSTANCE, or "default" if that is not set.
   std::string instance{};
   // How long Node() waits for a daemon before it throws; one that is there by then has at least a
-  // second to answer. Opening a port and switch_model() wait as long, but at least a second. At
-  // most a year.
+  // second to answer. Opening a port and switch_model() wait as long, but at least a second. From
+  // 0 on; more than a year counts as a year.
   std::chrono::milliseconds connect_timeout{5000};
   // Called once by each Node(), opening of a port or switch_model() that has waited half a second
-  // for a daemon, with a sentence that says for whom it waits, and how long at most. Empty: the
-  // sentence goes to standard error. Runs on the waiting thread, which holds no lock of the
-  // library: the callback may use the node and its ports, and is not called again if it waits for
-  // the daemon itself. The time that it takes counts as waiting. An exception that it throws ends
-  // the wait and leaves the waiting call, which then has opened nothing.
+  // for a daemon, or for its answer, with a sentence that says for whom it waits, and how long at
+  // most. Empty: the sentence goes to standard error. Runs on the waiting thread, which holds no
+  // lock of the library: the callback may use the node and its ports, and is not called again if it
+  // waits for the daemon itself. The time that it takes counts as waiting. An exception that it
+  // throws ends the wait and leaves the waiting call, which then has opened nothing.
   std::function<void(const std::string&)> on_waiting{};
   // Called with what a component should know about its ports (notice.hpp), once for each port and
   // sentence. Empty: the sentence goes to standard error.
