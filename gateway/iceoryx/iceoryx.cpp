@@ -27,7 +27,10 @@ constexpr shm::Nanoseconds kHangsInside = 5 * kSecond;  // the thread does not c
 // iceoryx ends the process at what it holds for fatal, and, where it was built with assertions, at
 // less. What is less is answered by the call that found it.
 void handle_error(iox::Error error, const std::function<void()>&, iox::ErrorLevel level) {
-  if (level != iox::ErrorLevel::FATAL) return;
+  if (level != iox::ErrorLevel::FATAL) {
+    last_fault_of_iceoryx = iox::ErrorHandler::toString(error);
+    return;
+  }
   const std::string made = what_is_made();
   const std::string why_not = why_no_traces();
   say(Level::kError, std::string("iceoryx gives up: ") + iox::ErrorHandler::toString(error) +
@@ -84,8 +87,8 @@ void Iceoryx::set_obstacle(const std::string& text) {
 
 void Iceoryx::tell_obstacles() {
   for (Out& out : outs_) {
-    const std::string peers = out.sender->wrong_peers();
-    const std::string text = obstacle_ + (obstacle_.empty() || peers.empty() ? "" : "; ") + peers;
+    const std::string fault = out.sender->fault();
+    const std::string text = obstacle_ + (obstacle_.empty() || fault.empty() ? "" : "; ") + fault;
     if (text == out.obstacle) continue;
     out.obstacle = text;
     out.sender->account().set_obstacle(text);
@@ -132,7 +135,9 @@ void Iceoryx::tend() {
 
 void Iceoryx::look_after_senders() {
   for (Out& out : outs_) {
-    const bool has_readers = out.sender->publisher()->hasSubscribers();
+    const Publisher* const publisher = out.sender->publisher();
+    if (publisher == nullptr) continue;
+    const bool has_readers = publisher->hasSubscribers();
     out.sender->account().set_peers(has_readers ? 1 : 0, true);
     if (has_readers && !out.had_readers && out.outgoing != nullptr) out.outgoing->peer_matched();
     out.had_readers = has_readers;

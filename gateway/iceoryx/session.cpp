@@ -27,6 +27,8 @@ constexpr shm::Nanoseconds kLongestWait = 250 * kMillisecond;
 // Topics that no WaitSet has room for are looked at that often: an emergency stop may be one.
 constexpr shm::Nanoseconds kUnwatchedPeriod = 5 * kMillisecond;
 constexpr shm::Nanoseconds kListPeriod = 200 * kMillisecond;
+// RouDi writes a line each time that it refuses.
+constexpr shm::Nanoseconds kMakePeriod = 5000 * kMillisecond;
 // RouDi needs a tenth of a second to connect who is in its list.
 constexpr int kLooksUntilRefused = 10;
 constexpr std::size_t kMostNames = 3;
@@ -83,7 +85,7 @@ struct Session::Inlet {
 };
 
 Sender::Result ChunkSender::send(Bytes sample) noexcept {
-  iox::popo::UntypedPublisher* const to = publisher();
+  Publisher* const to = publisher();
   if (to == nullptr) return Result::kNotReady;
   const IceoryxTopic& topic = *entry_.iceoryx;
   const std::size_t header = topic.padded_header();
@@ -109,7 +111,7 @@ Sender::Result ChunkSender::send(Bytes sample) noexcept {
 
 // Why there is no chunk, send() says.
 WritableBytes ChunkSender::draft(std::size_t bytes) noexcept {
-  iox::popo::UntypedPublisher* const to = publisher();
+  Publisher* const to = publisher();
   if (to == nullptr || entry_.iceoryx->padded_header() != 0 || bytes > UINT32_MAX) return {};
   auto loan = to->loan(static_cast<std::uint32_t>(bytes), entry_.iceoryx->alignment);
   if (loan.has_error()) return {};
@@ -165,15 +167,8 @@ void Session::run() {
 void Session::make_ends() {
   iox::runtime::PoshRuntime::initRuntime(
       iox::RuntimeName_t(iox::cxx::TruncateToCapacity, runtime_name(gateway_, ::getpid())));
-  for (const Outlet& out : outs_) {
-    const Entry& entry = out.sender->entry();
-    made = "the publisher of " + entry.outside();
-    iox::popo::PublisherOptions options;
-    options.historyCapacity = entry.iceoryx->history;
-    publishers_.push_back(
-        std::make_unique<iox::popo::UntypedPublisher>(service_of(*entry.iceoryx), options));
-    out.sender->use(*publishers_.back());
-  }
+  for (Outlet& out : outs_) make_publisher(out);
+  make_again_ = shm::monotonic_now() + kMakePeriod;
   made = "the subscriber of RouDi's list of ports";
   port_list_.emplace();
   wait_set_ = std::make_unique<iox::popo::WaitSet<>>();
@@ -185,6 +180,37 @@ void Session::make_ends() {
   if (watches_all_) return;
   say(Level::kInfo, "iceoryx can watch " + std::to_string(wait_set_->size()) +
                         " topics at once; the others are looked at every 5 ms");
+}
+
+void Session::make_publisher(Outlet& out) {
+  const Entry& entry = out.sender->entry();
+  made = "the publisher of " + entry.outside();
+  iox::popo::PublisherOptions options;
+  options.historyCapacity = entry.iceoryx->history;
+  try {
+    last_fault_of_iceoryx.clear();
+    publishers_.push_back(std::make_unique<Publisher>(service_of(*entry.iceoryx), options));
+    out.sender->use(*publishers_.back());
+    if (!std::exchange(out.not_made, {}).empty()) {
+      say(Level::kInfo, entry.outside() + " is served now");
+    }
+  } catch (const RefusedByRoudi& refusal) {
+    const std::string why = refusal.what();
+    const std::string text = "RouDi refuses the publisher: " + why;
+    if (std::exchange(out.not_made, text) != text) {
+      say(Level::kError, "RouDi refuses " + made + ": " + why + "; trying again every 5 s");
+    }
+  }
+  tell_fault(out);
+}
+
+void Session::make_refused(shm::Nanoseconds now) {
+  if (now < make_again_) return;
+  make_again_ = now + kMakePeriod;
+  for (Outlet& out : outs_) {
+    if (out.sender->publisher() == nullptr) make_publisher(out);
+  }
+  made.clear();
 }
 
 void Session::make_inlet(const Middleware::OpenIn& in) {
@@ -239,6 +265,7 @@ void Session::take_for_ever() {
     make_added();
     for (const auto& inlet : inlets_) take_all(*inlet);
     look_at_list(now);
+    make_refused(now);
   }
 }
 
@@ -287,7 +314,7 @@ void Session::look_at_list(shm::Nanoseconds now) {
   for (Outlet& out : outs_) {
     look_for_strangers(out);
     look_for_refused(out);
-    tell_wrong_peers(out);
+    tell_fault(out);
   }
 }
 
@@ -298,6 +325,7 @@ void Session::count_publishers(const Inlet& inlet) const {
 
 // RouDi connects no subscriber that asks for what its publisher does not offer, and tells neither.
 void Session::look_for_refused(Outlet& out) const {
+  if (out.sender->publisher() == nullptr) return;
   const auto subscribers = port_list_->subscribers_of(*out.sender->entry().iceoryx);
   if (subscribers.empty() || out.sender->publisher()->hasSubscribers()) {
     out.looks_without_any = 0;
@@ -325,14 +353,15 @@ void Session::look_for_strangers(Outlet& out) const {
                            "; let them publish to another topic, and map that one with <in>");
 }
 
-void Session::tell_wrong_peers(const Outlet& out) {
-  std::string text = out.strangers;
+void Session::tell_fault(const Outlet& out) {
+  std::string text = out.not_made;
+  if (!out.strangers.empty()) text += (text.empty() ? "" : "; ") + out.strangers;
   if (!out.refused.empty()) {
     text += (text.empty() ? "" : "; ") + ("no subscriber matched; " + out.refused) +
             " subscribes and is not connected: it asks for history=\"…\", or that publishers wait "
             "when its queue is full, which no gateway does";
   }
-  out.sender->set_wrong_peers(std::move(text));
+  out.sender->set_fault(std::move(text));
 }
 
 }  // namespace arbiter::gateway

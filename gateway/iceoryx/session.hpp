@@ -15,13 +15,13 @@
 #include <utility>
 #include <vector>
 
-#include <iceoryx_posh/popo/untyped_publisher.hpp>
 #include <iceoryx_posh/popo/untyped_subscriber.hpp>
 #include <iceoryx_posh/popo/wait_set.hpp>
 
 #include "gateway/core/announced.hpp"
 #include "gateway/core/middleware.hpp"
 #include "gateway/iceoryx/port_list.hpp"
+#include "gateway/iceoryx/publisher.hpp"
 #include "gateway/iceoryx/roudi.hpp"
 
 namespace arbiter::gateway {
@@ -39,27 +39,29 @@ class ChunkSender final : public Sender {
   [[nodiscard]] Result send_draft() noexcept override;
   void drop_draft() noexcept override;
   // From the session's thread, once; the loop sees it from then on.
-  void use(iox::popo::UntypedPublisher& publisher) noexcept { publisher_.announce(publisher); }
-  // What is wrong with who else is at the topic; empty: nothing. From the session's thread. What
-  // the account says is for the loop to write, which knows what is wrong with RouDi.
-  void set_wrong_peers(std::string text) {
+  void use(Publisher& publisher) noexcept { publisher_.announce(publisher); }
+  // What is wrong with the publisher, or with who else is at the topic; empty: nothing. From the
+  // session's thread. What the account says is for the loop to write, which knows what is wrong
+  // with RouDi.
+  void set_fault(std::string text) {
     const std::lock_guard lock(mutex_);
-    wrong_peers_ = std::move(text);
+    fault_ = std::move(text);
   }
-  [[nodiscard]] std::string wrong_peers() const {
+  [[nodiscard]] std::string fault() const {
     const std::lock_guard lock(mutex_);
-    return wrong_peers_;
+    return fault_;
   }
-  [[nodiscard]] iox::popo::UntypedPublisher* publisher() const noexcept { return publisher_.get(); }
+  // Null: there is none yet, or RouDi refuses it.
+  [[nodiscard]] Publisher* publisher() const noexcept { return publisher_.get(); }
   [[nodiscard]] const Entry& entry() const noexcept { return entry_; }
   [[nodiscard]] Account& account() const noexcept { return account_; }
 
  private:
   const Entry& entry_;
   Account& account_;
-  Announced<iox::popo::UntypedPublisher> publisher_;
+  Announced<Publisher> publisher_;
   mutable std::mutex mutex_;  // of the next one
-  std::string wrong_peers_;
+  std::string fault_;
   void* draft_ = nullptr;  // of whoever has the entry's turn
 };
 
@@ -81,7 +83,8 @@ class Session {
   void add(const std::vector<Middleware::OpenIn>& ins);
 
   [[nodiscard]] const RoudiIdentity& roudi() const noexcept { return roudi_; }
-  // All publishers and subscribers are made.
+  // All publishers and subscribers are made, but for publishers that RouDi refuses: these are tried
+  // again.
   [[nodiscard]] bool is_ready() const noexcept { return waits_.get() != nullptr; }
   // When its thread last went round, by CLOCK_MONOTONIC.
   [[nodiscard]] shm::Nanoseconds last_round() const noexcept {
@@ -103,11 +106,14 @@ class Session {
     ChunkSender* sender;
     std::string strangers{};
     std::string refused{};      // the first of those, or empty
+    std::string not_made{};     // why there is no publisher, or empty
     int looks_without_any = 0;  // at the list, while it has subscribers and the publisher none
   };
 
   void run();
   void make_ends();
+  void make_publisher(Outlet& out);
+  void make_refused(shm::Nanoseconds now);
   void make_inlet(const Middleware::OpenIn& in);
   void make_added();
   void take_all(Inlet& inlet);
@@ -116,7 +122,7 @@ class Session {
   void count_publishers(const Inlet& inlet) const;
   void look_for_strangers(Outlet& out) const;
   void look_for_refused(Outlet& out) const;
-  static void tell_wrong_peers(const Outlet& out);
+  static void tell_fault(const Outlet& out);
 
   const std::string gateway_;
   const RoudiIdentity roudi_;
@@ -127,12 +133,13 @@ class Session {
   // what is missed is found in the next round, and the lock orders what it guards.
   std::atomic<bool> has_added_{false};
   std::vector<Outlet> outs_;
-  std::vector<std::unique_ptr<iox::popo::UntypedPublisher>> publishers_;
+  std::vector<std::unique_ptr<Publisher>> publishers_;
   std::vector<std::unique_ptr<Inlet>> inlets_;
   std::unique_ptr<iox::popo::WaitSet<>> wait_set_;
   bool watches_all_ = true;  // no more topics than a WaitSet can watch
   std::optional<PortList> port_list_;
   shm::Nanoseconds looked_at_list_ = 0;
+  shm::Nanoseconds make_again_ = 0;        // publishers that RouDi has refused
   Announced<iox::popo::WaitSet<>> waits_;  // the last that is made
   // Relaxed is enough for these: a flag or a reading by itself, of which the last one counts. Who
   // finds that the thread has ended joins it.

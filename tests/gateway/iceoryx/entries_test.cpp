@@ -39,6 +39,23 @@ TEST_F(Iceoryx, APortThatSomebodyElseHasIsWaitedForAndTheOthersAreServed) {
   EXPECT_TRUE(subscriber.hear("|high"));
 }
 
+TEST_F(Iceoryx, APublisherThatRouDiRefusesIsTriedAgainAndTheOthersAreServed) {
+  const Roudi roudi(directory_);
+  Spoken crowd({ARBITER_TESTS "/plain_iceoryx_crowd"});
+  ASSERT_TRUE(crowd.hear("ready"));
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
+  ASSERT_TRUE(gate.hear("RouDi refuses the publisher of iceoryx Test/One/base: ")) << gate.heard;
+  wait_for_description("/Low:o", "no publisher matched");
+  const pid_t worker = worker_of("/Low:o");
+  wait_until([&] {
+    return described_input("/Base:i").find("RouDi refuses the publisher: ") != std::string::npos;
+  });
+  crowd.process.kill();
+  ASSERT_TRUE(gate.hear("iceoryx Test/One/base is served now")) << gate.heard;
+  expect_that_samples_pass();
+  EXPECT_EQ(worker_of("/Low:o"), worker);
+}
+
 TEST_F(Iceoryx, APortThatIsTakenUpLaterIsToldToStop) {
   const Roudi roudi(directory_);
   std::optional<Node> other("other");
