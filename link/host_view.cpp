@@ -12,6 +12,7 @@
 #include <arbiter/type.hpp>
 
 #include "gateway/core/max_ages.hpp"
+#include "gateway/core/turned_away.hpp"
 #include "link/core/host_card.hpp"
 #include "shm/clock.hpp"
 #include "shm/picture.hpp"
@@ -31,9 +32,6 @@ constexpr shm::Nanoseconds kAskPeriod = 250 * kMillisecond;
 // takes one percent of a processor at most.
 constexpr shm::Nanoseconds kLongestAskPeriod = 1000 * kMillisecond;
 constexpr shm::Nanoseconds kTimesItsCost = 100;
-// Another daemon of the instance may be found, elsewhere, while that of this link is restarted: who
-// leaves what it has open does not get it back.
-constexpr shm::Nanoseconds kStaysUnknown = 2000 * kMillisecond;
 // Torn tables are read again; seven models in one reading are nobody's.
 constexpr int kMaxTries = 4;
 
@@ -192,12 +190,8 @@ void HostView::look_at_ports() {
     if (input.open || is_back_soon) inputs.insert(input.name);
   }
   inputs_here_ = std::move(inputs);
-  for (const wire::StrangerStatus& each : status.strangers) {
-    const bool is_ours = each.pid == ::getpid() && each.node == watch::kLinkNode;
-    if (is_ours && each.seen - each.since >= kStaysUnknown) {
-      turned_away_ = std::max(turned_away_, each.seen);
-    }
-  }
+  const auto turned_away = gateway::turned_away_at(status, watch::kLinkNode);
+  if (turned_away) turned_away_ = std::max(turned_away_, *turned_away);
   know_model(status.model);
   obstacle_.clear();
 }

@@ -117,7 +117,7 @@ void Bridge::make_node(int stop) {
   options.connect_timeout = std::chrono::milliseconds(200);
   // Once there is a node: a port waits for a daemon that has gone. It does not wait any longer.
   options.on_waiting = [this](const std::string&) {
-    if (node_) throw Error("there is no daemon");
+    if (node_) throw Error("no daemon answers");
   };
   options.on_notice = [](const Notice& notice) { say(Level::kWarning, notice.text); };
   while (!node_) {
@@ -259,6 +259,9 @@ void Bridge::look_after(shm::Nanoseconds now, bool all) {
     max_ages_.update();
     watch_news();
     look_after_all();
+    if (options_.on_turned_away && max_ages_.is_turned_away(options_.name)) {
+      options_.on_turned_away();
+    }
     tell_at_ = shm::monotonic_now() + kTellPeriod;
   }
   // From here on: who was held up above serves before the next round.

@@ -4,7 +4,8 @@
 // Where a port cannot be opened, because it is taken or the policy does not allow it, it says so,
 // serves the other entries, and tries again once a second; where the daemon does not answer, which
 // holds up the loop, 10 to 20 s later. A daemon that goes and comes again is the node's business
-// (arbiter/node.hpp); samples pass meanwhile.
+// (arbiter/node.hpp); samples pass meanwhile. Where its state is lost the node cannot come back:
+// whoever runs the bridge makes another one.
 //
 // Thread safety: all of it runs on the thread that calls run(), but for wake().
 #pragma once
@@ -34,6 +35,9 @@ struct BridgeOptions {
   // Called by the loop every Middleware::tend_period() at least, so that somebody can see that it
   // goes round.
   std::function<void()> on_round{};
+  // Called, at most once a second, where the daemon does not know what this bridge has open: only
+  // another bridge in its place is let in.
+  std::function<void()> on_turned_away{};
 };
 
 // Lets a bridge's loop look at everything now. Any thread; also a signal handler.

@@ -4,7 +4,9 @@
 #include <exception>
 #include <utility>
 
+#include "gateway/core/turned_away.hpp"
 #include "shm/clock.hpp"
+#include "shm/segment.hpp"
 #include "wire/call.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -13,6 +15,7 @@ namespace {
 
 // After a daemon did not let us in.
 constexpr shm::Nanoseconds kJoinInterval = 1'000'000'000;
+constexpr shm::Nanoseconds kAskInterval = 1'000'000'000;
 // Torn tables are read again; seven models in one reading are nobody's.
 constexpr int kMaxTries = 4;
 
@@ -77,9 +80,27 @@ void MaxAges::join() {
   join_again_ = now + kJoinInterval;
   try {
     instance_ = std::make_unique<watch::Instance>(caller_of(instance_name_));
+    first_ = instance_->memory();
     obstacle_.clear();
   } catch (const std::exception& error) {
     obstacle_ = error.what();
+  }
+}
+
+bool MaxAges::has_other_memory() const {
+  if (instance_ == nullptr || !instance_->has_daemon()) return false;
+  const auto& now = instance_->memory();
+  return now != first_ && !shm::are_one_segment(now->board(), first_->board());
+}
+
+bool MaxAges::is_turned_away(std::string_view node) {
+  const shm::Nanoseconds now = shm::monotonic_now();
+  if (now < ask_again_ || !has_other_memory()) return false;
+  ask_again_ = now + kAskInterval;
+  try {
+    return turned_away_at(instance_->status(), node).has_value();
+  } catch (const std::exception&) {  // it does not answer: another time
+    return false;
   }
 }
 

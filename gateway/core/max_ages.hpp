@@ -45,6 +45,10 @@ class MaxAges final : public AgesOfSources {
   [[nodiscard]] bool knows_of_no_daemon() const noexcept {
     return instance_ != nullptr && !instance_->has_daemon();
   }
+  // Whether the daemon does not know what the node of that name in this process has open
+  // (turned_away.hpp). It is asked once a second, where it has other memory than the first one; who
+  // may not `observe` does not learn it.
+  [[nodiscard]] bool is_turned_away(std::string_view node);
   // What keeps it from knowing T, such as a policy that does not allow this user to `observe`;
   // empty: nothing.
   [[nodiscard]] const std::string& obstacle() const noexcept { return obstacle_; }
@@ -56,6 +60,7 @@ class MaxAges final : public AgesOfSources {
   };
 
   void join();
+  [[nodiscard]] bool has_other_memory() const;
   // T of a source by the model in force, and that model's own.
   struct Timeouts {
     shm::Nanoseconds own = shm::kDefaultTimeout;
@@ -66,8 +71,10 @@ class MaxAges final : public AgesOfSources {
   const std::string instance_name_;
   std::unique_ptr<watch::Instance> instance_;
   std::string obstacle_;
+  std::shared_ptr<const shm::DecisionMemory> first_;  // of the daemon that was joined first
   shm::Nanoseconds join_again_ = 0;
-  shm::Epoch epoch_ = 0;  // of the tables, at the last update()
+  shm::Nanoseconds ask_again_ = 0;  // whether it has turned the node away
+  shm::Epoch epoch_ = 0;            // of the tables, at the last update()
   std::vector<Watched> watched_;
 };
 

@@ -172,8 +172,27 @@ class Beat {
   std::_Exit(kBeginsAnew);
 }
 
-// Until it is to stop. `asked`: for another mapping; of a worker, its supervisor is.
-void serve(std::unique_ptr<Setup> setup, const ProgramKind& kind, Reload& reload) {
+// Where the daemon does not know what this gateway has open: by the mapping that it has.
+void leave_lost_ports(const Setup& setup, const Arguments& arguments, const ProgramKind& kind,
+                      const MakeMiddleware& make, Reload& reload) {
+  const std::string why =
+      "the daemon does not know what this gateway has open, because the state of the last daemon "
+      "is lost";
+  if (arguments.is_worker) throw NeedsNewProcess(why);
+  try {
+    reload.begin_anew([&] {
+      auto next = setup_of(arguments, kind, setup.settings.mappings, make);
+      say(Level::kWarning, why + "; the gateway begins anew");
+      return next;
+    });
+  } catch (const std::exception& error) {  // as of a middleware that has no descriptor left
+    say(Level::kError, why + "; the gateway cannot begin anew: " + error.what());
+  }
+}
+
+// Until it is to stop.
+void serve(std::unique_ptr<Setup> setup, const Arguments& arguments, const ProgramKind& kind,
+           const MakeMiddleware& make, Reload& reload) {
   Beat beat;
   for (; setup != nullptr; setup = reload.take()) {
     BridgeOptions options = setup->settings.bridge;
@@ -181,6 +200,7 @@ void serve(std::unique_ptr<Setup> setup, const ProgramKind& kind, Reload& reload
       beat();
       reload.look();
     };
+    options.on_turned_away = [&] { leave_lost_ports(*setup, arguments, kind, make, reload); };
     Bridge bridge(std::move(options), setup->settings.mappings, kind.kind, setup->bell,
                   *setup->middleware);
     try {
@@ -203,7 +223,7 @@ int serve(const Arguments& arguments, const ProgramKind& kind, std::vector<Mappi
   }
   Reload reload(asked.get(), stop, [&] { return read_again(arguments, kind, make); });
   if (!arguments.is_worker) sd_notify(0, "READY=1");
-  serve(std::move(setup), kind, reload);
+  serve(std::move(setup), arguments, kind, make, reload);
   // What the middleware does when the process ends may wait for ever, for a daemon of its own that
   // has gone; and the supervisor, who would see to it, may be gone as well.
   if (arguments.is_worker) ::alarm(kEndsWithin);

@@ -37,6 +37,14 @@ void Reload::look() {
     return;
   }
   say(Level::kInfo, "the mapping was read again: the gateway begins anew with it");
+  begin_anew(std::move(next));
+}
+
+void Reload::begin_anew(const std::function<std::unique_ptr<Setup>()>& make) {
+  if (next_ == nullptr) begin_anew(make());
+}
+
+void Reload::begin_anew(std::unique_ptr<Setup> next) {
   next_ = std::move(next);
   changed_.ring();
 }

@@ -1,4 +1,5 @@
-// A running gateway that is asked to read its mapping again (SIGUSR1). What is bad changes nothing.
+// A running gateway that begins anew: it is asked to read its mapping again (SIGUSR1), or the
+// daemon's state is lost. What is bad changes nothing.
 //
 // Thread safety: one thread, the gateway's loop.
 #pragma once
@@ -30,10 +31,14 @@ class Reload {
   [[nodiscard]] int ends() const noexcept { return ends_.get(); }
   // Whether it is asked now; ten times a second.
   void look();
+  // By that setup, unless there is another one already.
+  void begin_anew(const std::function<std::unique_ptr<Setup>()>& make);
   // Null: it is to stop.
   [[nodiscard]] std::unique_ptr<Setup> take();
 
  private:
+  void begin_anew(std::unique_ptr<Setup> next);
+
   const int asked_;
   const std::function<std::unique_ptr<Setup>()> prepare_;
   Bell changed_;

@@ -90,6 +90,21 @@ TEST_P(DdsComingAndGoing, AGatewayThatBeginsAnewOrEndsStopsTheRobotThatItDrove) 
   base.await("sample 0 0");
 }
 
+// The components that were open stay with each other; what is started again meets the gateway.
+TEST_P(DdsComingAndGoing, ADaemonThatKnowsNobodyLetsTheGatewayInAgain) {
+  Drive drive("1000s", GetParam(), GetParam());
+  auto& [domain, daemon, gateway, base, navigation] = static_cast<Passage&>(drive);
+  publish_until_heard(navigation, base, "1 0");
+  daemon.terminate();
+  daemon.lose_state();
+  daemon.restart();
+  base.await("sample 0 0");
+  gateway.see("the state of the last daemon is lost; the gateway begins anew");
+  publish_until_heard(navigation, base, "2 0");
+  await_described(daemon, "/Nav/cmd_vel:o", "1 publisher matched");
+  EXPECT_EQ(daemon.input("/Base/cmd_vel:i")["component"]["node"], "arbiter-gateway-dds");
+}
+
 // ExecStopPost= of its unit. Not even a daemon is needed.
 TEST_P(DdsComingAndGoing, ForAGatewayThatIsKilledTheRobotIsStoppedByAnother) {
   Drive drive("1000s", GetParam(), GetParam());

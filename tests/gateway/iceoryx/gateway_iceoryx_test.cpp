@@ -169,6 +169,18 @@ TEST_F(Iceoryx, SamplesPassWhileNoDaemonRunsAndTheNextOneKnowsTheGateway) {
   EXPECT_EQ(subscriber.line(), "|y");
 }
 
+TEST_F(Iceoryx, ADaemonThatKnowsNobodyLetsTheGatewayInAgain) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
+  wait_for_description("/Low:o", "no publisher matched");
+  daemon_.terminate();
+  daemon_.lose_state();
+  daemon_.restart();
+  ASSERT_TRUE(gate.hear("the state of the last daemon is lost; the gateway begins anew"));
+  wait_for_description("/Low:o", "no publisher matched");
+  expect_that_samples_pass();
+}
+
 TEST_F(Iceoryx, AGatewayThatIsStartedFirstWaitsForTheDaemon) {
   const Roudi roudi(directory_);
   daemon_.kill();
