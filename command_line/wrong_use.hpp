@@ -102,6 +102,7 @@ inline bool takes_words(const CLI::App& verb) {
 inline std::string text_of_words(const CLI::App& verb, const std::string& name) {
   const std::vector<std::string> words = verb.remaining();
   std::vector<std::string> quoted;
+  quoted.reserve(words.size());
   for (const std::string& word : words) quoted.push_back(rules::quote(word));
   const std::string text = name + " has no place for " + rules::enumerate(quoted);
   const bool is_model =

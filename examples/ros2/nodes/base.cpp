@@ -8,7 +8,7 @@
 
 namespace {
 
-constexpr const char* kHelp =
+constexpr const char* kBaseHelp =
     "A simulated base, which drives by the last command for ever.\n"
     "Usage: base [TOPIC]\n\n"
     "TOPIC is that of the commands, as DDS calls it; by default rt/cmd_vel.\n"
@@ -17,7 +17,7 @@ constexpr const char* kHelp =
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (ros2_demo::printed_help(argc, argv, kHelp)) return 0;
+  if (ros2_demo::printed_help(argc, argv, kBaseHelp)) return 0;
   ros2_demo::Node node;
   std::mutex mutex;
   ros2_demo::Twist command{};

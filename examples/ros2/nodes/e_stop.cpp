@@ -4,7 +4,7 @@
 
 namespace {
 
-constexpr const char* kHelp =
+constexpr const char* kEStopHelp =
     "An emergency stop, which says ten times a second on rt/e_stop whether it is pressed.\n"
     "Usage: e_stop [START [PRESSED [DEAD]]]\n\n"
     "START is a time of the steady clock in nanoseconds. PRESSED and DEAD are when it is\n"
@@ -13,7 +13,7 @@ constexpr const char* kHelp =
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (ros2_demo::printed_help(argc, argv, kHelp)) return 0;
+  if (ros2_demo::printed_help(argc, argv, kEStopHelp)) return 0;
   ros2_demo::Node node;
   const auto publish = node.publisher<ros2_demo::Bool>("rt/e_stop");
   for (ros2_demo::Script script(argc, argv);;) {

@@ -16,7 +16,7 @@ struct Heard {
   [[nodiscard]] bool expired() const { return !at || Clock::now() - *at > kTimeout; }
 };
 
-constexpr const char* kHelp =
+constexpr const char* kMuxHelp =
     "What twist_mux does with rt/cmd_vel_nav, rt/cmd_vel_teleop and the lock rt/e_stop.\n"
     "Usage: mux\n\n"
     "It publishes rt/mux/cmd_vel.";
@@ -24,7 +24,7 @@ constexpr const char* kHelp =
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (ros2_demo::printed_help(argc, argv, kHelp)) return 0;
+  if (ros2_demo::printed_help(argc, argv, kMuxHelp)) return 0;
   ros2_demo::Node node;
   std::mutex mutex;
   Heard navigation;  // priority 10

@@ -3,7 +3,7 @@
 
 namespace {
 
-constexpr const char* kHelp =
+constexpr const char* kNavigationHelp =
     "Navigation, which follows a wide curve to the left: it publishes rt/cmd_vel_nav.\n"
     "Usage: navigation START DRIVES\n\n"
     "START is a time of the steady clock in nanoseconds; DRIVES is when it publishes, in\n"
@@ -12,7 +12,7 @@ constexpr const char* kHelp =
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (ros2_demo::printed_help(argc, argv, kHelp)) return 0;
+  if (ros2_demo::printed_help(argc, argv, kNavigationHelp)) return 0;
   ros2_demo::Node node;
   const auto publish = node.publisher<ros2_demo::Twist>("rt/cmd_vel_nav");
   for (ros2_demo::Script script(argc, argv);;) {

@@ -3,7 +3,7 @@
 
 namespace {
 
-constexpr const char* kHelp =
+constexpr const char* kTeleopHelp =
     "A person at a joystick, who turns to the right: it publishes rt/cmd_vel_teleop.\n"
     "Usage: teleop START DRIVES\n\n"
     "START is a time of the steady clock in nanoseconds; DRIVES is when it publishes, in\n"
@@ -12,7 +12,7 @@ constexpr const char* kHelp =
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (ros2_demo::printed_help(argc, argv, kHelp)) return 0;
+  if (ros2_demo::printed_help(argc, argv, kTeleopHelp)) return 0;
   ros2_demo::Node node;
   const auto publish = node.publisher<ros2_demo::Twist>("rt/cmd_vel_teleop");
   for (ros2_demo::Script script(argc, argv);;) {
