@@ -9,6 +9,7 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -114,14 +115,25 @@ std::vector<Ownership> ownerships_of(const evidence::Run& run, const std::string
   return all;
 }
 
-// Who published what won. A source may win after its component has gone.
-std::vector<const evidence::PortChange*> components_of(const Reign& reign) {
+// Who had each source open, found out once for all that it won.
+class Components {
+ public:
+  // Who published what won. A source may win after its component has gone.
+  [[nodiscard]] std::vector<const evidence::PortChange*> of(const Reign& reign);
+
+ private:
+  std::map<std::pair<const evidence::Run*, std::string>, std::vector<Ownership>> known_;
+};
+
+std::vector<const evidence::PortChange*> Components::of(const Reign& reign) {
   const evidence::WinnerChange& change = reign.change;
   const bool begins_itself =
       change.why == evidence::WinnerChange::Why::arrival && change.by == change.winner;
+  const auto [known, is_new] = known_.try_emplace({reign.run, change.winner});
+  if (is_new) known->second = ownerships_of(*reign.run, change.winner);
   const evidence::PortChange* before = nullptr;
   std::vector<const evidence::PortChange*> found;
-  for (const Ownership& each : ownerships_of(*reign.run, change.winner)) {
+  for (const Ownership& each : known->second) {
     if (each.until <= change.time) {
       before = each.opening;
     } else if (each.since() < reign.end || (found.empty() && begins_itself)) {
@@ -136,9 +148,9 @@ std::vector<const evidence::PortChange*> components_of(const Reign& reign) {
 }
 
 // " of nav (pid 4711)", " from host base"; empty: not known.
-std::string components_text(const Reign& reign) {
+std::string components_text(const std::vector<const evidence::PortChange*>& components) {
   std::string text;
-  for (const evidence::PortChange* each : components_of(reign)) {
+  for (const evidence::PortChange* each : components) {
     const std::string one = shm::printable(each->host.empty() ? "of " + watch::process_text(*each)
                                                               : "from host " + each->host);
     text += (text.empty() ? " " : ", then ") + one;
@@ -146,9 +158,9 @@ std::string components_text(const Reign& reign) {
   return text;
 }
 
-ordered_json components_json(const Reign& reign) {
+ordered_json components_json(const std::vector<const evidence::PortChange*>& components) {
   ordered_json list = ordered_json::array();
-  for (const evidence::PortChange* each : components_of(reign)) {
+  for (const evidence::PortChange* each : components) {
     list.push_back({{"node", each->node},
                     {"pid", each->pid},
                     {"host", each->host.empty() ? ordered_json() : ordered_json(each->host)}});
@@ -220,6 +232,7 @@ int show_winners(const RecordedWinners& options) {
     });
   }
   const shm::Nanoseconds offset = recorded.about.wall_offset;
+  Components components;
   if (options.json) {
     ordered_json list = ordered_json::array();
     for (const Reign& reign : reigns) {
@@ -231,7 +244,7 @@ int show_winners(const RecordedWinners& options) {
            {"cut_off", reign.is_cut_off},
            {"port", change.port},
            {"winner", change.winner.empty() ? ordered_json() : ordered_json(change.winner)},
-           {"components", components_json(reign)},
+           {"components", components_json(components.of(reign))},
            {"why", evidence::name_of(change.why)},
            {"by", change.by},
            {"generation", change.generation}});
@@ -244,8 +257,8 @@ int show_winners(const RecordedWinners& options) {
     const evidence::WinnerChange& change = reign.change;
     out << clock_text(change.time + offset) << "  " << shm::printable(change.port) << "  "
         << (change.winner.empty() ? "idle" : shm::printable(change.winner))
-        << components_text(reign) << "  " << length_text(reign) << ": " << cause_text(change)
-        << '\n';
+        << components_text(components.of(reign)) << "  " << length_text(reign) << ": "
+        << cause_text(change) << '\n';
   }
   if (reigns.empty()) out << nobody_text(options);
   std::cout << out.str();
