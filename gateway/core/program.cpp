@@ -172,19 +172,17 @@ class Beat {
   std::_Exit(kBeginsAnew);
 }
 
-// Where the daemon does not know what this gateway has open: by the mapping that it has.
+// The daemon does not know what this gateway has open: it begins anew, by the mapping that it has.
 void leave_lost_ports(const Setup& setup, const Arguments& arguments, const ProgramKind& kind,
                       const MakeMiddleware& make, Reload& reload) {
   const std::string why =
       "the daemon does not know what this gateway has open, because the state of the last daemon "
       "is lost";
   if (arguments.is_worker) throw NeedsNewProcess(why);
+  if (reload.has_next()) return;
   try {
-    reload.begin_anew([&] {
-      auto next = setup_of(arguments, kind, setup.settings.mappings, make);
-      say(Level::kWarning, why + "; the gateway begins anew");
-      return next;
-    });
+    reload.begin_anew(setup_of(arguments, kind, setup.settings.mappings, make));
+    say(Level::kWarning, why + "; the gateway begins anew");
   } catch (const std::exception& error) {  // as of a middleware that has no descriptor left
     say(Level::kError, why + "; the gateway cannot begin anew: " + error.what());
   }

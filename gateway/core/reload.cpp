@@ -40,10 +40,6 @@ void Reload::look() {
   begin_anew(std::move(next));
 }
 
-void Reload::begin_anew(const std::function<std::unique_ptr<Setup>()>& make) {
-  if (next_ == nullptr) begin_anew(make());
-}
-
 void Reload::begin_anew(std::unique_ptr<Setup> next) {
   next_ = std::move(next);
   changed_.ring();

@@ -31,14 +31,13 @@ class Reload {
   [[nodiscard]] int ends() const noexcept { return ends_.get(); }
   // Whether it is asked now; ten times a second.
   void look();
-  // By that setup, unless there is another one already.
-  void begin_anew(const std::function<std::unique_ptr<Setup>()>& make);
+  // By that setup, which takes the place of one that waits already.
+  void begin_anew(std::unique_ptr<Setup> next);
+  [[nodiscard]] bool has_next() const noexcept { return next_ != nullptr; }
   // Null: it is to stop.
   [[nodiscard]] std::unique_ptr<Setup> take();
 
  private:
-  void begin_anew(std::unique_ptr<Setup> next);
-
   const int asked_;
   const std::function<std::unique_ptr<Setup>()> prepare_;
   Bell changed_;
