@@ -15,7 +15,6 @@ namespace arbiter::gateway {
 namespace {
 
 constexpr shm::Nanoseconds kSecond = 1'000'000'000;
-constexpr const char* kAnotherGroup = "RouDi is of another group than this user";
 constexpr shm::Nanoseconds kHangs = 2 * kSecond;  // RouDi does not answer
 // RouDi sends something once a second to each process that it knows. It forgets a process that it
 // has not heard from for a while, even if it was RouDi that did not run. The ends of that process
@@ -23,6 +22,16 @@ constexpr shm::Nanoseconds kHangs = 2 * kSecond;  // RouDi does not answer
 constexpr shm::Nanoseconds kSilent = 5 * kSecond;
 constexpr shm::Nanoseconds kSilentTooLong = 10 * kSecond;
 constexpr shm::Nanoseconds kHangsInside = 5 * kSecond;  // the thread does not come out of a call
+
+constexpr const char* kAnotherGroup = "RouDi is of another group than this user";
+
+const char* why_no_roudi() {
+  return is_closed_to_us(roudi_socket_path()) ? kAnotherGroup : "RouDi does not run";
+}
+
+const char* why_no_answer() {
+  return are_ours_closed_to(roudi_socket_path()) ? kAnotherGroup : "RouDi does not answer";
+}
 
 // iceoryx ends the process at what it holds for fatal, and, where it was built with assertions, at
 // less. What is less is answered by the call that found it.
@@ -100,9 +109,7 @@ void Iceoryx::tend() {
   const auto roudi = find_roudi(roudi_socket_path());
   const shm::Nanoseconds now = shm::monotonic_now();
   if (session_ == nullptr) {
-    set_obstacle(roudi                                  ? "RouDi has just come"
-                 : is_closed_to_us(roudi_socket_path()) ? kAnotherGroup
-                                                        : "RouDi does not run");
+    set_obstacle(roudi ? "RouDi has just come" : why_no_roudi());
     if (!roudi) return;
     std::vector<ChunkSender*> senders;
     for (const Out& each : outs_) senders.push_back(each.sender.get());
@@ -115,10 +122,7 @@ void Iceoryx::tend() {
     throw NeedsNewProcess("the gateway was held up, so that RouDi may have given it up");
   }
   if (!session_->is_ready()) {
-    if (now - joined_ > kHangs) {
-      set_obstacle(are_ours_closed_to(roudi_socket_path()) ? kAnotherGroup
-                                                           : "RouDi does not answer");
-    }
+    if (now - joined_ > kHangs) set_obstacle(why_no_answer());
     return;
   }
   if (now - session_->last_round() > kHangsInside) {
