@@ -180,27 +180,27 @@ std::vector<Obstacle> Obstacles::of_connection(const std::string& source) const 
         {"type-mismatch", "not connected, the two ports do not fit: " + *connection.mismatch});
     return result;
   }
-  const auto say = [&](std::uint64_t count, const char* code, const std::string& one,
-                       const std::string& several, bool is_wrong) {
+  const auto say = [&](std::uint64_t count, const char* code, const char* of_one,
+                       const char* of_several, const std::string& what, bool is_wrong) {
     if (count == 0) return;
-    result.push_back(
-        {code, rules::counted(count, "sample") + (count == 1 ? one : several), is_wrong});
+    result.push_back({code,
+                      rules::counted(count, "sample") + (count == 1 ? of_one : of_several) + what,
+                      is_wrong});
   };
   const std::string component =
       is_open() ? "component " + component_text(*input_) : "the component";
   // Counted from the opening of the ports on: it may be long ago.
-  const std::string full =
-      " been refused since the ports were opened, because the queue was full (refuse_new)";
-  say(connection.refused, "refused", " has" + full, " have" + full, true);
-  const std::string slow = " been lost to newer ones since the ports were opened, because " +
-                           component + " took them too slowly";
-  say(connection.overtaken, "overtaken", " has" + slow, " have" + slow, true);
+  say(connection.refused, "refused", " has", " have",
+      " been refused since the ports were opened, because the queue was full (refuse_new)", true);
+  say(connection.overtaken, "overtaken", " has", " have",
+      " been lost to newer ones since the ports were opened, because " + component +
+          " took them too slowly",
+      true);
   // Arbitration at both ends is no fault, nor is a component that takes when it wants to.
-  const std::string lost =
-      " dropped at the take since the ports were opened, because this connection no longer won";
-  say(connection.dropped, "dropped", " that had been accepted was" + lost,
-      " that had been accepted were" + lost, false);
-  say(connection.waiting, "waiting", " waits to be taken", " wait to be taken", false);
+  say(connection.dropped, "dropped", " that had been accepted was", " that had been accepted were",
+      " dropped at the take since the ports were opened, because this connection no longer won",
+      false);
+  say(connection.waiting, "waiting", " waits", " wait", " to be taken", false);
   if (connection.accepted != 0 && connection.taken + connection.dropped == 0) {
     result.push_back({"none-taken", component + " has not taken " +
                                         (connection.accepted == 1

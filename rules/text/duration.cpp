@@ -93,12 +93,9 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
       return refuse("has no unit", words.advice);
     if (unit.front() == ' ')
       return refuse("has a blank", "write the unit right behind the number, as in 500ms");
+    if (const auto seconds = unit == kMinutes.first ? without_minutes(text) : ""; !seconds.empty())
+      return refuse("has an unknown unit", "write " + seconds + " in its place");
     const bool is_fraction = unit.starts_with('.') || unit.starts_with(',');
-    if (unit == kMinutes.first) {
-      const std::string seconds = without_minutes(text);
-      if (!seconds.empty())
-        return refuse("has an unknown unit", "write " + seconds + " in its place");
-    }
     if (!is_fraction) return refuse("has an unknown unit", words.advice);
     const std::string whole = without_fraction(text, words.takes_minutes);
     return refuse("is a fraction",
