@@ -81,9 +81,10 @@ bool TapReader::poll(Room room, std::vector<RecordPtr>& records) {
     ports_changed = ports_changed || kind == TapEventKind::state || kind == TapEventKind::closed ||
                     kind == TapEventKind::destinations;
     take(*event, room, records);
-    is_live_.store(kind != TapEventKind::closed, std::memory_order_relaxed);
+    is_live_ = kind != TapEventKind::closed;
     told_.store(word_of(*event), std::memory_order_relaxed);
   }
+  polled_.store((polled().polls + 1) * 2 + (is_live_ ? 1 : 0), std::memory_order_relaxed);
   return ports_changed;
 }
 

@@ -53,7 +53,14 @@ class TapReader {
   // Any thread. Hints for who looks at the page of a source that nobody tells of; one writer, the
   // thread that polls. Relaxed is enough: who looks too early looks again.
 
-  [[nodiscard]] bool is_live() const { return is_live_.load(std::memory_order_relaxed); }
+  struct Polled {
+    std::uint64_t polls;  // that have ended
+    bool is_live;         // a port is open, as the last of them found
+  };
+  [[nodiscard]] Polled polled() const {
+    const std::uint64_t word = polled_.load(std::memory_order_relaxed);
+    return {word / 2, word % 2 != 0};
+  }
   [[nodiscard]] evidence::ActivityWord told() const {
     return told_.load(std::memory_order_relaxed);
   }
@@ -73,7 +80,8 @@ class TapReader {
   evidence::ContextPtr context_;
   std::optional<LeftOut> left_out_;
   TapCounts counts_;
-  std::atomic<bool> is_live_{false};
+  bool is_live_ = false;
+  std::atomic<std::uint64_t> polled_{0};  // both in one, so that they are of one poll
   std::atomic<evidence::ActivityWord> told_;
 };
 

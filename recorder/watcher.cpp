@@ -332,22 +332,24 @@ void Watcher::add_page_state(const std::string& source, ActivityWord word, Batch
 }
 
 // What nobody tells: an operator deactivates a source whose port is closed; a publisher dies
-// between its arrival and telling of it. Where somebody has only just begun to tell, the second
-// look finds it told.
+// between its arrival and telling of it. Where somebody tells, it may be that the tap was not
+// polled since; so the page is believed once a whole poll has told nothing.
 void Watcher::look_at_pages() {
   Batch batch;
   for (auto& [source, watched] : sources_) {
     const TapReader* const tap = watched.tap.get();
-    if (tap != nullptr && tap->is_live()) continue;
     const ActivityWord word = page_word(source);
-    const bool is_new = word != watched.reported && (tap == nullptr || word != tap->told());
-    // Of one that cannot be tapped nobody else tells.
-    const bool is_sure = tap == nullptr || (word == watched.seen && !tap->is_live());
-    if (is_new && is_sure) {
-      add_page_state(source, word, batch);
-      watched.reported = word;
-    }
+    const auto polled = tap == nullptr ? TapReader::Polled{} : tap->polled();
+    if (polled.is_live || word != watched.seen) watched.polls = polled.polls;
     watched.seen = word;
+    if (polled.is_live) continue;
+    const bool is_new = word != watched.reported && (tap == nullptr || word != tap->told());
+    // One poll may have been under way, but the next has begun behind the look. Of a source that
+    // cannot be tapped nobody else tells.
+    const bool is_sure = tap == nullptr || polled.polls >= watched.polls + 2;
+    if (!is_new || !is_sure) continue;
+    add_page_state(source, word, batch);
+    watched.reported = word;
   }
   if (!batch.records.empty()) queue_.push(std::move(batch));
 }

@@ -89,6 +89,7 @@ class Watcher {
     // Of the page: what it said last, and what was put into the queue.
     evidence::ActivityWord seen = shm::kNeverActive;
     evidence::ActivityWord reported = shm::kNeverActive;
+    std::uint64_t polls = 0;  // of the tap, when that was seen first
   };
   std::map<std::string, Watched> sources_;
   OpenPorts ports_{0};

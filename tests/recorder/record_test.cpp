@@ -160,14 +160,15 @@ TEST(Record, SeesWhatAnOperatorDeactivates) {
   EXPECT_EQ(shm::deactivation(change.time), recording.records<evidence::SourceState>().back().word);
 }
 
-// By whose activity the next one begins, nobody has missed anything.
+// By whose activity the next one begins, nobody has missed anything; nor where the pages of sources
+// have said what has happened long before taps tell of it.
 TEST(Record, HasNoGapWhereASourceIsOpenedAgain) {
   const std::string forever = R"(<source port="/high" timeout="forever"/></behaviors>)";
   Daemon daemon(kLasting.substr(0, kLasting.find("</behaviors>")) + forever);
   Node node("test");
   auto in = node.input_port<int>("/p");
   auto low = node.output_port<int>("/low");
-  Recording recording(daemon);
+  Recording recording(daemon, {"--period", "100ms"});
   std::size_t arrivals = 0;
   for (const bool is_over : {false, true, false}) {
     {
