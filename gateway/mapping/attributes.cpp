@@ -127,9 +127,17 @@ std::optional<long double> Attributes::real(std::string_view name) {
 std::optional<shm::Nanoseconds> Attributes::duration(std::string_view name) {
   const auto found = value(name);
   if (!found) return {};
-  const rules::ParsedDuration parsed = rules::parse_duration(found->text);
-  if (parsed.problem.empty() && parsed.value != shm::kForever) return parsed.value;
-  refuse(*found, name, "a duration; write a whole number with a unit, such as 250us, 100ms or 2s");
+  constexpr std::string_view kAdvice =
+      "write a whole number with a unit, such as 250us, 100ms or 2s";
+  if (found->text == rules::to_string(shm::kForever)) {
+    refuse(*found, name, "a duration; " + std::string(kAdvice) + ", or leave it out");
+    return {};
+  }
+  const std::string subject = std::string(name) + "=";
+  rules::ParsedDuration parsed =
+      rules::parse_duration(found->text, {subject, "is zero", "shorten it", kAdvice});
+  if (parsed.problem.empty()) return parsed.value;
+  reader_.error("invalid-value", found->where, std::move(parsed.problem));
   return {};
 }
 

@@ -179,6 +179,17 @@ TEST(Mapping, AllProblemsOfAFileAreReportedInOneGo) {
   EXPECT_THAT(read.message(10), HasSubstr("did you mean \"reliable\"?"));
 }
 
+TEST(Mapping, ADurationThatIsNoneIsToldWhatToWrite) {
+  const auto max_age = [](const std::string& text) {
+    return read_dds("<in topic='a' type='State' port='/a:o' max_age='" + text + "'/>").message();
+  };
+  EXPECT_THAT(max_age("5min"), HasSubstr("max_age=\"5min\" has an unknown unit; write 300s in"));
+  EXPECT_THAT(max_age("0.5s"), HasSubstr("max_age=\"0.5s\" is a fraction; write 500ms in"));
+  EXPECT_THAT(max_age("0s"), HasSubstr("max_age=\"0s\" is zero; write at least 1ns"));
+  EXPECT_THAT(max_age("100"), HasSubstr("max_age=\"100\" has no unit; write a whole number"));
+  EXPECT_THAT(max_age("forever"), HasSubstr("is not a duration; write a whole number"));
+}
+
 TEST(Mapping, AFileWithoutAGatewaySaysWhatToWrite) {
   EXPECT_THAT(read_text("").findings(), ElementsAre("1:1 error empty-file"));
   EXPECT_THAT(read_text("<gateway/>").findings(), ElementsAre("1:1 error missing-attribute"));
