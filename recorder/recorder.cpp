@@ -89,8 +89,11 @@ void Recorder::forget_taps() {
 
 Recorded Recorder::finish() {
   watcher_.stop();
+  watcher_.look_at_pages();
   last_push_ = 0;  // nothing new is news: that it has been recorded until now
   poll_taps();     // those too that it has opened since
+  poll_taps();     // the watcher believes a page after two
+  watcher_.look_at_pages();
   forget_taps();
   queue_.close();
   pipeline_.finish();

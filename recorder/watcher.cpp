@@ -335,6 +335,7 @@ void Watcher::add_page_state(const std::string& source, ActivityWord word, Batch
 // between its arrival and telling of it. Where somebody tells, it may be that the tap was not
 // polled since; so the page is believed once a whole poll has told nothing.
 void Watcher::look_at_pages() {
+  if (memory_ == nullptr) return;  // another daemon has come, and was busy
   Batch batch;
   for (auto& [source, watched] : sources_) {
     const TapReader* const tap = watched.tap.get();

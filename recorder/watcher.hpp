@@ -42,6 +42,8 @@ class Watcher {
   // Goes on by itself.
   void start();
   void stop();
+  // Once it is stopped: for what has happened last. It does so by itself before.
+  void look_at_pages();
 
   // The thread that polls.
 
@@ -72,7 +74,6 @@ class Watcher {
   void hand_over_taps(bool is_start);
   void add_page_state(const std::string& source, evidence::ActivityWord word, Batch& batch) const;
   [[nodiscard]] evidence::ActivityWord page_word(const std::string& source) const;
-  void look_at_pages();
   void try_refused();
   void look_at_ports();
 

@@ -160,6 +160,19 @@ TEST(Record, SeesWhatAnOperatorDeactivates) {
   EXPECT_EQ(shm::deactivation(change.time), recording.records<evidence::SourceState>().back().word);
 }
 
+TEST(Record, SeesWhatAnOperatorDeactivatesLast) {
+  Daemon daemon(R"(<behaviors timeout="forever">
+    <arbiter at="/p"><select from="/a"/></arbiter></behaviors>)");
+  {
+    Node node("test");
+    node.output_port<int>("/a").signal();
+  }
+  Recording recording(daemon, {"--period", "1s"});
+  EXPECT_EQ(arbiter({"deactivate", "/a"}).exit_code, 0);
+  EXPECT_EQ(recording.end(), 0);
+  EXPECT_TRUE(shm::is_deactivation(recording.records<evidence::SourceState>().back().word));
+}
+
 // By whose activity the next one begins, nobody has missed anything; nor where the pages of sources
 // have said what has happened long before taps tell of it.
 TEST(Record, HasNoGapWhereASourceIsOpenedAgain) {
