@@ -139,7 +139,8 @@ const LoadedModel& ModelChanges::loaded_model(const std::string& name) const {
   // The name is a client's: it must not break lines.
   throw std::runtime_error(
       "there is no model " + (is_model_name(name) ? '"' + name + '"' : "of that name") +
-      (library_.models().empty() ? "; none is loaded" : "; there are: " + library_.names()));
+      (library_.models().empty() ? "; none is loaded" : "; there are: " + library_.names()) +
+      (name.ends_with(".xml") ? "; arbiterd --model NAME=FILE gives a file a name" : ""));
 }
 
 void ModelChanges::prepare_switch(Swap& swap) {
@@ -179,8 +180,13 @@ const PastModel& ModelChanges::past_model(std::uint64_t asked) const {
     if (oldest == nullptr) {
       throw std::runtime_error("there is no model to go back to: none has been in force");
     }
-    throw std::runtime_error("model " + std::to_string(oldest->content) +
-                             " is the oldest that is kept; arbiter history shows all");
+    const std::string content = std::to_string(oldest->content);
+    const std::string is_oldest = oldest->generation == oldest->content
+                                      ? "model " + content + " is the oldest that is kept"
+                                      : "model " + std::to_string(oldest->generation) +
+                                            " decides as model " + content +
+                                            " does, the oldest that is kept";
+    throw std::runtime_error(is_oldest + "; arbiter history shows all");
   }
   if (past == nullptr) {
     throw std::runtime_error("model " + std::to_string(asked) +

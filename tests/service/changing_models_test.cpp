@@ -33,6 +33,9 @@ TEST_F(ChangingModels, SwitchGoesToAnotherModelAndListsAll) {
   EXPECT_THAT(arbiter({"status"}).out, HasSubstr(", model 2 other " + files_.path()));
   expect_refusal(arbiter({"switch", "third"}),
                  "there is no model \"third\"; there are: default and other");
+  expect_refusal(arbiter({"switch", "third.xml"}),
+                 "there is no model \"third.xml\"; there are: default and other; arbiterd --model "
+                 "NAME=FILE gives a file a name");
   EXPECT_EQ(name_in_force(), "other");
 }
 
@@ -256,8 +259,9 @@ TEST_F(ChangingModels, RollbackGoesBackStepByStepOrToOneByItsNumber) {
   EXPECT_THAT(arbiter({"switch"}).out, HasSubstr("(after a rollback, an older one is in force)"));
   ASSERT_EQ(arbiter({"rollback"}).exit_code, 0);
   EXPECT_EQ(source_in_force(), "/a");
-  expect_refusal(arbiter({"rollback"}),
-                 "model 1 is the oldest that is kept; arbiter history shows all");
+  expect_refusal(
+      arbiter({"rollback"}),
+      "model 5 decides as model 1 does, the oldest that is kept; arbiter history shows all");
   ASSERT_EQ(arbiter({"rollback", "3"}).exit_code, 0);
   EXPECT_EQ(source_in_force(), "/c");
   expect_refusal(arbiter({"rollback", "9"}),
@@ -282,12 +286,14 @@ TEST_F(ChangingModels, AModelThatStaysAsItIsIsNoStepAfterARollbackEither) {
   ASSERT_EQ(source_in_force(), "/a");
   ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
   ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
-  expect_refusal(arbiter({"rollback"}),
-                 "model 1 is the oldest that is kept; arbiter history shows all");
+  expect_refusal(
+      arbiter({"rollback"}),
+      "model 6 decides as model 1 does, the oldest that is kept; arbiter history shows all");
   ASSERT_EQ(arbiter({"rollback", "1"}).exit_code, 0);
   ASSERT_EQ(arbiter({"switch", "default"}).exit_code, 0);
-  expect_refusal(arbiter({"rollback"}),
-                 "model 1 is the oldest that is kept; arbiter history shows all");
+  expect_refusal(
+      arbiter({"rollback"}),
+      "model 8 decides as model 1 does, the oldest that is kept; arbiter history shows all");
 }
 
 TEST_F(ChangingModels, HistoryTellsWhatWhenHowAndByWhom) {
