@@ -50,13 +50,42 @@ void add_outside(const std::string& name, const char* how, const auto& open,
   }
 }
 
-// Who has asked for the port in vain last; null: nobody.
-const wire::RefusalStatus* refusal_of(const wire::Status& status,
-                                      std::optional<std::string> wire::RefusalStatus::*end,
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// By which end of a port it is found what has become of it.
+struct PortEnd {
+  std::optional<std::string> wire::RefusalStatus::*refused;
+  std::vector<std::string> wire::DeathStatus::*left_open;
+};
+constexpr PortEnd kOutput{&wire::RefusalStatus::output, &wire::DeathStatus::outputs};
+constexpr PortEnd kInput{&wire::RefusalStatus::input, &wire::DeathStatus::inputs};
+
+// Who has died with the port open last; null: nobody, as far as the daemon remembers.
+const wire::DeathStatus* death_of(const wire::Status& status, const PortEnd& end,
+                                  const std::string& port) {
+  const auto found =
+      std::find_if(status.deaths.begin(), status.deaths.end(),
+                   [&](const auto& each) { return contains(each.*end.left_open, port); });
+  return found == status.deaths.end() ? nullptr : &*found;
+}
+
+// Who has asked for the port in vain last; null: nobody, or only while another had it who has died.
+const wire::RefusalStatus* refusal_of(const wire::Status& status, const PortEnd& end,
                                       const std::string& port) {
   const auto found = std::find_if(status.refusals.begin(), status.refusals.end(),
-                                  [&](const auto& each) { return each.*end == port; });
-  return found == status.refusals.end() ? nullptr : &*found;
+                                  [&](const auto& each) { return each.*end.refused == port; });
+  if (found == status.refusals.end()) return nullptr;
+  const wire::DeathStatus* death = death_of(status, end, port);
+  return death != nullptr && found->at < death->at ? nullptr : &*found;
+}
+
+// "; gaze-control (pid 4711) had it open, and died 3 s ago", or nothing.
+std::string death_text(const wire::DeathStatus* death) {
+  if (death == nullptr) return "";
+  return "; " + process_text(*death) + " had it open, and died " +
+         span_text(shm::monotonic_now() - death->at) + " ago";
 }
 
 void add_refusal(const wire::RefusalStatus* refusal, std::vector<Obstacle>& result) {
@@ -65,10 +94,6 @@ void add_refusal(const wire::RefusalStatus* refusal, std::vector<Obstacle>& resu
       {"opening-refused", "component " + process_text(*refusal) + " asked for the port " +
                               span_text(shm::monotonic_now() - refusal->at) +
                               " ago and was refused: " + shm::printable(refusal->why)});
-}
-
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
 }
 
 // The open port of a list that the model does not mention, and that `name` may stand for.
@@ -111,8 +136,9 @@ std::vector<Obstacle> Obstacles::of_port() const {
   } else if (is_away()) {
     add_away(*input_->away_pid, result);
   } else if (stranger == nullptr) {
-    result.push_back({"port-not-open", "no component has the port open: nothing is taken"});
-    add_refusal(refusal_of(status_, &wire::RefusalStatus::input, port_), result);
+    result.push_back({"port-not-open", "no component has the port open: nothing is taken" +
+                                           death_text(death_of(status_, kInput, port_))});
+    add_refusal(refusal_of(status_, kInput, port_), result);
   }
   if (stranger != nullptr) add_unknown(*stranger, result);
   add_other_strangers(result);
@@ -240,7 +266,7 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
     return;
   }
   if (stranger != nullptr) return;
-  const auto* refusal = refusal_of(status_, &wire::RefusalStatus::output, source);
+  const auto* refusal = refusal_of(status_, kOutput, source);
   if (refusal != nullptr) {
     result.push_back({"output-not-open", "no component has the output port open"});
     add_refusal(refusal, result);
@@ -249,10 +275,14 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
                       "no component has the output port open: it was never "
                       "started, or opens it under another name"});
   } else {
-    result.push_back(
-        {"output-not-open",
-         "no component has the output port open any longer: its component closed it or died, or "
-         "the host that it came from is gone"});
+    const wire::DeathStatus* death = death_of(status_, kOutput, source);
+    const auto arrived = sources_.state(source).last_arrival();
+    if (death != nullptr && arrived > death->at) death = nullptr;  // another has had it since
+    const std::string how =
+        death != nullptr
+            ? death_text(death)
+            : ": its component closed it or died, or the host that it came from is gone";
+    result.push_back({"output-not-open", "no component has the output port open any longer" + how});
   }
   if (is_latched) {
     result.push_back(
@@ -294,7 +324,7 @@ bool Obstacles::was_never_started(const std::string& source) const {
   const wire::SourceStatus* output = status_.find_source(source);
   return output != nullptr && !output->open && !output->away_pid &&
          stranger_with(&StrangerStatus::outputs, source) == nullptr &&
-         refusal_of(status_, &wire::RefusalStatus::output, source) == nullptr &&
+         refusal_of(status_, kOutput, source) == nullptr &&
          sources_.state(source).word == shm::kNeverActive && !other_source(source);
 }
 

@@ -157,13 +157,18 @@ TEST(Why, TellsOfComponentsThatAreStoppedAndThatHaveDied) {
   component.stop();
   EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
               ElementsAre(AllOf(HasSubstr("its component arbiter-pub"), HasSubstr("is stopped"))));
+  ASSERT_THAT(arbiter({"pub", "/random", "--count", "1"}).err, HasSubstr("is held by node"));
   component.kill();
   await([&] { return daemon.source("/random")["open"] == false; });
   const json random = connection(why_json({"/gaze"}), "/random");
   EXPECT_EQ(random["winner"], true) << "activity belongs to the source, not to the process";
   EXPECT_THAT(texts(random["obstacles"]),
-              ElementsAre(HasSubstr("its component closed it or died, or"),
-                          HasSubstr("arbiter deactivate /random ends it")));
+              ElementsAre(AllOf(HasSubstr("open any longer; arbiter-pub"),
+                                HasSubstr("had it open, and died")),
+                          HasSubstr("arbiter deactivate /random ends it")))
+      << "and nothing of who was refused while it lived";
+  { Node("test").output_port<int>("/random").signal(); }
+  EXPECT_THAT(why({"/gaze"}), HasSubstr("its component closed it or died, or the host"));
 }
 
 TEST(Why, TellsOfConnectionsAndPortsWithoutRules) {
