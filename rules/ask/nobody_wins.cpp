@@ -21,6 +21,8 @@ constexpr std::size_t kMaxCausesTold = 8;
 constexpr std::size_t kMaxChains = 4;
 // Circles of which statements say that nobody wins, before no more are looked for.
 constexpr std::size_t kMaxCirclesTried = 64;
+// Ways from one candidate to others that keep it out, looked at for more circles.
+constexpr std::size_t kMaxWays = 1024;
 
 class PortFindings {
  public:
@@ -170,10 +172,12 @@ class PortFindings {
 
   // Each of them wins only while the next one is inactive, the last while the first is. With all of
   // them active, and nobody else, nobody wins, which nobody means who gives priorities. One for a
-  // port. A circle of which a statement says that nobody wins is passed over with its inhibitions.
+  // port. A circle of which a statement says that nobody wins is passed over: at first with its
+  // inhibitions, which leads far with few tries, then by itself.
   void warn_of_circle() {
     std::size_t tries = 0;
     const Candidates in_circles = those_in_circles();
+    const std::vector<Candidates> all = keeps_out_;
     for (std::size_t first = 0; first < candidates_.size(); ++first) {
       while (in_circles[first]) {
         const std::vector<std::size_t> circle = shortest_circle(first);
@@ -185,6 +189,33 @@ class PortFindings {
         if (++tries == kMaxCirclesTried) return;
       }
     }
+    if (tries == 0) return;
+    keeps_out_ = all;
+    tries = 0;
+    for (std::size_t first = 0; first < candidates_.size(); ++first) {
+      if (in_circles[first] && ends_with_circle_of(first, tries)) return;
+    }
+  }
+
+  // Looks at the circles of a candidate and those behind it, the shortest first. True: one is told,
+  // or enough are tried.
+  bool ends_with_circle_of(std::size_t first, std::size_t& tries) {
+    std::vector<std::vector<std::size_t>> ways{{first}};
+    for (std::size_t at = 0; at < ways.size(); ++at) {
+      const std::vector<std::size_t> way = ways[at];
+      for (std::size_t next = first; next < candidates_.size(); ++next) {
+        if (!keeps_out_[next][way.back()]) continue;
+        if (next == first) {
+          const bool is_told = !is_stated(way);
+          if (is_told) warn_of(way);
+          if (is_told || ++tries == kMaxCirclesTried) return true;
+        } else if (ways.size() < kMaxWays && std::find(way.begin(), way.end(), next) == way.end()) {
+          ways.push_back(way);
+          ways.back().push_back(next);
+        }
+      }
+    }
+    return false;
   }
 
   // All of them, and some between two circles: without those that keep nobody out, without those

@@ -21,10 +21,8 @@ rules::RuleSet robot() {
       .port("/Base", {{"/Nav", inactive("/Object")}});
 }
 
-// "nobody-wins /Arm", each, where all of these statements are proved, or not.
-std::vector<std::string> found_beside(const std::string& text,
-                                      std::uint64_t steps = rules::Budget::kSteps) {
-  const rules::RuleSet set = robot();
+// What is found where all of these statements are proved, or not.
+std::vector<rules::Diagnostic> items_beside(const rules::RuleSet& set, const std::string& text) {
   Diagnostics diagnostics;
   const auto model = compile(set, diagnostics);
   rules::ProvedStatements proved;
@@ -35,10 +33,15 @@ std::vector<std::string> found_beside(const std::string& text,
     if (verdict.proved) proved.push_back(verdict.proved);
   }
   Diagnostics found;
-  rules::Budget budget(steps);
+  rules::Budget budget;
   find_more(set, model, found, budget, proved);
+  return found.items();
+}
+
+// "nobody-wins /Arm", each.
+std::vector<std::string> found_beside(const std::string& text) {
   std::vector<std::string> result;
-  for (const auto& item : found.items()) {
+  for (const auto& item : items_beside(robot(), text)) {
     const bool is_arm = item.message.find("/Arm") != std::string::npos;
     result.push_back(item.code + (is_arm ? " /Arm" : " /Base"));
   }
@@ -82,6 +85,35 @@ TEST(StatedFindings, AStatementMayTieOnePortToAnother) {
 TEST(StatedFindings, WhatIsRefutedQuietsNothing) {
   EXPECT_THAT(found_beside("/collision -> idle(/Arm)"),
               ElementsAre("nobody-wins /Arm", "starved /Arm", "nobody-wins /Base"));
+}
+
+// The circle that is told where these statements are proved: "/a /b /c", each kept out by the next.
+std::string circle_beside(const std::string& text) {
+  const rules::RuleSet set = RulesByHand()
+                                 .port("/p", {{"/a", inactive("/b")},
+                                              {"/b", all_of({inactive("/a"), inactive("/c")})},
+                                              {"/c", inactive("/a")}})
+                                 .port("/q", {{"/x", inactive("/y")}, {"/y", inactive("/x")}});
+  std::string result;
+  for (const auto& item : items_beside(set, text)) {
+    if (item.code != "inhibition-circle" || item.about.ports != std::vector<std::string>{"/p"}) {
+      continue;
+    }
+    for (const std::string name : {"/a", "/b", "/c"}) {
+      if (item.message.find(name + " is kept out") != std::string::npos) result += name + ' ';
+    }
+  }
+  return result;
+}
+
+TEST(StatedFindings, ACircleThatIsToBeIdleIsNone) {
+  EXPECT_EQ(circle_beside("/x and /y -> idle(/q)"), "/a /b ");
+  EXPECT_EQ(circle_beside("/a and /b -> idle(/p)"), "");
+}
+
+TEST(StatedFindings, ACircleIsToldThatSharesAnInhibitionWithOneThatIsToBeIdle) {
+  EXPECT_EQ(circle_beside("/a and /b and not /c -> idle(/p)"), "/a /b /c ");
+  EXPECT_EQ(circle_beside("/a and /b and (/c or not /c) -> idle(/p)"), "");
 }
 
 }  // namespace
