@@ -82,7 +82,7 @@ bool TraceParser::read_header() {
 std::optional<TraceEvent> TraceParser::read_event(const CsvRecord& record) {
   if (record.size() != columns_) {
     error("trace-fields", record[std::min(record.size() - 1, columns_)],
-          "this line has " + std::to_string(record.size()) + " fields, and the header " +
+          "this line has " + counted(record.size(), "field") + ", and the header " +
               std::to_string(columns_));
     return std::nullopt;
   }

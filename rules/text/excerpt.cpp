@@ -67,8 +67,9 @@ std::string Excerpts::at(const Location& where) {
   if (where.line < 1 || where.line > file.line_starts.size() || where.column < 1) return {};
   const std::size_t start = file.line_starts[where.line - 1];
   const std::string_view content = file.content;
-  // A line's bytes far from the place are of no interest, however many there are.
-  constexpr std::size_t kMaxBytes = 4096;
+  // A line's bytes far from the place are of no interest, however many there are. There may be an
+  // excerpt of it for each of thousands of findings.
+  constexpr std::size_t kMaxBytes = 1024;
   std::string_view line = content.substr(start, content.find('\n', start) - start);
   if (line.ends_with('\r')) line.remove_suffix(1);
   std::size_t place = where.column - 1;

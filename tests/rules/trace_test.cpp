@@ -117,6 +117,10 @@ TEST(Trace, EachLineHasTheFieldsOfTheHeader) {
               ElementsAre("2:1 trace-fields", "3:6 trace-fields"));
   EXPECT_THAT(problems_of("t_ns,source,event\n1,/a\n1,/a,,\n"),
               ElementsAre("2:3 trace-fields", "3:7 trace-fields"));
+  Diagnostics diagnostics;
+  events_of("t_ns,source\n1\n", diagnostics);
+  ASSERT_EQ(diagnostics.items().size(), 1u);
+  EXPECT_EQ(diagnostics.items()[0].message, "this line has 1 field, and the header 2");
 }
 
 TEST(Trace, RefusesOtherEvents) {
