@@ -248,11 +248,10 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
   const StrangerStatus* stranger = stranger_with(&StrangerStatus::outputs, source);
   if (stranger != nullptr) add_unknown(*stranger, result);
   if (output == nullptr) return;
-  const bool is_latched =
-      sources_.is_active(source) && sources_.state(source).timeout == shm::kForever;
+  const SourceState state = sources_.state(source);
+  const bool is_latched = sources_.is_active(source) && state.timeout == shm::kForever;
   if (output->open) {
     add_stopped(output->open->component.pid, "its component " + component_text(*output), result);
-    const SourceState state = sources_.state(source);
     if (state.gap) {
       result.push_back({"slow-publisher", "its last two arrivals were " + span_text(*state.gap) +
                                               " apart, and its T is " + span_text(state.timeout) +
@@ -267,22 +266,22 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
   }
   if (stranger != nullptr) return;
   const auto* refusal = refusal_of(status_, kOutput, source);
+  const auto* death = death_of(status_, kOutput, source);
+  // Another component has had it since.
+  if (death != nullptr && state.last_arrival() > death->at) death = nullptr;
+  const std::string not_open = "no component has the output port open";
   if (refusal != nullptr) {
-    result.push_back({"output-not-open", "no component has the output port open"});
+    result.push_back({"output-not-open", not_open});
     add_refusal(refusal, result);
-  } else if (sources_.state(source).word == shm::kNeverActive) {
-    result.push_back({"output-not-open",
-                      "no component has the output port open: it was never "
-                      "started, or opens it under another name"});
+  } else if (death != nullptr) {
+    result.push_back({"output-not-open", not_open + " any longer" + death_text(death)});
+  } else if (state.word == shm::kNeverActive) {
+    result.push_back(
+        {"output-not-open", not_open + ": it was never started, or opens it under another name"});
   } else {
-    const wire::DeathStatus* death = death_of(status_, kOutput, source);
-    const auto arrived = sources_.state(source).last_arrival();
-    if (death != nullptr && arrived > death->at) death = nullptr;  // another has had it since
-    const std::string how =
-        death != nullptr
-            ? death_text(death)
-            : ": its component closed it or died, or the host that it came from is gone";
-    result.push_back({"output-not-open", "no component has the output port open any longer" + how});
+    result.push_back({"output-not-open", not_open +
+                                             " any longer: its component closed it or died, or the "
+                                             "host that it came from is gone"});
   }
   if (is_latched) {
     result.push_back(
@@ -325,6 +324,7 @@ bool Obstacles::was_never_started(const std::string& source) const {
   return output != nullptr && !output->open && !output->away_pid &&
          stranger_with(&StrangerStatus::outputs, source) == nullptr &&
          refusal_of(status_, kOutput, source) == nullptr &&
+         death_of(status_, kOutput, source) == nullptr &&
          sources_.state(source).word == shm::kNeverActive && !other_source(source);
 }
 

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/why_program.hpp"
+#include "tests/client/component.hpp"
 #include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 
@@ -169,6 +170,17 @@ TEST(Why, TellsOfComponentsThatAreStoppedAndThatHaveDied) {
       << "and nothing of who was refused while it lived";
   { Node("test").output_port<int>("/random").signal(); }
   EXPECT_THAT(why({"/gaze"}), HasSubstr("its component closed it or died, or the host"));
+}
+
+TEST(Why, TellsOfWhoHasDiedBeforeItPublished) {
+  Daemon daemon(kGazeModel);
+  Component component("face");
+  ASSERT_EQ(component.tell("output /face"), "open");
+  component.kill();
+  await([&] { return daemon.source("/face")["open"] == false; });
+  EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/face")["obstacles"]),
+              ElementsAre(AllOf(HasSubstr("open any longer; face (pid "),
+                                HasSubstr(" had it open, and died"))));
 }
 
 TEST(Why, TellsOfConnectionsAndPortsWithoutRules) {
