@@ -73,6 +73,7 @@ void add(std::vector<RecordPtr>& records, T record) {
 
 bool TapReader::poll(Room room, std::vector<RecordPtr>& records) {
   bool ports_changed = false;
+  auto [polls, is_live] = polled();
   if (room != Room::none) tell_left_out(records);
   for (int i = 0; i < kMostEvents; ++i) {
     const auto event = tap_.take();
@@ -81,10 +82,10 @@ bool TapReader::poll(Room room, std::vector<RecordPtr>& records) {
     ports_changed = ports_changed || kind == TapEventKind::state || kind == TapEventKind::closed ||
                     kind == TapEventKind::destinations;
     take(*event, room, records);
-    is_live_ = kind != TapEventKind::closed;
+    is_live = kind != TapEventKind::closed;
     told_.store(word_of(*event), std::memory_order_relaxed);
   }
-  polled_.store((polled().polls + 1) * 2 + (is_live_ ? 1 : 0), std::memory_order_relaxed);
+  polled_.store((polls + 1) * 2 + (is_live ? 1 : 0), std::memory_order_relaxed);
   return ports_changed;
 }
 

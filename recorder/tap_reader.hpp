@@ -51,7 +51,9 @@ class TapReader {
   void finish(std::vector<RecordPtr>& records);
 
   // Any thread. Hints for who looks at the page of a source that nobody tells of; one writer, the
-  // thread that polls. Relaxed is enough: who looks too early looks again.
+  // thread that polls. Relaxed is enough, for neither stands for other memory: both parts of
+  // polled() are of one poll, because they are one word, and after a told() that is older than
+  // that, the page only says once more what the tap has told.
 
   struct Polled {
     std::uint64_t polls;  // that have ended
@@ -80,8 +82,7 @@ class TapReader {
   evidence::ContextPtr context_;
   std::optional<LeftOut> left_out_;
   TapCounts counts_;
-  bool is_live_ = false;
-  std::atomic<std::uint64_t> polled_{0};  // both in one, so that they are of one poll
+  std::atomic<std::uint64_t> polled_{0};  // twice the number of polls, and 1 if a port is open
   std::atomic<evidence::ActivityWord> told_;
 };
 
