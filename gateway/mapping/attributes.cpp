@@ -129,15 +129,16 @@ std::optional<shm::Nanoseconds> Attributes::duration(std::string_view name) {
   if (!found) return {};
   constexpr std::string_view kAdvice =
       "write a whole number with a unit, such as 250us, 100ms or 2s";
-  if (found->text == rules::to_string(shm::kForever)) {
-    refuse(*found, name, "a duration; " + std::string(kAdvice) + ", or leave it out");
-    return {};
-  }
   const std::string subject = std::string(name) + "=";
   rules::ParsedDuration parsed =
       rules::parse_duration(found->text, {subject, "is zero", "shorten it", kAdvice});
-  if (parsed.problem.empty()) return parsed.value;
-  reader_.error("invalid-value", found->where, std::move(parsed.problem));
+  if (!parsed.problem.empty()) {
+    reader_.error("invalid-value", found->where, std::move(parsed.problem));
+  } else if (parsed.value == shm::kForever) {
+    refuse(*found, name, "a duration; " + std::string(kAdvice) + ", or leave it out");
+  } else {
+    return parsed.value;
+  }
   return {};
 }
 
