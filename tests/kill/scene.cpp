@@ -123,7 +123,6 @@ void Scene::require_all_is_well(const OwnSegments& dead, const shm::Activity& be
     Successor successor;
     succeed(successor);
     require_successor_works(successor);
-    require_taps_fit();
     require_no_slot_is_lost(successor);
     require_accounts_balance(dead);
     successor.out->deactivate();
@@ -163,8 +162,6 @@ void Scene::require_tap_was_told() {
   }
 }
 
-// As many as there may be at all: the dead one's place, and what it held, are free again once its
-// death is known.
 void Scene::require_taps_fit() {
   std::vector<Tap<Number>> taps;
   for (int tries = 0; taps.size() < shm::kMaxTaps; ++tries) {

@@ -55,6 +55,9 @@ class Scene {
 
   // The victim is dead: everything that must be so.
   void require_all_is_well(const OwnSegments& dead, const shm::Activity& before);
+  // It had a tap of /first:o: as many as there may be at all can be opened, for its place, and what
+  // it held, are free again.
+  void require_taps_fit();
 
   [[nodiscard]] shm::Activity& page() { return page_.as<shm::ActivityPage>()->of(source_id_); }
   OutputPort<Number>& first() { return *first_; }
@@ -72,7 +75,6 @@ class Scene {
   void meet_daemon();
   void require_survivors_go_on();
   void require_tap_was_told();
-  void require_taps_fit();
   void require_page_is_sane(const shm::Activity& before);
   void succeed(Successor& successor);
   void require_successor_works(Successor& successor);
