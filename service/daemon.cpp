@@ -13,7 +13,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "rules/text/names.hpp"
 #include "service/clients/headroom.hpp"
 #include "service/kept/step.hpp"
 #include "service/log/event.hpp"
@@ -22,6 +21,7 @@
 #include "service/policy/users.hpp"
 #include "shm/assertion.hpp"
 #include "shm/clock.hpp"
+#include "shm/utf8.hpp"
 #include "wire/errands.hpp"
 #include "wire/hang_up.hpp"
 
@@ -295,7 +295,7 @@ void Daemon::log_refusal(const Client& client, const wire::Message& request,
                          const std::string& why) {
   Event event{EventKind::kRefused, {client.name}};
   const std::string name(request.name_view());
-  const bool is_port = !rules::find_problem_in_port(name);
+  const bool is_port = shm::is_port_name(name);
   const auto is = [&](wire::MessageKind kind) { return is_port && request.kind == kind; };
   bool is_news = true;
   if (is(wire::MessageKind::kOpenInput)) {

@@ -1,5 +1,7 @@
 #include "shm/utf8.hpp"
 
+#include "shm/limits.hpp"
+
 namespace arbiter::shm {
 
 Utf8Character decode_utf8(std::string_view bytes) {
@@ -55,6 +57,10 @@ std::optional<NameFault> find_fault_in_name(std::string_view name) {
     i += character.length;
   }
   return {};
+}
+
+bool is_port_name(std::string_view name) {
+  return name.size() <= kMaxNameLength && name.starts_with('/') && !find_fault_in_name(name);
 }
 
 std::string printable(std::string_view text, std::string_view kept) {

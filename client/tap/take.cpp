@@ -28,12 +28,9 @@ constexpr std::size_t kMaxTakes = 1024;
 // The daemon lets no input port have another name: whoever uses a tap may write names to a terminal
 // or into a document.
 bool can_be_ports(const shm::Destinations& destinations) {
-  return std::all_of(destinations.begin(), destinations.end(),
-                     [](const shm::Destination& destination) {
-                       const std::string& name = destination.name;
-                       return !name.empty() && name.size() <= shm::kMaxNameLength &&
-                              name.front() == '/' && !shm::find_fault_in_name(name);
-                     });
+  return std::all_of(
+      destinations.begin(), destinations.end(),
+      [](const shm::Destination& destination) { return shm::is_port_name(destination.name); });
 }
 
 }  // namespace

@@ -15,10 +15,6 @@ constexpr std::uint32_t kDemandMagic = 0x44425241;  // "ARBD"
 
 }  // namespace
 
-bool is_port_name(const std::string& name) {
-  return name.size() > 1 && name.front() == '/' && !shm::find_fault_in_name(name);
-}
-
 bool is_host_name(const std::string& name) noexcept {
   const auto is_fine = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
@@ -69,7 +65,7 @@ std::optional<OfferCard> read_offer_card(Bytes bytes) {
     if (shm::fault_of(card.type)) return std::nullopt;
   }
   if (!reader.is_good() || card.incarnation == 0 || !is_host_name(card.host) ||
-      !is_port_name(card.source)) {
+      !shm::is_port_name(card.source)) {
     return std::nullopt;
   }
   return card;

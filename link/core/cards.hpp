@@ -61,8 +61,6 @@ struct DemandCard {
 [[nodiscard]] std::optional<TokenMessage> read_token_message(Bytes bytes);
 [[nodiscard]] std::optional<DemandCard> read_demand_card(Bytes bytes);
 
-// Whether a port may be called so.
-[[nodiscard]] bool is_port_name(const std::string& name);
 // Whether links may call a host so: 1 to kMaxHostName letters, digits, `.`, `-` and `_`.
 [[nodiscard]] bool is_host_name(const std::string& name) noexcept;
 

@@ -41,7 +41,7 @@ void read_ports(CardReader& reader, std::uint32_t& count, std::vector<std::strin
     ports.push_back(reader.text(shm::kMaxNameLength));
     bytes += 2 + ports.back().size();
     reader.require(bytes <= kMostPortBytes);
-    reader.require(is_port_name(ports.back()) && (i == 0 || ports[i - 1] < ports[i]));
+    reader.require(shm::is_port_name(ports.back()) && (i == 0 || ports[i - 1] < ports[i]));
   }
 }
 

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "shm/utf8.hpp"
+
 namespace arbiter::rules {
 namespace {
 
@@ -21,6 +23,7 @@ TEST(Names, OfPortsTakeAnyPrintableCharacter) {
   for (const std::string name :
        {"/a", "/", "/Face/pos:o", "/a-b_c.d/0", "/größe+1@x,y*", "/日本", "//", "/&<>'"}) {
     EXPECT_FALSE(find_problem_in_port(name)) << name;
+    EXPECT_TRUE(shm::is_port_name(name)) << name;
   }
   EXPECT_FALSE(find_problem_in_port("/" + std::string(254, 'x')));
 }
@@ -43,6 +46,7 @@ TEST(Names, OfPortsAreRefusedAtTheVeryByteThatIsWrong) {
       {"/a\xff", 2, "not UTF-8"},
   };
   for (const Case& c : cases) {
+    EXPECT_FALSE(shm::is_port_name(c.name)) << c.name;
     const auto problem = find_problem_in_port(c.name);
     ASSERT_TRUE(problem) << c.name;
     EXPECT_EQ(problem->code, "invalid-port-name");
@@ -75,6 +79,9 @@ TEST(Names, AMisspeltOneIsRecognised) {
   EXPECT_EQ(find_similar("Track Object", known), std::nullopt);
   EXPECT_EQ(find_similar("", known), std::nullopt);
   EXPECT_EQ(find_similar("B", {"A"}), std::nullopt) << "one letter is like any other";
+  EXPECT_EQ(find_similar("/zz:o", {"/a:o"}), std::nullopt) << "of a port's name, the letters";
+  EXPECT_EQ(find_similar("/P", {"/p"}), "/p");
+  EXPECT_EQ(find_similar("/faec:o", {"/face:o"}), "/face:o");
   EXPECT_EQ(find_similar("abcd", {"abxy", "abcx"}), "abcx") << "the nearest one";
   EXPECT_EQ(find_similar("wyh", {"who", "why"}), "why") << "two in the wrong order are one slip";
   EXPECT_EQ(find_similar("oLko Around", known), "Look Around");

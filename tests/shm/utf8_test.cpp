@@ -5,6 +5,8 @@
 
 #include <string>
 
+#include "shm/limits.hpp"
+
 namespace arbiter::shm {
 namespace {
 
@@ -32,6 +34,14 @@ TEST(Utf8, ANameThatWouldBreakALineOrMisleadItsReaderIsRefusedWithThePlace) {
   EXPECT_EQ(fault("/\"x\""), "a double quote at 1");
   EXPECT_EQ(fault("/a\xff"), "a byte that is not UTF-8 at 2");
   EXPECT_EQ(fault("/a\xc3"), "a byte that is not UTF-8 at 2");
+}
+
+TEST(Utf8, APortsNameBeginsWithASlash) {
+  for (const char* const name : {"/", "/Gaze/pos:i", "/顔/位置:o"}) EXPECT_TRUE(is_port_name(name));
+  for (const char* const name : {"", "a", "\"/a\"", "/a b"}) EXPECT_FALSE(is_port_name(name)) << name;
+  const std::string longest = "/" + std::string(kMaxNameLength - 1, 'a');
+  EXPECT_TRUE(is_port_name(longest));
+  EXPECT_FALSE(is_port_name(longest + "a"));
 }
 
 TEST(Utf8, WhatIsPrintedCannotForgeALineNorSteerATerminal) {
