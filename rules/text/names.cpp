@@ -43,6 +43,19 @@ std::size_t count_edits(std::string_view a, std::string_view b) {
   return rows[a.size() % 3][b.size()];
 }
 
+bool is_equal_but_for_case(std::string_view a, std::string_view b) {
+  const auto small = [](char each) { return each >= 'A' && each <= 'Z' ? char(each + 32) : each; };
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [&](char x, char y) { return small(x) == small(y); });
+}
+
+// Without what most names of ports have: "/" and ":o".
+std::size_t own_length(std::string_view name) {
+  if (!name.starts_with('/')) return name.size();
+  const bool has_direction = name.size() > 3 && name[name.size() - 2] == ':';
+  return name.size() - (has_direction ? 3 : 1);
+}
+
 }  // namespace
 
 std::string_view trim(std::string_view text) {
@@ -143,8 +156,9 @@ std::optional<std::string> find_similar(std::string_view name,
   if (name.empty() || name.size() > kMaxComparedLength) return {};
   std::optional<std::string> best;
   // A short name is within two edits of anything; at least half of it must be right.
-  std::size_t fewest = std::min(kMaxEdits, name.size() / 2) + 1;
+  std::size_t fewest = std::min(kMaxEdits, own_length(name) / 2) + 1;
   for (const std::string_view candidate : candidates) {
+    if (is_equal_but_for_case(name, candidate)) return std::string(candidate);
     const std::size_t shorter = std::min(name.size(), candidate.size());
     const std::size_t longer = std::max(name.size(), candidate.size());
     if (longer > kMaxComparedLength || longer - shorter >= fewest) continue;
