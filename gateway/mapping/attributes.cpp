@@ -127,18 +127,14 @@ std::optional<long double> Attributes::real(std::string_view name) {
 std::optional<shm::Nanoseconds> Attributes::duration(std::string_view name) {
   const auto found = value(name);
   if (!found) return {};
-  constexpr std::string_view kAdvice =
-      "write a whole number with a unit, such as 250us, 100ms or 2s";
   const std::string subject = std::string(name) + "=";
-  rules::ParsedDuration parsed =
-      rules::parse_duration(found->text, {subject, "is zero", "shorten it", kAdvice});
-  if (!parsed.problem.empty()) {
-    reader_.error("invalid-value", found->where, std::move(parsed.problem));
-  } else if (parsed.value == shm::kForever) {
-    refuse(*found, name, "a duration; " + std::string(kAdvice) + ", or leave it out");
-  } else {
-    return parsed.value;
-  }
+  rules::DurationWords words{subject, "is zero", "shorten it",
+                             "write a whole number with a unit, such as 250us, 100ms or 2s, or "
+                             "leave it out"};
+  words.takes_forever = false;
+  rules::ParsedDuration parsed = rules::parse_duration(found->text, words);
+  if (parsed.problem.empty()) return parsed.value;
+  reader_.error("invalid-value", found->where, std::move(parsed.problem));
   return {};
 }
 

@@ -76,13 +76,14 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
     return ParsedDuration{
         0, std::string(words.subject) + quote(text) + " " + why + "; " + std::string(advice)};
   };
-  if (text == kForever) return {shm::kForever, {}};
+  if (words.takes_forever && text == kForever) return {shm::kForever, {}};
   const bool lacks_zero = text.starts_with('.') || text.starts_with(',');
   if (lacks_zero) return parse_duration("0" + std::string(text), words);
   const std::size_t digits = text.find_first_not_of("0123456789");
   if (text.empty() || digits == 0) {
+    const bool means_forever = words.takes_forever && is_meant_as_forever(text);
     return refuse("is not a whole number with a unit",
-                  is_meant_as_forever(text) ? "did you mean \"forever\"?" : words.advice);
+                  means_forever ? "did you mean \"forever\"?" : words.advice);
   }
   if (digits == std::string_view::npos) return refuse("has no unit", words.advice);
 

@@ -21,9 +21,10 @@ struct DurationWords {
   std::string_view advice =
       "write a whole number with a unit, such as 250ns, 10us, 500ms or 2s, or forever";
   bool takes_minutes = false;  // 5min, on a command line: a model has none, and is told 300s
+  bool takes_forever = true;
 };
 
-// A whole number from 1 on with a unit right behind it, or shm::kForever.
+// A whole number from 1 on with a unit right behind it, or shm::kForever where `forever` is taken.
 ParsedDuration parse_duration(std::string_view text, const DurationWords& words = {});
 
 // In the largest unit that has no fraction.

@@ -187,7 +187,7 @@ TEST(Mapping, ADurationThatIsNoneIsToldWhatToWrite) {
   EXPECT_THAT(max_age("0.5s"), HasSubstr("max_age=\"0.5s\" is a fraction; write 500ms in"));
   EXPECT_THAT(max_age("0s"), HasSubstr("max_age=\"0s\" is zero; write at least 1ns"));
   EXPECT_THAT(max_age("100"), HasSubstr("max_age=\"100\" has no unit; write a whole number"));
-  EXPECT_THAT(max_age("forever"), HasSubstr("is not a duration; write a whole number"));
+  EXPECT_THAT(max_age("forever"), HasSubstr("is not a whole number with a unit; write"));
 }
 
 TEST(Mapping, AFileWithoutAGatewaySaysWhatToWrite) {

@@ -47,6 +47,11 @@ TEST(Duration, ForeverIsRecognisedWhereItIsMisspelt) {
     EXPECT_THAT(parse_duration(text).problem, HasSubstr("; did you mean \"forever\"?")) << text;
   }
   EXPECT_THAT(parse_duration("soon").problem, testing::Not(HasSubstr("did you mean")));
+  for (const char* const text : {"forever", "Forever"}) {
+    EXPECT_THAT(parse_duration(text, {.advice = "leave it out", .takes_forever = false}).problem,
+                testing::EndsWith("is not a whole number with a unit; leave it out"))
+        << text;
+  }
 }
 
 TEST(Duration, IsWrittenInTheLargestUnitWithoutAFraction) {
