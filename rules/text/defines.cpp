@@ -1,5 +1,6 @@
 #include "rules/text/defines.hpp"
 
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -63,9 +64,13 @@ const std::string* Defines::look_up(const std::string& name, const Text& text, s
   if (expects_gaps_) return nullptr;
   const auto later = announced_.find(name);
   if (later != announced_.end()) {
-    diagnostics.error("unknown-define", text.where(at),
-                      "${" + name + "} is used before it is defined, at " +
-                          describe(later->second) + "; move the define up");
+    const Location use = text.where(at);
+    const Location& begin = later->second;
+    const bool is_inside = std::tie(begin.line, begin.column) < std::tie(use.line, use.column);
+    diagnostics.error("unknown-define", use,
+                      is_inside ? "${" + name + "} uses itself; write out what it stands for"
+                                : "${" + name + "} is used before it is defined, at " +
+                                      describe(begin) + "; move the define up");
     return nullptr;
   }
   std::vector<std::string_view> known;

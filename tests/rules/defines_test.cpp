@@ -73,7 +73,7 @@ TEST(Defines, MistakesAreReportedAtTheirPlace) {
       {"<source port='/a${}'/>", "1:17 error unknown-define", "the name \"\""},
       {"<source port='/${b}'/>\n<define name='b'>b</define>", "1:16 error unknown-define",
        "used before it is defined, at "},
-      {"<define name='b'>${b}</define>", "1:18 error unknown-define", "used before it is defined"},
+      {"<define name='b'>${b}</define>", "1:18 error unknown-define", "${b} uses itself; write out"},
       {"<source port='/a${b'/>", "1:17 error unterminated-define", "close it with '}'"},
       {"<define name='b'>b</define>\n<source port='/a${b/${b}'/>", "2:17 error unterminated-define",
        "close it with '}'"},
