@@ -4,7 +4,7 @@
 #include <iostream>
 #include <set>
 
-#include "cli/shell_word.hpp"
+#include "command_line/shell_word.hpp"
 #include "rules/model/quantifiers.hpp"
 #include "rules/text/names.hpp"
 #include "shm/utf8.hpp"
@@ -64,8 +64,8 @@ std::string similar_pattern(const std::string& pattern,
 void warn_without_match(const std::string& option, const std::string& pattern,
                         const PatternNames& known) {
   if (match_among(known.names, pattern) != nullptr) return;
-  std::string text =
-      option + ' ' + shm::printable(shell_word(pattern)) + " matches no " + known.what;
+  std::string text = option + ' ' + shm::printable(command_line::shell_word(pattern)) +
+                     " matches no " + known.what;
   if (const std::string_view* const other = match_among(known.others, pattern)) {
     text += "; " + shm::printable(std::string(*other)) + " is an " + known.other_what;
   } else if (const std::string similar = similar_pattern(pattern, known.names); !similar.empty()) {

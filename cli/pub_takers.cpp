@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "cli/pub_type.hpp"
-#include "cli/shell_word.hpp"
+#include "command_line/shell_word.hpp"
 #include "rules/text/names.hpp"
 #include "watch/imported.hpp"
 
@@ -36,9 +36,9 @@ std::string PubCommand::like(const std::string& port, std::size_t size) const {
     if (option == "--type" || option == "--like") continue;
     if (is_payload(option) && (payload_size != size || option == "--size")) continue;
     if (!option.empty()) line += ' ' + option;
-    if (!value.empty() || option.empty()) line += ' ' + shell_word(value);
+    if (!value.empty() || option.empty()) line += ' ' + command_line::shell_word(value);
     if (!option.empty() || is_said) continue;
-    line += " --like " + shell_word(port);
+    line += " --like " + command_line::shell_word(port);
     is_said = true;
   }
   return line;

@@ -19,8 +19,8 @@
 #include "cli/numbers.hpp"
 #include "cli/port_patterns.hpp"
 #include "cli/recording_info.hpp"
-#include "cli/shell_word.hpp"
 #include "cli/verbs.hpp"
+#include "command_line/shell_word.hpp"
 #include "recorder/recorder.hpp"
 #include "recording/compression.hpp"
 #include "rules/text/names.hpp"
@@ -54,7 +54,7 @@ std::string typed_command() {
   std::ifstream words("/proc/self/cmdline", std::ios::binary);
   std::string text;
   for (std::string word; std::getline(words, word, '\0');) {
-    text += (text.empty() ? "" : " ") + shell_word(word);
+    text += (text.empty() ? "" : " ") + command_line::shell_word(word);
   }
   return text;
 }

@@ -14,6 +14,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "command_line/shell_word.hpp"
 #include "rules/text/names.hpp"
 #include "shm/utf8.hpp"
 
@@ -98,16 +99,29 @@ inline bool takes_words(const CLI::App& verb) {
                      [](const CLI::Option* each) { return each->get_positional(); });
 }
 
-// A model is a plain argument of some programs, and not of others.
+// What words that stand where none are taken, or other ones, were probably meant to be: the values
+// of options. `missing` is one that must be there; empty: there is none such.
+inline std::string meant(const CLI::App& verb, const std::vector<std::string>& words,
+                         const std::string& missing) {
+  const bool takes_others = takes_words(verb);
+  for (const std::string& word : words) {
+    std::string option = takes_others ? "" : missing;
+    if (word.ends_with(".mcap") && has_option(verb, "--recording")) option = "--recording";
+    if (word.ends_with(".csv") && has_option(verb, "--trace")) option = "--trace";
+    // A model is a plain argument of some programs, and not of others.
+    const bool is_model = word.ends_with(".xml") && !takes_others;
+    if (is_model && has_option(verb, "--model")) option = "--model";
+    if (!option.empty()) return "; did you mean " + option + ' ' + shell_word(word) + '?';
+  }
+  return {};
+}
+
 inline std::string text_of_words(const CLI::App& verb, const std::string& name) {
   const std::vector<std::string> words = verb.remaining();
   std::vector<std::string> quoted;
   quoted.reserve(words.size());
   for (const std::string& word : words) quoted.push_back(rules::quote(word));
-  const std::string text = name + " has no place for " + rules::enumerate(quoted);
-  const bool is_model =
-      words.front().ends_with(".xml") && has_option(verb, "--model") && !takes_words(verb);
-  return is_model ? text + "; did you mean --model " + words.front() + '?' : text;
+  return name + " has no place for " + rules::enumerate(quoted) + meant(verb, words, "");
 }
 
 inline std::string text_of_missing_verb(const CLI::App& verb, const std::string& name) {
@@ -123,15 +137,46 @@ inline std::string text_of_missing_verb(const CLI::App& verb, const std::string&
          rules::advise(*word, {names.begin(), names.end()}, "it has " + rules::enumerate(names));
 }
 
+// `missing`: as CLI11 says it, "--until is required".
+inline std::string text_of_missing(const CLI::App& verb, const std::string& missing) {
+  std::vector<std::string> words = verb.remaining();
+  for (const CLI::Option* option : verb.get_options()) {
+    if (!option->get_positional()) continue;
+    const auto taken = option->results();
+    words.insert(words.end(), taken.begin(), taken.end());
+  }
+  const std::string option = missing.substr(0, missing.find(' '));
+  return missing + meant(verb, words, option.starts_with("--") ? option : "");
+}
+
+// The first example that the verb's help has, to be put behind what lacks something else that would
+// help.
+inline std::string example_of(const CLI::App& verb) {
+  const std::string help = verb.get_footer();
+  const std::size_t heading = help.find("Example");
+  if (heading == std::string::npos) return {};
+  const std::size_t begin = help.find("\n  ", heading);
+  if (begin == std::string::npos) return {};
+  const std::string line = help.substr(begin + 3, help.find('\n', begin + 3) - begin - 3);
+  return "; for example: " + line;
+}
+
 inline std::string text_of(const CLI::Error& error, const CLI::App& verb, const std::string& name) {
   const auto is = [&](CLI::ExitCodes code) {
     return error.get_exit_code() == static_cast<int>(code);
   };
   const bool has_words = !verb.remaining().empty();
-  if (is(CLI::ExitCodes::ExtrasError) && has_words) return text_of_words(verb, name);
   const bool lacks_verb = verb.get_require_subcommand_min() > 0 && verb.get_subcommands().empty();
-  if (is(CLI::ExitCodes::RequiredError) && lacks_verb) return text_of_missing_verb(verb, name);
-  return error.what();
+  std::string text = error.what();
+  if (is(CLI::ExitCodes::ExtrasError) && has_words) {
+    text = text_of_words(verb, name);
+  } else if (is(CLI::ExitCodes::RequiredError)) {
+    if (lacks_verb) return text_of_missing_verb(verb, name);
+    text = text_of_missing(verb, text);
+  } else {
+    return text;
+  }
+  return text.ends_with('?') ? text : text + example_of(verb);
 }
 
 }  // namespace wrong_use

@@ -141,6 +141,22 @@ TEST(Program, SaysWhichArgumentItDoesNotKnowAndWhatWasMeant) {
               HasSubstr("arbiter pub has no place for \"one\" and \"two\""));
 }
 
+TEST(Program, ShowsWhatWasMeantByAWordOrAnExample) {
+  const auto error = [](const std::vector<std::string>& arguments) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 2);
+    return result.err.substr(0, result.err.find('\n'));
+  };
+  EXPECT_EQ(error({"wait", "idle(/a)"}), "--until is required; did you mean --until 'idle(/a)'?");
+  EXPECT_EQ(error({"record", "x.mcap"}), "--output is required; did you mean --output x.mcap?");
+  EXPECT_EQ(error({"simulate", "x.mcap"}), "--trace is required; did you mean --recording x.mcap?");
+  EXPECT_EQ(error({"simulate", "m.xml", "t.csv"}),
+            "--trace is required; did you mean --trace t.csv?");
+  EXPECT_EQ(error({"why"}), "PORT is required; for example: arbiter why /Gaze/pos:i");
+  EXPECT_EQ(error({"reload", "m.xml"}),
+            "arbiter reload has no place for \"m.xml\"; for example: arbiter reload");
+}
+
 TEST(Program, ShowsControlCharactersInsteadOfSendingThem) {
   for (const auto& arguments :
        std::vector<std::vector<std::string>>{{"\x1b[31mred"},

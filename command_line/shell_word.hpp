@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace arbiter::cli {
+namespace arbiter::command_line {
 
 // As a shell reads it: bare where nothing in it has a meaning to any shell.
 inline std::string shell_word(const std::string& text) {
@@ -16,4 +16,4 @@ inline std::string shell_word(const std::string& text) {
   return word + "'";
 }
 
-}  // namespace arbiter::cli
+}  // namespace arbiter::command_line
