@@ -346,6 +346,7 @@ const std::vector<std::string>& finding_codes() {
                                               "replaced-program",
                                               "time-namespace",
                                               "stranger",
+                                              "dead-component",
                                               "slow-publisher",
                                               "silent-link",
                                               "link-waits",

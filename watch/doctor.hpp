@@ -37,6 +37,9 @@ using Findings = std::vector<Finding>;
 // The processes that a status names.
 [[nodiscard]] Findings examine_processes(const Machine& machine, const wire::Status& status);
 
+// Components that died with ports open that nobody has opened since.
+[[nodiscard]] Findings examine_deaths(const wire::Status& status);
+
 // Sources that are inactive between their arrivals, because their publishers are slower than T. The
 // daemon is asked for its memory, and activities are watched for some seconds where components have
 // sources open; meanwhile `while_looking` is called often.

@@ -207,6 +207,26 @@ TEST(Doctor, FindsThatMemoryIsShort) {
   EXPECT_THAT(codes_of(machine.findings()), IsEmpty());
 }
 
+// full_status() has a death, of 44 with /o, /i and /j.
+TEST(Doctor, FindsWhoDiedAndWasNotStartedAgain) {
+  wire::Status status = full_status();
+  const Findings findings = watch::examine_deaths(status);
+  ASSERT_THAT(codes_of(findings), ElementsAre("dead-component"));
+  EXPECT_THAT(findings[0].what, testing::StartsWith("dead (pid 44) died "));
+  EXPECT_THAT(findings[0].what,
+              testing::EndsWith(" ago, and nobody has opened /o, /i and /j since"));
+  // Of two who had it, the last one is told of.
+  status.deaths.push_back({"before", 40, 1000, 12, {"/o", "/p"}, {}});
+  EXPECT_THAT(watch::examine_deaths(status)[1].what, testing::EndsWith("has opened /p since"));
+  // Whoever has come in its place, be it away for the moment, is enough.
+  status.deaths = {{"dead", 44, 1000, 13, {}, {}}};
+  for (const auto& source : status.sources) {
+    if (source.open || source.away_pid) status.deaths[0].outputs.push_back(source.name);
+  }
+  ASSERT_FALSE(status.deaths[0].outputs.empty());
+  EXPECT_THAT(watch::examine_deaths(status), IsEmpty());
+}
+
 // full_status() has a daemon (42), components (44 and 46), some away (45 and 47), and a stranger.
 TEST(Doctor, LooksAtTheProcessesOfTheStatus) {
   const MadeUpMachine machine;
