@@ -68,7 +68,7 @@ void print_model(std::ostream& out, const wire::Status& status) {
   out << '\n';
   if (model.reloads_refused != 0) {
     out << "  " << rules::counted(model.reloads_refused, "reload")
-        << " refused: the daemon's log says why\n";
+        << " refused since this daemon started; its log says why\n";
   }
 }
 
